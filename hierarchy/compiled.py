@@ -1,0 +1,85 @@
+"""The one decorator that compiles a kernel, caches it on disk and says so the first time.
+
+numba caches machine code per source file but does not notice when a helper in *another* file
+changed. Here the cache folder carries a digest of the kernel's own file and of every file it
+calls into, so a stale kernel cannot be loaded.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import sys
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numba
+from numba.core import event
+
+_Function = TypeVar("_Function", bound=Callable[..., Any])
+
+
+def compiled(function: _Function) -> _Function:
+    """Compile `function` for the types it is first called with, and keep the result on disk.
+
+    IEEE arithmetic as written (no fastmath), division by zero gives inf or NaN as in numpy, the
+    GIL is released. With `NUMBA_DISABLE_JIT=1` the plain function runs, for debugging.
+    """
+    files = _files_behind(function)
+    kernel = _jit_into(_cache_root() / _digest(tuple(sorted(files))), function)
+    if not isinstance(kernel, type(function)):
+        kernel.source_files = files
+    return kernel  # type: ignore[no-any-return]
+
+
+def _files_behind(function: Callable[..., Any]) -> frozenset[str]:
+    code = function.__code__
+    called = (function.__globals__.get(name) for name in code.co_names)
+    behind = (getattr(kernel, "source_files", ()) for kernel in called)
+    return frozenset({code.co_filename}).union(*behind)
+
+
+@cache
+def _digest(files: tuple[str, ...]) -> str:
+    content = b"".join(Path(file).read_bytes() for file in files)
+    return hashlib.sha256(content + numba.__version__.encode()).hexdigest()[:16]
+
+
+@cache
+def _cache_root() -> Path:
+    base = os.environ.get("NUMBA_CACHE_DIR")
+    if base is None:
+        base = os.environ.get("XDG_CACHE_HOME", os.path.expanduser("~/.cache"))
+    return Path(base) / "task-hierarchy"
+
+
+def _jit_into(folder: Path, function: Callable[..., Any]) -> Any:
+    before = numba.config.CACHE_DIR
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        numba.config.CACHE_DIR = str(folder)
+    except OSError:  # a home that cannot be written: numba's own choice of folder
+        numba.config.CACHE_DIR = before
+    try:
+        return numba.njit(cache=True, error_model="numpy", nogil=True)(function)
+    finally:
+        numba.config.CACHE_DIR = before
+
+
+class _FirstCompilation(event.Listener):
+    """Says once that kernels are being compiled; numba sends the event only on a cache miss."""
+
+    def on_start(self, event: Any) -> None:
+        module = event.data["dispatcher"].py_func.__module__.partition(".")[0]
+        if module in ("hierarchy", "solvers", "scenarios"):
+            numba.core.event.unregister("numba:compile", self)
+            print("task-hierarchy: compiling kernels for this machine, once "
+                  "(some seconds) ...", file=sys.stderr, flush=True)
+
+    def on_end(self, event: Any) -> None:
+        pass
+
+
+event.register("numba:compile", _FirstCompilation())

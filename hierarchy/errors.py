@@ -1,0 +1,24 @@
+"""The errors that a caller can make, each naming what was wrong and where."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+
+class HierarchyError(ValueError):
+    """A caller's mistake; the text names the task or level, the row and the value."""
+
+
+class UnknownNameError(HierarchyError):
+    """A name that is not known, with the nearest one that is."""
+
+    def __init__(self, what: str, name: str, known: Iterable[str]) -> None:
+        known = sorted(known)
+        near = difflib.get_close_matches(str(name), known, n=1, cutoff=0.4)
+        hint = f"; did you mean {near[0]!r}?" if near else ""
+        super().__init__(f"unknown {what} {name!r}{hint} Known: {', '.join(known) or 'none'}.")
+
+
+class RobotError(HierarchyError):
+    """A robot model that cannot be read, or a state that does not fit it."""

@@ -1,0 +1,170 @@
+"""The prioritized problem in its neutral form: packed rows, level sizes, a reference."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from hierarchy.errors import HierarchyError
+
+Array = NDArray[np.float64]
+
+
+class Hierarchy:
+    """Levels of rows `lower <= A x <= upper`, most important first.
+
+    Level k minimises the Euclidean norm of its violation without giving up any of the norms above
+    it; among all such x the answer is the one nearest to `reference`. An equality row has
+    `lower == upper`, a missing side is infinite.
+
+    Attributes
+    ----------
+    A : (m, n) the rows of all levels, one level under the other, C-contiguous.
+    lower, upper : (m,) the sides, in the unit of the rows.
+    sizes : (L,) rows of each level; zero is allowed.
+    offsets : (L + 1,) first row of each level, and m.
+    reference : (n,) the x preferred where nothing else decides.
+    names : L level names, used in messages.
+    """
+
+    __slots__ = ("A", "lower", "names", "offsets", "reference", "sizes", "upper")
+
+    def __init__(self, A: Array, lower: Array, upper: Array, sizes: NDArray[np.int64],
+                 reference: Array, names: tuple[str, ...]) -> None:
+        """Wrap arrays as they are: no copy and no check. `from_levels` checks."""
+        self.A, self.lower, self.upper = A, lower, upper
+        self.sizes, self.reference, self.names = sizes, reference, names
+        self.offsets = np.concatenate(([0], np.cumsum(sizes))).astype(np.int64)
+
+    @classmethod
+    def from_levels(cls, levels: Sequence[Sequence[ArrayLike]], reference: ArrayLike | None = None,
+                    names: Sequence[str] | None = None) -> Hierarchy:
+        """Pack levels given as `(A, b)` or `(A, lower, upper)`.
+
+        Parameters
+        ----------
+        levels : each `A (m_k, n)` with `b (m_k,)`, or with `lower (m_k,)` and `upper (m_k,)`.
+        reference : (n,) or None for zero.
+        names : one name a level for messages, or None for "level 1", "level 2", ...
+
+        Raises
+        ------
+        HierarchyError : a wrong shape, a NaN, an infinite entry of A or of an equality,
+            lower > upper, n = 0, or no level and no reference; names level, row and value.
+        """
+        names = _level_names(names, len(levels))
+        packed = [_checked_level(name, level) for name, level in zip(names, levels, strict=True)]
+        n = _columns(packed, names, reference)
+        ref = np.zeros(n) if reference is None else _vector("reference", reference, n)
+        if not np.isfinite(ref).all():
+            i = int(np.flatnonzero(~np.isfinite(ref))[0])
+            raise HierarchyError(f"reference, entry {i}: {ref[i]} is not finite")
+        return cls(np.ascontiguousarray(np.vstack([np.empty((0, n)), *(A for A, _, _ in packed)])),
+                   np.concatenate([np.empty(0), *(low for _, low, _ in packed)]),
+                   np.concatenate([np.empty(0), *(up for _, _, up in packed)]),
+                   np.array([A.shape[0] for A, _, _ in packed], dtype=np.int64), ref, names)
+
+    @property
+    def n(self) -> int:
+        """Number of unknowns."""
+        return int(self.A.shape[1])
+
+    @property
+    def m(self) -> int:
+        """Number of rows of all levels together."""
+        return int(self.A.shape[0])
+
+    @property
+    def is_equality(self) -> bool:
+        """Whether every row is an equality."""
+        return bool((self.lower == self.upper).all())
+
+    def levels(self) -> Iterator[tuple[Array, Array, Array]]:
+        """Yield `(A_k (m_k, n), lower_k (m_k,), upper_k (m_k,))` as views, top level first."""
+        for first, last in zip(self.offsets[:-1], self.offsets[1:], strict=True):
+            yield self.A[first:last], self.lower[first:last], self.upper[first:last]
+
+    def slacks(self, x: ArrayLike) -> Array:
+        """Signed violation of every row at x: (m,), positive above `upper`, zero inside."""
+        value = self.A @ _vector("x", x, self.n)
+        return np.maximum(value - self.upper, 0.0) - np.maximum(self.lower - value, 0.0)
+
+    def violations(self, x: ArrayLike) -> Array:
+        """Euclidean norm of each level's violation at x: (L,)."""
+        slack = self.slacks(x)
+        pairs = zip(self.offsets[:-1], self.offsets[1:], strict=True)
+        return np.array([np.linalg.norm(slack[i:j]) for i, j in pairs])
+
+    def __repr__(self) -> str:
+        return f"Hierarchy(n={self.n}, sizes={self.sizes.tolist()})"
+
+
+def _level_names(names: Sequence[str] | None, count: int) -> tuple[str, ...]:
+    if names is None:
+        return tuple(f"level {k + 1}" for k in range(count))
+    if len(names) != count:
+        raise HierarchyError(f"{len(names)} names for {count} levels")
+    return tuple(names)
+
+
+def _checked_level(name: str, level: Sequence[ArrayLike]) -> tuple[Array, Array, Array]:
+    if not isinstance(level, (tuple, list)) or len(level) not in (2, 3):
+        raise HierarchyError(f"{name}: expected (A, b) or (A, lower, upper), got {_brief(level)}")
+    A = _array(f"{name}: A", level[0])
+    if A.ndim != 2:
+        raise HierarchyError(f"{name}: A has shape {A.shape}, expected (rows, n)")
+    lower = _vector(f"{name}: lower" if len(level) == 3 else f"{name}: b", level[1], A.shape[0])
+    upper = lower.copy() if len(level) == 2 else _vector(f"{name}: upper", level[2], A.shape[0])
+    check_rows(name, A, lower, upper)
+    return A, lower, upper
+
+
+def check_rows(name: str, A: Array, lower: Array, upper: Array) -> None:
+    """Raise a HierarchyError that names the first bad row of a level, or return None.
+
+    Shapes: A (m_k, n), lower and upper (m_k,).
+    """
+    for row, column in np.argwhere(~np.isfinite(A))[:1]:
+        raise HierarchyError(f"{name}, row {row}: A[{row}, {column}] is {A[row, column]}")
+    for side, values in (("lower", lower), ("upper", upper)):
+        for (row,) in np.argwhere(np.isnan(values))[:1]:
+            raise HierarchyError(f"{name}, row {row}: {side} is nan")
+    for (row,) in np.argwhere((lower > upper) | (lower == np.inf) | (upper == -np.inf))[:1]:
+        raise HierarchyError(
+            f"{name}, row {row}: no value lies between lower {lower[row]} and upper {upper[row]}")
+
+
+def _columns(packed: list[tuple[Array, Array, Array]], names: tuple[str, ...],
+             reference: ArrayLike | None) -> int:
+    if not packed and reference is None:
+        raise HierarchyError("no levels and no reference: the number of unknowns is not known")
+    n = packed[0][0].shape[1] if packed else _array("reference", reference).size
+    for name, (A, _, _) in zip(names, packed, strict=True):
+        if A.shape[1] != n:
+            raise HierarchyError(
+                f"{name}: A has {A.shape[1]} columns where {names[0]} has {n}")
+    if n == 0:
+        raise HierarchyError("n = 0: a hierarchy needs at least one unknown")
+    return n
+
+
+def _vector(what: str, value: ArrayLike, size: int) -> Array:
+    vector = _array(what, value)
+    if vector.shape != (size,):
+        raise HierarchyError(f"{what} has shape {vector.shape}, expected ({size},)")
+    return vector
+
+
+def _array(what: str, value: Any) -> Array:
+    try:
+        return np.array(value, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise HierarchyError(f"{what} is not an array of numbers: {_brief(value)}") from error
+
+
+def _brief(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= 60 else text[:57] + "..."
