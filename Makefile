@@ -1,0 +1,62 @@
+# make demo    set up, run the main job, say where its report is
+# make test    set up, then lint, types, import rules and every test: what CI runs
+# make bench   time the resolvers and the control tick
+# make docs    check that what the documents point at exists (they are plain Markdown)
+# make clean   remove what the targets above made
+#
+# PYTHON=/path/to/python3 chooses the interpreter; otherwise the first suitable one is taken.
+
+SHELL      := /bin/bash
+PYTHON     ?=
+CANDIDATES := $(PYTHON) $(if $(PYTHON),,python3.11 python3.12 python3.13 python3)
+BIN        := .venv/bin
+INSTALLED  := .venv/installed
+
+.DELETE_ON_ERROR:
+.PHONY: demo test bench docs clean set-up
+
+demo: $(INSTALLED)
+	@rm -rf runs/demo
+	@$(BIN)/hierarchy compare ellipse --out runs/demo
+
+test: $(INSTALLED)
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports --no-logo
+	$(BIN)/pytest -n auto --maxprocesses 4
+
+bench: $(INSTALLED)
+	@$(BIN)/hierarchy bench
+
+docs: $(INSTALLED)
+	@$(BIN)/pytest tests/test_project.py -k document
+
+clean:
+	rm -rf .venv build dist runs *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
+
+set-up: $(INSTALLED)
+
+# One set-up for all targets, repeated only when what is to be installed has changed.
+$(INSTALLED): pyproject.toml constraints.txt
+	@python=; \
+	for candidate in $(CANDIDATES); do \
+	  if "$$candidate" -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null; \
+	  then python=$$candidate; break; fi; \
+	done; \
+	if [ -z "$$python" ]; then \
+	  echo "task-hierarchy needs Python 3.11 or newer; tried: $(CANDIDATES)." >&2; \
+	  echo "Debian and Ubuntu: apt install python3 python3-venv. Or: make PYTHON=/path/to/python3" >&2; \
+	  exit 1; \
+	fi; \
+	if ! "$$python" -c 'import venv, ensurepip' 2>/dev/null; then \
+	  version=$$("$$python" -c 'import sys; print("%d.%d" % sys.version_info[:2])'); \
+	  echo "$$python cannot make a virtual environment: its venv or ensurepip module is missing." >&2; \
+	  echo "Debian and Ubuntu: apt install python$$version-venv" >&2; \
+	  exit 1; \
+	fi; \
+	echo "Setting up .venv with $$("$$python" --version) (once; downloads about 250 MB) ..."; \
+	"$$python" -m venv --clear .venv
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --progress-bar off \
+	  --constraint constraints.txt --editable '.[dev]'
+	@echo "Installed $$($(BIN)/python -m pip list --disable-pip-version-check --format freeze | wc -l) packages into .venv."
+	@touch $@
