@@ -1,0 +1,52 @@
+"""Algorithm 1 of the letter: from what is measured to the order of the stack."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from hierarchy.avoidance.measurement import SurveillanceAreas
+
+AVOIDANCE, POSITION, POINTING = "avoidance", "position", "pointing"
+
+
+class Allocation(NamedTuple):
+    """Order of the stack, most important first, and whether eq. (30) adds the repulsion."""
+
+    order: tuple[str, ...]
+    repulsion: bool
+
+
+def allocate(minimal_distance: float, end_effector_distance: float, cone_error: float,
+             areas: SurveillanceAreas, always_point: bool = False) -> Allocation:
+    """Return the order of the tasks "position", "pointing" and "avoidance" for one tick.
+
+    Parameters
+    ----------
+    minimal_distance : D_minimal of the body's control points (31) [m], infinite if none.
+    end_effector_distance : D_min of the end effector (22) [m], infinite if none.
+    cone_error : cos(alpha_d) - cos(alpha); the pointing task is asked for while it is positive,
+        and never when it is NaN (no pointing task).
+    areas : the thresholds eps_1, eps_2, eps_ee.
+    always_point : the pointing task is an equality (16), in the stack at all times.
+
+    Source: Algorithm 1. The published code differs at exact ties only: there avoidance goes first
+    also when both distances are equal, and the far area is open at eps_2.
+    """
+    near = minimal_distance <= areas.near
+    first = near and minimal_distance < end_effector_distance
+    second = near and not first
+    point = cone_error > 0.0 or (always_point and cone_error == cone_error)
+    last = areas.near < minimal_distance <= areas.far
+    return Allocation(_ORDERS[first, second, point, last],
+                      end_effector_distance <= areas.end_effector)
+
+
+def _order(first: bool, second: bool, point: bool, last: bool) -> tuple[str, ...]:
+    return (*(AVOIDANCE,) * first, POSITION, *(AVOIDANCE,) * second, *(POINTING,) * point,
+            *(AVOIDANCE,) * last)
+
+
+# One tuple for each case, so that the loop makes none.
+_ORDERS = {(first, second, point, last): _order(first, second, point, last)
+           for first in (False, True) for second in (False, True)
+           for point in (False, True) for last in (False, True)}

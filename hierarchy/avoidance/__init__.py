@@ -1,0 +1,9 @@
+"""Where obstacles are, how far, and how strongly the robot should leave them (eqs. 22-27, 31)."""
+
+from hierarchy.avoidance.control_points import ControlPoint
+from hierarchy.avoidance.measurement import Measurement, SurveillanceAreas, measure_exactly
+from hierarchy.avoidance.obstacles import Obstacle, Obstacles
+from hierarchy.avoidance.repulsion import Repulsion
+
+__all__ = ["ControlPoint", "Measurement", "Obstacle", "Obstacles", "Repulsion",
+           "SurveillanceAreas", "measure_exactly"]

@@ -1,0 +1,112 @@
+"""What the sensor tells the controller in one tick: distances, directions, magnitudes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import inf, sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hierarchy.avoidance.obstacles import distance_to_obstacle
+from hierarchy.avoidance.repulsion import repulsion
+from hierarchy.compiled import compiled
+from hierarchy.errors import HierarchyError
+from hierarchy.problem import Array
+
+
+@dataclass(frozen=True)
+class SurveillanceAreas:
+    """Danger thresholds [m]: eps_1 = near, eps_2 = far of the body, eps_ee = end_effector."""
+
+    near: float
+    far: float
+    end_effector: float
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.near <= self.far < inf:
+            raise HierarchyError(f"surveillance areas need 0 <= near <= far, got near = "
+                                 f"{self.near} m, far = {self.far} m")
+        if not 0.0 <= self.end_effector < inf:
+            raise HierarchyError(f"surveillance area end_effector = {self.end_effector} m must "
+                                 "not be negative")
+
+
+class Measurement:
+    """Distances of K control points, and of the end effector as entry K, to the obstacles.
+
+    points (K + 1, 3) [m]; distance (K + 1,) [m] to the nearest obstacle, eq. (22), infinite when
+    there is none; direction (K + 1, 3) unit vector away from it; magnitude (K + 1,) of the
+    repulsion, eq. (23); nearest (K + 1,) index of that obstacle or -1. `active` is the control
+    point of eq. (31), the first with the smallest distance (-1 if there is none).
+    """
+
+    __slots__ = ("active", "direction", "distance", "magnitude", "nearest", "points")
+
+    def __init__(self, control_points: int) -> None:
+        size = control_points + 1
+        self.points, self.direction = np.zeros((size, 3)), np.zeros((size, 3))
+        self.distance, self.magnitude = np.full(size, inf), np.zeros(size)
+        self.nearest = np.full(size, -1, dtype=np.int64)
+        self.active = -1
+
+    @property
+    def minimal_distance(self) -> float:
+        """D_minimal [m] of eq. (31): the smallest distance of a control point, without the end."""
+        return float(self.distance[self.active]) if self.active >= 0 else inf
+
+    @property
+    def end_effector_distance(self) -> float:
+        """D_min [m] of the end effector, eq. (22)."""
+        return float(self.distance[-1])
+
+
+def measure_exactly(measurement: Measurement, placements: Array, joints: NDArray[np.int64],
+                    offsets: Array, obstacles: Array, laws: Array, mean_within: float) -> None:
+    """Fill a Measurement from known geometry.
+
+    placements (joints + 1, 12) of a State; joints (K + 1,), offsets (K + 1, 3) of the control
+    points and the end effector; obstacles (H, 16) a table of `Obstacles`; laws (2, 4) of
+    `repulsion.laws`. The direction is that of the nearest obstacle, or with `mean_within` > 0 the
+    mean (25)-(26) over the obstacles nearer than that [m].
+    """
+    measurement.active = _measure(
+        placements, joints, offsets, obstacles, laws, mean_within, measurement.points,
+        measurement.distance, measurement.direction, measurement.magnitude, measurement.nearest)
+
+
+@compiled
+def _measure(placements, joints, offsets, obstacles, laws, mean_within,  # type: ignore[no-untyped-def]
+             points, distance, direction, magnitude, nearest):
+    away, best, total = np.empty(3), np.empty(3), np.empty(3)
+    count = len(joints)
+    active, D_minimal = -1, np.inf
+    for k in range(count):
+        T = placements[joints[k]]
+        for i in range(3):
+            points[k, i] = (T[9 + i] + T[i] * offsets[k, 0] + T[3 + i] * offsets[k, 1]
+                            + T[6 + i] * offsets[k, 2])
+        D_min, at = np.inf, -1
+        total[:] = 0.0
+        for j in range(obstacles.shape[0]):
+            D = distance_to_obstacle(obstacles[j], points[k, 0], points[k, 1], points[k, 2], away)
+            if D < D_min:  # (22)
+                D_min, at = D, j
+                best[:] = away
+            if mean_within > 0.0 and D < mean_within:
+                total += away  # (25); the factor 1/h is lost in (26)
+        distance[k], nearest[k] = D_min, at
+        if at < 0:
+            magnitude[k] = 0.0
+            direction[k] = 0.0
+            continue
+        norm = sqrt(total[0] ** 2 + total[1] ** 2 + total[2] ** 2)
+        if norm > 1e-6:
+            direction[k] = total / norm  # (26)
+        else:
+            direction[k] = best  # the unit vectors cancel, or the nearest is asked for
+        law = laws[1] if k == count - 1 else laws[0]
+        magnitude[k] = repulsion(max(D_min, 0.0), law[0], law[1], law[2], law[3])  # (23)
+        if k < count - 1 and D_min < D_minimal:  # (31)
+            D_minimal, active = D_min, k
+    return active

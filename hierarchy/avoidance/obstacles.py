@@ -1,0 +1,122 @@
+"""Obstacles: points, spheres, capsules and boxes, still or moving on a path."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import inf, sqrt
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from hierarchy.compiled import compiled
+from hierarchy.errors import HierarchyError, UnknownNameError
+from hierarchy.paths import Path
+from hierarchy.problem import Array
+
+# One obstacle is one row of the packed table: shape, size, centre, rotation.
+SHAPES = {"point": 0, "sphere": 1, "capsule": 2, "box": 3}
+_WIDTH = 1 + 3 + 3 + 9
+_CENTRE = slice(4, 7)
+
+
+@dataclass(frozen=True)
+class Obstacle:
+    """One convex obstacle.
+
+    shape : "point", "sphere" (size = (radius,)), "capsule" (size = (radius, half length along its
+        z axis)) or "box" (size = three half lengths), all [m].
+    centre : (3,) [m] in the world; with `path`, the path's position is the centre instead.
+    rotation : (3, 3) of its axes in the world.
+    """
+
+    shape: str
+    centre: tuple[float, float, float]
+    size: tuple[float, ...] = ()
+    rotation: ArrayLike = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
+    path: Path | None = None
+    name: str = "obstacle"
+
+    def __post_init__(self) -> None:
+        if self.shape not in SHAPES:
+            raise UnknownNameError("obstacle shape", self.shape, SHAPES)
+        expected = {"point": 0, "sphere": 1, "capsule": 2, "box": 3}[self.shape]
+        if len(self.size) != expected or any(not 0.0 < s < inf for s in self.size):
+            raise HierarchyError(f"{self.name}: a {self.shape} takes {expected} positive "
+                                 f"size(s), got {list(self.size)}")
+        if not np.isfinite(np.asarray(self.centre, dtype=float)).all():
+            raise HierarchyError(f"{self.name}: centre {list(self.centre)} is not finite")
+
+    def packed(self) -> Array:
+        """The obstacle as one row (16,) of the kernels' table."""
+        size = (*self.size, 0.0, 0.0, 0.0)[:3]
+        return np.array([SHAPES[self.shape], *size, *self.centre,
+                         *np.asarray(self.rotation, dtype=float).ravel()])
+
+
+class Obstacles:
+    """All obstacles of a scene as one table (H, 16) that follows time."""
+
+    def __init__(self, obstacles: Sequence[Obstacle] = ()) -> None:
+        self.obstacles = tuple(obstacles)
+        self.table = np.array([o.packed() for o in obstacles]).reshape(-1, _WIDTH)
+        self._moving = [(h, o.path) for h, o in enumerate(obstacles) if o.path is not None]
+        self.at(0.0)
+
+    def __len__(self) -> int:
+        return len(self.obstacles)
+
+    def at(self, t: float) -> Array:
+        """Move the obstacles to time t [s] and return the table (H, 16)."""
+        for h, path in self._moving:
+            self.table[h, _CENTRE] = path(t)[0]
+        return self.table
+
+    @property
+    def centres(self) -> Array:
+        """Where the obstacles' centres are now: (H, 3) [m], a view."""
+        return self.table[:, _CENTRE]
+
+
+@compiled
+def distance_to_obstacle(obstacle, x, y, z, away):  # type: ignore[no-untyped-def]
+    """Signed distance of a point to one obstacle; `away` (3,) gets the unit vector off it.
+
+    Negative inside. Where the direction is undefined (on a point, at a centre or on an axis),
+    `away` is the obstacle's z axis.
+    """
+    # Point in the obstacle's axes.
+    ox, oy, oz = x - obstacle[4], y - obstacle[5], z - obstacle[6]
+    px = obstacle[7] * ox + obstacle[10] * oy + obstacle[13] * oz
+    py = obstacle[8] * ox + obstacle[11] * oy + obstacle[14] * oz
+    pz = obstacle[9] * ox + obstacle[12] * oy + obstacle[15] * oz
+    shape = int(obstacle[0])
+    if shape == 3:
+        D, ux, uy, uz = _off_box(obstacle[1], obstacle[2], obstacle[3], px, py, pz)
+    else:
+        if shape == 2:  # nearest point of the capsule's segment
+            pz -= min(max(pz, -obstacle[2]), obstacle[2])
+        length = sqrt(px * px + py * py + pz * pz)
+        D = length - obstacle[1]
+        if length > 1e-12:
+            ux, uy, uz = px / length, py / length, pz / length
+        else:
+            ux, uy, uz = 0.0, 0.0, 1.0
+    for i in range(3):
+        away[i] = obstacle[7 + 3 * i] * ux + obstacle[8 + 3 * i] * uy + obstacle[9 + 3 * i] * uz
+    return D
+
+
+@compiled
+def _off_box(hx, hy, hz, px, py, pz):  # type: ignore[no-untyped-def]
+    dx, dy, dz = abs(px) - hx, abs(py) - hy, abs(pz) - hz
+    sx, sy, sz = (1.0 if px >= 0 else -1.0), (1.0 if py >= 0 else -1.0), (1.0 if pz >= 0 else -1.0)
+    if dx <= 0.0 and dy <= 0.0 and dz <= 0.0:  # inside: out through the nearest face
+        if dx >= dy and dx >= dz:
+            return dx, sx, 0.0, 0.0
+        if dy >= dz:
+            return dy, 0.0, sy, 0.0
+        return dz, 0.0, 0.0, sz
+    ex, ey, ez = max(dx, 0.0), max(dy, 0.0), max(dz, 0.0)
+    D = sqrt(ex * ex + ey * ey + ez * ez)
+    return D, sx * ex / D, sy * ey / D, sz * ez / D

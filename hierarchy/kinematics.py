@@ -1,0 +1,108 @@
+"""Compiled kinematics of points and axes fixed to a body, out of a State's arrays.
+
+J is the world-frame spatial Jacobian of all joints (linear part at the world origin), so a point p
+on body j has the columns J_v + J_w x p of the joints that support j. Its time derivative is
+dJ_v + dJ_w x p + J_w x dp/dt. `placements` rows are rotation (by columns) and translation.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hierarchy.compiled import compiled
+
+# ruff: noqa: D103
+# mypy: disable-error-code="no-untyped-def"
+
+
+@compiled
+def point_at(placements, joint, offset, i):
+    """Coordinate i of the world position of `offset` on body `joint`."""
+    T = placements[joint]
+    return T[9 + i] + T[i] * offset[0] + T[3 + i] * offset[1] + T[6 + i] * offset[2]
+
+
+@compiled
+def axis_at(placements, joint, axis, i):
+    """Coordinate i of the world direction of `axis` on body `joint`."""
+    T = placements[joint]
+    return T[i] * axis[0] + T[3 + i] * axis[1] + T[6 + i] * axis[2]
+
+
+@compiled
+def write_point_jacobian(J, placements, supports, joint, offset, A, row):
+    """Write dp/dq (3, n) of a point into A[row : row + 3]."""
+    x = point_at(placements, joint, offset, 0)
+    y = point_at(placements, joint, offset, 1)
+    z = point_at(placements, joint, offset, 2)
+    for c in range(A.shape[1]):
+        if supports[joint, c]:
+            A[row, c] = J[0, c] + J[4, c] * z - J[5, c] * y
+            A[row + 1, c] = J[1, c] + J[5, c] * x - J[3, c] * z
+            A[row + 2, c] = J[2, c] + J[3, c] * y - J[4, c] * x
+        else:
+            A[row, c] = 0.0
+            A[row + 1, c] = 0.0
+            A[row + 2, c] = 0.0
+
+
+@compiled
+def write_point_jacobian_derivative(v, J, dJ, placements, supports, previous_J,
+                                    previous_placements, period, joint, offset, out):
+    """Write d/dt dp/dq of a point into out (3, n): exact, or by backward difference."""
+    if period > 0.0:
+        before = np.empty((3, out.shape[1]))
+        write_point_jacobian(J, placements, supports, joint, offset, out, 0)
+        write_point_jacobian(previous_J, previous_placements, supports, joint, offset, before, 0)
+        subtract_over_period(out, before, period)
+        return
+    x = point_at(placements, joint, offset, 0)
+    y = point_at(placements, joint, offset, 1)
+    z = point_at(placements, joint, offset, 2)
+    dx, dy, dz = 0.0, 0.0, 0.0
+    for c in range(out.shape[1]):
+        if supports[joint, c]:
+            dx += (J[0, c] + J[4, c] * z - J[5, c] * y) * v[c]
+            dy += (J[1, c] + J[5, c] * x - J[3, c] * z) * v[c]
+            dz += (J[2, c] + J[3, c] * y - J[4, c] * x) * v[c]
+    for c in range(out.shape[1]):
+        if supports[joint, c]:
+            out[0, c] = dJ[0, c] + dJ[4, c] * z - dJ[5, c] * y + J[4, c] * dz - J[5, c] * dy
+            out[1, c] = dJ[1, c] + dJ[5, c] * x - dJ[3, c] * z + J[5, c] * dx - J[3, c] * dz
+            out[2, c] = dJ[2, c] + dJ[3, c] * y - dJ[4, c] * x + J[3, c] * dy - J[4, c] * dx
+        else:
+            out[0, c] = 0.0
+            out[1, c] = 0.0
+            out[2, c] = 0.0
+
+
+@compiled
+def write_rotation_jacobian(J, supports, joint, A, row):
+    """Write the Jacobian (3, n) of a body's angular velocity into A[row : row + 3]."""
+    for i in range(3):
+        for c in range(A.shape[1]):
+            A[row + i, c] = J[3 + i, c] if supports[joint, c] else 0.0
+
+
+@compiled
+def subtract_over_period(now, before, period):
+    """Replace `now` by the backward difference (now - before) / period."""
+    for i in range(now.shape[0]):
+        for c in range(now.shape[1]):
+            now[i, c] = (now[i, c] - before[i, c]) / period
+
+
+@compiled
+def row_times(A, row, v):
+    """A[row] v."""
+    total = 0.0
+    for c in range(A.shape[1]):
+        total += A[row, c] * v[c]
+    return total
+
+
+@compiled
+def write_equality(lower, upper, row, value):
+    """Make a row an equality."""
+    lower[row] = value
+    upper[row] = value

@@ -1,0 +1,118 @@
+"""Paths in space as functions of time: position, velocity and acceleration."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from math import cos, inf, sin
+
+import numpy as np
+
+from hierarchy.compiled import compiled
+from hierarchy.errors import HierarchyError
+from hierarchy.problem import Array
+
+Vector = Sequence[float]
+
+
+class Path(ABC):
+    """A point that moves in space."""
+
+    @abstractmethod
+    def write(self, t: float, out: Array) -> None:
+        """Write position [m], velocity [m/s], acceleration [m/s^2] at t [s] as rows of (3, 3)."""
+
+    def __call__(self, t: float) -> Array:
+        """Position, velocity and acceleration at t [s] as rows of a new (3, 3) array."""
+        out = np.empty((3, 3))
+        self.write(t, out)
+        return out
+
+
+@dataclass(frozen=True)
+class Still(Path):
+    """A point that stays where it is, `position` (3,) [m]."""
+
+    position: Vector
+
+    def __post_init__(self) -> None:
+        _check("position", self.position)
+
+    def write(self, t: float, out: Array) -> None:
+        """See `Path.write`."""
+        out[0] = self.position
+        out[1:] = 0.0
+
+
+@dataclass(frozen=True)
+class Ellipse(Path):
+    """p(t) = centre + cosine cos(rate t) + sine sin(rate t); vectors [m], rate [rad/s]."""
+
+    centre: Vector
+    cosine: Vector
+    sine: Vector
+    rate: float = 1.0
+    _packed: Array = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        for name in ("centre", "cosine", "sine"):
+            _check(name, getattr(self, name))
+        if not abs(self.rate) < inf:
+            raise HierarchyError(f"ellipse: rate {self.rate} is not finite")
+        object.__setattr__(self, "_packed", np.array([self.centre, self.cosine, self.sine],
+                                                     dtype=float))
+
+    def write(self, t: float, out: Array) -> None:
+        """See `Path.write`."""
+        _write_ellipse(t, self._packed, self.rate, out)
+
+
+@dataclass(frozen=True)
+class Waypoints(Path):
+    """Straight from point to point, at rest at each: quintic in time, velocity and acceleration 0.
+
+    `times` (N,) [s] increasing, `points` (N, 3) [m]; before the first and after the last it rests.
+    """
+
+    times: Sequence[float]
+    points: Sequence[Vector]
+
+    def __post_init__(self) -> None:
+        if len(self.times) != len(self.points) or not self.times:
+            raise HierarchyError(f"waypoints: {len(self.times)} times for {len(self.points)} points")
+        if any(b <= a for a, b in zip(self.times, self.times[1:], strict=False)):
+            raise HierarchyError(f"waypoints: times must increase, got {list(self.times)}")
+        for i, point in enumerate(self.points):
+            _check(f"points[{i}]", point)
+
+    def write(self, t: float, out: Array) -> None:
+        """See `Path.write`."""
+        i = int(np.searchsorted(self.times, t, side="right"))
+        out[1:] = 0.0
+        if i == 0 or i == len(self.times):
+            out[0] = self.points[min(i, len(self.times) - 1)]
+            return
+        span = self.times[i] - self.times[i - 1]
+        s = (t - self.times[i - 1]) / span
+        start = np.asarray(self.points[i - 1], dtype=float)
+        way = np.asarray(self.points[i], dtype=float) - start
+        out[0] = start + way * (s**3 * (10 - 15 * s + 6 * s * s))
+        out[1] = way * (30 * s * s * (1 - s) ** 2 / span)
+        out[2] = way * (60 * s * (1 - s) * (1 - 2 * s) / span**2)
+
+
+def _check(name: str, vector: Vector) -> None:
+    array = np.asarray(vector, dtype=float)
+    if array.shape != (3,) or not np.isfinite(array).all():
+        raise HierarchyError(f"{name} must be three finite numbers [m], got {list(vector)}")
+
+
+@compiled
+def _write_ellipse(t, packed, rate, out):  # type: ignore[no-untyped-def]
+    c, s = cos(rate * t), sin(rate * t)
+    for i in range(3):
+        along = packed[1, i] * c + packed[2, i] * s
+        out[0, i] = packed[0, i] + along
+        out[1, i] = rate * (packed[2, i] * c - packed[1, i] * s)
+        out[2, i] = -rate * rate * along

@@ -1,0 +1,275 @@
+"""Robot and State: the only module that calls pinocchio, and everything a task may read."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike, NDArray
+
+from hierarchy.avoidance.control_points import ControlPoint
+from hierarchy.avoidance.measurement import Measurement
+from hierarchy.compiled import compiled
+from hierarchy.errors import RobotError, UnknownNameError
+from hierarchy.problem import Array
+from hierarchy.robots import TABLES, DHTable
+
+ROBOTS = TABLES
+END_EFFECTOR = "end_effector"
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A frame fixed to the body that `joint` moves; offset (3,) [m] and rotation (3, 3) in it."""
+
+    name: str
+    joint: int
+    offset: Array
+    rotation: Array
+
+
+class Robot:
+    """A fixed-base robot: its model, limits, frames and control points.
+
+    `n` is the number of joint velocities, `nq` that of joint positions (more than n only where a
+    joint is continuous). `lower`, `upper` (nq,) [rad or m] and `velocity_limit` (n,) [rad/s or
+    m/s] are infinite where the model has none.
+    """
+
+    def __init__(self, model: Any, name: str, end_effector: str | None = None,
+                 control_points: tuple[ControlPoint, ...] = ()) -> None:
+        self.model, self.name = model, name
+        self.n, self.nq = int(model.nv), int(model.nq)
+        if self.n == 0:
+            raise RobotError(f"robot {name!r} has no joint that moves")
+        if "freeflyer" in str(model.joints[1].shortname()).lower():
+            raise RobotError(f"robot {name!r} has a floating base, which is not supported")
+        self.joint_names: tuple[str, ...] = tuple(model.names)[1:]
+        self.lower, self.upper = _finite_or_inf(model.lowerPositionLimit,
+                                                model.upperPositionLimit)
+        self.velocity_limit = _positive_or_inf(model.upperVelocityLimit)
+        self.end_effector = end_effector or tuple(model.frames)[-1].name
+        self.frame(self.end_effector)
+        self.control_points = control_points
+
+    @classmethod
+    def named(cls, name: str) -> Robot:
+        """Build a robot of `hierarchy.robot.ROBOTS`; an unknown name raises UnknownNameError."""
+        if name not in TABLES:
+            raise UnknownNameError("robot", name, TABLES)
+        table = TABLES[name]
+        robot = cls(_model_from_table(table), name, END_EFFECTOR)
+        robot.control_points = tuple(
+            robot.control_point(joint, offset) for joint, offset in table.control_points)
+        return robot
+
+    @classmethod
+    def from_file(cls, path: str | Path, end_effector: str | None = None) -> Robot:
+        """Read a URDF (.urdf) or MJCF (.xml, .mjcf) file; RobotError if it cannot be read.
+
+        `end_effector` names a frame; without it the last frame of the file is taken.
+        """
+        path = Path(path)
+        if not path.is_file():
+            raise RobotError(f"robot file {str(path)!r} does not exist")
+        readers = {".urdf": pin.buildModelFromUrdf, ".xml": pin.buildModelFromMJCF,
+                   ".mjcf": pin.buildModelFromMJCF}
+        if path.suffix not in readers:
+            raise RobotError(f"robot file {str(path)!r}: expected .urdf, .xml or .mjcf")
+        try:
+            model = readers[path.suffix](str(path))
+        except Exception as error:  # the parsers raise many kinds; all mean the file is bad
+            raise RobotError(f"robot file {str(path)!r} cannot be read: {error}") from error
+        return cls(model, path.stem, end_effector)
+
+    def joint(self, name: str) -> int:
+        """Index of the joint called `name`, as used by frames and control points."""
+        if name not in self.joint_names:
+            raise UnknownNameError("joint", name, self.joint_names)
+        return self.joint_names.index(name) + 1
+
+    def frame(self, name: str) -> Frame:
+        """Find the frame called `name`; UnknownNameError if there is none."""
+        names = [frame.name for frame in self.model.frames]
+        if name not in names:
+            raise UnknownNameError("frame", name, names)
+        frame = self.model.frames[names.index(name)]
+        return Frame(name, int(frame.parentJoint), frame.placement.translation.copy(),
+                     np.ascontiguousarray(frame.placement.rotation))
+
+    def control_point(self, joint: str, offset: ArrayLike, name: str | None = None) -> ControlPoint:
+        """Attach a point to the body that `joint` moves, `offset` (3,) [m] in that joint's frame."""
+        return ControlPoint(name or f"{joint} {np.asarray(offset).tolist()}", self.joint(joint),
+                            np.array(offset, dtype=float))
+
+    def integrate(self, q: Array, step: Array) -> Array:
+        """Return q (nq,) moved by `step` (n,) [rad or m] along the joints."""
+        if self.nq == self.n:
+            return q + step
+        return np.asarray(pin.integrate(self.model, q, step))
+
+    def state(self, q: ArrayLike, v: ArrayLike | None = None, t: float = 0.0,
+              differences: float | None = None) -> State:
+        """Make a State at joint positions q (nq,) [rad or m] and velocities v (n,), zero if None.
+
+        `differences` is the period [s] of backward differences, None for exact derivatives.
+        """
+        state = State(self, differences)
+        state.move(t, self._checked("q", q, self.nq),
+                   self._checked("v", np.zeros(self.n) if v is None else v, self.n))
+        return state
+
+    def _checked(self, what: str, value: ArrayLike, size: int) -> Array:
+        vector = np.array(value, dtype=float)
+        if vector.shape != (size,):
+            raise RobotError(f"robot {self.name!r}: {what} has shape {vector.shape}, "
+                             f"expected ({size},)")
+        for (i,) in np.argwhere(~np.isfinite(vector))[:1]:
+            raise RobotError(f"robot {self.name!r}: {what}[{i}] ({self.joint_names[i]}) is "
+                             f"{vector[i]}")
+        return vector
+
+    def __repr__(self) -> str:
+        return f"Robot({self.name!r}, n={self.n})"
+
+
+class State:
+    """Time, joint state and kinematics of one tick: everything that a task may read.
+
+    t [s], q (nq,), v (n,); J, dJ (6, n) world-frame spatial Jacobian of every joint and its time
+    derivative, linear part at the world origin; placements (joints + 1, 12): rotation (column by
+    column) and translation of each joint's frame; supports (joints + 1, n) whether a column moves
+    a body. J, dJ and placements are views of what `move` computed last.
+
+    With `period` > 0 [s] derivatives are backward differences against previous_J and
+    previous_placements, those of the `move` before; with 0 they are exact. `measurement` holds
+    what the sensor saw this tick, or None.
+    """
+
+    def __init__(self, robot: Robot, differences: float | None = None) -> None:
+        self.robot = robot
+        self.t = 0.0
+        self.q, self.v = pin.neutral(robot.model), np.zeros(robot.n)
+        self.measurement: Measurement | None = None
+        self._model, self._data = robot.model, robot.model.createData()
+        pin.computeJointJacobiansTimeVariation(self._model, self._data, self.q, self.v)
+        self.J, self.dJ = self._data.J, self._data.dJ
+        self.placements = _placements_view(self._data, robot.model.njoints)
+        self.supports = _supports(robot.model)
+        self.period = differences or 0.0
+        self.previous_J = self.J.copy(order="F")
+        self.previous_placements = self.placements.copy()
+        self._started = False
+        # What every task kernel takes first, in this order.
+        self.arrays: tuple[Any, ...] = (
+            self.v, self.J, self.dJ, self.placements, self.supports,
+            self.previous_J, self.previous_placements, self.period)
+
+    @property
+    def n(self) -> int:
+        """Number of joint velocities."""
+        return self.robot.n
+
+    def move(self, t: float, q: Array, v: Array) -> None:
+        """Go to time t [s] at q (nq,), v (n,), unchecked: the one kinematics call of a tick."""
+        if self.period > 0.0 and self._started:
+            self._keep_kinematics()
+        self.t = t
+        self.q[:] = q
+        self.v[:] = v
+        pin.computeJointJacobiansTimeVariation(self._model, self._data, self.q, self.v)
+        if self.period > 0.0 and not self._started:  # no tick before: all differences are zero
+            self._keep_kinematics()
+        self._started = True
+
+    def _keep_kinematics(self) -> None:
+        _copy_kinematics(self.J, self.placements, self.previous_J, self.previous_placements)
+
+    def mass_matrix(self) -> Array:
+        """Joint-space inertia matrix M(q) (n, n) [kg m^2]."""
+        upper = np.triu(pin.crba(self._model, self._data, self.q))
+        return np.ascontiguousarray(upper + np.triu(upper, 1).T)
+
+    def position(self, frame: Frame) -> Array:
+        """World position (3,) [m] of a frame's origin."""
+        rotation, translation = self._placement(frame.joint)
+        return translation + rotation @ frame.offset
+
+    def rotation(self, frame: Frame) -> Array:
+        """World orientation (3, 3) of a frame."""
+        return self._placement(frame.joint)[0] @ frame.rotation
+
+    def _placement(self, joint: int) -> tuple[Array, Array]:
+        row = self.placements[joint]
+        return row[:9].reshape(3, 3).T, row[9:]
+
+
+@compiled
+def _copy_kinematics(J, placements, previous_J, previous_placements):  # type: ignore[no-untyped-def]
+    previous_J[:] = J
+    previous_placements[:] = placements
+
+
+def _placements_view(data: Any, joints: int) -> Array:
+    """One (joints, 12) view over pinocchio's contiguous vector of placements."""
+    first = data.oMi[0].rotation
+    view = np.lib.stride_tricks.as_strided(first.T.reshape(-1), (joints, 12), (96, 8))
+    for i in range(joints):
+        here = data.oMi[i]
+        if not (np.shares_memory(view, here.translation)
+                and (view[i] == np.r_[here.rotation.T.ravel(), here.translation]).all()):
+            raise RobotError("this pinocchio stores placements in a layout that is not known")
+    return view
+
+
+def _supports(model: Any) -> NDArray[np.bool_]:
+    supports = np.zeros((model.njoints, model.nv), dtype=np.bool_)
+    for body in range(1, model.njoints):
+        for joint in model.supports[body].tolist():
+            if joint > 0:
+                first = model.joints[joint].idx_v
+                supports[body, first:first + model.joints[joint].nv] = True
+    return supports
+
+
+def _finite_or_inf(lower: Array, upper: Array) -> tuple[Array, Array]:
+    """Limits as given; pinocchio's huge numbers for "none" become infinite."""
+    return (np.where(np.abs(lower) > 1e300, -np.inf, lower),
+            np.where(np.abs(upper) > 1e300, np.inf, upper))
+
+
+def _positive_or_inf(limit: Array) -> Array:
+    return np.where((limit <= 0.0) | (limit > 1e300), np.inf, limit)
+
+
+def _model_from_table(table: DHTable) -> Any:
+    model = pin.Model()
+    model.name = table.name
+    joint, placement = 0, pin.SE3.Identity()
+    for i, d in enumerate(table.d):
+        limit = np.deg2rad([table.range[i]])
+        joint = model.addJoint(joint, pin.JointModelRZ(), placement, f"joint_{i + 1}",
+                               np.array([1e3]), np.array([table.velocity[i]]), -limit, limit)
+        placement = pin.SE3(_rotation_about_x(table.alpha[i]), np.array([table.a[i], 0.0, d]))
+        model.appendBodyToJoint(joint, _rod(table, i), pin.SE3.Identity())
+        model.addJointFrame(joint, -1)
+    model.addFrame(pin.Frame(END_EFFECTOR, joint, placement, pin.FrameType.OP_FRAME))
+    return model
+
+
+def _rod(table: DHTable, i: int) -> Any:
+    """Inertia of a uniform cylinder from the joint to the next origin."""
+    length = max(float(np.hypot(table.a[i], table.d[i])), 2 * table.radius)
+    across = table.mass[i] * (3 * table.radius**2 + length**2) / 12
+    along = table.mass[i] * table.radius**2 / 2
+    centre = np.array([table.a[i], 0.0, table.d[i]]) / 2
+    return pin.Inertia(table.mass[i], centre, np.diag([across, across, along]))
+
+
+def _rotation_about_x(degrees: float) -> Array:
+    """Exact for multiples of 90 degrees."""
+    c, s = np.round([np.cos(np.deg2rad(degrees)), np.sin(np.deg2rad(degrees))], 15)
+    return np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])

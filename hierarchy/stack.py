@@ -1,0 +1,115 @@
+"""Stack: named tasks in order of priority, turned into a Hierarchy at a State."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from hierarchy.errors import HierarchyError, UnknownNameError
+from hierarchy.problem import Hierarchy
+from hierarchy.robot import State
+from hierarchy.task import Level, Task
+
+
+class Stack:
+    """Tasks by name, most important first.
+
+    Parameters
+    ----------
+    tasks : the tasks; their names must differ.
+    level : "velocity" or "acceleration", what x of the hierarchy means.
+    reference : a joint task (posture, damping) whose value is the hierarchy's reference, the
+        null-space term of eq. (14); None for zero.
+    """
+
+    def __init__(self, tasks: Iterable[Task] = (), level: Level = "acceleration",
+                 reference: Task | None = None) -> None:
+        if level not in ("velocity", "acceleration"):
+            raise HierarchyError(f"level must be 'velocity' or 'acceleration', got {level!r}")
+        self.level: Level = level
+        self.reference = reference
+        self._tasks: dict[str, Task] = {}
+        self._order: tuple[str, ...] = ()
+        self._hierarchies: dict[tuple[str, ...], Hierarchy] = {}
+        for task in tasks:
+            self.insert(task)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the tasks, most important first."""
+        return self._order
+
+    def __len__(self) -> int:
+        return len(self._order)
+
+    def __getitem__(self, name: str) -> Task:
+        if name not in self._tasks:
+            raise UnknownNameError("task", name, self._tasks)
+        return self._tasks[name]
+
+    def insert(self, task: Task, index: int | None = None) -> None:
+        """Put a task at `index` of the order, 0 being the most important; None for the end."""
+        if task.name in self._tasks:
+            raise HierarchyError(f"the stack already has a task {task.name!r}")
+        position = len(self._order) if index is None else index
+        if not 0 <= position <= len(self._order):
+            raise HierarchyError(f"task {task.name!r}: index {index} is outside "
+                                 f"0 .. {len(self._order)}")
+        self._tasks[task.name] = task
+        self._order = (*self._order[:position], task.name, *self._order[position:])
+
+    def remove(self, name: str) -> Task:
+        """Take a task out and return it; UnknownNameError if it is not there."""
+        task = self[name]
+        del self._tasks[name]
+        self._order = tuple(other for other in self._order if other != name)
+        self._hierarchies.clear()
+        return task
+
+    def swap(self, first: str, second: str) -> None:
+        """Exchange the places of two tasks."""
+        place = {self[first].name: second, self[second].name: first}
+        self._order = tuple(place.get(name, name) for name in self._order)
+
+    def reorder(self, order: Sequence[str]) -> None:
+        """Put all tasks in a new order; HierarchyError unless each is named once."""
+        for name in order:
+            self[name]
+        if sorted(order) != sorted(self._order):
+            raise HierarchyError(f"reorder needs each of {list(self._order)} once, got "
+                                 f"{list(order)}")
+        self._order = tuple(order)
+
+    def hierarchy(self, state: State, order: tuple[str, ...] | None = None) -> Hierarchy:
+        """Write the tasks' rows at a state and return them as a Hierarchy.
+
+        `order` names some or all of the tasks, most important first; None takes the stack's own.
+        The arrays are buffers of this stack: they hold until the same order is asked for again.
+        """
+        order = self._order if order is None else order
+        try:
+            hierarchy = self._hierarchies[order]
+        except KeyError:
+            hierarchy = self._prepare(order, state.n)
+        A, lower, upper, level = hierarchy.A, hierarchy.lower, hierarchy.upper, self.level
+        row = 0
+        for name in order:
+            task = self._tasks[name]
+            task.write(state, level, A, lower, upper, row)
+            row += task.dimension
+        if self.reference is not None:
+            hierarchy.reference[:] = (
+                self.reference.reference_acceleration(state) if level == "acceleration"
+                else self.reference.reference_velocity(state))
+        return hierarchy
+
+    def _prepare(self, order: tuple[str, ...], n: int) -> Hierarchy:
+        if not order:
+            raise HierarchyError("the stack is empty: nothing is asked of the robot")
+        sizes = np.array([self[name].dimension for name in order], dtype=np.int64)
+        m = int(sizes.sum())
+        hierarchy = Hierarchy(np.zeros((m, n)), np.zeros(m), np.zeros(m), sizes, np.zeros(n),
+                              tuple(order))
+        self._hierarchies[tuple(order)] = hierarchy
+        return hierarchy

@@ -1,0 +1,15 @@
+"""The tasks as shipped, one a file; `TASKS` lists them by name."""
+
+from hierarchy.task import Task
+from hierarchy.tasks.avoidance import Avoidance
+from hierarchy.tasks.pointing import Pointing
+from hierarchy.tasks.pose import Pose
+from hierarchy.tasks.position import Position
+from hierarchy.tasks.posture import JointDamping, Posture
+
+TASKS: dict[str, type[Task]] = {
+    "avoidance": Avoidance, "damping": JointDamping, "pointing": Pointing, "pose": Pose,
+    "position": Position, "posture": Posture,
+}
+
+__all__ = ["TASKS", "Avoidance", "JointDamping", "Pointing", "Pose", "Position", "Posture"]

@@ -1,0 +1,130 @@
+"""Avoidance by a control point of the body: 3-D (28), or relaxed to one row (29)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hierarchy.avoidance.control_points import ControlPoint, pack_points
+from hierarchy.avoidance.measurement import Measurement
+from hierarchy.compiled import compiled
+from hierarchy.errors import HierarchyError
+from hierarchy.kinematics import (
+    row_times,
+    write_equality,
+    write_point_jacobian,
+    write_point_jacobian_derivative,
+)
+from hierarchy.problem import Array
+from hierarchy.robot import State
+from hierarchy.task import Level, Task
+
+
+@dataclass(frozen=True)
+class Avoidance(Task):
+    """Push the active control point of the measurement away from what is near.
+
+    rows = 3: the point's acceleration is the repulsive vector, eqs. (27)-(28). rows = 1: its
+    component along the direction of repulsion is the magnitude, eq. (29). At velocity level the
+    vector is a velocity. With one row the derivative is that of (29), r^T dJ_c/dt: the direction
+    is held, because (29) projects an acceleration and does not differentiate a distance.
+
+    `points` are the control points in the order of the measurement; the task works on
+    `measurement.active`, or on the first point while that is -1.
+    """
+
+    points: Sequence[ControlPoint]
+    rows: Literal[1, 3] = 1
+    name: str = "avoidance"
+    joints: NDArray[np.int64] = field(init=False, repr=False, compare=False)
+    offsets: Array = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        if self.rows not in (1, 3):
+            raise HierarchyError(f"task {self.name!r}: rows must be 1 or 3, got {self.rows}")
+        if not self.points:
+            raise HierarchyError(f"task {self.name!r}: needs at least one control point")
+        joints, offsets = pack_points(self.points)
+        object.__setattr__(self, "joints", joints)
+        object.__setattr__(self, "offsets", offsets)
+
+    @property
+    def dimension(self) -> int:
+        """One row or three."""
+        return self.rows
+
+    def error(self, state: State) -> Array:
+        """The repulsion (rows,) [m/s^2 or m/s]: this task has no position to reach."""
+        seen, k = self._seen(state)
+        r = seen.magnitude[k]
+        return np.array([r]) if self.rows == 1 else np.asarray(r * seen.direction[k])
+
+    def jacobian(self, state: State) -> Array:
+        """J_c (3, n) of the active point, or r^T J_c (1, n)."""
+        seen, k = self._seen(state)
+        J = np.empty((3, state.n))
+        write_point_jacobian(state.J, state.placements, state.supports, int(self.joints[k]),
+                             self.offsets[k], J, 0)
+        return J if self.rows == 3 else seen.direction[k][None] @ J
+
+    def jacobian_derivative(self, state: State) -> Array:
+        """dJ_c/dt (3, n) of the active point, or r^T dJ_c/dt (1, n)."""
+        seen, k = self._seen(state)
+        dJ = np.empty((3, state.n))
+        write_point_jacobian_derivative(*state.arrays, int(self.joints[k]), self.offsets[k], dJ)
+        return dJ if self.rows == 3 else seen.direction[k][None] @ dJ
+
+    def reference_velocity(self, state: State) -> Array:
+        """The repulsion as a velocity (rows,) [m/s]."""
+        return self.error(state)
+
+    def reference_acceleration(self, state: State) -> Array:
+        """The repulsion as an acceleration (rows,) [m/s^2], eqs. (28)-(29)."""
+        return self.error(state)
+
+    def write(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
+              row: int) -> None:
+        """See `Task.write`."""
+        seen, k = self._seen(state)
+        _write(*state.arrays, self.joints, self.offsets, k, seen.direction, seen.magnitude,
+               level == "acceleration", self.rows, A, lower, upper, row)
+
+    def _seen(self, state: State) -> tuple[Measurement, int]:
+        if state.measurement is None:
+            raise HierarchyError(f"task {self.name!r}: the state carries no measurement")
+        return state.measurement, max(state.measurement.active, 0)
+
+
+@compiled
+def _write(v, J, dJ, placements, supports, previous_J, previous_placements,  # type: ignore[no-untyped-def]
+           period, joints, offsets, k, direction, magnitude, acceleration, rows,
+           A, lower, upper, row):
+    n = A.shape[1]
+    joint, offset, r = joints[k], offsets[k], direction[k]
+    J_c, dJ_c = np.empty((3, n)), np.zeros((3, n))
+    write_point_jacobian(J, placements, supports, joint, offset, J_c, 0)
+    if acceleration:
+        write_point_jacobian_derivative(v, J, dJ, placements, supports, previous_J,
+                                        previous_placements, period, joint, offset, dJ_c)
+    write_repulsion(v, J_c, dJ_c, r, magnitude[k], rows, A, lower, upper, row)
+
+
+@compiled
+def write_repulsion(v, J_c, dJ_c, r, magnitude, rows, A, lower, upper, row):  # type: ignore[no-untyped-def]
+    """Write the rows of eqs. (28) or (29) from a point's Jacobian, its drift and repulsion."""
+    drift = np.empty(3)
+    for i in range(3):
+        drift[i] = row_times(dJ_c, i, v)
+    if rows == 3:
+        for i in range(3):
+            A[row + i] = J_c[i]
+            write_equality(lower, upper, row + i, magnitude * r[i] - drift[i])  # (28)
+        return
+    for c in range(A.shape[1]):
+        A[row, c] = r[0] * J_c[0, c] + r[1] * J_c[1, c] + r[2] * J_c[2, c]
+    write_equality(lower, upper, row,
+                   magnitude - (r[0] * drift[0] + r[1] * drift[1] + r[2] * drift[2]))  # (29)

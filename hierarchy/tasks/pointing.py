@@ -1,0 +1,131 @@
+"""Relaxed pointing: an axis of a frame on, or inside, a cone (eqs. 16-21)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from math import cos
+
+import numpy as np
+
+from hierarchy.compiled import compiled
+from hierarchy.errors import HierarchyError
+from hierarchy.kinematics import axis_at, row_times, subtract_over_period
+from hierarchy.problem import Array
+from hierarchy.robot import Frame, State
+from hierarchy.task import Kind, Level, Task
+
+
+@dataclass(frozen=True)
+class Pointing(Task):
+    """Keep the z axis of `frame` at `half_angle` [rad] to `axis` (m = 1, p = z_d . z_e).
+
+    kind = "equality": on the cone, cos(alpha) = cos(alpha_d), eq. (16). kind = "inequality": inside
+    it, cos(alpha_d) <= cos(alpha), eq. (21), as one row with a lower side only. `axis` (3,) is
+    z_d, normalised here. Gains as in `Task`.
+    """
+
+    frame: Frame
+    axis: tuple[float, float, float]
+    half_angle: float
+    kind: Kind = "equality"
+    stiffness: float = 5.0
+    damping: float = 2.0
+    gain: float = 5.0
+    name: str = "pointing"
+    z_d: Array = field(init=False, repr=False, compare=False)
+    z_e: Array = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        axis = np.array(self.axis, dtype=float)
+        length = float(np.linalg.norm(axis))
+        if axis.shape != (3,) or not 1e-9 < length < np.inf:
+            raise HierarchyError(f"task {self.name!r}: axis {list(self.axis)} has no direction")
+        if not 0.0 <= self.half_angle <= np.pi:
+            raise HierarchyError(f"task {self.name!r}: half_angle {self.half_angle} rad is "
+                                 "outside 0 .. pi")
+        object.__setattr__(self, "z_d", axis / length)
+        object.__setattr__(self, "z_e", np.ascontiguousarray(self.frame.rotation[:, 2]))
+
+    @property
+    def dimension(self) -> int:
+        """One row."""
+        return 1
+
+    def error(self, state: State) -> Array:
+        """cos(alpha_d) - cos(alpha) (1,), positive outside the cone."""
+        cosine = float(self.z_d @ state.rotation(self.frame)[:, 2])
+        return np.array([cos(self.half_angle) - cosine])
+
+    def jacobian(self, state: State) -> Array:
+        """z_d^T S^T(z_e) J_O (1, n), eq. (19)."""
+        J = np.empty((1, state.n))
+        _write_jacobian(state.J, state.placements, state.supports, self.frame.joint, self.z_e,
+                        self.z_d, J, 0)
+        return J
+
+    def jacobian_derivative(self, state: State) -> Array:
+        """Its time derivative (1, n) [1/s]."""
+        dJ = np.empty((1, state.n))
+        _write_jacobian_derivative(*state.arrays, self.frame.joint, self.z_e, self.z_d, dJ)
+        return dJ
+
+    def write(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
+              row: int) -> None:
+        """See `Task.write`."""
+        _write(*state.arrays, self.frame.joint, self.z_e, self.z_d, cos(self.half_angle),
+               self.stiffness, self.damping, self.gain, level == "acceleration",
+               self.kind == "inequality", A, lower, upper, row)
+
+
+@compiled
+def _write_jacobian(J, placements, supports, joint, z_e, z_d, A, row):  # type: ignore[no-untyped-def]
+    x, y, z = (axis_at(placements, joint, z_e, 0), axis_at(placements, joint, z_e, 1),
+               axis_at(placements, joint, z_e, 2))
+    cx, cy, cz = y * z_d[2] - z * z_d[1], z * z_d[0] - x * z_d[2], x * z_d[1] - y * z_d[0]
+    for c in range(A.shape[1]):  # z_d . (w x z_e) = w . (z_e x z_d)
+        A[row, c] = (J[3, c] * cx + J[4, c] * cy + J[5, c] * cz) if supports[joint, c] else 0.0
+
+
+@compiled
+def _write_jacobian_derivative(v, J, dJ, placements, supports,  # type: ignore[no-untyped-def]
+                               previous_J, previous_placements, period, joint, z_e, z_d, out):
+    n = out.shape[1]
+    if period > 0.0:
+        before = np.empty((1, n))
+        _write_jacobian(J, placements, supports, joint, z_e, z_d, out, 0)
+        _write_jacobian(previous_J, previous_placements, supports, joint, z_e, z_d, before, 0)
+        subtract_over_period(out, before, period)
+        return
+    wx, wy, wz = 0.0, 0.0, 0.0
+    for c in range(n):
+        if supports[joint, c]:
+            wx += J[3, c] * v[c]
+            wy += J[4, c] * v[c]
+            wz += J[5, c] * v[c]
+    x, y, z = (axis_at(placements, joint, z_e, 0), axis_at(placements, joint, z_e, 1),
+               axis_at(placements, joint, z_e, 2))
+    dx, dy, dz = wy * z - wz * y, wz * x - wx * z, wx * y - wy * x  # (18)
+    cx, cy, cz = y * z_d[2] - z * z_d[1], z * z_d[0] - x * z_d[2], x * z_d[1] - y * z_d[0]
+    ex, ey, ez = dy * z_d[2] - dz * z_d[1], dz * z_d[0] - dx * z_d[2], dx * z_d[1] - dy * z_d[0]
+    for c in range(n):
+        out[0, c] = (dJ[3, c] * cx + dJ[4, c] * cy + dJ[5, c] * cz
+                     + J[3, c] * ex + J[4, c] * ey + J[5, c] * ez) if supports[joint, c] else 0.0
+
+
+@compiled
+def _write(v, J, dJ, placements, supports, previous_J, previous_placements,  # type: ignore[no-untyped-def]
+           period, joint, z_e, z_d, cos_alpha_d, stiffness, damping, gain, acceleration,
+           inequality, A, lower, upper, row):
+    _write_jacobian(J, placements, supports, joint, z_e, z_d, A, row)
+    error = cos_alpha_d
+    for i in range(3):
+        error -= z_d[i] * axis_at(placements, joint, z_e, i)  # (16)
+    if acceleration:
+        A_dot = np.empty((1, A.shape[1]))
+        _write_jacobian_derivative(v, J, dJ, placements, supports, previous_J,
+                                   previous_placements, period, joint, z_e, z_d, A_dot)
+        b = stiffness * error - damping * row_times(A, row, v) - row_times(A_dot, 0, v)
+    else:
+        b = gain * error
+    lower[row] = b
+    upper[row] = np.inf if inequality else b  # (21), (16)

@@ -1,0 +1,123 @@
+"""Position of a frame along a path, with the end-effector repulsion of eq. (30)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from hierarchy.compiled import compiled
+from hierarchy.kinematics import (
+    point_at,
+    row_times,
+    write_equality,
+    write_point_jacobian,
+    write_point_jacobian_derivative,
+)
+from hierarchy.paths import Path
+from hierarchy.problem import Array
+from hierarchy.robot import Frame, State
+from hierarchy.task import Level, Task
+
+
+@dataclass(frozen=True)
+class Position(Task):
+    """Bring the origin of `frame` along `path` (m = 3) [m].
+
+    stiffness [1/s^2] and damping [1/s] act at acceleration level, gain [1/s] at velocity level.
+    With `repulsion_within` > 0 [m], the repulsive vector (27) of the measurement's end effector
+    is added to the reference, eq. (30), while that distance is not exceeded (eps_ee).
+    """
+
+    frame: Frame
+    path: Path
+    stiffness: float = 40.0
+    damping: float = 20.0
+    gain: float = 10.0
+    repulsion_within: float = -1.0
+    name: str = "position"
+    target: Array = field(default_factory=lambda: np.zeros((3, 3)), init=False, repr=False,
+                          compare=False)  # p_d, dp_d/dt, d2p_d/dt2 at the last write
+
+    @property
+    def dimension(self) -> int:
+        """Three rows."""
+        return 3
+
+    def error(self, state: State) -> Array:
+        """p_d - p (3,) [m]."""
+        return self.path(state.t)[0] - state.position(self.frame)
+
+    def jacobian(self, state: State) -> Array:
+        """Linear Jacobian of the frame's origin (3, n) [m]."""
+        J = np.empty((3, state.n))
+        write_point_jacobian(state.J, state.placements, state.supports, self.frame.joint,
+                             self.frame.offset, J, 0)
+        return J
+
+    def jacobian_derivative(self, state: State) -> Array:
+        """Its time derivative (3, n) [m/s]."""
+        dJ = np.empty((3, state.n))
+        write_point_jacobian_derivative(*state.arrays, self.frame.joint, self.frame.offset, dJ)
+        return dJ
+
+    def desired_velocity(self, state: State) -> Array:
+        """dp_d/dt (3,) [m/s]."""
+        return self.path(state.t)[1]
+
+    def desired_acceleration(self, state: State) -> Array:
+        """d2p_d/dt2 (3,) [m/s^2]."""
+        return self.path(state.t)[2]
+
+    def reference_velocity(self, state: State) -> Array:
+        """Closed loop plus repulsion (3,) [m/s]."""
+        return super().reference_velocity(state) + self.repulsion(state)
+
+    def reference_acceleration(self, state: State) -> Array:
+        """Closed loop plus repulsion (3,) [m/s^2], eq. (30)."""
+        return super().reference_acceleration(state) + self.repulsion(state)
+
+    def repulsion(self, state: State) -> Array:
+        """Repulsive vector (27) of the end effector (3,), zero beyond `repulsion_within`."""
+        seen = state.measurement
+        if seen is None or not seen.distance[-1] <= self.repulsion_within:
+            return np.zeros(3)
+        return np.asarray(seen.magnitude[-1] * seen.direction[-1])
+
+    def write(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
+              row: int) -> None:
+        """See `Task.write`."""
+        self.path.write(state.t, self.target)
+        seen = state.measurement
+        if seen is None:
+            distance, magnitude, direction = _NOTHING_SEEN
+        else:
+            distance, magnitude, direction = seen.distance, seen.magnitude, seen.direction
+        _write(*state.arrays, self.frame.joint, self.frame.offset, self.target, self.stiffness,
+               self.damping, self.gain, level == "acceleration", distance, magnitude, direction,
+               self.repulsion_within, A, lower, upper, row)
+
+
+_NOTHING_SEEN = (np.full(1, np.inf), np.zeros(1), np.zeros((1, 3)))
+
+
+@compiled
+def _write(v, J, dJ, placements, supports, previous_J, previous_placements,  # type: ignore[no-untyped-def]
+           period, joint, offset, target, stiffness, damping, gain, acceleration,
+           distance, magnitude, direction, repulsion_within, A, lower, upper, row):
+    write_point_jacobian(J, placements, supports, joint, offset, A, row)
+    if acceleration:
+        A_dot = np.empty((3, A.shape[1]))
+        write_point_jacobian_derivative(v, J, dJ, placements, supports, previous_J,
+                                        previous_placements, period, joint, offset, A_dot)
+    last = len(distance) - 1
+    for i in range(3):
+        error = target[0, i] - point_at(placements, joint, offset, i)
+        if acceleration:
+            rate = target[1, i] - row_times(A, row + i, v)
+            b = target[2, i] + damping * rate + stiffness * error - row_times(A_dot, i, v)
+        else:
+            b = target[1, i] + gain * error
+        if distance[last] <= repulsion_within:
+            b += magnitude[last] * direction[last, i]  # (30)
+        write_equality(lower, upper, row + i, b)

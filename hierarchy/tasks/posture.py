@@ -1,0 +1,85 @@
+"""Tasks of the joints themselves: a posture to go to, and damping of the motion (eq. 15)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from hierarchy.errors import HierarchyError
+from hierarchy.problem import Array
+from hierarchy.robot import State
+from hierarchy.task import Task
+
+
+class JointTask(Task):
+    """A task whose Jacobian is the identity: a last level, or the stack's null-space reference."""
+
+    joints: int
+
+    @property
+    def dimension(self) -> int:
+        """One row a joint."""
+        return self.joints
+
+    def jacobian(self, state: State) -> Array:
+        """The identity (n, n)."""
+        return np.eye(self.joints)
+
+    def jacobian_derivative(self, state: State) -> Array:
+        """Zero (n, n)."""
+        return np.zeros((self.joints, self.joints))
+
+
+@dataclass(frozen=True)
+class Posture(JointTask):
+    """Bring every joint to `target` (n,) [rad or m]; gains as in `Task`."""
+
+    target: tuple[float, ...]
+    stiffness: float = 10.0
+    damping: float = 5.0
+    gain: float = 1.0
+    name: str = "posture"
+
+    @property
+    def joints(self) -> int:  # type: ignore[override]
+        """Number of joints n."""
+        return len(self.target)
+
+    def error(self, state: State) -> Array:
+        """q_d - q (n,) [rad or m]."""
+        if state.robot.nq != self.joints:
+            raise HierarchyError(f"task {self.name!r}: {self.joints} targets for "
+                                 f"{state.robot.nq} joint positions")
+        return np.asarray(self.target) - state.q
+
+
+@dataclass(frozen=True)
+class JointDamping(JointTask):
+    """Slow every joint down: a = -D v, eq. (15), D = k I or D = k M(q); v = 0 at velocity level.
+
+    `damping` is k, in [1/s] with weight = "identity" and in [1/(kg m^2 s)] with "mass".
+    """
+
+    joints: int
+    damping: float = 5.0
+    weight: Literal["identity", "mass"] = "identity"
+    name: str = "damping"
+
+    def __post_init__(self) -> None:
+        if self.weight not in ("identity", "mass"):
+            raise HierarchyError(f"task {self.name!r}: weight must be 'identity' or 'mass', got "
+                                 f"{self.weight!r}")
+        if not 0.0 <= self.damping < np.inf:
+            raise HierarchyError(f"task {self.name!r}: damping {self.damping} must not be negative")
+
+    def error(self, state: State) -> Array:
+        """Zero (n,): there is no position to reach."""
+        return np.zeros(self.joints)
+
+    def reference_acceleration(self, state: State) -> Array:
+        """-D v (n,) [rad/s^2]."""
+        if self.weight == "mass":
+            return np.asarray(-self.damping * (state.mass_matrix() @ state.v))
+        return np.asarray(-self.damping * state.v)
