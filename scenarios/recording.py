@@ -2,11 +2,20 @@
 
 from __future__ import annotations
 
+import json
+import os
+import platform
+import zipfile
 from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from hierarchy.errors import HierarchyError
+from scenarios.folders import whole
 
 if TYPE_CHECKING:
     from scenarios.config import Scenario
@@ -55,3 +64,74 @@ class Recording:
     def switches(self) -> NDArray[np.int64]:
         """Ticks k at which the stack's order differs from that of tick k - 1."""
         return np.flatnonzero(np.diff(self.signals["order"])) + 1
+
+
+def save(recording: Recording, folder: str | Path, figures: bool = True) -> Path:
+    """Write a run's folder, whole or not at all, and return its path.
+
+    It holds `run.npz` (the signals by name, with `orders` and `fault`), `metrics.json`,
+    `scenario.toml` as it was run, `versions.json`, and the letter's figures if `figures`.
+    `folder` must be new or empty.
+    """
+    from scenarios import metrics  # here, since metrics reads recordings
+
+    with whole(folder) as partial:
+        np.savez_compressed(partial / "run.npz", allow_pickle=False, **recording.signals,
+                            orders=np.array(recording.orders, dtype=np.str_),
+                            fault=np.array(recording.fault or ""))
+        _write_json(partial / "metrics.json", metrics.as_plain_data(recording))
+        _write_json(partial / "versions.json", versions())
+        (partial / "scenario.toml").write_text(recording.scenario.to_toml(), encoding="utf-8")
+        if figures:
+            from scenarios import figures as drawing
+            drawing.write_all(recording, partial)
+    return Path(folder)
+
+
+def load_run(folder: str | Path) -> Recording:
+    """Read the Recording that `save` wrote.
+
+    Raises
+    ------
+    HierarchyError : a file of the run is missing or damaged, named.
+    """
+    from scenarios.config import load
+
+    path = Path(folder)
+    scenario = load(str(path / "scenario.toml"))
+    try:
+        with (path / "run.npz").open("rb") as stream, np.load(stream, allow_pickle=False) as file:
+            signals = {name: file[name] for name in file.files}
+        orders, fault = signals.pop("orders"), signals.pop("fault")
+    except FileNotFoundError:
+        raise HierarchyError(f"{path} is not a run folder: it has no run.npz") from None
+    except (OSError, KeyError, ValueError, EOFError, zipfile.BadZipFile) as error:
+        raise HierarchyError(f"{path / 'run.npz'} cannot be read: {error}") from error
+    return Recording(signals, tuple(map(str, orders)), scenario, str(fault) or None)
+
+
+def versions() -> dict[str, str]:
+    """Return the versions and the processor that a run's numbers were made with."""
+    packages = ("task-hierarchy", "numpy", "numba", "pin", "qpsolvers", "proxsuite", "osqp")
+    return {"python": platform.python_version(), **{name: _version(name) for name in packages},
+            "system": f"{platform.system()} {platform.machine()}",
+            "processor": f"{_processor()}, {os.cpu_count()} cores"}
+
+
+def _version(package: str) -> str:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return "not installed"
+
+
+def _processor() -> str:
+    try:
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+        return next(line.partition(":")[2].strip() for line in lines if line[:10] == "model name")
+    except (OSError, StopIteration):
+        return platform.processor() or "unknown processor"
+
+
+def _write_json(path: Path, data: Any) -> None:
+    path.write_text(json.dumps(data, indent=2, allow_nan=False) + "\n", encoding="utf-8")

@@ -1,0 +1,60 @@
+"""Recordings and scenarios made by hand, whose every number is known."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from scenarios.recording import Recording
+
+LABELS = {"tpm": "tpm published", "tpm:form=staircase": "tpm staircase"}
+
+
+@dataclass(frozen=True)
+class HandMadeScenario:
+    """As much of a Scenario as metrics, figures and reports read."""
+
+    name: str = "hand-made"
+    title: str = "A run made by hand"
+    description: str = "Nothing was simulated."
+    resolver: str = "tpm"
+    pointing: Any = field(default_factory=lambda: SimpleNamespace(alpha_d=60.0, kind="inequality"))
+    avoidance: Any = field(default_factory=lambda: SimpleNamespace(
+        near=0.05, far=0.15, end_effector=0.1, dimension=1, obstacles=[[0.1, 0.5, 0.1]]))
+    control: Any = field(default_factory=lambda: SimpleNamespace(
+        level="acceleration", resolver="tpm", options={}, period=0.001, duration=4.0,
+        jacobian_derivative="exact"))
+    robot: Any = field(default_factory=lambda: SimpleNamespace(model="kuka_lwr"))
+
+    def with_resolver(self, spec: str) -> HandMadeScenario:
+        return replace(self, resolver=spec)
+
+    def make_resolver(self) -> Any:
+        return SimpleNamespace(label=LABELS.get(self.resolver, self.resolver))
+
+    def to_toml(self) -> str:
+        return f'name = "{self.name}"\n'
+
+
+def recording(scenario: Any = None, fault: str | None = None, orders: tuple[str, ...] = ("a", "b"),
+              **changed: Any) -> Recording:
+    """Five ticks, one second apart, two joints at rest, every signal there and quiet."""
+    ticks, joints = len(changed.get("t", range(5))), 2
+    signals: dict[str, Any] = {
+        "t": np.arange(float(ticks)), "order": np.zeros(ticks, int), "status": np.zeros(ticks, int),
+        "iterations": np.ones(ticks, int),
+        **{name: np.zeros((ticks, joints)) for name in ("q", "v", "a", "command")},
+        **{name: np.zeros((ticks, 3)) for name in ("ee_position", "desired_position",
+                                                   "position_error")},
+        "pointing_error": np.full(ticks, -0.1), "pointing_active": np.zeros(ticks, bool),
+        "control_point_distance": np.ones((ticks, 8)), "minimal_distance": np.ones(ticks),
+        "active_control_point": np.full(ticks, -1), "ee_distance": np.ones(ticks),
+        "repulsion_active": np.zeros(ticks, bool),
+        **{f"time_{part}": np.full(ticks, 1e-6) for part in ("kinematics", "rows", "resolve")},
+        "time_tick": np.full(ticks, 4e-6), "joint_lower": np.full(joints, -2.0),
+        "joint_upper": np.full(joints, 2.0), "velocity_limit": np.full(joints, np.inf)}
+    signals |= {name: np.asarray(value) for name, value in changed.items()}
+    return Recording(signals, orders, scenario or HandMadeScenario(), fault)

@@ -1,0 +1,110 @@
+import json
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from hand_made import HandMadeScenario, recording
+
+from hierarchy.errors import HierarchyError
+from scenarios import config
+from scenarios.folders import OutputError, claim, next_free, whole
+from scenarios.recording import load_run, save
+
+
+@pytest.fixture
+def hand_made_scenarios(monkeypatch):
+    monkeypatch.setattr(config, "load", lambda path, changes=(): HandMadeScenario())
+
+
+@pytest.mark.usefixtures("hand_made_scenarios")
+def test_what_was_saved_is_loaded_again_to_the_last_bit(tmp_path):
+    saved = recording(q=np.random.default_rng(0).normal(size=(5, 2)), fault="stopped at tick 5")
+    loaded = load_run(save(saved, tmp_path / "run", figures=False))
+    assert loaded.signals.keys() == saved.signals.keys()
+    for name, signal in saved.signals.items():
+        np.testing.assert_array_equal(loaded[name], signal)
+        assert loaded[name].dtype == signal.dtype
+    assert (loaded.orders, loaded.fault) == (saved.orders, saved.fault)
+
+
+@pytest.mark.usefixtures("hand_made_scenarios")
+def test_a_run_without_a_fault_comes_back_without_one(tmp_path):
+    assert load_run(save(recording(), tmp_path / "run", figures=False)).fault is None
+
+
+def test_a_run_folder_holds_arrays_metrics_scenario_versions_and_figures(tmp_path):
+    save(recording(), tmp_path / "run")
+    names = {path.name for path in (tmp_path / "run").iterdir()}
+    assert {"run.npz", "metrics.json", "scenario.toml", "versions.json", "picture.svg",
+            "figure-4-joint-velocities.png", "figure-5-distances.svg"} <= names
+    assert "hand-made" in (tmp_path / "run" / "scenario.toml").read_text()
+    assert {"python", "numpy", "pin", "task-hierarchy"} <= json.loads(
+        (tmp_path / "run" / "versions.json").read_text()).keys()
+    assert json.loads((tmp_path / "run" / "metrics.json").read_text())["ticks"] == 5
+
+
+def test_arrays_are_found_by_name_without_this_package(tmp_path):
+    save(recording(), tmp_path / "run", figures=False)
+    with np.load(tmp_path / "run" / "run.npz", allow_pickle=False) as file:
+        assert file["t"].shape == (5,)
+        assert file["q"].shape == (5, 2)
+
+
+def test_a_save_that_breaks_leaves_nothing_behind(tmp_path):
+    def broken():
+        raise KeyboardInterrupt
+
+    scenario = SimpleNamespace(pointing=None, to_toml=broken)
+    with pytest.raises(KeyboardInterrupt):
+        save(recording(scenario), tmp_path / "run", figures=False)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_earlier_run_is_never_overwritten(tmp_path):
+    save(recording(), tmp_path / "run", figures=False)
+    before = (tmp_path / "run" / "run.npz").read_bytes()
+    with pytest.raises(OutputError):
+        save(recording(t=[0.0, 1.0]), tmp_path / "run", figures=False)
+    assert (tmp_path / "run" / "run.npz").read_bytes() == before
+    assert [path.name for path in tmp_path.iterdir()] == ["run"]
+
+
+@pytest.mark.usefixtures("hand_made_scenarios")
+def test_a_folder_that_is_no_run_or_is_damaged_is_named(tmp_path):
+    with pytest.raises(HierarchyError, match=r"no run\.npz"):
+        load_run(tmp_path)
+    (tmp_path / "run.npz").write_bytes(b"PK\x03\x04 half a file")
+    with pytest.raises(HierarchyError, match=r"run\.npz.*cannot be read"):
+        load_run(tmp_path)
+
+
+def test_an_empty_or_new_folder_can_be_claimed_with_its_parents(tmp_path):
+    (tmp_path / "empty").mkdir()
+    assert claim(tmp_path / "empty") == tmp_path / "empty"
+    assert claim(tmp_path / "a" / "b").is_dir()
+
+
+def test_a_folder_in_use_cannot_be_claimed(tmp_path):
+    (tmp_path / "precious.txt").touch()
+    with pytest.raises(OutputError, match="not empty"):
+        claim(tmp_path)
+
+
+def test_a_folder_that_cannot_be_written_cannot_be_claimed(tmp_path):
+    (tmp_path / "file").touch()
+    with pytest.raises(OutputError, match="cannot be written"):
+        claim(tmp_path / "file" / "run")
+
+
+def test_numbered_folders_fill_the_first_gap(tmp_path):
+    assert next_free(tmp_path / "run") == tmp_path / "run"
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run-3").mkdir()
+    assert next_free(tmp_path / "run") == tmp_path / "run-2"
+
+
+def test_a_whole_folder_has_the_usual_permissions(tmp_path):
+    (tmp_path / "usual").mkdir()
+    with whole(tmp_path / "new") as partial:
+        (partial / "file").touch()
+    assert (tmp_path / "new").stat().st_mode == (tmp_path / "usual").stat().st_mode
