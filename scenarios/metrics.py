@@ -1,0 +1,182 @@
+"""What is measured on a recording; every number has a unit, a plain name and a direction."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from scenarios.recording import Recording
+
+Array = NDArray[np.float64]
+
+# Display units by SI unit: how many of them make one, what it is called, decimals.
+_SHOWN = {"m": (1e3, "mm", 3), "s": (1e6, "µs", 2), "deg": (1.0, "°", 3), "share": (100.0, "%", 2),
+          "rad": (1.0, "rad", 3), "rad/s": (1.0, "rad/s", 3), "rad/s^2": (1.0, "rad/s²", 2),
+          "": (1.0, "", 0)}
+
+
+@dataclass(frozen=True)
+class Metric:
+    """One number about one run.
+
+    `value` is in the SI `unit` ("" for a count, "share" of 1, "deg"), and None when the run has
+    no such thing. `lower_is_better` is None where neither direction is. A `detail` is left out of
+    tables that must be short.
+    """
+
+    name: str
+    label: str
+    value: float | None
+    unit: str
+    lower_is_better: bool | None = True
+    group: str = ""
+    note: str = ""
+    detail: bool = False
+
+    @property
+    def shown_unit(self) -> str:
+        """The unit in which tables show the value."""
+        return _SHOWN[self.unit][1]
+
+    def shown(self) -> str:
+        """Return the value for a table: in `shown_unit`, without the unit."""
+        if self.value is None:
+            return "–"
+        scale, _, decimals = _SHOWN[self.unit]
+        value = self.value * scale
+        if value != 0.0 and (abs(value) < 0.5 * 10.0**-decimals or abs(value) >= 1e5):
+            return f"{value:.1e}"
+        return f"{value:.{decimals}f}"
+
+
+def measure(recording: Recording, settle: float = 2.0,
+            cone_tolerance_deg: float = 0.01) -> dict[str, Metric]:
+    """Return the metrics of a run by name, in the order in which tables show them.
+
+    Parameters
+    ----------
+    settle : [s] after which the start, which may lie off the path, no longer counts.
+    cone_tolerance_deg : [deg] beyond the cone that still counts as being on it.
+    """
+    if recording.ticks == 0:
+        return {}
+    found = (*_tracking(recording, settle), *_pointing(recording, cone_tolerance_deg),
+             *_distances(recording), *_motion(recording), *_switching(recording),
+             *_time(recording))
+    return {metric.name: metric for metric in found}
+
+
+def as_plain_data(recording: Recording) -> dict[str, Any]:
+    """Return what `metrics.json` holds: ticks, fault, and value, unit, label of each metric."""
+    return {"ticks": recording.ticks, "fault": recording.fault,
+            "metrics": {metric.name: plain(metric) for metric in measure(recording).values()}}
+
+
+def plain(metric: Metric) -> dict[str, Any]:
+    """Return a metric as plain data for a JSON file."""
+    note = {"note": metric.note} if metric.note else {}
+    return {"value": metric.value, "unit": metric.unit, "label": metric.label,
+            "lower_is_better": metric.lower_is_better, **note}
+
+
+def _tracking(recording: Recording, settle: float) -> Iterator[Metric]:
+    if "position_error" not in recording:
+        return
+    error = np.linalg.norm(recording["position_error"], axis=1)
+    after = error[recording["t"] - recording["t"][0] >= settle]
+    spans = (("", "", error), ("_settled", f" after {settle:g} s", after))
+    for suffix, when, e in spans:
+        yield Metric(f"position_error_rms{suffix}", f"Position error{when}, rms",
+                     _finite(np.sqrt(np.mean(e**2))) if e.size else None, "m", group="Tracking")
+        yield Metric(f"position_error_max{suffix}", f"Position error{when}, largest",
+                     _largest(e), "m", group="Tracking")
+    yield Metric("position_error_median_settled", f"Position error after {settle:g} s, median",
+                 _finite(np.median(after)) if after.size else None, "m", group="Tracking")
+
+
+def _pointing(recording: Recording, tolerance: float) -> Iterator[Metric]:
+    if "pointing_error" not in recording or recording.scenario.pointing is None:
+        return
+    half_angle = recording.scenario.pointing.alpha_d
+    beyond = pointing_angle(recording) - half_angle
+    yield Metric("cone_violation_max", f"Beyond the {half_angle:g}° cone, largest",
+                 _finite(max(float(beyond.max()), 0.0)), "deg", group="Tracking")
+    yield Metric("cone_violation_share", "Time outside the cone",
+                 float(np.mean(beyond > tolerance)), "share", group="Tracking",
+                 note=f"outside by more than {tolerance:g}°")
+
+
+def pointing_angle(recording: Recording) -> Array:
+    """Return the angle between the pointing axis and the cone's axis: (T,) [deg]."""
+    assert recording.scenario.pointing is not None
+    cosine = np.cos(np.radians(recording.scenario.pointing.alpha_d)) - recording["pointing_error"]
+    return np.asarray(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))))
+
+
+def _distances(recording: Recording) -> Iterator[Metric]:
+    for name, signal, label in (("body_distance_min", "minimal_distance", "Body to obstacle"),
+                                ("ee_distance_min", "ee_distance", "End effector to obstacle")):
+        if signal in recording:
+            yield Metric(name, f"{label}, smallest", _finite(np.min(recording[signal])), "m",
+                         lower_is_better=False, group="Safety")
+
+
+def _motion(recording: Recording) -> Iterator[Metric]:
+    v, group = recording["v"], "Safety"
+    yield _joint_limit_excess(recording)
+    yield Metric("speed_max", "Joint speed, largest", _largest(v), "rad/s", group=group)
+    yield Metric("velocity_step_max", "Joint speed step in a tick, largest",
+                 _largest(np.diff(v, axis=0)), "rad/s", group=group)
+    yield Metric("acceleration_max", "Joint acceleration, largest", _largest(recording["a"]),
+                 "rad/s^2", group=group)
+
+
+def _joint_limit_excess(recording: Recording) -> Metric:
+    value, note = None, "the robot has no joint limits"
+    if "joint_lower" in recording and "joint_upper" in recording:
+        lower, upper, q = recording["joint_lower"], recording["joint_upper"], recording["q"]
+        if np.isfinite(lower).any() or np.isfinite(upper).any():
+            excess = np.maximum(q - upper, lower - q).max(axis=0)
+            joint = int(np.argmax(excess))
+            value = _finite(max(float(excess[joint]), 0.0))
+            note = f"joint {joint + 1}" if excess[joint] > 0.0 else ""
+    return Metric("joint_limit_excess", "Beyond a joint limit, largest", value, "rad",
+                  group="Safety", note=note)
+
+
+def _switching(recording: Recording) -> Iterator[Metric]:
+    yield Metric("stack_changes", "Changes of the stack", float(recording.switches().size), "",
+                 group="Switching")
+    if "active_control_point" in recording:
+        changes = np.count_nonzero(np.diff(recording["active_control_point"].astype(int)))
+        yield Metric("active_point_changes", "Changes of the active control point",
+                     float(changes), "", group="Switching")
+
+
+def _time(recording: Recording) -> Iterator[Metric]:
+    if "status" in recording:
+        from solvers import Status
+        failed = np.count_nonzero(recording["status"] != int(Status.SOLVED))
+        yield Metric("ticks_not_solved", "Ticks not solved", float(failed), "", group="Computing")
+    parts = (("time_tick", "Whole tick"), ("time_kinematics", "Kinematics"), ("time_rows", "Rows"),
+             ("time_resolve", "Resolve"))
+    levels = (("median", 50.0, "median"), ("p95", 95.0, "95 %"), ("p999", 99.9, "99.9 %"))
+    for signal, part in parts:
+        for key, percent, label in levels if signal in recording else ():
+            yield Metric(f"{signal}_{key}", f"{part}, {label}",
+                         _finite(np.percentile(recording[signal], percent)), "s",
+                         group="Computing",
+                         detail=key != "median" and signal in ("time_kinematics", "time_rows"))
+
+
+def _largest(values: Array) -> float | None:
+    return _finite(np.abs(values).max()) if values.size else None
+
+
+def _finite(value: Any) -> float | None:
+    return float(value) if np.isfinite(value) else None

@@ -1,0 +1,123 @@
+import hand_made
+import numpy as np
+import pytest
+from hand_made import recording
+
+from scenarios.metrics import as_plain_data, measure
+
+
+def value(name, **signals):
+    return measure(recording(**signals))[name].value
+
+
+def test_position_error_is_the_norm_over_axes_and_the_start_can_be_left_out():
+    error = np.zeros((5, 3))
+    error[0] = (3e-3, 4e-3, 0.0)  # 5 mm at t = 0
+    error[4] = (0.0, 0.0, 1e-3)  # 1 mm at t = 4 s; [2, 4] s has three ticks
+    found = measure(recording(position_error=error))
+    assert found["position_error_max"].value == pytest.approx(5e-3)
+    assert found["position_error_rms"].value == pytest.approx(np.sqrt(26e-6 / 5))
+    assert found["position_error_max_settled"].value == pytest.approx(1e-3)
+    assert found["position_error_rms_settled"].value == pytest.approx(np.sqrt(1e-6 / 3))
+    assert found["position_error_median_settled"].value == 0.0
+
+
+def test_a_run_shorter_than_the_start_has_no_settled_error_rather_than_zero():
+    found = measure(recording(t=[0.0, 0.1]))
+    assert found["position_error_rms_settled"].value is None
+    assert found["position_error_max_settled"].shown() == "–"
+
+
+def test_cone_violation_is_an_angle_beyond_the_cone_and_a_share_of_ticks():
+    angles = np.radians([50.0, 60.0, 60.001, 61.0, 63.0])  # the cone is 60 degrees
+    error = np.cos(np.radians(60.0)) - np.cos(angles)
+    found = measure(recording(pointing_error=error))
+    assert found["cone_violation_max"].value == pytest.approx(3.0)
+    assert found["cone_violation_share"].value == pytest.approx(2 / 5)  # 0.001 degrees is on it
+
+
+def test_inside_the_cone_nothing_is_violated():
+    assert value("cone_violation_max") == 0.0
+    assert value("cone_violation_share") == 0.0
+
+
+def test_distances_are_the_smallest_and_more_is_better():
+    found = measure(recording(minimal_distance=[1, 0.2, 0.3, 1, 1], ee_distance=[1, 1, 1, 1, 0.1]))
+    assert found["body_distance_min"].value == pytest.approx(0.2)
+    assert found["ee_distance_min"].value == pytest.approx(0.1)
+    assert found["body_distance_min"].lower_is_better is False
+
+
+def test_motion_counts_either_sign_and_the_step_between_neighbouring_ticks():
+    v = np.array([[0, 0], [1, 0], [1, -3], [1, -2], [1, -2]], float)
+    found = measure(recording(v=v, a=-7.0 * np.eye(5, 2)))
+    assert found["speed_max"].value == 3.0
+    assert found["velocity_step_max"].value == 3.0
+    assert found["acceleration_max"].value == 7.0
+
+
+def test_joint_limit_excess_names_the_joint_that_is_furthest_out():
+    q = np.zeros((5, 2))
+    q[1] = (2.1, -2.25)  # limits are -2 and 2
+    metric = measure(recording(q=q))["joint_limit_excess"]
+    assert metric.value == pytest.approx(0.25)
+    assert metric.note == "joint 2"
+    assert value("joint_limit_excess") == 0.0
+
+
+def test_a_robot_without_limits_has_no_excess_rather_than_none_of_it():
+    metric = measure(recording(joint_lower=[-np.inf] * 2, joint_upper=[np.inf] * 2))
+    assert metric["joint_limit_excess"].value is None
+
+
+def test_changes_are_counted_between_ticks():
+    assert value("stack_changes", order=[0, 1, 1, 0, 0]) == 2
+    assert value("active_point_changes", active_control_point=[-1, 6, 6, 7, -1]) == 3
+
+
+def test_times_are_given_by_median_and_tails_for_each_part():
+    found = measure(recording(t=np.arange(1001.0), time_resolve=np.arange(1001) * 1e-6))
+    assert found["time_resolve_median"].value == pytest.approx(500e-6)
+    assert found["time_resolve_p95"].value == pytest.approx(950e-6)
+    assert found["time_resolve_p999"].value == pytest.approx(999e-6)
+    assert found["time_kinematics_median"].shown() == "1.00"
+    assert found["time_kinematics_median"].shown_unit == "µs"
+
+
+def test_ticks_that_were_not_solved_are_counted():
+    from solvers import Status
+
+    other = next(int(status) for status in Status if status != Status.SOLVED)
+    solved = int(Status.SOLVED)
+    assert value("ticks_not_solved", status=[solved, other, other, solved, solved]) == 2
+
+
+def test_a_scenario_without_a_task_has_no_metric_of_it():
+    full = recording()
+    for signal in ("pointing_error", "minimal_distance", "ee_distance", "position_error"):
+        del full.signals[signal]
+    assert {"cone_violation_max", "body_distance_min", "ee_distance_min", "position_error_rms"
+            }.isdisjoint(measure(full))
+    no_cone = recording(hand_made.HandMadeScenario(pointing=None))
+    assert "cone_violation_max" not in measure(no_cone)
+
+
+def test_a_run_of_no_ticks_has_no_metrics():
+    empty = recording()
+    empty.signals["t"] = np.empty(0)
+    assert measure(empty) == {}
+
+
+def test_a_number_that_is_not_finite_is_left_out_of_the_file_and_not_passed_off_as_one():
+    data = as_plain_data(recording(a=np.full((5, 2), np.nan), fault="diverged at tick 5"))
+    assert data["metrics"]["acceleration_max"]["value"] is None
+    assert data["fault"] == "diverged at tick 5"
+    assert data["ticks"] == 5
+
+
+def test_every_metric_says_unit_name_and_direction():
+    for metric in measure(recording()).values():
+        assert metric.label
+        assert metric.group
+        assert isinstance(metric.shown_unit, str)
+        assert metric.lower_is_better in (True, False, None)
