@@ -1,0 +1,226 @@
+"""The same scenarios under several resolvers: run, measured, and laid side by side."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import re
+import shlex
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property, partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from scenarios import metrics
+from scenarios.folders import claim, write_text
+from scenarios.metrics import Metric
+from scenarios.recording import Recording, save, versions
+
+if TYPE_CHECKING:
+    from scenarios.config import Scenario
+
+DEFAULT_RESOLVERS = ("tpm", "tpm:form=staircase", "recursive", "augmented", "hqp")
+
+Progress = Callable[[str, int, int], None]
+
+
+@dataclass(frozen=True)
+class Run:
+    """One scenario under one resolver, with what came of it.
+
+    `recording` is None when the run could not begin or broke; `error` then says why.
+    """
+
+    scenario: Scenario
+    spec: str
+    label: str
+    recording: Recording | None = None
+    error: str | None = None
+
+    @property
+    def fault(self) -> str | None:
+        """Why the run did not reach its end, or None when it did."""
+        return self.error or (self.recording.fault if self.recording else None)
+
+    @property
+    def folder(self) -> str:
+        """Where the run lies below the comparison's own folder."""
+        return f"{_slug(self.scenario.name)}/{_slug(self.spec)}"
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """The resolver's settings as they were used."""
+        resolver = self.scenario.make_resolver()
+        return {field.name: getattr(resolver, field.name) for field in dataclasses.fields(resolver)
+                } if dataclasses.is_dataclass(resolver) else {}
+
+    @cached_property
+    def metrics(self) -> dict[str, Metric]:
+        """What was measured on it, by name; empty without a recording."""
+        return metrics.measure(self.recording) if self.recording else {}
+
+
+@dataclass(frozen=True)
+class Row:
+    """One line of the table: a metric, its value for each run, and which of them are best."""
+
+    label: str
+    unit: str
+    group: str
+    cells: tuple[str, ...]
+    notes: tuple[str, ...]
+    best: frozenset[int]
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Runs in the order asked for, scenario by scenario."""
+
+    runs: tuple[Run, ...]
+    command: str
+    versions: dict[str, str]
+
+    @property
+    def faults(self) -> list[Run]:
+        """The runs that did not reach their end."""
+        return [run for run in self.runs if run.fault]
+
+    def by_scenario(self) -> dict[str, list[Run]]:
+        """Return the runs of each scenario, by its name."""
+        names = dict.fromkeys(run.scenario.name for run in self.runs)
+        return {name: [run for run in self.runs if run.scenario.name == name] for name in names}
+
+
+def compare(scenarios: Iterable[str | Scenario] | str, resolvers: Sequence[str] = DEFAULT_RESOLVERS,
+            out: str | Path | None = None, progress: Progress | None = None,
+            command: str | None = None) -> Comparison:
+    """Run every scenario under every resolver, one after the other, and compare.
+
+    With `out`, each run's folder is out/<scenario>/<resolver>, the page is out/index.html and the
+    numbers are in out/comparison.json. A run that breaks or faults does not lose the others;
+    Ctrl-C keeps what was run so far.
+
+    Parameters
+    ----------
+    scenarios : names, paths or Scenario objects.
+    resolvers : specs `name` or `name:setting=value:setting=value`.
+    progress : called as progress(label, ticks done, ticks in all).
+    command : the command line to print on the page; made up from the names if not given.
+
+    Raises
+    ------
+    HierarchyError : before anything is run: an unknown scenario, resolver or setting, or an output
+        folder that is in use.
+    """
+    planned = _plan([scenarios] if isinstance(scenarios, str) else scenarios, resolvers)
+    folder = None if out is None else claim(out)
+    runs: list[Run] = []
+    for run in planned:
+        try:
+            runs.append(_carried_out(run, folder, progress))
+        except KeyboardInterrupt:
+            runs.append(dataclasses.replace(run, error="interrupted"))
+        if _interrupted(runs[-1]):
+            break
+    comparison = Comparison(tuple(runs), command or _command(planned, out), versions())
+    if folder is not None:
+        _write(comparison, folder)
+    return comparison
+
+
+def table(runs: Sequence[Run], details: bool = True) -> list[Row]:
+    """Return the rows that compare runs of one scenario, best values marked.
+
+    Only runs that reached their end compete: the others' numbers cover less time. Values within
+    one percent of the best are as good, and where all are, none is marked.
+    """
+    known = {name: metric for run in runs for name, metric in run.metrics.items()
+             if details or not metric.detail}
+    return [_row(metric, [run.metrics.get(name) for run in runs],
+                 [run.fault is None for run in runs]) for name, metric in known.items()]
+
+
+def _row(metric: Metric, found: Sequence[Metric | None], competes: Sequence[bool]) -> Row:
+    cells = tuple(m.shown() if m else "–" for m in found)
+    values = {i: m.value for i, m in enumerate(found)
+              if m and m.value is not None and competes[i]}
+    return Row(metric.label, metric.shown_unit, metric.group, cells,
+               tuple(m.note if m else "" for m in found), _best(values, metric.lower_is_better))
+
+
+def _best(values: Mapping[int, float], lower: bool | None, tie: float = 0.01) -> frozenset[int]:
+    """Return which of the values are within `tie`, relative, of the best; empty if all are."""
+    if lower is None or not values:
+        return frozenset()
+    winner = min(values.values()) if lower else max(values.values())
+    best = frozenset(i for i, value in values.items()
+                     if abs(value - winner) <= tie * max(abs(value), abs(winner)))
+    return best if len(best) < len(values) else frozenset()
+
+
+def _plan(scenarios: Iterable[str | Scenario], resolvers: Sequence[str]) -> list[Run]:
+    from scenarios.config import load
+
+    loaded = [load(s) if isinstance(s, (str, Path)) else s for s in scenarios]
+    runs = []
+    for scenario in loaded:
+        for spec in dict.fromkeys(resolvers):
+            changed = scenario.with_resolver(spec)
+            runs.append(Run(changed, spec, str(changed.make_resolver().label)))
+    return [_distinct(run, runs) for run in runs]
+
+
+def _distinct(run: Run, runs: Sequence[Run]) -> Run:
+    """Return the run with its spec as its label where another resolver has the same label."""
+    same = {other.spec for other in runs if other.label == run.label}
+    return dataclasses.replace(run, label=run.spec) if len(same) > 1 else run
+
+
+def _carried_out(run: Run, folder: Path | None, progress: Progress | None) -> Run:
+    from scenarios.simulate import simulate
+
+    tell = partial(progress, run.label) if progress else None
+    try:
+        recording = simulate(run.scenario, progress=tell)
+    except Exception as error:  # one way's failure is a result, and must not lose the others'
+        return dataclasses.replace(run, error=f"{type(error).__name__}: {error}")
+    if folder is not None:
+        save(recording, folder / run.folder)
+    return dataclasses.replace(run, recording=recording)
+
+
+def _interrupted(run: Run) -> bool:
+    return bool(run.fault) and str(run.fault).startswith("interrupted")
+
+
+def _write(comparison: Comparison, folder: Path) -> None:
+    from scenarios.report import page
+
+    data = {"command": comparison.command, "versions": comparison.versions,
+            "runs": [_plain(run) for run in comparison.runs]}
+    write_text(folder / "comparison.json", json.dumps(data, indent=2, allow_nan=False) + "\n")
+    write_text(folder / "index.html", page(comparison))
+
+
+def _plain(run: Run) -> dict[str, Any]:
+    return {"scenario": run.scenario.name, "resolver": run.spec, "label": run.label,
+            "folder": run.folder, "fault": run.fault,
+            "settings": {name: _plain_value(value) for name, value in run.settings.items()},
+            "ticks": run.recording.ticks if run.recording else 0,
+            "metrics": {name: metrics.plain(metric) for name, metric in run.metrics.items()}}
+
+
+def _plain_value(value: Any) -> Any:
+    return value if isinstance(value, (bool, int, float, str, type(None))) else repr(value)
+
+
+def _command(planned: Sequence[Run], out: str | Path | None) -> str:
+    names = dict.fromkeys(run.scenario.name for run in planned)
+    specs = ",".join(dict.fromkeys(run.spec for run in planned))
+    where = ["--out", str(out)] if out is not None else []
+    return shlex.join(["hierarchy", "compare", *names, "--resolvers", specs, *where])
+
+
+def _slug(text: str) -> str:
+    return re.sub(r"[^A-Za-z0-9._]+", "-", text).strip("-.") or "unnamed"

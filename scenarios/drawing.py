@@ -1,0 +1,133 @@
+"""How every figure looks: colours, thinning of long curves, projection, SVG for a page."""
+
+from __future__ import annotations
+
+import io
+import itertools
+import re
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+# Text, axes and desired curves. In an inline SVG it becomes the page's own text colour.
+INK = "#0b0c0d"
+ALERT = "#d33a2c"
+
+# Okabe and Ito's colours, safe for colour-blind readers and legible on white and on near-black.
+_BY_LABEL = {"tpm published": "#0072b2", "tpm staircase": "#56b4e9", "recursive": "#e69f00",
+             "augmented": "#cc79a7", "hqp": "#009e73", "hcod": "#d55e00", "weighted": "#a8781e",
+             "sns": "#8a8f98"}
+# Tol's bright scheme, for the joints of one robot.
+JOINTS = ("#4477aa", "#ee6677", "#228833", "#ccbb44", "#66ccee", "#aa3377", "#999999", "#dd7733")
+
+_STYLE: dict[Any, Any] = {
+    "font.size": 9.0, "axes.titlesize": 9.0, "axes.titlelocation": "left", "legend.frameon": False,
+    "axes.edgecolor": INK, "axes.labelcolor": INK, "text.color": INK, "xtick.color": INK,
+    "ytick.color": INK, "grid.color": INK, "grid.alpha": 0.12, "grid.linewidth": 0.6,
+    "axes.grid": True, "axes.linewidth": 0.6, "lines.linewidth": 1.0, "axes.facecolor": "none",
+    "axes.spines.top": False, "axes.spines.right": False, "xtick.major.width": 0.6,
+    "ytick.major.width": 0.6, "svg.fonttype": "none", "figure.dpi": 72.0}
+
+
+def colours(labels: Iterable[str]) -> dict[str, str]:
+    """Return a colour for each label: the same one for a resolver wherever it appears."""
+    labels = list(labels)
+    chosen = {label: _BY_LABEL[label] for label in labels if label in _BY_LABEL}
+    spare = [colour for colour in _BY_LABEL.values() if colour not in chosen.values()]
+    for label in labels:
+        if label not in chosen:
+            chosen[label] = spare.pop(0) if spare else JOINTS[len(chosen) % len(JOINTS)]
+    return chosen
+
+
+def figure(rows: int = 1, width: float = 3.3, height: float = 2.1) -> tuple[Figure, list[Axes]]:
+    """Return a figure of `rows` axes one under the other, in inches, in this project's style."""
+    with matplotlib.rc_context(_STYLE):
+        fig = Figure(figsize=(width, height), layout="constrained")
+        axes = fig.subplots(rows, 1, sharex=True, squeeze=False)[:, 0]
+    return fig, list(axes)
+
+
+def envelope(y: Array, buckets: int = 350) -> NDArray[np.int64]:
+    """Return the indices that keep the shape of a long curve: each bucket's extremes and ends.
+
+    y is (T,); every smallest and largest value, and so every peak, stays. NaN is left out.
+    """
+    if len(y) <= 3 * buckets:
+        return np.arange(len(y))
+    edges = np.linspace(0, len(y), buckets + 1).astype(int)
+    kept = {0, len(y) - 1}
+    for first, last in itertools.pairwise(edges):
+        part = y[first:last]
+        if np.isnan(part).all():
+            kept.add(first)
+        else:
+            kept.update((first + int(np.nanargmin(part)), first + int(np.nanargmax(part))))
+    return np.array(sorted(kept))
+
+
+def curve(ax: Axes, t: Array, y: Array, **style: Any) -> None:
+    """Plot y over t, thinned."""
+    kept = envelope(y)
+    ax.plot(t[kept], y[kept], **style)
+
+
+def spans(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """Return (first, last + 1) of every run of True in mask (T,)."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], mask, [False])).astype(np.int8)))
+    return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
+
+
+def project(points: Array, azimuth: float = 150.0, elevation: float = 30.0) -> Array:
+    """Return the orthographic picture (..., 2) of points (..., 3); angles in degrees."""
+    a, e = np.radians([azimuth, elevation])
+    right = np.array([-np.sin(a), np.cos(a), 0.0])
+    up = np.array([-np.sin(e) * np.cos(a), -np.sin(e) * np.sin(a), np.cos(e)])
+    return np.asarray(points @ np.column_stack([right, up]))
+
+
+def shared_limits(ranges: Sequence[tuple[float, float]], factor: float = 4.0
+                  ) -> tuple[float, float]:
+    """Return limits that fit every range, but for those that would flatten all the others.
+
+    A range more than `factor` times as wide as the median one is left to be cut.
+    """
+    widths = np.array([high - low for low, high in ranges])
+    usual = factor * np.median(widths)
+    kept = [r for r, width in zip(ranges, widths, strict=True) if width <= usual]
+    low, high = min(low for low, _ in kept), max(high for _, high in kept)
+    margin = 0.04 * (high - low) or 1.0
+    return low - margin, high + margin
+
+
+def svg(fig: Figure, title: str) -> str:
+    """Return a figure as an inline `<svg>` that scales, follows the page's theme and is named."""
+    text = io.StringIO()
+    with matplotlib.rc_context({**_STYLE, "svg.hashsalt": title}):
+        fig.savefig(text, format="svg", transparent=True, metadata={"Date": None})
+    body = text.getvalue()[text.getvalue().index("<svg"):]
+    body = re.sub(r"<metadata>.*?</metadata>", "", body, flags=re.DOTALL)
+    body = re.sub(r' id="[a-zA-Z0-9]+_\d+"', "", body)
+    body = re.sub(r"<!--.*?-->\s*|\s*\n\s*", lambda m: "" if m[0][0] == "<" else " ", body)
+    body = re.sub(r"(?<=[ \"LM-])(\d+\.\d)\d+(?=[ \"])", r"\1", body)
+    body = body.replace(INK, "currentColor").replace("'DejaVu Sans'", "inherit")
+    head = f'<svg role="img" aria-label="{_escape(title)}" viewBox="'
+    return re.sub(r'<svg [^>]*?viewBox="', lambda _: head, body, count=1)
+
+
+def write(fig: Figure, stem: str) -> None:
+    """Write a figure as stem.svg and stem.png, on white."""
+    with matplotlib.rc_context({**_STYLE, "svg.hashsalt": "task-hierarchy"}):
+        fig.savefig(f"{stem}.svg", facecolor="white", metadata={"Date": None})
+        fig.savefig(f"{stem}.png", facecolor="white", dpi=160)
+
+
+def _escape(text: str) -> str:
+    return text.replace("&", "&amp;").replace('"', "&quot;").replace("<", "&lt;")

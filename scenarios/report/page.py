@@ -1,0 +1,162 @@
+"""A comparison as one self-contained HTML page: verdict, table, figures, settings, versions."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cache
+from html import escape
+from importlib.resources import files
+from itertools import groupby
+from string import Template
+from typing import TYPE_CHECKING, Any
+
+from matplotlib.figure import Figure
+
+from scenarios import drawing, figures
+from scenarios.report.verdict import in_words, verdict
+
+if TYPE_CHECKING:
+    from scenarios.compare import Comparison, Row, Run
+    from scenarios.recording import Recording
+
+
+def page(comparison: Comparison) -> str:
+    """Return the page; it refers to nothing outside itself but the run folders beside it."""
+    by_scenario = comparison.by_scenario()
+    sections = [_scenario(name, runs) for name, runs in by_scenario.items()]
+    return Template(_resource("page.html")).substitute(
+        title=escape(f"{', '.join(by_scenario)}: a comparison of resolvers"),
+        style=_resource("style.css"), sections="\n".join(sections),
+        command=escape(comparison.command), versions=_pairs(comparison.versions))
+
+
+def _scenario(name: str, runs: Sequence[Run]) -> str:
+    recordings = {run.label: run.recording for run in runs
+                  if run.recording is not None and run.recording.ticks > 1}
+    parts = [_lead(name, runs, recordings), _faults(runs), _table(runs)]
+    if recordings:
+        parts += [_overlays(name, recordings), *_panels(name, recordings)]
+    return "\n".join([*parts, _settings(runs)])
+
+
+def _lead(name: str, runs: Sequence[Run], recordings: Mapping[str, Recording]) -> str:
+    scenario = runs[0].scenario
+    ways = "one way" if len(runs) == 1 else f"{in_words(len(runs))} ways"
+    drawn = [r for r in recordings.values() if "ee_position" in r]
+    scene = _svg(figures.picture(drawn), f"{name}: the paths taken") if drawn else ""
+    caption = "Dashed: the path asked for. Red: the obstacles, with ε₁ and ε₂ around them."
+    figure = (f'<figure>{scene}<figcaption class="quiet">{caption}</figcaption></figure>'
+              if scene else "")
+    return f"""<header class="lead"><div>
+<p class="quiet">hierarchy compare · <b>{escape(name)}</b></p>
+<h1>{escape(scenario.title or name)}, resolved in {ways}</h1>
+<p class="verdict">{escape(verdict(runs))}</p>
+<p class="quiet">{escape(scenario.description)}</p>
+{_legend([run.label for run in runs])}</div>
+{figure}</header>"""
+
+
+def _faults(runs: Sequence[Run]) -> str:
+    return "".join(f'<p class="alert"><b>{escape(run.label)}</b> did not reach the end: '
+                   f"{escape(str(run.fault))}.</p>" for run in runs if run.fault)
+
+
+def _table(runs: Sequence[Run]) -> str:
+    from scenarios.compare import table
+
+    colour = drawing.colours([run.label for run in runs])
+    heads = "".join(f"<th>{_chip(colour[run.label])}{escape(run.label)}</th>" for run in runs)
+    out = [run.fault is not None for run in runs]
+    body = []
+    for group, rows in groupby(table(runs), key=lambda row: row.group):
+        body.append(f'<tr class="group"><th colspan="{len(runs) + 1}">{escape(group)}</th></tr>')
+        body += [_line(row, out) for row in rows]
+    return f"""<section><h2>In numbers</h2>
+<p class="quiet">Best of each row in colour, with a dot; within 1 % is as good, and a row where all
+are is unmarked.</p>
+<div class="scroll"><table><thead><tr><th></th>{heads}</tr></thead>
+<tbody>{"".join(body)}</tbody></table></div></section>"""
+
+
+def _line(row: Row, out: Sequence[bool]) -> str:
+    unit = f" <small class='quiet'>[{escape(row.unit)}]</small>" if row.unit else ""
+    cells = []
+    for i, (cell, note) in enumerate(zip(row.cells, row.notes, strict=True)):
+        kind = "best" if i in row.best else "out" if out[i] else ""
+        title = f' title="{escape(note)}"' if note else ""
+        cells.append(f'<td class="{kind}"{title}>{escape(cell)}</td>')
+    return f"<tr><th>{escape(row.label)}{unit}</th>{''.join(cells)}</tr>"
+
+
+def _overlays(name: str, recordings: Mapping[str, Recording]) -> str:
+    first = next(iter(recordings))
+    drawn = []
+    if all("position_error" in r for r in recordings.values()):
+        drawn.append(("Distance from the path [mm]",
+                      figures.overlay(figures.position_error, recordings)))
+    if len(recordings) > 1:
+        drawn.append((f"How far the joints depart from those of {first} [rad]",
+                      figures.departure(recordings)))
+    if all("time_tick" in r for r in recordings.values()):
+        drawn.append(("Computing, median of kinematics, rows, resolve (light to full); "
+                      "whole tick: | median, ⅄ 95 %, × 99.9 %", figures.computing_time(recordings)))
+    body = "".join(f"<figure><figcaption><b>{escape(title)}</b></figcaption>"
+                   f"{_svg(fig, f'{name}: {title}')}</figure>" for title, fig in drawn)
+    return (f"<section><h2>Laid over each other</h2>{_legend(recordings)}"
+            f'<div class="wide">{body}</div></section>')
+
+
+def _panels(name: str, recordings: Mapping[str, Recording]) -> list[str]:
+    sections, colour = [], drawing.colours(recordings)
+    for panel in figures.PANELS:
+        drawn = figures.side_by_side(panel, recordings)
+        body = "".join(f"<figure><figcaption>{_chip(colour[label])}{escape(label)}</figcaption>"
+                       f"{_svg(fig, f'{name}, {label}: {panel.title}')}</figure>"
+                       for label, fig in drawn.items())
+        if drawn:
+            unit = f"<small class='quiet'>[{escape(panel.unit)}] over time [s]</small>"
+            sections.append(f"<section><h2>{escape(panel.title)} {unit}</h2>"
+                            f'<p class="quiet">{escape(panel.explains)}</p>'
+                            f'<div class="panels">{body}</div></section>')
+    return sections
+
+
+def _settings(runs: Sequence[Run]) -> str:
+    rows = "".join(
+        f"<tr><th>{escape(run.label)}</th><td><code>{escape(_settings_text(run.settings))}</code></td>"
+        f'<td><a href="{escape(run.folder)}/">{escape(run.folder)}/</a></td></tr>' for run in runs)
+    return f"""<section><h2>Settings</h2>
+<p class="quiet">As they were used, damping included; every run's folder has the whole scenario.</p>
+<div class="scroll"><table class="plain"><tbody>{rows}</tbody></table></div>
+<details><summary>The scenario as run by {escape(runs[0].label)}</summary>
+<pre><code>{escape(runs[0].scenario.to_toml())}</code></pre></details></section>"""
+
+
+def _settings_text(settings: Mapping[str, Any]) -> str:
+    return ", ".join(f"{name} = {value!r}" for name, value in settings.items()) or "none"
+
+
+def _pairs(pairs: Mapping[str, str]) -> str:
+    rows = "".join(f"<tr><th>{escape(a)}</th><td>{escape(b)}</td></tr>" for a, b in pairs.items())
+    return f'<div class="scroll"><table class="plain"><tbody>{rows}</tbody></table></div>'
+
+
+def _legend(labels: Any) -> str:
+    chosen = drawing.colours(labels)
+    return '<div class="legend">' + "".join(
+        f"<span>{_chip(colour)}{escape(label)}</span>"
+        for label, colour in sorted(chosen.items(), key=lambda pair: list(labels).index(pair[0]))
+    ) + "</div>"
+
+
+def _chip(colour: str) -> str:
+    return f'<span class="chip" style="background:{colour}"></span>'
+
+
+def _svg(fig: Figure, title: str) -> str:
+    return drawing.svg(fig, title)
+
+
+@cache
+def _resource(name: str) -> str:
+    return files("scenarios.report").joinpath(name).read_text(encoding="utf-8")
