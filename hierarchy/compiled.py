@@ -13,28 +13,29 @@ import sys
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import numba
 from numba.core import event
 
-_Function = TypeVar("_Function", bound=Callable[..., Any])
+# Kernels carry no annotations: their types are those of the first call.
+Kernel = Callable[..., Any]
 
 
-def compiled(function: _Function) -> _Function:
+def compiled(function: Kernel) -> Kernel:
     """Compile `function` for the types it is first called with, and keep the result on disk.
 
     IEEE arithmetic as written (no fastmath), division by zero gives inf or NaN as in numpy, the
     GIL is released. With `NUMBA_DISABLE_JIT=1` the plain function runs, for debugging.
     """
     files = _files_behind(function)
-    kernel = _jit_into(_cache_root() / _digest(tuple(sorted(files))), function)
+    kernel: Kernel = _jit_into(_cache_root() / _digest(tuple(sorted(files))), function)
     if not isinstance(kernel, type(function)):
-        kernel.source_files = files
-    return kernel  # type: ignore[no-any-return]
+        kernel.source_files = files  # type: ignore[attr-defined]
+    return kernel
 
 
-def _files_behind(function: Callable[..., Any]) -> frozenset[str]:
+def _files_behind(function: Kernel) -> frozenset[str]:
     code = function.__code__
     called = (function.__globals__.get(name) for name in code.co_names)
     behind = (getattr(kernel, "source_files", ()) for kernel in called)
@@ -51,11 +52,11 @@ def _digest(files: tuple[str, ...]) -> str:
 def _cache_root() -> Path:
     base = os.environ.get("NUMBA_CACHE_DIR")
     if base is None:
-        base = os.environ.get("XDG_CACHE_HOME", os.path.expanduser("~/.cache"))
-    return Path(base) / "task-hierarchy"
+        base = os.environ.get("XDG_CACHE_HOME", "~/.cache")
+    return Path(base).expanduser() / "task-hierarchy"
 
 
-def _jit_into(folder: Path, function: Callable[..., Any]) -> Any:
+def _jit_into(folder: Path, function: Kernel) -> Any:
     before = numba.config.CACHE_DIR
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -68,7 +69,7 @@ def _jit_into(folder: Path, function: Callable[..., Any]) -> Any:
         numba.config.CACHE_DIR = before
 
 
-class _FirstCompilation(event.Listener):
+class _FirstCompilation(event.Listener):  # type: ignore[misc]
     """Says once that kernels are being compiled; numba sends the event only on a cache miss."""
 
     def on_start(self, event: Any) -> None:

@@ -1,5 +1,7 @@
 """Paths in space as functions of time: position, velocity and acceleration."""
 
+# mypy: disable-error-code="no-untyped-def"
+
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
@@ -80,7 +82,8 @@ class Waypoints(Path):
 
     def __post_init__(self) -> None:
         if len(self.times) != len(self.points) or not self.times:
-            raise HierarchyError(f"waypoints: {len(self.times)} times for {len(self.points)} points")
+            raise HierarchyError(f"waypoints: {len(self.times)} times for "
+                                 f"{len(self.points)} points")
         if any(b <= a for a, b in zip(self.times, self.times[1:], strict=False)):
             raise HierarchyError(f"waypoints: times must increase, got {list(self.times)}")
         for i, point in enumerate(self.points):
@@ -109,7 +112,7 @@ def _check(name: str, vector: Vector) -> None:
 
 
 @compiled
-def _write_ellipse(t, packed, rate, out):  # type: ignore[no-untyped-def]
+def _write_ellipse(t, packed, rate, out):
     c, s = cos(rate * t), sin(rate * t)
     for i in range(3):
         along = packed[1, i] * c + packed[2, i] * s

@@ -1,5 +1,7 @@
 """Robot and State: the only module that calls pinocchio, and everything a task may read."""
 
+# mypy: disable-error-code="no-untyped-def"
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -100,8 +102,9 @@ class Robot:
         return Frame(name, int(frame.parentJoint), frame.placement.translation.copy(),
                      np.ascontiguousarray(frame.placement.rotation))
 
-    def control_point(self, joint: str, offset: ArrayLike, name: str | None = None) -> ControlPoint:
-        """Attach a point to the body that `joint` moves, `offset` (3,) [m] in that joint's frame."""
+    def control_point(self, joint: str, offset: ArrayLike,
+                      name: str | None = None) -> ControlPoint:
+        """Attach a point to the body that `joint` moves; offset (3,) [m] in that joint's frame."""
         return ControlPoint(name or f"{joint} {np.asarray(offset).tolist()}", self.joint(joint),
                             np.array(offset, dtype=float))
 
@@ -208,7 +211,7 @@ class State:
 
 
 @compiled
-def _copy_kinematics(J, placements, previous_J, previous_placements):  # type: ignore[no-untyped-def]
+def _copy_kinematics(J, placements, previous_J, previous_placements):
     previous_J[:] = J
     previous_placements[:] = placements
 

@@ -105,7 +105,7 @@ class Stack:
         return hierarchy
 
     def _prepare(self, order: tuple[str, ...], n: int) -> Hierarchy:
-        if not order:
+        if not self._tasks:
             raise HierarchyError("the stack is empty: nothing is asked of the robot")
         sizes = np.array([self[name].dimension for name in order], dtype=np.int64)
         m = int(sizes.sum())

@@ -1,5 +1,7 @@
 """What the sensor tells the controller in one tick: distances, directions, magnitudes."""
 
+# mypy: disable-error-code="no-untyped-def"
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -76,7 +78,7 @@ def measure_exactly(measurement: Measurement, placements: Array, joints: NDArray
 
 
 @compiled
-def _measure(placements, joints, offsets, obstacles, laws, mean_within,  # type: ignore[no-untyped-def]
+def _measure(placements, joints, offsets, obstacles, laws, mean_within,
              points, distance, direction, magnitude, nearest):
     away, best, total = np.empty(3), np.empty(3), np.empty(3)
     count = len(joints)
@@ -90,10 +92,10 @@ def _measure(placements, joints, offsets, obstacles, laws, mean_within,  # type:
         total[:] = 0.0
         for j in range(obstacles.shape[0]):
             D = distance_to_obstacle(obstacles[j], points[k, 0], points[k, 1], points[k, 2], away)
-            if D < D_min:  # (22)
+            if D_min > D:  # (22)
                 D_min, at = D, j
                 best[:] = away
-            if mean_within > 0.0 and D < mean_within:
+            if mean_within > 0.0 and mean_within > D:
                 total += away  # (25); the factor 1/h is lost in (26)
         distance[k], nearest[k] = D_min, at
         if at < 0:

@@ -1,5 +1,7 @@
 """Obstacles: points, spheres, capsules and boxes, still or moving on a path."""
 
+# mypy: disable-error-code="no-untyped-def"
+
 from __future__ import annotations
 
 from collections.abc import Sequence
@@ -79,7 +81,7 @@ class Obstacles:
 
 
 @compiled
-def distance_to_obstacle(obstacle, x, y, z, away):  # type: ignore[no-untyped-def]
+def distance_to_obstacle(obstacle, x, y, z, away):
     """Signed distance of a point to one obstacle; `away` (3,) gets the unit vector off it.
 
     Negative inside. Where the direction is undefined (on a point, at a centre or on an axis),
@@ -108,7 +110,7 @@ def distance_to_obstacle(obstacle, x, y, z, away):  # type: ignore[no-untyped-de
 
 
 @compiled
-def _off_box(hx, hy, hz, px, py, pz):  # type: ignore[no-untyped-def]
+def _off_box(hx, hy, hz, px, py, pz):
     dx, dy, dz = abs(px) - hx, abs(py) - hy, abs(pz) - hz
     sx, sy, sz = (1.0 if px >= 0 else -1.0), (1.0 if py >= 0 else -1.0), (1.0 if pz >= 0 else -1.0)
     if dx <= 0.0 and dy <= 0.0 and dz <= 0.0:  # inside: out through the nearest face

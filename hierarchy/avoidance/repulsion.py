@@ -1,5 +1,7 @@
 """Magnitude of the repulsive vector, eq. (23) in a form for which (24) holds."""
 
+# mypy: disable-error-code="no-untyped-def"
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -43,7 +45,8 @@ class Repulsion:
 
 
 @compiled
-def repulsion(D, r_max, rho, gamma, scale):  # type: ignore[no-untyped-def]
+def repulsion(D, r_max, rho, gamma, scale):
+    """Magnitude r(D) of eq. (23); see `Repulsion`."""
     exponent = (D * scale / rho - 1.0) * gamma
     if exponent > 700.0:  # exp would overflow; r is zero to rounding long before
         return 0.0

@@ -1,5 +1,7 @@
 """Avoidance by a control point of the body: 3-D (28), or relaxed to one row (29)."""
 
+# mypy: disable-error-code="no-untyped-def"
+
 from __future__ import annotations
 
 from collections.abc import Sequence
@@ -100,7 +102,7 @@ class Avoidance(Task):
 
 
 @compiled
-def _write(v, J, dJ, placements, supports, previous_J, previous_placements,  # type: ignore[no-untyped-def]
+def _write(v, J, dJ, placements, supports, previous_J, previous_placements,
            period, joints, offsets, k, direction, magnitude, acceleration, rows,
            A, lower, upper, row):
     n = A.shape[1]
@@ -110,21 +112,15 @@ def _write(v, J, dJ, placements, supports, previous_J, previous_placements,  # t
     if acceleration:
         write_point_jacobian_derivative(v, J, dJ, placements, supports, previous_J,
                                         previous_placements, period, joint, offset, dJ_c)
-    write_repulsion(v, J_c, dJ_c, r, magnitude[k], rows, A, lower, upper, row)
-
-
-@compiled
-def write_repulsion(v, J_c, dJ_c, r, magnitude, rows, A, lower, upper, row):  # type: ignore[no-untyped-def]
-    """Write the rows of eqs. (28) or (29) from a point's Jacobian, its drift and repulsion."""
     drift = np.empty(3)
     for i in range(3):
         drift[i] = row_times(dJ_c, i, v)
     if rows == 3:
         for i in range(3):
             A[row + i] = J_c[i]
-            write_equality(lower, upper, row + i, magnitude * r[i] - drift[i])  # (28)
+            write_equality(lower, upper, row + i, magnitude[k] * r[i] - drift[i])  # (28)
         return
     for c in range(A.shape[1]):
         A[row, c] = r[0] * J_c[0, c] + r[1] * J_c[1, c] + r[2] * J_c[2, c]
     write_equality(lower, upper, row,
-                   magnitude - (r[0] * drift[0] + r[1] * drift[1] + r[2] * drift[2]))  # (29)
+                   magnitude[k] - (r[0] * drift[0] + r[1] * drift[1] + r[2] * drift[2]))  # (29)

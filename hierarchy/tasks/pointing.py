@@ -1,5 +1,7 @@
 """Relaxed pointing: an axis of a frame on, or inside, a cone (eqs. 16-21)."""
 
+# mypy: disable-error-code="no-untyped-def"
+
 from __future__ import annotations
 
 from dataclasses import dataclass, field
@@ -34,6 +36,7 @@ class Pointing(Task):
     name: str = "pointing"
     z_d: Array = field(init=False, repr=False, compare=False)
     z_e: Array = field(init=False, repr=False, compare=False)
+    cos_alpha_d: float = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         axis = np.array(self.axis, dtype=float)
@@ -44,6 +47,7 @@ class Pointing(Task):
             raise HierarchyError(f"task {self.name!r}: half_angle {self.half_angle} rad is "
                                  "outside 0 .. pi")
         object.__setattr__(self, "z_d", axis / length)
+        object.__setattr__(self, "cos_alpha_d", cos(self.half_angle))
         object.__setattr__(self, "z_e", np.ascontiguousarray(self.frame.rotation[:, 2]))
 
     @property
@@ -53,8 +57,12 @@ class Pointing(Task):
 
     def error(self, state: State) -> Array:
         """cos(alpha_d) - cos(alpha) (1,), positive outside the cone."""
-        cosine = float(self.z_d @ state.rotation(self.frame)[:, 2])
-        return np.array([cos(self.half_angle) - cosine])
+        return np.array([self.cone_error(state)])
+
+    def cone_error(self, state: State) -> float:
+        """The error as a number, cheap enough for every tick of Algorithm 1."""
+        return float(_cone_error(state.placements, self.frame.joint, self.z_e, self.z_d,
+                                 self.cos_alpha_d))
 
     def jacobian(self, state: State) -> Array:
         """z_d^T S^T(z_e) J_O (1, n), eq. (19)."""
@@ -72,13 +80,21 @@ class Pointing(Task):
     def write(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
               row: int) -> None:
         """See `Task.write`."""
-        _write(*state.arrays, self.frame.joint, self.z_e, self.z_d, cos(self.half_angle),
+        _write(*state.arrays, self.frame.joint, self.z_e, self.z_d, self.cos_alpha_d,
                self.stiffness, self.damping, self.gain, level == "acceleration",
                self.kind == "inequality", A, lower, upper, row)
 
 
 @compiled
-def _write_jacobian(J, placements, supports, joint, z_e, z_d, A, row):  # type: ignore[no-untyped-def]
+def _cone_error(placements, joint, z_e, z_d, cos_alpha_d):
+    cosine = 0.0
+    for i in range(3):
+        cosine += z_d[i] * axis_at(placements, joint, z_e, i)  # (16)
+    return cos_alpha_d - cosine
+
+
+@compiled
+def _write_jacobian(J, placements, supports, joint, z_e, z_d, A, row):
     x, y, z = (axis_at(placements, joint, z_e, 0), axis_at(placements, joint, z_e, 1),
                axis_at(placements, joint, z_e, 2))
     cx, cy, cz = y * z_d[2] - z * z_d[1], z * z_d[0] - x * z_d[2], x * z_d[1] - y * z_d[0]
@@ -87,7 +103,7 @@ def _write_jacobian(J, placements, supports, joint, z_e, z_d, A, row):  # type: 
 
 
 @compiled
-def _write_jacobian_derivative(v, J, dJ, placements, supports,  # type: ignore[no-untyped-def]
+def _write_jacobian_derivative(v, J, dJ, placements, supports,
                                previous_J, previous_placements, period, joint, z_e, z_d, out):
     n = out.shape[1]
     if period > 0.0:
@@ -113,13 +129,11 @@ def _write_jacobian_derivative(v, J, dJ, placements, supports,  # type: ignore[n
 
 
 @compiled
-def _write(v, J, dJ, placements, supports, previous_J, previous_placements,  # type: ignore[no-untyped-def]
+def _write(v, J, dJ, placements, supports, previous_J, previous_placements,
            period, joint, z_e, z_d, cos_alpha_d, stiffness, damping, gain, acceleration,
            inequality, A, lower, upper, row):
     _write_jacobian(J, placements, supports, joint, z_e, z_d, A, row)
-    error = cos_alpha_d
-    for i in range(3):
-        error -= z_d[i] * axis_at(placements, joint, z_e, i)  # (16)
+    error = _cone_error(placements, joint, z_e, z_d, cos_alpha_d)
     if acceleration:
         A_dot = np.empty((1, A.shape[1]))
         _write_jacobian_derivative(v, J, dJ, placements, supports, previous_J,

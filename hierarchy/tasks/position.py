@@ -1,5 +1,7 @@
 """Position of a frame along a path, with the end-effector repulsion of eq. (30)."""
 
+# mypy: disable-error-code="no-untyped-def"
+
 from __future__ import annotations
 
 from dataclasses import dataclass, field
@@ -46,7 +48,8 @@ class Position(Task):
 
     def error(self, state: State) -> Array:
         """p_d - p (3,) [m]."""
-        return self.path(state.t)[0] - state.position(self.frame)
+        target: Array = self.path(state.t)[0]
+        return target - state.position(self.frame)
 
     def jacobian(self, state: State) -> Array:
         """Linear Jacobian of the frame's origin (3, n) [m]."""
@@ -63,11 +66,11 @@ class Position(Task):
 
     def desired_velocity(self, state: State) -> Array:
         """dp_d/dt (3,) [m/s]."""
-        return self.path(state.t)[1]
+        return np.asarray(self.path(state.t)[1])
 
     def desired_acceleration(self, state: State) -> Array:
         """d2p_d/dt2 (3,) [m/s^2]."""
-        return self.path(state.t)[2]
+        return np.asarray(self.path(state.t)[2])
 
     def reference_velocity(self, state: State) -> Array:
         """Closed loop plus repulsion (3,) [m/s]."""
@@ -102,7 +105,7 @@ _NOTHING_SEEN = (np.full(1, np.inf), np.zeros(1), np.zeros((1, 3)))
 
 
 @compiled
-def _write(v, J, dJ, placements, supports, previous_J, previous_placements,  # type: ignore[no-untyped-def]
+def _write(v, J, dJ, placements, supports, previous_J, previous_placements,
            period, joint, offset, target, stiffness, damping, gain, acceleration,
            distance, magnitude, direction, repulsion_within, A, lower, upper, row):
     write_point_jacobian(J, placements, supports, joint, offset, A, row)

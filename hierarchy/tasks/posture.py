@@ -52,7 +52,8 @@ class Posture(JointTask):
         if state.robot.nq != self.joints:
             raise HierarchyError(f"task {self.name!r}: {self.joints} targets for "
                                  f"{state.robot.nq} joint positions")
-        return np.asarray(self.target) - state.q
+        target: Array = np.asarray(self.target, dtype=float)
+        return target - state.q
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,190 @@
+"""From a scenario file to the parts of its control loop."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import radians
+
+import numpy as np
+
+from hierarchy import HierarchyError, Robot, Stack, State, Task
+from hierarchy.avoidance import Obstacle, Obstacles, Repulsion, SurveillanceAreas
+from hierarchy.paths import Ellipse, Path, Still, Waypoints
+from hierarchy.problem import Array
+from hierarchy.tasks import Avoidance, JointDamping, Pointing, Position, Posture
+from scenarios.config import (
+    EllipseSection,
+    ObstacleSection,
+    PathSection,
+    RepulsionSection,
+    RobotSection,
+    Scenario,
+    ScenarioError,
+    StartSection,
+    WaypointsSection,
+)
+from scenarios.plants import KinematicArm
+from scenarios.published import PublishedAvoidance
+from scenarios.sensors import ExactDistances
+from solvers import make
+
+
+@dataclass(frozen=True)
+class Cell:
+    """A robot with its start, its tasks and what it senses: everything the loop needs.
+
+    `position`, `pointing` are the tasks of that name or None; without `areas` nothing is avoided.
+    """
+
+    robot: Robot
+    state: State
+    plant: KinematicArm
+    stack: Stack
+    sensor: ExactDistances | None
+    areas: SurveillanceAreas | None
+    position: Position | None
+    pointing: Pointing | None
+
+
+def build(scenario: Scenario) -> Cell:
+    """Make the parts; raises HierarchyError where the scenario does not fit its robot."""
+    robot = make_robot(scenario.robot)
+    control, avoidance = scenario.control, scenario.avoidance
+    q, v = _start(robot, scenario.start)
+    differences = control.period if control.jacobian_derivative == "difference" else None
+    state = State(robot, differences)
+    sensor = _sensor(scenario, robot)
+    if sensor is not None:
+        sensor.check_start(robot.state(q, v))
+    position, pointing = _position(scenario, robot), _pointing(scenario, robot)
+    tasks = [task for task in (position, pointing, _avoidance(scenario, robot)) if task]
+    areas = avoidance and SurveillanceAreas(avoidance.near, avoidance.far, avoidance.end_effector)
+    return Cell(robot, state, KinematicArm(robot, q, v, control.period, control.level),
+                Stack(tasks, control.level, _reference(scenario, robot)), sensor, areas,
+                position, pointing)
+
+
+def make_robot(section: RobotSection) -> Robot:
+    """Make the robot of a scenario, with the control points the scenario asks for."""
+    if section.model.endswith((".urdf", ".xml", ".mjcf")):
+        robot = Robot.from_file(section.model, section.end_effector)
+    else:
+        robot = Robot.named(section.model)
+        if section.end_effector is not None:
+            robot.end_effector = robot.frame(section.end_effector).name
+    if section.control_points is not None:
+        robot.control_points = tuple(
+            robot.control_point(point.joint, point.offset) for point in section.control_points)
+    return robot
+
+
+def make_path(section: PathSection) -> Path:
+    """Make the path that a section describes."""
+    if isinstance(section, EllipseSection):
+        return Ellipse(section.centre, section.cosine, section.sine, section.rate)
+    if isinstance(section, WaypointsSection):
+        return Waypoints(section.times, section.points)
+    return Still(section.position)
+
+
+def make_obstacles(sections: tuple[ObstacleSection, ...]) -> Obstacles:
+    """Make the scene's obstacles, numbered from 1 in messages."""
+    return Obstacles([_obstacle(i, section) for i, section in enumerate(sections, 1)])
+
+
+def _obstacle(number: int, section: ObstacleSection) -> Obstacle:
+    path = section.path and make_path(section.path)
+    size = {"point": (), "sphere": (section.radius,),
+            "capsule": (section.radius, section.half_length),
+            "box": section.half_lengths}[section.shape]
+    return Obstacle(section.shape, section.centre or (0.0, 0.0, 0.0),
+                    tuple(float(s) for s in size or () if s is not None),
+                    np.array(section.rotation), path, f"obstacle {number}")
+
+
+def _start(robot: Robot, section: StartSection) -> tuple[Array, Array]:
+    q = np.zeros(robot.nq) if section.q is None else section.q
+    try:
+        state = robot.state(q, section.v)
+    except HierarchyError as error:
+        raise ScenarioError(f"start: {error}") from error
+    if section.end_effector is None:
+        return state.q.copy(), state.v.copy()
+    return _reach(robot, state.q.copy(), np.array(section.end_effector)), state.v.copy()
+
+
+_REACHED = 1e-6      # [m]
+_REACH_STEPS = 500   # damped Newton steps; a reachable point takes some ten
+_LONGEST_STEP = 0.3  # [rad] of any joint
+
+
+def _reach(robot: Robot, q: Array, point: Array) -> Array:
+    """Bring the end effector to a point [m] from q, or raise a ScenarioError."""
+    frame, resolver = robot.frame(robot.end_effector), make("tpm", damping=0.05)
+    stack = Stack([Position(frame, Still(point.tolist()), gain=1.0)], "velocity")
+    nearest = np.inf
+    for _ in range(_REACH_STEPS):
+        state = robot.state(q)
+        distance = float(np.linalg.norm(state.position(frame) - point))
+        nearest = min(nearest, distance)
+        if distance < _REACHED:
+            return q
+        step = resolver.solve(stack.hierarchy(state)).x
+        step = step * min(1.0, _LONGEST_STEP / max(float(np.abs(step).max()), 1e-12))
+        q = robot.integrate(q, step)
+    raise ScenarioError(f"start.end_effector {point.tolist()} m cannot be reached: robot "
+                        f"{robot.name!r} came no nearer than {nearest:.3g} m")
+
+
+def _sensor(scenario: Scenario, robot: Robot) -> ExactDistances | None:
+    section = scenario.avoidance
+    if section is None:
+        return None
+    if not robot.control_points:
+        raise ScenarioError(f"[avoidance]: robot {robot.name!r} has no control points; list them "
+                            "in robot.control_points")
+    mean_within = section.far if section.direction == "mean" else 0.0
+    return ExactDistances(robot, make_obstacles(section.obstacles), _law(section.body),
+                          _law(section.tip), mean_within)
+
+
+def _law(section: RepulsionSection) -> Repulsion:
+    return Repulsion(section.maximum, section.reach, section.shape, section.scale)
+
+
+def _position(scenario: Scenario, robot: Robot) -> Position | None:
+    section = scenario.position
+    if section is None:
+        return None
+    within = scenario.avoidance.end_effector if scenario.avoidance else -1.0
+    return Position(robot.frame(robot.end_effector), make_path(section.path), section.stiffness,
+                    section.damping, section.gain, repulsion_within=within)
+
+
+def _pointing(scenario: Scenario, robot: Robot) -> Pointing | None:
+    section = scenario.pointing
+    if section is None:
+        return None
+    # Algorithm 1 puts the cone's surface into the stack while it is violated: an equality.
+    return Pointing(robot.frame(robot.end_effector), section.axis, radians(section.alpha_d),
+                    "equality", section.stiffness, section.damping, section.gain)
+
+
+def _avoidance(scenario: Scenario, robot: Robot) -> Avoidance | None:
+    section = scenario.avoidance
+    if section is None:
+        return None
+    kind = PublishedAvoidance if section.jacobian == "published" else Avoidance
+    return kind(robot.control_points, section.dimension)
+
+
+def _reference(scenario: Scenario, robot: Robot) -> Task | None:
+    if scenario.damping is not None:
+        return JointDamping(robot.n, scenario.damping.value, scenario.damping.weight)
+    if scenario.posture is not None:
+        if len(scenario.posture.target) != robot.n:
+            raise ScenarioError(f"posture.target has {len(scenario.posture.target)} entries, robot "
+                                f"{robot.name!r} has {robot.n} joints")
+        section = scenario.posture
+        return Posture(section.target, section.stiffness, section.damping, section.gain)
+    return None

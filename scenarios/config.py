@@ -1,0 +1,391 @@
+"""The validated form of a scenario file, and how such a file is read."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
+
+import tomli_w
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
+
+from hierarchy.errors import HierarchyError, UnknownNameError
+
+if TYPE_CHECKING:
+    from solvers import Resolver
+
+LIBRARY = Path(__file__).parent / "library"
+
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
+Vector3 = tuple[Finite, Finite, Finite]
+
+
+class ScenarioError(HierarchyError):
+    """A scenario file, or a change to one, that cannot be used; names file and key."""
+
+
+class _Section(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=False)
+
+
+class ControlPointSection(_Section):
+    """A point on the body that `joint` moves, `offset` [m] in that joint's frame."""
+
+    joint: str
+    offset: Vector3
+
+
+class RobotSection(_Section):
+    """Which robot: a name of `hierarchy list`, or a URDF or MJCF file."""
+
+    model: str
+    end_effector: str | None = None
+    control_points: tuple[ControlPointSection, ...] | None = None
+
+
+class StartSection(_Section):
+    """Joint positions [rad or m] and velocities; `end_effector` [m] is reached from q first."""
+
+    q: tuple[Finite, ...] | None = None
+    v: tuple[Finite, ...] | None = None
+    end_effector: Vector3 | None = None
+
+
+class ControlSection(_Section):
+    """How the tasks are resolved and how often."""
+
+    level: Literal["velocity", "acceleration"] = "acceleration"
+    period: Annotated[float, Field(gt=0.0, le=1.0)] = 0.001
+    duration: Positive
+    jacobian_derivative: Literal["exact", "difference"] = "exact"
+    resolver: str
+    options: dict[str, Any] = Field(default_factory=dict)
+
+    @model_validator(mode="after")
+    def _makes_a_resolver(self) -> Self:
+        from solvers import make
+
+        make(self.resolver, **self.options)
+        return self
+
+
+class StillSection(_Section):
+    """A point that does not move, `position` [m]."""
+
+    kind: Literal["still"]
+    position: Vector3
+
+
+class EllipseSection(_Section):
+    """p(t) = centre + cosine cos(rate t) + sine sin(rate t), [m] and [rad/s]."""
+
+    kind: Literal["ellipse"]
+    centre: Vector3
+    cosine: Vector3
+    sine: Vector3
+    rate: Finite = 1.0
+
+
+class WaypointsSection(_Section):
+    """From point to point [m] at increasing times [s], at rest at each."""
+
+    kind: Literal["waypoints"]
+    times: tuple[NotNegative, ...]
+    points: tuple[Vector3, ...]
+
+
+PathSection = Annotated[StillSection | EllipseSection | WaypointsSection,
+                        Field(discriminator="kind")]
+
+
+class PositionSection(_Section):
+    """End-effector position along a path."""
+
+    path: PathSection
+    stiffness: NotNegative = 40.0
+    damping: NotNegative = 20.0
+    gain: NotNegative = 10.0
+
+
+class PointingSection(_Section):
+    """The end effector's z axis in a cone of half-angle `alpha_d` [deg] about `axis`."""
+
+    kind: Literal["equality", "inequality"] = "inequality"
+    axis: Vector3
+    alpha_d: Annotated[float, Field(ge=0.0, le=180.0)]
+    stiffness: NotNegative = 5.0
+    damping: NotNegative = 2.0
+    gain: NotNegative = 5.0
+
+
+class RepulsionSection(_Section):
+    """Magnitude of the repulsion, eq. (23); see hierarchy.avoidance.Repulsion."""
+
+    maximum: Positive
+    reach: Positive
+    shape: Positive
+    scale: Positive = 2.0
+
+
+class ObstacleSection(_Section):
+    """An obstacle: shape, centre [m], sizes [m], rotation rows, and a path if it moves."""
+
+    shape: Literal["point", "sphere", "capsule", "box"] = "point"
+    centre: Vector3 | None = None
+    radius: Positive | None = None
+    half_length: Positive | None = None
+    half_lengths: tuple[Positive, Positive, Positive] | None = None
+    rotation: tuple[Vector3, Vector3, Vector3] = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
+    path: PathSection | None = None
+
+    @model_validator(mode="after")
+    def _complete(self) -> Self:
+        needs = {"point": (), "sphere": ("radius",), "capsule": ("radius", "half_length"),
+                 "box": ("half_lengths",)}[self.shape]
+        for key in ("radius", "half_length", "half_lengths"):
+            if (getattr(self, key) is None) == (key in needs):
+                raise ValueError(f"a {self.shape} takes {' and '.join(needs) or 'no size'}")
+        if (self.centre is None) == (self.path is None):
+            raise ValueError("give either a centre or a path")
+        return self
+
+
+def _point_as_table(obstacle: Any) -> Any:
+    """[x, y, z] is short for a point obstacle."""
+    return {"centre": obstacle} if isinstance(obstacle, list | tuple) else obstacle
+
+
+class AvoidanceSection(_Section):
+    """Avoidance by the body and repulsion of the end effector."""
+
+    dimension: Literal[1, 3] = 1
+    direction: Literal["nearest", "mean"] = "nearest"
+    near: NotNegative
+    far: NotNegative
+    end_effector: NotNegative
+    obstacles: tuple[Annotated[ObstacleSection, BeforeValidator(_point_as_table)], ...]
+    body: RepulsionSection
+    tip: RepulsionSection
+    jacobian: Literal["exact", "published"] = "exact"
+
+    @model_validator(mode="after")
+    def _areas_nested(self) -> Self:
+        if self.near > self.far:
+            raise ValueError(f"near = {self.near} m is beyond far = {self.far} m")
+        return self
+
+
+class DampingSection(_Section):
+    """Null-space term a = -D v, eq. (15): D = value I, or value M(q) with weight = "mass"."""
+
+    value: NotNegative
+    weight: Literal["identity", "mass"] = "identity"
+
+
+class PostureSection(_Section):
+    """Null-space term toward a posture [rad or m]."""
+
+    target: tuple[Finite, ...]
+    stiffness: NotNegative = 10.0
+    damping: NotNegative = 5.0
+    gain: NotNegative = 1.0
+
+
+class Scenario(_Section):
+    """One scenario: a robot, a start, tasks, and how they are resolved.
+
+    Sections of tasks that are absent ask for nothing. `damping` and `posture` are the null-space
+    term of eq. (14), so only one of them may be given.
+    """
+
+    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$")]
+    title: str = ""
+    description: str = ""
+    robot: RobotSection
+    start: StartSection = StartSection()
+    control: ControlSection
+    position: PositionSection | None = None
+    pointing: PointingSection | None = None
+    avoidance: AvoidanceSection | None = None
+    damping: DampingSection | None = None
+    posture: PostureSection | None = None
+
+    @model_validator(mode="after")
+    def _asks_for_something(self) -> Self:
+        if not (self.position or self.pointing or self.avoidance):
+            raise ValueError("the stack is empty: give at least one of [position], [pointing], "
+                             "[avoidance]")
+        if self.damping and self.posture:
+            raise ValueError("give [damping] or [posture], not both")
+        if self.avoidance and not self.position:
+            raise ValueError("[avoidance] needs [position]: Algorithm 1 orders one by the other")
+        return self
+
+    def make_resolver(self) -> Resolver:
+        """Make the resolver that `control.resolver` and `control.options` describe."""
+        from solvers import make
+
+        return make(self.control.resolver, **self.control.options)
+
+    def with_resolver(self, spec: str) -> Scenario:
+        """Return this scenario under another resolver.
+
+        `spec` is `name` or `name:setting=value:setting=value`. Settings of this scenario that the
+        named resolver also has are kept, then those of the spec are laid over.
+        """
+        name, *settings = spec.split(":")
+        options = _parse_changes(settings, what=f"resolver {spec!r}")
+        kept = {key: value for key, value in self.control.options.items()
+                if key in _settings_of(name)}
+        control = {**self.control.model_dump(), "resolver": name, "options": {**kept, **options}}
+        return _validated({**self.model_dump(), "control": control}, f"resolver {spec!r}")
+
+    def to_toml(self) -> str:
+        """Return the scenario as a file that `load` reads back."""
+        return tomli_w.dumps(_without_none(self.model_dump(mode="json")))
+
+
+def shipped() -> tuple[str, ...]:
+    """Names of the scenarios that come with the package."""
+    return tuple(sorted(path.stem for path in LIBRARY.glob("*.toml")))
+
+
+def load(name_or_path: str | Path, changes: Sequence[str] | Mapping[str, Any] = ()) -> Scenario:
+    """Read a shipped scenario by name, or a scenario file by path, and apply changes to it.
+
+    A file may begin with `extends = "ellipse"` (a shipped name or a path beside it) and then gives
+    only what differs. `changes` are "dotted.key=value" texts with TOML values, or a mapping of
+    dotted keys. Raises ScenarioError, naming the file and the key, and UnknownNameError for a name
+    that is not shipped.
+    """
+    path = Path(name_or_path)
+    if path.suffix != ".toml":
+        if str(name_or_path) not in shipped():
+            raise UnknownNameError("scenario", str(name_or_path), shipped())
+        path = LIBRARY / f"{name_or_path}.toml"
+    data = _read_extended(path)
+    if not isinstance(changes, Mapping):
+        changes = _parse_changes(changes, what="--set")
+    for key, value in changes.items():
+        _change(data, key, value)
+    robot = data.get("robot")
+    if isinstance(robot, dict) and str(robot.get("model", "")).endswith((".urdf", ".xml", ".mjcf")):
+        robot["model"] = str(path.parent.resolve() / robot["model"])
+    return _validated(data, str(path) if path.parent != LIBRARY else f"scenario {path.stem!r}")
+
+
+def _read_extended(path: Path, below: tuple[Path, ...] = ()) -> dict[str, Any]:
+    """Read a file and, under it, the shipped scenario or the file that its `extends` names."""
+    data = _read(path)
+    base = data.pop("extends", None)
+    if base is None:
+        return data
+    if not isinstance(base, str):
+        raise ScenarioError(f"{path}: extends: expected a name or a path, got {base!r}")
+    source = LIBRARY / f"{base}.toml" if base in shipped() else path.parent / base
+    if source.resolve() in (*below, path.resolve()):
+        raise ScenarioError(f"{path}: extends: {base!r} extends this file in turn")
+    if source.suffix != ".toml":
+        raise ScenarioError(f"{path}: extends: {UnknownNameError('scenario', base, shipped())}")
+    return _laid_over(_read_extended(source, (*below, path.resolve())), data)
+
+
+def _laid_over(below: dict[str, Any], above: dict[str, Any]) -> dict[str, Any]:
+    merged = dict(below)
+    for key, value in above.items():
+        both = isinstance(value, dict) and isinstance(merged.get(key), dict)
+        merged[key] = _laid_over(merged[key], value) if both else value
+    return merged
+
+
+def _read(path: Path) -> dict[str, Any]:
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError as error:
+        raise ScenarioError(f"scenario file {str(path)!r} does not exist") from error
+    except OSError as error:
+        raise ScenarioError(f"scenario file {str(path)!r}: {error.strerror}") from error
+    except UnicodeDecodeError as error:
+        raise ScenarioError(f"scenario file {str(path)!r} is not UTF-8 text") from error
+    except tomllib.TOMLDecodeError as error:  # its text says line and column
+        raise ScenarioError(f"scenario file {str(path)!r}: {error}") from error
+
+
+def _parse_changes(changes: Sequence[str], what: str) -> dict[str, Any]:
+    parsed = {}
+    for change in changes:
+        key, equals, text = change.partition("=")
+        if not equals or not key.strip():
+            raise ScenarioError(f"{what}: expected key=value, got {change!r}")
+        parsed[key.strip()] = _value(text.strip(), f"{what} {change!r}")
+    return parsed
+
+
+def _value(text: str, what: str) -> Any:
+    try:
+        return tomllib.loads(f"value = {text}")["value"]
+    except tomllib.TOMLDecodeError as error:
+        if text and all(c.isalnum() or c in "_-./" for c in text):
+            return text  # a bare word: quotes are a nuisance on a command line
+        raise ScenarioError(f"{what}: {text!r} is not a TOML value") from error
+
+
+def _change(data: dict[str, Any], dotted: str, value: Any) -> None:
+    *path, last = dotted.split(".")
+    table = data
+    for key in path:
+        table = table.setdefault(key, {})
+        if not isinstance(table, dict):
+            raise ScenarioError(f"{dotted}: {key!r} is not a table")
+    table[last] = value
+
+
+def _validated(data: dict[str, Any], what: str) -> Scenario:
+    try:
+        return Scenario.model_validate(data)
+    except ValidationError as error:
+        raise ScenarioError("\n".join(_say(what, e) for e in error.errors())) from error
+    except HierarchyError as error:  # what a resolver says of its settings
+        raise ScenarioError(f"{what}: control: {error}") from error
+
+
+def _say(what: str, error: Any) -> str:
+    keys = [str(key) for key in error["loc"]]
+    where = ".".join(keys) or "file"
+    if error["type"] == "extra_forbidden":
+        return f"{what}: {UnknownNameError('key', where, _keys_beside(keys))}"
+    text = error["msg"].removeprefix("Value error, ")
+    value = "" if isinstance(error["input"], dict) else f", got {error['input']!r}"
+    return f"{what}: {where}: {text}{value}"
+
+
+def _keys_beside(keys: list[str]) -> list[str]:
+    """Full names of the keys that may stand where the last of `keys` stands."""
+    section: Any = Scenario
+    for key in keys[:-1]:
+        field = section.model_fields.get(key) if hasattr(section, "model_fields") else None
+        section = _section_in(field.annotation) if field else None
+    known = section.model_fields if hasattr(section, "model_fields") else {}
+    return [".".join([*keys[:-1], key]) for key in known]
+
+
+def _section_in(annotation: Any) -> Any:
+    options = [annotation, *getattr(annotation, "__args__", ())]
+    return next((o for o in options if isinstance(o, type) and issubclass(o, _Section)), None)
+
+
+def _settings_of(resolver: str) -> frozenset[str]:
+    from solvers import settings
+
+    return frozenset(settings(resolver))
+
+
+def _without_none(data: Any) -> Any:
+    if isinstance(data, dict):
+        return {key: _without_none(value) for key, value in data.items() if value is not None}
+    if isinstance(data, list):
+        return [_without_none(value) for value in data]
+    return data

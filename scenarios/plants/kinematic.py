@@ -1,0 +1,45 @@
+"""A robot that follows its command exactly, integrated over one period."""
+
+from __future__ import annotations
+
+# mypy: disable-error-code="no-untyped-def"
+import numpy as np
+
+from hierarchy import Robot
+from hierarchy.compiled import compiled
+from hierarchy.problem import Array
+from hierarchy.task import Level
+
+
+class KinematicArm:
+    """Integrator: q += v T + a T^2 / 2, v += a T, or at velocity level q += x T, v = x.
+
+    `q` (nq,), `v` (n,) hold the state, `a` (n,) the acceleration of the last step [rad, s].
+    """
+
+    def __init__(self, robot: Robot, q: Array, v: Array, period: float, level: Level) -> None:
+        self.q, self.v, self.a = q.copy(), v.copy(), np.zeros(robot.n)
+        self._robot, self._period = robot, period
+        self._acceleration = level == "acceleration"
+        self._step = np.zeros(robot.n)
+
+    def act(self, command: Array) -> None:
+        """Apply a command (n,) for one period."""
+        _integrate(self.v, command, self._period, self._acceleration, self.a, self._step)
+        if self._robot.nq == self._robot.n:
+            self.q += self._step
+        else:
+            self.q = self._robot.integrate(self.q, self._step)
+
+
+@compiled
+def _integrate(v, x, T, acceleration, a, step):
+    for i in range(len(v)):
+        if acceleration:
+            a[i] = x[i]
+            step[i] = v[i] * T + x[i] * T * T / 2
+            v[i] += x[i] * T
+        else:
+            a[i] = (x[i] - v[i]) / T
+            step[i] = x[i] * T
+            v[i] = x[i]

@@ -1,0 +1,55 @@
+"""Distances from known geometry, without noise or delay."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hierarchy import HierarchyError, Robot, State
+from hierarchy.avoidance import (
+    ControlPoint,
+    Measurement,
+    Obstacles,
+    Repulsion,
+    measure_exactly,
+)
+from hierarchy.avoidance.control_points import pack_points
+from hierarchy.avoidance.repulsion import laws
+
+_TOUCHING = 1e-9  # [m] a control point this near to an obstacle has no direction to leave it
+
+
+class ExactDistances:
+    """Measures a robot's control points and end effector against obstacles.
+
+    `body` and `tip` are the magnitudes of the repulsion of the control points and of the end
+    effector; with `mean_within` > 0 [m] directions are the mean (25)-(26) over the obstacles
+    nearer than that, else those of the nearest obstacle.
+    """
+
+    def __init__(self, robot: Robot, obstacles: Obstacles, body: Repulsion, tip: Repulsion,
+                 mean_within: float = 0.0) -> None:
+        end = robot.frame(robot.end_effector)
+        self.points = (*robot.control_points,
+                       ControlPoint(robot.end_effector, end.joint, end.offset))
+        self.obstacles, self.mean_within = obstacles, mean_within
+        self._joints, self._offsets = pack_points(self.points)
+        self._laws = laws(body, tip)
+        self.measurement = Measurement(len(robot.control_points))
+
+    def measure(self, state: State) -> Measurement:
+        """Measure at a state and hang the measurement on it; valid until the next call."""
+        measure_exactly(self.measurement, state.placements, self._joints, self._offsets,
+                        self.obstacles.at(state.t), self._laws, self.mean_within)
+        state.measurement = self.measurement
+        return self.measurement
+
+    def check_start(self, state: State) -> None:
+        """Raise a HierarchyError if an obstacle lies at a control point, or a point inside one."""
+        seen = self.measure(state)
+        for k in np.flatnonzero(seen.distance < _TOUCHING)[:1]:
+            obstacle = self.obstacles.obstacles[seen.nearest[k]]
+            what = "end effector" if k == len(self.points) - 1 else f"control point {k + 1}"
+            raise HierarchyError(
+                f"{obstacle.name} at {self.obstacles.centres[seen.nearest[k]].tolist()} m "
+                f"touches {what} ({self.points[k].name}) at the start: distance "
+                f"{seen.distance[k]:.3g} m")

@@ -1,0 +1,43 @@
+"""A KUKA LWR among obstacles, for tests of tasks and stacks."""
+
+import numpy as np
+
+from hierarchy import Robot
+from hierarchy.avoidance import Obstacle, Obstacles, Repulsion
+from hierarchy.paths import Ellipse
+from hierarchy.tasks import Avoidance, JointDamping, Pointing, Pose, Position, Posture
+from scenarios.sensors import ExactDistances
+
+ROBOT = Robot.named("kuka_lwr")
+FRAME = ROBOT.frame("end_effector")
+PATH = Ellipse((0.0, 0.6, 0.0), (0.2, 0.0, 0.2), (0.0, 0.1, 0.0), rate=1.3)
+OBSTACLES = Obstacles([
+    Obstacle("point", (0.1, 0.5, 0.1)), Obstacle("box", (-0.2, 0.3, 0.2), (0.1, 0.02, 0.03)),
+    Obstacle("capsule", (-0.1, 0.4, -0.1), (0.02, 0.1))])
+BODY, TIP = Repulsion(0.15, 0.15, 2.0, 3.0), Repulsion(5.0, 0.1, 10.0, 1.5)
+SENSOR = ExactDistances(ROBOT, OBSTACLES, BODY, TIP)
+
+TASKS = {
+    "position": Position(FRAME, PATH, repulsion_within=0.5),
+    "pointing": Pointing(FRAME, (1.0, 0.2, 0.0), 0.3),
+    "cone": Pointing(FRAME, (1.0, 0.2, 0.0), 0.3, "inequality"),
+    "avoidance 1-D": Avoidance(ROBOT.control_points, 1),
+    "avoidance 3-D": Avoidance(ROBOT.control_points, 3),
+    "pose": Pose(FRAME, PATH, np.eye(3)),
+    "posture": Posture((0.1,) * 7),
+    "damping": JointDamping(7),
+}
+
+
+def states(count, seed=1):
+    """Random (q, v) within the joint limits."""
+    rng = np.random.default_rng(seed)
+    return [(rng.uniform(0.9 * ROBOT.lower, 0.9 * ROBOT.upper), rng.normal(size=7))
+            for _ in range(count)]
+
+
+def state_at(q, v, t=0.7, differences=None):
+    """A State that carries a measurement of its own moment."""
+    state = ROBOT.state(q, v, t, differences)
+    SENSOR.measure(state)
+    return state

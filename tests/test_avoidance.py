@@ -1,0 +1,215 @@
+import numpy as np
+import pytest
+from scene import BODY, OBSTACLES, ROBOT, TIP, states
+
+from hierarchy import HierarchyError
+from hierarchy.avoidance import Measurement, Obstacle, Obstacles, Repulsion, SurveillanceAreas
+from hierarchy.avoidance.obstacles import distance_to_obstacle
+from hierarchy.errors import UnknownNameError
+from hierarchy.paths import Ellipse, Still, Waypoints
+from scenarios.sensors import ExactDistances
+
+TURN = np.array([[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]])
+SHAPES = {
+    "point": Obstacle("point", (0.1, -0.2, 0.3)),
+    "sphere": Obstacle("sphere", (0.1, -0.2, 0.3), (0.15,)),
+    "capsule": Obstacle("capsule", (0.1, -0.2, 0.3), (0.1, 0.25), TURN),
+    "box": Obstacle("box", (0.1, -0.2, 0.3), (0.2, 0.1, 0.3), TURN),
+}
+
+
+def distance(obstacle, point):
+    away = np.empty(3)
+    return distance_to_obstacle(obstacle.packed(), *point, away), away
+
+
+def surface_points(obstacle, count=200_000):
+    """Points all over the surface, drawn without the code under test."""
+    rng = np.random.default_rng(0)
+    unit = rng.normal(size=(count, 3))
+    unit /= np.linalg.norm(unit, axis=1)[:, None]
+    if obstacle.shape == "sphere":
+        local = obstacle.size[0] * unit
+    elif obstacle.shape == "capsule":
+        radius, half = obstacle.size
+        local = radius * unit
+        side = rng.random(count) < 0.7
+        local[:, 2] += np.where(unit[:, 2] > 0, half, -half)
+        ring = unit[:, :2] / np.linalg.norm(unit[:, :2], axis=1)[:, None]
+        local[side] = np.c_[radius * ring, rng.uniform(-half, half, count)][side]
+    else:
+        half = np.array(obstacle.size)
+        local = rng.uniform(-half, half, (count, 3))
+        face = rng.integers(0, 3, count)
+        rows = np.arange(count)
+        local[rows, face] = half[face] * np.where(rng.random(count) < 0.5, 1, -1)
+    return local @ np.asarray(obstacle.rotation).T + obstacle.centre
+
+
+@pytest.mark.parametrize("shape", ["sphere", "capsule", "box"])
+def test_distance_is_that_of_the_nearest_surface_point(shape):
+    obstacle = SHAPES[shape]
+    surface = surface_points(obstacle)
+    for point in np.random.default_rng(1).uniform(-1, 1, (40, 3)):
+        D, away = distance(obstacle, point)
+        nearest = np.linalg.norm(surface - point, axis=1).min()
+        assert abs(D) == pytest.approx(nearest, abs=2e-3)
+        assert np.linalg.norm(away) == pytest.approx(1)
+        on_surface, _ = distance(obstacle, point - D * away)
+        assert on_surface == pytest.approx(0, abs=1e-12)
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_direction_is_the_gradient_of_distance(shape):
+    obstacle, h = SHAPES[shape], 1e-6
+    for point in np.random.default_rng(2).uniform(-1, 1, (40, 3)):
+        _, away = distance(obstacle, point)
+        gradient = [(distance(obstacle, point + h * e)[0] - distance(obstacle, point - h * e)[0])
+                    / (2 * h) for e in np.eye(3)]
+        np.testing.assert_allclose(away, gradient, atol=1e-7)
+
+
+@pytest.mark.parametrize("shape", ["sphere", "capsule", "box"])
+def test_distance_is_negative_inside(shape):
+    assert distance(SHAPES[shape], (0.11, -0.2, 0.3))[0] < 0
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_direction_has_a_fallback_at_the_centre(shape):
+    D, away = distance(SHAPES[shape], SHAPES[shape].centre)
+    assert np.isfinite(D)
+    assert np.linalg.norm(away) == pytest.approx(1)
+
+
+def test_moving_obstacles_follow_their_path():
+    path = Waypoints((1.0, 2.0), ((0, 0, 0), (1, 0, 0)))
+    obstacles = Obstacles([Obstacle("sphere", (9, 9, 9), (0.1,), path=path), SHAPES["box"]])
+    np.testing.assert_allclose(obstacles.at(1.5)[:, 4:7], [[0.5, 0, 0], [0.1, -0.2, 0.3]])
+    np.testing.assert_allclose(obstacles.at(3.0)[0, 4:7], [1, 0, 0])
+
+
+@pytest.mark.parametrize(("arguments", "said"), [
+    (("cone", (0, 0, 0)), "unknown obstacle shape 'cone'"),
+    (("sphere", (0, 0, 0)), "takes 1 positive"),
+    (("box", (0, 0, 0), (1, 1, -1)), "takes 3 positive"),
+    (("point", (0, np.nan, 0)), "not finite"),
+])
+def test_bad_obstacles_are_named(arguments, said):
+    with pytest.raises(HierarchyError, match=said):
+        Obstacle(*arguments)
+
+
+def test_magnitude_reaches_its_maximum_at_contact_and_vanishes_at_the_reach():
+    """Equation (24), which the letter's (23) as printed contradicts."""
+    law = Repulsion(maximum=2.0, reach=0.15, shape=20.0)
+    assert law(0.0) == pytest.approx(2.0, rel=1e-8)
+    assert law(0.15) == pytest.approx(0.0, abs=1e-8)
+    assert law(0.075) == pytest.approx(1.0)
+    values = [law(D) for D in np.linspace(0, 1, 50)]
+    assert (np.diff(values) <= 0).all()
+    assert law(1e6) == 0.0
+
+
+def test_magnitude_has_the_shape_of_the_published_code():
+    D = 0.06
+    assert BODY(D) == pytest.approx(0.15 / (1 + np.exp(D * 3 / 0.15 * 2 - 2)))
+    assert TIP(D) == pytest.approx(5 / (1 + np.exp(D * 1.5 / 0.1 * 10 - 10)))
+
+
+@pytest.mark.parametrize("bad", [{"maximum": 0}, {"reach": -1}, {"shape": np.nan},
+                                 {"scale": np.inf}])
+def test_bad_repulsion_is_named(bad):
+    with pytest.raises(HierarchyError, match=next(iter(bad))):
+        Repulsion(**({"maximum": 1.0, "reach": 1.0, "shape": 1.0} | bad))
+
+
+def test_areas_must_be_nested():
+    with pytest.raises(HierarchyError, match="near"):
+        SurveillanceAreas(0.2, 0.1, 0.1)
+    with pytest.raises(HierarchyError, match="end_effector"):
+        SurveillanceAreas(0.1, 0.2, -0.1)
+
+
+def test_the_active_point_is_the_nearest_one_without_the_end_effector():
+    sensor = ExactDistances(ROBOT, OBSTACLES, BODY, TIP)
+    for q, v in states(30, seed=4):
+        state = ROBOT.state(q, v)
+        seen = sensor.measure(state)
+        for k, point in enumerate(sensor.points):
+            rotation, translation = state._placement(point.joint)
+            np.testing.assert_allclose(seen.points[k], translation + rotation @ point.offset,
+                                       atol=1e-14)
+            each = [distance(o, seen.points[k])[0] for o in OBSTACLES.obstacles]
+            assert seen.distance[k] == pytest.approx(min(each))
+            assert seen.nearest[k] == int(np.argmin(each))
+            law = TIP if k == 8 else BODY
+            assert seen.magnitude[k] == pytest.approx(law(max(min(each), 0)))
+        assert seen.active == int(np.argmin(seen.distance[:8]))
+        assert seen.minimal_distance == seen.distance[:8].min()
+        assert seen.end_effector_distance == seen.distance[8]
+
+
+def at_origin_between(*centres, mean_within):
+    """Measure the end effector of an arm whose end is put at the middle of two points."""
+    state = ROBOT.state(np.full(7, 0.4))
+    middle = state.position(ROBOT.frame("end_effector"))
+    obstacles = Obstacles([Obstacle("point", tuple(middle + c)) for c in np.array(centres)])
+    return ExactDistances(ROBOT, obstacles, BODY, TIP, mean_within).measure(state)
+
+
+def test_mean_direction_is_that_of_all_near_obstacles():
+    seen = at_origin_between((0.1, 0, 0), (0, 0.2, 0), (0, 0, 5.0), mean_within=1.0)
+    np.testing.assert_allclose(seen.direction[8], [-(0.5**0.5), -(0.5**0.5), 0], atol=1e-12)
+
+
+def test_mean_direction_falls_back_to_the_nearest_where_the_unit_vectors_cancel():
+    seen = at_origin_between((0.1, 0, 0), (-0.2, 0, 0), mean_within=1.0)
+    np.testing.assert_allclose(seen.direction[8], [-1, 0, 0], atol=1e-12)
+
+
+def test_without_obstacles_nothing_is_near():
+    seen = ExactDistances(ROBOT, Obstacles([]), BODY, TIP).measure(ROBOT.state(np.zeros(7)))
+    assert seen.active == -1
+    assert seen.minimal_distance == seen.end_effector_distance == np.inf
+    assert not seen.magnitude.any()
+    assert Measurement(3).minimal_distance == np.inf
+
+
+def test_an_obstacle_at_a_control_point_is_refused_at_the_start():
+    state = ROBOT.state(np.full(7, 0.4))
+    rotation, translation = state._placement(ROBOT.control_points[4].joint)
+    point = translation + rotation @ ROBOT.control_points[4].offset
+    obstacles = Obstacles([Obstacle("point", (5, 5, 5)),
+                           Obstacle("point", tuple(point), name="obstacle 2")])
+    with pytest.raises(HierarchyError, match=r"obstacle 2 .* touches control point 5"):
+        ExactDistances(ROBOT, obstacles, BODY, TIP).check_start(state)
+
+
+PATHS = [Still((1, 2, 3)), Ellipse((0, 0.6, 0), (0.2, 0, 0.2), (0, 0.1, 0), 0.7),
+         Waypoints((0.5, 2.0, 2.5), ((0, 0, 0), (1, 2, 3), (1, 0, 0)))]
+
+
+@pytest.mark.parametrize("path", PATHS)
+def test_path_velocity_and_acceleration_are_derivatives(path):
+    h = 1e-5
+    for t in (0.1, 0.9, 1.7, 2.2, 4.0):
+        _, v, a = path(t)
+        np.testing.assert_allclose(v, (path(t + h)[0] - path(t - h)[0]) / (2 * h), atol=1e-8)
+        np.testing.assert_allclose(a, (path(t + h)[1] - path(t - h)[1]) / (2 * h), atol=1e-7)
+
+
+@pytest.mark.parametrize(("make", "said"), [
+    (lambda: Still((1, 2)), "position"),
+    (lambda: Ellipse((0, 0, 0), (np.inf, 0, 0), (0, 0, 0)), "cosine"),
+    (lambda: Ellipse((0, 0, 0), (0, 0, 0), (0, 0, 0), np.nan), "rate"),
+    (lambda: Waypoints((1, 1), ((0, 0, 0), (0, 0, 1))), "times must increase"),
+    (lambda: Waypoints((1,), ()), "1 times for 0 points"),
+])
+def test_bad_paths_are_named(make, said):
+    with pytest.raises(HierarchyError, match=said):
+        make()
+
+
+def test_unknown_shape_is_an_unknown_name():
+    with pytest.raises(UnknownNameError, match="did you mean 'sphere'"):
+        Obstacle("sfere", (0, 0, 0))

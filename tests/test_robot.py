@@ -1,0 +1,143 @@
+import numpy as np
+import pytest
+
+from hierarchy import HierarchyError, Robot
+from hierarchy.errors import RobotError, UnknownNameError
+
+ROBOT = Robot.named("kuka_lwr")
+
+URDF = """<robot name="pendulum">
+  <link name="base"/>
+  <link name="arm"><inertial><mass value="1"/><origin xyz="0 0 -0.5"/>
+    <inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <link name="hand"/>
+  <joint name="hinge" type="{kind}"><parent link="base"/><child link="arm"/>
+    <axis xyz="0 1 0"/>{limit}</joint>
+  <joint name="wrist" type="fixed"><parent link="arm"/><child link="hand"/>
+    <origin xyz="0 0 -1"/></joint>
+</robot>"""
+LIMIT = '<limit lower="-1" upper="2" velocity="3" effort="10"/>'
+
+MJCF = """<mujoco><worldbody><body name="arm"><joint name="hinge" type="hinge" axis="0 1 0"/>
+<geom type="capsule" size="0.05" fromto="0 0 0 0 0 -1"/></body></worldbody></mujoco>"""
+
+
+D = [0, 0, 0.4, 0, 0.39, 0, 0.078]
+ALPHA = np.deg2rad([90, -90, -90, 90, 90, -90, 0])
+
+
+def from_dh_table(q, joints=7):
+    """Placement after so many joints, by multiplying the letter's Denavit-Hartenberg matrices."""
+    T = np.eye(4)
+    for angle, d, alpha in list(zip(q, D, ALPHA, strict=True))[:joints]:
+        c, s, ca, sa = np.cos(angle), np.sin(angle), np.cos(alpha), np.sin(alpha)
+        T = T @ [[c, -s * ca, s * sa, 0], [s, c * ca, -c * sa, 0], [0, sa, ca, d], [0, 0, 0, 1]]
+    return T
+
+
+def test_kinematics_equal_the_table_multiplied_out():
+    frame = ROBOT.frame("end_effector")
+    for q in np.random.default_rng(0).uniform(-3, 3, (50, 7)):
+        state, T = ROBOT.state(q), from_dh_table(q)
+        np.testing.assert_allclose(state.position(frame), T[:3, 3], atol=1e-14)
+        np.testing.assert_allclose(state.rotation(frame), T[:3, :3], atol=1e-14)
+
+
+def test_the_start_of_the_letter_is_22_mm_off_the_path():
+    q0 = [0.923, -0.854, 0.903, 1.195, 0.971, 1.796, 0.0]
+    p = ROBOT.state(q0).position(ROBOT.frame("end_effector"))
+    assert np.linalg.norm(p - [0.2, 0.6, 0.2]) == pytest.approx(0.022, abs=5e-4)
+
+
+def test_control_points_lie_on_the_upper_arm_and_the_forearm():
+    state = ROBOT.state(np.linspace(-1, 1, 7))
+    elbow, wrist = from_dh_table(state.q, 3)[:3, 3], from_dh_table(state.q, 5)[:3, 3]
+    for i, point in enumerate(ROBOT.control_points):
+        rotation, translation = state._placement(point.joint)
+        here = translation + rotation @ point.offset
+        end, other, reach = (elbow, np.zeros(3), 0.2) if i < 4 else (wrist, elbow, 0.39)
+        toward = (other - end) / np.linalg.norm(other - end)
+        np.testing.assert_allclose(here, end + toward * (i % 4) / 4 * reach, atol=1e-13)
+
+
+def test_limits_are_those_of_the_arm():
+    np.testing.assert_allclose(np.rad2deg(ROBOT.upper), [170, 120, 170, 120, 170, 120, 170])
+    np.testing.assert_allclose(ROBOT.lower, -ROBOT.upper)
+    assert (ROBOT.velocity_limit > 1.5).all()
+
+
+def test_the_mass_matrix_is_symmetric_and_positive():
+    M = ROBOT.state(np.ones(7)).mass_matrix()
+    np.testing.assert_allclose(M, M.T)
+    assert np.linalg.eigvalsh(M).min() > 0
+
+
+def test_a_state_is_moved_without_making_another():
+    state = ROBOT.state(np.zeros(7))
+    views = [state.J, state.dJ, state.placements]
+    state.move(1.0, np.ones(7), np.ones(7))
+    fresh = ROBOT.state(np.ones(7), np.ones(7))
+    for view, name in zip(views, ("J", "dJ", "placements"), strict=True):
+        np.testing.assert_array_equal(view, getattr(fresh, name))
+
+
+@pytest.mark.parametrize(("q", "v", "said"), [
+    ([0] * 6, None, "q has shape (6,), expected (7,)"),
+    ([0, 0, np.nan, 0, 0, 0, 0], None, "q[2] (joint_3) is nan"),
+    ([0] * 7, [0, np.inf, 0, 0, 0, 0, 0], "v[1] (joint_2) is inf"),
+])
+def test_a_bad_state_is_named(q, v, said):
+    with pytest.raises(RobotError) as error:
+        ROBOT.state(q, v)
+    assert said in str(error.value)
+
+
+def test_unknown_names_come_with_the_nearest_known():
+    with pytest.raises(UnknownNameError, match="did you mean 'kuka_lwr'"):
+        Robot.named("kuka_lvr")
+    with pytest.raises(UnknownNameError, match="did you mean 'end_effector'"):
+        ROBOT.frame("end_efector")
+    with pytest.raises(UnknownNameError, match="unknown joint 'elbow'"):
+        ROBOT.control_point("elbow", (0, 0, 0))
+
+
+@pytest.fixture
+def pendulum(tmp_path):
+    def write(kind="revolute", limit=LIMIT):
+        path = tmp_path / f"{kind}.urdf"
+        path.write_text(URDF.format(kind=kind, limit=limit))
+        return path
+    return write
+
+
+def test_a_urdf_file_is_read_with_its_limits_and_frames(pendulum):
+    robot = Robot.from_file(pendulum())
+    assert (robot.n, robot.name, robot.joint_names) == (1, "revolute", ("hinge",))
+    assert (robot.lower[0], robot.upper[0], robot.velocity_limit[0]) == (-1, 2, 3)
+    assert robot.end_effector == "hand"
+    p = robot.state([0.5]).position(robot.frame("hand"))
+    np.testing.assert_allclose(p, [-np.sin(0.5), 0, -np.cos(0.5)])
+
+
+def test_a_continuous_joint_keeps_its_own_coordinates(pendulum):
+    robot = Robot.from_file(pendulum("continuous", ""))
+    assert (robot.n, robot.nq) == (1, 2)
+    q = robot.integrate(np.array([1.0, 0.0]), np.array([0.5]))
+    np.testing.assert_allclose(q, [np.cos(0.5), np.sin(0.5)])
+
+
+def test_an_mjcf_file_is_read(tmp_path):
+    path = tmp_path / "arm.xml"
+    path.write_text(MJCF)
+    assert Robot.from_file(path).joint_names == ("hinge",)
+
+
+def test_bad_robot_files_are_named(tmp_path, pendulum):
+    (tmp_path / "broken.urdf").write_text("<robot")
+    (tmp_path / "arm.stl").write_text("solid")
+    for path, said in [("none.urdf", "does not exist"), ("broken.urdf", "cannot be read"),
+                       ("arm.stl", "expected .urdf")]:
+        with pytest.raises(HierarchyError, match=said):
+            Robot.from_file(tmp_path / path)
+    with pytest.raises(HierarchyError, match="unknown frame 'tool'"):
+        Robot.from_file(pendulum(), end_effector="tool")

@@ -1,0 +1,243 @@
+import numpy as np
+import pytest
+from scene import BODY, FRAME, PATH, ROBOT, SENSOR, TASKS, TIP, state_at, states
+
+from hierarchy import HierarchyError, Task
+from hierarchy.tasks import Avoidance, JointDamping, Pointing, Position, Posture
+from hierarchy.tasks.pose import rotation_vector
+
+STEP = 1e-6
+STATES = states(20)
+
+
+def moved(q, v, step, task_state):
+    """The state a little later along v, with the measurement of `task_state`."""
+    state = ROBOT.state(q + step * v, v, task_state.t)
+    state.measurement = task_state.measurement
+    return state
+
+
+@pytest.mark.parametrize("name", ["position", "pointing", "cone", "posture"])
+def test_jacobian_is_the_derivative_of_what_the_error_measures(name):
+    task = TASKS[name]
+    for q, v in STATES:
+        state = state_at(q, v)
+        columns = [(task.error(moved(q, e, -STEP, state)) - task.error(moved(q, e, STEP, state)))
+                   / (2 * STEP) for e in np.eye(7)]
+        np.testing.assert_allclose(np.transpose(columns), task.jacobian(state), atol=1e-9)
+
+
+@pytest.mark.parametrize("rows", [1, 3])
+def test_avoidance_jacobian_is_that_of_the_active_control_point(rows):
+    task = TASKS[f"avoidance {rows}-D"]
+    for q, v in STATES:
+        state = state_at(q, v)
+        seen = state.measurement
+        point = ROBOT.control_points[seen.active]
+        away = seen.direction[seen.active].copy()
+
+        def position(q, point=point):
+            rotation, translation = ROBOT.state(q)._placement(point.joint)
+            return translation + rotation @ point.offset
+
+        J = np.transpose([(position(q + STEP * e) - position(q - STEP * e)) / (2 * STEP)
+                          for e in np.eye(7)])
+        np.testing.assert_allclose(task.jacobian(state), J if rows == 3 else away[None] @ J,
+                                   atol=1e-9)
+
+
+@pytest.mark.parametrize("name", [name for name in TASKS if name != "damping"])
+def test_jacobian_derivative_agrees_with_central_differences(name):
+    task = TASKS[name]
+    for q, v in STATES:
+        state = state_at(q, v)
+        later, before = moved(q, v, STEP, state), moved(q, v, -STEP, state)
+        difference = (task.jacobian(later) - task.jacobian(before)) / (2 * STEP)
+        np.testing.assert_allclose(task.jacobian_derivative(state), difference, atol=3e-9)
+
+
+@pytest.mark.parametrize("name", TASKS)
+def test_backward_difference_is_that_of_the_jacobians_of_two_ticks(name):
+    task, period = TASKS[name], 1e-3
+    q, v = STATES[0]
+    state = state_at(q, v, differences=period)
+    assert not task.jacobian_derivative(state).any(), "no tick before: no difference"
+    before = task.jacobian(state)
+    state.move(0.8, q + period * v, v)
+    np.testing.assert_allclose(task.jacobian_derivative(state),
+                               (task.jacobian(state) - before) / period, atol=1e-12)
+
+
+@pytest.mark.parametrize("level", ["velocity", "acceleration"])
+@pytest.mark.parametrize("differences", [None, 1e-3])
+@pytest.mark.parametrize("name", TASKS)
+def test_compiled_rows_equal_those_of_the_plain_methods(name, level, differences):
+    task = TASKS[name]
+    for q, v in STATES[:5]:
+        state = state_at(q, v, differences=differences)
+        state.move(0.8, q + 1e-3 * v, v)
+        written, plain = [(np.full((8, 7), 5.0), np.full(8, 5.0), np.full(8, 5.0))
+                          for _ in range(2)]
+        task.write(state, level, *written, row=1)
+        Task.write(task, state, level, *plain, row=1)
+        for a, b in zip(written, plain, strict=True):
+            np.testing.assert_allclose(a, b, rtol=1e-12, atol=1e-11)
+            assert a[0].max() == 5.0
+            assert (a[1 + task.dimension:] == 5.0).all(), "rows of others are left alone"
+
+
+@pytest.mark.parametrize("differences", [None, 1e-3])
+def test_following_the_reference_acceleration_gives_the_second_derivative(differences):
+    """d2p/dt2 along a joint trajectory equals J a + dJ v."""
+    task, h = TASKS["position"], 1e-4
+    q, v = STATES[1]
+    a = np.arange(7.0) - 3
+
+    def p(t):
+        return ROBOT.state(q + v * t + a * t * t / 2).position(FRAME)
+
+    state = ROBOT.state(q, v)
+    second = (p(h) - 2 * p(0) + p(-h)) / h**2
+    np.testing.assert_allclose(
+        task.jacobian(state) @ a + task.jacobian_derivative(state) @ v, second, atol=1e-6)
+
+
+def test_position_reference_is_the_closed_loop_of_the_letter():
+    task = Position(FRAME, PATH, stiffness=40.0, damping=20.0, gain=3.0)
+    q, v = STATES[2]
+    state = ROBOT.state(q, v, 0.7)
+    p, dp, ddp = PATH(0.7)
+    error, rate = p - state.position(FRAME), dp - task.jacobian(state) @ v
+    np.testing.assert_allclose(task.reference_acceleration(state), ddp + 20 * rate + 40 * error)
+    np.testing.assert_allclose(task.reference_velocity(state), dp + 3 * error)
+
+
+def test_end_effector_repulsion_is_added_within_its_area_only():
+    q, v = STATES[3]
+    state = state_at(q, v)
+    near = state.measurement.end_effector_distance
+    plain = Position(FRAME, PATH).reference_acceleration(state)
+    inside = Position(FRAME, PATH, repulsion_within=near * 1.01)
+    outside = Position(FRAME, PATH, repulsion_within=near * 0.99)
+    added = TIP(near) * state.measurement.direction[-1]
+    np.testing.assert_allclose(inside.reference_acceleration(state), plain + added)
+    np.testing.assert_allclose(outside.reference_acceleration(state), plain)
+
+
+def test_the_cone_asks_for_one_side_and_its_surface_for_both():
+    q, v = STATES[4]
+    state = state_at(q, v)
+    for name, upper in (("pointing", "equal"), ("cone", "infinite")):
+        A, low, up = np.zeros((1, 7)), np.zeros(1), np.zeros(1)
+        TASKS[name].write(state, "acceleration", A, low, up, 0)
+        assert (up[0] == low[0]) == (upper == "equal")
+        assert np.isinf(up[0]) == (upper == "infinite")
+
+
+def test_pointing_error_is_positive_outside_the_cone():
+    state = ROBOT.state(*STATES[5])
+    axis = state.rotation(FRAME)[:, 2]
+    across = np.cross(axis, [0.3, 0.5, 0.1])
+    assert Pointing(FRAME, tuple(axis), 0.1).error(state)[0] < 0
+    assert Pointing(FRAME, tuple(across), 0.1).error(state)[0] > 0
+
+
+def test_one_row_of_avoidance_is_the_projection_of_three():
+    q, v = STATES[6]
+    state = state_at(q, v)
+    r = state.measurement.direction[state.measurement.active]
+    one, three = TASKS["avoidance 1-D"], TASKS["avoidance 3-D"]
+    np.testing.assert_allclose(one.jacobian(state), r[None] @ three.jacobian(state))
+    np.testing.assert_allclose(one.error(state), [r @ three.error(state)])
+    assert one.error(state)[0] == pytest.approx(BODY(state.measurement.minimal_distance))
+
+
+def test_damping_brakes_in_proportion_to_speed_or_momentum():
+    q, v = STATES[7]
+    state = ROBOT.state(q, v)
+    np.testing.assert_allclose(JointDamping(7, 5.0).reference_acceleration(state), -5 * v)
+    np.testing.assert_allclose(JointDamping(7, 2.0, "mass").reference_acceleration(state),
+                               -2 * state.mass_matrix() @ v)
+    np.testing.assert_allclose(JointDamping(7).reference_velocity(state), 0)
+
+
+def test_posture_pulls_toward_its_target():
+    q, v = STATES[8]
+    task = Posture((0.1,) * 7, stiffness=3.0, damping=2.0, gain=4.0)
+    state = ROBOT.state(q, v)
+    np.testing.assert_allclose(task.reference_acceleration(state), 3 * (0.1 - q) - 2 * v)
+    np.testing.assert_allclose(task.reference_velocity(state), 4 * (0.1 - q))
+
+
+@pytest.mark.parametrize("angle", [0.0, 1e-9, 0.5, 3.0, np.pi - 1e-9, np.pi])
+def test_rotation_vector_inverts_rodrigues(angle):
+    axis = np.array([0.6, -0.48, 0.64])
+    K = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
+    R = np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * K @ K
+    vector = rotation_vector(R)
+    if angle > 3.1:  # both signs of the axis describe half a turn
+        vector = vector * np.sign(vector @ axis)
+    np.testing.assert_allclose(vector, angle * axis, atol=1e-8)
+
+
+def test_pose_error_falls_when_its_velocity_is_followed():
+    q, _ = STATES[9]
+    task = TASKS["pose"]
+    error = task.error(ROBOT.state(q))
+    v = np.linalg.pinv(task.jacobian(ROBOT.state(q))) @ error
+    assert np.linalg.norm(task.error(ROBOT.state(q + 1e-3 * v))) < np.linalg.norm(error)
+
+
+class Elbow(Task):
+    """A user's task in plain numpy: the fourth joint's angle."""
+
+    name, gain, stiffness, damping = "elbow", 2.0, 4.0, 3.0
+    dimension = 1
+
+    def error(self, state):
+        return np.array([1.0 - state.q[3]])
+
+    def jacobian(self, state):
+        return np.eye(7)[3:4]
+
+    def jacobian_derivative(self, state):
+        return np.zeros((1, 7))
+
+
+def test_a_task_in_plain_numpy_needs_three_methods():
+    q, v = STATES[10]
+    A, low, up = np.zeros((1, 7)), np.zeros(1), np.zeros(1)
+    Elbow().write(ROBOT.state(q, v), "acceleration", A, low, up, 0)
+    assert low[0] == up[0] == pytest.approx(4 * (1 - q[3]) - 3 * v[3])
+
+
+@pytest.mark.parametrize(("method", "value", "said"), [
+    ("jacobian", np.eye(7), "task 'elbow': jacobian has shape (7, 7), expected (1, 7)"),
+    ("jacobian", np.full((1, 7), np.nan), "task 'elbow', row 0: A[0, 0] is nan"),
+    ("error", np.array([np.nan]), "task 'elbow', row 0: lower is nan"),
+])
+def test_a_wrong_task_is_named(method, value, said, monkeypatch):
+    monkeypatch.setattr(Elbow, method, lambda self, state: value)
+    with pytest.raises(HierarchyError) as error:
+        Elbow().write(ROBOT.state(*STATES[0]), "velocity", np.zeros((1, 7)), np.zeros(1),
+                      np.zeros(1), 0)
+    assert said in str(error.value)
+
+
+def test_bad_settings_of_tasks_are_named():
+    for make, said in [
+        (lambda: Pointing(FRAME, (0.0, 0.0, 0.0), 0.1), "axis"),
+        (lambda: Pointing(FRAME, (1.0, 0.0, 0.0), 4.0), "half_angle"),
+        (lambda: Avoidance(ROBOT.control_points, 2), "rows must be 1 or 3"),
+        (lambda: Avoidance(()), "control point"),
+        (lambda: JointDamping(7, 1.0, "momentum"), "weight"),
+        (lambda: JointDamping(7, -1.0), "damping"),
+    ]:
+        with pytest.raises(HierarchyError, match=said):
+            make()
+
+
+def test_avoidance_without_a_measurement_is_an_error():
+    with pytest.raises(HierarchyError, match="no measurement"):
+        TASKS["avoidance 1-D"].jacobian(ROBOT.state(*STATES[0]))
+    assert SENSOR.measurement is not None
