@@ -110,8 +110,8 @@ def compare(scenarios: Iterable[str | Scenario] | str, resolvers: Sequence[str] 
 
     Raises
     ------
-    HierarchyError : before anything is run: an unknown scenario, resolver or setting, or an output
-        folder that is in use.
+    HierarchyError : before anything is run: an unknown scenario, resolver or setting, a scenario
+        that does not fit its robot, or an output folder that is in use.
     """
     planned = _plan([scenarios] if isinstance(scenarios, str) else scenarios, resolvers)
     folder = None if out is None else claim(out)
@@ -125,6 +125,7 @@ def compare(scenarios: Iterable[str | Scenario] | str, resolvers: Sequence[str] 
             break
     comparison = Comparison(tuple(runs), command or _command(planned, out), versions())
     if folder is not None:
+        folder.mkdir(exist_ok=True)
         _write(comparison, folder)
     return comparison
 
@@ -160,11 +161,13 @@ def _best(values: Mapping[int, float], lower: bool | None, tie: float = 0.01) ->
 
 
 def _plan(scenarios: Iterable[str | Scenario], resolvers: Sequence[str]) -> list[Run]:
+    from scenarios.build import build
     from scenarios.config import load
 
     loaded = [load(s) if isinstance(s, (str, Path)) else s for s in scenarios]
     runs = []
     for scenario in loaded:
+        build(scenario)
         for spec in dict.fromkeys(resolvers):
             changed = scenario.with_resolver(spec)
             runs.append(Run(changed, spec, str(changed.make_resolver().label)))

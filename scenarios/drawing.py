@@ -116,7 +116,7 @@ def svg(fig: Figure, title: str) -> str:
     body = re.sub(r"<metadata>.*?</metadata>", "", body, flags=re.DOTALL)
     body = re.sub(r' id="[a-zA-Z0-9]+_\d+"', "", body)
     body = re.sub(r"<!--.*?-->\s*|\s*\n\s*", lambda m: "" if m[0][0] == "<" else " ", body)
-    body = re.sub(r"(?<=[ \"LM-])(\d+\.\d)\d+(?=[ \"])", r"\1", body)
+    body = re.sub(r' d="[^"]*"', _rounded, body)
     body = body.replace(INK, "currentColor").replace("'DejaVu Sans'", "inherit")
     head = f'<svg role="img" aria-label="{_escape(title)}" viewBox="'
     return re.sub(r'<svg [^>]*?viewBox="', lambda _: head, body, count=1)
@@ -127,6 +127,11 @@ def write(fig: Figure, stem: str) -> None:
     with matplotlib.rc_context({**_STYLE, "svg.hashsalt": "task-hierarchy"}):
         fig.savefig(f"{stem}.svg", facecolor="white", metadata={"Date": None})
         fig.savefig(f"{stem}.png", facecolor="white", dpi=160)
+
+
+def _rounded(path: re.Match[str]) -> str:
+    """Round a path's coordinates to a tenth of a point, which no eye can see."""
+    return re.sub(r"(\.\d)\d+", r"\1", path[0])
 
 
 def _escape(text: str) -> str:

@@ -11,10 +11,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.patches import Circle
+from matplotlib.ticker import MaxNLocator
 
 from scenarios import drawing
 from scenarios.drawing import ALERT, INK, JOINTS, Array
+from scenarios.picture import picture
 
 if TYPE_CHECKING:
     from scenarios.recording import Recording
@@ -41,8 +42,13 @@ class Panel:
 def joint_velocities(ax: Axes, recording: Recording, colour: str) -> None:
     """Draw figure 4: every joint's velocity [rad/s], and the limits where they come into view."""
     for joint, velocity in enumerate(recording["v"].T):
-        drawing.curve(ax, recording["t"], velocity, color=JOINTS[joint % len(JOINTS)],
+        drawing.curve(ax, recording["t"], velocity, color=joint_colour(joint),
                       linewidth=0.8, label=f"joint {joint + 1}")
+
+
+def joint_colour(joint: int) -> str:
+    """Return the colour of a joint, numbered from 0."""
+    return JOINTS[joint % len(JOINTS)]
 
 
 def ee_distance(ax: Axes, recording: Recording, colour: str) -> None:
@@ -98,7 +104,7 @@ def position_error(ax: Axes, recording: Recording, colour: str) -> None:
 
 PANELS = (
     Panel("joint-velocities", "Joint velocities", "rad/s", "v", joint_velocities,
-          "Figure 4 of the letter: smooth at acceleration level, whatever the stack does."),
+          "Figure 4: continuous at acceleration level, with jumps at velocity level."),
     Panel("position-error", "Distance from the path", "mm, logarithmic", "position_error",
           position_error, "The start lies off the path on purpose."),
     Panel("body-distance", "Body to the nearest obstacle", "m", "minimal_distance", body_distance,
@@ -141,7 +147,7 @@ def write_all(recording: Recording, folder: Path) -> None:
         if panels:
             drawing.write(stacked(recording, panels, wanted.title), str(folder / wanted.name))
     if "ee_position" in recording and recording.ticks > 1:
-        drawing.write(picture([recording]), str(folder / "picture"))
+        drawing.write(picture({label_of(recording): recording}), str(folder / "picture"))
 
 
 def stacked(recording: Recording, panels: Sequence[Panel], title: str) -> Figure:
@@ -189,6 +195,7 @@ def _share_limits(figures: Sequence[Figure], times: Sequence[Array]) -> None:
     for ax, (low, high) in zip(axes, ranges, strict=True):
         ax.set_ylim(limits)
         ax.set_xlim(0.0, end)
+        ax.xaxis.set_major_locator(MaxNLocator(4))
         if high - low > 1.1 * (limits[1] - limits[0]):
             ax.text(0.98, 0.96, f"cut: reaches {low:.2g} to {high:.2g}", color=ALERT, fontsize=8,
                     ha="right", va="top", transform=ax.transAxes)
@@ -219,7 +226,7 @@ def departure(recordings: Mapping[str, Recording]) -> Figure:
 
 
 def computing_time(recordings: Mapping[str, Recording]) -> Figure:
-    """Return the median time of a tick's parts [us], with the whole tick's 95 % and 99.9 %."""
+    """Return the median time of a tick's parts [us], with the whole tick's median and 99.9 %."""
     fig, (ax,) = drawing.figure(width=4.9, height=0.7 + 0.4 * len(recordings))
     parts = (("time_kinematics", 0.35), ("time_rows", 0.6), ("time_resolve", 1.0))
     chosen = drawing.colours(recordings)
@@ -230,7 +237,7 @@ def computing_time(recordings: Mapping[str, Recording]) -> Figure:
             ax.barh(row, width, left=left, color=chosen[label], alpha=alpha, height=0.6)
             left += width
         if "time_tick" in recording:
-            for percent, mark in ((50.0, "|"), (95.0, "4"), (99.9, "x")):
+            for percent, mark in ((50.0, "|"), (99.9, "x")):
                 ax.plot(1e6 * np.percentile(recording["time_tick"], percent), row, mark,
                         color=INK, markersize=7)
     ax.set_yticks(range(len(recordings)), list(recordings))
@@ -241,41 +248,6 @@ def computing_time(recordings: Mapping[str, Recording]) -> Figure:
     return fig
 
 
-def picture(recordings: Sequence[Recording]) -> Figure:
-    """Return the scene in space: obstacles with their zones, the wanted path, the paths taken."""
-    fig, (ax,) = drawing.figure(width=4.9, height=4.2)
-    chosen = drawing.colours(map(label_of, recordings))
-    _obstacles(ax, recordings[0])
-    for recording in reversed(recordings):
-        path = drawing.project(recording["ee_position"])
-        kept = slice(None, None, max(1, recording.ticks // 1500))
-        ax.plot(*path[kept].T, color=chosen[label_of(recording)], linewidth=1.3)
-    if "desired_position" in recordings[0]:
-        wanted = drawing.project(recordings[0]["desired_position"])
-        ax.plot(*wanted[:: max(1, len(wanted) // 1500)].T, color=INK, linewidth=0.8,
-                linestyle=(0, (4, 3)))
-    ax.plot(*drawing.project(recordings[0]["ee_position"][0]), "o", color=INK, markersize=4)
-    ax.set_aspect("equal")
-    ax.set_axis_off()
-    return fig
-
-
-def _obstacles(ax: Axes, recording: Recording) -> None:
-    """Draw each obstacle that stands still, as the ball around it, with its eps_1 and eps_2."""
-    avoidance = recording.scenario.avoidance
-    if avoidance is None:
-        return
-    for obstacle in avoidance.obstacles:
-        place = getattr(obstacle, "centre", obstacle)
-        if place is None:
-            continue
-        x, y = drawing.project(np.asarray(place, dtype=float))
-        size = getattr(obstacle, "radius", None) or 0.0
-        for radius, alpha in ((avoidance.far, 0.06), (avoidance.near, 0.14), (0.0, 1.0)):
-            ax.add_patch(Circle((x, y), size + radius, color=ALERT, alpha=alpha, linewidth=0))
-        ax.plot(x, y, "o", color=ALERT, markersize=5)
-
-
 def label_of(recording: Recording) -> str:
     """Return the label of the resolver that made a run, as "tpm published"."""
     return str(recording.scenario.make_resolver().label)
@@ -283,7 +255,7 @@ def label_of(recording: Recording) -> str:
 
 def _in_red(ax: Axes, t: Array, y: Array, mask: Array) -> None:
     if mask.any():
-        drawing.curve(ax, t, np.where(mask, y, np.nan), color=ALERT, linewidth=1.2)
+        drawing.curve(ax, t, np.where(mask, y, np.nan), color=ALERT, linewidth=1.7)
 
 
 def _threshold(ax: Axes, t: Array, value: float, name: str) -> None:

@@ -18,21 +18,22 @@ class OutputError(HierarchyError):
 
 
 def claim(folder: str | Path) -> Path:
-    """Make `folder`, or take it as it is if it is empty, and return its absolute path.
+    """Make sure that `folder` can be written later, and return its absolute path.
+
+    It is not made yet, only the folders above it.
 
     Raises
     ------
-    OutputError : it holds something, is no folder, or it or its parent cannot be written.
+    OutputError : it holds something, is no folder, or its parent cannot be written.
     """
     path = Path(folder).expanduser().resolve()
     try:
-        path.mkdir(parents=True, exist_ok=True)
-        if any(path.iterdir()):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        if path.exists() and any(path.iterdir()):
             raise OutputError(f"output folder {folder} exists and is not empty; "
                               "choose another, or remove it first")
-        for place in (path, path.parent):
-            with tempfile.TemporaryFile(dir=place):
-                pass
+        with tempfile.TemporaryFile(dir=path.parent):
+            pass
     except OSError as error:
         raise OutputError(f"output folder {folder} cannot be written: {error.strerror}") from error
     return path

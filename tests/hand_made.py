@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from scenarios.config import RobotSection
 from scenarios.recording import Recording
 
 LABELS = {"tpm": "tpm published", "tpm:form=staircase": "tpm staircase"}
@@ -27,7 +28,7 @@ class HandMadeScenario:
     control: Any = field(default_factory=lambda: SimpleNamespace(
         level="acceleration", resolver="tpm", options={}, period=0.001, duration=4.0,
         jacobian_derivative="exact"))
-    robot: Any = field(default_factory=lambda: SimpleNamespace(model="kuka_lwr"))
+    robot: Any = field(default_factory=lambda: RobotSection(model="kuka_lwr"))
 
     def with_resolver(self, spec: str) -> HandMadeScenario:
         return replace(self, resolver=spec)
@@ -41,8 +42,9 @@ class HandMadeScenario:
 
 def recording(scenario: Any = None, fault: str | None = None, orders: tuple[str, ...] = ("a", "b"),
               **changed: Any) -> Recording:
-    """Five ticks, one second apart, two joints at rest, every signal there and quiet."""
-    ticks, joints = len(changed.get("t", range(5))), 2
+    """Five ticks, one second apart, joints at rest, every signal there and quiet."""
+    ticks = len(changed.get("t", range(5)))
+    joints = np.shape(changed.get("q", np.empty((ticks, 7))))[1]
     signals: dict[str, Any] = {
         "t": np.arange(float(ticks)), "order": np.zeros(ticks, int), "status": np.zeros(ticks, int),
         "iterations": np.ones(ticks, int),

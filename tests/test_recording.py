@@ -47,7 +47,7 @@ def test_arrays_are_found_by_name_without_this_package(tmp_path):
     save(recording(), tmp_path / "run", figures=False)
     with np.load(tmp_path / "run" / "run.npz", allow_pickle=False) as file:
         assert file["t"].shape == (5,)
-        assert file["q"].shape == (5, 2)
+        assert file["q"].shape == (5, 7)
 
 
 def test_a_save_that_breaks_leaves_nothing_behind(tmp_path):
@@ -81,7 +81,13 @@ def test_a_folder_that_is_no_run_or_is_damaged_is_named(tmp_path):
 def test_an_empty_or_new_folder_can_be_claimed_with_its_parents(tmp_path):
     (tmp_path / "empty").mkdir()
     assert claim(tmp_path / "empty") == tmp_path / "empty"
-    assert claim(tmp_path / "a" / "b").is_dir()
+    claim(tmp_path / "a" / "b")
+    assert (tmp_path / "a").is_dir()
+
+
+def test_claiming_a_folder_does_not_make_it(tmp_path):
+    claim(tmp_path / "run")
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_folder_in_use_cannot_be_claimed(tmp_path):

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from matplotlib.figure import Figure
 
 from scenarios import drawing, figures
+from scenarios.picture import picture
 from scenarios.report.verdict import in_words, verdict
 
 if TYPE_CHECKING:
@@ -42,10 +43,11 @@ def _scenario(name: str, runs: Sequence[Run]) -> str:
 def _lead(name: str, runs: Sequence[Run], recordings: Mapping[str, Recording]) -> str:
     scenario = runs[0].scenario
     ways = "one way" if len(runs) == 1 else f"{in_words(len(runs))} ways"
-    drawn = [r for r in recordings.values() if "ee_position" in r]
-    scene = _svg(figures.picture(drawn), f"{name}: the paths taken") if drawn else ""
-    caption = "Dashed: the path asked for. Red: the obstacles, with ε₁ and ε₂ around them."
-    figure = (f'<figure>{scene}<figcaption class="quiet">{caption}</figcaption></figure>'
+    drawn = {label: r for label, r in recordings.items() if "ee_position" in r}
+    scene = _svg(picture(drawn), f"{name}: the paths taken") if drawn else ""
+    caption = ("Dashed: the path asked for. Red: obstacles with ε₁ and ε₂ around them, and control "
+               f"points. The arm is that of {next(iter(drawn), '')}, where it is nearest to one.")
+    figure = (f'<figure>{scene}<figcaption class="quiet">{escape(caption)}</figcaption></figure>'
               if scene else "")
     return f"""<header class="lead"><div>
 <p class="quiet">hierarchy compare · <b>{escape(name)}</b></p>
@@ -65,10 +67,11 @@ def _table(runs: Sequence[Run]) -> str:
     from scenarios.compare import table
 
     colour = drawing.colours([run.label for run in runs])
-    heads = "".join(f"<th>{_chip(colour[run.label])}{escape(run.label)}</th>" for run in runs)
+    heads = "".join(f"<th>{_chip(colour[run.label])}{escape(run.label)}{_stopped(run)}</th>"
+                    for run in runs)
     out = [run.fault is not None for run in runs]
     body = []
-    for group, rows in groupby(table(runs), key=lambda row: row.group):
+    for group, rows in groupby(table(runs, details=False), key=lambda row: row.group):
         body.append(f'<tr class="group"><th colspan="{len(runs) + 1}">{escape(group)}</th></tr>')
         body += [_line(row, out) for row in rows]
     return f"""<section><h2>In numbers</h2>
@@ -76,6 +79,13 @@ def _table(runs: Sequence[Run]) -> str:
 are is unmarked.</p>
 <div class="scroll"><table><thead><tr><th></th>{heads}</tr></thead>
 <tbody>{"".join(body)}</tbody></table></div></section>"""
+
+
+def _stopped(run: Run) -> str:
+    if run.fault is None:
+        return ""
+    seconds = run.recording["t"][-1] if run.recording and run.recording.ticks else 0.0
+    return f'<br><small class="alert">stopped at {seconds:.2f} s</small>'
 
 
 def _line(row: Row, out: Sequence[bool]) -> str:
@@ -98,8 +108,8 @@ def _overlays(name: str, recordings: Mapping[str, Recording]) -> str:
         drawn.append((f"How far the joints depart from those of {first} [rad]",
                       figures.departure(recordings)))
     if all("time_tick" in r for r in recordings.values()):
-        drawn.append(("Computing, median of kinematics, rows, resolve (light to full); "
-                      "whole tick: | median, ⅄ 95 %, × 99.9 %", figures.computing_time(recordings)))
+        drawn.append(("Time per tick: kinematics, rows, resolve (light to full, medians); "
+                      "whole tick | median, × 99.9 %", figures.computing_time(recordings)))
     body = "".join(f"<figure><figcaption><b>{escape(title)}</b></figcaption>"
                    f"{_svg(fig, f'{name}: {title}')}</figure>" for title, fig in drawn)
     return (f"<section><h2>Laid over each other</h2>{_legend(recordings)}"
@@ -117,6 +127,7 @@ def _panels(name: str, recordings: Mapping[str, Recording]) -> list[str]:
             unit = f"<small class='quiet'>[{escape(panel.unit)}] over time [s]</small>"
             sections.append(f"<section><h2>{escape(panel.title)} {unit}</h2>"
                             f'<p class="quiet">{escape(panel.explains)}</p>'
+                            f"{_joints(recordings) if panel.name == 'joint-velocities' else ''}"
                             f'<div class="panels">{body}</div></section>')
     return sections
 
@@ -147,6 +158,12 @@ def _legend(labels: Any) -> str:
         f"<span>{_chip(colour)}{escape(label)}</span>"
         for label, colour in sorted(chosen.items(), key=lambda pair: list(labels).index(pair[0]))
     ) + "</div>"
+
+
+def _joints(recordings: Mapping[str, Recording]) -> str:
+    count = next(iter(recordings.values()))["v"].shape[1]
+    chips = (f"<span>{_chip(figures.joint_colour(i))}joint {i + 1}</span>" for i in range(count))
+    return f'<div class="legend">{"".join(chips)}</div>'
 
 
 def _chip(colour: str) -> str:

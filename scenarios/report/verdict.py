@@ -30,10 +30,11 @@ def _completion(runs: Sequence[Run], finished: Sequence[Run]) -> str:
     if len(finished) == len(runs) == 1:
         return f"{runs[0].label} ran the whole {seconds}"
     if len(finished) == len(runs):
-        return f"All {in_words(len(runs))} ways ran the whole {seconds}"
+        every = "Both" if len(runs) == 2 else f"All {in_words(len(runs))}"
+        return f"{every} ways ran the whole {seconds}"
     stopped = ", ".join(run.label for run in runs if run.fault)
-    return (f"{in_words(len(finished)).capitalize()} of {in_words(len(runs))} ways ran the whole "
-            f"{seconds} ({stopped} did not)")
+    some = f"{in_words(len(finished)).capitalize()} of {in_words(len(runs))} ways"
+    return f"{some if finished else 'No way'} ran the whole {seconds} ({stopped} did not)"
 
 
 def _distance(runs: Sequence[Run]) -> str:
@@ -63,7 +64,7 @@ def _speed(runs: Sequence[Run]) -> str:
     worst, high = _extreme(runs, name, largest=True)
     if best is None or worst is None:
         return ""
-    against = f", {worst.label} takes {1e6 * high:.3g} µs" if high > 1.2 * low else ""
+    against = f", {worst.label} takes {1e6 * high:.2g} µs" if high > 1.2 * low else ""
     return f"{best.label} resolves a tick in {1e6 * low:.2g} µs{against}"
 
 
@@ -76,4 +77,4 @@ def _extreme(runs: Sequence[Run], name: str, largest: bool) -> tuple[Run | None,
 
 
 def _mm(metres: float) -> str:
-    return f"{1e3 * metres:.3g} mm"
+    return f"{1e3 * metres:.2g} mm"

@@ -1,0 +1,237 @@
+"""The command `hierarchy`: list, run, compare, check, bench.
+
+Nothing heavy is imported before it is needed, so that `--help` and completion answer at once.
+Exit codes: 0 done, 1 a run ended in a fault that is reported, 2 the command line or a file is
+wrong.
+"""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from enum import StrEnum
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from scenarios.compare import Run
+    from scenarios.config import Scenario
+
+app = typer.Typer(help="Prioritized robot tasks: many ways of resolving them, compared.",
+                  rich_markup_mode=None, pretty_exceptions_enable=False)
+
+Changes = Annotated[list[str] | None, typer.Option(
+    "--set", metavar="KEY=VALUE",
+    help="Change the scenario: a dotted key and a TOML value. May be repeated.")]
+Duration = Annotated[float | None, typer.Option(
+    "--duration", metavar="SECONDS", help="Run for so long instead of the scenario's duration.")]
+Out = Annotated[Path | None, typer.Option(
+    "--out", metavar="FOLDER", help="Where to write; new or empty. Default: a new one in runs/.")]
+
+
+class Bench(StrEnum):
+    """What can be timed."""
+
+    resolvers = "resolvers"
+    tick = "tick"
+
+
+def main() -> None:
+    """Run the command line and exit with its code; see the module's text."""
+    sys.exit(run_command(sys.argv[1:]))
+
+
+def run_command(arguments: list[str]) -> int:
+    """Run one command line and return its exit code; mistakes become one line on stderr."""
+    try:
+        return int(app(arguments or ["--help"], prog_name="hierarchy", standalone_mode=False) or 0)
+    except typer.TyperException as error:
+        return _wrong(error.format_message())
+    except (KeyboardInterrupt, typer.Abort):
+        print("hierarchy: interrupted", file=sys.stderr)
+        return 1
+    except Exception as error:
+        from hierarchy.errors import HierarchyError
+
+        if isinstance(error, HierarchyError):
+            return _wrong(str(error))
+        raise
+
+
+@app.command("list")
+def list_() -> None:
+    """List the scenarios, resolvers, tasks and robots there are."""
+    import solvers
+    from hierarchy.robot import ROBOTS
+    from hierarchy.tasks import TASKS
+    from scenarios.config import load, shipped
+
+    _print_list("scenarios", {name: load(name).title for name in shipped()})
+    _print_list("resolvers", {name: solvers.make(name).label for name in solvers.names()})
+    _print_list("tasks", {name: _first_line(task) for name, task in TASKS.items()})
+    _print_list("robots", dict.fromkeys(ROBOTS, ""))
+
+
+@app.command()
+def run(scenario: Annotated[str, typer.Argument(help="Name of a scenario, or a scenario file.")],
+        resolver: Annotated[str | None, typer.Option(
+            "--resolver", metavar="SPEC",
+            help="Another resolver: name, or name:setting=value:setting=value.")] = None,
+        changes: Changes = None, duration: Duration = None, out: Out = None) -> int:
+    """Run one scenario, measure it, keep the run in a folder."""
+    chosen = _load(scenario, changes, duration)
+    if resolver is not None:
+        chosen = chosen.with_resolver(resolver)
+    from scenarios.folders import claim, next_free
+
+    name = f"{chosen.name}-{chosen.control.resolver}"
+    folder = claim(out if out is not None else next_free(Path("runs") / name))
+    from scenarios.progress import bar
+    from scenarios.recording import save
+    from scenarios.simulate import simulate
+
+    with bar() as told:
+        label = str(chosen.make_resolver().label)
+        recording = simulate(chosen, progress=partial(told, label) if told else None)
+    save(recording, folder)
+    _print_table([_run_of(chosen, recording)])
+    print(f"\n{recording.ticks} ticks in {_shown(folder)}")
+    return _fault(recording.fault)
+
+
+@app.command()
+def compare(scenarios: Annotated[list[str], typer.Argument(
+                help="Names of scenarios, or scenario files.")],
+            resolvers: Annotated[str | None, typer.Option(
+                "--resolvers", metavar="SPEC,SPEC,...",
+                help="Resolvers: name, or name:setting=value. Default: five ways.")] = None,
+            changes: Changes = None, duration: Duration = None, out: Out = None) -> int:
+    """Run scenarios under several resolvers; write a report."""
+    from scenarios.compare import DEFAULT_RESOLVERS
+    from scenarios.compare import compare as run_all
+    from scenarios.folders import next_free
+    from scenarios.progress import bar
+
+    chosen = [_load(name, changes, duration) for name in scenarios]
+    specs = _split(resolvers) if resolvers is not None else DEFAULT_RESOLVERS
+    folder = out if out is not None else next_free(Path("runs") / f"compare-{chosen[0].name}")
+    command = shlex.join(["hierarchy", *sys.argv[1:]])
+    with bar() as told:
+        comparison = run_all(chosen, specs, out=folder, progress=told, command=command)
+    for runs in comparison.by_scenario().values():
+        _print_table(runs)
+    print(f"\nReport: {_shown(folder / 'index.html')}")
+    return max([_fault(f"{run.label}: {run.fault}") for run in comparison.faults], default=0)
+
+
+@app.command()
+def check(file: Annotated[str, typer.Argument(help="A scenario file, or a scenario's name.")],
+          changes: Changes = None) -> None:
+    """Read a scenario file and say what was understood."""
+    scenario = _load(file, changes, None)
+    ticks = round(scenario.control.duration / scenario.control.period)
+    print(f"{scenario.name}: {scenario.title}")
+    print(f"  robot     {scenario.robot.model}")
+    print(f"  control   {scenario.control.level} level, {ticks} ticks of "
+          f"{1e3 * scenario.control.period:g} ms")
+    print(f"  resolver  {scenario.make_resolver()!r}")
+    if scenario.pointing is not None:
+        print(f"  pointing  {scenario.pointing.kind}, cone of {scenario.pointing.alpha_d:g} deg")
+    if scenario.avoidance is not None:
+        areas = scenario.avoidance
+        print(f"  avoidance {len(areas.obstacles)} obstacles; within {areas.near:g} and "
+              f"{areas.far:g} m of the body, {areas.end_effector:g} m of the end effector")
+    print("The file is right.")
+
+
+@app.command()
+def bench(what: Annotated[Bench | None, typer.Argument(
+        help="Only this. Default: both.")] = None) -> None:
+    """Time the resolvers and the whole control tick."""
+    from importlib import import_module
+
+    for wanted in [what] if what is not None else list(Bench):
+        import_module(f"scenarios.bench.{wanted.value}").run()
+
+
+def _load(name: str, changes: list[str] | None, duration: float | None) -> Scenario:
+    from scenarios.config import load
+
+    lengthened = [] if duration is None else [f"control.duration={duration!r}"]
+    return load(name, [*(changes or []), *lengthened])
+
+
+def _split(specs: str) -> list[str]:
+    named = [spec.strip() for spec in specs.split(",") if spec.strip()]
+    if not named:
+        raise typer.BadParameter("names no resolver", param_hint="--resolvers")
+    return named
+
+
+def _run_of(scenario: Scenario, recording: Any) -> Run:
+    from scenarios.compare import Run
+
+    return Run(scenario, scenario.control.resolver, str(scenario.make_resolver().label), recording)
+
+
+def _print_table(runs: list[Run]) -> None:
+    from rich.console import Console
+
+    print()
+    Console(markup=False, highlight=False).print(_table(runs))
+
+
+def _table(runs: list[Run]) -> Table:
+    """Lay metrics out for a terminal, best in bold with a star; 80 columns hold five runs."""
+    from rich.table import Table
+    from rich.text import Text
+
+    from scenarios.compare import table
+
+    laid_out = Table(title=Text(runs[0].scenario.title or runs[0].scenario.name), box=None,
+                     title_justify="left", padding=(0, 1, 0, 0), pad_edge=False)
+    laid_out.add_column("", overflow="fold", min_width=26)
+    for one in runs:
+        laid_out.add_column(Text(one.label), justify="right", overflow="fold")
+    for row in table(runs, details=False):
+        cells = [Text(cell + ("*" if i in row.best else " "), "bold" if i in row.best else "")
+                 for i, cell in enumerate(row.cells)]
+        laid_out.add_row(Text(f"{row.label} [{row.unit}]" if row.unit else row.label), *cells)
+    return laid_out
+
+
+def _print_list(what: str, entries: dict[str, str]) -> None:
+    print(f"{what}:")
+    width = max((len(name) for name in entries), default=0)
+    for name, text in entries.items():
+        print(f"  {name:{width}}  {text}".rstrip())
+
+
+def _first_line(thing: Any) -> str:
+    return (thing.__doc__ or "").strip().partition("\n")[0]
+
+
+def _shown(path: Path) -> str:
+    path = path.resolve()
+    return str(path.relative_to(Path.cwd()) if path.is_relative_to(Path.cwd()) else path)
+
+
+def _fault(fault: str | None) -> int:
+    if fault is None:
+        return 0
+    print(f"hierarchy: fault: {fault}", file=sys.stderr)
+    return 1
+
+
+def _wrong(text: str) -> int:
+    print(f"hierarchy: error: {text}", file=sys.stderr)
+    return 2
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,98 @@
+"""The scene of a run in space: the arm, the path asked for, the path taken, the obstacles."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle
+
+from scenarios import drawing
+from scenarios.drawing import ALERT, INK, Array
+
+if TYPE_CHECKING:
+    from scenarios.recording import Recording
+
+_VERTICES = 1200
+_OTHER_POSES = 5
+
+
+def picture(recordings: Mapping[str, Recording]) -> Figure:
+    """Return the scene, after figure 3 of the letter.
+
+    The arm is that of the first run, in full where its body is nearest to an obstacle, with the
+    line to it and with its control points; every run's path has the colour of its label.
+    """
+    fig, (ax,) = drawing.figure(width=4.9, height=3.9)
+    first = next(iter(recordings.values()))
+    _obstacles(ax, first)
+    _arms(ax, first)
+    for label, colour in reversed(drawing.colours(recordings).items()):
+        _line(ax, recordings[label]["ee_position"], color=colour, linewidth=1.8)
+    if "desired_position" in first:
+        _line(ax, first["desired_position"], color=INK, linewidth=0.9, linestyle=(0, (3, 3)))
+    ax.set_aspect("equal")
+    ax.set_axis_off()
+    return fig
+
+
+def _line(ax: Axes, path: Array, **style: object) -> None:
+    kept = path[:: max(1, len(path) // _VERTICES)]
+    ax.plot(*drawing.project(kept).T, **style)  # type: ignore[arg-type]
+
+
+def _obstacles(ax: Axes, recording: Recording) -> None:
+    """Draw each obstacle that stands still as the ball around it, with its eps_1 and eps_2."""
+    avoidance = recording.scenario.avoidance
+    if avoidance is None:
+        return
+    for obstacle in avoidance.obstacles:
+        place = getattr(obstacle, "centre", obstacle)
+        if place is None:
+            continue
+        x, y = drawing.project(np.asarray(place, dtype=float))
+        size = getattr(obstacle, "radius", None) or 0.0
+        for radius, alpha in ((avoidance.far, 0.08), (avoidance.near, 0.18), (0.0, 1.0)):
+            ax.add_patch(Circle((x, y), size + radius, color=ALERT, alpha=alpha, linewidth=0))
+        ax.plot(x, y, "o", color=ALERT, markersize=5)
+
+
+def _arms(ax: Axes, recording: Recording) -> None:
+    from scenarios.build import make_robot
+
+    robot = make_robot(recording.scenario.robot)
+    nearest = (int(np.argmin(recording["minimal_distance"]))
+               if "minimal_distance" in recording else recording.ticks - 1)
+    others = np.linspace(0, recording.ticks - 1, _OTHER_POSES).astype(int)
+    for k, alpha in (*((int(k), 0.16) for k in others), (nearest, 0.9)):
+        placements = robot.state(recording["q"][k]).placements
+        tip = recording["ee_position"][k]
+        chain = drawing.project(np.vstack([np.zeros(3), placements[1:, 9:], tip]))
+        ax.plot(*chain.T, color=INK, alpha=alpha, linewidth=5.0 if k == nearest else 2.5,
+                solid_capstyle="round", solid_joinstyle="round")
+        if k == nearest:
+            ax.plot(*chain.T, "o", color=INK, markersize=6)
+            body = [_place(placements[point.joint], point.offset)
+                    for point in robot.control_points]
+            if body:
+                ax.plot(*drawing.project(np.array(body)).T, "o", color=ALERT, markersize=3)
+                _shortest(ax, recording, k, body)
+
+
+def _shortest(ax: Axes, recording: Recording, k: int, body: list[Array]) -> None:
+    """Link the control point that is nearest to an obstacle with it, as figure 3 does."""
+    avoidance = recording.scenario.avoidance
+    still = [getattr(o, "centre", o) for o in avoidance.obstacles] if avoidance else []
+    ends = np.array([place for place in still if place is not None], dtype=float)
+    if ends.size and "control_point_distance" in recording:
+        point = body[int(np.argmin(recording["control_point_distance"][k]))]
+        end = ends[int(np.argmin(np.linalg.norm(ends - point, axis=1)))]
+        ax.plot(*drawing.project(np.array([point, end])).T, color=ALERT, linewidth=1.2)
+
+
+def _place(placement: Array, offset: Array) -> Array:
+    """Return the world position (3,) [m] of an offset in a frame given as a placement row."""
+    return np.asarray(placement[9:] + placement[:9].reshape(3, 3).T @ offset)

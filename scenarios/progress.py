@@ -1,0 +1,30 @@
+"""A progress bar on standard error, where that is a terminal, and nothing where it is not."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+
+@contextmanager
+def bar() -> Iterator[Callable[[str, int, int], None] | None]:
+    """Give a function to call as told(label, ticks done, ticks in all), or None off a terminal."""
+    if not sys.stderr.isatty():
+        yield None
+        return
+    from rich.console import Console
+    from rich.markup import escape
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(),
+               TextColumn("{task.completed:.0f}/{task.total:.0f} ticks"), TimeRemainingColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+        lines: dict[str, int] = {}
+
+        def told(label: str, done: int, total: int) -> None:
+            if label not in lines:
+                lines[label] = int(progress.add_task(escape(label), total=total))
+            progress.update(lines[label], completed=done)  # type: ignore[arg-type]
+
+        yield told
