@@ -3,7 +3,9 @@
 The names below are imported when first used, so that `import scenarios` costs nothing.
 """
 
+import sys
 from importlib import import_module
+from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -22,6 +24,19 @@ _HOME = {"Comparison": "compare", "Recording": "recording", "Scenario": "config"
 def __getattr__(name: str) -> Any:
     if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    # `compare` and `simulate` are also the names of their modules: keep the function.
     value = globals()[name] = getattr(import_module(f"scenarios.{_HOME.get(name, name)}"), name)
     return value
+
+
+class _Package(ModuleType):
+    """Keeps `scenarios.compare` and `scenarios.simulate` the functions of these names.
+
+    Importing the modules of the same names would otherwise put the modules in their place.
+    """
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        if not (name in __all__ and isinstance(value, ModuleType)):
+            super().__setattr__(name, value)
+
+
+sys.modules[__name__].__class__ = _Package

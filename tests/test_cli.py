@@ -1,0 +1,223 @@
+import importlib
+import json
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+from hand_made import recording
+
+from scenarios import compare
+from scenarios.cli import run_command
+
+SHORT = ["--duration", "0.02"]
+
+
+@pytest.fixture(autouse=True)
+def in_an_empty_folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+
+
+def fails(arguments, capsys):
+    """Run a wrong command line: exit code 2, one error on stderr, nothing on stdout or on disk."""
+    assert run_command(arguments) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.startswith("hierarchy: error: ")
+    assert "Traceback" not in err
+    return err
+
+
+def test_run_prints_its_metrics_and_keeps_the_run(tmp_path, capsys):
+    assert run_command(["run", "ellipse", *SHORT, "--out", "runs/a"]) == 0
+    out = capsys.readouterr().out
+    assert "Position error, rms [mm]" in out
+    assert "runs/a" in out
+    assert (tmp_path / "runs" / "a" / "run.npz").exists()
+
+
+def test_run_without_out_never_takes_a_folder_twice(tmp_path):
+    for _ in range(2):
+        assert run_command(["run", "ellipse", *SHORT, "--resolver", "recursive"]) == 0
+    assert sorted(path.name for path in (tmp_path / "runs").iterdir()) == [
+        "ellipse-recursive", "ellipse-recursive-2"]
+
+
+def test_a_saved_run_says_itself_how_to_repeat_it(tmp_path):
+    first = ["run", "ellipse", *SHORT, "--set", "pointing.alpha_d=35", "--out", "a"]
+    assert run_command(first) == 0
+    assert run_command(["run", "a/scenario.toml", "--out", "b"]) == 0
+    assert ((tmp_path / "a" / "scenario.toml").read_text()
+            == (tmp_path / "b" / "scenario.toml").read_text())
+    assert "alpha_d = 35" in (tmp_path / "b" / "scenario.toml").read_text()
+
+
+def test_a_loaded_run_is_the_run_that_was_saved(tmp_path):
+    import numpy as np
+
+    from scenarios import load_run
+
+    assert run_command(["run", "ellipse", *SHORT, "--out", "a"]) == 0
+    run = load_run(tmp_path / "a")
+    assert run.ticks == 20
+    assert run.scenario.name == "ellipse"
+    with np.load(tmp_path / "a" / "run.npz") as file:
+        np.testing.assert_array_equal(file["q"], run["q"])
+
+
+def test_compare_writes_page_numbers_and_a_folder_for_each_run(tmp_path, capsys):
+    arguments = ["compare", "ellipse", "--resolvers", "tpm,tpm:form=staircase,recursive", *SHORT]
+    assert run_command([*arguments, "--out", "b"]) == 0
+    assert "Report: b/index.html" in capsys.readouterr().out
+    assert {path.name for path in (tmp_path / "b" / "ellipse").iterdir()} == {
+        "tpm", "tpm-form-staircase", "recursive"}
+    numbers = json.loads((tmp_path / "b" / "comparison.json").read_text())
+    assert [run["label"] for run in numbers["runs"]] == [
+        "tpm published", "tpm staircase", "recursive"]
+    assert numbers["runs"][0]["settings"]["damping"] == 0.05
+
+
+def test_the_table_fits_a_terminal_of_80_columns(capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    assert run_command(["compare", "ellipse", *SHORT]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert max(map(len, lines)) <= 80
+    assert not any("…" in line for line in lines)
+
+
+def test_nothing_but_results_goes_to_stdout_and_no_bar_off_a_terminal(capsys):
+    assert run_command(["run", "ellipse", *SHORT, "--out", "a"]) == 0
+    assert "ticks" not in capsys.readouterr().err
+
+
+def test_list_names_scenarios_resolvers_tasks_and_robots(capsys):
+    assert run_command(["list"]) == 0
+    out = capsys.readouterr().out
+    for name in ("ellipse", "recursive", "tpm", "pointing", "kuka_lwr"):
+        assert f"  {name} " in out or f"  {name}\n" in out
+
+
+def test_check_says_what_was_understood(tmp_path, capsys):
+    assert run_command(["check", "ellipse"]) == 0
+    out = capsys.readouterr().out
+    assert "18850 ticks of 1 ms" in out
+    assert "kuka_lwr" in out
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(("arguments", "says"), [
+    (["run", "elipse"], "did you mean 'ellipse'"),
+    (["run", "ellipse", "--resolver", "recursiv"], "did you mean 'recursive'"),
+    (["run", "ellipse", "--resolver", "tpm:dampign=0.1"], "dampign"),
+    (["run", "ellipse", "--set", "pointing.alfa_d=5"], "pointing.alpha_d"),
+    (["run", "ellipse", "--set", "pointing.alpha_d"], "expected key=value"),
+    (["run", "ellipse", "--set", "pointing.alpha_d='wide'"], "pointing.alpha_d"),
+    (["run", "ellipse", "--set", "robot.model=kuka_lrw"], "kuka_lwr"),
+    (["run", "ellipse", "--duration", "-1"], "control.duration"),
+    (["run", "ellipse", "--duration", "long"], "--duration"),
+    (["run", "missing.toml"], "missing.toml"),
+    (["compare", "ellipse", "--resolvers", ","], "names no resolver"),
+    (["compare", "ellipse", "--resolvers", "tpm,recursiv"], "did you mean 'recursive'"),
+    (["check", "missing.toml"], "missing.toml"),
+    (["rnu", "ellipse"], "rnu"),
+    (["run"], "Missing argument"),
+    (["run", "ellipse", "--bogus"], "--bogus"),
+    (["bench", "[red]nothing[/red]"], "[red]nothing[/red]"),
+])
+def test_a_mistake_is_named_before_anything_is_run(arguments, says, capsys, tmp_path):
+    assert says in fails(arguments, capsys)
+    assert not list(tmp_path.rglob("run.npz"))
+
+
+def test_a_broken_file_is_named_with_line_and_column(tmp_path, capsys):
+    (tmp_path / "broken.toml").write_text('name = "x"\n[robot\n')
+    said = fails(["check", "broken.toml"], capsys)
+    assert "broken.toml" in said
+    assert "line 2" in said
+
+
+def test_an_output_folder_in_use_stops_the_run_before_it_begins(tmp_path, capsys, monkeypatch):
+    simulation_is(must_not_run, monkeypatch)
+    (tmp_path / "precious").mkdir()
+    (tmp_path / "precious" / "thesis.tex").touch()
+    for command in ("run", "compare"):
+        assert "not empty" in fails([command, "ellipse", "--out", "precious"], capsys)
+    assert [path.name for path in (tmp_path / "precious").iterdir()] == ["thesis.tex"]
+
+
+def test_an_output_folder_that_cannot_be_written_stops_the_run_before_it_begins(
+        tmp_path, capsys, monkeypatch):
+    simulation_is(must_not_run, monkeypatch)
+    (tmp_path / "file").touch()
+    for command in ("run", "compare"):
+        assert "cannot be written" in fails([command, "ellipse", "--out", "file/x"], capsys)
+
+
+def simulation_is(stand_in, monkeypatch):
+    monkeypatch.setattr(importlib.import_module("scenarios.simulate"), "simulate", stand_in)
+
+
+def must_not_run(*_, **__):
+    raise AssertionError("the run began")
+
+
+def test_a_fault_is_reported_and_the_run_kept(tmp_path, capsys, monkeypatch):
+    def faulty(scenario, progress=None):
+        return recording(scenario, fault="interrupted at tick 5")
+
+    simulation_is(faulty, monkeypatch)
+    assert run_command(["run", "ellipse", "--out", "a"]) == 1
+    assert "fault: interrupted at tick 5" in capsys.readouterr().err
+    assert (tmp_path / "a" / "run.npz").exists()
+
+
+def test_ctrl_c_in_a_comparison_keeps_what_was_run_and_runs_no_more(tmp_path, monkeypatch):
+    begun = []
+
+    def interrupted_at_the_second(scenario, progress=None):
+        begun.append(scenario.control.resolver)
+        return recording(scenario, "interrupted at tick 5" if len(begun) == 2 else None)
+
+    simulation_is(interrupted_at_the_second, monkeypatch)
+    assert run_command(["compare", "ellipse", "--resolvers", "tpm,recursive,hqp",
+                        "--out", "b"]) == 1
+    assert begun == ["tpm", "recursive"]
+    assert {path.name for path in (tmp_path / "b" / "ellipse").iterdir()} == {"tpm", "recursive"}
+    assert "interrupted at tick 5" in (tmp_path / "b" / "index.html").read_text()
+
+
+def test_one_run_that_breaks_does_not_lose_the_others(tmp_path, monkeypatch, capsys):
+    def breaks_under_recursive(scenario, progress=None):
+        if scenario.control.resolver == "recursive":
+            raise ArithmeticError("[bold]no[/bold] answer")
+        return recording(scenario)
+
+    simulation_is(breaks_under_recursive, monkeypatch)
+    done = compare("ellipse", ["recursive", "tpm"], out=tmp_path / "b")
+    assert [run.fault for run in done.runs] == ["ArithmeticError: [bold]no[/bold] answer", None]
+    assert run_command(["compare", "ellipse", "--resolvers", "recursive,tpm", "--out", "c"]) == 1
+    assert "[bold]no[/bold] answer" in capsys.readouterr().err
+
+
+def test_a_real_interrupt_saves_every_tick_so_far_whole(tmp_path):
+    command = [sys.executable, "-c", "from scenarios.cli import main; main()",
+               "run", "ellipse", "--duration", "10000", "--out", "a"]
+    process = subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True)
+    time.sleep(8.0)
+    process.send_signal(signal.SIGINT)
+    _, err = process.communicate(timeout=60)
+    assert process.returncode == 1
+    if (tmp_path / "a").exists():  # else it was interrupted while still starting
+        from scenarios import load_run
+
+        run = load_run(tmp_path / "a")
+        assert run.fault == f"interrupted at tick {run.ticks}"
+    assert "interrupted" in err
+
+
+def test_help_needs_none_of_the_heavy_packages():
+    code = ("import sys; from scenarios.cli import run_command; run_command(['--help']); "
+            "print({'numpy', 'numba', 'pinocchio', 'pydantic', 'matplotlib'} & set(sys.modules))")
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.endswith("set()\n")

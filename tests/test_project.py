@@ -1,0 +1,84 @@
+"""The repository itself: what it promises about set-up, documents and imports."""
+
+import re
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+LINK = re.compile(r"\[[^\]]*\]\((?!https?://|#|mailto:)([^)#\s]+)")
+
+
+def documents():
+    return sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md")])
+
+
+@pytest.mark.parametrize("document", documents(), ids=lambda path: str(path.relative_to(ROOT)))
+def test_a_document_points_only_at_files_that_exist(document):
+    missing = [link for link in LINK.findall(document.read_text(encoding="utf-8"))
+               if not (document.parent / link).exists()]
+    assert missing == []
+
+
+def test_continuous_integration_runs_what_a_developer_runs():
+    assert "make test" in (ROOT / ".ci" / "run").read_text()
+    assert (ROOT / ".ci" / "run").stat().st_mode & 0o100
+
+
+def test_every_dependency_has_a_pinned_version_and_nothing_but_versions_is_pinned():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    lines = [line for line in (ROOT / "constraints.txt").read_text().splitlines()
+             if line and not line.startswith("#")]
+    assert all(re.fullmatch(r"[A-Za-z0-9_.-]+==[A-Za-z0-9_.+!-]+", line) for line in lines)
+    pinned = {line.partition("==")[0].lower().replace("_", "-") for line in lines}
+    asked = [*project["dependencies"], *project["optional-dependencies"]["dev"]]
+    assert {re.split(r"[<>=\[ ]", one)[0].lower() for one in asked} <= pinned
+
+
+def test_the_version_is_the_same_wherever_it_is_written():
+    version = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"]
+    assert f"\nversion: {version}\n" in (ROOT / "CITATION.cff").read_text()
+
+
+def test_make_says_what_is_missing_when_python_is_too_old(tmp_path):
+    done = make_set_up(tmp_path, "#!/bin/sh\nexit 1\n")
+    assert done.returncode != 0
+    assert "needs Python 3.11 or newer" in done.stderr
+
+
+def test_make_names_the_package_when_python_cannot_make_an_environment(tmp_path):
+    done = make_set_up(tmp_path, '#!/bin/sh\ncase "$2" in\n  *ensurepip*) exit 1;;\n'
+                                 '  *print*) echo 3.11;;\nesac\n')
+    assert done.returncode != 0
+    assert "apt install python3.11-venv" in done.stderr
+
+
+def make_set_up(folder, interpreter):
+    """Run `make set-up` in a copy of what it reads, with a stand-in for Python."""
+    for name in ("Makefile", "pyproject.toml", "constraints.txt"):
+        (folder / name).write_bytes((ROOT / name).read_bytes())
+    python = folder / "python"
+    python.write_text(interpreter)
+    python.chmod(0o755)
+    return subprocess.run(["make", "set-up", f"PYTHON={python}"], cwd=folder, text=True,
+                          capture_output=True, check=False)
+
+
+def test_importing_the_package_costs_nothing():
+    code = "import sys, scenarios; print('numpy' in sys.modules, 'pydantic' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "False False\n"
+
+
+def test_what_the_package_says_it_exports_is_there():
+    import scenarios
+    import scenarios.compare
+    import scenarios.simulate
+
+    for name in scenarios.__all__:
+        assert callable(getattr(scenarios, name))
+    with pytest.raises(AttributeError, match="no attribute 'nothing'"):
+        _ = scenarios.nothing
