@@ -1,0 +1,9 @@
+"""How a hierarchy is resolved: many resolvers behind one interface."""
+
+from solvers import augmented as augmented
+from solvers import hqp as hqp
+from solvers import recursive as recursive
+from solvers import tpm as tpm
+from solvers.resolver import Resolution, Resolver, Status, make, names
+
+__all__ = ["Resolution", "Resolver", "Status", "make", "names"]

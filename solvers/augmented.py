@@ -1,0 +1,35 @@
+"""All levels as one, for comparison."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar, final
+
+from hierarchy.problem import Hierarchy
+from solvers.kernels.augmented import augmented
+from solvers.resolver import Resolution, Resolver, register
+
+
+@final
+@register
+@dataclass(frozen=True, kw_only=True)
+class Augmented(Resolver):
+    """The least-squares solution of the whole stack, eqs. (2) and (14): priorities play no role.
+
+    It is the strict answer only where all levels can be met together. With damping on, the whole
+    stack is damped as one level.
+    """
+
+    name: ClassVar[str] = "augmented"
+
+    @property
+    def strict(self) -> bool:
+        """No: a lower level may take from a higher one."""
+        return False
+
+    def solve(self, h: Hierarchy, memory: Any = None) -> Resolution:
+        """Resolve h; direct, `memory` is not used."""
+        x = h.reference.copy()
+        code = augmented(h.A, h.lower, h.upper, h.sizes, x, self.damping, self.threshold,
+                         self.rank_tolerance)
+        return self._resolution(h, x, code) if code else Resolution(x)

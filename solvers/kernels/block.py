@@ -1,0 +1,150 @@
+"""One level's own small problem: min ||M y - r||^2 + lambda^2 ||y||^2, lambda from the damping."""
+
+# mypy: disable-error-code="no-untyped-def"
+
+from __future__ import annotations
+
+import numpy as np
+
+from hierarchy.compiled import compiled
+
+SWEEPS = 40  # bound; Jacobi needs 6 to 10
+
+
+@compiled
+def solve_block(M, r, y, i0, i1, k0, k1, damping, threshold):
+    """Write into y[k0:k1] the step of one level with rows i0:i1 and columns k0:k1 of M.
+
+    The block is lower trapezoidal with a nonzero diagonal: its rows in pivot order, in the columns
+    that the level adds. r[i0:i1] is what its rows still miss.
+    """
+    if k0 == k1:
+        return
+    damped = variable_damping(M, i0, i1, k0, k1, damping, threshold) if damping > 0.0 else 0.0
+    if damped > 0.0 or i1 - i0 > k1 - k0:
+        _least_squares(M, r, y, i0, i1, k0, k1, damped)
+        return
+    for k in range(k0, k1):
+        i = i0 + k - k0
+        rest = r[i]
+        for c in range(k0, k):
+            rest -= M[i, c] * y[c]
+        y[k] = rest / M[i, k]
+
+
+@compiled
+def variable_damping(M, i0, i1, k0, k1, damping, threshold):
+    """Return lambda, with lambda^2 = (1 - (s / threshold)^2) damping^2 for s < threshold, else 0.
+
+    s is the smallest singular value of the block, counted over its rows: 0 where rank < rows. It
+    is computed only where the cheap bound s >= 1 / ||L^-1||_F does not already pass.
+    """
+    if i1 - i0 > k1 - k0:
+        return damping
+    p = k1 - k0
+    L = np.empty((p, p))
+    if invert_triangle(M, L, i0, k0, p) * threshold * threshold <= 1.0:
+        return 0.0
+    for i in range(p):
+        for j in range(p):
+            L[i, j] = M[i0 + i, k0 + j] if i >= j else 0.0
+    orthogonalise_rows(L, np.empty((p, 0)))
+    ratio = smallest_square(L) / (threshold * threshold)
+    return damping * np.sqrt(1.0 - ratio) if ratio < 1.0 else 0.0
+
+
+@compiled
+def invert_triangle(M, T, i0, k0, p):
+    """Write the inverse transpose of a lower triangle into T (p, p); return its squared norm.
+
+    The triangle L is rows i0 .. i0 + p - 1 and columns k0 .. k0 + p - 1 of M. Its smallest singular
+    value is at least 1 / ||L^-1||_F. Where L is singular, entries of T are not finite.
+    """
+    square = 0.0
+    for j in range(p):
+        for i in range(j):
+            T[j, i] = 0.0
+        for i in range(j, p):
+            value = 1.0 if i == j else 0.0
+            for k in range(j, i):
+                value -= M[i0 + i, k0 + k] * T[j, k]
+            T[j, i] = value / M[i0 + i, k0 + i]
+            square += T[j, i] * T[j, i]
+    return square
+
+
+@compiled
+def smallest_square(W):
+    """Smallest squared norm among the rows of W."""
+    smallest = np.inf
+    for i in range(W.shape[0]):
+        square = 0.0
+        for j in range(W.shape[1]):
+            square += W[i, j] * W[i, j]
+        smallest = min(smallest, square)
+    return smallest
+
+
+@compiled
+def orthogonalise_rows(W, U):
+    """Rotate the rows of W, and those of U alike, until the rows of W are orthogonal (Hestenes).
+
+    The norms of the rows of W are then the singular values of the old W; where U was the identity,
+    the old W is U^T W.
+    """
+    for _ in range(SWEEPS):
+        settled = True
+        for i in range(W.shape[0] - 1):
+            for j in range(i + 1, W.shape[0]):
+                a = b = c = 0.0
+                for k in range(W.shape[1]):
+                    a += W[i, k] * W[i, k]
+                    b += W[j, k] * W[j, k]
+                    c += W[i, k] * W[j, k]
+                if c * c <= 1e-32 * a * b:
+                    continue
+                settled = False
+                zeta = (b - a) / (2.0 * c)
+                t = 1.0 / (abs(zeta) + np.sqrt(1.0 + zeta * zeta))
+                t = t if zeta >= 0.0 else -t
+                cosine = 1.0 / np.sqrt(1.0 + t * t)
+                for V in (W, U):
+                    for k in range(V.shape[1]):
+                        above = V[i, k]
+                        V[i, k] = cosine * (above - t * V[j, k])
+                        V[j, k] = cosine * (t * above + V[j, k])
+        if settled:
+            return
+
+
+@compiled
+def _least_squares(M, r, y, i0, i1, k0, k1, damped):
+    """Write the minimiser into y[k0:k1], by Householder reflections of [M r; lambda I 0]."""
+    rows, p = i1 - i0, k1 - k0
+    height = rows + p
+    T = np.zeros((height, p + 1))
+    for i in range(rows):
+        for k in range(p):
+            T[i, k] = M[i0 + i, k0 + k]
+        T[i, p] = r[i0 + i]
+    for k in range(p):
+        T[rows + k, k] = damped
+    for k in range(p):
+        square = 0.0
+        for i in range(k, height):
+            square += T[i, k] * T[i, k]
+        norm = -np.sqrt(square) if T[k, k] > 0.0 else np.sqrt(square)
+        T[k, k] -= norm
+        for j in range(k + 1, p + 1):
+            s = 0.0
+            for i in range(k, height):
+                s += T[i, k] * T[i, j]
+            s /= norm * T[k, k]
+            for i in range(k, height):
+                T[i, j] += s * T[i, k]
+        T[k, k] = norm
+    for k in range(p - 1, -1, -1):
+        rest = T[k, p]
+        for j in range(k + 1, p):
+            rest -= T[k, j] * y[k0 + j]
+        y[k0 + k] = rest / T[k, k]

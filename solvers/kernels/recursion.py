@@ -1,0 +1,112 @@
+"""The recursion with null-space projections, (5), (6) and (13), at every rank.
+
+(J_i P_{i-1})^# comes from an orthogonal decomposition J_i P_{i-1} = C V that reveals its rank: rows
+of V orthonormal, C lower trapezoidal, pivoted by the largest remainder. Then P_i = P_{i-1} - V^T V.
+"""
+
+# mypy: disable-error-code="no-untyped-def"
+
+from __future__ import annotations
+
+import numpy as np
+
+from hierarchy.compiled import compiled
+from solvers.kernels.block import solve_block
+from solvers.kernels.rows import SOLVED, ZERO, finish, largest_row, load_rows, swap_rows
+
+SHRUNK = 0.01  # squared norm that a row may lose by projection before it is projected once more
+
+
+@compiled
+def recursion(A, lower, upper, sizes, x, damping, threshold, rank_tolerance):
+    """Solve; x (n,) comes in as the reference and goes out as the answer, zero on failure.
+
+    Returns SOLVED, NUMERICAL_FAILURE, or -(i + 1) where row i is an inequality.
+    """
+    m, n = A.shape
+    W, C = np.empty((m, n)), np.zeros((m, n))
+    scratch = np.zeros(2 * m + 2 * n)
+    zero, miss = scratch[:m], scratch[m:2 * m]
+    y, q = scratch[2 * m:2 * m + n], scratch[2 * m + n:]
+    code = load_rows(W, zero, A, lower, upper, rank_tolerance)
+    if code != SOLVED:
+        return finish(x, code)
+    P, V = np.zeros((n, n)), np.empty((n, n))
+    for c in range(n):
+        P[c, c] = 1.0  # P_0 = I
+
+    rank = first = ZERO
+    for level in range(sizes.size):
+        last, above = first + sizes[level], rank
+        for i in range(first, last):
+            miss[i] = lower[i]
+            for c in range(n):
+                miss[i] -= A[i, c] * q[c]  # p_i - J_i x_{i-1}, in (13)
+            if above > 0:
+                project(W, i, A, i, P)  # J_i P_{i-1}
+        for i in range(first, last):
+            pivot, square = largest_row(W, zero, i, last, ZERO)
+            if pivot < 0 or rank == n:
+                break
+            if pivot != i:
+                swap_rows(W, i, pivot)
+                swap_rows(C, i, pivot)
+                zero[i], zero[pivot] = zero[pivot], zero[i]
+                miss[i], miss[pivot] = miss[pivot], miss[i]
+            again = not rank_tolerance * rank_tolerance * square > SHRUNK * zero[i]
+            _take_direction(W, C, P, V, i, last, rank, again)
+            rank += 1
+        solve_block(C, miss, y, first, last, above, rank, damping, threshold)
+        for k in range(above, rank):
+            for c in range(n):
+                q[c] += V[k, c] * y[k]  # (5)
+        first = last
+
+    for i in range(n):
+        for c in range(n):
+            q[c] += P[i, c] * x[i]  # (14): I - J^# J = P_l
+    for c in range(n):
+        x[c] = q[c]
+    return finish(x, SOLVED)
+
+
+@compiled
+def project(W, i, A, j, P):
+    """Set row i of W to row j of A times P."""
+    w = W[i]
+    for c in range(w.size):
+        w[c] = 0.0
+    for k in range(w.size):
+        factor, p = A[j, k], P[k]
+        for c in range(w.size):
+            w[c] += factor * p[c]
+
+
+@compiled
+def _take_direction(W, C, P, V, i, last, k, again):
+    """Make row i of W unit vector V[k], and take it out of the level's rows and out of P.
+
+    again: project it once more, so that V[k] stays in the range of P when little was left of it.
+    """
+    if again:
+        project(V, k, W, i, P)
+    v = V[k]
+    square = 0.0
+    for c in range(v.size):
+        v[c] = v[c] if again else W[i, c]
+        square += v[c] * v[c]
+    norm = np.sqrt(square)
+    for c in range(v.size):
+        v[c] /= norm
+    for j in range(i, last):
+        w = W[j]
+        s = 0.0
+        for c in range(v.size):
+            s += w[c] * v[c]
+        C[j, k] = s
+        for c in range(v.size):
+            w[c] -= s * v[c]
+    for j in range(v.size):
+        s, p = v[j], P[j]
+        for c in range(v.size):
+            p[c] -= s * v[c]  # (6)

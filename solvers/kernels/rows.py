@@ -1,0 +1,107 @@
+"""What kernels do to rows: check and copy them, reflect them, swap them.
+
+The inner loops run over views of whole rows, unit stride, so that the compiler may vectorise them
+without fastmath. numba does not inline across functions, so each function here does the work of a
+range of rows; and it compiles a function once more for a literal argument, so counters start from
+ZERO.
+"""
+
+# mypy: disable-error-code="no-untyped-def"
+
+from __future__ import annotations
+
+import numpy as np
+
+from hierarchy.compiled import compiled
+
+ZERO = np.int64(0)
+SOLVED, NUMERICAL_FAILURE = 0, 2  # values of solvers.Status; -(i + 1) refuses row i, an inequality
+
+
+@compiled
+def load_rows(W, zero, A, lower, upper, rank_tolerance):
+    """Copy A into the first rows of W, check it, and say when a row counts as zero.
+
+    zero (m,) receives the squared norm at or below which what is left of a row is nothing.
+    Returns SOLVED, NUMERICAL_FAILURE at an entry that is not finite, or -(i + 1) where row i is an
+    inequality.
+    """
+    m, n = A.shape
+    for i in range(m):
+        if lower[i] != upper[i]:
+            return -(i + 1) if lower[i] < upper[i] else NUMERICAL_FAILURE
+        square = 0.0
+        for c in range(n):
+            W[i, c] = A[i, c]
+            square += A[i, c] * A[i, c]
+        zero[i] = rank_tolerance * rank_tolerance * square
+        if not (np.isfinite(square) and np.isfinite(lower[i])):
+            return NUMERICAL_FAILURE
+    return SOLVED
+
+
+@compiled
+def reflect_rows(W, beta, V, k0, k1, i0, i1):
+    """Apply reflectors k0 .. k1 - 1 to rows i0 .. i1 - 1 of W, one after the other.
+
+    Reflector k is I - beta[k] v v^T, its v in row V + k of W, zero before column k.
+    """
+    for k in range(k0, k1):
+        v = W[V + k, k:]
+        for i in range(i0, i1):
+            w = W[i, k:]
+            s = 0.0
+            for c in range(v.size):
+                s += w[c] * v[c]
+            s *= beta[k]
+            for c in range(v.size):
+                w[c] -= s * v[c]
+
+
+@compiled
+def largest_row(W, zero, i0, i1, c0):
+    """Row of i0 .. i1 - 1 with the largest norm from column c0 on, and that norm squared.
+
+    The row is -1 if all count as zero.
+    """
+    largest, pivot = 0.0, -1
+    for i in range(i0, i1):
+        w = W[i, c0:]
+        square = 0.0
+        for c in range(w.size):
+            square += w[c] * w[c]
+        if square > largest and square > zero[i]:
+            largest, pivot = square, i
+    return pivot, largest
+
+
+@compiled
+def swap_rows(W, i, j):
+    """Exchange rows i and j of W."""
+    for c in range(W.shape[1]):
+        W[i, c], W[j, c] = W[j, c], W[i, c]
+
+
+@compiled
+def make_reflector(W, beta, V, k, i, square):
+    """Make reflector k (see `reflect_rows`) map row i of W onto unit vector k; apply it to no row.
+
+    square is the squared norm of the row from column k on.
+    """
+    for c in range(k, W.shape[1]):
+        W[V + k, c] = W[i, c]
+    norm = np.sqrt(square)
+    W[V + k, k] += norm if W[V + k, k] >= 0.0 else -norm
+    beta[k] = 1.0 / (norm * abs(W[V + k, k]))
+
+
+@compiled
+def finish(x, code):
+    """Return code if x is finite; otherwise, or if code is no success, make x zero and say so."""
+    for i in range(x.size):
+        if not np.isfinite(x[i]) and code == SOLVED:
+            code = NUMERICAL_FAILURE
+    if code != SOLVED:
+        for i in range(x.size):
+            x[i] = 0.0
+    return code

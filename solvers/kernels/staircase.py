@@ -1,0 +1,82 @@
+"""The exact task priority solution at every rank, from a level-by-level QR of J^T.
+
+J^T = Q [R; O] (8), but with R an upper block staircase: a level takes as many columns of Q as it
+adds rank, so what an upper level cannot use stays free for the levels below. In y = Q^T x the
+levels are solved from the top by block forward substitution, least squares in each block: the
+recursion (5), (13) in other coordinates. The columns of Q that no level took carry (14).
+"""
+
+# mypy: disable-error-code="no-untyped-def"
+
+from __future__ import annotations
+
+import numpy as np
+
+from hierarchy.compiled import compiled
+from solvers.kernels.block import solve_block
+from solvers.kernels.rows import (
+    SOLVED,
+    ZERO,
+    finish,
+    largest_row,
+    load_rows,
+    make_reflector,
+    reflect_rows,
+    swap_rows,
+)
+
+
+@compiled
+def staircase(A, lower, upper, sizes, x, damping, threshold, rank_tolerance):
+    """Solve; x (n,) comes in as the reference and goes out as the answer, zero on failure.
+
+    Returns SOLVED, NUMERICAL_FAILURE, or -(i + 1) where row i is an inequality.
+    """
+    m, n = A.shape
+    W = np.empty((m + n + 1, n))  # rows of J, then of Q's reflectors, then x
+    V, X = m, m + n
+    zero, miss, beta, y = np.empty(m), np.empty(m), np.empty(n), np.empty(n)
+    code = load_rows(W, zero, A, lower, upper, rank_tolerance)
+    if code != SOLVED:
+        return finish(x, code)
+    for i in range(m):
+        miss[i] = lower[i]
+
+    rank = first = ZERO
+    for level in range(sizes.size):
+        last, above = first + sizes[level], rank
+        reflect_rows(W, beta, V, ZERO, above, first, last)  # J_i Q: the level as seen from above
+        rank = _factor_level(W, zero, miss, beta, V, first, last, rank)
+        for i in range(first, last):
+            for c in range(above):
+                miss[i] -= W[i, c] * y[c]  # p_i - J_i x_{i-1}, in (13)
+        solve_block(W, miss, y, first, last, above, rank, damping, threshold)
+        first = last
+
+    for c in range(n):
+        W[X, c] = x[c]
+    reflect_rows(W, beta, V, ZERO, rank, X, X + 1)  # Q^T q0, of which (14) keeps the rest
+    for c in range(rank):
+        W[X, c] = y[c]
+    for k in range(rank - 1, -1, -1):
+        reflect_rows(W, beta, V, k, k + 1, X, X + 1)  # x = Q [y; rest]: (7) and (14) at once
+    for c in range(n):
+        x[c] = W[X, c]
+    return finish(x, SOLVED)
+
+
+@compiled
+def _factor_level(W, zero, miss, beta, V, first, last, rank):
+    """Give a level, already reflected, its own columns of Q; return the rank with it."""
+    for i in range(first, last):
+        pivot, square = largest_row(W, zero, i, last, rank)
+        if pivot < 0:
+            break
+        if pivot != i:
+            swap_rows(W, i, pivot)
+            zero[i], zero[pivot] = zero[pivot], zero[i]
+            miss[i], miss[pivot] = miss[pivot], miss[i]
+        make_reflector(W, beta, V, rank, i, square)
+        reflect_rows(W, beta, V, rank, rank + 1, i, last)
+        rank += 1
+    return rank
