@@ -58,7 +58,8 @@ def build(scenario: Scenario) -> Cell:
         sensor.check_start(robot.state(q, v))
     position, pointing = _position(scenario, robot), _pointing(scenario, robot)
     tasks = [task for task in (position, pointing, _avoidance(scenario, robot)) if task]
-    areas = avoidance and SurveillanceAreas(avoidance.near, avoidance.far, avoidance.end_effector)
+    areas = None if avoidance is None else SurveillanceAreas(avoidance.near, avoidance.far,
+                                                             avoidance.end_effector)
     return Cell(robot, state, KinematicArm(robot, q, v, control.period, control.level),
                 Stack(tasks, control.level, _reference(scenario, robot)), sensor, areas,
                 position, pointing)
@@ -93,7 +94,7 @@ def make_obstacles(sections: tuple[ObstacleSection, ...]) -> Obstacles:
 
 
 def _obstacle(number: int, section: ObstacleSection) -> Obstacle:
-    path = section.path and make_path(section.path)
+    path = None if section.path is None else make_path(section.path)
     size = {"point": (), "sphere": (section.radius,),
             "capsule": (section.radius, section.half_length),
             "box": section.half_lengths}[section.shape]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -378,9 +379,9 @@ def _section_in(annotation: Any) -> Any:
 
 
 def _settings_of(resolver: str) -> frozenset[str]:
-    from solvers import settings
+    from solvers import make
 
-    return frozenset(settings(resolver))
+    return frozenset(field.name for field in dataclasses.fields(make(resolver)))
 
 
 def _without_none(data: Any) -> Any:

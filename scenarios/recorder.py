@@ -6,10 +6,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from hierarchy.allocation import AVOIDANCE
 from hierarchy.compiled import compiled
 from hierarchy.kinematics import point_at
-from scenarios.build import Cell
 from scenarios.config import Scenario
+from scenarios.controller import Controller
 from scenarios.recording import Recording
 
 _TIMES = ("time_kinematics", "time_rows", "time_resolve", "time_tick")
@@ -21,40 +22,43 @@ class Recorder:
     `ticks` is the number of rows written so far.
     """
 
-    def __init__(self, cell: Cell, ticks: int) -> None:
+    def __init__(self, controller: Controller, ticks: int) -> None:
         self.ticks = 0
-        self._cell = cell
-        robot = cell.robot
-        self._frame = robot.frame(robot.end_effector)
-        self._points = len(cell.sensor.measurement.distance) if cell.sensor else 0
-        self._distance = (cell.sensor.measurement.distance if cell.sensor
-                          else np.empty(0))
+        self._controller = controller
+        self._cell = cell = controller.cell
+        self._frame = cell.robot.frame(cell.robot.end_effector)
+        self._distance = cell.sensor.measurement.distance if cell.sensor else np.empty(0)
         self._target = cell.position.target if cell.position else np.full((3, 3), np.nan)
         self._orders: dict[tuple[str, ...], int] = {}
         # One row: t, q, v, a, command, end effector, target, cone error, distances.
-        self._log = np.empty((ticks, 1 + robot.nq + 3 * robot.n + 7 + self._points))
+        self._log = np.empty((ticks, 8 + cell.robot.nq + 3 * cell.robot.n + len(self._distance)))
         self._choices = np.empty((ticks, 5), dtype=np.int16)
         self._times = np.empty((ticks, len(_TIMES)))
 
-    def write(self, command, cone_error: float, order: tuple[str, ...], active: int,
-              repulsion: bool, status: int, iterations: int, times: tuple[float, ...]) -> bool:
-        """Record one tick after its command was applied; False if the state is not finite."""
-        index = self._orders.get(order)
-        if index is None:
-            index = self._orders[order] = len(self._orders)
-        k, state = self.ticks, self._cell.state
+    def write(self) -> bool:
+        """Record the tick whose command was just applied; False if its state is not finite."""
+        controller, cell, k = self._controller, self._cell, self.ticks
+        order, repulsion = controller.allocation
+        index = self._orders.setdefault(order, len(self._orders))
+        active = cell.sensor.measurement.active + 1 if AVOIDANCE in order and cell.sensor else -1
+        resolution, state = controller.resolution, cell.state
         finite = _write(self._log, self._choices, self._times, k, state.t, state.q, state.v,
-                        self._cell.plant.a, command, state.placements, self._frame.joint,
-                        self._frame.offset, self._target, cone_error, self._distance,
-                        index, active, repulsion, status, iterations, *times)
+                        cell.plant.a, resolution.x, state.placements, self._frame.joint,
+                        self._frame.offset, self._target, controller.cone_error, self._distance,
+                        index, active, repulsion, int(resolution.status), resolution.iterations,
+                        *controller.stamps)
         self.ticks = k + 1
         return bool(finite)
+
+    def stamp(self, clock: float) -> None:
+        """Note when the tick just written was over [s]."""
+        self._times[self.ticks - 1, 3] += clock
 
     def finish(self, scenario: Scenario, fault: str | None) -> Recording:
         """Return what was recorded so far."""
         robot, rows = self._cell.robot, slice(0, self.ticks)
         n, log = robot.n, self._log[rows]
-        widths = [1, robot.nq, n, n, n, 3, 3, 1, max(self._points - 1, 0)]
+        widths = [1, robot.nq, n, n, n, 3, 3, 1, max(len(self._distance) - 1, 0)]
         ends = np.cumsum(widths)
         t, q, v, a, command, actual, desired, cone, body = (
             log[:, end - width:end].copy() for end, width in zip(ends, widths, strict=True))
@@ -68,7 +72,7 @@ class Recorder:
         if self._cell.pointing is not None:
             asked = np.array(["pointing" in names for names in orders])
             signals |= {"pointing_error": cone[:, 0], "pointing_active": asked[order]}
-        if self._points:
+        if len(self._distance):
             signals |= {"control_point_distance": body, "minimal_distance": body.min(axis=1),
                         "ee_distance": log[:, -1].copy(), "active_control_point": active,
                         "repulsion_active": repulsion.astype(bool)}
@@ -81,7 +85,7 @@ class Recorder:
 @compiled
 def _write(log, choices, times, k, t, q, v, a, command, placements, joint, offset, target,
            cone_error, distance, order, active, repulsion, status, iterations,
-           kinematics, rows, resolve, tick):
+           begin, moved, written, resolved):
     row = log[k]
     row[0] = t
     i = 1
@@ -111,8 +115,8 @@ def _write(log, choices, times, k, t, q, v, a, command, placements, joint, offse
     choices[k, 2] = repulsion
     choices[k, 3] = status
     choices[k, 4] = min(iterations, 32767)
-    times[k, 0] = kinematics
-    times[k, 1] = rows
-    times[k, 2] = resolve
-    times[k, 3] = tick
+    times[k, 0] = moved - begin
+    times[k, 1] = written - moved
+    times[k, 2] = resolved - written
+    times[k, 3] = -begin  # `stamp` adds the end
     return finite

@@ -52,8 +52,7 @@ class Posture(JointTask):
         if state.robot.nq != self.joints:
             raise HierarchyError(f"task {self.name!r}: {self.joints} targets for "
                                  f"{state.robot.nq} joint positions")
-        target: Array = np.asarray(self.target, dtype=float)
-        return target - state.q
+        return np.asarray(self.target - state.q)
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,31 @@
+import csv
+
+import numpy as np
+
+from scenarios.bench.plain import PlainTick
+from scenarios.build import build
+from scenarios.config import load
+from scenarios.controller import Controller
+from scenarios.simulate import simulate
+
+
+def test_the_plain_numpy_tick_commands_what_the_compiled_one_does():
+    """Else the benchmark would compare two different jobs."""
+    scenario = load("ellipse")
+    controller, plain = Controller(scenario), PlainTick(scenario, build(scenario))
+    path = simulate(scenario)
+    for k in range(0, path.ticks, 100):
+        state = path["t"][k], path["q"][k], path["v"][k]
+        np.testing.assert_allclose(plain.step(*state), controller.command(*state), atol=1e-8)
+
+
+def test_the_tick_benchmark_writes_a_row_for_every_candidate(tmp_path, monkeypatch):
+    from scenarios.bench import tick
+
+    short = load("ellipse", ["control.duration=0.6"])
+    monkeypatch.setattr(tick, "load", lambda name: short)
+    rows = tick.run(tmp_path)
+    assert [row["tick"] for row in rows] == [*tick.SPECS, "plain numpy"]
+    assert all(row["failures"] == 0 and row["ticks"] == 600 for row in rows)
+    with (tmp_path / "tick.csv").open() as file:
+        assert len(list(csv.DictReader(file))) == len(rows)
