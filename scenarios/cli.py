@@ -195,9 +195,9 @@ def _table(runs: list[Run]) -> Table:
 
     laid_out = Table(title=Text(runs[0].scenario.title or runs[0].scenario.name), box=None,
                      title_justify="left", padding=(0, 1, 0, 0), pad_edge=False)
-    laid_out.add_column("", overflow="fold", min_width=26)
+    laid_out.add_column("", overflow="fold")
     for one in runs:
-        laid_out.add_column(Text(one.label), justify="right", overflow="fold")
+        laid_out.add_column(Text(one.label.replace(" ", "\n")), justify="right", no_wrap=True)
     for row in table(runs, details=False):
         cells = [Text(cell + ("*" if i in row.best else " "), "bold" if i in row.best else "")
                  for i, cell in enumerate(row.cells)]

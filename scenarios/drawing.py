@@ -21,7 +21,7 @@ INK = "#0b0c0d"
 ALERT = "#d33a2c"
 
 # Okabe and Ito's colours, safe for colour-blind readers and legible on white and on near-black.
-_BY_LABEL = {"tpm published": "#0072b2", "tpm staircase": "#56b4e9", "recursive": "#e69f00",
+_BY_LABEL = {"tpm published": "#0072b2", "tpm": "#56b4e9", "recursive": "#e69f00",
              "augmented": "#cc79a7", "hqp": "#009e73", "hcod": "#d55e00", "weighted": "#a8781e",
              "sns": "#8a8f98"}
 # Tol's bright scheme, for the joints of one robot.
@@ -37,14 +37,19 @@ _STYLE: dict[Any, Any] = {
 
 
 def colours(labels: Iterable[str]) -> dict[str, str]:
-    """Return a colour for each label: the same one for a resolver wherever it appears."""
+    """Return a colour for each label: the same one for a resolver wherever it appears.
+
+    "hqp proxqp" has the colour of "hqp", if that is not taken by another label.
+    """
     labels = list(labels)
-    chosen = {label: _BY_LABEL[label] for label in labels if label in _BY_LABEL}
-    spare = [colour for colour in _BY_LABEL.values() if colour not in chosen.values()]
-    for label in labels:
-        if label not in chosen:
-            chosen[label] = spare.pop(0) if spare else JOINTS[len(chosen) % len(JOINTS)]
-    return chosen
+    known = {label: label if label in _BY_LABEL else label.partition(" ")[0] for label in labels}
+    chosen: dict[str, str] = {}
+    for label in sorted(labels, key=lambda label: known[label] != label):
+        colour = _BY_LABEL.get(known[label])
+        if colour is not None and colour not in chosen.values():
+            chosen[label] = colour
+    spare = [colour for colour in (*_BY_LABEL.values(), *JOINTS) if colour not in chosen.values()]
+    return {label: chosen.get(label) or spare.pop(0) for label in labels}
 
 
 def figure(rows: int = 1, width: float = 3.3, height: float = 2.1) -> tuple[Figure, list[Axes]]:

@@ -219,7 +219,7 @@ def departure(recordings: Mapping[str, Recording]) -> Figure:
         if label in others:
             ticks = min(reference.ticks, recordings[label].ticks)
             apart = np.abs(recordings[label]["q"][:ticks] - reference["q"][:ticks]).max(axis=1)
-            drawing.curve(ax, reference["t"][:ticks], np.maximum(apart, 1e-17), color=colour)
+            drawing.curve(ax, reference["t"][:ticks], np.maximum(apart, 1e-16), color=colour)
     ax.set_yscale("log")
     ax.set_xlabel("time [s]")
     return fig

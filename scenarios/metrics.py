@@ -89,13 +89,13 @@ def _tracking(recording: Recording, settle: float) -> Iterator[Metric]:
         return
     error = np.linalg.norm(recording["position_error"], axis=1)
     after = error[recording["t"] - recording["t"][0] >= settle]
-    spans = (("", "", error), ("_settled", f" after {settle:g} s", after))
+    spans = (("", "Position error", error), ("_settled", f"Error after {settle:g} s", after))
     for suffix, when, e in spans:
-        yield Metric(f"position_error_rms{suffix}", f"Position error{when}, rms",
+        yield Metric(f"position_error_rms{suffix}", f"{when}, rms",
                      _finite(np.sqrt(np.mean(e**2))) if e.size else None, "m", group="Tracking")
-        yield Metric(f"position_error_max{suffix}", f"Position error{when}, largest",
+        yield Metric(f"position_error_max{suffix}", f"{when}, max",
                      _largest(e), "m", group="Tracking")
-    yield Metric("position_error_median_settled", f"Position error after {settle:g} s, median",
+    yield Metric("position_error_median_settled", f"Error after {settle:g} s, median",
                  _finite(np.median(after)) if after.size else None, "m", group="Tracking")
 
 
@@ -104,7 +104,7 @@ def _pointing(recording: Recording, tolerance: float) -> Iterator[Metric]:
         return
     half_angle = recording.scenario.pointing.alpha_d
     beyond = pointing_angle(recording) - half_angle
-    yield Metric("cone_violation_max", f"Beyond the {half_angle:g}° cone, largest",
+    yield Metric("cone_violation_max", f"Beyond the {half_angle:g}° cone, max",
                  _finite(max(float(beyond.max()), 0.0)), "deg", group="Tracking")
     yield Metric("cone_violation_share", "Time outside the cone",
                  float(np.mean(beyond > tolerance)), "share", group="Tracking",
@@ -119,20 +119,20 @@ def pointing_angle(recording: Recording) -> Array:
 
 
 def _distances(recording: Recording) -> Iterator[Metric]:
-    for name, signal, label in (("body_distance_min", "minimal_distance", "Body to obstacle"),
-                                ("ee_distance_min", "ee_distance", "End effector to obstacle")):
+    for name, signal, label in (("body_distance_min", "minimal_distance", "Body distance"),
+                                ("ee_distance_min", "ee_distance", "End effector distance")):
         if signal in recording:
-            yield Metric(name, f"{label}, smallest", _finite(np.min(recording[signal])), "m",
+            yield Metric(name, f"{label}, min", _finite(np.min(recording[signal])), "m",
                          lower_is_better=False, group="Safety")
 
 
 def _motion(recording: Recording) -> Iterator[Metric]:
     v, group = recording["v"], "Safety"
     yield _joint_limit_excess(recording)
-    yield Metric("speed_max", "Joint speed, largest", _largest(v), "rad/s", group=group)
-    yield Metric("velocity_step_max", "Joint speed step in a tick, largest",
+    yield Metric("speed_max", "Joint speed, max", _largest(v), "rad/s", group=group)
+    yield Metric("velocity_step_max", "Joint speed step, max",
                  _largest(np.diff(v, axis=0)), "rad/s", group=group)
-    yield Metric("acceleration_max", "Joint acceleration, largest", _largest(recording["a"]),
+    yield Metric("acceleration_max", "Joint acceleration, max", _largest(recording["a"]),
                  "rad/s^2", group=group)
 
 
@@ -145,7 +145,7 @@ def _joint_limit_excess(recording: Recording) -> Metric:
             joint = int(np.argmax(excess))
             value = _finite(max(float(excess[joint]), 0.0))
             note = f"joint {joint + 1}" if excess[joint] > 0.0 else ""
-    return Metric("joint_limit_excess", "Beyond a joint limit, largest", value, "rad",
+    return Metric("joint_limit_excess", "Beyond a joint limit, max", value, "rad",
                   group="Safety", note=note)
 
 
@@ -154,7 +154,7 @@ def _switching(recording: Recording) -> Iterator[Metric]:
                  group="Switching")
     if "active_control_point" in recording:
         changes = np.count_nonzero(np.diff(recording["active_control_point"].astype(int)))
-        yield Metric("active_point_changes", "Changes of the active control point",
+        yield Metric("active_point_changes", "Changes of the active point",
                      float(changes), "", group="Switching")
 
 
@@ -167,11 +167,12 @@ def _time(recording: Recording) -> Iterator[Metric]:
              ("time_resolve", "Resolve"))
     levels = (("median", 50.0, "median"), ("p95", 95.0, "95 %"), ("p999", 99.9, "99.9 %"))
     for signal, part in parts:
+        shared = signal in ("time_kinematics", "time_rows")  # the same code under any resolver
         for key, percent, label in levels if signal in recording else ():
             yield Metric(f"{signal}_{key}", f"{part}, {label}",
                          _finite(np.percentile(recording[signal], percent)), "s",
-                         group="Computing",
-                         detail=key != "median" and signal in ("time_kinematics", "time_rows"))
+                         lower_is_better=None if shared else True, group="Computing",
+                         detail=shared and key != "median")
 
 
 def _largest(values: Array) -> float | None:

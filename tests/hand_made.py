@@ -11,7 +11,7 @@ import numpy as np
 from scenarios.config import RobotSection
 from scenarios.recording import Recording
 
-LABELS = {"tpm": "tpm published", "tpm:form=staircase": "tpm staircase"}
+LABELS = {"tpm": "tpm published", "tpm:form=staircase": "tpm"}
 
 
 @dataclass(frozen=True)

@@ -74,7 +74,7 @@ def test_compare_writes_page_numbers_and_a_folder_for_each_run(tmp_path, capsys)
         "tpm", "tpm-form-staircase", "recursive"}
     numbers = json.loads((tmp_path / "b" / "comparison.json").read_text())
     assert [run["label"] for run in numbers["runs"]] == [
-        "tpm published", "tpm staircase", "recursive"]
+        "tpm published", "tpm", "recursive"]
     assert numbers["runs"][0]["settings"]["damping"] == 0.05
 
 

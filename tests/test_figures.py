@@ -36,6 +36,13 @@ def test_a_resolver_has_the_same_colour_in_any_company():
     assert drawing.colours(["hqp", "something new", "recursive"])["recursive"] == alone
 
 
+def test_a_variant_has_the_colour_of_its_resolver_unless_that_is_there_too():
+    assert drawing.colours(["hqp proxqp"])["hqp proxqp"] == drawing.colours(["hqp"])["hqp"]
+    both = drawing.colours(["hqp proxqp", "hqp"])
+    assert list(both) == ["hqp proxqp", "hqp"]
+    assert both["hqp"] == drawing.colours(["hqp"])["hqp"] != both["hqp proxqp"]
+
+
 def test_no_two_resolvers_of_a_comparison_share_a_colour():
     labels = ["tpm published", "one", "two", "three", "hqp", "recursive"]
     assert len(set(drawing.colours(labels).values())) == len(labels)

@@ -28,7 +28,7 @@ def row(runs, label):
 
 def test_the_best_of_each_row_is_marked():
     runs = [made("tpm", minimal_distance=np.full(5, 0.2)), made("hqp")]
-    assert row(runs, "Body to obstacle").best == {1}  # 1 m beats 0.2 m: more is better
+    assert row(runs, "Body distance").best == {1}  # 1 m beats 0.2 m: more is better
     runs = [made("tpm", a=np.ones((5, 7))), made("hqp")]
     assert row(runs, "Joint acceleration").best == {1}
 
@@ -51,7 +51,7 @@ def test_a_run_that_stopped_early_wins_nothing():
 
 def test_a_run_that_never_began_has_empty_cells_and_loses_nobody_else_theirs():
     runs = [made("tpm"), made("hqp", error="HierarchyError: cannot")]
-    assert row(runs, "Joint speed, largest").cells == ("0.000", "–")
+    assert row(runs, "Joint speed, max").cells == ("0.000", "–")
 
 
 def test_the_verdict_is_made_of_what_was_measured():
@@ -60,7 +60,7 @@ def test_the_verdict_is_made_of_what_was_measured():
     said = verdict(runs)
     assert said.startswith("Both ways ran the whole 4 s")
     assert "at least 52 mm" in said
-    assert "tpm published resolves a tick in 2 µs, hqp takes 80 µs" in said
+    assert "tpm published resolves a tick in 2 µs, hqp in 80 µs" in said
 
 
 def test_the_verdict_says_which_ways_did_not_finish_and_takes_nothing_from_them():
@@ -68,6 +68,18 @@ def test_the_verdict_says_which_ways_did_not_finish_and_takes_nothing_from_them(
     said = verdict(runs)
     assert said.startswith("One of two ways ran the whole 4 s (hqp did not)")
     assert "at least 1000 mm" in said
+
+
+def test_the_verdict_tells_who_moved_alike_and_what_the_others_did_instead():
+    runs = [made("tpm", minimal_distance=np.full(5, 0.04)),
+            made("recursive", q=np.full((5, 7), 1e-11), minimal_distance=np.full(5, 0.04)),
+            made("augmented", q=np.full((5, 7), 0.3), minimal_distance=np.full(5, 0.02))]
+    assert ("tpm published and recursive moved the arm alike to 1e-11 rad, augmented did not "
+            "(body to obstacle 20 mm against 40 mm)") in verdict(runs)
+
+
+def test_the_verdict_finds_no_agreement_where_there_is_none():
+    assert "no two moved the arm alike" in verdict([made("tpm"), made("hqp", q=np.ones((5, 7)))])
 
 
 def test_the_verdict_does_not_hide_a_collision():

@@ -154,10 +154,8 @@ def _pairs(pairs: Mapping[str, str]) -> str:
 
 def _legend(labels: Any) -> str:
     chosen = drawing.colours(labels)
-    return '<div class="legend">' + "".join(
-        f"<span>{_chip(colour)}{escape(label)}</span>"
-        for label, colour in sorted(chosen.items(), key=lambda pair: list(labels).index(pair[0]))
-    ) + "</div>"
+    chips = (f"<span>{_chip(colour)}{escape(label)}</span>" for label, colour in chosen.items())
+    return f'<div class="legend">{"".join(chips)}</div>'
 
 
 def _joints(recordings: Mapping[str, Recording]) -> str:

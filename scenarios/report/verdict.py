@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 if TYPE_CHECKING:
     from scenarios.compare import Run
@@ -11,12 +14,18 @@ if TYPE_CHECKING:
 _NUMBERS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten")
 
 
-def verdict(runs: Sequence[Run]) -> str:
-    """Return the sentence about runs of one scenario; only what was measured enters it."""
+def verdict(runs: Sequence[Run], alike: float = 1e-6) -> str:
+    """Return the sentence about runs of one scenario; only what was measured enters it.
+
+    Runs whose joints stay within `alike` [rad] of the first run's count as the same motion.
+    """
     finished = [run for run in runs if run.fault is None]
     parts = [_completion(runs, finished)]
     if finished:
-        parts += [_distance(finished), _tracking(finished), _speed(finished)]
+        same, others, apart = _groups(finished, alike)
+        parts += [_agreement(same, others, apart), _collision(finished)]
+        parts += [] if others and len(same) > 1 else [_distance(finished), _tracking(finished)]
+        parts += [_speed(finished)]
     return "; ".join(part for part in parts if part) + "."
 
 
@@ -37,13 +46,58 @@ def _completion(runs: Sequence[Run], finished: Sequence[Run]) -> str:
     return f"{some if finished else 'No way'} ran the whole {seconds} ({stopped} did not)"
 
 
+def _groups(runs: Sequence[Run], alike: float) -> tuple[list[Run], list[Run], float]:
+    """Return the runs that move as the first one does, the others, and how far the first differ."""
+    apart = {run.label: departure(run, runs[0]) for run in runs}
+    same = [run for run in runs if apart[run.label] <= alike]
+    others = [run for run in runs if apart[run.label] > alike]
+    return same, others, max((apart[run.label] for run in same), default=0.0)
+
+
+def departure(run: Run, other: Run) -> float:
+    """Return the largest difference of any joint between two runs [rad]; infinite if unknown."""
+    if run.recording is None or other.recording is None:
+        return math.inf
+    q, reference = run.recording["q"], other.recording["q"]
+    if q.shape != reference.shape:
+        return math.inf
+    largest = float(np.abs(q - reference).max())
+    return math.inf if math.isnan(largest) else largest
+
+
+def _agreement(same: Sequence[Run], others: Sequence[Run], apart: float) -> str:
+    if len(same) < 2:
+        return "no two moved the arm alike" if others else ""
+    to = f"alike to {apart:.0e} rad" if apart > 0.0 else "alike to the last bit"
+    if not others:
+        return f"all moved the arm {to}"
+    return f"{_listed(same)} moved the arm {to}, {_listed(others)} did not{_instead(same, others)}"
+
+
+def _instead(same: Sequence[Run], others: Sequence[Run]) -> str:
+    """Return in brackets what the others did worse or better, where it can be seen."""
+    said = []
+    for what, name, largest in (("body to obstacle", "body_distance_min", False),
+                                ("path error, median", "position_error_median_settled", True)):
+        (known, usual), (one, value) = _extreme(same[:1], name, largest), _extreme(
+            others, name, largest)
+        if known and one and abs(value - usual) > 0.05 * abs(usual):
+            said.append(f"{what} {_mm(value)} against {_mm(usual)}")
+    return f" ({', '.join(said)})" if said else ""
+
+
+def _collision(runs: Sequence[Run]) -> str:
+    touched = [run for run in runs
+               if (distance := run.metrics.get("body_distance_min")) is not None
+               and distance.value is not None and distance.value <= 0.0]
+    return f"{_listed(touched)} touched an obstacle with the body" if touched else ""
+
+
 def _distance(runs: Sequence[Run]) -> str:
     nearest, value = _extreme(runs, "body_distance_min", largest=False)
-    if nearest is None:
+    if nearest is None or value <= 0.0:
         return ""
-    if value <= 0.0:
-        return f"{nearest.label} touched an obstacle with its body"
-    return f"the body kept at least {1e3 * value:.0f} mm from every obstacle"
+    return f"the body kept at least {_mm(value)} from every obstacle"
 
 
 def _tracking(runs: Sequence[Run]) -> str:
@@ -64,8 +118,8 @@ def _speed(runs: Sequence[Run]) -> str:
     worst, high = _extreme(runs, name, largest=True)
     if best is None or worst is None:
         return ""
-    against = f", {worst.label} takes {1e6 * high:.2g} µs" if high > 1.2 * low else ""
-    return f"{best.label} resolves a tick in {1e6 * low:.2g} µs{against}"
+    against = f", {worst.label} in {_digits(1e6 * high)} µs" if high > 1.2 * low else ""
+    return f"{best.label} resolves a tick in {_digits(1e6 * low)} µs{against}"
 
 
 def _extreme(runs: Sequence[Run], name: str, largest: bool) -> tuple[Run | None, float]:
@@ -77,4 +131,14 @@ def _extreme(runs: Sequence[Run], name: str, largest: bool) -> tuple[Run | None,
 
 
 def _mm(metres: float) -> str:
-    return f"{1e3 * metres:.2g} mm"
+    return f"{_digits(1e3 * metres)} mm"
+
+
+def _digits(value: float) -> str:
+    """Return two digits, and all that stand before the point: 0.14, 1.9, 254."""
+    return f"{value:.0f}" if abs(value) >= 10.0 else f"{value:.2g}"
+
+
+def _listed(runs: Sequence[Run]) -> str:
+    *first, last = [run.label for run in runs]
+    return f"{', '.join(first)} and {last}" if first else last
