@@ -87,7 +87,8 @@ class Hqp(Resolver):
     def solve(self, h: Hierarchy, memory: Any = None) -> Resolution:
         """Resolve h; a failed program ends it with the x of the levels that were finished."""
         finite = np.isfinite(h.A).all() and np.isfinite(h.reference).all()
-        if not finite or not (h.lower <= h.upper).all():
+        sides = (h.lower <= h.upper) & (h.lower < np.inf) & (h.upper > -np.inf)
+        if not finite or not sides.all():
             return Resolution(np.zeros(h.n), Status.NUMERICAL_FAILURE)
         return _Cascade(self, h).run()
 

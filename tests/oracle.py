@@ -1,0 +1,56 @@
+"""Slow, obvious, independent: what a strict resolver of equalities has to answer.
+
+Null spaces and least squares straight from numpy's SVD, level after level; no code shared with
+what it judges.
+"""
+
+import numpy as np
+
+
+def solve(h, damping=0.0, threshold=0.1, rank_tolerance=1e-9):
+    """Return x (n,) of a hierarchy of equalities, with the damping that `Resolver` describes."""
+    x, N = np.zeros(h.n), np.eye(h.n)
+    for A, b, _ in h.levels():
+        if len(b) == 0 or N.shape[1] == 0:
+            continue
+        B = A @ N
+        size = np.linalg.norm(A, axis=1)
+        _, s, Vt = np.linalg.svd(B / np.where(size > 0, size, 1.0)[:, None])
+        rank = np.count_nonzero(s > rank_tolerance)
+        V = Vt[:rank].T  # directions of the null space that these rows can see
+        lam = damping_of(B, rank, damping, threshold)
+        if lam > 0:
+            y = np.linalg.solve((B @ V).T @ (B @ V) + lam**2 * np.eye(rank), (B @ V).T @ (b - A @ x))
+        else:
+            y = np.linalg.pinv(B @ V) @ (b - A @ x)
+        x = x + N @ V @ y
+        N = N @ Vt[rank:].T
+    return x + N @ (N.T @ h.reference)
+
+
+def damping_of(B, rank, damping, threshold):
+    """Return lambda of one level, from the smallest singular value counted over its rows."""
+    smallest = np.linalg.svd(B, compute_uv=False)[-1] if rank == len(B) else 0.0
+    return damping * np.sqrt(max(0.0, 1.0 - (smallest / threshold) ** 2))
+
+
+def published(h, rank_tolerance=1e-9, damping=0.0, threshold=0.1):
+    """Return x and F of the published Task Priority Matrix: eqs. (8)-(10), (14)."""
+    A, b = h.A, h.lower
+    m, n = A.shape
+    square = np.hstack([A, np.zeros((m, max(0, m - n)))])
+    F = np.linalg.qr(square.T)[1]
+    tolerance = rank_tolerance * np.linalg.norm(A, axis=1).max()
+    for i, j in zip(h.offsets[:-1], h.offsets[1:], strict=True):
+        F[i:j] = _pivot(F[i:j, i:j], tolerance, damping, threshold) @ F[i:j]
+        F[:i] -= F[:i, i:j] @ F[i:j]
+    F = F.T
+    J = np.linalg.pinv(A, rcond=rank_tolerance)
+    return J @ (F @ b - A @ h.reference) + h.reference, F
+
+
+def _pivot(R, tolerance, damping, threshold):
+    U, s, Vt = np.linalg.svd(R)
+    lam2 = damping**2 * max(0.0, 1.0 - (s[-1] / threshold) ** 2) if len(s) else 0.0
+    gain = [v / (v * v + lam2) if lam2 > 0 or v > tolerance else 0.0 for v in s]
+    return Vt.T @ np.diag(gain) @ U.T

@@ -1,0 +1,230 @@
+"""What every resolver promises, over names() x rank cases. A new resolver is picked up by name."""
+
+import dataclasses
+import os
+import tracemalloc
+
+import numpy as np
+import oracle
+import pytest
+from rank_cases import CASES, build, family, generic, rng
+
+from hierarchy import Hierarchy, HierarchyError
+from solvers import Status, make, names
+
+RESOLVERS = [*(make(name) for name in names()), make("tpm", form="published"),
+             make("hqp", backend="osqp")]
+STRICT = [r for r in RESOLVERS if r.strict]
+EQUALITIES_ONLY = [r for r in RESOLVERS if not r.handles_inequalities]
+EQUALITY_FAMILIES = ("EQ7", "EQ7over", "EQ7sing", "EQ30L8", "EQ30L10")
+PROBLEMS = 3 if os.environ.get("NUMBA_DISABLE_JIT") == "1" else 50
+
+
+def every(resolvers):
+    return pytest.mark.parametrize("resolver", resolvers, ids=lambda r: r.label.replace(" ", "-"))
+
+
+every_case = pytest.mark.parametrize("case", CASES, ids=lambda c: c.__name__)
+with_and_without_reference = pytest.mark.parametrize("reference", [False, True],
+                                                     ids=["no_reference", "reference"])
+
+
+def assert_close(resolver, x, expected):
+    assert np.abs(x - expected).max() <= resolver.accuracy * (1.0 + np.abs(expected).max())
+
+
+@every(STRICT)
+@every_case
+@with_and_without_reference
+def test_strict_resolvers_find_the_oracles_answer(resolver, case, reference):
+    h = build(case, reference)
+    res = resolver.solve(h)
+    assert res.status is Status.SOLVED
+    assert_close(resolver, res.x, oracle.solve(h))
+
+
+@every(STRICT)
+@pytest.mark.parametrize("name", EQUALITY_FAMILIES)
+def test_strict_resolvers_solve_the_equality_families(resolver, name):
+    for h, x, norms in list(family(name))[:PROBLEMS]:
+        res = resolver.solve(h)
+        assert res.status is Status.SOLVED
+        assert_close(resolver, res.x, x)
+        assert_close(resolver, h.violations(res.x), norms)
+
+
+@pytest.mark.parametrize("name", EQUALITY_FAMILIES)
+def test_the_oracle_agrees_with_the_certified_solutions(name):
+    for h, x, _ in family(name):
+        assert np.abs(oracle.solve(h) - x).max() < 1e-9
+
+
+@every(STRICT)
+@every_case
+def test_lower_levels_leave_upper_levels_untouched(resolver, case):
+    h = build(case, True)
+    full = h.violations(resolver.solve(h).x)
+    for count in range(1, len(h.sizes)):
+        upper = Hierarchy.from_levels(list(h.levels())[:count], h.reference)
+        assert_close(resolver, full[:count], upper.violations(resolver.solve(upper).x))
+
+
+@every([r for r in RESOLVERS if r.strict or not r.handles_inequalities])
+@every_case
+def test_the_null_space_term_changes_no_row(resolver, case):
+    with_reference, without = build(case, True), build(case, False)
+    if with_reference.m:
+        difference = resolver.solve(with_reference).x - resolver.solve(without).x
+        assert_close(resolver, with_reference.A @ difference, np.zeros(with_reference.m))
+
+
+@every(STRICT)
+@every_case
+def test_the_null_space_projector_is_symmetric_and_idempotent(resolver, case):
+    h = build(case, True)
+    zero = np.zeros(h.m)
+    P = np.array([resolver.solve(Hierarchy(h.A, zero, zero, h.sizes, unit, h.names)).x
+                  for unit in np.eye(h.n)])
+    assert_close(resolver, P, P.T)
+    assert_close(resolver, P @ P, P)
+    assert round(np.trace(P)) == h.n - np.linalg.matrix_rank(scaled(h.A), tol=1e-8)
+
+
+def scaled(A):
+    size = np.linalg.norm(A, axis=1, keepdims=True)
+    return A / np.where(size > 0, size, 1.0) if len(A) else np.zeros((1, A.shape[1]))
+
+
+@every(RESOLVERS)
+@every_case
+def test_a_solve_is_repeatable_and_leaves_its_input_alone(resolver, case):
+    h, same = build(case, True), build(case, True)
+    first = resolver.solve(h)
+    again = resolver.solve(h)
+    assert first.x is not again.x
+    assert np.array_equal(first.x, again.x)
+    for kept, given in ((h.A, same.A), (h.lower, same.lower), (h.reference, same.reference)):
+        assert np.array_equal(kept, given)
+
+
+@every(RESOLVERS)
+@every_case
+def test_the_answer_is_finite_and_says_how_it_came_about(resolver, case):
+    h = build(case, True)
+    res = resolver.solve(h)
+    assert res.x.shape == (h.n,)
+    assert np.isfinite(res.x).all()
+    assert isinstance(res.status, Status)
+
+
+@every(STRICT)
+@every_case
+@pytest.mark.parametrize("threshold", [0.1, 3.0])
+def test_damping_means_the_same_to_every_strict_resolver(resolver, case, threshold):
+    damped = dataclasses.replace(resolver, damping=0.05, threshold=threshold)
+    h = build(case, True)
+    assert_close(resolver, damped.solve(h).x, oracle.solve(h, 0.05, threshold))
+
+
+@every(STRICT)
+def test_damping_is_off_above_its_threshold(resolver):
+    h = build(generic, True)
+    damped = dataclasses.replace(resolver, damping=0.05, threshold=1e-3)
+    assert_close(resolver, damped.solve(h).x, resolver.solve(h).x)
+
+
+@every(STRICT)
+def test_damping_bounds_the_answer_near_a_singularity(resolver):
+    A = np.array([[1.0, 0.0, 0.0], [1.0, 1e-7, 0.0]])
+    h = Hierarchy.from_levels([(A, [0.0, 1.0])])
+    damped = dataclasses.replace(resolver, damping=0.05)
+    assert np.abs(resolver.solve(h).x).max() > 1e6
+    assert np.abs(damped.solve(h).x).max() < 10.0
+
+
+@every(STRICT)
+@pytest.mark.parametrize("scale", [1e-6, 1e6])
+def test_the_unit_of_a_level_does_not_matter(resolver, scale):
+    levels = generic()
+    h = Hierarchy.from_levels(levels)
+    levels[1] = (levels[1][0] * scale, levels[1][1] * scale)
+    assert_close(resolver, resolver.solve(Hierarchy.from_levels(levels)).x, resolver.solve(h).x)
+
+
+@every(RESOLVERS)
+@pytest.mark.parametrize("bad", [np.nan, np.inf])
+@pytest.mark.parametrize("where", ["A", "target", "reference"])
+def test_entries_that_are_not_finite_give_a_status_and_a_finite_answer(resolver, where, bad):
+    h = build(generic, True)
+    if where == "A":
+        h.A[3, 2] = bad
+    elif where == "target":
+        h.lower[4] = h.upper[4] = bad
+    else:
+        h.reference[1] = bad
+    res = resolver.solve(h)
+    assert res.status is Status.NUMERICAL_FAILURE
+    assert not res.x.any()
+    assert "NaN" in str(res.status)
+
+
+@every(EQUALITIES_ONLY)
+def test_an_inequality_is_refused_by_level_and_row(resolver):
+    h = Hierarchy.from_levels([([[1.0, 0.0]], [0.0]), ([[1.0, 1.0], [0.0, 1.0]], [0, 0], [0, 2])],
+                              names=("position", "limits"))
+    with pytest.raises(HierarchyError, match="limits, row 1: an inequality, 0 <= a x <= 2"):
+        resolver.solve(h)
+
+
+@pytest.mark.parametrize("name", names())
+def test_a_misspelt_setting_names_the_nearest(name):
+    with pytest.raises(HierarchyError, match="did you mean 'damping'"):
+        make(name, dampnig=0.1)
+
+
+def test_an_unknown_resolver_names_the_nearest():
+    with pytest.raises(HierarchyError, match="unknown resolver 'recursiv'; did you mean 'recursive'"):
+        make("recursiv")
+
+
+@pytest.mark.parametrize("name", names())
+@pytest.mark.parametrize(("setting", "value"), [
+    ("damping", -0.1), ("damping", float("nan")), ("damping", "0.1"), ("threshold", 0.0),
+    ("threshold", float("inf")), ("rank_tolerance", -1e-9), ("rank_tolerance", 1.0),
+    ("rank_tolerance", True)])
+def test_a_setting_out_of_range_is_named_with_its_value(name, setting, value):
+    with pytest.raises(HierarchyError, match=f"{name}: {setting} = "):
+        make(name, **{setting: value})
+
+
+@pytest.mark.parametrize("name", names())
+def test_whole_numbers_are_as_good_as_decimals(name):
+    assert make(name, damping=1).damping == 1.0
+    assert isinstance(make(name, damping=1).damping, float)
+
+
+@every(RESOLVERS)
+def test_resolvers_are_immutable_and_equal_by_their_settings(resolver):
+    assert dataclasses.replace(resolver) == resolver
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        resolver.damping = 1.0
+
+
+def test_labels_tell_resolvers_apart():
+    assert len({r.label for r in RESOLVERS}) == len(RESOLVERS)
+
+
+@every(EQUALITIES_ONLY)
+def test_many_solves_do_not_grow_memory(resolver):
+    h = Hierarchy.from_levels([(rng().normal(size=(3, 7)), [1.0, 2.0, 3.0])])
+    resolver.solve(h)
+    tracemalloc.start()
+    try:
+        for _ in range(10):
+            resolver.solve(h)
+        before = tracemalloc.get_traced_memory()[0]
+        for _ in range(500):
+            resolver.solve(h)
+        assert tracemalloc.get_traced_memory()[0] - before < 2000
+    finally:
+        tracemalloc.stop()
