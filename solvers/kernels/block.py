@@ -58,7 +58,7 @@ def invert_triangle(M, T, i0, k0, p):
     """Write the inverse transpose of a lower triangle into T (p, p); return its squared norm.
 
     The triangle L is rows i0 .. i0 + p - 1 and columns k0 .. k0 + p - 1 of M. Its smallest singular
-    value is at least 1 / ||L^-1||_F. Where L is singular, entries of T are not finite.
+    value is at least 1 / ||L^-1||_F. Where L is singular, entries of T are infinite.
     """
     square = 0.0
     for j in range(p):
@@ -68,6 +68,9 @@ def invert_triangle(M, T, i0, k0, p):
             value = 1.0 if i == j else 0.0
             for k in range(j, i):
                 value -= M[i0 + i, k0 + k] * T[j, k]
+            if M[i0 + i, k0 + i] == 0.0:
+                T[j, i:] = square = np.inf
+                break
             T[j, i] = value / M[i0 + i, k0 + i]
             square += T[j, i] * T[j, i]
     return square

@@ -35,7 +35,7 @@ def published(A, lower, upper, sizes, x, damping, threshold, rank_tolerance):
     N = max(m, n)
     W, beta = np.empty((2 * m + 1, N)), np.empty(m)  # rows of J, reflectors of Q, then x
     F, T = np.empty((m, m)), np.empty((m, m))
-    code = priority_matrix(A, lower, upper, sizes, W, beta, F, T, damping, threshold,
+    code = priority_matrix(A, lower, upper, sizes, x, W, beta, F, T, damping, threshold,
                            rank_tolerance)
     if code != SOLVED:
         return finish(x, code)
@@ -71,13 +71,13 @@ def published(A, lower, upper, sizes, x, damping, threshold, rank_tolerance):
 
 
 @compiled
-def priority_matrix(A, lower, upper, sizes, W, beta, F, T, damping, threshold, rank_tolerance):
+def priority_matrix(A, lower, upper, sizes, x, W, beta, F, T, damping, threshold, rank_tolerance):
     """Write R^T into W, its reflectors below and into beta, F^T into F and R^-1 into T; a code.
 
     Shapes, with N = max(m, n): W (>= 2 m, N), beta (m,), F (m, m), T (m, m).
     """
     m, n = A.shape
-    code = load_rows(W, beta, A, lower, upper, rank_tolerance)
+    code = load_rows(W, beta, A, lower, upper, x, rank_tolerance)
     if code != SOLVED:
         return code
     for i in range(m):

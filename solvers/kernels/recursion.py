@@ -28,7 +28,7 @@ def recursion(A, lower, upper, sizes, x, damping, threshold, rank_tolerance):
     scratch = np.zeros(2 * m + 2 * n)
     zero, miss = scratch[:m], scratch[m:2 * m]
     y, q = scratch[2 * m:2 * m + n], scratch[2 * m + n:]
-    code = load_rows(W, zero, A, lower, upper, rank_tolerance)
+    code = load_rows(W, zero, A, lower, upper, x, rank_tolerance)
     if code != SOLVED:
         return finish(x, code)
     P, V = np.zeros((n, n)), np.empty((n, n))

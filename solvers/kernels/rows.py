@@ -19,8 +19,8 @@ SOLVED, NUMERICAL_FAILURE = 0, 2  # values of solvers.Status; -(i + 1) refuses r
 
 
 @compiled
-def load_rows(W, zero, A, lower, upper, rank_tolerance):
-    """Copy A into the first rows of W, check it, and say when a row counts as zero.
+def load_rows(W, zero, A, lower, upper, x, rank_tolerance):
+    """Copy A into the first rows of W, check all data, and say when a row counts as zero.
 
     zero (m,) receives the squared norm at or below which what is left of a row is nothing.
     Returns SOLVED, NUMERICAL_FAILURE at an entry that is not finite, or -(i + 1) where row i is an
@@ -36,6 +36,9 @@ def load_rows(W, zero, A, lower, upper, rank_tolerance):
             square += A[i, c] * A[i, c]
         zero[i] = rank_tolerance * rank_tolerance * square
         if not (np.isfinite(square) and np.isfinite(lower[i])):
+            return NUMERICAL_FAILURE
+    for c in range(n):
+        if not np.isfinite(x[c]):
             return NUMERICAL_FAILURE
     return SOLVED
 

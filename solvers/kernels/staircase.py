@@ -36,7 +36,7 @@ def staircase(A, lower, upper, sizes, x, damping, threshold, rank_tolerance):
     W = np.empty((m + n + 1, n))  # rows of J, then of Q's reflectors, then x
     V, X = m, m + n
     zero, miss, beta, y = np.empty(m), np.empty(m), np.empty(n), np.empty(n)
-    code = load_rows(W, zero, A, lower, upper, rank_tolerance)
+    code = load_rows(W, zero, A, lower, upper, x, rank_tolerance)
     if code != SOLVED:
         return finish(x, code)
     for i in range(m):
