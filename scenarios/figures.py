@@ -162,7 +162,8 @@ def stacked(recording: Recording, panels: Sequence[Panel], title: str) -> Figure
         axes[0].legend(ncols=7, fontsize=6.5, loc="lower center", bbox_to_anchor=(0.5, 1.0),
                        handlelength=1.0, columnspacing=1.0)
     axes[-1].set_xlabel("time [s]")
-    fig.suptitle(f"{title}: {recording.scenario.name}, {label}", x=0.01, ha="left", fontsize=9)
+    fig.suptitle(f"{title}: {recording.scenario.name}, {label}", x=0.01, ha="left", fontsize=9,
+                 color=INK)
     return fig
 
 
@@ -261,7 +262,7 @@ def _in_red(ax: Axes, t: Array, y: Array, mask: Array) -> None:
 def _threshold(ax: Axes, t: Array, value: float, name: str) -> None:
     ax.axhline(value, color=INK, linewidth=0.6, linestyle=(0, (4, 3)))
     ax.annotate(name, (1.0, value), xycoords=("axes fraction", "data"), fontsize=8, va="bottom",
-                ha="right")
+                ha="right", color=INK)
 
 
 def _wide(recordings: Mapping[str, Recording]) -> bool:

@@ -1,9 +1,7 @@
 import importlib
 import json
-import signal
 import subprocess
 import sys
-import time
 
 import pytest
 from hand_made import recording
@@ -200,20 +198,32 @@ def test_one_run_that_breaks_does_not_lose_the_others(tmp_path, monkeypatch, cap
     assert "[bold]no[/bold] answer" in capsys.readouterr().err
 
 
-def test_a_real_interrupt_saves_every_tick_so_far_whole(tmp_path):
-    command = [sys.executable, "-c", "from scenarios.cli import main; main()",
-               "run", "ellipse", "--duration", "10000", "--out", "a"]
-    process = subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True)
-    time.sleep(8.0)
-    process.send_signal(signal.SIGINT)
-    _, err = process.communicate(timeout=60)
-    assert process.returncode == 1
-    if (tmp_path / "a").exists():  # else it was interrupted while still starting
-        from scenarios import load_run
+INTERRUPTED_AT_TICK_500 = """
+import contextlib, os, signal
+import scenarios.progress
 
-        run = load_run(tmp_path / "a")
-        assert run.fault == f"interrupted at tick {run.ticks}"
-    assert "interrupted" in err
+@contextlib.contextmanager
+def bar():
+    yield lambda label, done, total: done == 500 and os.kill(os.getpid(), signal.SIGINT)
+
+scenarios.progress.bar = bar
+from scenarios.cli import main
+main()
+"""
+
+
+def test_ctrl_c_in_the_middle_of_a_run_saves_every_tick_so_far_whole(tmp_path):
+    from scenarios import load_run
+
+    command = [sys.executable, "-c", INTERRUPTED_AT_TICK_500,
+               "run", "ellipse", "--duration", "600", "--out", "a"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    run = load_run(tmp_path / "a")
+    assert 500 <= run.ticks < 600_000
+    assert run.fault == f"interrupted at tick {run.ticks}"
+    assert run.fault in done.stderr
+    assert [path.name for path in tmp_path.iterdir()] == ["a"]
 
 
 def test_help_needs_none_of_the_heavy_packages():

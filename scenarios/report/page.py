@@ -74,9 +74,13 @@ def _table(runs: Sequence[Run]) -> str:
     for group, rows in groupby(table(runs, details=False), key=lambda row: row.group):
         body.append(f'<tr class="group"><th colspan="{len(runs) + 1}">{escape(group)}</th></tr>')
         body += [_line(row, out) for row in rows]
+    detour = any(run.recording and "repulsion_active" in run.recording
+                 and run.recording["repulsion_active"].any() for run in runs)
+    why = (" The position error contains the detour by which the end effector is pushed around an "
+           "obstacle on its path." if detour else "")
     return f"""<section><h2>In numbers</h2>
 <p class="quiet">Best of each row in colour, with a dot; within 1 % is as good, and a row where all
-are is unmarked.</p>
+are is unmarked.{why}</p>
 <div class="scroll"><table><thead><tr><th></th>{heads}</tr></thead>
 <tbody>{"".join(body)}</tbody></table></div></section>"""
 

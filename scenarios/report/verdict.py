@@ -78,7 +78,7 @@ def _instead(same: Sequence[Run], others: Sequence[Run]) -> str:
     """Return in brackets what the others did worse or better, where it can be seen."""
     said = []
     for what, name, largest in (("body to obstacle", "body_distance_min", False),
-                                ("path error, median", "position_error_median_settled", True)):
+                                ("median path error", "position_error_median_settled", True)):
         (known, usual), (one, value) = _extreme(same[:1], name, largest), _extreme(
             others, name, largest)
         if known and one and abs(value - usual) > 0.05 * abs(usual):
