@@ -26,10 +26,10 @@ class Tpm(Resolver):
     `recursive`, to rounding.
 
     form = "published": plain QR and Gauss-Jordan elimination with pivot blocks R_ii, as printed.
-    It departs from the strict answer wherever a level above the last loses rank and freedom is not
-    left over. With damping on, the pivots R_ii^# are damped by their own smallest singular value
-    and J^# is not: near singularities another x than that of the damped recursion, even at full
-    rank. Its rank_tolerance is absolute for singular values: times the largest row norm of J.
+    It departs from the strict answer where a level above the last loses rank and no freedom is left
+    over. The pivots R_ii^# are damped by their own smallest singular value, J^# is not; while the
+    rows of J are independent that is again the x of `recursive`, to rounding. Its rank_tolerance is
+    absolute for singular values: times the largest row norm of J.
     """
 
     name: ClassVar[str] = "tpm"

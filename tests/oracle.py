@@ -18,11 +18,12 @@ def solve(h, damping=0.0, threshold=0.1, rank_tolerance=1e-9):
         _, s, Vt = np.linalg.svd(B / np.where(size > 0, size, 1.0)[:, None])
         rank = np.count_nonzero(s > rank_tolerance)
         V = Vt[:rank].T  # directions of the null space that these rows can see
+        M, missing = B @ V, b - A @ x
         lam = damping_of(B, rank, damping, threshold)
         if lam > 0:
-            y = np.linalg.solve((B @ V).T @ (B @ V) + lam**2 * np.eye(rank), (B @ V).T @ (b - A @ x))
+            y = np.linalg.solve(M.T @ M + lam**2 * np.eye(rank), M.T @ missing)
         else:
-            y = np.linalg.pinv(B @ V) @ (b - A @ x)
+            y = np.linalg.pinv(M) @ missing
         x = x + N @ V @ y
         N = N @ Vt[rank:].T
     return x + N @ (N.T @ h.reference)

@@ -183,7 +183,7 @@ def test_a_misspelt_setting_names_the_nearest(name):
 
 
 def test_an_unknown_resolver_names_the_nearest():
-    with pytest.raises(HierarchyError, match="unknown resolver 'recursiv'; did you mean 'recursive'"):
+    with pytest.raises(HierarchyError, match="'recursiv'; did you mean 'recursive'"):
         make("recursiv")
 
 

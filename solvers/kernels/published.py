@@ -88,8 +88,8 @@ def priority_matrix(A, lower, upper, sizes, x, W, beta, F, T, damping, threshold
         for c in range(k, W.shape[1]):
             W[m + k, c] = 0.0
             square += W[k, c] * W[k, c]
-        beta[k] = 0.0
-        if square > 0.0:
+        zero, beta[k] = beta[k], 0.0
+        if square > zero:  # else rounding error would choose the direction
             make_reflector(W, beta, m, k, k, square)
             reflect_rows(W, beta, m, k, k + 1, k, m)
     invert_triangle(W, T, ZERO, ZERO, m)

@@ -1,0 +1,180 @@
+"""The Task Priority Matrix: exact as a staircase, and where the published form is not."""
+
+import numpy as np
+import oracle
+import pytest
+from rank_cases import CASES, build, family, generic, random_levels, rng
+
+from hierarchy import Hierarchy, HierarchyError
+from solvers import Status, make
+from solvers.tpm import FORMS, task_priority_matrix
+
+every_case = pytest.mark.parametrize("case", CASES, ids=lambda c: c.__name__)
+every_form = pytest.mark.parametrize("form", FORMS)
+PUBLISHED = make("tpm", form="published")
+STAIRCASE = make("tpm")
+
+
+@every_case
+@every_form
+@pytest.mark.parametrize("damping", [0.0, 0.05])
+def test_contributions_and_null_space_term_add_up_to_the_answer(case, form, damping):
+    h = build(case, True)
+    tpm = task_priority_matrix(h, form=form, damping=damping)
+    x = make("tpm", form=form, damping=damping).solve(h).x
+    assert tpm.contributions.shape == (len(h.sizes), h.n)
+    close(tpm.contributions.sum(axis=0) + tpm.null_space_term, x)
+
+
+@every_case
+@every_form
+@pytest.mark.parametrize("damping", [0.0, 0.05])
+def test_f_gives_the_answer_through_the_pseudoinverse_of_the_whole_stack(case, form, damping):
+    h = build(case, True)
+    tpm = task_priority_matrix(h, form=form, damping=damping)
+    if h.m:
+        J = pseudoinverse(h)
+        close(J @ tpm.F, tpm.G)
+        x = J @ (tpm.F @ h.lower - h.A @ h.reference) + h.reference  # (14)
+        close(x, make("tpm", form=form, damping=damping).solve(h).x)
+
+
+def pseudoinverse(h):
+    """J^# with the rank decided on rows of unit norm, as the resolvers do."""
+    size = np.linalg.norm(h.A, axis=1, keepdims=True)
+    _, s, Vt = np.linalg.svd(h.A / np.where(size > 0, size, 1.0))
+    V = Vt[:np.count_nonzero(s > 1e-9)].T
+    return V @ np.linalg.pinv(h.A @ V)
+
+
+def close(x, y, tolerance=1e-8):
+    np.testing.assert_allclose(x, y, rtol=0, atol=tolerance * (1.0 + np.abs(y).max(initial=0.0)))
+
+
+@every_form
+def test_f_of_one_level_or_of_independent_levels_is_block_triangular(form):
+    """Row i of F says what level i is asked to do: nothing of what is below it."""
+    h = Hierarchy.from_levels(generic())
+    F = task_priority_matrix(h, form=form).F
+    assert np.abs(np.triu(F, 1)).max() < 1e-13
+    assert np.abs(np.diag(F) - 1.0).max() < 1e-13
+
+
+@every_form
+def test_a_level_that_the_levels_above_decide_contributes_nothing(form):
+    A = rng().normal(size=(3, 6))
+    h = Hierarchy.from_levels([(A, [1.0, 2.0, 3.0]), (A[:2], [5.0, 5.0])])
+    assert np.abs(task_priority_matrix(h, form=form).contributions[1]).max() < 1e-12
+
+
+def test_the_matrix_of_an_inequality_is_refused():
+    h = Hierarchy.from_levels([([[1.0, 0.0]], [0.0], [1.0])])
+    with pytest.raises(HierarchyError, match="level 1, row 0: an inequality"):
+        task_priority_matrix(h)
+
+
+def test_the_matrix_of_rows_that_are_not_finite_is_refused():
+    h = Hierarchy.from_levels([([[1.0, 0.0]], [0.0])])
+    h.A[0, 0] = np.nan
+    with pytest.raises(HierarchyError, match="no task priority matrix"):
+        task_priority_matrix(h)
+
+
+# -- the published form, as printed: not to be mended ---------------------------------------------
+
+# A row dependent on those above takes a column of Q that nothing determines, and later levels need
+# it; or absolute tolerances see another rank in rows of unequal scale.
+ARBITRARY = ("rank_lost_inside_the_first_level", "middle_level_dependent_on_the_first",
+             "row_repeated_inside_a_level", "unequal_scales")
+
+
+@every_case
+@pytest.mark.parametrize("damping", [0.0, 0.05])
+def test_the_published_form_is_what_its_equations_say(case, damping):
+    h = build(case, True)
+    if h.m and case.__name__ not in ARBITRARY:
+        x, F = oracle.published(h, damping=damping)
+        close(make("tpm", form="published", damping=damping).solve(h).x, x)
+        close(task_priority_matrix(h, form="published", damping=damping).F.T @ h.lower,
+              F.T @ h.lower)
+
+
+@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("change", ["none", "last level dependent", "freedom left over"])
+def test_the_published_form_is_exact_where_no_upper_level_loses_rank_or_freedom_is_left(
+        seed, change):
+    levels = random_levels(10 if change == "freedom left over" else 6, (3, 2, 3), seed)
+    if change == "last level dependent":
+        levels[2][0][0] = [1.0, -2.0, 0.5] @ levels[0][0]
+    if change == "freedom left over":
+        levels[1][0][0] = [1.0, -2.0, 0.5] @ levels[0][0]
+    h = Hierarchy.from_levels(levels)
+    close(PUBLISHED.solve(h).x, oracle.solve(h))
+
+
+@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize(("n", "sizes", "level"), [
+    (6, (3, 2, 3), 1), (7, (3, 3, 3, 3), 0), (5, (3, 3), 0)])
+def test_the_published_form_departs_where_an_upper_level_loses_rank_that_is_needed_below(
+        seed, n, sizes, level):
+    """The case of the published algorithm's limits; the staircase has none of them."""
+    levels = random_levels(n, sizes, seed)
+    levels[level][0][1] = levels[0][0][0]  # dependent on the first level, or repeated inside it
+    h = Hierarchy.from_levels(levels)
+    exact = oracle.solve(h)
+    close(STAIRCASE.solve(h).x, exact)
+    assert np.abs(PUBLISHED.solve(h).x - exact).max() > 1e-6
+
+
+def test_the_published_form_is_not_called_strict():
+    assert STAIRCASE.strict
+    assert not PUBLISHED.strict
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_damped_pivots_are_the_damped_recursion_while_rows_are_independent(seed):
+    """F b = R^T y with y from block substitution, so x = J^# J Q y, and Q y is in J's row space.
+
+    The projectors of the recursion stay undamped; with damped ones the two would differ.
+    """
+    levels = random_levels(8, (3, 2, 2), seed)
+    noise = rng(seed + 100).normal(size=(2, 8))
+    levels[0][0][1] = levels[0][0][0] + 0.01 * noise[0]
+    levels[1][0][0] = levels[0][0][2] + 0.01 * noise[1]
+    h = Hierarchy.from_levels(levels, noise[0])
+    settings = {"damping": 0.05, "threshold": 0.1}
+    close(make("tpm", form="published", **settings).solve(h).x, oracle.solve(h, **settings))
+    assert np.abs(oracle.solve(h, **settings) - oracle.solve(h)).max() > 0.1
+
+
+# -- near the edge of a rank -----------------------------------------------------------------------
+
+@pytest.mark.parametrize("resolver", [STAIRCASE, make("recursive")], ids=lambda r: r.label)
+@pytest.mark.parametrize("gap", [1e-3, 1e-5, 1e-7])
+def test_almost_parallel_levels_keep_their_order(resolver, gap):
+    """What is left of a row is small, so its rounding error is large beside it."""
+    r = rng(5)
+    A = r.normal(size=(3, 7))
+    B = A[:2] + gap * r.normal(size=(2, 7))
+    h = Hierarchy.from_levels([(A, r.normal(size=3)), (B, r.normal(size=2)),
+                               (r.normal(size=(2, 7)), [1.0, 2.0])])
+    x = resolver.solve(h).x
+    assert h.violations(x).max() < 1e-12 * np.abs(x).max()
+
+
+@pytest.mark.parametrize("resolver", [STAIRCASE, make("recursive")], ids=lambda r: r.label)
+def test_the_rank_tolerance_decides_what_counts_as_parallel(resolver):
+    A = np.array([[1.0, 0.0], [1.0, 1e-5]])
+    h = Hierarchy.from_levels([(A[:1], [1.0]), (A[1:], [2.0])])
+    blunt = make(resolver.name, rank_tolerance=1e-4)
+    assert np.allclose(resolver.solve(h).x, [1.0, 1e5])
+    assert np.allclose(blunt.solve(h).x, [1.0, 0.0])
+
+
+@pytest.mark.parametrize("resolver", [STAIRCASE, make("recursive")], ids=lambda r: r.label)
+def test_a_rank_tolerance_of_zero_is_still_finite(resolver):
+    exact = make(resolver.name, rank_tolerance=0.0)
+    for h, _, _ in list(family("EQ7sing"))[:10]:
+        res = exact.solve(h)
+        assert np.isfinite(res.x).all()
+        assert res.status in (Status.SOLVED, Status.NUMERICAL_FAILURE)
