@@ -7,6 +7,7 @@ wrong.
 
 from __future__ import annotations
 
+import re
 import shlex
 import sys
 from enum import StrEnum
@@ -72,7 +73,8 @@ def list_() -> None:
     from scenarios.config import load, shipped
 
     _print_list("scenarios", {name: load(name).title for name in shipped()})
-    _print_list("resolvers", {name: solvers.make(name).label for name in solvers.names()})
+    _print_list("resolvers", {name: _first_line(solvers.make(name))
+                               for name in solvers.names()})
     _print_list("tasks", {name: _first_line(task) for name, task in TASKS.items()})
     _print_list("robots", dict.fromkeys(ROBOTS, ""))
 
@@ -123,7 +125,7 @@ def compare(scenarios: Annotated[list[str], typer.Argument(
     command = shlex.join(["hierarchy", *sys.argv[1:]])
     with bar() as told:
         comparison = run_all(chosen, specs, out=folder, progress=told, command=command)
-    for runs in comparison.by_scenario().values():
+    for runs in comparison.groups().values():
         _print_table(runs)
     print(f"\nReport: {_shown(folder / 'index.html')}")
     return max([_fault(f"{run.label}: {run.fault}") for run in comparison.faults], default=0)
@@ -182,7 +184,8 @@ def _run_of(scenario: Scenario, recording: Any) -> Run:
 def _print_table(runs: list[Run]) -> None:
     from rich.console import Console
 
-    print()
+    titles = dict.fromkeys(one.scenario.title or one.scenario.name for one in runs)
+    print("", *titles, "", sep="\n")
     Console(markup=False, highlight=False).print(_table(runs))
 
 
@@ -193,16 +196,21 @@ def _table(runs: list[Run]) -> Table:
 
     from scenarios.compare import table
 
-    laid_out = Table(title=Text(runs[0].scenario.title or runs[0].scenario.name), box=None,
-                     title_justify="left", padding=(0, 1, 0, 0), pad_edge=False)
+    laid_out = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False)
     laid_out.add_column("", overflow="fold")
     for one in runs:
-        laid_out.add_column(Text(one.label.replace(" ", "\n")), justify="right", no_wrap=True)
+        head = re.sub(r"(?<=[^ :-])[ :-]", _broken, one.label)
+        laid_out.add_column(Text(head), justify="right", no_wrap=True)
     for row in table(runs, details=False):
         cells = [Text(cell + ("*" if i in row.best else " "), "bold" if i in row.best else "")
                  for i, cell in enumerate(row.cells)]
         laid_out.add_row(Text(f"{row.label} [{row.unit}]" if row.unit else row.label), *cells)
     return laid_out
+
+
+def _broken(separator: re.Match[str]) -> str:
+    """Break a column's head after a colon or hyphen, or instead of a space."""
+    return f"{separator[0].strip()}\n"
 
 
 def _print_list(what: str, entries: dict[str, str]) -> None:

@@ -6,12 +6,14 @@ import dataclasses
 import json
 import re
 import shlex
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from hierarchy.errors import HierarchyError
 from scenarios import metrics
 from scenarios.folders import claim, write_text
 from scenarios.metrics import Metric
@@ -86,8 +88,14 @@ class Comparison:
         """The runs that did not reach their end."""
         return [run for run in self.runs if run.fault]
 
-    def by_scenario(self) -> dict[str, list[Run]]:
-        """Return the runs of each scenario, by its name."""
+    def groups(self) -> dict[str, list[Run]]:
+        """Return the runs that stand side by side, with the name of each group.
+
+        Those are the runs of one scenario; or, with one resolver, the runs of all scenarios.
+        """
+        if len({run.spec for run in self.runs}) == 1:
+            return {self.runs[0].spec: list(self.runs)} if len(self.runs) > 1 else {
+                self.runs[0].scenario.name: list(self.runs)}
         names = dict.fromkeys(run.scenario.name for run in self.runs)
         return {name: [run for run in self.runs if run.scenario.name == name] for name in names}
 
@@ -133,13 +141,16 @@ def compare(scenarios: Iterable[str | Scenario] | str, resolvers: Sequence[str] 
 def table(runs: Sequence[Run], details: bool = True) -> list[Row]:
     """Return the rows that compare runs of one scenario, best values marked.
 
-    Only runs that reached their end compete: the others' numbers cover less time. Values within
-    one percent of the best are as good, and where all are, none is marked.
+    Only runs of one scenario that reached their end compete: other scenarios ask for other things,
+    and a shorter run's numbers cover less time. Values within one percent of the best are as good,
+    and where all are, none is marked.
     """
+    one_scenario = len({run.scenario.name for run in runs}) == 1
+    competes = [one_scenario and run.fault is None for run in runs]
     known = {name: metric for run in runs for name, metric in run.metrics.items()
              if details or not metric.detail}
-    return [_row(metric, [run.metrics.get(name) for run in runs],
-                 [run.fault is None for run in runs]) for name, metric in known.items()]
+    return [_row(metric, [run.metrics.get(name) for run in runs], competes)
+            for name, metric in known.items()]
 
 
 def _row(metric: Metric, found: Sequence[Metric | None], competes: Sequence[bool]) -> Row:
@@ -165,6 +176,9 @@ def _plan(scenarios: Iterable[str | Scenario], resolvers: Sequence[str]) -> list
     from scenarios.config import load
 
     loaded = [load(s) if isinstance(s, (str, Path)) else s for s in scenarios]
+    for name, count in Counter(scenario.name for scenario in loaded).items():
+        if count > 1:
+            raise HierarchyError(f"{count} scenarios are called {name!r}; give each its own name")
     runs = []
     for scenario in loaded:
         build(scenario)
@@ -175,7 +189,13 @@ def _plan(scenarios: Iterable[str | Scenario], resolvers: Sequence[str]) -> list
 
 
 def _distinct(run: Run, runs: Sequence[Run]) -> Run:
-    """Return the run with its spec as its label where another resolver has the same label."""
+    """Return the run with a label that tells it from those beside it.
+
+    That is its resolver's label, or its spec where another resolver has the same one, or its
+    scenario's name where there is only one resolver.
+    """
+    if len(runs) > 1 and len({other.spec for other in runs}) == 1:
+        return dataclasses.replace(run, label=run.scenario.name)
     same = {other.spec for other in runs if other.label == run.label}
     return dataclasses.replace(run, label=run.spec) if len(same) > 1 else run
 
@@ -183,7 +203,7 @@ def _distinct(run: Run, runs: Sequence[Run]) -> Run:
 def _carried_out(run: Run, folder: Path | None, progress: Progress | None) -> Run:
     from scenarios.simulate import simulate
 
-    tell = partial(progress, run.label) if progress else None
+    tell = partial(progress, f"{run.scenario.name} {run.spec}") if progress else None
     try:
         recording = simulate(run.scenario, progress=tell)
     except Exception as error:  # one way's failure is a result, and must not lose the others'

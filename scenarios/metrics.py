@@ -104,8 +104,9 @@ def _pointing(recording: Recording, tolerance: float) -> Iterator[Metric]:
         return
     half_angle = recording.scenario.pointing.alpha_d
     beyond = pointing_angle(recording) - half_angle
-    yield Metric("cone_violation_max", f"Beyond the {half_angle:g}° cone, max",
-                 _finite(max(float(beyond.max()), 0.0)), "deg", group="Tracking")
+    yield Metric("cone_violation_max", "Beyond the cone, max",
+                 _finite(max(float(beyond.max()), 0.0)), "deg", group="Tracking",
+                 note=f"a cone of {half_angle:g}°")
     yield Metric("cone_violation_share", "Time outside the cone",
                  float(np.mean(beyond > tolerance)), "share", group="Tracking",
                  note=f"outside by more than {tolerance:g}°")

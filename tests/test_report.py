@@ -108,6 +108,23 @@ def test_a_page_is_whole_and_needs_nothing_outside_itself(runs):
     assert not re.search(r"<(?:script|link|img|iframe)\b|@import|url\((?!#)", text)
 
 
+def test_one_resolver_in_several_scenarios_is_one_table_and_nothing_is_best():
+    asked = [HandMadeScenario(name=name) for name in ("slow", "jumpy")]
+    runs = [dataclasses.replace(made("tpm", scenario=one, v=speed * np.eye(5, 7)),
+                                label=one.name) for one, speed in zip(asked, (0.1, 2.0), strict=True)]
+    text = page(comparison(*runs))
+    assert list(comparison(*runs).groups()) == ["tpm"]
+    assert all(not line.best for line in table(runs))
+    assert "0.1 rad/s in slow, 2 rad/s in jumpy" in text
+    assert "none is marked as best" in text
+
+
+def test_several_resolvers_in_several_scenarios_are_a_section_each():
+    runs = [made(spec, scenario=HandMadeScenario(name=name))
+            for name in ("one", "other") for spec in ("tpm", "hqp")]
+    assert list(comparison(*runs).groups()) == ["one", "other"]
+
+
 def test_the_page_shows_table_then_figures_then_settings_then_command():
     text = page(comparison(made("tpm"), made("hqp")))
     places = [text.index(mark) for mark in ("<table", "Joint velocities", "<h2>Settings",

@@ -23,15 +23,15 @@ if TYPE_CHECKING:
 
 def page(comparison: Comparison) -> str:
     """Return the page; it refers to nothing outside itself but the run folders beside it."""
-    by_scenario = comparison.by_scenario()
-    sections = [_scenario(name, runs) for name, runs in by_scenario.items()]
+    groups = comparison.groups()
+    sections = [_group(name, runs) for name, runs in groups.items()]
     return Template(_resource("page.html")).substitute(
-        title=escape(f"{', '.join(by_scenario)}: a comparison of resolvers"),
+        title=escape(f"{', '.join(groups)}: a comparison"),
         style=_resource("style.css"), sections="\n".join(sections),
         command=escape(comparison.command), versions=_pairs(comparison.versions))
 
 
-def _scenario(name: str, runs: Sequence[Run]) -> str:
+def _group(name: str, runs: Sequence[Run]) -> str:
     recordings = {run.label: run.recording for run in runs
                   if run.recording is not None and run.recording.ticks > 1}
     parts = [_lead(name, runs, recordings), _faults(runs), _table(runs)]
@@ -41,8 +41,16 @@ def _scenario(name: str, runs: Sequence[Run]) -> str:
 
 
 def _lead(name: str, runs: Sequence[Run], recordings: Mapping[str, Recording]) -> str:
-    scenario = runs[0].scenario
-    ways = "one way" if len(runs) == 1 else f"{in_words(len(runs))} ways"
+    asked = {run.scenario.name: run.scenario for run in runs}
+    if len(asked) > 1:
+        title = f"{in_words(len(asked)).capitalize()} scenarios, resolved by {name}"
+    else:
+        ways = "one way" if len(runs) == 1 else f"{in_words(len(runs))} ways"
+        title = f"{runs[0].scenario.title or name}, resolved in {ways}"
+    about = "".join(f'<p class="quiet"><b>{escape(key)}</b>: {escape(one.title)}</p>'
+                    for key, one in asked.items())
+    if len(asked) == 1:
+        about = f'<p class="quiet">{escape(runs[0].scenario.description)}</p>'
     drawn = {label: r for label, r in recordings.items() if "ee_position" in r}
     scene = _svg(picture(drawn), f"{name}: the paths taken") if drawn else ""
     caption = ("Dashed: the path asked for. Red: obstacles with ε₁ and ε₂ around them, and control "
@@ -51,9 +59,9 @@ def _lead(name: str, runs: Sequence[Run], recordings: Mapping[str, Recording]) -
               if scene else "")
     return f"""<header class="lead"><div>
 <p class="quiet">hierarchy compare · <b>{escape(name)}</b></p>
-<h1>{escape(scenario.title or name)}, resolved in {ways}</h1>
+<h1>{escape(title)}</h1>
 <p class="verdict">{escape(verdict(runs))}</p>
-<p class="quiet">{escape(scenario.description)}</p>
+{about}
 {_legend([run.label for run in runs])}</div>
 {figure}</header>"""
 
@@ -76,11 +84,13 @@ def _table(runs: Sequence[Run]) -> str:
         body += [_line(row, out) for row in rows]
     detour = any(run.recording and "repulsion_active" in run.recording
                  and run.recording["repulsion_active"].any() for run in runs)
+    marks = ("Best of each row in colour, with a dot; within 1 % is as good, and a row where all "
+             "are is unmarked." if len({run.scenario.name for run in runs}) == 1 else
+             "Different scenarios ask for different things, so none is marked as best.")
     why = (" The position error contains the detour by which the end effector is pushed around an "
            "obstacle on its path." if detour else "")
     return f"""<section><h2>In numbers</h2>
-<p class="quiet">Best of each row in colour, with a dot; within 1 % is as good, and a row where all
-are is unmarked.{why}</p>
+<p class="quiet">{marks}{why}</p>
 <div class="scroll"><table><thead><tr><th></th>{heads}</tr></thead>
 <tbody>{"".join(body)}</tbody></table></div></section>"""
 
@@ -108,7 +118,7 @@ def _overlays(name: str, recordings: Mapping[str, Recording]) -> str:
     if all("position_error" in r for r in recordings.values()):
         drawn.append(("Distance from the path [mm]",
                       figures.overlay(figures.position_error, recordings)))
-    if len(recordings) > 1:
+    if len({r.scenario.name for r in recordings.values()}) < len(recordings):
         drawn.append((f"How far the joints depart from those of {first} [rad]",
                       figures.departure(recordings)))
     if all("time_tick" in r for r in recordings.values()):
@@ -140,11 +150,14 @@ def _settings(runs: Sequence[Run]) -> str:
     rows = "".join(
         f"<tr><th>{escape(run.label)}</th><td><code>{escape(_settings_text(run.settings))}</code></td>"
         f'<td><a href="{escape(run.folder)}/">{escape(run.folder)}/</a></td></tr>' for run in runs)
+    asked = {run.scenario.name: run for run in reversed(runs)}
+    files = "".join(f"<details><summary>{escape(name)}.toml, as run by {escape(run.spec)}</summary>"
+                    f"<pre><code>{escape(run.scenario.to_toml())}</code></pre></details>"
+                    for name, run in reversed(asked.items()))
     return f"""<section><h2>Settings</h2>
 <p class="quiet">As they were used, damping included; every run's folder has the whole scenario.</p>
 <div class="scroll"><table class="plain"><tbody>{rows}</tbody></table></div>
-<details><summary>The scenario as run by {escape(runs[0].label)}</summary>
-<pre><code>{escape(runs[0].scenario.to_toml())}</code></pre></details></section>"""
+{files}</section>"""
 
 
 def _settings_text(settings: Mapping[str, Any]) -> str:

@@ -15,13 +15,15 @@ _NUMBERS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight"
 
 
 def verdict(runs: Sequence[Run], alike: float = 1e-6) -> str:
-    """Return the sentence about runs of one scenario; only what was measured enters it.
+    """Return the sentence about runs side by side; only what was measured enters it.
 
     Runs whose joints stay within `alike` [rad] of the first run's count as the same motion.
     """
     finished = [run for run in runs if run.fault is None]
     parts = [_completion(runs, finished)]
-    if finished:
+    if len({run.scenario.name for run in runs}) > 1:
+        parts += [_collision(finished), *_contrasts(finished)]
+    elif finished:
         same, others, apart = _groups(finished, alike)
         parts += [_agreement(same, others, apart), _collision(finished)]
         parts += [] if others and len(same) > 1 else [_distance(finished), _tracking(finished)]
@@ -35,15 +37,17 @@ def in_words(count: int) -> str:
 
 
 def _completion(runs: Sequence[Run], finished: Sequence[Run]) -> str:
-    seconds = f"{runs[0].scenario.control.duration:.4g} s"
+    durations = {f"{run.scenario.control.duration:.4g} s" for run in runs}
+    seconds = durations.pop() if len(durations) == 1 else "duration"
+    noun = "ways" if len({run.scenario.name for run in runs}) == 1 else "scenarios"
     if len(finished) == len(runs) == 1:
         return f"{runs[0].label} ran the whole {seconds}"
     if len(finished) == len(runs):
         every = "Both" if len(runs) == 2 else f"All {in_words(len(runs))}"
-        return f"{every} ways ran the whole {seconds}"
+        return f"{every} {noun} ran the whole {seconds}"
     stopped = ", ".join(run.label for run in runs if run.fault)
-    some = f"{in_words(len(finished)).capitalize()} of {in_words(len(runs))} ways"
-    return f"{some if finished else 'No way'} ran the whole {seconds} ({stopped} did not)"
+    some = f"{in_words(len(finished)).capitalize()} of {in_words(len(runs))} {noun}"
+    return f"{some if finished else f'No {noun[:-1]}'} ran the whole {seconds} ({stopped} did not)"
 
 
 def _groups(runs: Sequence[Run], alike: float) -> tuple[list[Run], list[Run], float]:
@@ -84,6 +88,20 @@ def _instead(same: Sequence[Run], others: Sequence[Run]) -> str:
         if known and one and abs(value - usual) > 0.05 * abs(usual):
             said.append(f"{what} {_mm(value)} against {_mm(usual)}")
     return f" ({', '.join(said)})" if said else ""
+
+
+def _contrasts(runs: Sequence[Run]) -> list[str]:
+    """Return where scenarios differ by half and more in what they ask of the arm."""
+    said = []
+    for what, name, scale, unit in (("the largest joint speed step is", "velocity_step_max", 1.0,
+                                     "rad/s"),
+                                    ("the body came within", "body_distance_min", 1e3, "mm")):
+        (least, low), (most, high) = (_extreme(runs, name, largest=False),
+                                      _extreme(runs, name, largest=True))
+        if least and most and high > 1.5 * low:
+            said.append(f"{what} {_digits(scale * low)} {unit} in {least.label}, "
+                        f"{_digits(scale * high)} {unit} in {most.label}")
+    return said
 
 
 def _collision(runs: Sequence[Run]) -> str:
