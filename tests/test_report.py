@@ -110,8 +110,8 @@ def test_a_page_is_whole_and_needs_nothing_outside_itself(runs):
 
 def test_one_resolver_in_several_scenarios_is_one_table_and_nothing_is_best():
     asked = [HandMadeScenario(name=name) for name in ("slow", "jumpy")]
-    runs = [dataclasses.replace(made("tpm", scenario=one, v=speed * np.eye(5, 7)),
-                                label=one.name) for one, speed in zip(asked, (0.1, 2.0), strict=True)]
+    runs = [dataclasses.replace(made("tpm", scenario=one, v=speed * np.eye(5, 7)), label=one.name)
+            for one, speed in zip(asked, (0.1, 2.0), strict=True)]
     text = page(comparison(*runs))
     assert list(comparison(*runs).groups()) == ["tpm"]
     assert all(not line.best for line in table(runs))
