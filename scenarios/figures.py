@@ -157,10 +157,10 @@ def stacked(recording: Recording, panels: Sequence[Panel], title: str) -> Figure
     colour = drawing.colours([label])[label]
     for ax, panel in zip(axes, panels, strict=True):
         panel.draw(ax, recording, colour)
-        ax.set_ylabel(f"{panel.title}\n[{panel.unit}]")
+        ax.set_title(f"{panel.title} [{panel.unit}]", loc="left", fontsize=9, color=INK)
     if "joint-velocities" in [panel.name for panel in panels]:
-        axes[0].legend(ncols=7, fontsize=6.5, loc="lower center", bbox_to_anchor=(0.5, 1.0),
-                       handlelength=1.0, columnspacing=1.0)
+        fig.legend(*axes[0].get_legend_handles_labels(), ncols=8, fontsize=7, frameon=False,
+                   loc="outside lower center", handlelength=1.0, columnspacing=1.0)
     axes[-1].set_xlabel("time [s]")
     fig.suptitle(f"{title}: {recording.scenario.name}, {label}", x=0.01, ha="left", fontsize=9,
                  color=INK)
