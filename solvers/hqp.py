@@ -8,6 +8,7 @@ from types import MappingProxyType
 from typing import Any, ClassVar, final
 
 import numpy as np
+from numpy.linalg import norm
 from numpy.typing import NDArray
 
 from hierarchy.errors import HierarchyError
@@ -15,6 +16,7 @@ from hierarchy.problem import Array, Hierarchy
 from solvers.resolver import Resolution, Resolver, Status, register
 
 REFINEMENTS = 20  # bound on the steps from a backend's active set to the exact one
+EXACT = 1e-10  # relative tolerance of the optimality conditions
 ACTIVE = 1e-6  # distance to its side, relative to 1 + |side|, at which a row is a candidate
 
 
@@ -47,7 +49,8 @@ class Hqp(Resolver):
     looks for x + N z. Fixed are equalities, and inequalities that had to be violated. The other
     inequalities above stay as constraints, relaxed by `slack` so that rounding cannot make them
     infeasible. From the backend's answer the active set is read off and solved exactly; where that
-    passes its own optimality check it replaces the backend's answer, and the slack leaves no trace.
+    passes the optimality conditions it replaces the backend's answer, even one that the backend did
+    not vouch for, and the slack leaves no trace.
     A level of equalities below which no inequality was asked yet is plain least squares, and one
     whose inequalities hold already needs nothing: neither calls the backend. `iterations` counts
     the programs that were solved.
@@ -121,15 +124,17 @@ class _Rows:
     def relaxed(self, slack: float) -> _Rows:
         return _Rows(self.A, self.lower - slack, self.upper + slack)
 
-    def sides(self, z: Array) -> Array:
-        """+1 where A z is near or above `upper`, -1 near or below `lower`, 0 elsewhere."""
+    def sides(self, z: Array, near: float) -> Array:
+        """+1 where A z is near or above `upper`, -1 near or below `lower`, 0 elsewhere.
+
+        near : how near, relative to 1 + |side|.
+        """
         value = self.A @ z
-        with np.errstate(invalid="ignore"):
-            above = value >= self.upper - ACTIVE * (1.0 + abs(self.upper))
-            below = value <= self.lower + ACTIVE * (1.0 + abs(self.lower))
-        above &= np.isfinite(self.upper)
-        below &= np.isfinite(self.lower)
-        return np.where(above, 1.0, np.where(below, -1.0, 0.0))
+        up, low = np.isfinite(self.upper), np.isfinite(self.lower)
+        side = np.zeros(len(value))
+        side[low] -= value[low] <= self.lower[low] + near * (1.0 + abs(self.lower[low]))
+        side[up] += value[up] >= self.upper[up] - near * (1.0 + abs(self.upper[up]))
+        return side
 
     def at(self, side: Array) -> Array:
         return np.where(side > 0, self.upper, self.lower)
@@ -166,7 +171,7 @@ class _Cascade:
         if not self.N.shape[1]:
             return True
         M, equal = rows.A @ self.N, rows.lower == rows.upper
-        norms = np.linalg.norm(rows.A, axis=1)
+        norms = norm(rows.A, axis=1)
         goal = rows.where(equal).seen(self.N, self.x)
         limits = rows.where(~equal).seen(self.N, self.x)
         lam = self._variable_damping(M, norms)
@@ -205,10 +210,14 @@ class _Cascade:
         kept = self.kept.seen(self.N, self.x)
         if not kept.lower.size and not limits.lower.size:
             return np.asarray(np.linalg.lstsq(E, e, rcond=None)[0])
-        z = self._program(E, e, limits, kept.relaxed(self.settings.slack))
-        return None if z is None else _refined(z, E, e, limits, kept)
+        z, found = self._program(E, e, limits, kept.relaxed(self.settings.slack))
+        for start in (z, np.zeros_like(z)):  # zero keeps all of `kept`: x does
+            exact = _refined(start, E, e, limits, kept)
+            if exact is not None:
+                return exact
+        return z if found else None
 
-    def _program(self, E: Array, e: Array, limits: _Rows, kept: _Rows) -> Array | None:
+    def _program(self, E: Array, e: Array, limits: _Rows, kept: _Rows) -> tuple[Array, bool]:
         """Ask the backend, for z and the signed violation w of the limits together."""
         backend = BACKENDS.get(self.settings.backend, OTHER)
         p, k = E.shape[1], limits.lower.size
@@ -221,12 +230,17 @@ class _Cascade:
         G = np.vstack([A[np.isfinite(upper)], -A[np.isfinite(lower)]])
         h = np.concatenate([upper[np.isfinite(upper)], -lower[np.isfinite(lower)]])
         self.programs += 1
-        z = _call(self.settings.backend, backend, P, np.concatenate([-E.T @ e, np.zeros(k)]), G, h)
-        return None if z is None or not np.isfinite(z).all() else z[:p]
+        q = np.concatenate([-E.T @ e, np.zeros(k)])
+        z, found = _call(self.settings.backend, backend, P, q, G, h)
+        return z[:p], found
 
 
-def _call(name: str, backend: Backend, P: Array, q: Array, G: Array, h: Array) -> Array | None:
-    """Return the backend's minimiser of z^T P z / 2 + q^T z with G z <= h, None if it has none."""
+def _call(name: str, backend: Backend, P: Array, q: Array, G: Array,
+          h: Array) -> tuple[Array, bool]:
+    """Return the backend's z for min z^T P z / 2 + q^T z, G z <= h, and whether it vouches for it.
+
+    Where it gave nothing finite, z is zero.
+    """
     import qpsolvers
     from scipy.sparse import csc_matrix  # type: ignore[import-untyped]
 
@@ -237,8 +251,10 @@ def _call(name: str, backend: Backend, P: Array, q: Array, G: Array, h: Array) -
             problem = qpsolvers.Problem(kind(P), q, kind(G), h)
             solution = qpsolvers.solve_problem(problem, solver=name, **backend.options)
         except Exception:  # backends raise whatever they like; all of it is a failure of theirs
-            return None
-    return np.asarray(solution.x) if solution.found and solution.x is not None else None
+            return np.zeros(len(q)), False
+    if solution.x is None or not np.isfinite(solution.x).all():
+        return np.zeros(len(q)), False
+    return np.asarray(solution.x), bool(solution.found)
 
 
 def _split(M: Array, norms: Array, rank_tolerance: float) -> tuple[Array, Array]:
@@ -252,27 +268,48 @@ def _split(M: Array, norms: Array, rank_tolerance: float) -> tuple[Array, Array]
     return Vt[:rank].T, Vt[rank:].T
 
 
-def _refined(z: Array, E: Array, e: Array, limits: _Rows, kept: _Rows) -> Array:
+def _refined(z: Array, E: Array, e: Array, limits: _Rows, kept: _Rows) -> Array | None:
     """Move from a backend's z to the exact minimiser for its active set, corrected where needed.
 
-    The result is returned only if it passes the optimality conditions; else z, as it came.
+    The result has passed the optimality conditions; None where no step did.
     """
-    active, broken = kept.sides(z), np.sign(limits.excess(z)) * (abs(limits.excess(z)) > ACTIVE)
+    active, excess = kept.sides(z, ACTIVE), limits.excess(z)
+    broken = np.sign(excess) * (abs(excess) > ACTIVE)
     for _ in range(REFINEMENTS):
         on, out = active != 0, broken != 0
         B, c = np.vstack([E, limits.A[out]]), np.concatenate([e, limits.at(broken)[out]])
         G, g = kept.A[on], kept.at(active)[on]
-        new = z + np.linalg.pinv(G) @ (g - G @ z)
-        free = _split(G, np.ones(len(G)), 1e-12)[1]
-        new = new + free @ np.linalg.lstsq(B @ free, c - B @ new, rcond=1e-12)[0]
-        multipliers = np.zeros(len(active))
-        multipliers[on] = np.linalg.lstsq(G.T, B.T @ (c - B @ new), rcond=1e-12)[0]
-        scale = 1e-12 * (1.0 + np.linalg.norm(new))
+        new = z + np.linalg.pinv(G, rcond=EXACT) @ (g - G @ z)
+        free = _split(G, np.ones(len(G)), EXACT)[1]
+        new = new + free @ np.linalg.lstsq(B @ free, c - B @ new, rcond=EXACT)[0]
+        scale = EXACT * (1.0 + norm(new))
         over, excess = kept.excess(new), limits.excess(new)
+        near = np.where(on, active, kept.sides(new, EXACT))
+        multipliers, rest = _multipliers(near, kept.A, B.T @ (c - B @ new))
         next_broken = np.sign(excess) * (abs(excess) > scale)
-        held = np.where(active * multipliers < -scale, 0.0, active)
-        next_active = np.where(abs(over) > 10 * scale, np.sign(over), held)
-        if (next_active == active).all() and (next_broken == broken).all():
+        feasible = (abs(over) <= scale).all()
+        if feasible and (next_broken == broken).all() and rest <= EXACT * (1.0 + norm(B.T @ c)):
             return np.asarray(new)
+        next_active = np.where(multipliers > 0.0, near, 0.0)
+        next_active = np.where(abs(over) > scale, np.sign(over), next_active)
+        if (next_active == active).all() and (next_broken == broken).all():
+            return None
         active, broken = next_active, next_broken
-    return z
+    return None
+
+
+def _multipliers(side: Array, A: Array, gradient: Array) -> tuple[Array, float]:
+    """Multipliers >= 0 of the rows with a side that balance a gradient best, and what they leave.
+
+    Rows may be dependent: any multipliers that leave nothing prove the minimum.
+    """
+    from scipy.optimize import nnls  # type: ignore[import-untyped]
+
+    found, on = np.zeros(len(side)), side != 0
+    if not on.any():
+        return found, float(norm(gradient))
+    try:
+        found[on], rest = nnls((side[on, None] * A[on]).T, gradient)
+    except RuntimeError:  # its bound on iterations
+        rest = np.inf
+    return found, float(rest)

@@ -1,12 +1,9 @@
 """Hierarchies of equalities at every rank, as (A, b) levels, and the equality families."""
 
-from pathlib import Path
-
 import numpy as np
 
 from hierarchy import Hierarchy
-
-FAMILIES = Path(__file__).parent / "data" / "hlsp"
+from scenarios.bench import resolvers
 
 
 def rng(seed=7):
@@ -106,12 +103,5 @@ def build(case, with_reference):
 
 def family(name):
     """Yield (hierarchy, x, norms) of a reference family; see data/hlsp/README.md."""
-    with np.load(FAMILIES / f"{name}.npz") as file:
-        data = dict(file)
-    for p in range(len(data["x"])):
-        levels = []
-        for k in range(int(data["L"])):
-            lower, upper = data[f"lb{k}"][p], data[f"ub{k}"][p]
-            levels.append((data[f"A{k}"][p], np.where(lower <= -1e9, -np.inf, lower),
-                           np.where(upper >= 1e9, np.inf, upper)))
-        yield Hierarchy.from_levels(levels), data["x"][p], data["norms"][p]
+    for problem in resolvers.family(name):
+        yield problem.h, problem.x, problem.norms

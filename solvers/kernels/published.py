@@ -89,7 +89,9 @@ def priority_matrix(A, lower, upper, sizes, x, W, beta, F, T, damping, threshold
             W[m + k, c] = 0.0
             square += W[k, c] * W[k, c]
         zero, beta[k] = beta[k], 0.0
-        if square > zero:  # else rounding error would choose the direction
+        if square <= zero:  # nothing is left of the row: rounding error must not choose for it
+            W[k, k:] = 0.0
+        else:
             make_reflector(W, beta, m, k, k, square)
             reflect_rows(W, beta, m, k, k + 1, k, m)
     invert_triangle(W, T, ZERO, ZERO, m)
