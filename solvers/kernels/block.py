@@ -104,11 +104,11 @@ def orthogonalise_rows(W, U):
                     a += W[i, k] * W[i, k]
                     b += W[j, k] * W[j, k]
                     c += W[i, k] * W[j, k]
-                if c * c <= 1e-32 * a * b:
+                if c * c <= 1e-30 * a * b:
                     continue
                 settled = False
                 zeta = (b - a) / (2.0 * c)
-                t = 1.0 / (abs(zeta) + np.sqrt(1.0 + zeta * zeta))
+                t = 1.0 / (abs(zeta) + np.hypot(1.0, zeta))
                 t = t if zeta >= 0.0 else -t
                 cosine = 1.0 / np.sqrt(1.0 + t * t)
                 for V in (W, U):
