@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, final
 
 from hierarchy.problem import Hierarchy
-from solvers.kernels.augmented import augmented
+from solvers.kernels.staircase import staircase
 from solvers.resolver import Resolution, Resolver, register
 
 
@@ -29,7 +29,7 @@ class Augmented(Resolver):
 
     def solve(self, h: Hierarchy, memory: Any = None) -> Resolution:
         """Resolve h; direct, `memory` is not used."""
-        x = h.reference.copy()
-        code = augmented(h.A, h.lower, h.upper, h.sizes, x, self.damping, self.threshold,
+        x, whole = h.reference.copy(), h.offsets[-1:]  # one level of m rows
+        code = staircase(h.A, h.lower, h.upper, whole, x, self.damping, self.threshold,
                          self.rank_tolerance)
         return self._resolution(h, x, code) if code else Resolution(x)

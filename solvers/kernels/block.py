@@ -69,7 +69,9 @@ def invert_triangle(M, T, i0, k0, p):
             for k in range(j, i):
                 value -= M[i0 + i, k0 + k] * T[j, k]
             if M[i0 + i, k0 + i] == 0.0:
-                T[j, i:] = square = np.inf
+                for k in range(i, p):
+                    T[j, k] = np.inf
+                square = np.inf
                 break
             T[j, i] = value / M[i0 + i, k0 + i]
             square += T[j, i] * T[j, i]

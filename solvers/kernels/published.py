@@ -90,7 +90,8 @@ def priority_matrix(A, lower, upper, sizes, x, W, beta, F, T, damping, threshold
             square += W[k, c] * W[k, c]
         zero, beta[k] = beta[k], 0.0
         if square <= zero:  # nothing is left of the row: rounding error must not choose for it
-            W[k, k:] = 0.0
+            for c in range(k, W.shape[1]):
+                W[k, c] = 0.0
         else:
             make_reflector(W, beta, m, k, k, square)
             reflect_rows(W, beta, m, k, k + 1, k, m)
