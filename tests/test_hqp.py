@@ -114,7 +114,7 @@ def test_a_backend_that_is_not_installed_is_named():
 
 def test_a_failing_backend_leaves_the_levels_that_were_finished(monkeypatch):
     monkeypatch.setattr("solvers.hqp._call", lambda *_: (np.full(9, 0.1), False))
-    monkeypatch.setattr("solvers.hqp._refined", lambda *_: None)
+    monkeypatch.setattr("solvers.hqp.refined", lambda *_: None)
     h = Hierarchy.from_levels([([[1.0, 0.0]], [2.0]), (np.eye(2), [-1.0, 3.0], [1.0, 4.0])])
     res = make("hqp").solve(h)
     assert res.status is Status.BACKEND_FAILURE
