@@ -212,8 +212,12 @@ class State:
 
 @compiled
 def _copy_kinematics(J, placements, previous_J, previous_placements):
-    previous_J[:] = J
-    previous_placements[:] = placements
+    for c in range(J.shape[1]):
+        for i in range(6):
+            previous_J[i, c] = J[i, c]
+    for i in range(placements.shape[0]):
+        for k in range(12):
+            previous_placements[i, k] = placements[i, k]
 
 
 def _placements_view(data: Any, joints: int) -> Array:

@@ -20,6 +20,9 @@ def simulate(scenario: Scenario, progress: Callable[[int, int], None] | None = N
     state stops being finite ends early: the Recording has all ticks so far and says why in
     `fault`. Raises HierarchyError where the scenario does not fit its robot or resolver.
     """
+    rehearsal = Controller(scenario)
+    rehearsal.rehearse()
+    Recorder(rehearsal, 1).write()
     controller = Controller(scenario)
     ticks = max(1, round(scenario.control.duration / scenario.control.period))
     recorder = Recorder(controller, ticks)

@@ -14,6 +14,7 @@ from hierarchy.avoidance.obstacles import distance_to_obstacle
 from hierarchy.avoidance.repulsion import repulsion
 from hierarchy.compiled import compiled
 from hierarchy.errors import HierarchyError
+from hierarchy.kinematics import point_at
 from hierarchy.problem import Array
 
 
@@ -80,35 +81,35 @@ def measure_exactly(measurement: Measurement, placements: Array, joints: NDArray
 @compiled
 def _measure(placements, joints, offsets, obstacles, laws, mean_within,
              points, distance, direction, magnitude, nearest):
-    away, best, total = np.empty(3), np.empty(3), np.empty(3)
+    away = np.empty(3)
     count = len(joints)
     active, D_minimal = -1, np.inf
     for k in range(count):
-        T = placements[joints[k]]
+        joint = joints[k]
         for i in range(3):
-            points[k, i] = (T[9 + i] + T[i] * offsets[k, 0] + T[3 + i] * offsets[k, 1]
-                            + T[6 + i] * offsets[k, 2])
+            points[k, i] = point_at(placements, joint, offsets[k], i)
         D_min, at = np.inf, -1
-        total[:] = 0.0
+        x = y = z = 0.0
         for j in range(obstacles.shape[0]):
             D = distance_to_obstacle(obstacles[j], points[k, 0], points[k, 1], points[k, 2], away)
-            if D_min > D:  # (22)
+            if D < D_min:  # (22)
                 D_min, at = D, j
-                best[:] = away
-            if mean_within > 0.0 and mean_within > D:
-                total += away  # (25); the factor 1/h is lost in (26)
+                direction[k, 0], direction[k, 1], direction[k, 2] = away[0], away[1], away[2]
+            if mean_within > 0.0 and D < mean_within:  # (25); the factor 1/h is lost in (26)
+                x += away[0]
+                y += away[1]
+                z += away[2]
         distance[k], nearest[k] = D_min, at
         if at < 0:
             magnitude[k] = 0.0
-            direction[k] = 0.0
+            direction[k, 0] = direction[k, 1] = direction[k, 2] = 0.0
             continue
-        norm = sqrt(total[0] ** 2 + total[1] ** 2 + total[2] ** 2)
-        if norm > 1e-6:
-            direction[k] = total / norm  # (26)
-        else:
-            direction[k] = best  # the unit vectors cancel, or the nearest is asked for
-        law = laws[1] if k == count - 1 else laws[0]
-        magnitude[k] = repulsion(max(D_min, 0.0), law[0], law[1], law[2], law[3])  # (23)
+        norm = sqrt(x * x + y * y + z * z)
+        if norm > 1e-6:  # else the unit vectors cancel, or the nearest is asked for
+            direction[k, 0], direction[k, 1], direction[k, 2] = x / norm, y / norm, z / norm  # (26)
+        law = 1 if k == count - 1 else 0
+        magnitude[k] = repulsion(max(D_min, 0.0), laws[law, 0], laws[law, 1], laws[law, 2],
+                                 laws[law, 3])  # (23)
         if k < count - 1 and D_min < D_minimal:  # (31)
             D_minimal, active = D_min, k
     return active

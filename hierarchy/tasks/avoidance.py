@@ -107,20 +107,21 @@ def _write(v, J, dJ, placements, supports, previous_J, previous_placements,
            A, lower, upper, row):
     n = A.shape[1]
     joint, offset, r = joints[k], offsets[k], direction[k]
-    J_c, dJ_c = np.empty((3, n)), np.zeros((3, n))
+    J_c, dJ_c = np.empty((3, n)), np.empty((3, n))
     write_point_jacobian(J, placements, supports, joint, offset, J_c, 0)
     if acceleration:
         write_point_jacobian_derivative(v, J, dJ, placements, supports, previous_J,
                                         previous_placements, period, joint, offset, dJ_c)
     drift = np.empty(3)
     for i in range(3):
-        drift[i] = row_times(dJ_c, i, v)
+        drift[i] = row_times(dJ_c, i, v) if acceleration else 0.0
     if rows == 3:
         for i in range(3):
-            A[row + i] = J_c[i]
+            for c in range(n):
+                A[row + i, c] = J_c[i, c]
             write_equality(lower, upper, row + i, magnitude[k] * r[i] - drift[i])  # (28)
         return
-    for c in range(A.shape[1]):
+    for c in range(n):
         A[row, c] = r[0] * J_c[0, c] + r[1] * J_c[1, c] + r[2] * J_c[2, c]
     write_equality(lower, upper, row,
                    magnitude[k] - (r[0] * drift[0] + r[1] * drift[1] + r[2] * drift[2]))  # (29)
