@@ -56,7 +56,12 @@ class StartSection(_Section):
 
 
 class ControlSection(_Section):
-    """How the tasks are resolved and how often."""
+    """How the tasks are resolved and how often.
+
+    `options` are settings of the resolver. A table in it that bears a resolver's name, such as
+    `[control.options.tpm]`, holds for that resolver alone; so the resolver can be swapped by
+    changing its name, and nothing else. A plain setting goes before one from such a table.
+    """
 
     level: Literal["velocity", "acceleration"] = "acceleration"
     period: Annotated[float, Field(gt=0.0, le=1.0)] = 0.001
@@ -67,10 +72,21 @@ class ControlSection(_Section):
 
     @model_validator(mode="after")
     def _makes_a_resolver(self) -> Self:
-        from solvers import make
+        from solvers import make, names
 
-        make(self.resolver, **self.options)
+        for name in self.options:
+            if name in names() and isinstance(self.options[name], dict):
+                make(name, **self.options[name])
+        make(self.resolver, **self.settings())
         return self
+
+    def settings(self) -> dict[str, Any]:
+        """Settings of the resolver: those of its own table, the plain ones laid over."""
+        from solvers import names
+
+        own = self.options.get(self.resolver, {})
+        plain = {key: value for key, value in self.options.items() if key not in names()}
+        return {**(own if isinstance(own, dict) else {self.resolver: own}), **plain}
 
 
 class StillSection(_Section):
@@ -229,19 +245,22 @@ class Scenario(_Section):
         """Make the resolver that `control.resolver` and `control.options` describe."""
         from solvers import make
 
-        return make(self.control.resolver, **self.control.options)
+        return make(self.control.resolver, **self.control.settings())
 
     def with_resolver(self, spec: str) -> Scenario:
         """Return this scenario under another resolver.
 
-        `spec` is `name` or `name:setting=value:setting=value`. Settings of this scenario that the
-        named resolver also has are kept, then those of the spec are laid over.
+        `spec` is `name` or `name:setting=value:setting=value`. The scenario's settings are kept
+        where the named resolver has them; those of the spec go before them.
         """
+        from solvers import make
+
         name, *settings = spec.split(":")
-        options = _parse_changes(settings, what=f"resolver {spec!r}")
+        own = {field.name for field in dataclasses.fields(make(name))}
         kept = {key: value for key, value in self.control.options.items()
-                if key in _settings_of(name)}
-        control = {**self.control.model_dump(), "resolver": name, "options": {**kept, **options}}
+                if key in own or isinstance(value, dict)}
+        options = {**kept, **_parse_changes(settings, what=f"resolver {spec!r}")}
+        control = {**self.control.model_dump(), "resolver": name, "options": options}
         return _validated({**self.model_dump(), "control": control}, f"resolver {spec!r}")
 
     def to_toml(self) -> str:
@@ -376,12 +395,6 @@ def _keys_beside(keys: list[str]) -> list[str]:
 def _section_in(annotation: Any) -> Any:
     options = [annotation, *getattr(annotation, "__args__", ())]
     return next((o for o in options if isinstance(o, type) and issubclass(o, _Section)), None)
-
-
-def _settings_of(resolver: str) -> frozenset[str]:
-    from solvers import make
-
-    return frozenset(field.name for field in dataclasses.fields(make(resolver)))
 
 
 def _without_none(data: Any) -> Any:

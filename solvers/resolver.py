@@ -168,7 +168,7 @@ def names() -> tuple[str, ...]:
     return tuple(sorted(_REGISTRY))
 
 
-def make(name: str, **settings: Any) -> Resolver:
+def make(name: str, /, **settings: Any) -> Resolver:
     """Return the resolver called `name` with these settings, the rest at their defaults.
 
     Raises

@@ -30,7 +30,7 @@ def test_a_scenario_as_run_reads_back_the_same(name, tmp_path):
 def test_the_letters_settings():
     s = load("ellipse")
     assert (s.control.level, s.control.resolver, s.control.period) == ("acceleration", "tpm", 1e-3)
-    assert s.control.options == {"form": "published", "damping": 0.05, "threshold": 0.1}
+    assert s.control.settings() == {"form": "published", "damping": 0.05, "threshold": 0.1}
     assert s.control.duration == pytest.approx(6 * np.pi)
     assert (s.pointing.alpha_d, s.pointing.kind) == (5.0, "inequality")
     assert (s.avoidance.near, s.avoidance.far, s.avoidance.end_effector) == (0.05, 0.15, 0.1)
@@ -42,8 +42,7 @@ def test_changes_are_toml_values_at_dotted_keys():
                          "avoidance.obstacles=[[1, 2, 3]]", "control.options.damping = 0.02"])
     assert (s.pointing.alpha_d, s.pointing.kind) == (35.0, "equality")
     assert s.avoidance.obstacles[0].centre == (1, 2, 3)
-    assert s.control.options["damping"] == 0.02
-    assert s.control.options["form"] == "published"
+    assert s.control.settings() == {"form": "published", "damping": 0.02, "threshold": 0.1}
     assert load("ellipse", {"pointing.alpha_d": 35}).pointing.alpha_d == 35
 
 
@@ -60,9 +59,11 @@ def test_obstacles_may_have_shapes_and_move(tmp_path):
 def test_a_resolver_is_swapped_by_name_keeping_the_shared_settings():
     s = load("ellipse").with_resolver("recursive")
     assert s.control.resolver == "recursive"
-    assert s.control.options == {"damping": 0.05, "threshold": 0.1}
+    assert s.control.settings() == {"damping": 0.05, "threshold": 0.1}
+    assert load("ellipse", ["control.resolver=recursive"]) == s, "changing its name is enough"
+    assert s.with_resolver("tpm") == load("ellipse")
     t = load("ellipse").with_resolver("tpm:form=staircase:damping=0.01")
-    assert t.control.options == {"form": "staircase", "damping": 0.01, "threshold": 0.1}
+    assert t.control.settings() == {"form": "staircase", "damping": 0.01, "threshold": 0.1}
 
 
 def test_a_file_extends_another(tmp_path):
@@ -90,6 +91,9 @@ def test_files_that_extend_each_other_are_refused(tmp_path):
     ("control.resolver=tmp", "did you mean 'tpm'"),
     ("control.options.dampin=0.1", "did you mean 'damping'"),
     ("control.options.damping=-1", "damping"),
+    ("control.options.recursive.form=published", "unknown setting of recursive 'form'"),
+    ("control.options.tpm=3", "unknown setting of tpm 'tpm'"),
+    ("control.options.tmp.form=published", "unknown setting of tpm 'tmp'"),
     ("control.options.form=printed", "published, staircase"),
     ("control.period=0", "control.period"),
     ("control.period=fast", "control.period"),
