@@ -19,6 +19,7 @@ class Status(IntEnum):
     ITERATION_LIMIT = 1
     NUMERICAL_FAILURE = 2
     BACKEND_FAILURE = 3
+    INACCURATE = 4
 
     @property
     def remedy(self) -> str:
