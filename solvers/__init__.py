@@ -4,6 +4,7 @@ from solvers import augmented as augmented
 from solvers import hqp as hqp
 from solvers import recursive as recursive
 from solvers import tpm as tpm
+from solvers.certificate import Certificate, certify
 from solvers.resolver import Resolution, Resolver, Status, make, names
 
-__all__ = ["Resolution", "Resolver", "Status", "make", "names"]
+__all__ = ["Certificate", "Resolution", "Resolver", "Status", "certify", "make", "names"]
