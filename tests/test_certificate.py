@@ -1,0 +1,210 @@
+"""The certificate accepts the answer, and nothing that differs from it where it matters."""
+
+import ast
+from pathlib import Path
+
+import lexicographic
+import numpy as np
+import pytest
+from rank_cases import CASES, build, family, rng
+
+from hierarchy import Hierarchy, HierarchyError
+from solvers import certificate, certify, make
+from solvers.problems import Recipe, generate
+
+FAMILIES = ("EQ7", "EQ7over", "EQ7sing", "EQ30L8", "EQ30L10", "INEQ7", "HUM38", "DEGEN7")
+TINY = Recipe(joints=(2, 3), levels=(2, 4), rows=(1, 3), scales=(1.0, 1.0), spread=1.0,
+              angles=(1e-2, 1e-1), ties=0.5, zero_rows=0.1, duplicates=0.3, near_parallel=0.1)
+OFF = 1e-4
+
+every_family = pytest.mark.parametrize("name", FAMILIES)
+
+
+def well_posed(name):
+    """DEGEN7 has rows of one level at an angle of 2e-9 with targets 0.3 apart.
+
+    The answer is then some 1e8 away, or not, after the angle at which a row counts as dependent.
+    """
+    problems = [(h, x) for h, x, _ in family(name) if not conflict_of_almost_parallel_rows(h)]
+    assert len(problems) == (40 if name == "DEGEN7" else 50)
+    return problems
+
+
+def conflict_of_almost_parallel_rows(h):
+    for A, lower, upper in h.levels():
+        unit = A / np.maximum(np.linalg.norm(A, axis=1, keepdims=True), 1e-300)
+        apart = np.linalg.norm(unit[:, None] - unit[None], axis=2)
+        if ((apart > 1e-12) & (apart < 1e-6) & (lower[:, None] > upper[None] + 1e-3)).any():
+            return True
+    return False
+
+
+@every_family
+def test_the_stored_solutions_are_certified_far_below_the_tolerance(name):
+    for h, x in well_posed(name):
+        verdict = certify(h, x)
+        assert verdict.certified, str(verdict)
+        assert max([verdict.nearest, *verdict.stationarity]) < 0.1 * certificate.TOLERANCE
+
+
+@every_family
+def test_a_step_of_one_in_ten_thousand_in_any_direction_is_rejected(name):
+    r = rng()
+    for h, x in well_posed(name):
+        for direction in r.normal(size=(5, h.n)):
+            step = OFF * direction / np.linalg.norm(direction)
+            assert not certify(h, x + step).certified
+
+
+@every_family
+def test_a_step_along_the_row_of_any_level_is_rejected(name):
+    r = rng()
+    for h, x in well_posed(name):
+        for A, *_ in h.levels():
+            row = A[r.integers(len(A))]
+            if row.any():
+                assert not certify(h, x + OFF * row / np.linalg.norm(row)).certified
+
+
+@pytest.mark.parametrize("name", ["EQ7", "EQ30L8"])
+def test_a_step_that_no_row_feels_leaves_the_levels_optimal_but_not_nearest(name):
+    for h, x in well_posed(name):
+        free = np.linalg.svd(h.A)[2][-1]
+        verdict = certify(h, x + OFF * free)
+        assert verdict.optimal
+        assert not verdict.is_nearest
+        assert "not nearest to the reference" in str(verdict)
+
+
+@every_family
+def test_rounding_of_an_iterative_solver_is_forgiven(name):
+    r = rng()
+    for h, x in well_posed(name):
+        assert certify(h, x + 1e-11 * r.normal(size=h.n)).certified
+
+
+@pytest.mark.parametrize("case", CASES, ids=lambda c: c.__name__)
+@pytest.mark.parametrize("reference", [False, True], ids=["no_reference", "reference"])
+def test_strict_answers_are_certified_at_every_rank(case, reference):
+    h = build(case, reference)
+    assert certify(h, make("tpm").solve(h).x).certified
+
+
+@pytest.mark.parametrize("seed", range(300))
+def test_the_answer_found_by_trying_everything_is_certified(seed):
+    h = generate(seed, TINY)
+    verdict = certify(h, lexicographic.solve(h))
+    assert verdict.certified, str(verdict)
+
+
+@pytest.mark.parametrize("seed", range(200))
+def test_levels_count_as_optimal_just_where_trying_everything_does_no_better(seed):
+    """The least violation of a level is one vector, not only one norm."""
+    h, r = generate(seed, TINY), rng(seed)
+    answer = lexicographic.solve(h)
+    for x in candidates(h, answer, r):
+        worse = np.abs(h.slacks(x) - h.slacks(answer)).max()
+        if worse < 1e-9 or worse > 1e-5:
+            assert certify(h, x).optimal == (worse < 1e-9), worse
+
+
+@pytest.mark.parametrize("seed", range(200))
+def test_of_all_that_is_optimal_only_the_nearest_is_certified(seed):
+    h, r = generate(seed, TINY), rng(seed)
+    answer = lexicographic.solve(h)
+    for x in candidates(h, answer, r):
+        verdict = certify(h, x)
+        if verdict.optimal and np.linalg.norm(x - answer) > 1e-5:
+            assert not verdict.is_nearest
+
+
+def candidates(h, answer, r):
+    """Points near and far, with single rows or none pulled out of the answer's place."""
+    for length in (1e-4, 1e-2, 1.0):
+        yield answer + length * r.normal(size=h.n)
+        free = np.linalg.svd(h.A)[2][-1]
+        yield answer + length * free
+        yield answer - length * free
+        yield answer + length * (h.reference - answer)
+        yield answer + length * h.A[r.integers(h.m)]
+
+
+def test_each_level_is_judged_within_what_the_levels_above_leave():
+    above = ([[1.0, 0.0]], [-np.inf], [1.0])
+    h = Hierarchy.from_levels([above, (np.eye(2), [3.0, 2.0])])
+    assert certify(h, [1.0, 2.0]).certified
+    assert certify(h, [0.5, 2.0]).level == 1
+    assert certify(h, [3.0, 2.0]).level == 0
+
+
+def test_a_row_pushes_only_towards_its_own_side():
+    h = Hierarchy.from_levels([([[1.0, 0.0]], [-np.inf], [1.0]), (np.eye(2), [-3.0, 2.0])])
+    assert not certify(h, [1.0, 2.0]).optimal
+    assert certify(h, [-3.0, 2.0]).certified
+
+
+def test_a_violated_row_keeps_its_violation():
+    both = ([[1.0, 0.0], [1.0, 0.0]], [-np.inf, 1.0], [-1.0, np.inf])
+    h = Hierarchy.from_levels([both, (np.eye(2), [0.5, 2.0])])
+    assert certify(h, [0.0, 2.0]).certified
+    assert not certify(h, [0.5, 2.0]).optimal
+
+
+def test_the_verdict_names_the_level():
+    h = Hierarchy.from_levels([([[1.0, 0.0]], [1.0]), ([[0.0, 1.0]], [2.0])],
+                              names=("position", "pointing"))
+    verdict = certify(h, [1.0, 2.1])
+    assert verdict.level == 1
+    assert str(verdict).startswith("not optimal at pointing: residual ")
+    assert str(certify(h, [1.0, 2.0])).startswith("certified: ")
+
+
+@pytest.mark.parametrize("scale", [1e-6, 1e6])
+@pytest.mark.parametrize("level", range(5))
+def test_the_unit_of_a_level_does_not_matter(scale, level):
+    for h, x in well_posed("INEQ7")[:10]:
+        levels = [[np.array(part) for part in parts] for parts in h.levels()]
+        levels[level] = [scale * part for part in levels[level]]
+        scaled = Hierarchy.from_levels(levels)
+        assert certify(scaled, x).certified
+        assert not certify(scaled, x + OFF / np.sqrt(h.n)).certified
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, 1e200])
+@pytest.mark.parametrize("where", ["x", "A", "reference", "target"])
+def test_what_is_not_finite_is_never_certified(bad, where):
+    h = build(CASES[0], True)
+    x = make("tpm").solve(h).x
+    {"x": x, "A": h.A[0], "reference": h.reference, "target": h.lower}[where][0] = bad
+    h.upper[0] = h.lower[0]
+    verdict = certify(h, x)
+    assert not verdict.certified
+    assert verdict.level == 0
+
+
+def test_a_wrong_shape_is_the_callers_mistake():
+    with pytest.raises(HierarchyError, match="x has shape"):
+        certify(build(CASES[0], False), np.zeros(3))
+
+
+def test_without_levels_only_the_reference_is_the_answer():
+    h = Hierarchy.from_levels([], reference=[1.0, -2.0])
+    assert certify(h, [1.0, -2.0]).certified
+    assert not certify(h, [1.0, -2.0 + OFF]).certified
+    assert certify(h, [0.0, 0.0]).optimal
+
+
+def test_zero_rows_and_levels_without_rows_hold_nothing():
+    h = Hierarchy.from_levels([(np.zeros((2, 2)), [1.0, 0.0], [2.0, np.inf]),
+                               (np.empty((0, 2)), []), ([[1.0, 1.0]], [2.0])])
+    assert certify(h, [1.0, 1.0]).certified
+    assert certify(h, [1.0, 1.0 + OFF]).level == 2
+
+
+def test_the_certificate_shares_no_code_with_any_solver():
+    tree = ast.parse(Path(certificate.__file__).read_text(encoding="utf-8"))
+    imported = {node.module.partition(".")[0] for node in ast.walk(tree)
+                if isinstance(node, ast.ImportFrom)}
+    imported |= {alias.name.partition(".")[0] for node in ast.walk(tree)
+                 if isinstance(node, ast.Import) for alias in node.names}
+    assert imported == {"__future__", "dataclasses", "typing", "numpy", "scipy", "hierarchy"}
