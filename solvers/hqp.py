@@ -2,37 +2,32 @@
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass, field
-from types import MappingProxyType
 from typing import Any, ClassVar, final
 
 import numpy as np
 from numpy.linalg import norm
 
-from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array, Hierarchy
-from solvers.refinement import Rows, refined, split
+from solvers.backends import Backend, Program, backend_of
+from solvers.refinement import EXACT, Rows, refined, split
 from solvers.resolver import Resolution, Resolver, Status, register
+
+_SHARE = 0.01  # of the declared accuracy: what one level may be off by, since lower ones magnify it
+_WIDER = (1.0, 100.0)  # times `slack`: tried one after the other
 
 
 @final
 @dataclass(frozen=True)
-class Backend:
-    """How qpsolvers is to call a backend, and the error of x to expect from it (see `accuracy`)."""
+class Memory:
+    """The step that every level took from the levels above it, each (n,), and the last one.
 
-    accuracy: float
-    options: MappingProxyType[str, Any]
-    sparse: bool = False
-    regularisation: float = 0.0  # added to the diagonal where the Hessian has to be definite
+    `corrected` of the `programs` were not answered well enough to be taken as they were.
+    """
 
-
-BACKENDS = {
-    "proxqp": Backend(1e-6, MappingProxyType({"eps_abs": 1e-9, "eps_rel": 0.0, "max_iter": 1000})),
-    "osqp": Backend(1e-5, MappingProxyType({"eps_abs": 1e-7, "eps_rel": 1e-7, "max_iter": 20000}),
-                    sparse=True),
-}
-OTHER = Backend(1e-5, MappingProxyType({}), regularisation=1e-9)
+    steps: tuple[Array, ...]
+    programs: int
+    corrected: int
 
 
 @final
@@ -41,25 +36,35 @@ OTHER = Backend(1e-5, MappingProxyType({}), regularisation=1e-9)
 class Hqp(Resolver):
     """Quadratic programs from the top level down, equalities and inequalities.
 
-    With x so far and N a basis of the null space of the rows that upper levels have fixed, a level
-    looks for x + N z. Fixed are equalities, and inequalities that had to be violated. The other
-    inequalities above stay as constraints, relaxed by `slack` so that rounding cannot make them
-    infeasible. From the backend's answer the active set is read off and solved exactly; where that
-    passes the optimality conditions it replaces the backend's answer, even one that the backend did
-    not vouch for, and the slack leaves no trace.
+    What upper levels have settled is frozen by design so that no backend can find it infeasible.
+    Settled are equalities, and inequalities that had to be violated: they leave the program as
+    `form` says. The other inequalities above stay as rows, divided by their norms and moved out by
+    `slack`; those that nothing can move any more are dropped. A level is divided by its largest
+    entry.
 
-    A level of equalities with no inequality above it is plain least squares, and one whose
-    inequalities hold already needs nothing: neither calls the backend. `iterations` counts the
-    programs that were solved.
+    No answer of a backend is taken on trust. Without inequalities, the gradient that it leaves
+    bounds its error; where the bound is within a hundredth of the backend's declared accuracy the
+    answer is taken as it is, and otherwise corrected by one exact least-squares step. With
+    inequalities, the active set is read off, resolved exactly, repaired where multipliers or rows
+    say so, and taken when it passes the optimality conditions to 1e-10, so that neither the slack
+    nor the backend's error leaves a trace below. Where that fails even from a program with 100
+    times the slack, the status is INACCURATE (BACKEND_FAILURE if the backend gave nothing it
+    vouched for), and x is that of the levels above, which hold.
 
-    backend : any solver that qpsolvers finds installed.
-    slack : relaxation of the inequalities above, in the unit of the rows.
-    violated : an inequality violated by more than this, in the unit of the rows, is fixed.
+    A level of inequalities that already hold asks nothing of the backend, nor does the reference
+    where no inequality is left. `iterations` counts the programs that were solved. `memory` hands
+    the steps of an earlier resolution to backends that can begin from one.
+
+    backend : proxqp, osqp, quadprog, daqp, piqp or clarabel.
+    form : "null-space", the program's unknowns are coordinates of what upper levels leave free;
+        "slack", they are x and a slack for each row, and an orthonormal basis of what is settled
+        is held by equality rows.
+    slack : relaxation of the inequalities above, relative to the norm of the row.
     """
 
     backend: str = "proxqp"
+    form: str = "null-space"
     slack: float = 1e-7
-    violated: float = 1e-6
 
     name: ClassVar[str] = "hqp"
     handles_inequalities: ClassVar[bool] = True
@@ -67,22 +72,19 @@ class Hqp(Resolver):
     def __post_init__(self) -> None:
         super().__post_init__()
         self._number("slack", 0.0, 1.0)
-        self._number("violated", 0.0, 1.0)
-        from qpsolvers import available_solvers  # costs 0.3 s: only where it is used
-
-        if self.backend not in available_solvers:
-            raise HierarchyError(f"hqp: backend {self.backend!r} is not installed; installed: "
-                                 f"{', '.join(sorted(available_solvers))}")
+        self._one_of("form", ("null-space", "slack"))
+        backend_of(self.backend)
 
     @property
     def label(self) -> str:
-        """`hqp` and the backend."""
-        return f"{self.name} {self.backend}"
+        """`hqp`, the backend, and the form where it is not the usual one."""
+        form = " slack" if self.form == "slack" else ""
+        return f"{self.name} {self.backend}{form}"
 
     @property
     def accuracy(self) -> float:
         """Error of x to expect, relative to 1 + |x|: the backend's."""
-        return BACKENDS.get(self.backend, OTHER).accuracy
+        return backend_of(self.backend).accuracy
 
     def solve(self, h: Hierarchy, memory: Any = None) -> Resolution:
         """Resolve h; a failed program ends it with the x of the levels that were finished."""
@@ -90,63 +92,90 @@ class Hqp(Resolver):
         sides = (h.lower <= h.upper) & (h.lower < np.inf) & (h.upper > -np.inf)
         if not finite or not sides.all():
             return Resolution(np.zeros(h.n), Status.NUMERICAL_FAILURE)
-        return _Cascade(self, h).run()
+        known = memory.steps if isinstance(memory, Memory) else ()
+        starts = known if len(known) == len(h.sizes) + 1 and known[0].shape == (h.n,) else ()
+        with np.errstate(all="ignore"):
+            try:
+                return _Cascade(self, h, backend_of(self.backend), starts).run()
+            except np.linalg.LinAlgError:  # an SVD of numbers beyond what a float can square
+                return Resolution(np.zeros(h.n), Status.NUMERICAL_FAILURE)
+
+
+class _StopError(Exception):
+    """A program without an answer that can be taken."""
+
+    def __init__(self, status: Status) -> None:
+        super().__init__(status.remedy)
+        self.status = status
 
 
 @dataclass
 class _Cascade:
-    """One run of the cascade: x so far, the freedom N left, the inequalities to keep."""
+    """One run of the cascade.
+
+    x so far; the basis N of the freedom left and F of what is settled, one orthonormal vector a
+    column of N, a row of F; the inequalities to keep.
+    """
 
     settings: Hqp
     h: Hierarchy
+    backend: Backend
+    starts: tuple[Array, ...]
     programs: int = 0
+    corrected: int = 0
+    steps: list[Array] = field(default_factory=list)
     x: Array = field(init=False)
     N: Array = field(init=False)
+    F: Array = field(init=False)
     kept: Rows = field(init=False)
 
     def __post_init__(self) -> None:
         n = self.h.n
-        self.x, self.N = np.zeros(n), np.eye(n)
-        self.kept = Rows(np.empty((0, n)), np.empty(0), np.empty(0))
+        self.x, self.N, self.F = np.zeros(n), np.eye(n), np.empty((0, n))
+        self.kept = Rows.none(n)
 
     def run(self) -> Resolution:
-        for A, lower, upper in self.h.levels():
-            if not self._level(Rows(A, lower, upper)):
-                return Resolution(self.x, Status.BACKEND_FAILURE, self.programs)
-        target = self.N.T @ (self.h.reference - self.x)
-        nothing = Rows(np.empty((0, target.size)), np.empty(0), np.empty(0))
-        z = self._minimise(np.eye(target.size), target, nothing)
-        if z is None:
-            return Resolution(self.x, Status.BACKEND_FAILURE, self.programs)
-        return Resolution(self.x + self.N @ z, Status.SOLVED, self.programs)
+        status = Status.SOLVED
+        try:
+            for A, lower, upper in self.h.levels():
+                self._level(A, lower, upper)
+            self._step(self._nearest())
+        except _StopError as stop:
+            status = stop.status
+        memory = Memory(tuple(self.steps), self.programs, self.corrected)
+        return Resolution(self.x, status, self.programs, memory)
 
-    def _level(self, rows: Rows) -> bool:
-        if not self.N.shape[1]:
-            return True
-        M, equal = rows.A @ self.N, rows.lower == rows.upper
-        norms = norm(rows.A, axis=1)
-        goal = rows.where(equal).seen(self.N, self.x)
-        limits = rows.where(~equal).seen(self.N, self.x)
-        lam = self._variable_damping(M, norms)
-        own, _ = split(goal.A, norms[equal], self.settings.rank_tolerance)
-        if not equal.any() and not limits.excess(np.zeros(M.shape[1])).any():
-            z: Array | None = np.zeros(M.shape[1])
-        elif equal.all() and not self.kept.lower.size:
-            damped = np.vstack([goal.A @ own, lam * np.eye(own.shape[1])])
-            missing = np.concatenate([goal.lower, np.zeros(own.shape[1])])
-            z = own @ np.linalg.lstsq(damped, missing, rcond=None)[0]
+    def _step(self, z: Array) -> None:
+        x = self.x + self.N @ z
+        if not np.isfinite(x).all():
+            raise _StopError(Status.NUMERICAL_FAILURE)
+        self.steps.append(x - self.x)
+        self.x = x
+
+    def _level(self, A: Array, lower: Array, upper: Array) -> None:
+        """Move x to the minimum of a level; settle its equalities and what it must violate."""
+        if not self.N.shape[1] or not A.any():
+            self.steps.append(np.zeros(self.h.n))
+            return
+        scale, equal = float(abs(A).max()), lower == upper
+        rows = Rows(A / scale, lower / scale, upper / scale)
+        norms, M = norm(rows.A, axis=1), rows.A @ self.N
+        goal = rows.where(equal).from_(self.x)
+        limits = rows.where(~equal).from_(self.x)
+        near = EXACT * (1.0 + norm(self.x))
+        broken = np.zeros(limits.lower.size)
+        if not equal.any() and (abs(limits.excess(np.zeros(self.h.n))) <= near).all():
+            z = np.zeros(self.N.shape[1])
         else:
-            cost = np.vstack([goal.A, lam * np.eye(M.shape[1])]) if lam else goal.A
-            z = self._minimise(cost, np.pad(goal.lower, (0, len(cost) - len(goal.lower))), limits)
-        if z is None:
-            return False
-        self.x = self.x + self.N @ z
-        excess = rows.excess(self.x)
-        fixed = equal | (abs(excess) > self.settings.violated)
-        _, free = split(M[fixed], norms[fixed], self.settings.rank_tolerance)
+            lam = self._variable_damping(scale * M, scale * norms) / scale
+            z, broken = self._minimise(goal, limits, norms[equal], lam)
+        self._step(z)
+        fixed = equal.copy()
+        fixed[~equal] = broken != 0
+        own, free = split(M[fixed], norms[fixed], self.settings.rank_tolerance)
+        self.F = np.vstack([self.F, (self.N @ own).T])
         self.N = self.N @ free
-        self.kept = self.kept.and_(rows.where(~fixed))
-        return True
+        self.kept = self.kept.and_(rows.where(~fixed).normalised())
 
     def _variable_damping(self, M: Array, norms: Array) -> float:
         s = self.settings
@@ -156,55 +185,115 @@ class _Cascade:
         smallest = np.linalg.svd(M, compute_uv=False)[-1] if rank == M.shape[0] else 0.0
         return float(s.damping * np.sqrt(max(0.0, 1.0 - (smallest / s.threshold) ** 2)))
 
-    def _minimise(self, E: Array, e: Array, limits: Rows) -> Array | None:
-        """Minimise ||E z - e||^2 + ||excess of limits||^2 over the z that the kept rows allow."""
-        if not E.shape[1]:
-            return np.zeros(0)
-        kept = self.kept.seen(self.N, self.x)
-        if not kept.lower.size and not limits.lower.size:
-            return np.asarray(np.linalg.lstsq(E, e, rcond=None)[0])
-        z, found = self._program(E, e, limits, kept.relaxed(self.settings.slack))
-        for start in (z, np.zeros_like(z)):  # zero keeps all of `kept`: x does
-            exact = refined(start, E, e, limits, kept)
-            if exact is not None:
-                return exact
-        return z if found else None
+    def _nearest(self) -> Array:
+        """Return the z that leads nearest to the reference."""
+        target = self.h.reference - self.x
+        if not self.N.shape[1] or not self._movable().lower.size:
+            return np.asarray(self.N.T @ target)
+        goal = Rows(np.eye(self.h.n), target, target)
+        return self._minimise(goal, Rows.none(self.h.n), np.ones(self.h.n), 0.0, last=True)[0]
 
-    def _program(self, E: Array, e: Array, limits: Rows, kept: Rows) -> tuple[Array, bool]:
-        """Ask the backend, for z and the signed violation w of the limits together."""
-        backend = BACKENDS.get(self.settings.backend, OTHER)
-        p, k = E.shape[1], limits.lower.size
-        P = np.zeros((p + k, p + k))
-        P[:p, :p], P[p:, p:] = E.T @ E, np.eye(k)
-        P[range(p), range(p)] += backend.regularisation
-        A = np.block([[limits.A, -np.eye(k)], [kept.A, np.zeros((kept.lower.size, k))]])
-        lower = np.concatenate([limits.lower, kept.lower])
-        upper = np.concatenate([limits.upper, kept.upper])
-        G = np.vstack([A[np.isfinite(upper)], -A[np.isfinite(lower)]])
-        h = np.concatenate([upper[np.isfinite(upper)], -lower[np.isfinite(lower)]])
+    def _movable(self) -> Rows:
+        """Return the kept rows that a step along N can still move, as rows of that step."""
+        moved = norm(self.kept.A @ self.N, axis=1) > self.settings.rank_tolerance
+        return self.kept.where(moved).from_(self.x)
+
+    def _minimise(self, goal: Rows, limits: Rows, norms: Array, lam: float, last: bool = False
+                  ) -> tuple[Array, Array]:
+        """Minimise ||goal||^2 + ||excess of limits||^2 + lam^2 ||z||^2 within the kept rows.
+
+        All rows are of the step N z. Returns z and, for each limit, the side on which it remains
+        violated.
+        """
+        kept, N = self._movable(), self.N
+        p = N.shape[1]
+        seen = Rows(np.empty((0, p)), np.empty(0), np.empty(0)) if last else goal.seen(N)
+        E, e = np.vstack([seen.A, lam * np.eye(p)]), np.concatenate([seen.lower, np.zeros(p)])
+        if last:
+            E, e = np.eye(p), N.T @ goal.lower
+        elif not lam:
+            E, e = seen.A, seen.lower
+        vouched = False
+        for wider in _WIDER:
+            z, found = self._ask(goal, limits, kept.relaxed(wider * self.settings.slack), lam, last)
+            vouched |= found
+            if not kept.lower.size and not limits.lower.size:
+                return self._least_squares(z, E, e, norms, lam), np.empty(0)
+            for start in (z, np.zeros(p)):  # zero keeps all of `kept`: x does
+                exact = refined(start, E, e, limits.seen(N), kept.seen(N))
+                if exact is not None:
+                    off = norm(exact[0] - z) > self._allowed()
+                    self.corrected += bool(off)
+                    return exact
+        raise _StopError(Status.INACCURATE if vouched else Status.BACKEND_FAILURE)
+
+    def _allowed(self) -> float:
+        return float(_SHARE * self.backend.accuracy * (1.0 + norm(self.x)))
+
+    def _least_squares(self, z: Array, E: Array, e: Array, norms: Array, lam: float) -> Array:
+        """Return z where it is shown to be near enough to the least squares, or the exact ones."""
+        if lam:
+            own, smallest = np.eye(len(z)), lam
+        else:
+            own, _ = split(E, norms, self.settings.rank_tolerance)
+            smallest = float(np.linalg.svd(E @ own, compute_uv=False).min(initial=np.inf))
+        z = own.T @ z  # what is outside of it the level cannot see
+        if norm(own.T @ (E.T @ e) - own.T @ (E.T @ (E @ (own @ z)))) <= (
+                self._allowed() * smallest**2):
+            return np.asarray(own @ z)
+        self.corrected += 1
+        return np.asarray(own @ np.linalg.lstsq(E @ own, e, rcond=None)[0])
+
+    def _ask(self, goal: Rows, limits: Rows, kept: Rows, lam: float, last: bool
+             ) -> tuple[Array, bool]:
+        """Return z as the backend has it, and whether it vouches for it."""
+        start = self.starts[len(self.steps)] if self.starts else None
         self.programs += 1
-        q = np.concatenate([-E.T @ e, np.zeros(k)])
-        z, found = _call(self.settings.backend, backend, P, q, G, h)
-        return z[:p], found
+        if self.settings.form == "slack":
+            d, found = _slack_program(goal, limits, kept, self.F, lam, last, start).solve(
+                self.backend)
+            return self.N.T @ d[:self.h.n], found
+        if start is not None:
+            start = self.N.T @ start
+        program = _null_space_program(goal.seen(self.N), limits.seen(self.N), kept.seen(self.N),
+                                      lam, start)
+        z, found = program.solve(self.backend)
+        return z[:self.N.shape[1]], found
 
 
-def _call(name: str, backend: Backend, P: Array, q: Array, G: Array,
-          h: Array) -> tuple[Array, bool]:
-    """Return the backend's z for min z^T P z / 2 + q^T z, G z <= h, and whether it vouches for it.
+def _null_space_program(goal: Rows, limits: Rows, kept: Rows, lam: float,
+                        start: Array | None) -> Program:
+    """Unknowns: z, and w (k,) the signed violation of each limit."""
+    p, k = goal.A.shape[1], limits.lower.size
+    P = np.eye(p + k)
+    P[:p, :p] = goal.A.T @ goal.A + lam**2 * np.eye(p)
+    A = np.block([[limits.A, -np.eye(k)], [kept.A, np.zeros((kept.lower.size, k))]])
+    begin = None if start is None else np.concatenate([start, limits.excess(start)])
+    return Program(P, np.concatenate([-goal.A.T @ goal.lower, np.zeros(k)]), A,
+                   np.concatenate([limits.lower, kept.lower]),
+                   np.concatenate([limits.upper, kept.upper]),
+                   np.empty((0, p + k)), np.empty(0), begin)
 
-    Where it gave nothing finite, z is zero.
+
+def _slack_program(goal: Rows, limits: Rows, kept: Rows, F: Array, lam: float, last: bool,
+                   start: Array | None) -> Program:
+    """Unknowns: the step d (n,), and w (k,) what each goal and limit is missed by; F d = 0.
+
+    The last program, where `goal` is d itself, is written without w.
     """
-    import qpsolvers
-    from scipy.sparse import csc_matrix  # type: ignore[import-untyped]
-
-    kind = csc_matrix if backend.sparse else np.asarray
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # backends warn of what their status says anyway
-        try:
-            problem = qpsolvers.Problem(kind(P), q, kind(G), h)
-            solution = qpsolvers.solve_problem(problem, solver=name, **backend.options)
-        except Exception:  # backends raise whatever they like; all of it is a failure of theirs
-            return np.zeros(len(q)), False
-    if solution.x is None or not np.isfinite(solution.x).all():
-        return np.zeros(len(q)), False
-    return np.asarray(solution.x), bool(solution.found)
+    n, m, k = goal.A.shape[1], 0 if last else goal.lower.size, limits.lower.size
+    P = np.eye(n + m + k)
+    P[:n, :n] *= 1.0 if last else lam**2
+    q = np.zeros(n + m + k)
+    q[:n] = -goal.lower if last else 0.0
+    kept_rows = np.hstack([kept.A, np.zeros((kept.lower.size, m + k))])
+    limit_rows = np.hstack([limits.A, np.zeros((k, m)), -np.eye(k)])
+    goal_rows = np.hstack([goal.A[:m], -np.eye(m), np.zeros((m, k))])
+    settled = np.hstack([F, np.zeros((len(F), m + k))])
+    begin = None if start is None else np.concatenate(
+        [start, (goal.A @ start - goal.lower)[:m], limits.excess(start)])
+    return Program(P, q, np.vstack([limit_rows, kept_rows]),
+                   np.concatenate([limits.lower, kept.lower]),
+                   np.concatenate([limits.upper, kept.upper]),
+                   np.vstack([goal_rows, settled]),
+                   np.concatenate([goal.lower[:m], np.zeros(len(F))]), begin)

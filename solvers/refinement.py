@@ -11,8 +11,10 @@ from numpy.typing import NDArray
 
 from hierarchy.problem import Array
 
-REFINEMENTS = 20  # bound on the steps from a backend's active set to the exact one
+REFINEMENTS = 60  # bound on the steps from a backend's active set to the exact one
+AT_ONCE = 10  # of them change all rows that are on the wrong side, the others one row at a time
 EXACT = 1e-10  # relative tolerance of the optimality conditions
+LITTLE = 1e-3  # rows broken by less are thought to hold at a nearby minimiser
 ACTIVE = 1e-6  # distance to its side, relative to 1 + |side|, at which a row is a candidate
 
 
@@ -30,10 +32,25 @@ class Rows:
         value: Array = self.A @ z
         return value - np.clip(value, self.lower, self.upper)
 
-    def seen(self, N: Array, x: Array) -> Rows:
-        """Return the same rows on z, where the unknown is x + N z."""
+    @staticmethod
+    def none(n: int) -> Rows:
+        """Return no rows, of n unknowns."""
+        return Rows(np.empty((0, n)), np.empty(0), np.empty(0))
+
+    def from_(self, x: Array) -> Rows:
+        """Return the same rows on d, where the unknown is x + d."""
         value = self.A @ x
-        return Rows(self.A @ N, self.lower - value, self.upper - value)
+        return Rows(self.A, self.lower - value, self.upper - value)
+
+    def seen(self, N: Array) -> Rows:
+        """Return the same rows on z, where the unknown is N z."""
+        return Rows(self.A @ N, self.lower, self.upper)
+
+    def normalised(self) -> Rows:
+        """Return the rows divided by their norms, without those of zeros."""
+        size = norm(self.A, axis=1)
+        rows, size = self.where(size > 0.0), size[size > 0.0]
+        return Rows(rows.A / size[:, None], rows.lower / size, rows.upper / size)
 
     def where(self, chosen: NDArray[np.bool_]) -> Rows:
         """Return the rows chosen by a mask."""
@@ -76,34 +93,76 @@ def split(M: Array, norms: Array, rank_tolerance: float) -> tuple[Array, Array]:
     return Vt[:rank].T, Vt[rank:].T
 
 
-def refined(z: Array, E: Array, e: Array, limits: Rows, kept: Rows) -> Array | None:
+def refined(z: Array, E: Array, e: Array, limits: Rows, kept: Rows
+            ) -> tuple[Array, Array] | None:
     """Move from a backend's z to the exact minimiser for its active set, corrected where needed.
 
-    The result has passed the optimality conditions; None where no step did.
+    Minimised is ||E z - e||^2 + ||excess of limits||^2 within the kept rows. Returns z, and +1,
+    -1 or 0 for each limit that is violated above, below, or not. The result has passed the
+    optimality conditions; None where no step did.
     """
     active, excess = kept.sides(z, ACTIVE), limits.excess(z)
     broken = np.sign(excess) * (abs(excess) > ACTIVE)
-    for _ in range(REFINEMENTS):
+    for step in range(REFINEMENTS):
         on, out = active != 0, broken != 0
         B, c = np.vstack([E, limits.A[out]]), np.concatenate([e, limits.at(broken)[out]])
         G, g = kept.A[on], kept.at(active)[on]
         new = z + np.linalg.pinv(G, rcond=EXACT) @ (g - G @ z)
         free = split(G, np.ones(len(G)), EXACT)[1]
         new = new + free @ np.linalg.lstsq(B @ free, c - B @ new, rcond=EXACT)[0]
+        new = _moved_inside(new, free @ split(B @ free, norm(B, axis=1), EXACT)[1],
+                            kept.where(~on).and_(limits.where(~out)))
+        if not np.isfinite(new).all():
+            return None
         scale = EXACT * (1.0 + norm(new))
         over, excess = kept.excess(new), limits.excess(new)
         near = np.where(on, active, kept.sides(new, EXACT))
-        multipliers, rest = _multipliers(near, kept.A, B.T @ (c - B @ new))
+        gradient = E.T @ (e - E @ new) - limits.A.T @ excess
+        multipliers, rest = _multipliers(near, kept.A, gradient)
         next_broken = np.sign(excess) * (abs(excess) > scale)
-        feasible = (abs(over) <= scale).all()
-        if feasible and (next_broken == broken).all() and rest <= EXACT * (1.0 + norm(B.T @ c)):
-            return np.asarray(new)
+        if (abs(over) <= scale).all() and rest <= EXACT * (1.0 + norm(B.T @ c)):
+            return np.asarray(new), np.asarray(next_broken)
         next_active = np.where(multipliers > 0.0, near, 0.0)
         next_active = np.where(abs(over) > scale, np.sign(over), next_active)
         if (next_active == active).all() and (next_broken == broken).all():
             return None
+        if step >= AT_ONCE:  # all at once has cycled: only the first row that is to change
+            next_active = _first_change(active, next_active)
+            if (next_active != active).any():
+                next_broken = broken
+            else:
+                next_broken = _first_change(broken, next_broken)
         active, broken = next_active, next_broken
     return None
+
+
+def _moved_inside(z: Array, D: Array, rows: Rows) -> Array:
+    """Return the point z + D y nearest to z at which rows hold that it breaks by a little.
+
+    The least-distance problem of Lawson and Hanson (1974, ch. 23), by non-negative least squares.
+    Returns z where they hold, are broken by much, or cannot all hold.
+    """
+    off = float(abs(rows.excess(z)).max(initial=0.0))
+    if not EXACT < off < LITTLE or not D.shape[1]:
+        return z
+    value, M = rows.A @ z, rows.A @ D
+    up, low = np.isfinite(rows.upper), np.isfinite(rows.lower)
+    G = np.vstack([-M[up], M[low]])
+    g = np.concatenate([value[up] - rows.upper[up], rows.lower[low] - value[low]]) / off
+    target = np.zeros(D.shape[1] + 1)
+    target[-1] = 1.0
+    u, rest = _non_negative(np.vstack([G.T, g]), target)
+    if not ACTIVE < rest < np.inf:  # 1 / rest is the length of y: they hold nowhere, or far away
+        return z
+    return np.asarray(z + D @ (G.T @ u) * (off / (1.0 - g @ u)))
+
+
+def _first_change(old: Array, new: Array) -> Array:
+    """Return `old` with the first entry in which `new` differs."""
+    changed = old.copy()
+    for i in np.flatnonzero(old != new)[:1]:
+        changed[i] = new[i]
+    return changed
 
 
 def _multipliers(side: Array, A: Array, gradient: Array) -> tuple[Array, float]:
@@ -111,13 +170,19 @@ def _multipliers(side: Array, A: Array, gradient: Array) -> tuple[Array, float]:
 
     Rows may be dependent: any multipliers that leave nothing prove the minimum.
     """
-    from scipy.optimize import nnls  # type: ignore[import-untyped]
-
     found, on = np.zeros(len(side)), side != 0
     if not on.any():
         return found, float(norm(gradient))
+    found[on], rest = _non_negative((side[on, None] * A[on]).T, gradient)
+    return found, rest
+
+
+def _non_negative(A: Array, b: Array) -> tuple[Array, float]:
+    """Return u >= 0 that minimises ||A u - b||, and that norm; infinite where none was found."""
+    from scipy.optimize import nnls  # type: ignore[import-untyped]
+
     try:
-        found[on], rest = nnls((side[on, None] * A[on]).T, gradient)
+        u, rest = nnls(A, b)
     except RuntimeError:  # its bound on iterations
-        rest = np.inf
-    return found, float(rest)
+        return np.zeros(A.shape[1]), np.inf
+    return np.asarray(u), float(rest)

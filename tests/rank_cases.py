@@ -3,7 +3,7 @@
 import numpy as np
 
 from hierarchy import Hierarchy
-from scenarios.bench import resolvers
+from scenarios.bench import families
 
 
 def rng(seed=7):
@@ -103,5 +103,5 @@ def build(case, with_reference):
 
 def family(name):
     """Yield (hierarchy, x, norms) of a reference family; see data/hlsp/README.md."""
-    for problem in resolvers.family(name):
+    for problem in families.family(name):
         yield problem.h, problem.x, problem.norms

@@ -1,19 +1,23 @@
 """The cascade of quadratic programs: inequalities at any level, through each backend."""
 
 import dataclasses
-import os
+import sys
 
 import numpy as np
 import pytest
 from rank_cases import family, generic
 
 from hierarchy import Hierarchy, HierarchyError
-from solvers import Status, make
+from hierarchy.errors import UnknownNameError
+from scenarios.bench.families import well_posed_levels
+from solvers import Status, backends, make
 
-BACKENDS = [make("hqp", backend=name) for name in ("proxqp", "osqp")]
-PROBLEMS = 10 if os.environ.get("NUMBA_DISABLE_JIT") == "1" else 50
+BACKENDS = [make("hqp", backend=name, form=form)
+            for name in backends.BACKENDS for form in ("null-space", "slack")]
+HUMANOIDS = (0, 4, 17, 29, 42, 48)  # proxqp used to be wrong on 29 and 48 without saying so
+PROBLEMS = 10
 
-every_backend = pytest.mark.parametrize("hqp", BACKENDS, ids=lambda r: r.backend)
+every_backend = pytest.mark.parametrize("hqp", BACKENDS, ids=lambda r: f"{r.backend}-{r.form}")
 
 
 def assert_close(hqp, x, expected):
@@ -22,22 +26,23 @@ def assert_close(hqp, x, expected):
 
 
 @every_backend
-def test_an_arm_with_limits_gets_the_certified_answer(hqp):
-    for h, x, norms in list(family("INEQ7"))[:PROBLEMS]:
+@pytest.mark.parametrize("name", ["INEQ7", "HUM38", "DEGEN7"])
+def test_an_answer_is_right_or_says_that_it_is_not(hqp, name):
+    """And where it is not, the levels that were finished keep what they have."""
+    problems = list(family(name))
+    chosen = [problems[i] for i in HUMANOIDS] if name == "HUM38" else problems[:PROBLEMS]
+    for h, x, norms in chosen:
         res = hqp.solve(h)
-        assert res.status is Status.SOLVED
-        assert_close(hqp, res.x, x)
-        assert_close(hqp, h.violations(res.x), norms)
+        known = well_posed_levels(h, x)
+        finished = known if res.status is Status.SOLVED else len(res.memory.steps)
+        assert_close(hqp, h.violations(res.x)[:min(finished, known)], norms[:min(finished, known)])
+        if res.status is Status.SOLVED and known == len(norms):
+            assert_close(hqp, res.x, x)
 
 
 @every_backend
-def test_a_humanoid_gets_the_certified_answer_or_is_told_that_it_did_not(hqp):
-    """A failed program ends the cascade, and the levels above it keep what they have."""
-    for h, _, norms in list(family("HUM38"))[:12]:
-        res = hqp.solve(h)
-        if res.status is Status.SOLVED:
-            assert_close(hqp, h.violations(res.x), norms)
-        assert h.violations(res.x)[0] <= norms[0] + 1e-6
+def test_nearly_all_arms_with_limits_are_solved(hqp):
+    assert sum(hqp.solve(h).status is Status.SOLVED for h, _, _ in family("INEQ7")) >= 48
 
 
 @every_backend
@@ -93,10 +98,48 @@ def test_a_row_with_no_side_asks_for_nothing(hqp):
 
 
 @every_backend
-def test_equalities_alone_need_no_program(hqp):
-    assert hqp.solve(Hierarchy.from_levels(generic())).iterations == 0
+def test_every_level_of_equalities_is_put_to_the_backend(hqp):
+    assert hqp.solve(Hierarchy.from_levels(generic())).iterations == 3
+
+
+@every_backend
+def test_inequalities_that_hold_already_are_not(hqp):
     satisfied = [(np.eye(7), [-1.0] * 7, [1.0] * 7)]
     assert hqp.solve(Hierarchy.from_levels(satisfied)).iterations <= 1
+
+
+def test_backends_differ_in_the_last_digits_of_an_equality():
+    """Else they would all be one and the same least squares."""
+    h = Hierarchy.from_levels(generic())
+    answers = {make("hqp", backend=name).solve(h).x.tobytes() for name in backends.BACKENDS}
+    assert len(answers) > 3
+
+
+@every_backend
+@pytest.mark.parametrize("name", ["EQ7", "INEQ7"])
+def test_a_warm_start_does_not_change_the_answer(hqp, name):
+    for h, x, _ in list(family(name))[:PROBLEMS]:
+        moved = Hierarchy(h.A, 1.01 * h.lower, 1.01 * h.upper, h.sizes, h.reference, h.names)
+        res = hqp.solve(h, hqp.solve(moved).memory)
+        if res.status is Status.SOLVED:
+            assert_close(hqp, res.x, x)
+
+
+@every_backend
+def test_the_memory_of_another_hierarchy_does_no_harm(hqp):
+    h = Hierarchy.from_levels(generic())
+    for levels in (generic()[:2], [(np.eye(2), [1.0, 2.0])]):
+        memory = hqp.solve(Hierarchy.from_levels(levels)).memory
+        assert_close(hqp, hqp.solve(h, memory).x, hqp.solve(h).x)
+    assert_close(hqp, hqp.solve(h, "not a memory").x, hqp.solve(h).x)
+
+
+@every_backend
+def test_limits_that_have_just_room_for_each_other_all_hold(hqp):
+    """Whoever moves a broken row exactly on its side finds it whole, and another one broken."""
+    h = Hierarchy.from_levels([(np.eye(2), [-1.0, -1.0], [1.0, 1.0]),
+                               ([[1.0, 1.0], [1.0, -1.0]], [1.5, 0.2], [np.inf, np.inf])])
+    assert h.violations(hqp.solve(h).x).max() <= 1e-9
 
 
 @every_backend
@@ -107,17 +150,33 @@ def test_damping_bounds_the_step_of_a_level_among_inequalities(hqp):
     assert np.abs(damped.solve(h).x).max() < 10.0
 
 
-def test_a_backend_that_is_not_installed_is_named():
-    with pytest.raises(HierarchyError, match=r"backend 'gurobi' is not installed; .*osqp"):
-        make("hqp", backend="gurobi")
+def test_an_unknown_backend_names_the_nearest():
+    with pytest.raises(UnknownNameError, match="'daqpp'; did you mean 'daqp'"):
+        make("hqp", backend="daqpp")
+    with pytest.raises(UnknownNameError, match="form of hqp 'slak'; did you mean 'slack'"):
+        make("hqp", form="slak")
 
 
-def test_a_failing_backend_leaves_the_levels_that_were_finished(monkeypatch):
-    monkeypatch.setattr("solvers.hqp._call", lambda *_: (np.full(9, 0.1), False))
+@pytest.mark.parametrize("name", backends.BACKENDS)
+def test_a_backend_that_is_not_installed_names_what_brings_it(name, monkeypatch):
+    backends.installed.cache_clear()
+    monkeypatch.setitem(sys.modules, backends.BACKENDS[name].module, None)
+    what = "task-hierarchy" if name in ("proxqp", "osqp") else r"task-hierarchy\[qp\]"
+    with pytest.raises(HierarchyError, match=f"'{name}' is not installed; pip install {what}$"):
+        make("hqp", backend=name)
+    backends.installed.cache_clear()
+
+
+LIMITS_BELOW = Hierarchy.from_levels([([[1.0, 0.0]], [2.0]), (np.eye(2), [-1.0, 3.0], [1.0, 4.0])])
+
+
+@pytest.mark.parametrize(("vouched", "status"), [(False, Status.BACKEND_FAILURE),
+                                                 (True, Status.INACCURATE)])
+def test_an_answer_that_cannot_be_shown_right_leaves_the_levels_above(vouched, status, monkeypatch):
+    monkeypatch.setattr(backends.Program, "solve", lambda *_: (np.full(9, 0.1), vouched))
     monkeypatch.setattr("solvers.hqp.refined", lambda *_: None)
-    h = Hierarchy.from_levels([([[1.0, 0.0]], [2.0]), (np.eye(2), [-1.0, 3.0], [1.0, 4.0])])
-    res = make("hqp").solve(h)
-    assert res.status is Status.BACKEND_FAILURE
+    res = make("hqp").solve(LIMITS_BELOW)
+    assert res.status is status
     assert_close(make("hqp"), res.x, [2.0, 0.0])
 
 

@@ -13,48 +13,12 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from hierarchy.errors import HierarchyError
-from hierarchy.problem import Array, Hierarchy
+from hierarchy.problem import Hierarchy
+from scenarios.bench.families import DATA, Problem, family
+from scenarios.bench.families import EQUALITIES as FAMILIES
 from solvers import Resolution, Status, make, names
 
-FAMILIES = ("EQ7", "EQ7over", "EQ7sing", "EQ30L8", "EQ30L10")
-DATA = Path(__file__).parents[2] / "tests" / "data" / "hlsp"
 _SOLVED_TO = 1e-6  # a level's violation off by more than this is a failure
-_MISSING = 1e9     # the data's sign for a missing side
-
-
-@dataclass(frozen=True)
-class Problem:
-    """A reference hierarchy with its certified answer x (n,) and violations, norms (L,)."""
-
-    h: Hierarchy
-    x: Array
-    norms: Array
-
-
-def family(name: str, folder: Path = DATA) -> list[Problem]:
-    """Read the problems of one reference family.
-
-    Raises
-    ------
-    HierarchyError : the family's file is not in the folder.
-    """
-    file = Path(folder) / f"{name}.npz"
-    if not file.is_file():
-        raise HierarchyError(f"no reference problems at {file}; they are in tests/data/hlsp of a "
-                             "source checkout, and another folder can be given")
-    with np.load(file) as opened:
-        data = dict(opened)
-    return [_problem(data, p) for p in range(len(data["x"]))]
-
-
-def _problem(data: dict[str, Array], p: int) -> Problem:
-    levels = []
-    for k in range(int(data["L"])):
-        lower, upper = data[f"lb{k}"][p], data[f"ub{k}"][p]
-        levels.append((data[f"A{k}"][p], np.where(lower <= -_MISSING, -np.inf, lower),
-                       np.where(upper >= _MISSING, np.inf, upper)))
-    return Problem(Hierarchy.from_levels(levels), data["x"][p], data["norms"][p])
 
 
 def plain_numpy(h: Hierarchy) -> Resolution:

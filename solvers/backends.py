@@ -1,0 +1,129 @@
+"""The quadratic programming solvers that `hqp` calls through qpsolvers: how, and how good."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from importlib import import_module
+from types import MappingProxyType
+from typing import Any, final
+
+import numpy as np
+
+from hierarchy.errors import HierarchyError, UnknownNameError
+from hierarchy.problem import Array
+
+
+@final
+@dataclass(frozen=True)
+class Backend:
+    """A solver, how it is called, and the accuracy that is asked of it.
+
+    name : as qpsolvers knows it.
+    module : what has to be importable; part of the package's dependencies, or of its extra `qp`.
+    accuracy : of x, relative to 1 + |x|. An answer that is not shown to be as good is not taken.
+    options : its tolerances, handed on by qpsolvers.
+    sparse : whether it wants sparse matrices.
+    regularisation : added to the diagonal of the Hessian, where that has to be definite.
+    starts : whether it begins from a given x.
+    core : whether it comes with the package; if not, with the extra.
+    """
+
+    name: str
+    module: str
+    accuracy: float
+    options: Mapping[str, Any]
+    sparse: bool = False
+    regularisation: float = 0.0
+    starts: bool = False
+    core: bool = False
+
+
+def _options(**options: Any) -> Mapping[str, Any]:
+    return MappingProxyType(options)
+
+
+BACKENDS: Mapping[str, Backend] = MappingProxyType({backend.name: backend for backend in (
+    Backend("proxqp", "proxsuite", 1e-6, _options(eps_abs=1e-9, eps_rel=0.0, max_iter=1000),
+            starts=True, core=True),
+    Backend("osqp", "osqp", 1e-5, _options(eps_abs=1e-7, eps_rel=1e-7, max_iter=20000),
+            sparse=True, starts=True, core=True),
+    Backend("quadprog", "quadprog", 1e-6, _options(), regularisation=1e-9),
+    Backend("daqp", "daqp", 1e-6, _options(primal_tol=1e-9), regularisation=1e-9, starts=True),
+    Backend("piqp", "piqp", 1e-6, _options(eps_abs=1e-9, eps_rel=0.0)),
+    Backend("clarabel", "clarabel", 1e-6,
+            _options(tol_gap_abs=1e-10, tol_gap_rel=1e-10, tol_feas=1e-10), sparse=True),
+)})
+
+
+def backend_of(name: str) -> Backend:
+    """Return the backend of that name.
+
+    Raises
+    ------
+    UnknownNameError : there is none.
+    HierarchyError : it is not installed; names the extra that brings it.
+    """
+    if name not in BACKENDS:
+        raise UnknownNameError("backend of hqp", name, BACKENDS)
+    backend = BACKENDS[name]
+    if not installed(name):
+        where = "task-hierarchy" if backend.core else "task-hierarchy[qp]"
+        raise HierarchyError(f"hqp: backend {name!r} is not installed; pip install {where}")
+    return backend
+
+
+@cache
+def installed(name: str) -> bool:
+    """Whether a backend can be imported."""
+    try:
+        import_module(BACKENDS[name].module)
+    except ImportError:
+        return False
+    return True
+
+
+@final
+@dataclass(frozen=True)
+class Program:
+    """min y^T P y / 2 + q^T y with lower <= A y <= upper and F y = f, begun from y = start."""
+
+    P: Array
+    q: Array
+    A: Array
+    lower: Array
+    upper: Array
+    F: Array
+    f: Array
+    start: Array | None = None
+
+    def solve(self, backend: Backend) -> tuple[Array, bool]:
+        """Return the backend's y, and whether it vouches for it; zeros where it gave none."""
+        import qpsolvers
+
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # backends warn of what their status says anyway
+            try:
+                solution = qpsolvers.solve_problem(
+                    qpsolvers.Problem(*self._matrices(backend)), solver=backend.name,
+                    initvals=self.start if backend.starts else None, **backend.options)
+            except Exception:  # backends raise whatever they like; all of it is their failure
+                return np.zeros(len(self.q)), False
+        if solution.x is None or not np.isfinite(solution.x).all():
+            return np.zeros(len(self.q)), False
+        return np.asarray(solution.x), bool(solution.found)
+
+    def _matrices(self, backend: Backend) -> tuple[Any, ...]:
+        """Return P, q, G, h, F, f as the backend wants them, with G y <= h for both sides."""
+        from scipy.sparse import csc_matrix  # type: ignore[import-untyped]
+
+        kind = csc_matrix if backend.sparse else np.ascontiguousarray
+        up, low = np.isfinite(self.upper), np.isfinite(self.lower)
+        P = self.P + backend.regularisation * np.eye(len(self.q))
+        G = np.vstack([self.A[up], -self.A[low]])
+        h = np.concatenate([self.upper[up], -self.lower[low]])
+        rows = (kind(G), h) if h.size else (None, None)
+        fixed = (kind(self.F), self.f) if self.f.size else (None, None)
+        return kind(P), self.q, *rows, *fixed
