@@ -1,6 +1,7 @@
 # make demo    set up, run the main job, say where its report is
 # make test    set up, then lint, types, import rules and every test: what CI runs
 # make bench   time the resolvers and the control tick
+# make stress  a resolver on a million generated problems, every answer certified; about an hour
 # make docs    check that what the documents point at exists (they are plain Markdown)
 # make clean   remove what the targets above made
 #
@@ -13,7 +14,7 @@ BIN        := .venv/bin
 INSTALLED  := .venv/installed
 
 .DELETE_ON_ERROR:
-.PHONY: demo test bench docs clean set-up
+.PHONY: demo test bench stress docs clean set-up
 
 demo: $(INSTALLED)
 	@rm -rf runs/demo
@@ -27,6 +28,12 @@ test: $(INSTALLED)
 
 bench: $(INSTALLED)
 	@$(BIN)/hierarchy bench
+
+COUNT    ?= 1000000
+RESOLVER ?= hcod
+
+stress: $(INSTALLED)
+	@$(BIN)/python -m scenarios.bench.stress --count $(COUNT) --resolver $(RESOLVER)
 
 docs: $(INSTALLED)
 	@$(BIN)/pytest tests/test_project.py -k document

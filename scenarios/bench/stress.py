@@ -1,0 +1,167 @@
+"""A resolver on a million generated problems, every answer certified.
+
+    python -m scenarios.bench.stress --count 1000000 --resolver hcod
+
+Exit code 1 if it raised, gave a number that is not finite, or called solved what `certify` rejects.
+Such a problem is shrunk while it still fails in the same way, and kept as a file that
+`solvers.problems.load` reads.
+"""
+
+from __future__ import annotations
+
+import argparse
+import multiprocessing
+import os
+import sys
+from collections import Counter
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import final
+
+import numpy as np
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+from hierarchy.problem import Hierarchy
+from solvers import Resolver, Status, certify, make, problems
+
+CERTIFIED = "certified"
+RAISED, NOT_FINITE, WRONG = "raised", "not finite", "solved, not certified"
+FAILURES = (RAISED, NOT_FINITE, WRONG)
+_CHUNK = 500  # seeds a process takes at a time
+_KEPT = 20    # failing problems that are shrunk and written, at most
+_TRIALS = 3000  # of one shrinking
+
+
+@final
+@dataclass
+class Tally:
+    """How many problems ended how, and the seeds of those that failed."""
+
+    counts: Counter[str] = field(default_factory=Counter)
+    failing: list[tuple[int, str]] = field(default_factory=list)
+
+    def add(self, other: Tally) -> None:
+        """Take in the counts of another."""
+        self.counts.update(other.counts)
+        self.failing += other.failing
+
+    def __str__(self) -> str:
+        always = dict.fromkeys((CERTIFIED, *FAILURES), 0)
+        return ", ".join(f"{what}: {count}" for what, count in (always | self.counts).items())
+
+
+def outcome(resolver: Resolver, h: Hierarchy) -> str:
+    """Return how a solve ended: certified, one of FAILURES, or the name of another Status."""
+    try:
+        res = resolver.solve(h)
+    except Exception:  # whatever it is, a solve must not raise it
+        return RAISED
+    if not np.isfinite(res.x).all():
+        return NOT_FINITE
+    if res.status is not Status.SOLVED:
+        return res.status.name
+    return CERTIFIED if certify(h, res.x).certified else WRONG
+
+
+def recipe_for(resolver: Resolver) -> problems.Recipe:
+    """Return what the resolver can be asked for."""
+    return problems.Recipe(equalities_only=not resolver.handles_inequalities)
+
+
+def tally(name: str, seeds: range) -> Tally:
+    """Judge the resolver called `name` on the problems of these seeds."""
+    resolver, found = make(name), Tally()
+    recipe = recipe_for(resolver)
+    for seed in seeds:
+        what = outcome(resolver, problems.generate(seed, recipe))
+        found.counts[what] += 1
+        if what in FAILURES:
+            found.failing.append((seed, what))
+    return found
+
+
+def shrunk(h: Hierarchy, fails: Callable[[Hierarchy], bool]) -> Hierarchy:
+    """Leave out levels, rows, columns and the reference, as long as `fails` holds."""
+    left, changed = _TRIALS, True
+    while changed and left:
+        changed = False
+        for smaller in _smaller(h):
+            left -= 1
+            if fails(smaller):
+                h, changed = smaller, True
+                break
+            if not left:
+                break
+    return h
+
+
+def _smaller(h: Hierarchy) -> Iterator[Hierarchy]:
+    """Yield the hierarchy without one of its parts, the largest parts first."""
+    levels = [tuple(part.copy() for part in level) for level in h.levels()]
+    for k in range(len(levels)):
+        yield Hierarchy.from_levels(levels[:k] + levels[k + 1:], h.reference)
+    for k, level in enumerate(levels):
+        for row in range(len(level[0])):
+            fewer = tuple(np.delete(part, row, axis=0) for part in level)
+            yield Hierarchy.from_levels([*levels[:k], fewer, *levels[k + 1:]], h.reference)
+    for column in range(h.n if h.n > 1 else 0):
+        yield Hierarchy.from_levels(
+            [(np.delete(A, column, axis=1), lower, upper) for A, lower, upper in levels],
+            np.delete(h.reference, column))
+    if h.reference.any():
+        yield Hierarchy.from_levels(levels, np.zeros(h.n))
+
+
+def run(count: int, name: str, first: int = 0, processes: int | None = None,
+        out: Path = Path("runs/stress")) -> Tally:
+    """Judge a resolver on `count` problems from seed `first` on; print the counts and return them.
+
+    processes : how many at once; None for one a core.
+    out : folder for failing problems, made when there is one.
+    """
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # read by the processes when they start
+    chunks = [range(i, min(i + _CHUNK, first + count)) for i in range(first, first + count, _CHUNK)]
+    found = Tally()
+    bar = Progress(TextColumn(name), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn(),
+                   TextColumn("failed: {task.fields[failed]}"))
+    with multiprocessing.get_context("spawn").Pool(processes) as pool, bar:
+        task = bar.add_task(name, total=count, failed=0)
+        for part in pool.imap_unordered(partial(tally, name), chunks):
+            found.add(part)
+            bar.update(task, advance=part.counts.total(), failed=len(found.failing))
+    print(f"{name}, {count} problems: {found}")
+    for seed, what in sorted(found.failing)[:_KEPT]:
+        print(f"  seed {seed}, {what}: {keep(name, seed, what, out)}")
+    return found
+
+
+def keep(name: str, seed: int, what: str, out: Path) -> Path:
+    """Shrink the problem of a seed while it ends the same way; write it and return the file."""
+    resolver = make(name)
+    h = problems.generate(seed, recipe_for(resolver))
+    smallest = shrunk(h, lambda smaller: outcome(resolver, smaller) == what)
+    out.mkdir(parents=True, exist_ok=True)
+    file = out / f"{name}-{seed}.npz"
+    problems.save(smallest, file)
+    return file
+
+
+def main() -> int:
+    """Run from the command line."""
+    parser = argparse.ArgumentParser(prog="python -m scenarios.bench.stress",
+                                     description="A resolver on generated problems, certified.")
+    parser.add_argument("--count", type=int, default=1_000_000, help="how many problems")
+    parser.add_argument("--resolver", default="hcod")
+    parser.add_argument("--first", type=int, default=0, help="first seed")
+    parser.add_argument("--processes", type=int, default=None, help="default: one a core")
+    parser.add_argument("--out", type=Path, default=Path("runs/stress"),
+                        help="folder for problems that fail")
+    given = parser.parse_args()
+    found = run(given.count, given.resolver, given.first, given.processes, given.out)
+    return 1 if found.failing else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

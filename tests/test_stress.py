@@ -1,0 +1,106 @@
+"""Twenty thousand generated problems, every answer certified; problems that once failed."""
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hierarchy import Hierarchy
+from scenarios.bench import stress
+from solvers import Resolution, Resolver, Status, certify, make, names, problems
+
+REGRESSIONS = sorted((Path(__file__).parent / "data" / "regressions").glob("*.npz"))
+JUDGED = [name for name in ("hcod", "tpm", "recursive") if name in names()]
+COUNT = 200 if os.environ.get("NUMBA_DISABLE_JIT") == "1" else 20_000
+PARTS = 4  # so that cores can share them
+FIRST = 10_000_000  # seeds that nothing was tuned on
+
+
+@pytest.mark.parametrize("part", range(PARTS))
+@pytest.mark.parametrize("name", JUDGED[:1])
+def test_generated_problems_are_solved_and_certified(name, part):
+    each = COUNT // PARTS
+    found = stress.tally(name, range(FIRST + part * each, FIRST + (part + 1) * each))
+    print(f"\n{name}, {each} problems: {found}")
+    assert not found.failing
+    assert found.counts[stress.CERTIFIED] == each
+
+
+@pytest.mark.parametrize("name", JUDGED[1:])
+def test_generated_equalities_are_solved_and_certified(name):
+    found = stress.tally(name, range(FIRST, FIRST + COUNT // 20))
+    assert not found.failing
+    assert found.counts[stress.CERTIFIED] == COUNT // 20
+
+
+@pytest.mark.parametrize("name", JUDGED)
+@pytest.mark.parametrize("file", REGRESSIONS, ids=lambda file: file.stem)
+def test_what_once_failed_is_solved(file, name):
+    h, resolver = problems.load(file), make(name)
+    if not (resolver.handles_inequalities or h.is_equality):
+        pytest.skip("has inequalities")
+    res = resolver.solve(h)
+    assert res.status is Status.SOLVED
+    verdict = certify(h, res.x)
+    assert verdict.certified, str(verdict)
+
+
+class Wrong(Resolver):
+    """Fails on hierarchies in which the third unknown is asked to be above 1."""
+
+    name = "wrong"
+    handles_inequalities = True
+
+    def __init__(self, way):
+        self.way = way
+
+    def solve(self, h, memory=None):
+        triggered = h.n > 2 and bool(((h.A[:, 2] != 0.0) & (h.lower > 1.0)).any())
+        if triggered and self.way == stress.RAISED:
+            raise ZeroDivisionError
+        x = np.full(h.n, np.nan if triggered and self.way == stress.NOT_FINITE else 0.0)
+        solved = triggered and self.way == stress.WRONG
+        return Resolution(x, Status.SOLVED if solved else Status.ITERATION_LIMIT)
+
+
+def problem():
+    levels = [(np.eye(5), np.full(5, -9.0), np.full(5, 9.0)),
+              (np.ones((3, 5)), [0.0, 5.0, 0.0]), (np.eye(5), np.zeros(5))]
+    return Hierarchy.from_levels(levels, reference=np.ones(5))
+
+
+@pytest.mark.parametrize("way", stress.FAILURES)
+def test_each_way_to_fail_is_told_from_the_others_and_shrunk_to_its_core(way):
+    resolver = Wrong(way)
+    assert stress.outcome(resolver, problem()) == way
+    smallest = stress.shrunk(problem(), lambda h: stress.outcome(resolver, h) == way)
+    assert smallest.sizes.tolist() == [1]
+    assert smallest.n == 3
+    assert not smallest.reference.any()
+
+
+def test_a_status_other_than_solved_is_counted_by_its_name():
+    h = Hierarchy.from_levels([(np.eye(2), np.zeros(2))])
+    assert stress.outcome(Wrong(stress.RAISED), h) == "ITERATION_LIMIT"
+
+
+def test_a_right_answer_is_counted_as_certified():
+    assert stress.outcome(make("tpm"), Hierarchy.from_levels([(np.eye(2), [1.0, 2.0])])) == \
+        stress.CERTIFIED
+
+
+def test_a_failing_problem_is_kept_as_a_file(tmp_path, monkeypatch):
+    monkeypatch.setattr(stress, "make", lambda name: Wrong(stress.WRONG))
+    found = stress.tally("wrong", range(200))
+    seed, what = found.failing[0]
+    file = stress.keep("wrong", seed, what, tmp_path / "kept")
+    assert stress.outcome(Wrong(stress.WRONG), problems.load(file)) == stress.WRONG
+
+
+def test_many_processes_count_like_one(tmp_path, capsys):
+    found = stress.run(1200, "tpm", processes=2, out=tmp_path / "none")
+    assert found.counts == {stress.CERTIFIED: 1200}
+    assert "certified: 1200, raised: 0, not finite: 0, solved, not certified: 0" in \
+        capsys.readouterr().out
+    assert not (tmp_path / "none").exists()
