@@ -7,6 +7,7 @@ wrong.
 
 from __future__ import annotations
 
+import os
 import re
 import shlex
 import sys
@@ -84,7 +85,10 @@ def run(scenario: Annotated[str, typer.Argument(help="Name of a scenario, or a s
         resolver: Annotated[str | None, typer.Option(
             "--resolver", metavar="SPEC",
             help="Another resolver: name, or name:setting=value:setting=value.")] = None,
-        changes: Changes = None, duration: Duration = None, out: Out = None) -> int:
+        changes: Changes = None, duration: Duration = None, out: Out = None,
+        certify: Annotated[bool, typer.Option(
+            "--certify", help="Certify the answer of every tick, outside the times measured.")
+            ] = False) -> int:
     """Run one scenario, measure it, keep the run in a folder."""
     chosen = _load(scenario, changes, duration)
     if resolver is not None:
@@ -99,9 +103,12 @@ def run(scenario: Annotated[str, typer.Argument(help="Name of a scenario, or a s
 
     with bar() as told:
         label = str(chosen.make_resolver().label)
-        recording = simulate(chosen, progress=partial(told, label) if told else None)
+        recording = simulate(chosen, progress=partial(told, label) if told else None,
+                             certified=certify)
     save(recording, folder)
     _print_table([_run_of(chosen, recording)])
+    if certify:
+        print(f"\n{_verdict(recording, chosen.make_resolver().damping)}")
     print(f"\n{recording.ticks} ticks in {_shown(folder)}")
     return _fault(recording.fault)
 
@@ -153,12 +160,17 @@ def check(file: Annotated[str, typer.Argument(help="A scenario file, or a scenar
 
 @app.command()
 def bench(what: Annotated[Bench | None, typer.Argument(
-        help="Only this. Default: both.")] = None) -> None:
-    """Time the resolvers and the whole control tick."""
+        help="Only this. Default: both.")] = None, out: Out = None) -> None:
+    """Time the resolvers and the whole control tick; keep the numbers in a folder."""
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy is loaded: one core is timed
     from importlib import import_module
 
+    from scenarios.folders import claim, next_free
+
+    folder = claim(out if out is not None else next_free(Path("runs") / "bench"))
     for wanted in [what] if what is not None else list(Bench):
-        import_module(f"scenarios.bench.{wanted.value}").run()
+        import_module(f"scenarios.bench.{wanted.value}").run(folder)
+    print(f"\nNumbers: {_shown(folder)}")
 
 
 def _load(name: str, changes: list[str] | None, duration: float | None) -> Scenario:
@@ -179,6 +191,20 @@ def _run_of(scenario: Scenario, recording: Any) -> Run:
     from scenarios.compare import Run
 
     return Run(scenario, scenario.control.resolver, str(scenario.make_resolver().label), recording)
+
+
+def _verdict(recording: Any, damping: float) -> str:
+    """Say how many ticks were certified and which is the first that was not."""
+    certified = recording["certified"]
+    text = f"certified: {certified.sum()} of {recording.ticks} ticks"
+    if certified.all():
+        return text
+    first = int(certified.argmin())
+    text += f"; the first that is not is tick {first} (t = {recording['t'][first]:.3f} s)"
+    if damping > 0.0:
+        text += (f"\n(damping = {damping:g}: near a singularity the answer is meant to differ from "
+                 "the undamped one, which is what is certified)")
+    return text
 
 
 def _print_table(runs: list[Run]) -> None:

@@ -21,9 +21,9 @@ _BRAKE = 10.0  # [1/s] deceleration per velocity in a tick without an answer
 class Controller:
     """Sense, allocate, stack, resolve.
 
-    After `command`: `allocation` and `cone_error` of the tick, its `resolution`, and `stamps`, the
-    clock [s] at its begin, after kinematics, after rows (sensing and allocation included) and
-    after resolving.
+    After `command`: `allocation` and `cone_error` of the tick, its `hierarchy` (until the next
+    command) and `resolution`, and `stamps`, the clock [s] at its begin, after kinematics, after
+    rows (sensing and allocation included) and after resolving.
     """
 
     def __init__(self, scenario: Scenario, cell: Cell | None = None,
@@ -52,7 +52,7 @@ class Controller:
         if cell.pointing is not None:
             self.cone_error = cell.pointing.cone_error(state)
         self.allocation = self._allocate()
-        hierarchy = cell.stack.hierarchy(state, self.allocation.order)
+        self.hierarchy = hierarchy = cell.stack.hierarchy(state, self.allocation.order)
         written = perf_counter()
         self.resolution = resolution = self.resolver.solve(hierarchy, self._memory)
         self.stamps = (begin, moved, written, perf_counter())

@@ -39,6 +39,7 @@ class Recording:
     active_control_point (T,) number 1..K of the point whose avoidance was in the stack, or -1
     ee_distance (T,) [m]; repulsion_active (T,) bool, whether eq. (30) was in force
     order (T,) index into `orders`; status (T,) value of solvers.Status; iterations (T,)
+    certified (T,) bool, whether x is the undamped answer, in a run that was certified
     time_kinematics, time_rows, time_resolve, time_tick (T,) [s] of computing
     joint_lower, joint_upper, velocity_limit (n,) of the robot, infinite where it has none
 

@@ -35,6 +35,19 @@ def test_run_prints_its_metrics_and_keeps_the_run(tmp_path, capsys):
     assert (tmp_path / "runs" / "a" / "run.npz").exists()
 
 
+def test_certify_counts_the_ticks_whose_answer_is_right(capsys):
+    plain = ["run", "ellipse", "--certify", "--set", "control.options.damping=0.0", "--duration", "0.05"]
+    assert run_command(plain) == 0
+    assert "certified: 50 of 50 ticks\n" in capsys.readouterr().out
+
+
+def test_certify_names_the_first_tick_that_is_not_and_says_that_damping_is_on(capsys):
+    assert run_command(["run", "ellipse", "--certify", "--duration", "0.05"]) == 0
+    out = capsys.readouterr().out
+    assert "certified: 0 of 50 ticks; the first that is not is tick 0 (t = 0.000 s)\n" in out
+    assert "damping = 0.05: near a singularity" in out
+
+
 def test_run_without_out_never_takes_a_folder_twice(tmp_path):
     for _ in range(2):
         assert run_command(["run", "ellipse", *SHORT, "--resolver", "recursive"]) == 0
@@ -162,7 +175,7 @@ def must_not_run(*_, **__):
 
 
 def test_a_fault_is_reported_and_the_run_kept(tmp_path, capsys, monkeypatch):
-    def faulty(scenario, progress=None):
+    def faulty(scenario, progress=None, certified=False):
         return recording(scenario, fault="interrupted at tick 5")
 
     simulation_is(faulty, monkeypatch)

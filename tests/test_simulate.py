@@ -43,6 +43,14 @@ def test_the_velocity_command_is_the_next_velocity(velocity_run):
     np.testing.assert_allclose(r["a"][:-1], np.diff(r["v"], axis=0) / 1e-3, atol=1e-9)
 
 
+def test_every_answer_is_certified_where_asked_and_nothing_is_where_not(run):
+    judged = simulate(load("ellipse", ["control.options.damping=0.0", "control.duration=0.4"]),
+                      certified=True)
+    assert judged["certified"].shape == (400,)
+    assert judged["certified"].all()
+    assert "certified" not in run
+
+
 def test_velocity_steps_are_bounded_at_acceleration_level_and_large_at_velocity_level(
         run, velocity_run):
     step, largest = np.abs(np.diff(run["v"], axis=0)).max(), np.abs(run["a"]).max()
