@@ -1,6 +1,7 @@
 """How a hierarchy is resolved: many resolvers behind one interface."""
 
 from solvers import augmented as augmented
+from solvers import hcod as hcod
 from solvers import hqp as hqp
 from solvers import recursive as recursive
 from solvers import tpm as tpm

@@ -23,6 +23,7 @@ STRICT = [r for r in RESOLVERS if r.strict]
 INEQUALITIES = [r for r in STRICT if r.handles_inequalities]
 EQUALITIES_ONLY = [r for r in RESOLVERS if not r.handles_inequalities]
 PROBLEMS = 3 if os.environ.get("NUMBA_DISABLE_JIT") == "1" else 50
+NEARLY_PARALLEL = 1e-8  # what the stored norms of DEGEN7 are good for, rows parallel to 1e-9
 SLOW = 6  # problems of a family for a cascade: the rest is in the benchmark
 
 
@@ -68,7 +69,8 @@ def test_resolvers_of_inequalities_are_right_wherever_the_answer_is_well_posed(r
         assert res.status is Status.SOLVED or resolver in HQP
         if res.status is Status.SOLVED:
             known = well_posed_levels(h, x)
-            assert_close(resolver, h.violations(res.x)[:known], norms[:known])
+            gap = np.abs(h.violations(res.x)[:known] - norms[:known]).max(initial=0.0)
+            assert gap <= max(NEARLY_PARALLEL, resolver.accuracy) * (1.0 + norms.max())
             if known == len(norms):
                 assert_close(resolver, res.x, x)
                 assert certify(h, res.x, 10.0 * resolver.accuracy).certified

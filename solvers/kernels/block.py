@@ -126,13 +126,13 @@ def orthogonalise_rows(W, U):
 def _least_squares(M, r, y, i0, i1, k0, k1, damped):
     """Write the minimiser into y[k0:k1], by Householder reflections of [M r; lambda I 0]."""
     rows, p = i1 - i0, k1 - k0
-    height = rows + p
+    height = rows + p if damped > 0.0 else rows
     T = np.zeros((height, p + 1))
     for i in range(rows):
         for k in range(p):
             T[i, k] = M[i0 + i, k0 + k]
         T[i, p] = r[i0 + i]
-    for k in range(p):
+    for k in range(height - rows):
         T[rows + k, k] = damped
     for k in range(p):
         square = 0.0

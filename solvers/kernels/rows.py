@@ -15,7 +15,8 @@ import numpy as np
 from hierarchy.compiled import compiled
 
 ZERO = np.int64(0)
-SOLVED, NUMERICAL_FAILURE = 0, 2  # values of solvers.Status; -(i + 1) refuses row i, an inequality
+# Values of solvers.Status; -(i + 1) refuses row i, an inequality.
+SOLVED, ITERATION_LIMIT, NUMERICAL_FAILURE = 0, 1, 2
 
 
 @compiled
@@ -96,6 +97,27 @@ def make_reflector(W, beta, V, k, i, square):
     norm = np.sqrt(square)
     W[V + k, k] += norm if W[V + k, k] >= 0.0 else -norm
     beta[k] = 1.0 / (norm * abs(W[V + k, k]))
+
+
+@compiled
+def factor_level(W, row, zero, miss, beta, V, begin, end, rank):
+    """Give the rows begin .. end - 1, already reflected, columns of their own; return the rank.
+
+    The rows are brought into pivot order, and row, zero and miss with them.
+    """
+    for i in range(begin, end):
+        pivot, square = largest_row(W, zero, i, end, rank)
+        if pivot < 0:
+            break
+        if pivot != i:
+            swap_rows(W, i, pivot)
+            row[i], row[pivot] = row[pivot], row[i]
+            zero[i], zero[pivot] = zero[pivot], zero[i]
+            miss[i], miss[pivot] = miss[pivot], miss[i]
+        make_reflector(W, beta, V, rank, i, square)
+        reflect_rows(W, beta, V, rank, rank + 1, i, end)
+        rank += 1
+    return rank
 
 
 @compiled

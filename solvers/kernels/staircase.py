@@ -17,12 +17,10 @@ from solvers.kernels.block import solve_block
 from solvers.kernels.rows import (
     SOLVED,
     ZERO,
+    factor_level,
     finish,
-    largest_row,
     load_rows,
-    make_reflector,
     reflect_rows,
-    swap_rows,
 )
 
 
@@ -36,6 +34,7 @@ def staircase(A, lower, upper, sizes, x, damping, threshold, rank_tolerance):
     W = np.empty((m + n + 1, n))  # rows of J, then of Q's reflectors, then x
     V, X = m, m + n
     zero, miss, beta, y = np.empty(m), np.empty(m), np.empty(n), np.empty(n)
+    row = np.empty(m, np.int64)  # the pivot order, which nobody asks for here
     code = load_rows(W, zero, A, lower, upper, x, rank_tolerance)
     if code != SOLVED:
         return finish(x, code)
@@ -46,7 +45,7 @@ def staircase(A, lower, upper, sizes, x, damping, threshold, rank_tolerance):
     for level in range(sizes.size):
         last, above = first + sizes[level], rank
         reflect_rows(W, beta, V, ZERO, above, first, last)  # J_i Q: the level as seen from above
-        rank = _factor_level(W, zero, miss, beta, V, first, last, rank)
+        rank = factor_level(W, row, zero, miss, beta, V, first, last, rank)
         for i in range(first, last):
             for c in range(above):
                 miss[i] -= W[i, c] * y[c]  # p_i - J_i x_{i-1}, in (13)
@@ -63,20 +62,3 @@ def staircase(A, lower, upper, sizes, x, damping, threshold, rank_tolerance):
     for c in range(n):
         x[c] = W[X, c]
     return finish(x, SOLVED)
-
-
-@compiled
-def _factor_level(W, zero, miss, beta, V, first, last, rank):
-    """Give a level, already reflected, its own columns of Q; return the rank with it."""
-    for i in range(first, last):
-        pivot, square = largest_row(W, zero, i, last, rank)
-        if pivot < 0:
-            break
-        if pivot != i:
-            swap_rows(W, i, pivot)
-            zero[i], zero[pivot] = zero[pivot], zero[i]
-            miss[i], miss[pivot] = miss[pivot], miss[i]
-        make_reflector(W, beta, V, rank, i, square)
-        reflect_rows(W, beta, V, rank, rank + 1, i, last)
-        rank += 1
-    return rank
