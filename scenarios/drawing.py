@@ -52,6 +52,11 @@ def colours(labels: Iterable[str]) -> dict[str, str]:
     return {label: chosen.get(label) or spare.pop(0) for label in labels}
 
 
+def style() -> dict[Any, Any]:
+    """Return matplotlib's settings in this project's style, to be used as a context."""
+    return dict(_STYLE)
+
+
 def figure(rows: int = 1, width: float = 3.3, height: float = 2.1) -> tuple[Figure, list[Axes]]:
     """Return a figure of `rows` axes one under the other, in inches, in this project's style."""
     with matplotlib.rc_context(_STYLE):

@@ -1,6 +1,5 @@
 """The registry, the status, the resolution; what importing costs."""
 
-import csv
 import subprocess
 import sys
 
@@ -8,7 +7,6 @@ import numpy as np
 import pytest
 
 from hierarchy import HierarchyError
-from scenarios.bench import resolvers as bench
 from solvers import Resolution, Status, make, names
 
 
@@ -48,22 +46,3 @@ def test_importing_solvers_does_not_import_the_quadratic_programming_backends():
             "if m in sys.modules])")
     out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert out.stdout.strip() == "[]"
-
-
-def test_the_benchmark_has_a_row_for_every_resolver_and_family(tmp_path):
-    rows = bench.run(tmp_path, seconds=0.0)
-    labels = {resolver.label for resolver in bench.candidates()} | {"plain numpy"}
-    assert {(row["family"], row["resolver"]) for row in rows} == {
-        (name, label) for name in bench.FAMILIES for label in labels}
-    for row in rows:
-        assert row["median_us"] <= row["p95_us"] <= row["p99.9_us"]
-        if row["resolver"] in ("tpm", "recursive", "hqp proxqp"):
-            assert row["failures"] == 0
-            assert row["largest_error"] < 1e-9
-    with (tmp_path / "resolvers.csv").open() as file:
-        assert len(list(csv.DictReader(file))) == len(rows)
-
-
-def test_a_benchmark_without_its_problems_says_where_they_are(tmp_path):
-    with pytest.raises(HierarchyError, match="tests/data/hlsp of a source checkout"):
-        bench.run(folder=tmp_path)

@@ -1,0 +1,109 @@
+"""Who is timed: the resolvers, plain numpy, and DAQP's hierarchical call made by hand."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, final
+
+import numpy as np
+
+from hierarchy.problem import Array, Hierarchy
+from solvers import Resolution, Resolver, Status, make, names
+from solvers.backends import BACKENDS, installed
+
+NUMPY, DAQP = "plain numpy", "DAQP by hand"
+_MOVED = 0.01       # relative change of the targets between a warm start's tick and the one before
+_UNBOUNDED = 1e30   # how DAQP writes a missing side
+
+Call = Callable[[], Any]
+
+
+@final
+@dataclass(frozen=True)
+class Candidate:
+    """One to be timed.
+
+    prepare : makes of a hierarchy the call that is timed; what it does itself is not.
+    read : what the call returned, as a Resolution.
+    """
+
+    label: str
+    inequalities: bool
+    prepare: Callable[[Hierarchy], Call]
+    read: Callable[[Any], Resolution] = lambda answer: answer
+
+
+def candidates() -> tuple[list[Candidate], dict[str, str]]:
+    """Return everyone who can be timed here, and by name why others cannot."""
+    missing = {f"hqp {name}": "pip install task-hierarchy[qp]"
+               for name in BACKENDS if not installed(name)}
+    field = [Candidate(NUMPY, False, lambda h: lambda: plain_numpy(h))]
+    if installed("daqp"):
+        field.append(Candidate(DAQP, True, _daqp, _read_daqp))
+    else:
+        missing[DAQP] = "pip install task-hierarchy[qp]"
+    cold = [*(make(name) for name in names() if name != "hqp"), make("tpm", form="published"),
+            *(make("hqp", backend=name) for name in BACKENDS if installed(name))]
+    warm = [resolver for resolver in cold if _starts(resolver)]
+    field += [Candidate(r.label, r.handles_inequalities, _cold(r)) for r in cold]
+    field += [Candidate(f"{r.label} warm", r.handles_inequalities, _warm(r)) for r in warm]
+    if "hcod" not in names():
+        missing["hcod"] = "no resolver of this name"
+    return field, missing
+
+
+def plain_numpy(h: Hierarchy) -> Resolution:
+    """Solve by the recursion (5), (6), (14) as one writes it with np.linalg.pinv."""
+    x, P = np.zeros(h.n), np.eye(h.n)
+    for first, last in zip(h.offsets[:-1], h.offsets[1:], strict=True):
+        J, b = h.A[first:last], h.lower[first:last]
+        inverse = np.linalg.pinv(J @ P, rcond=1e-9)
+        x = x + inverse @ (b - J @ x)
+        P = P - inverse @ (J @ P)
+    return Resolution(x + P @ h.reference)
+
+
+def moved(h: Hierarchy, seed: int = 0) -> Hierarchy:
+    """Return h with the sides of every row changed by up to 1 %, both by the same factor."""
+    factor = 1.0 + _MOVED * np.random.default_rng(seed).uniform(-1.0, 1.0, h.m)
+    return Hierarchy(h.A, h.lower * factor, h.upper * factor, h.sizes, h.reference, h.names)
+
+
+def _starts(resolver: Resolver) -> bool:
+    """Whether the resolver gains something from the memory of the tick before."""
+    if resolver.name == "hqp":
+        return BACKENDS[getattr(resolver, "backend", "")].starts
+    h = Hierarchy.from_levels([(np.eye(2), [1.0, 2.0])])
+    return resolver.solve(h).memory is not None
+
+
+def _cold(resolver: Resolver) -> Callable[[Hierarchy], Call]:
+    return lambda h: lambda: resolver.solve(h)
+
+
+def _warm(resolver: Resolver) -> Callable[[Hierarchy], Call]:
+    def prepare(h: Hierarchy) -> Call:
+        memory = resolver.solve(moved(h)).memory
+        return lambda: resolver.solve(h, memory)
+
+    return prepare
+
+
+def _daqp(h: Hierarchy) -> Call:
+    """Write h as DAQP wants it: leading rows of the identity as bounds, big numbers for no side."""
+    import daqp
+
+    n = h.n
+    bounds = n if len(h.sizes) and h.sizes[0] == n and (h.A[:n] == np.eye(n)).all() else 0
+    arguments = (np.eye(n), -h.reference, np.ascontiguousarray(h.A[bounds:]),
+                 np.minimum(h.upper, _UNBOUNDED), np.maximum(h.lower, -_UNBOUNDED),
+                 np.zeros(h.m, dtype=np.int32), np.cumsum(h.sizes).astype(np.int32))
+    return lambda: daqp.solve(*arguments)
+
+
+def _read_daqp(answer: tuple[Array, float, int, dict[str, Any]]) -> Resolution:
+    x, _, flag, info = answer
+    right = flag > 0 and np.isfinite(x).all()  # its x is uninitialised memory otherwise
+    return Resolution(np.array(x) if right else np.zeros(len(x)),
+                      Status.SOLVED if right else Status.BACKEND_FAILURE, int(info["iterations"]))

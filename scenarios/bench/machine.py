@@ -1,0 +1,47 @@
+"""On what was timed, and on one core only."""
+
+from __future__ import annotations
+
+import os
+import platform
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib import metadata
+from pathlib import Path
+
+_PACKAGES = ("numpy", "numba", "scipy", "qpsolvers", "proxsuite", "osqp", "quadprog", "daqp",
+             "piqp", "clarabel")
+
+
+@contextmanager
+def one_core() -> Iterator[None]:
+    """Keep this process on one of its cores, where the system can; all of them afterwards."""
+    if not hasattr(os, "sched_setaffinity"):
+        yield
+        return
+    before = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, {max(before)})
+    try:
+        yield
+    finally:
+        os.sched_setaffinity(0, before)
+
+
+def machine() -> dict[str, str]:
+    """Return processor, cores and versions by name; nothing that tells whose machine it is."""
+    found = {"processor": _processor(), "cores": str(os.cpu_count()),
+             "system": f"{platform.system()} {platform.machine()}",
+             "python": platform.python_version()}
+    for name in _PACKAGES:
+        try:
+            found[name] = metadata.version(name)
+        except metadata.PackageNotFoundError:
+            found[name] = "not installed"
+    return found
+
+
+def _processor() -> str:
+    about = Path("/proc/cpuinfo")
+    lines = about.read_text().splitlines() if about.is_file() else []
+    named = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    return named[0] if named else platform.processor() or "unknown"

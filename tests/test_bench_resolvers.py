@@ -1,0 +1,97 @@
+"""The benchmark of resolvers: everybody asked, every answer judged, nothing cut off."""
+
+import csv
+import json
+
+import numpy as np
+import pytest
+
+from hierarchy import HierarchyError
+from scenarios.bench import candidates, families, machine, resolvers
+from scenarios.bench.families import family, well_posed_levels
+from solvers import Status, backends
+
+
+@pytest.fixture
+def few(monkeypatch):
+    """Only three problems a family, since one cascade takes 40 ms for one of them."""
+    monkeypatch.setattr(resolvers, "family", lambda name, folder: family(name, folder)[:3])
+
+
+def test_a_row_for_everybody_and_every_family(few, tmp_path, capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    rows = resolvers.run(tmp_path, seconds=0.0)
+    field, missing = candidates.candidates()
+    assert not missing or set(missing) == {"hcod"}
+    assert {(row["family"], row["resolver"]) for row in rows} == {
+        (name, one.label) for name in families.FAMILIES for one in field
+        if one.inequalities or name in families.EQUALITIES}
+    for row in rows:
+        assert row["median_us"] <= row["p95_us"]
+        if row["resolver"].startswith(("hqp", "hcod")) or row["resolver"] in ("tpm", "recursive"):
+            assert row["wrong"] == 0, row
+            assert round(row["certified"] * row["problems"]) == row["problems"] - row["unsolved"]
+    with (tmp_path / "resolvers.csv").open() as file:
+        assert len(list(csv.DictReader(file))) == len(rows)
+    assert {path.name for path in tmp_path.iterdir()} == {
+        "resolvers.csv", "machine.json", "time-accuracy.svg", "time-accuracy.png"}
+    assert "processor" in json.loads((tmp_path / "machine.json").read_text())
+    out = capsys.readouterr().out
+    assert max(map(len, out.splitlines())) <= 80
+    assert "…" not in out
+
+
+def test_a_backend_that_is_not_installed_is_named_and_not_skipped_silently(monkeypatch):
+    monkeypatch.setattr(candidates, "installed", lambda name: name != "daqp")
+    field, missing = candidates.candidates()
+    assert missing["hqp daqp"] == missing["DAQP by hand"] == "pip install task-hierarchy[qp]"
+    assert not {"hqp daqp", "hqp daqp warm", "DAQP by hand"} & {one.label for one in field}
+
+
+def test_a_warm_start_comes_from_targets_moved_by_a_percent():
+    for name in ("EQ7", "INEQ7"):
+        h = family(name)[0].h
+        moved = candidates.moved(h)
+        finite = np.isfinite(h.lower)
+        np.testing.assert_allclose(moved.lower[finite], h.lower[finite], rtol=0.01)
+        assert (moved.lower <= moved.upper).all()
+        assert not np.array_equal(moved.lower, h.lower)
+        assert moved.is_equality == h.is_equality
+
+
+@pytest.mark.skipif(not backends.installed("daqp"), reason="DAQP is an extra")
+def test_the_call_made_by_hand_solves_what_it_is_timed_on():
+    """Where no rows conflict, and to what its finite weight allows."""
+    daqp = next(one for one in candidates.candidates()[0] if one.label == candidates.DAQP)
+    for problem in family("INEQ7")[:10]:
+        call = daqp.prepare(problem.h)
+        call()
+        res = daqp.read(call())
+        assert res.status is Status.SOLVED
+        assert abs(problem.h.violations(res.x) - problem.norms).max() < 1e-5
+
+
+def test_its_flag_is_read_before_its_answer():
+    x = np.array([1.0, np.nan])
+    res = candidates._read_daqp((x, 0.0, 1, {"iterations": 3}))
+    assert res.status is Status.BACKEND_FAILURE
+    assert not res.x.any()
+
+
+def test_nearly_parallel_rows_make_the_levels_below_them_ill_posed():
+    assert {well_posed_levels(p.h, p.x) for p in family("INEQ7")} == {5}
+    assert {well_posed_levels(p.h, p.x) for p in family("DEGEN7")} <= {2, 3}
+
+
+def test_timing_on_one_core_gives_the_others_back():
+    import os
+
+    before = os.sched_getaffinity(0)
+    with machine.one_core():
+        assert len(os.sched_getaffinity(0)) == 1
+    assert os.sched_getaffinity(0) == before
+
+
+def test_a_benchmark_without_its_problems_says_where_they_are(tmp_path):
+    with pytest.raises(HierarchyError, match="tests/data/hlsp of a source checkout"):
+        resolvers.run(folder=tmp_path)
