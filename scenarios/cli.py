@@ -21,7 +21,7 @@ import typer
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from scenarios.compare import Run
+    from scenarios.compare import Row, Run
     from scenarios.config import Scenario
 
 app = typer.Typer(help="Prioritized robot tasks: many ways of resolving them, compared.",
@@ -34,6 +34,9 @@ Duration = Annotated[float | None, typer.Option(
     "--duration", metavar="SECONDS", help="Run for so long instead of the scenario's duration.")]
 Out = Annotated[Path | None, typer.Option(
     "--out", metavar="FOLDER", help="Where to write; new or empty. Default: a new one in runs/.")]
+
+
+_BESIDE = 5  # runs that a table of 80 columns holds
 
 
 class Bench(StrEnum):
@@ -118,16 +121,20 @@ def compare(scenarios: Annotated[list[str], typer.Argument(
                 help="Names of scenarios, or scenario files.")],
             resolvers: Annotated[str | None, typer.Option(
                 "--resolvers", metavar="SPEC,SPEC,...",
-                help="Resolvers: name, or name:setting=value. Default: five ways.")] = None,
+                help="Resolvers: name, or name:setting=value. Default: eight ways.")] = None,
             changes: Changes = None, duration: Duration = None, out: Out = None) -> int:
     """Run scenarios under several resolvers; write a report."""
-    from scenarios.compare import DEFAULT_RESOLVERS
     from scenarios.compare import compare as run_all
+    from scenarios.compare import default_resolvers
     from scenarios.folders import next_free
     from scenarios.progress import bar
 
     chosen = [_load(name, changes, duration) for name in scenarios]
-    specs = _split(resolvers) if resolvers is not None else DEFAULT_RESOLVERS
+    specs, missing = default_resolvers()
+    if resolvers is not None:
+        specs, missing = tuple(_split(resolvers)), {}
+    for spec, remedy in missing.items():
+        print(f"left out: {spec} is not installed; {remedy}")
     folder = out if out is not None else next_free(Path("runs") / f"compare-{chosen[0].name}")
     command = shlex.join(["hierarchy", *sys.argv[1:]])
     with bar() as told:
@@ -210,26 +217,35 @@ def _verdict(recording: Any, damping: float) -> str:
 def _print_table(runs: list[Run]) -> None:
     from rich.console import Console
 
+    from scenarios.compare import table
+    from scenarios.parting import partings
+
+    console = Console(markup=False, highlight=False)
     titles = dict.fromkeys(one.scenario.title or one.scenario.name for one in runs)
-    print("", *titles, "", sep="\n")
-    Console(markup=False, highlight=False).print(_table(runs))
+    print("", *titles, sep="\n")
+    rows = table(runs, details=False)
+    beside = -(-len(runs) // -(-len(runs) // _BESIDE))  # so that tables are about equally wide
+    for first in range(0, len(runs), beside):
+        print()
+        console.print(_table(runs, rows, range(first, min(first + beside, len(runs)))))
+    said = [str(one) for one in partings(runs)]
+    if said:
+        console.print("", *said, sep="\n")
 
 
-def _table(runs: list[Run]) -> Table:
-    """Lay metrics out for a terminal, best in bold with a star; 80 columns hold five runs."""
+def _table(runs: list[Run], rows: list[Row], chosen: range) -> Table:
+    """Lay metrics of the chosen runs out for a terminal, best of all in bold with a star."""
     from rich.table import Table
     from rich.text import Text
 
-    from scenarios.compare import table
-
     laid_out = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False)
     laid_out.add_column("", overflow="fold")
-    for one in runs:
-        head = re.sub(r"(?<=[^ :-])[ :-]", _broken, one.label)
+    for i in chosen:
+        head = re.sub(r"(?<=[^ :-])[ :-]", _broken, runs[i].label)
         laid_out.add_column(Text(head), justify="right", no_wrap=True)
-    for row in table(runs, details=False):
-        cells = [Text(cell + ("*" if i in row.best else " "), "bold" if i in row.best else "")
-                 for i, cell in enumerate(row.cells)]
+    for row in rows:
+        cells = [Text(row.cells[i] + ("*" if i in row.best else " "),
+                      "bold" if i in row.best else "") for i in chosen]
         laid_out.add_row(Text(f"{row.label} [{row.unit}]" if row.unit else row.label), *cells)
     return laid_out
 

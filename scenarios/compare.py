@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import math
 import re
 import shlex
 from collections import Counter
@@ -17,12 +18,14 @@ from hierarchy.errors import HierarchyError
 from scenarios import metrics
 from scenarios.folders import claim, write_text
 from scenarios.metrics import Metric
+from scenarios.parting import Parting, partings
 from scenarios.recording import Recording, save, versions
 
 if TYPE_CHECKING:
     from scenarios.config import Scenario
 
-DEFAULT_RESOLVERS = ("tpm", "tpm:form=staircase", "recursive", "augmented", "hqp")
+DEFAULT_RESOLVERS = ("tpm", "tpm:form=staircase", "recursive", "augmented", "hqp",
+                     "hqp:backend=osqp", "hqp:backend=daqp", "hcod")
 
 Progress = Callable[[str, int, int], None]
 
@@ -100,7 +103,17 @@ class Comparison:
         return {name: [run for run in self.runs if run.scenario.name == name] for name in names}
 
 
-def compare(scenarios: Iterable[str | Scenario] | str, resolvers: Sequence[str] = DEFAULT_RESOLVERS,
+def default_resolvers() -> tuple[tuple[str, ...], dict[str, str]]:
+    """Return those of DEFAULT_RESOLVERS that can run here, and of the others what brings them."""
+    from solvers.backends import BACKENDS, installed
+
+    wanted = {spec: spec.partition(":backend=")[2] for spec in DEFAULT_RESOLVERS}
+    missing = {spec: "pip install task-hierarchy[qp]" for spec, backend in wanted.items()
+               if backend in BACKENDS and not installed(backend)}
+    return tuple(spec for spec in DEFAULT_RESOLVERS if spec not in missing), missing
+
+
+def compare(scenarios: Iterable[str | Scenario] | str, resolvers: Sequence[str] | None = None,
             out: str | Path | None = None, progress: Progress | None = None,
             command: str | None = None) -> Comparison:
     """Run every scenario under every resolver, one after the other, and compare.
@@ -112,7 +125,8 @@ def compare(scenarios: Iterable[str | Scenario] | str, resolvers: Sequence[str] 
     Parameters
     ----------
     scenarios : names, paths or Scenario objects.
-    resolvers : specs `name` or `name:setting=value:setting=value`.
+    resolvers : specs `name` or `name:setting=value:setting=value`; by default those of
+        DEFAULT_RESOLVERS that are installed.
     progress : called as progress(label, ticks done, ticks in all).
     command : the command line to print on the page; made up from the names if not given.
 
@@ -121,7 +135,8 @@ def compare(scenarios: Iterable[str | Scenario] | str, resolvers: Sequence[str] 
     HierarchyError : before anything is run: an unknown scenario, resolver or setting, a scenario
         that does not fit its robot, or an output folder that is in use.
     """
-    planned = _plan([scenarios] if isinstance(scenarios, str) else scenarios, resolvers)
+    chosen = default_resolvers()[0] if resolvers is None else resolvers
+    planned = _plan([scenarios] if isinstance(scenarios, str) else scenarios, chosen)
     folder = None if out is None else claim(out)
     runs: list[Run] = []
     for run in planned:
@@ -221,7 +236,9 @@ def _write(comparison: Comparison, folder: Path) -> None:
     from scenarios.report import page
 
     data = {"command": comparison.command, "versions": comparison.versions,
-            "runs": [_plain(run) for run in comparison.runs]}
+            "runs": [_plain(run) for run in comparison.runs],
+            "partings": {name: [_plain_parting(one) for one in partings(runs)]
+                         for name, runs in comparison.groups().items()}}
     write_text(folder / "comparison.json", json.dumps(data, indent=2, allow_nan=False) + "\n")
     write_text(folder / "index.html", page(comparison))
 
@@ -232,6 +249,11 @@ def _plain(run: Run) -> dict[str, Any]:
             "settings": {name: _plain_value(value) for name, value in run.settings.items()},
             "ticks": run.recording.ticks if run.recording else 0,
             "metrics": {name: metrics.plain(metric) for name, metric in run.metrics.items()}}
+
+
+def _plain_parting(one: Parting) -> dict[str, Any]:
+    return {"label": one.label, "from": one.other, "bound_rad": one.bound, "tick": one.tick,
+            "largest_rad": one.largest if math.isfinite(one.largest) else None, "why": one.why}
 
 
 def _plain_value(value: Any) -> Any:

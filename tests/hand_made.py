@@ -34,7 +34,8 @@ class HandMadeScenario:
         return replace(self, resolver=spec)
 
     def make_resolver(self) -> Any:
-        return SimpleNamespace(label=LABELS.get(self.resolver, self.resolver))
+        return SimpleNamespace(label=LABELS.get(self.resolver, self.resolver), accuracy=1e-9,
+                               strict=self.resolver not in ("tpm", "augmented"))
 
     def to_toml(self) -> str:
         return f'name = "{self.name}"\n'

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from matplotlib.figure import Figure
 
 from scenarios import drawing, figures
+from scenarios.parting import BOUND, partings
 from scenarios.picture import picture
 from scenarios.report.verdict import in_words, verdict
 
@@ -34,7 +35,7 @@ def page(comparison: Comparison) -> str:
 def _group(name: str, runs: Sequence[Run]) -> str:
     recordings = {run.label: run.recording for run in runs
                   if run.recording is not None and run.recording.ticks > 1}
-    parts = [_lead(name, runs, recordings), _faults(runs), _table(runs)]
+    parts = [_lead(name, runs, recordings), _faults(runs), _table(runs), _partings(runs)]
     if recordings:
         parts += [_overlays(name, recordings), *_panels(name, recordings)]
     return "\n".join([*parts, _settings(runs)])
@@ -93,6 +94,15 @@ def _table(runs: Sequence[Run]) -> str:
 <p class="quiet">{marks}{why}</p>
 <div class="scroll"><table><thead><tr><th></th>{heads}</tr></thead>
 <tbody>{"".join(body)}</tbody></table></div></section>"""
+
+
+def _partings(runs: Sequence[Run]) -> str:
+    said = "".join(f"<li>{escape(str(one))}.</li>" for one in partings(runs))
+    return f"""<section><h2>Where they part</h2>
+<p class="quiet">Resolvers that are strict at every rank solve the same problem at every tick, so
+their joints should follow the same path; the bound is {BOUND:.0e} rad, or the accuracy that a
+resolver declares where that is more.</p>
+<ul>{said}</ul></section>""" if said else ""
 
 
 def _stopped(run: Run) -> str:
