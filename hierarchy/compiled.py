@@ -25,8 +25,8 @@ Kernel = Callable[..., Any]
 def compiled(function: Kernel) -> Kernel:
     """Compile `function` for the types it is first called with, and keep the result on disk.
 
-    IEEE arithmetic as written (no fastmath), division by zero gives inf or NaN as in numpy, the
-    GIL is released. With `NUMBA_DISABLE_JIT=1` the plain function runs, for debugging.
+    IEEE arithmetic as written (no fastmath), division by zero gives inf or NaN as in numpy.
+    With `NUMBA_DISABLE_JIT=1` the plain function runs, for debugging.
     """
     return _compiled(function, inline=False)
 
@@ -77,7 +77,7 @@ def _jit_into(folder: Path, function: Kernel, inline: bool) -> Any:
     except OSError:  # a home that cannot be written: numba's own choice of folder
         numba.config.CACHE_DIR = before
     try:
-        return numba.njit(cache=True, error_model="numpy", nogil=True,
+        return numba.njit(cache=True, error_model="numpy",
                           forceinline=inline)(function)
     finally:
         numba.config.CACHE_DIR = before

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, ClassVar, final
 
 import numpy as np
@@ -93,14 +94,18 @@ class Hcod(Resolver):
             if not isinstance(value, int) or isinstance(value, bool) or not 1 <= value < 2**31:
                 raise HierarchyError(f"hcod: {setting} = {value!r}, expected a whole number >= 1")
 
+    @cached_property
+    def _settings(self) -> Array:
+        return np.array([self.damping, self.threshold, self.rank_tolerance, self.tolerance,
+                         self.guesses, self.max_iterations], dtype=float)
+
     def solve(self, h: Hierarchy, memory: Any = None) -> ActiveSetResolution:
         """Resolve h, beginning with the active set of an earlier resolution if one is given."""
         x = h.reference.copy()
         size = 3 * len(h.lower) + 3
-        warm = memory is not None and len(memory) == size
-        record = memory.copy() if warm else np.empty(size)
-        code = hcod(h.A, h.lower, h.upper, h.sizes, x, record, warm, self.damping, self.threshold,
-                    self.rank_tolerance, self.tolerance, self.guesses, self.max_iterations)
+        fits = memory is not None and len(memory) == size
+        record = memory.copy() if fits else np.zeros(size)
+        code = hcod(h.A, h.lower, h.upper, h.sizes, x, record, self._settings)
         if code == COUNT:  # solved at the first guess
             return ActiveSetResolution(x, _SOLVED, 1, record)
         iterations, code = divmod(code, COUNT)

@@ -21,9 +21,17 @@ def solve_block(M, r, y, i0, i1, k0, k1, damping, threshold):
     if k0 == k1:
         return
     damped = variable_damping(M, i0, i1, k0, k1, damping, threshold) if damping > 0.0 else 0.0
-    if damped > 0.0 or i1 - i0 > k1 - k0:
+    if damped == 0.0 and i1 - i0 == k1 - k0:
+        _substitute(M, r, y, i0, k0, k1)
+    elif k1 - k0 == 1:
+        _one_unknown(M, r, y, i0, i1, k0, damped)
+    else:
         _least_squares(M, r, y, i0, i1, k0, k1, damped)
-        return
+
+
+@compiled
+def _substitute(M, r, y, i0, k0, k1):
+    """Write the solution of a square block into y[k0:k1]."""
     for k in range(k0, k1):
         i = i0 + k - k0
         rest = r[i]
@@ -120,6 +128,16 @@ def orthogonalise_rows(W, U):
                         V[j, k] = cosine * (t * above + V[j, k])
         if settled:
             return
+
+
+@compiled
+def _one_unknown(M, r, y, i0, i1, k, damped):
+    """Write the minimiser into y[k]."""
+    along, square = 0.0, damped * damped
+    for i in range(i0, i1):
+        along += M[i, k] * r[i]
+        square += M[i, k] * M[i, k]
+    y[k] = along / square
 
 
 @compiled

@@ -29,6 +29,7 @@ from solvers.kernels.rows import (
     reflect_rows,
 )
 from solvers.kernels.stages import solve_by_stages
+from solvers.kernels.staircase import staircase
 
 FREE, EQUAL = 0, 2  # what a row does; -1 and +1: it acts at its lower or upper side
 COUNT = 8
@@ -36,16 +37,36 @@ FEW = 16  # inequality rows up to which a guess from nothing is worth its cost (
 
 
 @compiled
-def hcod(A, lower, upper, sizes, x, record, warm, damping, threshold, rank_tolerance, tolerance,
-         guesses, max_iterations):
+def hcod(A, lower, upper, sizes, x, record, settings):
     """Solve; x (n,) comes in as the reference and goes out as the answer, zero on failure.
 
-    record (3 m + 3,) goes out as: what each row does; the level that each row holds back (its own
-    if it stays violated, L for the reference, -1 for none); its multiplier there; guesses tried;
-    steps by stages; the level that was not finished. With `warm` its first m entries come in as a
-    guess. Returns SOLVED, NUMERICAL_FAILURE or ITERATION_LIMIT, after which x keeps the levels
-    above the unfinished one, plus COUNT times the guesses and steps.
+    record (3 m + 3,) comes in as zeros, or as that of an earlier solve whose active set is to be
+    guessed. It goes out as: what each row does; the level that each row holds back (its own if it
+    stays violated, L for the reference, -1 for none); its multiplier there; guesses tried; steps
+    by stages; the level that was not finished. settings: damping, threshold, rank_tolerance,
+    tolerance, guesses, max_iterations, in one array because each argument costs time. Returns
+    SOLVED, NUMERICAL_FAILURE or ITERATION_LIMIT, after which x keeps the levels above the
+    unfinished one, plus COUNT times the guesses and steps.
     """
+    m = A.shape[0]
+    counts = record[3 * m:]
+    warm = counts[0] + counts[1] > 0.0
+    counts[0] = counts[1] = 0.0
+    counts[2] = -1.0
+    equalities = 0
+    for i in range(m):
+        equalities += lower[i] == upper[i]
+    if equalities == m:
+        for i in range(m):
+            record[i], record[m + i], record[2 * m + i] = EQUAL, -1.0, 0.0
+        counts[0] = 1.0
+        return COUNT + staircase(A, lower, upper, sizes, x, settings[0], settings[1], settings[2])
+    code = _solve(A, lower, upper, sizes, x, record, settings, warm)
+    return code + COUNT * int(counts[0] + counts[1])
+
+
+@compiled
+def _solve(A, lower, upper, sizes, x, record, settings, warm):
     m, n = A.shape
     levels = sizes.size
     active, held, multiplier = record[:m], record[m:2 * m], record[2 * m:3 * m]
@@ -56,9 +77,9 @@ def hcod(A, lower, upper, sizes, x, record, warm, damping, threshold, rank_toler
     at = m + n + 1
     beta, y, g, pull, reference = W[at], W[at + 1], W[at + 2], W[at + 3], W[at + 4]
     row, first, rank = of_levels[:m], of_levels[m:m + levels + 1], of_levels[m + levels + 1:]
-    counts[0] = counts[1] = 0.0
-    counts[2] = -1.0
-    inequalities = _prepare(A, lower, upper, x, active, held, multiplier, scale, warm)
+    damping, threshold, rank_tolerance = settings[0], settings[1], settings[2]
+    tolerance, guesses, max_iterations = settings[3], settings[4], settings[5]
+    inequalities = _prepare(A, lower, upper, x, active, held, multiplier, scale)
     if inequalities < 0:
         return finish(x, NUMERICAL_FAILURE)
     for c in range(n):
@@ -67,20 +88,17 @@ def hcod(A, lower, upper, sizes, x, record, warm, damping, threshold, rank_toler
         counts[0] += 1.0
         _solve_guess(A, lower, upper, sizes, reference, x, active, scale, W, row, first, rank, zero,
                      miss, beta, y, pull, damping, threshold, rank_tolerance)
-        if inequalities == 0:
-            return finish(x, SOLVED) + COUNT
         _residuals(first, rank, W, miss, y, w, damping)
         if _improve(A, lower, upper, reference, x, active, held, multiplier, scale, W, row, first,
                     rank, w, g, pull, damping, tolerance):
-            return finish(x, SOLVED) + COUNT * int(counts[0])
+            return finish(x, SOLVED)
     code = solve_by_stages(A, lower, upper, sizes, reference, x, active, held, multiplier, scale,
                            counts, damping, threshold, rank_tolerance, tolerance, max_iterations)
-    code = code if finish(x, SOLVED) == SOLVED else NUMERICAL_FAILURE
-    return code + COUNT * int(counts[0] + counts[1])
+    return code if finish(x, SOLVED) == SOLVED else NUMERICAL_FAILURE
 
 
 @inlined
-def _prepare(A, lower, upper, x, active, held, multiplier, scale, warm):
+def _prepare(A, lower, upper, x, active, held, multiplier, scale):
     """Check the data and start the record; return the number of inequality rows, -1 if bad."""
     m, n = A.shape
     inequalities = 0
@@ -100,7 +118,7 @@ def _prepare(A, lower, upper, x, active, held, multiplier, scale, warm):
             active[i] = EQUAL
             continue
         inequalities += 1
-        guess = active[i] if warm else FREE
+        guess = active[i]
         known = (guess == 1 and up < np.inf) or (guess == -1 and low > -np.inf)
         active[i] = guess if known else FREE
     return inequalities
