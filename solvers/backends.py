@@ -122,8 +122,9 @@ class Program:
         kind = csc_matrix if backend.sparse else np.ascontiguousarray
         up, low = np.isfinite(self.upper), np.isfinite(self.lower)
         P = self.P + backend.regularisation * np.eye(len(self.q))
-        G = np.vstack([self.A[up], -self.A[low]])
-        h = np.concatenate([self.upper[up], -self.lower[low]])
-        rows = (kind(G), h) if h.size else (None, None)
+        rows: tuple[Any, Any] = (None, None)
+        if len(self.A):
+            rows = (kind(np.vstack([self.A[up], -self.A[low]])),
+                    np.concatenate([self.upper[up], -self.lower[low]]))
         fixed = (kind(self.F), self.f) if self.f.size else (None, None)
         return kind(P), self.q, *rows, *fixed

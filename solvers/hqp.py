@@ -163,25 +163,30 @@ class _Cascade:
         goal = rows.where(equal).from_(self.x)
         limits = rows.where(~equal).from_(self.x)
         near = EXACT * (1.0 + norm(self.x))
+        own, free = self._split(M[equal], norms[equal])
         broken = np.zeros(limits.lower.size)
         if not equal.any() and (abs(limits.excess(np.zeros(self.h.n))) <= near).all():
             z = np.zeros(self.N.shape[1])
         else:
-            lam = self._variable_damping(scale * M, scale * norms) / scale
-            z, broken = self._minimise(goal, limits, norms[equal], lam)
+            seen = own if equal.all() else self._split(M, norms)[0]
+            lam = self._variable_damping(scale * M, seen.shape[1]) / scale
+            z, broken = self._minimise(goal, limits, own, lam)
         self._step(z)
         fixed = equal.copy()
         fixed[~equal] = broken != 0
-        own, free = split(M[fixed], norms[fixed], self.settings.rank_tolerance)
+        if broken.any():
+            own, free = self._split(M[fixed], norms[fixed])
         self.F = np.vstack([self.F, (self.N @ own).T])
         self.N = self.N @ free
         self.kept = self.kept.and_(rows.where(~fixed).normalised())
 
-    def _variable_damping(self, M: Array, norms: Array) -> float:
+    def _split(self, M: Array, norms: Array) -> tuple[Array, Array]:
+        return split(M, norms, self.settings.rank_tolerance)
+
+    def _variable_damping(self, M: Array, rank: int) -> float:
         s = self.settings
         if not s.damping or not M.shape[0]:
             return 0.0
-        rank = split(M, norms, s.rank_tolerance)[0].shape[1]
         smallest = np.linalg.svd(M, compute_uv=False)[-1] if rank == M.shape[0] else 0.0
         return float(s.damping * np.sqrt(max(0.0, 1.0 - (smallest / s.threshold) ** 2)))
 
@@ -191,19 +196,19 @@ class _Cascade:
         if not self.N.shape[1] or not self._movable().lower.size:
             return np.asarray(self.N.T @ target)
         goal = Rows(np.eye(self.h.n), target, target)
-        return self._minimise(goal, Rows.none(self.h.n), np.ones(self.h.n), 0.0, last=True)[0]
+        return self._minimise(goal, Rows.none(self.h.n), np.eye(len(target)), 0.0, last=True)[0]
 
     def _movable(self) -> Rows:
         """Return the kept rows that a step along N can still move, as rows of that step."""
         moved = norm(self.kept.A @ self.N, axis=1) > self.settings.rank_tolerance
         return self.kept.where(moved).from_(self.x)
 
-    def _minimise(self, goal: Rows, limits: Rows, norms: Array, lam: float, last: bool = False
+    def _minimise(self, goal: Rows, limits: Rows, own: Array, lam: float, last: bool = False
                   ) -> tuple[Array, Array]:
         """Minimise ||goal||^2 + ||excess of limits||^2 + lam^2 ||z||^2 within the kept rows.
 
-        All rows are of the step N z. Returns z and, for each limit, the side on which it remains
-        violated.
+        All rows are of the step N z; own is a basis of the z that the goal can see.
+        Returns z and, for each limit, the side on which it remains violated.
         """
         kept, N = self._movable(), self.N
         p = N.shape[1]
@@ -218,7 +223,7 @@ class _Cascade:
             z, found = self._ask(goal, limits, kept.relaxed(wider * self.settings.slack), lam, last)
             vouched |= found
             if not kept.lower.size and not limits.lower.size:
-                return self._least_squares(z, E, e, norms, lam), np.empty(0)
+                return self._least_squares(z, E, e, own, lam), np.empty(0)
             for start in (z, np.zeros(p)):  # zero keeps all of `kept`: x does
                 exact = refined(start, E, e, limits.seen(N), kept.seen(N))
                 if exact is not None:
@@ -230,12 +235,11 @@ class _Cascade:
     def _allowed(self) -> float:
         return float(_SHARE * self.backend.accuracy * (1.0 + norm(self.x)))
 
-    def _least_squares(self, z: Array, E: Array, e: Array, norms: Array, lam: float) -> Array:
+    def _least_squares(self, z: Array, E: Array, e: Array, own: Array, lam: float) -> Array:
         """Return z where it is shown to be near enough to the least squares, or the exact ones."""
         if lam:
             own, smallest = np.eye(len(z)), lam
         else:
-            own, _ = split(E, norms, self.settings.rank_tolerance)
             smallest = float(np.linalg.svd(E @ own, compute_uv=False).min(initial=np.inf))
         z = own.T @ z  # what is outside of it the level cannot see
         if norm(own.T @ (E.T @ e) - own.T @ (E.T @ (E @ (own @ z)))) <= (

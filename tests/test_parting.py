@@ -1,0 +1,89 @@
+"""Where strict resolvers part: the tick, and what was different before it."""
+
+import json
+
+import hand_made
+import numpy as np
+from hand_made import HandMadeScenario, recording
+
+from scenarios import compare
+from scenarios.compare import Comparison, Run, default_resolvers
+from scenarios.parting import partings
+from scenarios.report.page import page
+from solvers import backends
+
+
+def run_of(spec, q=None, fault=None, **changed):
+    scenario = HandMadeScenario().with_resolver(spec)
+    q = np.zeros((5, 7)) if q is None else q
+    label = hand_made.LABELS.get(spec, spec)
+    return Run(scenario, spec, label, recording(scenario, fault, q=q, **changed))
+
+
+def away_from(tick, by=1e-3):
+    q = np.zeros((5, 7))
+    q[tick:, 2] = by
+    return q
+
+
+def test_runs_that_stay_together_are_said_to():
+    (one,) = partings([run_of("recursive"), run_of("hqp", away_from(1, 1e-8))])
+    assert one.tick is None
+    assert str(one) == "hqp keeps within 1e-08 rad of recursive to the end"
+
+
+def test_the_first_tick_beyond_the_bound_is_named():
+    (one,) = partings([run_of("recursive"), run_of("hqp", away_from(3))])
+    assert one.tick == 3
+    assert "at tick 3 (3.00 s), by 1e-03 rad at most" in str(one)
+    assert "the motion magnifies the errors of each tick (declared: 1e-09)" in one.why
+
+
+def test_a_tick_that_was_not_solved_is_the_reason():
+    failing = run_of("hqp", away_from(3), status=np.array([0, 0, 3, 0, 0]))
+    (one,) = partings([run_of("recursive"), failing])
+    assert one.why == "tick 2 of hqp was not solved, and braked"
+
+
+def test_a_stack_switched_at_another_tick_is_the_reason():
+    switched = run_of("hqp", away_from(3), order=np.array([0, 1, 0, 0, 0]))
+    assert "another one at tick 1" in partings([run_of("recursive"), switched])[0].why
+
+
+def test_a_run_that_is_not_finite_has_parted():
+    (one,) = partings([run_of("recursive"), run_of("hqp", away_from(2, np.nan))])
+    assert one.tick == 2
+    assert one.largest == np.inf
+
+
+def test_resolvers_that_are_not_strict_need_not_agree():
+    """Neither as the one compared with, nor as the one compared."""
+    assert partings([run_of("tpm"), run_of("recursive"), run_of("augmented", away_from(1))]) == []
+
+
+def test_the_page_says_it():
+    runs = (run_of("recursive"), run_of("hqp", away_from(3)))
+    text = page(Comparison(runs, "hierarchy compare", {}))
+    assert "Where they part" in text
+    assert "parts from recursive" in text
+
+
+def test_the_numbers_hold_it(tmp_path):
+    from scenarios import load
+
+    compare([load("ellipse", ["control.duration=0.02"])], ["tpm:form=staircase", "hqp"],
+            out=tmp_path / "a")
+    (one,) = json.loads((tmp_path / "a" / "comparison.json").read_text())["partings"]["ellipse"]
+    assert (one["label"], one["from"], one["tick"]) == ("hqp proxqp", "tpm", None)
+    assert one["largest_rad"] < 1e-9
+
+
+
+
+def test_a_backend_that_is_not_installed_leaves_the_default_comparison_and_is_named(monkeypatch):
+    everything, nothing = default_resolvers()
+    assert not nothing
+    monkeypatch.setattr(backends, "installed", lambda name: name != "daqp")
+    rest, missing = default_resolvers()
+    assert set(everything) - set(rest) == {"hqp:backend=daqp"}
+    assert missing == {"hqp:backend=daqp": "pip install task-hierarchy[qp]"}
