@@ -2,9 +2,10 @@
 
     python -m scenarios.bench.stress --count 1000000 --resolver hcod
 
-Exit code 1 if it raised, gave a number that is not finite, or called solved what `certify` rejects.
-Such a problem is shrunk while it still fails in the same way, and kept as a file that
-`solvers.problems.load` reads.
+Exit code 1 if it raised, gave a number that is not finite, called solved what `certify` rejects, or
+ended its process. A problem that fails is shrunk while it still fails in the same way, and kept as
+a file that `solvers.problems.load` reads. With NUMBA_BOUNDSCHECK=1 (and a NUMBA_CACHE_DIR of its
+own) a kernel that reads or writes outside its arrays raises where it would corrupt memory.
 """
 
 from __future__ import annotations
@@ -15,8 +16,9 @@ import os
 import sys
 from collections import Counter
 from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, field
-from functools import partial
 from pathlib import Path
 from typing import final
 
@@ -29,6 +31,7 @@ from solvers import Resolver, Status, certify, make, problems
 CERTIFIED = "certified"
 RAISED, NOT_FINITE, WRONG = "raised", "not finite", "solved, not certified"
 FAILURES = (RAISED, NOT_FINITE, WRONG)
+CRASHED = "not judged, a process died"
 _CHUNK = 500  # seeds a process takes at a time
 _KEPT = 20    # failing problems that are shrunk and written, at most
 _TRIALS = 3000  # of one shrinking
@@ -37,15 +40,22 @@ _TRIALS = 3000  # of one shrinking
 @final
 @dataclass
 class Tally:
-    """How many problems ended how, and the seeds of those that failed."""
+    """How many problems ended how, the seeds of those that failed, and those not judged."""
 
     counts: Counter[str] = field(default_factory=Counter)
     failing: list[tuple[int, str]] = field(default_factory=list)
+    lost: list[range] = field(default_factory=list)
+
+    @property
+    def passed(self) -> bool:
+        """Whether all were judged and none failed."""
+        return not self.failing and not self.lost
 
     def add(self, other: Tally) -> None:
         """Take in the counts of another."""
         self.counts.update(other.counts)
         self.failing += other.failing
+        self.lost += other.lost
 
     def __str__(self) -> str:
         always = dict.fromkeys((CERTIFIED, *FAILURES), 0)
@@ -124,17 +134,29 @@ def run(count: int, name: str, first: int = 0, processes: int | None = None,
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # read by the processes when they start
     chunks = [range(i, min(i + _CHUNK, first + count)) for i in range(first, first + count, _CHUNK)]
     found = Tally()
-    bar = Progress(TextColumn(name), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn(),
-                   TextColumn("failed: {task.fields[failed]}"))
-    with multiprocessing.get_context("spawn").Pool(processes) as pool, bar:
+    columns = (TextColumn(name), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn(),
+               TextColumn("failed: {task.fields[failed]}"))
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(processes, context) as pool, Progress(*columns) as bar:
         task = bar.add_task(name, total=count, failed=0)
-        for part in pool.imap_unordered(partial(tally, name), chunks):
-            found.add(part)
-            bar.update(task, advance=part.counts.total(), failed=len(found.failing))
+        parts = {pool.submit(tally, name, chunk): chunk for chunk in chunks}
+        for part in as_completed(parts):
+            found.add(_judged(part, parts[part]))
+            bar.update(task, completed=found.counts.total(), failed=len(found.failing))
     print(f"{name}, {count} problems: {found}")
     for seed, what in sorted(found.failing)[:_KEPT]:
         print(f"  seed {seed}, {what}: {keep(name, seed, what, out)}")
+    for chunk in sorted(found.lost, key=lambda seeds: seeds.start)[:_KEPT]:
+        print(f"  seeds {chunk.start} to {chunk.stop - 1}: {CRASHED}")
     return found
+
+
+def _judged(part: Future[Tally], seeds: range) -> Tally:
+    """Return the tally of these seeds, or that they were lost with the process that had them."""
+    try:
+        return part.result()
+    except BrokenProcessPool:
+        return Tally(Counter({CRASHED: len(seeds)}), lost=[seeds])
 
 
 def keep(name: str, seed: int, what: str, out: Path) -> Path:
@@ -160,7 +182,7 @@ def main() -> int:
                         help="folder for problems that fail")
     given = parser.parse_args()
     found = run(given.count, given.resolver, given.first, given.processes, given.out)
-    return 1 if found.failing else 0
+    return 0 if found.passed else 1
 
 
 if __name__ == "__main__":
