@@ -32,10 +32,12 @@ class Parting:
     why: str = ""
 
     def __str__(self) -> str:
+        if self.largest == 0.0:
+            return f"{self.label} moves as {self.other} to the last bit"
         if self.tick is None:
-            return f"{self.label} keeps within {self.largest:.0e} rad of {self.other} to the end"
+            return f"{self.label} keeps within {self.largest:.1e} rad of {self.other} to the end"
         return (f"{self.label} parts from {self.other} by more than {self.bound:.0e} rad at tick "
-                f"{self.tick} ({self.time:.2f} s), by {self.largest:.0e} rad at most: {self.why}")
+                f"{self.tick} ({self.time:.2f} s), by {self.largest:.1e} rad at most: {self.why}")
 
 
 def partings(runs: Sequence[Run]) -> list[Parting]:

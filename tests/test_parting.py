@@ -10,6 +10,7 @@ from scenarios import compare
 from scenarios.compare import Comparison, Run, default_resolvers
 from scenarios.parting import partings
 from scenarios.report.page import page
+from scenarios.report.verdict import verdict
 from solvers import backends
 
 
@@ -29,13 +30,28 @@ def away_from(tick, by=1e-3):
 def test_runs_that_stay_together_are_said_to():
     (one,) = partings([run_of("recursive"), run_of("hqp", away_from(1, 1e-8))])
     assert one.tick is None
-    assert str(one) == "hqp keeps within 1e-08 rad of recursive to the end"
+    assert str(one) == "hqp keeps within 1.0e-08 rad of recursive to the end"
+
+
+def test_runs_of_the_same_bits_are_said_to_be():
+    assert [str(one) for one in partings([run_of("recursive"), run_of("hcod")])] == [
+        "hcod moves as recursive to the last bit"]
+
+
+def test_the_verdict_tells_a_run_that_parted_late_from_another_motion():
+    said = verdict([run_of("recursive"), run_of("hcod"), run_of("hqp", away_from(3)),
+                    run_of("augmented", away_from(1, 0.5))])
+    assert "recursive and hcod moved the arm alike to the last bit, augmented did not" in said
+    assert "hqp stayed within 1e-03 rad of recursive" in said
+    said = verdict([run_of("recursive"), run_of("hqp", away_from(3))])
+    assert "alike" not in said
+    assert "hqp stayed within 1e-03 rad of recursive" in said
 
 
 def test_the_first_tick_beyond_the_bound_is_named():
     (one,) = partings([run_of("recursive"), run_of("hqp", away_from(3))])
     assert one.tick == 3
-    assert "at tick 3 (3.00 s), by 1e-03 rad at most" in str(one)
+    assert "at tick 3 (3.00 s), by 1.0e-03 rad at most" in str(one)
     assert "the motion magnifies the errors of each tick (declared: 1e-09)" in one.why
 
 

@@ -14,10 +14,11 @@ if TYPE_CHECKING:
 _NUMBERS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten")
 
 
-def verdict(runs: Sequence[Run], alike: float = 1e-6) -> str:
+def verdict(runs: Sequence[Run], alike: float = 1e-6, nearly: float = 1e-2) -> str:
     """Return the sentence about runs side by side; only what was measured enters it.
 
-    Runs whose joints stay within `alike` [rad] of the first run's count as the same motion.
+    Runs whose joints stay within `alike` [rad] of the first run's count as the same motion, and
+    those within `nearly` are said to be near it.
     """
     finished = [run for run in runs if run.fault is None]
     parts = [_completion(runs, finished)]
@@ -25,7 +26,9 @@ def verdict(runs: Sequence[Run], alike: float = 1e-6) -> str:
         parts += [_collision(finished), *_contrasts(finished)]
     elif finished:
         same, others, apart = _groups(finished, alike)
-        parts += [_agreement(same, others, apart), _collision(finished)]
+        near, others, near_apart = _groups(others, nearly, finished[0])
+        parts += [_agreement(same, near, others, apart),
+                  _nearness(near, finished[0], near_apart), _collision(finished)]
         parts += [] if others and len(same) > 1 else [_distance(finished), _tracking(finished)]
         parts += [_speed(finished)]
     return "; ".join(part for part in parts if part) + "."
@@ -50,9 +53,10 @@ def _completion(runs: Sequence[Run], finished: Sequence[Run]) -> str:
     return f"{some if finished else f'No {noun[:-1]}'} ran the whole {seconds} ({stopped} did not)"
 
 
-def _groups(runs: Sequence[Run], alike: float) -> tuple[list[Run], list[Run], float]:
+def _groups(runs: Sequence[Run], alike: float, first: Run | None = None
+            ) -> tuple[list[Run], list[Run], float]:
     """Return the runs that move as the first one does, the others, and how far the first differ."""
-    apart = {run.label: departure(run, runs[0]) for run in runs}
+    apart = {run.label: departure(run, first or runs[0]) for run in runs}
     same = [run for run in runs if apart[run.label] <= alike]
     others = [run for run in runs if apart[run.label] > alike]
     return same, others, max((apart[run.label] for run in same), default=0.0)
@@ -69,13 +73,18 @@ def departure(run: Run, other: Run) -> float:
     return math.inf if math.isnan(largest) else largest
 
 
-def _agreement(same: Sequence[Run], others: Sequence[Run], apart: float) -> str:
+def _agreement(same: Sequence[Run], near: Sequence[Run], others: Sequence[Run], apart: float
+               ) -> str:
     if len(same) < 2:
-        return "no two moved the arm alike" if others else ""
+        return "no two moved the arm alike" if others and not near else ""
     to = f"alike to {apart:.0e} rad" if apart > 0.0 else "alike to the last bit"
     if not others:
-        return f"all moved the arm {to}"
+        return f"{_listed(same) if near else 'all'} moved the arm {to}"
     return f"{_listed(same)} moved the arm {to}, {_listed(others)} did not{_instead(same, others)}"
+
+
+def _nearness(near: Sequence[Run], first: Run, apart: float) -> str:
+    return f"{_listed(near)} stayed within {apart:.0e} rad of {first.label}" if near else ""
 
 
 def _instead(same: Sequence[Run], others: Sequence[Run]) -> str:
