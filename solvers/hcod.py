@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array, Hierarchy
-from solvers.kernels.hcod import COUNT, hcod
+from solvers.kernels.hcod import UNPROVED, hcod
+from solvers.kernels.stages import solve_by_stages
 from solvers.resolver import Resolution, Resolver, Status, register
 
 
@@ -30,6 +31,14 @@ class ActiveSetResolution(Resolution):
     """
 
     __slots__ = ()
+
+    def __init__(self, x: Array, status: Status, memory: Array) -> None:
+        self.x, self.status, self.memory = x, status, memory
+
+    @property
+    def iterations(self) -> int:  # type: ignore[override]
+        """Active sets guessed and steps by stages."""
+        return int(self.memory[-3] + self.memory[-2])
 
     @property
     def active(self) -> NDArray[np.int8]:
@@ -106,10 +115,12 @@ class Hcod(Resolver):
         fits = memory is not None and len(memory) == size
         record = memory.copy() if fits else np.zeros(size)
         code = hcod(h.A, h.lower, h.upper, h.sizes, x, record, self._settings)
-        if code == COUNT:  # solved at the first guess
-            return ActiveSetResolution(x, _SOLVED, 1, record)
-        iterations, code = divmod(code, COUNT)
-        return ActiveSetResolution(x, Status(code), iterations, record)
+        if code == 0:
+            return ActiveSetResolution(x, _SOLVED, record)
+        if code == UNPROVED:
+            x[:] = h.reference
+            code = solve_by_stages(h.A, h.lower, h.upper, h.sizes, x, record, self._settings)
+        return ActiveSetResolution(x, Status(code), record)
 
 
 _SOLVED = Status.SOLVED

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from hierarchy.problem import Array
 
-REFINEMENTS = 60  # bound on the steps from a backend's active set to the exact one
+REFINEMENTS = 25  # bound on the steps from a backend's active set to the exact one
 AT_ONCE = 10  # of them change all rows that are on the wrong side, the others one row at a time
 EXACT = 1e-10  # relative tolerance of the optimality conditions
 LITTLE = 1e-3  # rows broken by less are thought to hold at a nearby minimiser

@@ -5,7 +5,7 @@ guess and the multipliers of every level. If no other row is violated and no mul
 wrong sign, x is proved optimal. Otherwise the violated rows join, those with a wrong sign leave,
 and so on: the primal-dual active set method (Hintermueller, Ito, Kunisch 2002) on the hierarchy of
 Escande, Mansard, Wieber (2014). It mostly ends in two to five steps but may cycle; `stages.py`
-always ends, and takes over.
+always ends, and is called where this does not.
 
 An inequality row of level j that acts on a lower level k has a multiplier in
 A_k^T w_k + sum_j A_j^T lambda_j = 0, w_k being what level k misses. Over k = j + 1, ..., its first
@@ -21,18 +21,19 @@ import numpy as np
 from hierarchy.compiled import compiled, inlined
 from solvers.kernels.block import solve_block
 from solvers.kernels.rows import (
+    EQUAL,
+    FREE,
     NUMERICAL_FAILURE,
     SOLVED,
     ZERO,
     factor_level,
     finish,
+    prepare,
     reflect_rows,
 )
-from solvers.kernels.stages import solve_by_stages
 from solvers.kernels.staircase import staircase
 
-FREE, EQUAL = 0, 2  # what a row does; -1 and +1: it acts at its lower or upper side
-COUNT = 8
+UNPROVED = 7  # no value of solvers.Status
 FEW = 16  # inequality rows up to which a guess from nothing is worth its cost (measured)
 
 
@@ -45,8 +46,7 @@ def hcod(A, lower, upper, sizes, x, record, settings):
     stays violated, L for the reference, -1 for none); its multiplier there; guesses tried; steps
     by stages; the level that was not finished. settings: damping, threshold, rank_tolerance,
     tolerance, guesses, max_iterations, in one array because each argument costs time. Returns
-    SOLVED, NUMERICAL_FAILURE or ITERATION_LIMIT, after which x keeps the levels above the
-    unfinished one, plus COUNT times the guesses and steps.
+    SOLVED, NUMERICAL_FAILURE, or UNPROVED where `solve_by_stages` must be called.
     """
     m = A.shape[0]
     counts = record[3 * m:]
@@ -60,13 +60,12 @@ def hcod(A, lower, upper, sizes, x, record, settings):
         for i in range(m):
             record[i], record[m + i], record[2 * m + i] = EQUAL, -1.0, 0.0
         counts[0] = 1.0
-        return COUNT + staircase(A, lower, upper, sizes, x, settings[0], settings[1], settings[2])
-    code = _solve(A, lower, upper, sizes, x, record, settings, warm)
-    return code + COUNT * int(counts[0] + counts[1])
+        return staircase(A, lower, upper, sizes, x, settings[0], settings[1], settings[2])
+    return _guess(A, lower, upper, sizes, x, record, settings, warm)
 
 
 @compiled
-def _solve(A, lower, upper, sizes, x, record, settings, warm):
+def _guess(A, lower, upper, sizes, x, record, settings, warm):
     m, n = A.shape
     levels = sizes.size
     active, held, multiplier = record[:m], record[m:2 * m], record[2 * m:3 * m]
@@ -78,8 +77,8 @@ def _solve(A, lower, upper, sizes, x, record, settings, warm):
     beta, y, g, pull, reference = W[at], W[at + 1], W[at + 2], W[at + 3], W[at + 4]
     row, first, rank = of_levels[:m], of_levels[m:m + levels + 1], of_levels[m + levels + 1:]
     damping, threshold, rank_tolerance = settings[0], settings[1], settings[2]
-    tolerance, guesses, max_iterations = settings[3], settings[4], settings[5]
-    inequalities = _prepare(A, lower, upper, x, active, held, multiplier, scale)
+    tolerance, guesses = settings[3], settings[4]
+    inequalities = prepare(A, lower, upper, x, active, held, multiplier, scale)
     if inequalities < 0:
         return finish(x, NUMERICAL_FAILURE)
     for c in range(n):
@@ -92,36 +91,7 @@ def _solve(A, lower, upper, sizes, x, record, settings, warm):
         if _improve(A, lower, upper, reference, x, active, held, multiplier, scale, W, row, first,
                     rank, w, g, pull, damping, tolerance):
             return finish(x, SOLVED)
-    code = solve_by_stages(A, lower, upper, sizes, reference, x, active, held, multiplier, scale,
-                           counts, damping, threshold, rank_tolerance, tolerance, max_iterations)
-    return code if finish(x, SOLVED) == SOLVED else NUMERICAL_FAILURE
-
-
-@inlined
-def _prepare(A, lower, upper, x, active, held, multiplier, scale):
-    """Check the data and start the record; return the number of inequality rows, -1 if bad."""
-    m, n = A.shape
-    inequalities = 0
-    for c in range(n):
-        if not np.isfinite(x[c]):
-            return -1
-    for i in range(m):
-        square = 0.0
-        for c in range(n):
-            square += A[i, c] * A[i, c]
-        scale[i] = np.sqrt(square)
-        held[i], multiplier[i] = -1.0, 0.0
-        low, up = lower[i], upper[i]
-        if not np.isfinite(square) or not low <= up or low == np.inf or up == -np.inf:
-            return -1
-        if low == up:
-            active[i] = EQUAL
-            continue
-        inequalities += 1
-        guess = active[i]
-        known = (guess == 1 and up < np.inf) or (guess == -1 and low > -np.inf)
-        active[i] = guess if known else FREE
-    return inequalities
+    return UNPROVED
 
 
 @inlined

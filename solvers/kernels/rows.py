@@ -12,11 +12,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from hierarchy.compiled import compiled
+from hierarchy.compiled import compiled, inlined
 
 ZERO = np.int64(0)
 # Values of solvers.Status; -(i + 1) refuses row i, an inequality.
 SOLVED, ITERATION_LIMIT, NUMERICAL_FAILURE = 0, 1, 2
+
+FREE, EQUAL = 0, 2  # what a row does; -1 and +1: it acts at its lower or upper side
 
 
 @compiled
@@ -45,6 +47,33 @@ def load_rows(W, zero, A, lower, upper, x, rank_tolerance):
 
 
 @compiled
+def prepare(A, lower, upper, x, active, held, multiplier, scale):
+    """Check the data and start the record; return the number of inequality rows, -1 if bad."""
+    m, n = A.shape
+    inequalities = 0
+    for c in range(n):
+        if not np.isfinite(x[c]):
+            return -1
+    for i in range(m):
+        square = 0.0
+        for c in range(n):
+            square += A[i, c] * A[i, c]
+        scale[i] = np.sqrt(square)
+        held[i], multiplier[i] = -1.0, 0.0
+        low, up = lower[i], upper[i]
+        if not np.isfinite(square) or not low <= up or low == np.inf or up == -np.inf:
+            return -1
+        if low == up:
+            active[i] = EQUAL
+            continue
+        inequalities += 1
+        guess = active[i]
+        known = (guess == 1 and up < np.inf) or (guess == -1 and low > -np.inf)
+        active[i] = guess if known else FREE
+    return inequalities
+
+
+@inlined
 def reflect_rows(W, beta, V, k0, k1, i0, i1):
     """Apply reflectors k0 .. k1 - 1 to rows i0 .. i1 - 1 of W, one after the other.
 
@@ -62,7 +91,7 @@ def reflect_rows(W, beta, V, k0, k1, i0, i1):
                 w[c] -= s * v[c]
 
 
-@compiled
+@inlined
 def largest_row(W, zero, i0, i1, c0):
     """Row of i0 .. i1 - 1 with the largest norm from column c0 on, and that norm squared.
 
@@ -79,14 +108,14 @@ def largest_row(W, zero, i0, i1, c0):
     return pivot, largest
 
 
-@compiled
+@inlined
 def swap_rows(W, i, j):
     """Exchange rows i and j of W."""
     for c in range(W.shape[1]):
         W[i, c], W[j, c] = W[j, c], W[i, c]
 
 
-@compiled
+@inlined
 def make_reflector(W, beta, V, k, i, square):
     """Make reflector k (see `reflect_rows`) map row i of W onto unit vector k; apply it to no row.
 

@@ -22,45 +22,56 @@ import numpy as np
 from hierarchy.compiled import compiled, inlined
 from solvers.kernels.block import solve_block
 from solvers.kernels.rows import (
+    EQUAL,
     ITERATION_LIMIT,
+    NUMERICAL_FAILURE,
     SOLVED,
     ZERO,
     factor_level,
+    finish,
     make_reflector,
+    prepare,
     reflect_rows,
 )
 
 WATCHED, HELD, SOFT, FIXED = 1, 2, 3, 4  # state of a row; 0 while its level is still to come
-EQUAL = 2
 BLAND_AFTER = 20  # steps of length zero in one stage
 
 
 @compiled
-def solve_by_stages(A, lower, upper, sizes, reference, x, active, held, multiplier, scale, counts,
-                    damping, threshold, rank_tolerance, tolerance, max_iterations):
-    """Solve; x (n,) goes out as the answer. The other arguments are those of `hcod`.
+def solve_by_stages(A, lower, upper, sizes, x, record, settings):
+    """Solve; arguments and results as those of `hcod`, but record is only written.
 
-    Where the iterations end early, x keeps all levels above counts[2], and that level is as good
-    as it got.
+    Where the iterations end early, x keeps all levels above the unfinished one, and that level is
+    as good as it got. Returns SOLVED, ITERATION_LIMIT or NUMERICAL_FAILURE.
     """
     m, n = A.shape
     levels = sizes.size
+    active, held, multiplier = record[:m], record[m:2 * m], record[2 * m:3 * m]
+    counts = record[3 * m:]
+    damping, threshold, rank_tolerance = settings[0], settings[1], settings[2]
+    tolerance, max_iterations = settings[3], settings[5]
+    counts[1], counts[2] = 0.0, -1.0
     # The level's rows being factored, behind the held rows, and behind the fixed ones; then the
     # held rows, the reflectors, and one vector.
     W = np.empty((3 * m + 2 * n + 1, n))
     behind, base, held_at, V, X = m, 2 * m, 3 * m, 3 * m + n, 3 * m + 2 * n
-    of_rows, of_columns = np.empty((5, m)), np.empty((6, n))
+    of_rows, of_columns = np.empty((6, m)), np.empty((7, n))
     value, along, zero, miss, w = of_rows[0], of_rows[1], of_rows[2], of_rows[3], of_rows[4]
     beta, y, start, p, g, force = (of_columns[0], of_columns[1], of_columns[2], of_columns[3],
                                    of_columns[4], of_columns[5])
+    scale, reference = of_rows[5], of_columns[6]
     of_row = np.empty((4, m), np.int64)
     state, unit, soft, order = of_row[0], of_row[1], of_row[2], of_row[3]
     hard = np.empty(n, np.int64)
+    if prepare(A, lower, upper, x, active, held, multiplier, scale) < 0:
+        return finish(x, NUMERICAL_FAILURE)
     for c in range(n):
-        x[c] = 0.0
+        reference[c], x[c] = x[c], 0.0
     for i in range(m):
-        state[i], held[i], unit[i] = 0, -1, _only_column(A, i)
-        active[i] = EQUAL if lower[i] == upper[i] else 0
+        state[i], unit[i] = 0, _only_column(A, i)
+        if active[i] != EQUAL:
+            active[i] = 0.0
     fixed = first = ZERO
     for k in range(levels + 1):
         at_reference = k == levels
@@ -81,7 +92,8 @@ def solve_by_stages(A, lower, upper, sizes, reference, x, active, held, multipli
         while True:
             if counts[1] >= max_iterations:
                 counts[2] = k
-                return ITERATION_LIMIT
+                code = finish(x, SOLVED)
+                return ITERATION_LIMIT if code == SOLVED else code
             counts[1] += 1
             bland = still > BLAND_AFTER
             # The best point that the held rows leave, as seen from where the stage began.
@@ -140,7 +152,7 @@ def solve_by_stages(A, lower, upper, sizes, reference, x, active, held, multipli
         elif not at_reference:
             fixed = _fix_again(A, W, state, scale, hard, h, soft, s, V, beta, fixed, rank_tolerance)
         first = last
-    return SOLVED
+    return finish(x, SOLVED)
 
 
 @inlined
