@@ -6,6 +6,7 @@ from solvers import hqp as hqp
 from solvers import recursive as recursive
 from solvers import tpm as tpm
 from solvers.certificate import Certificate, certify
+from solvers.explain import explain
 from solvers.resolver import Resolution, Resolver, Status, make, names
 
-__all__ = ["Certificate", "Resolution", "Resolver", "Status", "certify", "make", "names"]
+__all__ = ["Certificate", "Resolution", "Resolver", "Status", "certify", "explain", "make", "names"]

@@ -1,0 +1,213 @@
+import numpy as np
+import pytest
+from rank_cases import family
+
+from hierarchy import Hierarchy, HierarchyError
+from solvers import Status, certify, explain, make
+
+INF = np.inf
+HCOD = make("hcod")
+INEQUALITIES = ["INEQ7", "HUM38"]
+
+
+def two_joints(limit=1.0):
+    """Limits on two joints, a hand that asks for too much of the first, a posture."""
+    return Hierarchy.from_levels(
+        [(np.eye(2), [-limit, -limit], [limit, limit]), ([[1.0, 0.5]], [3.0]),
+         (np.eye(2), [0.0, 0.25])], names=["limits", "hand", "posture"])
+
+
+def moved(h, rng, share=0.01):
+    """The same rows with sides moved by a share of themselves."""
+    factor = 1.0 + share * rng.uniform(-1, 1, h.m)
+    return Hierarchy(h.A, h.lower * factor, h.upper * factor, h.sizes, h.reference, h.names)
+
+
+def test_an_answer_found_by_hand():
+    res = HCOD.solve(two_joints())
+    np.testing.assert_allclose(res.x, [1, 1])
+    assert res.status is Status.SOLVED
+    assert res.active.tolist() == [1, 1, 2, 2, 2]
+    assert res.holds_back[:2].tolist() == [1, 1]
+    assert res.multipliers[:2] == pytest.approx([1.5, 0.75])
+
+
+@pytest.mark.parametrize("name", INEQUALITIES)
+def test_every_reference_problem_is_solved_and_certified(name):
+    for h, _, norms in family(name):
+        res = HCOD.solve(h)
+        assert res.status is Status.SOLVED
+        np.testing.assert_allclose(h.violations(res.x), norms, atol=1e-6)
+        assert certify(h, res.x).certified
+
+
+@pytest.mark.parametrize("name", INEQUALITIES)
+def test_the_answer_does_not_depend_on_the_memory(name):
+    rng = np.random.default_rng(0)
+    for h, _, _ in family(name):
+        cold = HCOD.solve(h)
+        for memory in (cold.memory, HCOD.solve(moved(h, rng)).memory, nonsense(h, rng)):
+            warm = HCOD.solve(h, memory)
+            assert warm.status is Status.SOLVED
+            np.testing.assert_allclose(warm.x, cold.x, atol=1e-8 * (1 + np.abs(cold.x).max()))
+
+
+def nonsense(h, rng):
+    memory = rng.integers(-1, 2, 3 * h.m + 3).astype(float)
+    memory[-3:] = 1.0
+    return memory
+
+
+@pytest.mark.parametrize("name", INEQUALITIES)
+def test_its_own_memory_needs_one_guess(name):
+    for h, _, _ in list(family(name))[:20]:
+        cold = HCOD.solve(h)
+        warm = HCOD.solve(h, cold.memory)
+        assert warm.iterations == 1
+        np.testing.assert_allclose(warm.x, cold.x, atol=1e-9 * (1 + np.abs(cold.x).max()))
+
+
+def test_a_memory_of_another_hierarchy_is_left_aside():
+    h = two_joints()
+    other = Hierarchy.from_levels([([[1.0]], [0.0], [1.0])])
+    np.testing.assert_allclose(HCOD.solve(h, HCOD.solve(other).memory).x, [1, 1])
+
+
+@pytest.mark.parametrize("name", ["EQ7", "EQ7over", "EQ7sing", "EQ30L8"])
+@pytest.mark.parametrize("damping", [0.0, 0.5])
+def test_equalities_alone_are_the_staircase_to_the_last_digit(name, damping):
+    hcod, tpm = make("hcod", damping=damping), make("tpm", damping=damping)
+    for h, _, _ in family(name):
+        np.testing.assert_array_equal(hcod.solve(h).x, tpm.solve(h).x)
+
+
+@pytest.mark.parametrize("guesses", [1, 3, 30])
+def test_guessing_and_going_level_by_level_give_one_answer(guesses):
+    resolver, stages = make("hcod", guesses=guesses), by_stages()
+    for h, _, _ in family("INEQ7"):
+        np.testing.assert_allclose(resolver.solve(h).x, stages(h).x, atol=1e-9)
+
+
+def by_stages():
+    """hcod without a guess."""
+    from solvers.hcod import ActiveSetResolution
+    from solvers.kernels.stages import solve_by_stages
+
+    def solve(h):
+        x, record = h.reference.copy(), np.zeros(3 * h.m + 3)
+        code = solve_by_stages(h.A, h.lower, h.upper, h.sizes, x, record, HCOD._settings)
+        return ActiveSetResolution(x, Status(code), record)
+
+    return solve
+
+
+def test_both_ways_know_the_same_rows_and_multipliers():
+    stages = by_stages()
+    for h, _, _ in family("INEQ7"):
+        a, b = HCOD.solve(h, HCOD.solve(h).memory), stages(h)
+        np.testing.assert_array_equal(a.holds_back, b.holds_back)
+        np.testing.assert_allclose(a.multipliers, b.multipliers, atol=1e-6)
+
+
+def test_multipliers_balance_the_pull_of_the_level_they_hold_back():
+    h = two_joints()
+    res = HCOD.solve(h)
+    pull = h.A[2] * (h.A[2] @ res.x - 3.0)
+    np.testing.assert_allclose(pull + res.multipliers[:2] @ h.A[:2], 0, atol=1e-12)
+
+
+@pytest.mark.parametrize("limit", range(1, 12))
+def test_an_iteration_limit_keeps_the_levels_above_and_says_where_it_was(limit):
+    resolver = make("hcod", max_iterations=limit, guesses=1)
+    for h, _, norms in list(family("HUM38"))[:10]:
+        res = resolver.solve(h)
+        assert np.isfinite(res.x).all()
+        if res.status is Status.SOLVED:
+            assert res.unfinished is None
+            continue
+        assert res.status is Status.ITERATION_LIMIT
+        k = res.unfinished
+        np.testing.assert_allclose(h.violations(res.x)[:k], norms[:k], atol=1e-8)
+        assert h.names[k] in explain(h, res)
+
+
+def test_explain_says_in_words_what_blocks_what():
+    h = two_joints()
+    text = explain(h, HCOD.solve(h)).splitlines()
+    assert text[0] == "limits is met."
+    assert text[1] == ("hand is missed by 1.5: held back by limits row 0 at its upper side and "
+                       "limits row 1 at its upper side.")
+    assert text[2].startswith("posture is missed by 1.25: held back by")
+
+
+def test_explain_names_equalities_and_rows_that_disagree():
+    h = Hierarchy.from_levels(
+        [([[1.0, 0.0]], [1.0]), ([[1.0, 0.0]], [2.0]), (np.zeros((0, 2)), []),
+         ([[0.0, 1.0], [0.0, 1.0]], [0.0, 1.0])], names=["hand", "elbow", "none", "wrist"])
+    assert explain(h, HCOD.solve(h)).splitlines() == [
+        "hand is met.", "elbow is missed by 1: held back by hand.", "none asks for nothing.",
+        "wrist is missed by 0.707: its own rows disagree."]
+
+
+def test_explain_needs_to_know_the_active_set():
+    h = Hierarchy.from_levels([([[1.0]], [1.0])])
+    with pytest.raises(HierarchyError, match="hcod"):
+        explain(h, make("tpm").solve(h))
+
+
+def test_rows_without_sides_and_empty_sides_do_nothing():
+    h = Hierarchy.from_levels([([[1.0, 0.0]], [-INF], [INF]), ([[0.0, 0.0]], [-1.0], [1.0]),
+                               ([[1.0, 1.0]], [2.0], [INF])], reference=[0.5, 0.0])
+    res = HCOD.solve(h)
+    np.testing.assert_allclose(res.x, [1.25, 0.75])
+    assert res.active.tolist() == [0, 0, -1]
+
+
+def test_a_zero_row_that_cannot_be_met_disturbs_nobody():
+    h = Hierarchy.from_levels([(np.zeros((1, 2)), [1.0], [2.0]), ([[1.0, 1.0]], [4.0])])
+    res = HCOD.solve(h)
+    assert res.status is Status.SOLVED
+    np.testing.assert_allclose(res.x, [2, 2])
+    np.testing.assert_allclose(h.violations(res.x), [1, 0], atol=1e-15)
+
+
+def test_inequalities_stay_violated_where_they_must():
+    h = Hierarchy.from_levels([([[1.0], [1.0]], [1.0, -INF], [INF, -1.0])])
+    res = HCOD.solve(h)
+    np.testing.assert_allclose(res.x, [0.0], atol=1e-12)
+    np.testing.assert_allclose(res.multipliers, [-1, 1])
+    assert res.holds_back.tolist() == [0, 0]
+
+
+@pytest.mark.parametrize("scale", [1e-6, 1.0, 1e6])
+def test_the_answer_scales_with_the_data(scale):
+    for h, x, _ in list(family("INEQ7"))[:20]:
+        scaled = Hierarchy(h.A, h.lower * scale, h.upper * scale, h.sizes, h.reference, h.names)
+        np.testing.assert_allclose(HCOD.solve(scaled).x, x * scale, rtol=1e-7,
+                                   atol=1e-8 * scale * np.abs(x).max())
+
+
+def test_a_reference_is_reached_as_far_as_the_rows_allow():
+    h = Hierarchy.from_levels([([[1.0, 0.0]], [-1.0], [1.0])], reference=[5.0, 7.0])
+    res = HCOD.solve(h)
+    np.testing.assert_allclose(res.x, [1, 7])
+    assert res.holds_back.tolist() == [1]
+
+
+@pytest.mark.parametrize("spoil", ["A", "lower", "upper", "reference"])
+def test_bad_numbers_after_construction_are_a_status(spoil):
+    h = two_joints()
+    getattr(h, spoil).flat[0] = np.nan
+    res = HCOD.solve(h)
+    assert res.status is Status.NUMERICAL_FAILURE
+    assert not res.x.any()
+
+
+@pytest.mark.parametrize(("settings", "said"), [
+    ({"guesses": 0}, "guesses = 0"), ({"guesses": 1.5}, "guesses = 1.5"),
+    ({"max_iterations": 0}, "max_iterations"), ({"tolerance": 0.0}, "tolerance"),
+    ({"tolerence": 1e-9}, "did you mean 'tolerance'"), ({"_settings": 1}, "unknown setting"),
+])
+def test_bad_settings_are_named(settings, said):
+    with pytest.raises(HierarchyError, match=said):
+        make("hcod", **settings)
