@@ -180,6 +180,9 @@ class _Cascade:
         self.N = self.N @ free
         self.kept = self.kept.and_(rows.where(~fixed).normalised())
 
+    def _seen(self, rows: Rows) -> Rows:
+        return rows.seen(self.N, self.settings.rank_tolerance)
+
     def _split(self, M: Array, norms: Array) -> tuple[Array, Array]:
         return split(M, norms, self.settings.rank_tolerance)
 
@@ -212,12 +215,12 @@ class _Cascade:
         """
         kept, N = self._movable(), self.N
         p = N.shape[1]
-        seen = Rows(np.empty((0, p)), np.empty(0), np.empty(0)) if last else goal.seen(N)
-        E, e = np.vstack([seen.A, lam * np.eye(p)]), np.concatenate([seen.lower, np.zeros(p)])
         if last:
             E, e = np.eye(p), N.T @ goal.lower
-        elif not lam:
-            E, e = seen.A, seen.lower
+        elif lam:
+            E, e = np.vstack([goal.A @ N, lam * np.eye(p)]), np.pad(goal.lower, (0, p))
+        else:
+            E, e = goal.A @ N @ own @ own.T, goal.lower
         vouched = False
         for wider in _WIDER:
             z, found = self._ask(goal, limits, kept.relaxed(wider * self.settings.slack), lam, last)
@@ -225,7 +228,8 @@ class _Cascade:
             if not kept.lower.size and not limits.lower.size:
                 return self._least_squares(z, E, e, own, lam), np.empty(0)
             for start in (z, np.zeros(p)):  # zero keeps all of `kept`: x does
-                exact = refined(start, E, e, limits.seen(N), kept.seen(N))
+                exact = refined(start, E, e, self._seen(limits), self._seen(kept),
+                                self.settings.rank_tolerance)
                 if exact is not None:
                     off = norm(exact[0] - z) > self._allowed()
                     self.corrected += bool(off)
@@ -259,8 +263,8 @@ class _Cascade:
             return self.N.T @ d[:self.h.n], found
         if start is not None:
             start = self.N.T @ start
-        program = _null_space_program(goal.seen(self.N), limits.seen(self.N), kept.seen(self.N),
-                                      lam, start)
+        program = _null_space_program(self._seen(goal), self._seen(limits), self._seen(kept), lam,
+                                      start)
         z, found = program.solve(self.backend)
         return z[:self.N.shape[1]], found
 

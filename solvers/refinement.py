@@ -42,9 +42,11 @@ class Rows:
         value = self.A @ x
         return Rows(self.A, self.lower - value, self.upper - value)
 
-    def seen(self, N: Array) -> Rows:
-        """Return the same rows on z, where the unknown is N z."""
-        return Rows(self.A @ N, self.lower, self.upper)
+    def seen(self, N: Array, rank_tolerance: float) -> Rows:
+        """Return the same rows on z, where the unknown is N z; zeros where N leaves only those."""
+        A = self.A @ N
+        A[norm(A, axis=1) <= rank_tolerance * norm(self.A, axis=1)] = 0.0
+        return Rows(A, self.lower, self.upper)
 
     def normalised(self) -> Rows:
         """Return the rows divided by their norms, without those of zeros."""
@@ -93,13 +95,14 @@ def split(M: Array, norms: Array, rank_tolerance: float) -> tuple[Array, Array]:
     return Vt[:rank].T, Vt[rank:].T
 
 
-def refined(z: Array, E: Array, e: Array, limits: Rows, kept: Rows
+def refined(z: Array, E: Array, e: Array, limits: Rows, kept: Rows, rank_tolerance: float
             ) -> tuple[Array, Array] | None:
     """Move from a backend's z to the exact minimiser for its active set, corrected where needed.
 
     Minimised is ||E z - e||^2 + ||excess of limits||^2 within the kept rows. Returns z, and +1,
     -1 or 0 for each limit that is violated above, below, or not. The result has passed the
-    optimality conditions; None where no step did.
+    optimality conditions; None where no step did. Rows are of the order of one; what their singular
+    values fall short of `rank_tolerance` is not moved.
     """
     active, excess = kept.sides(z, ACTIVE), limits.excess(z)
     broken = np.sign(excess) * (abs(excess) > ACTIVE)
@@ -107,10 +110,10 @@ def refined(z: Array, E: Array, e: Array, limits: Rows, kept: Rows
         on, out = active != 0, broken != 0
         B, c = np.vstack([E, limits.A[out]]), np.concatenate([e, limits.at(broken)[out]])
         G, g = kept.A[on], kept.at(active)[on]
-        new = z + np.linalg.pinv(G, rcond=EXACT) @ (g - G @ z)
-        free = split(G, np.ones(len(G)), EXACT)[1]
-        new = new + free @ np.linalg.lstsq(B @ free, c - B @ new, rcond=EXACT)[0]
-        new = _moved_inside(new, free @ split(B @ free, norm(B, axis=1), EXACT)[1],
+        step_on, free = _least(G, g - G @ z, rank_tolerance)
+        new = z + step_on
+        step_in, still = _least(B @ free, c - B @ new, rank_tolerance)
+        new = _moved_inside(new + free @ step_in, free @ still,
                             kept.where(~on).and_(limits.where(~out)))
         if not np.isfinite(new).all():
             return None
@@ -134,6 +137,16 @@ def refined(z: Array, E: Array, e: Array, limits: Rows, kept: Rows
                 next_broken = _first_change(broken, next_broken)
         active, broken = next_active, next_broken
     return None
+
+
+def _least(M: Array, r: Array, tolerance: float) -> tuple[Array, Array]:
+    """Return the shortest y that minimises ||M y - r||, and a basis of what does not change M y.
+
+    Singular values up to `tolerance` are zero.
+    """
+    U, s, Vt = np.linalg.svd(M)
+    rank = int((s > tolerance).sum())
+    return Vt[:rank].T @ ((U.T[:rank] @ r) / s[:rank]), Vt[rank:].T
 
 
 def _moved_inside(z: Array, D: Array, rows: Rows) -> Array:

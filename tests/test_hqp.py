@@ -10,7 +10,7 @@ from rank_cases import family, generic
 from hierarchy import Hierarchy, HierarchyError
 from hierarchy.errors import UnknownNameError
 from scenarios.bench.families import well_posed_levels
-from solvers import Status, backends, make
+from solvers import Status, backends, certify, make, problems
 
 BACKENDS = [make("hqp", backend=name, form=form)
             for name in backends.BACKENDS for form in ("null-space", "slack")]
@@ -43,6 +43,32 @@ def test_an_answer_is_right_or_says_that_it_is_not(hqp, name):
 @every_backend
 def test_nearly_all_arms_with_limits_are_solved(hqp):
     assert sum(hqp.solve(h).status is Status.SOLVED for h, _, _ in family("INEQ7")) >= 48
+
+
+SMALL = dataclasses.replace(problems.ANY, joints=(1, 15), levels=(1, 6), rows=(0, 10))
+
+
+@every_backend
+def test_no_answer_to_a_generated_problem_is_called_solved_without_being_right(hqp):
+    solved = 0
+    for seed in range(360, 400):
+        h = problems.generate(seed, SMALL)
+        res = hqp.solve(h)
+        assert np.isfinite(res.x).all()
+        if res.status is Status.SOLVED:
+            solved += 1
+            assert certify(h, res.x, hqp.accuracy).optimal, seed
+    assert solved >= 37
+
+
+@every_backend
+def test_a_row_opposite_to_one_above_moves_x_nowhere(hqp):
+    """What is left of it beside the row above is rounding, and dividing by that led to 5e14."""
+    a = np.array([0.74016879, 0.67242112])
+    h = Hierarchy.from_levels([([a], [0.938], [1.75]), ([-a], [-0.518])], reference=[-1.9, 0.5])
+    res = hqp.solve(h)
+    assert_close(hqp, h.violations(res.x), [0.0, 0.42])
+    assert np.linalg.norm(res.x) < 5.0
 
 
 @every_backend
