@@ -63,7 +63,7 @@ def solve_by_stages(A, lower, upper, sizes, x, record, settings):
     scale, reference = of_rows[5], of_columns[6]
     of_row = np.empty((4, m), np.int64)
     state, unit, soft, order = of_row[0], of_row[1], of_row[2], of_row[3]
-    hard = np.empty(n, np.int64)
+    hard = np.empty(m, np.int64)  # more than n may ask to be held
     if prepare(A, lower, upper, x, active, held, multiplier, scale) < 0:
         return finish(x, NUMERICAL_FAILURE)
     for c in range(n):
