@@ -1,4 +1,4 @@
-"""The Python in README and CONTRIBUTING runs as printed."""
+"""The Python in the documents runs as printed."""
 
 import re
 from pathlib import Path
@@ -7,7 +7,7 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 BLOCK = re.compile(r"```python\n(.*?)```", re.DOTALL)
-BLOCKS = [(name, i, code) for name in ("README.md", "CONTRIBUTING.md")
+BLOCKS = [(name, i, code) for name in ("README.md", "CONTRIBUTING.md", "docs/hcod.md")
           for i, code in enumerate(BLOCK.findall((ROOT / name).read_text(encoding="utf-8")))]
 
 
