@@ -13,6 +13,8 @@ from solvers.backends import Backend, Program, backend_of
 from solvers.refinement import EXACT, Rows, refined, split
 from solvers.resolver import Resolution, Resolver, Status, register
 
+FORMS = ("null-space", "slack")
+
 _SHARE = 0.01  # of the declared accuracy: what one level may be off by, since lower ones magnify it
 _WIDER = (1.0, 100.0)  # times `slack`: tried one after the other
 
@@ -72,7 +74,7 @@ class Hqp(Resolver):
     def __post_init__(self) -> None:
         super().__post_init__()
         self._number("slack", 0.0, 1.0)
-        self._one_of("form", ("null-space", "slack"))
+        self._one_of("form", FORMS)
         backend_of(self.backend)
 
     @property

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from hierarchy import HierarchyError
-from scenarios.bench import candidates, families, machine, resolvers
+from scenarios.bench import candidates, cascade, families, machine, resolvers
 from scenarios.bench.families import family, well_posed_levels
 from solvers import Status, backends
 
@@ -36,6 +36,18 @@ def test_a_row_for_everybody_and_every_family(few, tmp_path, capsys, monkeypatch
     assert {path.name for path in tmp_path.iterdir()} == {
         "resolvers.csv", "machine.json", "time-accuracy.svg", "time-accuracy.png"}
     assert "processor" in json.loads((tmp_path / "machine.json").read_text())
+    out = capsys.readouterr().out
+    assert max(map(len, out.splitlines())) <= 80
+    assert "…" not in out
+
+
+def test_the_share_that_each_backend_solves_is_counted(capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    monkeypatch.setattr(cascade, "family", lambda name: family(name)[:2])
+    rows = cascade.run(("EQ7", "INEQ7"))
+    assert len(rows) == 2 * 2 * len(backends.BACKENDS)
+    assert all(row["largest_error"] <= 10.0 * row["accuracy"] for row in rows)
+    assert all(row["solved"] == 1.0 for row in rows if row["family"] == "EQ7")
     out = capsys.readouterr().out
     assert max(map(len, out.splitlines())) <= 80
     assert "…" not in out
