@@ -1,7 +1,7 @@
 # make demo    set up, run the main job, say where its report is
 # make test    set up, then lint, types, import rules and every test: what CI runs
 # make bench   time the resolvers and the control tick
-# make stress  a resolver on a million generated problems, every answer certified; about an hour
+# make stress  a resolver on a million generated problems, every answer certified; half an hour
 # make docs    check that what the documents point at exists (they are plain Markdown)
 # make clean   remove what the targets above made
 #
