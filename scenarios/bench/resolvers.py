@@ -36,9 +36,10 @@ largest such difference of those called solved. /DAQP, /numpy: ratios of medians
 memory of the same problem with its targets moved by up to 1 %.
 Known limits. DAQP's hierarchical mode minimises violations divided by the norms of the rows, \
 another problem where rows differ in norm and conflict, softened by a finite weight; rows of \
-zeros are infeasible to it; its arrays are made ready before the clock starts. augmented and tpm published are \
-not strict at every rank. Resolvers of equalities are not asked about inequalities. In DEGEN7 \
-levels below a nearly parallel pair of rows are ill-posed and not compared."""
+zeros are infeasible to it; its arrays are made ready before the clock starts. augmented and \
+tpm published are not strict at every rank. Resolvers of equalities are not asked about \
+inequalities. In DEGEN7 levels below a nearly parallel pair of rows are ill-posed and not \
+compared."""
 
 
 @dataclass
