@@ -12,7 +12,9 @@ level, and for x - reference with the rows of all levels. The projection d of -A
 polar of that cone, found with a QR factorisation for the span and non-negative least squares for
 the cone, is the feasible direction of steepest descent (Moreau); |d|^2 / |A_k d| is what the
 violation loses along it to first order. This is the residual: zero at the answer, of the order of
-the error in A_k x elsewhere, at most |w_k| always.
+the error in A_k x elsewhere, at most |w_k| always. It is a lower bound: where rows of a level are
+nearly parallel, more could be gained than the steepest direction shows, and the level named may be
+one below the level at fault.
 """
 
 from __future__ import annotations
