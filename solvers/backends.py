@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
@@ -11,10 +10,7 @@ from importlib import import_module
 from types import MappingProxyType
 from typing import Any, final
 
-import numpy as np
-
 from hierarchy.errors import HierarchyError, UnknownNameError
-from hierarchy.problem import Array
 
 # OSQP looks for its MKL and CUDA builds on disk at every program, a fifth of its time, unless told.
 os.environ.setdefault("OSQP_ALGEBRA_BACKEND", "builtin")
@@ -87,48 +83,3 @@ def installed(name: str) -> bool:
     except ImportError:
         return False
     return True
-
-
-@final
-@dataclass(frozen=True)
-class Program:
-    """min y^T P y / 2 + q^T y with lower <= A y <= upper and F y = f, begun from y = start."""
-
-    P: Array
-    q: Array
-    A: Array
-    lower: Array
-    upper: Array
-    F: Array
-    f: Array
-    start: Array | None = None
-
-    def solve(self, backend: Backend) -> tuple[Array, bool]:
-        """Return the backend's y, and whether it vouches for it; zeros where it gave none."""
-        import qpsolvers
-
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # backends warn of what their status says anyway
-            try:
-                solution = qpsolvers.solve_problem(
-                    qpsolvers.Problem(*self._matrices(backend)), solver=backend.name,
-                    initvals=self.start if backend.starts else None, **backend.options)
-            except Exception:  # backends raise whatever they like; all of it is their failure
-                return np.zeros(len(self.q)), False
-        if solution.x is None or not np.isfinite(solution.x).all():
-            return np.zeros(len(self.q)), False
-        return np.asarray(solution.x), bool(solution.found)
-
-    def _matrices(self, backend: Backend) -> tuple[Any, ...]:
-        """Return P, q, G, h, F, f as the backend wants them, with G y <= h for both sides."""
-        from scipy.sparse import csc_matrix  # type: ignore[import-untyped]
-
-        kind = csc_matrix if backend.sparse else np.ascontiguousarray
-        up, low = np.isfinite(self.upper), np.isfinite(self.lower)
-        P = self.P + backend.regularisation * np.eye(len(self.q))
-        rows: tuple[Any, Any] = (None, None)
-        if len(self.A):
-            rows = (kind(np.vstack([self.A[up], -self.A[low]])),
-                    np.concatenate([self.upper[up], -self.lower[low]]))
-        fixed = (kind(self.F), self.f) if self.f.size else (None, None)
-        return kind(P), self.q, *rows, *fixed

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.linalg import norm
 
 from hierarchy.problem import Array, Hierarchy
-from solvers.backends import Backend, Program, backend_of
+from solvers.backends import Backend, backend_of
+from solvers.programs import null_space_program, slack_program
 from solvers.refinement import EXACT, Rows, refined, split
 from solvers.resolver import Resolution, Resolver, Status, register
 
@@ -260,50 +261,12 @@ class _Cascade:
         start = self.starts[len(self.steps)] if self.starts else None
         self.programs += 1
         if self.settings.form == "slack":
-            d, found = _slack_program(goal, limits, kept, self.F, lam, last, start).solve(
+            d, found = slack_program(goal, limits, kept, self.F, lam, last, start).solve(
                 self.backend)
             return self.N.T @ d[:self.h.n], found
         if start is not None:
             start = self.N.T @ start
-        program = _null_space_program(self._seen(goal), self._seen(limits), self._seen(kept), lam,
+        program = null_space_program(self._seen(goal), self._seen(limits), self._seen(kept), lam,
                                       start)
         z, found = program.solve(self.backend)
         return z[:self.N.shape[1]], found
-
-
-def _null_space_program(goal: Rows, limits: Rows, kept: Rows, lam: float,
-                        start: Array | None) -> Program:
-    """Unknowns: z, and w (k,) the signed violation of each limit."""
-    p, k = goal.A.shape[1], limits.lower.size
-    P = np.eye(p + k)
-    P[:p, :p] = goal.A.T @ goal.A + lam**2 * np.eye(p)
-    A = np.block([[limits.A, -np.eye(k)], [kept.A, np.zeros((kept.lower.size, k))]])
-    begin = None if start is None else np.concatenate([start, limits.excess(start)])
-    return Program(P, np.concatenate([-goal.A.T @ goal.lower, np.zeros(k)]), A,
-                   np.concatenate([limits.lower, kept.lower]),
-                   np.concatenate([limits.upper, kept.upper]),
-                   np.empty((0, p + k)), np.empty(0), begin)
-
-
-def _slack_program(goal: Rows, limits: Rows, kept: Rows, F: Array, lam: float, last: bool,
-                   start: Array | None) -> Program:
-    """Unknowns: the step d (n,), and w (k,) what each goal and limit is missed by; F d = 0.
-
-    The last program, where `goal` is d itself, is written without w.
-    """
-    n, m, k = goal.A.shape[1], 0 if last else goal.lower.size, limits.lower.size
-    P = np.eye(n + m + k)
-    P[:n, :n] *= 1.0 if last else lam**2
-    q = np.zeros(n + m + k)
-    q[:n] = -goal.lower if last else 0.0
-    kept_rows = np.hstack([kept.A, np.zeros((kept.lower.size, m + k))])
-    limit_rows = np.hstack([limits.A, np.zeros((k, m)), -np.eye(k)])
-    goal_rows = np.hstack([goal.A[:m], -np.eye(m), np.zeros((m, k))])
-    settled = np.hstack([F, np.zeros((len(F), m + k))])
-    begin = None if start is None else np.concatenate(
-        [start, (goal.A @ start - goal.lower)[:m], limits.excess(start)])
-    return Program(P, q, np.vstack([limit_rows, kept_rows]),
-                   np.concatenate([limits.lower, kept.lower]),
-                   np.concatenate([limits.upper, kept.upper]),
-                   np.vstack([goal_rows, settled]),
-                   np.concatenate([goal.lower[:m], np.zeros(len(F))]), begin)

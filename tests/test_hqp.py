@@ -10,7 +10,7 @@ from rank_cases import family, generic
 from hierarchy import Hierarchy, HierarchyError
 from hierarchy.errors import UnknownNameError
 from scenarios.bench.families import well_posed_levels
-from solvers import Status, backends, certify, make, problems
+from solvers import Status, backends, certify, make, problems, programs
 
 BACKENDS = [make("hqp", backend=name, form=form)
             for name in backends.BACKENDS for form in ("null-space", "slack")]
@@ -199,7 +199,7 @@ LIMITS_BELOW = Hierarchy.from_levels([([[1.0, 0.0]], [2.0]), (np.eye(2), [-1.0, 
 @pytest.mark.parametrize(("vouched", "status"), [(False, Status.BACKEND_FAILURE),
                                                  (True, Status.INACCURATE)])
 def test_an_answer_that_cannot_be_shown_right_leaves_the_levels_above(vouched, status, monkeypatch):
-    monkeypatch.setattr(backends.Program, "solve", lambda *_: (np.full(9, 0.1), vouched))
+    monkeypatch.setattr(programs.Program, "solve", lambda *_: (np.full(9, 0.1), vouched))
     monkeypatch.setattr("solvers.hqp.refined", lambda *_: None)
     res = make("hqp").solve(LIMITS_BELOW)
     assert res.status is status
