@@ -33,7 +33,7 @@ def _level(h: Hierarchy, resolution: ActiveSetResolution, k: int, tolerance: flo
     w = h.slacks(resolution.x)[rows]
     size = np.linalg.norm(h.A[rows]) * np.linalg.norm(resolution.x) + 1e-300
     missed = float(np.linalg.norm(w))
-    held_by = [_row(h, resolution, i) for i in np.flatnonzero(resolution.holds_back == k)
+    held_by = [_row(h, resolution, int(i)) for i in np.flatnonzero(resolution.holds_back == k)
                if i < h.offsets[k]]
     equalities = _equalities_in_the_way(h, resolution, k, w)
     if missed <= tolerance * size:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array, Hierarchy
+from solvers.certificate import certify
 from solvers.kernels.hcod import UNPROVED, hcod
 from solvers.kernels.stages import solve_by_stages
 from solvers.resolver import Resolution, Resolver, Status, register
@@ -77,6 +78,9 @@ class Hcod(Resolver):
     equalities alone it is `tpm`, to the last digit; its damping is that of `tpm` too, with
     inequality rows that act counted as rows of their level.
 
+    Where nearly parallel rows, or rows of very different scale, leave a doubt about the active set,
+    `certify` judges; an answer that it does not accept has Status.INACCURATE.
+
     tolerance : of violations and multipliers, relative to the size of the terms they are made of.
     guesses : active sets tried before going level by level; at least 1.
     max_iterations : steps by levels, then Status.ITERATION_LIMIT: x keeps the levels above the
@@ -120,7 +124,25 @@ class Hcod(Resolver):
         if code == UNPROVED:
             x[:] = h.reference
             code = solve_by_stages(h.A, h.lower, h.upper, h.sizes, x, record, self._settings)
-        return ActiveSetResolution(x, Status(code), record)
+        resolution = ActiveSetResolution(x, Status(code), record)
+        return self._without_doubt(h, resolution) if code == Status.INACCURATE else resolution
+
+    def _without_doubt(self, h: Hierarchy, first: ActiveSetResolution) -> ActiveSetResolution:
+        """Let `certify` judge a doubtful answer, and others found with finer tolerances."""
+        answer = first
+        for tolerance in (None, *_FINER):
+            if tolerance is not None:
+                x, record = h.reference.copy(), first.memory.copy()
+                settings = self._settings.copy()
+                settings[3] *= tolerance
+                code = solve_by_stages(h.A, h.lower, h.upper, h.sizes, x, record, settings)
+                answer = ActiveSetResolution(x, Status(code), record)
+            if answer.status in (Status.SOLVED, Status.INACCURATE) and certify(
+                    h, answer.x).certified:
+                answer.status = Status.SOLVED
+                return answer
+        return first
 
 
 _SOLVED = Status.SOLVED
+_FINER = (1e-2, 1e-3)  # shares of the tolerance that a doubtful answer is tried again with

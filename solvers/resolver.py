@@ -38,8 +38,9 @@ _REMEDIES = {
                               "entries so large that their squares overflow",
     Status.BACKEND_FAILURE: "x keeps the levels that were finished; try another backend, or scale "
                             "the rows to a similar norm",
-    Status.INACCURATE: "an answer was found but not shown to be right, and is left out; x keeps "
-                       "the levels that were finished; try another backend or resolver",
+    Status.INACCURATE: "an answer was found but not shown to be right: rows that are nearly "
+                       "parallel, or of very different scale, leave a doubt; try another "
+                       "resolver or backend",
 }
 
 

@@ -21,9 +21,12 @@ import numpy as np
 from hierarchy.compiled import compiled, inlined
 from solvers.kernels.block import solve_block
 from solvers.kernels.rows import (
+    DOUBT,
     EQUAL,
     FREE,
+    NEARLY_PARALLEL,
     NUMERICAL_FAILURE,
+    ROUNDING,
     SOLVED,
     ZERO,
     factor_level,
@@ -70,7 +73,8 @@ def _guess(A, lower, upper, sizes, x, record, settings, warm):
     levels = sizes.size
     active, held, multiplier = record[:m], record[m:2 * m], record[2 * m:3 * m]
     counts = record[3 * m:]
-    W = np.empty((m + n + 6, n))  # active rows, reflectors of Q, x, and five vectors
+    # Active rows, reflectors of Q, x, five vectors, and a basis of what a level finds free.
+    W = np.empty((m + 2 * n + 6, n))
     of_rows, of_levels = np.empty((4, m)), np.empty(m + 2 * levels + 2, np.int64)
     scale, zero, miss, w = of_rows[0], of_rows[1], of_rows[2], of_rows[3]
     at = m + n + 1
@@ -87,9 +91,11 @@ def _guess(A, lower, upper, sizes, x, record, settings, warm):
         counts[0] += 1.0
         _solve_guess(A, lower, upper, sizes, reference, x, active, scale, W, row, first, rank, zero,
                      miss, beta, y, pull, damping, threshold, rank_tolerance)
+        if _nearly_parallel(W, row, first, rank, scale):
+            return UNPROVED
         _residuals(first, rank, W, miss, y, w, damping)
         if _improve(A, lower, upper, reference, x, active, held, multiplier, scale, W, row, first,
-                    rank, w, g, pull, damping, tolerance):
+                    rank, w, g, beta, pull, damping, tolerance):
             return finish(x, SOLVED)
     return UNPROVED
 
@@ -118,11 +124,21 @@ def _solve_guess(A, lower, upper, sizes, reference, x, active, scale, W, row, fi
         begin_row = end_row
         if q == begin:
             continue
-        reflect_rows(W, beta, V, ZERO, above, begin, q)
+        tall = _is_tall(q - begin, above, n)
+        if tall:
+            _see_in_basis(A, W, row, miss, beta, V, y, begin, q, above)
+        else:
+            reflect_rows(W, beta, V, ZERO, above, begin, q)
         r = factor_level(W, row, zero, miss, beta, V, begin, q, r)
-        for p in range(begin, q):
-            for c in range(above):
-                miss[p] -= W[p, c] * y[c]
+        if tall:  # the rows in pivot order are needed whole, for the multipliers
+            for p in range(begin, begin + r - above):
+                for c in range(n):
+                    W[p, c] = A[row[p], c]
+            reflect_rows(W, beta, V, ZERO, r, begin, begin + r - above)
+        else:
+            for p in range(begin, q):
+                for c in range(above):
+                    miss[p] -= W[p, c] * y[c]
         solve_block(W, miss, y, begin, q, above, r, damping, threshold)
     first[sizes.size], rank[sizes.size] = q, r
     for c in range(n):
@@ -135,6 +151,78 @@ def _solve_guess(A, lower, upper, sizes, reference, x, active, scale, W, row, fi
         reflect_rows(W, beta, V, k, k + 1, X, X + 1)
     for c in range(n):
         x[c] = W[X, c]
+
+
+@inlined
+def _nearly_parallel(W, row, first, rank, scale):
+    """Whether so little is left of a row behind those before it that x is worth a doubt."""
+    nearly = False
+    for k in range(first.size - 1):
+        for c in range(rank[k], rank[k + 1]):
+            q = first[k] + c - rank[k]
+            nearly |= abs(W[q, c]) < NEARLY_PARALLEL * scale[row[q]]
+    return nearly
+
+
+@inlined
+def _is_tall(rows, above, n):
+    """Whether a level has so many rows that a basis of the free directions is cheaper."""
+    free = n - above
+    by_basis = (free + 1) * (above + rows // 2) + free * (above + free)
+    return above > 0 and rows * above > by_basis
+
+
+@inlined
+def _see_in_basis(A, W, row, miss, beta, V, y, begin, end, above):
+    """Write a level's rows as seen from above by products with the directions left free.
+
+    The columns of Q from `above` on, and the x of the levels above, are made by reflecting unit
+    vectors and y back: fewer reflections than there are rows.
+    """
+    n = A.shape[1]
+    Z, free = V + n + 6, n - above  # V + n + 6: behind the reflectors, x and the five vectors
+    for j in range(free + 1):
+        for c in range(n):
+            W[Z + j, c] = 0.0
+        if j < free:
+            W[Z + j, above + j] = 1.0
+        else:
+            for c in range(above):
+                W[Z + j, c] = y[c]
+    for k in range(above - 1, -1, -1):
+        reflect_rows(W, beta, V, k, k + 1, Z, Z + free + 1)
+    for p in range(begin, end):
+        i = row[p]
+        for j in range(free + 1):
+            product = 0.0
+            for c in range(n):
+                product += A[i, c] * W[Z + j, c]
+            if j < free:
+                W[p, above + j] = product
+            else:
+                miss[p] -= product
+
+
+@inlined
+def _pull_of_level(A, W, row, w, g, beta, V, begin, end, above):
+    """Write Q^T A_k^T w_k into g, in the columns of the levels above."""
+    n = A.shape[1]
+    if not _is_tall(end - begin, above, n):
+        for c in range(above):
+            g[c] = 0.0
+        for q in range(begin, end):
+            for c in range(above):
+                g[c] += w[q] * W[q, c]
+        return
+    Z = V + n + 6
+    for c in range(n):
+        W[Z, c] = 0.0
+    for q in range(begin, end):
+        for c in range(n):
+            W[Z, c] += w[q] * A[row[q], c]
+    reflect_rows(W, beta, V, ZERO, above, Z, Z + 1)
+    for c in range(above):
+        g[c] = W[Z, c]
 
 
 @inlined
@@ -155,7 +243,7 @@ def _residuals(first, rank, W, miss, y, w, damping):
 
 @inlined
 def _improve(A, lower, upper, reference, x, active, held, multiplier, scale, W, row, first, rank,
-             w, g, pull, damping, tolerance):
+             w, g, beta, pull, damping, tolerance):
     """Say whether the guess is right; otherwise let violated rows act, and rows that pull rest."""
     m, n = A.shape
     levels = first.size - 1
@@ -178,38 +266,48 @@ def _improve(A, lower, upper, reference, x, active, held, multiplier, scale, W, 
         held[i], multiplier[i] = -1.0, 0.0
     for k in range(levels + 1):
         if k == levels:
+            pulled = 0.0
+            for c in range(n):
+                pulled += (x[c] - reference[c]) ** 2
+            pulled = np.sqrt(pulled)
             noise = max(size, np.sqrt(square))
+            missed = pulled > tolerance * noise
             for c in range(rank[k]):
                 g[c] = pull[c]
         elif damping == 0.0 and first[k + 1] - first[k] == rank[k + 1] - rank[k]:
             continue
         else:
-            noise = 0.0
-            for c in range(rank[k]):
-                g[c] = 0.0
+            noise = pulled = 0.0
+            missed = False
             for q in range(first[k], first[k + 1]):
                 i = row[q]
                 around = scale[i] * size + abs(upper[i] if active[i] > 0 else lower[i])
                 noise = max(noise, scale[i] * around)
+                pulled += abs(w[q]) * scale[i]
+                missed |= scale[i] > 0.0 and abs(w[q]) > tolerance * around
                 if active[i] != EQUAL:
-                    if active[i] * w[q] < -tolerance * around:
+                    if active[i] * w[q] < -ROUNDING * around:
                         active[i] = FREE
                         right = False
                     elif active[i] * w[q] > tolerance * around:
                         held[i], multiplier[i] = k, w[q]
-                for c in range(rank[k]):
-                    g[c] += w[q] * W[q, c]
-        right &= _signs_kept(row, first, rank, W, g, active, held, multiplier, scale, k,
-                             tolerance * noise)
+        if missed:
+            if k < levels:
+                _pull_of_level(A, W, row, w, g, beta, m, first[k], first[k + 1], rank[k])
+            right &= _signs_kept(row, first, rank, W, g, active, held, multiplier, scale, k,
+                                 max(tolerance * pulled, ROUNDING * noise), DOUBT * pulled)
         if not right:
             break
     return right
 
 
 @inlined
-def _signs_kept(row, first, rank, W, g, active, held, multiplier, scale, k, tolerance):
-    """Give the rows above level k their multipliers in it; free those that pull, if any."""
-    kept = True
+def _signs_kept(row, first, rank, W, g, active, held, multiplier, scale, k, sure, doubt):
+    """Give the rows above level k their multipliers in it; free those that pull, if any.
+
+    False if any pulls, or if multipliers that matter cannot be told from rounding.
+    """
+    kept = not sure > doubt > 0.0
     for j in range(k - 1, -1, -1):
         for c in range(rank[j + 1] - 1, rank[j] - 1, -1):
             q = first[j] + c - rank[j]
@@ -220,9 +318,9 @@ def _signs_kept(row, first, rank, W, g, active, held, multiplier, scale, k, tole
             if active[i] == EQUAL or held[i] >= 0:
                 continue
             push = active[i] * force * scale[i]
-            if push > tolerance:
+            if push > sure:
                 held[i], multiplier[i] = k, force
-            elif push < -tolerance:
+            elif push < -sure:
                 active[i] = FREE
                 kept = False
     return kept

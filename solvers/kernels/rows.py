@@ -18,6 +18,11 @@ ZERO = np.int64(0)
 # Values of solvers.Status; -(i + 1) refuses row i, an inequality.
 SOLVED, ITERATION_LIMIT, NUMERICAL_FAILURE = 0, 1, 2
 
+INACCURATE = 4
+# A multiplier is known to ROUNDING times the size of the rows that it balances: where rows of very
+# different scale conflict, that is more than DOUBT times what they really pull.
+ROUNDING, DOUBT = 1e-13, 1e-6
+NEARLY_PARALLEL = 1e-5  # what is left of a row behind others, as a share; less is worth a doubt
 FREE, EQUAL = 0, 2  # what a row does; -1 and +1: it acts at its lower or upper side
 
 

@@ -22,9 +22,13 @@ import numpy as np
 from hierarchy.compiled import compiled, inlined
 from solvers.kernels.block import solve_block
 from solvers.kernels.rows import (
+    DOUBT,
     EQUAL,
+    INACCURATE,
     ITERATION_LIMIT,
+    NEARLY_PARALLEL,
     NUMERICAL_FAILURE,
+    ROUNDING,
     SOLVED,
     ZERO,
     factor_level,
@@ -36,6 +40,7 @@ from solvers.kernels.rows import (
 
 WATCHED, HELD, SOFT, FIXED = 1, 2, 3, 4  # state of a row; 0 while its level is still to come
 BLAND_AFTER = 20  # steps of length zero in one stage
+PATIENCE = 10  # steps of one stage for each of its rows, after which small multipliers are noise
 
 
 @compiled
@@ -43,7 +48,8 @@ def solve_by_stages(A, lower, upper, sizes, x, record, settings):
     """Solve; arguments and results as those of `hcod`, but record is only written.
 
     Where the iterations end early, x keeps all levels above the unfinished one, and that level is
-    as good as it got. Returns SOLVED, ITERATION_LIMIT or NUMERICAL_FAILURE.
+    as good as it got. Returns SOLVED, ITERATION_LIMIT, NUMERICAL_FAILURE, or INACCURATE where
+    nearly parallel rows, or rows of very different scale, leave a doubt.
     """
     m, n = A.shape
     levels = sizes.size
@@ -73,6 +79,7 @@ def solve_by_stages(A, lower, upper, sizes, x, record, settings):
         if active[i] != EQUAL:
             active[i] = 0.0
     fixed = first = ZERO
+    doubtful = False
     for k in range(levels + 1):
         at_reference = k == levels
         last = first if at_reference else first + sizes[k]
@@ -88,7 +95,7 @@ def solve_by_stages(A, lower, upper, sizes, x, record, settings):
                        _list_held(state, hard, first), held_at, V, beta, fixed, scale,
                        rank_tolerance)
         _copy_soft(W, ZERO, s, base, behind, V, beta, fixed, h)
-        still = ZERO
+        still = steps = ZERO
         while True:
             if counts[1] >= max_iterations:
                 counts[2] = k
@@ -128,16 +135,31 @@ def solve_by_stages(A, lower, upper, sizes, x, record, settings):
                     state[block], active[block] = FIXED, 0
                 continue
             size = _norm(x)
-            noise = _noise(lower, upper, active, scale, soft, s, size)
             if at_reference:
-                noise = max(size, _norm(reference))
-            _forces(W, h, held_at, fixed, g, force)
+                missed, sure, coarse, doubt = _pull_to_reference(x, reference, size,
+                                                                 tolerance)
+            else:
+                missed, sure, coarse, doubt = _pull_of_soft(lower, upper, active, scale, soft,
+                                                            order, s, w, size, tolerance)
+            steps += 1
+            inside = ROUNDING
+            if steps > PATIENCE * (h + s + 1):
+                sure, inside = max(sure, coarse), tolerance
+            if missed:
+                _forces(W, h, held_at, fixed, g, force)
+            else:
+                for q in range(h):
+                    force[q] = 0.0
             drop = _worst_pull(lower, upper, active, scale, hard, h, force, soft, order, s, w, size,
-                               noise, tolerance, bland)
+                               sure, inside, bland)
             if drop < 0:
                 break
-            active[drop], state[drop] = 0, WATCHED
+            was = active[drop]
             value[drop] = _value(A, unit, x, drop)
+            active[drop] = _side_missed(lower, upper, scale, value, drop, size, tolerance)
+            if drop >= first and active[drop] == -was:
+                continue  # beyond its other side now: it stays soft, and its target is that side
+            active[drop], state[drop] = 0, WATCHED
             if drop >= first:
                 s = _without(W, soft, s, base, drop)
             else:
@@ -145,14 +167,17 @@ def solve_by_stages(A, lower, upper, sizes, x, record, settings):
                 h = _hold_from(A, lower, upper, W, active, state, value, hard, place, h - 1,
                                held_at, V, beta, fixed, scale, rank_tolerance)
             _copy_soft(W, ZERO, s, base, behind, V, beta, fixed, h)
+        doubtful |= _are_doubtful(W, scale, hard, h, force, held_at, soft, order, fixed, rank, sure,
+                                  doubt)
         whole = _settle(lower, upper, active, state, held, multiplier, scale, hard, h, force, soft,
-                        order, s, w, size, noise, tolerance, k)
+                        order, s, w, size, sure, tolerance, k)
         if whole and not at_reference:
             fixed = rank
         elif not at_reference:
             fixed = _fix_again(A, W, state, scale, hard, h, soft, s, V, beta, fixed, rank_tolerance)
         first = last
-    return finish(x, SOLVED)
+    code = finish(x, SOLVED)
+    return INACCURATE if doubtful and code == SOLVED else code
 
 
 @inlined
@@ -187,16 +212,23 @@ def _norm(x):
 
 
 @inlined
+def _side_missed(lower, upper, scale, value, i, size, tolerance):
+    """+1 where row i is above its upper side, -1 where it is below its lower, 0 within."""
+    if value[i] > upper[i] + tolerance * (scale[i] * size + abs(upper[i])):
+        return 1
+    if value[i] < lower[i] - tolerance * (scale[i] * size + abs(lower[i])):
+        return -1
+    return 0
+
+
+@inlined
 def _take_soft(A, lower, upper, x, active, state, unit, scale, value, soft, first, last, tolerance):
     """List the rows that a level misses or must meet; the others are watched. Return how many."""
     size, s = _norm(x), 0
     for i in range(first, last):
-        v = value[i] = _value(A, unit, x, i)
+        value[i] = _value(A, unit, x, i)
         if active[i] != EQUAL:
-            if v > upper[i] + tolerance * (scale[i] * size + abs(upper[i])):
-                active[i] = 1
-            elif v < lower[i] - tolerance * (scale[i] * size + abs(lower[i])):
-                active[i] = -1
+            active[i] = _side_missed(lower, upper, scale, value, i, size, tolerance)
         state[i] = SOFT if active[i] != 0 else WATCHED
         if active[i] != 0:
             soft[s] = i
@@ -390,14 +422,44 @@ def _first_block(A, lower, upper, state, unit, scale, value, along, x, p, last, 
 
 
 @inlined
-def _noise(lower, upper, active, scale, soft, s, size):
-    """Size of the terms in a level's gradient: what its multipliers are small against."""
-    noise = 0.0
+def _pull_of_soft(lower, upper, active, scale, soft, order, s, w, size, tolerance):
+    """Whether a level is missed, and the size of multipliers that are sure, that are sure even if
+    rows are nearly parallel, and that matter.
+    """
+    noise = pulled = 0.0
+    missed = False
     for q in range(s):
-        i = soft[q]
-        bound = upper[i] if active[i] > 0 else lower[i]
-        noise = max(noise, scale[i] * (scale[i] * size + abs(bound)))
-    return noise
+        i = soft[order[q]]
+        around = scale[i] * size + abs(upper[i] if active[i] > 0 else lower[i])
+        noise = max(noise, scale[i] * around)
+        pulled += abs(w[q]) * scale[i]
+        missed |= scale[i] > 0.0 and abs(w[q]) > tolerance * around
+    return missed, max(tolerance * pulled, ROUNDING * noise), tolerance * noise, DOUBT * pulled
+
+
+@inlined
+def _pull_to_reference(x, reference, size, tolerance):
+    """Like `_pull_of_soft`, for the last stage."""
+    pulled = 0.0
+    for c in range(x.size):
+        pulled += (x[c] - reference[c]) ** 2
+    pulled, noise = np.sqrt(pulled), max(size, _norm(reference))
+    return (pulled > tolerance * noise, max(tolerance * pulled, ROUNDING * noise),
+            tolerance * noise, DOUBT * pulled)
+
+
+@inlined
+def _are_doubtful(W, scale, hard, h, force, held_at, soft, order, fixed, rank, sure, doubt):
+    """Whether a stage may be wrong: a multiplier too small to be sure of and too large to be
+    nothing, or a row of which little is left behind those before.
+    """
+    doubtful = h > 0 and sure > doubt > 0.0
+    for q in range(h):
+        push, size = abs(force[q]) * scale[hard[q]], NEARLY_PARALLEL * scale[hard[q]]
+        doubtful |= doubt < push <= sure or abs(W[held_at + q, fixed + q]) < size
+    for q in range(rank - fixed - h):
+        doubtful |= abs(W[q, fixed + h + q]) < NEARLY_PARALLEL * scale[soft[order[q]]]
+    return doubtful
 
 
 @inlined
@@ -410,23 +472,27 @@ def _forces(W, h, held_at, fixed, g, force):
 
 
 @inlined
-def _worst_pull(lower, upper, active, scale, hard, h, force, soft, order, s, w, size, noise,
-                tolerance, bland):
-    """The row that holds x back the wrong way most, or by Bland's rule the first; -1 if none."""
-    worst, drop = -tolerance, -1
+def _worst_pull(lower, upper, active, scale, hard, h, force, soft, order, s, w, size, sure, inside,
+                bland):
+    """The row that holds x back the wrong way most, or by Bland's rule the first; -1 if none.
+
+    How much is counted in `sure` for the held rows, and in `inside` times the size of its terms for
+    a soft row that is within its side.
+    """
+    worst, drop = -1.0, -1
     for q in range(h + s):
         if q < h:
             i = hard[q]
-            push = active[i] * force[q] * scale[i] / noise if noise > 0.0 else 0.0
+            push = active[i] * force[q] * scale[i] / sure if sure > 0.0 else 0.0
         else:
             i = soft[order[q - h]]
             if active[i] == EQUAL:
                 continue
             bound = upper[i] if active[i] > 0 else lower[i]
-            around = scale[i] * size + abs(bound)
+            around = inside * (scale[i] * size + abs(bound))
             push = active[i] * w[q - h] / around if around > 0.0 else 0.0
         if bland:
-            if push < -tolerance and (drop < 0 or i < drop):
+            if push < -1.0 and (drop < 0 or i < drop):
                 drop = i
         elif push < worst:
             worst, drop = push, i
@@ -435,12 +501,12 @@ def _worst_pull(lower, upper, active, scale, hard, h, force, soft, order, s, w, 
 
 @inlined
 def _settle(lower, upper, active, state, held, multiplier, scale, hard, h, force, soft, order, s, w,
-            size, noise, tolerance, k):
+            size, sure, tolerance, k):
     """Make the rows that a stage decided equalities for good; return whether it decided all."""
     whole = True
     for q in range(h):
         i = hard[q]
-        if active[i] * force[q] * scale[i] > tolerance * noise:
+        if active[i] * force[q] * scale[i] > sure:
             state[i], held[i], multiplier[i] = FIXED, k, force[q]
         else:
             whole = False
