@@ -27,6 +27,7 @@ from solvers.kernels.rows import (
     NEARLY_PARALLEL,
     NUMERICAL_FAILURE,
     ROUNDING,
+    SLIGHT,
     SOLVED,
     ZERO,
     factor_level,
@@ -271,27 +272,29 @@ def _improve(A, lower, upper, reference, x, active, held, multiplier, scale, W, 
                 pulled += (x[c] - reference[c]) ** 2
             pulled = np.sqrt(pulled)
             noise = max(size, np.sqrt(square))
-            missed = pulled > tolerance * noise
+            worst = 1.0 if pulled > tolerance * noise else 0.0
             for c in range(rank[k]):
                 g[c] = pull[c]
         elif damping == 0.0 and first[k + 1] - first[k] == rank[k + 1] - rank[k]:
             continue
         else:
-            noise = pulled = 0.0
-            missed = False
+            noise = pulled = worst = 0.0
             for q in range(first[k], first[k + 1]):
                 i = row[q]
                 around = scale[i] * size + abs(upper[i] if active[i] > 0 else lower[i])
                 noise = max(noise, scale[i] * around)
                 pulled += abs(w[q]) * scale[i]
-                missed |= scale[i] > 0.0 and abs(w[q]) > tolerance * around
+                if scale[i] > 0.0 and abs(w[q]) > worst * around:
+                    worst = abs(w[q]) / around
                 if active[i] != EQUAL:
                     if active[i] * w[q] < -ROUNDING * around:
                         active[i] = FREE
                         right = False
                     elif active[i] * w[q] > tolerance * around:
                         held[i], multiplier[i] = k, w[q]
-        if missed:
+        if tolerance < worst < SLIGHT:  # missed so slightly that it may be attainable
+            right = False
+        if worst > tolerance:
             if k < levels:
                 _pull_of_level(A, W, row, w, g, beta, m, first[k], first[k + 1], rank[k])
             right &= _signs_kept(row, first, rank, W, g, active, held, multiplier, scale, k,

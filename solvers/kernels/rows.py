@@ -22,6 +22,7 @@ INACCURATE = 4
 # A multiplier is known to ROUNDING times the size of the rows that it balances: where rows of very
 # different scale conflict, that is more than DOUBT times what they really pull.
 ROUNDING, DOUBT = 1e-13, 1e-6
+SLIGHT = 2e-8  # share of its terms by which a level may be missed and yet be attainable
 NEARLY_PARALLEL = 1e-5  # what is left of a row behind others, as a share; less is worth a doubt
 FREE, EQUAL = 0, 2  # what a row does; -1 and +1: it acts at its lower or upper side
 

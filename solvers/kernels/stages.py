@@ -29,6 +29,7 @@ from solvers.kernels.rows import (
     NEARLY_PARALLEL,
     NUMERICAL_FAILURE,
     ROUNDING,
+    SLIGHT,
     SOLVED,
     ZERO,
     factor_level,
@@ -424,17 +425,19 @@ def _first_block(A, lower, upper, state, unit, scale, value, along, x, p, last, 
 @inlined
 def _pull_of_soft(lower, upper, active, scale, soft, order, s, w, size, tolerance):
     """Whether a level is missed, and the size of multipliers that are sure, that are sure even if
-    rows are nearly parallel, and that matter.
+    rows are nearly parallel, and that matter: -1 where the level is missed so slightly that it may
+    be attainable.
     """
-    noise = pulled = 0.0
-    missed = False
+    noise = pulled = worst = 0.0
     for q in range(s):
         i = soft[order[q]]
         around = scale[i] * size + abs(upper[i] if active[i] > 0 else lower[i])
         noise = max(noise, scale[i] * around)
         pulled += abs(w[q]) * scale[i]
-        missed |= scale[i] > 0.0 and abs(w[q]) > tolerance * around
-    return missed, max(tolerance * pulled, ROUNDING * noise), tolerance * noise, DOUBT * pulled
+        if scale[i] > 0.0 and abs(w[q]) > worst * around:
+            worst = abs(w[q]) / around
+    return (worst > tolerance, max(tolerance * pulled, ROUNDING * noise), tolerance * noise,
+            -1.0 if tolerance < worst < SLIGHT else DOUBT * pulled)
 
 
 @inlined
@@ -453,10 +456,10 @@ def _are_doubtful(W, scale, hard, h, force, held_at, soft, order, fixed, rank, s
     """Whether a stage may be wrong: a multiplier too small to be sure of and too large to be
     nothing, or a row of which little is left behind those before.
     """
-    doubtful = h > 0 and sure > doubt > 0.0
+    doubtful = doubt < 0.0 or (h > 0 and sure > doubt > 0.0)
     for q in range(h):
         push, size = abs(force[q]) * scale[hard[q]], NEARLY_PARALLEL * scale[hard[q]]
-        doubtful |= doubt < push <= sure or abs(W[held_at + q, fixed + q]) < size
+        doubtful |= 0.0 < doubt < push <= sure or abs(W[held_at + q, fixed + q]) < size
     for q in range(rank - fixed - h):
         doubtful |= abs(W[q, fixed + h + q]) < NEARLY_PARALLEL * scale[soft[order[q]]]
     return doubtful
