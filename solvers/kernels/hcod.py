@@ -57,9 +57,9 @@ def hcod(A, lower, upper, sizes, x, record, settings):
     warm = counts[0] + counts[1] > 0.0
     counts[0] = counts[1] = 0.0
     counts[2] = -1.0
-    equalities = 0
-    for i in range(m):
-        equalities += lower[i] == upper[i]
+    equalities = ZERO
+    while equalities < m and lower[equalities] == upper[equalities]:
+        equalities += 1
     if equalities == m:
         for i in range(m):
             record[i], record[m + i], record[2 * m + i] = EQUAL, -1.0, 0.0
@@ -142,9 +142,12 @@ def _solve_guess(A, lower, upper, sizes, reference, x, active, scale, W, row, fi
                     miss[p] -= W[p, c] * y[c]
         solve_block(W, miss, y, begin, q, above, r, damping, threshold)
     first[sizes.size], rank[sizes.size] = q, r
+    zero_reference = True
     for c in range(n):
         W[X, c] = reference[c]
-    reflect_rows(W, beta, V, ZERO, r, X, X + 1)
+        zero_reference &= reference[c] == 0.0
+    if not zero_reference:
+        reflect_rows(W, beta, V, ZERO, r, X, X + 1)
     for c in range(r):
         pull[c] = y[c] - W[X, c]
         W[X, c] = y[c]

@@ -52,9 +52,12 @@ def staircase(A, lower, upper, sizes, x, damping, threshold, rank_tolerance):
         solve_block(W, miss, y, first, last, above, rank, damping, threshold)
         first = last
 
+    zero_reference = True
     for c in range(n):
         W[X, c] = x[c]
-    reflect_rows(W, beta, V, ZERO, rank, X, X + 1)  # Q^T q0, of which (14) keeps the rest
+        zero_reference &= x[c] == 0.0
+    if not zero_reference:
+        reflect_rows(W, beta, V, ZERO, rank, X, X + 1)  # Q^T q0, of which (14) keeps the rest
     for c in range(rank):
         W[X, c] = y[c]
     for k in range(rank - 1, -1, -1):
