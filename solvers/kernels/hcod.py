@@ -32,6 +32,7 @@ from solvers.kernels.rows import (
     ZERO,
     factor_level,
     finish,
+    grown,
     prepare,
     reflect_rows,
 )
@@ -97,7 +98,8 @@ def _guess(A, lower, upper, sizes, x, record, settings, warm):
         _residuals(first, rank, W, miss, y, w, damping)
         if _improve(A, lower, upper, reference, x, active, held, multiplier, scale, W, row, first,
                     rank, w, g, beta, pull, damping, tolerance):
-            return finish(x, SOLVED)
+            doubtful = grown(lower, upper, active, scale, x, reference)
+            return UNPROVED if doubtful else finish(x, SOLVED)
     return UNPROVED
 
 

@@ -22,7 +22,8 @@ INACCURATE = 4
 # A multiplier is known to ROUNDING times the size of the rows that it balances: where rows of very
 # different scale conflict, that is more than DOUBT times what they really pull.
 ROUNDING, DOUBT = 1e-13, 1e-6
-SLIGHT = 2e-8  # share of its terms by which a level may be missed and yet be attainable
+SLIGHT = 1e-6  # share of its terms by which a level may be missed and yet be attainable
+GROWTH = 1e3  # of x over the distance of the farthest acting row from zero; more is worth a doubt
 NEARLY_PARALLEL = 1e-5  # what is left of a row behind others, as a share; less is worth a doubt
 FREE, EQUAL = 0, 2  # what a row does; -1 and +1: it acts at its lower or upper side
 
@@ -153,6 +154,24 @@ def factor_level(W, row, zero, miss, beta, V, begin, end, rank):
         reflect_rows(W, beta, V, rank, rank + 1, i, end)
         rank += 1
     return rank
+
+
+@compiled
+def grown(lower, upper, active, scale, x, reference):
+    """Whether x is far longer than the rows that act, or the reference, ask for."""
+    size = square = 0.0
+    for c in range(x.size):
+        size += x[c] * x[c]
+        square += reference[c] * reference[c]
+    if size <= GROWTH * GROWTH * square:
+        return False
+    size = np.sqrt(size)
+    for i in range(active.size):
+        if active[i] != FREE:
+            bound = upper[i] if active[i] > 0 else lower[i]
+            if scale[i] * size <= GROWTH * abs(bound):
+                return False
+    return size > 0.0
 
 
 @compiled

@@ -34,6 +34,7 @@ from solvers.kernels.rows import (
     ZERO,
     factor_level,
     finish,
+    grown,
     make_reflector,
     prepare,
     reflect_rows,
@@ -177,6 +178,7 @@ def solve_by_stages(A, lower, upper, sizes, x, record, settings):
         elif not at_reference:
             fixed = _fix_again(A, W, state, scale, hard, h, soft, s, V, beta, fixed, rank_tolerance)
         first = last
+    doubtful |= grown(lower, upper, active, scale, x, reference)
     code = finish(x, SOLVED)
     return INACCURATE if doubtful and code == SOLVED else code
 
