@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array, Hierarchy
 from solvers.certificate import certify
-from solvers.kernels.hcod import UNPROVED, hcod
+from solvers.kernels.hcod import UNPROVED, hcod, hcod_equalities
 from solvers.kernels.stages import solve_by_stages
 from solvers.resolver import Resolution, Resolver, Status, register
 
@@ -118,7 +118,11 @@ class Hcod(Resolver):
         size = 3 * len(h.lower) + 3
         fits = memory is not None and len(memory) == size
         record = memory.copy() if fits else np.zeros(size)
-        code = hcod(h.A, h.lower, h.upper, h.sizes, x, record, self._settings)
+        problem = (h.A, h.lower, h.upper, h.sizes, x, record, self._settings)
+        equal = len(h.lower) == 0 or h.lower.item(0) == h.upper.item(0)
+        code = hcod_equalities(*problem) if equal else UNPROVED
+        if code == UNPROVED:
+            code = hcod(*problem)
         if code == 0:
             return ActiveSetResolution(x, _SOLVED, record)
         if code == UNPROVED:

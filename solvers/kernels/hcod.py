@@ -43,6 +43,19 @@ FEW = 16  # inequality rows up to which a guess from nothing is worth its cost (
 
 
 @compiled
+def hcod_equalities(A, lower, upper, sizes, x, record, settings):
+    """Like `hcod`, for equalities alone: the staircase. UNPROVED if there are inequalities."""
+    m = A.shape[0]
+    for i in range(m):
+        if lower[i] != upper[i]:
+            return UNPROVED
+    for i in range(m):
+        record[i], record[m + i], record[2 * m + i] = EQUAL, -1.0, 0.0
+    record[3 * m], record[3 * m + 1], record[3 * m + 2] = 1.0, 0.0, -1.0
+    return staircase(A, lower, upper, sizes, x, settings[0], settings[1], settings[2])
+
+
+@compiled
 def hcod(A, lower, upper, sizes, x, record, settings):
     """Solve; x (n,) comes in as the reference and goes out as the answer, zero on failure.
 
@@ -53,28 +66,13 @@ def hcod(A, lower, upper, sizes, x, record, settings):
     tolerance, guesses, max_iterations, in one array because each argument costs time. Returns
     SOLVED, NUMERICAL_FAILURE, or UNPROVED where `solve_by_stages` must be called.
     """
-    m = A.shape[0]
-    counts = record[3 * m:]
-    warm = counts[0] + counts[1] > 0.0
-    counts[0] = counts[1] = 0.0
-    counts[2] = -1.0
-    equalities = ZERO
-    while equalities < m and lower[equalities] == upper[equalities]:
-        equalities += 1
-    if equalities == m:
-        for i in range(m):
-            record[i], record[m + i], record[2 * m + i] = EQUAL, -1.0, 0.0
-        counts[0] = 1.0
-        return staircase(A, lower, upper, sizes, x, settings[0], settings[1], settings[2])
-    return _guess(A, lower, upper, sizes, x, record, settings, warm)
-
-
-@compiled
-def _guess(A, lower, upper, sizes, x, record, settings, warm):
     m, n = A.shape
     levels = sizes.size
     active, held, multiplier = record[:m], record[m:2 * m], record[2 * m:3 * m]
     counts = record[3 * m:]
+    warm = counts[0] + counts[1] > 0.0
+    counts[0] = counts[1] = 0.0
+    counts[2] = -1.0
     # Active rows, reflectors of Q, x, five vectors, and a basis of what a level finds free.
     W = np.empty((m + 2 * n + 6, n))
     of_rows, of_levels = np.empty((4, m)), np.empty(m + 2 * levels + 2, np.int64)
