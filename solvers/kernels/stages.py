@@ -169,8 +169,7 @@ def solve_by_stages(A, lower, upper, sizes, x, record, settings):
                 h = _hold_from(A, lower, upper, W, active, state, value, hard, place, h - 1,
                                held_at, V, beta, fixed, scale, rank_tolerance)
             _copy_soft(W, ZERO, s, base, behind, V, beta, fixed, h)
-        doubtful |= _are_doubtful(W, scale, hard, h, force, held_at, soft, order, fixed, rank, sure,
-                                  doubt)
+        doubtful |= _is_doubtful(W, scale, hard, h, held_at, soft, order, fixed, rank, sure, doubt)
         whole = _settle(lower, upper, active, state, held, multiplier, scale, hard, h, force, soft,
                         order, s, w, size, sure, tolerance, k)
         if whole and not at_reference:
@@ -454,14 +453,13 @@ def _pull_to_reference(x, reference, size, tolerance):
 
 
 @inlined
-def _are_doubtful(W, scale, hard, h, force, held_at, soft, order, fixed, rank, sure, doubt):
-    """Whether a stage may be wrong: a multiplier too small to be sure of and too large to be
-    nothing, or a row of which little is left behind those before.
+def _is_doubtful(W, scale, hard, h, held_at, soft, order, fixed, rank, sure, doubt):
+    """Whether a stage may be wrong: multipliers that matter cannot be told from rounding, the level
+    may be attainable after all, or little is left of a row behind those before.
     """
     doubtful = doubt < 0.0 or (h > 0 and sure > doubt > 0.0)
     for q in range(h):
-        push, size = abs(force[q]) * scale[hard[q]], NEARLY_PARALLEL * scale[hard[q]]
-        doubtful |= 0.0 < doubt < push <= sure or abs(W[held_at + q, fixed + q]) < size
+        doubtful |= abs(W[held_at + q, fixed + q]) < NEARLY_PARALLEL * scale[hard[q]]
     for q in range(rank - fixed - h):
         doubtful |= abs(W[q, fixed + h + q]) < NEARLY_PARALLEL * scale[soft[order[q]]]
     return doubtful
