@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import chain
 from typing import Any, ClassVar, final
 
 import numpy as np
@@ -125,22 +126,23 @@ class Hcod(Resolver):
             code = hcod(*problem)
         if code == 0:
             return ActiveSetResolution(x, _SOLVED, record)
-        if code == UNPROVED:
-            x[:] = h.reference
-            code = solve_by_stages(h.A, h.lower, h.upper, h.sizes, x, record, self._settings)
-        resolution = ActiveSetResolution(x, Status(code), record)
-        return self._without_doubt(h, resolution) if code == Status.INACCURATE else resolution
+        if code != UNPROVED:
+            return ActiveSetResolution(x, Status(code), record)
+        resolution = self._by_stages(h, record)
+        return (self._without_doubt(h, resolution) if resolution.status is Status.INACCURATE
+                else resolution)
+
+    def _by_stages(self, h: Hierarchy, record: Array, share: float = 1.0) -> ActiveSetResolution:
+        """Go level by level, with a share of the tolerance."""
+        x, settings = h.reference.copy(), self._settings.copy()
+        settings[3] *= share
+        code = solve_by_stages(h.A, h.lower, h.upper, h.sizes, x, record, settings)
+        return ActiveSetResolution(x, Status(code), record)
 
     def _without_doubt(self, h: Hierarchy, first: ActiveSetResolution) -> ActiveSetResolution:
         """Let `certify` judge a doubtful answer, and others found with finer tolerances."""
-        answer = first
-        for tolerance in (None, *_FINER):
-            if tolerance is not None:
-                x, record = h.reference.copy(), first.memory.copy()
-                settings = self._settings.copy()
-                settings[3] *= tolerance
-                code = solve_by_stages(h.A, h.lower, h.upper, h.sizes, x, record, settings)
-                answer = ActiveSetResolution(x, Status(code), record)
+        finer = (self._by_stages(h, first.memory.copy(), share) for share in _FINER)
+        for answer in chain([first], finer):
             if answer.status in (Status.SOLVED, Status.INACCURATE) and certify(
                     h, answer.x).certified:
                 answer.status = Status.SOLVED
