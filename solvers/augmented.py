@@ -8,6 +8,7 @@ from typing import Any, ClassVar, final
 from hierarchy.problem import Hierarchy
 from solvers.kernels.staircase import staircase
 from solvers.resolver import Resolution, Resolver, register
+from solvers.workspace import WORKSPACE
 
 
 @final
@@ -31,5 +32,5 @@ class Augmented(Resolver):
         """Resolve h; direct, `memory` is not used."""
         x, whole = h.reference.copy(), h.offsets[-1:]  # one level of m rows
         code = staircase(h.A, h.lower, h.upper, whole, x, self.damping, self.threshold,
-                         self.rank_tolerance)
-        return self._resolution(h, x, code) if code else Resolution(x)
+                         self.rank_tolerance, WORKSPACE.array)
+        return self._otherwise(h, x, code, memory) if code else Resolution(x)

@@ -14,8 +14,10 @@ from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array, Hierarchy
 from solvers.certificate import certify
 from solvers.kernels.hcod import UNPROVED, hcod, hcod_equalities
+from solvers.kernels.rows import TOO_SMALL
 from solvers.kernels.stages import solve_by_stages
-from solvers.resolver import Resolution, Resolver, Status, register
+from solvers.resolver import Handles, Resolution, Resolver, Status, register
+from solvers.workspace import WORKSPACE
 
 
 @final
@@ -77,7 +79,8 @@ class Hcod(Resolver):
     Guesses the active set, solves it by the staircase of `tpm`, and proves the answer by its
     multipliers; where `guesses` do not lead there, a primal active set goes level by level. On
     equalities alone it is `tpm`, to the last digit; its damping is that of `tpm` too, with
-    inequality rows that act counted as rows of their level.
+    inequality rows that act counted as rows of their level. Where damping and active inequalities
+    meet, an active set that keeps all signs need not exist: the status then says so.
 
     Where nearly parallel rows, or rows of very different scale, leave a doubt about the active set,
     `certify` judges; an answer that it does not accept has Status.INACCURATE.
@@ -95,7 +98,7 @@ class Hcod(Resolver):
     """
 
     name: ClassVar[str] = "hcod"
-    handles_inequalities: ClassVar[bool] = True
+    handles: ClassVar[Handles] = "inequalities"
     tolerance: float = 1e-10
     guesses: int = 3
     max_iterations: int = 1000
@@ -119,13 +122,16 @@ class Hcod(Resolver):
         size = 3 * len(h.lower) + 3
         fits = memory is not None and len(memory) == size
         record = memory.copy() if fits else np.zeros(size)
-        problem = (h.A, h.lower, h.upper, h.sizes, x, record, self._settings)
+        problem = (h.A, h.lower, h.upper, h.sizes, x, record, self._settings, WORKSPACE.array)
         equal = len(h.lower) == 0 or h.lower.item(0) == h.upper.item(0)
         code = hcod_equalities(*problem) if equal else UNPROVED
         if code == UNPROVED:
             code = hcod(*problem)
         if code == 0:
             return ActiveSetResolution(x, _SOLVED, record)
+        if code == TOO_SMALL:
+            WORKSPACE.double()
+            return self.solve(h, memory)
         if code != UNPROVED:
             return ActiveSetResolution(x, Status(code), record)
         resolution = self._by_stages(h, record)
@@ -136,7 +142,9 @@ class Hcod(Resolver):
         """Go level by level, with a share of the tolerance."""
         x, settings = h.reference.copy(), self._settings.copy()
         settings[3] *= share
-        code = solve_by_stages(h.A, h.lower, h.upper, h.sizes, x, record, settings)
+        problem = (h.A, h.lower, h.upper, h.sizes, x, record, settings)
+        while (code := solve_by_stages(*problem, WORKSPACE.array)) == TOO_SMALL:
+            WORKSPACE.double()
         return ActiveSetResolution(x, Status(code), record)
 
     def _without_doubt(self, h: Hierarchy, first: ActiveSetResolution) -> ActiveSetResolution:

@@ -12,7 +12,7 @@ from hierarchy.problem import Array, Hierarchy
 from solvers.backends import Backend, backend_of
 from solvers.programs import null_space_program, slack_program
 from solvers.refinement import EXACT, Rows, refined, split
-from solvers.resolver import Resolution, Resolver, Status, register
+from solvers.resolver import Handles, Resolution, Resolver, Status, register
 
 FORMS = ("null-space", "slack")
 
@@ -70,7 +70,7 @@ class Hqp(Resolver):
     slack: float = 1e-7
 
     name: ClassVar[str] = "hqp"
-    handles_inequalities: ClassVar[bool] = True
+    handles: ClassVar[Handles] = "inequalities"
 
     def __post_init__(self) -> None:
         super().__post_init__()

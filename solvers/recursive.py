@@ -8,6 +8,7 @@ from typing import Any, ClassVar, final
 from hierarchy.problem import Hierarchy
 from solvers.kernels.recursion import recursion
 from solvers.resolver import Resolution, Resolver, register
+from solvers.workspace import WORKSPACE
 
 
 @final
@@ -26,5 +27,5 @@ class Recursive(Resolver):
         """Resolve h; direct, `memory` is not used."""
         x = h.reference.copy()
         code = recursion(h.A, h.lower, h.upper, h.sizes, x, self.damping, self.threshold,
-                         self.rank_tolerance)
-        return self._resolution(h, x, code) if code else Resolution(x)
+                         self.rank_tolerance, WORKSPACE.array)
+        return self._otherwise(h, x, code, memory) if code else Resolution(x)

@@ -6,10 +6,12 @@ import dataclasses
 import math
 from abc import ABC, abstractmethod
 from enum import IntEnum
-from typing import Any, ClassVar, TypeVar
+from typing import Any, ClassVar, Literal, TypeVar
 
 from hierarchy.errors import HierarchyError, UnknownNameError
 from hierarchy.problem import Array, Hierarchy
+from solvers.kernels.rows import TOO_SMALL
+from solvers.workspace import WORKSPACE
 
 
 class Status(IntEnum):
@@ -42,6 +44,12 @@ _REMEDIES = {
                        "parallel, or of very different scale, leave a doubt; try another "
                        "resolver or backend",
 }
+
+
+Handles = Literal["equalities", "bounds", "inequalities"]
+_RESOLVED: dict[str, str] = {
+    "equalities": "equalities only",
+    "bounds": "equalities, and bounds on single unknowns in a first level of their own"}
 
 
 class Resolution:
@@ -96,8 +104,9 @@ class Resolver(ABC):
     rank_tolerance: float = 1e-9
 
     name: ClassVar[str]
-    handles_inequalities: ClassVar[bool] = False
-    """Whether rows with lower < upper are resolved; if not, they are refused."""
+    handles: ClassVar[Handles] = "equalities"
+    """Which rows with lower < upper are resolved: none; bounds on single unknowns in the first
+    level, which then has no other rows; or any. Others are refused."""
 
     def __post_init__(self) -> None:
         self._number("damping", 0.0, math.inf)
@@ -140,8 +149,11 @@ class Resolver(ABC):
         if getattr(self, setting) not in allowed:
             raise UnknownNameError(f"{setting} of {self.name}", getattr(self, setting), allowed)
 
-    def _resolution(self, h: Hierarchy, x: Array, code: int) -> Resolution:
-        """Turn a kernel's code other than SOLVED into a resolution, or refuse the row it names."""
+    def _otherwise(self, h: Hierarchy, x: Array, code: int, memory: Any) -> Resolution:
+        """What follows a kernel's code other than SOLVED: more room, a refused row, a failure."""
+        if code == TOO_SMALL:
+            WORKSPACE.double()
+            return self.solve(h, memory)
         if code < 0:
             refuse_inequality(self, h, -code - 1)
         return Resolution(x, Status(code))
@@ -150,10 +162,10 @@ class Resolver(ABC):
 def refuse_inequality(resolver: Resolver, h: Hierarchy, row: int) -> None:
     """Raise the HierarchyError that names the level and the row (of the whole stack) refused."""
     level = int((h.offsets[1:] <= row).sum())
-    able = sorted(name for name, kind in _REGISTRY.items() if kind.handles_inequalities)
+    able = sorted(name for name, kind in _REGISTRY.items() if kind.handles == "inequalities")
     raise HierarchyError(
         f"{h.names[level]}, row {row - h.offsets[level]}: an inequality, {h.lower[row]:g} <= a x "
-        f"<= {h.upper[row]:g}; {resolver.name} resolves equalities only"
+        f"<= {h.upper[row]:g}; {resolver.name} resolves {_RESOLVED[resolver.handles]}"
         f" (inequalities: {', '.join(able)})")
 
 

@@ -12,6 +12,7 @@ from hierarchy.problem import Array, Hierarchy
 from solvers.kernels.published import priority_matrix, published
 from solvers.kernels.staircase import staircase
 from solvers.resolver import Resolution, Resolver, Status, register
+from solvers.workspace import WORKSPACE
 
 FORMS = ("staircase", "published")
 
@@ -54,8 +55,8 @@ class Tpm(Resolver):
         x = h.reference.copy()
         kernel = staircase if self.form == "staircase" else published
         code = kernel(h.A, h.lower, h.upper, h.sizes, x, self.damping, self.threshold,
-                      self.rank_tolerance)
-        return self._resolution(h, x, code) if code else Resolution(x)
+                      self.rank_tolerance, WORKSPACE.array)
+        return self._otherwise(h, x, code, memory) if code else Resolution(x)
 
 
 @final

@@ -46,8 +46,8 @@ def candidates() -> tuple[list[Candidate], dict[str, str]]:
     cold = [*(make(name) for name in names() if name != "hqp"), make("tpm", form="published"),
             *(make("hqp", backend=name) for name in BACKENDS if installed(name))]
     warm = [resolver for resolver in cold if _starts(resolver)]
-    field += [Candidate(r.label, r.handles_inequalities, _cold(r)) for r in cold]
-    field += [Candidate(f"{r.label} warm", r.handles_inequalities, _warm(r)) for r in warm]
+    field += [Candidate(r.label, r.handles == "inequalities", _cold(r)) for r in cold]
+    field += [Candidate(f"{r.label} warm", r.handles == "inequalities", _warm(r)) for r in warm]
     if "hcod" not in names():
         missing["hcod"] = "no resolver of this name"
     return field, missing

@@ -77,7 +77,7 @@ def outcome(resolver: Resolver, h: Hierarchy) -> str:
 
 def recipe_for(resolver: Resolver) -> problems.Recipe:
     """Return what the resolver can be asked for."""
-    return problems.Recipe(equalities_only=not resolver.handles_inequalities)
+    return problems.Recipe(equalities_only=resolver.handles != "inequalities")
 
 
 def tally(name: str, seeds: range) -> Tally:

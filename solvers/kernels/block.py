@@ -12,21 +12,24 @@ SWEEPS = 40  # bound; Jacobi needs 6 to 10
 
 
 @compiled
-def solve_block(M, r, y, i0, i1, k0, k1, damping, threshold):
+def solve_block(M, r, y, i0, i1, k0, k1, damping, threshold, work):
     """Write into y[k0:k1] the step of one level with rows i0:i1 and columns k0:k1 of M.
 
     The block is lower trapezoidal with a nonzero diagonal: its rows in pivot order, in the columns
-    that the level adds. r[i0:i1] is what its rows still miss.
+    that the level adds. r[i0:i1] is what its rows still miss. work: at least (m + n) (n + 1)
+    numbers, of any content.
     """
     if k0 == k1:
         return
-    damped = variable_damping(M, i0, i1, k0, k1, damping, threshold) if damping > 0.0 else 0.0
+    damped = 0.0
+    if damping > 0.0:
+        damped = _variable_damping(M, i0, i1, k0, k1, damping, threshold, work)
     if damped == 0.0 and i1 - i0 == k1 - k0:
         _substitute(M, r, y, i0, k0, k1)
     elif k1 - k0 == 1:
         _one_unknown(M, r, y, i0, i1, k0, damped)
     else:
-        _least_squares(M, r, y, i0, i1, k0, k1, damped)
+        _least_squares(M, r, y, i0, i1, k0, k1, damped, work)
 
 
 @compiled
@@ -41,7 +44,7 @@ def _substitute(M, r, y, i0, k0, k1):
 
 
 @compiled
-def variable_damping(M, i0, i1, k0, k1, damping, threshold):
+def _variable_damping(M, i0, i1, k0, k1, damping, threshold, work):
     """Return lambda, with lambda^2 = (1 - (s / threshold)^2) damping^2 for s < threshold, else 0.
 
     s is the smallest singular value of the block, counted over its rows: 0 where rank < rows. It
@@ -50,13 +53,13 @@ def variable_damping(M, i0, i1, k0, k1, damping, threshold):
     if i1 - i0 > k1 - k0:
         return damping
     p = k1 - k0
-    L = np.empty((p, p))
+    L = work[:p * p].reshape((p, p))
     if invert_triangle(M, L, i0, k0, p) * threshold * threshold <= 1.0:
         return 0.0
     for i in range(p):
         for j in range(p):
             L[i, j] = M[i0 + i, k0 + j] if i >= j else 0.0
-    orthogonalise_rows(L, np.empty((p, 0)))
+    orthogonalise_rows(L, work[:0].reshape((p, 0)))
     ratio = smallest_square(L) / (threshold * threshold)
     return damping * np.sqrt(1.0 - ratio) if ratio < 1.0 else 0.0
 
@@ -141,11 +144,14 @@ def _one_unknown(M, r, y, i0, i1, k, damped):
 
 
 @compiled
-def _least_squares(M, r, y, i0, i1, k0, k1, damped):
+def _least_squares(M, r, y, i0, i1, k0, k1, damped, work):
     """Write the minimiser into y[k0:k1], by Householder reflections of [M r; lambda I 0]."""
     rows, p = i1 - i0, k1 - k0
     height = rows + p if damped > 0.0 else rows
-    T = np.zeros((height, p + 1))
+    T = work[:height * (p + 1)].reshape((height, p + 1))
+    for i in range(height):
+        for k in range(p + 1):
+            T[i, k] = 0.0
     for i in range(rows):
         for k in range(p):
             T[i, k] = M[i0 + i, k0 + k]

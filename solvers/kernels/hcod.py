@@ -29,6 +29,7 @@ from solvers.kernels.rows import (
     ROUNDING,
     SLIGHT,
     SOLVED,
+    TOO_SMALL,
     ZERO,
     factor_level,
     finish,
@@ -36,47 +37,62 @@ from solvers.kernels.rows import (
     prepare,
     reflect_rows,
 )
-from solvers.kernels.staircase import staircase
+from solvers.kernels.staircase import staircase, staircase_work
 
 UNPROVED = 7  # no value of solvers.Status
 FEW = 16  # inequality rows up to which a guess from nothing is worth its cost (measured)
 
 
 @compiled
-def hcod_equalities(A, lower, upper, sizes, x, record, settings):
+def hcod_work(m, n, levels):
+    """Return how many numbers of work space a hierarchy needs; `staircase` needs fewer."""
+    return (2 * m + 3 * n + 7) * n + 6 * m + 2 * levels + 2
+
+
+@compiled
+def hcod_equalities(A, lower, upper, sizes, x, record, settings, work):
     """Like `hcod`, for equalities alone: the staircase. UNPROVED if there are inequalities."""
-    m = A.shape[0]
+    m, n = A.shape
+    if work.size < staircase_work(m, n):
+        return TOO_SMALL
     for i in range(m):
         if lower[i] != upper[i]:
             return UNPROVED
     for i in range(m):
         record[i], record[m + i], record[2 * m + i] = EQUAL, -1.0, 0.0
     record[3 * m], record[3 * m + 1], record[3 * m + 2] = 1.0, 0.0, -1.0
-    return staircase(A, lower, upper, sizes, x, settings[0], settings[1], settings[2])
+    return staircase(A, lower, upper, sizes, x, settings[0], settings[1], settings[2],
+                     work)
 
 
 @compiled
-def hcod(A, lower, upper, sizes, x, record, settings):
+def hcod(A, lower, upper, sizes, x, record, settings, work):
     """Solve; x (n,) comes in as the reference and goes out as the answer, zero on failure.
 
     record (3 m + 3,) comes in as zeros, or as that of an earlier solve whose active set is to be
     guessed. It goes out as: what each row does; the level that each row holds back (its own if it
     stays violated, L for the reference, -1 for none); its multiplier there; guesses tried; steps
     by stages; the level that was not finished. settings: damping, threshold, rank_tolerance,
-    tolerance, guesses, max_iterations, in one array because each argument costs time. Returns
-    SOLVED, NUMERICAL_FAILURE, or UNPROVED where `solve_by_stages` must be called.
+    tolerance, guesses, max_iterations, in one array because each argument costs time. work: at
+    least hcod_work(m, n, levels), of any content. Returns SOLVED, NUMERICAL_FAILURE, TOO_SMALL,
+    or UNPROVED where `solve_by_stages` must be called.
     """
     m, n = A.shape
     levels = sizes.size
+    if work.size < hcod_work(m, n, levels):
+        return TOO_SMALL
     active, held, multiplier = record[:m], record[m:2 * m], record[2 * m:3 * m]
     counts = record[3 * m:]
     warm = counts[0] + counts[1] > 0.0
     counts[0] = counts[1] = 0.0
     counts[2] = -1.0
     # Active rows, reflectors of Q, x, five vectors, and a basis of what a level finds free.
-    W = np.empty((m + 2 * n + 6, n))
-    of_rows, of_levels = np.empty((4, m)), np.empty(m + 2 * levels + 2, np.int64)
-    scale, zero, miss, w = of_rows[0], of_rows[1], of_rows[2], of_rows[3]
+    at = (m + 2 * n + 6) * n
+    W = work[:at].reshape((m + 2 * n + 6, n))
+    scale, zero, miss = work[at:at + m], work[at + m:at + 2 * m], work[at + 2 * m:at + 3 * m]
+    w, at = work[at + 3 * m:at + 4 * m], at + 4 * m
+    of_levels = work[at:at + m + 2 * levels + 2].view(np.int64)
+    of_block = work[at + m + 2 * levels + 2:]
     at = m + n + 1
     beta, y, g, pull, reference = W[at], W[at + 1], W[at + 2], W[at + 3], W[at + 4]
     row, first, rank = of_levels[:m], of_levels[m:m + levels + 1], of_levels[m + levels + 1:]
@@ -90,7 +106,7 @@ def hcod(A, lower, upper, sizes, x, record, settings):
     while counts[0] < guesses and (warm or inequalities <= FEW):
         counts[0] += 1.0
         _solve_guess(A, lower, upper, sizes, reference, x, active, scale, W, row, first, rank, zero,
-                     miss, beta, y, pull, damping, threshold, rank_tolerance)
+                     miss, beta, y, pull, damping, threshold, rank_tolerance, of_block)
         if _nearly_parallel(W, row, first, rank, scale):
             return UNPROVED
         _residuals(first, rank, W, miss, y, w, damping)
@@ -103,7 +119,7 @@ def hcod(A, lower, upper, sizes, x, record, settings):
 
 @inlined
 def _solve_guess(A, lower, upper, sizes, reference, x, active, scale, W, row, first, rank, zero,
-                 miss, beta, y, pull, damping, threshold, rank_tolerance):
+                 miss, beta, y, pull, damping, threshold, rank_tolerance, of_block):
     """Solve the hierarchy of the active rows as equalities: `staircase.py` on a part of the rows.
 
     first, rank (L + 1,): where the active rows of a level begin in W, and its columns of Q.
@@ -140,7 +156,7 @@ def _solve_guess(A, lower, upper, sizes, reference, x, active, scale, W, row, fi
             for p in range(begin, q):
                 for c in range(above):
                     miss[p] -= W[p, c] * y[c]
-        solve_block(W, miss, y, begin, q, above, r, damping, threshold)
+        solve_block(W, miss, y, begin, q, above, r, damping, threshold, of_block)
     first[sizes.size], rank[sizes.size] = q, r
     zero_reference = True
     for c in range(n):
@@ -324,6 +340,8 @@ def _signs_kept(row, first, rank, W, g, active, held, multiplier, scale, k, sure
             if active[i] == EQUAL or held[i] >= 0:
                 continue
             push = active[i] * force * scale[i]
+            if sure < abs(push) < doubt:
+                kept = False
             if push > sure:
                 held[i], multiplier[i] = k, force
             elif push < -sure:

@@ -15,23 +15,26 @@ from hierarchy.compiled import compiled
 from solvers.kernels.block import invert_triangle, orthogonalise_rows, smallest_square
 from solvers.kernels.rows import (
     SOLVED,
+    TOO_SMALL,
     ZERO,
     finish,
     load_rows,
     make_reflector,
     reflect_rows,
 )
-from solvers.kernels.staircase import staircase
+from solvers.kernels.staircase import staircase, staircase_work
 
 
 @compiled
-def published(A, lower, upper, sizes, x, damping, threshold, rank_tolerance):
+def published(A, lower, upper, sizes, x, damping, threshold, rank_tolerance, work):
     """Solve (14) with F of (10); x (n,) comes in as the reference and goes out as the answer.
 
-    x is zero on failure. Returns SOLVED, NUMERICAL_FAILURE, or -(i + 1) where row i is an
-    inequality.
+    x is zero on failure. work: as of `staircase`. Returns SOLVED, NUMERICAL_FAILURE, TOO_SMALL, or
+    -(i + 1) where row i is an inequality.
     """
     m, n = A.shape
+    if work.size < staircase_work(m, n):
+        return TOO_SMALL
     N = max(m, n)
     W, beta = np.empty((2 * m + 1, N)), np.empty(m)  # rows of J, reflectors of Q, then x
     F, T = np.empty((m, m)), np.empty((m, m))
@@ -64,7 +67,7 @@ def published(A, lower, upper, sizes, x, damping, threshold, rank_tolerance):
         return finish(x, SOLVED)
     whole, least = np.empty(1, np.int64), np.zeros(n)
     whole[0] = m
-    code = staircase(A, u, u, whole, least, 0.0, threshold, rank_tolerance)  # J^# at any rank
+    code = staircase(A, u, u, whole, least, 0.0, threshold, rank_tolerance, work)  # J^# at any
     for c in range(n):
         x[c] += least[c]
     return finish(x, code)

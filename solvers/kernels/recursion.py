@@ -12,28 +12,52 @@ import numpy as np
 
 from hierarchy.compiled import compiled
 from solvers.kernels.block import solve_block
-from solvers.kernels.rows import SOLVED, ZERO, finish, largest_row, load_rows, swap_rows
+from solvers.kernels.rows import (
+    SOLVED,
+    TOO_SMALL,
+    ZERO,
+    finish,
+    largest_row,
+    load_rows,
+    swap_rows,
+)
 
 SHRUNK = 0.01  # squared norm that a row may lose by projection before it is projected once more
 
 
 @compiled
-def recursion(A, lower, upper, sizes, x, damping, threshold, rank_tolerance):
+def recursion_work(m, n):
+    """Return how many numbers of work space a hierarchy of m rows needs."""
+    return 3 * (m + n) * (n + 1)
+
+
+@compiled
+def recursion(A, lower, upper, sizes, x, damping, threshold, rank_tolerance, work):
     """Solve; x (n,) comes in as the reference and goes out as the answer, zero on failure.
 
-    Returns SOLVED, NUMERICAL_FAILURE, or -(i + 1) where row i is an inequality.
+    work: at least recursion_work(m, n), of any content. Returns SOLVED, NUMERICAL_FAILURE,
+    TOO_SMALL, or -(i + 1) where row i is an inequality.
     """
     m, n = A.shape
-    W, C = np.empty((m, n)), np.zeros((m, n))
-    scratch = np.zeros(2 * m + 2 * n)
-    zero, miss = scratch[:m], scratch[m:2 * m]
-    y, q = scratch[2 * m:2 * m + n], scratch[2 * m + n:]
+    if work.size < recursion_work(m, n):
+        return TOO_SMALL
+    of_rows = 2 * (m + n) * n
+    of_columns = of_rows + 2 * m
+    in_rows = work[:of_rows].reshape((2 * (m + n), n))
+    W, C, P, V = in_rows[:m], in_rows[m:2 * m], in_rows[2 * m:2 * m + n], in_rows[2 * m + n:]
+    zero, miss = work[of_rows:of_rows + m], work[of_rows + m:of_columns]
+    y, q = work[of_columns:of_columns + n], work[of_columns + n:of_columns + 2 * n]
+    of_block = work[of_columns + 2 * n:]
     code = load_rows(W, zero, A, lower, upper, x, rank_tolerance)
     if code != SOLVED:
         return finish(x, code)
-    P, V = np.zeros((n, n)), np.empty((n, n))
-    for c in range(n):
-        P[c, c] = 1.0  # P_0 = I
+    for i in range(m):
+        for c in range(n):
+            C[i, c] = 0.0
+    for i in range(n):
+        q[i] = 0.0
+        for c in range(n):
+            P[i, c] = 1.0 if i == c else 0.0  # P_0 = I
 
     rank = first = ZERO
     for level in range(sizes.size):
@@ -56,7 +80,7 @@ def recursion(A, lower, upper, sizes, x, damping, threshold, rank_tolerance):
             again = not rank_tolerance * rank_tolerance * square > SHRUNK * zero[i]
             _take_direction(W, C, P, V, i, last, rank, again)
             rank += 1
-        solve_block(C, miss, y, first, last, above, rank, damping, threshold)
+        solve_block(C, miss, y, first, last, above, rank, damping, threshold, of_block)
         for k in range(above, rank):
             for c in range(n):
                 q[c] += V[k, c] * y[k]  # (5)

@@ -19,6 +19,7 @@ ZERO = np.int64(0)
 SOLVED, ITERATION_LIMIT, NUMERICAL_FAILURE = 0, 1, 2
 
 INACCURATE = 4
+TOO_SMALL = 8  # no value of solvers.Status: the work space is, and nothing was done
 # A multiplier is known to ROUNDING times the size of the rows that it balances: where rows of very
 # different scale conflict, that is more than DOUBT times what they really pull.
 ROUNDING, DOUBT = 1e-13, 1e-6

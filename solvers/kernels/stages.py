@@ -31,6 +31,7 @@ from solvers.kernels.rows import (
     ROUNDING,
     SLIGHT,
     SOLVED,
+    TOO_SMALL,
     ZERO,
     factor_level,
     finish,
@@ -40,13 +41,20 @@ from solvers.kernels.rows import (
     reflect_rows,
 )
 
-WATCHED, HELD, SOFT, FIXED = 1, 2, 3, 4  # state of a row; 0 while its level is still to come
+# State of a row; 0 while its level is still to come. PARALLEL: the held rows keep it where it is.
+WATCHED, HELD, SOFT, FIXED, PARALLEL = 1, 2, 3, 4, 5
 BLAND_AFTER = 20  # steps of length zero in one stage
 PATIENCE = 10  # steps of one stage for each of its rows, after which small multipliers are noise
 
 
 @compiled
-def solve_by_stages(A, lower, upper, sizes, x, record, settings):
+def stages_work(m, n):
+    """Return how many numbers of work space a hierarchy of m rows needs."""
+    return (4 * m + 3 * n + 1) * n + 12 * m + 8 * n
+
+
+@compiled
+def solve_by_stages(A, lower, upper, sizes, x, record, settings, work):
     """Solve; arguments and results as those of `hcod`, but record is only written.
 
     Where the iterations end early, x keeps all levels above the unfinished one, and that level is
@@ -55,6 +63,8 @@ def solve_by_stages(A, lower, upper, sizes, x, record, settings):
     """
     m, n = A.shape
     levels = sizes.size
+    if work.size < stages_work(m, n):
+        return TOO_SMALL
     active, held, multiplier = record[:m], record[m:2 * m], record[2 * m:3 * m]
     counts = record[3 * m:]
     damping, threshold, rank_tolerance = settings[0], settings[1], settings[2]
@@ -62,16 +72,17 @@ def solve_by_stages(A, lower, upper, sizes, x, record, settings):
     counts[1], counts[2] = 0.0, -1.0
     # The level's rows being factored, behind the held rows, and behind the fixed ones; then the
     # held rows, the reflectors, and one vector.
-    W = np.empty((3 * m + 2 * n + 1, n))
+    at = (3 * m + 2 * n + 1) * n
+    W = work[:at].reshape((3 * m + 2 * n + 1, n))
     behind, base, held_at, V, X = m, 2 * m, 3 * m, 3 * m + n, 3 * m + 2 * n
-    of_rows, of_columns = np.empty((6, m)), np.empty((7, n))
+    of_rows, at = work[at:at + 6 * m].reshape((6, m)), at + 6 * m
+    of_columns, at = work[at:at + 7 * n].reshape((7, n)), at + 7 * n
     value, along, zero, miss, w = of_rows[0], of_rows[1], of_rows[2], of_rows[3], of_rows[4]
     beta, y, start, p, g, force = (of_columns[0], of_columns[1], of_columns[2], of_columns[3],
                                    of_columns[4], of_columns[5])
     scale, reference = of_rows[5], of_columns[6]
-    of_row = np.empty((4, m), np.int64)
-    state, unit, soft, order = of_row[0], of_row[1], of_row[2], of_row[3]
-    hard = np.empty(m, np.int64)  # more than n may ask to be held
+    of_row, of_block = work[at:at + 5 * m].view(np.int64).reshape((5, m)), work[at + 5 * m:]
+    state, unit, soft, order, hard = of_row[0], of_row[1], of_row[2], of_row[3], of_row[4]
     if prepare(A, lower, upper, x, active, held, multiplier, scale) < 0:
         return finish(x, NUMERICAL_FAILURE)
     for c in range(n):
@@ -92,6 +103,7 @@ def solve_by_stages(A, lower, upper, sizes, x, record, settings):
             continue
         for c in range(n):
             start[c] = x[c]
+        _watch_parallel(A, unit, x, state, value, first)
         _reflect_soft(A, W, soft, ZERO, s, base, V, beta, ZERO, fixed)
         h = _hold_from(A, lower, upper, W, active, state, value, hard, ZERO,
                        _list_held(state, hard, first), held_at, V, beta, fixed, scale,
@@ -112,7 +124,7 @@ def solve_by_stages(A, lower, upper, sizes, x, record, settings):
             else:
                 rank = _step_of_soft(A, lower, upper, active, unit, scale, start, W, soft, order, s,
                                      behind, V, beta, zero, miss, w, y, g, fixed, h, damping,
-                                     threshold, rank_tolerance)
+                                     threshold, rank_tolerance, of_block)
             _back_to_x(W, V, X, beta, y, start, x, p, fixed, rank, at_reference)
             block, side, length = _first_block(A, lower, upper, state, unit, scale, value, along, x,
                                                p, last, tolerance, bland)
@@ -133,8 +145,8 @@ def solve_by_stages(A, lower, upper, sizes, x, record, settings):
                     state[block] = HELD
                     h += 1
                     reflect_rows(W, beta, V, fixed + h - 1, fixed + h, behind, behind + s)
-                else:  # parallel to what is held already, to rounding: it moves no more
-                    state[block], active[block] = FIXED, 0
+                else:
+                    state[block], active[block] = PARALLEL, 0
                 continue
             size = _norm(x)
             if at_reference:
@@ -162,6 +174,7 @@ def solve_by_stages(A, lower, upper, sizes, x, record, settings):
             if drop >= first and active[drop] == -was:
                 continue  # beyond its other side now: it stays soft, and its target is that side
             active[drop], state[drop] = 0, WATCHED
+            _watch_parallel(A, unit, x, state, value, last)
             if drop >= first:
                 s = _without(W, soft, s, base, drop)
             else:
@@ -169,7 +182,8 @@ def solve_by_stages(A, lower, upper, sizes, x, record, settings):
                 h = _hold_from(A, lower, upper, W, active, state, value, hard, place, h - 1,
                                held_at, V, beta, fixed, scale, rank_tolerance)
             _copy_soft(W, ZERO, s, base, behind, V, beta, fixed, h)
-        doubtful |= _is_doubtful(W, scale, hard, h, held_at, soft, order, fixed, rank, sure, doubt)
+        doubtful |= _is_doubtful(W, scale, hard, h, held_at, force, soft, order, fixed, rank, sure,
+                                 doubt)
         whole = _settle(lower, upper, active, state, held, multiplier, scale, hard, h, force, soft,
                         order, s, w, size, sure, tolerance, k)
         if whole and not at_reference:
@@ -211,6 +225,14 @@ def _norm(x):
     for c in range(x.size):
         square += x[c] * x[c]
     return np.sqrt(square)
+
+
+@inlined
+def _watch_parallel(A, unit, x, state, value, last):
+    """Watch again the rows that were kept in place by held rows, as those are no more the same."""
+    for i in range(last):
+        if state[i] == PARALLEL:
+            state[i], value[i] = WATCHED, _value(A, unit, x, i)
 
 
 @inlined
@@ -341,7 +363,8 @@ def _step_of_held(A, lower, upper, active, unit, start, W, hard, h, held_at, fix
 
 @inlined
 def _step_of_soft(A, lower, upper, active, unit, scale, start, W, soft, order, s, behind, V, beta,
-                  zero, miss, w, y, g, fixed, h, damping, threshold, rank_tolerance):
+                  zero, miss, w, y, g, fixed, h, damping, threshold, rank_tolerance,
+                  of_block):
     """Write the step of the level behind the held rows, what it still misses, and its pull."""
     free = fixed + h
     for q in range(s):
@@ -353,7 +376,7 @@ def _step_of_soft(A, lower, upper, active, unit, scale, start, W, soft, order, s
         for c in range(fixed, free):
             miss[q] -= W[q, c] * y[c]
     rank = factor_level(W, order, zero, miss, beta, V, 0 * s, s, free)
-    solve_block(W, miss, y, 0 * s, s, free, rank, damping, threshold)
+    solve_block(W, miss, y, 0 * s, s, free, rank, damping, threshold, of_block)
     for c in range(h):
         g[c] = 0.0
     for q in range(s):
@@ -453,12 +476,13 @@ def _pull_to_reference(x, reference, size, tolerance):
 
 
 @inlined
-def _is_doubtful(W, scale, hard, h, held_at, soft, order, fixed, rank, sure, doubt):
+def _is_doubtful(W, scale, hard, h, held_at, force, soft, order, fixed, rank, sure, doubt):
     """Whether a stage may be wrong: multipliers that matter cannot be told from rounding, the level
     may be attainable after all, or little is left of a row behind those before.
     """
     doubtful = doubt < 0.0 or (h > 0 and sure > doubt > 0.0)
     for q in range(h):
+        doubtful |= sure < abs(force[q]) * scale[hard[q]] < doubt
         doubtful |= abs(W[held_at + q, fixed + q]) < NEARLY_PARALLEL * scale[hard[q]]
     for q in range(rank - fixed - h):
         doubtful |= abs(W[q, fixed + h + q]) < NEARLY_PARALLEL * scale[soft[order[q]]]

@@ -16,6 +16,7 @@ from hierarchy.compiled import compiled
 from solvers.kernels.block import solve_block
 from solvers.kernels.rows import (
     SOLVED,
+    TOO_SMALL,
     ZERO,
     factor_level,
     finish,
@@ -25,16 +26,27 @@ from solvers.kernels.rows import (
 
 
 @compiled
-def staircase(A, lower, upper, sizes, x, damping, threshold, rank_tolerance):
+def staircase_work(m, n):
+    """Return how many numbers of work space a hierarchy of m rows needs."""
+    return (2 * m + 2 * n + 4) * n + 4 * m
+
+
+@compiled
+def staircase(A, lower, upper, sizes, x, damping, threshold, rank_tolerance, work):
     """Solve; x (n,) comes in as the reference and goes out as the answer, zero on failure.
 
-    Returns SOLVED, NUMERICAL_FAILURE, or -(i + 1) where row i is an inequality.
+    work: at least staircase_work(m, n), of any content. Returns SOLVED, NUMERICAL_FAILURE,
+    TOO_SMALL, or -(i + 1) where row i is an inequality.
     """
     m, n = A.shape
-    W = np.empty((m + n + 1, n))  # rows of J, then of Q's reflectors, then x
-    V, X = m, m + n
-    zero, miss, beta, y = np.empty(m), np.empty(m), np.empty(n), np.empty(n)
-    row = np.empty(m, np.int64)  # the pivot order, which nobody asks for here
+    if work.size < staircase_work(m, n):
+        return TOO_SMALL
+    V, X, of_rows = m, m + n, (m + n + 3) * n
+    W = work[:of_rows].reshape((m + n + 3, n))  # rows of J, then of Q's reflectors, then x
+    beta, y = W[X + 1], W[X + 2]
+    zero, miss = work[of_rows:of_rows + m], work[of_rows + m:of_rows + 2 * m]
+    row = work[of_rows + 2 * m:of_rows + 3 * m].view(np.int64)  # the pivot order, not asked for
+    of_block = work[of_rows + 3 * m:]
     code = load_rows(W, zero, A, lower, upper, x, rank_tolerance)
     if code != SOLVED:
         return finish(x, code)
@@ -49,7 +61,7 @@ def staircase(A, lower, upper, sizes, x, damping, threshold, rank_tolerance):
         for i in range(first, last):
             for c in range(above):
                 miss[i] -= W[i, c] * y[c]  # p_i - J_i x_{i-1}, in (13)
-        solve_block(W, miss, y, first, last, above, rank, damping, threshold)
+        solve_block(W, miss, y, first, last, above, rank, damping, threshold, of_block)
         first = last
 
     zero_reference = True

@@ -1,0 +1,27 @@
+"""Work space that kernels write their intermediate numbers into.
+
+Kernels allocate nothing: that costs them more than many of their sums. Each thread has one array,
+made larger when a kernel says that it is TOO_SMALL; what is left in it from before never matters.
+"""
+
+from __future__ import annotations
+
+import threading
+
+import numpy as np
+
+from hierarchy.problem import Array
+
+
+class _Workspace(threading.local):
+    """One array for each thread."""
+
+    def __init__(self) -> None:
+        self.array: Array = np.empty(4096)  # 32 kB: a humanoid's stack fits
+
+    def double(self) -> None:
+        """Make room for twice as many numbers."""
+        self.array = np.empty(2 * self.array.size)
+
+
+WORKSPACE = _Workspace()
