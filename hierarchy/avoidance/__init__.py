@@ -1,9 +1,11 @@
 """Where obstacles are, how far, and how strongly the robot should leave them (eqs. 22-27, 31)."""
 
+from hierarchy.avoidance.barrier import Barrier
 from hierarchy.avoidance.control_points import ControlPoint
 from hierarchy.avoidance.measurement import Measurement, SurveillanceAreas, measure_exactly
 from hierarchy.avoidance.obstacles import Obstacle, Obstacles
+from hierarchy.avoidance.pairs import Pairs, measure_pairs
 from hierarchy.avoidance.repulsion import Repulsion
 
-__all__ = ["ControlPoint", "Measurement", "Obstacle", "Obstacles", "Repulsion",
-           "SurveillanceAreas", "measure_exactly"]
+__all__ = ["Barrier", "ControlPoint", "Measurement", "Obstacle", "Obstacles", "Pairs",
+           "Repulsion", "SurveillanceAreas", "measure_exactly", "measure_pairs"]

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hierarchy.avoidance.obstacles import distance_to_obstacle
+from hierarchy.avoidance.pairs import Pairs
 from hierarchy.avoidance.repulsion import repulsion
 from hierarchy.compiled import compiled
 from hierarchy.errors import HierarchyError
@@ -41,10 +42,11 @@ class Measurement:
     points (K + 1, 3) [m]; distance (K + 1,) [m] to the nearest obstacle, eq. (22), infinite when
     there is none; direction (K + 1, 3) unit vector away from it; magnitude (K + 1,) of the
     repulsion, eq. (23); nearest (K + 1,) index of that obstacle or -1. `active` is the control
-    point of eq. (31), the first with the smallest distance (-1 if there is none).
+    point of eq. (31), the first with the smallest distance (-1 if there is none). `pairs` has
+    every point against every obstacle, or is None where nobody asked for it.
     """
 
-    __slots__ = ("active", "direction", "distance", "magnitude", "nearest", "points")
+    __slots__ = ("active", "direction", "distance", "magnitude", "nearest", "pairs", "points")
 
     def __init__(self, control_points: int) -> None:
         size = control_points + 1
@@ -52,6 +54,7 @@ class Measurement:
         self.distance, self.magnitude = np.full(size, inf), np.zeros(size)
         self.nearest = np.full(size, -1, dtype=np.int64)
         self.active = -1
+        self.pairs: Pairs | None = None
 
     @property
     def minimal_distance(self) -> float:

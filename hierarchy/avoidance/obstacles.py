@@ -57,11 +57,15 @@ class Obstacle:
 
 
 class Obstacles:
-    """All obstacles of a scene as one table (H, 16) that follows time."""
+    """All obstacles of a scene as one table (H, 16) that follows time.
+
+    `motion` (H, 6) has the velocity [m/s] and acceleration [m/s^2] of each centre.
+    """
 
     def __init__(self, obstacles: Sequence[Obstacle] = ()) -> None:
         self.obstacles = tuple(obstacles)
         self.table = np.array([o.packed() for o in obstacles]).reshape(-1, _WIDTH)
+        self.motion = np.zeros((len(self.table), 6))
         self._moving = [(h, o.path) for h, o in enumerate(obstacles) if o.path is not None]
         self.at(0.0)
 
@@ -71,7 +75,9 @@ class Obstacles:
     def at(self, t: float) -> Array:
         """Move the obstacles to time t [s] and return the table (H, 16)."""
         for h, path in self._moving:
-            self.table[h, _CENTRE] = path(t)[0]
+            moved = path(t)
+            self.table[h, _CENTRE] = moved[0]
+            self.motion[h] = moved[1:].ravel()
         return self.table
 
     @property

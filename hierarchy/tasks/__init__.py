@@ -6,10 +6,12 @@ from hierarchy.tasks.pointing import Pointing
 from hierarchy.tasks.pose import Pose
 from hierarchy.tasks.position import Position
 from hierarchy.tasks.posture import JointDamping, Posture
+from hierarchy.tasks.separation import Separation
 
 TASKS: dict[str, type[Task]] = {
     "avoidance": Avoidance, "damping": JointDamping, "pointing": Pointing, "pose": Pose,
-    "position": Position, "posture": Posture,
+    "position": Position, "posture": Posture, "separation": Separation,
 }
 
-__all__ = ["TASKS", "Avoidance", "JointDamping", "Pointing", "Pose", "Position", "Posture"]
+__all__ = ["TASKS", "Avoidance", "JointDamping", "Pointing", "Pose", "Position", "Posture",
+           "Separation"]

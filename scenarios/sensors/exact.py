@@ -9,8 +9,10 @@ from hierarchy.avoidance import (
     ControlPoint,
     Measurement,
     Obstacles,
+    Pairs,
     Repulsion,
     measure_exactly,
+    measure_pairs,
 )
 from hierarchy.avoidance.control_points import pack_points
 from hierarchy.avoidance.repulsion import laws
@@ -23,11 +25,12 @@ class ExactDistances:
 
     `body` and `tip` are the magnitudes of the repulsion of the control points and of the end
     effector; with `mean_within` > 0 [m] directions are the mean (25)-(26) over the obstacles
-    nearer than that, else those of the nearest obstacle.
+    nearer than that, else those of the nearest obstacle. With `pairs`, every point is also
+    measured against every obstacle, which the task `Separation` needs.
     """
 
     def __init__(self, robot: Robot, obstacles: Obstacles, body: Repulsion, tip: Repulsion,
-                 mean_within: float = 0.0) -> None:
+                 mean_within: float = 0.0, pairs: bool = False) -> None:
         end = robot.frame(robot.end_effector)
         self.points = (*robot.control_points,
                        ControlPoint(robot.end_effector, end.joint, end.offset))
@@ -35,11 +38,15 @@ class ExactDistances:
         self._joints, self._offsets = pack_points(self.points)
         self._laws = laws(body, tip)
         self.measurement = Measurement(len(robot.control_points))
+        if pairs:
+            self.measurement.pairs = Pairs(len(self.points), len(obstacles))
 
     def measure(self, state: State) -> Measurement:
         """Measure at a state and hang the measurement on it; valid until the next call."""
         measure_exactly(self.measurement, state.placements, self._joints, self._offsets,
                         self.obstacles.at(state.t), self._laws, self.mean_within)
+        if self.measurement.pairs is not None:
+            measure_pairs(self.measurement.pairs, self.measurement.points, self.obstacles)
         state.measurement = self.measurement
         return self.measurement
 

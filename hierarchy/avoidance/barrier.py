@@ -1,0 +1,126 @@
+"""What a row that keeps h >= 0 is made of: the side it asks for, and the motion of two points.
+
+h is a distance less the one to keep. The side is a control barrier: of first order at velocity
+level, dh/dt >= -rate h, of second order at acceleration level, (d/dt + rate)^2 h >= 0. Sources:
+Ames et al., "Control barrier functions: theory and applications" (2019); Nguyen and Sreenath,
+"Exponential control barrier functions" (2016).
+"""
+
+# mypy: disable-error-code="no-untyped-def"
+
+from __future__ import annotations
+
+from dataclasses import astuple, dataclass
+from math import inf
+
+import numpy as np
+
+from hierarchy.compiled import inlined
+from hierarchy.errors import HierarchyError
+from hierarchy.problem import Array
+
+
+@dataclass(frozen=True)
+class Barrier:
+    """How h = d - distance is kept from becoming negative.
+
+    distance : what to keep, d_min [m].
+    rate : how fast what is left of h may be used up [1/s]; times the period it should be well
+        below 1.
+    influence : beyond this distance [m] a row has no side.
+    recovery : the largest speed away from the obstacle that is asked for inside d_min [m/s].
+    limit : the largest acceleration away from it that is ever asked for [m/s^2].
+
+    At velocity level dh/dt >= min(-rate h, recovery). At acceleration level d2h/dt2 >=
+    2 rate (min(-rate h / 2, recovery) - dh/dt), at most `limit`: critically damped, and inside
+    d_min it goes out at `recovery` until h = -2 recovery / rate. From h >= 0 and dh/dt >= -rate h
+    on h stays so as long as rows are met and `limit` does not act; after a faster approach
+    h may become negative, and recovers. In a sampled loop h may pass zero by terms in the period.
+
+    A side appears when d falls to `influence`. It does not bind at once: there h is large, and an
+    approach at up to rate h, at acceleration level up to half of that, may go on as it is.
+
+    Raises HierarchyError, naming the setting, where one is out of its range.
+    """
+
+    distance: float
+    rate: float = 10.0
+    influence: float = 0.3
+    recovery: float = 0.2
+    limit: float = 50.0
+
+    def __post_init__(self) -> None:
+        for name, least in (("distance", 0.0), ("rate", 0.0), ("recovery", 0.0), ("limit", 0.0)):
+            value = getattr(self, name)
+            if not least <= value < inf or (name in ("rate", "limit") and value == 0.0):
+                raise HierarchyError(f"barrier: {name} = {value} is out of range")
+        if not self.distance < self.influence:
+            raise HierarchyError(f"barrier: influence = {self.influence} m must be more than the "
+                                 f"distance to keep, {self.distance} m")
+
+    def packed(self) -> Array:
+        """The settings as one array (5,), as the kernels take it."""
+        return np.array(astuple(self))
+
+
+@inlined
+def least_rate(h, settings):
+    """The dh/dt [m/s] to ask for at least, at velocity level; settings of `Barrier.packed`."""
+    return min(-settings[1] * h, settings[3])
+
+
+@inlined
+def least_acceleration(h, rate_of_h, settings):
+    """The d2h/dt2 [m/s^2] to ask for at least; settings of `Barrier.packed`."""
+    toward = min(-0.5 * settings[1] * h, settings[3])
+    return min(2.0 * settings[1] * (toward - rate_of_h), settings[4])
+
+
+@inlined
+def velocity_of_point(J, supports, joint, v, x, y, z):
+    """Velocity of the material point that is at x, y, z, and the angular one of its body."""
+    px = py = pz = wx = wy = wz = 0.0
+    for c in range(v.size):
+        if supports[joint, c]:
+            px += J[0, c] * v[c]
+            py += J[1, c] * v[c]
+            pz += J[2, c] * v[c]
+            wx += J[3, c] * v[c]
+            wy += J[4, c] * v[c]
+            wz += J[5, c] * v[c]
+    return px + wy * z - wz * y, py + wz * x - wx * z, pz + wx * y - wy * x, wx, wy, wz
+
+
+@inlined
+def drift_of_point(v, J, dJ, placements, supports, previous_J, previous_placements, period,
+                   joint, ox, oy, oz):
+    """Velocity J_c v (3) and drift dJ_c/dt v (3) of the point at offset ox, oy, oz on a body.
+
+    The drift is exact, or with a period that of the backward difference of J_c.
+    """
+    x, y, z = place(placements[joint], ox, oy, oz)
+    px, py, pz, wx, wy, wz = velocity_of_point(J, supports, joint, v, x, y, z)
+    if period > 0.0:
+        bx, by, bz = place(previous_placements[joint], ox, oy, oz)
+        bx, by, bz, _, _, _ = velocity_of_point(previous_J, supports, joint, v, bx, by, bz)
+        return px, py, pz, (px - bx) / period, (py - by) / period, (pz - bz) / period
+    # dJ_v v + dJ_w v x p, as a velocity with dJ for J, and w x dp/dt
+    dx, dy, dz, _, _, _ = velocity_of_point(dJ, supports, joint, v, x, y, z)
+    return (px, py, pz, dx + wy * pz - wz * py, dy + wz * px - wx * pz, dz + wx * py - wy * px)
+
+
+@inlined
+def place(T, ox, oy, oz):
+    """World position of an offset on the body whose placement is T (12,)."""
+    return (T[9] + T[0] * ox + T[3] * oy + T[6] * oz, T[10] + T[1] * ox + T[4] * oy + T[7] * oz,
+            T[11] + T[2] * ox + T[5] * oy + T[8] * oz)
+
+
+@inlined
+def add_row(J, supports, joint, x, y, z, rx, ry, rz, A, row):
+    """Add r^T J_c (n,) of the point of a body that is at x, y, z to A[row]."""
+    mx, my, mz = y * rz - z * ry, z * rx - x * rz, x * ry - y * rx  # r . (w x p) = w . (p x r)
+    for c in range(A.shape[1]):
+        if supports[joint, c]:
+            A[row, c] += (J[0, c] * rx + J[1, c] * ry + J[2, c] * rz
+                          + J[3, c] * mx + J[4, c] * my + J[5, c] * mz)

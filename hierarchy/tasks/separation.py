@@ -1,0 +1,182 @@
+"""Separation: all points kept from all obstacles by one-sided rows, whatever else is asked."""
+
+# mypy: disable-error-code="no-untyped-def"
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hierarchy.avoidance.barrier import (
+    Barrier,
+    add_row,
+    drift_of_point,
+    least_acceleration,
+    least_rate,
+    place,
+)
+from hierarchy.avoidance.control_points import ControlPoint, pack_points
+from hierarchy.avoidance.pairs import Pairs
+from hierarchy.compiled import compiled
+from hierarchy.errors import HierarchyError
+from hierarchy.kinematics import write_point_jacobian, write_point_jacobian_derivative
+from hierarchy.problem import Array
+from hierarchy.robot import State
+from hierarchy.task import Kind, Level, Task
+
+
+@dataclass(frozen=True)
+class Separation(Task):
+    """Keep every point at `barrier.distance` or more from every obstacle (m = points x obstacles).
+
+    `points` are those of the sensor, in its order, the end effector last; `obstacles` is how many
+    the measurement has. With None there is one row a point, against what is nearest to it: fewer
+    rows, but where another obstacle becomes the nearest, nothing has slowed its approach before.
+
+    With d the distance of a pair, r the direction and o the obstacle, a row is, see `Barrier`,
+
+    - at velocity level r^T J_c v >= r . v_o + what is asked of dh/dt,
+    - at acceleration level r^T J_c a >= r . a_o - r^T dJ_c/dt v + what is asked of d2h/dt2.
+
+    Left out of d2d/dt2 is what the turning of r adds: |w|^2 / d beside a point, with w the relative
+    velocity across r; less beside a capsule or a box, never negative for a convex obstacle that
+    does not turn. So the distance grows by at least what the row says. The derivative of J_c is
+    exact or a backward difference, as the state has it. A pair beyond `barrier.influence` has a row
+    without sides, which does nothing.
+    """
+
+    points: Sequence[ControlPoint]
+    barrier: Barrier
+    obstacles: int | None = None
+    name: str = "separation"
+    kind: Kind = "inequality"
+    joints: NDArray[np.int64] = field(init=False, repr=False, compare=False)
+    offsets: Array = field(init=False, repr=False, compare=False)
+    settings: Array = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        if not self.points:
+            raise HierarchyError(f"task {self.name!r}: needs at least one point")
+        if self.kind != "inequality":
+            raise HierarchyError(f"task {self.name!r}: its rows are inequalities")
+        joints, offsets = pack_points(self.points)
+        object.__setattr__(self, "joints", joints)
+        object.__setattr__(self, "offsets", offsets)
+        object.__setattr__(self, "settings", self.barrier.packed())
+
+    @property
+    def dimension(self) -> int:
+        """A row for each pair, or for each point."""
+        return len(self.joints) * (1 if self.obstacles is None else self.obstacles)
+
+    def error(self, state: State) -> Array:
+        """distance - d (m,) [m], positive where a point is too near."""
+        return np.array([self.barrier.distance - pair[0] for _, pair in self._rows(state)])
+
+    def jacobian(self, state: State) -> Array:
+        """r^T J_c (m, n): the derivative of the distances to obstacles that stand still."""
+        J = np.empty((3, state.n))
+        A = np.empty((self.dimension, state.n))
+        for row, (k, pair) in enumerate(self._rows(state)):
+            write_point_jacobian(state.J, state.placements, state.supports, int(self.joints[k]),
+                                 self.offsets[k], J, 0)
+            A[row] = pair[1:4] @ J
+        return A
+
+    def jacobian_derivative(self, state: State) -> Array:
+        """r^T dJ_c/dt (m, n), the direction held."""
+        dJ = np.empty((3, state.n))
+        A_dot = np.empty((self.dimension, state.n))
+        for row, (k, pair) in enumerate(self._rows(state)):
+            write_point_jacobian_derivative(*state.arrays, int(self.joints[k]), self.offsets[k], dJ)
+            A_dot[row] = pair[1:4] @ dJ
+        return A_dot
+
+    def desired_velocity(self, state: State) -> Array:
+        """r . v_o (m,) [m/s]."""
+        return np.array([pair[4] for _, pair in self._rows(state)])
+
+    def desired_acceleration(self, state: State) -> Array:
+        """r . a_o (m,) [m/s^2]."""
+        return np.array([pair[5] for _, pair in self._rows(state)])
+
+    def reference_velocity(self, state: State) -> Array:
+        """The least r^T J_c v (m,) [m/s], -inf beyond `influence`."""
+        asked = [least_rate(-e, self.settings) for e in self.error(state)]
+        return self._near(state, self.desired_velocity(state) + asked)
+
+    def reference_acceleration(self, state: State) -> Array:
+        """The least r^T d2p/dt2 (m,) [m/s^2], -inf beyond `influence`."""
+        rates = self.jacobian(state) @ state.v - self.desired_velocity(state)
+        asked = [least_acceleration(-e, rate, self.settings)
+                 for e, rate in zip(self.error(state), rates, strict=True)]
+        return self._near(state, self.desired_acceleration(state) + asked)
+
+    def write(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
+              row: int) -> None:
+        """See `Task.write`."""
+        _write(*state.arrays, self.joints, self.offsets, self._seen(state).table, self.settings,
+               self.obstacles is None, level == "acceleration", A, lower, upper, row)
+
+    def _near(self, state: State, lower: Array) -> Array:
+        distances = self.barrier.distance - self.error(state)
+        return np.where(distances <= self.barrier.influence, lower, -np.inf)
+
+    def _rows(self, state: State) -> list[tuple[int, Array]]:
+        """Point and pair (6,) of each row."""
+        seen = self._seen(state)
+        if self.obstacles is None:
+            return [(k, pairs[int(np.argmin(pairs[:, 0]))]) for k, pairs in enumerate(seen.table)]
+        return [(k, pair) for k, pairs in enumerate(seen.table) for pair in pairs]
+
+    def _seen(self, state: State) -> Pairs:
+        seen = None if state.measurement is None else state.measurement.pairs
+        if seen is None:
+            raise HierarchyError(f"task {self.name!r}: the state carries no measurement of pairs")
+        points, obstacles, _ = seen.table.shape
+        if self.obstacles is None:
+            fits = points == len(self.joints) and obstacles > 0
+        else:
+            fits = points == len(self.joints) and obstacles == self.obstacles
+        if not fits:
+            raise HierarchyError(
+                f"task {self.name!r}: {points} points are measured against {obstacles} obstacles, "
+                f"expected {len(self.joints)} against {self.obstacles or 'one at least'}")
+        return seen
+
+
+@compiled
+def _write(v, J, dJ, placements, supports, previous_J, previous_placements, period,
+           joints, offsets, pairs, settings, nearest, acceleration, A, lower, upper, row):
+    distance, influence = settings[0], settings[2]
+    for k in range(joints.size):
+        joint = joints[k]
+        x, y, z = place(placements[joint], offsets[k, 0], offsets[k, 1], offsets[k, 2])
+        vx, vy, vz, ax, ay, az = drift_of_point(
+            v, J, dJ, placements, supports, previous_J, previous_placements, period, joint,
+            offsets[k, 0], offsets[k, 1], offsets[k, 2])
+        first, end = 0, pairs.shape[1]
+        if nearest:
+            for j in range(1, end):
+                if pairs[k, j, 0] < pairs[k, first, 0]:
+                    first = j
+            end = first + 1
+        for j in range(first, end):
+            pair = pairs[k, j]
+            rx, ry, rz = pair[1], pair[2], pair[3]
+            for c in range(A.shape[1]):
+                A[row, c] = 0.0
+            add_row(J, supports, joint, x, y, z, rx, ry, rz, A, row)
+            lower[row], upper[row] = -np.inf, np.inf
+            if pair[0] <= influence:
+                h = pair[0] - distance
+                if acceleration:
+                    rate = rx * vx + ry * vy + rz * vz - pair[4]
+                    lower[row] = (least_acceleration(h, rate, settings) + pair[5]
+                                  - (rx * ax + ry * ay + rz * az))
+                else:
+                    lower[row] = least_rate(h, settings) + pair[4]
+            row += 1
