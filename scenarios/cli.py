@@ -159,9 +159,14 @@ def check(file: Annotated[str, typer.Argument(help="A scenario file, or a scenar
     if scenario.pointing is not None:
         print(f"  pointing  {scenario.pointing.kind}, cone of {scenario.pointing.alpha_d:g} deg")
     if scenario.avoidance is not None:
-        areas = scenario.avoidance
-        print(f"  avoidance {len(areas.obstacles)} obstacles; within {areas.near:g} and "
-              f"{areas.far:g} m of the body, {areas.end_effector:g} m of the end effector")
+        asked = scenario.avoidance
+        body, tip = (" and ".join(f"{distance:g}" for distance in thresholds.values())
+                     for thresholds in (asked.thresholds, asked.tip_thresholds))
+        print(f"  avoidance {asked.kind}, {len(asked.obstacles)} obstacles; within {body} m of the "
+              f"body, {tip} m of the end effector")
+    if scenario.limits is not None:
+        print(f"  limits    positions and velocities of the robot, "
+              f"{scenario.limits.acceleration} rad/s^2")
     print("The file is right.")
 
 

@@ -9,7 +9,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 import tomli_w
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Discriminator,
+    Field,
+    Tag,
+    ValidationError,
+    model_validator,
+)
 
 from hierarchy.errors import HierarchyError, UnknownNameError
 
@@ -58,12 +67,17 @@ class StartSection(_Section):
 class ControlSection(_Section):
     """How the tasks are resolved and how often.
 
+    `stack` = "switched": Algorithm 1 says which tasks are in the stack, and all are equalities.
+    "hierarchical": limits, avoidance, position and pointing are in it at all times, in this order,
+    inequalities as inequalities.
+
     `options` are settings of the resolver. A table in it that bears a resolver's name, such as
     `[control.options.tpm]`, holds for that resolver alone; so the resolver can be swapped by
     changing its name, and nothing else. A plain setting goes before one from such a table.
     """
 
     level: Literal["velocity", "acceleration"] = "acceleration"
+    stack: Literal["switched", "hierarchical"] = "switched"
     period: Annotated[float, Field(gt=0.0, le=1.0)] = 0.001
     duration: Positive
     jacobian_derivative: Literal["exact", "difference"] = "exact"
@@ -175,15 +189,19 @@ def _point_as_table(obstacle: Any) -> Any:
     return {"centre": obstacle} if isinstance(obstacle, list | tuple) else obstacle
 
 
-class AvoidanceSection(_Section):
-    """Avoidance by the body and repulsion of the end effector."""
+Obstacles = tuple[Annotated[ObstacleSection, BeforeValidator(_point_as_table)], ...]
 
+
+class AvoidanceSection(_Section):
+    """Avoidance by the body and repulsion of the end effector, switched by Algorithm 1."""
+
+    kind: Literal["repulsion"] = "repulsion"
     dimension: Literal[1, 3] = 1
     direction: Literal["nearest", "mean"] = "nearest"
     near: NotNegative
     far: NotNegative
     end_effector: NotNegative
-    obstacles: tuple[Annotated[ObstacleSection, BeforeValidator(_point_as_table)], ...]
+    obstacles: Obstacles
     body: RepulsionSection
     tip: RepulsionSection
     jacobian: Literal["exact", "published"] = "exact"
@@ -193,6 +211,71 @@ class AvoidanceSection(_Section):
         if self.near > self.far:
             raise ValueError(f"near = {self.near} m is beyond far = {self.far} m")
         return self
+
+    @property
+    def thresholds(self) -> dict[str, float]:
+        """Distances of the body [m] at which something changes, by symbol."""
+        return {r"$\epsilon_1$": self.near, r"$\epsilon_2$": self.far}
+
+    @property
+    def tip_thresholds(self) -> dict[str, float]:
+        """The same for the end effector."""
+        return {r"$\epsilon_{ee}$": self.end_effector}
+
+
+class SeparationSection(_Section):
+    """All control points and the end effector kept off all obstacles, as one-sided rows.
+
+    `distance` [m] that is kept; `rate` [1/s] at which it may be approached; obstacles beyond
+    `influence` [m] ask for nothing. With `self_collision` the arm's own links too.
+    """
+
+    kind: Literal["separation"]
+    distance: NotNegative = 0.03
+    rate: Positive = 10.0
+    influence: Positive = 0.5
+    self_collision: bool = False
+    obstacles: Obstacles = ()
+
+    @model_validator(mode="after")
+    def _areas_nested(self) -> Self:
+        if self.distance >= self.influence:
+            raise ValueError(f"distance = {self.distance} m is not below influence = "
+                             f"{self.influence} m")
+        return self
+
+    @property
+    def thresholds(self) -> dict[str, float]:
+        """Distances of the body [m] at which something changes, by symbol."""
+        return {r"$d_{min}$": self.distance}
+
+    @property
+    def tip_thresholds(self) -> dict[str, float]:
+        """The same for the end effector."""
+        return self.thresholds
+
+
+def _avoidance_kind(section: Any) -> str:
+    return (str(section.get("kind", "repulsion")) if isinstance(section, dict)
+            else str(getattr(section, "kind", "repulsion")))
+
+
+AvoidanceKind = Annotated[
+    Annotated[AvoidanceSection, Tag("repulsion")] | Annotated[SeparationSection, Tag("separation")],
+    Discriminator(_avoidance_kind)]
+
+
+class LimitsSection(_Section):
+    """The robot's joint limits as the first level of the stack.
+
+    Positions and velocities are those of the robot; `acceleration` [rad/s^2] of every joint, or
+    one for each; `margin` [rad] is kept off the position limits; `torque` is the share of the
+    effort limits that may be used, at acceleration level, or None for any torque.
+    """
+
+    acceleration: Positive | tuple[Positive, ...]
+    margin: NotNegative = 0.0
+    torque: Annotated[float, Field(gt=0.0, le=1.0)] | None = None
 
 
 class DampingSection(_Section):
@@ -226,7 +309,8 @@ class Scenario(_Section):
     control: ControlSection
     position: PositionSection | None = None
     pointing: PointingSection | None = None
-    avoidance: AvoidanceSection | None = None
+    avoidance: AvoidanceKind | None = None
+    limits: LimitsSection | None = None
     damping: DampingSection | None = None
     posture: PostureSection | None = None
 
@@ -237,8 +321,14 @@ class Scenario(_Section):
                              "[avoidance]")
         if self.damping and self.posture:
             raise ValueError("give [damping] or [posture], not both")
-        if self.avoidance and not self.position:
+        switched = self.control.stack == "switched"
+        if self.avoidance and switched != (self.avoidance.kind == "repulsion"):
+            raise ValueError('avoidance.kind = "repulsion" goes with control.stack = "switched", '
+                             '"separation" with "hierarchical"')
+        if self.avoidance and switched and not self.position:
             raise ValueError("[avoidance] needs [position]: Algorithm 1 orders one by the other")
+        if self.limits and self.limits.torque and self.control.level == "velocity":
+            raise ValueError("limits.torque needs control.level = \"acceleration\"")
         return self
 
     def make_resolver(self) -> Resolver:
@@ -373,7 +463,7 @@ def _validated(data: dict[str, Any], what: str) -> Scenario:
 
 
 def _say(what: str, error: Any) -> str:
-    keys = [str(key) for key in error["loc"]]
+    keys = _without_kinds([str(key) for key in error["loc"]])
     where = ".".join(keys) or "file"
     if error["type"] == "extra_forbidden":
         return f"{what}: {UnknownNameError('key', where, _keys_beside(keys))}"
@@ -382,19 +472,37 @@ def _say(what: str, error: Any) -> str:
     return f"{what}: {where}: {text}{value}"
 
 
+def _without_kinds(loc: list[str]) -> list[str]:
+    """Leave out what pydantic puts into a place for the kind that was chosen there."""
+    return [key for i, key in enumerate(loc)
+            if i in (0, len(loc) - 1) or key not in _kinds_at(loc[:i])]
+
+
 def _keys_beside(keys: list[str]) -> list[str]:
     """Full names of the keys that may stand where the last of `keys` stands."""
-    section: Any = Scenario
-    for key in keys[:-1]:
-        field = section.model_fields.get(key) if hasattr(section, "model_fields") else None
-        section = _section_in(field.annotation) if field else None
-    known = section.model_fields if hasattr(section, "model_fields") else {}
+    beside = _sections_at(keys[:-1])
+    known = dict.fromkeys(key for section in beside for key in section.model_fields)
     return [".".join([*keys[:-1], key]) for key in known]
 
 
-def _section_in(annotation: Any) -> Any:
-    options = [annotation, *getattr(annotation, "__args__", ())]
-    return next((o for o in options if isinstance(o, type) and issubclass(o, _Section)), None)
+def _kinds_at(path: list[str]) -> set[str]:
+    found = (section.model_fields.get("kind") for section in _sections_at(path))
+    return {kind for field in found if field for kind in getattr(field.annotation, "__args__", ())}
+
+
+def _sections_at(path: list[str]) -> list[Any]:
+    """The sections that may stand at a path: more than one where a kind decides."""
+    sections: list[Any] = [Scenario]
+    for key in path:
+        fields = [section.model_fields[key] for section in sections if key in section.model_fields]
+        sections = [found for field in fields for found in _sections_in(field.annotation)]
+    return sections
+
+
+def _sections_in(annotation: Any) -> list[Any]:
+    if isinstance(annotation, type) and issubclass(annotation, _Section):
+        return [annotation]
+    return [found for part in getattr(annotation, "__args__", ()) for found in _sections_in(part)]
 
 
 def _without_none(data: Any) -> Any:

@@ -57,8 +57,9 @@ def ee_distance(ax: Axes, recording: Recording, colour: str) -> None:
     drawing.curve(ax, t, distance, color=colour)
     if "repulsion_active" in recording:
         _in_red(ax, t, distance, recording["repulsion_active"])
-    if recording.scenario.avoidance is not None:
-        _threshold(ax, t, recording.scenario.avoidance.end_effector, r"$\epsilon_{ee}$")
+    avoidance = recording.scenario.avoidance
+    for symbol, threshold in avoidance.tip_thresholds.items() if avoidance else ():
+        _threshold(ax, t, threshold, symbol)
 
 
 def active_point(ax: Axes, recording: Recording, colour: str) -> None:
@@ -80,9 +81,8 @@ def body_distance(ax: Axes, recording: Recording, colour: str) -> None:
     t = recording["t"]
     drawing.curve(ax, t, recording["minimal_distance"], color=colour)
     avoidance = recording.scenario.avoidance
-    if avoidance is not None:
-        _threshold(ax, t, avoidance.near, r"$\epsilon_1$")
-        _threshold(ax, t, avoidance.far, r"$\epsilon_2$")
+    for symbol, distance in avoidance.thresholds.items() if avoidance else ():
+        _threshold(ax, t, distance, symbol)
     ax.set_ylim(bottom=0.0)
 
 

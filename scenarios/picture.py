@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 _VERTICES = 1200
 _OTHER_POSES = 5
+_AREA_ALPHAS = (0.08, 0.18)  # of the outer and the inner area
 
 
 def picture(recordings: Mapping[str, Recording]) -> Figure:
@@ -45,7 +46,7 @@ def _line(ax: Axes, path: Array, **style: object) -> None:
 
 
 def _obstacles(ax: Axes, recording: Recording) -> None:
-    """Draw each obstacle that stands still as the ball around it, with its eps_1 and eps_2."""
+    """Draw each obstacle that stands still as the ball around it, with its areas."""
     avoidance = recording.scenario.avoidance
     if avoidance is None:
         return
@@ -55,7 +56,8 @@ def _obstacles(ax: Axes, recording: Recording) -> None:
             continue
         x, y = drawing.project(np.asarray(place, dtype=float))
         size = getattr(obstacle, "radius", None) or 0.0
-        for radius, alpha in ((avoidance.far, 0.08), (avoidance.near, 0.18), (0.0, 1.0)):
+        areas = sorted(avoidance.thresholds.values(), reverse=True)
+        for radius, alpha in zip((*areas, 0.0), (*_AREA_ALPHAS[-len(areas):], 1.0), strict=True):
             ax.add_patch(Circle((x, y), size + radius, color=ALERT, alpha=alpha, linewidth=0))
         ax.plot(x, y, "o", color=ALERT, markersize=5)
 

@@ -24,7 +24,8 @@ class HandMadeScenario:
     resolver: str = "tpm"
     pointing: Any = field(default_factory=lambda: SimpleNamespace(alpha_d=60.0, kind="inequality"))
     avoidance: Any = field(default_factory=lambda: SimpleNamespace(
-        near=0.05, far=0.15, end_effector=0.1, dimension=1, obstacles=[[0.1, 0.5, 0.1]]))
+        thresholds={"near": 0.05, "far": 0.15}, tip_thresholds={"tip": 0.1}, dimension=1,
+        obstacles=[[0.1, 0.5, 0.1]]))
     control: Any = field(default_factory=lambda: SimpleNamespace(
         level="acceleration", resolver="tpm", options={}, period=0.001, duration=4.0,
         jacobian_derivative="exact"))

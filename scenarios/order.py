@@ -1,0 +1,52 @@
+"""Which tasks are in the stack in one tick, and in which order."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import cache
+from typing import final
+
+from hierarchy.allocation import POINTING, POSITION, Allocation, allocate
+from hierarchy.avoidance import Measurement, SurveillanceAreas
+
+Order = Callable[[Measurement | None, float], Allocation]
+
+
+@final
+class Hierarchical:
+    """All tasks at all times: the resolver decides what acts."""
+
+    def __init__(self, names: Sequence[str]) -> None:
+        self._allocation = Allocation(tuple(names), repulsion=False)
+
+    def __call__(self, seen: Measurement | None, cone_error: float) -> Allocation:
+        """Return the order; measurement and cone error do not matter."""
+        return self._allocation
+
+
+@final
+class Switched:
+    """Algorithm 1, behind the tasks called `first`; without `areas` the cone alone is switched.
+
+    With `always_point` the cone is an equality, in the stack at all times.
+    """
+
+    def __init__(self, areas: SurveillanceAreas | None, always_point: bool,
+                 first: Sequence[str] = (), position: bool = True) -> None:
+        self._areas, self._always_point = areas, always_point
+        self._first, self._position = tuple(first), position
+        self._behind_first = cache(self._put_behind)
+
+    def __call__(self, seen: Measurement | None, cone_error: float) -> Allocation:
+        """Return the order at the distances measured and cos(alpha_d) - cos(alpha)."""
+        if self._areas is None or seen is None:
+            point = cone_error > 0.0 or self._always_point
+            chosen = Allocation((POSITION,) * self._position + (POINTING,) * point,
+                                repulsion=False)
+        else:
+            chosen = allocate(seen.minimal_distance, seen.end_effector_distance, cone_error,
+                              self._areas, self._always_point)
+        return self._behind_first(chosen) if self._first else chosen
+
+    def _put_behind(self, chosen: Allocation) -> Allocation:
+        return Allocation((*self._first, *chosen.order), chosen.repulsion)
