@@ -64,6 +64,38 @@ class StartSection(_Section):
     end_effector: Vector3 | None = None
 
 
+AnswerPolicy = Literal["brake", "hold", "stop", "use"]
+BlindPolicy = Literal["brake", "hold", "stop"]
+
+
+class PolicySection(_Section):
+    """What is sent in a tick with trouble, for each kind of it.
+
+    "brake": toward rest. "hold": the last command of a tick without trouble, for at most
+    `patience` ticks in a row, then brake. "stop": to rest as fast as the limits allow, where the
+    run ends with a fault. "use": the answer, where there is one. In a tick with troubles of several
+    kinds the last of use, hold, brake, stop that one of them asks for is done.
+
+    The first four kinds are statuses of a resolver, see solvers.Status. not_finite: a measured
+    joint state is NaN or infinite, or a distance NaN. stale: no new measurement for more than
+    `stale_after` [s]; up to then the last one is carried on by the commands sent. overrun: the
+    command was not there `deadline` [s] after the tick began; None for no deadline. inside: a
+    point of the robot is on or inside an obstacle.
+    """
+
+    iteration_limit: AnswerPolicy = "brake"
+    numerical_failure: BlindPolicy = "brake"
+    backend_failure: AnswerPolicy = "brake"
+    inaccurate: AnswerPolicy = "brake"
+    not_finite: BlindPolicy = "brake"
+    stale: BlindPolicy = "brake"
+    overrun: AnswerPolicy = "brake"
+    inside: AnswerPolicy = "brake"
+    patience: Annotated[int, Field(ge=0)] = 10
+    stale_after: NotNegative = 0.02
+    deadline: Positive | None = None
+
+
 class ControlSection(_Section):
     """How the tasks are resolved and how often.
 
@@ -74,6 +106,10 @@ class ControlSection(_Section):
     `options` are settings of the resolver. A table in it that bears a resolver's name, such as
     `[control.options.tpm]`, holds for that resolver alone; so the resolver can be swapped by
     changing its name, and nothing else. A plain setting goes before one from such a table.
+
+    `transition` = "blend": where the order of the stack or the active control point changes, the
+    command passes over from the old stack's to the new one's within `transition_time` [s]; "none":
+    at once.
     """
 
     level: Literal["velocity", "acceleration"] = "acceleration"
@@ -83,6 +119,9 @@ class ControlSection(_Section):
     jacobian_derivative: Literal["exact", "difference"] = "exact"
     resolver: str
     options: dict[str, Any] = Field(default_factory=dict)
+    policy: PolicySection = PolicySection()
+    transition: Literal["none", "blend"] = "none"
+    transition_time: Positive = 0.1
 
     @model_validator(mode="after")
     def _makes_a_resolver(self) -> Self:
@@ -294,6 +333,45 @@ class PostureSection(_Section):
     gain: NotNegative = 1.0
 
 
+class FaultSection(_Section):
+    """Something that goes wrong on purpose from `at` [s] on, for `duration` [s].
+
+    nan_position, nan_velocity: what is measured of `joint` (1, 2, ...; of all without it) is NaN.
+    nan_distance: so is the distance of `point` (control points 1, 2, ..., then the end effector;
+    of all without it). stale: joints and distances stay as they were. status: the resolver says
+    `status` of its answer. overrun: the tick takes `takes` [s] more. obstacle: a sphere of `radius`
+    [m] stands at `centre` [m], or at `place` on the body as this was when the sphere appeared.
+    """
+
+    kind: Literal["nan_position", "nan_velocity", "nan_distance", "stale", "status", "overrun",
+                  "obstacle"]
+    at: NotNegative
+    duration: Positive
+    joint: Annotated[int, Field(ge=1)] | None = None
+    point: Annotated[int, Field(ge=1)] | None = None
+    status: Literal["iteration_limit", "numerical_failure", "backend_failure",
+                    "inaccurate"] | None = None
+    takes: Positive | None = None
+    centre: Vector3 | None = None
+    place: ControlPointSection | None = None
+    radius: Positive | None = None
+
+    @model_validator(mode="after")
+    def _complete(self) -> Self:
+        of_kind = {"nan_position": {"joint"}, "nan_velocity": {"joint"}, "nan_distance": {"point"},
+                   "status": {"status"}, "overrun": {"takes"},
+                   "obstacle": {"centre", "place", "radius"}}.get(self.kind, set())
+        for key in ("joint", "point", "status", "takes", "centre", "place", "radius"):
+            if getattr(self, key) is not None and key not in of_kind:
+                raise ValueError(f"a fault of kind {self.kind!r} takes no {key}")
+        for key in of_kind & {"status", "takes", "radius"}:
+            if getattr(self, key) is None:
+                raise ValueError(f"a fault of kind {self.kind!r} needs {key}")
+        if self.kind == "obstacle" and (self.centre is None) == (self.place is None):
+            raise ValueError("give either a centre or a place")
+        return self
+
+
 class Scenario(_Section):
     """One scenario: a robot, a start, tasks, and how they are resolved.
 
@@ -313,6 +391,7 @@ class Scenario(_Section):
     limits: LimitsSection | None = None
     damping: DampingSection | None = None
     posture: PostureSection | None = None
+    faults: tuple[FaultSection, ...] = ()
 
     @model_validator(mode="after")
     def _asks_for_something(self) -> Self:
@@ -329,6 +408,14 @@ class Scenario(_Section):
             raise ValueError("[avoidance] needs [position]: Algorithm 1 orders one by the other")
         if self.limits and self.limits.torque and self.control.level == "velocity":
             raise ValueError("limits.torque needs control.level = \"acceleration\"")
+        return self
+
+    @model_validator(mode="after")
+    def _faults_have_a_sensor(self) -> Self:
+        blind = next((fault.kind for fault in self.faults
+                      if fault.kind in ("nan_distance", "obstacle")), None)
+        if blind and not self.avoidance:
+            raise ValueError(f"a fault of kind {blind!r} needs [avoidance]")
         return self
 
     def make_resolver(self) -> Resolver:
