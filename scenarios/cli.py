@@ -121,7 +121,7 @@ def compare(scenarios: Annotated[list[str], typer.Argument(
                 help="Names of scenarios, or scenario files.")],
             resolvers: Annotated[str | None, typer.Option(
                 "--resolvers", metavar="SPEC,SPEC,...",
-                help="Resolvers: name, or name:setting=value. Default: eight ways.")] = None,
+                help="Resolvers: name, or name:setting=value. Default: all that suit.")] = None,
             changes: Changes = None, duration: Duration = None, out: Out = None) -> int:
     """Run scenarios under several resolvers; write a report."""
     from scenarios.compare import compare as run_all
@@ -130,9 +130,10 @@ def compare(scenarios: Annotated[list[str], typer.Argument(
     from scenarios.progress import bar
 
     chosen = [_load(name, changes, duration) for name in scenarios]
-    specs, missing = default_resolvers()
-    if resolvers is not None:
-        specs, missing = tuple(_split(resolvers)), {}
+    specs = None if resolvers is None else _split(resolvers)
+    missing: dict[str, str] = {}
+    for scenario in chosen if specs is None else ():
+        missing |= default_resolvers(scenario.asks)[1]
     for spec, remedy in missing.items():
         print(f"left out: {spec} is not installed; {remedy}")
     folder = out if out is not None else next_free(Path("runs") / f"compare-{chosen[0].name}")
@@ -141,6 +142,7 @@ def compare(scenarios: Annotated[list[str], typer.Argument(
         comparison = run_all(chosen, specs, out=folder, progress=told, command=command)
     for runs in comparison.groups().values():
         _print_table(runs)
+    print("", *comparison.refused, sep="\n" if comparison.refused else "")
     print(f"\nReport: {_shown(folder / 'index.html')}")
     return max([_fault(f"{run.label}: {run.fault}") for run in comparison.faults], default=0)
 

@@ -23,9 +23,15 @@ from scenarios.recording import Recording, save, versions
 
 if TYPE_CHECKING:
     from scenarios.config import Scenario
+    from solvers.resolver import Handles
 
-DEFAULT_RESOLVERS = ("tpm", "tpm:form=staircase", "recursive", "augmented", "hqp",
-                     "hqp:backend=osqp", "hqp:backend=daqp", "hcod")
+# By default every way that the letter compares, and ours; where rows are inequalities, the whole
+# field of those that take them.
+DEFAULT_RESOLVERS: dict[Handles, tuple[str, ...]] = {
+    "equalities": ("tpm", "tpm:form=staircase", "recursive", "augmented", "hqp",
+                   "hqp:backend=osqp", "hqp:backend=daqp", "hcod"),
+    "bounds": ("tpm:form=staircase", "sns", "weighted", "hqp", "hcod"),
+    "inequalities": ("weighted", "hqp", "hqp:backend=daqp", "hcod")}
 
 Progress = Callable[[str, int, int], None]
 
@@ -80,11 +86,15 @@ class Row:
 
 @dataclass(frozen=True)
 class Comparison:
-    """Runs in the order asked for, scenario by scenario."""
+    """Runs in the order asked for, scenario by scenario.
+
+    `refused` says of each resolver that cannot resolve a scenario why it was not run.
+    """
 
     runs: tuple[Run, ...]
     command: str
     versions: dict[str, str]
+    refused: tuple[str, ...] = ()
 
     @property
     def faults(self) -> list[Run]:
@@ -103,20 +113,22 @@ class Comparison:
         return {name: [run for run in self.runs if run.scenario.name == name] for name in names}
 
 
-def default_resolvers() -> tuple[tuple[str, ...], dict[str, str]]:
+def default_resolvers(asked: Handles = "equalities") -> tuple[tuple[str, ...], dict[str, str]]:
     """Return those of DEFAULT_RESOLVERS that can run here, and of the others what brings them."""
     from solvers.backends import BACKENDS, installed
 
-    wanted = {spec: spec.partition(":backend=")[2] for spec in DEFAULT_RESOLVERS}
+    wanted = {spec: spec.partition(":backend=")[2] for spec in DEFAULT_RESOLVERS[asked]}
     missing = {spec: "pip install task-hierarchy[qp]" for spec, backend in wanted.items()
                if backend in BACKENDS and not installed(backend)}
-    return tuple(spec for spec in DEFAULT_RESOLVERS if spec not in missing), missing
+    return tuple(spec for spec in wanted if spec not in missing), missing
 
 
 def compare(scenarios: Iterable[str | Scenario] | str, resolvers: Sequence[str] | None = None,
             out: str | Path | None = None, progress: Progress | None = None,
             command: str | None = None) -> Comparison:
     """Run every scenario under every resolver, one after the other, and compare.
+
+    A resolver that cannot resolve a scenario's rows is not run on it, and the Comparison says so.
 
     With `out`, each run's folder is out/<scenario>/<resolver>, the page is out/index.html and the
     numbers are in out/comparison.json. A run that breaks or faults does not lose the others;
@@ -126,17 +138,17 @@ def compare(scenarios: Iterable[str | Scenario] | str, resolvers: Sequence[str] 
     ----------
     scenarios : names, paths or Scenario objects.
     resolvers : specs `name` or `name:setting=value:setting=value`; by default those of
-        DEFAULT_RESOLVERS that are installed.
+        DEFAULT_RESOLVERS that suit the scenario and are installed.
     progress : called as progress(label, ticks done, ticks in all).
     command : the command line to print on the page; made up from the names if not given.
 
     Raises
     ------
     HierarchyError : before anything is run: an unknown scenario, resolver or setting, a scenario
-        that does not fit its robot, or an output folder that is in use.
+        that does not fit its robot, resolvers of which none can resolve anything, or an output
+        folder that is in use.
     """
-    chosen = default_resolvers()[0] if resolvers is None else resolvers
-    planned = _plan([scenarios] if isinstance(scenarios, str) else scenarios, chosen)
+    planned, refused = _plan([scenarios] if isinstance(scenarios, str) else scenarios, resolvers)
     folder = None if out is None else claim(out)
     runs: list[Run] = []
     for run in planned:
@@ -146,7 +158,8 @@ def compare(scenarios: Iterable[str | Scenario] | str, resolvers: Sequence[str] 
             runs.append(dataclasses.replace(run, error="interrupted"))
         if _interrupted(runs[-1]):
             break
-    comparison = Comparison(tuple(runs), command or _command(planned, out), versions())
+    comparison = Comparison(tuple(runs), command or _command(planned, out), versions(),
+                            tuple(refused))
     if folder is not None:
         folder.mkdir(exist_ok=True)
         _write(comparison, folder)
@@ -186,7 +199,9 @@ def _best(values: Mapping[int, float], lower: bool | None, tie: float = 0.01) ->
     return best if len(best) < len(values) else frozenset()
 
 
-def _plan(scenarios: Iterable[str | Scenario], resolvers: Sequence[str]) -> list[Run]:
+def _plan(scenarios: Iterable[str | Scenario],
+          resolvers: Sequence[str] | None) -> tuple[list[Run], list[str]]:
+    """Return the runs to be made, and why others are not."""
     from scenarios.build import build
     from scenarios.config import load
 
@@ -194,13 +209,21 @@ def _plan(scenarios: Iterable[str | Scenario], resolvers: Sequence[str]) -> list
     for name, count in Counter(scenario.name for scenario in loaded).items():
         if count > 1:
             raise HierarchyError(f"{count} scenarios are called {name!r}; give each its own name")
-    runs = []
+    runs, refused = [], []
     for scenario in loaded:
         build(scenario)
-        for spec in dict.fromkeys(resolvers):
+        asked = scenario.asks
+        for spec in dict.fromkeys(default_resolvers(asked)[0] if resolvers is None else resolvers):
             changed = scenario.with_resolver(spec)
-            runs.append(Run(changed, spec, str(changed.make_resolver().label)))
-    return [_distinct(run, runs) for run in runs]
+            resolver = changed.make_resolver()
+            if resolver.can_resolve(asked):
+                runs.append(Run(changed, spec, str(resolver.label)))
+            else:
+                refused.append(f"{spec} is not run on {scenario.name}, which asks for {asked}: it "
+                               f"resolves {resolver.handles}")
+    if not runs:
+        raise HierarchyError("; ".join(refused) or "no resolver is named")
+    return [_distinct(run, runs) for run in runs], refused
 
 
 def _distinct(run: Run, runs: Sequence[Run]) -> Run:
@@ -236,7 +259,7 @@ def _write(comparison: Comparison, folder: Path) -> None:
     from scenarios.report import page
 
     data = {"command": comparison.command, "versions": comparison.versions,
-            "runs": [_plain(run) for run in comparison.runs],
+            "runs": [_plain(run) for run in comparison.runs], "refused": list(comparison.refused),
             "partings": {name: [_plain_parting(one) for one in partings(runs)]
                          for name, runs in comparison.groups().items()}}
     write_text(folder / "comparison.json", json.dumps(data, indent=2, allow_nan=False) + "\n")

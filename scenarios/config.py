@@ -24,6 +24,7 @@ from hierarchy.errors import HierarchyError, UnknownNameError
 
 if TYPE_CHECKING:
     from solvers import Resolver
+    from solvers.resolver import Handles
 
 LIBRARY = Path(__file__).parent / "library"
 
@@ -417,6 +418,15 @@ class Scenario(_Section):
         if blind and not self.avoidance:
             raise ValueError(f"a fault of kind {blind!r} needs [avoidance]")
         return self
+
+    @property
+    def asks(self) -> Handles:
+        """Which kind of rows its stack has."""
+        inequalities = self.control.stack == "hierarchical" and (
+            self.avoidance is not None or (self.pointing and self.pointing.kind == "inequality"))
+        if inequalities or (self.limits and self.limits.torque):
+            return "inequalities"
+        return "bounds" if self.limits else "equalities"
 
     def make_resolver(self) -> Resolver:
         """Make the resolver that `control.resolver` and `control.options` describe."""

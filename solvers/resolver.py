@@ -47,6 +47,7 @@ _REMEDIES = {
 
 
 Handles = Literal["equalities", "bounds", "inequalities"]
+_KINDS: tuple[Handles, ...] = ("equalities", "bounds", "inequalities")
 _RESOLVED: dict[str, str] = {
     "equalities": "equalities only",
     "bounds": "equalities, and bounds on single unknowns in a first level of their own"}
@@ -112,6 +113,10 @@ class Resolver(ABC):
         self._number("damping", 0.0, math.inf)
         self._number("threshold", 0.0, math.inf, open_below=True)
         self._number("rank_tolerance", 0.0, 1.0)
+
+    def can_resolve(self, asked: Handles) -> bool:
+        """Whether it takes the rows that somebody asks for."""
+        return _KINDS.index(asked) <= _KINDS.index(self.handles)
 
     @property
     def label(self) -> str:

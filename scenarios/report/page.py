@@ -28,8 +28,12 @@ def page(comparison: Comparison) -> str:
     sections = [_group(name, runs) for name, runs in groups.items()]
     return Template(_resource("page.html")).substitute(
         title=escape(f"{', '.join(groups)}: a comparison"),
-        style=_resource("style.css"), sections="\n".join(sections),
+        style=_resource("style.css"), sections="\n".join([*sections, _refused(comparison)]),
         command=escape(comparison.command), versions=_pairs(comparison.versions))
+
+
+def _refused(comparison: Comparison) -> str:
+    return "".join(f'<p class="quiet">{escape(said)}.</p>' for said in comparison.refused)
 
 
 def _group(name: str, runs: Sequence[Run]) -> str:
