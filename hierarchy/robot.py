@@ -176,17 +176,21 @@ class State:
         """Number of joint velocities."""
         return self.robot.n
 
-    def move(self, t: float, q: Array, v: Array) -> None:
-        """Go to time t [s] at q (nq,), v (n,), unchecked: the one kinematics call of a tick."""
+    def move(self, t: float, q: Array, v: Array) -> bool:
+        """Go to time t [s] at q (nq,), v (n,): the one kinematics call of a tick.
+
+        Shapes are not checked. Where an entry is not finite, False is returned and nothing moves.
+        """
+        if not _copy_if_finite(q, v, self.q, self.v):
+            return False
         if self.period > 0.0 and self._started:
             self._keep_kinematics()
         self.t = t
-        self.q[:] = q
-        self.v[:] = v
         pin.computeJointJacobiansTimeVariation(self._model, self._data, self.q, self.v)
         if self.period > 0.0 and not self._started:  # no tick before: all differences are zero
             self._keep_kinematics()
         self._started = True
+        return True
 
     def _keep_kinematics(self) -> None:
         _copy_kinematics(self.J, self.placements, self.previous_J, self.previous_placements)
@@ -208,6 +212,21 @@ class State:
     def _placement(self, joint: int) -> tuple[Array, Array]:
         row = self.placements[joint]
         return row[:9].reshape(3, 3).T, row[9:]
+
+
+@compiled
+def _copy_if_finite(q, v, to_q, to_v):
+    for i in range(len(q)):
+        if not np.isfinite(q[i]):
+            return False
+    for i in range(len(v)):
+        if not np.isfinite(v[i]):
+            return False
+    for i in range(len(q)):
+        to_q[i] = q[i]
+    for i in range(len(v)):
+        to_v[i] = v[i]
+    return True
 
 
 @compiled
