@@ -37,8 +37,9 @@ class Robot:
     """A fixed-base robot: its model, limits, frames and control points.
 
     `n` is the number of joint velocities, `nq` that of joint positions (more than n only where a
-    joint is continuous). `lower`, `upper` (nq,) [rad or m] and `velocity_limit` (n,) [rad/s or
-    m/s] are infinite where the model has none.
+    joint is continuous). `lower`, `upper` (nq,) [rad or m], `velocity_limit` (n,) [rad/s or m/s]
+    and `effort_limit` (n,) [N m or N] are infinite where the model has none. `coordinates` (n,)
+    says where in q the position that belongs to a velocity is, or begins.
     """
 
     def __init__(self, model: Any, name: str, end_effector: str | None = None,
@@ -53,6 +54,8 @@ class Robot:
         self.lower, self.upper = _finite_or_inf(model.lowerPositionLimit,
                                                 model.upperPositionLimit)
         self.velocity_limit = _positive_or_inf(model.upperVelocityLimit)
+        self.effort_limit = _positive_or_inf(model.effortLimit)
+        self.coordinates = _coordinates(model)
         self.end_effector = end_effector or tuple(model.frames)[-1].name
         self.frame(self.end_effector)
         self.control_points = control_points
@@ -107,6 +110,25 @@ class Robot:
         """Attach a point to the body that `joint` moves; offset (3,) [m] in that joint's frame."""
         return ControlPoint(name or f"{joint} {np.asarray(offset).tolist()}", self.joint(joint),
                             np.array(offset, dtype=float))
+
+    def position_limits(self) -> tuple[Array, Array]:
+        """Return lower and upper (n,), (n,) [rad or m], one for each velocity.
+
+        Infinite for a continuous joint, whose coordinates are a cosine and a sine. RobotError for
+        another joint with more coordinates than velocities, if one of them has a limit.
+        """
+        lower, upper = self.lower[self.coordinates], self.upper[self.coordinates]
+        for name, joint in zip(self.joint_names, self.model.joints[1:], strict=True):
+            if joint.nq != joint.nv:
+                of = slice(joint.idx_q, joint.idx_q + joint.nq)
+                limits = np.abs([self.lower[of], self.upper[of]])
+                if (np.isfinite(limits) & (limits != _UNIT)).any():
+                    raise RobotError(f"robot {self.name!r}: joint {name!r} has {joint.nq} "
+                                     f"coordinates for {joint.nv} velocities; limits of its "
+                                     "positions are not supported")
+                lower[joint.idx_v:joint.idx_v + joint.nv] = -np.inf
+                upper[joint.idx_v:joint.idx_v + joint.nv] = np.inf
+        return lower, upper
 
     def integrate(self, q: Array, step: Array) -> Array:
         """Return q (nq,) moved by `step` (n,) [rad or m] along the joints."""
@@ -200,6 +222,10 @@ class State:
         upper = np.triu(pin.crba(self._model, self._data, self.q))
         return np.ascontiguousarray(upper + np.triu(upper, 1).T)
 
+    def bias_effort(self) -> Array:
+        """Joint efforts h(q, v) (n,) [N m or N] of gravity, Coriolis and centrifugal forces."""
+        return np.array(pin.nonLinearEffects(self._model, self._data, self.q, self.v))
+
     def position(self, frame: Frame) -> Array:
         """World position (3,) [m] of a frame's origin."""
         rotation, translation = self._placement(frame.joint)
@@ -261,6 +287,17 @@ def _supports(model: Any) -> NDArray[np.bool_]:
     return supports
 
 
+_UNIT = 1.01  # what pinocchio gives as the limit of a cosine, a sine or an entry of a quaternion
+
+
+def _coordinates(model: Any) -> NDArray[np.int64]:
+    coordinates = np.zeros(model.nv, dtype=np.int64)
+    for joint in model.joints[1:]:
+        for i in range(joint.nv):
+            coordinates[joint.idx_v + i] = joint.idx_q + (i if joint.nq == joint.nv else 0)
+    return coordinates
+
+
 def _finite_or_inf(lower: Array, upper: Array) -> tuple[Array, Array]:
     """Limits as given; pinocchio's huge numbers for "none" become infinite."""
     return (np.where(np.abs(lower) > 1e300, -np.inf, lower),
@@ -278,7 +315,8 @@ def _model_from_table(table: DHTable) -> Any:
     for i, d in enumerate(table.d):
         limit = np.deg2rad([table.range[i]])
         joint = model.addJoint(joint, pin.JointModelRZ(), placement, f"joint_{i + 1}",
-                               np.array([1e3]), np.array([table.velocity[i]]), -limit, limit)
+                               np.array([table.effort[i]]), np.array([table.velocity[i]]),
+                               -limit, limit)
         placement = pin.SE3(_rotation_about_x(table.alpha[i]), np.array([table.a[i], 0.0, d]))
         model.appendBodyToJoint(joint, _rod(table, i), pin.SE3.Identity())
         model.addJointFrame(joint, -1)

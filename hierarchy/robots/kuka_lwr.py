@@ -1,7 +1,8 @@
 """KUKA LWR IV, base frame at the shoulder (0.3105 m above the foot of the real arm).
 
 Geometry and position limits: the arm's data sheet, as used in the letter. Velocity limits: the
-data sheet of the LWR 4+ [deg/s]. Masses: plausible round numbers for a 16 kg arm, not identified.
+data sheet of the LWR 4+ [deg/s]. Torque limits: as models of this arm commonly give them, not
+checked against its data sheet. Masses: plausible round numbers for a 16 kg arm, not identified.
 """
 
 from __future__ import annotations
@@ -33,6 +34,7 @@ KUKA_LWR = DHTable(
     alpha=(90.0, -90.0, -90.0, 90.0, 90.0, -90.0, 0.0),
     range=(170.0, 120.0, 170.0, 120.0, 170.0, 120.0, 170.0),
     velocity=tuple(radians(v) for v in (110.0, 110.0, 128.0, 128.0, 204.0, 184.0, 184.0)),
+    effort=(176.0, 176.0, 100.0, 100.0, 100.0, 38.0, 38.0),
     mass=(2.7, 2.7, 2.7, 2.7, 1.7, 1.6, 0.3),
     radius=0.06,
     control_points=_letters_eight_points(),

@@ -2,6 +2,7 @@
 
 from hierarchy.task import Task
 from hierarchy.tasks.avoidance import Avoidance
+from hierarchy.tasks.joint_limits import JointLimits
 from hierarchy.tasks.pointing import Pointing
 from hierarchy.tasks.pose import Pose
 from hierarchy.tasks.position import Position
@@ -9,9 +10,10 @@ from hierarchy.tasks.posture import JointDamping, Posture
 from hierarchy.tasks.separation import Separation
 
 TASKS: dict[str, type[Task]] = {
-    "avoidance": Avoidance, "damping": JointDamping, "pointing": Pointing, "pose": Pose,
-    "position": Position, "posture": Posture, "separation": Separation,
+    "avoidance": Avoidance, "damping": JointDamping, "joint limits": JointLimits,
+    "pointing": Pointing, "pose": Pose, "position": Position, "posture": Posture,
+    "separation": Separation,
 }
 
-__all__ = ["TASKS", "Avoidance", "JointDamping", "Pointing", "Pose", "Position", "Posture",
-           "Separation"]
+__all__ = ["TASKS", "Avoidance", "JointDamping", "JointLimits", "Pointing", "Pose", "Position",
+           "Posture", "Separation"]

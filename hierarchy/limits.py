@@ -1,0 +1,170 @@
+"""The box of commands, never empty, from which a joint can always stop before its limits.
+
+What "viable" means is after A. Del Prete, "Joint Position and Velocity Bounds in Discrete-Time
+Acceleration/Torque Control of Robot Manipulators", RA-L 2018; the formulas here are our own, for a
+joint that comes to rest at the end of a tick, which lets both levels share them. One joint, period
+T [s], acceleration limit A [rad/s^2]:
+
+    S(w) = T (w + (w - A T) + (w - 2 A T) + ...), terms > 0     the way of a joint that has speed w
+                                                                and loses A T a tick
+    F(s) = the w with S(w) = s, F(-s) = -F(s)                   S and F are made of straight pieces
+
+A velocity x moves a joint from q to q + S(x) before it rests. At acceleration level the velocity
+goes from v to w in a straight line, and it rests at q + v T / 2 + S(w). So with
+
+    r = q  (velocity level),   r = q + v T / 2  (acceleration level)                            (a)
+
+the next velocity must lie in
+
+    F(L - r) <= w <= F(U - r),   -V <= w <= V,   v - A T <= w <= v + A T                        (b)
+
+and a = (w - v) / T. If F(U - r) >= 0 nothing passes U between samples either: where v > 0 > w the
+joint turns back before it would have come to rest.
+"""
+
+# mypy: disable-error-code="no-untyped-def"
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from math import sqrt
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from hierarchy.compiled import compiled, inlined
+from hierarchy.errors import HierarchyError
+from hierarchy.problem import Array
+from hierarchy.task import Level
+
+ROUNDING = 1e-12  # of a position, relative to 1 + its limit: nearer to a limit is on it
+_FAR = 1e100      # [rad] stands for an infinite way
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Limits of n joints that get a command every `period` [s], and the box they leave it.
+
+    `lower`, `upper` (n,) [rad or m] and `velocity` (n,) [rad/s or m/s] may be infinite,
+    `acceleration` (n,) [rad/s^2 or m/s^2] may not. Raises HierarchyError, naming joint and value,
+    where an entry is NaN, lower > upper, or a rate or the period is not positive.
+
+    The box is finite and never empty. Each joint by itself, with any command of the box in every
+    tick, to rounding:
+
+    - A state is viable if it is within `lower`, `upper` and `velocity` and can come to rest at
+      the end of a tick with `acceleration` before a position limit. From a viable state no limit
+      is exceeded, between ticks neither, and the next state is viable. The box is the largest
+      for which that holds.
+    - Acceleration level: a joint that can keep its position limit only by turning back within a
+      tick (it is up to A T^2 / 8 from viable) keeps it as well, unless that breaks another limit.
+    - The acceleration limit holds from every start, always.
+    - Faster than `velocity`: the speed falls by A T a tick until it is not. A slower joint never
+      gets faster than `velocity`.
+    - Too fast to stop: the full A brakes, as far as `velocity` and the other position limit let
+      it; the joint goes past its limit by what v^2 / (2 A) and the ticks make unavoidable.
+    - Beyond a position limit: speed outward is braked so; then the joint returns at least as fast
+      as a joint that speeds up and slows down with A and comes to rest on the limit. It is back
+      after finitely many ticks, never farther out than the tick before, and never faster than
+      `velocity`; within a distance `ROUNDING` of the limit counts as back.
+    """
+
+    lower: Array
+    upper: Array
+    velocity: Array
+    acceleration: Array
+    period: float
+    packed: Array = field(init=False, repr=False, compare=False)  # (4, n), as the kernels take it
+
+    def __post_init__(self) -> None:
+        rows = [np.asarray(side, dtype=float).ravel()
+                for side in (self.lower, self.upper, self.velocity, self.acceleration)]
+        if len({len(row) for row in rows}) != 1:
+            raise HierarchyError("limits: lower, upper, velocity and acceleration have "
+                                 f"{', '.join(str(len(row)) for row in rows)} entries")
+        lower, upper, velocity, acceleration = rows
+        _refuse(~((lower <= upper) & (lower < np.inf) & (upper > -np.inf)),
+                "no position lies between lower and upper", lower, upper)
+        _refuse(~(velocity > 0.0), "velocity must be positive", velocity)
+        _refuse(~((acceleration > 0.0) & (acceleration < np.inf)),
+                "acceleration must be positive and finite", acceleration)
+        if not 0.0 < self.period < np.inf:
+            raise HierarchyError(f"limits: period {self.period} s must be positive and finite")
+        object.__setattr__(self, "packed", np.array(rows))
+
+    def box(self, q: Array, v: Array, level: Level) -> tuple[Array, Array]:
+        """Return the least and the greatest command (n,), (n,) at positions q and velocities v.
+
+        Both (n,) and finite. The command is a velocity or an acceleration, by `level`.
+        """
+        lower, upper = np.empty(len(v)), np.empty(len(v))
+        write_box(q, v, self.packed, self.period, level == "acceleration", lower, upper, 0)
+        return lower, upper
+
+    def clamp(self, q: Array, v: Array, level: Level, x: ArrayLike) -> Array:
+        """Return the command x (n,) with each entry moved to the nearest one of the box.
+
+        The last guard of a control loop: the answer is finite whatever x is. NaN becomes the
+        command of the box that comes nearest to a standstill.
+        """
+        command = np.array(x, dtype=float)
+        clamp_into_box(q, v, self.packed, self.period, level == "acceleration", command)
+        return command
+
+
+def _refuse(bad: NDArray[np.bool_], why: str, *values: Array) -> None:
+    for (i,) in np.argwhere(bad)[:1]:
+        raise HierarchyError(f"limits, joint {i}: {why}, got "
+                             + ", ".join(str(value[i]) for value in values))
+
+
+@compiled
+def write_box(q, v, limits, T, acceleration, lower, upper, row):
+    """Write the box of n joints into lower and upper from `row` on; limits as `Limits.packed`."""
+    for i in range(len(v)):
+        lower[row + i], upper[row + i] = box(q[i], v[i], limits[0, i], limits[1, i],
+                                             limits[2, i], limits[3, i], T, acceleration)
+
+
+@compiled
+def clamp_into_box(q, v, limits, T, acceleration, x):
+    """Clamp x (n,) in place, see `Limits.clamp`."""
+    for i in range(len(v)):
+        lower, upper = box(q[i], v[i], limits[0, i], limits[1, i], limits[2, i], limits[3, i], T,
+                           acceleration)
+        rest = -v[i] / T if acceleration else 0.0
+        x[i] = clipped(rest if np.isnan(x[i]) else x[i], lower, upper)
+        if np.isnan(x[i]):  # q or v is NaN
+            x[i] = 0.0
+
+
+@inlined
+def box(q, v, L, U, V, A, T, acceleration):
+    """Return the least and the greatest command of one joint."""
+    r = q + v * T / 2 if acceleration else q                                           # (a)
+    low = clipped(fastest(L - r, A, T), -V, V)                                         # (b)
+    up = clipped(fastest(U - r, A, T), -V, V)
+    if not acceleration:
+        return clipped(low, v - A * T, v + A * T), clipped(up, v - A * T, v + A * T)
+    low, up = clipped((low - v) / T, -A, A), clipped((up - v) / T, -A, A)
+    # Where it cannot rest in time it turns back within the tick, at most v^2 / (2 |a|) from here.
+    if v > 0.0 and r > U:
+        return low, max(low, min(up, -v * v / (2 * max(U - q, ROUNDING * (1 + abs(U))))))
+    if v < 0.0 and r < L:
+        return min(up, max(low, v * v / (2 * max(q - L, ROUNDING * (1 + abs(L)))))), up
+    return low, up
+
+
+@inlined
+def fastest(s, A, T):
+    """Return F(s), the velocity from which a joint that loses A T a tick rests after the way s."""
+    way = min(abs(s), _FAR)
+    k = np.floor((sqrt(1 + 8 * way / (A * T * T)) - 1) / 2)  # whole steps: S(k A T) <= s
+    w = k * A * T + (way - k * (k + 1) / 2 * A * T * T) / ((k + 1) * T)
+    return w if s >= 0 else -w
+
+
+@inlined
+def clipped(x, low, up):
+    """Return the value of low .. up nearest to x."""
+    return min(max(x, low), up)
