@@ -78,12 +78,13 @@ class Hcod(Resolver):
 
     Guesses the active set, solves it by the staircase of `tpm`, and proves the answer by its
     multipliers; where `guesses` do not lead there, a primal active set goes level by level. On
-    equalities alone it is `tpm`, to the last digit; its damping is that of `tpm` too, with
-    inequality rows that act counted as rows of their level. Where damping and active inequalities
-    meet, an active set that keeps all signs need not exist: the status then says so.
+    equalities alone it is `tpm`, to the last digit, damped or not. With damping on and inequalities,
+    it goes level by level: a level minimises ||what it misses||^2 + lambda^2 ||its own step||^2
+    inside the rows above, lambda being the largest of the active sets met on the way.
 
     Where nearly parallel rows, or rows of very different scale, leave a doubt about the active set,
-    `certify` judges; an answer that it does not accept has Status.INACCURATE.
+    `certify` judges; an answer that it does not accept has Status.INACCURATE. (Not with damping
+    on, which is for such rows and makes another problem of it.)
 
     tolerance : of violations and multipliers, relative to the size of the terms they are made of.
     guesses : active sets tried before going level by level; at least 1.

@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 from rank_cases import family
+from scipy.optimize import lsq_linear
 
 from hierarchy import Hierarchy, HierarchyError
 from solvers import Status, certify, explain, make
@@ -202,3 +203,33 @@ def test_bad_numbers_after_construction_are_a_status(spoil):
 def test_bad_settings_are_named(settings, said):
     with pytest.raises(HierarchyError, match=said):
         make("hcod", **settings)
+
+
+@pytest.mark.parametrize("seed", range(30))
+@pytest.mark.parametrize("damping", [0.01, 0.3])
+def test_a_damped_level_inside_bounds_is_a_bounded_least_squares_problem(seed, damping):
+    rng = np.random.default_rng(seed)
+    A, b = rng.normal(size=(6, 4)), 3.0 * rng.normal(size=6)  # dependent rows: lambda = damping
+    centre, width = rng.normal(size=4), rng.uniform(0.1, 1.0, 4)
+    low, up = centre - width, centre + width
+    h = Hierarchy.from_levels([(np.eye(4), low, up), (A, b)])
+    res = make("hcod", damping=damping).solve(h)
+    begin = np.clip(0.0, low, up)  # what the bounds alone leave, nearest to zero
+    expected = lsq_linear(np.vstack([A, damping * np.eye(4)]),
+                          np.concatenate([b, damping * begin]), (low, up), method="bvls",
+                          tol=1e-15).x
+    assert res.status is Status.SOLVED
+    np.testing.assert_allclose(res.x, expected, atol=1e-9)
+
+
+def test_damping_and_active_inequalities_always_end():
+    rng = np.random.default_rng(0)
+    for damping in (0.01, 0.1, 0.5):
+        resolver = make("hcod", damping=damping)
+        for _ in range(100):
+            A, b = rng.normal(size=(4, 3, 9)), rng.normal(size=(4, 3))
+            h = Hierarchy.from_levels([(A[0], b[0], b[0] + 1.0), (A[1], b[1]),
+                                       (A[2], b[2], b[2] + 1.0), (A[3], b[3])])
+            res = resolver.solve(h)
+            assert res.status is Status.SOLVED
+            assert h.violations(res.x)[0] < 1e-9

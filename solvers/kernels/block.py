@@ -19,16 +19,20 @@ def solve_block(M, r, y, i0, i1, k0, k1, damping, threshold, work):
     that the level adds. r[i0:i1] is what its rows still miss. work: at least (m + n) (n + 1)
     numbers, of any content.
     """
-    if k0 == k1:
-        return
     damped = 0.0
-    if damping > 0.0:
-        damped = _variable_damping(M, i0, i1, k0, k1, damping, threshold, work)
+    if damping > 0.0 and k1 > k0:
+        damped = variable_damping(M, i0, i1, k0, k1, damping, threshold, work)
+    solve_damped(M, r, y, i0, i1, k0, k1, damped, work)
+
+
+@compiled
+def solve_damped(M, r, y, i0, i1, k0, k1, damped, work):
+    """Like `solve_block`, with lambda given."""
     if damped == 0.0 and i1 - i0 == k1 - k0:
         _substitute(M, r, y, i0, k0, k1)
     elif k1 - k0 == 1:
         _one_unknown(M, r, y, i0, i1, k0, damped)
-    else:
+    elif k1 > k0:
         _least_squares(M, r, y, i0, i1, k0, k1, damped, work)
 
 
@@ -44,7 +48,7 @@ def _substitute(M, r, y, i0, k0, k1):
 
 
 @compiled
-def _variable_damping(M, i0, i1, k0, k1, damping, threshold, work):
+def variable_damping(M, i0, i1, k0, k1, damping, threshold, work):
     """Return lambda, with lambda^2 = (1 - (s / threshold)^2) damping^2 for s < threshold, else 0.
 
     s is the smallest singular value of the block, counted over its rows: 0 where rank < rows. It

@@ -101,6 +101,8 @@ def hcod(A, lower, upper, sizes, x, record, settings, work):
     inequalities = prepare(A, lower, upper, x, active, held, multiplier, scale)
     if inequalities < 0:
         return finish(x, NUMERICAL_FAILURE)
+    if damping > 0.0:  # a damped level's multipliers are those of its own stage
+        return UNPROVED
     for c in range(n):
         reference[c] = x[c]
     while counts[0] < guesses and (warm or inequalities <= FEW):

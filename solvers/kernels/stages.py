@@ -20,7 +20,7 @@ from __future__ import annotations
 import numpy as np
 
 from hierarchy.compiled import compiled, inlined
-from solvers.kernels.block import solve_block
+from solvers.kernels.block import solve_damped, variable_damping
 from solvers.kernels.rows import (
     DOUBT,
     EQUAL,
@@ -110,6 +110,7 @@ def solve_by_stages(A, lower, upper, sizes, x, record, settings, work):
                        rank_tolerance)
         _copy_soft(W, ZERO, s, base, behind, V, beta, fixed, h)
         still = steps = ZERO
+        damped = 0.0
         while True:
             if counts[1] >= max_iterations:
                 counts[2] = k
@@ -122,9 +123,10 @@ def solve_by_stages(A, lower, upper, sizes, x, record, settings, work):
             if at_reference:
                 rank = _step_to_reference(W, V, X, beta, reference, start, y, g, fixed, h)
             else:
-                rank = _step_of_soft(A, lower, upper, active, unit, scale, start, W, soft, order, s,
-                                     behind, V, beta, zero, miss, w, y, g, fixed, h, damping,
-                                     threshold, rank_tolerance, of_block)
+                rank, damped = _step_of_soft(A, lower, upper, active, unit, scale, start, W, soft,
+                                             order, s, behind, V, beta, zero, miss, w, y, g, fixed,
+                                             h, damping, threshold, rank_tolerance, damped,
+                                             of_block)
             _back_to_x(W, V, X, beta, y, start, x, p, fixed, rank, at_reference)
             block, side, length = _first_block(A, lower, upper, state, unit, scale, value, along, x,
                                                p, last, tolerance, bland)
@@ -192,6 +194,7 @@ def solve_by_stages(A, lower, upper, sizes, x, record, settings, work):
             fixed = _fix_again(A, W, state, scale, hard, h, soft, s, V, beta, fixed, rank_tolerance)
         first = last
     doubtful |= grown(lower, upper, active, scale, x, reference)
+    doubtful &= damping == 0.0  # damping is for such cases, and makes them well-posed
     code = finish(x, SOLVED)
     return INACCURATE if doubtful and code == SOLVED else code
 
@@ -363,9 +366,13 @@ def _step_of_held(A, lower, upper, active, unit, start, W, hard, h, held_at, fix
 
 @inlined
 def _step_of_soft(A, lower, upper, active, unit, scale, start, W, soft, order, s, behind, V, beta,
-                  zero, miss, w, y, g, fixed, h, damping, threshold, rank_tolerance,
+                  zero, miss, w, y, g, fixed, h, damping, threshold, rank_tolerance, damped,
                   of_block):
-    """Write the step of the level behind the held rows, what it still misses, and its pull."""
+    """Write the step of the level behind the held rows, what it still misses, and its pull.
+
+    Returns the rank, and the damping of the stage, which grows only: so the stage remains convex,
+    min ||what is missed||^2 + damped^2 ||the step from where the stage began||^2, and ends.
+    """
     free = fixed + h
     for q in range(s):
         i = soft[q]
@@ -376,9 +383,12 @@ def _step_of_soft(A, lower, upper, active, unit, scale, start, W, soft, order, s
         for c in range(fixed, free):
             miss[q] -= W[q, c] * y[c]
     rank = factor_level(W, order, zero, miss, beta, V, 0 * s, s, free)
-    solve_block(W, miss, y, 0 * s, s, free, rank, damping, threshold, of_block)
+    if damping > 0.0 and rank > free:
+        damped = max(damped, variable_damping(W, 0 * s, s, free, rank, damping, threshold,
+                                              of_block))
+    solve_damped(W, miss, y, 0 * s, s, free, rank, damped, of_block)
     for c in range(h):
-        g[c] = 0.0
+        g[c] = damped * damped * y[fixed + c]
     for q in range(s):
         w[q] = 0.0
         if s > rank - free or damping > 0.0:  # else the rows are independent, and met
@@ -387,7 +397,7 @@ def _step_of_soft(A, lower, upper, active, unit, scale, start, W, soft, order, s
                 w[q] += W[q, c] * y[c]
             for c in range(h):
                 g[c] += w[q] * W[q, fixed + c]
-    return rank
+    return rank, damped
 
 
 @inlined
