@@ -1,8 +1,8 @@
 """The one decorator that compiles a kernel, caches it on disk and says so the first time.
 
 numba caches machine code per source file but does not notice when a helper in *another* file
-changed. Here the cache folder carries a digest of the kernel's own file and of every file it
-calls into, so a stale kernel cannot be loaded.
+changed. Here the cache folder carries a digest of the kernel's own file, of every file it calls
+into, and of this one, so a stale kernel cannot be loaded.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ def inlined(function: Kernel) -> Kernel:
 
 def _compiled(function: Kernel, inline: bool) -> Kernel:
     files = _files_behind(function)
-    folder = _cache_root() / _digest(tuple(sorted(files)))
+    folder = _cache_root() / _digest((__file__, *sorted(files)))
     allocates = _allocates(function)
     kernel: Kernel = _jit_into(folder, function, inline, allocates)
     if not isinstance(kernel, type(function)):
