@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import product
 from typing import NamedTuple
 
 from hierarchy.avoidance.measurement import SurveillanceAreas
@@ -37,8 +38,7 @@ def allocate(minimal_distance: float, end_effector_distance: float, cone_error: 
     second = near and not first
     point = cone_error > 0.0 or (always_point and cone_error == cone_error)
     last = areas.near < minimal_distance <= areas.far
-    return Allocation(_ORDERS[first, second, point, last],
-                      end_effector_distance <= areas.end_effector)
+    return _ALLOCATIONS[first, second, point, last, end_effector_distance <= areas.end_effector]
 
 
 def _order(first: bool, second: bool, point: bool, last: bool) -> tuple[str, ...]:
@@ -46,7 +46,7 @@ def _order(first: bool, second: bool, point: bool, last: bool) -> tuple[str, ...
             *(AVOIDANCE,) * last)
 
 
-# One tuple for each case, so that the loop makes none.
-_ORDERS = {(first, second, point, last): _order(first, second, point, last)
-           for first in (False, True) for second in (False, True)
-           for point in (False, True) for last in (False, True)}
+# One object for each case, so that the loop makes none.
+_ALLOCATIONS = {(first, second, point, last, repulsion):
+                Allocation(_order(first, second, point, last), repulsion)
+                for first, second, point, last, repulsion in product((False, True), repeat=5)}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
@@ -10,6 +10,9 @@ from hierarchy.errors import HierarchyError, UnknownNameError
 from hierarchy.problem import Hierarchy
 from hierarchy.robot import State
 from hierarchy.task import Level, Task
+
+# The buffers of one order, and what writes into them from which row on.
+_Prepared = tuple[Hierarchy, tuple[tuple[Callable[..., None], int], ...]]
 
 
 class Stack:
@@ -31,7 +34,7 @@ class Stack:
         self.reference = reference
         self._tasks: dict[str, Task] = {}
         self._order: tuple[str, ...] = ()
-        self._hierarchies: dict[tuple[str, ...], Hierarchy] = {}
+        self._prepared: dict[tuple[str, ...], _Prepared] = {}
         for task in tasks:
             self.insert(task)
 
@@ -64,7 +67,7 @@ class Stack:
         task = self[name]
         del self._tasks[name]
         self._order = tuple(other for other in self._order if other != name)
-        self._hierarchies.clear()
+        self._prepared.clear()
         return task
 
     def swap(self, first: str, second: str) -> None:
@@ -89,27 +92,26 @@ class Stack:
         """
         order = self._order if order is None else order
         try:
-            hierarchy = self._hierarchies[order]
+            hierarchy, writers = self._prepared[order]
         except KeyError:
-            hierarchy = self._prepare(order, state.n)
+            hierarchy, writers = self._prepare(order, state.n)
         A, lower, upper, level = hierarchy.A, hierarchy.lower, hierarchy.upper, self.level
-        row = 0
-        for name in order:
-            task = self._tasks[name]
-            task.write(state, level, A, lower, upper, row)
-            row += task.dimension
+        for write, row in writers:
+            write(state, level, A, lower, upper, row)
         if self.reference is not None:
             hierarchy.reference[:] = (
                 self.reference.reference_acceleration(state) if level == "acceleration"
                 else self.reference.reference_velocity(state))
         return hierarchy
 
-    def _prepare(self, order: tuple[str, ...], n: int) -> Hierarchy:
+    def _prepare(self, order: tuple[str, ...], n: int) -> _Prepared:
         if not self._tasks:
             raise HierarchyError("the stack is empty: nothing is asked of the robot")
         sizes = np.array([self[name].dimension for name in order], dtype=np.int64)
         m = int(sizes.sum())
         hierarchy = Hierarchy(np.zeros((m, n)), np.zeros(m), np.zeros(m), sizes, np.zeros(n),
                               tuple(order))
-        self._hierarchies[tuple(order)] = hierarchy
-        return hierarchy
+        writers = tuple((self[name].write, int(row))
+                        for name, row in zip(order, hierarchy.offsets, strict=False))
+        self._prepared[tuple(order)] = hierarchy, writers
+        return hierarchy, writers
