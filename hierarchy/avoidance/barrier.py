@@ -19,6 +19,8 @@ from hierarchy.compiled import inlined
 from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array
 
+_ROUNDING = 1e-13  # [m] an entry of a row below this is rounding
+
 
 @dataclass(frozen=True)
 class Barrier:
@@ -70,10 +72,13 @@ def least_rate(h, settings):
 
 
 @inlined
-def least_acceleration(h, rate_of_h, settings):
-    """The d2h/dt2 [m/s^2] to ask for at least; settings of `Barrier.packed`."""
+def least_acceleration(h, rate_of_h, bend, settings):
+    """The d2h/dt2 - bend [m/s^2] to ask for at least; settings of `Barrier.packed`.
+
+    bend is what the turning of the direction adds to d2h/dt2.
+    """
     toward = min(-0.5 * settings[1] * h, settings[3])
-    return min(2.0 * settings[1] * (toward - rate_of_h), settings[4])
+    return min(2.0 * settings[1] * (toward - rate_of_h) - bend, settings[4])
 
 
 @inlined
@@ -94,19 +99,21 @@ def velocity_of_point(J, supports, joint, v, x, y, z):
 @inlined
 def drift_of_point(v, J, dJ, placements, supports, previous_J, previous_placements, period,
                    joint, ox, oy, oz):
-    """Velocity J_c v (3) and drift dJ_c/dt v (3) of the point at offset ox, oy, oz on a body.
+    """Velocity J_c v and drift dJ_c/dt v of the point at offset ox, oy, oz on a body.
 
-    The drift is exact, or with a period that of the backward difference of J_c.
+    The drift is exact, or with a period that of the backward difference of J_c. The angular
+    velocity of the body comes last.
     """
     x, y, z = place(placements[joint], ox, oy, oz)
     px, py, pz, wx, wy, wz = velocity_of_point(J, supports, joint, v, x, y, z)
     if period > 0.0:
-        bx, by, bz = place(previous_placements[joint], ox, oy, oz)
-        bx, by, bz, _, _, _ = velocity_of_point(previous_J, supports, joint, v, bx, by, bz)
-        return px, py, pz, (px - bx) / period, (py - by) / period, (pz - bz) / period
-    # dJ_v v + dJ_w v x p, as a velocity with dJ for J, and w x dp/dt
-    dx, dy, dz, _, _, _ = velocity_of_point(dJ, supports, joint, v, x, y, z)
-    return (px, py, pz, dx + wy * pz - wz * py, dy + wz * px - wx * pz, dz + wx * py - wy * px)
+        x, y, z = place(previous_placements[joint], ox, oy, oz)
+        bx, by, bz, _, _, _ = velocity_of_point(previous_J, supports, joint, v, x, y, z)
+        ax, ay, az = (px - bx) / period, (py - by) / period, (pz - bz) / period
+    else:  # dJ_v v + dJ_w v x p + w x dp/dt
+        ax, ay, az, _, _, _ = velocity_of_point(dJ, supports, joint, v, x, y, z)
+        ax, ay, az = ax + wy * pz - wz * py, ay + wz * px - wx * pz, az + wx * py - wy * px
+    return px, py, pz, ax, ay, az, wx, wy, wz
 
 
 @inlined
@@ -124,3 +131,11 @@ def add_row(J, supports, joint, x, y, z, rx, ry, rz, A, row):
         if supports[joint, c]:
             A[row, c] += (J[0, c] * rx + J[1, c] * ry + J[2, c] * rz
                           + J[3, c] * mx + J[4, c] * my + J[5, c] * mz)
+
+
+@inlined
+def drop_rounding(A, row):
+    """Make what is zero but for rounding zero: no joint moves the point along r at all."""
+    for c in range(A.shape[1]):
+        if abs(A[row, c]) < _ROUNDING:
+            A[row, c] = 0.0

@@ -116,6 +116,43 @@ def distance_to_obstacle(obstacle, x, y, z, away):
 
 
 @compiled
+def turning_off_obstacle(obstacle, x, y, z, D, straight):
+    """Radius [m] about which the direction off an obstacle turns; infinite beside a flat face.
+
+    The second derivative of the distance D by the point is (I - r r^T - e e^T) / radius; e is
+    `straight` (3,), the axis of a capsule beside its side, that of a box's edge beside the edge,
+    and zero elsewhere.
+    """
+    straight[0] = straight[1] = straight[2] = 0.0
+    shape = int(obstacle[0])
+    if shape < 2:
+        return D + obstacle[1]
+    ox, oy, oz = x - obstacle[4], y - obstacle[5], z - obstacle[6]
+    if shape == 2:
+        along = obstacle[9] * ox + obstacle[12] * oy + obstacle[15] * oz
+        _copy_axis(obstacle, 2 if abs(along) < obstacle[2] else -1, straight)
+        return D + obstacle[1]
+    beyond, axis = 0, -1
+    for i in range(3):  # beyond one face of three: flat; of two: an edge; of all: a corner
+        along = obstacle[7 + i] * ox + obstacle[10 + i] * oy + obstacle[13 + i] * oz
+        if abs(along) > obstacle[1 + i]:
+            beyond += 1
+        else:
+            axis = i
+    if beyond < 2:
+        return np.inf
+    _copy_axis(obstacle, axis, straight)
+    return D
+
+
+@compiled
+def _copy_axis(obstacle, axis, out):
+    if axis >= 0:
+        for i in range(3):
+            out[i] = obstacle[7 + 3 * i + axis]
+
+
+@compiled
 def _off_box(hx, hy, hz, px, py, pz):
     dx, dy, dz = abs(px) - hx, abs(py) - hy, abs(pz) - hz
     sx, sy, sz = (1.0 if px >= 0 else -1.0), (1.0 if py >= 0 else -1.0), (1.0 if pz >= 0 else -1.0)

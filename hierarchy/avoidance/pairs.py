@@ -8,30 +8,37 @@ from math import inf
 
 import numpy as np
 
-from hierarchy.avoidance.obstacles import Obstacles, distance_to_obstacle
+from hierarchy.avoidance.obstacles import Obstacles, distance_to_obstacle, turning_off_obstacle
 from hierarchy.compiled import compiled
 from hierarchy.problem import Array
 
-_WIDTH = 6  # distance, direction, speed, acceleration
+# Columns of the table.
+_DISTANCE, _DIRECTION, _VELOCITY, _ACCELERATION = 0, slice(1, 4), slice(4, 7), slice(7, 10)
+_STRAIGHT, _RADIUS, _WIDTH = slice(10, 13), 13, 14
 
 
 class Pairs:
     """P points of the robot against H obstacles.
 
     distance (P, H) [m], negative inside, infinite where nothing is seen; direction (P, H, 3) unit
-    vector away from the obstacle; speed (P, H) [m/s] and acceleration (P, H) [m/s^2] of the
-    obstacle along that direction, zero where they are not known. All are views of `table`
-    (P, H, 6), which kernels take. A sensor that sees surfaces and not obstacles has H = 1: what is
-    nearest to each point.
+    vector away from the obstacle; velocity, acceleration (P, H, 3) of the obstacle, zero where
+    they are not known. radius (P, H) [m] and straight (P, H, 3) say how the direction turns where
+    the point moves across it: by the speed over the radius, but not along the unit vector
+    `straight`; an infinite radius, that of a flat face, is on the safe side where it is not known.
+
+    All are views of `table` (P, H, 14), which kernels take. A sensor that sees surfaces and not
+    obstacles has H = 1: what is nearest to each point.
     """
 
-    __slots__ = ("acceleration", "direction", "distance", "speed", "table")
+    __slots__ = ("acceleration", "direction", "distance", "radius", "straight", "table", "velocity")
 
     def __init__(self, points: int, obstacles: int) -> None:
         self.table = np.zeros((points, obstacles, _WIDTH))
-        self.distance, self.direction = self.table[..., 0], self.table[..., 1:4]
-        self.speed, self.acceleration = self.table[..., 4], self.table[..., 5]
-        self.distance[:] = inf
+        self.distance, self.direction = self.table[..., _DISTANCE], self.table[..., _DIRECTION]
+        self.velocity = self.table[..., _VELOCITY]
+        self.acceleration = self.table[..., _ACCELERATION]
+        self.radius, self.straight = self.table[..., _RADIUS], self.table[..., _STRAIGHT]
+        self.distance[:] = self.radius[:] = inf
 
 
 def measure_pairs(pairs: Pairs, points: Array, obstacles: Obstacles) -> None:
@@ -42,10 +49,10 @@ def measure_pairs(pairs: Pairs, points: Array, obstacles: Obstacles) -> None:
 @compiled
 def _measure(points, obstacles, motion, table):
     for k in range(table.shape[0]):
+        x, y, z = points[k, 0], points[k, 1], points[k, 2]
         for j in range(table.shape[1]):
-            pair, moves = table[k, j], motion[j]
-            r = pair[1:4]
-            pair[0] = distance_to_obstacle(obstacles[j], points[k, 0], points[k, 1], points[k, 2],
-                                           r)
-            pair[4] = r[0] * moves[0] + r[1] * moves[1] + r[2] * moves[2]
-            pair[5] = r[0] * moves[3] + r[1] * moves[4] + r[2] * moves[5]
+            pair = table[k, j]
+            pair[0] = distance_to_obstacle(obstacles[j], x, y, z, pair[1:4])
+            for i in range(6):
+                pair[4 + i] = motion[j, i]
+            pair[13] = turning_off_obstacle(obstacles[j], x, y, z, pair[0], pair[10:13])

@@ -14,6 +14,7 @@ from hierarchy.avoidance.barrier import (
     Barrier,
     add_row,
     drift_of_point,
+    drop_rounding,
     least_acceleration,
     least_rate,
     place,
@@ -39,13 +40,15 @@ class Separation(Task):
     With d the distance of a pair, r the direction and o the obstacle, a row is, see `Barrier`,
 
     - at velocity level r^T J_c v >= r . v_o + what is asked of dh/dt,
-    - at acceleration level r^T J_c a >= r . a_o - r^T dJ_c/dt v + what is asked of d2h/dt2.
+    - at acceleration level r^T J_c a >= r . a_o - r^T dJ_c/dt v - bend + what is asked of d2h/dt2.
 
-    Left out of d2d/dt2 is what the turning of r adds: |w|^2 / d beside a point, with w the relative
-    velocity across r; less beside a capsule or a box, never negative for a convex obstacle that
-    does not turn. So the distance grows by at least what the row says. The derivative of J_c is
-    exact or a backward difference, as the state has it. A pair beyond `barrier.influence` has a row
-    without sides, which does nothing.
+    bend = |w|^2 / radius is what the turning of r adds to d2d/dt2, with w the relative velocity
+    across r, and radius and axis without turning from `Pairs`. It is never negative for a convex
+    obstacle that does not rotate, so a sensor that does not know the radius may leave it out; but
+    then a point that swings around an obstacle at a constant distance is asked for what no
+    acceleration can give. Inside d_min the radius is taken as d_min at least. The derivative of J_c
+    is exact or a backward difference, as the state has it. A pair beyond `barrier.influence` has a
+    row without sides, which does nothing.
     """
 
     points: Sequence[ControlPoint]
@@ -97,11 +100,23 @@ class Separation(Task):
 
     def desired_velocity(self, state: State) -> Array:
         """r . v_o (m,) [m/s]."""
-        return np.array([pair[4] for _, pair in self._rows(state)])
+        return np.array([pair[1:4] @ pair[4:7] for _, pair in self._rows(state)])
 
     def desired_acceleration(self, state: State) -> Array:
         """r . a_o (m,) [m/s^2]."""
-        return np.array([pair[5] for _, pair in self._rows(state)])
+        return np.array([pair[1:4] @ pair[7:10] for _, pair in self._rows(state)])
+
+    def bend(self, state: State) -> Array:
+        """What the turning of the directions adds to d2d/dt2 (m,) [m/s^2]."""
+        J = np.empty((3, state.n))
+        bend = np.empty(self.dimension)
+        for row, (k, pair) in enumerate(self._rows(state)):
+            write_point_jacobian(state.J, state.placements, state.supports, int(self.joints[k]),
+                                 self.offsets[k], J, 0)
+            w = J @ state.v - pair[4:7]
+            across = w @ w - (pair[1:4] @ w) ** 2 - (pair[10:13] @ w) ** 2
+            bend[row] = max(across, 0.0) / max(pair[13], self.barrier.distance)
+        return bend
 
     def reference_velocity(self, state: State) -> Array:
         """The least r^T J_c v (m,) [m/s], -inf beyond `influence`."""
@@ -111,8 +126,8 @@ class Separation(Task):
     def reference_acceleration(self, state: State) -> Array:
         """The least r^T d2p/dt2 (m,) [m/s^2], -inf beyond `influence`."""
         rates = self.jacobian(state) @ state.v - self.desired_velocity(state)
-        asked = [least_acceleration(-e, rate, self.settings)
-                 for e, rate in zip(self.error(state), rates, strict=True)]
+        asked = [least_acceleration(-e, rate, bend, self.settings) for e, rate, bend
+                 in zip(self.error(state), rates, self.bend(state), strict=True)]
         return self._near(state, self.desired_acceleration(state) + asked)
 
     def write(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
@@ -155,7 +170,7 @@ def _write(v, J, dJ, placements, supports, previous_J, previous_placements, peri
     for k in range(joints.size):
         joint = joints[k]
         x, y, z = place(placements[joint], offsets[k, 0], offsets[k, 1], offsets[k, 2])
-        vx, vy, vz, ax, ay, az = drift_of_point(
+        vx, vy, vz, ax, ay, az, _, _, _ = drift_of_point(
             v, J, dJ, placements, supports, previous_J, previous_placements, period, joint,
             offsets[k, 0], offsets[k, 1], offsets[k, 2])
         first, end = 0, pairs.shape[1]
@@ -170,13 +185,19 @@ def _write(v, J, dJ, placements, supports, previous_J, previous_placements, peri
             for c in range(A.shape[1]):
                 A[row, c] = 0.0
             add_row(J, supports, joint, x, y, z, rx, ry, rz, A, row)
+            drop_rounding(A, row)
             lower[row], upper[row] = -np.inf, np.inf
             if pair[0] <= influence:
                 h = pair[0] - distance
                 if acceleration:
-                    rate = rx * vx + ry * vy + rz * vz - pair[4]
-                    lower[row] = (least_acceleration(h, rate, settings) + pair[5]
-                                  - (rx * ax + ry * ay + rz * az))
+                    wx, wy, wz = vx - pair[4], vy - pair[5], vz - pair[6]
+                    rate = rx * wx + ry * wy + rz * wz
+                    straight = pair[10] * wx + pair[11] * wy + pair[12] * wz
+                    across = wx * wx + wy * wy + wz * wz - rate * rate - straight * straight
+                    bend = max(across, 0.0) / max(pair[13], distance)
+                    lower[row] = (least_acceleration(h, rate, bend, settings)
+                                  + rx * (pair[7] - ax) + ry * (pair[8] - ay) + rz * (pair[9] - az))
                 else:
-                    lower[row] = least_rate(h, settings) + pair[4]
+                    lower[row] = (least_rate(h, settings)
+                                  + rx * pair[4] + ry * pair[5] + rz * pair[6])
             row += 1

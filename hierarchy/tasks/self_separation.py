@@ -1,0 +1,207 @@
+"""Self-separation: links of the robot kept apart from each other by one-sided rows."""
+
+# mypy: disable-error-code="no-untyped-def"
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hierarchy.avoidance.barrier import (
+    Barrier,
+    add_row,
+    drift_of_point,
+    drop_rounding,
+    least_acceleration,
+    least_rate,
+    place,
+)
+from hierarchy.avoidance.self_collision import (
+    ON_AXIS,
+    Capsule,
+    bend_of_nearest,
+    dot,
+    measure_capsules,
+    nearest_of_capsules,
+    pack_capsules,
+    pairs_of_chain,
+    turned,
+)
+from hierarchy.compiled import compiled
+from hierarchy.errors import HierarchyError
+from hierarchy.kinematics import write_point_jacobian, write_point_jacobian_derivative
+from hierarchy.problem import Array
+from hierarchy.robot import State
+from hierarchy.task import Kind, Level, Task
+
+
+@dataclass(frozen=True)
+class SelfSeparation(Task):
+    """Keep pairs of capsules of the robot at `barrier.distance` or more (m = pairs).
+
+    `pairs` are indices of `capsules`; None takes every pair of the chain but neighbours. No sensor
+    is needed. With d the distance of a pair, r its direction, a and b the nearest points, as if
+    fixed to their bodies, a row is, see `Barrier`,
+
+    - at velocity level r^T (J_a - J_b) v >= what is asked of dh/dt,
+    - at acceleration level r^T (J_a - J_b) a >= - r^T (dJ_a/dt - dJ_b/dt) v - bend + what is asked
+      of d2h/dt2.
+
+    bend is the rest of d2d/dt2, of the turning of r and of the nearest points that slide along the
+    axes; unlike that of an obstacle it may be negative. Where two axes pass through being parallel
+    the nearest points jump, d has a kink, and bend falls without bound: `barrier.limit` then limits
+    the row, and d may pass `barrier.distance` by what one period brings at velocity level, and by
+    the way of slowing down with `limit` at acceleration level.
+
+    Axes that cross (d = - the two radii) have no direction: the row then says "along z".
+    """
+
+    capsules: Sequence[Capsule]
+    barrier: Barrier
+    pairs: Sequence[tuple[int, int]] | None = None
+    name: str = "self-separation"
+    kind: Kind = "inequality"
+    joints: NDArray[np.int64] = field(init=False, repr=False, compare=False)
+    table: Array = field(init=False, repr=False, compare=False)
+    indices: NDArray[np.int64] = field(init=False, repr=False, compare=False)
+    settings: Array = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        pairs = pairs_of_chain(self.capsules) if self.pairs is None else self.pairs
+        count = len(self.capsules)
+        if not pairs:
+            raise HierarchyError(f"task {self.name!r}: no pair among {count} capsules")
+        for i, j in pairs:
+            if not (0 <= i < count and 0 <= j < count and i != j):
+                raise HierarchyError(f"task {self.name!r}: pair ({i}, {j}) is no pair among "
+                                     f"{count} capsules")
+        if self.kind != "inequality":
+            raise HierarchyError(f"task {self.name!r}: its rows are inequalities")
+        joints, table = pack_capsules(self.capsules)
+        object.__setattr__(self, "joints", joints)
+        object.__setattr__(self, "table", table)
+        object.__setattr__(self, "indices", np.array(pairs, dtype=np.int64))
+        object.__setattr__(self, "settings", self.barrier.packed())
+
+    @property
+    def dimension(self) -> int:
+        """A row for each pair."""
+        return len(self.indices)
+
+    def distances(self, state: State) -> Array:
+        """d (m,) [m], negative where capsules overlap."""
+        return self._seen(state)[:, 0]
+
+    def error(self, state: State) -> Array:
+        """distance - d (m,) [m], positive where two are too near."""
+        return self.barrier.distance - self.distances(state)
+
+    def jacobian(self, state: State) -> Array:
+        """r^T (J_a - J_b) (m, n): the derivative of the distances."""
+        def of_point(joint: int, offset: Array) -> Array:
+            J = np.empty((3, state.n))
+            write_point_jacobian(state.J, state.placements, state.supports, joint, offset, J, 0)
+            return J
+        return self._between(state, of_point)
+
+    def jacobian_derivative(self, state: State) -> Array:
+        """r^T (dJ_a/dt - dJ_b/dt) (m, n), directions and nearest points held."""
+        def of_point(joint: int, offset: Array) -> Array:
+            dJ = np.empty((3, state.n))
+            write_point_jacobian_derivative(*state.arrays, joint, offset, dJ)
+            return dJ
+        return self._between(state, of_point)
+
+    def bend(self, state: State) -> Array:
+        """What d2d/dt2 has beside r^T (J_a - J_b) a + r^T (dJ_a/dt - dJ_b/dt) v: (m,) [m/s^2]."""
+        return np.array([
+            _motion(*state.arrays, self.joints, self.table, i, j, *seen)[2]
+            for (i, j), seen in zip(self.indices, self._seen(state), strict=True)])
+
+    def reference_velocity(self, state: State) -> Array:
+        """The least r^T (J_a - J_b) v (m,) [m/s], -inf beyond `influence`."""
+        return self._near(state, [least_rate(-e, self.settings) for e in self.error(state)])
+
+    def reference_acceleration(self, state: State) -> Array:
+        """The least r^T (J_a - J_b) a + r^T (dJ_a/dt - dJ_b/dt) v (m,), -inf beyond `influence`."""
+        terms = zip(self.error(state), self.jacobian(state) @ state.v, self.bend(state),
+                    strict=True)
+        return self._near(state, [least_acceleration(-e, rate, bend, self.settings)
+                                  for e, rate, bend in terms])
+
+    def write(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
+              row: int) -> None:
+        """See `Task.write`."""
+        _write(*state.arrays, self.joints, self.table, self.indices, self.settings,
+               level == "acceleration", A, lower, upper, row)
+
+    def _near(self, state: State, lower: Sequence[float]) -> Array:
+        return np.where(self.distances(state) <= self.barrier.influence, lower, -np.inf)
+
+    def _seen(self, state: State) -> Array:
+        return measure_capsules(state.placements, self.joints, self.table, self.indices)
+
+    def _between(self, state: State, of_point: Callable[[int, Array], Array]) -> Array:
+        """r^T (of a - of b) (m, n) of the nearest points of each pair."""
+        rows = np.empty((self.dimension, state.n))
+        for row, (i, j), seen in zip(rows, self.indices, self._seen(state), strict=True):
+            a, b = self.table[i], self.table[j]
+            row[:] = seen[1:4] @ (of_point(int(self.joints[i]), a[:3] + seen[4] * a[3:6])
+                                  - of_point(int(self.joints[j]), b[:3] + seen[5] * b[3:6]))
+        return rows
+
+
+@compiled
+def _write(v, J, dJ, placements, supports, previous_J, previous_placements, period,
+           joints, capsules, pairs, settings, acceleration, A, lower, upper, row):
+    for m in range(pairs.shape[0]):
+        i, j = pairs[m, 0], pairs[m, 1]
+        a, b = capsules[i], capsules[j]
+        T_a, T_b = placements[joints[i]], placements[joints[j]]
+        D, rx, ry, rz, s, t = nearest_of_capsules(T_a, a, T_b, b)
+        for c in range(A.shape[1]):
+            A[row, c] = 0.0
+        x, y, z = place(T_a, a[0] + s * a[3], a[1] + s * a[4], a[2] + s * a[5])
+        add_row(J, supports, joints[i], x, y, z, rx, ry, rz, A, row)
+        x, y, z = place(T_b, b[0] + t * b[3], b[1] + t * b[4], b[2] + t * b[5])
+        add_row(J, supports, joints[j], x, y, z, -rx, -ry, -rz, A, row)
+        drop_rounding(A, row)
+        lower[row], upper[row] = -np.inf, np.inf
+        if D <= settings[2]:
+            if acceleration:
+                rate, drift, bend = _motion(
+                    v, J, dJ, placements, supports, previous_J, previous_placements, period,
+                    joints, capsules, i, j, D, rx, ry, rz, s, t)
+                lower[row] = least_acceleration(D - settings[0], rate, bend, settings) - drift
+            else:
+                lower[row] = least_rate(D - settings[0], settings)
+        row += 1
+
+
+@compiled
+def _motion(v, J, dJ, placements, supports, previous_J, previous_placements, period,
+            joints, capsules, i, j, D, rx, ry, rz, s, t):
+    """dd/dt, r^T (dJ_a/dt - dJ_b/dt) v and bend of one pair."""
+    a, b = capsules[i], capsules[j]
+    ax, ay, az, fx, fy, fz, ox, oy, oz = drift_of_point(
+        v, J, dJ, placements, supports, previous_J, previous_placements, period, joints[i],
+        a[0] + s * a[3], a[1] + s * a[4], a[2] + s * a[5])
+    bx, by, bz, gx, gy, gz, px, py, pz = drift_of_point(
+        v, J, dJ, placements, supports, previous_J, previous_placements, period, joints[j],
+        b[0] + t * b[3], b[1] + t * b[4], b[2] + t * b[5])
+    vx, vy, vz = ax - bx, ay - by, az - bz
+    rate = dot(rx, ry, rz, vx, vy, vz)
+    drift = dot(rx, ry, rz, fx - gx, fy - gy, fz - gz)
+    length = D + a[6] + b[6]
+    if length < ON_AXIS:
+        return rate, drift, 0.0
+    ux, uy, uz = turned(placements[joints[i]], a)
+    wx, wy, wz = turned(placements[joints[j]], b)
+    bend = bend_of_nearest(
+        length, rx, ry, rz, vx, vy, vz,
+        ux, uy, uz, oy * uz - oz * uy, oz * ux - ox * uz, ox * uy - oy * ux, s,
+        wx, wy, wz, py * wz - pz * wy, pz * wx - px * wz, px * wy - py * wx, t)
+    return rate, drift, bend
