@@ -2,64 +2,86 @@
 
 from __future__ import annotations
 
-from math import nan
+from collections.abc import Callable
+from functools import partial
+from math import inf, nan
 from time import perf_counter
 from typing import Any
 
 import numpy as np
 
 from hierarchy.allocation import POINTING, POSITION, Allocation, allocate
-from hierarchy.problem import Array
+from hierarchy.problem import Array, Hierarchy
 from scenarios.build import Cell, build
 from scenarios.config import Scenario
-from solvers import Resolver, Status
+from scenarios.policy import Policy, smallest
+from scenarios.transition import Blend
+from solvers import Resolution, Resolver, Status
 
 _REHEARSALS = 20
-_BRAKE = 10.0  # [1/s] deceleration per velocity in a tick without an answer
 
 
 class Controller:
-    """Sense, allocate, stack, resolve.
+    """Sense, allocate, stack, resolve; then the policy says what is sent.
 
-    After `command`: `allocation` and `cone_error` of the tick, its `hierarchy` (until the next
-    command) and `resolution`, and `stamps`, the clock [s] at its begin, after kinematics, after
-    rows (sensing and allocation included) and after resolving.
+    After `command`: `sent`; `allocation` and `cone_error` of the tick, its `hierarchy` (until the
+    next command) and `resolution`, and `stamps`, the clock [s] at its begin, after kinematics,
+    after rows (sensing and allocation included) and after resolving. A tick whose measurement is of
+    no use is not `answered`, and leaves allocation and hierarchy as they were. `policy` has the
+    events of the tick, `blend` the weight of the present stack, or is None.
     """
 
+    hierarchy: Hierarchy
+
     def __init__(self, scenario: Scenario, cell: Cell | None = None,
-                 resolver: Resolver | None = None) -> None:
-        self.cell = build(scenario) if cell is None else cell
+                 resolver: Resolver | None = None,
+                 clock: Callable[[], float] = perf_counter) -> None:
+        self.cell = cell = build(scenario) if cell is None else cell
         self.resolver = scenario.make_resolver() if resolver is None else resolver
-        self.level = scenario.control.level
+        control = scenario.control
+        self.level, self.clock = control.level, clock
+        limits = getattr(cell, "limits", None)
+        self.policy = Policy(control.policy, control.level, control.period,
+                             limits and partial(limits.clamp, cell.state, control.level))
+        self.blend = Blend(control.transition_time) if control.transition == "blend" else None
         self.cone_error = nan
         self.allocation = Allocation((), repulsion=False)
+        self.resolution = self._unanswered = Resolution(np.zeros(cell.robot.n),
+                                                        Status.NUMERICAL_FAILURE, 0)
         self.stamps = (0.0, 0.0, 0.0, 0.0)
         self._always_point = bool(scenario.pointing and scenario.pointing.kind == "equality")
         self._memory: Any = None
+        self._deadline = control.policy.deadline or inf
+        self._stale_after, self._measured_at = control.policy.stale_after, -inf
+        # What a first tick without a measurement goes on from.
+        cell.state.move(0.0, cell.plant.q, cell.plant.v)
+        self.sent = cell.plant.v.copy() if self.level == "velocity" else np.zeros(cell.robot.n)
 
-    def command(self, t: float, q: Array, v: Array) -> Array:
+    @property
+    def answered(self) -> bool:
+        """Whether the resolver was asked in the last tick."""
+        return self.resolution is not self._unanswered
+
+    def command(self, t: float, q: Array, v: Array, measured_at: float | None = None) -> Array:
         """Return the velocity or acceleration (n,) to send at time t [s], joints at q and v.
 
-        A tick without an answer brakes: zero velocity, or deceleration in proportion to v.
+        `measured_at` [s] is the time of q and v, None for t. The command is finite whatever was
+        measured; `control.policy` says what it is in a tick with trouble.
         """
-        cell = self.cell
-        state = cell.state
-        begin = perf_counter()
-        state.move(t, q, v)
-        moved = perf_counter()
-        if cell.sensor is not None:
-            cell.sensor.measure(state)
-        if cell.pointing is not None:
-            self.cone_error = cell.pointing.cone_error(state)
-        self.allocation = self._allocate()
-        self.hierarchy = hierarchy = cell.stack.hierarchy(state, self.allocation.order)
-        written = perf_counter()
-        self.resolution = resolution = self.resolver.solve(hierarchy, self._memory)
-        self.stamps = (begin, moved, written, perf_counter())
-        self._memory = resolution.memory
-        if resolution.status is Status.SOLVED:
-            return resolution.x
-        return np.zeros_like(v) if self.level == "velocity" else -_BRAKE * v
+        clock, state = self.clock, self.cell.state
+        troubles: list[str] = []
+        begin = clock()
+        if measured_at is not None or not state.move(t, q, v):
+            self._move(t, q, v, measured_at, troubles)
+        moved = clock()
+        self._sense(troubles)
+        x = self._answer(troubles)
+        resolved = clock()
+        self.stamps = (begin, moved, self._written, resolved)
+        if resolved - begin > self._deadline:
+            troubles.append("overrun")
+        self.sent = sent = self.policy.choose(t, troubles, x, state.v)
+        return sent
 
     def rehearse(self) -> None:
         """Call every kernel of the loop once, so that none is loaded while ticks are timed.
@@ -71,6 +93,57 @@ class Controller:
         for _ in range(_REHEARSALS):
             self.resolver.solve(self.cell.stack.hierarchy(self.cell.state, tasks), self._memory)
         plant.act(np.zeros_like(plant.v))
+
+    def _move(self, t: float, q: Array, v: Array, measured_at: float | None,
+              troubles: list[str]) -> None:
+        """Go to what was measured if it is new and finite, else on from the last such state."""
+        state, stamp = self.cell.state, t if measured_at is None else measured_at
+        new = stamp > self._measured_at
+        if new and state.move(t, q, v):
+            self._measured_at = stamp
+            return
+        if new:
+            troubles.append("not_finite")
+        elif t - stamp > self._stale_after:
+            troubles.append("stale")
+        state.move(t, *self._carried_on(t - state.t))
+
+    def _carried_on(self, dt: float) -> tuple[Array, Array]:
+        """Return q (nq,), v (n,) after `dt` [s] under the command that was sent last."""
+        state, x = self.cell.state, self.sent
+        if self.level == "velocity":
+            return state.robot.integrate(state.q, x * dt), x
+        return state.robot.integrate(state.q, state.v * dt + x * (dt * dt / 2)), state.v + x * dt
+
+    def _sense(self, troubles: list[str]) -> None:
+        cell = self.cell
+        if cell.pointing is not None:
+            self.cone_error = cell.pointing.cone_error(cell.state)
+        if cell.sensor is not None:
+            nearest = smallest(cell.sensor.measure(cell.state).distance)
+            if not nearest > 0.0:
+                troubles.append("inside" if nearest <= 0.0 else "not_finite")
+
+    def _answer(self, troubles: list[str]) -> Array:
+        """Return the resolver's answer (n,), or zero where nothing usable was measured."""
+        if troubles and troubles != ["inside"]:
+            self.resolution, self._written = self._unanswered, self.clock()
+            return self.resolution.x
+        cell = self.cell
+        self.allocation = self._allocate()
+        order = self.allocation.order
+        self.hierarchy = hierarchy = cell.stack.hierarchy(cell.state, order)
+        self._written = self.clock()
+        if self.blend is None:
+            self.resolution = resolution = self.resolver.solve(hierarchy, self._memory)
+            x, self._memory = resolution.x, resolution.memory
+        else:
+            resolution, x = self.blend.resolve(self.resolver, cell.stack, cell.state, order,
+                                               hierarchy)
+            self.resolution = resolution
+        if resolution.status is not Status.SOLVED:
+            troubles.append(resolution.status.name.lower())
+        return x
 
     def _allocate(self) -> Allocation:
         cell = self.cell

@@ -11,7 +11,7 @@ from hierarchy.compiled import compiled
 from hierarchy.kinematics import point_at
 from scenarios.config import Scenario
 from scenarios.controller import Controller
-from scenarios.recording import Recording
+from scenarios.recording import Event, Recording
 
 _TIMES = ("time_kinematics", "time_rows", "time_resolve", "time_tick")
 
@@ -34,6 +34,8 @@ class Recorder:
         self._log = np.empty((ticks, 8 + cell.robot.nq + 3 * cell.robot.n + len(self._distance)))
         self._choices = np.empty((ticks, 5), dtype=np.int16)
         self._times = np.empty((ticks, len(_TIMES)))
+        self._weights = np.empty(ticks if controller.blend else 0)
+        self._events: list[Event] = []
 
     def write(self) -> bool:
         """Record the tick whose command was just applied; False if its state is not finite."""
@@ -43,10 +45,14 @@ class Recorder:
         active = cell.sensor.measurement.active + 1 if AVOIDANCE in order and cell.sensor else -1
         resolution, state = controller.resolution, cell.state
         finite = _write(self._log, self._choices, self._times, k, state.t, state.q, state.v,
-                        cell.plant.a, resolution.x, state.placements, self._frame.joint,
+                        cell.plant.a, controller.sent, state.placements, self._frame.joint,
                         self._frame.offset, self._target, controller.cone_error, self._distance,
                         index, active, repulsion, int(resolution.status), resolution.iterations,
                         *controller.stamps)
+        if controller.blend is not None:
+            self._weights[k] = controller.blend.weight
+        if controller.policy.events:
+            self._events += [Event(k, *event) for event in controller.policy.events]
         self.ticks = k + 1
         return bool(finite)
 
@@ -72,6 +78,8 @@ class Recorder:
         if self._cell.pointing is not None:
             asked = np.array(["pointing" in names for names in orders])
             signals |= {"pointing_error": cone[:, 0], "pointing_active": asked[order]}
+        if self._controller.blend is not None:
+            signals["transition"] = self._weights[rows].copy()
         if len(self._distance):
             signals |= {"control_point_distance": body, "minimal_distance": body.min(axis=1),
                         "ee_distance": log[:, -1].copy(), "active_control_point": active,
@@ -79,7 +87,8 @@ class Recorder:
         signals |= dict(zip(_TIMES, self._times[rows].T.copy(), strict=True))
         signals |= {"joint_lower": robot.lower, "joint_upper": robot.upper,
                     "velocity_limit": robot.velocity_limit}
-        return Recording(signals, tuple(" > ".join(names) for names in orders), scenario, fault)
+        return Recording(signals, tuple(" > ".join(names) for names in orders), scenario, fault,
+                         tuple(self._events))
 
 
 @compiled

@@ -9,7 +9,7 @@ import zipfile
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,17 @@ if TYPE_CHECKING:
     from scenarios.config import Scenario
 
 
+class Event(NamedTuple):
+    """What kind of trouble a tick had and what was done; the kinds of `scenarios.policy`."""
+
+    tick: int
+    kind: str
+    action: str
+
+
+_EVENT = np.dtype([("tick", np.int64), ("kind", "U24"), ("action", "U8")])
+
+
 @dataclass(frozen=True)
 class Recording:
     """What one run did, tick by tick.
@@ -30,8 +41,8 @@ class Recording:
 
     Signals
     -------
-    t (T,) [s] · q, v, a (T, n) [rad, rad/s, rad/s^2] · command (T, n), the x that the resolver
-    gave: a velocity or an acceleration, after `scenario.control.level`
+    t (T,) [s] · q, v, a (T, n) [rad, rad/s, rad/s^2], q and v as the controller knew them
+    command (T, n) that was sent: a velocity or an acceleration, after `scenario.control.level`
     ee_position, desired_position, position_error (T, 3) [m], error = desired - actual
     pointing_error (T,) cos(alpha_d) - cos(alpha), positive outside the cone
     pointing_active (T,) bool, whether the pointing task was in the stack
@@ -39,17 +50,19 @@ class Recording:
     active_control_point (T,) number 1..K of the point whose avoidance was in the stack, or -1
     ee_distance (T,) [m]; repulsion_active (T,) bool, whether eq. (30) was in force
     order (T,) index into `orders`; status (T,) value of solvers.Status; iterations (T,)
+    transition (T,) weight of the present stack's answer in the command, where stacks are blended
     certified (T,) bool, whether x is the undamped answer, in a run that was certified
     time_kinematics, time_rows, time_resolve, time_tick (T,) [s] of computing
     joint_lower, joint_upper, velocity_limit (n,) of the robot, infinite where it has none
 
-    A signal that the scenario has no use for is absent.
+    A signal that the scenario has no use for is absent. `events` are the ticks with trouble.
     """
 
     signals: dict[str, NDArray[Any]]
     orders: tuple[str, ...]
     scenario: Scenario
     fault: str | None = None
+    events: tuple[Event, ...] = ()
 
     def __getitem__(self, name: str) -> NDArray[Any]:
         return self.signals[name]
@@ -66,11 +79,18 @@ class Recording:
         """Ticks k at which the stack's order differs from that of tick k - 1."""
         return np.flatnonzero(np.diff(self.signals["order"])) + 1
 
+    def troubles(self) -> dict[tuple[str, str], list[int]]:
+        """Ticks of each kind of trouble and what was done, in the order of their first."""
+        found: dict[tuple[str, str], list[int]] = {}
+        for tick, kind, action in self.events:
+            found.setdefault((kind, action), []).append(tick)
+        return found
+
 
 def save(recording: Recording, folder: str | Path, figures: bool = True) -> Path:
     """Write a run's folder, whole or not at all, and return its path.
 
-    It holds `run.npz` (the signals by name, with `orders` and `fault`), `metrics.json`,
+    It holds `run.npz` (the signals by name, with `orders`, `fault` and `events`), `metrics.json`,
     `scenario.toml` as it was run, `versions.json`, and the letter's figures if `figures`.
     `folder` must be new or empty.
     """
@@ -79,7 +99,8 @@ def save(recording: Recording, folder: str | Path, figures: bool = True) -> Path
     with whole(folder) as partial:
         np.savez_compressed(partial / "run.npz", allow_pickle=False, **recording.signals,
                             orders=np.array(recording.orders, dtype=np.str_),
-                            fault=np.array(recording.fault or ""))
+                            fault=np.array(recording.fault or ""),
+                            events=np.array(list(recording.events), dtype=_EVENT))
         _write_json(partial / "metrics.json", metrics.as_plain_data(recording))
         _write_json(partial / "versions.json", versions())
         (partial / "scenario.toml").write_text(recording.scenario.to_toml(), encoding="utf-8")
@@ -104,11 +125,13 @@ def load_run(folder: str | Path) -> Recording:
         with (path / "run.npz").open("rb") as stream, np.load(stream, allow_pickle=False) as file:
             signals = {name: file[name] for name in file.files}
         orders, fault = signals.pop("orders"), signals.pop("fault")
+        events = signals.pop("events", np.empty(0, _EVENT))
     except FileNotFoundError:
         raise HierarchyError(f"{path} is not a run folder: it has no run.npz") from None
     except (OSError, KeyError, ValueError, EOFError, zipfile.BadZipFile) as error:
         raise HierarchyError(f"{path / 'run.npz'} cannot be read: {error}") from error
-    return Recording(signals, tuple(map(str, orders)), scenario, str(fault) or None)
+    return Recording(signals, tuple(map(str, orders)), scenario, str(fault) or None,
+                     tuple(Event(*event) for event in events.tolist()))
 
 
 def versions() -> dict[str, str]:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from time import perf_counter
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hierarchy.problem import Array
 from scenarios.config import Scenario
 from scenarios.controller import Controller
+from scenarios.faults import Faults
 from scenarios.recorder import Recorder
 from scenarios.recording import Recording
 from solvers import certify
@@ -21,22 +22,23 @@ def simulate(scenario: Scenario, progress: Callable[[int, int], None] | None = N
              certified: bool = False) -> Recording:
     """Run a scenario from its start to its end.
 
-    `progress(done, total)` is called now and then. A run that is interrupted (Ctrl-C) or whose
-    state stops being finite ends early: the Recording has all ticks so far and says why in
-    `fault`. With `certified`, every answer is judged by `solvers.certify` after its tick was timed,
-    and the Recording has the verdicts as its signal `certified`. Raises HierarchyError where the
-    scenario does not fit its robot or resolver.
+    `progress(done, total)` is called now and then. A run that is interrupted (Ctrl-C), that is
+    stopped by its policy, or whose state stops being finite ends early: the Recording has all ticks
+    so far and says why in `fault`. With `certified`, every answer is judged by `solvers.certify`
+    after its tick was timed, and the Recording has the verdicts as its signal `certified`. Raises
+    HierarchyError where the scenario does not fit its robot or resolver.
     """
     rehearsal = Controller(scenario)
     rehearsal.rehearse()
     Recorder(rehearsal, 1).write()
-    controller = Controller(scenario)
+    faults = Faults(scenario) if scenario.faults else None
+    controller = Controller(scenario) if faults is None else faults.controller
     ticks = max(1, round(scenario.control.duration / scenario.control.period))
     recorder = Recorder(controller, ticks)
     verdicts = np.zeros(ticks, dtype=bool) if certified else None
     try:
         fault = _run(controller, recorder, scenario.control.period, ticks, progress or _silent,
-                     verdicts)
+                     verdicts, faults)
     except KeyboardInterrupt:
         fault = f"interrupted at tick {recorder.ticks}"
     recording = recorder.finish(scenario, fault)
@@ -46,19 +48,30 @@ def simulate(scenario: Scenario, progress: Callable[[int, int], None] | None = N
 
 
 def _run(controller: Controller, recorder: Recorder, period: float, ticks: int,
-         progress: Callable[[int, int], None], verdicts: NDArray[np.bool_] | None) -> str | None:
-    plant = controller.cell.plant
+         progress: Callable[[int, int], None], verdicts: NDArray[np.bool_] | None,
+         faults: Faults | None) -> str | None:
+    plant, policy = controller.cell.plant, controller.policy
     for k in range(ticks):
         if k % _REPORT_EVERY == 0:
             progress(k, ticks)
-        plant.act(controller.command(k * period, plant.q, plant.v))
-        if not recorder.write():
+        if faults is None:
+            plant.act(controller.command(k * period, plant.q, plant.v))
+        else:
+            plant.act(controller.command(k * period, *faults.measure(k * period)))
+        finite = recorder.write()
+        recorder.stamp(controller.clock())
+        if not finite or (policy.events and not _finite(plant.q, plant.v)):
             return f"the state is not finite from tick {k} on (t = {k * period:.3f} s)"
-        recorder.stamp(perf_counter())
-        if verdicts is not None:
+        if verdicts is not None and controller.answered:
             verdicts[k] = certify(controller.hierarchy, controller.resolution.x).certified
+        if policy.stopped:
+            break
     progress(ticks, ticks)
-    return None
+    return policy.fault
+
+
+def _finite(*arrays: Array) -> bool:
+    return all(np.isfinite(array).all() for array in arrays)
 
 
 def _silent(done: int, total: int) -> None:

@@ -1,0 +1,117 @@
+"""From one stack to the next without a jump: a convex combination of their answers.
+
+Every row that all of the stacks share, at the same or a higher priority, is kept by each of their
+answers, so by a convex combination too, and so are bounds. Where one equality task enters or leaves
+it is the intermediate desired value approach of Lee, Mansard, Park, "Intermediate desired value
+approach for task transition of robots in kinematic control" (T-RO 2012): the answer of the stack
+with the task, its target b replaced by h b + (1 - h) J x, with x the answer without it. Undamped
+answers are meant; damping is not linear in b.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple, final
+
+import numpy as np
+
+from hierarchy import Stack, State
+from hierarchy.allocation import AVOIDANCE
+from hierarchy.problem import Array, Hierarchy
+from solvers import Resolution, Resolver, Status
+
+_NO_WEIGHT = 1e-6  # below this a stack is not worth a solve
+
+
+class Key(NamedTuple):
+    """What tells one stack from another: its order, and the active point if it avoids by one."""
+
+    order: tuple[str, ...]
+    active: int = -1
+
+
+@final
+class Blend:
+    """Weights of the stacks in force within the last `time` [s], and their answers together.
+
+    The weight of a stack is what a kernel 6 s (1 - s), s the age over `time`, finds of it in the
+    past: after a single change the new stack's rises as the smoothstep s^2 (3 - 2 s), and changes
+    that come before the last is over add up. So weights have continuous derivatives, are not
+    negative and sum to one. At most `most` stacks are solved, the present one and the heaviest.
+
+    `weight` is that of the present stack after `resolve`.
+    """
+
+    def __init__(self, time: float, most: int = 4) -> None:
+        self.weight = 1.0
+        self._time, self._most = time, most
+        self._visits: list[tuple[Key, float]] = []  # stacks and since when, the oldest first
+        self._memories: dict[Key, Any] = {}
+
+    def resolve(self, resolver: Resolver, stack: Stack, state: State,
+                order: tuple[str, ...], hierarchy: Hierarchy) -> tuple[Resolution, Array]:
+        """Return what the present stack's solve gave, and the combined answer x (n,).
+
+        `hierarchy` has the rows of `order` at `state`, and has them afterwards. A former stack
+        without an answer is left out.
+        """
+        present = _key(state, order)
+        fading = self._fading(present, state.t)
+        blended, total = np.zeros(hierarchy.n), 0.0
+        for key, weight in fading:
+            former = self._solve(resolver, key, _rows(stack, state, key))
+            if former.status is Status.SOLVED:
+                blended += weight * former.x
+                total += weight
+        if fading:
+            stack.hierarchy(state, order)
+        resolution = self._solve(resolver, present, hierarchy)
+        if total == 0.0:
+            return resolution, resolution.x
+        return resolution, (blended + self.weight * resolution.x) / (total + self.weight)
+
+    def weights(self, t: float, present: Key) -> dict[Key, float]:
+        """Return the weight of each stack at time t [s], with `present` in force from now on."""
+        visits = self._visits
+        if visits and t < visits[-1][1]:  # another run
+            visits.clear()
+        if not visits or visits[-1][0] != present:
+            visits.append((present, t))
+        while len(visits) > 1 and t - visits[1][1] >= self._time:
+            del visits[0]
+        risen = [1.0, *(_smoothstep((t - since) / self._time) for _, since in visits[1:]), 0.0]
+        found: dict[Key, float] = {}
+        for (key, _), here, after in zip(visits, risen, risen[1:], strict=True):
+            found[key] = found.get(key, 0.0) + here - after
+        return found
+
+    def _fading(self, present: Key, t: float) -> list[tuple[Key, float]]:
+        """Return the former stacks that are still worth a solve, the heaviest first."""
+        found = self.weights(t, present)
+        self.weight = found.pop(present)
+        heaviest = sorted(found.items(), key=lambda item: -item[1])[:self._most - 1]
+        return [(key, weight) for key, weight in heaviest if weight > _NO_WEIGHT]
+
+    def _solve(self, resolver: Resolver, key: Key, hierarchy: Hierarchy) -> Resolution:
+        resolution = resolver.solve(hierarchy, self._memories.get(key))
+        self._memories[key] = resolution.memory
+        return resolution
+
+
+def _key(state: State, order: tuple[str, ...]) -> Key:
+    seen = state.measurement
+    return Key(order, seen.active) if seen is not None and AVOIDANCE in order else Key(order)
+
+
+def _rows(stack: Stack, state: State, key: Key) -> Hierarchy:
+    """Write a former stack's rows at the present state, with the point that was active in it."""
+    seen = state.measurement
+    if seen is None:
+        return stack.hierarchy(state, key.order)
+    active, seen.active = seen.active, key.active
+    rows = stack.hierarchy(state, key.order)
+    seen.active = active
+    return rows
+
+
+def _smoothstep(s: float) -> float:
+    return 1.0 if s >= 1.0 else s * s * (3.0 - 2.0 * s)
