@@ -5,6 +5,7 @@ from solvers import hcod as hcod
 from solvers import hqp as hqp
 from solvers import recursive as recursive
 from solvers import reverse as reverse
+from solvers import sns as sns
 from solvers import tpm as tpm
 from solvers.certificate import Certificate, certify
 from solvers.explain import explain
