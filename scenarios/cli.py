@@ -40,10 +40,12 @@ _BESIDE = 5  # runs that a table of 80 columns holds
 
 
 class Bench(StrEnum):
-    """What can be timed."""
+    """What can be measured."""
 
     resolvers = "resolvers"
     tick = "tick"
+    first_paper = "first-paper"
+    strictness = "strictness"
 
 
 def main() -> None:
@@ -174,8 +176,8 @@ def check(file: Annotated[str, typer.Argument(help="A scenario file, or a scenar
 
 @app.command()
 def bench(what: Annotated[Bench | None, typer.Argument(
-        help="Only this. Default: both.")] = None, out: Out = None) -> None:
-    """Time the resolvers and the whole control tick; keep the numbers in a folder."""
+        help="Only this. Default: all.")] = None, out: Out = None) -> None:
+    """Time resolvers and control tick, judge errors and strictness; keep the numbers."""
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy is loaded: one core is timed
     from importlib import import_module
 
@@ -183,7 +185,7 @@ def bench(what: Annotated[Bench | None, typer.Argument(
 
     folder = claim(out if out is not None else next_free(Path("runs") / "bench"))
     for wanted in [what] if what is not None else list(Bench):
-        import_module(f"scenarios.bench.{wanted.value}").run(folder)
+        import_module(f"scenarios.bench.{wanted.name}").run(folder)
     print(f"\nNumbers: {_shown(folder)}")
 
 

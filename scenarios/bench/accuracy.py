@@ -1,0 +1,187 @@
+"""Error of every task and of x on random 6R arms: regular, near-singular, damped, in conflict."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, final
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from hierarchy.problem import Array, Hierarchy
+from scenarios.bench.arms import near_singular, regular
+from scenarios.bench.candidates import NUMPY, plain_numpy
+from scenarios.bench.exact import damped, exact
+from solvers import Resolution, Resolver, Status, certify, make, names
+
+DAMPING, THRESHOLD = 0.05, 0.1  # the letter's code
+REACHED = 1e-6                  # error up to which a task counts as reached
+_FORMS = (("tpm", "published"), ("reverse", "in-order"))
+_TARGETS = 1.0                  # [m/s or rad/s] the largest target of a row
+_REST, _CROSSED, _FULL = ((0, 1), (2, 3), (4, 5)), ((0, 1), (1, 2), (3, 4)), (
+    (0, 1), (1, 2), (3, 4), (5, 0))
+
+Solve = Callable[[Hierarchy], Resolution]
+
+
+@final
+@dataclass(frozen=True)
+class Case:
+    """One kind of arm and of tasks.
+
+    tasks : for each task, rows of the end effector's Jacobian: 0 to 2 position, 3 to 5 rotation. A
+        row that an upper task has too is asked for twice, with different targets.
+    jacobians : makes so many (N, 6, 6) from a seed.
+    """
+
+    name: str
+    title: str
+    tasks: tuple[tuple[int, ...], ...]
+    jacobians: Callable[[int, int], Array]
+    damping: float = 0.0
+
+
+CASES = (
+    Case("regular", "Regular arms, three tasks of two rows", _REST, regular),
+    Case("near-singular", "Near a singularity, not damped", _REST, near_singular),
+    Case("damped", f"Near a singularity, damped by {DAMPING:g} below {THRESHOLD:g}", _REST,
+         near_singular, DAMPING),
+    Case("conflict", "Task 2 asks a row of task 1 for something else", _CROSSED, regular),
+    Case("crowded", "The same and a fourth task: eight rows, no joint left over", _FULL, regular),
+)
+
+
+def run(count: int, checked: int, seed: int = 0,
+        cases: Iterable[Case] = CASES) -> list[dict[str, Any]]:
+    """Resolve `count` arms of every case with everybody; print a table a case, return its rows.
+
+    `checked` of the arms are also held against the exact x, and judged by `certify`.
+    """
+    console = Console(highlight=False, markup=False)
+    rows: list[dict[str, Any]] = []
+    for case in cases:
+        problems, least = hierarchies(case, count, seed)
+        answers = [_reference(case, h) for h in problems[:checked]]
+        found = [{"case": case.name, "resolver": label, "arms": count, "checked": checked,
+                  **_judged(solve, case, problems, least, answers)}
+                 for label, solve in entrants(case.damping).items()]
+        _print(console, case, found)
+        console.print(said(case, found), "", sep="\n")
+        rows += found
+    return rows
+
+
+def entrants(damping: float = 0.0) -> dict[str, Solve]:
+    """Return how each resolver solves, by label; plain numpy too where nothing is damped."""
+    solves: dict[str, Solve] = {} if damping else {NUMPY: plain_numpy}
+    return {**solves, **{resolver.label: resolver.solve for resolver in resolvers(damping)}}
+
+
+def resolvers(damping: float = 0.0) -> list[Resolver]:
+    """Return every resolver there is, in each form that makes a difference to equalities."""
+    settings: dict[str, Any] = {"damping": damping, "threshold": THRESHOLD}
+    usual = [make(name, **settings) for name in names()]
+    return usual + [make(name, form=form, **settings) for name, form in _FORMS if name in names()]
+
+
+def hierarchies(case: Case, count: int, seed: int) -> tuple[list[Hierarchy], Array]:
+    """Return the problems of a case, and the least violation (count, L) each task can have.
+
+    A row of a task above cannot be given up, and the other rows can all be met: so what is asked
+    of a row for the second time is missed by the difference of its targets.
+    """
+    order = [row for task in case.tasks for row in task]
+    sizes = np.array([len(task) for task in case.tasks], dtype=np.int64)
+    A = np.ascontiguousarray(case.jacobians(count, seed)[:, order])
+    b = np.random.default_rng(seed + 1).uniform(-_TARGETS, _TARGETS, (count, len(order)))
+    off = b - b[:, [order.index(row) for row in order]]
+    least = np.sqrt(np.add.reduceat(off**2, np.cumsum(sizes) - sizes, axis=1))
+    level_names = tuple(f"task {k + 1}" for k in range(len(sizes)))
+    return [Hierarchy(A[i], b[i], b[i], sizes, np.zeros(6), level_names)
+            for i in range(count)], least
+
+
+def said(case: Case, rows: Sequence[dict[str, Any]]) -> str:
+    """Return in a sentence which tasks who reaches, from the rows of one case's table."""
+    parties: dict[tuple[int, ...], list[dict[str, Any]]] = {}
+    for row in rows:
+        missed = tuple(k + 1 for k in range(len(case.tasks))
+                       if not row[f"task_{k + 1}_max"] <= REACHED)
+        parties.setdefault(missed, []).append(row)
+    parts = [_party(missed, members, len(case.tasks)) for missed, members in parties.items()]
+    return f"Shows: {'; '.join(parts)}."
+
+
+def _party(missed: tuple[int, ...], rows: Sequence[dict[str, Any]], tasks: int) -> str:
+    labels = _listed([row["resolver"] for row in rows])
+    rest = {row["resolver"]: max(row[f"task_{k + 1}_max"] for k in range(tasks)
+                                 if k + 1 not in missed)
+            for row in rows if len(missed) < tasks}
+    if not missed:
+        return f"all that the tasks can have is reached by {labels}, {_between(rest)}"
+    off = _listed([f"task {k} by up to {max(row[f'task_{k}_max'] for row in rows):.1g}"
+                   for k in missed])
+    kept = f", the rest is reached {_between(rest)}" if rest else ""
+    return f"{off} is missed by {labels}{kept}"
+
+
+def _between(errors: Mapping[str, float]) -> str:
+    best, worst = min(errors, key=errors.__getitem__), max(errors, key=errors.__getitem__)
+    if best == worst:
+        return f"to {errors[best]:.0e}"
+    return f"to between {errors[best]:.0e} ({best}) and {errors[worst]:.0e} ({worst})"
+
+
+def _listed(parts: Sequence[str]) -> str:
+    return " and ".join(filter(None, [", ".join(parts[:-1]), parts[-1]]))
+
+
+def _reference(case: Case, h: Hierarchy) -> Array:
+    return damped(h, case.damping, THRESHOLD) if case.damping else exact(h)
+
+
+def _judged(solve: Solve, case: Case, problems: Sequence[Hierarchy], least: Array,
+            answers: Sequence[Array]) -> dict[str, Any]:
+    """Solve every problem; return errors of the tasks, of x, and what was certified or failed."""
+    answered = [solve(h) for h in problems]
+    solved = np.array([res.status is Status.SOLVED for res in answered])
+    errors = np.array([abs(h.violations(res.x) - lowest) for h, res, lowest in zip(
+        problems, answered, least, strict=True)])[solved]
+    sample = [(h, res.x, x) for h, res, x in zip(problems, answered, answers, strict=False)
+              if res.status is Status.SOLVED]
+    x_errors = [float(np.linalg.norm(x - right) / (1.0 + np.linalg.norm(right)))
+                for _, x, right in sample]
+    certified = [certify(h, x).certified for h, x, _ in sample]
+    tasks = {f"task_{k + 1}_{key}": value for k in range(len(case.tasks))
+             for key, value in _summary(errors[:, k]).items()}
+    return {"failed": int((~solved).sum()), **tasks,
+            **{f"x_{key}": value for key, value in _summary(x_errors).items()},
+            "certified": None if case.damping else sum(certified) / max(len(answers), 1)}
+
+
+def _summary(errors: Sequence[float] | Array) -> dict[str, float | None]:
+    if not len(errors):
+        return {"mean": None, "median": None, "max": None}
+    return {"mean": float(np.mean(errors)), "median": float(np.median(errors)),
+            "max": float(np.max(errors))}
+
+
+def _print(console: Console, case: Case, rows: Sequence[dict[str, Any]]) -> None:
+    console.print(f"{case.title}; {rows[0]['arms']} arms")
+    table = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False)
+    keys = [(f"task_{k + 1}_{key}", f"{over}\n{key}") for k in range(len(case.tasks))
+            for key, over in (("mean", f"task {k + 1}"), ("max", ""))] + [("x_max", "x\nmax")]
+    table.add_column("", no_wrap=True)
+    for _, head in [*keys, ("", "cert")]:
+        table.add_column(head, justify="right", no_wrap=True)
+    for row in rows:
+        cells = ["–" if row[key] is None else f"{row[key]:.0e}" for key, _ in keys]
+        certified = "–" if row["certified"] is None else f"{100.0 * row['certified']:.0f}%"
+        table.add_row(row["resolver"], *cells, certified)
+    console.print(table)
+    failed = {row["resolver"]: row["failed"] for row in rows if row["failed"]}
+    if failed:
+        console.print("without an answer: " + ", ".join(
+            f"{label} {number}" for label, number in failed.items()))

@@ -1,0 +1,241 @@
+"""Does a lower task touch an upper one while velocity limits are active?
+
+A KUKA LWR has to make a step of its end effector that is too fast for its joints, and below it in
+priority to go to another posture. Every tick is resolved twice at the same state, with and without
+the posture: a strict resolver gives the end effector the same motion in both. A plain resolver
+whose answer is cut off at the limits is the yardstick of what is not strict.
+`hierarchy bench strictness`, or `strictness(make("hcod"))`.
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, ClassVar, final
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from hierarchy import Hierarchy, Robot, State
+from hierarchy.kinematics import write_point_jacobian
+from hierarchy.problem import Array
+from solvers import Resolution, Resolver, Status, make, names
+from solvers.backends import BACKENDS, installed
+from solvers.resolver import Handles
+
+AIM = 1e-9                       # [m] of the end effector a tick
+RATIOS = (10.0, 100.0, 1000.0)   # of weights, one level to the next
+_FORMS = {"sns": ("optimal",)}   # beside the usual one
+_START = (0.923, -0.854, 0.903, 1.195, 0.971, 1.796, 0.0)   # [rad] where the letter's run begins
+_STEP = (-0.3, 0.15, -0.25)      # [m]
+_POSTURE = (1.2, 0.6, -1.0, -1.2, 1.0, -0.9, 1.0)           # [rad] from the start
+_GAIN, _POSTURE_GAIN = 20.0, 5.0  # [1/s]
+_AT_LIMIT = 1e-9                 # [rad/s]
+
+
+@final
+@dataclass(frozen=True)
+class Strictness:
+    """What one resolver did.
+
+    Attributes
+    ----------
+    label, strict : the resolver's name, and whether it claims to be strict.
+    ticks, limited : ticks simulated, and those with a joint at its velocity limit.
+    failed : ticks in which a solve, with or without the posture, ended with a status.
+    largest, final, total : [m] how far the posture moves the end effector in one tick at most, in
+        the last one, and in all of them added up. Ticks that failed are left out.
+    missed : [m] what the limits keep the end effector from in one tick, at most.
+    excess : [rad/s] largest joint velocity beyond its limit.
+    error, error_alone : [m] position error at the end, run with and without the posture.
+    """
+
+    label: str
+    strict: bool
+    ticks: int
+    limited: int
+    failed: int
+    largest: float
+    final: float
+    total: float
+    missed: float
+    excess: float
+    error: float
+    error_alone: float
+
+    @property
+    def met(self) -> bool:
+        """Whether the aim is met, with an answer in every tick."""
+        return self.largest <= AIM and not self.failed
+
+
+def strictness(resolver: Resolver, duration: float = 2.0, period: float = 1e-3) -> Strictness:
+    """Run the step for `duration` [s], one tick each `period` [s], with one resolver.
+
+    Raises
+    ------
+    HierarchyError : the resolver does not handle bounds.
+    """
+    ticks = round(duration / period)
+    with_posture, alone = _Step(period), _Step(period)
+    moved, missed, excess = np.zeros((3, ticks))
+    limited = failed = 0
+    memory = memory_without = memory_alone = None
+    for k in range(ticks):
+        both, upper = with_posture.hierarchies()
+        res, without = resolver.solve(both, memory), resolver.solve(upper, memory_without)
+        memory, memory_without = res.memory, without.memory
+        if res.status is Status.SOLVED and without.status is Status.SOLVED:
+            moved[k] = np.linalg.norm(with_posture.jacobian @ (res.x - without.x)) * period
+        else:
+            failed += 1
+        missed[k] = upper.violations(without.x)[1] * period
+        excess[k] = (abs(res.x) - with_posture.limit).max()
+        limited += bool(excess[k] > -_AT_LIMIT)
+        with_posture.move(res.x)
+        own = resolver.solve(alone.hierarchies()[1], memory_alone)
+        memory_alone = own.memory
+        alone.move(own.x)
+    return Strictness(resolver.label, resolver.strict, ticks, limited, failed, float(moved.max()),
+                      float(moved[-1]), float(moved.sum()), float(missed.max()),
+                      float(max(excess.max(), 0.0)), with_posture.error(), alone.error())
+
+
+@final
+@dataclass(frozen=True, kw_only=True)
+class CutOff(Resolver):
+    """`tpm` on all levels but the first, whose bounds then cut its answer off. Not strict."""
+
+    name: ClassVar[str] = "tpm, cut off"
+    handles: ClassVar[Handles] = "bounds"
+
+    @property
+    def strict(self) -> bool:
+        """No: what is cut off takes from every level."""
+        return False
+
+    def solve(self, h: Hierarchy, memory: Any = None) -> Resolution:
+        """Resolve h, whose first level bounds every unknown."""
+        n = h.n
+        rest = Hierarchy(h.A[n:], h.lower[n:], h.upper[n:], h.sizes[1:], h.reference, h.names[1:])
+        res = make("tpm").solve(rest)
+        return Resolution(np.clip(res.x, h.lower[:n], h.upper[:n]), res.status)
+
+
+def able() -> list[Resolver]:
+    """Return every resolver that handles bounds: each backend and ratio where it has such."""
+    found: list[Resolver] = []
+    for name in names():
+        if name == "hqp":
+            found += [make(name, backend=backend) for backend in BACKENDS if installed(backend)]
+        elif name == "weighted":
+            found += [make(name, ratio=ratio) for ratio in RATIOS]
+        else:
+            found += [make(name), *(make(name, form=form) for form in _FORMS.get(name, ()))]
+    return [resolver for resolver in found if resolver.handles != "equalities"]
+
+
+def run(out: Path | None = None, resolvers: Iterable[Resolver] | None = None,
+        duration: float = 2.0) -> list[Strictness]:
+    """Hold resolvers to it, or every able one; print the table and return what each did.
+
+    Writes strictness.csv into the folder `out` if given.
+    """
+    chosen = [*able(), CutOff()] if resolvers is None else resolvers
+    found = [strictness(resolver, duration) for resolver in chosen]
+    _print(found)
+    if out is not None:
+        out.mkdir(parents=True, exist_ok=True)
+        with (out / "strictness.csv").open("w", newline="") as file:
+            writer = csv.DictWriter(file, list(asdict(found[0])))
+            writer.writeheader()
+            writer.writerows(asdict(one) for one in found)
+    return found
+
+
+class _Step:
+    """The arm on its way: velocity limits, then the end effector's position, then the posture."""
+
+    def __init__(self, period: float) -> None:
+        self.robot, self.period = Robot.named("kuka_lwr"), period
+        self.frame, self.limit = self.robot.frame("end_effector"), self.robot.velocity_limit
+        n = self.robot.n
+        self.state: State = self.robot.state(_START)
+        self.goal = self.state.position(self.frame) + _STEP
+        self.posture = np.add(_START, _POSTURE)
+        self.A = np.vstack([np.eye(n), np.zeros((3, n)), np.eye(n)])
+        self.lower = np.concatenate([-self.limit, np.zeros(3 + n)])
+        self.upper = np.concatenate([self.limit, np.zeros(3 + n)])
+
+    @property
+    def jacobian(self) -> Array:
+        """Jacobian (3, n) of the end effector at the last `hierarchies`."""
+        return self.A[self.robot.n:self.robot.n + 3]
+
+    def hierarchies(self) -> tuple[Hierarchy, Hierarchy]:
+        """Return the stack at the state as it is, and the same without the posture."""
+        n, state, frame = self.robot.n, self.state, self.frame
+        write_point_jacobian(state.J, state.placements, state.supports, frame.joint, frame.offset,
+                             self.A, n)
+        wanted = np.concatenate([_GAIN * (self.goal - state.position(frame)),
+                                 _POSTURE_GAIN * (self.posture - state.q)])
+        self.lower[n:] = self.upper[n:] = wanted
+        levels = [slice(0, n), slice(n, n + 3), slice(n + 3, None)]
+        stack = [(self.A[rows], self.lower[rows], self.upper[rows]) for rows in levels]
+        known = ("velocity limits", "position", "posture")
+        return (Hierarchy.from_levels(stack, names=known),
+                Hierarchy.from_levels(stack[:2], names=known[:2]))
+
+    def move(self, v: Array) -> None:
+        """Go on by one period with joint velocities v."""
+        state = self.state
+        state.move(state.t + self.period, state.q + self.period * v, v)
+
+    def error(self) -> float:
+        """Distance [m] of the end effector from its goal."""
+        return float(np.linalg.norm(self.goal - self.state.position(self.frame)))
+
+
+def _print(found: list[Strictness]) -> None:
+    console = Console(highlight=False, markup=False)
+    console.print("How far the posture moves the end effector that has priority over it [m]")
+    table = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False)
+    table.add_column("", no_wrap=True)
+    for head in ("a tick,\nat most", "last\ntick", "limits\ntake", "error\nat end",
+                 "without\nposture", "at\nlimit", "over\n[rad/s]", "fail", "aim"):
+        table.add_column(head, justify="right", no_wrap=True)
+    for one in found:
+        lengths = (one.largest, one.final, one.missed, one.error, one.error_alone)
+        table.add_row(one.label, *(f"{value:.0e}" for value in lengths), str(one.limited),
+                      f"{one.excess:.0e}", str(one.failed), "met" if one.met else "no")
+    console.print(table)
+    console.print(said(found))
+
+
+def said(found: list[Strictness]) -> str:
+    """Return in a sentence who met the aim."""
+    met = [one.label for one in found if one.met]
+    missed = [f"{one.label} ({one.largest:.0e} m)" for one in found if not one.met]
+    parts = [f"{_listed(met)} move the end effector by less than {AIM:g} m a tick"] if met else []
+    parts += [f"not so {_listed(missed)}"] if missed else []
+    return f"Shows: {'; '.join(parts)}."
+
+
+def _listed(parts: list[str]) -> str:
+    return " and ".join(filter(None, [", ".join(parts[:-1]), parts[-1]]))
+
+
+def main() -> None:
+    """Run from the command line; the numbers go to a new folder in runs/."""
+    from scenarios.folders import next_free
+
+    folder = next_free(Path("runs") / "strictness")
+    run(folder)
+    print(f"\nNumbers: {folder}")
+
+
+if __name__ == "__main__":
+    main()
