@@ -28,6 +28,8 @@ from hierarchy.problem import Array
 from hierarchy.robot import State
 from hierarchy.task import Kind, Level, Task
 
+_SHARPEST = 1e-3  # [m] least radius about which a direction is taken to turn
+
 
 @dataclass(frozen=True)
 class Separation(Task):
@@ -46,7 +48,7 @@ class Separation(Task):
     across r, and radius and axis without turning from `Pairs`. It is never negative for a convex
     obstacle that does not rotate, so a sensor that does not know the radius may leave it out; but
     then a point that swings around an obstacle at a constant distance is asked for what no
-    acceleration can give. Inside d_min the radius is taken as d_min at least. The derivative of J_c
+    acceleration can give. The radius is taken as d_min at least. The derivative of J_c
     is exact or a backward difference, as the state has it. A pair beyond `barrier.influence` has a
     row without sides, which does nothing.
     """
@@ -115,7 +117,7 @@ class Separation(Task):
                                  self.offsets[k], J, 0)
             w = J @ state.v - pair[4:7]
             across = w @ w - (pair[1:4] @ w) ** 2 - (pair[10:13] @ w) ** 2
-            bend[row] = max(across, 0.0) / max(pair[13], self.barrier.distance)
+            bend[row] = max(across, 0.0) / max(pair[13], self.barrier.distance, _SHARPEST)
         return bend
 
     def reference_velocity(self, state: State) -> Array:
@@ -194,7 +196,7 @@ def _write(v, J, dJ, placements, supports, previous_J, previous_placements, peri
                     rate = rx * wx + ry * wy + rz * wz
                     straight = pair[10] * wx + pair[11] * wy + pair[12] * wz
                     across = wx * wx + wy * wy + wz * wz - rate * rate - straight * straight
-                    bend = max(across, 0.0) / max(pair[13], distance)
+                    bend = max(across, 0.0) / max(pair[13], distance, _SHARPEST)
                     lower[row] = (least_acceleration(h, rate, bend, settings)
                                   + rx * (pair[7] - ax) + ry * (pair[8] - ay) + rz * (pair[9] - az))
                 else:

@@ -1,0 +1,280 @@
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from scene import ROBOT, states
+
+from hierarchy import HierarchyError, Stack, State, Task
+from hierarchy.avoidance import Barrier, Capsule, link_capsules, pairs_of_chain
+from hierarchy.avoidance.self_collision import measure_capsules, pack_capsules
+from hierarchy.robots import TABLES
+from hierarchy.tasks import Posture
+from hierarchy.tasks.self_separation import SelfSeparation, _write
+from scenarios.plants import KinematicArm
+from solvers import Status, make
+
+LEVELS = ["velocity", "acceleration"]
+ARM = link_capsules(TABLES["kuka_lwr"], foot=0.3105)
+# Capsules at odds with the links' own axes, so that every kind of nearest points comes up.
+ODD = (Capsule("ball", 1, (0.1, 0.1, 0.1), (0.1, 0.1, 0.1), 0.05),
+       Capsule("bar", 3, (-0.3, 0.1, 0.2), (0.3, 0.0, 0.3), 0.02),
+       Capsule("rod", 5, (0.1, -0.3, 0.1), (0.0, 0.4, 0.3), 0.03),
+       Capsule("hand", 7, (0.0, -0.2, 0.1), (0.0, 0.2, 0.0), 0.0))
+EVERYWHERE = Barrier(0.02, influence=5.0)
+TASKS = {"arm": SelfSeparation(ARM, EVERYWHERE),
+         "odd": SelfSeparation(ODD, EVERYWHERE, ((0, 1), (0, 2), (3, 1), (1, 2), (2, 3)))}
+STATES = states(40, seed=3)
+IDENTITY = np.r_[np.eye(3).ravel(), np.zeros(3)][None]
+
+
+def measured(a, b):
+    """Distance, direction and shares of two capsules given by start, end and radius, at rest."""
+    joints, table = pack_capsules([Capsule("a", 0, *a), Capsule("b", 0, *b)])
+    return measure_capsules(IDENTITY, joints, table, np.array([[0, 1]]))[0]
+
+
+def by_search(a, b):
+    """Least distance of two segments: a fine walk along one, nearest point of the other."""
+    (p, q), (r, s) = np.array(a, dtype=float), np.array(b, dtype=float)
+
+    def off(share):
+        points = p + share[:, None] * (q - p)
+        along = s - r
+        t = np.clip((points - r) @ along / max(along @ along, 1e-300), 0, 1)
+        return np.linalg.norm(points - r - t[:, None] * along, axis=1)
+
+    low, high = 0.0, 1.0
+    for _ in range(12):  # the distance is convex along the segment
+        grid = np.linspace(low, high, 41)
+        best = int(np.argmin(off(grid)))
+        low, high = grid[max(best - 1, 0)], grid[min(best + 1, 40)]
+    return off(np.linspace(low, high, 41)).min()
+
+
+def segments():
+    rng = np.random.default_rng(0)
+    for _ in range(300):
+        yield rng.normal(size=(2, 3)), rng.normal(size=(2, 3))
+    for _ in range(100):  # parallel, nearly parallel, on one line, short, of no length
+        a = rng.normal(size=(2, 3))
+        shift, stretch = rng.normal(size=3), rng.normal()
+        yield a, a + shift
+        yield a, a[::-1] * stretch + shift
+        yield a, a + shift + 1e-7 * rng.normal(size=(2, 3))
+        yield a, a + stretch * (a[1] - a[0])
+        yield a, shift + 1e-9 * a
+        yield a, np.array([shift, shift])
+        yield np.array([shift, shift]), a[[0, 0]]
+
+
+def test_distance_of_segments_is_the_least_there_is():
+    for a, b in segments():
+        a, b = np.round(a, 12).tolist(), np.round(b, 12).tolist()
+        seen = measured((*a, 0.0), (*b, 0.0))
+        assert seen[0] == pytest.approx(by_search(a, b), abs=2e-8)
+        assert 0.0 <= seen[4:].min() <= seen[4:].max() <= 1.0
+        on_a, on_b = [np.add(p, share * np.subtract(q, p))
+                      for (p, q), share in zip((a, b), seen[4:], strict=True)]
+        assert np.linalg.norm(seen[1:4]) == pytest.approx(1)
+        if seen[0] > 1e-6:
+            np.testing.assert_allclose(seen[0] * seen[1:4], on_a - on_b, atol=1e-9)
+
+
+def test_capsules_overlap_by_a_negative_distance():
+    seen = measured(((0, 0, 0), (1, 0, 0), 0.3), ((0.5, -1, 0.4), (0.5, 1, 0.4), 0.2))
+    np.testing.assert_allclose(seen, [-0.1, 0, 0, -1, 0.5, 0.5])
+
+
+def test_axes_that_cross_have_a_finite_direction():
+    seen = measured(((-1, 0, 0), (1, 0, 0), 0.1), ((0, -1, 0), (0, 1, 0), 0.1))
+    np.testing.assert_allclose(seen, [-0.2, 0, 0, 1, 0.5, 0.5])
+
+
+def test_distances_agree_with_coal_through_pinocchio():
+    pytest.importorskip("coal")
+    import coal
+    import pinocchio as pin
+
+    for name, task in TASKS.items():
+        geometry = pin.GeometryModel()
+        for capsule in task.capsules:
+            start, end = np.array(capsule.start), np.array(capsule.end)
+            length = float(np.linalg.norm(end - start))
+            turn = (pin.Quaternion.FromTwoVectors(np.array([0, 0, 1.0]), (end - start) / length)
+                    if length else pin.Quaternion.Identity())
+            shape = (coal.Capsule(capsule.radius, length) if length
+                     else coal.Sphere(capsule.radius))
+            geometry.addGeometryObject(pin.GeometryObject(
+                capsule.name, capsule.joint, pin.SE3(turn.matrix(), (start + end) / 2), shape))
+        for i, j in task.indices.tolist():
+            geometry.addCollisionPair(pin.CollisionPair(i, j))
+        data, seen = ROBOT.model.createData(), geometry.createData()
+        for q, _ in STATES:
+            pin.computeDistances(ROBOT.model, data, geometry, seen, q)
+            coal_says = np.array([result.min_distance for result in seen.distanceResults])
+            ours = task.distances(ROBOT.state(q))
+            apart = ours > 0
+            np.testing.assert_allclose(ours[apart], coal_says[apart], atol=2e-6)
+            assert (coal_says[~apart] < 2e-6).all(), name
+
+
+@pytest.mark.parametrize("name", TASKS)
+def test_rows_are_the_derivative_of_the_distances(name):
+    task, h = TASKS[name], 1e-6
+    for q, v in STATES:
+        columns = [(task.distances(ROBOT.state(q + h * e)) - task.distances(ROBOT.state(q - h * e)))
+                   / (2 * h) for e in np.eye(7)]
+        np.testing.assert_allclose(task.jacobian(ROBOT.state(q, v)), np.transpose(columns),
+                                   atol=1e-7)
+
+
+def test_rows_give_the_second_derivative_with_nearest_points_that_slide():
+    task, h, rng, kinds, negative = TASKS["odd"], 5e-5, np.random.default_rng(0), set(), 0
+    for q, v in STATES:
+        a, d, free = rng.normal(size=7), [], []
+        for t in (-h, 0.0, h):
+            state = ROBOT.state(q + v * t + a * t * t / 2)
+            d.append(task.distances(state))
+            seen = measure_capsules(state.placements, task.joints, task.table, task.indices)
+            free.append((seen[:, 4:] > 0) & (seen[:, 4:] < 1))
+        state = ROBOT.state(q, v)
+        bend = task.bend(state)
+        second = task.jacobian(state) @ a + task.jacobian_derivative(state) @ v + bend
+        same = (free[0] == free[2]).all(axis=1)  # no nearest point came to an end in between
+        calm = same & (np.abs(bend) < 50.0)
+        np.testing.assert_allclose(second[calm], ((d[2] - 2 * d[1] + d[0]) / h**2)[calm],
+                                   atol=2e-3)
+        assert calm.sum() >= 4
+        kinds |= {tuple(pair) for pair in free[1][calm].tolist()}
+        negative += (bend < -0.01).sum()
+    assert len(kinds) == 4
+    assert negative > 20
+
+
+@pytest.mark.parametrize("level", LEVELS)
+@pytest.mark.parametrize("differences", [None, 1e-3])
+@pytest.mark.parametrize("name", TASKS)
+def test_compiled_rows_equal_those_of_the_plain_methods(name, level, differences):
+    kind = TASKS[name]
+    task = SelfSeparation(kind.capsules, Barrier(0.02, influence=0.4), kind.pairs)
+    m, sided = task.dimension, 0
+    for q, v in STATES[:8]:
+        state = ROBOT.state(q, v, 0.7, differences)
+        state.move(0.701, q + 1e-3 * v, v)
+        written, plain = [(np.full((m + 2, 7), 5.0), np.full(m + 2, 5.0), np.full(m + 2, 5.0))
+                          for _ in range(2)]
+        task.write(state, level, *written, row=1)
+        Task.write(task, state, level, *plain, row=1)
+        for a, b in zip(written, plain, strict=True):
+            np.testing.assert_allclose(a, b, rtol=1e-11, atol=1e-11)
+            assert (a[[0, -1]] == 5.0).all(), "rows of others are left alone"
+        sided += np.isfinite(written[1][1:-1]).sum()
+    assert 0 < sided < 8 * m
+
+
+def test_parallel_links_give_finite_rows():
+    """Stretched out, then folded by half a turn: the axes of the arm lie on one line."""
+    for elbow in (0.0, np.pi):
+        state = ROBOT.state([0.0, 0.3, 0.0, elbow, 0.0, 0.0, 0.0], np.ones(7))
+        A, lower, upper = np.zeros((3, 7)), np.zeros(3), np.zeros(3)
+        TASKS["arm"].write(state, "acceleration", A, lower, upper, row=0)
+        assert np.isfinite(A).all()
+        assert np.isfinite(lower).all()
+
+
+def test_the_kernel_allocates_nothing():
+    assert not getattr(_write, "allocates", False)
+
+
+def drive(level, period, start, goal, barrier, differences=False, duration=2.5):
+    """Distances [m] of the arm's pairs on the way to a posture below it, tick after tick."""
+    task = SelfSeparation(ARM, barrier)
+    stack = Stack([task, Posture(goal, stiffness=25.0, damping=10.0, gain=5.0)], level)
+    state = State(ROBOT, period if differences else None)
+    plant = KinematicArm(ROBOT, np.array(start), np.zeros(7), period, level)
+    resolver, memory, seen = make("hcod"), None, []
+    for k in range(round(duration / period)):
+        state.move(k * period, plant.q, plant.v)
+        seen.append(task.distances(state))
+        done = resolver.solve(stack.hierarchy(state), memory)
+        assert done.status is Status.SOLVED
+        memory = done.memory
+        plant.act(done.x)
+    return np.array(seen), plant
+
+
+OPEN = (0.3, 0.5, 0.4, -0.9, 0.2, 0.5, 0.0)
+INTO_THE_FOOT = (0.3, 2.05, 0.1, -2.05, 0.2, 1.8, 0.0)
+
+
+@pytest.mark.parametrize("level", LEVELS)
+@pytest.mark.parametrize("period", [1e-3, 4e-3, 1e-2])
+@pytest.mark.parametrize("differences", [False, True])
+def test_an_arm_driven_into_its_foot_stops_before(level, period, differences):
+    collides = TASKS["arm"].distances(ROBOT.state(INTO_THE_FOOT)).min()
+    assert collides < 0
+    d, plant = drive(level, period, OPEN, INTO_THE_FOOT, Barrier(0.02), differences)
+    assert d[0].min() > 0.1
+    assert d.min() > 0.02 - 1e-6
+    assert d[-1].min() == pytest.approx(0.02, abs=1e-4)
+    assert np.abs(plant.v).max() < 0.1
+
+
+@pytest.mark.parametrize("level", LEVELS)
+def test_no_posture_near_that_one_brings_the_arm_into_itself(level):
+    rng = np.random.default_rng(1)
+    for _ in range(15):
+        start = rng.uniform(ROBOT.lower, ROBOT.upper)
+        goal = INTO_THE_FOOT + rng.uniform(-0.1, 0.1, 7)
+        goal[0] = rng.uniform(-2, 2)
+        assert TASKS["arm"].distances(ROBOT.state(start)).min() > 0.03
+        d, _ = drive(level, 4e-3, start, tuple(goal), Barrier(0.02))
+        assert d.min() > 0.02 - 1e-5
+
+
+@pytest.mark.parametrize("level", LEVELS)
+def test_a_start_in_contact_recovers(level):
+    d, _ = drive(level, 4e-3, INTO_THE_FOOT, INTO_THE_FOOT, Barrier(0.02, recovery=0.1))
+    assert d[0].min() < 0
+    assert (np.diff(d.min(axis=1)) > -1e-6).all()
+    assert np.diff(d.min(axis=1)).max() / 4e-3 < 0.11
+    assert d[-1].min() == pytest.approx(0.02, abs=1e-3)
+
+
+def test_a_distance_that_no_joint_changes_is_left_alone():
+    """That of the elbow from the foot: asking for more of it must not move the arm at all."""
+    state = ROBOT.state(OPEN)
+    task = SelfSeparation(ARM, Barrier(0.3, influence=0.5), ((0, 2),))
+    assert task.distances(state)[0] == pytest.approx(0.28)
+    for level in LEVELS:
+        assert not make("hcod").solve(Stack([task], level).hierarchy(state)).x.any()
+
+
+def test_capsules_of_a_table_are_its_links():
+    assert [(c.name, c.joint, c.start, c.end) for c in ARM] == [
+        ("foot", 0, (0.0, 0.0, -0.3105), (0.0, 0.0, 0.0)),
+        ("link 3", 3, (0.0, 0.0, 0.0), (0.0, 0.0, 0.4)),
+        ("link 5", 5, (0.0, 0.0, 0.0), (0.0, 0.0, 0.39)),
+        ("link 7", 7, (0.0, 0.0, 0.0), (0.0, 0.0, 0.078))]
+    assert [c.name for c in link_capsules(TABLES["kuka_lwr"])] == ["link 3", "link 5", "link 7"]
+    assert pairs_of_chain(ARM) == ((0, 2), (0, 3), (1, 3))
+    for q, _ in STATES:  # each begins where the one before it ends
+        state = ROBOT.state(q)
+        ends = [[rotation @ point + at for point in (np.array(c.start), np.array(c.end))]
+                for c in ARM for rotation, at in [state._placement(c.joint)]]
+        for (_, end), (start, _) in pairwise(ends):
+            np.testing.assert_allclose(end, start, atol=1e-12)
+
+
+@pytest.mark.parametrize(("make_it", "said"), [
+    (lambda: Capsule("x", 1, (0, 0, 0), (0, 0, 1), -1.0), "capsule 'x': radius -1.0 m"),
+    (lambda: Capsule("x", 1, (0, 0, np.nan), (0, 0, 1), 1.0), "capsule 'x': start"),
+    (lambda: Capsule("x", 1, (0, 0, 0), (0, 1), 1.0), "capsule 'x': end"),
+    (lambda: SelfSeparation(ARM[:2], EVERYWHERE), "'self-separation': no pair among 2"),
+    (lambda: SelfSeparation(ARM, EVERYWHERE, ((0, 4),)), r"pair \(0, 4\) is no pair among 4"),
+    (lambda: SelfSeparation(ARM, EVERYWHERE, ((1, 1),)), r"pair \(1, 1\) is no pair"),
+    (lambda: SelfSeparation(ARM, EVERYWHERE, kind="equality"), "are inequalities"),
+])
+def test_bad_input_is_named(make_it, said):
+    with pytest.raises(HierarchyError, match=said):
+        make_it()

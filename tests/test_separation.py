@@ -1,0 +1,336 @@
+import numpy as np
+import pytest
+from scene import BODY, FRAME, ROBOT, TIP, states
+
+from hierarchy import HierarchyError, Stack, State, Task
+from hierarchy.avoidance import Barrier, Measurement, Obstacle, Obstacles, Pairs
+from hierarchy.avoidance.barrier import least_acceleration, least_rate
+from hierarchy.paths import Ellipse, Still
+from hierarchy.tasks import JointDamping, Position, Separation
+from hierarchy.tasks.separation import _write
+from scenarios.plants import KinematicArm
+from scenarios.sensors import ExactDistances
+from solvers import Status, make
+
+TURN = np.array([[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]])
+ROUND = Ellipse((0.3, 0.5, 0.2), (0.2, 0.1, 0.0), (0.0, 0.1, 0.3), rate=2.0)
+SHAPES = [
+    Obstacle("point", (0.1, 0.5, 0.1)),
+    Obstacle("sphere", (0, 0, 0), (0.07,), path=ROUND),
+    Obstacle("capsule", (-0.1, 0.4, -0.1), (0.02, 0.2), TURN),
+    Obstacle("capsule", (0, 0, 0), (0.05, 0.1), TURN, path=ROUND),
+    Obstacle("box", (-0.3, 0.3, 0.4), (0.1, 0.3, 0.2), TURN),
+    Obstacle("box", (0, 0, 0), (0.02, 0.1, 0.05), TURN, path=ROUND),
+]
+STATES = states(20, seed=6)
+LEVELS = ["velocity", "acceleration"]
+PERIODS = [1e-3, 4e-3, 1e-2]
+START = np.array([0.923, -0.854, 0.903, 1.195, 0.971, 1.796, 0.0])
+
+
+def sensor_of(obstacles):
+    return ExactDistances(ROBOT, Obstacles(obstacles), BODY, TIP, pairs=True)
+
+
+SENSOR = sensor_of(SHAPES)
+EVERYWHERE = Barrier(0.05, influence=5.0)
+TASK = Separation(SENSOR.points, EVERYWHERE, len(SHAPES))
+
+
+def seen_at(q, v, t=0.7, differences=None):
+    state = ROBOT.state(q, v, t, differences)
+    SENSOR.measure(state)
+    return state
+
+
+def distances(q, t):
+    return SENSOR.measure(ROBOT.state(q, t=t)).pairs.distance.ravel().copy()
+
+
+def rows(count, n=7):
+    return np.full((count, n), 5.0), np.full(count, 5.0), np.full(count, 5.0)
+
+
+def test_pairs_agree_with_what_the_sensor_finds_nearest():
+    for q, v in STATES:
+        seen = seen_at(q, v).measurement
+        np.testing.assert_array_equal(seen.pairs.distance.min(axis=1), seen.distance)
+        np.testing.assert_array_equal(seen.pairs.distance.argmin(axis=1), seen.nearest)
+        nearest = seen.pairs.direction[np.arange(9), seen.nearest]
+        np.testing.assert_array_equal(nearest, seen.direction)
+
+
+def test_pairs_are_measured_only_where_they_are_asked_for():
+    assert ExactDistances(ROBOT, Obstacles(SHAPES), BODY, TIP).measurement.pairs is None
+    assert Measurement(8).pairs is None
+
+
+def test_pairs_know_how_obstacles_move():
+    (q, v), h = STATES[0], 1e-5
+    pairs = seen_at(q, v).measurement.pairs
+    _, velocity, acceleration = ROUND(0.7)
+    for j, obstacle in enumerate(SHAPES):
+        moves = obstacle.path is not None
+        np.testing.assert_array_equal(pairs.velocity[:, j], [velocity * moves] * 9)
+        np.testing.assert_array_equal(pairs.acceleration[:, j], [acceleration * moves] * 9)
+    along = np.einsum("phi,phi->ph", pairs.direction, pairs.velocity).ravel()
+    rate = (distances(q, 0.7 + h) - distances(q, 0.7 - h)) / (2 * h)
+    np.testing.assert_allclose(rate, -along, atol=1e-8)
+
+
+def test_rows_are_the_derivative_of_the_distances():
+    h = 1e-6
+    for q, v in STATES:
+        columns = [(distances(q + h * e, 0.7) - distances(q - h * e, 0.7)) / (2 * h)
+                   for e in np.eye(7)]
+        np.testing.assert_allclose(TASK.jacobian(seen_at(q, v)), np.transpose(columns), atol=1e-8)
+
+
+def test_rows_give_the_second_derivative_of_the_distances_to_moving_obstacles():
+    """Exact for all shapes; the bend is what a sensor that does not know it may leave out."""
+    task = Separation(SENSOR.points, Barrier(0.0, influence=5.0), len(SHAPES))
+    h, rng, bent, checked = 1e-4, np.random.default_rng(0), 0, 0
+    for q, v in STATES:
+        a, d, facing = rng.normal(size=7), [], []
+        for t in (-h, 0.0, h):
+            d.append(distances(q + v * t + a * t * t / 2, 0.7 + t))
+            facing.append(SENSOR.measurement.pairs.straight.reshape(54, 3).copy())
+        state = seen_at(q, v)
+        bend = task.bend(state)
+        assert (bend >= 0).all()
+        without = (task.jacobian(state) @ a + task.jacobian_derivative(state) @ v
+                   - task.desired_acceleration(state))
+        second = (d[2] - 2 * d[1] + d[0]) / h**2
+        same = (facing[0] == facing[2]).all(axis=1)  # no point passed from a side to an end
+        np.testing.assert_allclose((without + bend)[same], second[same], atol=3e-5)
+        bent, checked = bent + (bend[same] > 1e-3).sum(), checked + same.sum()
+    assert bent > 500
+    assert checked >= 54 * len(STATES) - 2
+
+
+@pytest.mark.parametrize("level", LEVELS)
+@pytest.mark.parametrize("differences", [None, 1e-3])
+@pytest.mark.parametrize("obstacles", [len(SHAPES), None])
+def test_compiled_rows_equal_those_of_the_plain_methods(level, differences, obstacles):
+    task = Separation(SENSOR.points, Barrier(0.05, influence=0.6), obstacles)
+    m, sided = task.dimension, 0
+    for q, v in STATES[:5]:
+        state = ROBOT.state(q, v, 0.7, differences)
+        state.move(0.701, q + 1e-3 * v, v)
+        SENSOR.measure(state)
+        written, plain = rows(m + 2), rows(m + 2)
+        task.write(state, level, *written, row=1)
+        Task.write(task, state, level, *plain, row=1)
+        for a, b in zip(written, plain, strict=True):
+            np.testing.assert_allclose(a, b, rtol=1e-12, atol=1e-11)
+            assert (a[[0, -1]] == 5.0).all(), "rows of others are left alone"
+        sided += np.isfinite(written[1][1:-1]).sum()
+    assert 0 < sided < 5 * m
+
+
+def test_one_row_a_point_is_that_of_its_nearest_obstacle():
+    nearest = Separation(SENSOR.points, EVERYWHERE)
+    for level in LEVELS:
+        state = seen_at(*STATES[1])
+        every, one = rows(54), rows(9)
+        TASK.write(state, level, *every, row=0)
+        nearest.write(state, level, *one, row=0)
+        chosen = np.arange(9) * len(SHAPES) + state.measurement.nearest
+        for a, b in zip(every, one, strict=True):
+            np.testing.assert_array_equal(a[chosen], b)
+
+
+def test_a_sensor_of_surfaces_fills_one_column():
+    """As a depth camera would: distances and directions only, and a point that sees nothing."""
+    state = seen_at(*STATES[1])
+    seen, everything = Measurement(8), state.measurement
+    seen.pairs = Pairs(9, 1)
+    seen.pairs.distance[:8, 0] = everything.distance[:8]
+    seen.pairs.direction[:8, 0] = everything.direction[:8]
+    state.measurement = seen
+    task = Separation(SENSOR.points, EVERYWHERE, 1)
+    A, lower, upper = rows(9)
+    task.write(state, "acceleration", A, lower, upper, row=0)
+    assert np.isfinite(lower[:8]).all()
+    assert lower[8] == -np.inf
+    assert not A[8].any()
+    assert not task.bend(state).any()
+
+
+def test_rows_beyond_the_influence_change_nothing():
+    task = Separation(SENSOR.points, Barrier(0.0, influence=1e-3), len(SHAPES))
+    for level in LEVELS:
+        state = seen_at(*STATES[2])
+        with_rows = Stack([task, Position(FRAME, ROUND)], level).hierarchy(state)
+        assert (with_rows.lower[:54] == -np.inf).all()
+        assert (with_rows.upper[:54] == np.inf).all()
+        without = Stack([Position(FRAME, ROUND)], level).hierarchy(state)
+        np.testing.assert_allclose(make("hcod").solve(with_rows).x,
+                                   make("hcod").solve(without).x, rtol=1e-12)
+
+
+def test_a_side_that_appears_does_not_bind_at_once():
+    barrier = Barrier(0.05, rate=10.0, influence=0.25)
+    h, settings = 0.2, barrier.packed()
+    assert least_rate(h, settings) == -2.0
+    assert least_acceleration(h, -1.0, 0.0, settings) == 0.0, "an approach at 1 m/s goes on"
+    assert least_acceleration(h, -0.5, 0.0, settings) < 0.0
+
+
+def test_what_is_asked_inside_is_bounded_and_continuous():
+    settings = Barrier(0.05, rate=10.0, recovery=0.2, limit=50.0).packed()
+    deep = np.linspace(-10, 1, 20001)
+    asked = np.array([[least_rate(h, settings), least_acceleration(h, 0.0, 0.0, settings)]
+                      for h in deep])
+    assert asked.max(axis=0).tolist() == [0.2, 4.0]
+    assert np.abs(np.diff(asked, axis=0)).max() < 0.1
+    assert least_acceleration(-0.1, -1e6, 0.0, settings) == 50.0
+    assert least_acceleration(-10.0, 0.2, 0.0, settings) == 0.0, "the speed of recovery is kept"
+
+
+def test_the_kernel_allocates_nothing():
+    assert not getattr(_write, "allocates", False)
+
+
+def drive(level, period, obstacles, tasks, barrier, duration=2.0, start=START, differences=False):
+    """Distances [m], joint velocities and what is sent, tick after tick; separation is on top."""
+    sensor = sensor_of(obstacles)
+    stack = Stack([Separation(sensor.points, barrier, len(obstacles)), *tasks], level,
+                  JointDamping(7))
+    state = State(ROBOT, period if differences else None)
+    plant = KinematicArm(ROBOT, start, np.zeros(7), period, level)
+    resolver, memory, log = make("hcod"), None, []
+    for k in range(round(duration / period)):
+        state.move(k * period, plant.q, plant.v)
+        sensor.measure(state)
+        done = resolver.solve(stack.hierarchy(state), memory)
+        assert done.status is Status.SOLVED
+        memory = done.memory
+        log.append((sensor.measurement.pairs.distance.copy(), plant.v.copy(), done.x))
+        plant.act(done.x)
+    return [np.array(signal) for signal in zip(*log, strict=True)]
+
+
+HAND = ROBOT.state(START).position(FRAME)
+
+
+def beside_the_hand(*offset):
+    return tuple((HAND + np.array(offset)).tolist())
+
+
+GOAL = beside_the_hand(-0.25, 0.05, 0.1)
+
+
+@pytest.mark.parametrize("level", LEVELS)
+@pytest.mark.parametrize("period", PERIODS)
+@pytest.mark.parametrize("differences", [False, True])
+def test_a_hand_driven_into_an_obstacle_stops_at_the_distance(level, period, differences):
+    obstacles = [Obstacle("sphere", GOAL, (0.05,)),
+                 Obstacle("box", (-0.2, 0.3, 0.2), (0.1, 0.02, 0.03)),
+                 Obstacle("capsule", (-0.1, 0.4, -0.1), (0.02, 0.1))]
+    d, _, _ = drive(level, period, obstacles, [Position(FRAME, Still(GOAL))], Barrier(0.05),
+                    3.0, differences=differences)
+    assert d.min() >= 0.05 - 1e-9
+    assert d[-1, 8, 0] == pytest.approx(0.05, abs=1e-6)
+
+
+@pytest.mark.parametrize("level", LEVELS)
+@pytest.mark.parametrize("period", PERIODS)
+def test_a_hand_that_slides_along_an_obstacle_keeps_the_distance(level, period):
+    path = Ellipse((0.0, 0.6, 0.0), (0.2, 0.0, 0.2), (0.0, 0.1, 0.0))
+    obstacles = [Obstacle("point", c) for c in ((0.1, 0.5, 0.1), (-0.2, 0.3, 0.2),
+                                                (-0.1, 0.4, -0.1))]
+    d, _, _ = drive(level, period, obstacles, [Position(FRAME, path)], Barrier(0.05), 6.5)
+    assert 0.05 - 1e-6 < d.min() < 0.052
+
+
+@pytest.mark.parametrize("level", LEVELS)
+@pytest.mark.parametrize("period", PERIODS)
+def test_an_arm_at_rest_makes_way_for_what_comes(level, period):
+    path = Ellipse(beside_the_hand(0.4, 0.0, 0.0), (0.0, 0.2, 0.1), (-0.4, 0.0, 0.0), rate=1.5)
+    obstacles = [Obstacle("sphere", (0, 0, 0), (0.05,), path=path)]
+    d, v, _ = drive(level, period, obstacles, [], Barrier(0.05), 4.0)
+    assert d.min() >= 0.05 - 0.005 * period, "well under a tick of the obstacle's 0.6 m/s"
+    assert d.min() < 0.06
+    assert 0.1 < np.abs(v).max() < 2.0
+
+
+@pytest.mark.parametrize("level", LEVELS)
+@pytest.mark.parametrize("period", PERIODS)
+def test_a_start_inside_recovers_at_a_bounded_speed(level, period):
+    obstacles = [Obstacle("sphere", beside_the_hand(0.06, 0.0, 0.0), (0.05,))]
+    barrier = Barrier(0.1, recovery=0.1)
+    d, v, x = drive(level, period, obstacles, [], barrier, 2.5)
+    d = d[:, 8, 0]
+    assert d[0] == pytest.approx(0.01)
+    assert (np.diff(d) > -1e-12).all()
+    assert np.diff(d).max() / period < 0.1 + 1e-3
+    assert 0.1 - 1e-4 < d[-1] < 0.105
+    assert np.abs(v).max() < 1.0
+    assert np.abs(x).max() < 20.0
+
+
+def test_a_start_inside_an_obstacle_comes_out():
+    obstacles = [Obstacle("box", beside_the_hand(0.0, 0.0, 0.0), (0.05, 0.1, 0.1))]
+    for level in LEVELS:
+        d, _, _ = drive(level, 4e-3, obstacles, [], Barrier(0.02), 3.0)
+        assert d[0, 8, 0] == pytest.approx(-0.05)
+        assert d[-1].min() > 0.02 - 1e-4
+
+
+def test_a_point_that_no_joint_moves_is_left_alone():
+    """Its row is zero but for rounding, which must not be taken for a way out."""
+    points = (ROBOT.control_point("joint_1", (0.0, 0.1, 0.0)),)
+    obstacles = Obstacles([Obstacle("sphere", (0.0, 0.0, 0.13), (0.05,))])
+    measurement = Measurement(0)
+    measurement.pairs = Pairs(1, 1)
+    state = ROBOT.state(START)
+    position = state.placements[1, 9:] + 0.1 * state.placements[1, 3:6]
+    away = position - obstacles.centres[0]
+    measurement.pairs.distance[:] = np.linalg.norm(away) - 0.05
+    measurement.pairs.direction[:] = away / np.linalg.norm(away)
+    state.measurement = measurement
+    for level in LEVELS:
+        here = Position(FRAME, Still(beside_the_hand(0.0, 0.0, 0.0)))
+        stack = Stack([Separation(points, Barrier(0.1), 1), here], level)
+        assert not make("hcod").solve(stack.hierarchy(state)).x.any()
+
+
+@pytest.mark.parametrize(("make_task", "said"), [
+    (lambda: Barrier(-0.1), "distance = -0.1"),
+    (lambda: Barrier(0.1, rate=0.0), "rate = 0.0"),
+    (lambda: Barrier(0.1, recovery=np.nan), "recovery = nan"),
+    (lambda: Barrier(0.1, limit=np.inf), "limit = inf"),
+    (lambda: Barrier(0.1, influence=0.1), "influence = 0.1 m must be more"),
+    (lambda: Separation((), EVERYWHERE), "'separation': needs at least one point"),
+    (lambda: Separation(SENSOR.points, EVERYWHERE, 3, kind="equality"), "are inequalities"),
+])
+def test_bad_settings_are_named(make_task, said):
+    with pytest.raises(HierarchyError, match=said):
+        make_task()
+
+
+@pytest.mark.parametrize(("pairs", "obstacles", "said"), [
+    (None, 1, "'separation': the state carries no measurement of pairs"),
+    (Pairs(9, 2), 1, "9 points are measured against 2 obstacles, expected 9 against 1"),
+    (Pairs(8, 1), 1, "8 points .* expected 9"),
+    (Pairs(9, 0), None, "9 points are measured against 0 obstacles, .* one at least"),
+])
+def test_a_measurement_that_does_not_fit_is_named(pairs, obstacles, said):
+    state = ROBOT.state(START)
+    task = Separation(SENSOR.points, EVERYWHERE, obstacles)
+    with pytest.raises(HierarchyError, match="measurement of pairs"):
+        task.write(state, "velocity", *rows(18), row=0)
+    state.measurement = Measurement(8)
+    state.measurement.pairs = pairs
+    with pytest.raises(HierarchyError, match=said):
+        task.write(state, "velocity", *rows(18), row=0)
+
+
+def test_without_obstacles_there_are_no_rows():
+    sensor = sensor_of([])
+    state = ROBOT.state(START)
+    sensor.measure(state)
+    task = Separation(sensor.points, EVERYWHERE, 0)
+    assert task.dimension == 0
+    task.write(state, "velocity", *rows(0), row=0)
