@@ -188,6 +188,19 @@ def test_what_is_asked_inside_is_bounded_and_continuous():
     assert least_acceleration(-10.0, 0.2, 0.0, settings) == 0.0, "the speed of recovery is kept"
 
 
+def test_a_point_on_an_obstacle_gives_finite_rows():
+    state = ROBOT.state(START, np.ones(7))
+    state.measurement = Measurement(8)
+    state.measurement.pairs = Pairs(9, 1)
+    state.measurement.pairs.distance[:] = state.measurement.pairs.radius[:] = 0.0
+    state.measurement.pairs.direction[..., 2] = 1.0
+    for level in LEVELS:
+        A, lower, upper = rows(9)
+        Separation(SENSOR.points, Barrier(0.0), 1).write(state, level, A, lower, upper, row=0)
+        assert np.isfinite(A).all()
+        assert np.isfinite(lower).all()
+
+
 def test_the_kernel_allocates_nothing():
     assert not getattr(_write, "allocates", False)
 
