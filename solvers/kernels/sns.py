@@ -85,11 +85,17 @@ def sns(A, lower, upper, sizes, x, record, settings, work):
     if code != SOLVED:
         return code - bounds if code < 0 else finish(x, code)
     for c in range(n):
-        if x[c] >= box[1, c]:
-            record[c] = 2.0 if box[0, c] == box[1, c] else 1.0
-        elif x[c] <= box[0, c]:
-            record[c] = -1.0
+        if _touches(x[c], box[1, c]):
+            x[c], record[c] = box[1, c], 2.0 if box[0, c] == box[1, c] else 1.0
+        elif _touches(x[c], box[0, c]):
+            x[c], record[c] = box[0, c], -1.0
     return finish(x, SOLVED)
+
+
+@inlined
+def _touches(x, side):
+    """Whether x is at this side of the box, to rounding."""
+    return abs(side) < np.inf and abs(x - side) <= SLACK * (1.0 + abs(side))
 
 
 @inlined
