@@ -7,13 +7,14 @@ from hierarchy.tasks.pointing import Pointing
 from hierarchy.tasks.pose import Pose
 from hierarchy.tasks.position import Position
 from hierarchy.tasks.posture import JointDamping, Posture
+from hierarchy.tasks.self_separation import SelfSeparation
 from hierarchy.tasks.separation import Separation
 
 TASKS: dict[str, type[Task]] = {
     "avoidance": Avoidance, "damping": JointDamping, "joint limits": JointLimits,
     "pointing": Pointing, "pose": Pose, "position": Position, "posture": Posture,
-    "separation": Separation,
+    "self-separation": SelfSeparation, "separation": Separation,
 }
 
 __all__ = ["TASKS", "Avoidance", "JointDamping", "JointLimits", "Pointing", "Pose", "Position",
-           "Posture", "Separation"]
+           "Posture", "SelfSeparation", "Separation"]
