@@ -18,10 +18,11 @@ from solvers.backends import BACKENDS
 HQP = [make("hqp", backend=name, form=form)
        for name in BACKENDS for form in ("null-space", "slack")]
 RESOLVERS = [*(make(name) for name in names() if name != "hqp"), make("tpm", form="published"),
-             *HQP]
+             make("sns", form="optimal"), *HQP]
 STRICT = [r for r in RESOLVERS if r.strict]
 INEQUALITIES = [r for r in STRICT if r.handles == "inequalities"]
 EQUALITIES_ONLY = [r for r in RESOLVERS if r.handles == "equalities"]
+BOUNDS = [r for r in RESOLVERS if r.handles == "bounds"]
 PROBLEMS = 3 if os.environ.get("NUMBA_DISABLE_JIT") == "1" else 50
 NEARLY_PARALLEL = 1e-8  # what the stored norms of DEGEN7 are good for, rows parallel to 1e-9
 SLOW = 6  # problems of a family for a cascade: the rest is in the benchmark
@@ -200,10 +201,32 @@ def test_entries_that_are_not_finite_give_a_status_and_a_finite_answer(resolver,
     assert "NaN" in str(res.status)
 
 
-@every(EQUALITIES_ONLY)
+@every(EQUALITIES_ONLY + BOUNDS)
 def test_an_inequality_is_refused_by_level_and_row(resolver):
     h = Hierarchy.from_levels([([[1.0, 0.0]], [0.0]), ([[1.0, 1.0], [0.0, 1.0]], [0, 0], [0, 2])],
                               names=("position", "limits"))
+    with pytest.raises(HierarchyError, match="limits, row 1: an inequality, 0 <= a x <= 2"):
+        resolver.solve(h)
+
+
+@every(BOUNDS)
+@every_case
+@pytest.mark.parametrize("room", [1e6, 0.3])
+def test_bounds_of_a_first_level_are_kept_and_change_nothing_where_they_are_far(resolver, case,
+                                                                               room):
+    h = build(case, True)
+    side = np.full(h.n, room)
+    levels = [(np.eye(h.n), -side, side), *((A, b) for A, b, _ in h.levels())]
+    res = resolver.solve(Hierarchy.from_levels(levels, h.reference))
+    assert res.status is Status.SOLVED
+    assert np.abs(res.x).max() <= room * (1.0 + 1e-12)
+    if room > 1.0:
+        assert_close(resolver, res.x, oracle.solve(h))
+
+
+@every(BOUNDS)
+def test_a_first_level_that_is_more_than_bounds_is_refused_by_level_and_row(resolver):
+    h = Hierarchy.from_levels([([[1.0, 0.0], [1.0, 1.0]], [-1, 0], [1, 2])], names=["limits"])
     with pytest.raises(HierarchyError, match="limits, row 1: an inequality, 0 <= a x <= 2"):
         resolver.solve(h)
 
@@ -246,7 +269,7 @@ def test_labels_tell_resolvers_apart():
     assert len({r.label for r in RESOLVERS}) == len(RESOLVERS)
 
 
-@every(EQUALITIES_ONLY)
+@every(EQUALITIES_ONLY + BOUNDS)
 def test_many_solves_do_not_grow_memory(resolver):
     h = Hierarchy.from_levels([(rng().normal(size=(3, 7)), [1.0, 2.0, 3.0])])
     resolver.solve(h)
