@@ -114,6 +114,8 @@ def run(scenario: Annotated[str, typer.Argument(help="Name of a scenario, or a s
     _print_table([_run_of(chosen, recording)])
     if certify:
         print(f"\n{_verdict(recording, chosen.make_resolver().damping)}")
+    for line in _troubles(recording):
+        print(line)
     print(f"\n{recording.ticks} ticks in {_shown(folder)}")
     return _fault(recording.fault)
 
@@ -207,6 +209,14 @@ def _run_of(scenario: Scenario, recording: Any) -> Run:
     from scenarios.compare import Run
 
     return Run(scenario, scenario.control.resolver, str(scenario.make_resolver().label), recording)
+
+
+def _troubles(recording: Any) -> list[str]:
+    """Say of each kind of trouble what was done, how often, and when first."""
+    lines = [f"{kind}: {action} in {len(ticks)} ticks, first in tick {ticks[0]} "
+             f"(t = {recording['t'][ticks[0]]:.3f} s)"
+             for (kind, action), ticks in recording.troubles().items()]
+    return ["", *lines] if lines else []
 
 
 def _verdict(recording: Any, damping: float) -> str:

@@ -19,6 +19,7 @@ from scenarios.transition import Blend
 from solvers import Resolution, Resolver, Status
 
 _REHEARSALS = 20
+_ROUNDING = 1e-9  # [s] of times that are compared
 
 
 class Controller:
@@ -42,7 +43,8 @@ class Controller:
         self.level, self.clock = control.level, clock
         limits = getattr(cell, "limits", None)
         self.policy = Policy(control.policy, control.level, control.period,
-                             limits and partial(limits.clamp, cell.state, control.level))
+                             None if limits is None
+                             else partial(limits.clamp, cell.state, control.level))
         self.blend = Blend(control.transition_time) if control.transition == "blend" else None
         self.cone_error = nan
         self.allocation = Allocation((), repulsion=False)
@@ -104,7 +106,7 @@ class Controller:
             return
         if new:
             troubles.append("not_finite")
-        elif t - stamp > self._stale_after:
+        elif t - stamp > self._stale_after + _ROUNDING:
             troubles.append("stale")
         state.move(t, *self._carried_on(t - state.t))
 

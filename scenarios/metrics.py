@@ -66,14 +66,18 @@ def measure(recording: Recording, settle: float = 2.0,
     if recording.ticks == 0:
         return {}
     found = (*_tracking(recording, settle), *_pointing(recording, cone_tolerance_deg),
+             *_strictness(recording),
              *_distances(recording), *_motion(recording), *_switching(recording),
-             *_time(recording))
+             *_troubles(recording), *_time(recording))
     return {metric.name: metric for metric in found}
 
 
 def as_plain_data(recording: Recording) -> dict[str, Any]:
-    """Return what `metrics.json` holds: ticks, fault, and value, unit, label of each metric."""
-    return {"ticks": recording.ticks, "fault": recording.fault,
+    """Return what `metrics.json` holds: ticks, fault, events, and each metric as `plain` has it."""
+    events = [{"kind": kind, "action": action, "ticks": len(ticks), "first_tick": ticks[0],
+               "first_time": float(recording["t"][ticks[0]])}
+              for (kind, action), ticks in recording.troubles().items()]
+    return {"ticks": recording.ticks, "fault": recording.fault, "events": events,
             "metrics": {metric.name: plain(metric) for metric in measure(recording).values()}}
 
 
@@ -119,11 +123,20 @@ def pointing_angle(recording: Recording) -> Array:
     return np.asarray(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))))
 
 
+def _strictness(recording: Recording) -> Iterator[Metric]:
+    if "moved_by_lower" in recording:
+        moved = recording["moved_by_lower"]
+        yield Metric("moved_by_lower_max", "Moved by lower tasks in a tick, max",
+                     _finite(np.nanmax(moved)) if np.isfinite(moved).any() else None, "m",
+                     group="Tracking", note="strict: not at all")
+
+
 def _distances(recording: Recording) -> Iterator[Metric]:
     for name, signal, label in (("body_distance_min", "minimal_distance", "Body distance"),
                                 ("ee_distance_min", "ee_distance", "End effector distance")):
         if signal in recording:
-            yield Metric(name, f"{label}, min", _finite(np.min(recording[signal])), "m",
+            known = recording[signal][~np.isnan(recording[signal])]
+            yield Metric(name, f"{label}, min", _finite(known.min()) if known.size else None, "m",
                          lower_is_better=False, group="Safety")
 
 
@@ -135,6 +148,8 @@ def _motion(recording: Recording) -> Iterator[Metric]:
                  _largest(np.diff(v, axis=0)), "rad/s", group=group)
     yield Metric("acceleration_max", "Joint acceleration, max", _largest(recording["a"]),
                  "rad/s^2", group=group)
+    yield Metric("acceleration_step_max", "Joint acceleration step, max",
+                 _largest(np.diff(recording["a"], axis=0)), "rad/s^2", group=group)
 
 
 def _joint_limit_excess(recording: Recording) -> Metric:
@@ -157,6 +172,18 @@ def _switching(recording: Recording) -> Iterator[Metric]:
         changes = np.count_nonzero(np.diff(recording["active_control_point"].astype(int)))
         yield Metric("active_point_changes", "Changes of the active point",
                      float(changes), "", group="Switching")
+
+
+_DONE = {"brake": "Ticks braked", "hold": "Ticks with the last command held",
+         "use": "Ticks with trouble, answer sent", "stop": "Ticks that stopped the run",
+         "clamp": "Ticks clamped to the limits"}
+
+
+def _troubles(recording: Recording) -> Iterator[Metric]:
+    for action, label in _DONE.items():
+        ticks = {event.tick for event in recording.events if event.action == action}
+        if ticks:
+            yield Metric(f"ticks_{action}", label, float(len(ticks)), "", group="Computing")
 
 
 def _time(recording: Recording) -> Iterator[Metric]:

@@ -72,7 +72,7 @@ def _why(run: Run, other: Run, tick: int, accuracy: float) -> str:
     for one in (run, other):
         failed = np.flatnonzero(_signal(one, "status")[:tick + 1] != 0)
         if failed.size:
-            return f"tick {failed[0]} of {one.label} was not solved, and braked"
+            return f"tick {failed[0]} of {one.label} was not solved"
     mine, theirs = (_orders(one)[:tick + 1] for one in (run, other))
     switched = np.flatnonzero(mine != theirs)
     if switched.size:

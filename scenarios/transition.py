@@ -41,7 +41,7 @@ class Blend:
     `weight` is that of the present stack after `resolve`.
     """
 
-    def __init__(self, time: float, most: int = 4) -> None:
+    def __init__(self, time: float, most: int = 6) -> None:
         self.weight = 1.0
         self._time, self._most = time, most
         self._visits: list[tuple[Key, float]] = []  # stacks and since when, the oldest first
@@ -56,15 +56,16 @@ class Blend:
         """
         present = _key(state, order)
         fading = self._fading(present, state.t)
+        if not fading:
+            resolution = self._solve(resolver, present, hierarchy)
+            return resolution, resolution.x
         blended, total = np.zeros(hierarchy.n), 0.0
         for key, weight in fading:
             former = self._solve(resolver, key, _rows(stack, state, key))
             if former.status is Status.SOLVED:
                 blended += weight * former.x
                 total += weight
-        if fading:
-            stack.hierarchy(state, order)
-        resolution = self._solve(resolver, present, hierarchy)
+        resolution = self._solve(resolver, present, stack.hierarchy(state, order))
         if total == 0.0:
             return resolution, resolution.x
         return resolution, (blended + self.weight * resolution.x) / (total + self.weight)
@@ -80,16 +81,22 @@ class Blend:
             del visits[0]
         risen = [1.0, *(_smoothstep((t - since) / self._time) for _, since in visits[1:]), 0.0]
         found: dict[Key, float] = {}
-        for (key, _), here, after in zip(visits, risen, risen[1:], strict=True):
+        for (key, _), here, after in zip(visits, risen[:-1], risen[1:], strict=True):
             found[key] = found.get(key, 0.0) + here - after
         return found
 
     def _fading(self, present: Key, t: float) -> list[tuple[Key, float]]:
         """Return the former stacks that are still worth a solve, the heaviest first."""
+        if len(self._visits) == 1 and self._visits[0][0] == present:
+            self.weight = 1.0
+            return []
         found = self.weights(t, present)
         self.weight = found.pop(present)
-        heaviest = sorted(found.items(), key=lambda item: -item[1])[:self._most - 1]
-        return [(key, weight) for key, weight in heaviest if weight > _NO_WEIGHT]
+        heaviest = sorted(found.items(), key=lambda item: -item[1])
+        # Less the first weight left out, so that nothing jumps where two change places.
+        least = heaviest[self._most - 1][1] if len(heaviest) >= self._most else 0.0
+        return [(key, weight - least) for key, weight in heaviest[:self._most - 1]
+                if weight - least > _NO_WEIGHT]
 
     def _solve(self, resolver: Resolver, key: Key, hierarchy: Hierarchy) -> Resolution:
         resolution = resolver.solve(hierarchy, self._memories.get(key))

@@ -58,7 +58,7 @@ def test_the_first_tick_beyond_the_bound_is_named():
 def test_a_tick_that_was_not_solved_is_the_reason():
     failing = run_of("hqp", away_from(3), status=np.array([0, 0, 3, 0, 0]))
     (one,) = partings([run_of("recursive"), failing])
-    assert one.why == "tick 2 of hqp was not solved, and braked"
+    assert one.why == "tick 2 of hqp was not solved"
 
 
 def test_a_stack_switched_at_another_tick_is_the_reason():
