@@ -8,11 +8,31 @@ from math import radians
 import numpy as np
 
 from hierarchy import HierarchyError, Robot, Stack, State, Task
-from hierarchy.avoidance import Obstacle, Obstacles, Repulsion, SurveillanceAreas
+from hierarchy.avoidance import (
+    Barrier,
+    ControlPoint,
+    Obstacle,
+    Obstacles,
+    Repulsion,
+    SurveillanceAreas,
+    link_capsules,
+)
 from hierarchy.paths import Ellipse, Path, Still, Waypoints
 from hierarchy.problem import Array
-from hierarchy.tasks import Avoidance, JointDamping, Pointing, Position, Posture
+from hierarchy.robots import TABLES
+from hierarchy.tasks import (
+    Avoidance,
+    JointDamping,
+    JointLimits,
+    Pointing,
+    Position,
+    Posture,
+    Separation,
+    TorqueLimits,
+)
+from hierarchy.tasks.self_separation import SelfSeparation
 from scenarios.config import (
+    AvoidanceSection,
     EllipseSection,
     ObstacleSection,
     PathSection,
@@ -20,9 +40,11 @@ from scenarios.config import (
     RobotSection,
     Scenario,
     ScenarioError,
+    SeparationSection,
     StartSection,
     WaypointsSection,
 )
+from scenarios.order import Hierarchical, Order, Switched
 from scenarios.plants import KinematicArm
 from scenarios.published import PublishedAvoidance
 from scenarios.sensors import ExactDistances
@@ -33,7 +55,8 @@ from solvers import make
 class Cell:
     """A robot with its start, its tasks and what it senses: everything the loop needs.
 
-    `position`, `pointing` are the tasks of that name or None; without `areas` nothing is avoided.
+    `order` says which tasks are in the stack, from the measurement and the cone error. `position`,
+    `pointing`, `limits` are the tasks of that name or None; `areas` those of Algorithm 1.
     """
 
     robot: Robot
@@ -44,6 +67,8 @@ class Cell:
     areas: SurveillanceAreas | None
     position: Position | None
     pointing: Pointing | None
+    limits: JointLimits | None
+    order: Order
 
 
 def build(scenario: Scenario) -> Cell:
@@ -56,13 +81,16 @@ def build(scenario: Scenario) -> Cell:
     sensor = _sensor(scenario, robot)
     if sensor is not None:
         sensor.check_start(robot.state(q, v))
+    limits, first = _limits(scenario, robot)
     position, pointing = _position(scenario, robot), _pointing(scenario, robot)
-    tasks = [task for task in (position, pointing, _avoidance(scenario, robot)) if task]
-    areas = None if avoidance is None else SurveillanceAreas(avoidance.near, avoidance.far,
-                                                             avoidance.end_effector)
+    last = _posture(scenario, robot, "task")
+    tasks = [*first, *_avoidance(scenario, robot),
+             *(task for task in (position, pointing, last) if task)]
+    areas = (SurveillanceAreas(avoidance.near, avoidance.far, avoidance.end_effector)
+             if isinstance(avoidance, AvoidanceSection) else None)
     return Cell(robot, state, KinematicArm(robot, q, v, control.period, control.level),
                 Stack(tasks, control.level, _reference(scenario, robot)), sensor, areas,
-                position, pointing)
+                position, pointing, limits, _order(scenario, areas, first, tasks))
 
 
 def make_robot(section: RobotSection) -> Robot:
@@ -144,9 +172,11 @@ def _sensor(scenario: Scenario, robot: Robot) -> ExactDistances | None:
     if not robot.control_points:
         raise ScenarioError(f"[avoidance]: robot {robot.name!r} has no control points; list them "
                             "in robot.control_points")
+    obstacles = make_obstacles(section.obstacles)
+    if isinstance(section, SeparationSection):
+        return ExactDistances(robot, obstacles, pairs=True)
     mean_within = section.far if section.direction == "mean" else 0.0
-    return ExactDistances(robot, make_obstacles(section.obstacles), _law(section.body),
-                          _law(section.tip), mean_within)
+    return ExactDistances(robot, obstacles, _law(section.body), _law(section.tip), mean_within)
 
 
 def _law(section: RepulsionSection) -> Repulsion:
@@ -157,7 +187,8 @@ def _position(scenario: Scenario, robot: Robot) -> Position | None:
     section = scenario.position
     if section is None:
         return None
-    within = scenario.avoidance.end_effector if scenario.avoidance else -1.0
+    avoidance = scenario.avoidance
+    within = avoidance.end_effector if isinstance(avoidance, AvoidanceSection) else -1.0
     return Position(robot.frame(robot.end_effector), make_path(section.path), section.stiffness,
                     section.damping, section.gain, repulsion_within=within)
 
@@ -167,25 +198,71 @@ def _pointing(scenario: Scenario, robot: Robot) -> Pointing | None:
     if section is None:
         return None
     # Algorithm 1 puts the cone's surface into the stack while it is violated: an equality.
+    kind = section.kind if scenario.control.stack == "hierarchical" else "equality"
     return Pointing(robot.frame(robot.end_effector), section.axis, radians(section.alpha_d),
-                    "equality", section.stiffness, section.damping, section.gain)
+                    kind, section.stiffness, section.damping, section.gain)
 
 
-def _avoidance(scenario: Scenario, robot: Robot) -> Avoidance | None:
+def _limits(scenario: Scenario, robot: Robot) -> tuple[JointLimits | None, list[Task]]:
+    """The joint limits, and the tasks that go first."""
+    section = scenario.limits
+    if section is None:
+        return None, []
+    try:
+        limits = JointLimits(robot, section.acceleration, scenario.control.period, section.margin)
+        torque = [] if section.torque is None else [TorqueLimits(robot, section.torque)]
+    except HierarchyError as error:
+        raise ScenarioError(f"limits: {error}") from error
+    return limits, [limits, *torque]
+
+
+def _avoidance(scenario: Scenario, robot: Robot) -> list[Task]:
     section = scenario.avoidance
     if section is None:
-        return None
+        return []
+    if isinstance(section, SeparationSection):
+        return _separation(section, robot)
     kind = PublishedAvoidance if section.jacobian == "published" else Avoidance
-    return kind(robot.control_points, section.dimension)
+    return [kind(robot.control_points, section.dimension)]
+
+
+def _separation(section: SeparationSection, robot: Robot) -> list[Task]:
+    tasks: list[Task] = []
+    if section.obstacles:
+        end = robot.frame(robot.end_effector)
+        points = (*robot.control_points, ControlPoint(end.name, end.joint, end.offset))
+        barrier = Barrier(section.distance, section.rate, section.influence, section.recovery,
+                          section.limit)
+        tasks.append(Separation(points, barrier, len(section.obstacles)))
+    if section.self_collision is not None:
+        if robot.name not in TABLES:
+            raise ScenarioError(f"avoidance.self_collision: robot {robot.name!r} has no capsules")
+        barrier = Barrier(section.self_collision, section.rate, section.influence,
+                          section.recovery, section.limit)
+        tasks.append(SelfSeparation(link_capsules(TABLES[robot.name]), barrier))
+    return tasks
+
+
+def _order(scenario: Scenario, areas: SurveillanceAreas | None, first: list[Task],
+           tasks: list[Task]) -> Order:
+    if scenario.control.stack == "hierarchical":
+        return Hierarchical([task.name for task in tasks])
+    always_point = bool(scenario.pointing and scenario.pointing.kind == "equality")
+    return Switched(areas, always_point, [task.name for task in first],
+                    scenario.position is not None)
 
 
 def _reference(scenario: Scenario, robot: Robot) -> Task | None:
     if scenario.damping is not None:
         return JointDamping(robot.n, scenario.damping.value, scenario.damping.weight)
-    if scenario.posture is not None:
-        if len(scenario.posture.target) != robot.n:
-            raise ScenarioError(f"posture.target has {len(scenario.posture.target)} entries, robot "
-                                f"{robot.name!r} has {robot.n} joints")
-        section = scenario.posture
-        return Posture(section.target, section.stiffness, section.damping, section.gain)
-    return None
+    return _posture(scenario, robot, "null-space")
+
+
+def _posture(scenario: Scenario, robot: Robot, role: str) -> Posture | None:
+    section = scenario.posture
+    if section is None or section.role != role:
+        return None
+    if len(section.target) != robot.n:
+        raise ScenarioError(f"posture.target has {len(section.target)} entries, robot "
+                            f"{robot.name!r} has {robot.n} joints")
+    return Posture(section.target, section.stiffness, section.damping, section.gain)

@@ -104,6 +104,9 @@ class ControlSection(_Section):
     "hierarchical": limits, avoidance, position and pointing are in it at all times, in this order,
     inequalities as inequalities.
 
+    With `strictness` every tick is also resolved without what is below the position, outside the
+    times measured, to see whether that moves the end effector.
+
     `options` are settings of the resolver. A table in it that bears a resolver's name, such as
     `[control.options.tpm]`, holds for that resolver alone; so the resolver can be swapped by
     changing its name, and nothing else. A plain setting goes before one from such a table.
@@ -115,6 +118,7 @@ class ControlSection(_Section):
 
     level: Literal["velocity", "acceleration"] = "acceleration"
     stack: Literal["switched", "hierarchical"] = "switched"
+    strictness: bool = False
     period: Annotated[float, Field(gt=0.0, le=1.0)] = 0.001
     duration: Positive
     jacobian_derivative: Literal["exact", "difference"] = "exact"
@@ -267,14 +271,18 @@ class SeparationSection(_Section):
     """All control points and the end effector kept off all obstacles, as one-sided rows.
 
     `distance` [m] that is kept; `rate` [1/s] at which it may be approached; obstacles beyond
-    `influence` [m] ask for nothing. With `self_collision` the arm's own links too.
+    `influence` [m] ask for nothing; one that is too near is left at up to `recovery` [m/s], with up
+    to `limit` [m/s^2]. `self_collision` is the distance [m] kept between links that are no
+    neighbours, None for any. See hierarchy.avoidance.Barrier.
     """
 
     kind: Literal["separation"]
     distance: NotNegative = 0.03
     rate: Positive = 10.0
-    influence: Positive = 0.5
-    self_collision: bool = False
+    influence: Positive = 0.3
+    recovery: NotNegative = 0.2
+    limit: Positive = 50.0
+    self_collision: NotNegative | None = None
     obstacles: Obstacles = ()
 
     @model_validator(mode="after")
@@ -326,9 +334,10 @@ class DampingSection(_Section):
 
 
 class PostureSection(_Section):
-    """Null-space term toward a posture [rad or m]."""
+    """Toward a posture [rad or m]: the null-space term, or with `role` = "task" the last level."""
 
     target: tuple[Finite, ...]
+    role: Literal["null-space", "task"] = "null-space"
     stiffness: NotNegative = 10.0
     damping: NotNegative = 5.0
     gain: NotNegative = 1.0
@@ -399,8 +408,12 @@ class Scenario(_Section):
         if not (self.position or self.pointing or self.avoidance):
             raise ValueError("the stack is empty: give at least one of [position], [pointing], "
                              "[avoidance]")
-        if self.damping and self.posture:
-            raise ValueError("give [damping] or [posture], not both")
+        if self.damping and self.posture and self.posture.role == "null-space":
+            raise ValueError("give [damping] or [posture], not both: each is the null-space term")
+        if self.posture and self.posture.role == "task" and self.control.stack == "switched":
+            raise ValueError('posture.role = "task" goes with control.stack = "hierarchical"')
+        if self.control.strictness and not self.position:
+            raise ValueError("control.strictness needs [position]")
         switched = self.control.stack == "switched"
         if self.avoidance and switched != (self.avoidance.kind == "repulsion"):
             raise ValueError('avoidance.kind = "repulsion" goes with control.stack = "switched", '

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from hierarchy.allocation import POINTING, POSITION, Allocation, allocate
+from hierarchy.allocation import Allocation
 from hierarchy.problem import Array, Hierarchy
 from scenarios.build import Cell, build
 from scenarios.config import Scenario
@@ -51,7 +51,6 @@ class Controller:
         self.resolution = self._unanswered = Resolution(np.zeros(cell.robot.n),
                                                         Status.NUMERICAL_FAILURE, 0)
         self.stamps = (0.0, 0.0, 0.0, 0.0)
-        self._always_point = bool(scenario.pointing and scenario.pointing.kind == "equality")
         self._memory: Any = None
         self._deadline = control.policy.deadline or inf
         self._stale_after, self._measured_at = control.policy.stale_after, -inf
@@ -148,11 +147,5 @@ class Controller:
         return x
 
     def _allocate(self) -> Allocation:
-        cell = self.cell
-        if cell.sensor is None or cell.areas is None:
-            point = self.cone_error > 0.0 or self._always_point
-            return Allocation((POSITION,) * (cell.position is not None) + (POINTING,) * point,
-                              repulsion=False)
-        seen = cell.sensor.measurement
-        return allocate(seen.minimal_distance, seen.end_effector_distance, self.cone_error,
-                        cell.areas, self._always_point)
+        sensor = self.cell.sensor
+        return self.cell.order(sensor.measurement if sensor else None, self.cone_error)

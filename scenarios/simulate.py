@@ -5,15 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hierarchy.problem import Array
+from scenarios.audit import Audit, Certified, Strictness
 from scenarios.config import Scenario
 from scenarios.controller import Controller
 from scenarios.faults import Faults
 from scenarios.recorder import Recorder
 from scenarios.recording import Recording
-from solvers import certify
 
 _REPORT_EVERY = 500  # ticks between two calls of `progress`
 
@@ -25,7 +24,8 @@ def simulate(scenario: Scenario, progress: Callable[[int, int], None] | None = N
     `progress(done, total)` is called now and then. A run that is interrupted (Ctrl-C), that is
     stopped by its policy, or whose state stops being finite ends early: the Recording has all ticks
     so far and says why in `fault`. With `certified`, every answer is judged by `solvers.certify`
-    after its tick was timed, and the Recording has the verdicts as its signal `certified`. Raises
+    after its tick was timed, and the Recording has the verdicts as its signal `certified`; with
+    `control.strictness` it has `moved_by_lower`, see scenarios.audit.Strictness. Raises
     HierarchyError where the scenario does not fit its robot or resolver.
     """
     rehearsal = Controller(scenario)
@@ -35,20 +35,25 @@ def simulate(scenario: Scenario, progress: Callable[[int, int], None] | None = N
     controller = Controller(scenario) if faults is None else faults.controller
     ticks = max(1, round(scenario.control.duration / scenario.control.period))
     recorder = Recorder(controller, ticks)
-    verdicts = np.zeros(ticks, dtype=bool) if certified else None
+    audits = _audits(scenario, ticks, certified)
     try:
         fault = _run(controller, recorder, scenario.control.period, ticks, progress or _silent,
-                     verdicts, faults)
+                     audits, faults)
     except KeyboardInterrupt:
         fault = f"interrupted at tick {recorder.ticks}"
     recording = recorder.finish(scenario, fault)
-    if verdicts is not None:
-        recording.signals["certified"] = verdicts[:recording.ticks]
+    for audit in audits:
+        recording.signals[audit.name] = audit.values[:recording.ticks]
     return recording
 
 
+def _audits(scenario: Scenario, ticks: int, certified: bool) -> list[Audit]:
+    audits: list[Audit] = [Certified(ticks)] if certified else []
+    return [*audits, Strictness(ticks, scenario)] if scenario.control.strictness else audits
+
+
 def _run(controller: Controller, recorder: Recorder, period: float, ticks: int,
-         progress: Callable[[int, int], None], verdicts: NDArray[np.bool_] | None,
+         progress: Callable[[int, int], None], audits: list[Audit],
          faults: Faults | None) -> str | None:
     plant, policy = controller.cell.plant, controller.policy
     for k in range(ticks):
@@ -62,8 +67,9 @@ def _run(controller: Controller, recorder: Recorder, period: float, ticks: int,
         recorder.stamp(controller.clock())
         if not finite or (policy.events and not _finite(plant.q, plant.v)):
             return f"the state is not finite from tick {k} on (t = {k * period:.3f} s)"
-        if verdicts is not None and controller.answered:
-            verdicts[k] = certify(controller.hierarchy, controller.resolution.x).certified
+        if controller.answered:
+            for audit in audits:
+                audit.look(k, controller)
         if policy.stopped:
             return policy.fault
     progress(ticks, ticks)

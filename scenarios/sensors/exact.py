@@ -18,6 +18,7 @@ from hierarchy.avoidance.control_points import pack_points
 from hierarchy.avoidance.repulsion import laws
 
 _TOUCHING = 1e-9  # [m] a control point this near to an obstacle has no direction to leave it
+_NO_LAWS = np.array([[0.0, 1.0, 1.0, 1.0]] * 2)  # r_max = 0
 
 
 class ExactDistances:
@@ -26,17 +27,19 @@ class ExactDistances:
     `body` and `tip` are the magnitudes of the repulsion of the control points and of the end
     effector; with `mean_within` > 0 [m] directions are the mean (25)-(26) over the obstacles
     nearer than that, else those of the nearest obstacle. With `pairs`, every point is also
-    measured against every obstacle, which the task `Separation` needs.
+    measured against every obstacle, which the task `Separation` needs. Without both laws nothing
+    is repelled.
     """
 
-    def __init__(self, robot: Robot, obstacles: Obstacles, body: Repulsion, tip: Repulsion,
-                 mean_within: float = 0.0, pairs: bool = False) -> None:
+    def __init__(self, robot: Robot, obstacles: Obstacles, body: Repulsion | None = None,
+                 tip: Repulsion | None = None, mean_within: float = 0.0,
+                 pairs: bool = False) -> None:
         end = robot.frame(robot.end_effector)
         self.points = (*robot.control_points,
                        ControlPoint(robot.end_effector, end.joint, end.offset))
         self.obstacles, self.mean_within = obstacles, mean_within
         self._joints, self._offsets = pack_points(self.points)
-        self._laws = laws(body, tip)
+        self._laws = laws(body, tip) if body and tip else _NO_LAWS
         self.measurement = Measurement(len(robot.control_points))
         if pairs:
             self.measurement.pairs = Pairs(len(self.points), len(obstacles))

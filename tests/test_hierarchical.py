@@ -1,0 +1,82 @@
+"""Scenarios whose rows are inequalities: limits, separation and cone in the stack at all times."""
+
+import numpy as np
+import pytest
+
+from hierarchy import HierarchyError
+from scenarios import load, simulate
+from scenarios.build import build
+from scenarios.metrics import measure
+
+SHORT = "control.duration=1.5"
+
+
+def names_of(*changes, scenario="ellipse-hqp"):
+    return build(load(scenario, changes)).order(None, 0.0).order
+
+
+@pytest.mark.parametrize("level", ["velocity", "acceleration"])
+@pytest.mark.parametrize("resolver", ["hcod", "weighted"])
+def test_limits_and_distances_are_kept_and_no_tick_fails(level, resolver):
+    scenario = load("ellipse-hqp", [SHORT, f"control.level={level}"]).with_resolver(resolver)
+    run = simulate(scenario)
+    assert run.fault is None
+    assert (run["status"] == 0).all()
+    excess = np.maximum(run["q"] - run["joint_upper"], run["joint_lower"] - run["q"])
+    assert excess.max() <= 1e-9
+    assert (np.abs(run["v"]) - run["velocity_limit"]).max() <= 1e-9
+    assert np.abs(run["a"]).max() <= 10.0 * (1.0 + 1e-6)
+    assert run["minimal_distance"].min() >= scenario.avoidance.distance - 1e-4
+
+
+def test_every_tick_of_hcod_is_certified():
+    run = simulate(load("ellipse-hqp", [SHORT]), certified=True)
+    assert run["certified"].all()
+
+
+def test_the_joint_that_passes_its_limit_in_the_letters_task_stops_at_it():
+    """Joint 6 of `ellipse` reaches its limit within the first turn."""
+    beyond = simulate(load("ellipse", {"control.duration": 5.0}))
+    inside = simulate(load("ellipse-limits", {"control.duration": 5.0}).with_resolver("hcod"))
+    assert measure(beyond)["joint_limit_excess"].value > 0.1
+    assert measure(inside)["joint_limit_excess"].value == 0.0
+
+
+def test_the_order_is_fixed_and_limits_come_first():
+    assert names_of() == ("joint limits", "separation", "position", "pointing")
+    assert names_of("limits.torque=0.5") == ("joint limits", "torque limits", "separation",
+                                             "position", "pointing")
+    assert names_of("avoidance.self_collision=0.02")[1:3] == ("separation", "self-separation")
+    assert names_of("posture={role='task', target=[0,0,0,0,0,0,0]}")[-1] == "posture"
+
+
+def test_limits_stand_before_what_algorithm_1_orders():
+    cell = build(load("ellipse-limits"))
+    assert cell.order(None, 1.0).order == ("joint limits", "position", "pointing")
+    assert cell.order(None, -1.0).order == ("joint limits", "position")
+
+
+@pytest.mark.parametrize("resolver", ["recursive", "tpm", "augmented", "reverse"])
+def test_resolvers_that_cannot_do_inequalities_refuse_with_the_level_and_the_row(resolver):
+    with pytest.raises(HierarchyError, match=rf"separation, row \d+: an inequality|joint limits"):
+        simulate(load("ellipse-hqp", [SHORT]).with_resolver(resolver))
+
+
+@pytest.mark.parametrize(("changes", "says"), [
+    (["control.stack=switched"], "goes with control.stack"),
+    (["avoidance.influence=0.01"], "is not below influence"),
+    (["control.level=velocity", "limits.torque=0.5"], "needs control.level"),
+    (["limits.acceleration=0"], "limits.acceleration"),
+    (["limits.acceleration=[1.0, 2.0]"], "expected a number or"),
+    (["avoidance.distanc=1"], "did you mean 'avoidance.distance'"),
+])
+def test_what_does_not_go_together_is_said(changes, says):
+    with pytest.raises(HierarchyError, match=says):
+        build(load("ellipse-hqp", changes))
+
+
+def test_the_strictness_scenario_measures_what_a_lower_task_moves():
+    strict = measure(simulate(load("strictness", ["control.duration=0.3"])))
+    assert strict["moved_by_lower_max"].value < 1e-9
+    weighted = simulate(load("strictness", ["control.duration=0.3"]).with_resolver("weighted:ratio=10"))
+    assert measure(weighted)["moved_by_lower_max"].value > 1e-7
