@@ -12,8 +12,6 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple, final
 
-import numpy as np
-
 from hierarchy import Stack, State
 from hierarchy.allocation import AVOIDANCE
 from hierarchy.problem import Array, Hierarchy
@@ -36,9 +34,9 @@ class Blend:
     The weight of a stack is what a kernel 6 s (1 - s), s the age over `time`, finds of it in the
     past: after a single change the new stack's rises as the smoothstep s^2 (3 - 2 s), and changes
     that come before the last is over add up. So weights have continuous derivatives, are not
-    negative and sum to one. At most `most` stacks are solved, the present one and the heaviest.
-
-    `weight` is that of the present stack after `resolve`.
+    negative and sum to one. The `most` heaviest stacks are solved; their weights, less the first
+    that is left out, are scaled to sum to one again, and so they are where a former stack has no
+    answer. `weight` is that of the present stack in the last answer.
     """
 
     def __init__(self, time: float, most: int = 6) -> None:
@@ -51,24 +49,26 @@ class Blend:
                 order: tuple[str, ...], hierarchy: Hierarchy) -> tuple[Resolution, Array]:
         """Return what the present stack's solve gave, and the combined answer x (n,).
 
-        `hierarchy` has the rows of `order` at `state`, and has them afterwards. A former stack
-        without an answer is left out.
+        `hierarchy` has the rows of `order` at `state`, and has them afterwards.
         """
         present = _key(state, order)
-        fading = self._fading(present, state.t)
-        if not fading:
-            resolution = self._solve(resolver, present, hierarchy)
+        shares = self._shares(present, state.t)
+        own, former = shares.pop(present, 0.0), {}
+        for key in shares:
+            former[key] = self._solve(resolver, key, _rows(stack, state, key))
+        if former:
+            stack.hierarchy(state, order)
+        resolution = self._solve(resolver, present, hierarchy)
+        solved = [key for key in former if former[key].status is Status.SOLVED]
+        total = own + sum(shares[key] for key in solved)
+        if not solved or total == 0.0:
+            self.weight = 1.0
             return resolution, resolution.x
-        blended, total = np.zeros(hierarchy.n), 0.0
-        for key, weight in fading:
-            former = self._solve(resolver, key, _rows(stack, state, key))
-            if former.status is Status.SOLVED:
-                blended += weight * former.x
-                total += weight
-        resolution = self._solve(resolver, present, stack.hierarchy(state, order))
-        if total == 0.0:
-            return resolution, resolution.x
-        return resolution, (blended + self.weight * resolution.x) / (total + self.weight)
+        self.weight = own / total
+        x = self.weight * resolution.x
+        for key in solved:
+            x += shares[key] / total * former[key].x
+        return resolution, x
 
     def weights(self, t: float, present: Key) -> dict[Key, float]:
         """Return the weight of each stack at time t [s], with `present` in force from now on."""
@@ -85,18 +85,15 @@ class Blend:
             found[key] = found.get(key, 0.0) + here - after
         return found
 
-    def _fading(self, present: Key, t: float) -> list[tuple[Key, float]]:
-        """Return the former stacks that are still worth a solve, the heaviest first."""
+    def _shares(self, present: Key, t: float) -> dict[Key, float]:
+        """Return the heaviest stacks with their weights, which need not sum to one."""
         if len(self._visits) == 1 and self._visits[0][0] == present:
-            self.weight = 1.0
-            return []
-        found = self.weights(t, present)
-        self.weight = found.pop(present)
-        heaviest = sorted(found.items(), key=lambda item: -item[1])
+            return {present: 1.0}
+        ranked = sorted(self.weights(t, present).items(), key=lambda item: -item[1])
         # Less the first weight left out, so that nothing jumps where two change places.
-        least = heaviest[self._most - 1][1] if len(heaviest) >= self._most else 0.0
-        return [(key, weight - least) for key, weight in heaviest[:self._most - 1]
-                if weight - least > _NO_WEIGHT]
+        least = ranked[self._most][1] if len(ranked) > self._most else 0.0
+        return {key: weight - least for key, weight in ranked[:self._most]
+                if weight - least > _NO_WEIGHT}
 
     def _solve(self, resolver: Resolver, key: Key, hierarchy: Hierarchy) -> Resolution:
         resolution = resolver.solve(hierarchy, self._memories.get(key))

@@ -1,0 +1,253 @@
+"""From one stack to the next without a jump."""
+
+import numpy as np
+import oracle
+import pytest
+import scene
+
+from hierarchy import Hierarchy, HierarchyError, Stack
+from hierarchy.tasks import JointLimits, Position
+from scenarios.config import load
+from scenarios.simulate import simulate
+from scenarios.transition import Blend, Key
+from solvers import Resolution, Status, make
+
+A, B, C = Key(("position",)), Key(("position", "pointing")), Key(("pointing", "position"))
+TIME, PERIOD = 0.1, 0.001
+
+
+def visited(keys, blend=None):
+    """Weights (ticks, 3) of A, B, C over ticks in which these keys are in force."""
+    blend = blend or Blend(TIME)
+    found = [blend.weights(k * PERIOD, key) for k, key in enumerate(keys)]
+    return np.array([[weights.get(key, 0.0) for key in (A, B, C)] for weights in found])
+
+
+def wandering(ticks, seed, longest):
+    """Keys of random stays of up to `longest` ticks."""
+    rng, keys = np.random.default_rng(seed), []
+    while len(keys) < ticks:
+        keys += [(A, B, C)[rng.integers(3)]] * rng.integers(1, longest + 1)
+    return keys[:ticks]
+
+
+def test_the_first_stack_has_all_the_weight():
+    np.testing.assert_array_equal(visited([A, A, A])[:, 0], 1.0)
+
+
+def test_after_one_change_the_weight_rises_as_the_smoothstep():
+    weights = visited([A] * 10 + [B] * 150)
+    s = np.clip((np.arange(160) - 10) * PERIOD / TIME, 0.0, 1.0)
+    np.testing.assert_allclose(weights[:, 1], s * s * (3 - 2 * s), atol=1e-12)
+    np.testing.assert_allclose(weights[:, 0], 1.0 - weights[:, 1], atol=1e-12)
+
+
+@pytest.mark.parametrize("longest", [1, 7, 60, 300])
+def test_however_often_it_changes_weights_are_convex_with_continuous_derivatives(longest):
+    weights = visited(wandering(2000, longest, longest))
+    np.testing.assert_allclose(weights.sum(axis=1), 1.0, atol=1e-12)
+    assert (weights > -1e-12).all()
+    # What the kernel 6 s (1 - s) / TIME makes of anything between 0 and 1.
+    rate = np.diff(weights, axis=0) / PERIOD
+    assert np.abs(rate).max() <= 1.5 / TIME * 1.001
+    assert np.abs(np.diff(rate, axis=0)).max() / PERIOD <= 12.0 / TIME**2 * 1.001
+
+
+def test_a_change_that_is_taken_back_at_once_leaves_next_to_nothing():
+    weights = visited([A] * 200 + [B] + [A] * 200)
+    assert weights[:, 1].max() <= 1.5 * PERIOD / TIME
+    np.testing.assert_array_equal(weights[-1], [1.0, 0.0, 0.0])
+
+
+def test_what_is_past_is_forgotten():
+    blend = Blend(TIME)
+    visited(wandering(5000, 1, 3), blend)
+    assert len(blend._visits) <= TIME / PERIOD + 2
+
+
+def test_a_clock_that_begins_anew_is_another_run():
+    blend = Blend(TIME)
+    visited([A] * 50 + [B] * 20, blend)
+    np.testing.assert_array_equal(visited([C] * 3, blend), [[0.0, 0.0, 1.0]] * 3)
+
+
+def test_no_more_than_a_few_stacks_are_solved_and_that_makes_no_jump():
+    """A jump would not get smaller with the time between two ticks."""
+    def largest_change(period):
+        keys = [Key(("position", "avoidance"), point) for point in range(8)]
+        rng, blend, before, found = np.random.default_rng(5), Blend(TIME, most=4), None, []
+        for k in range(round(2.0 / period)):
+            if k % round(0.01 / period) == 0:
+                present = keys[rng.integers(8)]
+            shares = blend._shares(present, k * period)
+            assert len(shares) <= 4
+            now = np.array([shares.get(key, 0.0) for key in keys]) / sum(shares.values())
+            found.append(0.0 if before is None else np.abs(now - before).max())
+            before = now
+        return max(found)
+
+    assert largest_change(1e-4) < 0.15 * largest_change(1e-3)
+
+
+# One scene: the end effector on its path, the axis to the cone, a posture for the rest.
+
+HAND, AXIS, ELBOW = (scene.TASKS[name] for name in ("position", "pointing", "avoidance 1-D"))
+NEAR = Position(scene.ROBOT.frame("joint_4"), scene.PATH, name="elbow")
+
+
+def blended(before, after, h_of, resolver="recursive", level="acceleration", tasks=(), **settings):
+    """Change from one order to another; return stack, state, and the answer at weight `h_of`."""
+    stack = Stack([*tasks, HAND, AXIS, ELBOW, NEAR], level, scene.TASKS["damping"])
+    q, v = scene.states(1, seed=4)[0]
+    blend, solver = Blend(TIME), make(resolver, **settings)
+    for t, order in ((0.0, before), (0.02, after), (0.02 + h_of * TIME, after)):
+        state = scene.state_at(q, v, t)
+        _, x = blend.resolve(solver, stack, state, order, stack.hierarchy(state, order))
+    return stack, state, x, blend
+
+
+def answer(stack, state, order):
+    return oracle.solve(stack.hierarchy(state, order))
+
+
+@pytest.mark.parametrize("resolver", ["tpm", "recursive", "hcod"])
+@pytest.mark.parametrize(("upper", "lower"), [
+    ((), ("position",)), (("position",), ()), (("position",), ("avoidance",)),
+    (("avoidance",), ("position", "elbow"))])
+@pytest.mark.parametrize("entering", [True, False])
+def test_one_task_that_enters_or_leaves_has_its_intermediate_desired_value(
+        resolver, upper, lower, entering):
+    """Lee, Mansard, Park (2012): b becomes h b + (1 - h) J x, x the answer without the task."""
+    with_it, without = (*upper, "pointing", *lower), (*upper, *lower)
+    orders = (without, with_it) if entering else (with_it, without)
+    stack, state, x, blend = blended(*orders, h_of=0.3, resolver=resolver)
+    h = blend.weight if entering else 1.0 - blend.weight
+    assert 0.0 < h < 1.0
+    x_without = answer(stack, state, without)
+    levels = [list(level) for level in stack.hierarchy(state, with_it).levels()]
+    J, b, _ = levels[len(upper)]
+    levels[len(upper)] = [J, h * b + (1 - h) * J @ x_without]
+    asked = Hierarchy.from_levels([(level[0], level[1]) for level in levels],
+                                  stack.hierarchy(state, with_it).reference)
+    np.testing.assert_allclose(x, oracle.solve(asked), rtol=0, atol=1e-8 * (1 + np.abs(x).max()))
+
+
+def test_rows_that_both_stacks_have_on_top_are_kept_exactly():
+    stack, state, x, _ = blended(("position", "pointing", "avoidance"),
+                                 ("position", "avoidance"), h_of=0.5)
+    assert stack.hierarchy(state, ("position",)).violations(x)[0] < 1e-9
+    assert stack.hierarchy(state, ("position", "pointing")).violations(x)[1] > 1e-3
+
+
+@pytest.mark.parametrize("level", ["velocity", "acceleration"])
+def test_bounds_that_both_stacks_have_on_top_are_kept(level):
+    limits = JointLimits(scene.ROBOT, 10.0, PERIOD)
+    for h in np.linspace(0.05, 0.95, 10):
+        _, state, x, _ = blended(("joint limits", "position", "pointing"),
+                                 ("joint limits", "pointing", "position"), h_of=h,
+                                 resolver="hcod", level=level, tasks=[limits])
+        low, up = limits.box(state, level)
+        assert (low - 1e-9 <= x).all()
+        assert (x <= up + 1e-9).all()
+
+
+def test_a_former_stack_keeps_the_point_that_was_active_in_it():
+    stack = Stack([HAND, ELBOW], "velocity")
+    q, v = scene.states(1, seed=4)[0]
+    order, blend, solver = ("avoidance", "position"), Blend(TIME), make("recursive")
+    answers = {}
+    for t, active in ((0.0, 2), (0.02, 5), (0.07, 5)):
+        state = scene.state_at(q, v, t)
+        for point in (2, 5):
+            state.measurement.active = point
+            answers[point] = oracle.solve(stack.hierarchy(state, order))
+        state.measurement.active = active
+        resolution, x = blend.resolve(solver, stack, state, order, stack.hierarchy(state, order))
+        assert state.measurement.active == active
+    assert blend.weight == pytest.approx(0.5)
+    np.testing.assert_allclose(resolution.x, answers[5], atol=1e-9)
+    np.testing.assert_allclose(x, (answers[2] + answers[5]) / 2, atol=1e-9)
+    rows = stack._prepared[order][0]
+    np.testing.assert_allclose(oracle.solve(rows), answers[5], atol=1e-12)  # those of the present
+
+
+def test_a_former_stack_without_an_answer_is_left_out():
+    class OnlyTheHand:
+        def solve(self, h, memory=None):
+            status = Status.SOLVED if h.names == ("position",) else Status.NUMERICAL_FAILURE
+            return Resolution(oracle.solve(h), status)
+
+    stack = Stack([HAND, AXIS], "velocity")
+    blend = Blend(TIME)
+    for t, order in ((0.0, ("pointing",)), (0.05, ("position",)), (0.1, ("position",))):
+        state = scene.state_at(*scene.states(1)[0], t)
+        resolution, x = blend.resolve(OnlyTheHand(), stack, state, order,
+                                      stack.hierarchy(state, order))
+    assert [key.order for key, _ in blend._visits] == [("pointing",), ("position",)]
+    assert blend.weight == 1.0
+    np.testing.assert_array_equal(x, resolution.x)
+
+
+def test_each_stack_gets_its_own_memory_back():
+    given = []
+
+    class Remembering:
+        def solve(self, h, memory=None):
+            given.append((h.names, memory))
+            return Resolution(np.zeros(h.n), memory=h.names)
+
+    stack, blend = Stack([HAND, AXIS], "velocity"), Blend(TIME)
+    for k, order in enumerate([("position",), ("pointing",)] * 3):
+        state = scene.state_at(*scene.states(1)[0], k * 0.01)
+        blend.resolve(Remembering(), stack, state, order, stack.hierarchy(state, order))
+    assert all(memory in (None, names) for names, memory in given)
+    assert sum(memory is None for _, memory in given) == 2
+
+
+@pytest.mark.parametrize("change", ["control.transition=smooth", "control.transition_time=0",
+                                    "control.transition_time=inf", "control.transitoin=blend"])
+def test_a_transition_that_does_not_exist_is_refused(change):
+    with pytest.raises(HierarchyError, match=r"control\.transit"):
+        load("ellipse", [change])
+
+
+# Closed loop. The first ticks are left out: the start is off the path, and the command jumps there.
+
+def steps(run, signal):
+    return np.abs(np.diff(run[signal][10:], axis=0)).max()
+
+
+def runs(name, *changes):
+    return (simulate(load(name, ["control.duration=8.0", *changes, *more]))
+            for more in ([], ["control.transition=blend"]))
+
+
+def test_at_velocity_level_the_speed_no_longer_jumps():
+    jumping, smooth = runs("ellipse-velocity")
+    assert steps(jumping, "v") > 1.0
+    assert steps(smooth, "v") < 0.1
+    assert jumping.switches().size > 10
+    for run in (jumping, smooth):
+        assert run.fault is None
+        late = run["t"] > 2.0
+        assert np.median(np.linalg.norm(run["position_error"][late], axis=1)) < 1e-3
+    assert "transition" not in jumping
+    assert 0.0 <= smooth["transition"].min() < 0.1
+    assert smooth["transition"].max() == 1.0
+
+
+@pytest.mark.parametrize("resolver", ["tpm", "hcod"])
+def test_at_acceleration_level_the_acceleration_no_longer_jumps(resolver):
+    jumping, smooth = runs("ellipse-35deg", f"control.resolver={resolver}")
+    assert steps(jumping, "a") > 5.0
+    assert steps(smooth, "a") < 1.0
+
+
+def test_a_stack_that_never_changes_is_not_touched():
+    changes = ["avoidance.near=0.0", "avoidance.far=0.0", "pointing.kind=equality",
+               "control.duration=0.5"]
+    plain = simulate(load("ellipse", changes))
+    same = simulate(load("ellipse", [*changes, "control.transition=blend"]))
+    assert len(plain.orders) == 1
+    np.testing.assert_array_equal(same["q"], plain["q"])
+    np.testing.assert_array_equal(same["transition"], 1.0)
