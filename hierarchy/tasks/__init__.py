@@ -2,6 +2,7 @@
 
 from hierarchy.task import Task
 from hierarchy.tasks.avoidance import Avoidance
+from hierarchy.tasks.danger_bounds import DangerBounds
 from hierarchy.tasks.joint_limits import JointLimits
 from hierarchy.tasks.pointing import Pointing
 from hierarchy.tasks.pose import Pose
@@ -11,10 +12,11 @@ from hierarchy.tasks.self_separation import SelfSeparation
 from hierarchy.tasks.separation import Separation
 
 TASKS: dict[str, type[Task]] = {
-    "avoidance": Avoidance, "damping": JointDamping, "joint limits": JointLimits,
-    "pointing": Pointing, "pose": Pose, "position": Position, "posture": Posture,
+    "avoidance": Avoidance, "damping": JointDamping, "danger bounds": DangerBounds,
+    "joint limits": JointLimits, "pointing": Pointing, "pose": Pose, "position": Position,
+    "posture": Posture,
     "self-separation": SelfSeparation, "separation": Separation,
 }
 
-__all__ = ["TASKS", "Avoidance", "JointDamping", "JointLimits", "Pointing", "Pose", "Position",
-           "Posture", "SelfSeparation", "Separation"]
+__all__ = ["TASKS", "Avoidance", "DangerBounds", "JointDamping", "JointLimits", "Pointing", "Pose",
+           "Position", "Posture", "SelfSeparation", "Separation"]

@@ -1,0 +1,158 @@
+"""Collision avoidance as bounds of the joints: what moves toward an obstacle is slowed down."""
+
+# mypy: disable-error-code="no-untyped-def"
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hierarchy.avoidance.control_points import ControlPoint, pack_points
+from hierarchy.avoidance.measurement import Measurement
+from hierarchy.avoidance.repulsion import Repulsion, repulsion
+from hierarchy.compiled import compiled
+from hierarchy.errors import HierarchyError
+from hierarchy.kinematics import point_at
+from hierarchy.limits import clipped
+from hierarchy.problem import Array
+from hierarchy.robot import State
+from hierarchy.task import Level, Task
+from hierarchy.tasks.joint_limits import JointLimits
+
+
+@dataclass(frozen=True)
+class DangerBounds(Task):
+    """Keep every joint within `limits`, and slow those that move a control point to an obstacle.
+
+    n rows, those of `limits` with a box that is at most as large, and never empty. A control point
+    at distance D [m], r being the direction away from its nearest obstacle, is in danger
+
+        f(D) = g(D) / g(0),  g(D) = 1 / (1 + exp((2 D / reach - 1) shape))
+
+    which is 1 at contact and near 0 from `reach` on. Of each joint with velocity limit V that
+    supports the point, one side is brought in: the next velocity w has w <= V (1 - f) where the
+    joint's column of r^T J_c is negative, w >= -V (1 - f) where it is positive, and both sides are
+    free where it is at most `lever` [m]. Of all points the greatest danger counts. At acceleration
+    level w = v + a T; a joint beyond such a bound brakes as hard as `limits` allow until it is not.
+    Braking is never forbidden.
+
+    So, once the joints are within these bounds, a point nears a resting obstacle at most at (1 - f)
+    times the sum of V |r^T J_c| over the joints, which is nothing at contact. Nothing is pushed
+    away: an obstacle that comes nearer is not fled from. At acceleration level `reach` must leave
+    way to brake. A bound jumps where a column changes its sign, and f sees only the nearest
+    obstacle of each point.
+
+    `points` are the control points in the order of the measurement; with those of the sensor, the
+    end effector is the last of them. Source: Flacco, Kroeger, De Luca, Khatib, "A depth space
+    approach to human-robot collision avoidance", ICRA 2012, reference [10] of the letter; there f
+    is g, which leaves exp(-shape) of the velocity at contact.
+
+    Raises HierarchyError where a joint has no velocity limit, there is no point, or a number makes
+    no sense.
+    """
+
+    limits: JointLimits
+    points: Sequence[ControlPoint]
+    reach: float = 0.4
+    shape: float = 6.0
+    lever: float = 1e-9
+    name: str = "danger bounds"
+    joints: NDArray[np.int64] = field(init=False, repr=False, compare=False)
+    offsets: Array = field(init=False, repr=False, compare=False)
+    danger: Repulsion = field(init=False, repr=False, compare=False)
+    kind = "inequality"
+
+    def __post_init__(self) -> None:
+        if not self.points:
+            raise HierarchyError(f"task {self.name!r}: needs at least one control point")
+        if not 0.0 <= self.lever < np.inf:
+            raise HierarchyError(f"task {self.name!r}: lever {self.lever} m must not be negative")
+        for (i,) in np.argwhere(~np.isfinite(self.limits.robot.velocity_limit))[:1]:
+            raise HierarchyError(f"task {self.name!r}: joint {self.limits.robot.joint_names[i]} "
+                                 "has no velocity limit to scale")
+        try:
+            danger = Repulsion(1.0, self.reach, self.shape)
+        except HierarchyError as error:
+            raise HierarchyError(f"task {self.name!r}: {error}") from error
+        joints, offsets = pack_points(self.points)
+        object.__setattr__(self, "danger", danger)
+        object.__setattr__(self, "joints", joints)
+        object.__setattr__(self, "offsets", offsets)
+
+    @property
+    def dimension(self) -> int:
+        """One row a joint."""
+        return self.limits.dimension
+
+    def box(self, state: State, level: Level) -> tuple[Array, Array]:
+        """Return the least and the greatest command (n,), (n,) at a state; never empty."""
+        lower, upper = self.limits.box(state, level)
+        self._bring_in(state, level, lower, upper, 0)
+        return lower, upper
+
+    def error(self, state: State) -> Array:
+        """How far each joint is from its range (n,) [rad or m], zero within."""
+        return self.limits.error(state)
+
+    def jacobian(self, state: State) -> Array:
+        """The identity (n, n)."""
+        return self.limits.jacobian(state)
+
+    def jacobian_derivative(self, state: State) -> Array:
+        """Zero (n, n)."""
+        return self.limits.jacobian_derivative(state)
+
+    def write(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
+              row: int) -> None:
+        """See `Task.write`; the rows have two sides."""
+        self.limits.write(state, level, A, lower, upper, row)
+        self._bring_in(state, level, lower, upper, row)
+
+    def _bring_in(self, state: State, level: Level, lower: Array, upper: Array, row: int) -> None:
+        seen = self._seen(state)
+        _bring_in(state.v, state.J, state.placements, state.supports, self.joints, self.offsets,
+                  seen.distance, seen.direction, self.reach, self.shape, self.lever,
+                  self.limits.limits.packed[2], self.limits.period, level == "acceleration",
+                  lower, upper, row)
+
+    def _seen(self, state: State) -> Measurement:
+        seen = state.measurement
+        if seen is None:
+            raise HierarchyError(f"task {self.name!r}: the state carries no measurement")
+        if len(self.points) > len(seen.distance):
+            raise HierarchyError(f"task {self.name!r}: {len(self.points)} control points, and "
+                                 f"distances of {len(seen.distance)}")
+        return seen
+
+
+@compiled
+def _bring_in(v, J, placements, supports, joints, offsets, distance, direction, reach, shape,
+              lever, V, T, acceleration, lower, upper, row):
+    """Bring in the sides of a box of n joints that begins at `row`."""
+    n = len(v)
+    danger = np.zeros((2, n))  # of moving backward, and forward
+    contact = repulsion(0.0, 1.0, reach, shape, 2.0)
+    for k in range(len(joints)):
+        joint, r = joints[k], direction[k]
+        f = min(repulsion(max(distance[k], 0.0), 1.0, reach, shape, 2.0) / contact, 1.0)
+        x = point_at(placements, joint, offsets[k], 0)
+        y = point_at(placements, joint, offsets[k], 1)
+        z = point_at(placements, joint, offsets[k], 2)
+        for c in range(n):
+            if supports[joint, c]:
+                away = (r[0] * (J[0, c] + J[4, c] * z - J[5, c] * y)
+                        + r[1] * (J[1, c] + J[5, c] * x - J[3, c] * z)
+                        + r[2] * (J[2, c] + J[3, c] * y - J[4, c] * x))  # column c of r^T J_c
+                if away > lever:
+                    danger[0, c] = max(danger[0, c], f)
+                elif away < -lever:
+                    danger[1, c] = max(danger[1, c], f)
+    for c in range(n):
+        low, up = -V[c] * (1.0 - danger[0, c]), V[c] * (1.0 - danger[1, c])
+        if acceleration:
+            low, up = (low - v[c]) / T, (up - v[c]) / T
+        least, most = lower[row + c], upper[row + c]
+        lower[row + c], upper[row + c] = clipped(low, least, most), clipped(up, least, most)

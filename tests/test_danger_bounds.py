@@ -1,0 +1,202 @@
+"""Bounds that slow a joint which would move a control point to an obstacle."""
+
+import numpy as np
+import pytest
+from scene import BODY, FRAME, ROBOT, SENSOR, TIP, state_at, states
+
+from hierarchy import HierarchyError, Stack
+from hierarchy.avoidance import Obstacle, Obstacles
+from hierarchy.paths import Still
+from hierarchy.tasks import JointDamping, JointLimits, Position
+from hierarchy.tasks.danger_bounds import DangerBounds
+from scenarios.plants import KinematicArm
+from scenarios.sensors import ExactDistances
+from solvers import Status, make
+
+PERIOD, REACH, SHAPE = 1e-3, 0.5, 6.0
+LIMITS = JointLimits(ROBOT, 30.0, PERIOD)
+QUICK = JointLimits(ROBOT, 1e6, PERIOD)  # its accelerations limit nothing
+V = ROBOT.velocity_limit
+STATES = states(40, seed=8)
+
+levels = pytest.mark.parametrize("level", ["velocity", "acceleration"])
+
+
+def task(limits=LIMITS, **settings):
+    return DangerBounds(limits, SENSOR.points, **({"reach": REACH, "shape": SHAPE} | settings))
+
+
+def danger(distance):
+    near = np.exp(-SHAPE)  # so that the danger is 1 at contact
+    return (1.0 + near) / (1.0 + near * np.exp(2.0 * max(distance, 0.0) / REACH * SHAPE))
+
+
+def columns(q, v):
+    """r^T J_c (K, n) of all points, by central differences of where they are."""
+    seen, step = state_at(q, v).measurement, 1e-6
+    there = [[state_at(q + sign * step * e, v).measurement.points.copy() for sign in (1, -1)]
+             for e in np.eye(7)]
+    J = np.array([(plus - minus) / (2 * step) for plus, minus in there])  # (n, K, 3)
+    state_at(q, v)
+    return np.einsum("nki,ki->kn", J, seen.direction)
+
+
+def velocity_sides(q, v):
+    """What the greatest danger leaves of each joint's velocities, from the definition."""
+    seen = state_at(q, v).measurement
+    f = np.array([danger(D) for D in seen.distance])
+    toward = columns(q, v)
+    forward = np.max(np.where(toward < -1e-8, f[:, None], 0.0), axis=0)
+    backward = np.max(np.where(toward > 1e-8, f[:, None], 0.0), axis=0)
+    return -V * (1.0 - backward), V * (1.0 - forward)
+
+
+def test_the_bounds_are_those_of_the_definition_at_velocity_level():
+    brought_in = 0
+    for q, v in STATES:
+        low, up = task(QUICK).box(state_at(q, v), "velocity")
+        least, most = QUICK.box(state_at(q, v), "velocity")
+        expected = [np.clip(side, least, most) for side in velocity_sides(q, v)]
+        np.testing.assert_allclose([low, up], expected, atol=1e-7)
+        brought_in += (up < most - 1e-3).sum() + (low > least + 1e-3).sum()
+    assert brought_in > 100
+
+
+def test_the_bounds_are_those_of_the_next_velocity_at_acceleration_level():
+    for q, v in STATES:
+        box = task(QUICK).box(state_at(q, 0.1 * v), "acceleration")
+        whole = QUICK.box(state_at(q, 0.1 * v), "acceleration")
+        for side, wanted in zip(box, velocity_sides(q, 0.1 * v), strict=True):
+            expected = np.clip((wanted - 0.1 * v) / PERIOD, *whole)
+            np.testing.assert_allclose(side, expected, rtol=1e-7)
+
+
+@levels
+def test_the_box_is_never_empty_lies_in_that_of_the_limits_and_lets_a_joint_brake(level):
+    rng = np.random.default_rng(0)
+    for q, v in STATES:
+        for fast in (0.0, 0.5, 3.0):
+            state = state_at(q + rng.normal(size=7), fast * v)
+            low, up = task().box(state, level)
+            least, most = LIMITS.box(state, level)
+            assert (least <= low).all()
+            assert (low <= up).all()
+            assert (up <= most).all()
+            halt = np.clip(-state.v / PERIOD if level == "acceleration" else 0.0, least, most)
+            assert (low <= halt).all()
+            assert (halt <= up).all()
+
+
+def test_a_joint_that_is_too_fast_brakes_as_hard_as_it_may():
+    braked = 0
+    for q, _ in STATES:
+        _, up = velocity_sides(q, np.zeros(7))
+        for j in np.flatnonzero(up < 0.9 * V):
+            v = 0.5 * (up + V) * np.eye(7)[j]
+            hardest = LIMITS.box(state_at(q, v), "acceleration")[0][j]
+            assert task().box(state_at(q, v), "acceleration")[1][j] == hardest
+            braked += 1
+    assert braked > 20
+
+
+def test_no_command_of_the_box_nears_a_point_faster_than_the_danger_lets_it():
+    rng = np.random.default_rng(1)
+    for q, _ in STATES:
+        state = state_at(q, np.zeros(7))
+        low, up = task(QUICK).box(state, "velocity")
+        distances, toward = state.measurement.distance.copy(), columns(q, np.zeros(7))
+        for D, row in zip(distances, toward, strict=True):
+            most = (1.0 - danger(D)) * np.abs(row) @ V
+            worst = np.where(row > 0.0, low, up)  # the command that nears it fastest
+            for x in (worst, *rng.uniform(low, up, (20, 7))):
+                assert row @ x >= -most - 1e-7
+
+
+@levels
+def test_without_obstacles_the_box_is_that_of_the_limits(level):
+    state = ROBOT.state(*STATES[0])
+    ExactDistances(ROBOT, Obstacles([]), BODY, TIP).measure(state)
+    np.testing.assert_array_equal(task().box(state, level), LIMITS.box(state, level))
+
+
+@levels
+def test_the_rows_are_the_identity_with_the_box_as_sides(level):
+    for q, v in STATES[:5]:
+        state = state_at(q, v)
+        A, low, up = np.full((9, 7), 5.0), np.full(9, 5.0), np.full(9, 5.0)
+        task().write(state, level, A, low, up, 1)
+        np.testing.assert_array_equal(A[1:8], np.eye(7))
+        np.testing.assert_array_equal([low[1:8], up[1:8]], task().box(state, level))
+        assert (A[[0, 8]] == 5.0).all()
+        assert (low[[0, 8]] == up[[0, 8]]).all()
+        assert not task().jacobian_derivative(state).any()
+        np.testing.assert_array_equal(task().jacobian(state), np.eye(7))
+        np.testing.assert_array_equal(task().error(state), LIMITS.error(state))
+
+
+def test_a_joint_that_only_turns_about_the_point_is_free():
+    q = np.array([0.3, 0.4, 0.0, 0.5, 0.2, 0.1, 0.6])
+    state = ROBOT.state(q)
+    axis = ROBOT.control_point("joint_1", (0.0, 0.0, 0.0))
+    sensor = ExactDistances(ROBOT, Obstacles([Obstacle("point", (0.01, 0.01, 0.0))]), BODY, TIP)
+    sensor.measure(state)
+    state.measurement.distance[0] = 0.001
+    bounds = DangerBounds(QUICK, [axis], reach=REACH)
+    np.testing.assert_array_equal(bounds.box(state, "velocity"), QUICK.box(state, "velocity"))
+
+
+@pytest.mark.parametrize(("settings", "said"), [
+    ({"reach": 0.0}, "task 'danger bounds': repulsion reach must be positive"),
+    ({"shape": -1.0}, "task 'danger bounds': repulsion shape must be positive"),
+    ({"lever": -1.0}, "task 'danger bounds': lever -1.0 m must not be negative"),
+])
+def test_bad_settings_are_named(settings, said):
+    with pytest.raises(HierarchyError, match=said):
+        task(**settings)
+
+
+def test_what_it_cannot_do_without_is_named(monkeypatch):
+    with pytest.raises(HierarchyError, match="needs at least one control point"):
+        DangerBounds(LIMITS, ())
+    with pytest.raises(HierarchyError, match="the state carries no measurement"):
+        task().box(ROBOT.state(np.zeros(7)), "velocity")
+    with pytest.raises(HierarchyError, match="18 control points, and distances of 9"):
+        DangerBounds(LIMITS, SENSOR.points * 2).box(state_at(*STATES[0]), "velocity")
+    monkeypatch.setattr(ROBOT, "velocity_limit", np.array([1.0, np.inf, 1, 1, 1, 1, 1]))
+    with pytest.raises(HierarchyError, match="joint joint_2 has no velocity limit"):
+        task()
+
+
+START = np.array([0.923, -0.854, 0.903, 1.195, 0.971, 1.796, 0.0])
+
+
+def closest(level, first, resolver, obstacles, goal, ticks=1500):
+    """Go to a goal; return the least distance of all points and the least slack of the box."""
+    sensor = ExactDistances(ROBOT, obstacles, BODY, TIP)
+    stack = Stack([first, Position(FRAME, goal)], level, reference=JointDamping(7, 5.0))
+    plant, state = KinematicArm(ROBOT, START, np.zeros(7), PERIOD, level), ROBOT.state(START)
+    nearest, slack = np.inf, np.inf
+    for tick in range(ticks):
+        state.move(tick * PERIOD, plant.q, plant.v)
+        nearest = min(nearest, sensor.measure(state).distance.min())
+        h = stack.hierarchy(state)
+        res = resolver.solve(h)
+        assert res.status is Status.SOLVED
+        slack = min(slack, (h.upper[:7] - res.x).min(), (res.x - h.lower[:7]).min())
+        plant.act(res.x)
+    return nearest, slack
+
+
+@levels
+@pytest.mark.parametrize("resolver", [make("sns"), make("sns", form="optimal", scales="miss")],
+                         ids=str)
+def test_with_sns_the_arm_stops_before_an_obstacle_on_its_way(level, resolver):
+    """The goal lies 0.3 m ahead, a ball of 5 cm half way to it."""
+    ahead = ROBOT.state(START).position(FRAME) + np.array([0.0, 0.0, 0.3])
+    obstacles = Obstacles([Obstacle("sphere", tuple(ahead - np.array([0.0, 0.0, 0.15])), (0.05,))])
+    goal = Still(tuple(ahead))
+    through, _ = closest(level, LIMITS, resolver, obstacles, goal)
+    before, slack = closest(level, task(reach=0.2), resolver, obstacles, goal)
+    assert through < -0.02
+    assert before > 0.0
+    assert slack >= 0.0
