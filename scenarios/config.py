@@ -113,7 +113,7 @@ class ControlSection(_Section):
 
     `transition` = "blend": where the order of the stack or the active control point changes, the
     command passes over from the old stack's to the new one's within `transition_time` [s]; "none":
-    at once.
+    at once. A task that enters, such as an avoidance, has its full effect only after that time.
     """
 
     level: Literal["velocity", "acceleration"] = "acceleration"

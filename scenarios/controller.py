@@ -41,10 +41,8 @@ class Controller:
         self.resolver = scenario.make_resolver() if resolver is None else resolver
         control = scenario.control
         self.level, self.clock = control.level, clock
-        limits = getattr(cell, "limits", None)
-        self.policy = Policy(control.policy, control.level, control.period,
-                             None if limits is None
-                             else partial(limits.clamp, cell.state, control.level))
+        clamp = partial(cell.limits.clamp, cell.state, control.level) if cell.limits else None
+        self.policy = Policy(control.policy, control.level, control.period, clamp)
         self.blend = Blend(control.transition_time) if control.transition == "blend" else None
         self.cone_error = nan
         self.allocation = Allocation((), repulsion=False)

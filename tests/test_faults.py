@@ -1,0 +1,239 @@
+"""Faults put into a run: every command is finite, the run says what happened, and goes on."""
+
+import json
+
+import numpy as np
+import pytest
+
+from hierarchy import HierarchyError
+from scenarios.build import build
+from scenarios.cli import run_command
+from scenarios.config import load
+from scenarios.faults import Faults
+from scenarios.metrics import measure
+from scenarios.recording import load_run, save
+from scenarios.simulate import simulate
+from solvers import Status
+
+AT, LASTS, END = 50, 60, 200  # ticks of 1 ms
+INSIDE = "place={joint='joint_4', offset=[0.0, 0.0, 0.0]}, radius=0.05"
+STATUSES = ("iteration_limit", "numerical_failure", "backend_failure", "inaccurate")
+
+# What is put into the run, the kind of trouble it makes, and after how many ticks.
+FAULTS = {
+    "all positions": ("nan_position", "", "not_finite", 0),
+    "one position": ("nan_position", "joint=3", "not_finite", 0),
+    "all velocities": ("nan_velocity", "", "not_finite", 0),
+    "one velocity": ("nan_velocity", "joint=7", "not_finite", 0),
+    "all distances": ("nan_distance", "", "not_finite", 0),
+    "the distance of the end effector": ("nan_distance", "point=9", "not_finite", 0),
+    "stale": ("stale", "", "stale", 20),  # the last measurement is one tick old already
+    **{status: ("status", f"status={status!r}", status, 0) for status in STATUSES},
+    "overrun": ("overrun", "takes=60.0", "overrun", 0),
+    "obstacle": ("obstacle", INSIDE, "inside", 0),
+}
+LIMITED = ["limits.acceleration=10.0", "control.resolver=hcod"]
+
+
+def faults(*kinds_and_settings, at=AT, lasts=LASTS):
+    tables = [", ".join(part for part in (f"kind='{kind}', at={at * 1e-3}, "
+                                          f"duration={lasts * 1e-3}", settings) if part)
+              for kind, settings in kinds_and_settings]
+    return f"faults=[{', '.join('{' + table + '}' for table in tables)}]"
+
+
+def scenario(name, fault, *changes, kind=None, policy="brake", ticks=END):
+    chosen = [f"control.policy.{kind}={policy}"] if kind else []
+    return load(name, [f"control.duration={ticks * 1e-3}", "control.policy.deadline=30.0", *chosen,
+                       *([fault] if fault else []), *changes])
+
+
+def true_motion(run):
+    """q, v (ticks, n) from the start and the commands alone, whatever was measured."""
+    T, q, v = run.scenario.control.period, run["q"][0].copy(), run["v"][0].copy()
+    motion = []
+    for x in run["command"]:
+        motion.append((q, v))
+        if run.scenario.control.level == "velocity":
+            q, v = q + x * T, x
+        else:
+            q, v = q + v * T + x * T * T / 2, v + x * T
+    return [np.array(part) for part in zip(*motion, strict=True)]
+
+
+def within_limits(run):
+    limits = build(run.scenario).limits.limits
+    for q, v, x in zip(*true_motion(run), run["command"], strict=True):
+        low, up = limits.box(q, v, run.scenario.control.level)
+        slack = 1e-9 * (1.0 + np.abs(low) + np.abs(up))
+        if (x < low - slack).any() or (x > up + slack).any():
+            return False
+    return True
+
+
+@pytest.mark.parametrize("limited", [False, True], ids=["free", "limited"])
+@pytest.mark.parametrize("policy", ["brake", "hold", "stop"])
+@pytest.mark.parametrize("name", ["ellipse", "ellipse-velocity"])
+@pytest.mark.parametrize("fault", FAULTS)
+def test_every_fault_under_every_policy(name, fault, policy, limited):
+    put, settings, kind, later = FAULTS[fault]
+    run = simulate(scenario(name, faults((put, settings)), *(LIMITED if limited else []),
+                            kind=kind, policy=policy))
+    assert np.isfinite(run["command"]).all()
+    assert np.isfinite(run["q"]).all()
+    np.testing.assert_allclose(run["q"], true_motion(run)[0], rtol=0, atol=1e-9)
+    if limited:
+        assert within_limits(run)
+    first = AT + later
+    told = [event for event in run.events if event.kind != "beyond_limits"]
+    assert (told[0].tick, told[0].kind, told[0].action) == (first, kind, policy)
+    assert {event.kind for event in told} == {kind}
+    if policy == "stop":
+        assert run.fault == f"stopped by its policy at t = {first * 1e-3:.3f} s: {kind}"
+        assert run.ticks < END
+        last, v = run["command"][-1], true_motion(run)[1][-1]
+        rest = v + last * 1e-3 if run.scenario.control.level == "acceleration" else last
+        np.testing.assert_allclose(rest, 0.0, atol=1e-8)
+        return
+    assert run.fault is None
+    assert run.ticks == END
+    assert [event.tick for event in told] == list(range(first, AT + LASTS))
+    held = [event for event in told if event.action == "hold"]
+    assert len(held) == (10 if policy == "hold" else 0)
+    assert (run["status"][AT + LASTS:] == Status.SOLVED).all()
+    assert np.abs(run["v"][-1]).max() > 1e-2  # it moves again
+
+
+def test_faults_leave_the_run_before_them_as_it_was():
+    clean = simulate(scenario("ellipse", None))
+    spoilt = simulate(scenario("ellipse", faults(*((put, settings)
+                                                   for put, settings, _, _ in FAULTS.values()))))
+    for signal in ("q", "v", "command", "ee_distance", "minimal_distance"):
+        np.testing.assert_array_equal(spoilt[signal][:AT], clean[signal][:AT])
+    assert clean.events == ()
+
+
+def test_a_blind_robot_brakes_to_rest_and_stays_there():
+    for put in ("nan_position", "nan_velocity", "stale"):
+        run = simulate(scenario("ellipse", faults((put, ""), at=500, lasts=1400), ticks=1900))
+        v = true_motion(run)[1]
+        assert np.abs(v[500]).max() > 0.05
+        assert np.abs(v[-1]).max() < 1e-4 * np.abs(v[500]).max()
+
+
+def test_an_answer_under_a_bad_status_may_be_used():
+    clean = simulate(scenario("ellipse", None))
+    for status in ("iteration_limit", "backend_failure", "inaccurate"):
+        fault = faults(("status", f"status='{status}'"))
+        run = simulate(scenario("ellipse", fault, kind=status, policy="use"))
+        np.testing.assert_array_equal(run["q"], clean["q"])
+        assert {(event.kind, event.action) for event in run.events} == {(status, "use")}
+        assert len(run.events) == LASTS
+
+
+def test_an_obstacle_stands_where_the_body_was_and_goes_away_again():
+    run = simulate(scenario("ellipse", faults(("obstacle", INSIDE))))
+    far = simulate(scenario("ellipse", None))
+    during = slice(AT, AT + LASTS)
+    assert run["minimal_distance"][AT] == pytest.approx(-0.05, abs=1e-3)
+    assert run["minimal_distance"][during].max() < 0.0
+    assert run["minimal_distance"][AT + LASTS:].min() > 0.1
+    assert far["minimal_distance"][during].min() > 0.1
+
+
+def test_an_obstacle_outside_the_robot_is_avoided_and_is_no_trouble():
+    fault = faults(("obstacle", "centre=[0.25, 0.6, 0.3], radius=0.02"), lasts=10_000)
+    run = simulate(scenario("ellipse", fault, ticks=1000))
+    assert run["ee_distance"][:AT].min() > run["ee_distance"][AT]
+    assert run.events == ()
+
+
+def test_two_faults_at_once_are_both_told():
+    fault = faults(("overrun", "takes=60.0"), ("status", "status='inaccurate'"))
+    run = simulate(scenario("ellipse", fault))
+    assert {event.kind for event in run.events if event.tick == AT} == {"overrun", "inaccurate"}
+
+
+@pytest.mark.parametrize("transition", ["none", "blend"])
+def test_faults_may_come_during_a_transition(transition):
+    fault = faults(("nan_distance", ""), ("status", "status='inaccurate'"), at=2000, lasts=300)
+    run = simulate(scenario("ellipse-35deg", fault, f"control.transition={transition}",
+                            ticks=4000))
+    assert run.fault is None
+    assert np.isfinite(run["command"]).all()
+    assert (run["status"][2300:] == Status.SOLVED).all()
+
+
+def test_with_the_letters_wrong_jacobians_too():
+    """Their rows are written in numpy and would refuse a NaN."""
+    run = simulate(scenario("ellipse-published", faults(("nan_distance", ""),
+                                                        ("nan_position", ""))))
+    assert run.fault is None
+
+
+def test_a_hierarchical_stack_survives_its_sensor():
+    fault = faults(("nan_distance", ""))
+    run = simulate(scenario("ellipse-hqp", fault))
+    assert run.fault is None
+    assert {event.kind for event in run.events} == {"not_finite"}
+    run = simulate(scenario("ellipse-hqp", faults(("obstacle", INSIDE))))
+    assert {event.kind for event in run.events} == {"inside"}
+
+
+def test_what_happened_is_saved_counted_and_loaded_again(tmp_path):
+    run = simulate(scenario("ellipse", faults(("nan_position", "")), kind="not_finite",
+                            policy="hold"))
+    found = measure(run)
+    assert (found["ticks_hold"].value, found["ticks_brake"].value) == (10, LASTS - 10)
+    loaded = load_run(save(run, tmp_path / "run", figures=False))
+    assert loaded.events == run.events
+    events = json.loads((tmp_path / "run" / "metrics.json").read_text())["events"]
+    assert events == [
+        {"kind": "not_finite", "action": "hold", "ticks": 10, "first_tick": AT,
+         "first_time": pytest.approx(AT * 1e-3)},
+        {"kind": "not_finite", "action": "brake", "ticks": LASTS - 10, "first_tick": AT + 10,
+         "first_time": pytest.approx((AT + 10) * 1e-3)}]
+
+
+def test_the_command_line_says_what_happened_and_fails_only_where_the_run_ended(
+        tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    arguments = ["run", "ellipse", "--duration", "0.2", "--set", faults(("nan_position", ""))]
+    assert run_command(arguments) == 0
+    said = capsys.readouterr().out
+    assert "not_finite: brake in 60 ticks, first in tick 50 (t = 0.050 s)\n" in said
+    assert "Ticks braked" in said
+    assert run_command([*arguments, "--set", "control.policy.not_finite=stop"]) == 1
+    captured = capsys.readouterr()
+    assert "not_finite: stop in 1 ticks" in captured.out
+    assert "fault: stopped by its policy at t = 0.050 s: not_finite" in captured.err
+
+
+@pytest.mark.parametrize(("fault", "said"), [
+    ("{kind='nan_positon', at=1, duration=1}", "faults.0.kind: Input should be"),
+    ("{kind='status', at=1, duration=1}", "'status' needs status"),
+    ("{kind='status', at=1, duration=1, status='solved'}", "faults.0.status: Input should be"),
+    ("{kind='stale', at=1, duration=1, joint=3}", "'stale' takes no joint"),
+    ("{kind='overrun', at=1, duration=1}", "'overrun' needs takes"),
+    ("{kind='obstacle', at=1, duration=1, radius=0.1}", "either a centre or a place"),
+    ("{kind='stale', at=-1, duration=1}", "faults.0.at"),
+    ("{kind='stale', at=1, duration=0}", "faults.0.duration"),
+    ("{kind='stale', at=1, durration=1, duration=1}", "durration"),
+    ("{kind='nan_position', at=1, duration=1, joint=8}", "faults.0.joint = 8: robot 'kuka_lwr'"),
+    ("{kind='nan_distance', at=1, duration=1, point=10}", "faults.0.point = 10: robot"),
+    ("{kind='obstacle', at=1, duration=1, radius=0.1, place={joint='elbow', offset=[0, 0, 0]}}",
+     "unknown joint 'elbow'"),
+])
+def test_a_fault_that_cannot_be_put_in_is_named(fault, said):
+    with pytest.raises(HierarchyError) as error:
+        Faults(load("ellipse", [f"faults=[{fault}]"]))
+    assert said in str(error.value)
+
+
+def test_a_fault_of_distances_needs_a_sensor(tmp_path):
+    path = tmp_path / "blind.toml"
+    path.write_text('name = "blind"\n[robot]\nmodel = "kuka_lwr"\n[control]\nresolver = "tpm"\n'
+                    'duration = 1.0\n[position.path]\nkind = "still"\nposition = [0.0, 0.6, 0.0]\n'
+                    '[[faults]]\nkind = "nan_distance"\nat = 0.1\nduration = 0.1\n')
+    with pytest.raises(HierarchyError, match="'nan_distance' needs"):
+        load(path)
