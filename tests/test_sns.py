@@ -119,6 +119,54 @@ def test_a_scaled_level_makes_up_for_that_share_of_what_it_misses():
     assert scaled > 10 or not JIT
 
 
+def as_printed(levels, low, up):
+    """The algorithm of the paper with its projectors and pseudo-inverses; full rank, zero inside.
+
+    Returns x and the scalings, or None where the paper leaves open which joint is critical.
+    """
+    n, x, P, scalings = len(low), np.zeros(len(low)), np.eye(len(low)), []
+    for J, b in levels:
+        W, way, best, s_best = np.eye(n), np.zeros(n), x, -1.0
+        while True:
+            saturated = np.linalg.pinv((np.eye(n) - W) @ P, rcond=1e-9)
+            inverse_of = J @ ((np.eye(n) - saturated) @ P)
+            if np.linalg.matrix_rank(inverse_of, tol=1e-9) < len(J):
+                break
+            inverse, start = np.linalg.pinv(inverse_of), x + saturated @ way
+            a, c = inverse @ b, start - inverse @ J @ start
+            free = np.diag(W) > 0.0
+            s_up, s_low = (up + 1e-11 - c)[free] / a[free], (low - 1e-11 - c)[free] / a[free]
+            s_max, s_min = np.maximum(s_up, s_low), np.minimum(s_up, s_low)
+            critical = np.flatnonzero(free)[np.argmin(s_max)]
+            if s_min.max() <= min(s_max.min(), 1.0) and s_max.min() >= 0.0:
+                s = min(s_max.min(), 1.0)
+                if s > s_best:
+                    s_best, best = s, s * a + c
+                if s == 1.0:
+                    break
+            if s_max.min() >= 1.0:
+                return None
+            side = up if a[critical] + c[critical] > up[critical] else low
+            W[critical, critical], way[critical] = 0.0, side[critical] - x[critical]
+        x = best
+        scalings.append(max(s_best, 0.0))
+        P = P - np.linalg.pinv(J @ P, rcond=1e-9) @ J @ P
+    return x, scalings
+
+
+def test_the_basic_form_is_the_algorithm_as_printed():
+    judged = 0
+    for seed in range(MANY):
+        levels = random_levels(7, (2, 2, 1), seed)
+        low, up = -np.random.default_rng(seed).uniform(0.1, 1.5, (2, 7)) * [[1.0], [-1.0]]
+        res, printed = BASIC.solve(boxed(low, up, *levels)), as_printed(levels, low, up)
+        if printed is not None:
+            np.testing.assert_allclose(res.x, printed[0], atol=1e-9)
+            np.testing.assert_allclose(res.scaling[1:], printed[1], atol=1e-9)
+            judged += any(0.0 < s < 1.0 for s in printed[1])
+    assert judged > 50 or not JIT
+
+
 # The planar arm of four unit links of the papers, q = (90, -90, 90, -90) degrees, and speeds of at
 # most 2, 1, 4, 4 rad/s.
 ARM = np.array([[-2.0, -1.0, -1.0, 0.0], [2.0, 2.0, 1.0, 1.0]])
