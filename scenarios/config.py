@@ -603,7 +603,7 @@ def _kinds_at(path: list[str]) -> set[str]:
 def _sections_at(path: list[str]) -> list[Any]:
     """The sections that may stand at a path: more than one where a kind decides."""
     sections: list[Any] = [Scenario]
-    for key in path:
+    for key in (key for key in path if not key.isdigit()):  # a place in a list is no key
         fields = [section.model_fields[key] for section in sections if key in section.model_fields]
         sections = [found for field in fields for found in _sections_in(field.annotation)]
     return sections

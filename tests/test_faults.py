@@ -218,7 +218,7 @@ def test_the_command_line_says_what_happened_and_fails_only_where_the_run_ended(
     ("{kind='obstacle', at=1, duration=1, radius=0.1}", "either a centre or a place"),
     ("{kind='stale', at=-1, duration=1}", "faults.0.at"),
     ("{kind='stale', at=1, duration=0}", "faults.0.duration"),
-    ("{kind='stale', at=1, durration=1, duration=1}", "durration"),
+    ("{kind='stale', at=1, durration=1, duration=1}", "did you mean 'faults.0.duration'"),
     ("{kind='nan_position', at=1, duration=1, joint=8}", "faults.0.joint = 8: robot 'kuka_lwr'"),
     ("{kind='nan_distance', at=1, duration=1, point=10}", "faults.0.point = 10: robot"),
     ("{kind='obstacle', at=1, duration=1, radius=0.1, place={joint='elbow', offset=[0, 0, 0]}}",
