@@ -22,6 +22,7 @@ from hierarchy.problem import Array
 from hierarchy.robots import TABLES
 from hierarchy.tasks import (
     Avoidance,
+    DangerBounds,
     JointDamping,
     JointLimits,
     Pointing,
@@ -114,6 +115,12 @@ def make_path(section: PathSection) -> Path:
     if isinstance(section, WaypointsSection):
         return Waypoints(section.times, section.points)
     return Still(section.position)
+
+
+def sensed_points(robot: Robot) -> tuple[ControlPoint, ...]:
+    """Return what a sensor measures: the control points, and the end effector as the last."""
+    end = robot.frame(robot.end_effector)
+    return (*robot.control_points, ControlPoint(end.name, end.joint, end.offset))
 
 
 def make_obstacles(sections: tuple[ObstacleSection, ...]) -> Obstacles:
@@ -210,10 +217,12 @@ def _limits(scenario: Scenario, robot: Robot) -> tuple[JointLimits | None, list[
         return None, []
     try:
         limits = JointLimits(robot, section.acceleration, scenario.control.period, section.margin)
+        box = limits if section.danger_reach is None else DangerBounds(
+            limits, sensed_points(robot), section.danger_reach, name=limits.name)
         torque = [] if section.torque is None else [TorqueLimits(robot, section.torque)]
     except HierarchyError as error:
         raise ScenarioError(f"limits: {error}") from error
-    return limits, [limits, *torque]
+    return limits, [box, *torque]
 
 
 def _avoidance(scenario: Scenario, robot: Robot) -> list[Task]:
@@ -229,11 +238,9 @@ def _avoidance(scenario: Scenario, robot: Robot) -> list[Task]:
 def _separation(section: SeparationSection, robot: Robot) -> list[Task]:
     tasks: list[Task] = []
     if section.obstacles:
-        end = robot.frame(robot.end_effector)
-        points = (*robot.control_points, ControlPoint(end.name, end.joint, end.offset))
         barrier = Barrier(section.distance, section.rate, section.influence, section.recovery,
                           section.limit)
-        tasks.append(Separation(points, barrier, len(section.obstacles)))
+        tasks.append(Separation(sensed_points(robot), barrier, len(section.obstacles)))
     if section.self_collision is not None:
         if robot.name not in TABLES:
             raise ScenarioError(f"avoidance.self_collision: robot {robot.name!r} has no capsules")

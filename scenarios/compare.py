@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 DEFAULT_RESOLVERS: dict[Handles, tuple[str, ...]] = {
     "equalities": ("tpm", "tpm:form=staircase", "recursive", "augmented", "hqp",
                    "hqp:backend=osqp", "hqp:backend=daqp", "hcod"),
-    "bounds": ("tpm:form=staircase", "sns", "weighted", "hqp", "hcod"),
+    "bounds": ("tpm:form=staircase", "sns", "sns:form=optimal", "weighted", "hqp", "hcod"),
     "inequalities": ("weighted", "hqp", "hqp:backend=daqp", "hcod")}
 
 Progress = Callable[[str, int, int], None]

@@ -318,11 +318,14 @@ class LimitsSection(_Section):
 
     Positions and velocities are those of the robot; `acceleration` [rad/s^2] of every joint, or
     one for each; `margin` [rad] is kept off the position limits; `torque` is the share of the
-    effort limits that may be used, at acceleration level, or None for any torque.
+    effort limits that may be used, at acceleration level, or None for any torque. With
+    `danger_reach` [m] joints that would move a control point toward an obstacle nearer than that
+    are slowed, see hierarchy.tasks.DangerBounds.
     """
 
     acceleration: Positive | tuple[Positive, ...]
     margin: NotNegative = 0.0
+    danger_reach: Positive | None = None
     torque: Annotated[float, Field(gt=0.0, le=1.0)] | None = None
 
 
@@ -420,6 +423,8 @@ class Scenario(_Section):
                              '"separation" with "hierarchical"')
         if self.avoidance and switched and not self.position:
             raise ValueError("[avoidance] needs [position]: Algorithm 1 orders one by the other")
+        if self.limits and self.limits.danger_reach and not self.avoidance:
+            raise ValueError("limits.danger_reach needs [avoidance], whose obstacles it sees")
         if self.limits and self.limits.torque and self.control.level == "velocity":
             raise ValueError("limits.torque needs control.level = \"acceleration\"")
         return self
