@@ -134,7 +134,7 @@ def clamp_into_box(q, v, limits, T, acceleration, x):
                            acceleration)
         rest = -v[i] / T if acceleration else 0.0
         x[i] = clipped(rest if np.isnan(x[i]) else x[i], lower, upper)
-        if np.isnan(x[i]):  # q or v is NaN
+        if not np.isfinite(x[i]):  # nor is q or v
             x[i] = 0.0
 
 

@@ -219,12 +219,16 @@ class State:
 
     def mass_matrix(self) -> Array:
         """Joint-space inertia matrix M(q) (n, n) [kg m^2]."""
-        upper = np.triu(pin.crba(self._model, self._data, self.q))
-        return np.ascontiguousarray(upper + np.triu(upper, 1).T)
+        return np.ascontiguousarray(pin.crba(self._model, self._data, self.q))
+
+    def mass_matrix_derivative(self) -> Array:
+        """Time derivative of M(q) (n, n) [kg m^2/s]."""
+        C = pin.computeCoriolisMatrix(self._model, self._data, self.q, self.v)
+        return np.ascontiguousarray(C + C.T)
 
     def bias_effort(self) -> Array:
         """Joint efforts h(q, v) (n,) [N m or N] of gravity, Coriolis and centrifugal forces."""
-        return np.array(pin.nonLinearEffects(self._model, self._data, self.q, self.v))
+        return np.asarray(pin.nonLinearEffects(self._model, self._data, self.q, self.v))
 
     def position(self, frame: Frame) -> Array:
         """World position (3,) [m] of a frame's origin."""

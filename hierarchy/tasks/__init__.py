@@ -10,13 +10,14 @@ from hierarchy.tasks.position import Position
 from hierarchy.tasks.posture import JointDamping, Posture
 from hierarchy.tasks.self_separation import SelfSeparation
 from hierarchy.tasks.separation import Separation
+from hierarchy.tasks.torque_limits import TorqueLimits
 
 TASKS: dict[str, type[Task]] = {
     "avoidance": Avoidance, "damping": JointDamping, "danger bounds": DangerBounds,
     "joint limits": JointLimits, "pointing": Pointing, "pose": Pose, "position": Position,
     "posture": Posture,
-    "self-separation": SelfSeparation, "separation": Separation,
+    "self-separation": SelfSeparation, "separation": Separation, "torque limits": TorqueLimits,
 }
 
 __all__ = ["TASKS", "Avoidance", "DangerBounds", "JointDamping", "JointLimits", "Pointing", "Pose",
-           "Position", "Posture", "SelfSeparation", "Separation"]
+           "Position", "Posture", "SelfSeparation", "Separation", "TorqueLimits"]

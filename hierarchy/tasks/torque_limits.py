@@ -1,0 +1,72 @@
+"""Limits of the joints' torques, as rows over their accelerations."""
+
+# mypy: disable-error-code="no-untyped-def"
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from hierarchy.compiled import compiled
+from hierarchy.errors import HierarchyError
+from hierarchy.problem import Array
+from hierarchy.robot import Robot, State
+from hierarchy.task import Level, Task
+
+
+@dataclass(frozen=True)
+class TorqueLimits(Task):
+    """Keep every joint's torque within its limits: -limit <= M(q) a + h(q, v) <= limit.
+
+    n rows, at acceleration level only. The limit is `fraction`, more than 0 and at most 1, of the
+    robot's `effort_limit` [N m or N]; rows of joints without one are infinite on both sides. The
+    torques are those of the robot's model: rigid bodies, no friction, nothing held in the hand.
+    """
+
+    robot: Robot
+    fraction: float = 1.0
+    name: str = "torque limits"
+    limit: Array = field(init=False, repr=False, compare=False)  # (n,) [N m or N]
+    kind = "inequality"
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.fraction <= 1.0:
+            raise HierarchyError(f"task {self.name!r}: fraction {self.fraction} is not more than 0 "
+                                 "and at most 1")
+        object.__setattr__(self, "limit", self.fraction * self.robot.effort_limit)
+
+    @property
+    def dimension(self) -> int:
+        """One row a joint."""
+        return self.robot.n
+
+    def error(self, state: State) -> Array:
+        """How far the torque of constant velocity is from the limits (n,) [N m or N]."""
+        h = state.bias_effort()
+        return np.asarray(np.clip(h, -self.limit, self.limit) - h)
+
+    def jacobian(self, state: State) -> Array:
+        """Mass matrix M(q) (n, n) [kg m^2]: the rate of torque with acceleration."""
+        return state.mass_matrix()
+
+    def jacobian_derivative(self, state: State) -> Array:
+        """Its time derivative (n, n) [kg m^2/s], which no row needs."""
+        return state.mass_matrix_derivative()
+
+    def write(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
+              row: int) -> None:
+        """See `Task.write`; HierarchyError at velocity level."""
+        if level != "acceleration":
+            raise HierarchyError(f"task {self.name!r}: torque limits need the acceleration level, "
+                                 f"not {level!r}")
+        _write(state.mass_matrix(), state.bias_effort(), self.limit, A, lower, upper, row)
+
+
+@compiled
+def _write(M, h, limit, A, lower, upper, row):
+    for i in range(len(h)):
+        for j in range(len(h)):
+            A[row + i, j] = M[i, j]
+        lower[row + i] = -limit[i] - h[i]
+        upper[row + i] = limit[i] - h[i]

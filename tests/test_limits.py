@@ -1,0 +1,572 @@
+"""The box of joint limits under adversaries, against braking simulated tick by tick."""
+
+import os
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from scene import PATH, ROBOT, state_at, states
+from test_robot import LIMIT, URDF
+
+from hierarchy import HierarchyError, Robot, Stack, State
+from hierarchy.compiled import compiled
+from hierarchy.errors import RobotError
+from hierarchy.limits import Limits, write_box
+from hierarchy.tasks import JointLimits, Position, TorqueLimits
+from solvers import Status, make
+
+PLAIN = os.environ.get("NUMBA_DISABLE_JIT") == "1"  # everything some hundred times slower
+JOINTS, TICKS = (40, 60) if PLAIN else (2000, 600)  # 1.2 million steps a test
+LEVELS = pytest.mark.parametrize("level", ["velocity", "acceleration"])
+
+# Rounding: of a position relative to 1 + |q|, of a speed and an acceleration relative to the limit.
+# An acceleration is (x - v) / T at velocity level: the rounding of v = 10 over T = 1e-4 s is 2e-11.
+POSITION, SPEED, ACCELERATION = 1e-12, 1e-12, 1e-9
+
+
+# ---- a plant that remembers what it has seen --------------------------------------------------
+
+@compiled
+def drive(q, v, limits, periods, acceleration, picks, low, up, seen, log):
+    """Move each joint through picks (ticks, joints), 0 for the lower end of its box, 1 the upper.
+
+    seen (6, joints): highest and lowest position, also between ticks, greatest speed and
+    acceleration, greatest lower - upper of the box, whether it was finite. log (ticks, 2, joints)
+    keeps q and v after every tick.
+    """
+    for k in range(len(picks)):
+        for j in range(len(q)):
+            T = periods[j]
+            write_box(q[j:j + 1], v[j:j + 1], limits[:, j:j + 1], T, acceleration, low, up, j)
+            x = low[j] * (1.0 - picks[k, j]) + up[j] * picks[k, j]
+            a = x if acceleration else (x - v[j]) / T
+            high, deep = q[j], q[j]
+            if acceleration:
+                if v[j] * (v[j] + a * T) < 0.0:  # turns between ticks
+                    turn = q[j] - v[j] * v[j] / (2 * a)
+                    high, deep = max(high, turn), min(deep, turn)
+                q[j] += v[j] * T + a * T * T / 2
+                v[j] += a * T
+            else:
+                q[j] += x * T
+                v[j] = x
+            seen[0, j] = max(seen[0, j], high, q[j])
+            seen[1, j] = min(seen[1, j], deep, q[j])
+            seen[2, j] = max(seen[2, j], abs(v[j]))
+            seen[3, j] = max(seen[3, j], abs(a))
+            seen[4, j] = max(seen[4, j], low[j] - up[j])
+            if not np.isfinite(low[j]) or not np.isfinite(up[j]):
+                seen[5, j] = 0.0
+            log[k, 0, j], log[k, 1, j] = q[j], v[j]
+
+
+class Ride:
+    """What happened to joints driven through `picks`."""
+
+    def __init__(self, q, v, limits, period, level, picks):
+        joints = len(q)
+        picks = np.ascontiguousarray(np.broadcast_to(picks, (len(picks), joints)), dtype=float)
+        seen = np.full((6, joints), -np.inf)
+        seen[1], seen[5] = np.inf, 1.0
+        log = np.empty((len(picks), 2, joints))
+        drive(q.copy(), v.copy(), limits, np.broadcast_to(period, joints).copy(),
+              level == "acceleration", picks, np.empty(joints), np.empty(joints), seen, log)
+        self.high, self.low, self.speed, self.acceleration, empty, finite = seen
+        self.q, self.v = log[:, 0], log[:, 1]
+        assert finite.all(), "a box was not finite"
+        assert (empty <= 0.0).all(), "a box was empty"
+
+    def keeps_acceleration(self, limits):
+        assert (self.acceleration <= limits[3] * (1 + ACCELERATION)).all()
+
+    def keeps(self, limits):
+        lower, upper, velocity, _ = limits
+        assert (self.high - upper <= POSITION * (1 + np.abs(self.high))).all()
+        assert (lower - self.low <= POSITION * (1 + np.abs(self.low))).all()
+        assert (self.speed <= velocity * (1 + SPEED)).all()
+        self.keeps_acceleration(limits)
+
+
+def braking_way(v, A, T, level):
+    """How far joints with v go until they rest at the end of a tick, (joints,)."""
+    way = np.zeros(len(v))
+    brake(np.abs(v), np.broadcast_to(A, len(v)), np.broadcast_to(T, len(v)),
+          level == "acceleration", way)
+    return way
+
+
+@compiled
+def brake(speed, A, T, acceleration, way):
+    for j in range(len(speed)):
+        while speed[j] > 0.0:  # one tick after another
+            slower = max(speed[j] - A[j] * T[j], 0.0)
+            way[j] += (speed[j] + slower) / 2 * T[j] if acceleration else slower * T[j]
+            speed[j] = slower
+
+
+def random_limits(rng, joints):
+    """Limits (4, joints) and periods (joints,), over orders of magnitude and some infinite."""
+    period = 10 ** rng.uniform(-4, np.log10(0.05), joints)
+    acceleration = 10 ** rng.uniform(-1, 3, joints)
+    velocity = np.where(rng.random(joints) < 0.2, np.inf, 10 ** rng.uniform(-2, 1, joints))
+    lower = rng.uniform(-4, 2, joints)
+    upper = lower + 10 ** rng.uniform(-8, 1, joints) * (rng.random(joints) > 0.02)
+    which = rng.random(joints)
+    lower, upper = np.where(which < 0.1, -np.inf, lower), np.where(abs(which - 0.1) < 0.05, np.inf,
+                                                                    upper)
+    return np.array([lower, upper, velocity, acceleration]), period
+
+
+def viable_starts(rng, limits, T, level):
+    """States from which simulated braking stays within the limits, a third of them barely."""
+    lower, upper, velocity, A = limits
+    ticks = 100 if PLAIN else 3000  # of braking, at most
+    v = rng.uniform(-1, 1, len(T)) * np.minimum(np.minimum(velocity, 3.0), ticks * A * T)
+    for _ in range(60):  # slower until there is room to brake
+        way = braking_way(v, A, T, level)
+        low, high = lower + np.where(v < 0, way, 0), upper - np.where(v > 0, way, 0)
+        v = np.where(low > high, v / 2, v)
+    v = np.where(low > high, 0.0, v)
+    low, high = np.where(low > high, lower, low), np.where(low > high, upper, high)
+    low = np.where(np.isfinite(low), low, np.where(np.isfinite(high), high - 3.0, -1.0))
+    high = np.where(np.isfinite(high), high, low + 3.0)
+    share = np.clip(rng.uniform(-0.25, 1.25, len(T)), 0.0, 1.0)
+    return low + share * (high - low), v
+
+
+def adversary(rng, joints, ticks):
+    """Picks (ticks, joints): each joint has its own way to choose from the box."""
+    up_and_down = (np.arange(ticks)[:, None] // rng.integers(1, 100, joints)) % 2
+    uniform, ends = rng.random((ticks, joints)), rng.integers(0, 2, (ticks, joints))
+    ways = np.array([np.zeros((ticks, joints)), np.ones((ticks, joints)), uniform, ends,
+                     up_and_down])
+    return ways[rng.integers(0, len(ways), joints), :, np.arange(joints)].T
+
+
+# ---- from a viable start ----------------------------------------------------------------------
+
+@LEVELS
+@pytest.mark.parametrize("seed", [0, 1])
+def test_no_limit_is_exceeded_whatever_is_chosen(level, seed):
+    rng = np.random.default_rng(seed)
+    limits, period = random_limits(rng, JOINTS)
+    q, v = viable_starts(rng, limits, period, level)
+    Ride(q, v, limits, period, level, adversary(rng, JOINTS, TICKS)).keeps(limits)
+
+
+@LEVELS
+def test_every_state_of_such_a_ride_is_viable(level):
+    rng = np.random.default_rng(2)
+    limits, T = random_limits(rng, JOINTS)
+    ride = Ride(*viable_starts(rng, limits, T, level), limits, T, level,
+                adversary(rng, JOINTS, TICKS))
+    for k in range(0, TICKS, TICKS // 6):
+        way = braking_way(ride.v[k], limits[3], T, level)
+        at = ride.q[k] + np.sign(ride.v[k]) * way
+        slack = 1e-11 * (1 + np.abs(ride.q[k]))
+        assert ((at <= limits[1] + slack) & (at >= limits[0] - slack)).all()
+
+
+@LEVELS
+def test_beyond_the_box_a_limit_is_exceeded_or_the_joint_cannot_stop_in_time(level):
+    rng = np.random.default_rng(3)
+    limits, T = random_limits(rng, JOINTS)
+    lower, upper, velocity, A = limits
+    q, v = viable_starts(rng, limits, T, level)
+    for sign in (-1, 1):
+        box = np.empty((2, JOINTS))
+        for j in range(JOINTS):
+            write_box(q[j:j + 1], v[j:j + 1], limits[:, j:j + 1], T[j], level == "acceleration",
+                      box[0], box[1], j)
+        x = box[(sign + 1) // 2]
+        more = 1e-4 * A if level == "acceleration" else 1e-4 * A * T
+        x = x + sign * more
+        a = x if level == "acceleration" else (x - v) / T
+        w = v + a * T
+        after = q + (v * T + a * T**2 / 2 if level == "acceleration" else x * T)
+        rest = after + np.sign(w) * braking_way(w, A, T, level)
+        assert ((rest > upper) | (rest < lower) | (abs(w) > velocity) | (abs(a) > A)).all()
+
+
+def test_between_ticks_the_position_is_within_its_limits_too():
+    """Here the ride's own formula for the turning point is not trusted."""
+    rng = np.random.default_rng(4)
+    limits, T = random_limits(rng, 40)
+    q, v = viable_starts(rng, limits, T, "acceleration")
+    ride = Ride(q, v, limits, T, "acceleration", adversary(rng, 40, 300))
+    q, v = np.vstack([q, ride.q]), np.vstack([v, ride.v])
+    for share in np.linspace(0, 1, 41):
+        t = share * T
+        between = q[:-1] + v[:-1] * t + (v[1:] - v[:-1]) / T * t**2 / 2
+        assert (between <= limits[1] + POSITION * 10).all()
+        assert (between >= limits[0] - POSITION * 10).all()
+
+
+@LEVELS
+@pytest.mark.parametrize("period", [1e-4, 1e-3, 7e-3, 0.05])
+def test_one_who_always_pushes_up_comes_to_rest_on_the_limit_without_bouncing(level, period):
+    limits = np.array([[-1.0], [1.5], [2.0], [8.0]])
+    ride = Ride(np.zeros(1), np.zeros(1), limits, period, level, np.ones((int(2 / period), 1)))
+    ride.keeps(limits)
+    assert abs(ride.q[-1, 0] - 1.5) < 1e-12
+    assert abs(ride.v[-1, 0]) < 1e-11
+    assert ride.v.min() > -1e-13 / period  # the rounding of q, in one tick
+    assert ride.v.max() == pytest.approx(2.0)
+
+
+@LEVELS
+def test_the_box_of_an_unlimited_joint_is_its_acceleration(level):
+    limits = Limits([-np.inf], [np.inf], [np.inf], [5.0], 0.01)
+    low, up = limits.box(np.array([1e3]), np.array([20.0]), level)
+    expected = [-5.0, 5.0] if level == "acceleration" else [19.95, 20.05]
+    np.testing.assert_allclose([low[0], up[0]], expected)
+
+
+def test_a_joint_that_must_turn_back_within_a_tick_keeps_its_limit():
+    """q + v^2 / (2 A) <= U, but too near to be at rest at the end of a tick."""
+    rng = np.random.default_rng(5)
+    _, T = random_limits(rng, JOINTS)
+    A = 10 ** rng.uniform(0, 2, JOINTS)
+    limits = np.array([np.full(JOINTS, -9.0), np.full(JOINTS, 1.0),
+                       np.maximum(10.0, 2 * A * T), A])
+    v = rng.uniform(0, 1, JOINTS) * np.minimum(3.0, 5 * A * T)
+    q = 1.0 - v**2 / (2 * A) - rng.choice([0.0, 1e-6, 1e-4], JOINTS)
+    Ride(q, v, limits, T, "acceleration", adversary(rng, JOINTS, TICKS)).keeps(limits)
+
+
+def test_turning_back_stops_short_of_making_the_other_limit_impossible():
+    limits = Limits([-0.05], [0.0], [9.0], [100.0], 0.05)
+    q, v = np.array([-0.01]), np.array([1.0])
+    _, up = limits.box(q, v, "acceleration")
+    w = v + up * 0.05
+    rest = q + (v + w) / 2 * 0.05 - braking_way(w, 100.0, 0.05, "acceleration")
+    assert w < 0.0
+    assert rest == pytest.approx(-0.05)
+
+
+@LEVELS
+def test_the_box_of_the_mirrored_joint_is_the_mirrored_box(level):
+    rng = np.random.default_rng(13)
+    (lower, upper, velocity, acceleration), _ = random_limits(rng, 1000)
+    q, v = rng.normal(0, 2, 1000), rng.normal(0, 0.1, 1000)
+    q[::2] = upper[::2] - 0.02 * np.abs(v[::2])  # where a joint turns back within a tick
+    q = np.where(np.isfinite(q), q, 0.0)
+    box = Limits(lower, upper, velocity, acceleration, 0.05).box(q, v, level)
+    mirrored = Limits(-upper, -lower, velocity, acceleration, 0.05).box(-q, -v, level)
+    np.testing.assert_array_equal(box, [-mirrored[1], -mirrored[0]])
+
+
+# ---- from outside -----------------------------------------------------------------------------
+
+def wide(joints, T, velocity=np.inf):
+    return np.array([np.full(joints, -50.0), np.full(joints, 1.0), np.full(joints, velocity),
+                     np.full(joints, 10.0)]), np.full(joints, T)
+
+
+PERIODS = pytest.mark.parametrize("period", [0.01, 0.05] if PLAIN else [1e-4, 2e-3, 0.05])
+
+
+@LEVELS
+@pytest.mark.parametrize("seed", [6, 7])
+def test_from_any_start_the_box_is_not_empty_and_the_acceleration_holds(level, seed):
+    rng = np.random.default_rng(seed)
+    limits, T = random_limits(rng, JOINTS)
+    middle = np.clip(0.0, np.maximum(limits[0], -9.0), np.minimum(limits[1], 9.0))
+    q, v = middle + rng.normal(0, 2, JOINTS), rng.normal(0, 1, JOINTS) * 10 ** rng.uniform(-3, 1)
+    ride = Ride(q, v, limits, T, level, adversary(rng, JOINTS, TICKS))
+    ride.keeps_acceleration(limits)
+    speed = np.abs(np.vstack([v, ride.v]))
+    allowed = np.maximum(limits[2], speed[:-1] - limits[3] * T)
+    assert (speed[1:] <= allowed * (1 + SPEED)).all(), "too fast, and not getting slower"
+
+
+@LEVELS
+def test_every_joint_ends_within_its_limits_wherever_it_started(level):
+    """Ranges of 0.01 to 1000 A T^2, speed limits of 0.1 to 100 A T: both sides are in the way."""
+    rng = np.random.default_rng(12)
+    T, A = 10 ** rng.uniform(-4, -1, JOINTS), 10 ** rng.uniform(-1, 2, JOINTS)
+    size = A * T**2
+    lower = rng.normal(0, 1, JOINTS)
+    upper = lower + 10 ** rng.uniform(-2, 3, JOINTS) * size
+    limits = np.array([lower, upper, 10 ** rng.uniform(-1, 2, JOINTS) * A * T, A])
+    q = lower + rng.uniform(-100, 100, JOINTS) * size
+    v = rng.normal(0, 1, JOINTS) * 10 ** rng.uniform(-2, 1, JOINTS) * A * T
+    ride = Ride(q, v, limits, T, level, adversary(rng, JOINTS, 4000))
+    last = np.s_[-1000:]
+    slack = POSITION * (1 + np.abs(ride.q[last]))
+    assert (ride.q[last] <= upper + slack).all()
+    assert (ride.q[last] >= lower - slack).all()
+    assert (np.abs(ride.v[last]) <= limits[2] * (1 + SPEED)).all()
+
+
+@LEVELS
+@PERIODS
+def test_a_joint_that_is_too_fast_to_stop_goes_no_farther_than_it_must(level, period):
+    rng = np.random.default_rng(8)
+    limits, T = wide(50, period)
+    v = rng.uniform(0.1, 3.0, 50)
+    q = 1.0 - rng.uniform(-0.5, 0.9, 50) * v**2 / 20  # some outside already
+    ride = Ride(q, v, limits, T, level, rng.random((int(0.4 / period), 50)))
+    unavoidable = q + (v**2 / 20 if level == "acceleration" else braking_way(v, 10.0, T, level))
+    beyond = unavoidable > 1.0
+    assert beyond.any()
+    np.testing.assert_allclose(ride.high[beyond], unavoidable[beyond], rtol=0, atol=1e-12)
+    assert (ride.high[~beyond] <= 1.0 + POSITION).all()
+
+
+@LEVELS
+@PERIODS
+@pytest.mark.parametrize("velocity", [0.3, np.inf])
+@pytest.mark.parametrize("side", [-1, 1])
+def test_a_joint_outside_returns_without_turning_and_in_finite_time(level, period, velocity, side):
+    """Whoever returns as slowly as the box allows needs the time of a bang-bang motion."""
+    rng = np.random.default_rng(9)
+    limits, T = wide(30, period, velocity)
+    e = 10 ** rng.uniform(-9, 0, 30)
+    q, v = 1.0 + e, -rng.uniform(0, 1, 30) * np.minimum(np.sqrt(5 * e), velocity)
+    if side < 0:
+        limits, q, v = np.array([-limits[1], -limits[0], *limits[2:]]), -q, -v
+    ticks = int(np.ceil((2 * np.sqrt(1 / 10) + 1 / velocity) / period)) + 4
+    for choice in ("slowest", "random"):
+        picks = np.full((ticks, 30), side > 0) if choice == "slowest" else rng.random((ticks, 30))
+        ride = Ride(q, v, limits, T, level, picks)
+        outside = side * np.vstack([q, ride.q]) - 1.0
+        assert (np.diff(outside, axis=0)[outside[:-1] > POSITION] <= 1e-15).all()
+        assert (outside[-1] <= POSITION).all()
+        assert (ride.speed <= max(velocity, np.sqrt(10 * 1.0) * 1.01)).all() or choice == "random"
+        assert (ride.speed <= velocity * (1 + SPEED)).all()
+
+
+@LEVELS
+@PERIODS
+def test_speed_outward_is_braked_by_the_full_acceleration_then_the_joint_returns(level, period):
+    limits, T = wide(3, period, 5.0)
+    q, v = np.array([1.0, 1.2, 1.5]), np.array([0.5, 0.02, 2.0])
+    ride = Ride(q, v, limits, T, level, np.ones((int(3 / period), 3)))
+    np.testing.assert_allclose(ride.high, q + (v**2 / 20 if level == "acceleration" else
+                                               braking_way(v, 10.0, T, level)), atol=1e-12)
+    top = ride.q.argmax(axis=0)
+    for j in range(3):
+        assert (np.diff(ride.q[top[j]:, j]) <= 1e-12).all()
+    assert (ride.q[-1] <= 1.0 + POSITION).all()
+
+
+@LEVELS
+def test_rounding_at_a_limit_does_not_make_the_joint_jump(level):
+    """A state off the limit by the last digits asks for a motion of their size, not for A."""
+    limits = Limits([-1.0], [1.0], [2.0], [100.0], 1e-3)
+    for q in (np.nextafter(1.0, 2.0), 1.0, np.nextafter(1.0, 0.0)):
+        for v in (-1e-14, 0.0, 1e-14):
+            low, up = limits.box(np.array([q]), np.array([v]), level)
+            assert low[0] < -0.09
+            assert abs(up[0]) < (1e-8 if level == "acceleration" else 1e-11)
+
+
+# ---- the guard --------------------------------------------------------------------------------
+
+@LEVELS
+def test_the_clamp_answers_anything_with_a_command_of_the_box(level):
+    rng = np.random.default_rng(10)
+    (lower, upper, velocity, acceleration), _ = random_limits(rng, 200)
+    limits = Limits(lower, upper, velocity, acceleration, 2e-3)
+    for _ in range(20):
+        q, v = rng.normal(0, 2, 200), rng.normal(0, 1, 200)
+        low, up = limits.box(q, v, level)
+        x = rng.choice([np.nan, np.inf, -np.inf, 1e308, -1e308, 0.0, -0.3, 2.0], 200)
+        given, answer = x.copy(), limits.clamp(q, v, level, x)
+        np.testing.assert_array_equal(x, given)
+        rest = -v / 2e-3 if level == "acceleration" else np.zeros(200)
+        np.testing.assert_array_equal(answer, np.clip(np.where(np.isnan(x), rest, x), low, up))
+        assert np.isfinite(answer).all()
+
+
+def test_nothing_but_nan_brings_a_joint_to_rest_within_its_limits():
+    limits = Limits([-1.0], [1.0], [2.0], [8.0], 0.01)
+    q, v = np.zeros(1), np.ones(1)
+    for _ in range(20):
+        a = limits.clamp(q, v, "acceleration", [np.nan])
+        q, v = q + v * 0.01 + a * 0.01**2 / 2, v + a * 0.01
+    assert v == pytest.approx(0.0, abs=1e-15)
+    assert q == pytest.approx(1 / 16, abs=1e-3)
+
+
+@LEVELS
+def test_the_clamp_is_finite_even_where_the_state_is_not(level):
+    limits = Limits([-1.0] * 3, [1.0] * 3, [2.0] * 3, [8.0] * 3, 0.01)
+    q, v = np.array([np.nan, 0.0, np.nan]), np.array([0.0, np.nan, np.nan])
+    assert np.isfinite(limits.clamp(q, v, level, [1.0, np.nan, np.inf])).all()
+
+
+# ---- the tasks --------------------------------------------------------------------------------
+
+@LEVELS
+def test_the_rows_are_the_identity_and_the_box(level):
+    task = JointLimits(ROBOT, 10.0, 1e-3, margin=0.02)
+    for q, v in states(10):
+        state = state_at(q, v)
+        A, lower, upper = np.full((10, 7), 5.0), np.full(10, 5.0), np.full(10, 5.0)
+        task.write(state, level, A, lower, upper, 2)
+        np.testing.assert_array_equal(A[2:9], np.eye(7))
+        limits = Limits(ROBOT.lower + 0.02, ROBOT.upper - 0.02, ROBOT.velocity_limit,
+                        np.full(7, 10.0), 1e-3)
+        for box in (task.box(state, level), limits.box(q, v, level)):
+            np.testing.assert_array_equal([lower[2:9], upper[2:9]], box)
+        assert (A[[0, 1, 9]] == 5.0).all()
+        assert (lower[[0, 1, 9]] == 5.0).all()
+        x = np.linspace(-50, 50, 7)
+        np.testing.assert_array_equal(task.clamp(state, level, x), np.clip(x, *box))
+
+
+@LEVELS
+def test_a_hand_that_is_pulled_out_of_reach_breaks_no_limit(level):
+    """The whole loop at a coarse period: the solver's answer, not the clamp, keeps the limits."""
+    period, a = 5e-3, 30.0
+    task, far = JointLimits(ROBOT, a, period, margin=0.05), Position(
+        ROBOT.frame("end_effector"), PATH, stiffness=4000.0, damping=5.0, gain=200.0)
+    stack, resolver = Stack([task, far], level), make("hcod")
+    state, memory = State(ROBOT), None
+    q, v = np.array([0.9, -0.8, 0.9, 1.2, 0.9, 1.8, 0.0]), np.zeros(7)
+    acted = np.zeros(7)
+    for k in range(20 if PLAIN else 400):
+        state.move(k * period, q, v)
+        res = resolver.solve(stack.hierarchy(state), memory)
+        memory, acted = res.memory, acted + (res.x <= task.box(state, level)[0] + 1e-9)
+        assert res.status is Status.SOLVED
+        w = res.x if level == "velocity" else v + res.x * period
+        assert (np.abs(w - v) <= a * period * (1 + 1e-9)).all()
+        q, v = q + (w if level == "velocity" else (v + w) / 2) * period, w
+        assert (np.abs(q) <= ROBOT.upper - 0.05 + 1e-9).all()
+        assert (np.abs(v) <= ROBOT.velocity_limit + 1e-9).all()
+    assert acted.any(), "nothing was asked of the limits"
+
+
+def test_the_error_is_how_far_a_joint_is_from_its_range():
+    task = JointLimits(ROBOT, 10.0, 1e-3, margin=0.1)
+    q = np.zeros(7)
+    q[0], q[3] = ROBOT.upper[0], ROBOT.lower[3] - 0.2
+    np.testing.assert_allclose(task.error(ROBOT.state(q)), [-0.1, 0, 0, 0.3, 0, 0, 0], atol=1e-15)
+    assert (task.dimension, task.kind) == (7, "inequality")
+    np.testing.assert_array_equal(task.jacobian(ROBOT.state(q)), np.eye(7))
+    assert not task.jacobian_derivative(ROBOT.state(q)).any()
+
+
+def model_of(*kinds):
+    """A chain of joints without limits of its own."""
+    model = pin.Model()
+    joint = 0
+    for i, kind in enumerate(kinds):
+        joint = model.addJoint(joint, kind, pin.SE3.Identity(), f"joint_{i}")
+        model.appendBodyToJoint(joint, pin.Inertia.Random(), pin.SE3.Random())
+        model.addJointFrame(joint, -1)
+    return model
+
+
+def test_a_continuous_joint_has_no_position_limits_and_the_others_keep_theirs():
+    model = model_of(pin.JointModelRUBZ(), pin.JointModelRX(), pin.JointModelPY())
+    model.lowerPositionLimit = np.array([-1.01, -1.01, -0.5, -np.inf])
+    model.upperPositionLimit = np.array([1.01, 1.01, 0.7, 3.0])
+    robot = Robot(model, "mixed")
+    np.testing.assert_array_equal(robot.coordinates, [0, 2, 3])
+    np.testing.assert_array_equal(robot.position_limits(),
+                                  [[-np.inf, -0.5, -np.inf], [np.inf, 0.7, 3.0]])
+    state = robot.state([1.0, 0.0, 0.7, 3.0])
+    low, up = JointLimits(robot, 10.0, 1e-3).box(state, "acceleration")
+    np.testing.assert_allclose(up, [10.0, 0.0, 0.0], atol=1e-9)
+    np.testing.assert_allclose(low, -10.0)
+
+
+def test_a_limit_on_coordinates_that_are_no_angles_is_refused():
+    model = model_of(pin.JointModelPlanar())
+    model.lowerPositionLimit = np.array([-2.0, -np.inf, -1.01, -1.01])
+    with pytest.raises(RobotError, match="joint 'joint_0' has 4 coordinates for 3 velocities"):
+        JointLimits(Robot(model, "cart"), 10.0, 1e-3)
+
+
+@pytest.mark.parametrize(("settings", "said"), [
+    ({"acceleration": 0.0}, "joint 0: acceleration must be positive and finite, got 0.0"),
+    ({"acceleration": np.inf}, "acceleration must be positive and finite, got inf"),
+    ({"acceleration": [1, 1, 1, np.nan, 1, 1, 1]}, "joint 3: acceleration must be positive"),
+    ({"acceleration": [1.0, 2.0]}, "acceleration has shape (2,), expected a number or (7,)"),
+    ({"period": 0.0}, "period 0.0 s must be positive"),
+    ({"period": np.nan}, "period nan s must be positive"),
+    ({"margin": -0.1}, "margin -0.1 must not be negative"),
+    ({"margin": 2.2}, "joint 1: no position lies between lower and upper"),
+])
+def test_settings_that_make_no_sense_are_named(settings, said):
+    with pytest.raises(HierarchyError) as error:
+        JointLimits(**({"robot": ROBOT, "acceleration": 10.0, "period": 1e-3} | settings))
+    assert said in str(error.value)
+    assert "task 'joint limits'" in str(error.value)
+
+
+@pytest.mark.parametrize(("limits", "said"), [
+    (([0, 0], [1], [1], [1]), "have 2, 1, 1, 1 entries"),
+    (([0], [np.nan], [1], [1]), "joint 0: no position lies between lower and upper, got 0.0, nan"),
+    (([0], [1], [0], [1]), "joint 0: velocity must be positive, got 0.0"),
+    (([0], [1], [np.nan], [1]), "joint 0: velocity must be positive, got nan"),
+])
+def test_limits_that_make_no_sense_are_named(limits, said):
+    with pytest.raises(HierarchyError) as error:
+        Limits(*limits, period=1e-3)
+    assert said in str(error.value)
+
+
+def test_torque_rows_hold_exactly_where_inverse_dynamics_does():
+    task, rng = TorqueLimits(ROBOT, fraction=0.5), np.random.default_rng(11)
+    data, held = ROBOT.model.createData(), []
+    for q, v in states(200):
+        state = state_at(q, v)
+        A, lower, upper = np.full((9, 7), 5.0), np.full(9, 5.0), np.full(9, 5.0)
+        task.write(state, "acceleration", A, lower, upper, 1)
+        a = rng.normal(0, 30, 7)
+        torque = pin.rnea(ROBOT.model, data, q, v, a)
+        np.testing.assert_allclose((A[1:8] @ a - lower[1:8]), torque + ROBOT.effort_limit / 2,
+                                   atol=1e-11)
+        np.testing.assert_allclose((upper[1:8] - A[1:8] @ a), ROBOT.effort_limit / 2 - torque,
+                                   atol=1e-11)
+        assert (A[[0, 8]] == 5.0).all()
+        held.append((np.abs(torque) <= ROBOT.effort_limit / 2).all())
+    assert 0 < sum(held) < 200, "the test has cases on one side only"
+
+
+def test_the_other_methods_of_the_torque_task_say_the_same():
+    task = TorqueLimits(ROBOT, fraction=0.2)
+    for q, v in states(5):
+        state = state_at(q, v)
+        bias = pin.rnea(ROBOT.model, ROBOT.model.createData(), q, v, np.zeros(7))
+        error = task.error(state)
+        assert (np.abs(bias + error) <= 0.2 * ROBOT.effort_limit + 1e-12).all()
+        np.testing.assert_array_equal(task.jacobian(state), state.mass_matrix())
+        later, before = (ROBOT.state(q + h * v).mass_matrix() for h in (1e-6, -1e-6))
+        np.testing.assert_allclose(task.jacobian_derivative(state), (later - before) / 2e-6,
+                                   atol=1e-7)
+    assert (task.dimension, task.kind) == (7, "inequality")
+
+
+def test_dynamics_leave_the_kinematics_of_a_state_alone():
+    q, v = states(1)[0]
+    state, fresh = state_at(q, v), state_at(q, v)
+    for _ in (state.mass_matrix(), state.bias_effort(), state.mass_matrix_derivative()):
+        for view in ("J", "dJ", "placements"):
+            np.testing.assert_array_equal(getattr(state, view), getattr(fresh, view))
+
+
+def test_torque_limits_need_the_acceleration_level_and_a_share():
+    with pytest.raises(HierarchyError, match="'torque limits': torque limits need the acceler"):
+        Stack([TorqueLimits(ROBOT)], "velocity").hierarchy(state_at(*states(1)[0]))
+    for fraction in (0.0, -1.0, 80.0, np.nan):
+        with pytest.raises(HierarchyError, match=f"fraction {fraction} is not more than 0"):
+            TorqueLimits(ROBOT, fraction)
+
+
+@pytest.mark.parametrize(("limit", "effort"), [
+    (LIMIT, 10.0), (LIMIT.replace('effort="10"', 'effort="0"'), np.inf)])
+def test_effort_limits_are_those_of_the_file(tmp_path, limit, effort):
+    path = tmp_path / "arm.urdf"
+    path.write_text(URDF.format(kind="revolute", limit=limit))
+    robot = Robot.from_file(path)
+    assert robot.effort_limit == effort
+    h = Stack([TorqueLimits(robot), JointLimits(robot, 5.0, 0.01)]).hierarchy(robot.state([0.3]))
+    res = make("hcod").solve(h)
+    assert res.status is Status.SOLVED
+    assert h.violations(res.x).max() <= 1e-9
