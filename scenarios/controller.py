@@ -129,8 +129,9 @@ class Controller:
             self.resolution, self._written = self._unanswered, self.clock()
             return self.resolution.x
         cell = self.cell
-        self.allocation = self._allocate()
-        order = self.allocation.order
+        seen = None if cell.sensor is None else cell.sensor.measurement
+        self.allocation = allocation = cell.order(seen, self.cone_error)
+        order = allocation.order
         self.hierarchy = hierarchy = cell.stack.hierarchy(cell.state, order)
         self._written = self.clock()
         if self.blend is None:
@@ -143,7 +144,3 @@ class Controller:
         if resolution.status is not Status.SOLVED:
             troubles.append(resolution.status.name.lower())
         return x
-
-    def _allocate(self) -> Allocation:
-        sensor = self.cell.sensor
-        return self.cell.order(sensor.measurement if sensor else None, self.cone_error)

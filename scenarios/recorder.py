@@ -34,6 +34,7 @@ class Recorder:
         self._log = np.empty((ticks, 8 + cell.robot.nq + 3 * cell.robot.n + len(self._distance)))
         self._choices = np.empty((ticks, 5), dtype=np.int16)
         self._times = np.empty((ticks, len(_TIMES)))
+        self._blend, self._policy = controller.blend, controller.policy
         self._weights = np.empty(ticks if controller.blend else 0)
         self._events: list[Event] = []
 
@@ -49,10 +50,10 @@ class Recorder:
                         self._frame.offset, self._target, controller.cone_error, self._distance,
                         index, active, repulsion, int(resolution.status), resolution.iterations,
                         *controller.stamps)
-        if controller.blend is not None:
-            self._weights[k] = controller.blend.weight
-        if controller.policy.events:
-            self._events += [Event(k, *event) for event in controller.policy.events]
+        if self._blend is not None:
+            self._weights[k] = self._blend.weight
+        if self._policy.events:
+            self._events += [Event(k, *event) for event in self._policy.events]
         self.ticks = k + 1
         return bool(finite)
 
@@ -78,7 +79,7 @@ class Recorder:
         if self._cell.pointing is not None:
             asked = np.array(["pointing" in names for names in orders])
             signals |= {"pointing_error": cone[:, 0], "pointing_active": asked[order]}
-        if self._controller.blend is not None:
+        if self._blend is not None:
             signals["transition"] = self._weights[rows].copy()
         if len(self._distance):
             signals |= {"control_point_distance": body, "minimal_distance": body.min(axis=1),
