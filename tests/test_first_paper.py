@@ -11,7 +11,7 @@ import rank_cases
 from hierarchy import Hierarchy, Robot
 from hierarchy.robots import KUKA_LWR, TABLES
 from scenarios.bench import accuracy, arms, exact, first_paper, growth, growth_figure
-from solvers import make, names
+from solvers import Resolution, Status, make, names
 
 
 @pytest.fixture(scope="module")
@@ -120,11 +120,32 @@ def test_the_table_tells_who_is_not_strict(tables):
 
 
 def test_the_sentence_under_a_table_names_the_tasks_that_are_missed():
-    rows = [{"resolver": name, "task_1_max": 1e-15, "task_2_max": worst, "task_3_max": 1e-15}
+    rows = [{"resolver": name, "x_max": 0.0, "task_1_max": 1e-15, "task_2_max": worst,
+             "task_3_max": 1e-15}
             for name, worst in (("one", 1e-14), ("another", 0.5), ("third", 2e-15))]
     assert accuracy.said(accuracy.CASES[0], rows) == (
         "Shows: all that the tasks can have is reached by one and third, to between 2e-15 (third) "
-        "and 1e-14 (one); task 2 by up to 0.5 is missed by another, the rest is reached to 1e-15.")
+        "and 1e-14 (one); another misses task 2 by up to 0.5, the rest by 1e-15.")
+
+
+def test_a_resolver_that_never_answers_is_counted_and_reaches_nothing(capsys, monkeypatch):
+    def nothing(h):
+        return Resolution(np.zeros(h.n), Status.NUMERICAL_FAILURE)
+
+    monkeypatch.setattr(accuracy, "entrants", lambda damping: {"silent": nothing})
+    (row,) = accuracy.run(3, 2, cases=accuracy.CASES[:1])
+    assert row["failed"] == 3
+    assert row["certified"] == 0.0
+    said = " ".join(capsys.readouterr().out.split())
+    assert "without an answer: silent 3" in said
+    assert "nobody answered" in said
+
+
+def test_under_damping_it_names_who_finds_another_answer():
+    rows = [{"resolver": "one", "x_max": 1e-12}, {"resolver": "another", "x_max": 0.25}]
+    assert accuracy.said(accuracy.CASES[2], rows) == (
+        "Shows: the damped x of the reference is found by one, to 1e-12; another x by another, "
+        "up to 0.2 away.")
 
 
 def test_every_strict_resolver_is_timed_at_every_size(tables):

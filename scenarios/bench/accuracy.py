@@ -104,27 +104,36 @@ def hierarchies(case: Case, count: int, seed: int) -> tuple[list[Hierarchy], Arr
 
 
 def said(case: Case, rows: Sequence[dict[str, Any]]) -> str:
-    """Return in a sentence which tasks who reaches, from the rows of one case's table."""
-    parties: dict[tuple[int, ...], list[dict[str, Any]]] = {}
-    for row in rows:
-        missed = tuple(k + 1 for k in range(len(case.tasks))
-                       if not row[f"task_{k + 1}_max"] <= REACHED)
-        parties.setdefault(missed, []).append(row)
-    parts = [_party(missed, members, len(case.tasks)) for missed, members in parties.items()]
+    """Return in a sentence which tasks who reaches; where all is damped, who finds the same x."""
+    rows = [row for row in rows if not np.isnan(row["x_max"])]
+    if not rows:
+        return "Shows: nobody answered."
+    if case.damping:
+        return f"Shows: {_damped_parties(rows)}."
+    tasks = [f"task_{k + 1}_max" for k in range(len(case.tasks))]
+    worst = {row["resolver"]: max(row[key] for key in tasks) for row in rows}
+    reached = {label: off for label, off in worst.items() if off <= REACHED}
+    parts = [f"all that the tasks can have is reached by {_listed(list(reached))}, "
+             f"{_between(reached)}"] if reached else []
+    parts += [_missing(row, tasks) for row in rows if row["resolver"] not in reached]
     return f"Shows: {'; '.join(parts)}."
 
 
-def _party(missed: tuple[int, ...], rows: Sequence[dict[str, Any]], tasks: int) -> str:
-    labels = _listed([row["resolver"] for row in rows])
-    rest = {row["resolver"]: max(row[f"task_{k + 1}_max"] for k in range(tasks)
-                                 if k + 1 not in missed)
-            for row in rows if len(missed) < tasks}
-    if not missed:
-        return f"all that the tasks can have is reached by {labels}, {_between(rest)}"
-    off = _listed([f"task {k} by up to {max(row[f'task_{k}_max'] for row in rows):.1g}"
-                   for k in missed])
-    kept = f", the rest is reached {_between(rest)}" if rest else ""
-    return f"{off} is missed by {labels}{kept}"
+def _missing(row: Mapping[str, Any], tasks: Sequence[str]) -> str:
+    errors = {f"task {k + 1}": row[key] for k, key in enumerate(tasks)}
+    rest = [off for off in errors.values() if off <= REACHED]
+    off = _listed([f"{task} by up to {off:.1g}" for task, off in errors.items() if off > REACHED])
+    return f"{row['resolver']} misses {off}{f', the rest by {max(rest):.0e}' if rest else ''}"
+
+
+def _damped_parties(rows: Sequence[dict[str, Any]]) -> str:
+    same = {row["resolver"]: row["x_max"] for row in rows if row["x_max"] <= REACHED}
+    other = {row["resolver"]: row["x_max"] for row in rows if row["resolver"] not in same}
+    parts = [f"the damped x of the reference is found by {_listed(list(same))}, {_between(same)}"
+             ] if same else []
+    parts += [f"another x by {_listed(list(other))}, up to {max(other.values()):.1g} away"
+              ] if other else []
+    return "; ".join(parts)
 
 
 def _between(errors: Mapping[str, float]) -> str:
@@ -161,9 +170,9 @@ def _judged(solve: Solve, case: Case, problems: Sequence[Hierarchy], least: Arra
             "certified": None if case.damping else sum(certified) / max(len(answers), 1)}
 
 
-def _summary(errors: Sequence[float] | Array) -> dict[str, float | None]:
-    if not len(errors):
-        return {"mean": None, "median": None, "max": None}
+def _summary(errors: Sequence[float] | Array) -> dict[str, float]:
+    if not len(errors):  # nobody answered
+        return dict.fromkeys(("mean", "median", "max"), float("nan"))
     return {"mean": float(np.mean(errors)), "median": float(np.median(errors)),
             "max": float(np.max(errors))}
 
@@ -177,7 +186,7 @@ def _print(console: Console, case: Case, rows: Sequence[dict[str, Any]]) -> None
     for _, head in [*keys, ("", "cert")]:
         table.add_column(head, justify="right", no_wrap=True)
     for row in rows:
-        cells = ["–" if row[key] is None else f"{row[key]:.0e}" for key, _ in keys]
+        cells = ["–" if np.isnan(row[key]) else f"{row[key]:.0e}" for key, _ in keys]
         certified = "–" if row["certified"] is None else f"{100.0 * row['certified']:.0f}%"
         table.add_row(row["resolver"], *cells, certified)
     console.print(table)
