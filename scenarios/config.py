@@ -126,7 +126,7 @@ class ControlSection(_Section):
     options: dict[str, Any] = Field(default_factory=dict)
     policy: PolicySection = PolicySection()
     transition: Literal["none", "blend"] = "none"
-    transition_time: Positive = 0.1
+    transition_time: Positive = 0.02
 
     @model_validator(mode="after")
     def _makes_a_resolver(self) -> Self:

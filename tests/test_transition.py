@@ -219,7 +219,7 @@ def steps(run, signal):
 
 def runs(name, *changes):
     return (simulate(load(name, ["control.duration=8.0", *changes, *more]))
-            for more in ([], ["control.transition=blend"]))
+            for more in ([], ["control.transition=blend", "control.transition_time=0.1"]))
 
 
 def test_at_velocity_level_the_speed_no_longer_jumps():

@@ -1,8 +1,8 @@
 """KUKA LWR IV, base frame at the shoulder (0.3105 m above the foot of the real arm).
 
 Geometry and position limits: the arm's data sheet, as used in the letter. Velocity limits: the
-data sheet of the LWR 4+ [deg/s]. Torque limits: as models of this arm commonly give them, not
-checked against its data sheet. Masses: plausible round numbers for a 16 kg arm, not identified.
+data sheet of the LWR 4+ [deg/s]. Torque limits: plausible, not checked against the data sheet.
+Masses: plausible round numbers for a 16 kg arm, not identified.
 """
 
 from __future__ import annotations
