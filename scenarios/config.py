@@ -314,7 +314,10 @@ AvoidanceKind = Annotated[
 
 
 class LimitsSection(_Section):
-    """The robot's joint limits as the first level of the stack.
+    """The robot's joint limits, as the first level of the stack.
+
+    With `place` = "guard" they are not in the stack: each command is moved into them joint by
+    joint, whatever that does to the tasks. So they suit every resolver.
 
     Positions and velocities are those of the robot; `acceleration` [rad/s^2] of every joint, or
     one for each; `margin` [rad] is kept off the position limits; `torque` is the share of the
@@ -324,6 +327,7 @@ class LimitsSection(_Section):
     """
 
     acceleration: Positive | tuple[Positive, ...]
+    place: Literal["stack", "guard"] = "stack"
     margin: NotNegative = 0.0
     danger_reach: Positive | None = None
     torque: Annotated[float, Field(gt=0.0, le=1.0)] | None = None
@@ -425,6 +429,9 @@ class Scenario(_Section):
             raise ValueError("[avoidance] needs [position]: Algorithm 1 orders one by the other")
         if self.limits and self.limits.danger_reach and not self.avoidance:
             raise ValueError("limits.danger_reach needs [avoidance], whose obstacles it sees")
+        if self.limits and self.limits.place == "guard" and (
+                self.limits.torque or self.limits.danger_reach):
+            raise ValueError('limits.torque and limits.danger_reach need limits.place = "stack"')
         if self.limits and self.limits.torque and self.control.level == "velocity":
             raise ValueError("limits.torque needs control.level = \"acceleration\"")
         return self
@@ -442,9 +449,10 @@ class Scenario(_Section):
         """Which kind of rows its stack has."""
         inequalities = self.control.stack == "hierarchical" and (
             self.avoidance is not None or (self.pointing and self.pointing.kind == "inequality"))
-        if inequalities or (self.limits and self.limits.torque):
+        limits = self.limits if self.limits and self.limits.place == "stack" else None
+        if inequalities or (limits and limits.torque):
             return "inequalities"
-        return "bounds" if self.limits else "equalities"
+        return "bounds" if limits else "equalities"
 
     def make_resolver(self) -> Resolver:
         """Make the resolver that `control.resolver` and `control.options` describe."""
