@@ -1,0 +1,335 @@
+"""`tpm` with limits: bounds always kept, and everything else as well as they allow."""
+
+import os
+
+import numpy as np
+import pytest
+from rank_cases import CASES, build, generic, random_levels, rng
+from scipy.optimize import lsq_linear
+
+from hierarchy import Hierarchy, HierarchyError
+from solvers import Status, certify, make
+from solvers.kernels.saturation import saturation_work
+from solvers.problems import Recipe, generate
+from solvers.workspace import WORKSPACE
+
+SLOW = os.environ.get("NUMBA_DISABLE_JIT") == "1"
+PROBLEMS = 5 if SLOW else 1000
+TPM = make("tpm")
+KEPT = 1e-12  # of a bound, relative to 1 + |bound|
+TAME = Recipe(equalities_only=True, joints=(1, 20), levels=(1, 5), rows=(0, 10), near_parallel=0.0,
+              scales=(1.0, 1.0), spread=1.0)
+WILD = Recipe(equalities_only=True, joints=(1, 20), levels=(1, 5), rows=(0, 10))
+
+every_case = pytest.mark.parametrize("case", CASES, ids=lambda c: c.__name__)
+every_room = pytest.mark.parametrize("room", [0.05, 0.3, 1.0])
+
+
+def boxed(h, low, high):
+    """h with the bounds low <= x <= high as its first level."""
+    levels = [(np.eye(h.n), np.broadcast_to(low, h.n), np.broadcast_to(high, h.n))]
+    return Hierarchy.from_levels([*levels, *((A, b) for A, b, _ in h.levels())], h.reference)
+
+
+def limited(seed, recipe=TAME):
+    """A generated hierarchy behind bounds of all kinds, some of which pass through its answer."""
+    h, r = generate(seed, recipe), rng(seed + 10**6)
+    x = TPM.solve(h).x
+    size = np.median(np.abs(x)) + 1e-3
+    rows, lower, upper = [], [], []
+    for joint in r.permutation(np.repeat(np.arange(h.n), r.integers(0, 3, h.n))):
+        middle = r.choice([0.0, x[joint], 0.5 * x[joint], size * r.normal()])
+        half = size * r.choice([0.0, 0.3, 1.0, 3.0]) * r.exponential()
+        sides = np.array([middle - half, middle + half])
+        sides[r.integers(2)] = r.choice([sides[0], sides[1], x[joint], np.inf * r.choice([-1, 1])])
+        scale = r.choice([1.0, 1.0, -1.0, 2.0, -0.01, 100.0])
+        low, high = np.sort(scale * sides)
+        if low == high and np.isinf(low):
+            low, high = -np.inf, np.inf
+        rows.append(scale * np.eye(h.n)[joint])
+        lower.append(-np.inf if low == np.inf else low)
+        upper.append(np.inf if high == -np.inf else high)
+    rows.append(np.eye(h.n)[0])  # one that is an inequality for certain
+    bounds = (np.array(rows), [*lower, -9.0 * size], [*upper, 9.0 * size])
+    return Hierarchy.from_levels([bounds, *((A, b) for A, b, _ in h.levels())], h.reference)
+
+
+def assert_kept(h, x):
+    """No bound that another does not exclude is passed by more than rounding."""
+    A, lower, upper = next(iter(h.levels()))
+    joint, scale = np.abs(A).argmax(axis=1), A.sum(axis=1)
+    sides = np.sort([lower / scale, upper / scale], axis=0)
+    low, high = np.full(h.n, -np.inf), np.full(h.n, np.inf)
+    np.maximum.at(low, joint, sides[0])
+    np.minimum.at(high, joint, sides[1])
+    low, high = np.minimum(low, high), np.maximum(low, high)
+    with np.errstate(invalid="ignore"):
+        assert not (x < low - KEPT * (1.0 + np.abs(low))).any()
+        assert not (x > high + KEPT * (1.0 + np.abs(high))).any()
+
+
+@pytest.mark.parametrize("recipe", [TAME, WILD], ids=["tame", "wild"])
+def test_bounds_are_kept_and_the_answer_is_certified(recipe):
+    doubtful = 0
+    for seed in range(PROBLEMS):
+        h = limited(seed, recipe)
+        res = TPM.solve(h)
+        assert_kept(h, res.x)
+        assert res.status is not Status.SOLVED or certify(h, res.x, 1e-7).certified
+        doubtful += res.status is not Status.SOLVED
+    assert doubtful <= (0 if recipe is TAME else PROBLEMS // 100)
+
+
+@every_case
+@every_room
+@pytest.mark.parametrize("reference", [False, True], ids=["no_reference", "reference"])
+def test_every_rank_is_certified_inside_bounds(case, room, reference):
+    h = boxed(build(case, reference), -room, 0.5 * room)
+    res = TPM.solve(h)
+    assert res.status is Status.SOLVED
+    assert_kept(h, res.x)
+    assert certify(h, res.x).certified
+
+
+@every_case
+def test_bounds_that_are_out_of_the_way_change_no_digit(case):
+    h = build(case, True)
+    x = TPM.solve(h).x
+    res = TPM.solve(boxed(h, x - 1e-3, x + 1e-3))
+    assert np.array_equal(res.x, x)
+    assert not res.saturated.any()
+    assert res.iterations == 1
+
+
+@pytest.mark.parametrize("seed", range(3 if SLOW else 40))
+def test_one_level_is_bounded_least_squares(seed):
+    """Against scipy; more rows than joints, so that there is one answer."""
+    r = rng(seed)
+    n = int(r.integers(1, 9))
+    A, b, high = r.normal(size=(n + 2, n)), r.normal(size=n + 2), r.exponential(size=n)
+    h = Hierarchy.from_levels([(np.eye(n), -0.5 * high, high), (A, b)])
+    expected = lsq_linear(A, b, (-0.5 * high, high), method="bvls", tol=1e-14).x
+    np.testing.assert_allclose(TPM.solve(h).x, expected, rtol=0, atol=1e-10)
+
+
+@pytest.mark.parametrize("seed", range(3 if SLOW else 40))
+def test_what_one_level_leaves_open_goes_to_the_reference(seed):
+    """Against scipy, by a weight that makes the reference one level with the rows."""
+    r = rng(seed)
+    A, b, reference = r.normal(size=(3, 7)), r.normal(size=3), r.normal(size=7)
+    h = Hierarchy.from_levels([(np.eye(7), [-0.4] * 7, [0.4] * 7), (A, b)], reference)
+    x, little = TPM.solve(h).x, 1e-5
+    rows = np.vstack([A, little * np.eye(7)]), np.concatenate([b, little * reference])
+    expected = lsq_linear(*rows, (-0.4, 0.4), method="bvls", tol=1e-15).x
+    np.testing.assert_allclose(x, expected, rtol=0, atol=1e-6)
+
+
+@pytest.mark.parametrize("room", [0.1, 0.4])
+def test_lower_levels_leave_upper_levels_untouched_at_the_bounds(room):
+    for seed in range(3 if SLOW else 100):
+        levels = random_levels(7, (3, 2, 2), seed)
+        h = boxed(Hierarchy.from_levels(levels, rng(seed).normal(size=7)), -room, room)
+        full = h.violations(TPM.solve(h).x)
+        for count in range(1, 4):
+            upper = Hierarchy.from_levels(list(h.levels())[:count])
+            missed = upper.violations(TPM.solve(upper).x)
+            np.testing.assert_allclose(full[:count], missed, rtol=0, atol=1e-12)
+
+
+def test_no_point_of_the_box_does_better_in_the_order_of_the_levels():
+    """Among points found by others, and points drawn near the answer."""
+    r = rng()
+    for seed in range(3 if SLOW else 100):
+        h = boxed(Hierarchy.from_levels(random_levels(7, (3, 1, 1), seed)), -0.3, 0.3)
+        x = TPM.solve(h).x
+        others = [make("sns").solve(h).x, *(np.clip(x + 0.1 * r.normal(size=(50, 7)), -0.3, 0.3))]
+        mine = h.violations(x)
+        for other in others:
+            difference = h.violations(other) - mine
+            decided = np.flatnonzero(np.abs(difference) > 1e-9)
+            assert not decided.size or difference[decided[0]] > 0.0
+
+
+def test_scaling_is_one_where_a_level_is_met_and_the_share_of_the_target_where_it_is_not():
+    bounds = (np.eye(2), [-1.0, -1.0], [1.0, 1.0])
+    h = Hierarchy.from_levels([bounds, ([[1.0, 0.0]], [0.5]), ([[0.0, 1.0]], [-4.0]),
+                               ([[0.0, 1.0]], [9.0]), ([[1.0, 1.0]], [0.0])])
+    res = TPM.solve(h)
+    np.testing.assert_allclose(res.x, [0.5, -1.0])
+    np.testing.assert_allclose(res.scaling, [1.0, 1.0, 0.25, 0.0, 0.0])
+    assert res.saturated.tolist() == [0, -1]
+    assert res.saturated.dtype == np.int8
+
+
+def test_scaling_is_exactly_one_when_all_is_feasible():
+    for seed in range(3 if SLOW else 100):
+        A, x = rng(seed).normal(size=(5, 7)), rng(seed + 1).uniform(-0.4, 0.4, 7)
+        h = Hierarchy.from_levels([(np.eye(7), [-0.4] * 7, [0.4] * 7), (A[:3], A[:3] @ x),
+                                   (A[3:], A[3:] @ x)])
+        assert TPM.solve(h).scaling.tolist() == [1.0, 1.0, 1.0]
+
+
+def test_saturated_joints_are_at_the_bound_named():
+    for seed in range(3 if SLOW else 100):
+        h = boxed(Hierarchy.from_levels(random_levels(7, (3, 3), seed)), -0.2, 0.3)
+        res = TPM.solve(h)
+        assert (res.x[res.saturated == 1] == 0.3).all()
+        assert (res.x[res.saturated == -1] == -0.2).all()
+
+
+def test_bounds_on_some_joints_with_any_coefficient_are_intersected():
+    bounds = ([[0.0, -2.0, 0.0], [0.0, 1.0, 0.0], [10.0, 0.0, 0.0]],
+              [-1.0, -np.inf, -np.inf], [np.inf, 0.7, 3.0])
+    h = Hierarchy.from_levels([bounds, (np.eye(3), [1.0, 1.0, 1.0])])
+    res = TPM.solve(h)
+    np.testing.assert_allclose(res.x, [0.3, 0.5, 1.0])
+    assert res.saturated.tolist() == [1, 1, 0]
+
+
+def test_bounds_that_exclude_each_other_give_the_point_of_least_violation():
+    bounds = ([[1.0, 0.0], [2.0, 0.0], [-1.0, 0.0], [0.0, 1.0]], [-5.0, 4.0, -0.5, -1.0],
+              [0.0, np.inf, np.inf, 1.0])
+    h = Hierarchy.from_levels([bounds, ([[1.0, 1.0]], [9.0])])
+    res = TPM.solve(h)
+    place = lsq_linear([[1.0], [2.0], [-1.0]], [0.0, 4.0, -0.5]).x[0]
+    np.testing.assert_allclose(res.x, [place, 1.0])
+    assert certify(h, res.x).certified
+    assert res.saturated.tolist() == [2, 1]
+    assert res.scaling[0] == 0.0
+
+
+def test_joints_that_cannot_move_stay_where_they_are():
+    low, room = np.array([0.2, -0.1, 0.0, 0.3]), np.array([0.0, 0.0, 0.0, 1e-3])
+    h = boxed(Hierarchy.from_levels(random_levels(4, (2, 1))), low, low + room)
+    res = TPM.solve(h)
+    np.testing.assert_allclose(res.x[:3], low[:3], rtol=0, atol=0)
+    assert res.saturated[:3].tolist() == [2, 2, 2]
+
+
+def test_a_box_away_from_zero_and_from_the_reference():
+    h = boxed(Hierarchy.from_levels(random_levels(5, (2, 1)), np.full(5, -3.0)), 7.0, 8.0)
+    res = TPM.solve(h)
+    assert certify(h, res.x).certified
+
+
+def test_only_bounds_clip_the_reference():
+    reference = np.array([3.0, -0.2, -9.0])
+    h = Hierarchy.from_levels([(np.eye(3), [-1.0] * 3, [1.0] * 3)], reference)
+    assert TPM.solve(h).x.tolist() == [1.0, -0.2, -1.0]
+
+
+def test_levels_without_rows_may_stand_before_the_bounds():
+    empty = (np.empty((0, 2)), [])
+    h = Hierarchy.from_levels([empty, (np.eye(2), [0.0, 0.0], [1.0, 1.0]), empty, (np.eye(2),
+                                                                                [2.0, 0.5])])
+    assert TPM.solve(h).x.tolist() == [1.0, 0.5]
+
+
+def test_the_memory_of_another_tick_does_not_change_the_answer():
+    for seed in range(3 if SLOW else 200):
+        levels, r = random_levels(7, (3, 1, 1), seed), rng(seed)
+        before = TPM.solve(boxed(Hierarchy.from_levels(levels), -0.3, 0.3)).memory
+        moved = [(A, b + 0.1 * r.normal(size=b.shape)) for A, b in levels]
+        h = boxed(Hierarchy.from_levels(moved), -0.3, 0.3)
+        warm, cold = TPM.solve(h, before), TPM.solve(h)
+        np.testing.assert_allclose(warm.x, cold.x, rtol=0, atol=1e-10)
+        again = TPM.solve(h, warm.memory)
+        np.testing.assert_allclose(again.x, cold.x, rtol=0, atol=1e-10)
+        assert again.iterations == 1
+
+
+def test_a_memory_is_handed_over_unharmed_and_need_not_fit():
+    h = boxed(Hierarchy.from_levels(generic()), -0.3, 0.3)
+    cold = TPM.solve(h)
+    kept = cold.memory.copy()
+    TPM.solve(h, cold.memory)
+    assert np.array_equal(cold.memory, kept)
+    for memory in (np.zeros(3), np.full(len(kept), np.nan), np.full(len(kept), 9.0)):
+        np.testing.assert_allclose(TPM.solve(h, memory).x, cold.x, rtol=0, atol=1e-12)
+    free = Hierarchy.from_levels(generic())
+    assert np.array_equal(TPM.solve(free, cold.memory).x, TPM.solve(free).x)
+
+
+@pytest.mark.parametrize("form", ["staircase", "published"])
+def test_inequalities_that_are_no_bounds_are_refused_by_level_and_row(form):
+    tpm, bounds = make("tpm", form=form), (np.eye(2), [0.0, 0.0], [1.0, 1.0])
+    for levels, where in (
+            ([([[1.0, 0.0], [1.0, 1.0]], [0, 0], [1, 2])], "level 1, row 1: .* <= a x <= 2"),
+            ([([[1.0, 0.0], [0.0, 0.0]], [0, 0], [1, 2])], "level 1, row 1: .* <= a x <= 2"),
+            ([([[1.0, 1.0], [1.0, 0.0]], [0, 0], [0, 1])], "level 1, row 1: .* <= a x <= 1"),
+            ([bounds, ([[1.0, 0.0]], [0], [3])], "level 2, row 0: .* <= a x <= 3"),
+            ([([[1.0, 0.0]], [0.0]), bounds], "level 2, row 0: .* <= a x <= 1")):
+        if form == "published":
+            where = "an inequality"
+        with pytest.raises(HierarchyError, match=where):
+            tpm.solve(Hierarchy.from_levels(levels))
+
+
+def test_the_published_form_refuses_bounds():
+    published = make("tpm", form="published")
+    assert published.handles == "equalities"
+    assert TPM.handles == "bounds"
+    with pytest.raises(HierarchyError, match="tpm resolves equalities only"):
+        published.solve(boxed(Hierarchy.from_levels(generic()), -1.0, 1.0))
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf])
+@pytest.mark.parametrize("where", ["bound", "coefficient", "A", "target", "reference"])
+def test_entries_that_are_not_finite_give_a_status_and_a_finite_answer(where, bad):
+    for memory in (None, np.zeros(12)):
+        h = boxed(Hierarchy.from_levels(generic()), -0.3, 0.3)
+        if where == "bound":
+            h.lower[2] = bad
+        elif where == "coefficient":
+            h.A[2, 2] = bad
+        elif where == "A":
+            h.A[9, 2] = bad
+        elif where == "target":
+            h.lower[10] = h.upper[10] = bad
+        else:
+            h.reference[1] = bad
+        res = TPM.solve(h, memory)
+        assert res.status is Status.NUMERICAL_FAILURE
+        assert not res.x.any()
+
+
+@pytest.mark.filterwarnings("ignore:overflow")
+def test_squares_that_overflow_give_a_status_and_a_finite_answer():
+    h = boxed(Hierarchy.from_levels([([[1e200, 1e200]], [1.0])]), -1.0, 1.0)
+    res = TPM.solve(h)
+    assert res.status is Status.NUMERICAL_FAILURE
+    assert not res.x.any()
+
+
+@pytest.mark.parametrize("damping", [0.05, 0.5])
+def test_damping_keeps_the_bounds_and_ends(damping):
+    damped = make("tpm", damping=damping, threshold=1.0)
+    for seed in range(3 if SLOW else 300):
+        h = limited(seed)
+        res = damped.solve(h)
+        assert res.status is Status.SOLVED
+        assert_kept(h, res.x)
+        assert res.iterations <= 1 + (3 * h.n + 1) * (len(h.sizes) + 1)
+        assert np.array_equal(damped.solve(h, res.memory).x, res.x)
+
+
+@every_case
+def test_damping_without_a_bound_in_the_way_is_that_of_tpm(case):
+    damped, h = make("tpm", damping=0.05, threshold=3.0), build(case, True)
+    x = damped.solve(h).x
+    assert np.array_equal(damped.solve(boxed(h, x - 1e-3, x + 1e-3)).x, x)
+
+
+def test_near_a_singularity_bounds_hold_x_without_damping():
+    h = boxed(Hierarchy.from_levels([([[1.0, 0.0, 0.0], [1.0, 1e-7, 0.0]], [0.0, 1.0])]), -2.0, 2.0)
+    res = TPM.solve(h)
+    assert_kept(h, res.x)
+    assert certify(h, res.x).certified
+
+
+def test_the_workspace_grows_where_it_must():
+    h = boxed(Hierarchy.from_levels(random_levels(60, (20, 20))), -0.1, 0.1)
+    WORKSPACE.array = np.empty(64)
+    res = TPM.solve(h)
+    assert WORKSPACE.array.size >= saturation_work(h.m, h.n, len(h.sizes))
+    assert certify(h, res.x).certified
