@@ -7,6 +7,7 @@ from solvers import recursive as recursive
 from solvers import reverse as reverse
 from solvers import sns as sns
 from solvers import tpm as tpm
+from solvers import weighted as weighted
 from solvers.certificate import Certificate, certify
 from solvers.explain import explain
 from solvers.resolver import Resolution, Resolver, Status, make, names
