@@ -33,6 +33,23 @@ class Frame:
     rotation: Array
 
 
+@dataclass(frozen=True)
+class Body:
+    """What joint `name` moves, and where that joint is on the body of joint `parent` (0: base).
+
+    position (3,) [m] and rotation (3, 3) of the joint's frame in the parent's; mass [kg], centre
+    of mass (3,) [m] and inertia about it (3, 3) [kg m^2] in the joint's frame.
+    """
+
+    name: str
+    parent: int
+    position: Array
+    rotation: Array
+    mass: float
+    centre: Array
+    inertia: Array
+
+
 class Robot:
     """A fixed-base robot: its model, limits, frames and control points.
 
@@ -110,6 +127,16 @@ class Robot:
         """Attach a point to the body that `joint` moves; offset (3,) [m] in that joint's frame."""
         return ControlPoint(name or f"{joint} {np.asarray(offset).tolist()}", self.joint(joint),
                             np.array(offset, dtype=float))
+
+    def bodies(self) -> tuple[Body, ...]:
+        """Return the robot's bodies in the order of its joints, for another engine to build."""
+        return tuple(
+            Body(name, int(self.model.parents[i]), placement.translation.copy(),
+                 placement.rotation.copy(), float(inertia.mass), inertia.lever.copy(),
+                 inertia.inertia.copy())
+            for i, (name, placement, inertia) in enumerate(
+                zip(self.joint_names, list(self.model.jointPlacements)[1:],
+                    list(self.model.inertias)[1:], strict=True), 1))
 
     def position_limits(self) -> tuple[Array, Array]:
         """Return lower and upper (n,), (n,) [rad or m], one for each velocity.

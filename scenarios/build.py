@@ -46,7 +46,7 @@ from scenarios.config import (
     WaypointsSection,
 )
 from scenarios.order import Hierarchical, Order, Switched
-from scenarios.plants import KinematicArm
+from scenarios.plants import Apart, Commanded, JointSensor, KinematicArm, PhysicsArm, Plant
 from scenarios.published import PublishedAvoidance
 from scenarios.sensors import ExactDistances
 from solvers import make
@@ -62,7 +62,7 @@ class Cell:
 
     robot: Robot
     state: State
-    plant: KinematicArm
+    plant: Plant
     stack: Stack
     sensor: ExactDistances | None
     areas: SurveillanceAreas | None
@@ -89,7 +89,8 @@ def build(scenario: Scenario) -> Cell:
              *(task for task in (position, pointing, last) if task)]
     areas = (SurveillanceAreas(avoidance.near, avoidance.far, avoidance.end_effector)
              if isinstance(avoidance, AvoidanceSection) else None)
-    return Cell(robot, state, KinematicArm(robot, q, v, control.period, control.level),
+    obstacles = sensor.obstacles if sensor else Obstacles()
+    return Cell(robot, state, _plant(scenario, robot, q, v, obstacles),
                 Stack(tasks, control.level, _reference(scenario, robot)), sensor, areas,
                 position, pointing, limits, _order(scenario, areas, first, tasks))
 
@@ -170,6 +171,21 @@ def _reach(robot: Robot, q: Array, point: Array) -> Array:
         q = robot.integrate(q, step)
     raise ScenarioError(f"start.end_effector {point.tolist()} m cannot be reached: robot "
                         f"{robot.name!r} came no nearer than {nearest:.3g} m")
+
+
+def _plant(scenario: Scenario, robot: Robot, q: Array, v: Array, obstacles: Obstacles) -> Plant:
+    section, control = scenario.plant, scenario.control
+    if not section.measurement.ideal and robot.nq != robot.n:
+        raise ScenarioError(f"plant.measurement: robot {robot.name!r} has joints with more "
+                            "coordinates than velocities, which have no noise, steps or delay")
+    sensor = JointSensor(section.measurement, control.period)
+    if section.kind == "mujoco":
+        arm = PhysicsArm(robot, q, v, control.period, control.level, obstacles, section.servo,
+                         section.joints)
+        return Apart(arm, Commanded(arm) if section.feedback == "commanded" else sensor)
+    exact = KinematicArm(robot, q, v, control.period, control.level)
+    ideal = section.measurement.ideal or section.feedback == "commanded"
+    return exact if ideal else Apart(exact, sensor)
 
 
 def _sensor(scenario: Scenario, robot: Robot) -> ExactDistances | None:

@@ -9,6 +9,8 @@ import numpy as np
 from hierarchy.allocation import AVOIDANCE
 from hierarchy.compiled import compiled
 from hierarchy.kinematics import point_at
+from hierarchy.problem import Array
+from hierarchy.robot import Frame, Robot, State
 from scenarios.config import Scenario
 from scenarios.controller import Controller
 from scenarios.recording import Event, Recording
@@ -34,6 +36,8 @@ class Recorder:
         self._log = np.empty((ticks, 8 + cell.robot.nq + 3 * cell.robot.n + len(self._distance)))
         self._choices = np.empty((ticks, 5), dtype=np.int16)
         self._times = np.empty((ticks, len(_TIMES)))
+        self._extra = {name: np.empty((ticks, *value.shape), value.dtype)
+                       for name, value in cell.plant.extra.items()}
         self._blend, self._policy = controller.blend, controller.policy
         self._weights = np.empty(ticks if controller.blend else 0)
         self._events: list[Event] = []
@@ -50,6 +54,8 @@ class Recorder:
                         self._frame.offset, self._target, controller.cone_error, self._distance,
                         index, active, repulsion, int(resolution.status), resolution.iterations,
                         *controller.stamps)
+        for name, value in cell.plant.extra.items():
+            self._extra[name][k] = value
         if self._blend is not None:
             self._weights[k] = self._blend.weight
         if self._policy.events:
@@ -81,6 +87,9 @@ class Recorder:
             signals |= {"pointing_error": cone[:, 0], "pointing_active": asked[order]}
         if self._blend is not None:
             signals["transition"] = self._weights[rows].copy()
+        signals |= {name: values[rows].copy() for name, values in self._extra.items()}
+        if "true_q" in signals:
+            signals["true_ee_position"] = _positions(robot, self._frame, signals["true_q"])
         if len(self._distance):
             signals |= {"control_point_distance": body, "minimal_distance": body.min(axis=1),
                         "ee_distance": log[:, -1].copy(), "active_control_point": active,
@@ -90,6 +99,16 @@ class Recorder:
                     "velocity_limit": robot.velocity_limit}
         return Recording(signals, tuple(" > ".join(names) for names in orders), scenario, fault,
                          tuple(self._events))
+
+
+def _positions(robot: Robot, frame: Frame, q: Array) -> Array:
+    """Where a frame's origin is (T, 3) [m] at joint positions q (T, nq)."""
+    state, at_rest = State(robot), np.zeros(robot.n)
+    positions = np.full((len(q), 3), np.nan)
+    for k, row in enumerate(q):
+        if state.move(0.0, row, at_rest):
+            positions[k] = state.position(frame)
+    return positions
 
 
 @compiled

@@ -43,6 +43,10 @@ class Recording:
     -------
     t (T,) [s] · q, v, a (T, n) [rad, rad/s, rad/s^2], q and v as the controller knew them
     command (T, n) that was sent: a velocity or an acceleration, after `scenario.control.level`
+    true_q, true_v (T, n) the true state where measuring or physics keep it apart from q and v;
+    true_ee_position (T, 3) [m] after true_q
+    contacts (T,) points of arm and obstacles that touched at once in the period of tick k;
+    contact_depth (T,) [m], contact_force (T,) [N], of a plant with physics
     ee_position, desired_position, position_error (T, 3) [m], error = desired - actual
     pointing_error (T,) cos(alpha_d) - cos(alpha), positive outside the cone
     pointing_active (T,) bool, whether the pointing task was in the stack
@@ -137,7 +141,8 @@ def load_run(folder: str | Path) -> Recording:
 
 def versions() -> dict[str, str]:
     """Return the versions and the processor that a run's numbers were made with."""
-    packages = ("task-hierarchy", "numpy", "numba", "pin", "qpsolvers", "proxsuite", "osqp")
+    packages = ("task-hierarchy", "numpy", "numba", "pin", "qpsolvers", "proxsuite", "osqp",
+                "mujoco")
     return {"python": platform.python_version(), **{name: _version(name) for name in packages},
             "system": f"{platform.system()} {platform.machine()}",
             "processor": f"{_processor()}, {os.cpu_count()} cores"}

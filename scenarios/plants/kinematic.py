@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 # mypy: disable-error-code="no-untyped-def"
+from typing import Any
+
 import numpy as np
+from numpy.typing import NDArray
 
 from hierarchy import Robot
 from hierarchy.compiled import compiled
@@ -14,11 +17,13 @@ from hierarchy.task import Level
 class KinematicArm:
     """Integrator: q += v T + a T^2 / 2, v += a T, or at velocity level q += x T, v = x.
 
-    `q` (nq,), `v` (n,) hold the state, `a` (n,) the acceleration of the last step [rad, s].
+    `q` (nq,), `v` (n,) hold the state, `a` (n,) the acceleration of the last step [rad, s];
+    `extra` is empty.
     """
 
     def __init__(self, robot: Robot, q: Array, v: Array, period: float, level: Level) -> None:
         self.q, self.v, self.a = q.copy(), v.copy(), np.zeros(robot.n)
+        self.extra: dict[str, NDArray[Any]] = {}
         self._robot, self._period = robot, period
         self._acceleration = level == "acceleration"
         self._step = np.zeros(robot.n)
