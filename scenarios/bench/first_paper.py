@@ -42,7 +42,7 @@ def run(out: Path | None = None, arms: int = ARMS, checked: int = CHECKED,
     from scenarios.bench import accuracy, growth
     from scenarios.bench.machine import machine
 
-    errors = accuracy.run(arms, min(checked, arms))
+    errors = accuracy.run(arms, max(1, min(checked, arms)))
     times = growth.run(seconds)
     Console(highlight=False, markup=False).print(NOTES)
     if out is not None:
