@@ -161,6 +161,7 @@ def check(file: Annotated[str, typer.Argument(help="A scenario file, or a scenar
     print(f"  robot     {scenario.robot.model}")
     print(f"  control   {scenario.control.level} level, {ticks} ticks of "
           f"{1e3 * scenario.control.period:g} ms")
+    print(f"  plant     {scenario.plant.kind}")
     print(f"  resolver  {scenario.make_resolver()!r}")
     if scenario.pointing is not None:
         print(f"  pointing  {scenario.pointing.kind}, cone of {scenario.pointing.alpha_d:g} deg")

@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 # Display units by SI unit: how many of them make one, what it is called, decimals.
 _SHOWN = {"m": (1e3, "mm", 3), "s": (1e6, "µs", 2), "deg": (1.0, "°", 3), "share": (100.0, "%", 2),
           "rad": (1.0, "rad", 3), "rad/s": (1.0, "rad/s", 3), "rad/s^2": (1.0, "rad/s²", 2),
-          "": (1.0, "", 0)}
+          "N": (1.0, "N", 1), "": (1.0, "", 0)}
 
 
 @dataclass(frozen=True)
@@ -67,8 +67,8 @@ def measure(recording: Recording, settle: float = 2.0,
         return {}
     found = (*_tracking(recording, settle), *_pointing(recording, cone_tolerance_deg),
              *_strictness(recording),
-             *_distances(recording), *_motion(recording), *_switching(recording),
-             *_troubles(recording), *_time(recording))
+             *_distances(recording), *_contacts(recording), *_motion(recording),
+             *_switching(recording), *_troubles(recording), *_time(recording))
     return {metric.name: metric for metric in found}
 
 
@@ -101,6 +101,12 @@ def _tracking(recording: Recording, settle: float) -> Iterator[Metric]:
                      _largest(e), "m", group="Tracking")
     yield Metric("position_error_median_settled", f"Error after {settle:g} s, median",
                  _finite(np.median(after)) if after.size else None, "m", group="Tracking")
+    if "true_ee_position" in recording:
+        true = np.linalg.norm(recording["desired_position"] - recording["true_ee_position"], axis=1)
+        yield Metric("true_position_error_rms", "True position error, rms",
+                     _finite(np.sqrt(np.mean(true**2))), "m", group="Tracking")
+        yield Metric("true_position_error_max", "True position error, max", _largest(true), "m",
+                     group="Tracking")
 
 
 def _pointing(recording: Recording, tolerance: float) -> Iterator[Metric]:
@@ -140,8 +146,22 @@ def _distances(recording: Recording) -> Iterator[Metric]:
                          lower_is_better=False, group="Safety")
 
 
+def _contacts(recording: Recording) -> Iterator[Metric]:
+    if "contacts" in recording:
+        yield Metric("contact_ticks", "Contacts: ticks",
+                     float(np.count_nonzero(recording["contacts"])), "", group="Safety")
+        for key, unit in (("depth", "m"), ("force", "N")):
+            yield Metric(f"contact_{key}_max", f"Contact {key}, max",
+                         _largest(recording[f"contact_{key}"]), unit, group="Safety")
+
+
+def _true(recording: Recording, signal: str) -> Array:
+    """Return q or v as it was, where that is known apart from what was measured."""
+    return recording[f"true_{signal}" if f"true_{signal}" in recording else signal]
+
+
 def _motion(recording: Recording) -> Iterator[Metric]:
-    v, group = recording["v"], "Safety"
+    v, group = _true(recording, "v"), "Safety"
     yield _joint_limit_excess(recording)
     yield Metric("speed_max", "Joint speed, max", _largest(v), "rad/s", group=group)
     yield Metric("velocity_step_max", "Joint speed step, max",
@@ -155,7 +175,8 @@ def _motion(recording: Recording) -> Iterator[Metric]:
 def _joint_limit_excess(recording: Recording) -> Metric:
     value, note = None, "the robot has no joint limits"
     if "joint_lower" in recording and "joint_upper" in recording:
-        lower, upper, q = recording["joint_lower"], recording["joint_upper"], recording["q"]
+        lower, upper, q = (recording["joint_lower"], recording["joint_upper"],
+                           _true(recording, "q"))
         if np.isfinite(lower).any() or np.isfinite(upper).any():
             excess = np.maximum(q - upper, lower - q).max(axis=0)
             joint = int(np.argmax(excess))

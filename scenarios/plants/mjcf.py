@@ -15,7 +15,7 @@ from hierarchy.robot import Body
 from scenarios.config import JointsSection, ScenarioError, ServoSection
 
 GRAVITY = 9.81     # [m/s^2], along -z of the world, as in the robot's own model
-_SOFTNESS = 0.005  # [s] in which a contact comes to rest; a few steps, the least that is stable
+_SOFTNESS = 0.02   # [s] in which a contact comes to rest: some mm at usual speeds
 _FRICTION = "0.5 0.005 0.0001"  # of a contact: sliding, turning [m], rolling [m]
 Element = ElementTree.Element
 
