@@ -35,6 +35,7 @@ from hierarchy.tasks.self_separation import SelfSeparation
 from scenarios.config import (
     AvoidanceSection,
     EllipseSection,
+    ExactSensorSection,
     ObstacleSection,
     PathSection,
     RepulsionSection,
@@ -48,7 +49,8 @@ from scenarios.config import (
 from scenarios.order import Hierarchical, Order, Switched
 from scenarios.plants import Apart, Commanded, JointSensor, KinematicArm, PhysicsArm, Plant
 from scenarios.published import PublishedAvoidance
-from scenarios.sensors import ExactDistances
+from scenarios.sensors import ExactDistances, Sensor
+from scenarios.sensors.making import make_depth_sensor
 from solvers import make
 
 
@@ -64,7 +66,7 @@ class Cell:
     state: State
     plant: Plant
     stack: Stack
-    sensor: ExactDistances | None
+    sensor: Sensor | None
     areas: SurveillanceAreas | None
     position: Position | None
     pointing: Pointing | None
@@ -188,7 +190,7 @@ def _plant(scenario: Scenario, robot: Robot, q: Array, v: Array, obstacles: Obst
     return exact if ideal else Apart(exact, sensor)
 
 
-def _sensor(scenario: Scenario, robot: Robot) -> ExactDistances | None:
+def _sensor(scenario: Scenario, robot: Robot) -> Sensor | None:
     section = scenario.avoidance
     if section is None:
         return None
@@ -197,9 +199,26 @@ def _sensor(scenario: Scenario, robot: Robot) -> ExactDistances | None:
                             "in robot.control_points")
     obstacles = make_obstacles(section.obstacles)
     if isinstance(section, SeparationSection):
-        return ExactDistances(robot, obstacles, pairs=True)
-    mean_within = section.far if section.direction == "mean" else 0.0
-    return ExactDistances(robot, obstacles, _law(section.body), _law(section.tip), mean_within)
+        return _seen_by(scenario, robot, ExactDistances(robot, obstacles, pairs=True),
+                        section.influence)
+    mean = section.direction == "mean"
+    body, tip = _law(section.body), _law(section.tip)
+    exact = ExactDistances(robot, obstacles, body, tip, section.far if mean else 0.0)
+    return _seen_by(scenario, robot, exact, max(section.far, section.end_effector), mean, body, tip)
+
+
+def _seen_by(scenario: Scenario, robot: Robot, exact: ExactDistances, region: float,
+             mean: bool = False, body: Repulsion | None = None,
+             tip: Repulsion | None = None) -> Sensor:
+    """The sensor that the scenario asks for, in place of an exact one."""
+    if isinstance(scenario.sensor, ExactSensorSection):
+        return exact
+    danger = scenario.limits.danger_reach if scenario.limits else None
+    try:
+        return make_depth_sensor(scenario.sensor, robot, exact, max(region, danger or 0.0), mean,
+                                 body, tip)
+    except HierarchyError as error:
+        raise ScenarioError(f"sensor: {error}") from error
 
 
 def _law(section: RepulsionSection) -> Repulsion:
@@ -248,17 +267,18 @@ def _avoidance(scenario: Scenario, robot: Robot) -> list[Task]:
     if section is None:
         return []
     if isinstance(section, SeparationSection):
-        return _separation(section, robot)
+        return _separation(section, robot, scenario.sensor.kind == "exact")
     kind = PublishedAvoidance if section.jacobian == "published" else Avoidance
     return [kind(robot.control_points, section.dimension)]
 
 
-def _separation(section: SeparationSection, robot: Robot) -> list[Task]:
+def _separation(section: SeparationSection, robot: Robot, exact: bool) -> list[Task]:
     tasks: list[Task] = []
-    if section.obstacles:
+    if section.obstacles or not exact:
         barrier = Barrier(section.distance, section.rate, section.influence, section.recovery,
                           section.limit)
-        tasks.append(Separation(sensed_points(robot), barrier, len(section.obstacles)))
+        tasks.append(Separation(sensed_points(robot), barrier,
+                                len(section.obstacles) if exact else None))
     if section.self_collision is not None:
         if robot.name not in TABLES:
             raise ScenarioError(f"avoidance.self_collision: robot {robot.name!r} has no capsules")

@@ -426,6 +426,88 @@ class PlantSection(_Section):
     joints: JointsSection = JointsSection()
 
 
+class ExactSensorSection(_Section):
+    """Distances of known geometry, without noise or delay."""
+
+    kind: Literal["exact"] = "exact"
+
+
+Share = Annotated[float, Field(ge=0.0, le=1.0)]
+
+
+class _DepthSection(_Section):
+    """How distances are evaluated in depth images, see scenarios.sensors.depth_space.
+
+    A frame is used from `latency` [s] after it was taken. Without a new frame for more than
+    `stale_after` [s] the camera is blind and `control.policy.stale` acts; one with a reading in
+    less than the share `least_readings` of its pixels is none. The robot, made of capsules with a
+    column of height `foot` [m] below its base, is taken out with a `margin` [m]. Obstacles within
+    `region` [m] of a point are seen, None for the largest distance at which avoidance acts.
+    `thin` [m] is how far obstacles reach behind their surface, None for any distance. A pixel
+    counts if `support` of the nine around it agree within `band` [m].
+    """
+
+    latency: NotNegative = 0.0
+    stale_after: NotNegative = 0.2
+    least_readings: Share = 0.1
+    foot: NotNegative = 0.31
+    margin: NotNegative = 0.05
+    region: Positive | None = None
+    thin: NotNegative | None = None
+    support: Annotated[int, Field(ge=1, le=9)] = 3
+    band: NotNegative = 0.05
+
+
+class CameraSection(_DepthSection):
+    """A simulated depth camera, see scenarios.sensors.camera and scenarios.sensors.errors.
+
+    Image size, focal lengths and centre [px], None for the middle; position [m]; a point [m] to
+    look at, or a rotation, which goes before it: rows, whose columns are the camera's axes right,
+    down and forward in the world. `rate` [Hz], `jitter` [s] of the frames; `seed` of all chance.
+    `ideal`: without any of the errors. `backdrop` [m] is the depth of a wall, 0 for none;
+    `point_radius` [m] that of the balls as which point obstacles are seen.
+    """
+
+    kind: Literal["camera"]
+    width: Annotated[int, Field(ge=1)] = 640
+    height: Annotated[int, Field(ge=1)] = 480
+    fx: Positive = 525.0
+    fy: Positive = 525.0
+    cx: Finite | None = None
+    cy: Finite | None = None
+    position: Vector3 = (0.0, 2.0, 0.7)
+    look_at: Vector3 = (0.0, 0.3, 0.1)
+    rotation: tuple[Vector3, Vector3, Vector3] | None = None
+    rate: Positive = 30.0
+    jitter: NotNegative = 0.0
+    seed: Annotated[int, Field(ge=0)] = 0
+    ideal: bool = False
+    noise_floor: NotNegative = 1.2e-3
+    noise_growth: NotNegative = 1.9e-3
+    noise_from: NotNegative = 0.4
+    rounding: Literal["disparity", "step"] = "disparity"
+    step: NotNegative = 2.85e-3
+    near: NotNegative = 0.5
+    far: Positive = 5.0
+    missing: Share = 0.002
+    missing_at_edges: Share = 0.3
+    outliers: Share = 0.02
+    outlier_size: Annotated[int, Field(ge=0)] = 2
+    point_radius: NotNegative = 0.02
+    backdrop: NotNegative = 4.0
+
+
+class FramesSection(_DepthSection):
+    """Depth images from a folder, or a shipped one by name, see scenarios.sensors.frames."""
+
+    kind: Literal["frames"]
+    folder: str
+
+
+SensorSection = Annotated[ExactSensorSection | CameraSection | FramesSection,
+                          Field(discriminator="kind")]
+
+
 class FaultSection(_Section):
     """Something that goes wrong on purpose from `at` [s] on, for `duration` [s].
 
@@ -434,10 +516,11 @@ class FaultSection(_Section):
     of all without it). stale: joints and distances stay as they were. status: the resolver says
     `status` of its answer. overrun: the tick takes `takes` [s] more. obstacle: a sphere of `radius`
     [m] stands at `centre` [m], or at `place` on the body as this was when the sphere appeared.
+    no_frames: the camera takes no images; dark_frames: they have no readings.
     """
 
     kind: Literal["nan_position", "nan_velocity", "nan_distance", "stale", "status", "overrun",
-                  "obstacle"]
+                  "obstacle", "no_frames", "dark_frames"]
     at: NotNegative
     duration: Positive
     joint: Annotated[int, Field(ge=1)] | None = None
@@ -479,6 +562,7 @@ class Scenario(_Section):
     start: StartSection = StartSection()
     control: ControlSection
     plant: PlantSection = PlantSection()
+    sensor: SensorSection = ExactSensorSection()
     position: PositionSection | None = None
     pointing: PointingSection | None = None
     avoidance: AvoidanceKind | None = None
@@ -519,6 +603,13 @@ class Scenario(_Section):
                       if fault.kind in ("nan_distance", "obstacle")), None)
         if blind and not self.avoidance:
             raise ValueError(f"a fault of kind {blind!r} needs [avoidance]")
+        kinds, sensor = {fault.kind for fault in self.faults}, self.sensor.kind
+        if sensor != "exact" and not self.avoidance:
+            raise ValueError(f"sensor.kind = {sensor!r} needs [avoidance], which it serves")
+        if sensor == "exact" and kinds & {"no_frames", "dark_frames"}:
+            raise ValueError("faults of frames need a sensor of kind \"camera\" or \"frames\"")
+        if sensor == "frames" and "obstacle" in kinds:
+            raise ValueError("a fault of kind 'obstacle' would not be in the recorded frames")
         return self
 
     @property
@@ -584,6 +675,10 @@ def load(name_or_path: str | Path, changes: Sequence[str] | Mapping[str, Any] = 
     robot = data.get("robot")
     if isinstance(robot, dict) and str(robot.get("model", "")).endswith((".urdf", ".xml", ".mjcf")):
         robot["model"] = str(path.parent.resolve() / robot["model"])
+    sensor = data.get("sensor")
+    if isinstance(sensor, dict) and not (LIBRARY / "frames" / str(sensor.get("folder"))).is_dir():
+        sensor |= {"folder": str(path.parent.resolve() / str(sensor["folder"]))
+                   } if "folder" in sensor else {}
     return _validated(data, str(path) if path.parent != LIBRARY else f"scenario {path.stem!r}")
 
 

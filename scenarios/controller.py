@@ -119,7 +119,10 @@ class Controller:
         if cell.pointing is not None:
             self.cone_error = cell.pointing.cone_error(cell.state)
         if cell.sensor is not None:
-            nearest = smallest(cell.sensor.measure(cell.state).distance)
+            seen = cell.sensor.measure(cell.state)
+            if seen.blind and "stale" not in troubles:
+                troubles.append("stale")
+            nearest = smallest(seen.distance)
             if not nearest > 0.0:
                 troubles.append("inside" if nearest <= 0.0 else "not_finite")
 

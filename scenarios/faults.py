@@ -15,7 +15,7 @@ from hierarchy.robot import Frame, Robot, State
 from scenarios.build import build
 from scenarios.config import FaultSection, ObstacleSection, Scenario, ScenarioError
 from scenarios.controller import Controller
-from scenarios.sensors import ExactDistances
+from scenarios.sensors import DepthSensor, ExactDistances, Sensor
 from solvers import Resolution, Resolver, Status
 
 _AWAY = (1e3, 1e3, 1e3)  # [m] where an obstacle waits for its time
@@ -87,14 +87,17 @@ class Faults:
 class _FaultySensor(ExactDistances):
     """Stands in for a sensor, with all that this one has."""
 
-    def __init__(self, sensor: ExactDistances, faults: Faults) -> None:
+    def __init__(self, sensor: Sensor, faults: Faults) -> None:
         self.__dict__.update(sensor.__dict__)
-        self._faults = faults
+        self._inner, self._faults = sensor, faults
 
     def measure(self, state: State) -> Measurement:
         if any(self._faults.now("stale")):
             return self.measurement
-        seen = super().measure(state)
+        if isinstance(self._inner, DepthSensor):
+            self._inner.stopped = any(self._faults.now("no_frames"))
+            self._inner.covered = any(self._faults.now("dark_frames"))
+        seen = self._inner.measure(state)
         points = [fault.point for fault in self._faults.now("nan_distance")]
         _spoil(seen.distance, points)
         if seen.pairs is not None:

@@ -43,10 +43,13 @@ class Measurement:
     there is none; direction (K + 1, 3) unit vector away from it; magnitude (K + 1,) of the
     repulsion, eq. (23); nearest (K + 1,) index of that obstacle or -1. `active` is the control
     point of eq. (31), the first with the smallest distance (-1 if there is none). `pairs` has
-    every point against every obstacle, or is None where nobody asked for it.
+    every point against every obstacle, or is None where nobody asked for it. `stamp` is the time
+    [s] of what was seen, infinite for now; a sensor that has seen nothing new for too long to be
+    relied on is `blind`.
     """
 
-    __slots__ = ("active", "direction", "distance", "magnitude", "nearest", "pairs", "points")
+    __slots__ = ("active", "blind", "direction", "distance", "magnitude", "nearest", "pairs",
+                 "points", "stamp")
 
     def __init__(self, control_points: int) -> None:
         size = control_points + 1
@@ -55,6 +58,7 @@ class Measurement:
         self.nearest = np.full(size, -1, dtype=np.int64)
         self.active = -1
         self.pairs: Pairs | None = None
+        self.stamp, self.blind = inf, False
 
     @property
     def minimal_distance(self) -> float:

@@ -1,5 +1,8 @@
-"""Where distances come from."""
+"""Where distances come from: known geometry, or depth images."""
 
+from scenarios.sensors.depth_sensor import DepthSensor
 from scenarios.sensors.exact import ExactDistances
 
-__all__ = ["ExactDistances"]
+Sensor = ExactDistances | DepthSensor
+
+__all__ = ["DepthSensor", "ExactDistances", "Sensor"]
