@@ -23,7 +23,7 @@ ALERT = "#d33a2c"
 # Okabe and Ito's colours, safe for colour-blind readers and legible on white and on near-black.
 _BY_LABEL = {"tpm published": "#0072b2", "tpm": "#56b4e9", "recursive": "#e69f00",
              "augmented": "#cc79a7", "hqp": "#009e73", "hcod": "#d55e00", "weighted": "#a8781e",
-             "sns": "#8a8f98", "reverse": "#9467bd", "reverse in-order": "#ee6677"}
+             "sns": "#bcbd22", "reverse": "#9467bd", "reverse in-order": "#ee6677"}
 # Tol's bright scheme, for the joints of one robot.
 JOINTS = ("#4477aa", "#ee6677", "#228833", "#ccbb44", "#66ccee", "#aa3377", "#999999", "#dd7733")
 

@@ -34,6 +34,10 @@ class HandMadeScenario:
     def with_resolver(self, spec: str) -> HandMadeScenario:
         return replace(self, resolver=spec)
 
+    @property
+    def asks(self):
+        return "equalities"
+
     def make_resolver(self) -> Any:
         return SimpleNamespace(label=LABELS.get(self.resolver, self.resolver), accuracy=1e-9,
                                strict=self.resolver not in ("tpm", "augmented"))
