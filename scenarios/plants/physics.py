@@ -60,7 +60,7 @@ class PhysicsArm:
         self.data.qpos[:], self.data.qvel[:] = q, v
         self.q, self.v, self.a = q.copy(), v.copy(), np.zeros(len(v))
         self.reference_q, self.reference_v = q.copy(), v.copy()
-        self._time, self._wrench = 0.0, np.zeros((6, 1))
+        self._time, self._wrench = 0.0, np.zeros(6)
         self._references = np.zeros((self._steps, 2 * len(v)))
         self._contacts = np.zeros((), dtype=np.int16)
         self._depth, self._force = np.zeros(()), np.zeros(())
@@ -108,7 +108,7 @@ class PhysicsArm:
         self._depth[...] = max(float(self._depth), -float(contacts.dist.min()))
         for i in range(len(contacts)):
             self._force_of(self.model, self.data, i, self._wrench)
-            self._force[...] = max(float(self._force), float(self._wrench[0, 0]))
+            self._force[...] = max(float(self._force), float(self._wrench[0]))
 
 
 def _mujoco() -> Any:

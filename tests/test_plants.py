@@ -1,0 +1,494 @@
+"""Plants: exact or simulated physics, and what a controller is told of them."""
+
+import sys
+
+import numpy as np
+import pytest
+
+from hierarchy import HierarchyError, Robot
+from hierarchy.avoidance import Obstacle, Obstacles
+from hierarchy.paths import Waypoints
+from scenarios import load, simulate
+from scenarios.build import build
+from scenarios.cli import run_command
+from scenarios.config import JointsSection, MeasurementSection, ScenarioError, ServoSection
+from scenarios.controller import Controller
+from scenarios.metrics import measure
+from scenarios.plants import Apart, JointSensor, KinematicArm, PhysicsArm
+from scenarios.recording import load_run, save
+
+ROBOT = Robot.named("kuka_lwr")
+START = np.array([0.923, -0.854, 0.903, 1.195, 0.971, 1.796, 0.0])
+STILL = np.zeros(7)
+PERIOD = 0.005  # [s]
+SHORT = ["control.duration=0.3", "control.period=0.005"]
+PHYSICS = [*SHORT, "plant.kind=mujoco"]
+NOISY = ["plant.measurement.position_noise=1e-4", "plant.measurement.velocity_noise=1e-2"]
+
+
+@pytest.fixture(scope="module")
+def mujoco():
+    return pytest.importorskip("mujoco")
+
+
+def arm(mujoco, q=START, v=STILL, obstacles=(), level="velocity", period=PERIOD, servo=None,
+        joints=None):
+    return PhysicsArm(ROBOT, np.array(q), np.array(v), period, level, Obstacles(obstacles),
+                      servo and ServoSection(**servo), joints and JointsSection(**joints))
+
+
+def states(count=20):
+    rng = np.random.default_rng(5)
+    return [(rng.uniform(ROBOT.lower, ROBOT.upper), rng.normal(size=7)) for _ in range(count)]
+
+
+# The physics is that of the robot's model.
+
+
+def test_inertia_gravity_and_coriolis_forces_are_those_of_the_robots_model(mujoco):
+    plant = arm(mujoco, joints={"armature": 0.0})
+    model, data = plant.model, plant.data
+    for q, v in states():
+        data.qpos[:], data.qvel[:] = q, v
+        mujoco.mj_forward(model, data)
+        M = np.array([inertia_times(mujoco, plant, e) for e in np.eye(7)])
+        state = ROBOT.state(q, v)
+        upper = np.triu(state.mass_matrix())
+        np.testing.assert_allclose(M, upper + np.triu(upper, 1).T, rtol=0, atol=1e-9)
+        np.testing.assert_allclose(data.qfrc_bias, state.bias_effort(), rtol=0, atol=1e-9)
+
+
+def inertia_times(mujoco, plant, vector):
+    product = np.zeros(7)
+    mujoco.mj_mulM(plant.model, plant.data, product, vector)
+    return product
+
+
+def test_the_inertia_of_the_drives_comes_on_top(mujoco):
+    plain, driven = (arm(mujoco, joints={"armature": a}) for a in (0.0, tuple(np.arange(1.0, 8.0))))
+    for i, e in enumerate(np.eye(7)):
+        np.testing.assert_allclose(
+            inertia_times(mujoco, driven, e) - inertia_times(mujoco, plain, e), (i + 1) * e,
+            rtol=0, atol=1e-12)
+
+
+def test_the_links_are_where_the_robot_has_them(mujoco):
+    plant = arm(mujoco)
+    for q, v in states():
+        plant.data.qpos[:] = q
+        mujoco.mj_forward(plant.model, plant.data)
+        state = ROBOT.state(q, v)
+        for name in ROBOT.joint_names:
+            body, joint = plant.data.body(f"body {name}"), ROBOT.joint(name)
+            placed = state.placements[joint]
+            np.testing.assert_allclose(body.xpos, placed[9:], rtol=0, atol=1e-12)
+            np.testing.assert_allclose(body.xmat.reshape(3, 3), placed[:9].reshape(3, 3).T,
+                                       rtol=0, atol=1e-12)
+
+
+# The servos.
+
+
+@pytest.mark.parametrize("period", [0.001, 0.005])
+def test_an_arm_without_commands_holds_its_posture(mujoco, period):
+    for q, _ in states(3):
+        plant = arm(mujoco, 0.9 * q, period=period)
+        for _ in range(round(2.0 / period)):
+            plant.act(STILL)
+        assert np.abs(plant.q - 0.9 * q).max() < 1e-4
+        assert np.abs(plant.v).max() < 1e-4
+
+
+def test_an_arm_sags_by_the_share_of_gravity_that_is_not_compensated(mujoco):
+    plant = arm(mujoco, servo={"gravity": 0.5}, joints={"friction": 0.0})
+    for _ in range(400):
+        plant.act(STILL)
+    expected = 0.5 * ROBOT.state(plant.q).bias_effort() / plant.stiffness
+    np.testing.assert_allclose(START - plant.q, expected, rtol=1e-3, atol=1e-6)
+    assert np.abs(expected).max() > 1e-4
+
+
+@pytest.mark.parametrize("joint", range(7))
+def test_a_step_is_followed_to_what_friction_leaves(mujoco, joint):
+    plant = arm(mujoco)
+    step = 0.01 * np.eye(7)[joint]  # [rad]
+    plant.act(step / PERIOD)
+    reached = []
+    for _ in range(100):
+        plant.act(STILL)
+        reached.append(plant.q[joint] - START[joint])
+    np.testing.assert_allclose(plant.reference_q, START + step, rtol=0, atol=1e-15)
+    left_over = JointsSection().friction / plant.stiffness
+    assert (np.abs(plant.q - plant.reference_q) < left_over + 1e-6).all()
+    assert max(reached) < 0.013  # a damped servo, whose feedforward was for another speed
+
+
+def test_a_smooth_motion_is_followed_closely(mujoco):
+    plant, exact = (make(ROBOT, START, STILL, PERIOD, "acceleration")
+                    for make in (PhysicsArm, KinematicArm))
+    apart = 0.0
+    for k in range(400):
+        command = 0.5 * np.sin(2.0 * k * PERIOD + np.arange(7))
+        plant.act(command)
+        exact.act(command)
+        apart = max(apart, np.abs(plant.q - exact.q).max())
+        np.testing.assert_allclose(plant.reference_q, exact.q, rtol=0, atol=1e-12)
+        np.testing.assert_allclose(plant.reference_v, exact.v, rtol=0, atol=1e-12)
+        np.testing.assert_array_equal(plant.a, exact.a)
+    assert np.abs(exact.q - START).max() > 0.3
+    assert 1e-6 < apart < 2e-3
+
+
+def test_servos_stay_within_the_effort_limits(mujoco):
+    plant, most = arm(mujoco, servo={"bandwidth": 300.0}), STILL
+    for k in range(40):
+        plant.act(np.full(7, 5.0 if k % 4 < 2 else -5.0))
+        most = np.maximum(most, np.abs(plant.data.qfrc_actuator))
+    assert (most <= ROBOT.effort_limit * (1 + 1e-12)).all()
+    assert (most > 0.99 * ROBOT.effort_limit).any()
+
+
+@pytest.mark.parametrize("level", ["velocity", "acceleration"])
+def test_the_reference_keeps_the_joint_range(mujoco, level):
+    plant = arm(mujoco, STILL, level=level)
+    for k in range(800):
+        plant.act(np.ones(7) if level == "velocity" or k < 200 else STILL)
+        assert (plant.reference_q <= ROBOT.upper + 1e-15).all()
+    np.testing.assert_allclose(plant.reference_q, ROBOT.upper, rtol=0, atol=1e-12)
+    assert (plant.q < ROBOT.upper + 0.01).all()
+    np.testing.assert_array_equal(plant.reference_v, STILL)
+
+
+def test_the_servos_rate_is_a_whole_number_of_steps_a_period(mujoco):
+    assert arm(mujoco, period=0.001).model.opt.timestep == 0.001
+    assert arm(mujoco, period=0.005).model.opt.timestep == 0.001
+    assert arm(mujoco, period=0.0025).model.opt.timestep == pytest.approx(0.0025 / 3)
+
+
+# Contacts.
+
+
+def sphere_at(centre, radius=0.05, path=None):
+    return Obstacle("sphere", tuple(centre), (radius,), path=path)
+
+
+def forearm(q=START):
+    """The middle of the forearm, a capsule along the z axis of the frame of joint 5."""
+    placed = ROBOT.state(q).placements[5]
+    return placed[9:] + 0.195 * placed[6:9]
+
+
+def test_nothing_is_touched_where_nothing_is_near(mujoco):
+    plant = arm(mujoco, obstacles=[sphere_at((0.0, -1.0, 0.0))])
+    for _ in range(20):
+        plant.act(np.full(7, 0.2))
+        assert plant.extra["contacts"] == 0
+        assert plant.extra["contact_depth"] == plant.extra["contact_force"] == 0.0
+
+
+@pytest.mark.parametrize("shape", ["sphere", "capsule", "box"])
+def test_an_obstacle_put_into_the_arm_is_touched(mujoco, shape):
+    sizes = {"sphere": (0.05,), "capsule": (0.05, 0.1), "box": (0.05, 0.05, 0.05)}[shape]
+    plant = arm(mujoco, obstacles=[Obstacle(shape, tuple(forearm()), sizes)])
+    plant.act(STILL)
+    assert plant.extra["contacts"] > 0
+    assert plant.extra["contact_depth"] > 0.05
+    assert plant.extra["contact_force"] > 0.0
+
+
+def test_the_depth_of_a_contact_is_how_far_shapes_overlap(mujoco):
+    side = ROBOT.state(START).placements[5][0:3]
+    deep = 1e-3  # [m]
+    centre = forearm() + (0.06 + 0.05 - deep) * side  # radii of arm and ball
+    plant = arm(mujoco, obstacles=[sphere_at(centre)])
+    plant.act(STILL)
+    assert plant.extra["contacts"] == 1
+    assert plant.extra["contact_depth"] == pytest.approx(deep, rel=1e-6)
+
+
+def test_a_point_has_no_body(mujoco):
+    plant = arm(mujoco, obstacles=[Obstacle("point", tuple(forearm()))])
+    plant.act(STILL)
+    assert plant.extra["contacts"] == 0
+
+
+def test_the_links_do_not_touch_each_other(mujoco):
+    folded = [0.0, 0.0, 0.0, ROBOT.upper[3], 0.0, ROBOT.upper[5], 0.0]
+    plant = arm(mujoco, folded)
+    plant.act(STILL)
+    assert plant.extra["contacts"] == 0
+
+
+def test_a_moving_obstacle_touches_when_it_arrives_and_pushes_the_arm(mujoco):
+    side = ROBOT.state(START).placements[5][0:3]
+    path = Waypoints((0.0, 1.0), (tuple(forearm() + 0.3 * side), tuple(forearm() + 0.05 * side)))
+    plant = arm(mujoco, obstacles=[sphere_at((0.0, 0.0, 0.0), path=path)])
+    touched = []
+    for k in range(200):
+        reach = np.linalg.norm(path((k + 1) * PERIOD)[0] - forearm()) - 0.11
+        plant.act(STILL)
+        touched.append(bool(plant.extra["contacts"]))
+        if reach > 1e-3:
+            assert not touched[-1]
+    assert touched[-1]
+    assert np.abs(plant.q - START).max() > 1e-2
+
+
+def test_the_reference_of_an_arm_held_back_does_not_run_away(mujoco):
+    side = ROBOT.state(START).placements[5][0:3]
+    # Joint 1 turns the arm about the vertical, with this sign toward the wall.
+    sign = np.sign(np.cross([0.0, 0.0, 1.0], forearm()) @ side)
+    wall = Obstacle("box", tuple(forearm() + 0.17 * side), (0.1, 0.1, 0.1),
+                    ROBOT.state(START).placements[5][:9].reshape(3, 3).T)
+    plant = arm(mujoco, obstacles=[wall], servo={"lead": 0.05})
+    for _ in range(200):
+        plant.act(0.5 * sign * np.eye(7)[0])
+        assert (np.abs(plant.reference_q - plant.q) < 0.05 + 0.02).all()
+    assert plant.extra["contacts"] > 0
+    assert plant.extra["contact_force"] > 1.0
+
+
+# What the controller is told.
+
+
+def told(section, count, level="velocity", command=STILL, q=START):
+    """q, v as told and as they are, (count, 7) each, of an arm that follows exactly."""
+    plant = Apart(KinematicArm(ROBOT, q.copy(), STILL, PERIOD, level),
+                  JointSensor(MeasurementSection(**section), PERIOD))
+    rows = []
+    for _ in range(count):
+        q, v = plant.q.copy(), plant.v.copy()
+        plant.act(command)
+        rows.append((q, v, plant.extra["true_q"].copy(), plant.extra["true_v"].copy()))
+    return [np.array(part) for part in zip(*rows, strict=True)]
+
+
+def test_an_ideal_measurement_is_the_truth():
+    q, v, true_q, true_v = told({}, 10, command=np.arange(7.0))
+    np.testing.assert_array_equal(q, true_q)
+    np.testing.assert_array_equal(v, true_v)
+
+
+def test_noise_has_the_size_that_is_asked_for_and_no_memory():
+    q, v, true_q, true_v = told({"position_noise": 1e-3, "velocity_noise": 0.02}, 3000)
+    for noise, size in ((q - true_q, 1e-3), (v - true_v, 0.02)):
+        assert np.std(noise, axis=0) == pytest.approx(np.full(7, size), rel=0.06)
+        assert np.abs(noise.mean(axis=0)).max() < 0.1 * size
+        along_time = [np.corrcoef(noise[1:, i], noise[:-1, i])[0, 1] for i in range(7)]
+        between = np.corrcoef(noise.T) - np.eye(7)
+        assert max(np.abs(along_time).max(), np.abs(between).max()) < 0.08
+    np.testing.assert_array_equal(true_q, np.tile(START, (3000, 1)))
+
+
+def test_noise_belongs_to_its_seed():
+    first, again, other = (told({"position_noise": 1e-3, "seed": seed}, 20)[0]
+                           for seed in (1, 1, 2))
+    np.testing.assert_array_equal(first, again)
+    assert (first != other).all()
+
+
+@pytest.mark.parametrize("periods", [0, 1, 4])
+def test_a_delay_is_exact(periods):
+    q, v, true_q, true_v = told({"delay": periods * PERIOD}, 30, "acceleration", np.arange(7.0))
+    np.testing.assert_array_equal(q[periods:], true_q[:30 - periods])
+    np.testing.assert_array_equal(v[periods:], true_v[:30 - periods])
+    np.testing.assert_array_equal(q[:periods], np.tile(START, (periods, 1)))
+
+
+def test_a_delay_of_half_a_period_is_refused():
+    with pytest.raises(ScenarioError, match=r"delay = 0.0025 s is not a whole number of periods"):
+        build(load("ellipse", [*SHORT, "plant.measurement.delay=0.0025"]))
+
+
+def test_positions_come_in_steps():
+    step = 2e-3
+    q, _, true_q, _ = told({"quantisation": step}, 200, command=np.linspace(0.1, 0.7, 7))
+    np.testing.assert_allclose(q / step, np.round(q / step), rtol=0, atol=1e-9)
+    assert np.abs(q - true_q).max() <= step / 2 * (1 + 1e-9)
+    assert np.abs(q - true_q).max() > 0.4 * step
+
+
+def test_a_velocity_is_the_difference_of_the_positions_told():
+    q, v, _, _ = told({"velocity": "differenced", "quantisation": 1e-3}, 50,
+                      command=np.linspace(0.1, 0.7, 7))
+    np.testing.assert_allclose(v[1:], np.diff(q, axis=0) / PERIOD, rtol=0, atol=1e-9)
+
+
+def test_a_filtered_velocity_lags_by_the_time_of_its_filter():
+    slope, time = 2.0, 0.02  # [rad/s^2], [s]
+    _, v, _, true_v = told({"velocity": "differenced", "filter_time": time}, 200, "acceleration",
+                           np.full(7, slope))
+    # A difference is the velocity half a period ago.
+    np.testing.assert_allclose(true_v[-1] - v[-1], slope * (time + PERIOD / 2), rtol=1e-6)
+
+
+@pytest.mark.parametrize("wrong", ["{velocity='differenced', velocity_noise=0.1}",
+                                   "{filter_time=0.1}", "{delay=-1.0}", "{noise=1.0}"])
+def test_a_measurement_that_makes_no_sense_is_refused(wrong):
+    with pytest.raises(ScenarioError, match=r"plant\.measurement"):
+        load("ellipse", [f"plant.measurement={wrong}"])
+
+
+def test_noise_is_refused_for_joints_with_more_coordinates_than_velocities(tmp_path):
+    scenario = on_file(tmp_path, "continuous")
+    with pytest.raises(ScenarioError, match="more coordinates than velocities"):
+        build(load(scenario, ["plant.measurement.position_noise=1e-4"]))
+    build(load(scenario))
+
+
+# Runs.
+
+
+@pytest.mark.parametrize("changes", [[*SHORT, *NOISY], [*PHYSICS, *NOISY]],
+                         ids=["kinematic", "mujoco"])
+def test_a_run_repeats_to_the_byte(changes):
+    skip_without_mujoco(changes)
+    first, again = (simulate(load("ellipse", changes)) for _ in range(2))
+    for name in set(first.signals) - {name for name in first.signals if name.startswith("time_")}:
+        assert first[name].tobytes() == again[name].tobytes(), name
+    other = simulate(load("ellipse", [*changes, "plant.measurement.seed=7"]))
+    assert (other["q"] != first["q"]).any()
+
+
+@pytest.mark.parametrize("changes", [[*SHORT, *NOISY], [*PHYSICS, *NOISY]],
+                         ids=["kinematic", "mujoco"])
+def test_the_controller_sees_what_is_measured_and_nothing_else(changes):
+    skip_without_mujoco(changes)
+    scenario = load("ellipse", changes)
+    run = simulate(scenario)
+    assert np.std(run["q"] - run["true_q"]) == pytest.approx(1e-4, rel=0.1)
+    assert np.std(run["v"] - run["true_v"]) == pytest.approx(1e-2, rel=0.1)
+    controller = Controller(load("ellipse", SHORT))  # a plant of its own that nobody moves
+    for k in range(run.ticks):
+        command = controller.command(run["t"][k], run["q"][k], run["v"][k])
+        np.testing.assert_array_equal(command, run["command"][k])
+
+
+def test_the_end_effector_is_also_recorded_where_it_is(mujoco):
+    run = simulate(load("ellipse", [*PHYSICS, *NOISY]))
+    frame = ROBOT.frame("end_effector")
+    for k in (0, 17, run.ticks - 1):
+        true = ROBOT.state(run["true_q"][k]).position(frame)
+        np.testing.assert_allclose(run["true_ee_position"][k], true, rtol=0, atol=1e-15)
+        told = ROBOT.state(run["q"][k]).position(frame)
+        np.testing.assert_allclose(run["ee_position"][k], told, rtol=0, atol=1e-15)
+        assert np.linalg.norm(told - true) > 1e-6
+
+
+def test_a_kinematic_run_without_noise_has_one_state():
+    run = simulate(load("ellipse", SHORT))
+    assert not {"true_q", "true_v", "true_ee_position", "contacts"} & set(run.signals)
+
+
+@pytest.mark.parametrize("feedback", ["measured", "commanded"])
+@pytest.mark.parametrize("period", [0.001, 0.005])
+def test_the_ellipse_away_from_obstacles_is_tracked(mujoco, period, feedback):
+    changes = ["control.duration=4.0", f"control.period={period}", "limits.acceleration=10.0",
+               "control.options.tpm.form=staircase", "avoidance.obstacles=[[5.0, 5.0, 5.0]]"]
+    exact = simulate(load("ellipse", changes))
+    run = simulate(load("ellipse", [*changes, "plant.kind=mujoco", f"plant.feedback={feedback}"]))
+    settled = run["t"] > 2.0
+    assert np.linalg.norm(exact["position_error"][settled], axis=1).max() < 0.4e-3
+    error = np.linalg.norm(run["desired_position"] - run["true_ee_position"], axis=1)[settled]
+    assert error.max() < 1.5e-3
+    assert np.sqrt(np.mean(error**2)) < 0.6e-3
+
+
+def test_a_commanded_state_is_what_the_commands_add_up_to(mujoco):
+    run = simulate(load("ellipse", [*PHYSICS, *NOISY, "plant.feedback=commanded"]))
+    exact = simulate(load("ellipse", SHORT))
+    np.testing.assert_allclose(run["q"], exact["q"], rtol=0, atol=1e-12)
+    np.testing.assert_allclose(run["command"], exact["command"], rtol=0, atol=1e-9)
+    assert 1e-5 < np.abs(run["q"] - run["true_q"]).max() < 1e-2
+
+
+def test_contacts_are_measured_in_a_run(mujoco, tmp_path):
+    def touching(centre):
+        return simulate(load("ellipse", [
+            *PHYSICS, f"avoidance.obstacles=[{{shape='sphere', radius=0.05, centre={centre}}}]"]))
+
+    side = ROBOT.state(START).placements[5][0:3]
+    run = touching((forearm() + 0.105 * side).tolist())
+    found = measure(run)
+    assert found["contact_ticks"].value == np.count_nonzero(run["contacts"]) > 0
+    assert found["contact_depth_max"].value == run["contact_depth"].max() > 4e-3
+    assert found["contact_force_max"].value == run["contact_force"].max() > 1.0
+    assert found["contact_force_max"].shown_unit == "N"
+    assert run["contacts"].shape == (run.ticks,)
+    again = load_run(save(run, tmp_path / "run", figures=False))
+    np.testing.assert_array_equal(again["contact_force"], run["contact_force"])
+    assert again.scenario == run.scenario
+
+    away = measure(touching([0.0, -2.0, 0.0]))
+    assert away["contact_ticks"].value == away["contact_force_max"].value == 0.0
+    assert "contact_ticks" not in measure(simulate(load("ellipse", SHORT)))
+
+
+@pytest.mark.parametrize("kind", ["kinematic", "mujoco"])
+@pytest.mark.parametrize("fault", ["nan_position", "nan_velocity", "stale"])
+def test_faults_happen_to_what_is_measured(kind, fault):
+    skip_without_mujoco([kind])
+    run = simulate(load("ellipse", [*SHORT, *NOISY, f"plant.kind={kind}",
+                                    f"faults=[{{kind='{fault}', at=0.1, duration=0.1}}]"]))
+    assert run.fault is None
+    assert run.events
+    assert np.isfinite(run["command"]).all()
+    assert np.isfinite(run["true_q"]).all()
+
+
+def test_an_obstacle_of_a_fault_is_touched(mujoco):
+    run = simulate(load("ellipse", [
+        *PHYSICS, "faults=[{kind='obstacle', at=0.1, duration=0.1, radius=0.05, "
+                  "place={joint='joint_5', offset=[0.0, 0.0, 0.195]}}]"]))
+    ticks = np.flatnonzero(run["contacts"])
+    assert ticks[0] == 20
+    assert ticks[-1] < 40
+
+
+def test_a_scenario_without_obstacles_has_physics_too(mujoco):
+    run = simulate(load("human", [*PHYSICS, "avoidance.obstacles=[]"]))
+    assert not run["contacts"].any()
+
+
+# Mistakes.
+
+
+def test_without_mujoco_the_extra_is_named(monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, "mujoco", None)
+    assert run_command(["run", "ellipse", "--set", "plant.kind=mujoco", "--duration", "0.01"]) == 2
+    assert "pip install task-hierarchy[sim]" in capsys.readouterr().err
+    simulate(load("ellipse", SHORT))
+
+
+def test_only_an_arm_given_as_a_table_has_physics(mujoco, tmp_path):
+    with pytest.raises(ScenarioError, match="robot 'arm' is not one of kuka_lwr"):
+        build(load(on_file(tmp_path, "revolute"), ["plant.kind=mujoco"]))
+
+
+@pytest.mark.parametrize("setting", ["servo.bandwidth", "joints.friction", "joints.armature"])
+def test_a_setting_with_too_few_entries_is_named(mujoco, setting):
+    with pytest.raises(HierarchyError, match=f"plant.{setting} has 2 entries"):
+        build(load("ellipse", ["plant.kind=mujoco", f"plant.{setting}=[1.0, 2.0]"]))
+
+
+def skip_without_mujoco(changes):
+    if any("mujoco" in change for change in changes):
+        pytest.importorskip("mujoco")
+
+
+def on_file(folder, kind):
+    """A scenario of an arm of two joints of a URDF file."""
+    link = ("<link name='{0}'><inertial><mass value='1'/><inertia ixx='1' ixy='0' ixz='0' iyy='1' "
+            "iyz='0' izz='1'/></inertial></link>")
+    joint = ("<joint name='j{1}' type='{2}'><parent link='l{0}'/><child link='l{1}'/>"
+             "<origin xyz='0.5 0 0'/><axis xyz='0 0 1'/>"
+             "<limit lower='-1' upper='1' effort='10' velocity='2'/></joint>")
+    (folder / "arm.urdf").write_text(
+        "<robot name='arm'>" + "".join(link.format(f"l{i}") for i in range(3))
+        + "".join(joint.format(i, i + 1, kind) for i in range(2)) + "</robot>")
+    path = folder / "arm.toml"
+    path.write_text("name = 'arm'\n[robot]\nmodel = 'arm.urdf'\n[control]\nduration = 0.1\n"
+                    "resolver = 'recursive'\n[position]\npath = { kind = 'still', "
+                    "position = [0.8, 0.2, 0.0] }\n" + (
+                        "[start]\nq = [1.0, 0.0, 1.0, 0.0]\n" if kind == "continuous" else ""))
+    return path
