@@ -416,7 +416,8 @@ class PlantSection(_Section):
 
     `servo` and `joints` are those of "mujoco". It adds the commands up to a joint position
     reference. With feedback = "commanded" the controller is told that reference in place of what
-    `measurement` says: it then sees neither noise nor what the joints do.
+    `measurement` says: it then sees neither noise nor what the joints do, as where commands through
+    FRI are integrated blindly. Both are stable with the letter's gains.
     """
 
     kind: Literal["kinematic", "mujoco"] = "kinematic"

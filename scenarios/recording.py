@@ -57,7 +57,7 @@ class Recording:
     transition (T,) weight of the present stack's answer in the command, where stacks are blended
     certified (T,) bool, whether x is the undamped answer, in a run that was certified
     time_kinematics, time_rows, time_resolve, time_tick (T,) [s] of computing; where stacks are
-    blended, time_resolve has the rows of the former ones too
+    blended, time_resolve has the rows of the former ones too; time_tick has the plant's step too
     joint_lower, joint_upper, velocity_limit (n,) of the robot, infinite where it has none
 
     A signal that the scenario has no use for is absent. `events` are the ticks with trouble.
