@@ -446,7 +446,8 @@ def test_an_obstacle_of_a_fault_is_touched(mujoco):
 
 
 def test_a_scenario_without_obstacles_has_physics_too(mujoco):
-    run = simulate(load("human", [*PHYSICS, "avoidance.obstacles=[]"]))
+    run = simulate(load("ellipse", PHYSICS).model_copy(update={"avoidance": None}))
+    assert run.fault is None
     assert not run["contacts"].any()
 
 
