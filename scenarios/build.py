@@ -35,7 +35,6 @@ from hierarchy.tasks.self_separation import SelfSeparation
 from scenarios.config import (
     AvoidanceSection,
     EllipseSection,
-    ExactSensorSection,
     ObstacleSection,
     PathSection,
     RepulsionSection,
@@ -211,7 +210,7 @@ def _seen_by(scenario: Scenario, robot: Robot, exact: ExactDistances, region: fl
              mean: bool = False, body: Repulsion | None = None,
              tip: Repulsion | None = None) -> Sensor:
     """The sensor that the scenario asks for, in place of an exact one."""
-    if isinstance(scenario.sensor, ExactSensorSection):
+    if scenario.sensor.kind == "exact":
         return exact
     danger = scenario.limits.danger_reach if scenario.limits else None
     try:

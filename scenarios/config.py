@@ -427,27 +427,35 @@ class PlantSection(_Section):
     joints: JointsSection = JointsSection()
 
 
-class ExactSensorSection(_Section):
-    """Distances of known geometry, without noise or delay."""
-
-    kind: Literal["exact"] = "exact"
-
-
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
 
 
-class _DepthSection(_Section):
-    """How distances are evaluated in depth images, see scenarios.sensors.depth_space.
+class SensorSection(_Section):
+    """Where distances come from; settings that the kind does not use have no effect.
 
-    A frame is used from `latency` [s] after it was taken. Without a new frame for more than
-    `stale_after` [s] the camera is blind and `control.policy.stale` acts; one with a reading in
-    less than the share `least_readings` of its pixels is none. The robot, made of capsules with a
-    column of height `foot` [m] below its base, is taken out with a `margin` [m]. Obstacles within
-    `region` [m] of a point are seen, None for the largest distance at which avoidance acts.
-    `thin` [m] is how far obstacles reach behind their surface, None for any distance. A pixel
-    counts if `support` of the nine around it agree within `band` [m].
+    "exact": known geometry. "camera": a simulated depth camera that sees obstacles and robot.
+    "frames": depth images from a `folder`, or a shipped one by name, that also says which camera
+    took them and when; see scenarios.sensors.frames.
+
+    Of both kinds with images, see scenarios.sensors.depth_space: a frame is used from `latency` [s]
+    after it was taken. Without a new frame for more than `stale_after` [s] the camera is blind and
+    `control.policy.stale` acts; one with a reading in less than the share `least_readings` of its
+    pixels is none. The robot, made of capsules with a column of height `foot` [m] below its base,
+    is taken out with a `margin` [m]. Obstacles within `region` [m] of a point are seen, None for
+    the largest distance at which avoidance acts. `thin` [m] is how far obstacles reach behind their
+    surface, None for any distance. A pixel counts if `support` of the nine around it agree within
+    `band` [m].
+
+    Of the camera, see scenarios.sensors.camera: image size, focal lengths and centre [px], None for
+    the middle; position [m]; a point [m] to look at, or a rotation, which goes before it: rows,
+    whose columns are the camera's axes right, down and forward in the world. `rate` [Hz], `jitter`
+    [s] of the frames; `seed` of all chance. `ideal`: without the errors, which are those of
+    scenarios.sensors.errors. `backdrop` [m] is the depth of a wall, 0 for none; `point_radius` [m]
+    that of the balls as which point obstacles are seen.
     """
 
+    kind: Literal["exact", "camera", "frames"] = "exact"
+    folder: str | None = None
     latency: NotNegative = 0.0
     stale_after: NotNegative = 0.2
     least_readings: Share = 0.1
@@ -457,19 +465,6 @@ class _DepthSection(_Section):
     thin: NotNegative | None = None
     support: Annotated[int, Field(ge=1, le=9)] = 3
     band: NotNegative = 0.05
-
-
-class CameraSection(_DepthSection):
-    """A simulated depth camera, see scenarios.sensors.camera and scenarios.sensors.errors.
-
-    Image size, focal lengths and centre [px], None for the middle; position [m]; a point [m] to
-    look at, or a rotation, which goes before it: rows, whose columns are the camera's axes right,
-    down and forward in the world. `rate` [Hz], `jitter` [s] of the frames; `seed` of all chance.
-    `ideal`: without any of the errors. `backdrop` [m] is the depth of a wall, 0 for none;
-    `point_radius` [m] that of the balls as which point obstacles are seen.
-    """
-
-    kind: Literal["camera"]
     width: Annotated[int, Field(ge=1)] = 640
     height: Annotated[int, Field(ge=1)] = 480
     fx: Positive = 525.0
@@ -497,16 +492,13 @@ class CameraSection(_DepthSection):
     point_radius: NotNegative = 0.02
     backdrop: NotNegative = 4.0
 
-
-class FramesSection(_DepthSection):
-    """Depth images from a folder, or a shipped one by name, see scenarios.sensors.frames."""
-
-    kind: Literal["frames"]
-    folder: str
-
-
-SensorSection = Annotated[ExactSensorSection | CameraSection | FramesSection,
-                          Field(discriminator="kind")]
+    @model_validator(mode="after")
+    def _complete(self) -> Self:
+        if self.model_fields_set and "kind" not in self.model_fields_set:
+            raise ValueError("give its kind: exact, camera or frames")
+        if self.kind == "frames" and self.folder is None:
+            raise ValueError('kind = "frames" needs a folder')
+        return self
 
 
 class FaultSection(_Section):
@@ -563,7 +555,7 @@ class Scenario(_Section):
     start: StartSection = StartSection()
     control: ControlSection
     plant: PlantSection = PlantSection()
-    sensor: SensorSection = ExactSensorSection()
+    sensor: SensorSection = SensorSection()
     position: PositionSection | None = None
     pointing: PointingSection | None = None
     avoidance: AvoidanceKind | None = None
@@ -677,9 +669,9 @@ def load(name_or_path: str | Path, changes: Sequence[str] | Mapping[str, Any] = 
     if isinstance(robot, dict) and str(robot.get("model", "")).endswith((".urdf", ".xml", ".mjcf")):
         robot["model"] = str(path.parent.resolve() / robot["model"])
     sensor = data.get("sensor")
-    if isinstance(sensor, dict) and not (LIBRARY / "frames" / str(sensor.get("folder"))).is_dir():
-        sensor |= {"folder": str(path.parent.resolve() / str(sensor["folder"]))
-                   } if "folder" in sensor else {}
+    folder = sensor.get("folder") if isinstance(sensor, dict) else None
+    if isinstance(folder, str) and not (LIBRARY / "frames" / folder).is_dir():
+        data["sensor"]["folder"] = str(path.parent.resolve() / folder)
     return _validated(data, str(path) if path.parent != LIBRARY else f"scenario {path.stem!r}")
 
 

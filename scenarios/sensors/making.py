@@ -9,7 +9,7 @@ import numpy as np
 from hierarchy import HierarchyError, Robot
 from hierarchy.avoidance import Capsule, Repulsion, link_capsules
 from hierarchy.robots import TABLES
-from scenarios.config import CameraSection, FramesSection
+from scenarios.config import SensorSection
 from scenarios.sensors.camera import DepthCamera, Pinhole, looking_at
 from scenarios.sensors.depth_sensor import DepthSensor, Source
 from scenarios.sensors.depth_space import DepthSpace
@@ -18,7 +18,7 @@ from scenarios.sensors.exact import ExactDistances
 from scenarios.sensors.frames import RecordedFrames
 
 
-def make_depth_sensor(section: CameraSection | FramesSection, robot: Robot, exact: ExactDistances,
+def make_depth_sensor(section: SensorSection, robot: Robot, exact: ExactDistances,
                       region: float, mean: bool = False, body: Repulsion | None = None,
                       tip: Repulsion | None = None) -> DepthSensor:
     """Make the sensor of a section for what `exact` would measure.
@@ -28,11 +28,11 @@ def make_depth_sensor(section: CameraSection | FramesSection, robot: Robot, exac
     """
     capsules = _capsules(robot, section.foot)
     source: Source
-    if isinstance(section, CameraSection):
-        source = make_camera(section, exact, capsules)
-        checked = exact
+    checked: ExactDistances | None = None
+    if section.kind == "camera":
+        source, checked = make_camera(section, exact, capsules), exact
     else:
-        source, checked = RecordedFrames(section.folder, robot, section.latency), None
+        source = RecordedFrames(section.folder or "", robot, section.latency)
     space = DepthSpace(source.pinhole, exact.points, capsules, section.region or region,
                        section.margin, inf if section.thin is None else section.thin,
                        section.support, section.band, mean, body, tip,
@@ -40,7 +40,7 @@ def make_depth_sensor(section: CameraSection | FramesSection, robot: Robot, exac
     return DepthSensor(source, space, section.stale_after, section.least_readings, checked)
 
 
-def make_camera(section: CameraSection, exact: ExactDistances,
+def make_camera(section: SensorSection, exact: ExactDistances,
                 capsules: tuple[Capsule, ...]) -> DepthCamera:
     """Make the simulated camera of a section."""
     rotation = (looking_at(section.position, section.look_at) if section.rotation is None

@@ -65,17 +65,15 @@ def _draw_robot(depth, eye, placements, joints, capsules, margin):
 def _draw_capsule(depth, eye, x, y, z, ax, ay, az, radius):
     """Draw a capsule from x, y, z along ax, ay, az, in the camera's frame."""
     height, width = depth.shape
-    u0, u1 = pixels_of_ball(eye[0], eye[2], width, x, z, radius)
-    s0, s1 = pixels_of_ball(eye[0], eye[2], width, x + ax, z + az, radius)
-    v0, v1 = pixels_of_ball(eye[1], eye[3], height, y, z, radius)
-    t0, t1 = pixels_of_ball(eye[1], eye[3], height, y + ay, z + az, radius)
+    u0, u1 = _pixels_of_capsule(eye[0], eye[2], width, x, z, ax, az, radius)
+    v0, v1 = _pixels_of_capsule(eye[1], eye[3], height, y, z, ay, az, radius)
     aa, am = dot(ax, ay, az, ax, ay, az), dot(ax, ay, az, x, y, z)
     mm = dot(x, y, z, x, y, z) - radius * radius
     bx, by, bz = x + ax, y + ay, z + az
     nn = dot(bx, by, bz, bx, by, bz) - radius * radius
-    for v in range(min(v0, t0), max(v1, t1)):
+    for v in range(v0, v1):
         ry = (v - eye[3]) / eye[1]
-        for u in range(min(u0, s0), max(u1, s1)):
+        for u in range(u0, u1):
             rx = (u - eye[2]) / eye[0]
             rr, ra, rm = rx * rx + ry * ry + 1.0, rx * ax + ry * ay + az, rx * x + ry * y + z
             A = aa * rr - ra * ra
@@ -103,26 +101,46 @@ def _ball(rr, rm, mm):
     return (rm - sqrt(under)) / rr
 
 
+@inlined
+def _pixels_of_capsule(f, c, size, x, z, ax, az, radius):
+    """First and end of its pixels along one axis of the image; see `pixels_of_ball`."""
+    if min(z, z + az) <= radius < max(z, z + az):  # it reaches past the camera
+        return 0, size
+    first, end = pixels_of_ball(f, c, size, x, z, radius)
+    other_first, other_end = pixels_of_ball(f, c, size, x + ax, z + az, radius)
+    return min(first, other_first), max(end, other_end)
+
+
 @compiled
 def _draw_box(depth, eye, row):
     height, width = depth.shape
     u0, u1, v0, v1 = _pixels_of_box(eye, row, width, height)
     cx, cy, cz = in_camera(eye, row[4], row[5], row[6])
+    ax, ay, az = turned_into_camera(eye, row[7], row[10], row[13])
+    bx, by, bz = turned_into_camera(eye, row[8], row[11], row[14])
+    dx, dy, dz = turned_into_camera(eye, row[9], row[12], row[15])
+    a, b, d = dot(ax, ay, az, cx, cy, cz), dot(bx, by, bz, cx, cy, cz), dot(dx, dy, dz, cx, cy, cz)
+    ha, hb, hd = row[1], row[2], row[3]
     for v in range(v0, v1):
         ry = (v - eye[3]) / eye[1]
         for u in range(u0, u1):
             rx = (u - eye[2]) / eye[0]
-            enter, leave = 0.0, np.inf
-            for i in range(3):
-                ax, ay, az = turned_into_camera(eye, row[7 + i], row[10 + i], row[13 + i])
-                along, centre = rx * ax + ry * ay + az, cx * ax + cy * ay + cz * az
-                near, far = (centre - row[1 + i]) / along, (centre + row[1 + i]) / along
-                if along == 0.0:  # between the two faces all along, or never
-                    near = -np.inf if abs(centre) <= row[1 + i] else np.inf
-                    far = -near
-                enter, leave = max(enter, min(near, far)), min(leave, max(near, far))
+            a0, a1 = _between_faces(rx * ax + ry * ay + az, a, ha)
+            b0, b1 = _between_faces(rx * bx + ry * by + bz, b, hb)
+            d0, d1 = _between_faces(rx * dx + ry * dy + dz, d, hd)
+            enter, leave = max(a0, b0, d0), min(a1, b1, d1)
             if 0.0 < enter <= leave and enter < depth[v, u]:
                 depth[v, u] = enter
+
+
+@inlined
+def _between_faces(along, centre, half):
+    """Where a ray that goes by `along` a unit is within `half` of a centre: from, to."""
+    if along == 0.0:  # all along, or never
+        return (-np.inf, np.inf) if abs(centre) <= half else (np.inf, -np.inf)
+    per = 1.0 / along
+    near, far = (centre - half) * per, (centre + half) * per
+    return min(near, far), max(near, far)
 
 
 @compiled

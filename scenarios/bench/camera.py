@@ -1,0 +1,118 @@
+"""Time of a depth camera's parts at 640 x 480, on one core: `python -m scenarios.bench.camera`."""
+
+from __future__ import annotations
+
+import csv
+import os
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from hierarchy.problem import Array
+from scenarios.bench.machine import one_core
+from scenarios.build import Cell, build
+from scenarios.config import Scenario, load
+from scenarios.sensors import DepthSensor
+from scenarios.sensors.camera import DepthCamera
+from scenarios.sensors.depth_space import ObstacleImage
+
+_WARM_UP, _TIMES = 20, 300
+_TURN = 0.3  # [rad] by which joints are moved between two calls
+
+# The hand of `human` as it comes near; a wall close behind the arm; a curtain before it, in whose
+# shadow all points are, so that every pixel they may see is in their region.
+SCENES = {"hand": ("human", []),
+          "wall": ("human", ["avoidance.obstacles=[{shape='box', centre=[0.0, -0.15, 0.1], "
+                             "half_lengths=[2.0, 0.02, 2.0]}]"]),
+          "curtain": ("human", ["avoidance.obstacles=[{shape='box', centre=[0.0, 1.0, 0.1], "
+                                "half_lengths=[2.0, 0.02, 2.0]}]"])}
+_AT = 10.5  # [s] into the scenario, the hand being near
+
+
+def run(out: Path | None = None) -> list[dict[str, Any]]:
+    """Time drawing, errors, obstacle image and distances of nine points in each scene.
+
+    The arm is somewhere else in each call. Returns one row a part and scene, times in milliseconds;
+    prints a table; writes camera.csv into the folder `out` if given.
+    """
+    with one_core():
+        rows = [row for name, (scenario, changes) in SCENES.items()
+                for row in _scene(name, load(scenario, ["sensor.kind=camera", *changes]))]
+    _print(rows)
+    if out is not None:
+        out.mkdir(parents=True, exist_ok=True)
+        with (out / "camera.csv").open("w", newline="") as file:
+            writer = csv.DictWriter(file, list(rows[0]))
+            writer.writeheader()
+            writer.writerows(rows)
+    return rows
+
+
+def _scene(name: str, scenario: Scenario) -> list[dict[str, Any]]:
+    cell, ideal = build(scenario), build(_ideal(scenario))
+    sensor, bare = cell.sensor, ideal.sensor
+    assert isinstance(sensor, DepthSensor)
+    assert isinstance(bare, DepthSensor)
+    assert isinstance(sensor.source, DepthCamera)
+    assert isinstance(bare.source, DepthCamera)
+    image = ObstacleImage(sensor.space.pinhole)
+    reading = sensor.source.image(0, cell.state)[0]
+    parts: dict[str, Callable[[], Any]] = {
+        "draw": partial(bare.source.image, 0, cell.state),
+        "draw, with errors": partial(sensor.source.image, 0, cell.state),
+        "find obstacles": lambda: sensor.space.find_obstacles(reading, cell.state.placements,
+                                                              image),
+        "distances of 9 points": lambda: sensor.space.measure(image, cell.state.placements)}
+    times = {part: _time(cell, call, parts) for part, call in parts.items()}
+    seen = float(np.isfinite(sensor.measurement.distance).mean())
+    return [{"scene": name, "part": part, **_row(samples), "points that see something": seen}
+            for part, samples in times.items()]
+
+
+def _ideal(scenario: Scenario) -> Scenario:
+    return scenario.model_copy(update={
+        "sensor": scenario.sensor.model_copy(update={"ideal": True})})
+
+
+def _time(cell: Cell, call: Callable[[], Any], parts: dict[str, Callable[[], Any]]) -> Array:
+    rng, q = np.random.default_rng(0), cell.plant.q.copy()
+    samples = np.empty(_TIMES)
+    for k in range(-_WARM_UP, _TIMES):
+        cell.state.move(_AT, q + rng.uniform(-_TURN, _TURN, q.shape), np.zeros(cell.robot.n))
+        for part in ("draw, with errors", "find obstacles"):  # what the others work on
+            parts[part]()
+        begin = perf_counter()
+        call()
+        if k >= 0:
+            samples[k] = perf_counter() - begin
+    return samples * 1e3
+
+
+def _row(samples: Array) -> dict[str, float]:
+    median, p95, p999 = np.percentile(samples, [50, 95, 99.9])
+    return {"median_ms": median, "p95_ms": p95, "p99.9_ms": p999, "most_ms": samples.max()}
+
+
+def _print(rows: list[dict[str, Any]]) -> None:
+    table = Table(title="Depth camera of 640 x 480 pixels, milliseconds, one core, warm kernels")
+    for column in ("scene", "part", "median", "p95", "p99.9", "most"):
+        table.add_column(column, justify="left" if column in ("scene", "part") else "right")
+    for row in rows:
+        table.add_row(row["scene"], row["part"],
+                      *(f"{row[key]:.2f}" for key in ("median_ms", "p95_ms", "p99.9_ms",
+                                                      "most_ms")))
+    Console().print(table)
+    shares = {row["scene"]: row["points that see something"] for row in rows}
+    print("share of points with a distance:", ", ".join(f"{scene} {share:.2f}"
+                                                         for scene, share in shares.items()))
+
+
+if __name__ == "__main__":
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    run()

@@ -1,0 +1,245 @@
+"""The simulated depth camera: true depths, its errors, its clock."""
+
+import numpy as np
+import pytest
+
+from hierarchy import HierarchyError, Robot
+from hierarchy.avoidance import Capsule, Obstacle, Obstacles, link_capsules
+from hierarchy.avoidance.obstacles import distance_to_obstacle
+from hierarchy.robots import TABLES
+from scenarios.sensors.camera import DepthCamera, Pinhole, looking_at
+from scenarios.sensors.errors import DepthErrors
+
+ROBOT = Robot.named("kuka_lwr")
+STATE = ROBOT.state([0.9, -0.9, 0.9, 1.2, 1.0, 1.8, 0.0])
+SMALL = {"width": 80, "height": 60, "fx": 70.0, "fy": 65.0}
+IDEAL = DepthErrors.none()
+TURNED = ((0.36, 0.48, -0.8), (-0.8, 0.6, 0.0), (0.48, 0.64, 0.6))
+SHAPES = {
+    "sphere": Obstacle("sphere", (0.1, 0.0, 2.0), (0.3,)),
+    "capsule": Obstacle("capsule", (-0.1, 0.1, 2.0), (0.1, 0.4), TURNED),
+    "capsule along the axis": Obstacle("capsule", (0.02, 0.01, 2.0), (0.1, 0.4)),
+    "box": Obstacle("box", (0.0, 0.1, 2.0), (0.3, 0.2, 0.5), TURNED),
+    "box along the axes": Obstacle("box", (0.2, 0.1, 1.5), (0.3, 0.2, 0.5)),
+    "sphere half outside": Obstacle("sphere", (1.1, 0.5, 2.0), (0.3,)),
+    "box around the camera's plane": Obstacle("box", (0.4, 0.0, 0.0), (0.1, 0.1, 1.0)),
+    "capsule past the camera": Obstacle("capsule", (0.3, 0.1, 0.2), (0.1, 1.0)),
+}
+
+
+def camera(*obstacles, errors=IDEAL, capsules=(), pinhole=None, **settings):
+    return DepthCamera(pinhole or Pinhole(**SMALL), Obstacles(obstacles), capsules, errors,
+                       **settings)
+
+
+def wall(depth=2.0, **settings):
+    """A wall that fills the image, with the default errors."""
+    return camera(backdrop=depth, **{"errors": DepthErrors(), **settings})
+
+
+def depths(taken):
+    return taken.image(0, STATE)[0].astype(float)
+
+
+def traced(obstacle, pinhole, u, v):
+    """Depth by sphere tracing, from the distance function alone; 0 for a miss."""
+    away, row = np.zeros(3), obstacle.packed()
+    ray = pinhole.deproject((u, v, 1.0)) - pinhole.position
+    share = 0.0
+    for _ in range(2000):
+        point = pinhole.position + share * ray
+        distance = distance_to_obstacle(row, *point, away)
+        if distance < 1e-9:
+            return share
+        share += distance / np.linalg.norm(ray)
+        if share > 20.0:
+            break
+    return 0.0
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_every_pixel_has_the_depth_at_which_its_ray_meets_the_shape(name):
+    """Sphere tracing needs nothing but the distance function; grazing rays are left out."""
+    pinhole = Pinhole(**SMALL)
+    seen = depths(camera(SHAPES[name]))
+    assert (seen > 0.0).sum() > 20
+    beside = np.zeros_like(seen)
+    for axis, step in ((0, 1), (0, -1), (1, 1), (1, -1)):
+        beside += np.roll(seen, step, axis) > 0.0
+    rng = np.random.default_rng(1)
+    v, u = rng.integers(60, size=400), rng.integers(80, size=400)
+    whole = (seen > 0.0) * 4 == beside  # inside or outside with all neighbours
+    for i, j in zip(v[whole[v, u]], u[whole[v, u]], strict=True):
+        assert seen[i, j] == pytest.approx(traced(SHAPES[name], pinhole, j, i), rel=2e-6), (i, j)
+
+
+def test_depths_by_hand():
+    centre = {"pinhole": Pinhole(3, 3, 100.0, 100.0)}
+    assert depths(camera(SHAPES["sphere"], **centre))[1, 1] == pytest.approx(
+        2.0 - np.sqrt(0.3**2 - 0.1**2), rel=1e-6)
+    assert depths(camera(SHAPES["box along the axes"], **centre))[1, 1] == pytest.approx(1.0)
+    assert depths(camera(SHAPES["capsule along the axis"], **centre))[1, 1] == pytest.approx(
+        1.6 - np.sqrt(0.1**2 - 0.02**2 - 0.01**2), rel=1e-6)
+    lying = Obstacle("capsule", (0.0, 0.0, 2.0), (0.1, 0.4), np.eye(3)[:, [1, 2, 0]])
+    assert depths(camera(lying, **centre))[1] == pytest.approx(1.9, rel=1e-4)
+    assert depths(camera(Obstacle("point", (0.0, 0.0, 1.0)), point_radius=0.25,
+                         **centre))[1, 1] == pytest.approx(0.75)
+
+
+def test_the_nearest_shape_is_seen_and_a_wall_behind_all():
+    seen = depths(camera(Obstacle("sphere", (0.0, 0.0, 2.0), (0.2,)),
+                         Obstacle("sphere", (0.0, 0.0, 3.0), (0.6,)), backdrop=4.0))
+    assert seen[30, 40] == pytest.approx(1.8, rel=1e-3)
+    assert seen[30, 40 + 10] == pytest.approx(2.536, abs=1e-3)
+    assert seen[0, 0] == 4.0
+
+
+def test_the_robot_is_seen_where_its_capsules_are():
+    position = np.array([0.3, 2.0, 0.5])
+    pinhole = Pinhole(position=position, rotation=looking_at(position, (0.0, 0.3, 0.1)))
+    capsules = link_capsules(TABLES["kuka_lwr"])
+    seen = depths(camera(capsules=capsules, pinhole=pinhole))
+    for capsule in capsules:
+        placement = STATE.placements[capsule.joint]
+        for share in (0.0, 0.3, 1.0):
+            offset = np.array(capsule.start) * (1 - share) + np.array(capsule.end) * share
+            axis = placement[9:] + placement[:9].reshape(3, 3).T @ offset
+            u, v, depth = pinhole.project(axis)
+            assert 0.0 < seen[round(v), round(u)] < depth - 0.9 * capsule.radius + 1e-3
+
+
+def test_a_capsule_of_no_length_is_a_ball():
+    ball = (Capsule("ball", 0, (0.1, 0.0, 2.0), (0.1, 0.0, 2.0), 0.3),)
+    np.testing.assert_allclose(depths(camera(capsules=ball)), depths(camera(SHAPES["sphere"])),
+                               rtol=1e-6)
+
+
+def test_obstacles_are_seen_where_they_are_at_the_time():
+    from hierarchy.paths import Waypoints
+
+    path = Waypoints((0.0, 1.0), ((0.0, 0.0, 2.0), (0.0, 0.0, 3.0)))
+    moving = camera(Obstacle("sphere", (0, 0, 0), (0.5,), path=path), pinhole=Pinhole(3, 3))
+    assert moving.image(0, ROBOT.state(np.zeros(7), t=0.0))[0][1, 1] == pytest.approx(1.5)
+    assert moving.image(1, ROBOT.state(np.zeros(7), t=1.0))[0][1, 1] == pytest.approx(2.5)
+
+
+def test_a_camera_looks_at_its_target_upright():
+    position, target = np.array([1.0, -2.0, 1.5]), np.array([0.2, 0.1, 0.3])
+    pinhole = Pinhole(position=position, rotation=looking_at(position, target))
+    u, v, depth = pinhole.project(target)
+    assert (u, v) == pytest.approx((319.5, 239.5))
+    assert depth == pytest.approx(np.linalg.norm(target - position))
+    above = pinhole.project(target + [0.0, 0.0, 0.1])
+    assert above[0] == pytest.approx(319.5)
+    assert above[1] < v
+    down = Pinhole(position=(0, 0, 3), rotation=looking_at((0, 0, 3), (0, 0, 0)))
+    assert down.project((0.0, 0.1, 0.0))[1] < 239.5
+
+
+def test_projecting_and_back_gives_the_same_points():
+    points = np.random.default_rng(2).uniform(-1, 1, (50, 3))
+    pinhole = Pinhole(fx=500.0, fy=400.0, cx=310.0, position=(3, 1, 2),
+                      rotation=looking_at((3, 1, 2), (0, 0, 0)))
+    np.testing.assert_allclose(pinhole.deproject(pinhole.project(points)), points, atol=1e-12)
+
+
+@pytest.mark.parametrize("depth", [1.0, 3.0])
+def test_noise_has_the_stated_size_and_a_bound(depth):
+    errors = DepthErrors(step=0.0, missing=0.0, missing_at_edges=0.0, outliers=0.0)
+    off = depths(wall(depth, errors=errors)) - depth
+    sigma = 1.2e-3 + 1.9e-3 * (depth - 0.4) ** 2
+    assert abs(off.mean()) < 0.05 * sigma
+    assert off.std() == pytest.approx(sigma, rel=0.05)
+    assert np.abs(off).max() <= errors.bound(depth) + 1e-6 == pytest.approx(3.5 * sigma + 1e-6)
+
+
+@pytest.mark.parametrize(("rounding", "step"), [("step", 0.01), ("disparity", 2.85e-3)])
+def test_rounding_is_to_steps_of_the_depth_or_of_its_inverse(rounding, step):
+    errors = DepthErrors(0.0, 0.0, 0.0, rounding, step, 0.5, 5.0, 0.0, 0.0, 0.0, 0)
+    seen = depths(camera(SHAPES["sphere"], errors=errors))
+    true = depths(camera(SHAPES["sphere"]))
+    steps = seen[seen > 0] / step if rounding == "step" else 1.0 / seen[seen > 0] / step
+    np.testing.assert_allclose(steps, np.rint(steps), atol=2e-3)
+    assert len(np.unique(seen)) > 3
+    assert all(abs(a - z) <= errors.bound(z) + 1e-6
+               for a, z in zip(seen[true > 0], true[true > 0], strict=True))
+
+
+@pytest.mark.parametrize(("depth", "share"), [(0.4, 0.0), (0.6, 1.0), (4.9, 1.0), (5.1, 0.0)])
+def test_nothing_is_read_outside_the_range(depth, share):
+    errors = DepthErrors(0.0, 0.0, missing=0.0, outliers=0.0)
+    assert (depths(wall(depth, errors=errors)) > 0).mean() == share
+
+
+def test_pixels_are_missing_at_random_and_more_so_at_edges():
+    errors = DepthErrors(missing=0.1, missing_at_edges=0.5, outliers=0.0)
+    assert (depths(wall(errors=errors)) == 0).mean() == pytest.approx(0.1, abs=0.02)
+    scene = camera(Obstacle("sphere", (0.0, 0.0, 2.0), (0.5,)), backdrop=4.0, errors=errors)
+    missing = np.mean([scene.image(i, STATE)[0] == 0 for i in range(40)], axis=0)
+    true = scene.scene.astype(float)
+    steps = np.abs(np.diff(true, axis=1)) > 0.05
+    edge = np.pad(steps, ((0, 0), (1, 0))) | np.pad(steps, ((0, 0), (0, 1)))
+    assert missing[edge].mean() == pytest.approx(0.5, abs=0.05)
+
+
+def test_outliers_are_nearer_and_come_in_their_share_of_frames():
+    errors = DepthErrors(0.0, 0.0, step=0.0, missing=0.0, missing_at_edges=0.0, outliers=0.3,
+                         outlier_size=2)
+    scene = wall(errors=errors)
+    off = [np.flatnonzero(scene.image(i, STATE)[0] != 2.0) for i in range(200)]
+    assert np.mean([pixels.size > 0 for pixels in off]) == pytest.approx(0.3, abs=0.1)
+    assert max(pixels.size for pixels in off) == 25
+    assert {pixels.size for pixels in off} >= {0, 1, 9, 25}
+    for i in range(200):
+        reading = scene.image(i, STATE)[0]
+        assert ((reading == 2.0) | ((reading >= 0.5) & (reading < 2.0))).all()
+
+
+def test_a_frame_follows_from_seed_and_number_alone():
+    one, other, third = wall(seed=1), wall(seed=1), wall(seed=2)
+    later = one.image(7, STATE)[0].copy()
+    first = one.image(0, STATE)[0].copy()
+    np.testing.assert_array_equal(later, other.image(7, STATE)[0])
+    assert (first != later).mean() > 0.5
+    assert (third.image(7, STATE)[0] != later).mean() > 0.5
+
+
+def test_an_ideal_camera_reads_what_is_there():
+    seen = camera(*SHAPES.values(), backdrop=4.0)
+    np.testing.assert_array_equal(seen.image(3, STATE)[0], seen.scene)
+
+
+def test_frames_come_at_their_rate():
+    clock = camera(rate=30.0)
+    assert [clock.newest(t) for t in (-0.001, 0.0, 0.033, 1 / 30, 0.999999999, 10.0)] == [
+        -1, 0, 0, 1, 30, 300]
+
+
+def test_jitter_delays_each_frame_by_less_than_its_most_and_by_the_seed():
+    late = camera(rate=30.0, jitter=0.02, seed=3)
+    times = np.array([late.time(i) for i in range(100)])
+    waits = times - np.arange(100) / 30.0
+    assert waits.min() >= 0.0
+    assert 0.015 < waits.max() < 0.02
+    assert [late.newest(t) for t in times] == list(range(100))
+    assert [late.newest(t - 1e-6) for t in times] == list(range(-1, 99))
+    assert camera(rate=30.0, jitter=0.02, seed=3).time(5) == times[5]
+    assert camera(rate=30.0, jitter=0.02, seed=4).time(5) != times[5]
+
+
+@pytest.mark.parametrize(("make", "said"), [
+    (lambda: Pinhole(width=0), "width = 0 px"),
+    (lambda: Pinhole(fx=np.nan), "fx = nan px"),
+    (lambda: Pinhole(rotation=np.eye(3) * 1.1), "rotation"),
+    (lambda: Pinhole(rotation=np.diag([1, 1, -1])), "rotation"),
+    (lambda: Pinhole(position=(0, np.inf, 0)), "position"),
+    (lambda: looking_at((1, 2, 3), (1, 2, 3)), "look_at"),
+    (lambda: DepthErrors(missing=1.5), "missing = 1.5"),
+    (lambda: DepthErrors(noise_floor=-1.0), "noise_floor = -1.0"),
+    (lambda: DepthErrors(near=5.0, far=1.0), "near = 5.0 m"),
+    (lambda: DepthErrors(rounding="no"), "rounding = 'no'"),
+    (lambda: camera(rate=30.0, jitter=0.05), "jitter = 0.05 s"),
+])
+def test_what_cannot_be_is_refused_by_name(make, said):
+    with pytest.raises(HierarchyError, match=said.replace("(", r"\(")):
+        make()

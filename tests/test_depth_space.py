@@ -1,0 +1,498 @@
+"""Distances out of depth images, against all pixels one by one and against known geometry."""
+
+from math import inf
+
+import numpy as np
+import pytest
+
+from hierarchy import HierarchyError, Robot
+from hierarchy.avoidance import ControlPoint, Obstacle, Obstacles, Repulsion, link_capsules
+from hierarchy.robots import TABLES
+from scenarios import load, simulate
+from scenarios.build import build
+from scenarios.config import ScenarioError
+from scenarios.sensors import DepthSensor
+from scenarios.sensors.camera import DepthCamera, Pinhole, looking_at
+from scenarios.sensors.depth_space import DepthSpace, ObstacleImage
+from scenarios.sensors.errors import DepthErrors
+from scenarios.sensors.exact import ExactDistances
+from scenarios.sensors.frames import RecordedFrames, write
+
+ROBOT = Robot.named("kuka_lwr")
+CAPSULES = link_capsules(TABLES["kuka_lwr"], foot=0.31)
+STATE = ROBOT.state([0.9, -0.9, 0.9, 1.2, 1.0, 1.8, 0.0])
+BODY, TIP = Repulsion(3.0, 0.4, 4.0), Repulsion(12.0, 0.4, 6.0)
+FACING = Pinhole(101, 81, 100.0, 100.0)  # at the origin, z forward, its middle in pixel (50, 40)
+SIDE = Pinhole(320, 240, 262.0, 262.0, position=(0.3, 2.2, 0.8),
+               rotation=looking_at((0.3, 2.2, 0.8), (0.0, 0.3, 0.1)))
+
+
+def at(*places):
+    """Points that no joint moves, the last of which is the end effector."""
+    return [ControlPoint("point", 0, np.array(place, dtype=float)) for place in places]
+
+
+def seen_in(image, *places, pinhole=FACING, region=0.4, support=1, **settings):
+    """Measure points in an image (h, w) without a robot in it."""
+    space = DepthSpace(pinhole, at(*places), (), region, support=support, **settings)
+    obstacles = ObstacleImage(pinhole)
+    space.find_obstacles(np.asarray(image, np.float32), STATE.placements, obstacles)
+    return space.measure(obstacles, STATE.placements)
+
+
+def image_of(pixels, shape=(81, 101)):
+    """An empty image but for pixels {(u, v): depth}."""
+    image = np.zeros(shape, np.float32)
+    for (u, v), depth in pixels.items():
+        image[v, u] = depth
+    return image
+
+
+def one_by_one(image, pinhole, point, region, thin=inf):
+    """Distance, direction from the nearest and mean direction over all pixels; plain numpy."""
+    v, u = np.nonzero(image)
+    depth = image[v, u].astype(float)
+    own = pinhole.project(point)[2]
+    counted = np.where(depth < own, np.minimum(depth + thin, own), depth)
+    off = point - pinhole.deproject(np.column_stack([u, v, counted]))
+    distance = np.linalg.norm(off, axis=1)
+    if not (distance < region).any():
+        return inf, np.zeros(3), np.zeros(3)
+    off, distance = off[distance < region], distance[distance < region]
+    mean = (off / distance[:, None]).mean(axis=0)
+    nearest = np.argmin(distance)
+    return distance[nearest], off[nearest] / distance[nearest], mean / np.linalg.norm(mean)
+
+
+@pytest.mark.parametrize("thin", [inf, 0.1, 0.0])
+@pytest.mark.parametrize("share", [0.002, 0.3])
+def test_distances_and_directions_are_those_of_all_pixels_one_by_one(share, thin):
+    """Neither the square that is visited, nor the tiles that are left out, lose a pixel."""
+    rng = np.random.default_rng(5)
+    seen_some = 0
+    for _ in range(30):
+        image = rng.uniform(0.6, 2.5, (81, 101)) * (rng.random((81, 101)) < share)
+        image = image.astype(np.float32)
+        points = rng.uniform((-1, -1, 0.3), (1, 1, 2.8), (6, 3))
+        for mean in (False, True):
+            seen = seen_in(image, *points, thin=thin, mean=mean)
+            for k, point in enumerate(points):
+                D, nearest, average = one_by_one(image, FACING, point, 0.4, thin)
+                assert seen.distance[k] == pytest.approx(D, abs=1e-6)
+                seen_some += D < inf
+                if 0.05 < D < inf:
+                    np.testing.assert_allclose(seen.direction[k], average if mean else nearest,
+                                               atol=1e-4)
+    assert seen_some > 60
+
+
+def test_a_point_at_the_edge_of_the_image_or_near_the_camera_misses_nothing():
+    rng = np.random.default_rng(6)
+    image = rng.uniform(0.2, 2.0, (81, 101)).astype(np.float32)
+    for place in ((0.55, 0.0, 1.0), (-0.8, 0.5, 1.2), (0.0, 0.0, 0.3), (0.1, 0.1, 0.41),
+                  (0.0, 0.0, -0.1), (0.3, -0.6, 0.6), (3.0, 0.0, 1.0), (0.0, 0.0, -1.0)):
+        D, _, _ = one_by_one(image, FACING, np.array(place), 0.4)
+        assert seen_in(image, place).distance[0] == pytest.approx(D, abs=1e-6)
+
+
+def test_an_obstacle_behind_the_point_counts_at_its_own_depth():
+    seen = seen_in(image_of({(50, 40): 1.3}), (0.0, 0.0, 1.0))
+    assert seen.distance[0] == pytest.approx(0.3)
+    np.testing.assert_allclose(seen.direction[0], (0, 0, -1), atol=1e-9)
+    assert seen.nearest[0] == 40 * 101 + 50
+
+
+def test_an_obstacle_nearer_to_the_camera_counts_at_the_depth_of_the_point():
+    """The pixel 10 to the right is at 0.1 rad: 0.1 m beside the axis at the depth of 1 m."""
+    for depth in (0.999, 0.8, 0.3):
+        seen = seen_in(image_of({(60, 40): depth}), (0.0, 0.0, 1.0))
+        assert seen.distance[0] == pytest.approx(0.1)
+        np.testing.assert_allclose(seen.direction[0], (-1, 0, 0), atol=1e-9)
+
+
+def test_a_thin_obstacle_counts_at_its_back():
+    image = image_of({(60, 40): 0.5})
+    assert seen_in(image, (0, 0, 1), thin=0.2).distance[0] == pytest.approx(
+        np.hypot(0.07, 0.3))
+    assert seen_in(image, (0, 0, 1), thin=0.0, region=0.6).distance[0] == pytest.approx(
+        np.hypot(0.05, 0.5))
+    assert seen_in(image, (0, 0, 1), thin=0.5).distance[0] == pytest.approx(0.1)
+    assert seen_in(image, (0, 0, 1), thin=0.1, region=0.3).distance[0] == inf
+
+
+def test_a_point_in_the_shadow_of_an_obstacle_touches_it_and_leaves_it_where_it_ends_first():
+    image = np.zeros((81, 101))
+    image[20:61, 40:91] = 0.7  # its left side is 10 pixels off the point, all others farther
+    seen = seen_in(image, (0.0, 0.0, 1.0), mean=False, pairs=True)
+    assert seen.distance[0] == pytest.approx(0.0, abs=1e-9)
+    assert seen.direction[0] @ (-1.0, 0.0, 0.0) > 0.99
+    np.testing.assert_array_equal(seen.pairs.direction[0, 0], seen.direction[0])
+
+
+def test_a_direction_is_a_unit_vector_or_nothing():
+    seen = seen_in(image_of({(50, 40): 1.0}), (0, 0, 1.0), (0.3, 0.1, 1.0), (2.0, 0, 3.0))
+    np.testing.assert_allclose(np.linalg.norm(seen.direction, axis=1), (1, 1, 0))
+    assert (seen.distance[2], seen.magnitude[2], seen.nearest[2]) == (inf, 0.0, -1)
+
+
+def test_repulsion_is_that_of_the_distance_and_the_active_point_the_nearest_of_the_body():
+    image = image_of({(50, 40): 1.2, (80, 40): 1.0})
+    seen = seen_in(image, (0, 0, 1), (0.2, 0, 1), (0.25, 0, 1), body=BODY, tip=TIP)
+    assert seen.distance == pytest.approx([0.2, 0.1, 0.05])
+    assert seen.magnitude == pytest.approx([BODY(0.2), BODY(0.1), TIP(0.05)])
+    assert seen.active == 1
+    assert seen.minimal_distance == pytest.approx(0.1)
+    assert seen.end_effector_distance == pytest.approx(0.05)
+
+
+def test_pairs_have_what_is_nearest_and_know_no_velocity():
+    image = image_of({(50, 40): 1.2, (60, 40): 1.3})
+    seen = seen_in(image, (0, 0, 1), (2.0, 0, 1), pairs=True)
+    assert seen.pairs.table.shape == (2, 1, 14)
+    assert seen.pairs.distance[:, 0] == pytest.approx([0.2, inf])
+    np.testing.assert_allclose(seen.pairs.direction[0, 0], (0, 0, -1), atol=1e-9)
+    assert not seen.pairs.velocity.any()
+    assert not seen.pairs.acceleration.any()
+    assert np.isinf(seen.pairs.radius).all()
+
+
+def facing_surface(obstacle, place):
+    """The nearest point of an obstacle to a place, and how its normal faces the camera, or None."""
+    exact = ExactDistances(ROBOT, Obstacles([obstacle]))
+    exact._joints[:], exact._offsets[:] = 0, place
+    seen = exact.measure(STATE)
+    nearest = np.array(place) - seen.distance[0] * seen.direction[0]
+    ray = nearest - np.asarray(SIDE.position)
+    return nearest, -float(seen.direction[0] @ ray) / np.linalg.norm(ray), seen.distance[0]
+
+
+@pytest.mark.parametrize("noisy", [False, True], ids=["ideal", "noisy"])
+def test_the_distance_to_a_surface_that_is_seen_is_never_overestimated_beyond_its_bound(noisy):
+    """Of random spheres, capsules and boxes, where the nearest point of the surface is seen."""
+    errors = DepthErrors(missing=0.0, missing_at_edges=0.0, outliers=0.0) if noisy \
+        else DepthErrors.none()
+    rng, judged, shapes, worst = np.random.default_rng(7), 0, set(), 0.0
+    for i in range(150):
+        shape = ("sphere", "capsule", "box")[i % 3]
+        size = {"sphere": (0.15,), "capsule": (0.08, 0.2), "box": (0.15, 0.1, 0.2)}[shape]
+        turned = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+        obstacle = Obstacle(shape, tuple(rng.uniform((-0.5, -0.5, -0.3), (0.5, 0.6, 0.6))), size,
+                            turned * np.linalg.det(turned))
+        place = np.array(obstacle.centre) + rng.normal(size=3) * 0.25
+        nearest, facing, D = facing_surface(obstacle, place)
+        u, v, depth = SIDE.project(nearest)
+        if facing < 0.3 or D < 0.02 or not (5 < u < 314 and 5 < v < 234):
+            continue
+        scene = DepthCamera(SIDE, Obstacles([obstacle]), (), errors, seed=i)
+        space = DepthSpace(SIDE, at(place), (), region=2.0)
+        obstacles = ObstacleImage(SIDE)
+        space.find_obstacles(scene.image(0, STATE)[0], STATE.placements, obstacles)
+        estimate = space.measure(obstacles, STATE.placements).distance[0]
+        bound = space.overestimate(nearest, errors.bound(depth) if noisy else 0.0)
+        assert estimate - D <= bound, (i, estimate, D, bound)
+        if not noisy and SIDE.project(place)[2] < depth:  # nothing is in its shadow
+            assert estimate >= D - 1e-6
+        judged, worst = judged + 1, max(worst, (estimate - D) / bound)
+        shapes.add(shape)
+    assert judged > 40
+    assert len(shapes) == 3
+
+
+def test_the_arm_does_not_avoid_itself():
+    """Wherever it is, and whatever the camera gets wrong but for outliers in blobs."""
+    errors = DepthErrors(outliers=0.0)
+    camera = DepthCamera(SIDE, Obstacles(), CAPSULES, errors, backdrop=4.0)
+    space = DepthSpace(SIDE, ExactDistances(ROBOT, Obstacles()).points, CAPSULES, region=0.4)
+    rng, obstacles = np.random.default_rng(8), ObstacleImage(SIDE)
+    for i in range(60):
+        state = ROBOT.state(rng.uniform(0.9 * ROBOT.lower, 0.9 * ROBOT.upper))
+        space.find_obstacles(*camera.image(i, state), obstacles)
+        assert (camera.scene < 3.9).mean() > 0.005
+        assert np.isinf(space.measure(obstacles, state.placements).distance).all()
+
+
+def test_a_moving_arm_does_not_avoid_where_it_was():
+    """The image is old, the points are where they are now; what was the arm is no obstacle."""
+    sensor, move = sensor_of(camera_of(latency=0.1), inf)
+    for k in range(60):
+        q = STATE.q + 0.5 * np.sin(3.0 * k * 0.02)
+        seen = sensor.measure(move(0.02 * k, q))
+        assert np.isinf(seen.distance).all()
+    assert not seen.blind
+
+
+def test_an_obstacle_before_or_beside_the_arm_is_not_taken_for_it():
+    ball = Obstacle("sphere", (0.3, 1.0, 0.3), (0.05,))
+    sensor, move = sensor_of(camera_of(ball), inf, region=1.5)
+    seen = sensor.measure(move(0.0, STATE.q))
+    assert np.isfinite(seen.distance).all()
+
+
+def test_the_margin_is_what_is_taken_out_around_the_arm():
+    """A ball 8 cm off the arm's surface, to the side: seen with a margin of 5 cm, not of 20."""
+    points = ExactDistances(ROBOT, Obstacles()).measure(STATE).points
+    ball = Obstacle("sphere", tuple(points[2] + [0.0, 0.0, 0.06 + 0.08 + 0.03]), (0.03,))
+    found = {}
+    for margin in (0.05, 0.2):
+        sensor, move = sensor_of(camera_of(ball), inf, margin=margin)
+        found[margin] = sensor.measure(move(0.0, STATE.q)).minimal_distance
+    assert found[0.05] < 0.4
+    assert found[0.2] == inf
+
+
+def test_a_single_outlier_has_no_effect_with_support_and_a_wire_still_has():
+    wall = np.full((81, 101), 3.0)
+    lone, pair, wire, blob = (wall.copy() for _ in range(4))
+    lone[40, 50] = 1.2
+    pair[40, 50:52] = 1.2
+    wire[30:50, 50] = 1.2
+    blob[40:43, 50:53] = 1.2
+    distances = {support: [seen_in(image, (0, 0, 1), support=support).distance[0]
+                           for image in (lone, pair, wire, blob)] for support in (1, 2, 3, 9)}
+    assert distances[1] == pytest.approx([0.2] * 4)
+    assert distances[2] == pytest.approx([inf, 0.2, 0.2, 0.2])
+    assert distances[3] == pytest.approx([inf, inf, 0.2, 0.2])
+    assert distances[9] == pytest.approx([inf, inf, inf, 0.2], rel=1e-2)
+
+
+def test_support_needs_agreement_within_the_band():
+    image = image_of({(50, 40): 1.2, (51, 40): 1.24, (52, 40): 1.3})
+    assert seen_in(image, (0, 0, 1), support=2, band=0.05).distance[0] == pytest.approx(0.2)
+    assert seen_in(image, (0, 0, 1), support=2, band=0.03).distance[0] == inf
+
+
+def test_pixels_that_are_not_numbers_are_no_obstacles():
+    image = np.full((81, 101), np.nan)
+    image[40, 50], image[0, 0], image[1, 1] = 1.2, inf, -1.0
+    seen = seen_in(image, (0, 0, 1))
+    assert seen.distance[0] == pytest.approx(0.2)
+
+
+# The sensor in the loop.
+
+WALL = Obstacle("box", (0.0, -1.0, 0.1), (3.0, 0.02, 3.0))
+
+
+def camera_of(*obstacles, errors=None, capsules=CAPSULES, **settings):
+    return DepthCamera(SIDE, Obstacles(obstacles), capsules, errors or DepthErrors.none(),
+                       **{"backdrop": 4.0, **settings})
+
+
+def sensor_of(source, stale_after=0.2, region=0.4, least_readings=0.1, **settings):
+    """A sensor, and a function that gives a state at a time."""
+    points = ExactDistances(ROBOT, Obstacles()).points
+    space = DepthSpace(source.pinhole, points, CAPSULES, region, **settings)
+    return (DepthSensor(source, space, stale_after, least_readings),
+            lambda t, q=STATE.q: ROBOT.state(q, t=t))
+
+
+def test_frames_are_used_from_their_latency_on_until_the_next():
+    sensor, state_at = sensor_of(camera_of(rate=10.0, latency=0.05))
+    stamps = {t: sensor.measure(state_at(t)).stamp for t in (0.0, 0.04, 0.05, 0.1, 0.14, 0.15,
+                                                             0.29, 0.35)}
+    assert stamps == {0.0: -inf, 0.04: -inf, 0.05: 0.0, 0.1: 0.0, 0.14: 0.0, 0.15: 0.1,
+                      0.29: 0.1, 0.35: 0.29}
+
+
+def test_frames_may_be_later_than_their_rate():
+    sensor, state_at = sensor_of(camera_of(rate=10.0, latency=0.35), stale_after=0.5)
+    stamps = [sensor.measure(state_at(0.05 * k)).stamp for k in range(21)]
+    assert stamps[6:8] == [-inf, 0.0]
+    np.testing.assert_allclose(stamps[7:], [0.1 * (k // 2) for k in range(14)], atol=1e-9)
+
+
+def test_before_the_first_frame_the_camera_is_blind():
+    sensor, state_at = sensor_of(camera_of(latency=0.05))
+    assert sensor.measure(state_at(0.0)).blind
+    assert sensor.measure(state_at(0.04)).blind
+    assert not sensor.measure(state_at(0.05)).blind
+
+
+@pytest.mark.parametrize("how", ["stopped", "covered"])
+def test_a_camera_that_stops_or_is_covered_is_blind_after_its_time_and_sees_again(how):
+    ball = Obstacle("sphere", (0.4, 0.7, 0.2), (0.1,))
+    sensor, state_at = sensor_of(camera_of(ball, rate=20.0))
+    log = {}
+    for k in range(100):
+        t = 0.01 * k
+        setattr(sensor, how, 0.295 < t < 0.695)
+        seen = sensor.measure(state_at(t))
+        log[k] = seen.blind, seen.minimal_distance
+    blind = [k for k in log if log[k][0]]
+    assert blind == list(range(46, 70))  # the last image is of 0.25 s, and serves for 0.2 s
+    assert len({distance for _, distance in log.values()}) == 1  # the last image is kept
+
+
+def test_images_with_next_to_no_readings_are_none():
+    errors = DepthErrors(missing=0.95, outliers=0.0)
+    sensor, state_at = sensor_of(camera_of(errors=errors))
+    assert sensor.measure(state_at(0.0)).blind
+    sensor, state_at = sensor_of(camera_of(errors=errors), least_readings=0.01)
+    assert not sensor.measure(state_at(0.0)).blind
+
+
+def test_a_clock_that_is_set_back_begins_anew():
+    sensor, state_at = sensor_of(camera_of(rate=10.0))
+    assert [sensor.measure(state_at(t)).stamp for t in (0.0, 0.5, 0.1)] == [0.0, 0.5, 0.1]
+
+
+def test_between_frames_the_points_move_and_the_image_stays():
+    ball = Obstacle("sphere", (0.4, 0.7, 0.2), (0.1,))
+    sensor, state_at = sensor_of(camera_of(ball), region=1.0)
+    before = sensor.measure(state_at(0.0)).points.copy()
+    after = sensor.measure(state_at(0.02, STATE.q + 0.1))
+    assert np.abs(after.points - before).max() > 0.01
+    assert after.stamp == 0.0
+
+
+# Scenarios.
+
+VIEW = "kind='camera', position=[0.3, 2.2, 0.8], look_at=[0.0, 0.3, 0.1]"
+QUICK = [f"sensor={{{VIEW}, width=160, height=120, fx=131.0, fy=131.0}}",
+         "control.duration=0.6", "plant={}"]
+
+
+def troubles(run):
+    return {kind: [event.tick for event in run.events if event.kind == kind]
+            for kind in {event.kind for event in run.events}}
+
+
+@pytest.mark.parametrize("name", ["human", "human-hqp"])
+def test_a_scenario_runs_with_a_camera(name):
+    run = simulate(load(name, QUICK))
+    assert run.fault is None
+    assert troubles(run) == {}
+    assert np.isfinite(run["command"]).all()
+
+
+@pytest.mark.parametrize("kind", ["no_frames", "dark_frames"])
+@pytest.mark.parametrize("name", ["human", "human-hqp"])
+def test_a_blind_camera_leads_to_the_policy_for_stale_measurements(name, kind):
+    """Frames at 0, 1/30, 2/30 s, then none up to 0.4 s; blind is 0.1 s after the last."""
+    run = simulate(load(name, [*QUICK, "sensor.stale_after=0.1", "start.v=[0.1,0,0,0,0,0,0]",
+                               f"faults=[{{kind='{kind}', at=0.08, duration=0.32}}]"]))
+    assert run.fault is None
+    ticks = troubles(run).pop("stale")
+    assert ticks == list(range(ticks[0], 80))
+    assert ticks[0] in (35, 36)  # the last frame was taken in tick 14, at 0.07 s
+    assert np.abs(run["v"][79]).max() < 0.5 * np.abs(run["v"][ticks[0]]).max()
+    assert {event.action for event in run.events} == {"brake"}
+
+
+def test_a_camera_that_is_late_leaves_the_arm_at_rest_until_it_sees():
+    run = simulate(load("human", [*QUICK, "sensor.latency=0.2", "sensor.stale_after=0.3"]))
+    assert troubles(run) == {"stale": list(range(40))}
+    assert not run["command"][:40].any()
+    assert run["command"][40:].any()
+
+
+def test_a_latency_beyond_what_is_stale_stops_the_arm_for_good():
+    run = simulate(load("human", [*QUICK, "sensor.latency=0.3", "control.policy.stale=stop"]))
+    assert "stale" in run.fault
+
+
+def test_the_camera_tells_the_controller_what_exact_distances_would_nearly():
+    """With balls near the arm of `human`; no more is known of thickness than that it hides."""
+    for ball in ([0.4, 0.75, 0.2], [-0.3, 0.6, 0.1], [0.0, 0.4, 0.5]):
+        obstacle = f"avoidance.obstacles=[{{shape='sphere', centre={ball}, radius=0.08}}]"
+        camera, exact = (build(load("human", [obstacle, f"sensor={sensor}"])).sensor
+                         for sensor in (f"{{{VIEW}, ideal=true}}", "{kind='exact'}"))
+        state = ROBOT.state([1.1657, -0.9476, 0.5844, 1.4408, 1.1464, 1.7695, 0.0])
+        seen, known = camera.measure(state), exact.measure(state)
+        near = known.distance < 0.4
+        assert near.any()
+        assert (seen.distance[near] < known.distance[near] + 0.01).all()
+        assert seen.active == known.active or not near[:-1].any()
+
+
+@pytest.mark.parametrize(("changes", "said"), [
+    (["sensor.kind=radar"], "sensor"),
+    (["sensor.kind=camera", "sensor.missing=2.0"], "sensor.missing"),
+    (["sensor.kind=camera", "sensor.hight=2"], "sensor.height"),
+    (["sensor={position=[1,1,1]}"], "give its kind"),
+    (["sensor={kind='frames'}"], "folder"),
+    (["sensor.kind=exact", "faults=[{kind='no_frames', at=0.0, duration=1.0}]"], "camera"),
+    (["sensor={kind='frames', folder='hand'}",
+      "faults=[{kind='obstacle', at=0.0, duration=1.0, radius=0.1, centre=[0,0,0]}]"], "recorded"),
+])
+def test_a_section_that_is_wrong_is_refused_by_its_key(changes, said):
+    with pytest.raises(ScenarioError, match=said):
+        load("human", changes)
+
+
+@pytest.mark.parametrize(("changes", "said"), [
+    (["sensor={kind='camera', position=[1,1,1], look_at=[1,1,1]}"], "look_at"),
+    (["sensor.kind=camera", "sensor.rotation=[[1,0,0],[0,1,0],[0,0,-1]]"], "rotation"),
+    (["sensor.kind=camera", "sensor.jitter=0.1"], "jitter"),
+    (["sensor={kind='frames', folder='nowhere'}"], "nowhere"),
+])
+def test_a_section_that_does_not_fit_is_refused_when_it_is_built(changes, said):
+    with pytest.raises(ScenarioError, match=f"sensor: .*{said}"):
+        build(load("human", changes))
+
+
+def test_a_scenario_with_a_camera_survives_its_file(tmp_path):
+    scenario = load("human", [*QUICK, "sensor.thin=0.1", "sensor.cx=80.0"])
+    (tmp_path / "again.toml").write_text(scenario.to_toml())
+    assert load(tmp_path / "again.toml") == scenario
+
+
+# Frames.
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    run = simulate(load("human", [*QUICK, "control.duration=0.3"]))
+    return write(tmp_path_factory.mktemp("frames") / "some", run, frames=6), run
+
+
+def test_frames_written_are_those_the_camera_took(written):
+    folder, run = written
+    frames = RecordedFrames(folder, ROBOT)
+    camera = build(run.scenario).sensor.source
+    assert len(frames.times) == 6
+    assert frames.pinhole.packed() == pytest.approx(camera.pinhole.packed())
+    for i, t in enumerate(frames.times):
+        k = int(np.argmin(np.abs(run["t"] - t)))
+        state = ROBOT.state(run["q"][k], t=t)
+        taken, placements = frames.image(i, state)
+        np.testing.assert_allclose(taken, camera.image(camera.newest(t), state)[0], atol=5.1e-4)
+        np.testing.assert_allclose(placements, state.placements, atol=1e-12)
+
+
+def test_a_run_on_written_frames_goes_as_with_the_camera_until_they_end(written):
+    folder, run = written
+    again = simulate(load("human", [f"sensor={{kind='frames', folder='{folder}'}}",
+                                    "control.duration=0.5"]))
+    end = 34  # of the sixth frame's time, the seventh is not there
+    np.testing.assert_allclose(again["ee_distance"][:end], run["ee_distance"][:end], atol=1e-2)
+    np.testing.assert_allclose(again["q"][:end], run["q"][:end], atol=1e-3)
+    assert troubles(again)["stale"][-1] == again.ticks - 1
+
+
+def test_frames_that_cannot_be_used_are_refused_by_name(written, tmp_path):
+    folder, _ = written
+    with pytest.raises(HierarchyError, match="has no frames.toml"):
+        RecordedFrames(tmp_path, ROBOT)
+    text = (folder / "frames.toml").read_text()
+    for wrong, said in ((text.replace("width = 160", "width = 161"), "0000.png"),
+                        (text.replace("fx = ", "gx = "), "fx is missing"),
+                        (text.replace("0001.png", "9999.png"), "9999.png"),
+                        (text.replace("time = ", "at = "), "time"), ("x = [", "frames.toml")):
+        (tmp_path / "frames.toml").write_text(wrong)
+        for png in folder.glob("*.png"):
+            (tmp_path / png.name).write_bytes(png.read_bytes())
+        with pytest.raises(HierarchyError, match=said):
+            RecordedFrames(tmp_path, ROBOT)
+
+
+def test_the_shipped_frames_show_a_hand_that_comes_near():
+    frames = RecordedFrames("hand", ROBOT)
+    sensor, state_at = sensor_of(frames, least_readings=0.1)
+    distances = [sensor.measure(state_at(t, ROBOT.state(STATE.q).q)).distance.min()
+                 for t in frames.times]
+    assert len(frames.times) == 20
+    assert frames.pinhole.width == 160
+    assert not sensor.measurement.blind
+    assert np.isfinite(distances).any()
+    files = list(frames.folder.iterdir())
+    assert sum(file.stat().st_size for file in files) < 200_000
