@@ -259,7 +259,8 @@ class AvoidanceSection(_Section):
     @property
     def thresholds(self) -> dict[str, float]:
         """Distances of the body [m] at which something changes, by symbol."""
-        return {r"$\epsilon_1$": self.near, r"$\epsilon_2$": self.far}
+        outer = {r"$\epsilon_2$": self.far} if self.far > self.near else {}
+        return {r"$\epsilon_1$": self.near} | outer
 
     @property
     def tip_thresholds(self) -> dict[str, float]:
@@ -604,6 +605,11 @@ class Scenario(_Section):
         if sensor == "frames" and "obstacle" in kinds:
             raise ValueError("a fault of kind 'obstacle' would not be in the recorded frames")
         return self
+
+    @property
+    def is_experiment(self) -> bool:
+        """Whether it stands for the letter's section IV-B: physics, or distances seen."""
+        return self.plant.kind != "kinematic" or self.sensor.kind != "exact"
 
     @property
     def asks(self) -> Handles:

@@ -1,4 +1,4 @@
-"""The letter's figures 4 to 7 and a few more, each drawn from a recording alone."""
+"""The letter's figures 4 to 7, 9 and 10 and a few more, each drawn from a recording alone."""
 
 from __future__ import annotations
 
@@ -44,6 +44,12 @@ def joint_velocities(ax: Axes, recording: Recording, colour: str) -> None:
     for joint, velocity in enumerate(recording["v"].T):
         drawing.curve(ax, recording["t"], velocity, color=joint_colour(joint),
                       linewidth=0.8, label=f"joint {joint + 1}")
+
+
+def joint_accelerations(ax: Axes, recording: Recording, colour: str) -> None:
+    """Draw figure 9 (b): every joint's acceleration [rad/s^2]."""
+    for joint, acceleration in enumerate(recording["a"].T):
+        drawing.curve(ax, recording["t"], acceleration, color=joint_colour(joint), linewidth=0.6)
 
 
 def joint_colour(joint: int) -> str:
@@ -105,6 +111,8 @@ def position_error(ax: Axes, recording: Recording, colour: str) -> None:
 PANELS = (
     Panel("joint-velocities", "Joint velocities", "rad/s", "v", joint_velocities,
           "Figure 4: continuous at acceleration level, with jumps at velocity level."),
+    Panel("joint-accelerations", "Joint accelerations", "rad/s²", "a", joint_accelerations,
+          "Figure 9 (b): jumps at every change of the stack, within the limits."),
     Panel("position-error", "Distance from the path", "mm, logarithmic", "position_error",
           position_error, "The start lies off the path on purpose."),
     Panel("body-distance", "Body to the nearest obstacle", "m", "minimal_distance", body_distance,
@@ -128,7 +136,7 @@ class LetterFigure:
     panels: tuple[str, ...]
 
 
-LETTER = (
+SIMULATION = (
     LetterFigure("figure-4-joint-velocities", "Figure 4", ("joint-velocities",)),
     LetterFigure("figure-5-distances", "Figure 5", ("ee-distance", "active-point",
                                                     "body-distance")),
@@ -138,16 +146,25 @@ LETTER = (
     LetterFigure("figure-7-pointing-error", "Figure 7", ("pointing-error",)),
     LetterFigure("position-error", "Position error", ("position-error",)),
 )
+EXPERIMENT = (
+    LetterFigure("figure-9-velocities-and-accelerations", "Figure 9",
+                 ("joint-velocities", "joint-accelerations")),
+    LetterFigure("figure-10-errors-and-distances", "Figure 10",
+                 ("position-error", "pointing-error", "ee-distance", "active-point",
+                  "body-distance")),
+)
 
 
 def write_all(recording: Recording, folder: Path) -> None:
     """Write the letter's figures and the picture of a run into a folder, as SVG and PNG."""
-    for wanted in LETTER:
+    for wanted in EXPERIMENT if recording.scenario.is_experiment else SIMULATION:
         panels = [p for p in map(_PANEL.__getitem__, wanted.panels) if p.fits(recording)]
         if panels:
             drawing.write(stacked(recording, panels, wanted.title), str(folder / wanted.name))
     if "ee_position" in recording and recording.ticks > 1:
         drawing.write(picture({label_of(recording): recording}), str(folder / "picture"))
+    if "time_tick" in recording and recording.ticks > 1:
+        drawing.write(tick_times(recording), str(folder / "tick-times"))
 
 
 def stacked(recording: Recording, panels: Sequence[Panel], title: str) -> Figure:
@@ -246,6 +263,25 @@ def computing_time(recordings: Mapping[str, Recording]) -> Figure:
     ax.grid(axis="y", visible=False)
     ax.set_xscale("log") if _wide(recordings) else ax.set_xlim(left=0.0)
     ax.set_xlabel("µs a tick")
+    return fig
+
+
+def tick_times(recording: Recording) -> Figure:
+    """Return a histogram of the time of whole ticks [us], with the period of the loop."""
+    fig, (ax,) = drawing.figure(width=6.4, height=2.4)
+    label = label_of(recording)
+    times = 1e6 * recording["time_tick"]
+    edges = np.geomspace(max(times.min(), 1.0), max(times.max(), 2.0) * 1.01, 80)
+    ax.hist(times, edges, color=drawing.colours([label])[label], log=True)
+    ax.set_xscale("log")
+    period = 1e6 * recording.scenario.control.period
+    ax.axvline(period, color=INK, linewidth=0.6, linestyle=(0, (4, 3)))
+    ax.annotate("period", (period, 1.0), xycoords=("data", "axes fraction"), fontsize=8, va="top",
+                ha="right", color=INK, rotation=90)
+    ax.set_xlabel("whole tick [µs]")
+    ax.set_ylabel("ticks")
+    ax.set_title(f"{recording.scenario.name}, {label}: {np.mean(times <= period):.2%} of "
+                 f"{recording.ticks} ticks within the period", loc="left", fontsize=9, color=INK)
     return fig
 
 

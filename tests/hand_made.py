@@ -35,6 +35,10 @@ class HandMadeScenario:
         return replace(self, resolver=spec)
 
     @property
+    def is_experiment(self):
+        return False
+
+    @property
     def asks(self):
         return "equalities"
 

@@ -103,7 +103,7 @@ def test_the_stretches_in_which_a_task_is_active_are_red():
 def test_all_figures_of_a_run_are_written_as_svg_and_png(tmp_path):
     figures.write_all(recording(), tmp_path)
     stems = {path.stem for path in tmp_path.iterdir()}
-    assert stems == {figure.name for figure in figures.LETTER} | {"picture"}
+    assert stems == {figure.name for figure in figures.SIMULATION} | {"picture", "tick-times"}
     assert len(list(tmp_path.iterdir())) == 2 * len(stems)
 
 
