@@ -120,15 +120,16 @@ class Tpm(Resolver):
 
         Without bounds direct, and `memory` is not used. With them a `SaturatedResolution`.
         """
-        if memory is not None and self.strict:
+        staircased = self.form == "staircase"
+        if staircased and memory is not None:
             return self._within_bounds(h, memory)
         x = h.reference.copy()
-        kernel = staircase if self.form == "staircase" else published
+        kernel = staircase if staircased else published
         code = kernel(h.A, h.lower, h.upper, h.sizes, x, self.damping, self.threshold,
                       self.rank_tolerance, WORKSPACE.array)
         if code == 0:
             return Resolution(x)
-        return (self._within_bounds(h, None) if code < 0 and self.strict
+        return (self._within_bounds(h, None) if code < 0 and staircased
                 else self._otherwise(h, x, code, memory))
 
     def _within_bounds(self, h: Hierarchy, memory: Any) -> Resolution:

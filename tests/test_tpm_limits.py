@@ -8,6 +8,7 @@ from rank_cases import CASES, build, generic, random_levels, rng
 from scipy.optimize import lsq_linear
 
 from hierarchy import Hierarchy, HierarchyError
+from scenarios.bench import saturation
 from solvers import Status, certify, make
 from solvers.kernels.saturation import saturation_work
 from solvers.problems import Recipe, generate
@@ -293,6 +294,12 @@ def test_entries_that_are_not_finite_give_a_status_and_a_finite_answer(where, ba
         assert not res.x.any()
 
 
+def test_a_memory_does_not_turn_a_nan_among_equalities_into_an_inequality():
+    h = Hierarchy.from_levels(generic())
+    h.lower[4] = np.nan
+    assert TPM.solve(h, np.zeros(11)).status is Status.NUMERICAL_FAILURE
+
+
 @pytest.mark.filterwarnings("ignore:overflow")
 def test_squares_that_overflow_give_a_status_and_a_finite_answer():
     h = boxed(Hierarchy.from_levels([([[1e200, 1e200]], [1.0])]), -1.0, 1.0)
@@ -333,3 +340,14 @@ def test_the_workspace_grows_where_it_must():
     res = TPM.solve(h)
     assert WORKSPACE.array.size >= saturation_work(h.m, h.n, len(h.sizes))
     assert certify(h, res.x).certified
+
+
+def test_the_benchmark_has_a_row_for_everybody_and_finds_tpm_exact(tmp_path, capsys):
+    assert {"hcod", "sns", "tpm"} <= {one.name for one in saturation.resolvers()}
+    entrants = [make("hcod"), make("sns"), TPM]
+    rows = saturation.run(tmp_path, 3, entrants, saturation.FAMILIES[:2])
+    assert [row["resolver"] for row in rows] == ["hcod", "sns", "tpm"] * 2
+    assert all(row["nearest"] == 1.0 for row in rows if row["resolver"] != "sns")
+    assert all(row["beyond"] < 1e-12 for row in rows)
+    assert len((tmp_path / "saturation.csv").read_text().splitlines()) == 7
+    assert max(map(len, capsys.readouterr().out.splitlines())) <= 80

@@ -16,9 +16,9 @@ resolved by the staircase (`staircase.py`). S is found level by level:
 This is a primal active set on one convex problem a level: a step lowers what the level misses, and
 cannot touch the settled levels, so no S comes back and it ends with the exact answer. Where steps
 of length zero might go in circles joints are set free in order of their number (Bland), and after
-PATIENCE no more: then at most n steps follow. A change of S factors the settled levels again. To
-keep their reflectors and give each saturated joint one behind them takes a quarter off at 30 joints
-that saturate often, costs a tenth at 7, and is far more to say.
+PATIENCE no more: then at most n + L + 1 steps follow. A change of S factors the settled levels
+again. To keep their reflectors and give each saturated joint one behind them is more to do at 7
+joints (a sixth more time, measured) and less at 30 (up to a fifth).
 """
 
 # mypy: disable-error-code="no-untyped-def"
@@ -46,7 +46,7 @@ from solvers.kernels.rows import (
 NO_LIMITS = 9  # no value of solvers.Status: all rows are equalities, `staircase` is to be called
 TOLERANCE = 1e-10  # of a level that is met, and of multipliers, relative to the terms they are of
 PATIENCE = 5  # steps for each joint and level
-BLAND_AFTER = 10  # steps of length zero
+BLAND_AFTER = 10  # steps of no length in a row
 HALVINGS = 200  # bound; Newton's method needs 2 or 3 steps
 # Vectors in W, behind the rows of A: Q^T x, Q^T reference, the way to go, beta of the reflectors,
 # y, and the pull on y. Then come the reflectors.
@@ -56,7 +56,7 @@ PLACE, REFERENCE, WAY, BETA, Y, PULL, REFLECTORS = 0, 1, 2, 3, 4, 5, 6
 @compiled
 def saturation_work(m, n, levels):
     """Return how many numbers of work space a hierarchy of m rows needs."""
-    return (2 * m + 2 * n + 14) * n + 8 * m + 2 * levels + 2
+    return (2 * m + 2 * n + 14) * n + 5 * m + 2 * levels + 2
 
 
 @compiled
@@ -111,7 +111,7 @@ def saturation(A, lower, upper, sizes, x, record, damping, threshold, rank_toler
             share = (_go_to_bound(x, low, high, side, order, W, rank, k, m) if steps > 0
                      else _go_and_clip(x, low, high, side, order, W, rank, m))
             steps += 1
-            still = still + 1 if share <= 0.0 else ZERO
+            still = still + 1 if share < ROUNDING else ZERO
             if share < 1.0:
                 break
             while level <= k and _holds(A, upper, x, reference, side, held, square, W, row, first,
@@ -146,8 +146,10 @@ def _load(A, lower, upper, sizes, top, x, low, high, square, joint, scaling):
     unequal = ZERO
     while unequal < m and lower[unequal] == upper[unequal]:
         unequal += 1
+    if unequal == m:
+        return NO_LIMITS
     if unequal >= end:
-        return -(unequal + 1) if unequal < m else NO_LIMITS
+        return -(unequal + 1) if lower[unequal] < upper[unequal] else NUMERICAL_FAILURE
     sane, refused = True, ZERO
     for c in range(n):
         low[c], high[c] = -np.inf, np.inf
