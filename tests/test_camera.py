@@ -129,7 +129,7 @@ def test_a_camera_looks_at_its_target_upright():
     u, v, depth = pinhole.project(target)
     assert (u, v) == pytest.approx((319.5, 239.5))
     assert depth == pytest.approx(np.linalg.norm(target - position))
-    above = pinhole.project(target + [0.0, 0.0, 0.1])
+    above = pinhole.project(target + np.array([0.0, 0.0, 0.1]))
     assert above[0] == pytest.approx(319.5)
     assert above[1] < v
     down = Pinhole(position=(0, 0, 3), rotation=looking_at((0, 0, 3), (0, 0, 0)))
