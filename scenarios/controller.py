@@ -27,7 +27,8 @@ class Controller:
 
     After `command`: `sent`; `allocation` and `cone_error` of the tick, its `hierarchy` (until the
     next command) and `resolution`, and `stamps`, the clock [s] at its begin, after kinematics,
-    after rows (sensing and allocation included) and after resolving. A tick whose measurement is of
+    after rows (sensing and allocation included) and after resolving; what a simulated camera takes
+    for its image is taken out. A tick whose measurement is of
     no use is not `answered`, and leaves allocation and hierarchy as they were. `policy` has the
     events of the tick, `blend` the weight of the present stack, or is None.
     """
@@ -50,6 +51,7 @@ class Controller:
                                                         Status.NUMERICAL_FAILURE, 0)
         self.stamps = (0.0, 0.0, 0.0, 0.0)
         self._memory: Any = None
+        self._outside = 0.0
         self._deadline = control.policy.deadline or inf
         self._stale_after, self._measured_at = control.policy.stale_after, -inf
         # What a first tick without a measurement goes on from.
@@ -74,6 +76,8 @@ class Controller:
             self._move(t, q, v, measured_at, troubles)
         moved = clock()
         self._sense(troubles)
+        if self._outside > 0.0:
+            begin, moved = begin + self._outside, moved + self._outside
         x = self._answer(troubles)
         resolved = clock()
         self.stamps = (begin, moved, self._written, resolved)
@@ -120,6 +124,7 @@ class Controller:
             self.cone_error = cell.pointing.cone_error(cell.state)
         if cell.sensor is not None:
             seen = cell.sensor.measure(cell.state)
+            self._outside = cell.sensor.outside
             if seen.blind and "stale" not in troubles:
                 troubles.append("stale")
             nearest = smallest(seen.distance)

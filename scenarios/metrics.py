@@ -212,6 +212,10 @@ def _time(recording: Recording) -> Iterator[Metric]:
         from solvers import Status
         failed = np.count_nonzero(recording["status"] != int(Status.SOLVED))
         yield Metric("ticks_not_solved", "Ticks not solved", float(failed), "", group="Computing")
+    if "time_tick" in recording:
+        late = np.count_nonzero(recording["time_tick"] > recording.scenario.control.period)
+        yield Metric("ticks_late", "Ticks longer than the period", float(late), "",
+                     group="Computing")
     parts = (("time_tick", "Whole tick"), ("time_kinematics", "Kinematics"), ("time_rows", "Rows"),
              ("time_resolve", "Resolve"))
     levels = (("median", 50.0, "median"), ("p95", 95.0, "95 %"), ("p999", 99.9, "99.9 %"))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from math import inf
+from time import perf_counter
 from typing import Protocol
 
 from hierarchy import State
@@ -43,7 +44,8 @@ class DepthSensor:
     `measurement.blind` is set while that is more than `stale_after` [s] ago: the camera has
     stopped, is late or sees nothing. Distances are then those of the last image, infinite without
     any, and the controller treats the tick as stale. While `stopped` no frames are taken, while
-    `covered` they have no readings: what faults do.
+    `covered` they have no readings: what faults do. `outside` [s] is how long the source took to
+    make the image in the last measurement: work of a real camera, not of the control loop.
     """
 
     def __init__(self, source: Source, space: DepthSpace, stale_after: float = 0.2,
@@ -54,6 +56,7 @@ class DepthSensor:
         self.measurement, self.obstacles = space.measurement, source.obstacles
         self.reading: Image | None = None
         self.stopped = self.covered = False
+        self.outside = 0.0
         self._exact = exact
         self._nothing = self._current = ObstacleImage(space.pinhole)
         self._spare: list[ObstacleImage] = []
@@ -64,6 +67,7 @@ class DepthSensor:
     def measure(self, state: State) -> Measurement:
         """Measure at a state and hang the measurement on it; valid until the next call."""
         t, seen = state.t, self.measurement
+        self.outside = 0.0
         if t < self._now:
             self._forget()
         self._now = t
@@ -87,7 +91,9 @@ class DepthSensor:
     def _take(self, frame: int, state: State) -> None:
         if self.stopped:
             return
+        begin = perf_counter()
         self.reading, placements = self.source.image(frame, state)
+        self.outside = perf_counter() - begin
         if self.covered:
             self.reading[:] = 0.0
         image = self._spare.pop() if self._spare else ObstacleImage(self.space.pinhole)

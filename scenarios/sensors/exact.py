@@ -31,6 +31,8 @@ class ExactDistances:
     is repelled.
     """
 
+    outside = 0.0  # [s] of a measurement that the control loop would not spend
+
     def __init__(self, robot: Robot, obstacles: Obstacles, body: Repulsion | None = None,
                  tip: Repulsion | None = None, mean_within: float = 0.0,
                  pairs: bool = False) -> None:
