@@ -451,8 +451,8 @@ class SensorSection(_Section):
     the middle; position [m]; a point [m] to look at, or a rotation, which goes before it: rows,
     whose columns are the camera's axes right, down and forward in the world. `rate` [Hz], `jitter`
     [s] of the frames; `seed` of all chance. `ideal`: without the errors, which are those of
-    scenarios.sensors.errors. `backdrop` [m] is the depth of a wall, 0 for none; `point_radius` [m]
-    that of the balls as which point obstacles are seen.
+    scenarios.sensors.errors. `backdrop` [m] is the depth of a wall, 0 for none, which may
+    leave too few readings; `point_radius` [m] is that of the balls as which points are seen.
     """
 
     kind: Literal["exact", "camera", "frames"] = "exact"

@@ -366,6 +366,14 @@ def test_a_scenario_runs_with_a_camera(name):
     assert np.isfinite(run["command"]).all()
 
 
+def test_a_run_follows_from_its_seed():
+    ball = "avoidance.obstacles=[{shape='sphere', centre=[0.4, 0.75, 0.2], radius=0.08}]"
+    runs = [simulate(load("human", [*QUICK, ball, "control.duration=0.3", f"sensor.seed={seed}"]))
+            for seed in (1, 1, 2)]
+    np.testing.assert_array_equal(runs[0]["q"], runs[1]["q"])
+    assert (runs[0]["q"] != runs[2]["q"]).any()
+
+
 @pytest.mark.parametrize("kind", ["no_frames", "dark_frames"])
 @pytest.mark.parametrize("name", ["human", "human-hqp"])
 def test_a_blind_camera_leads_to_the_policy_for_stale_measurements(name, kind):

@@ -51,9 +51,11 @@ class DepthSpace:
     shadow, the mean is taken in any case. `body` and `tip` are the laws of repulsion.
 
     The distance to a surface that is seen (inside the image and the camera's range, not hidden,
-    nor taken out as the robot or for lack of support) is never overestimated by more than the
-    error of its reading along its ray and one pixel; see `overestimate`. Hidden space is taken
-    as occupied, so underestimates have no such bound. What is outside the image is not seen.
+    turned from the ray by less than some 70 deg, nor taken out as the robot or for lack of support)
+    is never overestimated by more than the error of its reading along its ray and one pixel, see
+    `overestimate`; a pixel without a reading costs one more. Hidden space is taken as occupied, so
+    underestimates have no such bound; that of the nearest of many noisy pixels is too small on
+    average. What is outside the image is not seen.
 
     `measurement.nearest` is the nearest pixel v width + u, -1 for none.
     """
