@@ -58,6 +58,9 @@ class PhysicsArm:
 
     def _start(self, mujoco: Any, q: Array, v: Array) -> None:
         self.data.qpos[:], self.data.qvel[:] = q, v
+        # A joint that starts beyond its limit has its stop there, and is not flung back.
+        self.model.jnt_range[:] = np.column_stack([np.minimum(self.model.jnt_range[:, 0], q),
+                                                   np.maximum(self.model.jnt_range[:, 1], q)])
         self.q, self.v, self.a = q.copy(), v.copy(), np.zeros(len(v))
         self.reference_q, self.reference_v = q.copy(), v.copy()
         self._time, self._wrench = 0.0, np.zeros(6)
@@ -145,7 +148,9 @@ def _follow(x, T, acceleration, lower, upper, lead, feedforward, q, reference_q,
             after = x[i]
             step = x[i] * T
         asked = reference_q[i] + step
-        allowed = min(max(asked, q[i] - lead, lower[i]), q[i] + lead, upper[i])
+        # A reference beyond a limit, where the arm started, may come back at its own pace.
+        low, up = min(lower[i], reference_q[i]), max(upper[i], reference_q[i])
+        allowed = min(max(asked, q[i] - lead, low), q[i] + lead, up)
         if allowed != asked:  # the reference is held, and its rate is what it still does
             step = allowed - reference_q[i]
             after = step / T
