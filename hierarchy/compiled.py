@@ -31,7 +31,12 @@ def compiled(function: Kernel) -> Kernel:
     IEEE arithmetic as written (no fastmath), division by zero gives inf or NaN as in numpy.
     With `NUMBA_DISABLE_JIT=1` the plain function runs, for debugging.
     """
-    return _compiled(function, inline=False)
+    return _compiled(function)
+
+
+def unlocked(function: Kernel) -> Kernel:
+    """Like `compiled`, and other threads of Python run meanwhile: for calls of milliseconds."""
+    return _compiled(function, nogil=True)
 
 
 def inlined(function: Kernel) -> Kernel:
@@ -42,11 +47,11 @@ def inlined(function: Kernel) -> Kernel:
     return _compiled(function, inline=True)
 
 
-def _compiled(function: Kernel, inline: bool) -> Kernel:
+def _compiled(function: Kernel, inline: bool = False, nogil: bool = False) -> Kernel:
     files = _files_behind(function)
     folder = _cache_root() / _digest((__file__, *sorted(files)))
     allocates = _allocates(function)
-    kernel: Kernel = _jit_into(folder, function, inline, allocates)
+    kernel: Kernel = _jit_into(folder, function, forceinline=inline, nogil=nogil, _nrt=allocates)
     if not isinstance(kernel, type(function)):
         kernel.source_files = files  # type: ignore[attr-defined]
         kernel.allocates = allocates  # type: ignore[attr-defined]
@@ -86,7 +91,7 @@ def _cache_root() -> Path:
     return Path(base).expanduser() / "task-hierarchy"
 
 
-def _jit_into(folder: Path, function: Kernel, inline: bool, allocates: bool) -> Any:
+def _jit_into(folder: Path, function: Kernel, **options: bool) -> Any:
     before = numba.config.CACHE_DIR
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -94,8 +99,7 @@ def _jit_into(folder: Path, function: Kernel, inline: bool, allocates: bool) -> 
     except OSError:  # a home that cannot be written: numba's own choice of folder
         numba.config.CACHE_DIR = before
     try:
-        return numba.njit(cache=True, error_model="numpy", forceinline=inline,
-                          _nrt=allocates)(function)
+        return numba.njit(cache=True, error_model="numpy", **options)(function)
     finally:
         numba.config.CACHE_DIR = before
 
