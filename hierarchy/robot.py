@@ -198,7 +198,8 @@ class State:
 
     With `period` > 0 [s] derivatives are backward differences against previous_J and
     previous_placements, those of the `move` before; with 0 they are exact. `measurement` holds
-    what the sensor saw this tick, or None.
+    what the sensor saw this tick, or None. `commanded` (n,) is the last command where commands are
+    velocities, which need not be v on a robot that lags; None for v.
     """
 
     def __init__(self, robot: Robot, differences: float | None = None) -> None:
@@ -206,6 +207,7 @@ class State:
         self.t = 0.0
         self.q, self.v = pin.neutral(robot.model), np.zeros(robot.n)
         self.measurement: Measurement | None = None
+        self.commanded: Array | None = None
         self._model, self._data = robot.model, robot.model.createData()
         pin.computeJointJacobiansTimeVariation(self._model, self._data, self.q, self.v)
         self.J, self.dJ = self._data.J, self._data.dJ

@@ -57,6 +57,7 @@ class Controller:
         # What a first tick without a measurement goes on from.
         cell.state.move(0.0, cell.plant.q, cell.plant.v)
         self.sent = cell.plant.v.copy() if self.level == "velocity" else np.zeros(cell.robot.n)
+        cell.state.commanded = self.sent if self.level == "velocity" else None
 
     @property
     def answered(self) -> bool:
@@ -84,6 +85,8 @@ class Controller:
         if resolved - begin > self._deadline:
             troubles.append("overrun")
         self.sent = sent = self.policy.choose(t, troubles, x, state.v)
+        if self.level == "velocity":
+            state.commanded = sent
         return sent
 
     def rehearse(self) -> None:

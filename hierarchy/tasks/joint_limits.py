@@ -24,7 +24,8 @@ class JointLimits(Task):
     n rows, the identity, at both levels. Positions and velocities are limited as `robot` says,
     `margin` [rad or m] is kept off each position limit, `acceleration` [rad/s^2 or m/s^2] is one
     number or (n,), `period` [s] is that of the control loop. What is promised from which start:
-    see `hierarchy.limits.Limits`. A continuous joint has no position limits.
+    see `hierarchy.limits.Limits`. A continuous joint has no position limits. At velocity level the
+    acceleration is that of the commands: a step from `State.commanded`.
 
     Raises HierarchyError where a limit makes no sense or the margin leaves no room.
     """
@@ -59,14 +60,14 @@ class JointLimits(Task):
 
     def box(self, state: State, level: Level) -> tuple[Array, Array]:
         """Return the least and the greatest command (n,), (n,) at a state; never empty."""
-        return self.limits.box(self._positions(state), state.v, level)
+        return self.limits.box(self._positions(state), _rates(state, level), level)
 
     def clamp(self, state: State, level: Level, x: ArrayLike) -> Array:
         """Return the command x (n,) moved into the box; finite also where x is not.
 
         NaN becomes the command of the box that comes nearest to a standstill.
         """
-        return self.limits.clamp(self._positions(state), state.v, level, x)
+        return self.limits.clamp(self._positions(state), _rates(state, level), level, x)
 
     def error(self, state: State) -> Array:
         """How far each joint is from its range (n,) [rad or m], zero within."""
@@ -84,12 +85,18 @@ class JointLimits(Task):
     def write(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
               row: int) -> None:
         """See `Task.write`; the rows have two sides."""
-        _write(self._positions(state), state.v, self.limits.packed, self.period,
+        _write(self._positions(state), _rates(state, level), self.limits.packed, self.period,
                level == "acceleration", A, lower, upper, row)
 
     def _positions(self, state: State) -> Array:
         robot = self.robot
         return state.q if robot.nq == robot.n else np.asarray(state.q[robot.coordinates])
+
+
+def _rates(state: State, level: Level) -> Array:
+    """The velocities (n,) from which the next ones are limited."""
+    commanded = state.commanded if level == "velocity" else None
+    return state.v if commanded is None else commanded
 
 
 @compiled
