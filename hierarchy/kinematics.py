@@ -11,17 +11,24 @@ from __future__ import annotations
 
 import numpy as np
 
-from hierarchy.compiled import compiled
+from hierarchy.compiled import compiled, inlined
 
 
-@compiled
+@inlined
+def place(T, ox, oy, oz):
+    """World position of an offset on the body whose placement is T (12,)."""
+    return (T[9] + T[0] * ox + T[3] * oy + T[6] * oz, T[10] + T[1] * ox + T[4] * oy + T[7] * oz,
+            T[11] + T[2] * ox + T[5] * oy + T[8] * oz)
+
+
+@inlined
 def point_at(placements, joint, offset, i):
     """Coordinate i of the world position of `offset` on body `joint`."""
     T = placements[joint]
     return T[9 + i] + T[i] * offset[0] + T[3 + i] * offset[1] + T[6 + i] * offset[2]
 
 
-@compiled
+@inlined
 def axis_at(placements, joint, axis, i):
     """Coordinate i of the world direction of `axis` on body `joint`."""
     T = placements[joint]
@@ -75,6 +82,51 @@ def write_point_jacobian_derivative(v, J, dJ, placements, supports, previous_J,
             out[2, c] = 0.0
 
 
+@inlined
+def velocity_of_point(J, supports, joint, v, x, y, z):
+    """Velocity of the material point that is at x, y, z, and the angular one of its body."""
+    px = py = pz = wx = wy = wz = 0.0
+    for c in range(v.size):
+        if supports[joint, c]:
+            px += J[0, c] * v[c]
+            py += J[1, c] * v[c]
+            pz += J[2, c] * v[c]
+            wx += J[3, c] * v[c]
+            wy += J[4, c] * v[c]
+            wz += J[5, c] * v[c]
+    return px + wy * z - wz * y, py + wz * x - wx * z, pz + wx * y - wy * x, wx, wy, wz
+
+
+@inlined
+def drift_of_point(v, J, dJ, placements, supports, previous_J, previous_placements, period,
+                   joint, ox, oy, oz):
+    """Velocity J_c v and drift dJ_c/dt v of the point at offset ox, oy, oz on a body.
+
+    The drift is exact, or with a period that of the backward difference of J_c. The angular
+    velocity of the body comes last.
+    """
+    x, y, z = place(placements[joint], ox, oy, oz)
+    px, py, pz, wx, wy, wz = velocity_of_point(J, supports, joint, v, x, y, z)
+    if period > 0.0:
+        x, y, z = place(previous_placements[joint], ox, oy, oz)
+        bx, by, bz, _, _, _ = velocity_of_point(previous_J, supports, joint, v, x, y, z)
+        ax, ay, az = (px - bx) / period, (py - by) / period, (pz - bz) / period
+    else:  # dJ_v v + dJ_w v x p + w x dp/dt
+        ax, ay, az, _, _, _ = velocity_of_point(dJ, supports, joint, v, x, y, z)
+        ax, ay, az = ax + wy * pz - wz * py, ay + wz * px - wx * pz, az + wx * py - wy * px
+    return px, py, pz, ax, ay, az, wx, wy, wz
+
+
+@inlined
+def add_row(J, supports, joint, x, y, z, rx, ry, rz, A, row):
+    """Add r^T J_c (n,) of the point of a body that is at x, y, z to A[row]."""
+    mx, my, mz = y * rz - z * ry, z * rx - x * rz, x * ry - y * rx  # r . (w x p) = w . (p x r)
+    for c in range(A.shape[1]):
+        if supports[joint, c]:
+            A[row, c] += (J[0, c] * rx + J[1, c] * ry + J[2, c] * rz
+                          + J[3, c] * mx + J[4, c] * my + J[5, c] * mz)
+
+
 @compiled
 def write_rotation_jacobian(J, supports, joint, A, row):
     """Write the Jacobian (3, n) of a body's angular velocity into A[row : row + 3]."""
@@ -91,7 +143,7 @@ def subtract_over_period(now, before, period):
             now[i, c] = (now[i, c] - before[i, c]) / period
 
 
-@compiled
+@inlined
 def row_times(A, row, v):
     """A[row] v."""
     total = 0.0
@@ -100,7 +152,7 @@ def row_times(A, row, v):
     return total
 
 
-@compiled
+@inlined
 def write_equality(lower, upper, row, value):
     """Make a row an equality."""
     lower[row] = value

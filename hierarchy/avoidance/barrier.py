@@ -1,4 +1,4 @@
-"""What a row that keeps h >= 0 is made of: the side it asks for, and the motion of two points.
+"""What a row that keeps h >= 0 asks for.
 
 h is a distance less the one to keep. The side is a control barrier: of first order at velocity
 level, dh/dt >= -rate h, of second order at acceleration level, (d/dt + rate)^2 h >= 0. Sources:
@@ -79,58 +79,6 @@ def least_acceleration(h, rate_of_h, bend, settings):
     """
     toward = min(-0.5 * settings[1] * h, settings[3])
     return min(2.0 * settings[1] * (toward - rate_of_h) - bend, settings[4])
-
-
-@inlined
-def velocity_of_point(J, supports, joint, v, x, y, z):
-    """Velocity of the material point that is at x, y, z, and the angular one of its body."""
-    px = py = pz = wx = wy = wz = 0.0
-    for c in range(v.size):
-        if supports[joint, c]:
-            px += J[0, c] * v[c]
-            py += J[1, c] * v[c]
-            pz += J[2, c] * v[c]
-            wx += J[3, c] * v[c]
-            wy += J[4, c] * v[c]
-            wz += J[5, c] * v[c]
-    return px + wy * z - wz * y, py + wz * x - wx * z, pz + wx * y - wy * x, wx, wy, wz
-
-
-@inlined
-def drift_of_point(v, J, dJ, placements, supports, previous_J, previous_placements, period,
-                   joint, ox, oy, oz):
-    """Velocity J_c v and drift dJ_c/dt v of the point at offset ox, oy, oz on a body.
-
-    The drift is exact, or with a period that of the backward difference of J_c. The angular
-    velocity of the body comes last.
-    """
-    x, y, z = place(placements[joint], ox, oy, oz)
-    px, py, pz, wx, wy, wz = velocity_of_point(J, supports, joint, v, x, y, z)
-    if period > 0.0:
-        x, y, z = place(previous_placements[joint], ox, oy, oz)
-        bx, by, bz, _, _, _ = velocity_of_point(previous_J, supports, joint, v, x, y, z)
-        ax, ay, az = (px - bx) / period, (py - by) / period, (pz - bz) / period
-    else:  # dJ_v v + dJ_w v x p + w x dp/dt
-        ax, ay, az, _, _, _ = velocity_of_point(dJ, supports, joint, v, x, y, z)
-        ax, ay, az = ax + wy * pz - wz * py, ay + wz * px - wx * pz, az + wx * py - wy * px
-    return px, py, pz, ax, ay, az, wx, wy, wz
-
-
-@inlined
-def place(T, ox, oy, oz):
-    """World position of an offset on the body whose placement is T (12,)."""
-    return (T[9] + T[0] * ox + T[3] * oy + T[6] * oz, T[10] + T[1] * ox + T[4] * oy + T[7] * oz,
-            T[11] + T[2] * ox + T[5] * oy + T[8] * oz)
-
-
-@inlined
-def add_row(J, supports, joint, x, y, z, rx, ry, rz, A, row):
-    """Add r^T J_c (n,) of the point of a body that is at x, y, z to A[row]."""
-    mx, my, mz = y * rz - z * ry, z * rx - x * rz, x * ry - y * rx  # r . (w x p) = w . (p x r)
-    for c in range(A.shape[1]):
-        if supports[joint, c]:
-            A[row, c] += (J[0, c] * rx + J[1, c] * ry + J[2, c] * rz
-                          + J[3, c] * mx + J[4, c] * my + J[5, c] * mz)
 
 
 @inlined

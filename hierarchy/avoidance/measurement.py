@@ -88,7 +88,6 @@ def measure_exactly(measurement: Measurement, placements: Array, joints: NDArray
 @compiled
 def _measure(placements, joints, offsets, obstacles, laws, mean_within,
              points, distance, direction, magnitude, nearest):
-    away = np.empty(3)
     count = len(joints)
     active, D_minimal = -1, np.inf
     for k in range(count):
@@ -96,20 +95,21 @@ def _measure(placements, joints, offsets, obstacles, laws, mean_within,
         for i in range(3):
             points[k, i] = point_at(placements, joint, offsets[k], i)
         D_min, at = np.inf, -1
-        x = y = z = 0.0
+        ax = ay = az = x = y = z = 0.0
+        away = direction[k]  # written anew for each obstacle
         for j in range(obstacles.shape[0]):
             D = distance_to_obstacle(obstacles[j], points[k, 0], points[k, 1], points[k, 2], away)
             if D < D_min:  # (22)
                 D_min, at = D, j
-                direction[k, 0], direction[k, 1], direction[k, 2] = away[0], away[1], away[2]
+                ax, ay, az = away[0], away[1], away[2]
             if mean_within > 0.0 and D < mean_within:  # (25); the factor 1/h is lost in (26)
                 x += away[0]
                 y += away[1]
                 z += away[2]
+        direction[k, 0], direction[k, 1], direction[k, 2] = ax, ay, az
         distance[k], nearest[k] = D_min, at
         if at < 0:
             magnitude[k] = 0.0
-            direction[k, 0] = direction[k, 1] = direction[k, 2] = 0.0
             continue
         norm = sqrt(x * x + y * y + z * z)
         if norm > 1e-6:  # else the unit vectors cancel, or the nearest is asked for

@@ -12,9 +12,9 @@ from math import inf, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from hierarchy.avoidance.barrier import place
 from hierarchy.compiled import compiled, inlined
 from hierarchy.errors import HierarchyError
+from hierarchy.kinematics import place
 from hierarchy.problem import Array
 from hierarchy.robots.table import DHTable
 

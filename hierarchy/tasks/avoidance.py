@@ -16,7 +16,9 @@ from hierarchy.avoidance.measurement import Measurement
 from hierarchy.compiled import compiled
 from hierarchy.errors import HierarchyError
 from hierarchy.kinematics import (
-    row_times,
+    add_row,
+    drift_of_point,
+    place,
     write_equality,
     write_point_jacobian,
     write_point_jacobian_derivative,
@@ -105,23 +107,21 @@ class Avoidance(Task):
 def _write(v, J, dJ, placements, supports, previous_J, previous_placements,
            period, joints, offsets, k, direction, magnitude, acceleration, rows,
            A, lower, upper, row):
-    n = A.shape[1]
     joint, offset, r = joints[k], offsets[k], direction[k]
-    J_c, dJ_c = np.empty((3, n)), np.empty((3, n))
-    write_point_jacobian(J, placements, supports, joint, offset, J_c, 0)
+    ax = ay = az = 0.0
     if acceleration:
-        write_point_jacobian_derivative(v, J, dJ, placements, supports, previous_J,
-                                        previous_placements, period, joint, offset, dJ_c)
-    drift = np.empty(3)
-    for i in range(3):
-        drift[i] = row_times(dJ_c, i, v) if acceleration else 0.0
+        _, _, _, ax, ay, az, _, _, _ = drift_of_point(
+            v, J, dJ, placements, supports, previous_J, previous_placements, period, joint,
+            offset[0], offset[1], offset[2])
     if rows == 3:
-        for i in range(3):
-            for c in range(n):
-                A[row + i, c] = J_c[i, c]
-            write_equality(lower, upper, row + i, magnitude[k] * r[i] - drift[i])  # (28)
+        write_point_jacobian(J, placements, supports, joint, offset, A, row)
+        write_equality(lower, upper, row, magnitude[k] * r[0] - ax)  # (28)
+        write_equality(lower, upper, row + 1, magnitude[k] * r[1] - ay)
+        write_equality(lower, upper, row + 2, magnitude[k] * r[2] - az)
         return
-    for c in range(n):
-        A[row, c] = r[0] * J_c[0, c] + r[1] * J_c[1, c] + r[2] * J_c[2, c]
+    x, y, z = place(placements[joint], offset[0], offset[1], offset[2])
+    for c in range(A.shape[1]):
+        A[row, c] = 0.0
+    add_row(J, supports, joint, x, y, z, r[0], r[1], r[2], A, row)
     write_equality(lower, upper, row,
-                   magnitude[k] - (r[0] * drift[0] + r[1] * drift[1] + r[2] * drift[2]))  # (29)
+                   magnitude[k] - (r[0] * ax + r[1] * ay + r[2] * az))  # (29)

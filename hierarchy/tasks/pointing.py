@@ -9,9 +9,9 @@ from math import cos
 
 import numpy as np
 
-from hierarchy.compiled import compiled
+from hierarchy.compiled import compiled, inlined
 from hierarchy.errors import HierarchyError
-from hierarchy.kinematics import axis_at, row_times, subtract_over_period
+from hierarchy.kinematics import axis_at, subtract_over_period, velocity_of_point
 from hierarchy.problem import Array
 from hierarchy.robot import Frame, State
 from hierarchy.task import Kind, Level, Task
@@ -128,6 +128,31 @@ def _write_jacobian_derivative(v, J, dJ, placements, supports,
                      + J[3, c] * ex + J[4, c] * ey + J[5, c] * ez) if supports[joint, c] else 0.0
 
 
+@inlined
+def _motion(v, J, dJ, placements, supports, previous_J, previous_placements, period, joint, z_e,
+            z_d):
+    """Rate J v and drift dJ/dt v of z_d . z_e; the drift exact, or of the backward difference."""
+    x, y, z, wx, wy, wz, dx, dy, dz = _turning(v, J, placements, supports, joint, z_e)
+    rate = z_d[0] * dx + z_d[1] * dy + z_d[2] * dz
+    if period > 0.0:
+        _, _, _, _, _, _, bx, by, bz = _turning(v, previous_J, previous_placements, supports,
+                                                joint, z_e)
+        return rate, (rate - (z_d[0] * bx + z_d[1] * by + z_d[2] * bz)) / period
+    _, _, _, ax, ay, az = velocity_of_point(dJ, supports, joint, v, 0.0, 0.0, 0.0)
+    return rate, (z_d[0] * (ay * z - az * y + wy * dz - wz * dy)
+                  + z_d[1] * (az * x - ax * z + wz * dx - wx * dz)
+                  + z_d[2] * (ax * y - ay * x + wx * dy - wy * dx))
+
+
+@inlined
+def _turning(v, J, placements, supports, joint, z_e):
+    """z_e in the world, the angular velocity of its body, and dz_e/dt, eq. (18)."""
+    x, y, z = (axis_at(placements, joint, z_e, 0), axis_at(placements, joint, z_e, 1),
+               axis_at(placements, joint, z_e, 2))
+    _, _, _, wx, wy, wz = velocity_of_point(J, supports, joint, v, 0.0, 0.0, 0.0)
+    return x, y, z, wx, wy, wz, wy * z - wz * y, wz * x - wx * z, wx * y - wy * x
+
+
 @compiled
 def _write(v, J, dJ, placements, supports, previous_J, previous_placements,
            period, joint, z_e, z_d, cos_alpha_d, stiffness, damping, gain, acceleration,
@@ -135,10 +160,9 @@ def _write(v, J, dJ, placements, supports, previous_J, previous_placements,
     _write_jacobian(J, placements, supports, joint, z_e, z_d, A, row)
     error = _cone_error(placements, joint, z_e, z_d, cos_alpha_d)
     if acceleration:
-        A_dot = np.empty((1, A.shape[1]))
-        _write_jacobian_derivative(v, J, dJ, placements, supports, previous_J,
-                                   previous_placements, period, joint, z_e, z_d, A_dot)
-        b = stiffness * error - damping * row_times(A, row, v) - row_times(A_dot, 0, v)
+        rate, drift = _motion(v, J, dJ, placements, supports, previous_J, previous_placements,
+                              period, joint, z_e, z_d)
+        b = stiffness * error - damping * rate - drift
     else:
         b = gain * error
     lower[row] = b

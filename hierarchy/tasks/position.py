@@ -10,8 +10,8 @@ import numpy as np
 
 from hierarchy.compiled import compiled
 from hierarchy.kinematics import (
+    drift_of_point,
     point_at,
-    row_times,
     write_equality,
     write_point_jacobian,
     write_point_jacobian_derivative,
@@ -109,16 +109,18 @@ def _write(v, J, dJ, placements, supports, previous_J, previous_placements,
            period, joint, offset, target, stiffness, damping, gain, acceleration,
            distance, magnitude, direction, repulsion_within, A, lower, upper, row):
     write_point_jacobian(J, placements, supports, joint, offset, A, row)
+    velocity = drift = (0.0, 0.0, 0.0)
     if acceleration:
-        A_dot = np.empty((3, A.shape[1]))
-        write_point_jacobian_derivative(v, J, dJ, placements, supports, previous_J,
-                                        previous_placements, period, joint, offset, A_dot)
+        vx, vy, vz, ax, ay, az, _, _, _ = drift_of_point(
+            v, J, dJ, placements, supports, previous_J, previous_placements, period, joint,
+            offset[0], offset[1], offset[2])
+        velocity, drift = (vx, vy, vz), (ax, ay, az)
     last = len(distance) - 1
     for i in range(3):
         error = target[0, i] - point_at(placements, joint, offset, i)
         if acceleration:
-            rate = target[1, i] - row_times(A, row + i, v)
-            b = target[2, i] + damping * rate + stiffness * error - row_times(A_dot, i, v)
+            rate = target[1, i] - velocity[i]
+            b = target[2, i] + damping * rate + stiffness * error - drift[i]
         else:
             b = target[1, i] + gain * error
         if distance[last] <= repulsion_within:

@@ -12,12 +12,9 @@ from numpy.typing import NDArray
 
 from hierarchy.avoidance.barrier import (
     Barrier,
-    add_row,
-    drift_of_point,
     drop_rounding,
     least_acceleration,
     least_rate,
-    place,
 )
 from hierarchy.avoidance.self_collision import (
     ON_AXIS,
@@ -32,7 +29,13 @@ from hierarchy.avoidance.self_collision import (
 )
 from hierarchy.compiled import compiled
 from hierarchy.errors import HierarchyError
-from hierarchy.kinematics import write_point_jacobian, write_point_jacobian_derivative
+from hierarchy.kinematics import (
+    add_row,
+    drift_of_point,
+    place,
+    write_point_jacobian,
+    write_point_jacobian_derivative,
+)
 from hierarchy.problem import Array
 from hierarchy.robot import State
 from hierarchy.task import Kind, Level, Task

@@ -12,18 +12,21 @@ from numpy.typing import NDArray
 
 from hierarchy.avoidance.barrier import (
     Barrier,
-    add_row,
-    drift_of_point,
     drop_rounding,
     least_acceleration,
     least_rate,
-    place,
 )
 from hierarchy.avoidance.control_points import ControlPoint, pack_points
 from hierarchy.avoidance.pairs import Pairs
 from hierarchy.compiled import compiled
 from hierarchy.errors import HierarchyError
-from hierarchy.kinematics import write_point_jacobian, write_point_jacobian_derivative
+from hierarchy.kinematics import (
+    add_row,
+    drift_of_point,
+    place,
+    write_point_jacobian,
+    write_point_jacobian_derivative,
+)
 from hierarchy.problem import Array
 from hierarchy.robot import State
 from hierarchy.task import Kind, Level, Task

@@ -14,9 +14,9 @@ from math import sqrt
 
 import numpy as np
 
-from hierarchy.avoidance.barrier import place
 from hierarchy.avoidance.repulsion import repulsion
 from hierarchy.compiled import compiled
+from hierarchy.kinematics import place
 from scenarios.sensors.rendering import in_camera, pixels_of_ball
 
 TILE = 16  # pixels to a side

@@ -14,9 +14,9 @@ from math import ceil, floor, sqrt
 
 import numpy as np
 
-from hierarchy.avoidance.barrier import place
 from hierarchy.avoidance.self_collision import dot, turned
 from hierarchy.compiled import compiled, inlined
+from hierarchy.kinematics import place
 
 _ALONG = 1e-12  # squared sine between ray and axis below which the side of a capsule is not met
 
