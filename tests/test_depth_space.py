@@ -350,7 +350,7 @@ def test_between_frames_the_points_move_and_the_image_stays():
 
 VIEW = "kind='camera', position=[0.3, 2.2, 0.8], look_at=[0.0, 0.3, 0.1]"
 QUICK = [f"sensor={{{VIEW}, width=160, height=120, fx=131.0, fy=131.0}}",
-         "control.duration=0.6", "plant={}"]
+         "control.duration=0.6", "plant={}", "control.resolver=hqp", "control.options={}"]
 
 
 def troubles(run):

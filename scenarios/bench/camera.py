@@ -25,14 +25,12 @@ from scenarios.sensors.depth_space import ObstacleImage
 _WARM_UP, _TIMES = 20, 300
 _TURN = 0.3  # [rad] by which joints are moved between two calls
 
-# The hand of `human` as it comes near; a wall close behind the arm; a curtain before it, in whose
+# The arm of `human` and a hand near it; a wall close behind the arm; a curtain before it, in whose
 # shadow all points are, so that every pixel they may see is in their region.
-SCENES = {"hand": ("human", []),
-          "wall": ("human", ["avoidance.obstacles=[{shape='box', centre=[0.0, -0.15, 0.1], "
-                             "half_lengths=[2.0, 0.02, 2.0]}]"]),
-          "curtain": ("human", ["avoidance.obstacles=[{shape='box', centre=[0.0, 1.0, 0.1], "
-                                "half_lengths=[2.0, 0.02, 2.0]}]"])}
-_AT = 10.5  # [s] into the scenario, the hand being near
+_WALL = "[{{shape='box', centre=[0.0, {}, 0.1], half_lengths=[2.0, 0.02, 2.0]}}]"
+SCENES = {"hand": "[{shape='capsule', centre=[0.45, 0.62, 0.05], radius=0.045, half_length=0.12, "
+                  "rotation=[[0,0,1],[0,1,0],[-1,0,0]]}]",
+          "wall": _WALL.format(-0.15), "curtain": _WALL.format(1.0)}
 
 
 def run(out: Path | None = None) -> list[dict[str, Any]]:
@@ -42,8 +40,9 @@ def run(out: Path | None = None) -> list[dict[str, Any]]:
     prints a table; writes camera.csv into the folder `out` if given.
     """
     with one_core():
-        rows = [row for name, (scenario, changes) in SCENES.items()
-                for row in _scene(name, load(scenario, ["sensor.kind=camera", *changes]))]
+        rows = [row for name, obstacles in SCENES.items()
+                for row in _scene(name, load("human", ["plant={}", "sensor={kind='camera'}",
+                                                       f"avoidance.obstacles={obstacles}"]))]
     _print(rows)
     if out is not None:
         out.mkdir(parents=True, exist_ok=True)
@@ -84,7 +83,7 @@ def _time(cell: Cell, call: Callable[[], Any], parts: dict[str, Callable[[], Any
     rng, q = np.random.default_rng(0), cell.plant.q.copy()
     samples = np.empty(_TIMES)
     for k in range(-_WARM_UP, _TIMES):
-        cell.state.move(_AT, q + rng.uniform(-_TURN, _TURN, q.shape), np.zeros(cell.robot.n))
+        cell.state.move(0.0, q + rng.uniform(-_TURN, _TURN, q.shape), np.zeros(cell.robot.n))
         for part in ("draw, with errors", "find obstacles"):  # what the others work on
             parts[part]()
         begin = perf_counter()
