@@ -43,6 +43,11 @@ class Metric:
         """The unit in which tables show the value."""
         return _SHOWN[self.unit][1]
 
+    @property
+    def scale(self) -> float:
+        """How many of `shown_unit` make one SI unit."""
+        return _SHOWN[self.unit][0]
+
     def shown(self) -> str:
         """Return the value for a table: in `shown_unit`, without the unit."""
         if self.value is None:

@@ -8,8 +8,11 @@ from contextlib import contextmanager
 
 
 @contextmanager
-def bar() -> Iterator[Callable[[str, int, int], None] | None]:
-    """Give a function to call as told(label, ticks done, ticks in all), or None off a terminal."""
+def bar(what: str = "ticks") -> Iterator[Callable[[str, int, int], None] | None]:
+    """Give a function to call as told(label, done, in all), or None off a terminal.
+
+    `what` is counted.
+    """
     if not sys.stderr.isatty():
         yield None
         return
@@ -18,7 +21,7 @@ def bar() -> Iterator[Callable[[str, int, int], None] | None]:
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
     columns = (TextColumn("{task.description}"), BarColumn(),
-               TextColumn("{task.completed:.0f}/{task.total:.0f} ticks"), TimeRemainingColumn())
+               TextColumn(f"{{task.completed:.0f}}/{{task.total:.0f}} {what}"), TimeRemainingColumn())
     with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
         lines: dict[str, int] = {}
 
