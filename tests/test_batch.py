@@ -1,19 +1,23 @@
 """Batches: each problem gets what it gets alone, to the last bit, on any number of threads."""
 
 import os
+from pathlib import Path
 
 import numpy as np
 import pytest
 from rank_cases import CASES, build, family, rng
 
-from hierarchy import Hierarchy
+from hierarchy import Hierarchy, HierarchyError
+from scenarios.bench.candidates import moved
+from solvers import Status, make
 from solvers import batch as batches
-from solvers import make
 from solvers.batch import Batch, solve
+from solvers.problems import Recipe, generate, load
 
 SLOW = os.environ.get("NUMBA_DISABLE_JIT") == "1"
 COPIES = 1 if SLOW else 20  # of a family's 50 problems, each with targets of its own
 EQUALITIES = ("EQ7", "EQ7over", "EQ7sing", "EQ30L8")
+REGRESSIONS = sorted((Path(__file__).parent / "data" / "regressions").glob("*.npz"))
 INEQUALITIES = ("INEQ7", "DEGEN7", "HUM38")
 
 both = pytest.mark.parametrize("name", ["tpm", "hcod"])
@@ -68,3 +72,190 @@ def test_each_problem_gets_what_it_gets_alone(name, of, threads):
 def test_a_batch_agrees_at_any_rank(name, case, settings):
     resolver, h = make(name, **settings), build(case, with_reference=True)
     assert_same(solve(Batch.of([h, h]), resolver), [resolver.solve(h)] * 2)
+
+
+RECIPE = Recipe(joints=(6, 6), levels=(3, 3), rows=(3, 3), empty=0.0, near_parallel=0.5)
+
+
+@pytest.mark.parametrize("guesses", [1, 3])
+def test_answers_in_doubt_are_judged_as_they_are_alone(guesses):
+    resolver = make("hcod", guesses=guesses)
+    hs = [generate(seed, RECIPE) for seed in range(10 if SLOW else 300)]
+    assert_same(solve(Batch.of(hs), resolver), [resolver.solve(h) for h in hs])
+
+
+def test_an_answer_that_is_inaccurate_alone_is_so_in_a_batch():
+    resolver, statuses = make("hcod"), []
+    for file in REGRESSIONS:
+        h = load(file)
+        hs = [h, moved(h), h]
+        alone = [resolver.solve(h) for h in hs]
+        assert_same(solve(Batch.of(hs), resolver), alone)
+        statuses += [res.status for res in alone]
+    assert Status.INACCURATE in statuses
+
+
+@pytest.mark.parametrize("half", [0.05, 0.3, 3.0])
+@pytest.mark.parametrize("settings", [{}, {"damping": 0.1}], ids=["undamped", "damped"])
+def test_bounds_and_their_memory_are_those_of_each_alone(half, settings):
+    resolver, hs = make("tpm", **settings), [bounded(seed, half) for seed in range(60)]
+    cold = solve(Batch.of(hs), resolver)
+    alone = [resolver.solve(h) for h in hs]
+    assert_same(cold, alone)
+    again = [moved(h) for h in hs]
+    assert_same(solve(Batch.of(again), resolver, memory=cold.memory),
+                [resolver.solve(h, res.memory) for h, res in zip(again, alone, strict=True)])
+
+
+def test_bounds_and_equalities_may_stand_in_one_batch():
+    free, tight = bounded(0, 9.0), bounded(1, 0.1)
+    pinned = Hierarchy(tight.A, tight.upper, tight.upper, tight.sizes, tight.reference, tight.names)
+    hs, resolver = [pinned, tight, free, pinned], make("tpm")
+    answer, alone = solve(Batch.of(hs), resolver), [resolver.solve(h) for h in hs]
+    assert_same(answer, alone)
+    warm = solve(Batch.of([pinned] * 4), resolver, memory=answer.memory)
+    assert_same(warm, [resolver.solve(pinned, res.memory) for res in alone])
+
+
+@both
+def test_an_active_set_is_remembered(name):
+    resolver, hs = make(name), problems_of("INEQ7" if name == "hcod" else "EQ7", copies=1)
+    cold, again = solve(Batch.of(hs), resolver), [moved(h) for h in hs]
+    alone = [resolver.solve(h, resolver.solve(before).memory)
+             for h, before in zip(again, hs, strict=True)]
+    warm = solve(Batch.of(again), resolver, memory=cold.memory)
+    assert_same(warm, alone)
+    if name == "hcod":
+        assert warm.iterations.sum() < cold.iterations.sum()
+
+
+@both
+@pytest.mark.parametrize("spoil", ["A", "lower", "reference", "crossed"])
+def test_one_spoilt_problem_fails_alone(name, spoil):
+    batch = Batch.of(problems_of("EQ7", copies=1))
+    expected = solve(batch, make(name)).x
+    if spoil == "crossed":
+        batch.lower[7, 1] = batch.upper[7, 1] + 1.0
+    else:
+        getattr(batch, spoil)[7].flat[1] = np.nan
+    answer = solve(batch, make(name))
+    assert answer.status[7] == Status.NUMERICAL_FAILURE
+    assert not answer.x[7].any()
+    others = np.arange(len(batch)) != 7
+    assert answer.solved[others].all()
+    np.testing.assert_array_equal(answer.x[others], expected[others])
+
+
+def test_an_inequality_is_refused_by_problem_level_and_row():
+    batch = Batch.of(problems_of("EQ7", copies=1))
+    batch.upper[11, 4] += 1.0
+    with pytest.raises(HierarchyError, match="problem 11, level 3, row 0: an inequality"):
+        solve(batch, make("tpm"))
+    assert solve(batch, make("hcod")).solved.all()
+
+
+@pytest.mark.parametrize(("wrong", "says"), [
+    ({"A": np.ones((4, 3))}, r"A has shape \(4, 3\), expected \(problems, rows, unknowns\)"),
+    ({"A": np.ones((4, 3, 0))}, r"A has shape \(4, 3, 0\)"),
+    ({"A": 1j * np.ones((4, 3, 5))}, "A is not an array of numbers"),
+    ({"lower": np.ones((4, 2))}, r"lower has shape \(4, 2\), expected \(4, 3\)"),
+    ({"upper": np.ones(3)}, r"upper has shape \(3,\), expected \(4, 3\)"),
+    ({"upper": "high"}, "upper is not an array of numbers"),
+    ({"reference": np.ones((5, 4))}, r"reference has shape \(5, 4\), expected \(4, 5\)"),
+    ({"sizes": [2, 2]}, "sizes sum to 4, and A has 3 rows"),
+    ({"sizes": [4, -1]}, "expected a whole number of rows"),
+    ({"sizes": [1.5, 1.5]}, "expected a whole number of rows")])
+def test_a_wrong_array_is_named(wrong, says):
+    right = {"A": np.ones((4, 3, 5)), "lower": np.ones((4, 3)), "upper": np.ones((4, 3)),
+             "sizes": [2, 1]}
+    with pytest.raises(HierarchyError, match=says):
+        Batch(**(right | wrong))
+
+
+def test_what_does_not_stack_is_refused():
+    with pytest.raises(HierarchyError, match=r"problem 1 is Hierarchy\(n=3, sizes=\[1\]\)"):
+        Batch.of([Hierarchy.from_levels([(np.eye(3)[:k], np.ones(k))]) for k in (2, 1)])
+    with pytest.raises(HierarchyError, match="no hierarchies"):
+        Batch.of([])
+
+
+def test_a_resolver_or_a_number_of_threads_that_makes_no_sense_is_refused():
+    batch = Batch.of([bounded(0, 1.0)])
+    with pytest.raises(HierarchyError, match="recursive resolves no batches"):
+        solve(batch, make("recursive"))
+    with pytest.raises(HierarchyError, match="tpm published resolves no batches"):
+        solve(batch, make("tpm", form="published"))
+    with pytest.raises(HierarchyError, match="threads = 0"):
+        solve(batch, threads=0)
+
+
+@both
+@pytest.mark.parametrize("shape", [(0, 3), (4, 0), (1, 3)])
+def test_a_batch_may_be_empty_or_without_rows(name, shape):
+    count, m = shape
+    A, b = rng(0).normal(size=(count, m, 5)), np.ones(shape)
+    answer = solve(Batch(A, b, b, [m], np.ones((count, 5))), make(name))
+    assert answer.x.shape == (count, 5)
+    assert answer.solved.all()
+    assert m or (answer.x == 1.0).all()
+
+
+@both
+def test_lists_strides_and_arrays_that_must_not_be_written_are_taken(name):
+    batch = Batch.of(problems_of("EQ7", copies=1))
+    expected = solve(batch, make(name)).x
+    A = np.asfortranarray(batch.A)
+    A.flags.writeable = False
+    given = Batch(A, batch.lower.tolist(), batch.upper[::-1][::-1], batch.sizes.tolist())
+    np.testing.assert_array_equal(solve(given, make(name)).x, expected)
+
+
+def test_work_space_grows_in_every_thread():
+    r = rng(4)
+    hs = [Hierarchy.from_levels([(r.normal(size=(30, 60)), r.normal(size=30))] * 2)
+          for _ in range(9)]
+    assert_same(solve(Batch.of(hs), make("tpm"), threads=3), [make("tpm").solve(h) for h in hs])
+
+
+@pytest.mark.parametrize("settings", [{}, {"damping": 0.05}], ids=["undamped", "damped"])
+@pytest.mark.parametrize("of", ["EQ7", "EQ7over", "EQ7sing"])
+def test_jax_agrees_with_the_kernel(of, settings):
+    in_jax = jax_backend()
+    batch, resolver = Batch.of(problems_of(of)), make("tpm", **settings)
+    ours, theirs = solve(batch, resolver), in_jax.solve(batch, resolver)
+    np.testing.assert_array_equal(ours.status, theirs.status)
+    assert_near(theirs.x, ours.x)
+
+
+@pytest.mark.parametrize("case", CASES, ids=lambda case: case.__name__)
+@pytest.mark.parametrize("settings", [{}, {"damping": 0.05}], ids=["undamped", "damped"])
+def test_jax_agrees_at_any_rank(case, settings):
+    in_jax, resolver = jax_backend(), make("tpm", **settings)
+    batch = Batch.of([build(case, with_reference=True)])
+    assert_near(in_jax.solve(batch, resolver).x, solve(batch, resolver).x)
+
+
+def test_jax_fails_alone_and_refuses_as_the_kernel_does():
+    in_jax, batch = jax_backend(), Batch.of(problems_of("EQ7", copies=1))
+    batch.A[3, 0, 0], batch.lower[5, 0] = np.nan, np.inf
+    answer = in_jax.solve(batch)
+    assert np.flatnonzero(~answer.solved).tolist() == [3, 5]
+    assert not answer.x[[3, 5]].any()
+    assert_near(answer.x, solve(batch).x)
+    batch.upper[11, 4] += 1.0
+    with pytest.raises(HierarchyError, match="problem 11, level 3, row 0: an inequality"):
+        in_jax.solve(batch)
+    with pytest.raises(HierarchyError, match="hcod is not there in jax"):
+        in_jax.solve(batch, make("hcod"))
+
+
+def jax_backend():
+    pytest.importorskip("jax")
+    from solvers import batch_jax
+
+    return batch_jax
+
+
+def assert_near(x, expected):
+    error = np.linalg.norm(x - expected, axis=1) / (1.0 + np.linalg.norm(expected, axis=1))
+    assert error.max() < 1e-9
