@@ -197,5 +197,5 @@ def _published_matrix(h: Hierarchy, r: Tpm) -> Array:
     W, beta = np.empty((2 * h.m, max(h.m, h.n))), np.empty(h.m)
     F, T = np.empty((h.m, h.m)), np.empty((h.m, h.m))
     priority_matrix(h.A, h.lower, h.upper, h.sizes, h.reference, W, beta, F, T, r.damping,
-                    r.threshold, r.rank_tolerance)
+                    r.threshold, r.rank_tolerance, np.empty(h.m + 3 * h.m * h.m))
     return F.T.copy()  # (10)

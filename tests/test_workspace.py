@@ -10,7 +10,8 @@ from solvers import Status, make
 from solvers.workspace import WORKSPACE
 
 KERNELS = [make("tpm"), make("tpm", form="published"), make("recursive"), make("augmented"),
-           make("hcod"), make("hcod", damping=0.1), make("tpm", damping=0.1)]
+           make("hcod"), make("hcod", damping=0.1), make("tpm", damping=0.1),
+           make("tpm", form="published", damping=0.1)]
 
 
 def levels(n, inequalities, seed=0):
@@ -20,8 +21,16 @@ def levels(n, inequalities, seed=0):
         [(A[k], b[k], b[k] + 1.0) if inequalities and k % 2 else (A[k], b[k]) for k in range(4)])
 
 
+def repeating(h):
+    """The hierarchy with the first row of its first level in its first and second level twice."""
+    for row in (1, h.sizes[0]):
+        h.A[row], h.lower[row], h.upper[row] = h.A[0], h.lower[0], h.upper[0]
+    return h
+
+
 def problems(resolver, n):
     yield levels(n, False)
+    yield repeating(levels(n, False))
     if resolver.handles == "inequalities" and not resolver.damping:
         yield levels(n, True)
 

@@ -26,23 +26,33 @@ from solvers.kernels.staircase import staircase, staircase_work
 
 
 @compiled
+def published_work(m, n):
+    """Return how many numbers of work space a hierarchy of m rows needs."""
+    return m + n + 1 + max((2 * m + 1) * max(m, n) + 2 * m + 5 * m * m, staircase_work(m, n))
+
+
+@compiled
 def published(A, lower, upper, sizes, x, damping, threshold, rank_tolerance, work):
     """Solve (14) with F of (10); x (n,) comes in as the reference and goes out as the answer.
 
-    x is zero on failure. work: as of `staircase`. Returns SOLVED, NUMERICAL_FAILURE, TOO_SMALL, or
-    -(i + 1) where row i is an inequality.
+    x is zero on failure. work: at least published_work(m, n), of any content. Returns
+    SOLVED, NUMERICAL_FAILURE, TOO_SMALL, or -(i + 1) where row i is an inequality.
     """
     m, n = A.shape
-    if work.size < staircase_work(m, n):
+    if work.size < published_work(m, n):
         return TOO_SMALL
-    N = max(m, n)
-    W, beta = np.empty((2 * m + 1, N)), np.empty(m)  # rows of J, reflectors of Q, then x
-    F, T = np.empty((m, m)), np.empty((m, m))
+    N, of_rows = max(m, n), m + n + 1
+    of_squares = of_rows + (2 * m + 1) * N
+    u, least, whole = work[:m], work[m:m + n], work[m + n:of_rows].view(np.int64)
+    W = work[of_rows:of_squares].reshape((2 * m + 1, N))  # rows of J, reflectors of Q, then x
+    F = work[of_squares:of_squares + m * m].reshape((m, m))
+    T = work[of_squares + m * m:of_squares + 2 * m * m].reshape((m, m))
+    beta = work[of_squares + 2 * m * m:of_squares + 2 * m * m + m]
     code = priority_matrix(A, lower, upper, sizes, x, W, beta, F, T, damping, threshold,
-                           rank_tolerance)
+                           rank_tolerance, work[of_squares + 2 * m * m + m:])
     if code != SOLVED:
         return finish(x, code)
-    u, tolerance, square = np.empty(m), _tolerance(A, rank_tolerance), 0.0
+    tolerance, square = _tolerance(A, rank_tolerance), 0.0
     for i in range(m):
         u[i] = 0.0
         for k in range(n):
@@ -65,19 +75,23 @@ def published(A, lower, upper, sizes, x, damping, threshold, rank_tolerance, wor
         for c in range(n):
             x[c] += W[2 * m, c]
         return finish(x, SOLVED)
-    whole, least = np.empty(1, np.int64), np.zeros(n)
     whole[0] = m
-    code = staircase(A, u, u, whole, least, 0.0, threshold, rank_tolerance, work)  # J^# at any
+    for c in range(n):
+        least[c] = 0.0
+    code = staircase(A, u, u, whole, least, 0.0, threshold, rank_tolerance,
+                     work[of_rows:])  # J^# at any rank
     for c in range(n):
         x[c] += least[c]
     return finish(x, code)
 
 
 @compiled
-def priority_matrix(A, lower, upper, sizes, x, W, beta, F, T, damping, threshold, rank_tolerance):
+def priority_matrix(A, lower, upper, sizes, x, W, beta, F, T, damping, threshold, rank_tolerance,
+                    work):
     """Write R^T into W, its reflectors below and into beta, F^T into F and R^-1 into T; a code.
 
-    Shapes, with N = max(m, n): W (>= 2 m, N), beta (m,), F (m, m), T (m, m).
+    Shapes, with N = max(m, n): W (>= 2 m, N), beta (m,), F (m, m), T (m, m). work: at least
+    m + 3 m^2 numbers, of any content.
     """
     m, n = A.shape
     code = load_rows(W, beta, A, lower, upper, x, rank_tolerance)
@@ -102,11 +116,13 @@ def priority_matrix(A, lower, upper, sizes, x, W, beta, F, T, damping, threshold
     for i in range(m):
         for k in range(m):
             F[i, k] = W[k, i] if k >= i else 0.0  # (9)
-    entries, tolerance = np.empty(m), _tolerance(A, rank_tolerance)
+    entries, of_block, tolerance = work[:m], work[m:], _tolerance(A, rank_tolerance)
     first = ZERO
     for level in range(sizes.size):
         last = first + sizes[level]
-        D = _pivot_inverse(F, T, first, last, damping, threshold, tolerance)
+        D = of_block[:(last - first) * (last - first)].reshape((last - first, last - first))
+        _invert_pivot(F, T, first, last, damping, threshold, tolerance, D,
+                      of_block[D.size:])
         for k in range(first, m):  # step 2
             for j in range(last - first):
                 entries[j] = F[first + j, k]
@@ -137,21 +153,23 @@ def _tolerance(A, rank_tolerance):
 
 
 @compiled
-def _pivot_inverse(F, T, first, last, damping, threshold, tolerance):
-    """R_ii^#, damped by R^T (R R^T + lambda^2 I)^-1 where its smallest singular value is small."""
-    p = last - first
-    D, square = np.empty((p, p)), 0.0
+def _invert_pivot(F, T, first, last, damping, threshold, tolerance, D, work):
+    """Write R_ii^# into D, damped where its smallest singular value is small.
+
+    That is R^T (R R^T + lambda^2 I)^-1. work: twice the size of D, of any content.
+    """
+    p, square = last - first, 0.0
     for i in range(p):
         for j in range(p):
             D[i, j] = T[first + i, first + j]
             square += D[i, j] * D[i, j]
     enough = max(tolerance, threshold) if damping > 0.0 else tolerance
     if square * enough * enough < 1.0:
-        return D
-    S, U = np.empty((p, p)), np.zeros((p, p))
+        return
+    S, U = work[:p * p].reshape((p, p)), work[p * p:2 * p * p].reshape((p, p))
     for i in range(p):
-        U[i, i] = 1.0
         for j in range(p):
+            U[i, j] = 1.0 if i == j else 0.0
             D[i, j] = 0.0
             S[i, j] = F[first + i, first + j]
     orthogonalise_rows(S, U)  # R_ii = U^T S, rows of S orthogonal
@@ -165,4 +183,3 @@ def _pivot_inverse(F, T, first, last, damping, threshold, tolerance):
             for i in range(p):
                 for j in range(p):
                     D[i, j] += S[k, i] * U[k, j] / (square + damped)
-    return D
