@@ -98,6 +98,7 @@ class _FaultySensor(ExactDistances):
             self._inner.stopped = any(self._faults.now("no_frames"))
             self._inner.covered = any(self._faults.now("dark_frames"))
         seen = self._inner.measure(state)
+        self.outside = self._inner.outside
         points = [fault.point for fault in self._faults.now("nan_distance")]
         _spoil(seen.distance, points)
         if seen.pairs is not None:

@@ -163,6 +163,12 @@ def write_all(recording: Recording, folder: Path) -> None:
             drawing.write(stacked(recording, panels, wanted.title), str(folder / wanted.name))
     if "ee_position" in recording and recording.ticks > 1:
         drawing.write(picture({label_of(recording): recording}), str(folder / "picture"))
+    seen = recording.scenario.is_experiment and recording.scenario.sensor.kind == "camera"
+    if seen and np.isfinite(recording["ee_distance"]).any():
+        from scenarios.depth_figure import depth_figure
+
+        nearest = float(recording["t"][int(np.argmin(recording["ee_distance"]))])
+        drawing.write(depth_figure(recording, nearest), str(folder / "figure-8-depth-image"))
     if "time_tick" in recording and recording.ticks > 1:
         drawing.write(tick_times(recording), str(folder / "tick-times"))
 

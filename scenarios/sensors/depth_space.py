@@ -15,10 +15,11 @@ from hierarchy.avoidance.self_collision import pack_capsules
 from hierarchy.problem import Array
 from scenarios.sensors.camera import Pinhole
 from scenarios.sensors.errors import Image
-from scenarios.sensors.pixels import TILE, find_obstacles, measure_pixels
+from scenarios.sensors.pixels import TILE, farthest, find_obstacles, measure_pixels
 from scenarios.sensors.rendering import draw_robot
 
 NO_LAWS = np.array([[0.0, 1.0, 1.0, 1.0]] * 2)  # r_max = 0
+_ON_ITS_WAY = 0.3  # [m]
 
 
 class ObstacleImage:
@@ -87,11 +88,13 @@ class DepthSpace:
     def find_obstacles(self, reading: Image, placements: Array, into: ObstacleImage) -> float:
         """Fill an obstacle image from a reading (h, w) [m] and the robot's placements then.
 
-        Returns the share of the pixels that have a reading: neither 0 nor NaN.
+        What is farther than any point of the robot can be interested in, also if it moves by
+        _ON_ITS_WAY until the next frame, is left out. Returns the share of the pixels that have a reading: neither 0 nor NaN.
         """
         draw_robot(self._robot, self._eye, placements, self._links, self._capsules, self._margin)
-        return float(find_obstacles(reading, self._robot, self._support, self._band, into.depth,
-                                    into.tiles))
+        beyond = farthest(placements, self._joints, self._offsets, self._eye)
+        return float(find_obstacles(reading, self._robot, self._support, self._band,
+                                    beyond + self.region + _ON_ITS_WAY, into.depth, into.tiles))
 
     def measure(self, obstacles: ObstacleImage, placements: Array) -> Measurement:
         """Measure the points of the robot where it is now; valid until the next call."""

@@ -23,13 +23,23 @@ TILE = 16  # pixels to a side
 
 
 @compiled
-def find_obstacles(reading, robot, support, band, depth, tiles):
+def farthest(placements, joints, offsets, eye):
+    """Return the depth [m] of the point that is farthest from the camera's plane."""
+    most = 0.0
+    for k in range(len(joints)):
+        x, y, z = place(placements[joints[k]], offsets[k, 0], offsets[k, 1], offsets[k, 2])
+        most = max(most, in_camera(eye, x, y, z)[2])
+    return most
+
+
+@compiled
+def find_obstacles(reading, robot, support, band, beyond, depth, tiles):
     """Write the obstacle image of a reading into depth (h, w) and tiles; return how much was read.
 
     robot (h, w) is the depth at which the robot begins, margin included, infinite beside it;
     it is used up. A pixel there or behind is no obstacle, nor is one with which less than `support`
-    pixels of the 3 x 3 around it, itself included, agree within `band` [m]. The share of pixels
-    with a reading is returned.
+    pixels of the 3 x 3 around it, itself included, agree within `band` [m], nor one farther than
+    `beyond` [m]. The share of pixels with a reading is returned.
     """
     height, width = reading.shape
     read = 0
@@ -40,7 +50,7 @@ def find_obstacles(reading, robot, support, band, depth, tiles):
                 robot[v, u] = 0.0
                 continue
             read += 1
-            robot[v, u] = z if z < robot[v, u] else 0.0
+            robot[v, u] = z if z < robot[v, u] and z <= beyond else 0.0
     tiles[:, :] = np.inf
     for v in range(height):
         for u in range(width):
