@@ -1,4 +1,4 @@
-"""The command `hierarchy`: list, run, compare, check, bench.
+"""The command `hierarchy`: list, run, compare, sweep, check, bench.
 
 Nothing heavy is imported before it is needed, so that `--help` and completion answer at once.
 Exit codes: 0 done, 1 a run ended in a fault that is reported, 2 the command line or a file is
@@ -72,13 +72,15 @@ def run_command(arguments: list[str]) -> int:
 
 @app.command("list")
 def list_() -> None:
-    """List the scenarios, resolvers, tasks and robots there are."""
+    """List the scenarios, sweeps, resolvers, tasks and robots there are."""
     import solvers
     from hierarchy.robot import ROBOTS
     from hierarchy.tasks import TASKS
     from scenarios.config import load, shipped
+    from scenarios.sweep.config import load_sweep, shipped_sweeps
 
     _print_list("scenarios", {name: load(name).title for name in shipped()})
+    _print_list("sweeps", {name: load_sweep(name).title for name in shipped_sweeps()})
     _print_list("resolvers", {name: _first_line(solvers.make(name))
                                for name in solvers.names()})
     _print_list("tasks", {name: _first_line(task) for name, task in TASKS.items()})
@@ -149,6 +151,23 @@ def compare(scenarios: Annotated[list[str], typer.Argument(
     print("", *comparison.refused, sep="\n" if comparison.refused else "")
     print(f"\nReport: {_shown(folder / 'index.html')}")
     return max([_fault(f"{run.label}: {run.fault}") for run in comparison.faults], default=0)
+
+
+@app.command()
+def sweep(file: Annotated[str, typer.Argument(help="Name of a sweep, or a sweep file.")],
+          out: Annotated[Path | None, typer.Option(
+              "--out", metavar="FOLDER",
+              help="Where to write, or to go on. Default: runs/sweep-NAME.")] = None,
+          workers: Annotated[int | None, typer.Option(
+              "--workers", metavar="N", min=1,
+              help="Processes on this machine. Default: one for each processor.")] = None,
+          scheduler: Annotated[str | None, typer.Option(
+              "--scheduler", metavar="ADDRESS",
+              help="Use the workers of this Dask scheduler instead.")] = None) -> int:
+    """Run scenarios under resolvers with sampled parameters; go on where that stopped."""
+    from scenarios.sweep.command import sweep_command
+
+    return sweep_command(file, out, workers, scheduler)
 
 
 @app.command()

@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
-import re
 import shlex
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -16,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from hierarchy.errors import HierarchyError
 from scenarios import metrics
-from scenarios.folders import claim, write_text
+from scenarios.folders import claim, slug, write_text
 from scenarios.metrics import Metric
 from scenarios.parting import Parting, partings
 from scenarios.recording import Recording, save, versions
@@ -57,7 +56,7 @@ class Run:
     @property
     def folder(self) -> str:
         """Where the run lies below the comparison's own folder."""
-        return f"{_slug(self.scenario.name)}/{_slug(self.spec)}"
+        return f"{slug(self.scenario.name)}/{slug(self.spec)}"
 
     @property
     def settings(self) -> dict[str, Any]:
@@ -288,7 +287,3 @@ def _command(planned: Sequence[Run], out: str | Path | None) -> str:
     specs = ",".join(dict.fromkeys(run.spec for run in planned))
     where = ["--out", str(out)] if out is not None else []
     return shlex.join(["hierarchy", "compare", *names, "--resolvers", specs, *where])
-
-
-def _slug(text: str) -> str:
-    return re.sub(r"[^A-Za-z0-9._]+", "-", text).strip("-.") or "unnamed"

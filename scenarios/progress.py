@@ -21,7 +21,8 @@ def bar(what: str = "ticks") -> Iterator[Callable[[str, int, int], None] | None]
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
     columns = (TextColumn("{task.description}"), BarColumn(),
-               TextColumn(f"{{task.completed:.0f}}/{{task.total:.0f}} {what}"), TimeRemainingColumn())
+               TextColumn(f"{{task.completed:.0f}}/{{task.total:.0f}} {what}"),
+               TimeRemainingColumn())
     with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
         lines: dict[str, int] = {}
 

@@ -1,0 +1,66 @@
+"""The figures of a sweep's page: shares with their intervals, and how each metric is spread."""
+
+from __future__ import annotations
+
+import matplotlib
+import numpy as np
+from matplotlib.figure import Figure
+
+from scenarios import drawing
+from scenarios.metrics import Metric
+from scenarios.sweep.results import Results
+
+
+def shares(results: Results) -> Figure:
+    """Draw for each criterion and resolver the share of runs, and its interval."""
+    criteria, labels = results.criteria(), results.labels
+    rows = len(criteria) * (len(labels) + 1)
+    fig, (ax,) = drawing.figure(width=5.4, height=0.5 + 0.2 * rows)
+    colours = drawing.colours(labels)
+    with matplotlib.rc_context(drawing.style()):
+        for i, criterion in enumerate(criteria):
+            top = i * (len(labels) + 1)
+            ax.text(0.0, top - 0.62, criterion.label, fontweight="bold", va="center", fontsize=9)
+            for j, label in enumerate(labels):
+                share = results.share(criterion, label)
+                low, high = share.interval
+                y, colour = top + j + 0.15, colours[label]
+                ax.plot([0.0, 1.0], [y, y], color=drawing.INK, alpha=0.1, lw=5.0,
+                        solid_capstyle="butt")
+                ax.plot([low, high], [y, y], color=colour, lw=5.0, alpha=0.4,
+                        solid_capstyle="butt")
+                ax.plot([share.met / share.of], [y], "o", color=colour, ms=6.0)
+                ax.text(1.04, y, f"{share}", va="center", fontsize=8)
+                ax.text(-0.03, y, label, va="center", ha="right", fontsize=8)
+    ax.set_ylim(rows - 1.2, -1.1)
+    ax.set_xlim(-0.02, 1.02)
+    ax.set_xticks([0.0, 0.25, 0.5, 0.75, 1.0], ["0 %", "25 %", "50 %", "75 %", "100 %"])
+    ax.set_yticks([])
+    ax.spines["left"].set_visible(False)
+    ax.grid(False)
+    return fig
+
+
+def spread(results: Results, metric: Metric) -> Figure:
+    """Draw how a metric is spread over the samples, a row for each resolver.
+
+    Box: the middle half, with the median; line: from 5 to 95 %; dots: least and largest.
+    """
+    labels = [label for label in results.labels if results.of(metric.name, label).size]
+    fig, (ax,) = drawing.figure(width=3.6, height=0.55 + 0.24 * len(labels))
+    colours = drawing.colours(results.labels)
+    with matplotlib.rc_context(drawing.style()):
+        for y, label in enumerate(labels):
+            values, colour = metric.scale * results.of(metric.name, label), colours[label]
+            p5, q1, median, q3, p95 = np.percentile(values, [5.0, 25.0, 50.0, 75.0, 95.0])
+            ax.plot([p5, p95], [y, y], color=colour, lw=1.2)
+            ax.barh(y, q3 - q1, left=q1, height=0.56, color=colour, alpha=0.4, lw=0)
+            ax.plot([median, median], [y - 0.28, y + 0.28], color=colour, lw=2.4)
+            ax.plot([values.min(), values.max()], [y, y], ".", color=colour, ms=4.5)
+    ax.set_yticks(range(len(labels)), labels)
+    ax.set_ylim(len(labels) - 0.5, -0.5)
+    ax.tick_params(axis="y", length=0)
+    ax.grid(False, axis="y")
+    ax.spines["left"].set_visible(False)
+    ax.locator_params(axis="x", nbins=6)
+    return fig

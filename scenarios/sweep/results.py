@@ -1,0 +1,214 @@
+"""What a sweep comes to: its runs as columns, shares of success, worst cases, failures."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenarios.metrics import Metric
+from scenarios.sweep.planning import Plan, Planned
+from scenarios.sweep.store import Store, metrics_of
+
+_TOLERANCE = 1e-6  # [rad] beyond a joint limit that is still on it
+
+
+@dataclass(frozen=True)
+class Share:
+    """In how many of how many runs something was so, with its 95 % interval after Wilson."""
+
+    met: int
+    of: int
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """The interval of the share, 0 to 1."""
+        return wilson(self.met, self.of)
+
+    def __str__(self) -> str:
+        return f"{self.met} of {self.of}"
+
+
+@dataclass(frozen=True)
+class Criterion:
+    """Something that a run should do: its name, and for each run whether it did."""
+
+    label: str
+    met: NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Worst:
+    """The run with the worst value of a metric, and what the others made of the same sample."""
+
+    metric: Metric
+    run: Planned
+    others: dict[str, Metric]
+
+
+@dataclass(frozen=True)
+class Failure:
+    """A reason for which runs ended early or broke, its first run, and how many there are."""
+
+    reason: str
+    run: Planned
+    count: int
+
+
+@dataclass(frozen=True)
+class Results:
+    """The runs of one scenario of a sweep, in the order of its plan; values NaN where unknown."""
+
+    runs: tuple[Planned, ...]
+    reasons: tuple[str | None, ...]
+    metrics: dict[str, Metric]
+    values: dict[str, NDArray[np.float64]]
+
+    @cached_property
+    def labels(self) -> tuple[str, ...]:
+        """Labels of the resolvers, in the order asked for."""
+        return tuple(dict.fromkeys(run.label for run in self.runs))
+
+    @cached_property
+    def _of(self) -> dict[str, NDArray[np.bool_]]:
+        names = np.array([run.label for run in self.runs])
+        return {label: names == label for label in self.labels}
+
+    def of(self, name: str, label: str) -> NDArray[np.float64]:
+        """Return the known values of a metric under a resolver."""
+        values = self.values[name][self._of[label]]
+        return np.asarray(values[np.isfinite(values)])
+
+    def share(self, criterion: Criterion, label: str) -> Share:
+        """Return in how many runs of a resolver a criterion was met."""
+        return Share(int((criterion.met & self._of[label]).sum()), int(self._of[label].sum()))
+
+    def criteria(self, tolerance: float = _TOLERANCE) -> list[Criterion]:
+        """Return what can be judged; a run that broke met nothing.
+
+        `tolerance` [rad] beyond a joint limit still keeps it.
+        """
+        finished = np.array([reason is None for reason in self.reasons])
+        found = [Criterion("Reached the end", finished)]
+        near = [self.values[name] for name in ("body_distance_min", "ee_distance_min")
+                if name in self.values]
+        contacts = [self.values["contact_ticks"]] if "contact_ticks" in self.values else []
+        if near or contacts:
+            found.append(Criterion("Touched nothing", np.all(
+                [*(values > 0.0 for values in near), *(values == 0.0 for values in contacts)],
+                axis=0)))
+        for label, name, most in (("Kept the joint limits", "joint_limit_excess", tolerance),
+                                  ("Every tick solved", "ticks_not_solved", 0.0)):
+            if name in self.values:
+                found.append(Criterion(label, self.values[name] <= most))
+        return [*found, Criterion("All of these", np.all([one.met for one in found], axis=0))]
+
+    def shown(self) -> list[Metric]:
+        """Return the metrics that are laid side by side: no computing times, which depend on load.
+
+        One that no run has is left out.
+        """
+        return [metric for name, metric in self.metrics.items()
+                if metric.group != "Computing" and np.isfinite(self.values[name]).any()]
+
+    def worst(self) -> list[Worst]:
+        """Return the worst run by each metric that has a direction and is not the same in all."""
+        found = []
+        for metric in self.shown():
+            values = self.values[metric.name]
+            if metric.lower_is_better is None or np.nanmin(values) == np.nanmax(values):
+                continue
+            i = int(np.nanargmax(values) if metric.lower_is_better else np.nanargmin(values))
+            others = {run.label: valued(metric, values[j]) for j, run in enumerate(self.runs)
+                      if j != i and run.sample == self.runs[i].sample}
+            found.append(Worst(valued(metric, values[i]), self.runs[i], others))
+        return found
+
+    def failures(self) -> list[Failure]:
+        """Return why runs failed; reasons under one resolver that differ in numbers are one."""
+        found: dict[tuple[str, str], Failure] = {}
+        for run, reason in zip(self.runs, self.reasons, strict=True):
+            if reason is not None:
+                kind = run.label, re.sub(r"\d+(\.\d+)?(e[+-]?\d+)?", "#", reason)
+                first = found.get(kind, Failure(reason, run, 0))
+                found[kind] = dataclasses.replace(first, count=first.count + 1)
+        return sorted(found.values(), key=lambda one: -one.count)
+
+
+def wilson(met: int, of: int, z: float = 1.96) -> tuple[float, float]:
+    """Return the interval of a share after Wilson (1927); z = 1.96 for 95 %."""
+    if of == 0:
+        return 0.0, 1.0
+    share = met / of
+    middle = (share + z**2 / (2 * of)) / (1 + z**2 / of)
+    half = z / (1 + z**2 / of) * math.sqrt(share * (1 - share) / of + z**2 / (4 * of**2))
+    return max(0.0, middle - half), min(1.0, middle + half)
+
+
+def valued(metric: Metric, value: float) -> Metric:
+    """Return a metric with a value, None for NaN."""
+    return dataclasses.replace(metric, value=float(value) if math.isfinite(value) else None)
+
+
+def summary(results: Results, metric: Metric, label: str) -> str:
+    """Return "median (worst)" of a metric under a resolver; the largest where none is worse."""
+    values = results.of(metric.name, label)
+    if not values.size:
+        return "–"
+    worst = values.min() if metric.lower_is_better is False else values.max()
+    return f"{valued(metric, np.median(values)).shown()} ({valued(metric, worst).shown()})"
+
+
+def joined(plan: Plan, store: Store) -> Any:
+    """Return the table of all runs of a plan: what was asked, what was sampled, what came of it.
+
+    Raises KeyError where a run of the plan has not been made.
+    """
+    import pyarrow as pa
+
+    kept = store.table()
+    place = {key: i for i, key in enumerate(kept["key"].to_pylist())}
+    kept = kept.take(pa.array([place[run.job.key] for run in plan.runs], pa.int64()))
+    asked = {"scenario": [run.scenario for run in plan.runs],
+             "resolver": [run.job.resolver for run in plan.runs],
+             "sample": [run.sample for run in plan.runs]}
+    for key in plan.sweep.parameters:
+        asked[key] = _of_one_type([run.values[key] for run in plan.runs])
+    table = pa.table(asked)
+    for field in kept.schema:
+        table = table.append_column(field, kept[field.name])
+    return table
+
+
+def results(plan: Plan, table: Any) -> dict[str, Results]:
+    """Return what came of each scenario, from the table that `joined` gives."""
+    metrics = metrics_of(table)
+    columns = {name: _floats(table[name]) for name in metrics}
+    faults, errors = table["fault"].to_pylist(), table["error"].to_pylist()
+    names = np.array([run.scenario for run in plan.runs])
+    found = {}
+    for name in dict.fromkeys(names.tolist()):
+        chosen = np.flatnonzero(names == name)
+        known = {key: metric for key, metric in metrics.items()
+                 if np.isfinite(columns[key][chosen]).any()}
+        found[name] = Results(tuple(plan.runs[i] for i in chosen),
+                              tuple(errors[i] or faults[i] for i in chosen), known,
+                              {key: columns[key][chosen] for key in known})
+    return found
+
+
+def _floats(column: Any) -> NDArray[np.float64]:
+    return np.asarray(column.to_numpy(zero_copy_only=False), dtype=float)
+
+
+def _of_one_type(values: Sequence[Any]) -> list[Any]:
+    """Return values that one column can hold: as they are, or as text where types differ."""
+    same = len({type(value) for value in values}) == 1
+    return list(values) if same else [str(value) for value in values]

@@ -1,0 +1,87 @@
+"""What is drawn for a sample, and a scenario with it put in."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from pydantic import ValidationError
+
+from hierarchy.errors import HierarchyError
+from scenarios.config import Scenario
+from scenarios.sweep.config import Sweep, SweepError, Value
+
+
+def drawn(sweep: Sweep, index: int, scenario: Scenario) -> dict[str, Value]:
+    """Return the values of sample `index` by dotted key, for one scenario.
+
+    They depend on the seed, the index and the key alone, and "around" on the scenario's own value.
+
+    Raises
+    ------
+    SweepError : a key that the scenario does not have, or has no fitting value for.
+    """
+    own = scenario.model_dump(mode="json")
+    values = {}
+    for key, distribution in sweep.parameters.items():
+        try:
+            table, last = _place(own, key)
+            values[key] = distribution.draw(_chance(sweep.seed, index, key), table[last])
+        except ValueError as error:
+            raise SweepError(f"sweep {sweep.name!r}: parameters.{key}: scenario "
+                             f"{scenario.name!r}: {error}") from error
+    return values
+
+
+def changed(scenario: Scenario, values: Mapping[str, Value], what: str) -> Scenario:
+    """Return the scenario with other values at dotted keys; raises SweepError where one is wrong.
+
+    `what` begins the text of the error.
+    """
+    data = scenario.model_dump(mode="json")
+    for key, value in values.items():
+        table, last = _place(data, key)
+        table[last] = value
+    try:
+        return Scenario.model_validate(data)
+    except ValidationError as error:
+        one = error.errors()[0]
+        where = ".".join(map(str, one["loc"])) or scenario.name
+        raise SweepError(f"{what}: {where}: {one['msg'].removeprefix('Value error, ')}, with "
+                         f"{_said(values)}") from error
+    except HierarchyError as error:  # what a resolver says of its settings
+        raise SweepError(f"{what}: {error}, with {_said(values)}") from error
+
+
+def _chance(seed: int, index: int, key: str) -> np.random.Generator:
+    """Chance of its own for each parameter of each sample, the same on every machine."""
+    words = np.frombuffer(hashlib.sha256(key.encode()).digest()[:16], dtype="<u4").tolist()
+    return np.random.Generator(np.random.PCG64(np.random.SeedSequence([seed, index, *words])))
+
+
+def _place(data: Any, dotted: str) -> tuple[Any, Any]:
+    """Return the table or list in which a dotted key stands, and its key or index there."""
+    *path, last = dotted.split(".")
+    for i, key in enumerate(path):
+        data = data[_within(data, key, ".".join(path[:i]))]
+    return data, _within(data, last, ".".join(path))
+
+
+def _within(data: Any, key: str, above: str) -> Any:
+    """Return the key of a table or the index of a list; raises ValueError where it has none."""
+    where = f"[{above}]" if above else "the file"
+    if isinstance(data, list):
+        if not (key.isdigit() and int(key) < len(data)):
+            raise ValueError(f"{where} has {len(data)} entries, counted from 0, and no {key!r}")
+        return int(key)
+    if not isinstance(data, dict):
+        raise ValueError(f"{where} is not there" if data is None else f"{where} is no table")
+    if key not in data and above != "control.options":
+        raise ValueError(f"{where} has no key {key!r}; it has {', '.join(data)}")
+    return key
+
+
+def _said(values: Mapping[str, Value]) -> str:
+    return ", ".join(f"{key} = {value}" for key, value in values.items())

@@ -1,0 +1,162 @@
+"""What came of the runs of a sweep: parquet parts, each written whole or not at all."""
+
+from __future__ import annotations
+
+import fcntl
+import hashlib
+import os
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+import pyarrow.parquet as parquet
+
+from hierarchy.errors import HierarchyError
+from scenarios.metrics import Metric
+from scenarios.sweep.run import Outcome
+
+_FIXED = (("key", pa.string()), ("ticks", pa.int64()), ("fault", pa.string()),
+          ("error", pa.string()), ("wall_seconds", pa.float64()), ("versions", pa.string()))
+
+
+class StoreError(HierarchyError):
+    """A folder of a sweep that is in use or no such folder, or a part that cannot be read."""
+
+
+class FullError(OSError):
+    """A file that could not be written, such as on a full disk; what was written before stays."""
+
+
+@dataclass(frozen=True)
+class Store:
+    """The folder of a sweep: `parts/`, one file for each batch of runs, and what is made of them.
+
+    A column of a part is named after its metric, in SI units; the column's metadata say label and
+    unit.
+    """
+
+    folder: Path
+
+    @property
+    def parts(self) -> list[Path]:
+        """The files of the parts."""
+        return sorted((self.folder / "parts").glob("*.parquet"))
+
+    @contextmanager
+    def opened(self) -> Iterator[None]:
+        """Keep the folder for this process alone, and make it if it is new.
+
+        Raises
+        ------
+        StoreError : it holds something else, or another process writes into it.
+        FullError : it cannot be made.
+        """
+        if self.folder.exists() and not (self.folder.is_dir() and self._is_free()):
+            raise StoreError(f"output folder {self.folder} holds something that is no sweep; "
+                             "choose another, or remove it first")
+        with _named(self.folder):
+            (self.folder / "parts").mkdir(parents=True, exist_ok=True)
+            lock = (self.folder / ".lock").open("w")
+        with lock:
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)  # the kernel lets go of it
+            except OSError:
+                raise StoreError(f"another sweep is writing into {self.folder}") from None
+            for left in (self.folder / "parts").glob(".*"):
+                left.unlink()
+            yield
+
+    def _is_free(self) -> bool:
+        return (self.folder / "parts").is_dir() or not any(self.folder.iterdir())
+
+    def keys(self) -> set[str]:
+        """Return the keys of all runs that are kept; raises StoreError for a damaged part."""
+        return {key for part in self.parts for key in _read(part, ["key"])["key"].to_pylist()}
+
+    def add(self, outcomes: Sequence[Outcome]) -> Path:
+        """Write one part, whole or not at all, and return its path; raises FullError."""
+        name = hashlib.sha256("".join(one.key for one in outcomes).encode()).hexdigest()[:16]
+        path = self.folder / "parts" / f"{name}.parquet"
+        write_table(_as_table(outcomes), path)
+        return path
+
+    def table(self) -> pa.Table:
+        """Return all parts as one table; raises StoreError for a damaged part."""
+        parts = [_read(part) for part in self.parts]
+        return pa.concat_tables(parts, promote_options="default") if parts else _as_table([])
+
+
+def write_table(table: pa.Table, path: Path) -> None:
+    """Write a table so that a reader finds the old file or the new one; raises FullError."""
+    partial = path.with_name(f".{path.name}.{os.getpid()}")
+    with _named(path):
+        try:
+            parquet.write_table(table, partial)
+            _sync(partial)
+            partial.replace(path)
+        finally:
+            partial.unlink(missing_ok=True)
+
+
+def write_text(text: str, path: Path) -> None:
+    """Write a file so that a reader finds the old one or the new one; raises FullError."""
+    from scenarios.folders import write_text as write
+
+    with _named(path):
+        write(path, text)
+
+
+def metrics_of(table: pa.Table) -> dict[str, Metric]:
+    """Return the metrics that a table of parts has columns for, by name and without a value."""
+    found = {}
+    for field in table.schema:
+        if field.metadata and b"label" in field.metadata:
+            said = {key.decode(): value.decode() for key, value in field.metadata.items()}
+            lower = {"yes": True, "no": False}.get(said["lower_is_better"])
+            found[field.name] = Metric(field.name, said["label"], None, said["unit"], lower,
+                                       said["group"], detail=said["detail"] == "yes")
+    return found
+
+
+def _as_table(outcomes: Sequence[Outcome]) -> pa.Table:
+    found = {metric.name: metric for one in outcomes for metric in one.metrics}
+    fields = [*(pa.field(*fixed) for fixed in _FIXED), *(map(_field, found.values()))]
+    values = [{metric.name: metric.value for metric in one.metrics} for one in outcomes]
+    columns = [[getattr(one, name) for one in outcomes] for name, _ in _FIXED]
+    columns += [[row.get(name) for row in values] for name in found]
+    return pa.table([pa.array(column, field.type) for column, field in
+                     zip(columns, fields, strict=True)], schema=pa.schema(fields))
+
+
+def _field(metric: Metric) -> pa.Field:
+    lower = {True: "yes", False: "no", None: "neither"}[metric.lower_is_better]
+    return pa.field(metric.name, pa.float64(), metadata={
+        "label": metric.label, "unit": metric.unit, "group": metric.group,
+        "lower_is_better": lower, "detail": "yes" if metric.detail else "no"})
+
+
+def _read(part: Path, columns: Sequence[str] | None = None) -> Any:
+    try:
+        return parquet.read_table(part, columns=columns, partitioning=None)
+    except (OSError, pa.ArrowException) as error:
+        raise StoreError(f"{part} cannot be read ({error}); remove it to have its runs run "
+                         "again") from error
+
+
+def _sync(path: Path) -> None:
+    """Have the file on the disk before it takes its name: a part must survive a loss of power."""
+    with path.open("rb") as stream:
+        os.fsync(stream.fileno())
+
+
+@contextmanager
+def _named(path: Path) -> Iterator[None]:
+    """Make an OSError say which file it is about and that nothing written before is lost."""
+    try:
+        yield
+    except OSError as error:
+        raise FullError(f"{path} cannot be written: {error.strerror or error}; what was written "
+                        "before it stays, and the same command goes on from there") from error
