@@ -3,16 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
+from hierarchy.avoidance.measurement import Measurement
 from hierarchy.errors import HierarchyError, UnknownNameError
 from hierarchy.problem import Hierarchy
 from hierarchy.robot import State
 from hierarchy.task import Level, Task
 
-# The buffers of one order, and what writes into them from which row on.
-_Prepared = tuple[Hierarchy, tuple[tuple[Callable[..., None], int], ...]]
+
+class _Prepared(NamedTuple):
+    """The buffers of one order, and what writes into them while a state and its measurement stay.
+
+    Tasks bind their kernels to all these arrays once, so that a tick looks nothing up.
+    """
+
+    hierarchy: Hierarchy
+    state: State
+    seen: Measurement | None
+    writers: tuple[Callable[[], object], ...]
 
 
 class Stack:
@@ -91,27 +102,28 @@ class Stack:
         The arrays are buffers of this stack: they hold until the same order is asked for again.
         """
         order = self._order if order is None else order
-        try:
-            hierarchy, writers = self._prepared[order]
-        except KeyError:
-            hierarchy, writers = self._prepare(order, state.n)
-        A, lower, upper, level = hierarchy.A, hierarchy.lower, hierarchy.upper, self.level
-        for write, row in writers:
-            write(state, level, A, lower, upper, row)
-        if self.reference is not None:
-            hierarchy.reference[:] = (
-                self.reference.reference_acceleration(state) if level == "acceleration"
-                else self.reference.reference_velocity(state))
-        return hierarchy
+        prepared = self._prepared.get(order)
+        if (prepared is None or prepared.state is not state
+                or prepared.seen is not state.measurement):
+            prepared = self._prepare(order, state)
+        for write in prepared.writers:
+            write()
+        return prepared.hierarchy
 
-    def _prepare(self, order: tuple[str, ...], n: int) -> _Prepared:
+    def _prepare(self, order: tuple[str, ...], state: State) -> _Prepared:
         if not self._tasks:
             raise HierarchyError("the stack is empty: nothing is asked of the robot")
+        known = self._prepared.get(order)
+        h = self._buffers(order, state.n) if known is None else known.hierarchy
+        writers = [self[name].writer(state, self.level, h.A, h.lower, h.upper, int(row))
+                   for name, row in zip(order, h.offsets, strict=False)]
+        if self.reference is not None:
+            writers.append(self.reference.reference_writer(state, self.level, h.reference))
+        prepared = _Prepared(h, state, state.measurement, tuple(writers))
+        self._prepared[order] = prepared
+        return prepared
+
+    def _buffers(self, order: tuple[str, ...], n: int) -> Hierarchy:
         sizes = np.array([self[name].dimension for name in order], dtype=np.int64)
         m = int(sizes.sum())
-        hierarchy = Hierarchy(np.zeros((m, n)), np.zeros(m), np.zeros(m), sizes, np.zeros(n),
-                              tuple(order))
-        writers = tuple((self[name].write, int(row))
-                        for name, row in zip(order, hierarchy.offsets, strict=False))
-        self._prepared[tuple(order)] = hierarchy, writers
-        return hierarchy, writers
+        return Hierarchy(np.zeros((m, n)), np.zeros(m), np.zeros(m), sizes, np.zeros(n), order)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -83,8 +85,8 @@ class Task(ABC):
               row: int) -> None:
         """Write this task's rows into A (m_all, n), lower, upper (m_all,) from `row` on.
 
-        This general form calls the methods above; the tasks of this package override it by a
-        compiled kernel. Raises HierarchyError, naming task and row, where a method returns the
+        This general form calls the methods above; tasks override it, or `writer`, by a compiled
+        kernel. Raises HierarchyError, naming task and row, where a method returns the
         wrong shape or NaN.
         """
         rows = slice(row, row + self.dimension)
@@ -98,6 +100,39 @@ class Task(ABC):
         lower[rows] = _shaped(self, "reference", b, (self.dimension,))
         upper[rows] = lower[rows] if self.kind == "equality" else np.inf
         check_rows(f"task {self.name!r}", A[rows], lower[rows], upper[rows])
+
+    def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
+               row: int) -> Callable[[], object]:
+        """Return what does `write` with these arguments, each time it is called.
+
+        A stack keeps it for as long as the state, and the measurement that the state carries, are
+        the same objects. What overrides it by a bound kernel has no `write` of its own to keep up.
+        """
+        return partial(self.write, state, level, A, lower, upper, row)
+
+    def reference_writer(self, state: State, level: Level, out: Array) -> Callable[[], object]:
+        """Return what writes the value asked for (m,) into `out`, each time it is called."""
+        asked = (self.reference_acceleration if level == "acceleration"
+                 else self.reference_velocity)
+
+        def write() -> None:
+            out[:] = asked(state)
+
+        return write
+
+
+class BoundTask(Task):
+    """A task whose rows are written by kernels bound to their arrays: it overrides `writer`."""
+
+    def __init_subclass__(cls) -> None:
+        super().__init_subclass__()
+        if "write" in vars(cls) and "writer" not in vars(cls):
+            cls.writer = Task.writer  # type: ignore[method-assign]
+
+    def write(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
+              row: int) -> None:
+        """See `Task.write`."""
+        self.writer(state, level, A, lower, upper, row)()
 
 
 def _shaped(task: Task, what: str, value: Array, shape: tuple[int, ...]) -> Array:

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from hierarchy.avoidance.control_points import ControlPoint, pack_points
 from hierarchy.avoidance.measurement import Measurement
+from hierarchy.binding import bind
 from hierarchy.compiled import compiled
 from hierarchy.errors import HierarchyError
 from hierarchy.kinematics import (
@@ -25,11 +26,11 @@ from hierarchy.kinematics import (
 )
 from hierarchy.problem import Array
 from hierarchy.robot import State
-from hierarchy.task import Level, Task
+from hierarchy.task import BoundTask, Level
 
 
 @dataclass(frozen=True)
-class Avoidance(Task):
+class Avoidance(BoundTask):
     """Push the active control point of the measurement away from what is near.
 
     rows = 3: the point's acceleration is the repulsive vector, eqs. (27)-(28). rows = 1: its
@@ -90,12 +91,14 @@ class Avoidance(Task):
         """The repulsion as an acceleration (rows,) [m/s^2], eqs. (28)-(29)."""
         return self.error(state)
 
-    def write(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-              row: int) -> None:
-        """See `Task.write`."""
+    def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
+               row: int) -> Callable[[], object]:
+        """See `Task.writer`."""
         seen, k = self._seen(state)
-        _write(*state.arrays, self.joints, self.offsets, k, seen.direction, seen.magnitude,
-               level == "acceleration", self.rows, A, lower, upper, row)
+        write_rows = bind(_write, *state.arrays, self.joints, self.offsets, seen.direction,
+                          seen.magnitude, level == "acceleration", self.rows, A, lower, upper, row,
+                          then=(k,))
+        return lambda: write_rows(seen.active)
 
     def _seen(self, state: State) -> tuple[Measurement, int]:
         if state.measurement is None:
@@ -105,8 +108,9 @@ class Avoidance(Task):
 
 @compiled
 def _write(v, J, dJ, placements, supports, previous_J, previous_placements,
-           period, joints, offsets, k, direction, magnitude, acceleration, rows,
-           A, lower, upper, row):
+           period, joints, offsets, direction, magnitude, acceleration, rows,
+           A, lower, upper, row, active):
+    k = max(active, 0)
     joint, offset, r = joints[k], offsets[k], direction[k]
     ax = ay = az = 0.0
     if acceleration:

@@ -4,21 +4,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from math import cos
 
 import numpy as np
 
+from hierarchy.binding import bind
 from hierarchy.compiled import compiled, inlined
 from hierarchy.errors import HierarchyError
 from hierarchy.kinematics import axis_at, subtract_over_period, velocity_of_point
 from hierarchy.problem import Array
 from hierarchy.robot import Frame, State
-from hierarchy.task import Kind, Level, Task
+from hierarchy.task import BoundTask, Kind, Level
 
 
 @dataclass(frozen=True)
-class Pointing(Task):
+class Pointing(BoundTask):
     """Keep the z axis of `frame` at `half_angle` [rad] to `axis` (m = 1, p = z_d . z_e).
 
     kind = "equality": on the cone, cos(alpha) = cos(alpha_d), eq. (16). kind = "inequality": inside
@@ -60,9 +62,14 @@ class Pointing(Task):
         return np.array([self.cone_error(state)])
 
     def cone_error(self, state: State) -> float:
-        """The error as a number, cheap enough for every tick of Algorithm 1."""
+        """The error as a number."""
         return float(_cone_error(state.placements, self.frame.joint, self.z_e, self.z_d,
                                  self.cos_alpha_d))
+
+    def follow_cone_error(self, state: State) -> Callable[[], float]:
+        """Return what gives the error at a state that moves, for every tick of Algorithm 1."""
+        return bind(_cone_error, state.placements, self.frame.joint, self.z_e, self.z_d,
+                    self.cos_alpha_d)
 
     def jacobian(self, state: State) -> Array:
         """z_d^T S^T(z_e) J_O (1, n), eq. (19)."""
@@ -77,12 +84,12 @@ class Pointing(Task):
         _write_jacobian_derivative(*state.arrays, self.frame.joint, self.z_e, self.z_d, dJ)
         return dJ
 
-    def write(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-              row: int) -> None:
-        """See `Task.write`."""
-        _write(*state.arrays, self.frame.joint, self.z_e, self.z_d, self.cos_alpha_d,
-               self.stiffness, self.damping, self.gain, level == "acceleration",
-               self.kind == "inequality", A, lower, upper, row)
+    def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
+               row: int) -> Callable[[], object]:
+        """See `Task.writer`."""
+        return bind(_write, *state.arrays, self.frame.joint, self.z_e, self.z_d, self.cos_alpha_d,
+                    self.stiffness, self.damping, self.gain, level == "acceleration",
+                    self.kind == "inequality", A, lower, upper, row)
 
 
 @compiled

@@ -4,10 +4,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
 
+from hierarchy.binding import bind
 from hierarchy.compiled import compiled
 from hierarchy.kinematics import (
     drift_of_point,
@@ -19,11 +21,11 @@ from hierarchy.kinematics import (
 from hierarchy.paths import Path
 from hierarchy.problem import Array
 from hierarchy.robot import Frame, State
-from hierarchy.task import Level, Task
+from hierarchy.task import BoundTask, Level
 
 
 @dataclass(frozen=True)
-class Position(Task):
+class Position(BoundTask):
     """Bring the origin of `frame` along `path` (m = 3) [m].
 
     stiffness [1/s^2] and damping [1/s] act at acceleration level, gain [1/s] at velocity level.
@@ -87,18 +89,21 @@ class Position(Task):
             return np.zeros(3)
         return np.asarray(seen.magnitude[-1] * seen.direction[-1])
 
-    def write(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-              row: int) -> None:
-        """See `Task.write`."""
-        self.path.write(state.t, self.target)
+    def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
+               row: int) -> Callable[[], object]:
+        """See `Task.writer`."""
         seen = state.measurement
-        if seen is None:
-            distance, magnitude, direction = _NOTHING_SEEN
-        else:
-            distance, magnitude, direction = seen.distance, seen.magnitude, seen.direction
-        _write(*state.arrays, self.frame.joint, self.frame.offset, self.target, self.stiffness,
-               self.damping, self.gain, level == "acceleration", distance, magnitude, direction,
-               self.repulsion_within, A, lower, upper, row)
+        near = _NOTHING_SEEN if seen is None else (seen.distance, seen.magnitude, seen.direction)
+        write_rows = bind(_write, *state.arrays, self.frame.joint, self.frame.offset, self.target,
+                          self.stiffness, self.damping, self.gain, level == "acceleration", *near,
+                          self.repulsion_within, A, lower, upper, row)
+        move_target, target = self.path.write, self.target
+
+        def write() -> None:
+            move_target(state.t, target)
+            write_rows()
+
+        return write
 
 
 _NOTHING_SEEN = (np.full(1, np.inf), np.zeros(1), np.zeros((1, 3)))

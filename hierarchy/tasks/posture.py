@@ -1,16 +1,21 @@
 """Tasks of the joints themselves: a posture to go to, and damping of the motion (eq. 15)."""
 
+# mypy: disable-error-code="no-untyped-def"
+
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
+from hierarchy.binding import bind
+from hierarchy.compiled import compiled
 from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array
 from hierarchy.robot import State
-from hierarchy.task import Task
+from hierarchy.task import Level, Task
 
 
 class JointTask(Task):
@@ -83,3 +88,15 @@ class JointDamping(JointTask):
         if self.weight == "mass":
             return np.asarray(-self.damping * (state.mass_matrix() @ state.v))
         return np.asarray(-self.damping * state.v)
+
+    def reference_writer(self, state: State, level: Level, out: Array) -> Callable[[], object]:
+        """See `Task.reference_writer`."""
+        if self.weight == "mass" or level == "velocity":
+            return super().reference_writer(state, level, out)
+        return bind(_brake, state.v, self.damping, out)
+
+
+@compiled
+def _brake(v, damping, out):
+    for c in range(len(v)):
+        out[c] = -damping * v[c]
