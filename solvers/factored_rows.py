@@ -21,6 +21,7 @@ from solvers.resolver import Status
 from solvers.tpm import Tpm
 
 FEWEST = 8   # rows that there is always room for
+_LEVELS = 16  # in the first table
 _ROUND = 4   # the width of a staircase is a multiple of this: fewer of them are laid out anew
 
 
@@ -47,7 +48,9 @@ class FactoredRows:
         self._settings, self._r, self._width = settings, 0, 0
         self._Q = np.empty((widest + 1, n))  # its rows are the columns of the letter's Q
         self._C, self._squares = np.empty((room, _rounded_up(widest))), np.empty(room)
-        self._pivots, self._table = np.empty(room, dtype=np.int64), _table([])
+        self._pivots = np.empty(room, dtype=np.int64)
+        self._room_of_table = np.empty((_LEVELS, 3), dtype=np.int64)  # slot, rows, rank so far
+        self._table = self._room_of_table[:0]
         self._W, self._work = np.empty((0, 0)), np.empty(0)
         self.J, self.used, self.kept = np.empty((room, n)), 0, 0
         self.status = Status.SOLVED
@@ -86,16 +89,15 @@ class FactoredRows:
 
     def refactor(self, levels: Sequence[Held]) -> Status:
         """Bring the levels behind the kept ones into the staircase."""
-        if self.kept < len(levels) or self.status is not Status.SOLVED:
-            table = _table(levels)
-            table[:self.kept, 2] = self._table[:self.kept, 2]
-            self._table = table
+        count = len(levels)
+        if self.kept < count or self.status is not Status.SOLVED:
+            self._list(levels, self.kept)
             self.status = Status(refactor(
-                self._C, self._squares, table, self.kept, self._W, len(self.J), self._pivots,
+                self._C, self._squares, self._table, self.kept, self._W, len(self.J), self._pivots,
                 self._settings.rank_tolerance, self._work))
-            self.kept = len(levels) if self.status is Status.SOLVED else 0
-        elif len(self._table) > len(levels):
-            self._table = self._table[:len(levels)]
+            self.kept = count if self.status is Status.SOLVED else 0
+        elif len(self._table) > count:
+            self._table = self._table[:count]
         return self.status
 
     def resolve(self, b: Array, x: Array) -> int:
@@ -110,6 +112,16 @@ class FactoredRows:
                       self._settings.threshold, self._work)
         return Z[:, :self._r]
 
+    def _list(self, levels: Sequence[Held], kept: int) -> None:
+        """Write the levels from `kept` on into the table."""
+        if len(levels) > len(self._room_of_table):
+            more = np.empty((2 * len(levels), 3), dtype=np.int64)
+            more[:kept] = self._room_of_table[:kept]
+            self._room_of_table = more
+        self._table = table = self._room_of_table[:len(levels)]
+        for k in range(kept, len(levels)):
+            _, table[k, 0], table[k, 1] = levels[k]
+
     def _widen(self, width: int) -> None:
         """Make room for a wider basis; what is factored has zeros in the new columns."""
         old, before, room = self._W, self._width, len(self.J)
@@ -118,11 +130,6 @@ class FactoredRows:
             self._W[:room + before, :before] = old[:room + before]
             self._W[room + width, :before] = old[room + before]  # beta
         self._work = np.empty(factorization_work(room, width))
-
-
-def _table(levels: Sequence[Held]) -> NDArray[np.int64]:
-    """Slot, rows and rank so far of each level: (L, 3)."""
-    return np.array([(slot, rows, 0) for _, slot, rows in levels], np.int64).reshape(-1, 3)
 
 
 def _rounded_up(width: int) -> int:

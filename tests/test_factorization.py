@@ -1,5 +1,7 @@
 """A factored stack after any edits is the stack factored afresh, and that of `tpm`."""
 
+import csv
+
 import numpy as np
 import oracle
 import pytest
@@ -9,6 +11,7 @@ from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, 
 from rank_cases import CASES, build, random_levels
 
 from hierarchy import HierarchyError
+from scenarios.bench import edits
 from solvers import Status, certify, make
 from solvers.factorization import Factorization
 from solvers.tpm import task_priority_matrix
@@ -215,6 +218,17 @@ def test_rows_of_very_different_scale_keep_their_ranks():
         np.testing.assert_allclose(A @ x, b, rtol=1e-9)
 
 
+def test_there_may_be_many_levels_and_empty_ones():
+    rng = np.random.default_rng(2)
+    factored = Factorization([rng.normal(size=(k % 2, 25)) for k in range(40)])
+    agrees(factored, rng)
+    for k in range(40):
+        factored.insert(f"more {k}", rng.normal(size=(k % 3 == 0, 25)), at=30)
+        agrees(factored, rng)
+    factored.reorder(factored.names[::-1])
+    agrees(factored, rng)
+
+
 def test_the_stack_may_be_empty_and_fill_again():
     factored = Factorization([], n=3)
     np.testing.assert_allclose(factored.solve([], [1.0, 2.0, 3.0]).x, [1.0, 2.0, 3.0])
@@ -227,6 +241,7 @@ def test_the_stack_may_be_empty_and_fill_again():
     np.testing.assert_allclose(factored.solve({}).x, 0.0)
 
 
+@pytest.mark.filterwarnings("ignore:overflow")  # of the kernels as plain Python
 def test_rows_whose_squares_overflow_are_a_status_until_they_are_deleted():
     factored = Factorization([[[1.0, 0.0]], [[1e200, 1e200]]], names=["a", "b"])
     for _ in range(2):
@@ -291,6 +306,17 @@ def test_a_mistake_is_named_and_changes_nothing(mistake, text):
         mistake(factored)
     assert factored.names == ("hand", "elbow")
     np.testing.assert_allclose(factored.solve([[1.0, 2.0], [3.0]]).x, [1.0, 2.0, 3.0])
+
+
+# -- the benchmark ---------------------------------------------------------------------------------
+
+def test_the_benchmark_of_edits_writes_a_row_for_every_edit_and_size(tmp_path, monkeypatch):
+    monkeypatch.setattr(edits, "_TURN", 3)
+    rows = edits.run(tmp_path, seconds=0.0, joints=(7, 20), levels=(3,))
+    assert len({row["what"] for row in rows}) == len(rows) / 2 == 10
+    assert all(row["median_us"] > 0.0 and row["calls"] == 3 for row in rows)
+    with (tmp_path / "edits.csv").open() as file:
+        assert len(list(csv.DictReader(file))) == len(rows)
 
 
 # -- any sequence of edits that hypothesis can think of --------------------------------------------
