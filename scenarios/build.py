@@ -196,7 +196,7 @@ def _sensor(scenario: Scenario, robot: Robot) -> Sensor | None:
     if not robot.control_points:
         raise ScenarioError(f"[avoidance]: robot {robot.name!r} has no control points; list them "
                             "in robot.control_points")
-    obstacles = make_obstacles(section.obstacles)
+    obstacles = make_obstacles(section.placed)
     if isinstance(section, SeparationSection):
         return _seen_by(scenario, robot, ExactDistances(robot, obstacles, pairs=True),
                         section.influence)

@@ -236,7 +236,39 @@ def _point_as_table(obstacle: Any) -> Any:
 Obstacles = tuple[Annotated[ObstacleSection, BeforeValidator(_point_as_table)], ...]
 
 
-class AvoidanceSection(_Section):
+class VariationSection(_Section):
+    """Obstacles on slightly other paths, which follow from `seed`.
+
+    Every waypoint is moved by up to `spread` [m] in any direction, points at which an obstacle
+    rests as one; every time but the first by up to the share `timing` of half the shorter span
+    beside it. Obstacles without waypoints stay as they are.
+    """
+
+    seed: Annotated[int, Field(ge=0)]
+    spread: NotNegative = 0.05
+    timing: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.1
+
+
+class _Avoiding(_Section):
+    obstacles: Obstacles
+    variation: VariationSection | None = None
+
+    @property
+    def placed(self) -> Obstacles:
+        """The obstacles on the paths that `variation` leads them."""
+        from scenarios.variation import varied
+
+        return self.obstacles if self.variation is None else varied(self.obstacles, self.variation)
+
+    @model_validator(mode="after")
+    def _varies_something(self) -> Self:
+        if self.variation and not any(isinstance(obstacle.path, WaypointsSection)
+                                      for obstacle in self.obstacles):
+            raise ValueError("variation needs an obstacle with a path of waypoints")
+        return self
+
+
+class AvoidanceSection(_Avoiding):
     """Avoidance by the body and repulsion of the end effector, switched by Algorithm 1."""
 
     kind: Literal["repulsion"] = "repulsion"
@@ -245,7 +277,6 @@ class AvoidanceSection(_Section):
     near: NotNegative
     far: NotNegative
     end_effector: NotNegative
-    obstacles: Obstacles
     body: RepulsionSection
     tip: RepulsionSection
     jacobian: Literal["exact", "published"] = "exact"
@@ -268,7 +299,7 @@ class AvoidanceSection(_Section):
         return {r"$\epsilon_{ee}$": self.end_effector}
 
 
-class SeparationSection(_Section):
+class SeparationSection(_Avoiding):
     """All control points and the end effector kept off all obstacles, as one-sided rows.
 
     `distance` [m] that is kept; `rate` [1/s] at which it may be approached; obstacles beyond
