@@ -223,7 +223,7 @@ def test_there_may_be_many_levels_and_empty_ones():
     factored = Factorization([rng.normal(size=(k % 2, 25)) for k in range(40)])
     agrees(factored, rng)
     for k in range(40):
-        factored.insert(f"more {k}", rng.normal(size=(k % 3 == 0, 25)), at=30)
+        factored.insert(f"more {k}", rng.normal(size=(int(k % 3 == 0), 25)), at=30)
         agrees(factored, rng)
     factored.reorder(factored.names[::-1])
     agrees(factored, rng)
