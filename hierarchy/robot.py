@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -209,7 +210,9 @@ class State:
         self.measurement: Measurement | None = None
         self.commanded: Array | None = None
         self._model, self._data = robot.model, robot.model.createData()
-        pin.computeJointJacobiansTimeVariation(self._model, self._data, self.q, self.v)
+        self._compute = partial(pin.computeJointJacobiansTimeVariation, self._model, self._data,
+                                self.q, self.v)
+        self._compute()
         self.J, self.dJ = self._data.J, self._data.dJ
         self.placements = _placements_view(self._data, robot.model.njoints)
         self.supports = _supports(robot.model)
@@ -237,7 +240,7 @@ class State:
         if self.period > 0.0 and self._started:
             self._keep_kinematics()
         self.t = t
-        pin.computeJointJacobiansTimeVariation(self._model, self._data, self.q, self.v)
+        self._compute()
         if self.period > 0.0 and not self._started:  # no tick before: all differences are zero
             self._keep_kinematics()
         self._started = True

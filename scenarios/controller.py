@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from hierarchy.allocation import Allocation
+from hierarchy.binding import bind
 from hierarchy.problem import Array, Hierarchy
 from scenarios.build import Cell, build
 from scenarios.config import Scenario
@@ -46,6 +47,9 @@ class Controller:
         self.policy = Policy(control.policy, control.level, control.period, clamp)
         self.blend = Blend(control.transition_time) if control.transition == "blend" else None
         self.cone_error = nan
+        self._measure_cone = cell.pointing.follow_cone_error(cell.state) if cell.pointing else None
+        if cell.sensor is not None:
+            self._nearest = bind(smallest, cell.sensor.measurement.distance)
         self.allocation = Allocation((), repulsion=False)
         self.resolution = self._unanswered = Resolution(np.zeros(cell.robot.n),
                                                         Status.NUMERICAL_FAILURE, 0)
@@ -123,14 +127,14 @@ class Controller:
 
     def _sense(self, troubles: list[str]) -> None:
         cell = self.cell
-        if cell.pointing is not None:
-            self.cone_error = cell.pointing.cone_error(cell.state)
+        if self._measure_cone is not None:
+            self.cone_error = self._measure_cone()
         if cell.sensor is not None:
             seen = cell.sensor.measure(cell.state)
             self._outside = cell.sensor.outside
             if seen.blind and "stale" not in troubles:
                 troubles.append("stale")
-            nearest = smallest(seen.distance)
+            nearest = self._nearest()
             if not nearest > 0.0:
                 troubles.append("inside" if nearest <= 0.0 else "not_finite")
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 import numpy as np
 
 from hierarchy.allocation import AVOIDANCE
+from hierarchy.binding import bind
 from hierarchy.compiled import compiled
 from hierarchy.kinematics import point_at
 from hierarchy.problem import Array
@@ -35,7 +36,13 @@ class Recorder:
         # One row: t, q, v, a, command, end effector, target, cone error, distances.
         self._log = np.empty((ticks, 8 + cell.robot.nq + 3 * cell.robot.n + len(self._distance)))
         self._choices = np.empty((ticks, 5), dtype=np.int16)
-        self._times = np.empty((ticks, len(_TIMES)))
+        self._times, self._over = np.empty((ticks, len(_TIMES))), np.full(ticks, np.nan)
+        state = cell.state
+        self._write_rest = bind(
+            _write, self._log, self._choices, self._times, state.q, state.v, state.placements,
+            self._frame.joint, self._frame.offset, self._target, self._distance,
+            then=(*(0,) * 6, *(0.0,) * 6))
+        self._given = 1 + cell.robot.nq + cell.robot.n  # column of a
         self._extra = {name: np.empty((ticks, *value.shape), value.dtype)
                        for name, value in cell.plant.extra.items()}
         self._blend, self._policy = controller.blend, controller.policy
@@ -48,14 +55,14 @@ class Recorder:
         order, repulsion = controller.allocation
         index = self._orders.setdefault(order, len(self._orders))
         active = cell.sensor.measurement.active + 1 if AVOIDANCE in order and cell.sensor else -1
-        resolution, state = controller.resolution, cell.state
-        finite = _write(self._log, self._choices, self._times, k, state.t, state.q, state.v,
-                        cell.plant.a, controller.sent, state.placements, self._frame.joint,
-                        self._frame.offset, self._target, controller.cone_error, self._distance,
-                        index, active, repulsion, int(resolution.status), resolution.iterations,
-                        *controller.stamps)
-        for name, value in cell.plant.extra.items():
-            self._extra[name][k] = value
+        resolution, plant = controller.resolution, cell.plant
+        finite = _write_given(self._log, k, self._given, plant.a, controller.sent)
+        finite &= self._write_rest(k, index, active, repulsion, resolution.status,
+                                   resolution.iterations, cell.state.t, controller.cone_error,
+                                   *controller.stamps)
+        if self._extra:
+            for name, value in plant.extra.items():
+                self._extra[name][k] = value
         if self._blend is not None:
             self._weights[k] = self._blend.weight
         if self._policy.events:
@@ -65,7 +72,7 @@ class Recorder:
 
     def stamp(self, clock: float) -> None:
         """Note when the tick just written was over [s]."""
-        self._times[self.ticks - 1, 3] += clock
+        self._over[self.ticks - 1] = clock
 
     def finish(self, scenario: Scenario, fault: str | None) -> Recording:
         """Return what was recorded so far."""
@@ -94,7 +101,9 @@ class Recorder:
             signals |= {"control_point_distance": body, "minimal_distance": body.min(axis=1),
                         "ee_distance": log[:, -1].copy(), "active_control_point": active,
                         "repulsion_active": repulsion.astype(bool)}
-        signals |= dict(zip(_TIMES, self._times[rows].T.copy(), strict=True))
+        times = self._times[rows].copy()
+        times[:, 3] = self._over[rows] - times[:, 3]
+        signals |= dict(zip(_TIMES, times.T.copy(), strict=True))
         signals |= {"joint_lower": robot.lower, "joint_upper": robot.upper,
                     "velocity_limit": robot.velocity_limit}
         return Recording(signals, tuple(" > ".join(names) for names in orders), scenario, fault,
@@ -112,9 +121,21 @@ def _positions(robot: Robot, frame: Frame, q: Array) -> Array:
 
 
 @compiled
-def _write(log, choices, times, k, t, q, v, a, command, placements, joint, offset, target,
-           cone_error, distance, order, active, repulsion, status, iterations,
+def _write_given(log, k, first, a, command):
+    """Write the acceleration and the command of tick k; whether the former is finite."""
+    row, n, finite = log[k], len(a), True
+    for j in range(n):
+        row[first + j] = a[j]
+        row[first + n + j] = command[j]
+        finite &= np.isfinite(a[j])
+    return finite
+
+
+@compiled
+def _write(log, choices, times, q, v, placements, joint, offset, target, distance,
+           k, order, active, repulsion, status, iterations, t, cone_error,
            begin, moved, written, resolved):
+    """Write the rest of tick k; whether q and v are finite."""
     row = log[k]
     row[0] = t
     i = 1
@@ -126,12 +147,7 @@ def _write(log, choices, times, k, t, q, v, a, command, placements, joint, offse
     for j in range(len(v)):
         row[i + j] = v[j]
         finite &= np.isfinite(v[j])
-    i += len(v)
-    for j in range(len(v)):
-        row[i + j] = a[j]
-        row[i + len(v) + j] = command[j]
-        finite &= np.isfinite(a[j])
-    i += 2 * len(v)
+    i += 3 * len(v)
     for j in range(3):
         row[i + j] = point_at(placements, joint, offset, j)
         row[i + 3 + j] = target[0, j]
@@ -147,5 +163,5 @@ def _write(log, choices, times, k, t, q, v, a, command, placements, joint, offse
     times[k, 0] = moved - begin
     times[k, 1] = written - moved
     times[k, 2] = resolved - written
-    times[k, 3] = -begin  # `stamp` adds the end
+    times[k, 3] = begin
     return finite

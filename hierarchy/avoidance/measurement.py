@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from math import inf, sqrt
 
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 from hierarchy.avoidance.obstacles import distance_to_obstacle
 from hierarchy.avoidance.pairs import Pairs
 from hierarchy.avoidance.repulsion import repulsion
+from hierarchy.binding import bind
 from hierarchy.compiled import compiled
 from hierarchy.errors import HierarchyError
 from hierarchy.kinematics import point_at
@@ -63,26 +65,38 @@ class Measurement:
     @property
     def minimal_distance(self) -> float:
         """D_minimal [m] of eq. (31): the smallest distance of a control point, without the end."""
-        return float(self.distance[self.active]) if self.active >= 0 else inf
+        return float(self.distance.item(self.active)) if self.active >= 0 else inf
 
     @property
     def end_effector_distance(self) -> float:
         """D_min [m] of the end effector, eq. (22)."""
-        return float(self.distance[-1])
+        return float(self.distance.item(-1))
 
 
 def measure_exactly(measurement: Measurement, placements: Array, joints: NDArray[np.int64],
                     offsets: Array, obstacles: Array, laws: Array, mean_within: float) -> None:
-    """Fill a Measurement from known geometry.
+    """Fill a Measurement from known geometry; see `exact_measurer`."""
+    exact_measurer(measurement, placements, joints, offsets, obstacles, laws, mean_within)()
+
+
+def exact_measurer(measurement: Measurement, placements: Array, joints: NDArray[np.int64],
+                   offsets: Array, obstacles: Array, laws: Array,
+                   mean_within: float) -> Callable[[], None]:
+    """Return what fills a Measurement from known geometry, each time it is called.
 
     placements (joints + 1, 12) of a State; joints (K + 1,), offsets (K + 1, 3) of the control
     points and the end effector; obstacles (H, 16) a table of `Obstacles`; laws (2, 4) of
     `repulsion.laws`. The direction is that of the nearest obstacle, or with `mean_within` > 0 the
     mean (25)-(26) over the obstacles nearer than that [m].
     """
-    measurement.active = _measure(
-        placements, joints, offsets, obstacles, laws, mean_within, measurement.points,
-        measurement.distance, measurement.direction, measurement.magnitude, measurement.nearest)
+    fill = bind(_measure, placements, joints, offsets, obstacles, laws, mean_within,
+                measurement.points, measurement.distance, measurement.direction,
+                measurement.magnitude, measurement.nearest)
+
+    def measure() -> None:
+        measurement.active = fill()
+
+    return measure
 
 
 @compiled

@@ -25,20 +25,21 @@ class KinematicArm:
         self.q, self.v, self.a = q.copy(), v.copy(), np.zeros(robot.n)
         self.extra: dict[str, NDArray[Any]] = {}
         self._robot, self._period = robot, period
-        self._acceleration = level == "acceleration"
+        self._acceleration = int(level == "acceleration")
         self._step = np.zeros(robot.n)
+        self._turning = robot.nq != robot.n  # joints with more coordinates than velocities
+        self._q = np.zeros(robot.n) if self._turning else self.q
 
     def act(self, command: Array) -> None:
         """Apply a command (n,) for one period."""
-        _integrate(self.v, command, self._period, self._acceleration, self.a, self._step)
-        if self._robot.nq == self._robot.n:
-            self.q += self._step
-        else:
+        _integrate(command, self._period, self._acceleration, self.v, self.a, self._step,
+                   self._q)
+        if self._turning:
             self.q = self._robot.integrate(self.q, self._step)
 
 
 @compiled
-def _integrate(v, x, T, acceleration, a, step):
+def _integrate(x, T, acceleration, v, a, step, q):
     for i in range(len(v)):
         if acceleration:
             a[i] = x[i]
@@ -48,3 +49,4 @@ def _integrate(v, x, T, acceleration, a, step):
             a[i] = (x[i] - v[i]) / T
             step[i] = x[i] * T
             v[i] = x[i]
+        q[i] += step[i]

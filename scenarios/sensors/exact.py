@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from hierarchy import HierarchyError, Robot, State
@@ -11,10 +13,10 @@ from hierarchy.avoidance import (
     Obstacles,
     Pairs,
     Repulsion,
-    measure_exactly,
     measure_pairs,
 )
 from hierarchy.avoidance.control_points import pack_points
+from hierarchy.avoidance.measurement import exact_measurer
 from hierarchy.avoidance.repulsion import laws
 
 _TOUCHING = 1e-9  # [m] a control point this near to an obstacle has no direction to leave it
@@ -43,17 +45,27 @@ class ExactDistances:
         self._joints, self._offsets = pack_points(self.points)
         self._laws = laws(body, tip) if body and tip else _NO_LAWS
         self.measurement = Measurement(len(robot.control_points))
+        self._followed: State | None = None
+        self._measure: Callable[[], None]
         if pairs:
             self.measurement.pairs = Pairs(len(self.points), len(obstacles))
 
     def measure(self, state: State) -> Measurement:
         """Measure at a state and hang the measurement on it; valid until the next call."""
-        measure_exactly(self.measurement, state.placements, self._joints, self._offsets,
-                        self.obstacles.at(state.t), self._laws, self.mean_within)
+        if state is not self._followed:
+            self._follow(state)
+        self.obstacles.at(state.t)
+        self._measure()
         if self.measurement.pairs is not None:
             measure_pairs(self.measurement.pairs, self.measurement.points, self.obstacles)
         state.measurement = self.measurement
         return self.measurement
+
+    def _follow(self, state: State) -> None:
+        self._followed = state
+        self._measure = exact_measurer(self.measurement, state.placements, self._joints,
+                                       self._offsets, self.obstacles.table, self._laws,
+                                       self.mean_within)
 
     def check_start(self, state: State) -> None:
         """Raise a HierarchyError if an obstacle lies at a control point, or a point inside one."""
