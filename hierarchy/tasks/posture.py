@@ -13,9 +13,10 @@ import numpy as np
 from hierarchy.binding import bind
 from hierarchy.compiled import compiled
 from hierarchy.errors import HierarchyError
+from hierarchy.kinematics import write_equality
 from hierarchy.problem import Array
 from hierarchy.robot import State
-from hierarchy.task import Level, Task
+from hierarchy.task import BoundTask, Level, Task
 
 
 class JointTask(Task):
@@ -38,7 +39,7 @@ class JointTask(Task):
 
 
 @dataclass(frozen=True)
-class Posture(JointTask):
+class Posture(JointTask, BoundTask):
     """Bring every joint to `target` (n,) [rad or m]; gains as in `Task`."""
 
     target: tuple[float, ...]
@@ -58,6 +59,16 @@ class Posture(JointTask):
             raise HierarchyError(f"task {self.name!r}: {self.joints} targets for "
                                  f"{state.robot.nq} joint positions")
         return np.asarray(self.target - state.q)
+
+    def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
+               row: int) -> Callable[[], object]:
+        """See `Task.writer`."""
+        self.error(state)
+        target = np.array(self.target, dtype=float)
+        for (i,) in np.argwhere(~np.isfinite(target))[:1]:
+            raise HierarchyError(f"task {self.name!r}: target {i} is {target[i]}")
+        return bind(_write, state.q, state.v, target, self.stiffness, self.damping, self.gain,
+                    level == "acceleration", A, lower, upper, row)
 
 
 @dataclass(frozen=True)
@@ -94,6 +105,17 @@ class JointDamping(JointTask):
         if self.weight == "mass" or level == "velocity":
             return super().reference_writer(state, level, out)
         return bind(_brake, state.v, self.damping, out)
+
+
+@compiled
+def _write(q, v, target, stiffness, damping, gain, acceleration, A, lower, upper, row):
+    for i in range(len(target)):
+        for j in range(len(v)):
+            A[row + i, j] = 0.0
+        A[row + i, i] = 1.0
+        error = target[i] - q[i]
+        b = stiffness * error - damping * v[i] if acceleration else gain * error
+        write_equality(lower, upper, row + i, b)
 
 
 @compiled
