@@ -146,7 +146,7 @@ def solve(batch: Batch, resolver: Resolver | None = None, threads: int | None = 
         raise HierarchyError(f"{resolver.label} resolves no batches; tpm and hcod do")
     if threads is not None and threads < 1:
         raise HierarchyError(f"threads = {threads}, expected at least 1")
-    run = _Run(batch, resolver, _cores() if threads is None else threads, memory)
+    run = _Run(batch, resolver, cores() if threads is None else threads, memory)
     return run.by_tpm() if isinstance(resolver, Tpm) else run.by_hcod(resolver)
 
 
@@ -224,8 +224,8 @@ class _Run:
             self.x[p], self.codes[p], self.record[p] = res.x, res.status, res.memory
 
 
-def _cores() -> int:
-    """Cores that this process may run on."""
+def cores() -> int:
+    """Return how many cores this process may run on."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1

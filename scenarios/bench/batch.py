@@ -1,0 +1,168 @@
+"""How many problems a second does a batch solve, on one core and on all of them?
+
+    python -m scenarios.bench.batch --out runs/batch
+
+Problems of a reference family, each with its own targets and reference, by `solvers.batch` with one
+thread and with one for each core, by `resolver.solve` in a Python loop, and for `tpm` in jax where
+that is installed. jax runs on the device that it finds; the numbers in docs/batch.md are from a
+processor, no GPU was at hand.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import sys
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+from importlib.util import find_spec
+from pathlib import Path
+from time import perf_counter, process_time
+from typing import Any, final
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from hierarchy.problem import Hierarchy
+from scenarios.bench.families import family
+from scenarios.bench.machine import machine
+from solvers import Resolver, make
+from solvers.batch import Batch, cores, solve
+
+COUNTS = (100, 1000, 10_000, 100_000)
+ENTRIES = (("EQ7", "tpm"), ("EQ7", "hcod"), ("INEQ7", "hcod"))
+_LOOPED = 1000  # problems at most that are solved one by one
+
+NOTES = """\
+Millions of problems a second: by the fastest call, and per core, over the processor time that all \
+calls took. Both are chosen because other work on the machine does not count; medians are in the \
+CSV."""
+
+
+@final
+@dataclass
+class Timed:
+    """One way to solve a batch: its call, and what its calls took [s]."""
+
+    way: str
+    call: Callable[[], Any]
+    count: int
+    wall: list[float] = field(default_factory=list)
+    processor: list[float] = field(default_factory=list)
+
+    def take_turn(self) -> None:
+        """Call once, timed."""
+        start, used = perf_counter(), process_time()
+        self.call()
+        self.processor.append(process_time() - used)
+        self.wall.append(perf_counter() - start)
+
+    def row(self, name: str, resolver: str, problems: int) -> dict[str, Any]:
+        """Return what is written down."""
+        best, median, p95 = np.percentile(self.wall, [0, 50, 95])
+        return {"family": name, "resolver": resolver, "problems": problems, "way": self.way,
+                "calls": len(self.wall), "best_us": 1e6 * best / self.count,
+                "median_us": 1e6 * median / self.count, "p95_us": 1e6 * p95 / self.count,
+                "per_second": self.count / best,
+                "per_second_and_core": self.count * len(self.processor) / sum(self.processor)}
+
+
+def run(out: Path | None = None, counts: Sequence[int] = COUNTS, seconds: float = 1.0,
+        entries: Sequence[tuple[str, str]] = ENTRIES) -> list[dict[str, Any]]:
+    """Time every way on every family and number of problems; print, return and keep the rows.
+
+    seconds : [s] for all ways together at one number of problems; at least three calls of each.
+    entries : (family, resolver).
+
+    Raises
+    ------
+    HierarchyError : a family that is not there.
+    """
+    console = Console(highlight=False, markup=False)
+    console.print(f"Batches on {cores()} cores of {machine()['processor']}")
+    rows: list[dict[str, Any]] = []
+    for name, resolver in entries:
+        some = [row for count in counts for row in _timed(name, make(resolver), count, seconds)]
+        _print(console, f"{name}, {resolver}", some)
+        rows += some
+    console.print(NOTES)
+    if out is not None:
+        _write(rows, out)
+    return rows
+
+
+def problems_like(name: str, count: int, seed: int = 0) -> Batch:
+    """Return so many problems of a family, each with targets moved by 1 % and a reference."""
+    r = np.random.default_rng(seed)
+    originals = [problem.h for problem in family(name)]
+    return Batch.of([_like(originals[p % len(originals)], r) for p in range(count)])
+
+
+def _like(h: Hierarchy, r: np.random.Generator) -> Hierarchy:
+    factor = 1.0 + 0.01 * r.uniform(-1.0, 1.0, h.m)
+    return Hierarchy(h.A, h.lower * factor, h.upper * factor, h.sizes, r.normal(size=h.n), h.names)
+
+
+def _timed(name: str, resolver: Resolver, count: int, seconds: float) -> Iterable[dict[str, Any]]:
+    ways = list(_ways(problems_like(name, count), resolver))
+    for way in ways:
+        way.call()
+    end = perf_counter() + seconds
+    while perf_counter() < end or len(ways[0].wall) < 3:
+        for way in ways:
+            way.take_turn()
+    return [way.row(name, resolver.name, count) for way in ways]
+
+
+def _ways(batch: Batch, resolver: Resolver) -> Iterable[Timed]:
+    alone = [batch[p] for p in range(min(len(batch), _LOOPED))]
+    yield Timed("one by one", lambda: [resolver.solve(h) for h in alone], len(alone))
+    for threads in dict.fromkeys((1, cores())):
+        yield Timed(f"{threads} thread" + "s" * (threads > 1), _call(batch, resolver, threads),
+                    len(batch))
+    if resolver.name == "tpm" and find_spec("jax") is not None:
+        from solvers import batch_jax
+
+        yield Timed("jax", lambda: batch_jax.solve(batch, resolver), len(batch))
+
+
+def _call(batch: Batch, resolver: Resolver, threads: int) -> Callable[[], Any]:
+    return lambda: solve(batch, resolver, threads)
+
+
+def _print(console: Console, title: str, rows: Sequence[dict[str, Any]]) -> None:
+    """Print a row for each number of problems, and of each way its rate and that of a core."""
+    ways = list(dict.fromkeys(row["way"] for row in rows))
+    table = Table(title=title, box=None, title_justify="left", pad_edge=False)
+    for head in ("problems", *(head for way in ways for head in (way, "per core"))):
+        table.add_column(head, justify="right")
+    for count in dict.fromkeys(row["problems"] for row in rows):
+        found = {row["way"]: row for row in rows if row["problems"] == count}
+        rates = [found[way][rate] for way in ways for rate in ("per_second", "per_second_and_core")]
+        table.add_row(f"{count:,}", *(f"{rate / 1e6:.3g}" for rate in rates))
+    console.print(table)
+
+
+def _write(rows: Sequence[dict[str, Any]], out: Path) -> None:
+    out.mkdir(parents=True, exist_ok=True)
+    with (out / "batch.csv").open("w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, list(rows[0]))
+        writer.writeheader()
+        writer.writerows(rows)
+
+
+def main() -> int:
+    """Run from the command line."""
+    parser = argparse.ArgumentParser(prog="python -m scenarios.bench.batch",
+                                     description="Problems a second in batches.")
+    parser.add_argument("--count", type=int, action="append", help="problems; may be repeated")
+    parser.add_argument("--seconds", type=float, default=1.0, help="for each number of problems")
+    parser.add_argument("--out", type=Path, default=None, help="folder for batch.csv")
+    given = parser.parse_args()
+    run(given.out, given.count or COUNTS, given.seconds)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
