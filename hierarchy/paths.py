@@ -5,12 +5,13 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from math import cos, inf, sin
 
 import numpy as np
 
+from hierarchy.binding import bind
 from hierarchy.compiled import compiled
 from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array
@@ -24,6 +25,10 @@ class Path(ABC):
     @abstractmethod
     def write(self, t: float, out: Array) -> None:
         """Write position [m], velocity [m/s], acceleration [m/s^2] at t [s] as rows of (3, 3)."""
+
+    def writer(self, out: Array) -> Callable[[float], object]:
+        """Return what does `write` into `out` (3, 3) for the time t [s] that it is given."""
+        return lambda t: self.write(t, out)
 
     def __call__(self, t: float) -> Array:
         """Position, velocity and acceleration at t [s] as rows of a new (3, 3) array."""
@@ -67,7 +72,11 @@ class Ellipse(Path):
 
     def write(self, t: float, out: Array) -> None:
         """See `Path.write`."""
-        _write_ellipse(t, self._packed, self.rate, out)
+        _write_ellipse(self._packed, self.rate, out, t)
+
+    def writer(self, out: Array) -> Callable[[float], object]:
+        """See `Path.writer`."""
+        return bind(_write_ellipse, self._packed, self.rate, out, then=(0.0,))
 
 
 @dataclass(frozen=True)
@@ -112,7 +121,7 @@ def _check(name: str, vector: Vector) -> None:
 
 
 @compiled
-def _write_ellipse(t, packed, rate, out):
+def _write_ellipse(packed, rate, out, t):
     c, s = cos(rate * t), sin(rate * t)
     for i in range(3):
         along = packed[1, i] * c + packed[2, i] * s

@@ -34,9 +34,11 @@ class Recorder:
         self._target = cell.position.target if cell.position else np.full((3, 3), np.nan)
         self._orders: dict[tuple[str, ...], int] = {}
         # One row: t, q, v, a, command, end effector, target, cone error, distances.
-        self._log = np.empty((ticks, 8 + cell.robot.nq + 3 * cell.robot.n + len(self._distance)))
-        self._choices = np.empty((ticks, 5), dtype=np.int16)
-        self._times, self._over = np.empty((ticks, len(_TIMES))), np.full(ticks, np.nan)
+        # All are written once here: the system maps memory when it is first touched.
+        self._log = np.full((ticks, 8 + cell.robot.nq + 3 * cell.robot.n + len(self._distance)),
+                            np.nan)
+        self._choices = np.full((ticks, 5), -1, dtype=np.int16)
+        self._times, self._over = np.full((ticks, len(_TIMES)), np.nan), np.full(ticks, np.nan)
         state = cell.state
         self._write_rest = bind(
             _write, self._log, self._choices, self._times, state.q, state.v, state.placements,

@@ -97,10 +97,10 @@ class Position(BoundTask):
         write_rows = bind(_write, *state.arrays, self.frame.joint, self.frame.offset, self.target,
                           self.stiffness, self.damping, self.gain, level == "acceleration", *near,
                           self.repulsion_within, A, lower, upper, row)
-        move_target, target = self.path.write, self.target
+        move_target = self.path.writer(self.target)
 
         def write() -> None:
-            move_target(state.t, target)
+            move_target(state.t)
             write_rows()
 
         return write
