@@ -85,9 +85,8 @@ class Task(ABC):
               row: int) -> None:
         """Write this task's rows into A (m_all, n), lower, upper (m_all,) from `row` on.
 
-        This general form calls the methods above; tasks override it, or `writer`, by a compiled
-        kernel. Raises HierarchyError, naming task and row, where a method returns the
-        wrong shape or NaN.
+        This general form calls the methods above; tasks override it by a compiled kernel. Raises
+        HierarchyError, naming task and row, where a method returns the wrong shape or NaN.
         """
         rows = slice(row, row + self.dimension)
         A[rows] = _shaped(self, "jacobian", self.jacobian(state), (self.dimension, state.n))
@@ -106,7 +105,7 @@ class Task(ABC):
         """Return what does `write` with these arguments, each time it is called.
 
         A stack keeps it for as long as the state, and the measurement that the state carries, are
-        the same objects. What overrides it by a bound kernel has no `write` of its own to keep up.
+        the same objects.
         """
         return partial(self.write, state, level, A, lower, upper, row)
 
@@ -122,17 +121,24 @@ class Task(ABC):
 
 
 class BoundTask(Task):
-    """A task whose rows are written by kernels bound to their arrays: it overrides `writer`."""
+    """A task whose rows are written by a kernel bound to all its arrays. Abstract."""
 
-    def __init_subclass__(cls) -> None:
-        super().__init_subclass__()
-        if "write" in vars(cls) and "writer" not in vars(cls):
-            cls.writer = Task.writer  # type: ignore[method-assign]
+    @abstractmethod
+    def bind_rows(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
+                  row: int) -> Callable[[], object]:
+        """Return what writes the rows there, each time it is called; see `Task.writer`."""
 
     def write(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
               row: int) -> None:
-        """See `Task.write`."""
-        self.writer(state, level, A, lower, upper, row)()
+        """See `Task.write`; a single call takes long, for the kernel is bound first."""
+        self.bind_rows(state, level, A, lower, upper, row)()
+
+    def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
+               row: int) -> Callable[[], object]:
+        """See `Task.writer`; a subclass that overrides `write` is asked for that."""
+        of_rows = (state, level, A, lower, upper, row)
+        mine = type(self).write is BoundTask.write
+        return self.bind_rows(*of_rows) if mine else super().writer(*of_rows)
 
 
 def _shaped(task: Task, what: str, value: Array, shape: tuple[int, ...]) -> Array:

@@ -1,9 +1,13 @@
+from dataclasses import dataclass
+
 import numpy as np
 import pytest
-from scene import ROBOT, TASKS, state_at, states
+from scene import FRAME, PATH, ROBOT, SENSOR, TASKS, state_at, states
 
-from hierarchy import HierarchyError, Stack
-from hierarchy.tasks import JointDamping
+from hierarchy import HierarchyError, Stack, Task
+from hierarchy.binding import bind
+from hierarchy.compiled import compiled
+from hierarchy.tasks import JointDamping, Position
 
 Q, V = states(1)[0]
 
@@ -54,6 +58,89 @@ def test_changing_the_stack_changes_the_hierarchy():
     assert s.hierarchy(state).names == ("position", "pointing")
     s.insert(TASKS["avoidance 1-D"], 0)
     assert s.hierarchy(state).sizes.tolist() == [1, 3, 1]
+
+
+def rows_of(h):
+    return h.A.copy(), h.lower.copy(), h.upper.copy()
+
+
+def test_another_state_and_another_measurement_are_followed():
+    s, one, other = stack(), state_at(Q, V), state_at(Q + 0.1, V)
+    expected = rows_of(stack().hierarchy(other))
+    s.hierarchy(one)
+    for a, b in zip(rows_of(s.hierarchy(other)), expected, strict=True):
+        np.testing.assert_array_equal(a, b)
+    one.move(0.7, Q + 0.1, V)
+    one.measurement = other.measurement
+    for a, b in zip(rows_of(s.hierarchy(one)), rows_of(stack().hierarchy(one)), strict=True):
+        np.testing.assert_array_equal(a, b)
+
+
+def test_what_moves_between_two_calls_is_followed():
+    s, state = stack(reference=JointDamping(7, 5.0)), state_at(Q, V)
+    s.hierarchy(state)
+    state.move(0.9, Q + 0.2, 2 * V)
+    SENSOR.measure(state)
+    state.measurement.active = (state.measurement.active + 1) % 8
+    for a, b in zip(rows_of(s.hierarchy(state)), rows_of(stack().hierarchy(state)), strict=True):
+        np.testing.assert_array_equal(a, b)
+    np.testing.assert_array_equal(s.hierarchy(state).reference, -10 * V)
+
+
+@dataclass(frozen=True)
+class Elbow(Task):
+    """A task in plain numpy."""
+
+    name: str = "elbow"
+    stiffness: float = 10.0
+    dimension = 1
+
+    def error(self, state):
+        return np.array([1.0 - state.q[3]])
+
+    def jacobian(self, state):
+        return np.eye(7)[3:4]
+
+    def jacobian_derivative(self, state):
+        return np.zeros((1, 7))
+
+
+@dataclass(frozen=True)
+class Slower(Position):
+    """A compiled task of the package, changed in plain numpy."""
+
+    def write(self, state, level, A, lower, upper, row):
+        super().write(state, level, A, lower, upper, row)
+        lower[row:row + 3] *= 0.5
+        upper[row:row + 3] *= 0.5
+
+
+def test_tasks_in_plain_numpy_stand_beside_compiled_ones():
+    s, state = Stack([Slower(FRAME, PATH), Elbow(), TASKS["pointing"]]), state_at(Q, V)
+    whole = Stack([Position(FRAME, PATH), TASKS["pointing"]])
+    for q in (Q, Q + 0.1):
+        state.move(0.7, q, V)
+        h, known = s.hierarchy(state), whole.hierarchy(state)
+        np.testing.assert_array_equal(h.A, np.vstack([known.A[:3], np.eye(7)[3:4], known.A[3:]]))
+        np.testing.assert_array_equal(h.lower[:3], 0.5 * known.lower[:3])
+        assert h.lower[3] == h.upper[3] == 10.0 * (1.0 - q[3])
+        assert h.lower[4] == known.lower[3]
+
+
+@compiled
+def _scaled(out, values, by, from_row):
+    for i in range(from_row, len(out)):
+        out[i] = by * values[i]
+
+
+def test_a_bound_kernel_is_the_kernel_at_whatever_number_comes_then():
+    values, out = np.arange(3.0), np.zeros(3)
+    scale = bind(_scaled, out, values, then=(0.0, 0))
+    for by, row in ((2.0, 0), (3, 1), (np.float64(0.5), np.int16(0)), (-1.0, True)):
+        expected = out.copy()
+        expected[row:] = by * values[row:]
+        scale(by, row)
+        np.testing.assert_array_equal(out, expected)
 
 
 def test_the_reference_is_the_null_space_term():

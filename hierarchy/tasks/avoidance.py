@@ -91,9 +91,9 @@ class Avoidance(BoundTask):
         """The repulsion as an acceleration (rows,) [m/s^2], eqs. (28)-(29)."""
         return self.error(state)
 
-    def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-               row: int) -> Callable[[], object]:
-        """See `Task.writer`."""
+    def bind_rows(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
+                  row: int) -> Callable[[], object]:
+        """See `BoundTask.bind_rows`."""
         seen, k = self._seen(state)
         write_rows = bind(_write, *state.arrays, self.joints, self.offsets, seen.direction,
                           seen.magnitude, level == "acceleration", self.rows, A, lower, upper, row,

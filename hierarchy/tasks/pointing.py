@@ -84,9 +84,9 @@ class Pointing(BoundTask):
         _write_jacobian_derivative(*state.arrays, self.frame.joint, self.z_e, self.z_d, dJ)
         return dJ
 
-    def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-               row: int) -> Callable[[], object]:
-        """See `Task.writer`."""
+    def bind_rows(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
+                  row: int) -> Callable[[], object]:
+        """See `BoundTask.bind_rows`."""
         return bind(_write, *state.arrays, self.frame.joint, self.z_e, self.z_d, self.cos_alpha_d,
                     self.stiffness, self.damping, self.gain, level == "acceleration",
                     self.kind == "inequality", A, lower, upper, row)

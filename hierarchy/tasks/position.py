@@ -89,9 +89,9 @@ class Position(BoundTask):
             return np.zeros(3)
         return np.asarray(seen.magnitude[-1] * seen.direction[-1])
 
-    def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-               row: int) -> Callable[[], object]:
-        """See `Task.writer`."""
+    def bind_rows(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
+                  row: int) -> Callable[[], object]:
+        """See `BoundTask.bind_rows`."""
         seen = state.measurement
         near = _NOTHING_SEEN if seen is None else (seen.distance, seen.magnitude, seen.direction)
         write_rows = bind(_write, *state.arrays, self.frame.joint, self.frame.offset, self.target,

@@ -60,9 +60,9 @@ class Posture(JointTask, BoundTask):
                                  f"{state.robot.nq} joint positions")
         return np.asarray(self.target - state.q)
 
-    def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-               row: int) -> Callable[[], object]:
-        """See `Task.writer`."""
+    def bind_rows(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
+                  row: int) -> Callable[[], object]:
+        """See `BoundTask.bind_rows`."""
         self.error(state)
         target = np.array(self.target, dtype=float)
         for (i,) in np.argwhere(~np.isfinite(target))[:1]:
