@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import argparse
 import csv
-import os
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -186,7 +185,6 @@ def main() -> int:
                         help="new or empty folder; default: a new one in runs/")
     parser.add_argument("--seconds", type=float, default=SECONDS, help="for all times together")
     given = parser.parse_args()
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from scenarios.folders import claim, next_free
 
     folder = claim(given.out if given.out is not None else next_free(Path("runs") / "edits"))

@@ -38,19 +38,22 @@ def time_over_size(rows: Sequence[dict[str, Any]]) -> Figure:
         for ax, (figure, (xlabel, _)) in zip(axes, _PANELS.items(), strict=True):
             some = [row for row in rows if row["figure"] == figure]
             for label in labels:
-                _draw(ax, figure, [row for row in some if row["resolver"] == label],
-                      colours[label], marks[label])
-            _scale(ax, sorted({row[figure] for row in some}))
+                draw_band(ax, figure, [row for row in some if row["resolver"] == label],
+                          colours[label], marks[label])
+            scale_axes(ax, sorted({row[figure] for row in some}))
             ax.set(xlabel=xlabel, title=_title(figure, some))
             ax.tick_params(labelleft=True)
         for ax, (figure, (_, letter)) in zip(axes, _PANELS.items(), strict=True):
-            _name(ax, figure, letter, [row for row in rows if row["figure"] == figure], colours)
+            name_lines(ax, figure, letter, [row for row in rows if row["figure"] == figure],
+                       colours)
         axes[0].set_ylabel("time of a solve [µs]: median, band to the 95th percentile",
                            fontsize=8.0)
     return fig
 
 
-def _draw(ax: Axes, figure: str, rows: Sequence[dict[str, Any]], colour: str, mark: str) -> None:
+def draw_band(ax: Axes, figure: str, rows: Sequence[dict[str, Any]], colour: str,
+              mark: str) -> None:
+    """Draw one median over the sizes of a figure, and the band up to the 95th percentile."""
     size, median, p95 = (np.array([row[key] for row in rows], dtype=float)
                          for key in (figure, "median_us", "p95_us"))
     dashed = rows[0]["resolver"] == NUMPY
@@ -59,9 +62,10 @@ def _draw(ax: Axes, figure: str, rows: Sequence[dict[str, Any]], colour: str, ma
             linestyle=(0, (4, 2)) if dashed else "-")
 
 
-def _scale(ax: Axes, sizes: Sequence[int]) -> None:
+def scale_axes(ax: Axes, sizes: Sequence[int], unmarked: Sequence[int] = _UNMARKED) -> None:
+    """Make both axes logarithmic, with a number at each size but the unmarked ones."""
     ax.set(xscale="log", yscale="log")
-    ax.set_xticks([size for size in sizes if size not in _UNMARKED])
+    ax.set_xticks([size for size in sizes if size not in unmarked])
     ax.xaxis.set_minor_locator(NullLocator())
     ax.xaxis.set_major_formatter(ScalarFormatter())
 
@@ -72,8 +76,8 @@ def _title(figure: str, rows: Sequence[dict[str, Any]]) -> str:
     return f"{rows[0]['tasks']} tasks of {ROWS} rows"
 
 
-def _name(ax: Axes, figure: str, letter: str, rows: Sequence[dict[str, Any]],
-          colours: dict[str, str]) -> None:
+def name_lines(ax: Axes, figure: str, letter: str, rows: Sequence[dict[str, Any]],
+               colours: dict[str, str]) -> None:
     """Write each name and exponent beside the end of its line, none over another."""
     powers = exponents(rows, figure)
     ends = {row["resolver"]: row for row in sorted(rows, key=lambda row: float(row[figure]))}

@@ -1,0 +1,146 @@
+"""How times grow far beyond the letter's sizes: python -m scenarios.bench.scaling.
+
+One solve over tasks, rows and joints, by everyone that keeps priorities; and a whole tick of
+`ellipse-hqp` over control points and obstacles, where `hcod` has a row for every pair of them.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import json
+import os
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from time import perf_counter
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+Size = tuple[int, int, int]  # joints, tasks, rows of each
+SIZES: dict[str, tuple[Size, ...]] = {
+    "tasks": tuple((70, count, 3) for count in (1, 2, 3, 4, 5, 7, 10, 14, 20)),
+    "rows": tuple((100, 5, each) for each in (1, 2, 3, 4, 6, 9, 14, 20)),
+    "joints": tuple((n, 5, 3) for n in (6, 7, 10, 15, 20, 30, 45, 70, 100, 150, 200, 300))}
+PAIRS = ((8, 3), (8, 8), (16, 8), (16, 16), (32, 16), (32, 32), (64, 32), (64, 64), (64, 128),
+         (64, 256))          # (control points, obstacles)
+PARTS = ("kinematics", "sensing and rows", "resolve", "whole tick")
+SECONDS = 90.0
+_TICKS = 1500            # of the run whose states are used
+_WIDTH = 100             # characters of a table
+
+
+def run(out: Path | None = None, seconds: float = SECONDS,
+        sizes: dict[str, tuple[Size, ...]] | None = None,
+        pairs: Sequence[tuple[int, int]] = PAIRS) -> list[dict[str, Any]]:
+    """Time all sizes in turns on one core for `seconds` [s], and at least once; return the rows.
+
+    Prints a table a figure; writes scaling.csv, machine.json and scaling.svg and .png into the
+    folder `out` if given.
+    """
+    from rich.console import Console
+
+    from scenarios.bench.machine import one_core
+    from scenarios.bench.scaling_timed import Ticks, solves_of
+    from scenarios.config import load
+    from scenarios.simulate import simulate
+
+    solves = [solve for figure, some in (SIZES if sizes is None else sizes).items()
+              for solve in solves_of(figure, some)]
+    path = simulate(load("ellipse-hqp", [f"control.duration={_TICKS / 1000}"]))
+    ticks = [Ticks(*pair, path) for pair in pairs]
+    turns = [*(solve.timed.take_turn for solve in solves), *(tick.take_turn for tick in ticks)]
+    with one_core():
+        for solve in solves:
+            solve.timed.call()
+        for tick in ticks:
+            tick.warm_up()
+        end = perf_counter() + seconds
+        while True:
+            for turn in turns:
+                turn()
+            if perf_counter() > end:
+                break
+    rows = [*(solve.row() for solve in solves), *(row for tick in ticks for row in tick.rows())]
+    console = Console(highlight=False, markup=False, width=_WIDTH)
+    for figure in dict.fromkeys(row["figure"] for row in rows):
+        _print(console, figure, [row for row in rows if row["figure"] == figure])
+    if out is not None:
+        _write(rows, out)
+    return rows
+
+
+def _print(console: Console, figure: str, rows: Sequence[dict[str, Any]]) -> None:
+    from rich.table import Table
+
+    from scenarios.bench.growth import exponents
+
+    sizes = list(dict.fromkeys(row[figure] for row in rows))
+    of = {(row["resolver"], row[figure]): row["median_us"] for row in rows}
+    powers = exponents(rows, figure)
+    console.print(f"Median time [us] over the number of {figure}; {fixed(figure, rows)}")
+    table = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False)
+    table.add_column("", no_wrap=True)
+    heads = list(dict.fromkeys(f"{row['points']}x{row['obstacles']}" if figure == "pairs"
+                               else str(row[figure]) for row in rows))
+    for head in (*heads, "power"):
+        table.add_column(head, justify="right", no_wrap=True)
+    for label in dict.fromkeys(row["resolver"] for row in rows):
+        table.add_row(label, *(_digits(of[label, size]) for size in sizes), f"{powers[label]:.2f}")
+    console.print(table)
+    if figure == "pairs":
+        failures = sum(row["failures"] for row in rows if row["resolver"] == PARTS[-1])
+        ticks = sum(row["solves"] for row in rows if row["resolver"] == PARTS[-1])
+        console.print(f"Ticks not solved: {failures} of {ticks}.")
+    console.print("")
+
+
+def fixed(figure: str, rows: Sequence[dict[str, Any]]) -> str:
+    """Return what does not vary in a figure, as words."""
+    row = rows[0]
+    each = row["rows"] // row["tasks"]
+    return {"tasks": f"{row['joints']} joints, tasks of {each} rows",
+            "rows": f"{row['joints']} joints, {row['tasks']} tasks",
+            "joints": f"{row['tasks']} tasks of {each} rows",
+            "pairs": f"a tick, {row['joints']} joints, hcod"}[figure]
+
+
+def _digits(value: float) -> str:
+    return f"{value:.0f}" if value >= 10.0 else f"{value:.1f}"
+
+
+def _write(rows: Sequence[dict[str, Any]], out: Path) -> None:
+    from scenarios.bench.machine import machine
+    from scenarios.bench.scaling_figure import time_over_sizes
+    from scenarios.drawing import write
+
+    out.mkdir(parents=True, exist_ok=True)
+    with (out / "scaling.csv").open("w", newline="") as file:
+        writer = csv.DictWriter(file, list(dict.fromkeys(key for row in rows for key in row)))
+        writer.writeheader()
+        writer.writerows(rows)
+    (out / "machine.json").write_text(json.dumps(machine(), indent=2) + "\n")
+    write(time_over_sizes(rows), str(out / "scaling"))
+
+
+def main() -> int:
+    """Run from the command line."""
+    parser = argparse.ArgumentParser(prog="python -m scenarios.bench.scaling",
+                                     description="Times over tasks, rows, joints and pairs.")
+    parser.add_argument("--out", type=Path, default=None,
+                        help="new or empty folder; default: a new one in runs/")
+    parser.add_argument("--seconds", type=float, default=SECONDS, help="for all times together")
+    given = parser.parse_args()
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy is loaded: one core is timed
+    from scenarios.folders import claim, next_free
+
+    folder = claim(given.out if given.out is not None else next_free(Path("runs") / "scaling"))
+    run(folder, given.seconds)
+    print(f"Numbers and figure: {folder}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
