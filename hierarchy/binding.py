@@ -7,6 +7,7 @@ from functools import partial
 from typing import Any
 
 import numba
+import numpy as np
 
 from hierarchy.compiled import Kernel
 
@@ -18,7 +19,23 @@ def bind(kernel: Kernel, *arguments: Any, then: tuple[float, ...] = ()) -> Calla
     is done once, and a call costs a third. `then` has a number of the type of each that is handed
     over at a call; those of a call may be any that Python can convert.
     """
-    if not hasattr(kernel, "compile"):  # NUMBA_DISABLE_JIT
+    dispatcher: Any = kernel
+    if not hasattr(dispatcher, "overloads"):  # NUMBA_DISABLE_JIT
         return partial(kernel, *arguments)
-    types = tuple(numba.typeof(value) for value in (*arguments, *then))
-    return partial(kernel.compile(types), *arguments)
+    types = tuple(_type_of(value) for value in (*arguments, *then))
+    known = dispatcher.overloads.get(types)
+    entry = dispatcher.compile(types) if known is None else known.entry_point
+    return partial(entry, *arguments)
+
+
+_TYPES: dict[tuple[Any, ...], Any] = {}
+
+
+def _type_of(value: Any) -> Any:
+    """Return numba's type of a value; those of arrays are kept, for they take 4 us to find."""
+    if not isinstance(value, np.ndarray):
+        return numba.typeof(value)
+    kind = value.dtype, value.ndim, value.flags.num
+    if kind not in _TYPES:
+        _TYPES[kind] = numba.typeof(value)
+    return _TYPES[kind]
