@@ -149,8 +149,7 @@ def _flat(table: Any, above: str = "") -> Any:
         return table
     flat: dict[str, Any] = {}
     for key, value in table.items():
-        if isinstance(value, dict) and value and _kind(value) is None and all(
-                isinstance(below, dict) for below in value.values()):
+        if isinstance(value, dict) and value and _kind(value) is None:
             flat |= _flat(value, f"{above}{key}.")
         else:
             flat[f"{above}{key}"] = value
@@ -205,7 +204,8 @@ def load_sweep(name_or_path: str | Path) -> Sweep:
     try:
         sweep = Sweep.model_validate(data)
     except ValidationError as error:
-        raise SweepError("\n".join(_say(path, one) for one in error.errors())) from error
+        said = dict.fromkeys(_say(path, one) for one in error.errors())
+        raise SweepError("\n".join(said)) from error
     return sweep.model_copy(update={"scenarios": tuple(
         str(path.parent.resolve() / name) if name.endswith(".toml") else name
         for name in sweep.scenarios)})
@@ -234,5 +234,8 @@ def _say(path: Path, error: Any) -> str:
 
 
 def _without_kind(loc: list[str]) -> list[str]:
-    """Leave out the kind that pydantic puts between a parameter and the key in its table."""
-    return loc[:2] + loc[3:] if loc[0] == "parameters" and len(loc) > 3 else loc
+    """Leave out the kind that pydantic puts between a parameter and the key in its table.
+
+    And what it puts after that: which form of the value it tried.
+    """
+    return loc[:2] + loc[3:4] if loc[0] == "parameters" and len(loc) > 3 else loc

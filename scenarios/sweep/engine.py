@@ -21,7 +21,7 @@ except ImportError as error:
 LARGEST_BATCH = 16     # runs; what is lost when everything is killed, for each worker
 _BATCHES_EACH = 4      # at least so many for each worker, so that the last ones end together
 _QUEUED_EACH = 3       # batches that the scheduler has at a time, for each worker
-_DEATHS = 2            # workers that may die of a batch before it is taken apart
+_DEATHS = 1            # workers that may die of a batch; at one more it is taken apart
 _PATIENCE = 30.0       # [s] for a scheduler to answer and to have a worker
 
 Work = Callable[[Sequence[Job], str], list[Outcome]]
@@ -52,20 +52,22 @@ def connected(workers: int | None = None, scheduler: str | None = None) -> Itera
         with _client_of(scheduler) as client:
             yield client
         return
-    settings = {"distributed.scheduler.allowed-failures": _DEATHS}
+    settings = {"distributed.scheduler.allowed-failures": _DEATHS,
+                "distributed.scheduler.worker-saturation": 1.0}
     with dask.config.set(settings), LocalCluster(
             n_workers=workers or processors(), threads_per_worker=1, processes=True,
-            host="127.0.0.1", dashboard_address=None, silence_logs=logging.CRITICAL
-            ) as cluster, Client(cluster) as client:
+            host="127.0.0.1", dashboard_address="127.0.0.1:0",  # any free port, and no dashboard:
+            scheduler_kwargs={"dashboard": False}, silence_logs=logging.CRITICAL) as cluster, \
+            Client(cluster) as client:
         yield client
 
 
 def carry_out(jobs: Sequence[Job], client: Client, keep: Callable[[list[Outcome]], object],
-              told: Callable[[int], object] | None = None, batch: int | None = None,
+              told: Callable[[int], object] = lambda count: None, batch: int | None = None,
               work: Work = run_batch) -> None:
     """Have all jobs run, and hand what came of them to `keep`, batch by batch, as it comes.
 
-    A job of which workers die has that as its outcome; those beside it in its batch do not.
+    A job of which workers die has that as its outcome; those beside it do not.
 
     Parameters
     ----------
@@ -77,55 +79,60 @@ def carry_out(jobs: Sequence[Job], client: Client, keep: Callable[[list[Outcome]
     ------
     EngineError : the scheduler is lost, or a worker refuses.
     """
-    waiting = iter(_batches(jobs, batch or _size(len(jobs), _threads(client))))
-    alone: list[list[Job]] = []
-    running: dict[str, tuple[Future, Sequence[Job]]] = {}
-    done = as_completed(with_results=False, raise_errors=False)
+    threads = max(1, _threads(client))
+    size = batch or max(1, min(LARGEST_BATCH, len(jobs) // (_BATCHES_EACH * threads)))
+    batches = [jobs[first:first + size] for first in range(0, len(jobs), size)]
+    suspects: list[Job] = []
+    for part, outcomes in _results(client, work, batches, _QUEUED_EACH):
+        if outcomes is None:
+            suspects += part
+        else:
+            keep(outcomes)
+            told(len(outcomes))
+    # One at a time: what else a worker has when it dies is blamed as well.
+    for (job,), outcomes in _results(client, work, [[job] for job in suspects], 0):
+        keep(outcomes or [_deadly(job)])
+        told(1)
+
+
+def _results(client: Client, work: Work, batches: Sequence[Sequence[Job]], queued: int
+             ) -> Iterator[tuple[Sequence[Job], list[Outcome] | None]]:
+    """Give each batch with what came of it as it is done, None where workers died of it.
+
+    The scheduler has at most `queued` batches at a time for each worker, and one if that is 0.
+    """
+    waiting = iter(batches)
+    running: dict[str, Sequence[Job]] = {}
+    done = as_completed()
 
     def fill() -> None:
-        while len(running) < _QUEUED_EACH * max(1, _threads(client)):
-            part = alone.pop() if alone else next(waiting, None)
-            if part is None:
-                return
+        while len(running) < max(1, queued * _threads(client)) and (part := next(waiting, None)):
             future = client.submit(work, part, digest(), pure=False)
-            running[future.key] = future, part
+            running[future.key] = part
             done.add(future)
 
     fill()
     while running:
         future = next(done)
-        _, part = running.pop(future.key)
-        outcomes = _outcomes(future, part)
-        if outcomes is None:
-            alone += [[job] for job in part]
-        else:
-            keep(outcomes)
-            if told is not None:
-                told(len(outcomes))
+        yield running.pop(future.key), _outcomes(future)
         future.release()
         fill()
 
 
-def _outcomes(future: Future, part: Sequence[Job]) -> list[Outcome] | None:
-    """Return what came of a batch, or None where it killed workers and is to be taken apart."""
+def _outcomes(future: Future) -> list[Outcome] | None:
+    """Return what came of a batch, or None where workers died of it."""
     if future.status == "finished":
         found: list[Outcome] = future.result()
         return found
     error = future.exception() if future.status == "error" else None
-    if not isinstance(error, KilledWorker):
-        raise EngineError(str(error or "the scheduler is lost") + "; what is done is kept")
-    if len(part) > 1:
+    if isinstance(error, KilledWorker):
         return None
-    said = f"KilledWorker: {_DEATHS + 1} workers died of this run"
-    return [Outcome(part[0].key, 0, None, said, float("nan"), digest())]
+    raise EngineError(f"{error or 'the scheduler is lost'}; what is done is kept")
 
 
-def _batches(jobs: Sequence[Job], size: int) -> list[Sequence[Job]]:
-    return [jobs[first:first + size] for first in range(0, len(jobs), size)]
-
-
-def _size(jobs: int, threads: int) -> int:
-    return max(1, min(LARGEST_BATCH, jobs // (_BATCHES_EACH * max(1, threads))))
+def _deadly(job: Job) -> Outcome:
+    return Outcome(job.key, 0, None, "KilledWorker: every worker that began this run died of it",
+                   float("nan"), digest())
 
 
 def _threads(client: Client) -> int:

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import matplotlib
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from scenarios import drawing
 from scenarios.metrics import Metric
 from scenarios.sweep.results import Results
+
+Array = NDArray[np.float64]
 
 
 def shares(results: Results) -> Figure:
@@ -44,23 +48,60 @@ def shares(results: Results) -> Figure:
 def spread(results: Results, metric: Metric) -> Figure:
     """Draw how a metric is spread over the samples, a row for each resolver.
 
-    Box: the middle half, with the median; line: from 5 to 95 %; dots: least and largest.
+    Box: the middle half, with the median; line: from 5 to 95 %; dots: least and largest. Few values
+    that are far from all others are off the picture, and an arrow says how many and how far.
     """
-    labels = [label for label in results.labels if results.of(metric.name, label).size]
-    fig, (ax,) = drawing.figure(width=3.6, height=0.55 + 0.24 * len(labels))
+    known = {label: metric.scale * results.of(metric.name, label) for label in results.labels}
+    known = {label: values for label, values in known.items() if values.size}
+    fig, (ax,) = drawing.figure(width=3.9, height=0.5 + 0.3 * len(known))
     colours = drawing.colours(results.labels)
+    low, high = _limits(list(known.values()))
     with matplotlib.rc_context(drawing.style()):
-        for y, label in enumerate(labels):
-            values, colour = metric.scale * results.of(metric.name, label), colours[label]
-            p5, q1, median, q3, p95 = np.percentile(values, [5.0, 25.0, 50.0, 75.0, 95.0])
-            ax.plot([p5, p95], [y, y], color=colour, lw=1.2)
-            ax.barh(y, q3 - q1, left=q1, height=0.56, color=colour, alpha=0.4, lw=0)
-            ax.plot([median, median], [y - 0.28, y + 0.28], color=colour, lw=2.4)
-            ax.plot([values.min(), values.max()], [y, y], ".", color=colour, ms=4.5)
-    ax.set_yticks(range(len(labels)), labels)
-    ax.set_ylim(len(labels) - 0.5, -0.5)
+        for y, (label, values) in enumerate(known.items()):
+            _box(ax, y, values, colours[label])
+            seen = values[(values >= low) & (values <= high)]
+            ax.plot([seen.min(), seen.max()], [y, y], ".", color=colours[label], ms=4.5)
+            _beyond(ax, y, values[values < low], low, colours[label])
+            _beyond(ax, y, values[values > high], high, colours[label])
+    ax.set_yticks(range(len(known)), list(known))
+    ax.set_ylim(len(known) - 0.5, -0.5)
+    margin = 0.03 * (high - low)
+    ax.set_xlim(low - margin, high + margin)
     ax.tick_params(axis="y", length=0)
     ax.grid(False, axis="y")
     ax.spines["left"].set_visible(False)
     ax.locator_params(axis="x", nbins=6)
     return fig
+
+
+def _box(ax: Axes, y: float, values: Array, colour: str) -> None:
+    p5, q1, median, q3, p95 = np.percentile(values, [5.0, 25.0, 50.0, 75.0, 95.0])
+    ax.plot([p5, p95], [y, y], color=colour, lw=1.2)
+    ax.barh(y, q3 - q1, left=q1, height=0.56, color=colour, alpha=0.4, lw=0)
+    ax.plot([median, median], [y - 0.28, y + 0.28], color=colour, lw=2.4)
+
+
+def _beyond(ax: Axes, y: float, values: Array, edge: float, colour: str) -> None:
+    """Say at an edge how many values lie beyond it, and the farthest."""
+    if not values.size:
+        return
+    right = values[0] > edge
+    farthest = values.max() if right else values.min()
+    text = f"{values.size}, to {farthest:.3g} \N{RIGHTWARDS ARROW}" if right else (
+        f"\N{LEFTWARDS ARROW} {values.size}, to {farthest:.3g}")
+    ax.text(edge, y - 0.3, text, ha="right" if right else "left", va="center", fontsize=7.5,
+            color=colour)
+
+
+def _limits(rows: list[Array], reach: float = 2.0) -> tuple[float, float]:
+    """Return limits that hold the middle nine tenths of all rows and what is not far from them.
+
+    Far is more than `reach` times their width away.
+    """
+    ends = [np.percentile(values, [5.0, 95.0]) for values in rows]
+    low, high = min(end[0] for end in ends), max(end[1] for end in ends)
+    far = reach * (high - low) or reach * max(abs(high), 1e-12)
+    values = np.concatenate(rows)
+    near = values[(values >= low - far) & (values <= high + far)]
+    return (float(near.min()), float(near.max())) if near.min() < near.max() else (
+        float(low - far), float(high + far))

@@ -18,7 +18,7 @@ from scenarios.folders import slug
 from scenarios.metrics import Metric
 from scenarios.sweep import figures
 from scenarios.sweep.planning import Plan, Planned
-from scenarios.sweep.results import Results, summary
+from scenarios.sweep.results import Results, Worst, summary
 from scenarios.sweep.verdict import verdict
 
 _FAILURES = 20  # reasons listed
@@ -53,29 +53,30 @@ class Page:
 
     def _head(self) -> str:
         sweep, runs = self.plan.sweep, self.plan.runs
-        labels = dict.fromkeys(run.label for run in runs)
-        varied = "".join(f"<tr><th><code>{escape(key)}</code></th><td>{escape(str(how))}</td></tr>"
+        labels = list(dict.fromkeys(run.label for run in runs))
+        each = f", each under {_listed(labels)}, so that all are judged on the same"
+        lone = next(iter(self.found.values())) if len(self.found) == 1 else None
+        said = f'<p class="verdict">{escape(verdict(lone))}</p>' if lone else ""
+        varied = "".join(f"<li><code>{escape(key)}</code>: {escape(str(how))}</li>"
                          for key, how in sweep.parameters.items())
-        refused = "".join(f'<p class="quiet">{escape(said)}.</p>' for said in self.plan.refused)
-        table = (f'<div class="scroll"><table class="plain"><tbody>{varied}</tbody></table></div>'
-                 if varied else "<p>Nothing: every run is the scenario as it is.</p>")
-        return f"""<header>
+        refused = "".join(f'<p class="quiet">{escape(why)}.</p>' for why in self.plan.refused)
+        return f"""<header class="lead"><div>
 <p class="quiet">hierarchy sweep · <b>{escape(sweep.name)}</b></p>
 <h1>{escape(sweep.title or sweep.name)}</h1>
-<p>{_count(len(runs), "run")}: {_count(sweep.samples, "sample")} of what is varied below, each
-under {escape(_listed(list(labels)))}, so that all are judged on the same samples.</p>{refused}
-<details open><summary>What was varied</summary>{table}</details></header>"""
+{said}
+<p>{_count(len(runs), "run")}: {_count(sweep.samples, "sample")}{escape(
+    each if len(labels) > 1 else f" under {labels[0]}")}. Sampled:</p>
+<ul>{varied or "<li>nothing: every run is the scenario as it is</li>"}</ul>{refused}</div>
+{_shares(lone) if lone else ""}</header>"""
 
     def _scenario(self, name: str) -> str:
         results = self.found[name]
         scenario = next(one for one in self.plan.scenarios if one.name == name)
-        chart = drawing.svg(figures.shares(results), f"{name}: shares of runs")
-        return f"""<section><div class="lead"><div>
-<h2>{escape(name)}: {escape(scenario.title)}</h2>
-<p class="verdict">{escape(verdict(results))}</p>
-<p class="quiet">{escape(scenario.description)}</p>{_legend(results.labels)}</div>
-<figure>{chart}<figcaption class="quiet">In how many runs. Bar: where the share of all possible
-samples lies, with 95 % confidence (Wilson).</figcaption></figure></div>
+        lead = "" if len(self.found) == 1 else (
+            f'<div class="lead"><p class="verdict">{escape(verdict(results))}</p>'
+            f"{_shares(results)}</div>")
+        return f"""<section><h2>{escape(name)}: {escape(scenario.title)}</h2>
+<p class="quiet">{escape(scenario.description)}</p>{lead}
 {self._failures(results)}{_distributions(name, results)}{self._worst(results)}{_numbers(results)}
 </section>"""
 
@@ -93,15 +94,18 @@ samples lies, with 95 % confidence (Wilson).</figcaption></figure></div>
 </tbody></table></div>{more}"""
 
     def _worst(self, results: Results) -> str:
+        runs: dict[str, list[Worst]] = {}
+        for one in results.worst():
+            runs.setdefault(one.run.job.key, []).append(one)
         rows = "".join(
-            f"<tr><th>{escape(one.metric.label)}</th><td>{escape(_with_unit(one.metric))}</td>"
-            f"<td>{escape(one.run.label)}</td><td>{escape(_others(one.others))}</td>"
-            f"{self._replay(one.run)}</tr>" for one in results.worst())
+            f"<tr><th>{'<br>'.join(escape(_in_full(one)) for one in found)}</th>"
+            f"<td>{escape(found[0].run.label)}</td>{self._replay(found[0].run)}</tr>"
+            for found in runs.values())
         return f"""<h3>Worst cases</h3>
-<p class="quiet">The one worst run by each measure, and the command that runs it again, with every
-digit of what was sampled.</p>
-<div class="scroll"><table class="plain worst"><thead><tr><th></th><th>Worst</th><th>Under</th>
-<th>On the same sample</th><th>Sample</th><th>To see it</th></tr></thead><tbody>{rows}</tbody>
+<p class="quiet">The worst run by each measure, in brackets what came of the same sample otherwise,
+and the command that runs it again, with every digit of what was sampled.</p>
+<div class="scroll"><table class="plain worst"><thead><tr><th>Worst in</th><th>Under</th>
+<th>Sample</th><th>To see it</th></tr></thead><tbody>{rows}</tbody>
 </table></div>""" if rows else ""
 
     def _replay(self, run: Planned) -> str:
@@ -126,7 +130,8 @@ def _distributions(name: str, results: Results) -> str:
         for metric in varied)
     return f"""<h3>How the runs are spread</h3>
 <p class="quiet">Box: the middle half of the runs, with the median. Line: from 5 % to 95 % of them.
-Dots: the least and the largest.</p><div class="panels wide">{panels}</div>""" if panels else ""
+Dots: the least and the largest; an arrow where they are off the picture, with how many runs and the
+farthest.</p><div class="spreads">{panels}</div>""" if panels else ""
 
 
 def _numbers(results: Results) -> str:
@@ -147,12 +152,17 @@ def _numbers(results: Results) -> str:
 </table></div>"""
 
 
-def _others(others: Mapping[str, Metric]) -> str:
-    return ", ".join(f"{label} {metric.shown()}" for label, metric in others.items()) or "–"
+def _shares(results: Results) -> str:
+    chart = drawing.svg(figures.shares(results), f"{results.runs[0].scenario}: shares of runs")
+    return f"""<figure>{chart}<figcaption class="quiet">In how many runs. Pale: where the share lies
+with 95 % confidence (Wilson).</figcaption></figure>"""
 
 
-def _with_unit(metric: Metric) -> str:
-    return f"{metric.shown()} {metric.shown_unit}".strip()
+def _in_full(worst: Worst) -> str:
+    metric = worst.metric
+    others = ", ".join(f"{label} {other.shown()}" for label, other in worst.others.items())
+    said = f"{metric.label}: {metric.shown()} {metric.shown_unit}".strip()
+    return f"{said} ({others})" if others else said
 
 
 def _direction(metric: Metric) -> str:
@@ -168,12 +178,6 @@ def _count(number: int, noun: str) -> str:
 def _listed(names: Sequence[str]) -> str:
     *first, last = names
     return f"{', '.join(first)} and {last}" if first else last
-
-
-def _legend(labels: Sequence[str]) -> str:
-    chips = "".join(f"<span>{_chip(colour)}{escape(label)}</span>"
-                    for label, colour in drawing.colours(labels).items())
-    return f'<div class="legend">{chips}</div>'
 
 
 def _chip(colour: str) -> str:

@@ -108,7 +108,7 @@ class Results:
                                   ("Every tick solved", "ticks_not_solved", 0.0)):
             if name in self.values:
                 found.append(Criterion(label, self.values[name] <= most))
-        return [*found, Criterion("All of these", np.all([one.met for one in found], axis=0))]
+        return [*found, Criterion("All of the above", np.all([one.met for one in found], axis=0))]
 
     def shown(self) -> list[Metric]:
         """Return the metrics that are laid side by side: no computing times, which depend on load.
