@@ -78,8 +78,8 @@ class Hcod(Resolver):
 
     Guesses the active set, solves it by the staircase of `tpm`, and proves the answer by its
     multipliers; where `guesses` do not lead there, a primal active set goes level by level. On
-    equalities alone it is `tpm`, to the last digit, damped or not. With damping on and inequalities,
-    it goes level by level: a level minimises ||what it misses||^2 + lambda^2 ||its own step||^2
+    equalities alone it is `tpm`, to the last digit, damped or not. With inequalities, damping makes
+    it go level by level: a level minimises ||what it misses||^2 + lambda^2 ||its own step||^2
     inside the rows above, lambda being the largest of the active sets met on the way.
 
     Where nearly parallel rows, or rows of very different scale, leave a doubt about the active set,

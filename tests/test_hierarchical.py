@@ -58,7 +58,7 @@ def test_limits_stand_before_what_algorithm_1_orders():
 
 @pytest.mark.parametrize("resolver", ["recursive", "tpm", "augmented", "reverse"])
 def test_resolvers_that_cannot_do_inequalities_refuse_with_the_level_and_the_row(resolver):
-    with pytest.raises(HierarchyError, match=rf"separation, row \d+: an inequality|joint limits"):
+    with pytest.raises(HierarchyError, match=r"separation, row \d+: an inequality|joint limits"):
         simulate(load("ellipse-hqp", [SHORT]).with_resolver(resolver))
 
 
@@ -78,5 +78,6 @@ def test_what_does_not_go_together_is_said(changes, says):
 def test_the_strictness_scenario_measures_what_a_lower_task_moves():
     strict = measure(simulate(load("strictness", ["control.duration=0.3"])))
     assert strict["moved_by_lower_max"].value < 1e-9
-    weighted = simulate(load("strictness", ["control.duration=0.3"]).with_resolver("weighted:ratio=10"))
+    scenario = load("strictness", ["control.duration=0.3"])
+    weighted = simulate(scenario.with_resolver("weighted:ratio=10"))
     assert measure(weighted)["moved_by_lower_max"].value > 1e-7

@@ -89,7 +89,8 @@ class DepthSpace:
         """Fill an obstacle image from a reading (h, w) [m] and the robot's placements then.
 
         What is farther than any point of the robot can be interested in, also if it moves by
-        _ON_ITS_WAY until the next frame, is left out. Returns the share of the pixels that have a reading: neither 0 nor NaN.
+        _ON_ITS_WAY until the next frame, is left out. Returns the share of the pixels that have a
+        reading: neither 0 nor NaN.
         """
         draw_robot(self._robot, self._eye, placements, self._links, self._capsules, self._margin)
         beyond = farthest(placements, self._joints, self._offsets, self._eye)
