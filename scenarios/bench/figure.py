@@ -15,7 +15,7 @@ from scenarios.bench.candidates import DAQP, NUMPY
 
 _LEAST, _MOST = 1e-16, 1e-4  # residuals drawn; what is beyond stands at the edge
 _MARKS = "osD^v<P"  # a cascade's backends share a colour
-_OWN = {NUMPY: "#8a8f98", DAQP: "#0b0c0d"}
+OWN = {NUMPY: "#8a8f98", DAQP: "#0b0c0d"}
 
 
 def time_against_accuracy(rows: Sequence[dict[str, Any]]) -> Figure:
@@ -72,8 +72,8 @@ def _styles(labels: Sequence[str]) -> dict[str, tuple[str, str]]:
     plain = list(dict.fromkeys(_plain(label)[0] for label in labels))
     cascades = [label for label in plain if label.startswith("hqp ")]
     colours = drawing.colours(label for label in plain
-                              if label not in _OWN and label not in cascades[1:])
-    found = {label: (_OWN.get(label) or colours.get(label) or colours[cascades[0]], "o")
+                              if label not in OWN and label not in cascades[1:])
+    found = {label: (OWN.get(label) or colours.get(label) or colours[cascades[0]], "o")
              for label in plain}
     found.update({label: (found[label][0], _MARKS[(i + 1) % len(_MARKS)])
                   for i, label in enumerate(cascades)})

@@ -29,9 +29,9 @@ from solvers.resolver import Handles
 AIM = 1e-9                       # [m] of the end effector a tick
 RATIOS = (10.0, 100.0, 1000.0)   # of weights, one level to the next
 _FORMS = {"sns": ("optimal",)}   # beside the usual one
-_START = (0.923, -0.854, 0.903, 1.195, 0.971, 1.796, 0.0)   # [rad] where the letter's run begins
-_STEP = (-0.3, 0.15, -0.25)      # [m]
-_POSTURE = (1.2, 0.6, -1.0, -1.2, 1.0, -0.9, 1.0)           # [rad] from the start
+START = (0.923, -0.854, 0.903, 1.195, 0.971, 1.796, 0.0)   # [rad] where the letter's run begins
+STEP = (-0.3, 0.15, -0.25)      # [m]
+POSTURE = (1.2, 0.6, -1.0, -1.2, 1.0, -0.9, 1.0)           # [rad] from the start
 _GAIN, _POSTURE_GAIN = 20.0, 5.0  # [1/s]
 _AT_LIMIT = 1e-9                 # [rad/s]
 
@@ -163,9 +163,9 @@ class _Step:
         self.robot, self.period = Robot.named("kuka_lwr"), period
         self.frame, self.limit = self.robot.frame("end_effector"), self.robot.velocity_limit
         n = self.robot.n
-        self.state: State = self.robot.state(_START)
-        self.goal = self.state.position(self.frame) + _STEP
-        self.posture = np.add(_START, _POSTURE)
+        self.state: State = self.robot.state(START)
+        self.goal = self.state.position(self.frame) + STEP
+        self.posture = np.add(START, POSTURE)
         self.A = np.vstack([np.eye(n), np.zeros((3, n)), np.eye(n)])
         self.lower = np.concatenate([-self.limit, np.zeros(3 + n)])
         self.upper = np.concatenate([self.limit, np.zeros(3 + n)])

@@ -1,0 +1,22 @@
+"""Ours beside the packages that can be had with pip: same arm, same path, same limits.
+
+`hierarchy bench peers`, after `python -m scenarios.bench.peers --install`. What is imported here is
+little, since the same files also run inside the peers' own environments.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from scenarios.bench.peers.entrants import Entrant
+
+
+def run(out: Path | None = None, entrants: Sequence[Entrant] | None = None,
+        ticks: int = 20_000, seconds: float = 20.0) -> list[dict[str, Any]]:
+    """See `scenarios.bench.peers.compare.run`."""
+    from scenarios.bench.peers.compare import run as run_all
+
+    return run_all(out, entrants, ticks, seconds)
