@@ -91,7 +91,7 @@ class Policy:
         if self._clamp is None:
             return x
         command = self._clamp(x)
-        if np.abs(command - x).max() > _UNCHANGED * (1.0 + np.abs(x).max()):
+        if _differ(command, x):
             self.events = [*self.events, ("beyond_limits", "clamp")]
         return command
 
@@ -103,6 +103,15 @@ def finite(values):
         if not np.isfinite(values[i]):
             return False
     return True
+
+
+@compiled
+def _differ(command, x):
+    """Whether a clamp took more off x (n,) than is left unmentioned."""
+    most = largest = 0.0
+    for i in range(len(x)):
+        most, largest = max(most, abs(command[i] - x[i])), max(largest, abs(x[i]))
+    return most > _UNCHANGED * (1.0 + largest)
 
 
 @compiled
