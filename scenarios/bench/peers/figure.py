@@ -36,8 +36,8 @@ def bars(rows: Sequence[dict[str, Any]]) -> Figure:
         ax.set_yticks(range(len(timed)), [row["entrant"] for row in timed])
         ax.invert_yaxis()
         ax.grid(visible=False, axis="y")
-        ax.legend(handles=_legend(), loc="upper center", bbox_to_anchor=(0.4, 1.16), ncols=3,
-                  fontsize=8.0)
+        ax.margins(y=0.01)
+        fig.legend(handles=_legend(), loc="outside upper center", ncols=3, fontsize=8.0)
     return fig
 
 

@@ -82,7 +82,10 @@ def write_scenes(scenes: dict[str, Scene], file: File) -> None:
 
 def read_scenes(file: File) -> dict[str, Scene]:
     """Read what `write_scenes` wrote."""
-    kept: dict[str, dict[str, Any]] = json.loads(file.read_text())
-    return {name: Scene(**{key: tuple(value) if isinstance(value, list) else value
-                           for key, value in numbers.items()})
-            for name, numbers in kept.items()}
+    return {name: _scene(numbers) for name, numbers in json.loads(file.read_text()).items()}
+
+
+def _scene(numbers: dict[str, Any]) -> Scene:
+    fields: dict[str, Any] = {key: tuple(value) if isinstance(value, list) else value
+                              for key, value in numbers.items()}
+    return Scene(**fields)

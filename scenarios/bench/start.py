@@ -1,0 +1,209 @@
+"""What it costs to begin: imports, compilation, the first solve, and the memory of a run.
+
+Each number is that of a fresh process. `hierarchy bench start`.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from time import perf_counter
+from typing import Any, final
+
+from rich.console import Console
+from rich.table import Table
+
+from scenarios.bench.machine import machine
+
+_REPEATED = 7        # times each short process is started; the least counts
+_KERNELS = 12        # slowest to compile, listed
+_MB = 1024.0 if sys.platform == "linux" else 1024.0**2  # of what the system counts memory in
+
+_SOLVE = """\
+import numpy as np
+from hierarchy import Hierarchy
+from solvers import make
+h = Hierarchy.from_levels([(np.eye(3)[:1], [1.0]), (np.eye(3)[1:], [1.0, 2.0])])
+make("tpm").solve(h)"""
+_TICK = """\
+from scenarios.build import build
+from scenarios.config import load
+from scenarios.controller import Controller
+controller = Controller(load("ellipse"))
+plant = controller.cell.plant
+controller.command(0.0, plant.q, plant.v)"""
+_COMPILE = """\
+import json, sys
+from numba.core import event
+with event.install_recorder("numba:compile") as recorder:
+    from scenarios import load, simulate
+    simulate(load("ellipse", ["control.duration=0.01"]))
+events = [(at, e.is_start, e.data["dispatcher"].py_func) for at, e in recorder.buffer]
+print(json.dumps([[at, start, f.__module__ + "." + f.__name__] for at, start, f in events]))"""
+_WORKER = """\
+import json
+from scenarios import load, simulate
+from scenarios.bench.start import resident
+short, after = load("ellipse", ["control.duration=0.5"]), []
+for _ in range(20):
+    simulate(short)
+    after.append(resident())
+print(json.dumps(after))"""
+
+
+@final
+@dataclass(frozen=True)
+class Cost:
+    """One number and the most it may be; a ceiling of None is none.
+
+    unit : "s" or "MB". processor : [s] of the processor's time in it, which the machine's other
+    work does not change; None where it is not measured.
+    """
+
+    what: str
+    value: float
+    unit: str
+    ceiling: float | None = None
+    processor: float | None = None
+
+    @property
+    def verdict(self) -> str:
+        """Whether the ceiling is kept."""
+        if self.ceiling is None:
+            return ""
+        return "met" if self.value <= self.ceiling else "not met"
+
+
+def run(out: Path | None = None) -> list[Cost]:
+    """Measure everything; print a table, write start.json into the folder `out` if given."""
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = Path(temporary)
+        compiled, kernels = first_compilation(folder / "cache")
+        costs = [*beginnings(), *compiled, *memory(folder)]
+    _print(costs, kernels)
+    if out is not None:
+        out.mkdir(parents=True, exist_ok=True)
+        (out / "start.json").write_text(json.dumps({
+            "costs": [{**asdict(cost), "verdict": cost.verdict} for cost in costs],
+            "compilation": kernels, "machine": machine()}, indent=2) + "\n")
+    return costs
+
+
+def beginnings() -> list[Cost]:
+    """Whole processes, from their start to their end, with kernels compiled before.
+
+    The least of several, since the machine's other work only adds to it.
+    """
+    timed = [("python, nothing done", ["-c", "pass"], None),
+             ("import scenarios", ["-c", "import scenarios"], None),
+             ("import hierarchy, solvers", ["-c", "import hierarchy, solvers"], None),
+             ("hierarchy --help", ["-m", "scenarios.cli", "--help"], 0.5),
+             ("first solve, kernels cached", ["-c", _SOLVE], 1.0),
+             ("first tick of ellipse, cached", ["-c", _TICK], None)]
+    return [_least(what, arguments, most) for what, arguments, most in timed]
+
+
+def first_compilation(cache: Path) -> tuple[list[Cost], dict[str, float]]:
+    """Run ten ticks of ellipse with no kernel cached; also the seconds that are each kernel's own.
+
+    Raises
+    ------
+    RuntimeError : the process failed.
+    """
+    done = _run(["-c", _COMPILE], NUMBA_CACHE_DIR=str(cache))
+    own = own_seconds(json.loads(done.said.splitlines()[-1]))
+    return [Cost("ellipse, first time ever", done.seconds, "s", None, done.processor),
+            Cost(f"of it compiling {len(own)} kernels", sum(own.values()), "s")], own
+
+
+def own_seconds(events: Sequence[Sequence[Any]]) -> dict[str, float]:
+    """Return from (time, whether it begins, name) the seconds each name took, less those within."""
+    own: dict[str, float] = {}
+    within: list[tuple[float, float]] = []  # when each that is open began, seconds of those in it
+    for at, begins, name in events:
+        if begins:
+            within.append((at, 0.0))
+            continue
+        began, inner = within.pop()
+        own[name] = own.get(name, 0.0) + at - began - inner
+        if within:
+            within[-1] = (within[-1][0], within[-1][1] + at - began)
+    return dict(sorted(own.items(), key=lambda item: -item[1]))
+
+
+def memory(folder: Path) -> list[Cost]:
+    """Return the most memory [MB] that processes hold at once."""
+    command = ["-m", "scenarios.cli", "run", "ellipse", "--duration", "2", "--out",
+               str(folder / "run")]
+    one, many = _run(command), _run(["-c", _WORKER])
+    after = json.loads(many.said.splitlines()[-1])
+    return [Cost("hierarchy run ellipse --duration 2", one.memory, "MB", 300.0),
+            Cost("20 runs of 0.5 s in one process", many.memory, "MB", 300.0),
+            Cost("growth over the last 15 of them", after[-1] - after[4], "MB")]
+
+
+def resident() -> float:
+    """Memory [MB] that this process holds; 0 where the system does not say."""
+    file = Path("/proc/self/statm")
+    if not file.is_file():
+        return 0.0
+    return int(file.read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 1024.0**2
+
+
+@final
+@dataclass(frozen=True)
+class _Done:
+    """What a process printed, its seconds on the clock and of the processor, its most memory [MB]."""
+
+    said: str
+    seconds: float
+    processor: float
+    memory: float
+
+
+def _least(what: str, arguments: list[str], most: float | None) -> Cost:
+    _run(arguments)  # so that files and kernels are in their caches
+    done = [_run(arguments) for _ in range(_REPEATED)]
+    return Cost(what, min(one.seconds for one in done), "s", most,
+                min(one.processor for one in done))
+
+
+def _run(arguments: list[str], **environment: str) -> _Done:
+    """Run Python with arguments; RuntimeError, with what it said, if it fails."""
+    with tempfile.TemporaryFile("w+") as said, tempfile.TemporaryFile("w+") as errors:
+        began = perf_counter()
+        process = subprocess.Popen([sys.executable, *arguments], stdout=said, stderr=errors,
+                                   env={**os.environ, **environment})
+        _, status, usage = os.wait4(process.pid, 0)
+        seconds = perf_counter() - began
+        process.returncode = os.waitstatus_to_exitcode(status)
+        said.seek(0)
+        errors.seek(0)
+        if process.returncode != 0:
+            raise RuntimeError(f"{arguments}: {errors.read().strip()}")
+        return _Done(said.read(), seconds, usage.ru_utime + usage.ru_stime,
+                     usage.ru_maxrss / _MB)
+
+
+def _print(costs: Sequence[Cost], kernels: dict[str, float]) -> None:
+    console = Console(highlight=False, markup=False)
+    table = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False, title="Whole processes",
+                  title_justify="left")
+    for head, side in (("", "left"), ("", "right"), ("", "left"), ("processor", "right"),
+                       ("ceiling", "right"), ("", "left")):
+        table.add_column(head, justify=side, no_wrap=True)  # type: ignore[arg-type]
+    for cost in costs:
+        digits = f"{cost.value:.2f}" if cost.unit == "s" else f"{cost.value:.0f}"
+        table.add_row(cost.what, digits, cost.unit,
+                      "" if cost.processor is None else f"{cost.processor:.2f}",
+                      "" if cost.ceiling is None else f"{cost.ceiling:g}", cost.verdict)
+    console.print(table)
+    slowest = list(kernels.items())[:_KERNELS]
+    listed = ", ".join(f"{name.removeprefix('solvers.kernels.')} {s:.1f}" for name, s in slowest)
+    console.print(f"\nSlowest to compile [s], without the kernels they call: {listed}.")
