@@ -13,7 +13,6 @@ import tempfile
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from time import perf_counter
 from typing import Any, final
 
 from rich.console import Console
@@ -25,6 +24,17 @@ _REPEATED = 7        # times each short process is started; the least counts
 _KERNELS = 12        # slowest to compile, listed
 _MB = 1024.0 if sys.platform == "linux" else 1024.0**2  # of what the system counts memory in
 
+# A process counts the memory of the one that started it as its own, if that held more: so a small
+# one starts it.
+_LAUNCH = """\
+import json, os, sys, time
+began = time.perf_counter()
+process = os.spawnv(os.P_NOWAIT, sys.argv[2], sys.argv[2:])
+_, status, usage = os.wait4(process, 0)
+spent = [time.perf_counter() - began, usage.ru_utime + usage.ru_stime, usage.ru_maxrss]
+with open(sys.argv[1], "w") as file:
+    json.dump(spent, file)
+sys.exit(os.waitstatus_to_exitcode(status))"""
 _SOLVE = """\
 import numpy as np
 from hierarchy import Hierarchy
@@ -159,7 +169,7 @@ def resident() -> float:
 @final
 @dataclass(frozen=True)
 class _Done:
-    """What a process printed, its seconds on the clock and of the processor, its most memory [MB]."""
+    """What a process printed, its seconds by clock and by processor, its most memory [MB]."""
 
     said: str
     seconds: float
@@ -176,19 +186,15 @@ def _least(what: str, arguments: list[str], most: float | None) -> Cost:
 
 def _run(arguments: list[str], **environment: str) -> _Done:
     """Run Python with arguments; RuntimeError, with what it said, if it fails."""
-    with tempfile.TemporaryFile("w+") as said, tempfile.TemporaryFile("w+") as errors:
-        began = perf_counter()
-        process = subprocess.Popen([sys.executable, *arguments], stdout=said, stderr=errors,
-                                   env={**os.environ, **environment})
-        _, status, usage = os.wait4(process.pid, 0)
-        seconds = perf_counter() - began
-        process.returncode = os.waitstatus_to_exitcode(status)
-        said.seek(0)
-        errors.seek(0)
-        if process.returncode != 0:
-            raise RuntimeError(f"{arguments}: {errors.read().strip()}")
-        return _Done(said.read(), seconds, usage.ru_utime + usage.ru_stime,
-                     usage.ru_maxrss / _MB)
+    with tempfile.TemporaryDirectory() as temporary:
+        measured = Path(temporary) / "measured.json"
+        done = subprocess.run([sys.executable, "-S", "-c", _LAUNCH, str(measured), sys.executable,
+                               *arguments], capture_output=True, text=True, check=False,
+                              env={**os.environ, **environment})
+        if done.returncode != 0:
+            raise RuntimeError(f"{arguments}: {done.stderr.strip()}")
+        seconds, processor, memory = json.loads(measured.read_text())
+    return _Done(done.stdout, seconds, processor, memory / _MB)
 
 
 def _print(costs: Sequence[Cost], kernels: dict[str, float]) -> None:

@@ -1,0 +1,71 @@
+import json
+import subprocess
+import sys
+
+import pytest
+
+from scenarios.bench import start
+from scenarios.bench.start import Cost, own_seconds, run
+
+
+def test_a_cost_is_met_up_to_its_ceiling():
+    assert Cost("a", 1.0, "s", 1.0).verdict == "met"
+    assert Cost("a", 1.1, "s", 1.0).verdict == "not met"
+    assert Cost("a", 1.1, "s").verdict == ""
+
+
+def test_seconds_of_what_is_compiled_within_are_not_counted_twice():
+    events = [(0.0, True, "outer"), (1.0, True, "inner"), (4.0, False, "inner"),
+              (5.0, True, "inner"), (6.0, False, "inner"), (10.0, False, "outer")]
+    assert own_seconds(events) == {"outer": 6.0, "inner": 4.0}
+
+
+def test_compiling_is_recorded_and_nested_rightly(tmp_path, monkeypatch):
+    """One small kernel of our own, in an empty cache."""
+    monkeypatch.setattr(start, "_COMPILE", """
+import json
+from numba.core import event
+with event.install_recorder("numba:compile") as recorder:
+    from hierarchy.limits import write_box
+    import numpy as np
+    one = np.ones(1)
+    write_box(one, one, np.ones((4, 1)), 0.001, False, one.copy(), one.copy(), 0)
+events = [(at, e.is_start, e.data["dispatcher"].py_func) for at, e in recorder.buffer]
+print(json.dumps([[at, start, f.__module__ + "." + f.__name__] for at, start, f in events]))""")
+    costs, kernels = start.first_compilation(tmp_path / "cache")
+    assert "hierarchy.limits.write_box" in kernels
+    assert all(seconds >= 0.0 for seconds in kernels.values())
+    assert costs[1].value <= costs[0].value
+
+
+def test_a_process_that_fails_is_an_error_with_its_words():
+    with pytest.raises(RuntimeError, match="went wrong"):
+        start._run(["-c", "raise SystemExit('it went wrong')"])
+
+
+def test_memory_that_a_process_held_is_seen():
+    small, large = (start._run(["-c", f"x = bytearray({n} * 2**20)"]).memory for n in (1, 200))
+    assert 190.0 < large - small < 210.0
+
+
+def test_everything_measured_is_printed_and_written(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(start, "beginnings", lambda: [Cost("help", 0.1, "s", 0.5, 0.09)])
+    monkeypatch.setattr(start, "first_compilation", lambda cache: (
+        [Cost("first", 20.0, "s", None, 19.0)], {"solvers.kernels.a.b": 2.0}))
+    monkeypatch.setattr(start, "memory", lambda folder: [Cost("a run", 301.0, "MB", 300.0)])
+    costs = run(tmp_path)
+    assert [cost.verdict for cost in costs] == ["met", "", "not met"]
+    kept = json.loads((tmp_path / "start.json").read_text())
+    assert [cost["verdict"] for cost in kept["costs"]] == ["met", "", "not met"]
+    assert kept["compilation"] == {"solvers.kernels.a.b": 2.0}
+    assert "processor" in kept["machine"]
+    said = capsys.readouterr().out
+    assert "not met" in said
+    assert "a.b 2.0" in said
+
+
+def test_importing_the_command_line_imports_nothing_heavy():
+    code = ("import sys, scenarios.cli; "
+            "print({'numpy', 'numba', 'pinocchio', 'scipy', 'matplotlib'} & set(sys.modules))")
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "set()\n"
