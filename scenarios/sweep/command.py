@@ -29,6 +29,9 @@ def sweep_command(file: str, out: Path | None, workers: int | None, scheduler: s
     except (FullError, EngineError) as error:
         print(f"hierarchy: fault: {error}", file=sys.stderr)
         return 1
+    except KeyboardInterrupt:
+        print("hierarchy: interrupted; the same command goes on from here", file=sys.stderr)
+        return 1
     for name, results in done.found.items():
         show(name, results)
     if done.plan.refused:

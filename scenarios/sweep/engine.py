@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import os
+import signal
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
@@ -13,7 +14,15 @@ from scenarios.sweep.run import Job, Outcome, digest, run_batch
 
 try:
     import dask
-    from distributed import Client, Future, KilledWorker, LocalCluster, as_completed
+    from distributed import (
+        Client,
+        Future,
+        KilledWorker,
+        LocalCluster,
+        Worker,
+        WorkerPlugin,
+        as_completed,
+    )
 except ImportError as error:
     raise HierarchyError("a sweep needs dask.distributed and pyarrow: "
                          "pip install 'task-hierarchy[sweep]'") from error
@@ -29,6 +38,13 @@ Work = Callable[[Sequence[Job], str], list[Outcome]]
 
 class EngineError(RuntimeError):
     """The runs cannot go on: the scheduler is lost, or a worker has another version."""
+
+
+class _LeaveInterrupts(WorkerPlugin):  # type: ignore[misc]
+    """Ctrl-C, which a terminal sends to all processes, is for the client to act on."""
+
+    def setup(self, worker: Worker) -> None:
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def processors() -> int:
@@ -53,12 +69,14 @@ def connected(workers: int | None = None, scheduler: str | None = None) -> Itera
             yield client
         return
     settings = {"distributed.scheduler.allowed-failures": _DEATHS,
-                "distributed.scheduler.worker-saturation": 1.0}
+                "distributed.scheduler.worker-saturation": 1.0,
+                "distributed.worker.profile.enabled": False}  # its samples fill the memory
     with dask.config.set(settings), LocalCluster(
             n_workers=workers or processors(), threads_per_worker=1, processes=True,
             host="127.0.0.1", dashboard_address="127.0.0.1:0",  # any free port, and no dashboard:
             scheduler_kwargs={"dashboard": False}, silence_logs=logging.CRITICAL) as cluster, \
             Client(cluster) as client:
+        client.register_plugin(_LeaveInterrupts())
         yield client
 
 
