@@ -105,12 +105,13 @@ class Stack:
         prepared = self._prepared.get(order)
         if (prepared is None or prepared.state is not state
                 or prepared.seen is not state.measurement):
-            prepared = self._prepare(order, state)
+            prepared = self.prepare(state, order)
         for write in prepared.writers:
             write()
         return prepared.hierarchy
 
-    def _prepare(self, order: tuple[str, ...], state: State) -> _Prepared:
+    def prepare(self, state: State, order: tuple[str, ...]) -> _Prepared:
+        """Bind the tasks of an order to a state now, not in the first tick that asks for it."""
         if not self._tasks:
             raise HierarchyError("the stack is empty: nothing is asked of the robot")
         known = self._prepared.get(order)

@@ -253,7 +253,7 @@ def _limits(scenario: Scenario, robot: Robot) -> tuple[JointLimits | None, list[
         limits = JointLimits(robot, section.acceleration, scenario.control.period, section.margin)
         box = limits if section.danger_reach is None else DangerBounds(
             limits, sensed_points(robot), section.danger_reach, name=limits.name)
-        if section.place == "guard":
+        if not scenario.limits_in_stack:
             return limits, []
         torque = [] if section.torque is None else [TorqueLimits(robot, section.torque)]
     except HierarchyError as error:

@@ -197,7 +197,8 @@ def check(file: Annotated[str, typer.Argument(help="A scenario file, or a scenar
               f"body, {tip} m of the end effector")
     if scenario.limits is not None:
         print(f"  limits    positions and velocities of the robot, "
-              f"{scenario.limits.acceleration} rad/s^2")
+              f"{scenario.limits.acceleration} rad/s^2, "
+              f"{'in the stack' if scenario.limits_in_stack else 'as a guard outside the stack'}")
     print("The file is right.")
 
 

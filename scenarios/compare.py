@@ -211,10 +211,10 @@ def _plan(scenarios: Iterable[str | Scenario],
     runs, refused = [], []
     for scenario in loaded:
         build(scenario)
-        asked = scenario.asks
-        for spec in dict.fromkeys(default_resolvers(asked)[0] if resolvers is None else resolvers):
+        usual = default_resolvers(scenario.asks)[0] if resolvers is None else resolvers
+        for spec in dict.fromkeys(usual):
             changed = scenario.with_resolver(spec)
-            resolver = changed.make_resolver()
+            resolver, asked = changed.make_resolver(), changed.asks
             if resolver.can_resolve(asked):
                 runs.append(Run(changed, spec, str(resolver.label)))
             else:

@@ -349,7 +349,8 @@ class LimitsSection(_Section):
     """The robot's joint limits, as the first level of the stack.
 
     With `place` = "guard" they are not in the stack: each command is moved into them joint by
-    joint, whatever that does to the tasks. So they suit every resolver.
+    joint, whatever that does to the tasks. So they suit every resolver. "either": in the stack of a
+    resolver that takes bounds, a guard for one that does not.
 
     Positions and velocities are those of the robot; `acceleration` [rad/s^2] of every joint, or
     one for each; `margin` [rad] is kept off the position limits; `torque` is the share of the
@@ -359,7 +360,7 @@ class LimitsSection(_Section):
     """
 
     acceleration: Positive | tuple[Positive, ...]
-    place: Literal["stack", "guard"] = "stack"
+    place: Literal["stack", "guard", "either"] = "stack"
     margin: NotNegative = 0.0
     danger_reach: Positive | None = None
     torque: Annotated[float, Field(gt=0.0, le=1.0)] | None = None
@@ -615,7 +616,7 @@ class Scenario(_Section):
             raise ValueError("[avoidance] needs [position]: Algorithm 1 orders one by the other")
         if self.limits and self.limits.danger_reach and not self.avoidance:
             raise ValueError("limits.danger_reach needs [avoidance], whose obstacles it sees")
-        if self.limits and self.limits.place == "guard" and (
+        if self.limits and self.limits.place != "stack" and (
                 self.limits.torque or self.limits.danger_reach):
             raise ValueError('limits.torque and limits.danger_reach need limits.place = "stack"')
         if self.limits and self.limits.torque and self.control.level == "velocity":
@@ -643,11 +644,18 @@ class Scenario(_Section):
         return self.plant.kind != "kinematic" or self.sensor.kind != "exact"
 
     @property
+    def limits_in_stack(self) -> bool:
+        """Whether the joint limits are a level of the stack, under the resolver that it names."""
+        if self.limits is None or self.limits.place == "guard":
+            return False
+        return self.limits.place == "stack" or self.make_resolver().handles != "equalities"
+
+    @property
     def asks(self) -> Handles:
-        """Which kind of rows its stack has."""
+        """Which kind of rows its stack has, under the resolver that it names."""
         inequalities = self.control.stack == "hierarchical" and (
             self.avoidance is not None or (self.pointing and self.pointing.kind == "inequality"))
-        limits = self.limits if self.limits and self.limits.place == "stack" else None
+        limits = self.limits if self.limits_in_stack else None
         if inequalities or (limits and limits.torque):
             return "inequalities"
         return "bounds" if limits else "equalities"

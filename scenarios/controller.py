@@ -62,6 +62,11 @@ class Controller:
         cell.state.move(0.0, cell.plant.q, cell.plant.v)
         self.sent = cell.plant.v.copy() if self.level == "velocity" else np.zeros(cell.robot.n)
         cell.state.commanded = self.sent if self.level == "velocity" else None
+        if cell.sensor is not None:
+            cell.state.measurement = cell.sensor.measurement
+        for order in cell.order.possible:
+            if set(order) <= set(cell.stack.names):
+                cell.stack.prepare(cell.state, order)
 
     @property
     def answered(self) -> bool:

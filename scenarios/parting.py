@@ -73,6 +73,8 @@ def _why(run: Run, other: Run, tick: int, accuracy: float) -> str:
         failed = np.flatnonzero(_signal(one, "status")[:tick + 1] != 0)
         if failed.size:
             return f"tick {failed[0]} of {one.label} was not solved"
+    if run.scenario.limits_in_stack != other.scenario.limits_in_stack:
+        return "the limits are in the stack of one, and a guard outside it for the other"
     if run.scenario.asks == "bounds" and "bounds" in (
             one.scenario.make_resolver().handles for one in (run, other)):
         return ("while limits act they agree only undamped, and sns not then: it scales what it "

@@ -39,6 +39,10 @@ class HandMadeScenario:
         return False
 
     @property
+    def limits_in_stack(self):
+        return False
+
+    @property
     def asks(self):
         return "equalities"
 

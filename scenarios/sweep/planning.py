@@ -82,11 +82,12 @@ def _resolvers(scenarios: Sequence[Scenario], specs: Sequence[str]
     labels: dict[str, dict[str, str]] = {}
     refused = []
     for scenario in scenarios:
-        made = {spec: scenario.with_resolver(spec).make_resolver() for spec in specs}
+        changed = {spec: scenario.with_resolver(spec) for spec in specs}
+        made = {spec: one.make_resolver() for spec, one in changed.items()}
         can = {spec: str(one.label) for spec, one in made.items()
-               if one.can_resolve(scenario.asks)}
-        refused += [f"{spec} is not run on {scenario.name}, which asks for {scenario.asks}: it "
-                    f"resolves {one.handles}" for spec, one in made.items() if spec not in can]
+               if one.can_resolve(changed[spec].asks)}
+        refused += [f"{spec} is not run on {scenario.name}, which asks for {changed[spec].asks}: "
+                    f"it resolves {one.handles}" for spec, one in made.items() if spec not in can]
         shared = Counter(can.values())
         labels[scenario.name] = {spec: spec if shared[label] > 1 else label
                                  for spec, label in can.items()}

@@ -31,7 +31,7 @@ class Daqp:
         self.kinds = np.zeros(len(self.upper), dtype=np.int32)
         self.levels = np.array(levels, dtype=np.int32)
 
-    def velocity(self, t: float, q: Array, goal: Array, rate: Array) -> Array:
+    def velocity(self, t: float, q: Array, v: Array, goal: Array, rate: Array) -> Array:
         """See `Adapter`."""
         n, scene = self.model.nv, self.scene
         pin.computeJointJacobians(self.model, self.data, q)

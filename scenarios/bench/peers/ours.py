@@ -30,12 +30,12 @@ class Ours:
                  Position(robot.frame(scene.frame), path, gain=scene.gain),
                  Posture(scene.posture, gain=scene.posture_gain)]
         self.stack = Stack(tasks if posture else tasks[:2], "velocity")
-        self.state, self.still = robot.state(scene.start), np.zeros(robot.n)
+        self.state = robot.state(scene.start)
         self.resolver, self.memory, self.before = make(resolver, **settings), None, None
 
-    def velocity(self, t: float, q: Array, goal: Array, rate: Array) -> Array:
+    def velocity(self, t: float, q: Array, v: Array, goal: Array, rate: Array) -> Array:
         """See `Adapter`; goal and rate come out of our own path."""
-        if not self.state.move(t, q, self.still):
+        if not self.state.move(t, q, v):
             raise RefusedError("State.move is False")
         self.h = self.stack.hierarchy(self.state)
         res = self.resolver.solve(self.h, self.memory)

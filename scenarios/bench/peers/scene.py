@@ -31,10 +31,11 @@ class Adapter(Protocol):
     rows: str
     """Which inequality rows it takes, in a few words."""
 
-    def velocity(self, t: float, q: Array, goal: Array, rate: Array) -> Array:
-        """Return joint velocities (n,) at joint positions q (n,): one whole tick.
+    def velocity(self, t: float, q: Array, v: Array, goal: Array, rate: Array) -> Array:
+        """Return joint velocities (n,): one whole tick.
 
-        goal (3,) [m] and rate (3,) [m/s] of the path at t [s]. Any exception is a failure.
+        q, v (n,) joint positions, and the velocities with which they were reached; goal (3,) [m]
+        and rate (3,) [m/s] of the path at t [s]. Any exception is a failure.
         """
 
     # def resolve(self) -> object: once more what the last tick resolved, and nothing else; optional

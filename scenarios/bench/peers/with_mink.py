@@ -33,7 +33,7 @@ class Mink:
         self.limits = [mink.VelocityLimit(model, dict(zip(scene.joints, scene.limit,
                                                           strict=True)))]
 
-    def velocity(self, t: float, q: Array, goal: Array, rate: Array) -> Array:
+    def velocity(self, t: float, q: Array, v: Array, goal: Array, rate: Array) -> Array:
         """See `Adapter`."""
         scene, configuration = self.scene, self.configuration
         configuration.update(q)

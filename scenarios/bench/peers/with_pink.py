@@ -38,7 +38,7 @@ class Pink:
         self.constraints = [self.position] if hard else None
         self.limits = [VelocityLimit(model, np.array(scene.limit))]
 
-    def velocity(self, t: float, q: Array, goal: Array, rate: Array) -> Array:
+    def velocity(self, t: float, q: Array, v: Array, goal: Array, rate: Array) -> Array:
         """See `Adapter`."""
         scene, configuration = self.scene, self.configuration
         configuration.update(q)

@@ -39,7 +39,7 @@ class Placo:
             self.joints = solver.add_joints_task()
             self.joints.configure("posture", "soft", 1.0)
 
-    def velocity(self, t: float, q: Array, goal: Array, rate: Array) -> Array:
+    def velocity(self, t: float, q: Array, v: Array, goal: Array, rate: Array) -> Array:
         """See `Adapter`."""
         scene, robot = self.scene, self.robot
         robot.state.q[_BASE:] = q

@@ -25,9 +25,9 @@ class Tsid:
     def __init__(self, scene: Scene, posture: bool, hard: bool = False) -> None:
         self.scene, self.hard = scene, hard
         self.robot = tsid.RobotWrapper(scene.file, [], False)
-        n, self.v, period = self.robot.nv, np.zeros(self.robot.nv), scene.period
+        n, period = self.robot.nv, scene.period
         self.formulation = tsid.InverseDynamicsFormulationAccForce("tsid", self.robot, False)
-        self.formulation.computeProblemData(0.0, np.array(scene.start), self.v)
+        self.formulation.computeProblemData(0.0, np.array(scene.start), np.zeros(n))
         self.bounds = bounds = tsid.TaskJointBounds("bounds", self.robot, period)
         bounds.setVelocityBounds(-np.array(scene.limit), np.array(scene.limit))
         self.formulation.addMotionTask(bounds, 1.0, 0, 0.0)  # keeps no reference
@@ -48,7 +48,7 @@ class Tsid:
         self.solver = tsid.SolverHQuadProgFast("solver")
         self.sized = False
 
-    def velocity(self, t: float, q: Array, goal: Array, rate: Array) -> Array:
+    def velocity(self, t: float, q: Array, v: Array, goal: Array, rate: Array) -> Array:
         """See `Adapter`."""
         scene, formulation, robot = self.scene, self.formulation, self.robot
         # The position is needed before computeProblemData, which computes it as well.
@@ -59,16 +59,14 @@ class Tsid:
         self.position.setReference(self.wanted)
         self.rates.derivative(scene.posture_gain * (self.posture - q))
         self.joints.setReference(self.rates)
-        self.problem = formulation.computeProblemData(t, q, self.v)
+        self.problem = formulation.computeProblemData(t, q, v)
         if not self.sized:
             self.solver.resize(formulation.nVar, formulation.nEq, formulation.nIn)
             self.sized = True
         found = self.resolve()
         if found.status != 0:
-            self.v = np.zeros(len(q))  # what then is commanded
             raise RefusedError(f"status {found.status}")
-        self.v = self.v + scene.period * formulation.getAccelerations(found)
-        return self.v
+        return np.asarray(v + scene.period * formulation.getAccelerations(found))
 
     def resolve(self) -> tsid.HQPOutput:
         """See `Adapter`."""

@@ -36,7 +36,7 @@ class Ticks:
         self.adapter = make(scene, True)
         self.other = make(scene, False) if beside else None
         self.resolve = getattr(self.adapter, "resolve", None)
-        self.t, self.q = 0.0, np.array(scene.start)
+        self.t, self.q, self.v = 0.0, np.array(scene.start), np.zeros(len(scene.start))
         self.log: dict[str, list[Any]] = {key: [] for key in (
             "t", "q", "v", "other", "failed", "clocked", "time", "resolve")}
         self.why = ""
@@ -60,12 +60,12 @@ class Ticks:
             for key, value in zip(self.log, (self.t, self.q, v, other, failed, k >= rehearsed,
                                              spent, again), strict=True):
                 self.log[key].append(value)
-            self.t, self.q = self.t + self.period, self.q + self.period * v
+            self.t, self.q, self.v = self.t + self.period, self.q + self.period * v, v
 
     def _velocity(self, adapter: Any, goal: Array, rate: Array) -> tuple[Array, bool]:
         """Ask for a velocity; zero, and a failure, where there is none that is finite."""
         try:
-            v = np.array(adapter.velocity(self.t, self.q, goal, rate))
+            v = np.array(adapter.velocity(self.t, self.q, self.v, goal, rate))
         except Exception as error:
             self.why = self.why or f"{type(error).__name__}: {error}".partition("\n")[0]
             return np.zeros(len(self.q)), True
@@ -86,7 +86,7 @@ def after_nan(scene: Scene, make: Make) -> str:
     q = ticks.q.copy()
     q[2] = np.nan
     try:
-        v = np.array(ticks.adapter.velocity(ticks.t, q, *scene.target(ticks.t)))
+        v = np.array(ticks.adapter.velocity(ticks.t, q, ticks.v, *scene.target(ticks.t)))
     except RefusedError as refusal:
         return f"says so: {refusal}"
     except Exception as error:
