@@ -95,17 +95,21 @@ class Recording:
 def save(recording: Recording, folder: str | Path, figures: bool = True) -> Path:
     """Write a run's folder, whole or not at all, and return its path.
 
-    It holds `run.npz` (the signals by name, with `orders`, `fault` and `events`), `metrics.json`,
-    `scenario.toml` as it was run, `versions.json`, and the letter's figures if `figures`.
-    `folder` must be new or empty.
+    It holds `run.npz` (the signals by name, with `orders`, `fault` and `events`), `timings.npz`
+    (the signals time_*), `metrics.json`, `scenario.toml` as it was run, `versions.json`, and the
+    letter's figures if `figures`. Times are measured, all else follows from the scenario: the same
+    scenario and versions give a `run.npz` of the same bytes. `folder` must be new or empty.
     """
     from scenarios import metrics  # here, since metrics reads recordings
 
+    times = {name: signal for name, signal in recording.signals.items() if name.startswith("time_")}
+    rest = {name: signal for name, signal in recording.signals.items() if name not in times}
     with whole(folder) as partial:
-        np.savez_compressed(partial / "run.npz", allow_pickle=False, **recording.signals,
+        np.savez_compressed(partial / "run.npz", allow_pickle=False, **rest,
                             orders=np.array(recording.orders, dtype=np.str_),
                             fault=np.array(recording.fault or ""),
                             events=np.array(list(recording.events), dtype=_EVENT))
+        np.savez_compressed(partial / "timings.npz", allow_pickle=False, **times)
         _write_json(partial / "metrics.json", metrics.as_plain_data(recording))
         _write_json(partial / "versions.json", versions())
         (partial / "scenario.toml").write_text(recording.scenario.to_toml(), encoding="utf-8")
@@ -126,17 +130,26 @@ def load_run(folder: str | Path) -> Recording:
 
     path = Path(folder)
     scenario = load(str(path / "scenario.toml"))
-    try:
-        with (path / "run.npz").open("rb") as stream, np.load(stream, allow_pickle=False) as file:
-            signals = {name: file[name] for name in file.files}
-        orders, fault = signals.pop("orders"), signals.pop("fault")
-        events = signals.pop("events", np.empty(0, _EVENT))
-    except FileNotFoundError:
-        raise HierarchyError(f"{path} is not a run folder: it has no run.npz") from None
-    except (OSError, KeyError, ValueError, EOFError, zipfile.BadZipFile) as error:
-        raise HierarchyError(f"{path / 'run.npz'} cannot be read: {error}") from error
+    if not (path / "run.npz").exists():
+        raise HierarchyError(f"{path} is not a run folder: it has no run.npz")
+    signals = _arrays(path / "run.npz")
+    for name in ("orders", "fault"):
+        if name not in signals:
+            raise HierarchyError(f"{path / 'run.npz'} cannot be read: it has no {name!r}")
+    orders, fault = signals.pop("orders"), signals.pop("fault")
+    events = signals.pop("events", np.empty(0, _EVENT))
+    if (path / "timings.npz").exists():  # earlier versions wrote the times into run.npz
+        signals |= _arrays(path / "timings.npz")
     return Recording(signals, tuple(map(str, orders)), scenario, str(fault) or None,
                      tuple(Event(*event) for event in events.tolist()))
+
+
+def _arrays(path: Path) -> dict[str, NDArray[Any]]:
+    try:
+        with path.open("rb") as stream, np.load(stream, allow_pickle=False) as file:
+            return {name: file[name] for name in file.files}
+    except (OSError, KeyError, ValueError, EOFError, zipfile.BadZipFile) as error:
+        raise HierarchyError(f"{path} cannot be read: {error}") from error
 
 
 def versions() -> dict[str, str]:
