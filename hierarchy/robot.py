@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from hierarchy.avoidance.control_points import ControlPoint
 from hierarchy.avoidance.measurement import Measurement
+from hierarchy.avoidance.self_collision import Capsule, link_capsules
 from hierarchy.compiled import compiled
 from hierarchy.errors import RobotError, UnknownNameError
 from hierarchy.problem import Array
@@ -52,7 +53,7 @@ class Body:
 
 
 class Robot:
-    """A fixed-base robot: its model, limits, frames and control points.
+    """A fixed-base robot: its model, limits, frames, control points and capsules of its links.
 
     `n` is the number of joint velocities, `nq` that of joint positions (more than n only where a
     joint is continuous). `lower`, `upper` (nq,) [rad or m], `velocity_limit` (n,) [rad/s or m/s]
@@ -61,7 +62,8 @@ class Robot:
     """
 
     def __init__(self, model: Any, name: str, end_effector: str | None = None,
-                 control_points: tuple[ControlPoint, ...] = ()) -> None:
+                 control_points: tuple[ControlPoint, ...] = (),
+                 capsules: tuple[Capsule, ...] = ()) -> None:
         self.model, self.name = model, name
         self.n, self.nq = int(model.nv), int(model.nq)
         if self.n == 0:
@@ -76,7 +78,7 @@ class Robot:
         self.coordinates = _coordinates(model)
         self.end_effector = end_effector or tuple(model.frames)[-1].name
         self.frame(self.end_effector)
-        self.control_points = control_points
+        self.control_points, self.capsules = control_points, capsules
 
     @classmethod
     def named(cls, name: str) -> Robot:
@@ -84,7 +86,7 @@ class Robot:
         if name not in TABLES:
             raise UnknownNameError("robot", name, TABLES)
         table = TABLES[name]
-        robot = cls(_model_from_table(table), name, END_EFFECTOR)
+        robot = cls(_model_from_table(table), name, END_EFFECTOR, capsules=link_capsules(table))
         robot.control_points = tuple(
             robot.control_point(joint, offset) for joint, offset in table.control_points)
         return robot
