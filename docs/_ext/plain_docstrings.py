@@ -1,0 +1,75 @@
+"""Docstrings are plain text; this makes reStructuredText of them, whatever characters they have.
+
+Known are paragraphs, lists with "- ", indented code, headings underlined with "---", and entries
+`name : text`, whose further lines may be indented. A name in backticks links to what it names.
+"""
+
+import re
+
+_ENTRY = re.compile(r"([A-Za-z_*][\w*.\[\]/^ ]*(?:, [A-Za-z_*][\w*.\[\]/^ ]*)*) : ?(.*)")
+_TICKS = re.compile(r"`([^`]+)`")
+_NAME = re.compile(r"[A-Za-z_][\w.]*")
+_SPECIAL = re.compile(r"([\\*|`]|_(?=\W|$))")
+
+
+def setup(app):
+    """Convert every docstring that autodoc hands over."""
+    app.connect("autodoc-process-docstring", lambda app, what, name, obj, options, lines:
+                lines.__setitem__(slice(None), converted(lines)))
+    return {"parallel_read_safe": True, "parallel_write_safe": True}
+
+
+def converted(lines):
+    """Return the lines of a docstring as reStructuredText."""
+    blocks = re.split(r"\n\s*\n", "\n".join(lines).strip("\n"))
+    return [line for block in blocks for line in [*_block(block.split("\n")), ""]]
+
+
+def _block(lines):
+    if len(lines) > 1 and re.fullmatch(r"-{3,}", lines[1].strip()):
+        return [f"**{_marked(lines[0])}**", "", *(_block(lines[2:]) if lines[2:] else [])]
+    if lines[0].startswith(" "):
+        return ["::", "", *(f"    {line}" for line in lines)]
+    if lines[0].startswith("- "):
+        return [f"- {_joined([item[0][2:], *item[1:]])}" for item in _split(lines, _is_item)]
+    if _ENTRY.fullmatch(lines[0]):
+        return [line for item in _split(lines, _ENTRY.fullmatch) for line in _entry(item)]
+    listed = next((i for i, line in enumerate(lines) if _is_item(line)), len(lines))
+    return [_joined(lines[:listed]), "", *(_block(lines[listed:]) if lines[listed:] else [])]
+
+
+def _is_item(line):
+    return line.startswith("- ")
+
+
+def _split(lines, begins):
+    """Cut lines into items; each begins where `begins` says so."""
+    items = []
+    for line in lines:
+        if begins(line) or not items:
+            items.append([])
+        items[-1].append(line)
+    return items
+
+
+def _entry(lines):
+    name, text = _ENTRY.fullmatch(lines[0]).groups()
+    return [f"``{name}``", f"    {_joined([text, *lines[1:]])}", ""]
+
+
+def _joined(lines):
+    return _marked(" ".join(line.strip() for line in lines))
+
+
+def _marked(text):
+    """Escape what reStructuredText would take for markup, and mark what is in backticks."""
+    parts = _TICKS.split(text)
+    return "".join(_quoted(part) if i % 2 else _escaped(part) for i, part in enumerate(parts))
+
+
+def _quoted(text):
+    return f"\\ :py:obj:`{text}`\\ " if _NAME.fullmatch(text) else f"\\ ``{text}``\\ "
+
+
+def _escaped(text):
+    return _SPECIAL.sub(r"\\\1", text)

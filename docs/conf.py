@@ -1,0 +1,34 @@
+"""Settings of the documentation; `make docs` builds it. Nothing is fetched, then or when read."""
+
+import sys
+import tomllib
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+sys.path[:0] = [str(ROOT), str(Path(__file__).parent / "_ext")]
+
+project = "task-hierarchy"
+author = "the contributors of task-hierarchy"
+suppress_warnings = ["toc.not_readable"]
+release = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"]
+
+extensions = ["myst_parser", "sphinx.ext.autodoc", "mathml", "outside_links", "plain_docstrings"]
+exclude_patterns = ["_build", "_ext"]
+myst_enable_extensions = ["dollarmath"]
+myst_heading_anchors = 3
+highlight_language = "none"
+
+autodoc_member_order = "bysource"
+autodoc_typehints = "signature"
+autodoc_preserve_defaults = True
+autodoc_type_aliases = {"Array": "Array"}
+toc_object_entries_show_parents = "hide"
+
+html_theme = "furo"
+html_title = project
+html_math_renderer = "mathml"
+html_static_path = ["_static"]
+html_css_files = ["site.css"]
+html_copy_source = False
+html_show_sphinx = False
+html_show_copyright = False
