@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from scenarios.config import RobotSection
+from scenarios.config import ObstacleSection, RobotSection, SensorSection
 from scenarios.recording import Recording
 
 LABELS = {"tpm": "tpm published", "tpm:form=staircase": "tpm"}
@@ -22,14 +22,17 @@ class HandMadeScenario:
     title: str = "A run made by hand"
     description: str = "Nothing was simulated."
     resolver: str = "tpm"
-    pointing: Any = field(default_factory=lambda: SimpleNamespace(alpha_d=60.0, kind="inequality"))
+    pointing: Any = field(default_factory=lambda: SimpleNamespace(
+        alpha_d=60.0, kind="inequality", axis=(1.0, 0.0, 0.0)))
     avoidance: Any = field(default_factory=lambda: SimpleNamespace(
         thresholds={"near": 0.05, "far": 0.15}, tip_thresholds={"tip": 0.1}, dimension=1,
-        obstacles=[[0.1, 0.5, 0.1]]))
+        obstacles=[[0.1, 0.5, 0.1]],
+        placed=(ObstacleSection(shape="point", centre=(0.1, 0.5, 0.1)),)))
     control: Any = field(default_factory=lambda: SimpleNamespace(
         level="acceleration", resolver="tpm", options={}, period=0.001, duration=4.0,
         jacobian_derivative="exact"))
     robot: Any = field(default_factory=lambda: RobotSection(model="kuka_lwr"))
+    sensor: Any = field(default_factory=lambda: SensorSection(kind="frames", folder="hand"))
 
     def with_resolver(self, spec: str) -> HandMadeScenario:
         return replace(self, resolver=spec)

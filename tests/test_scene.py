@@ -1,0 +1,180 @@
+import numpy as np
+import pytest
+from hand_made import recording as hand_made
+
+from hierarchy import HierarchyError, Robot, State
+from hierarchy.avoidance import link_capsules
+from hierarchy.robots import TABLES
+from scenarios import load, simulate
+from scenarios.controller import Controller
+from scenarios.levels import Fate, judge
+from scenarios.scene import capsules, ends, scene, stage
+
+SHORT = ["control.duration=1.5"]
+NAMES = ("ellipse", "ellipse-velocity", "ellipse-published", "ellipse-limits", "ellipse-hqp")
+
+
+@pytest.fixture(scope="module")
+def runs():
+    return {name: simulate(load(name, SHORT)) for name in NAMES}
+
+
+@pytest.fixture(scope="module")
+def ellipse(runs):
+    return scene(runs["ellipse"])
+
+
+def test_frames_are_the_ticks_nearest_to_their_times(runs, ellipse):
+    assert ellipse.ticks[0] == 0
+    assert ellipse.ticks[-1] == runs["ellipse"].ticks - 1
+    assert np.abs(np.diff(ellipse.t)[:-1] - 1 / 30).max() < 1.1e-3
+    assert np.array_equal(ellipse.t, runs["ellipse"]["t"][ellipse.ticks])
+
+
+def test_more_frames_than_ticks_are_the_ticks(runs):
+    assert np.array_equal(scene(runs["ellipse"], rate=5000.0).ticks, np.arange(1500))
+
+
+def test_placements_and_links_are_those_of_the_kinematics(runs, ellipse):
+    robot = Robot.named("kuka_lwr")
+    for f in (0, 20, -1):
+        state = robot.state(runs["ellipse"]["q"][ellipse.ticks[f]])
+        assert np.array_equal(ellipse.placements[f], state.placements)
+        chain = ellipse.links[f]
+        assert np.allclose(chain[0, 1], 0.0)  # the foot ends at the base
+        assert np.allclose(chain[1:, 0], chain[:-1, 1], atol=1e-12)
+        tip = robot.frame(robot.end_effector)
+        assert np.allclose(chain[-1, 1], state.position(tip))
+        assert np.allclose(ellipse.axis[f], state.rotation(tip)[:, 2])
+
+
+def test_points_and_distances_are_those_recorded(runs, ellipse):
+    recording, ticks = runs["ellipse"], ellipse.ticks
+    assert np.allclose(ellipse.traced, recording["ee_position"][ticks], atol=1e-12)
+    assert np.allclose(ellipse.distance[:, :-1], recording["control_point_distance"][ticks])
+    assert np.allclose(ellipse.distance[:, -1], recording["ee_distance"][ticks])
+    away = np.linalg.norm(ellipse.points - ellipse.nearest, axis=2)
+    assert np.allclose(away, ellipse.distance)
+
+
+def test_the_nearest_points_lie_on_the_obstacles(ellipse):
+    centres = ellipse.centres[:, None]  # the obstacles of ellipse are points
+    gap = np.linalg.norm(ellipse.nearest[:, :, None] - centres, axis=3).min(axis=2)
+    assert gap.max() < 1e-12
+
+
+def test_the_active_point_is_the_one_recorded(runs, ellipse):
+    active = runs["ellipse"]["active_control_point"][ellipse.ticks]
+    assert (ellipse.active[active > 0] == active[active > 0] - 1).all()
+    assert (ellipse.active[active < 1] == -1).all()
+    assert np.array_equal(ellipse.linked[ellipse.active < 0],
+                          ellipse.distance.argmin(axis=1)[ellipse.active < 0])
+
+
+def test_obstacles_that_move_are_where_their_path_says():
+    changes = ['avoidance.obstacles=[{shape = "sphere", radius = 0.05, path = {kind = "ellipse", '
+               'centre = [0.0, 1.0, 0.5], cosine = [0.3, 0.0, 0.0], sine = [0.0, 0.1, 0.0]}}]']
+    shown = scene(simulate(load("ellipse", ["control.duration=0.3", *changes])))
+    expected = [[0.3 * np.cos(t), 1.0 + 0.1 * np.sin(t), 0.5] for t in shown.t]
+    assert np.allclose(shown.centres[:, 0], expected)
+    assert np.allclose(np.linalg.norm(shown.nearest - shown.centres, axis=2), 0.05)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_violations_are_those_of_the_hierarchy_that_was_resolved(name):
+    """A second run asks the loop's own hierarchy, tick by tick, what its command violates."""
+    scenario = load(name, ["control.duration=0.2"])
+    controller = Controller(scenario)
+    plant, seen = controller.cell.plant, []
+    for k in range(200):
+        x = controller.command(k * scenario.control.period, plant.q, plant.v)
+        seen.append(dict(zip(controller.hierarchy.names, controller.hierarchy.violations(x),
+                             strict=True)))
+        plant.act(x)
+    levels = judge(simulate(scenario), range(200))
+    assert levels.known.all()
+    for found, fates, expected in zip(levels.violation, levels.fate, seen, strict=True):
+        for task, violation, fate in zip(levels.names, found, fates, strict=True):
+            assert np.isclose(violation, expected.get(task, np.nan), atol=1e-9, equal_nan=True)
+            assert (fate == Fate.ABSENT) == (task not in expected)
+
+
+def test_only_a_task_that_is_missed_is_violated(runs):
+    for name, fates in (("ellipse-hqp", {Fate.FREE, Fate.MET}),
+                        ("ellipse-limits", {Fate.FREE, Fate.MET, Fate.MISSED})):
+        levels = judge(runs[name], range(0, 1500, 10))
+        assert fates <= set(levels.fate.ravel().tolist())
+        assert (levels.violation[np.isin(levels.fate, (Fate.FREE, Fate.MET))] < 1e-6).all()
+        assert (levels.violation[levels.fate == Fate.MISSED] > 1e-9).all()
+
+
+def test_saturated_joints_have_the_command_of_a_side_of_their_limits():
+    scenario = load("ellipse-hqp", ["control.duration=0.5", "limits.acceleration=2.0"])
+    recording = simulate(scenario)
+    levels = judge(recording, range(recording.ticks))
+    assert (levels.saturated != 0).any()
+    at = levels.saturated[1:] != 0
+    assert np.abs(recording["command"][1:][~at]).max() < 2.0
+
+
+def test_distances_that_are_not_those_recorded_leave_levels_unknown(runs):
+    recording = runs["ellipse"]
+    kept = recording["control_point_distance"]
+    recording.signals["control_point_distance"] = kept + 1e-3
+    try:
+        levels = judge(recording, [0, 700])
+    finally:
+        recording.signals["control_point_distance"] = kept
+    assert not levels.known.any()
+    assert np.isnan(levels.violation).all()
+
+
+def test_no_peak_between_two_frames_is_lost(runs):
+    recording = runs["ellipse"]
+    for curve, values in zip(scene(recording, rate=4.0).series, scene(recording, 5000.0).series,
+                             strict=True):
+        assert np.allclose(curve.low.min(axis=0), values.value.min(axis=0))
+        assert np.allclose(curve.high.max(axis=0), values.value.max(axis=0))
+        assert ((curve.low <= curve.value) & (curve.value <= curve.high)).all()
+
+
+def test_marks_have_their_symbols_in_plain_text(ellipse):
+    assert [ellipse.series[i].marks for i in (1, 2, 3)] == [
+        (("α_d", 5.0),), (("ε₁", 0.05), ("ε₂", 0.15)), (("ε_ee", 0.1),)]
+    assert ellipse.stage.areas == (("ε₁", 0.05), ("ε₂", 0.15))
+
+
+def test_frames_end_where_the_state_stops_being_finite():
+    q = np.zeros((5, 7))
+    q[3:] = np.nan
+    assert scene(hand_made(q=q, order=np.zeros(5, int)), rate=1.0).ticks.tolist() == [0, 1, 2]
+
+
+@pytest.mark.parametrize("rate", [0.0, -1.0, np.nan, np.inf])
+def test_a_rate_that_is_none_is_refused(ellipse, runs, rate):
+    with pytest.raises(HierarchyError, match="rate"):
+        scene(runs["ellipse"], rate)
+
+
+def test_a_recording_without_ticks_is_refused():
+    with pytest.raises(HierarchyError, match="no tick"):
+        scene(hand_made(t=[]))
+
+
+def test_a_robot_without_capsules_is_drawn_as_sticks(tmp_path):
+    file = tmp_path / "two.urdf"
+    file.write_text("""<robot name="two"><link name="base"/><link name="a"/><link name="b"/>
+<joint name="one" type="revolute"><parent link="base"/><child link="a"/><axis xyz="0 0 1"/>
+<limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
+<joint name="two" type="revolute"><parent link="a"/><child link="b"/><origin xyz="0.5 0 0"/>
+<axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>""")
+    robot = Robot.from_file(file)
+    links = capsules(robot)
+    state = State(robot)
+    state.move(0.0, np.array([np.pi / 2, 0.0]), np.zeros(2))
+    assert np.allclose(ends(links, state.placements)[0, 1], [0.0, 0.5, 0.0])
+
+
+def test_the_arm_given_as_a_table_has_its_own_capsules():
+    assert capsules(Robot.named("kuka_lwr")) == link_capsules(TABLES["kuka_lwr"])
+    assert stage(load("ellipse")).floor == pytest.approx(-0.31)
