@@ -1,0 +1,68 @@
+"""A small picture and the main numbers of every shipped scenario, for docs/gallery.md.
+
+`python -m scenarios.gallery` runs all of them; names after it, only those.
+"""
+
+from __future__ import annotations
+
+import argparse
+import io
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import matplotlib
+from PIL import Image
+
+from scenarios import drawing
+from scenarios.config import load, shipped
+from scenarios.folders import write_bytes
+from scenarios.metrics import measure
+from scenarios.picture import picture
+from scenarios.simulate import simulate
+
+if TYPE_CHECKING:
+    from scenarios.recording import Recording
+
+FOLDER = Path(__file__).parents[1] / "docs" / "images" / "gallery"
+
+_DPI = 130
+_COLOURS = 64  # of the palette: enough for flat drawings, a quarter of the bytes
+_NUMBERS = ("position_error_rms_settled", "cone_violation_max", "body_distance_min",
+            "ee_distance_min", "joint_limit_excess", "speed_max", "acceleration_max",
+            "stack_changes", "ticks_not_solved")
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the scenarios named on the command line, or all, and write their pictures."""
+    parser = argparse.ArgumentParser(prog="python -m scenarios.gallery", description=__doc__)
+    parser.add_argument("scenarios", nargs="*", default=shipped(), metavar="scenario")
+    parser.add_argument("--out", type=Path, default=FOLDER, metavar="FOLDER")
+    asked = parser.parse_args(arguments)
+    asked.out.mkdir(parents=True, exist_ok=True)
+    for name in asked.scenarios:
+        recording = simulate(load(name))
+        write_bytes(asked.out / f"{name}.png", small_png(recording))
+        print(f"{name}: {'; '.join(main_numbers(recording))}", flush=True)
+
+
+def small_png(recording: Recording) -> bytes:
+    """Return the picture of a run as a PNG of few colours."""
+    drawn, reduced = io.BytesIO(), io.BytesIO()
+    with matplotlib.rc_context(drawing.style()):
+        picture({recording.scenario.name: recording}).savefig(
+            drawn, format="png", dpi=_DPI, facecolor="white")
+    with Image.open(drawn) as image:
+        image.convert("RGB").quantize(_COLOURS).save(reduced, format="png", optimize=True)
+    return reduced.getvalue()
+
+
+def main_numbers(recording: Recording) -> list[str]:
+    """Return the numbers that tell most about a run, as texts with units."""
+    found = measure(recording)
+    return [f"{found[name].label} {found[name].shown()} {found[name].shown_unit}".strip()
+            for name in _NUMBERS if name in found and found[name].value is not None]
+
+
+if __name__ == "__main__":
+    main()
