@@ -1,6 +1,6 @@
 # make demo    set up, run the main job, say where its report is
 # make test    set up, then lint, types, import rules and every test: what CI runs
-# make bench   time the resolvers and the control tick
+# make bench   time the resolvers, the control tick and the start, then all beside other packages
 # make stress  a resolver on a million generated problems, every answer certified; half an hour
 # make docs    build the documentation, any warning an error, and say where it is
 # make clean   remove what the targets above made
@@ -28,6 +28,7 @@ test: $(INSTALLED)
 
 bench: $(INSTALLED)
 	@$(BIN)/hierarchy bench
+	@$(BIN)/hierarchy bench peers
 
 COUNT    ?= 1000000
 RESOLVER ?= hcod
