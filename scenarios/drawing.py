@@ -14,16 +14,14 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from scenarios.palette import looks
+
 Array = NDArray[np.float64]
 
 # Text, axes and desired curves. In an inline SVG it becomes the page's own text colour.
 INK = "#0b0c0d"
 ALERT = "#d33a2c"
 
-# Okabe and Ito's colours, safe for colour-blind readers and legible on white and on near-black.
-_BY_LABEL = {"tpm published": "#0072b2", "tpm": "#56b4e9", "recursive": "#e69f00",
-             "augmented": "#cc79a7", "hqp": "#009e73", "hcod": "#d55e00", "weighted": "#a8781e",
-             "sns": "#bcbd22", "reverse": "#9467bd", "reverse in-order": "#ee6677"}
 # Tol's bright scheme, for the joints of one robot.
 JOINTS = ("#4477aa", "#ee6677", "#228833", "#ccbb44", "#66ccee", "#aa3377", "#999999", "#dd7733")
 
@@ -37,19 +35,8 @@ _STYLE: dict[Any, Any] = {
 
 
 def colours(labels: Iterable[str]) -> dict[str, str]:
-    """Return a colour for each label: the same one for a resolver wherever it appears.
-
-    "hqp proxqp" has the colour of "hqp", if that is not taken by another label.
-    """
-    labels = list(labels)
-    known = {label: label if label in _BY_LABEL else label.partition(" ")[0] for label in labels}
-    chosen: dict[str, str] = {}
-    for label in sorted(labels, key=lambda label: known[label] != label):
-        colour = _BY_LABEL.get(known[label])
-        if colour is not None and colour not in chosen.values():
-            chosen[label] = colour
-    spare = [colour for colour in (*_BY_LABEL.values(), *JOINTS) if colour not in chosen.values()]
-    return {label: chosen.get(label) or spare.pop(0) for label in labels}
+    """Return the colour of each label; variants of a resolver share its, see `palette.looks`."""
+    return {label: look.colour for label, look in looks(labels).items()}
 
 
 def style() -> dict[Any, Any]:

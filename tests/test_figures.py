@@ -1,8 +1,11 @@
+import itertools
+
 import numpy as np
 import pytest
 from hand_made import recording
 
-from scenarios import drawing, figures
+import solvers
+from scenarios import drawing, figures, palette
 from scenarios.picture import picture
 
 
@@ -31,21 +34,77 @@ def test_a_thinned_curve_keeps_the_gaps_of_what_was_not_there():
     assert np.isnan(y[kept[(kept > 4_100) & (kept < 7_900)]]).all()
 
 
+# Linear RGB as it is seen by most, and with each kind of colour blindness.
+SEEN_AS = {
+    "as most see": np.eye(3),
+    "protanopia": np.array([[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216],
+                            [-0.003882, -0.048116, 1.051998]]),
+    "deuteranopia": np.array([[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413],
+                              [-0.011820, 0.042940, 0.968881]]),
+    "tritanopia": np.array([[1.255528, -0.076749, -0.178779], [-0.078411, 0.930809, 0.147602],
+                            [0.004733, 0.691367, 0.303900]])}
+
+
+def linear(colour):
+    """Linear RGB (3,) of "#rrggbb"."""
+    c = np.array([int(colour[i:i + 2], 16) for i in (1, 3, 5)]) / 255
+    return np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4)
+
+
+def cielab(rgb):
+    to_xyz = np.array([[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722],
+                       [0.0193, 0.1192, 0.9505]])
+    x = to_xyz @ np.clip(rgb, 0.0, 1.0) / [0.9505, 1.0, 1.089]
+    f = np.where(x > 0.008856, np.cbrt(x), 7.787 * x + 16 / 116)
+    return np.array([116 * f[1] - 16, 500 * (f[0] - f[1]), 200 * (f[1] - f[2])])
+
+
+def contrast(one, other):
+    """Ratio of luminances as WCAG 2 defines it."""
+    low, high = sorted(float([0.2126, 0.7152, 0.0722] @ linear(c)) for c in (one, other))
+    return (high + 0.05) / (low + 0.05)
+
+
+@pytest.mark.parametrize("eyes", SEEN_AS)
+def test_the_colours_of_any_two_resolvers_are_told_apart(eyes):
+    seen = [cielab(SEEN_AS[eyes] @ linear(c)) for c in palette.COLOURS.values()]
+    apart = min(np.linalg.norm(a - b) for a, b in itertools.combinations(seen, 2))
+    assert apart > 16.0
+
+
+@pytest.mark.parametrize("ground", ["#ffffff", "#14171a"])
+def test_the_colours_are_legible_on_light_and_dark(ground):
+    assert min(contrast(c, ground) for c in palette.COLOURS.values()) > 2.2
+
+
+def test_every_resolver_there_is_has_a_colour_of_its_own():
+    assert set(palette.COLOURS) == set(solvers.names())
+    assert len(set(palette.COLOURS.values())) == len(palette.COLOURS)
+
+
 def test_a_resolver_has_the_same_colour_in_any_company():
-    alone = drawing.colours(["recursive"])["recursive"]
-    assert drawing.colours(["hqp", "something new", "recursive"])["recursive"] == alone
+    for label in ("recursive", "hqp osqp", "tpm published"):
+        for others in ([], ["hqp proxqp", "something new"], ["tpm", "hqp daqp", "my own"]):
+            assert drawing.colours([*others, label])[label] == palette.colour(label)
 
 
-def test_a_variant_has_the_colour_of_its_resolver_unless_that_is_there_too():
-    assert drawing.colours(["hqp proxqp"])["hqp proxqp"] == drawing.colours(["hqp"])["hqp"]
-    both = drawing.colours(["hqp proxqp", "hqp"])
-    assert list(both) == ["hqp proxqp", "hqp"]
-    assert both["hqp"] == drawing.colours(["hqp"])["hqp"] != both["hqp proxqp"]
+def test_a_variant_has_the_colour_of_its_resolver_and_a_line_of_its_own():
+    looks = palette.looks(["tpm published", "tpm", "hqp osqp", "hqp daqp", "hqp proxqp"])
+    assert list(looks) == ["tpm published", "tpm", "hqp osqp", "hqp daqp", "hqp proxqp"]
+    assert looks["tpm"] == (palette.COLOURS["tpm"], palette.SOLID)
+    assert looks["tpm published"].colour == looks["tpm"].colour
+    assert looks["hqp proxqp"].dash == palette.SOLID
+    assert len(set(looks.values())) == 5
 
 
-def test_no_two_resolvers_of_a_comparison_share_a_colour():
-    labels = ["tpm published", "one", "two", "three", "hqp", "recursive"]
-    assert len(set(drawing.colours(labels).values())) == len(labels)
+def test_a_label_and_the_spec_that_asks_for_it_have_one_colour():
+    assert palette.colour("hqp:backend=osqp") == palette.colour("hqp osqp")
+
+
+def test_no_two_that_stand_side_by_side_look_alike():
+    labels = ["tpm published", "one", "two", "three", "hqp", "weighted 10", "weighted 20",
+              "weighted 30", "ellipse", "human"]
+    assert len(set(palette.looks(labels).values())) == len(labels)
 
 
 def test_shared_limits_leave_out_the_one_run_that_would_flatten_the_others():

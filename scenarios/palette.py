@@ -1,0 +1,69 @@
+"""One colour for each resolver and one line for each variant, wherever either is drawn.
+
+No two of COLOURS are less than 16 apart in CIELAB, also as seen with protanopia, deuteranopia or
+tritanopia (simulated after Machado, Oliveira, Fernandes 2009), and each is legible on white and on
+near-black; tests/test_figures.py holds them to it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import NamedTuple
+
+Dash = tuple[float, ...]
+
+# Okabe and Ito's, a brown and a violet.
+COLOURS = {"tpm": "#0072b2", "recursive": "#e69f00", "augmented": "#cc79a7", "hqp": "#009e73",
+           "hcod": "#d55e00", "sns": "#56b4e9", "weighted": "#884422", "reverse": "#8844ee"}
+# For what is no resolver of this package.
+SPARE = ("#7f8790", "#999933", "#aa0044", "#44aa99", "#cc6677", "#664466")
+
+SOLID: Dash = ()
+_DASHES: tuple[Dash, ...] = (SOLID, (4.0, 1.6), (1.0, 1.4), (6.0, 1.4, 1.0, 1.4),
+                             (6.0, 1.4, 1.0, 1.4, 1.0, 1.4), (9.0, 2.0), (2.2, 1.2))
+_USUAL = ("", "proxqp")  # variants that a plain name stands for
+_VARIANTS = {"published": _DASHES[1], "in-order": _DASHES[1], "optimal": _DASHES[1],
+             "osqp": _DASHES[1], "daqp": _DASHES[2], "quadprog": _DASHES[3], "piqp": _DASHES[4],
+             "clarabel": _DASHES[5], "slack": _DASHES[6]}
+
+
+class Look(NamedTuple):
+    """A colour as "#rrggbb", and lengths on and off in line widths; none is a solid line."""
+
+    colour: str
+    dash: Dash
+
+
+def colour(label: str) -> str:
+    """Return the colour of a resolver's label: "hqp osqp" has that of "hqp"."""
+    return COLOURS.get(_resolver(label), SPARE[0])
+
+
+def dash(label: str) -> Dash:
+    """Return the line of a resolver's label: solid, but for variants."""
+    variant = label.partition(" ")[2]
+    return SOLID if variant in _USUAL else _VARIANTS.get(variant, _DASHES[1])
+
+
+def looks(labels: Iterable[str]) -> dict[str, Look]:
+    """Return how to draw labels side by side, no two alike as far as dashes and colours reach.
+
+    A resolver keeps its colour. Variants of it that would have the same line get another, and names
+    that are no resolver's get colours that are free.
+    """
+    labels = list(dict.fromkeys(labels))
+    known = {_resolver(label) for label in labels} & set(COLOURS)
+    free = [shade for name, shade in COLOURS.items() if name not in known]
+    free = [*SPARE, *free] if known else [*free, *SPARE]
+    found: dict[str, Look] = {}
+    for label in sorted(labels, key=lambda label: label.partition(" ")[2] not in _USUAL):
+        shade = COLOURS.get(_resolver(label)) or (free.pop(0) if free else SPARE[0])
+        lines = (line for line in (dash(label), *_DASHES)
+                 if Look(shade, line) not in found.values())
+        found[label] = Look(shade, next(lines, SOLID))
+    return {label: found[label] for label in labels}
+
+
+def _resolver(label: str) -> str:
+    """Return the name that a label "tpm published" or a spec "tpm:form=published" begins with."""
+    return label.partition(" ")[0].partition(":")[0]
