@@ -14,7 +14,7 @@ from scenarios import drawing
 from scenarios.bench.candidates import DAQP, NUMPY
 
 _LEAST, _MOST = 1e-16, 1e-4  # residuals drawn; what is beyond stands at the edge
-_MARKS = "osD^v<P"  # a cascade's backends share a colour
+_MARKS = "osD^v<P"  # variants of a resolver share its colour
 OWN = {NUMPY: "#8a8f98", DAQP: "#0b0c0d"}
 
 
@@ -70,13 +70,11 @@ def _plain(label: str) -> tuple[str, bool]:
 def _styles(labels: Sequence[str]) -> dict[str, tuple[str, str]]:
     """Return colour and mark of each candidate, warm or not."""
     plain = list(dict.fromkeys(_plain(label)[0] for label in labels))
-    cascades = [label for label in plain if label.startswith("hqp ")]
-    colours = drawing.colours(label for label in plain
-                              if label not in OWN and label not in cascades[1:])
-    found = {label: (OWN.get(label) or colours.get(label) or colours[cascades[0]], "o")
-             for label in plain}
-    found.update({label: (found[label][0], _MARKS[(i + 1) % len(_MARKS)])
-                  for i, label in enumerate(cascades)})
+    colours = {**drawing.colours(label for label in plain if label not in OWN), **OWN}
+    found: dict[str, tuple[str, str]] = {}
+    for label in plain:
+        variants = sum(colour == colours[label] for colour, _ in found.values())
+        found[label] = colours[label], _MARKS[variants % len(_MARKS)]
     return found
 
 
