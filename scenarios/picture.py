@@ -64,6 +64,7 @@ def _obstacles(ax: Axes, recording: Recording) -> None:
 
 def _arms(ax: Axes, recording: Recording) -> None:
     from scenarios.build import make_robot
+    from scenarios.scene import place
 
     robot = make_robot(recording.scenario.robot)
     nearest = (int(np.argmin(recording["minimal_distance"]))
@@ -77,14 +78,14 @@ def _arms(ax: Axes, recording: Recording) -> None:
                 solid_capstyle="round", solid_joinstyle="round")
         if k == nearest:
             ax.plot(*chain.T, "o", color=INK, markersize=6)
-            body = [_place(placements[point.joint], point.offset)
-                    for point in robot.control_points]
-            if body:
-                ax.plot(*drawing.project(np.array(body)).T, "o", color=ALERT, markersize=3)
+            points = robot.control_points
+            body = place(placements, [p.joint for p in points], [p.offset for p in points])
+            if len(body):
+                ax.plot(*drawing.project(body).T, "o", color=ALERT, markersize=3)
                 _shortest(ax, recording, k, body)
 
 
-def _shortest(ax: Axes, recording: Recording, k: int, body: list[Array]) -> None:
+def _shortest(ax: Axes, recording: Recording, k: int, body: Array) -> None:
     """Link the control point that is nearest to an obstacle with it, as figure 3 does."""
     avoidance = recording.scenario.avoidance
     still = [getattr(o, "centre", o) for o in avoidance.obstacles] if avoidance else []
@@ -93,8 +94,3 @@ def _shortest(ax: Axes, recording: Recording, k: int, body: list[Array]) -> None
         point = body[int(np.argmin(recording["control_point_distance"][k]))]
         end = ends[int(np.argmin(np.linalg.norm(ends - point, axis=1)))]
         ax.plot(*drawing.project(np.array([point, end])).T, color=ALERT, linewidth=1.2)
-
-
-def _place(placement: Array, offset: Array) -> Array:
-    """Return the world position (3,) [m] of an offset in a frame given as a placement row."""
-    return np.asarray(placement[9:] + placement[:9].reshape(3, 3).T @ offset)

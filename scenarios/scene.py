@@ -55,7 +55,8 @@ class Stage:
 class Series:
     """A quantity over the frames: value, and its extremes since the frame before, (F, C) each.
 
-    A mark is a name and the value of a line to compare with.
+    A mark is a name and the value of a line to compare with. `logarithmic` says on which scale it
+    is best drawn.
     """
 
     name: str
@@ -65,6 +66,7 @@ class Series:
     low: Array
     high: Array
     marks: Areas = ()
+    logarithmic: bool = False
 
 
 @dataclass(frozen=True)
@@ -147,7 +149,7 @@ def scene(recording: Recording, rate: float = 30.0) -> Scene:
                  desired=recording["desired_position"][ticks]
                  if "desired_position" in recording else None,
                  order=order[ticks], orders=order_names(recording),
-                 levels=judge(recording, ticks), series=tuple(_series(recording, ticks)),
+                 levels=judge(recording, ticks), series=tuple(series(recording, ticks)),
                  switches=recording["t"][recording.switches()])
 
 
@@ -232,11 +234,13 @@ def _areas(thresholds: dict[str, float]) -> Areas:
                  for name, radius in thresholds.items())
 
 
-def _series(recording: Recording, ticks: NDArray[np.int64]) -> Iterator[Series]:
+def series(recording: Recording, ticks: NDArray[np.int64]) -> Iterator[Series]:
+    """Yield the curves that a recording has the signals for, at some ticks."""
     scenario = recording.scenario
     if "position_error" in recording:
         error = 1e3 * np.linalg.norm(recording["position_error"], axis=1)
-        yield _sampled("Distance from the path", "mm", ("end effector",), error, ticks)
+        yield _sampled("Distance from the path", "mm", ("end effector",), error, ticks,
+                       logarithmic=True)
     if "pointing_error" in recording and scenario.pointing is not None:
         yield _sampled("Angle to the cone's axis", "deg", ("end effector",),
                        pointing_angle(recording), ticks, (("α_d", scenario.pointing.alpha_d),))
@@ -252,9 +256,9 @@ def _series(recording: Recording, ticks: NDArray[np.int64]) -> Iterator[Series]:
 
 
 def _sampled(name: str, unit: str, labels: tuple[str, ...], values: Array,
-             ticks: NDArray[np.int64], marks: Areas = ()) -> Series:
+             ticks: NDArray[np.int64], marks: Areas = (), logarithmic: bool = False) -> Series:
     values = values.reshape(len(values), -1)
     first = np.concatenate(([0], ticks[:-1] + 1))  # so no peak between two frames is lost
     upto = values[:ticks[-1] + 1]
     return Series(name, unit, labels, values[ticks], np.fmin.reduceat(upto, first, axis=0),
-                  np.fmax.reduceat(upto, first, axis=0), marks)
+                  np.fmax.reduceat(upto, first, axis=0), marks, logarithmic)
