@@ -16,6 +16,7 @@ from scenarios.config import Scenario
 from scenarios.controller import Controller
 from scenarios.recording import Event, Recording
 
+FASTEST = 1e3  # [rad/s or m/s] of a joint; what moves faster has diverged
 _TIMES = ("time_kinematics", "time_rows", "time_resolve", "time_tick")
 
 
@@ -27,32 +28,39 @@ class Recorder:
 
     def __init__(self, controller: Controller, ticks: int) -> None:
         self.ticks = 0
-        self._controller = controller
-        self._cell = cell = controller.cell
-        self._frame = cell.robot.frame(cell.robot.end_effector)
-        self._distance = cell.sensor.measurement.distance if cell.sensor else np.empty(0)
-        self._target = cell.position.target if cell.position else np.full((3, 3), np.nan)
+        cell, robot = controller.cell, controller.cell.robot
+        distances = len(cell.sensor.measurement.distance) if cell.sensor else 0
         self._orders: dict[tuple[str, ...], int] = {}
         # One row: t, q, v, a, command, end effector, target, cone error, distances.
         # All are written once here: the system maps memory when it is first touched.
-        self._log = np.full((ticks, 8 + cell.robot.nq + 3 * cell.robot.n + len(self._distance)),
-                            np.nan)
+        self._log = np.full((ticks, 8 + robot.nq + 3 * robot.n + distances), np.nan)
         self._choices = np.full((ticks, 5), -1, dtype=np.int16)
         self._times, self._over = np.full((ticks, len(_TIMES)), np.nan), np.full(ticks, np.nan)
-        state = cell.state
+        self._given = 1 + robot.nq + robot.n  # column of a
+        self._extra = {name: np.empty((ticks, *value.shape), value.dtype)
+                       for name, value in cell.plant.extra.items()}
+        self._weights = np.empty(ticks if controller.blend else 0)
+        self._events: list[Event] = []
+        self.follow(controller)
+
+    def follow(self, controller: Controller) -> None:
+        """Go on with this controller, of the same robot, plant and points that are measured."""
+        self._controller, self._cell = controller, controller.cell
+        cell, state = controller.cell, controller.cell.state
+        self._frame = cell.robot.frame(cell.robot.end_effector)
+        self._distance = cell.sensor.measurement.distance if cell.sensor else np.empty(0)
+        self._target = cell.position.target if cell.position else np.full((3, 3), np.nan)
         self._write_rest = bind(
             _write, self._log, self._choices, self._times, state.q, state.v, state.placements,
             self._frame.joint, self._frame.offset, self._target, self._distance,
             then=(*(0,) * 6, *(0.0,) * 6))
-        self._given = 1 + cell.robot.nq + cell.robot.n  # column of a
-        self._extra = {name: np.empty((ticks, *value.shape), value.dtype)
-                       for name, value in cell.plant.extra.items()}
         self._blend, self._policy = controller.blend, controller.policy
-        self._weights = np.empty(ticks if controller.blend else 0)
-        self._events: list[Event] = []
 
     def write(self) -> bool:
-        """Record the tick whose command was just applied; False if its state is not finite."""
+        """Record the tick whose command was just applied; False if its state is of no use.
+
+        That is not finite, or a joint faster than FASTEST.
+        """
         controller, cell, k = self._controller, self._cell, self.ticks
         order, repulsion = controller.allocation
         index = self._orders.setdefault(order, len(self._orders))
@@ -137,7 +145,7 @@ def _write_given(log, k, first, a, command):
 def _write(log, choices, times, q, v, placements, joint, offset, target, distance,
            k, order, active, repulsion, status, iterations, t, cone_error,
            begin, moved, written, resolved):
-    """Write the rest of tick k; whether q and v are finite."""
+    """Write the rest of tick k; whether q is finite, and v within FASTEST."""
     row = log[k]
     row[0] = t
     i = 1
@@ -148,7 +156,7 @@ def _write(log, choices, times, q, v, placements, joint, offset, target, distanc
     i += len(q)
     for j in range(len(v)):
         row[i + j] = v[j]
-        finite &= np.isfinite(v[j])
+        finite &= abs(v[j]) <= FASTEST
     i += 3 * len(v)
     for j in range(3):
         row[i + j] = point_at(placements, joint, offset, j)

@@ -11,7 +11,7 @@ from scenarios.audit import Audit, Certified, Strictness
 from scenarios.config import Scenario
 from scenarios.controller import Controller
 from scenarios.faults import Faults
-from scenarios.recorder import Recorder
+from scenarios.recorder import FASTEST, Recorder
 from scenarios.recording import Recording
 
 _REPORT_EVERY = 500  # ticks between two calls of `progress`
@@ -22,7 +22,8 @@ def simulate(scenario: Scenario, progress: Callable[[int, int], None] | None = N
     """Run a scenario from its start to its end.
 
     `progress(done, total)` is called now and then. A run that is interrupted (Ctrl-C), that is
-    stopped by its policy, or whose state stops being finite ends early: the Recording has all ticks
+    stopped by its policy, whose state stops being finite or whose joints pass `recorder.FASTEST`
+    ends early: the Recording has all ticks
     so far and says why in `fault`. With `certified`, every answer is judged by `solvers.certify`
     after its tick was timed, and the Recording has the verdicts as its signal `certified`; with
     `control.strictness` it has `moved_by_lower`, see scenarios.audit.Strictness. Raises
@@ -63,10 +64,10 @@ def _run(controller: Controller, recorder: Recorder, period: float, ticks: int,
             plant.act(controller.command(k * period, plant.q, plant.v))
         else:
             plant.act(controller.command(k * period, *faults.measure(k * period)))
-        finite = recorder.write()
+        sound = recorder.write()
         recorder.stamp(controller.clock())
-        if not finite or (policy.events and not _finite(plant.q, plant.v)):
-            return f"the state is not finite from tick {k} on (t = {k * period:.3f} s)"
+        if not sound or (policy.events and not _finite(plant.q, plant.v)):
+            return f"{_unsound(controller)} from tick {k} on (t = {k * period:.3f} s)"
         if controller.answered:
             for audit in audits:
                 audit.look(k, controller)
@@ -74,6 +75,15 @@ def _run(controller: Controller, recorder: Recorder, period: float, ticks: int,
             return policy.fault
     progress(ticks, ticks)
     return policy.fault
+
+
+def _unsound(controller: Controller) -> str:
+    state = controller.cell.state
+    joint = int(np.abs(state.v).argmax())
+    if not FASTEST < abs(state.v[joint]) < np.inf:
+        return "the state is not finite"
+    return (f"the motion has diverged: joint {joint} moves at {state.v[joint]:.3g} rad/s, "
+            f"more than {FASTEST:g},")
 
 
 def _finite(*arrays: Array) -> bool:

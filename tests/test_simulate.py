@@ -208,3 +208,14 @@ def test_a_run_whose_state_is_lost_ends_with_a_fault(monkeypatch):
     run = simulate(load("ellipse", SHORT))
     assert run.fault == "the state is not finite from tick 0 on (t = 0.000 s)"
     assert run.ticks == 1
+
+
+def test_a_run_that_diverges_ends_with_a_fault(monkeypatch):
+    def broken(self, command):
+        self.v[2] = 1.5e3 if self.v[2] else 1.0
+
+    monkeypatch.setattr(scenarios.plants.KinematicArm, "act", broken)
+    run = simulate(load("ellipse", SHORT))
+    assert run.fault == ("the motion has diverged: joint 2 moves at 1.5e+03 rad/s, more than 1000, "
+                         "from tick 2 on (t = 0.002 s)")
+    assert run.ticks == 3
