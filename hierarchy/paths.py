@@ -114,6 +114,32 @@ class Waypoints(Path):
         out[2] = way * (60 * s * (1 - s) * (1 - 2 * s) / span**2)
 
 
+@dataclass(frozen=True)
+class Shifted(Path):
+    """Another path, moved by `offset` (3,) [m]."""
+
+    path: Path
+    offset: Vector
+
+    def __post_init__(self) -> None:
+        _check("offset", self.offset)
+
+    def write(self, t: float, out: Array) -> None:
+        """See `Path.write`."""
+        self.path.write(t, out)
+        out[0] += self.offset
+
+    def writer(self, out: Array) -> Callable[[float], object]:
+        """See `Path.writer`."""
+        follow, offset = self.path.writer(out), np.asarray(self.offset, dtype=float)
+
+        def write(t: float) -> None:
+            follow(t)
+            out[0] += offset
+
+        return write
+
+
 def _check(name: str, vector: Vector) -> None:
     array = np.asarray(vector, dtype=float)
     if array.shape != (3,) or not np.isfinite(array).all():

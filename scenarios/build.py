@@ -17,7 +17,7 @@ from hierarchy.avoidance import (
     SurveillanceAreas,
     link_capsules,
 )
-from hierarchy.paths import Ellipse, Path, Still, Waypoints
+from hierarchy.paths import Ellipse, Path, Shifted, Still, Waypoints
 from hierarchy.problem import Array
 from hierarchy.robots import TABLES
 from hierarchy.tasks import (
@@ -61,6 +61,7 @@ class Cell:
     `pointing`, `limits` are the tasks of that name or None; `areas` those of Algorithm 1.
     """
 
+    scenario: Scenario
     robot: Robot
     state: State
     plant: Plant
@@ -73,16 +74,19 @@ class Cell:
     order: Order
 
 
-def build(scenario: Scenario) -> Cell:
-    """Make the parts; raises HierarchyError where the scenario does not fit its robot."""
-    robot = make_robot(scenario.robot)
+def build(scenario: Scenario, kept: Cell | None = None) -> Cell:
+    """Make the parts; raises HierarchyError where the scenario does not fit its robot.
+
+    With `kept`, the cell of a scenario that differs in its tasks' settings or its resolver, its
+    robot, state, plant and obstacles go on, and its sensor where the settings of that are the same.
+    """
+    robot = kept.robot if kept else make_robot(scenario.robot)
     control, avoidance = scenario.control, scenario.avoidance
-    q, v = _start(robot, scenario.start)
     differences = control.period if control.jacobian_derivative == "difference" else None
-    state = State(robot, differences)
-    sensor = _sensor(scenario, robot)
-    if sensor is not None:
-        sensor.check_start(robot.state(q, v))
+    state = kept.state if kept else State(robot, differences)
+    sensor = _kept_sensor(scenario, kept) if kept else _sensor(scenario, robot)
+    obstacles = sensor.obstacles if sensor else Obstacles()
+    plant = kept.plant if kept else _started_plant(scenario, robot, sensor, obstacles)
     limits, first = _limits(scenario, robot)
     position, pointing = _position(scenario, robot), _pointing(scenario, robot)
     last = _posture(scenario, robot, "task")
@@ -90,8 +94,7 @@ def build(scenario: Scenario) -> Cell:
              *(task for task in (position, pointing, last) if task)]
     areas = (SurveillanceAreas(avoidance.near, avoidance.far, avoidance.end_effector)
              if isinstance(avoidance, AvoidanceSection) else None)
-    obstacles = sensor.obstacles if sensor else Obstacles()
-    return Cell(robot, state, _plant(scenario, robot, q, v, obstacles),
+    return Cell(scenario, robot, state, plant,
                 Stack(tasks, control.level, _reference(scenario, robot)), sensor, areas,
                 position, pointing, limits, _order(scenario, areas, first, tasks))
 
@@ -174,6 +177,14 @@ def _reach(robot: Robot, q: Array, point: Array) -> Array:
                         f"{robot.name!r} came no nearer than {nearest:.3g} m")
 
 
+def _started_plant(scenario: Scenario, robot: Robot, sensor: Sensor | None,
+                   obstacles: Obstacles) -> Plant:
+    q, v = _start(robot, scenario.start)
+    if sensor is not None:
+        sensor.check_start(robot.state(q, v))
+    return _plant(scenario, robot, q, v, obstacles)
+
+
 def _plant(scenario: Scenario, robot: Robot, q: Array, v: Array, obstacles: Obstacles) -> Plant:
     section, control = scenario.plant, scenario.control
     if not section.measurement.ideal and robot.nq != robot.n:
@@ -189,14 +200,24 @@ def _plant(scenario: Scenario, robot: Robot, q: Array, v: Array, obstacles: Obst
     return exact if ideal else Apart(exact, sensor)
 
 
-def _sensor(scenario: Scenario, robot: Robot) -> Sensor | None:
+def _kept_sensor(scenario: Scenario, kept: Cell) -> Sensor | None:
+    same = (scenario.avoidance, scenario.sensor, scenario.limits) == (
+        kept.scenario.avoidance, kept.scenario.sensor, kept.scenario.limits)
+    if same or kept.sensor is None:
+        return kept.sensor
+    return _sensor(scenario, kept.robot, kept.sensor.obstacles)
+
+
+def _sensor(scenario: Scenario, robot: Robot,
+            obstacles: Obstacles | None = None) -> Sensor | None:
     section = scenario.avoidance
     if section is None:
         return None
     if not robot.control_points:
         raise ScenarioError(f"[avoidance]: robot {robot.name!r} has no control points; list them "
                             "in robot.control_points")
-    obstacles = make_obstacles(section.placed)
+    if obstacles is None:
+        obstacles = make_obstacles(section.placed)
     if isinstance(section, SeparationSection):
         return _seen_by(scenario, robot, ExactDistances(robot, obstacles, pairs=True),
                         section.influence)
@@ -230,8 +251,10 @@ def _position(scenario: Scenario, robot: Robot) -> Position | None:
         return None
     avoidance = scenario.avoidance
     within = avoidance.end_effector if isinstance(avoidance, AvoidanceSection) else -1.0
-    return Position(robot.frame(robot.end_effector), make_path(section.path), section.stiffness,
-                    section.damping, section.gain, repulsion_within=within)
+    path = make_path(section.path)
+    return Position(robot.frame(robot.end_effector),
+                    Shifted(path, section.offset) if any(section.offset) else path,
+                    section.stiffness, section.damping, section.gain, repulsion_within=within)
 
 
 def _pointing(scenario: Scenario, robot: Robot) -> Pointing | None:

@@ -177,9 +177,10 @@ PathSection = Annotated[StillSection | EllipseSection | WaypointsSection,
 
 
 class PositionSection(_Section):
-    """End-effector position along a path."""
+    """End-effector position along a path, which is moved by `offset` [m]."""
 
     path: PathSection
+    offset: Vector3 = (0.0, 0.0, 0.0)
     stiffness: NotNegative = 40.0
     damping: NotNegative = 20.0
     gain: NotNegative = 10.0
@@ -681,6 +682,13 @@ class Scenario(_Section):
         options = {**kept, **_parse_changes(settings, what=f"resolver {spec!r}")}
         control = {**self.control.model_dump(), "resolver": name, "options": options}
         return _validated({**self.model_dump(), "control": control}, f"resolver {spec!r}")
+
+    def with_changes(self, changes: Mapping[str, Any]) -> Scenario:
+        """Return this scenario with other values of dotted keys; ScenarioError as `load` does."""
+        data = self.model_dump()
+        for key, value in changes.items():
+            _change(data, key, value)
+        return _validated(data, f"scenario {self.name!r}")
 
     def to_toml(self) -> str:
         """Return the scenario as a file that `load` reads back."""

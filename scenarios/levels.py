@@ -62,7 +62,7 @@ def judge(recording: Recording, ticks: Sequence[int] | NDArray[np.int64]) -> Lev
     """Write the rows of some ticks again, and judge by them the command that was sent.
 
     The rows follow from the recorded joints, if the distances do. Where these were seen by a
-    camera, or are not those recorded, levels are UNKNOWN.
+    camera, or are not those recorded, or settings had been changed, levels are UNKNOWN.
     """
     orders = order_names(recording)
     names = tuple(dict.fromkeys(name for order in orders for name in order))
@@ -70,26 +70,45 @@ def judge(recording: Recording, ticks: Sequence[int] | NDArray[np.int64]) -> Lev
     levels = Levels(names, np.zeros(shape, np.int8), np.full(shape, np.nan),
                     np.zeros((len(ticks), recording["v"].shape[1]), np.int8))
     rows = _Rows(recording) if recording.scenario.sensor.kind == "exact" else None
+    accuracy = recording.scenario.make_resolver().accuracy
+    changed = recording.signals.get("changed", np.zeros(recording.ticks, bool))
     for f, k in enumerate(int(tick) for tick in ticks):
         order = orders[recording["order"][k]]
         columns = [names.index(name) for name in order]
         levels.fate[f, columns] = Fate.UNKNOWN
-        h = rows.hierarchy(k, order) if rows and order else None
+        h = rows.hierarchy(k, order) if rows and order and not changed[k] else None
         if rows and h:
-            x, near = recording["command"][k], rows.tolerance(k)
+            x = recording["command"][k]
+            near = tolerance(accuracy, x)
             levels.violation[f, columns] = h.violations(x)
-            levels.fate[f, columns] = _fates(h, x, near)
-            levels.saturated[f] = rows.saturated(h, x, near)
+            levels.fate[f, columns] = fates(h, x, near)
+            levels.saturated[f] = saturated(rows.cell, h, x, near)
     return levels
 
 
-def _fates(h: Hierarchy, x: Array, near: float) -> list[Fate]:
-    fates = []
+def fates(h: Hierarchy, x: Array, near: float) -> list[Fate]:
+    """What became of each level at x (n,); a row this near to a side is on it."""
+    found = []
     for violation, (A, lower, upper) in zip(h.violations(x), h.levels(), strict=True):
         at_a_side = np.minimum(A @ x - lower, upper - A @ x) <= near
-        fates.append(Fate.MISSED if violation > near else
+        found.append(Fate.MISSED if violation > near else
                      Fate.MET if at_a_side.any() else Fate.FREE)
-    return fates
+    return found
+
+
+def saturated(cell: Cell, h: Hierarchy, x: Array, near: float) -> NDArray[np.int8]:
+    """Side -1 or 1 of the cell's joint limits at which each entry of x (n,) is, else 0."""
+    limits = cell.limits
+    if limits is None:
+        return np.zeros(len(x), np.int8)
+    lower, upper = (limits.box(cell.state, cell.stack.level) if limits.name not in h.names
+                    else list(h.levels())[h.names.index(limits.name)][1:])
+    return (x >= upper - near).astype(np.int8) - (x <= lower + near).astype(np.int8)
+
+
+def tolerance(accuracy: float, x: Array) -> float:
+    """How far off a side a row may be to be on it, at an answer x (n,) of a resolver."""
+    return max(TOLERANCE, accuracy) * (1.0 + float(np.linalg.norm(x)))
 
 
 class _Rows:
@@ -98,16 +117,11 @@ class _Rows:
     def __init__(self, recording: Recording) -> None:
         scenario = recording.scenario
         self._recording, self._level = recording, scenario.control.level
-        self._cell: Cell = build(scenario.model_copy(update={"plant": PlantSection()}))
-        self._accuracy = max(TOLERANCE, scenario.make_resolver().accuracy)
-
-    def tolerance(self, k: int) -> float:
-        """How far off a side a row of tick k may be to be on it."""
-        return self._accuracy * (1.0 + float(np.linalg.norm(self._recording["command"][k])))
+        self.cell: Cell = build(scenario.model_copy(update={"plant": PlantSection()}))
 
     def hierarchy(self, k: int, order: tuple[str, ...]) -> Hierarchy | None:
         """The rows of tick k, valid until the next; None if they are not those of the run."""
-        recording, cell = self._recording, self._cell
+        recording, cell = self._recording, self.cell
         t, q, v = (recording[name] for name in ("t", "q", "v"))
         if cell.state.period > 0.0:  # differences are against the tick before
             cell.state.move(t[max(k - 1, 0)], q[max(k - 1, 0)], v[max(k - 1, 0)])
@@ -126,12 +140,3 @@ class _Rows:
             return True
         known = [*self._recording["control_point_distance"][k], self._recording["ee_distance"][k]]
         return bool(np.allclose(seen.distance, known, rtol=0.0, atol=_SAME))
-
-    def saturated(self, h: Hierarchy, x: Array, near: float) -> NDArray[np.int8]:
-        """Side -1 or 1 of its limits at which each joint (n,) is, else 0."""
-        limits = self._cell.limits
-        if limits is None:
-            return np.zeros(len(x), np.int8)
-        lower, upper = (limits.box(self._cell.state, self._level) if limits.name not in h.names
-                        else list(h.levels())[h.names.index(limits.name)][1:])
-        return (x >= upper - near).astype(np.int8) - (x <= lower + near).astype(np.int8)

@@ -59,6 +59,8 @@ class Recording:
     time_kinematics, time_rows, time_resolve, time_tick (T,) [s] of computing; where stacks are
     blended, time_resolve has the rows of the former ones too; time_tick has the plant's step too
     joint_lower, joint_upper, velocity_limit (n,) of the robot, infinite where it has none
+    obstacle_offset (T, H, 3) [m] by which obstacles had been dragged off their places, changed (T,)
+    bool, whether that or a setting was other than the scenario says, in a live run
 
     A signal that the scenario has no use for is absent. `events` are the ticks with trouble.
     """

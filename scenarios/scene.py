@@ -208,8 +208,11 @@ def _moved(fixed: Stage, recording: Recording, ticks: NDArray[np.int64]) -> dict
     seen, tip = sensor.measurement, robot.frame(robot.end_effector)
     frames: dict[str, list[Array]] = {name: [] for name in (
         "placements", "points", "nearest", "distance", "centres", "axis")}
+    offsets = recording.signals.get("obstacle_offset", np.empty((recording.ticks, 0, 3)))
     for k in ticks:
         state.move(float(recording["t"][k]), q[k], at_rest)
+        for h, offset in enumerate(offsets[k]):
+            fixed.obstacles.shift(h, offset)
         sensor.measure(state)
         away = np.where(np.isfinite(seen.distance), seen.distance, np.nan)[:, None]
         now = (state.placements, seen.points, seen.points - away * seen.direction, seen.distance,

@@ -59,13 +59,14 @@ class Obstacle:
 class Obstacles:
     """All obstacles of a scene as one table (H, 16) that follows time.
 
-    `motion` (H, 6) has the velocity [m/s] and acceleration [m/s^2] of each centre.
+    `motion` (H, 6) has the velocity [m/s] and acceleration [m/s^2] of each centre; `offset` (H, 3)
+    [m] is what `shift` moved each by.
     """
 
     def __init__(self, obstacles: Sequence[Obstacle] = ()) -> None:
         self.obstacles = tuple(obstacles)
         self.table = np.array([o.packed() for o in obstacles]).reshape(-1, _WIDTH)
-        self.motion = np.zeros((len(self.table), 6))
+        self.motion, self.offset = np.zeros((len(self.table), 6)), np.zeros((len(self.table), 3))
         self._moving = [(h, o.path) for h, o in enumerate(obstacles) if o.path is not None]
         self.at(0.0)
 
@@ -76,9 +77,17 @@ class Obstacles:
         """Move the obstacles to time t [s] and return the table (H, 16)."""
         for h, path in self._moving:
             moved = path(t)
-            self.table[h, _CENTRE] = moved[0]
+            self.table[h, _CENTRE] = moved[0] + self.offset[h]
             self.motion[h] = moved[1:].ravel()
         return self.table
+
+    def shift(self, h: int, offset: ArrayLike) -> None:
+        """Move obstacle h to `offset` (3,) [m] from where its centre or its path has it.
+
+        Its `motion` stays that of its path: a sensor does not know what moves it by hand.
+        """
+        self.table[h, _CENTRE] += np.asarray(offset, dtype=float) - self.offset[h]
+        self.offset[h] = offset
 
     @property
     def centres(self) -> Array:

@@ -1,0 +1,87 @@
+"""A run goes on with other settings: the same robot, plant and obstacles, other tasks."""
+
+import numpy as np
+import pytest
+
+from hierarchy.avoidance import Obstacle, Obstacles
+from hierarchy.paths import Ellipse, Shifted, Waypoints
+from scenarios.build import build
+from scenarios.config import ScenarioError, load
+from scenarios.controller import Controller
+from scenarios.recorder import Recorder
+
+ELLIPSE = Ellipse((0.0, 0.6, 0.0), (0.2, 0.0, 0.2), (0.0, 0.1, 0.0))
+WAY = Waypoints((0.0, 1.0), ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0)))
+
+
+def drive(controller, recorder, first, ticks):
+    plant = controller.cell.plant
+    for k in range(first, first + ticks):
+        plant.act(controller.command(k * 0.001, plant.q, plant.v))
+        recorder.write()
+
+
+@pytest.mark.parametrize("path", [ELLIPSE, WAY], ids=["ellipse", "waypoints"])
+def test_a_shifted_path_differs_by_its_offset_and_moves_alike(path):
+    shifted, out = Shifted(path, (0.1, -0.2, 0.3)), np.empty((3, 3))
+    shifted.writer(out)(0.4)
+    assert (out == shifted(0.4)).all()
+    assert out[0] == pytest.approx(path(0.4)[0] + [0.1, -0.2, 0.3])
+    assert (out[1:] == path(0.4)[1:]).all()
+
+
+def test_an_obstacle_that_was_shifted_keeps_its_offset_while_it_moves():
+    obstacles = Obstacles([Obstacle("point", (0.1, 0.2, 0.3)),
+                           Obstacle("sphere", (0.0, 0.0, 0.0), (0.1,), path=WAY)])
+    for offset in ((0.0, 0.0, 0.5), (0.0, 0.1, 0.0)):  # not one on top of the other
+        obstacles.shift(0, offset)
+        obstacles.shift(1, offset)
+    assert obstacles.centres[0] == pytest.approx([0.1, 0.3, 0.3])
+    for t in (0.0, 0.5, 1.0):
+        assert obstacles.at(t)[1, 4:7] == pytest.approx(WAY(t)[0] + [0.0, 0.1, 0.0])
+
+
+def test_position_offset_moves_the_target():
+    here, there = (build(load("ellipse", changes)).position.path(0.3)[0]
+                   for changes in ([], ["position.offset=[0.0, 0.1, 0.2]"]))
+    assert there - here == pytest.approx([0.0, 0.1, 0.2])
+
+
+def test_a_change_of_a_scenario_is_validated():
+    scenario = load("ellipse")
+    assert scenario.with_changes({"pointing.alpha_d": 35.0}).pointing.alpha_d == 35.0
+    with pytest.raises(ScenarioError, match=r"avoidance.*near = 0.3 m is beyond far = 0.15 m"):
+        scenario.with_changes({"avoidance.near": 0.3})
+    with pytest.raises(ScenarioError, match="alpha"):
+        scenario.with_changes({"pointing.alpha": 35.0})
+
+
+def test_a_cell_that_is_kept_goes_on_where_it_was():
+    scenario = load("ellipse", ["control.options.damping=0.0"])
+    whole, parted = Controller(scenario), Controller(scenario)
+    once, twice = Recorder(whole, 60), Recorder(parted, 60)
+    drive(whole, once, 0, 60)
+    drive(parted, twice, 0, 30)
+    again = Controller(scenario, build(scenario, parted.cell))
+    twice.follow(again)
+    drive(again, twice, 30, 30)
+    assert again.cell.plant is parted.cell.plant
+    one, other = once.finish(scenario, None), twice.finish(scenario, None)
+    for name in ("t", "q", "v", "command", "order", "minimal_distance", "desired_position"):
+        assert (one[name] == other[name]).all(), name
+
+
+def test_another_resolver_and_threshold_take_over_in_mid_motion():
+    scenario = load("ellipse")
+    controller = Controller(scenario)
+    recorder = Recorder(controller, 40)
+    drive(controller, recorder, 0, 20)
+    other = scenario.with_resolver("hcod").with_changes({"avoidance.near": 0.0, "avoidance.far": 0.0})
+    controller = Controller(other, build(other, controller.cell))
+    recorder.follow(controller)
+    drive(controller, recorder, 20, 20)
+    recording = recorder.finish(scenario, None)
+    assert controller.resolver.name == "hcod"
+    assert "avoidance" in recording.orders[recording["order"][0]]
+    assert "avoidance" not in recording.orders[recording["order"][-1]]
+    assert np.abs(np.diff(recording["q"], axis=0)).max() < 2e-3  # rad in 1 ms: nothing jumps
