@@ -76,7 +76,8 @@ def test_another_resolver_and_threshold_take_over_in_mid_motion():
     controller = Controller(scenario)
     recorder = Recorder(controller, 40)
     drive(controller, recorder, 0, 20)
-    other = scenario.with_resolver("hcod").with_changes({"avoidance.near": 0.0, "avoidance.far": 0.0})
+    nowhere = {"avoidance.near": 0.0, "avoidance.far": 0.0}
+    other = scenario.with_resolver("hcod").with_changes(nowhere)
     controller = Controller(other, build(other, controller.cell))
     recorder.follow(controller)
     drive(controller, recorder, 20, 20)
