@@ -1,0 +1,125 @@
+"""Levels at velocity level out of a MuJoCo model and its data (extra `sim`).
+
+Unknown is the velocity (nv,), in MuJoCo's order. The data must be up to date at its qpos:
+`mj_forward`, or `mj_kinematics` and `mj_comPos`. Each function returns a level for
+`Hierarchy.from_levels`: `(A, b)` or `(A, lower, upper)`.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from hierarchy.errors import HierarchyError, UnknownNameError
+from hierarchy.problem import Array
+
+KINDS = ("body", "site", "geom")
+
+
+def frame(model: Any, data: Any, name: str, kind: str = "body") -> tuple[Array, Array]:
+    """Return where a body, site or geom is: position (3,) [m] and rotation (3, 3), in the world."""
+    which = _index(model, name, kind)
+    # The frame of a body; `xipos` would be its centre of mass.
+    position, rotation = {"body": (data.xpos, data.xmat), "site": (data.site_xpos, data.site_xmat),
+                          "geom": (data.geom_xpos, data.geom_xmat)}[kind]
+    return np.array(position[which]), np.array(rotation[which]).reshape(3, 3)
+
+
+def jacobian(model: Any, data: Any, name: str, kind: str = "body") -> Array:
+    """Return the Jacobian (6, nv) of a frame: its origin's velocity, then its angular velocity.
+
+    Both in the world's axes.
+    """
+    import mujoco
+
+    write = {"body": mujoco.mj_jacBody, "site": mujoco.mj_jacSite, "geom": mujoco.mj_jacGeom}
+    J = np.zeros((6, model.nv))
+    which = _index(model, name, kind)
+    write[kind](model, data, J[:3], J[3:], which)
+    return J
+
+
+def position_level(model: Any, data: Any, name: str, target: ArrayLike, gain: float,
+                   kind: str = "body", velocity: ArrayLike = (0.0, 0.0, 0.0)
+                   ) -> tuple[Array, Array]:
+    """Bring a frame's origin to `target` (3,) [m]: J x = velocity + gain (target - position).
+
+    gain [1/s]; `velocity` (3,) [m/s] of the target.
+    """
+    position, _ = frame(model, data, name, kind)
+    return (jacobian(model, data, name, kind)[:3],
+            np.asarray(velocity, float) + gain * (_shaped("target", target, (3,)) - position))
+
+
+def orientation_level(model: Any, data: Any, name: str, target: ArrayLike, gain: float,
+                      kind: str = "body") -> tuple[Array, Array]:
+    """Turn a frame to the rotation `target` (3, 3): angular velocity = gain times what is missing.
+
+    What is missing is the rotation vector [rad], in the world's axes; gain [1/s].
+    """
+    import mujoco
+
+    _, rotation = frame(model, data, name, kind)
+    missing = _shaped("target", target, (3, 3)) @ rotation.T
+    quaternion, vector = np.empty(4), np.empty(3)
+    mujoco.mju_mat2Quat(quaternion, missing.ravel())
+    mujoco.mju_quat2Vel(vector, quaternion, 1.0)
+    return jacobian(model, data, name, kind)[3:], gain * vector
+
+
+def posture_level(model: Any, data: Any, target: ArrayLike, gain: float) -> tuple[Array, Array]:
+    """Bring all joints to `target` (nq,) [rad or m]: x = gain times the way there; gain [1/s]."""
+    import mujoco
+
+    way = np.empty(model.nv)
+    mujoco.mj_differentiatePos(model, way, 1.0, data.qpos, _shaped("target", target, (model.nq,)))
+    return np.eye(model.nv), gain * way
+
+
+def limit_level(model: Any, data: Any, period: float, velocity: float | ArrayLike = np.inf
+                ) -> tuple[Array, Array, Array]:
+    """Keep hinges and slides in their ranges after the next `period` [s], and within `velocity`.
+
+    velocity [rad/s or m/s] is one number or (nv,). A joint out of its range is brought back as fast
+    as that allows. Ranges of ball joints are not limited; HierarchyError names one that has any.
+    """
+    import mujoco
+
+    fastest = np.broadcast_to(np.asarray(velocity, dtype=float), model.nv)
+    if not (period > 0.0 and (fastest > 0.0).all()):
+        raise HierarchyError(f"limits: period {period} s and velocity {velocity!r} must be "
+                             "positive")
+    single = (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE))
+    lower, upper = -fastest, fastest.copy()
+    for joint in range(model.njnt):
+        if not model.jnt_limited[joint]:
+            continue
+        if model.jnt_type[joint] not in single:
+            raise HierarchyError(f"limits: joint {model.joint(joint).name!r} is neither a hinge "
+                                 "nor a slide, its range cannot be a bound")
+        i, q = model.jnt_dofadr[joint], data.qpos[model.jnt_qposadr[joint]]
+        lower[i], upper[i] = np.clip((model.jnt_range[joint] - q) / period, lower[i], upper[i])
+    return np.eye(model.nv), lower, upper
+
+
+def _index(model: Any, name: str, kind: str) -> int:
+    import mujoco
+
+    if kind not in KINDS:
+        raise UnknownNameError("kind of frame", kind, KINDS)
+    which = getattr(mujoco.mjtObj, f"mjOBJ_{kind.upper()}")
+    index = mujoco.mj_name2id(model, which, name)
+    if index < 0:
+        count = {"body": model.nbody, "site": model.nsite, "geom": model.ngeom}[kind]
+        names = [mujoco.mj_id2name(model, which, i) for i in range(count)]
+        raise UnknownNameError(kind, name, [known for known in names if known])
+    return int(index)
+
+
+def _shaped(what: str, value: ArrayLike, shape: tuple[int, ...]) -> Array:
+    array = np.array(value, dtype=float)
+    if array.shape != shape or not np.isfinite(array).all():
+        raise HierarchyError(f"{what} must be {shape} finite numbers, got {value!r}")
+    return array

@@ -1,0 +1,441 @@
+"""Adapters against the packages that they are for."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import qpsolvers
+
+from hierarchy import Hierarchy, HierarchyError, Robot, Stack
+from hierarchy.adapters.displacements import limit_level
+from hierarchy.adapters.pink import PinkTask
+from hierarchy.adapters.pink import hierarchy as pink_hierarchy
+from hierarchy.tasks import Position
+from solvers import make
+from solvers.adapters.pink import solve_ik
+from solvers.programs import level_problem
+
+DT = 0.01
+Q = np.array([0.1, 0.5, -0.2, -1.0, 0.3, 0.8, 0.0])
+ARM = """
+<mujoco><compiler angle="radian"/>
+  <worldbody><body name="upper" pos="0 0 0.1"><joint name="a" axis="0 0 1" range="-2 2"/>
+    <geom type="capsule" size="0.03" fromto="0 0 0 0 0 0.3"/>
+    <body name="middle" pos="0 0 0.3"><joint name="b" axis="0 1 0" range="-2 2"/>
+      <geom type="capsule" size="0.03" fromto="0 0 0 0.3 0 0"/>
+      <body name="lower" pos="0.3 0 0"><joint name="c" axis="0 1 0" range="-2 2"/>
+        <geom type="capsule" size="0.02" fromto="0 0 0 0.25 0 0"/>
+        <body name="wrist" pos="0.25 0 0"><joint name="d" axis="1 0 0" range="-2 2"/>
+          <geom name="pad" type="sphere" size="0.02" pos="0.1 0.02 0"/>
+          <site name="tip" pos="0.1 0.02 0"/>
+        </body></body></body></body></worldbody></mujoco>
+"""
+POSE = np.array([0.3, 0.4, 0.5, -0.2])
+
+
+# --- pink ---------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def robot():
+    pytest.importorskip("pink")
+    return Robot.named("kuka_lwr")
+
+
+@pytest.fixture
+def configuration(robot):
+    import pink
+
+    return pink.Configuration(robot.model, robot.model.createData(), Q)
+
+
+def frame_task(configuration, frame="end_effector", shift=(0.05, 0.02, -0.03), turn=0.1, gain=0.5,
+               position=1.0, orientation=0.5):
+    import pinocchio as pin
+    from pink.tasks import FrameTask
+
+    task = FrameTask(frame, position_cost=position, orientation_cost=orientation, gain=gain)
+    here = configuration.get_transform_frame_to_world(frame)
+    task.set_target(pin.SE3(here.rotation @ pin.exp3(np.array([turn, 0.0, 0.0])),
+                            here.translation + np.array(shift)))
+    return task
+
+
+def posture_task(target, cost=0.1):
+    from pink.tasks import PostureTask
+
+    task = PostureTask(cost=cost)
+    task.set_target(np.asarray(target))
+    return task
+
+
+def speed_of(task, configuration, v):
+    """What the task asked for and what v gives it: both (m,)."""
+    asked = -task.gain * task.compute_error(configuration) / DT
+    return asked, task.compute_jacobian(configuration) @ v
+
+
+@pytest.mark.parametrize("together", [True, False], ids=["hand and posture", "hand"])
+def test_one_level_within_limits_is_what_pink_finds_without_its_damping(configuration, together):
+    import pink
+
+    pytest.importorskip("quadprog")
+    tasks = [frame_task(configuration), *([posture_task(Q + 0.3)] if together else [])]
+    ours = solve_ik(configuration, [tasks], DT)
+    assert (np.abs(np.abs(ours) - configuration.model.velocityLimit) < 1e-9).any()  # limits act
+    off = {damping: np.abs(pink.solve_ik(configuration, tasks, DT, "quadprog", damping=damping)
+                           - ours).max() for damping in (1e-5, 1e-6, 1e-12)}
+    assert off[1e-12] < 1e-9
+    assert off[1e-6] == pytest.approx(off[1e-5] / 10.0, rel=0.05)  # the rest is pink's damping
+
+
+def test_of_two_tasks_in_conflict_the_first_is_served_exactly_and_in_pink_neither_is(configuration):
+    import pink
+
+    hand = frame_task(configuration, shift=(0.003, 0.001, -0.002), turn=0.01)
+    posture = posture_task(Q + 0.01, cost=1.0)
+    ours = solve_ik(configuration, [hand, posture], DT)
+    weighted = pink.solve_ik(configuration, [hand, posture], DT, "proxqp")
+    asked, given = speed_of(hand, configuration, ours)
+    np.testing.assert_allclose(given, asked, atol=1e-10)
+    asked, given = speed_of(hand, configuration, weighted)
+    assert np.abs(given - asked).max() > 0.01  # [m/s, rad/s]
+
+
+@pytest.mark.parametrize("solver", ["tpm", "recursive", "hqp", "weighted", "sns"])
+def test_every_resolver_can_be_the_solver(configuration, solver):
+    hand = frame_task(configuration, shift=(0.002, 0.0, 0.001), turn=0.0)
+    limits = [] if solver in ("tpm", "recursive") else None
+    resolver = make(solver)
+    ours = solve_ik(configuration, [hand], DT, resolver, limits=limits)
+    reference = solve_ik(configuration, [hand], DT, limits=limits)
+    np.testing.assert_allclose(ours, reference, atol=1e3 * resolver.accuracy)
+
+
+def test_constraints_of_pink_hold_before_all_tasks_and_without_costs(configuration):
+    import pink
+    from pink.tasks import JointCouplingTask
+
+    coupled = JointCouplingTask(["joint_1", "joint_5"], [3.0, -1.0], 100.0, configuration)
+    hand = frame_task(configuration, shift=(0.002, 0.0, 0.001), turn=0.0)
+    ours = solve_ik(configuration, [hand], DT, constraints=[coupled])
+    theirs = pink.solve_ik(configuration, [hand], DT, "proxqp", constraints=[coupled],
+                           eps_abs=1e-10)
+    J = coupled.compute_jacobian(configuration)
+    np.testing.assert_allclose(J @ ours, J @ theirs, atol=1e-6)
+    np.testing.assert_allclose(ours, theirs, atol=1e-4)
+
+
+def test_a_barrier_of_pink_is_a_row_of_the_first_level(configuration):
+    import pink
+    from pink.barriers import PositionBarrier
+
+    here = configuration.get_transform_frame_to_world("end_effector").translation
+    barrier = PositionBarrier("end_effector", indices=[0], p_max=here[:1] + 1e-3, gain=1.0)
+    hand = frame_task(configuration, shift=(0.01, 0.0, 0.0), turn=0.0)
+    ours = solve_ik(configuration, [[hand, posture_task(Q)]], DT, barriers=[barrier])
+    theirs = pink.solve_ik(configuration, [hand, posture_task(Q)], DT, "daqp", barriers=[barrier])
+    np.testing.assert_allclose(ours, theirs, atol=1e-6)
+    G, h = barrier.compute_qp_inequalities(configuration, DT)
+    assert (G @ ours * DT)[0] == pytest.approx(h[0])
+
+
+def test_limits_that_cannot_hold_are_no_solution_and_say_so(configuration):
+    from pink.exceptions import NoSolutionFound
+    from pink.limits import VelocityLimit
+
+    slow = VelocityLimit(configuration.model, np.full(7, 0.01))
+    away = SimpleNamespace(compute_qp_inequalities=lambda *_: (-np.eye(7)[:1], np.array([-1.0])))
+    with pytest.raises(NoSolutionFound, match="limits cannot all hold"):
+        solve_ik(configuration, [frame_task(configuration)], DT, limits=[slow, away])
+
+
+def test_a_configuration_outside_its_limits_is_refused_as_in_pink(robot):
+    import pink
+
+    outside = pink.Configuration(robot.model, robot.model.createData(), np.full(7, 3.0))
+    with pytest.raises(pink.exceptions.NotWithinConfigurationLimits):
+        solve_ik(outside, [posture_task(Q)], DT)
+    back = solve_ik(outside, [posture_task(Q)], DT, limits=[], safety_break=False)
+    assert np.isfinite(back).all()
+
+
+def test_what_has_no_meaning_in_a_strict_order_is_refused_by_name(configuration):
+    from pink.barriers import PositionBarrier
+
+    hand = frame_task(configuration)
+    hand.lm_damping = 1.0
+    with pytest.raises(HierarchyError, match="FrameTask of end_effector: lm_damping = 1"):
+        solve_ik(configuration, [hand], DT)
+    barrier = PositionBarrier("end_effector", p_max=np.ones(3), safe_displacement_gain=2.0)
+    with pytest.raises(HierarchyError, match="PositionBarrier: safe_displacement_gain = 2"):
+        solve_ik(configuration, [posture_task(Q)], DT, barriers=[barrier])
+    with pytest.raises(HierarchyError, match="unknown resolver 'proxqp'"):
+        solve_ik(configuration, [posture_task(Q)], DT, solver="proxqp")
+    with pytest.raises(TypeError, match="damping"):
+        solve_ik(configuration, [posture_task(Q)], DT, damping=1e-6)
+    with pytest.raises(HierarchyError, match="period 0"):
+        solve_ik(configuration, [posture_task(Q)], 0.0)
+
+
+def test_tasks_of_pink_serve_in_a_stack_and_their_configuration_follows(robot, configuration):
+    hand, posture = frame_task(configuration), posture_task(Q + 0.3)
+    stack = Stack([PinkTask(hand, configuration, DT), PinkTask(posture, configuration, DT, "rest")],
+                  "velocity")
+    moved = robot.state(Q + 0.1)
+    h = stack.hierarchy(moved)
+    np.testing.assert_array_equal(configuration.q, Q + 0.1)
+    assert h.names == ("FrameTask of end_effector", "rest")
+    expected = pink_hierarchy(configuration, [hand, posture], DT, limits=[])
+    np.testing.assert_allclose(h.A, expected.A)
+    np.testing.assert_allclose(h.lower, expected.lower)
+    np.testing.assert_allclose(make("tpm").solve(h).x, solve_ik(configuration, [hand, posture], DT,
+                                                                limits=[]), atol=1e-9)
+
+
+def test_a_task_of_pink_reaches_its_target_among_our_own(robot, configuration):
+    hand = frame_task(configuration, shift=(0.1, 0.05, 0.0), turn=0.0, orientation=0.0)
+    task = PinkTask(hand, configuration, DT)
+    assert task.dimension == 3  # rows that cost nothing ask for nothing
+    stack, state = Stack([task], "velocity"), robot.state(Q)
+    for _ in range(40):
+        x = make("hcod").solve(stack.hierarchy(state)).x
+        state = robot.state(robot.integrate(state.q, DT * x))
+    assert np.abs(task.error(state)).max() < 1e-6
+
+
+@pytest.mark.parametrize("shift", [0.0, 0.01])
+def test_rows_of_a_frame_task_are_those_of_our_position_task(robot, configuration, shift):
+    from hierarchy.paths import Still
+
+    hand = frame_task(configuration, shift=(shift, 2 * shift, 0.0), turn=0.0, orientation=0.0)
+    goal = hand.transform_target_to_world.translation
+    ours = Position(robot.frame("end_effector"), Still(goal.tolist()), gain=hand.gain / DT)
+    rows, theirs = (Stack([task], "velocity").hierarchy(robot.state(Q))
+                    for task in (ours, PinkTask(hand, configuration, DT)))
+    # pink's error is that of the target seen from the frame: in the frame's axes, and negative
+    to_frame = -configuration.get_transform_frame_to_world("end_effector").rotation.T
+    np.testing.assert_allclose(to_frame @ rows.lower, theirs.lower, atol=1e-9)
+    if not shift:  # away from the target its Jacobian has the derivative of the logarithm too
+        np.testing.assert_allclose(to_frame @ rows.A, theirs.A, atol=1e-9)
+
+
+def test_a_task_of_pink_refuses_another_robot_and_accelerations(robot, configuration):
+    import pink
+
+    task = PinkTask(posture_task(Q), configuration, DT)
+    with pytest.raises(HierarchyError, match="pink knows nothing of accelerations"):
+        Stack([task], "acceleration").hierarchy(robot.state(Q))
+    renamed = robot.model.copy()
+    renamed.names[1] = "other"
+    strange = pink.Configuration(renamed, renamed.createData(), Q)
+    with pytest.raises(HierarchyError, match="has the joints other"):
+        Stack([PinkTask(posture_task(Q), strange, DT)], "velocity").hierarchy(robot.state(Q))
+
+
+def test_rows_on_one_joint_become_a_box_unless_they_contradict_each_other():
+    rows = (np.array([[2.0, 0.0], [-1.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]),
+            np.array([4.0, 1.0, 1.0, 3.0, np.inf]))
+    A, lower, upper = limit_level([rows], 2, 0.5)
+    np.testing.assert_array_equal(A, [[1.0, 0.0], [1.0, 1.0]])
+    np.testing.assert_array_equal(np.column_stack([lower, upper]), [[-2.0, 2.0], [-np.inf, 6.0]])
+    A, lower, upper = limit_level([(np.array([[1.0], [-1.0]]), np.array([-1.0, -1.0]))], 1, 1.0)
+    np.testing.assert_array_equal(A, [[1.0], [1.0]])
+    np.testing.assert_array_equal(np.column_stack([lower, upper]), [[1.0, np.inf], [-np.inf, -1.0]])
+
+
+# --- MuJoCo and mink ----------------------------------------------------------------------------
+
+
+@pytest.fixture
+def arm():
+    mujoco = pytest.importorskip("mujoco")
+    model = mujoco.MjModel.from_xml_string(ARM)
+    data = mujoco.MjData(model)
+    data.qpos[:] = POSE
+    mujoco.mj_forward(model, data)
+    return model, data
+
+
+@pytest.mark.parametrize(("name", "kind"), [("tip", "site"), ("lower", "body"), ("pad", "geom")])
+def test_a_jacobian_of_mujoco_is_the_difference_of_its_frames(arm, name, kind):
+    import mujoco
+
+    from hierarchy.adapters import mujoco as adapter
+
+    model, data = arm
+    J, step = adapter.jacobian(model, data, name, kind), 1e-6
+    before = adapter.frame(model, data, name, kind)
+    for joint in range(model.nv):
+        data.qpos[:] = POSE + step * np.eye(4)[joint]
+        mujoco.mj_forward(model, data)
+        after = adapter.frame(model, data, name, kind)
+        turned = (after[1] @ before[1].T - np.eye(3)) / step
+        np.testing.assert_allclose((after[0] - before[0]) / step, J[:3, joint], atol=1e-5)
+        np.testing.assert_allclose([turned[2, 1], turned[0, 2], turned[1, 0]], J[3:, joint],
+                                   atol=1e-5)
+
+
+def test_levels_out_of_mujoco_move_the_tip_within_the_ranges(arm):
+    import mujoco
+
+    from hierarchy.adapters import mujoco as adapter
+
+    model, data = arm
+    start, turn = adapter.frame(model, data, "tip", "site")
+    goal, wanted = start + np.array([0.03, -0.05, 0.02]), turn
+    for _ in range(60):
+        levels = [adapter.limit_level(model, data, 0.01, 3.0),
+                  adapter.position_level(model, data, "tip", goal, 20.0, "site"),
+                  adapter.orientation_level(model, data, "tip", wanted, 5.0, "site"),
+                  adapter.posture_level(model, data, POSE, 1.0)]
+        x = make("hcod").solve(Hierarchy.from_levels(levels)).x
+        mujoco.mj_integratePos(model, data.qpos, x, 0.01)
+        mujoco.mj_forward(model, data)
+    assert np.abs(adapter.frame(model, data, "tip", "site")[0] - goal).max() < 1e-6
+    assert (np.abs(data.qpos) <= 2.0).all()
+
+
+def test_an_orientation_level_turns_a_frame_to_its_target(arm):
+    import mujoco
+
+    from hierarchy.adapters import mujoco as adapter
+
+    model, data = arm
+    data.qpos[:] = POSE + np.array([0.4, 0.0, 0.0, 0.3])
+    mujoco.mj_forward(model, data)
+    wanted = adapter.frame(model, data, "wrist")[1]
+    data.qpos[:] = POSE
+    for _ in range(60):
+        mujoco.mj_forward(model, data)
+        level = adapter.orientation_level(model, data, "wrist", wanted, 20.0)
+        x = make("hcod").solve(Hierarchy.from_levels([level])).x
+        mujoco.mj_integratePos(model, data.qpos, x, 0.01)
+    mujoco.mj_forward(model, data)
+    np.testing.assert_allclose(adapter.frame(model, data, "wrist")[1], wanted, atol=1e-3)
+
+
+def test_a_joint_beyond_its_range_comes_back_no_faster_than_allowed(arm):
+    from hierarchy.adapters import mujoco as adapter
+
+    model, data = arm
+    data.qpos[:] = [2.5, 1.99, 0.0, -2.001]
+    _, lower, upper = adapter.limit_level(model, data, 0.1, 1.0)
+    np.testing.assert_allclose(lower, [-1.0, -1.0, -1.0, 0.01])
+    np.testing.assert_allclose(upper, [-1.0, 0.1, 1.0, 1.0])
+
+
+def test_mistakes_with_mujoco_name_what_is_wrong(arm):
+    from hierarchy.adapters import mujoco as adapter
+
+    model, data = arm
+    with pytest.raises(HierarchyError, match="unknown site 'tipp'; did you mean 'tip'"):
+        adapter.jacobian(model, data, "tipp", "site")
+    with pytest.raises(HierarchyError, match="unknown kind of frame 'sites'; did you mean 'site'"):
+        adapter.jacobian(model, data, "tip", "sites")
+    with pytest.raises(HierarchyError, match=r"target must be \(3,\) finite numbers"):
+        adapter.position_level(model, data, "tip", [0.0, np.nan, 0.0], 1.0, "site")
+
+
+def mink_tasks(model, configuration):
+    import mink
+
+    hand = mink.FrameTask("tip", "site", position_cost=1.0, orientation_cost=0.3, gain=0.5)
+    here = configuration.get_transform_frame_to_world("tip", "site")
+    hand.set_target(mink.SE3.from_translation(np.array([0.0, 0.08, 0.05])) @ here)
+    posture = mink.PostureTask(model, cost=0.1)
+    posture.set_target(POSE + 0.2)
+    return hand, posture
+
+
+def test_one_level_of_mink_is_what_mink_finds_without_its_damping(arm):
+    mink = pytest.importorskip("mink")
+    from hierarchy.adapters.mink import hierarchy
+
+    model, _ = arm
+    configuration = mink.Configuration(model, q=POSE)
+    hand, posture = mink_tasks(model, configuration)
+    limits = [mink.ConfigurationLimit(model), mink.VelocityLimit(model, dict.fromkeys("abcd", 1.0))]
+    theirs = mink.solve_ik(configuration, [hand, posture], DT, "daqp", limits=limits)
+    h = hierarchy(configuration, [[hand, posture]], DT, limits)
+    ours = make("hcod").solve(h).x
+    assert np.abs(ours).max() == pytest.approx(1.0)
+    np.testing.assert_allclose(ours, theirs, atol=1e-7)
+
+
+def test_levels_of_mink_are_strict(arm):
+    mink = pytest.importorskip("mink")
+    from hierarchy.adapters.mink import hierarchy
+
+    model, _ = arm
+    configuration = mink.Configuration(model, q=POSE)
+    hand, posture = mink_tasks(model, configuration)
+    hand.set_orientation_cost(0.0)
+    h = hierarchy(configuration, [hand, posture], DT)
+    assert h.names == ("limits", "FrameTask of tip", "PostureTask")
+    x = make("hcod").solve(h).x
+    np.testing.assert_allclose(h.violations(x)[:2], 0.0, atol=1e-9)
+    assert h.violations(mink.solve_ik(configuration, [hand, posture], DT, "daqp"))[1] > 1e-3
+
+
+def test_a_task_of_mink_that_is_no_row_is_refused_by_name(arm):
+    mink = pytest.importorskip("mink")
+    from hierarchy.adapters.mink import hierarchy
+
+    configuration = mink.Configuration(arm[0], q=POSE)
+    with pytest.raises(HierarchyError, match="KineticEnergyRegularizationTask: not a task with"):
+        hierarchy(configuration, [mink.KineticEnergyRegularizationTask(1.0)], DT)
+
+
+# --- qpsolvers ----------------------------------------------------------------------------------
+
+
+def made_hierarchy(seed):
+    """Seven joints in their box, then equalities, inequalities that contradict each other, more."""
+    rng = np.random.default_rng(seed)
+    wanted, row = rng.normal(size=3), rng.normal(size=(1, 7))
+    return Hierarchy.from_levels([
+        (np.eye(7), np.full(7, -0.5), np.full(7, 0.5)),
+        (rng.normal(size=(3, 7)), 0.4 * wanted),
+        (np.vstack([row, row]), [-np.inf, 1.0], [-1.0, np.inf]),
+        (rng.normal(size=(2, 7)), [-np.inf, 0.1], [0.2, np.inf]),
+        (rng.normal(size=(3, 7)), wanted)], reference=rng.normal(size=7))
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_level_after_level_as_quadratic_programs_is_what_hcod_finds(seed):
+    pytest.importorskip("clarabel")
+    h, x = made_hierarchy(seed), None
+    for level in range(len(h.sizes) + 1):
+        solution = qpsolvers.solve_problem(level_problem(h, level, x, sparse=True),
+                                           "clarabel", tol_gap_abs=1e-11, tol_gap_rel=1e-11,
+                                           tol_feas=1e-11)
+        assert solution.found
+        x = solution.x[:h.n]
+    np.testing.assert_allclose(x, make("hcod").solve(h).x, atol=1e-6)
+
+
+def test_the_problem_of_a_level_is_optimal_where_the_hierarchy_is():
+    h = made_hierarchy(3)
+    x = make("hcod").solve(h).x
+    for level, size in enumerate(h.sizes):
+        problem = level_problem(h, level, None if level == 0 else x)
+        own = slice(h.offsets[level], h.offsets[level + 1])
+        equal = h.lower[own] == h.upper[own]
+        missed = np.where(equal, h.A[own] @ x - h.lower[own], h.slacks(x)[own])
+        y = np.concatenate([x, missed[equal], missed[~equal]])
+        assert len(problem.q) == h.n + size
+        cost = 0.5 * y @ problem.P @ y + problem.q @ y
+        assert cost == pytest.approx(0.5 * h.violations(x)[level] ** 2)
+        assert problem.A is None or np.abs(problem.A @ y - problem.b).max() < 1e-9
+        assert problem.G is None or (problem.G @ y - problem.h).max() < 1e-9
+
+
+def test_a_problem_needs_a_level_that_is_there_and_what_the_levels_above_reach():
+    h = made_hierarchy(0)
+    with pytest.raises(HierarchyError, match="level 9: the hierarchy has levels 0 to 4"):
+        level_problem(h, 9)
+    with pytest.raises(HierarchyError, match="level 2: above must be"):
+        level_problem(h, 2)
+    with pytest.raises(HierarchyError, match="level 2: above must be"):
+        level_problem(h, 2, np.full(7, np.nan))
