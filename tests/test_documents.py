@@ -1,26 +1,141 @@
-"""The Python in the documents runs as printed."""
+"""What the documents show works as printed: Python, scenario files, commands."""
 
+import importlib.util
 import re
+import shlex
+import tomllib
 from pathlib import Path
 
 import pytest
+import typer
+
+from hierarchy.robots import TABLES
+from hierarchy.tasks import TASKS
+from scenarios.cli import app, run_command
+from scenarios.config import load
+from scenarios.sweep.config import load_sweep
+from solvers.resolver import _REGISTRY
 
 ROOT = Path(__file__).parents[1]
-BLOCK = re.compile(r"```python\n(.*?)```", re.DOTALL)
-DOCUMENTS = ["README.md", "CONTRIBUTING.md", *(f"docs/{path.name}" for path in sorted(
-    (ROOT / "docs").glob("*.md")) if BLOCK.search(path.read_text(encoding="utf-8")))]
+BLOCK = re.compile(r"^```(\w*)\n(.*?)^```", re.DOTALL | re.MULTILINE)
+INLINE = re.compile(r"(?<!`)`((?:hierarchy|make|python -m) [^`]+)`(?!`)")
+TEXTS = {str(path.relative_to(ROOT)): path.read_text(encoding="utf-8")
+         for path in [ROOT / "README.md", ROOT / "CONTRIBUTING.md",
+                      *sorted(path for path in (ROOT / "docs").rglob("*.md")
+                              if "_build" not in path.parts)]}
+FOLLOWED = "docs/tutorial.md"  # whose commands are run, not only read
+COMMANDS = typer.main.get_command(app).commands
 
 
-def code_of(name):
-    """All Python blocks of a document as one program: later blocks go on from earlier ones."""
-    return "\n".join(BLOCK.findall((ROOT / name).read_text(encoding="utf-8")))
+def blocks(name, *languages):
+    """The blocks of a document in these languages, in order."""
+    return [text for language, text in BLOCK.findall(TEXTS[name]) if language in languages]
 
 
-@pytest.mark.parametrize("name", DOCUMENTS)
+def commands(name):
+    """The command lines of a document: of its shell blocks and of its running text."""
+    shell = "\n".join(blocks(name, "", "sh", "console", "bash")).replace("\\\n", " ")
+    lines = [line.strip().removeprefix("$ ") for line in shell.splitlines()]
+    prose = [" ".join(text.split()) for text in INLINE.findall(BLOCK.sub("", TEXTS[name]))]
+    return [re.split(r"\s{2,}| #", line)[0] for line in [*lines, *prose]
+            if re.match(r"(hierarchy|make|python -m|pip install) [a-z'\".-]", line)]
+
+
+def having(found):
+    return [name for name in TEXTS if found(name)]
+
+
+@pytest.fixture(autouse=True)
+def _in_a_folder_of_its_own(tmp_path, monkeypatch):
+    """What a document writes or registers is gone after it."""
+    monkeypatch.chdir(tmp_path)
+    kept = [(registry, dict(registry)) for registry in (_REGISTRY, TABLES, TASKS)]
+    yield
+    for registry, before in kept:
+        registry.clear()
+        registry.update(before)
+
+
+@pytest.mark.parametrize("name", having(lambda name: name != FOLLOWED and blocks(name, "python")))
 def test_the_code_of_a_document_runs(name):
-    code = code_of(name)
-    assert code.strip()
-    exec(compile(code, name, "exec"), {"__name__": "document"})
+    """Later blocks go on from earlier ones."""
+    exec(compile("\n".join(blocks(name, "python")), name, "exec"), {"__name__": "document"})
+
+
+@pytest.mark.parametrize("name", having(lambda name: blocks(name, "toml")))
+def test_the_files_that_a_document_shows_can_be_read(name, tmp_path):
+    (tmp_path / "my-scenario.toml").write_text('extends = "ellipse"\nname = "my-scenario"\n')
+    for i, text in enumerate(blocks(name, "toml")):
+        data, file = tomllib.loads(text), tmp_path / f"block-{i}.toml"
+        file.write_text(text)
+        if "scenarios" in data:
+            load_sweep(file)
+        elif "name" in data and ({"robot", "extends"} & set(data)):
+            load(file)
+
+
+@pytest.mark.parametrize("name", having(commands))
+def test_the_commands_of_a_document_exist(name):
+    for command in commands(name):
+        check(shlex.split(command))
+
+
+def check(words):
+    """One command line: its name, options, scenarios and resolvers are known."""
+    first, second, *rest = words
+    if first == "hierarchy":
+        check_hierarchy(second, rest)
+    elif first == "make":
+        for target in (word for word in words[1:] if "=" not in word):
+            assert f"\n{target}:" in (ROOT / "Makefile").read_text(), words
+    elif first == "python":
+        assert importlib.util.find_spec(rest[0]), words
+    else:
+        extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"][
+            "optional-dependencies"]
+        for extra in re.findall(r"task-hierarchy\[([^\]]+)\]", " ".join(words)):
+            assert set(extra.split(",")) <= set(extras), words
+
+
+def check_hierarchy(command, arguments):
+    if command.startswith("-"):
+        return
+    if not arguments:  # a command that is only mentioned
+        assert command in COMMANDS
+        return
+    asked = COMMANDS[command].make_context(command, list(arguments)).params
+    named = [*asked.get("scenarios", ()), asked.get("scenario"), asked.get("file")]
+    specs = [asked.get("resolver"), *(asked.get("resolvers") or "").split(",")]
+    for name in filter(is_name, named):
+        if command == "sweep":
+            load_sweep(name)
+            continue
+        scenario = load(name, asked.get("changes") or [])
+        for spec in filter(None, specs):
+            scenario.with_resolver(spec)
+
+
+def is_name(text):
+    """Whether it names something shipped: no path, and no placeholder such as FILE."""
+    return bool(text) and "." not in text and "/" not in text and not text.isupper()
+
+
+def test_the_tutorial_can_be_followed_from_top_to_bottom(tmp_path, monkeypatch):
+    """Files get the name in their first line, commands are run (but for figures), Python goes on.
+    """
+    monkeypatch.setattr("scenarios.figures.write_all", lambda recording, folder: None)
+    names, followed = {"__name__": "document"}, set()
+    for language, text in BLOCK.findall(TEXTS[FOLLOWED]):
+        followed.add(language)
+        if language == "toml":
+            (tmp_path / text.splitlines()[0].removeprefix("# ")).write_text(text)
+        elif language == "python":
+            exec(compile(text, FOLLOWED, "exec"), names)
+        elif language == "sh":
+            for line in text.splitlines():
+                if line.startswith("hierarchy "):
+                    assert run_command(shlex.split(line, comments=True)[1:]) == 0, line
+    assert followed >= {"toml", "python", "sh"}
 
 
 def test_the_task_of_the_guide_serves_in_a_stack():
@@ -28,7 +143,7 @@ def test_the_task_of_the_guide_serves_in_a_stack():
     from solvers import make
 
     names = {"__name__": "document"}
-    exec(code_of("CONTRIBUTING.md"), names)
+    exec("\n".join(blocks("CONTRIBUTING.md", "python")), names)
     state = Robot.named("kuka_lwr").state([0.1] * 7)
     h = Stack([names["Elbow"](joint=3, angle=1.0)], "velocity").hierarchy(state)
     assert make("tpm").solve(h).x[3] == pytest.approx(2.0 * 0.9)
