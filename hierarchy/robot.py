@@ -1,4 +1,4 @@
-"""Robot and State: the only module that calls pinocchio, and everything a task may read."""
+"""Robot and State, around pinocchio: everything a task may read."""
 
 # mypy: disable-error-code="no-untyped-def"
 
@@ -15,14 +15,23 @@ from numpy.typing import ArrayLike, NDArray
 
 from hierarchy.avoidance.control_points import ControlPoint
 from hierarchy.avoidance.measurement import Measurement
-from hierarchy.avoidance.self_collision import Capsule, link_capsules
+from hierarchy.avoidance.self_collision import Capsule
 from hierarchy.compiled import compiled
 from hierarchy.errors import RobotError, UnknownNameError
+from hierarchy.models import (
+    Found,
+    file_of,
+    from_table,
+    in_package,
+    points_along_chain,
+    read_file,
+)
+from hierarchy.models.found import is_floating
 from hierarchy.problem import Array
-from hierarchy.robots import TABLES, DHTable
+from hierarchy.robots import TABLES
+from hierarchy.robots.table import Base
 
 ROBOTS = TABLES
-END_EFFECTOR = "end_effector"
 
 
 @dataclass(frozen=True)
@@ -53,62 +62,92 @@ class Body:
 
 
 class Robot:
-    """A fixed-base robot: its model, limits, frames, control points and capsules of its links.
+    """A robot: its model, base, limits, frames, control points and capsules of its links.
 
-    `n` is the number of joint velocities, `nq` that of joint positions (more than n only where a
-    joint is continuous). `lower`, `upper` (nq,) [rad or m], `velocity_limit` (n,) [rad/s or m/s]
-    and `effort_limit` (n,) [N m or N] are infinite where the model has none. `coordinates` (n,)
-    says where in q the position that belongs to a velocity is, or begins.
+    `n` is the number of velocities, `nq` that of positions (more than n where a joint is continuous
+    or the base floats). A floating `base` has the first six velocities, those of its own frame
+    [m/s, rad/s], and no limits; `actuated` is the first velocity that a motor moves: 6 or 0.
+    `lower`, `upper` (nq,) [rad or m], `velocity_limit` (n,) [rad/s or m/s] and `effort_limit` (n,)
+    [N m or N] are infinite where the model has none. `coordinates` (n,) says where in q the
+    position that belongs to a velocity is, or begins. `parents` (joints + 1) has the joint that
+    carries each. `rest` (nq,) is where it starts unless told otherwise. `missing` are sentences on
+    what its file names and does not have.
     """
 
     def __init__(self, model: Any, name: str, end_effector: str | None = None,
                  control_points: tuple[ControlPoint, ...] = (),
-                 capsules: tuple[Capsule, ...] = ()) -> None:
+                 capsules: tuple[Capsule, ...] = (), rest: Array | None = None,
+                 missing: tuple[str, ...] = ()) -> None:
         self.model, self.name = model, name
         self.n, self.nq = int(model.nv), int(model.nq)
         if self.n == 0:
             raise RobotError(f"robot {name!r} has no joint that moves")
-        if "freeflyer" in str(model.joints[1].shortname()).lower():
-            raise RobotError(f"robot {name!r} has a floating base, which is not supported")
+        self.base: Base = "floating" if is_floating(model) else "fixed"
+        self.actuated = 6 if self.base == "floating" else 0
         self.joint_names: tuple[str, ...] = tuple(model.names)[1:]
+        self.parents: tuple[int, ...] = tuple(int(i) for i in model.parents)
         self.lower, self.upper = _finite_or_inf(model.lowerPositionLimit,
                                                 model.upperPositionLimit)
         self.velocity_limit = _positive_or_inf(model.upperVelocityLimit)
         self.effort_limit = _positive_or_inf(model.effortLimit)
+        if self.base == "floating":
+            self.lower[:7], self.upper[:7] = -np.inf, np.inf
+            self.velocity_limit[:6] = self.effort_limit[:6] = np.inf
         self.coordinates = _coordinates(model)
         self.end_effector = end_effector or tuple(model.frames)[-1].name
         self.frame(self.end_effector)
         self.control_points, self.capsules = control_points, capsules
+        self.rest = np.array(pin.neutral(model)) if rest is None else rest
+        self.missing = missing
 
     @classmethod
-    def named(cls, name: str) -> Robot:
-        """Build a robot of `hierarchy.robot.ROBOTS`; an unknown name raises UnknownNameError."""
+    def named(cls, name: str, base: Base | None = None) -> Robot:
+        """Build a robot of `hierarchy.robot.ROBOTS`; an unknown name raises UnknownNameError.
+
+        `base` "fixed" or "floating" goes before that of its table.
+        """
         if name not in TABLES:
             raise UnknownNameError("robot", name, TABLES)
-        table = TABLES[name]
-        robot = cls(_model_from_table(table), name, END_EFFECTOR, capsules=link_capsules(table))
-        robot.control_points = tuple(
-            robot.control_point(joint, offset) for joint, offset in table.control_points)
+        return cls._of(from_table(TABLES[name], base), name)
+
+    @classmethod
+    def from_file(cls, path: str | Path, end_effector: str | None = None,
+                  base: Base | None = None, shapes: bool = True) -> Robot:
+        """Read a URDF (.urdf) or MJCF (.xml, .mjcf) file; RobotError if it cannot be read.
+
+        `end_effector` names a frame; without it one is proposed, see
+        `hierarchy.models.proposed_end_effector`. `base` None is that of the file: fixed, or
+        floating for an MJCF with a free joint. Capsules are proposed from the collision
+        geometry, unless `shapes` is False, and control points along the chain to the end effector.
+        """
+        found = read_file(path, base, shapes)
+        return cls._of(found, Path(path).stem, end_effector)
+
+    @classmethod
+    def load(cls, model: str, end_effector: str | None = None, base: Base | None = None) -> Robot:
+        """Make a robot by a name of `ROBOTS`, a file, or "package:name".
+
+        Packages are example_robot_data and robot_descriptions (extra `robots`); the latter may
+        download. Raises RobotError and UnknownNameError.
+        """
+        if in_package(model):
+            robot = cls.from_file(file_of(model), end_effector, base)
+            robot.name = model.partition(":")[2]
+            return robot
+        if model.endswith((".urdf", ".xml", ".mjcf")):
+            return cls.from_file(model, end_effector, base)
+        robot = cls.named(model, base)
+        if end_effector is not None:
+            robot.end_effector = robot.frame(end_effector).name
         return robot
 
     @classmethod
-    def from_file(cls, path: str | Path, end_effector: str | None = None) -> Robot:
-        """Read a URDF (.urdf) or MJCF (.xml, .mjcf) file; RobotError if it cannot be read.
-
-        `end_effector` names a frame; without it the last frame of the file is taken.
-        """
-        path = Path(path)
-        if not path.is_file():
-            raise RobotError(f"robot file {str(path)!r} does not exist")
-        readers = {".urdf": pin.buildModelFromUrdf, ".xml": pin.buildModelFromMJCF,
-                   ".mjcf": pin.buildModelFromMJCF}
-        if path.suffix not in readers:
-            raise RobotError(f"robot file {str(path)!r}: expected .urdf, .xml or .mjcf")
-        try:
-            model = readers[path.suffix](str(path))
-        except Exception as error:  # the parsers raise many kinds; all mean the file is bad
-            raise RobotError(f"robot file {str(path)!r} cannot be read: {error}") from error
-        return cls(model, path.stem, end_effector)
+    def _of(cls, found: Found, name: str, end_effector: str | None = None) -> Robot:
+        robot = cls(found.model, name, end_effector or found.end_effector,
+                    found.control_points or (), found.capsules, found.rest, found.missing)
+        if found.control_points is None:
+            robot.control_points = points_along_chain(found.model, robot.end_effector)
+        return robot
 
     def joint(self, name: str) -> int:
         """Index of the joint called `name`, as used by frames and control points."""
@@ -344,34 +383,3 @@ def _finite_or_inf(lower: Array, upper: Array) -> tuple[Array, Array]:
 
 def _positive_or_inf(limit: Array) -> Array:
     return np.where((limit <= 0.0) | (limit > 1e300), np.inf, limit)
-
-
-def _model_from_table(table: DHTable) -> Any:
-    model = pin.Model()
-    model.name = table.name
-    joint, placement = 0, pin.SE3.Identity()
-    for i, d in enumerate(table.d):
-        limit = np.deg2rad([table.range[i]])
-        joint = model.addJoint(joint, pin.JointModelRZ(), placement, f"joint_{i + 1}",
-                               np.array([table.effort[i]]), np.array([table.velocity[i]]),
-                               -limit, limit)
-        placement = pin.SE3(_rotation_about_x(table.alpha[i]), np.array([table.a[i], 0.0, d]))
-        model.appendBodyToJoint(joint, _rod(table, i), pin.SE3.Identity())
-        model.addJointFrame(joint, -1)
-    model.addFrame(pin.Frame(END_EFFECTOR, joint, placement, pin.FrameType.OP_FRAME))
-    return model
-
-
-def _rod(table: DHTable, i: int) -> Any:
-    """Inertia of a uniform cylinder from the joint to the next origin."""
-    length = max(float(np.hypot(table.a[i], table.d[i])), 2 * table.radius)
-    across = table.mass[i] * (3 * table.radius**2 + length**2) / 12
-    along = table.mass[i] * table.radius**2 / 2
-    centre = np.array([table.a[i], 0.0, table.d[i]]) / 2
-    return pin.Inertia(table.mass[i], centre, np.diag([across, across, along]))
-
-
-def _rotation_about_x(degrees: float) -> Array:
-    """Exact for multiples of 90 degrees."""
-    c, s = np.round([np.cos(np.deg2rad(degrees)), np.sin(np.deg2rad(degrees))], 15)
-    return np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])

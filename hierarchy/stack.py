@@ -119,7 +119,8 @@ class Stack:
         writers = [self[name].writer(state, self.level, h.A, h.lower, h.upper, int(row))
                    for name, row in zip(order, h.offsets, strict=False)]
         if self.reference is not None:
-            writers.append(self.reference.reference_writer(state, self.level, h.reference))
+            joints = h.reference[state.n - self.reference.dimension:]  # a floating base has none
+            writers.append(self.reference.reference_writer(state, self.level, joints))
         prepared = _Prepared(h, state, state.measurement, tuple(writers))
         self._prepared[order] = prepared
         return prepared

@@ -1,8 +1,11 @@
 """Robots given as tables of numbers; `hierarchy.robot` turns one into a model."""
 
+from hierarchy.robots.dual_arm import DUAL_ARM
+from hierarchy.robots.humanoid import HUMANOID
 from hierarchy.robots.kuka_lwr import KUKA_LWR
-from hierarchy.robots.table import DHTable
+from hierarchy.robots.table import DHTable, Link, Table, TreeFrame, TreeJoint, TreeTable
 
-TABLES: dict[str, DHTable] = {KUKA_LWR.name: KUKA_LWR}
+TABLES: dict[str, Table] = {table.name: table for table in (KUKA_LWR, DUAL_ARM, HUMANOID)}
 
-__all__ = ["KUKA_LWR", "TABLES", "DHTable"]
+__all__ = ["DUAL_ARM", "HUMANOID", "KUKA_LWR", "TABLES", "DHTable", "Link", "Table", "TreeFrame",
+           "TreeJoint", "TreeTable"]

@@ -1,8 +1,12 @@
-"""A serial arm of revolute joints as its Denavit-Hartenberg table."""
+"""Robots as tables of numbers: a serial arm by its Denavit-Hartenberg parameters, or any tree."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
+
+Vector = tuple[float, float, float]
+Base = Literal["fixed", "floating"]
 
 
 @dataclass(frozen=True)
@@ -24,4 +28,74 @@ class DHTable:
     effort: tuple[float, ...]
     mass: tuple[float, ...]
     radius: float
-    control_points: tuple[tuple[str, tuple[float, float, float]], ...]
+    control_points: tuple[tuple[str, Vector], ...]
+
+
+@dataclass(frozen=True)
+class Link:
+    """What a joint moves: a uniform capsule of `mass` [kg] and `radius` [m] from `start` to `end`.
+
+    Both (3,) [m] in the joint's frame. A link of mass 0 has no shape: its joint shares an origin
+    with the next one.
+    """
+
+    end: Vector = (0.0, 0.0, 0.0)
+    radius: float = 0.0
+    mass: float = 0.0
+    start: Vector = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class TreeJoint:
+    """One revolute joint of a tree.
+
+    `parent` is a joint further up in the table, "" the base; `at` (3,) [m] is the joint's origin in
+    the parent's frame, whose axes it has at angle zero; `axis` is "x", "y" or "z" of that frame.
+    `range` (lower, upper) [deg], `velocity` [rad/s], `effort` [N m]; `rest` [deg] is the angle of
+    the posture in which the robot starts if nothing else is said.
+    """
+
+    name: str
+    parent: str
+    at: Vector
+    axis: Literal["x", "y", "z"]
+    range: tuple[float, float]
+    velocity: float
+    effort: float
+    link: Link = Link()
+    rest: float = 0.0
+
+
+@dataclass(frozen=True)
+class TreeFrame:
+    """A frame fixed to what `joint` moves ("" the base), `offset` (3,) [m] in the joint's frame.
+
+    Its axes are those of the joint, or turned so that z is `z_axis`.
+    """
+
+    name: str
+    joint: str
+    offset: Vector
+    z_axis: Vector = (0.0, 0.0, 1.0)
+
+
+@dataclass(frozen=True)
+class TreeTable:
+    """A robot of revolute joints that branch; parents come before their children.
+
+    `base` "floating" gives it six more velocities, those of the base's own frame, which is at
+    `base_height` [m] above the world's origin at the start. `links` are further shapes as (joint,
+    link), "" being the base, and `control_points` as (joint, offset (3,) [m]).
+    """
+
+    name: str
+    joints: tuple[TreeJoint, ...]
+    frames: tuple[TreeFrame, ...]
+    end_effector: str
+    links: tuple[tuple[str, Link], ...] = ()
+    control_points: tuple[tuple[str, Vector], ...] = ()
+    base: Base = "fixed"
+    base_height: float = 0.0
+
+
+Table = DHTable | TreeTable

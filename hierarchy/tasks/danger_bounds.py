@@ -68,6 +68,9 @@ class DangerBounds(Task):
     def __post_init__(self) -> None:
         if not self.points:
             raise HierarchyError(f"task {self.name!r}: needs at least one control point")
+        if self.limits.robot.base == "floating":
+            raise HierarchyError(f"task {self.name!r}: robot {self.limits.robot.name!r} has a "
+                                 "floating base, whose speed no joint bounds")
         if not 0.0 <= self.lever < np.inf:
             raise HierarchyError(f"task {self.name!r}: lever {self.lever} m must not be negative")
         for (i,) in np.argwhere(~np.isfinite(self.limits.robot.velocity_limit))[:1]:

@@ -21,11 +21,12 @@ from hierarchy.task import Level, Task
 class JointLimits(Task):
     """Keep every joint within its limits and able to stop before them: lower <= x <= upper.
 
-    n rows, the identity, at both levels. Positions and velocities are limited as `robot` says,
-    `margin` [rad or m] is kept off each position limit, `acceleration` [rad/s^2 or m/s^2] is one
-    number or (n,), `period` [s] is that of the control loop. What is promised from which start:
-    see `hierarchy.limits.Limits`. A continuous joint has no position limits. At velocity level the
-    acceleration is that of the commands: a step from `State.commanded`.
+    One row a joint that a motor moves, the identity, at both levels: n rows, n - 6 with a floating
+    base, which has no limits; below n stands for that number. Positions and velocities are limited
+    as `robot` says, `margin` [rad or m] is kept off each position limit, `acceleration` [rad/s^2 or
+    m/s^2] is one number or (n,), `period` [s] is that of the control loop. What is promised from
+    which start: see `hierarchy.limits.Limits`. A continuous joint has no position limits. At
+    velocity level the acceleration is that of the commands: a step from `State.commanded`.
 
     Raises HierarchyError where a limit makes no sense or the margin leaves no room.
     """
@@ -40,34 +41,43 @@ class JointLimits(Task):
 
     def __post_init__(self) -> None:
         robot, acceleration = self.robot, np.asarray(self.acceleration, dtype=float)
-        if acceleration.shape not in ((), (robot.n,)):
+        n, of_joints = robot.n - robot.actuated, slice(robot.actuated, robot.n)
+        if acceleration.shape not in ((), (n,)):
             raise HierarchyError(f"task {self.name!r}: acceleration has shape "
-                                 f"{acceleration.shape}, expected a number or ({robot.n},)")
+                                 f"{acceleration.shape}, expected a number or ({n},)")
         if not 0.0 <= self.margin < np.inf:
             raise HierarchyError(f"task {self.name!r}: margin {self.margin} must not be negative")
         lower, upper = robot.position_limits()
         try:
-            limits = Limits(lower + self.margin, upper - self.margin, robot.velocity_limit,
-                            np.broadcast_to(acceleration, robot.n), self.period)
+            limits = Limits(lower[of_joints] + self.margin, upper[of_joints] - self.margin,
+                            robot.velocity_limit[of_joints], np.broadcast_to(acceleration, n),
+                            self.period)
         except HierarchyError as error:
             raise HierarchyError(f"task {self.name!r}: {error}") from error
         object.__setattr__(self, "limits", limits)
 
     @property
     def dimension(self) -> int:
-        """One row a joint."""
-        return self.robot.n
+        """One row a joint that a motor moves."""
+        return self.robot.n - self.robot.actuated
 
     def box(self, state: State, level: Level) -> tuple[Array, Array]:
         """Return the least and the greatest command (n,), (n,) at a state; never empty."""
-        return self.limits.box(self._positions(state), _rates(state, level), level)
+        return self.limits.box(self._positions(state), self._rates(state, level), level)
 
     def clamp(self, state: State, level: Level, x: ArrayLike) -> Array:
-        """Return the command x (n,) moved into the box; finite also where x is not.
+        """Return the command x, of the base too, moved into the box; finite also where x is not.
 
-        NaN becomes the command of the box that comes nearest to a standstill.
+        NaN becomes the command of the box that comes nearest to a standstill; of the base, zero.
         """
-        return self.limits.clamp(self._positions(state), _rates(state, level), level, x)
+        first, positions, rates = self.robot.actuated, self._positions(state), self._rates(
+            state, level)
+        if first == 0:
+            return self.limits.clamp(positions, rates, level, x)
+        command = np.array(x, dtype=float)
+        command[:first][~np.isfinite(command[:first])] = 0.0
+        command[first:] = self.limits.clamp(positions, rates, level, command[first:])
+        return command
 
     def error(self, state: State) -> Array:
         """How far each joint is from its range (n,) [rad or m], zero within."""
@@ -75,34 +85,37 @@ class JointLimits(Task):
         return np.asarray(np.clip(q, *self.limits.packed[:2]) - q)
 
     def jacobian(self, state: State) -> Array:
-        """The identity (n, n)."""
-        return np.eye(state.n)
+        """The identity (n, n), beside zeros for the base."""
+        return np.eye(state.n)[self.robot.actuated:]
 
     def jacobian_derivative(self, state: State) -> Array:
         """Zero (n, n)."""
-        return np.zeros((state.n, state.n))
+        return np.zeros((self.dimension, state.n))
 
     def write(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
               row: int) -> None:
         """See `Task.write`; the rows have two sides."""
-        _write(self._positions(state), _rates(state, level), self.limits.packed, self.period,
+        _write(self._positions(state), self._rates(state, level), self.limits.packed, self.period,
                level == "acceleration", A, lower, upper, row)
 
     def _positions(self, state: State) -> Array:
         robot = self.robot
-        return state.q if robot.nq == robot.n else np.asarray(state.q[robot.coordinates])
+        if robot.nq == robot.n:
+            return state.q
+        return np.asarray(state.q[robot.coordinates[robot.actuated:]])
 
-
-def _rates(state: State, level: Level) -> Array:
-    """The velocities (n,) from which the next ones are limited."""
-    commanded = state.commanded if level == "velocity" else None
-    return state.v if commanded is None else commanded
+    def _rates(self, state: State, level: Level) -> Array:
+        """The velocities (n,) from which the next ones are limited."""
+        commanded = state.commanded if level == "velocity" else None
+        rates = state.v if commanded is None else commanded
+        return rates if self.robot.actuated == 0 else rates[self.robot.actuated:]
 
 
 @compiled
 def _write(q, v, limits, T, acceleration, A, lower, upper, row):
+    base = A.shape[1] - len(v)
     for i in range(len(v)):
-        for j in range(len(v)):
+        for j in range(A.shape[1]):
             A[row + i, j] = 0.0
-        A[row + i, i] = 1.0
+        A[row + i, base + i] = 1.0
     write_box(q, v, limits, T, acceleration, lower, upper, row)

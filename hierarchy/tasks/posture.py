@@ -40,7 +40,10 @@ class JointTask(Task):
 
 @dataclass(frozen=True)
 class Posture(JointTask, BoundTask):
-    """Bring every joint to `target` (n,) [rad or m]; gains as in `Task`."""
+    """Bring every joint to `target` (n,) [rad or m]; gains as in `Task`.
+
+    A floating base is no joint: the rows are those of the joints behind it.
+    """
 
     target: tuple[float, ...]
     stiffness: float = 10.0
@@ -55,19 +58,33 @@ class Posture(JointTask, BoundTask):
 
     def error(self, state: State) -> Array:
         """q_d - q (n,) [rad or m]."""
-        if state.robot.nq != self.joints:
+        return np.asarray(self.target - self._positions(state))
+
+    def jacobian(self, state: State) -> Array:
+        """The identity (n, n), beside zeros for a floating base."""
+        return np.eye(state.n)[state.n - self.joints:]
+
+    def jacobian_derivative(self, state: State) -> Array:
+        """Zero, of the same shape."""
+        return np.zeros((self.joints, state.n))
+
+    def _positions(self, state: State) -> Array:
+        """A view of the joints' positions (n,)."""
+        robot = state.robot
+        joints = robot.nq - (7 if robot.base == "floating" else 0)
+        if joints != robot.n - robot.actuated or joints != self.joints:
             raise HierarchyError(f"task {self.name!r}: {self.joints} targets for "
-                                 f"{state.robot.nq} joint positions")
-        return np.asarray(self.target - state.q)
+                                 f"{joints} joint positions")
+        return state.q[robot.nq - joints:]
 
     def bind_rows(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
                   row: int) -> Callable[[], object]:
         """See `BoundTask.bind_rows`."""
-        self.error(state)
+        positions, rates = self._positions(state), state.v[state.n - self.joints:]
         target = np.array(self.target, dtype=float)
         for (i,) in np.argwhere(~np.isfinite(target))[:1]:
             raise HierarchyError(f"task {self.name!r}: target {i} is {target[i]}")
-        return bind(_write, state.q, state.v, target, self.stiffness, self.damping, self.gain,
+        return bind(_write, positions, rates, target, self.stiffness, self.damping, self.gain,
                     level == "acceleration", A, lower, upper, row)
 
 
@@ -109,10 +126,11 @@ class JointDamping(JointTask):
 
 @compiled
 def _write(q, v, target, stiffness, damping, gain, acceleration, A, lower, upper, row):
+    base = A.shape[1] - len(target)
     for i in range(len(target)):
-        for j in range(len(v)):
+        for j in range(A.shape[1]):
             A[row + i, j] = 0.0
-        A[row + i, i] = 1.0
+        A[row + i, base + i] = 1.0
         error = target[i] - q[i]
         b = stiffness * error - damping * v[i] if acceleration else gain * error
         write_equality(lower, upper, row + i, b)

@@ -34,6 +34,9 @@ class TorqueLimits(Task):
         if not 0.0 < self.fraction <= 1.0:
             raise HierarchyError(f"task {self.name!r}: fraction {self.fraction} is not more than 0 "
                                  "and at most 1")
+        if self.robot.base == "floating":
+            raise HierarchyError(f"task {self.name!r}: robot {self.robot.name!r} has a floating "
+                                 "base; its torques depend on contact forces, which are not known")
         object.__setattr__(self, "limit", self.fraction * self.robot.effort_limit)
 
     @property

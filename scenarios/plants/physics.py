@@ -11,15 +11,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hierarchy import Robot
-from hierarchy.avoidance import Obstacles, link_capsules
+from hierarchy.avoidance import Obstacles
 from hierarchy.compiled import compiled
 from hierarchy.problem import Array
-from hierarchy.robots import TABLES
+from hierarchy.robots import TABLES, DHTable
 from hierarchy.task import Level
 from scenarios.config import JointsSection, ScenarioError, ServoSection
 from scenarios.plants.mjcf import each, scene
 
 _ROUNDING = 1e-9  # of a number of steps
+_ARMS = [name for name, table in TABLES.items() if isinstance(table, DHTable)]
 
 
 class PhysicsArm:
@@ -39,15 +40,15 @@ class PhysicsArm:
                  joints: JointsSection | None = None) -> None:
         mujoco = _mujoco()
         servo, joints = servo or ServoSection(), joints or JointsSection()
-        if robot.name not in TABLES:
+        if robot.name not in _ARMS:
             raise ScenarioError(f'plant.kind = "mujoco": robot {robot.name!r} is not one of '
-                                f"{', '.join(TABLES)}, whose links have a shape")
+                                f"{', '.join(_ARMS)}, the arms given as tables")
         self._steps = ceil(period * servo.rate - _ROUNDING)
         self._period, self._acceleration = period, level == "acceleration"
         self.stiffness, self.damping = _gains(robot, q, servo, joints)
         self._obstacles = obstacles or Obstacles()
         self.model = mujoco.MjModel.from_xml_string(
-            scene(robot, link_capsules(TABLES[robot.name]), self._obstacles.obstacles, joints,
+            scene(robot, robot.capsules, self._obstacles.obstacles, joints,
                   servo, (self.stiffness, self.damping), period / self._steps))
         self.data = mujoco.MjData(self.model)
         self._step, self._force_of = mujoco.mj_step, mujoco.mj_contactForce

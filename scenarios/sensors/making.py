@@ -7,8 +7,7 @@ from math import inf
 import numpy as np
 
 from hierarchy import HierarchyError, Robot
-from hierarchy.avoidance import Capsule, Repulsion, link_capsules
-from hierarchy.robots import TABLES
+from hierarchy.avoidance import Capsule, Repulsion
 from scenarios.config import SensorSection
 from scenarios.sensors.camera import DepthCamera, Pinhole, looking_at
 from scenarios.sensors.depth_sensor import DepthSensor, Source
@@ -57,7 +56,10 @@ def make_camera(section: SensorSection, exact: ExactDistances,
 
 
 def _capsules(robot: Robot, foot: float) -> tuple[Capsule, ...]:
-    if robot.name not in TABLES:
+    if not robot.capsules:
         raise HierarchyError(f"robot {robot.name!r} has no capsules, by which it is taken out of "
                              "the image")
-    return link_capsules(TABLES[robot.name], foot)
+    if foot == 0.0 or robot.base == "floating":
+        return robot.capsules
+    column = Capsule("foot", 0, (0.0, 0.0, -foot), (0.0, 0.0, 0.0), robot.capsules[0].radius)
+    return (column, *robot.capsules)

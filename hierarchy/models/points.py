@@ -1,0 +1,69 @@
+"""What is proposed where a file does not say it: end effector and control points."""
+
+from __future__ import annotations
+
+import re
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from hierarchy.avoidance.control_points import ControlPoint
+from hierarchy.problem import Array
+
+COUNT = 8            # control points that are proposed
+FIRST_MOVED_BY = 3   # the joint of the chain, counted from 1, from whose origin on they lie
+_NAMED_SO = re.compile(r"(^|[_\W])(tcp|tool\d*|eef?|end_?effector|gripper|flange)($|[_\W])",
+                       re.IGNORECASE)
+
+
+def proposed_end_effector(model: Any) -> str:
+    """Return the last frame whose name is usual for a tool's, or the last frame of the file.
+
+    Usual are tcp, tool, ee, eef, end_effector, gripper and flange, as a part between underscores;
+    a frame that no joint moves does not count, and a joint's own frame neither.
+    """
+    frames = list(model.frames)
+    joints = set(model.names)
+    named = [frame.name for frame in frames if frame.parentJoint > 0
+             and frame.name not in joints and _NAMED_SO.search(frame.name)]
+    links = [name for name in named if not name.endswith("joint")]
+    return str((links or named or [frames[-1].name])[-1])
+
+
+def points_along_chain(model: Any, end_effector: str, count: int = COUNT,
+                       first: int = FIRST_MOVED_BY) -> tuple[ControlPoint, ...]:
+    """Return points spread evenly over the chain that carries the end effector.
+
+    The chain is the line through the origins of its joints, from the joint number `first` of those
+    that carry it on (a floating base does not count) to the end effector, which itself is left
+    out: sensors measure it anyway. A point between two origins is fixed to the joint before it.
+    """
+    frame = model.frames[model.getFrameId(end_effector)]
+    chain = [joint for joint in model.supports[frame.parentJoint].tolist()
+             if joint > 0 and model.joints[joint].nv == 1]
+    chain = chain[min(first, len(chain)) - 1:]
+    ends = [np.array(_between(model, a, b)) for a, b in pairwise(chain)]
+    ends.append(np.array(frame.placement.translation))
+    lengths = np.array([np.linalg.norm(end) for end in ends])
+    begin = np.concatenate([[0.0], np.cumsum(lengths)])
+    if not chain or begin[-1] < 1e-3:
+        return ()
+    points = []
+    for k in range(1, count + 1):
+        at = k * begin[-1] / (count + 1)
+        i = min(int(np.searchsorted(begin, at, side="right")) - 1, len(chain) - 1)
+        offset = ends[i] * ((at - begin[i]) / lengths[i])
+        points.append(ControlPoint(f"{model.names[chain[i]]} {np.round(offset, 3).tolist()}",
+                                   chain[i], offset))
+    return tuple(points)
+
+
+def _between(model: Any, joint: int, below: int) -> Array:
+    """Origin of joint `below` in the frame of `joint`, with what is between at zero."""
+    placement = model.jointPlacements[below]
+    parent = model.parents[below]
+    while parent != joint:
+        placement = model.jointPlacements[parent] * placement
+        parent = model.parents[parent]
+    return np.asarray(placement.translation)

@@ -1,0 +1,111 @@
+"""Capsules around collision geometry."""
+
+from __future__ import annotations
+
+from itertools import product
+from typing import Any
+
+import numpy as np
+
+from hierarchy.avoidance.self_collision import Capsule, Vector
+from hierarchy.problem import Array
+
+_AROUND = 24  # points on the rim of a circle
+_CORNERS: Array = np.array(list(product((-1.0, 1.0), repeat=3)))
+_MOST = 2000  # vertices of a mesh that are looked at first, to choose the axis
+
+
+def capsules_of(geometries: Any) -> tuple[tuple[Capsule, ...], tuple[str, ...]]:
+    """Return a capsule around each collision geometry, and sentences on those that have none."""
+    capsules, left_out = [], []
+    for geometry in geometries:
+        name, kind = str(geometry.name), type(geometry.geometry).__name__
+        found = _capsule_of(geometry.geometry, kind)
+        if found is None:
+            left_out.append(f"collision geometry {name!r} is a {kind}, for which there is no "
+                            "capsule")
+            continue
+        start, end, radius = found
+        placement = geometry.placement
+        capsules.append(Capsule(
+            name, int(geometry.parentJoint), _vector(placement.act(start)),
+            _vector(placement.act(end)), float(radius)))
+    return tuple(capsules), tuple(left_out)
+
+
+def _capsule_of(shape: Any, kind: str) -> tuple[Array, Array, float] | None:
+    z = np.array([0.0, 0.0, 1.0])
+    if kind == "Sphere":
+        return 0.0 * z, 0.0 * z, shape.radius
+    if kind == "Capsule":
+        return -shape.halfLength * z, shape.halfLength * z, shape.radius
+    if kind == "Cylinder":
+        return -shape.halfLength * z, shape.halfLength * z, shape.radius
+    points = _points_of(shape, kind)
+    return None if points is None or len(points) == 0 else bounding_capsule(points)
+
+
+def _points_of(shape: Any, kind: str) -> Array | None:
+    """Points whose convex hull is the shape, or contains it."""
+    if kind == "Box":
+        return _CORNERS * np.asarray(shape.halfSide, dtype=float)
+    if kind == "Ellipsoid":  # the box around it
+        return _CORNERS * np.asarray(shape.radii, dtype=float)
+    if kind == "Cone":
+        angles = 2 * np.pi * np.arange(_AROUND) / _AROUND
+        rim = np.column_stack([shape.radius * np.cos(angles), shape.radius * np.sin(angles),
+                               np.full(_AROUND, -shape.halfLength)])
+        return np.vstack([rim, [0.0, 0.0, shape.halfLength]])
+    for of_mesh in ("vertices", "points"):
+        if hasattr(shape, of_mesh):
+            points = getattr(shape, of_mesh)
+            return np.array(points() if callable(points) else points, dtype=float).reshape(-1, 3)
+    return None
+
+
+def bounding_capsule(points: Array) -> tuple[Array, Array, float]:
+    """Return start (3,), end (3,) and radius [m] of a capsule that contains points (N, 3).
+
+    Of the axes x, y, z and the three principal ones of the points, through the middle of their
+    extent, that whose capsule has the least volume. It is not the smallest of all capsules.
+    """
+    few = points[::max(1, len(points) // _MOST)]
+    centred = few - few.mean(axis=0)
+    principal = np.linalg.svd(centred, full_matrices=False)[2]
+    axes = [*np.eye(3), *principal]
+    best = min(axes, key=lambda axis: _volume(_around(few, axis)))
+    return _around(points, best)
+
+
+def _around(points: Array, axis: Array) -> tuple[Array, Array, float]:
+    """Return the capsule along `axis` that contains the points."""
+    across = _across(axis)
+    flat = points @ across.T
+    middle = (flat.min(axis=0) + flat.max(axis=0)) / 2
+    off_axis = np.linalg.norm(flat - middle, axis=1)
+    radius = float(off_axis.max())
+    cap = np.sqrt(np.maximum(radius**2 - off_axis**2, 0.0))  # how far a cap reaches there
+    along = points @ axis
+    low, high = float((along + cap).min()), float((along - cap).max())
+    if low > high:  # one ball is enough
+        low = high = (low + high) / 2
+    origin = middle @ across
+    return origin + low * axis, origin + high * axis, radius
+
+
+def _across(axis: Array) -> Array:
+    """Two unit vectors (2, 3) at right angles to an axis."""
+    other = np.eye(3)[int(np.argmin(np.abs(axis)))]
+    first = np.cross(axis, other)
+    first /= np.linalg.norm(first)
+    return np.array([first, np.cross(axis, first)])
+
+
+def _volume(capsule: tuple[Array, Array, float]) -> float:
+    start, end, radius = capsule
+    return float(np.pi * radius**2 * (np.linalg.norm(end - start) + 4.0 / 3.0 * radius))
+
+
+def _vector(point: Array) -> Vector:
+    x, y, z = (float(value) for value in point)
+    return x, y, z
