@@ -1,0 +1,63 @@
+"""A thread that stops a robot when the loop that moves it hangs."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from threading import Event, Lock, Thread
+
+
+class Watchdog:
+    """Calls `stop` once if it is not fed for `limit` [s]; in a thread, while it is entered.
+
+    The thread is one of this process: it cannot act while compiled code holds the interpreter.
+    """
+
+    def __init__(self, limit: float, stop: Callable[[], object],
+                 clock: Callable[[], float] = time.monotonic) -> None:
+        self.limit, self.fired = limit, False
+        self.error: BaseException | None = None
+        self._stop, self._clock, self._over = stop, clock, Event()
+        self._fed = clock()
+        self._thread = Thread(target=self._watch, name="watchdog", daemon=True)
+
+    def feed(self) -> None:
+        """Say that all is well now."""
+        self._fed = self._clock()
+
+    def check(self) -> bool:
+        """Call `stop` if it is time and was not done; return whether it was done."""
+        if not self.fired and self._clock() - self._fed > self.limit:
+            self.fired = True
+            try:
+                self._stop()
+            except BaseException as error:
+                self.error = error
+        return self.fired
+
+    def __enter__(self) -> Watchdog:
+        self.feed()
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._over.set()
+        self._thread.join(self.limit)
+
+    def _watch(self) -> None:
+        while not self._over.wait(self.limit / 4) and not self.check():
+            pass
+
+
+class Once:
+    """A function that is called the first time only, from whatever thread."""
+
+    def __init__(self, function: Callable[[], object]) -> None:
+        self._function, self._lock, self._done = function, Lock(), False
+
+    def __call__(self) -> None:
+        """Call it, unless that was done."""
+        with self._lock:
+            first, self._done = not self._done, True
+        if first:
+            self._function()

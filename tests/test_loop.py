@@ -1,0 +1,277 @@
+"""The loop for hardware: planned times, overruns, watchdog, log; on a clock made by hand."""
+
+import ast
+import gc
+import os
+import subprocess
+import sys
+from pathlib import Path
+from threading import Event
+
+import numpy as np
+import pytest
+
+from hierarchy import HierarchyError
+from hierarchy.loop import Loop
+from hierarchy.watchdog import Once, Watchdog
+
+PERIOD = 0.25  # with steps of eighths every time is exact
+
+
+class Clock:
+    """Time that passes only where it is told to, or by `per_look` where it is looked at."""
+
+    def __init__(self, per_look=0.0, oversleep=0.0):
+        self.now, self.per_look, self.oversleep = 100.0, per_look, oversleep
+        self.slept = []
+
+    def __call__(self):
+        self.now += self.per_look
+        return self.now
+
+    def sleep(self, seconds):
+        self.slept.append(seconds)
+        self.now += seconds + self.oversleep
+
+
+class Robot:
+    """Notes what is asked of it; a tick takes the next of `durations`."""
+
+    def __init__(self, clock=None, durations=()):
+        self.clock, self.durations = clock, list(durations)
+        self.times, self.sent, self.stops = [], [], 0
+
+    def step(self, t):
+        self.times.append(t)
+        if self.durations:
+            self.clock.now += self.durations.pop(0)
+        return np.array([t, -t])
+
+    def send(self, command):
+        self.sent.append(command)
+
+    def stop(self):
+        self.stops += 1
+
+
+def ran(durations, seconds=2.0, clock=None, **settings):
+    clock = clock or Clock()
+    robot = Robot(clock, durations)
+    loop = Loop(PERIOD, clock=clock, sleep=clock.sleep, **settings)
+    return robot, loop.run(robot.step, robot.stop, seconds, robot.send, record=2)
+
+
+def test_every_tick_is_run_at_its_planned_time_and_the_end_is_a_safe_stop():
+    robot, log = ran([0.125] * 8)
+    np.testing.assert_array_equal(robot.times, PERIOD * np.arange(8))
+    np.testing.assert_array_equal(log.late, np.zeros(8))
+    np.testing.assert_array_equal(log.duration, np.full(8, 0.125))
+    assert (log.overruns, log.skipped, log.ended) == (0, 0, "all ticks were run")
+    assert robot.stops == 1
+
+
+def test_a_sleep_that_is_too_long_is_not_added_up():
+    _, log = ran([], seconds=100.0, clock=Clock(oversleep=0.125))
+    np.testing.assert_array_equal(log.late, [0.0] + [0.125] * 399)
+
+
+def test_the_end_of_a_wait_is_watched_where_that_was_asked_for():
+    clock = Clock(per_look=1e-4, oversleep=0.01)
+    _, log = ran([], clock=clock, spin=0.02)
+    assert log.late.max() < 1e-3
+    assert max(clock.slept) <= PERIOD - 0.02
+
+
+def test_commands_are_sent_and_recorded():
+    robot, log = ran([])
+    np.testing.assert_array_equal(log.command, robot.sent)
+    assert set(log.arrays()) == {"tick", "late", "duration", "command"}
+
+
+# A tick that takes 0.625 s ends in the middle of the third period.
+
+
+def test_skipped_ticks_are_left_out_and_those_after_are_on_time():
+    robot, log = ran([0.0, 0.625], overrun="skip")
+    np.testing.assert_array_equal(log.tick, [0, 1, 4, 5, 6, 7])
+    np.testing.assert_array_equal(log.late, np.zeros(6))
+    np.testing.assert_array_equal(robot.times, PERIOD * log.tick)
+    assert (log.overruns, log.skipped) == (1, 2)
+
+
+def test_missed_ticks_are_caught_up():
+    _, log = ran([0.0, 0.625], overrun="catch up")
+    np.testing.assert_array_equal(log.tick, np.arange(8))
+    np.testing.assert_array_equal(log.late, [0.0, 0.0, 0.375, 0.125, 0.0, 0.0, 0.0, 0.0])
+    assert log.skipped == 0
+
+
+def test_no_more_ticks_are_caught_up_than_was_allowed():
+    _, log = ran([1.125], overrun="catch up", behind=2)
+    np.testing.assert_array_equal(log.tick, [0, 3, 4, 5, 6, 7])
+    np.testing.assert_array_equal(log.late[:4], [0.0, 0.375, 0.125, 0.0])
+
+
+def test_a_loop_that_may_not_overrun_stops():
+    robot, log = ran([0.0, 0.0, 0.375], overrun="stop")
+    assert log.ended == "tick 2 ended 125 ms too late"
+    assert (log.count, robot.stops) == (3, 1)
+
+
+def test_a_tick_that_ends_as_the_next_begins_is_no_overrun():
+    _, log = ran([PERIOD] * 8, overrun="stop")
+    assert (log.count, log.overruns) == (8, 0)
+
+
+@pytest.mark.parametrize("error", [ValueError("no cable"), KeyboardInterrupt()],
+                         ids=["exception", "Ctrl-C"])
+@pytest.mark.parametrize("where", ["step", "send"])
+def test_an_exception_ends_in_a_safe_stop_and_goes_on_with_the_log_kept(error, where):
+    robot, loop = Robot(), Loop(PERIOD, clock=(clock := Clock()), sleep=clock.sleep)
+
+    def fails(_):
+        if len(robot.times) == (2 if where == "step" else 3):
+            raise error
+        return robot.step(0.0) if where == "step" else None
+
+    with pytest.raises(type(error)):
+        loop.run(fails if where == "step" else robot.step, robot.stop, 2.0,
+                 robot.send if where == "step" else fails)
+    assert (robot.stops, loop.log.count) == (1, 2)
+    assert loop.log.ended.startswith(f"{type(error).__name__} after 2 ticks")
+
+
+def test_the_collector_of_garbage_rests_while_the_loop_runs_and_only_then():
+    seen = []
+    assert gc.isenabled()
+    Loop(PERIOD, clock=(clock := Clock()), sleep=clock.sleep).run(
+        lambda t: seen.append(gc.isenabled()), lambda: seen.append(gc.isenabled()), 0.5)
+    assert seen == [False, False, False]
+    assert gc.isenabled()
+
+
+def test_a_priority_that_is_not_given_is_said_and_one_that_is_is_given_back():
+    before = os.sched_getscheduler(0)
+    _, log = ran([], priority=1)
+    assert os.sched_getscheduler(0) == before
+    assert all("SCHED_FIFO at priority 1" in note for note in log.notes)
+    _, log = ran([], priority=10_000)
+    assert "SCHED_FIFO at priority 10000 was not given" in str(log)
+
+
+def test_a_summary_has_percentiles_of_lateness_and_duration():
+    _, log = ran([0.125] * 6 + [0.0] * 2)
+    found = log.summary()
+    assert found["duration"]["median"] == found["duration"]["max"] == 0.125
+    assert list(found["late"]) == ["median", "p95", "p99.9", "max"]
+    assert "8 ticks of 250 ms, 0 overruns, 0 skipped; all ticks were run" in str(log)
+    assert "nan" in str(Loop(PERIOD).log)
+
+
+# --- the watchdog -------------------------------------------------------------------------------
+
+
+def test_a_watchdog_stops_once_when_it_was_not_fed_for_its_time():
+    clock, robot = Clock(), Robot()
+    dog = Watchdog(1.0, robot.stop, clock)
+    clock.now += 1.0
+    assert not dog.check()
+    dog.feed()
+    clock.now += 1.125
+    assert dog.check()
+    assert dog.check()
+    assert robot.stops == 1
+
+
+def test_a_step_that_hangs_is_stopped_from_outside_and_sends_nothing_after():
+    stopped, robot = Event(), Robot()
+
+    def hangs(t):
+        assert stopped.wait(30.0)
+        return t
+
+    def stop():
+        robot.stop()
+        stopped.set()
+
+    log = Loop(0.001, watchdog=0.01).run(hangs, stop, 1.0, robot.send)
+    assert (log.ended, log.count) == ("the watchdog fired in tick 0", 0)
+    assert (robot.stops, robot.sent) == (1, [])
+
+
+def test_a_command_that_may_have_left_after_the_stop_is_stopped_again():
+    stopped, robot = Event(), Robot()
+
+    def hangs(command):
+        assert stopped.wait(30.0)
+        robot.send(command)
+
+    def stop():
+        robot.stop()
+        stopped.set()
+
+    log = Loop(0.001, watchdog=0.01).run(robot.step, stop, 1.0, hangs)
+    assert log.ended == "the watchdog fired in tick 0"
+    assert (robot.stops, len(robot.sent)) == (2, 1)
+
+
+def test_a_safe_stop_that_fails_in_the_watchdog_is_reported():
+    called = Event()
+
+    def fails():
+        called.set()
+        raise OSError("no answer")
+
+    loop = Loop(0.001, watchdog=0.01)
+    with pytest.raises(OSError, match="no answer"):
+        loop.run(lambda t: called.wait(30.0), fails, 1.0, lambda command: None)
+    assert any("safe_stop failed in the watchdog" in note for note in loop.log.notes)
+
+
+def test_a_loop_that_is_fed_never_wakes_its_watchdog():
+    robot = Robot()
+    log = Loop(0.001, watchdog=60.0).run(robot.step, robot.stop, 0.02, robot.send)
+    assert log.ended == "all ticks were run"
+    assert robot.stops == 1
+
+
+def test_a_function_is_called_once_from_whatever_side():
+    robot = Robot()
+    once = Once(robot.stop)
+    once()
+    once()
+    assert robot.stops == 1
+
+
+@pytest.mark.parametrize(("settings", "text"), [
+    ({"period": 0.0}, "period 0.0 s must be positive"),
+    ({"overrun": "skipp"}, "did you mean 'skip'"),
+    ({"behind": 0}, "behind = 0"), ({"spin": -1.0}, "spin -1.0 s"),
+    ({"watchdog": 0.1}, "watchdog 0.1 s must be longer than the period 0.25 s")],
+    ids=["period", "overrun", "behind", "spin", "watchdog"])
+def test_settings_that_make_no_sense_are_refused(settings, text):
+    with pytest.raises(HierarchyError, match=text):
+        Loop(**{"period": PERIOD, **settings})
+
+
+def test_a_duration_must_be_positive_and_finite():
+    robot = Robot()
+    with pytest.raises(HierarchyError, match="duration inf s"):
+        Loop(PERIOD).run(robot.step, robot.stop, np.inf)
+    assert robot.stops == 0
+
+
+# --- the examples -------------------------------------------------------------------------------
+
+EXAMPLES = Path(__file__).parents[1] / "examples"
+
+
+def test_the_example_of_a_loop_runs():
+    ran = subprocess.run([sys.executable, EXAMPLES / "loop.py", "--duration", "0.1"], check=True,
+                         capture_output=True, text=True)
+    assert "all ticks were run" in ran.stdout
+
+
+def test_the_node_for_ros_is_python_and_says_that_no_more_was_checked():
+    tree = ast.parse((EXAMPLES / "ros2_node.py").read_text(encoding="utf-8"))
+    assert "only checked for its syntax" in ast.get_docstring(tree)
