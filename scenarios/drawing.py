@@ -5,7 +5,10 @@ from __future__ import annotations
 import io
 import itertools
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass
 from typing import Any
 
 import matplotlib
@@ -25,13 +28,56 @@ ALERT = "#d33a2c"
 # Tol's bright scheme, for the joints of one robot.
 JOINTS = ("#4477aa", "#ee6677", "#228833", "#ccbb44", "#66ccee", "#aa3377", "#999999", "#dd7733")
 
-_STYLE: dict[Any, Any] = {
+_SCREEN: dict[Any, Any] = {
     "font.size": 9.0, "axes.titlesize": 9.0, "axes.titlelocation": "left", "legend.frameon": False,
     "axes.edgecolor": INK, "axes.labelcolor": INK, "text.color": INK, "xtick.color": INK,
     "ytick.color": INK, "grid.color": INK, "grid.alpha": 0.12, "grid.linewidth": 0.6,
     "axes.grid": True, "axes.linewidth": 0.6, "lines.linewidth": 1.0, "axes.facecolor": "none",
     "axes.spines.top": False, "axes.spines.right": False, "xtick.major.width": 0.6,
     "ytick.major.width": 0.6, "svg.fonttype": "none", "figure.dpi": 72.0}
+# Lines that are told apart in grey, one for each of JOINTS.
+_IN_GREY = ("-", "--", ":", "-.", (0, (5, 1, 1, 1, 1, 1)), (0, (8, 2)), (0, (3, 1)), (0, (1, 3)))
+_PAPER = {**_SCREEN, "font.family": "STIXGeneral", "mathtext.fontset": "stix", "font.size": 8.0,
+          "axes.titlesize": 8.0, "pdf.fonttype": 42}
+
+
+@dataclass(frozen=True)
+class Style:
+    """How figures are drawn: matplotlib's settings, and what those cannot say.
+
+    width [in] that every figure has, or None for each its own; titled, whether figures say of which
+    run they are; formats of the files; lines, those of the joints in turn.
+    """
+
+    settings: Mapping[Any, Any]
+    width: float | None
+    titled: bool
+    formats: tuple[str, ...]
+    lines: tuple[Any, ...] = ("-",)
+
+
+SCREEN = Style(_SCREEN, None, True, ("svg", "png"))
+# One column of IEEE's journals, and its usual size of letters in figures.
+PAPER = Style(_PAPER, 3.5, False, ("pdf",), _IN_GREY)
+STYLES = {"screen": SCREEN, "paper": PAPER}
+_LEAST_HEIGHT = 0.75  # of a figure made narrower, relative to its own: letters keep their size
+_present: ContextVar[Style] = ContextVar("style", default=SCREEN)
+
+
+@contextmanager
+def styled(style: Style) -> Iterator[None]:
+    """Draw and write all figures in a style, as a context."""
+    token = _present.set(style)
+    try:
+        with matplotlib.rc_context(dict(style.settings)):
+            yield
+    finally:
+        _present.reset(token)
+
+
+def present() -> Style:
+    """Return the style in which figures are drawn now."""
+    return _present.get()
 
 
 def colours(labels: Iterable[str]) -> dict[str, str]:
@@ -39,16 +85,30 @@ def colours(labels: Iterable[str]) -> dict[str, str]:
     return {label: look.colour for label, look in looks(labels).items()}
 
 
+def joint_colour(joint: int) -> str:
+    """Return the colour of a joint, numbered from 0."""
+    return JOINTS[joint % len(JOINTS)]
+
+
+def joint_line(joint: int) -> dict[str, Any]:
+    """Return colour and line of a joint's curve, numbered from 0, as matplotlib names them."""
+    lines = present().lines
+    return {"color": joint_colour(joint), "linestyle": lines[joint % len(lines)]}
+
+
 def style() -> dict[Any, Any]:
-    """Return matplotlib's settings in this project's style, to be used as a context."""
-    return dict(_STYLE)
+    """Return matplotlib's settings of the present style, to be used as a context."""
+    return dict(present().settings)
 
 
-def figure(rows: int = 1, width: float = 3.3, height: float = 2.1) -> tuple[Figure, list[Axes]]:
-    """Return a figure of `rows` axes one under the other, in inches, in this project's style."""
-    with matplotlib.rc_context(_STYLE):
+def figure(rows: int = 1, width: float = 3.3, height: float = 2.1,
+           heights: Sequence[float] | None = None) -> tuple[Figure, list[Axes]]:
+    """Return a figure of `rows` axes one under the other, in inches, in the present style."""
+    if (fixed := present().width) is not None:
+        width, height = fixed, height * min(max(fixed / width, _LEAST_HEIGHT), 1.0)
+    with matplotlib.rc_context(style()):
         fig = Figure(figsize=(width, height), layout="constrained")
-        axes = fig.subplots(rows, 1, sharex=True, squeeze=False)[:, 0]
+        axes = fig.subplots(rows, 1, sharex=True, squeeze=False, height_ratios=heights)[:, 0]
     return fig, list(axes)
 
 
@@ -107,7 +167,7 @@ def shared_limits(ranges: Sequence[tuple[float, float]], factor: float = 4.0
 def svg(fig: Figure, title: str) -> str:
     """Return a figure as an inline `<svg>` that scales, follows the page's theme and is named."""
     text = io.StringIO()
-    with matplotlib.rc_context({**_STYLE, "svg.hashsalt": title}):
+    with matplotlib.rc_context({**style(), "svg.hashsalt": title}):
         fig.savefig(text, format="svg", transparent=True, metadata={"Date": None})
     body = text.getvalue()[text.getvalue().index("<svg"):]
     body = re.sub(r"<metadata>.*?</metadata>", "", body, flags=re.DOTALL)
@@ -120,10 +180,14 @@ def svg(fig: Figure, title: str) -> str:
 
 
 def write(fig: Figure, stem: str) -> None:
-    """Write a figure as stem.svg and stem.png, on white."""
-    with matplotlib.rc_context({**_STYLE, "svg.hashsalt": "task-hierarchy"}):
-        fig.savefig(f"{stem}.svg", facecolor="white", metadata={"Date": None})
-        fig.savefig(f"{stem}.png", facecolor="white", dpi=160)
+    """Write a figure as stem.svg, stem.png or stem.pdf, on white, as the present style says.
+
+    The same figure is the same bytes: no file has a date.
+    """
+    undated = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
+    with matplotlib.rc_context({**style(), "svg.hashsalt": "task-hierarchy"}):
+        for kind in present().formats:
+            fig.savefig(f"{stem}.{kind}", facecolor="white", dpi=160, metadata=undated.get(kind))
 
 
 def _rounded(path: re.Match[str]) -> str:

@@ -18,6 +18,11 @@ COLOURS = {"tpm": "#0072b2", "recursive": "#e69f00", "augmented": "#cc79a7", "hq
 # For what is no resolver of this package.
 SPARE = ("#7f8790", "#999933", "#aa0044", "#44aa99", "#cc6677", "#664466")
 
+# Tol's light scheme, for bands with dark letters on them: tasks of a stack.
+_TASKS = {"position": "#77aadd", "pointing": "#eedd88", "avoidance": "#ee8866",
+          "separation": "#ffaabb", "joint limits": "#dddddd"}
+_MORE_TASKS = ("#44bb99", "#bbcc33", "#99ddff", "#aaaa00", "#c9a0dc")
+
 SOLID: Dash = ()
 _DASHES: tuple[Dash, ...] = (SOLID, (4.0, 1.6), (1.0, 1.4), (6.0, 1.4, 1.0, 1.4),
                              (6.0, 1.4, 1.0, 1.4, 1.0, 1.4), (9.0, 2.0), (2.2, 1.2))
@@ -62,6 +67,14 @@ def looks(labels: Iterable[str]) -> dict[str, Look]:
                  if Look(shade, line) not in found.values())
         found[label] = Look(shade, next(lines, SOLID))
     return {label: found[label] for label in labels}
+
+
+def task_colours(names: Iterable[str]) -> dict[str, str]:
+    """Return a light colour for each task: of its own, or the next of those that are left."""
+    names = list(dict.fromkeys(names))
+    others = [name for name in names if name not in _TASKS]
+    return {name: _TASKS.get(name) or _MORE_TASKS[others.index(name) % len(_MORE_TASKS)]
+            for name in names}
 
 
 def _resolver(label: str) -> str:

@@ -5,8 +5,9 @@ import pytest
 from hand_made import recording
 
 import solvers
-from scenarios import drawing, figures, palette
+from scenarios import drawing, figures, palette, panels
 from scenarios.picture import picture
+from scenarios.report.figures import side_by_side
 
 
 def spiky(ticks=20_000):
@@ -125,27 +126,27 @@ def test_the_picture_is_seen_without_distortion():
     assert drawing.project(np.array([0.0, 0.0, 1.0]))[0] == pytest.approx(0.0)
 
 
-@pytest.mark.parametrize("panel", figures.PANELS, ids=lambda panel: panel.name)
+@pytest.mark.parametrize("panel", panels.PANELS, ids=lambda panel: panel.name)
 def test_every_panel_draws_a_run_that_has_its_signal(panel):
     run = recording()
     assert panel.fits(run)
-    drawn = figures.side_by_side(panel, {"tpm published": run, "hqp": run})
+    drawn = side_by_side(panel, {"tpm published": run, "hqp": run})
     assert list(drawn) == ["tpm published", "hqp"]
     assert drawn["hqp"].axes[0].get_ylim() == drawn["tpm published"].axes[0].get_ylim()
 
 
-@pytest.mark.parametrize("panel", figures.PANELS, ids=lambda panel: panel.name)
+@pytest.mark.parametrize("panel", panels.PANELS, ids=lambda panel: panel.name)
 def test_a_panel_without_its_signal_is_left_out_and_not_drawn_empty(panel):
     run = recording()
     del run.signals[panel.signal]
-    assert figures.side_by_side(panel, {"hqp": run}) == {}
+    assert side_by_side(panel, {"hqp": run}) == {}
 
 
 def test_a_run_far_beyond_the_others_is_cut_and_says_so():
     quiet = recording(v=np.eye(5, 7))
     wild = recording(v=1000.0 * np.eye(5, 7))
-    velocities = figures.PANELS[0]
-    drawn = figures.side_by_side(velocities, {"a": quiet, "b": quiet, "c": wild})
+    velocities = panels.PANELS[0]
+    drawn = side_by_side(velocities, {"a": quiet, "b": quiet, "c": wild})
     texts = [text.get_text() for text in drawn["c"].axes[0].texts]
     assert any("cut" in text for text in texts)
     assert drawn["a"].axes[0].get_ylim()[1] < 10.0
@@ -154,7 +155,7 @@ def test_a_run_far_beyond_the_others_is_cut_and_says_so():
 def test_the_stretches_in_which_a_task_is_active_are_red():
     run = recording(pointing_active=[False, True, True, False, False],
                     pointing_error=[0.0, 1.0, 2.0, 3.0, 4.0])
-    fig = figures.side_by_side(figures._PANEL["pointing-error"], {"hqp": run})["hqp"]
+    fig = side_by_side(panels.PANEL["pointing-error"], {"hqp": run})["hqp"]
     (red,) = [line for line in fig.axes[0].lines if line.get_color() == drawing.ALERT]
     np.testing.assert_array_equal(red.get_ydata(), [np.nan, 1.0, 2.0, np.nan, np.nan])
 
@@ -162,7 +163,8 @@ def test_the_stretches_in_which_a_task_is_active_are_red():
 def test_all_figures_of_a_run_are_written_as_svg_and_png(tmp_path):
     figures.write_all(recording(), tmp_path)
     stems = {path.stem for path in tmp_path.iterdir()}
-    assert stems == {figure.name for figure in figures.SIMULATION} | {"picture", "tick-times"}
+    letter = {figure.name for figure in figures.SIMULATION}
+    assert stems == letter | {"picture", "stack", "tick-times"}
     assert len(list(tmp_path.iterdir())) == 2 * len(stems)
 
 

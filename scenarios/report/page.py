@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING, Any
 
 from matplotlib.figure import Figure
 
-from scenarios import drawing, figures
+from scenarios import drawing, panels
 from scenarios.parting import BOUND, partings
 from scenarios.picture import picture
+from scenarios.report import figures
 from scenarios.report.verdict import in_words, verdict
 
 if TYPE_CHECKING:
@@ -131,7 +132,7 @@ def _overlays(name: str, recordings: Mapping[str, Recording]) -> str:
     drawn = []
     if all("position_error" in r for r in recordings.values()):
         drawn.append(("Distance from the path [mm]",
-                      figures.overlay(figures.position_error, recordings)))
+                      figures.overlay(panels.position_error, recordings)))
     if len({r.scenario.name for r in recordings.values()}) < len(recordings):
         drawn.append((f"How far the joints depart from those of {first} [rad]",
                       figures.departure(recordings)))
@@ -146,7 +147,7 @@ def _overlays(name: str, recordings: Mapping[str, Recording]) -> str:
 
 def _panels(name: str, recordings: Mapping[str, Recording]) -> list[str]:
     sections, colour = [], drawing.colours(recordings)
-    for panel in figures.PANELS:
+    for panel in panels.PANELS:
         drawn = figures.side_by_side(panel, recordings)
         body = "".join(f"<figure><figcaption>{_chip(colour[label])}{escape(label)}</figcaption>"
                        f"{_svg(fig, f'{name}, {label}: {panel.title}')}</figure>"
@@ -191,7 +192,7 @@ def _legend(labels: Any) -> str:
 
 def _joints(recordings: Mapping[str, Recording]) -> str:
     count = next(iter(recordings.values()))["v"].shape[1]
-    chips = (f"<span>{_chip(figures.joint_colour(i))}joint {i + 1}</span>" for i in range(count))
+    chips = (f"<span>{_chip(drawing.joint_colour(i))}joint {i + 1}</span>" for i in range(count))
     return f'<div class="legend">{"".join(chips)}</div>'
 
 
