@@ -111,8 +111,9 @@ def check_hierarchy(command, arguments):
             load_sweep(name)
             continue
         scenario = load(name, asked.get("changes") or [])
-        for spec in filter(None, specs):
-            scenario.with_resolver(spec)
+        for spec in specs:
+            if spec and not spec.isupper():
+                scenario.with_resolver(spec)
 
 
 def is_name(text):
