@@ -49,7 +49,7 @@ def inlined(function: Kernel) -> Kernel:
 
 def _compiled(function: Kernel, inline: bool = False, nogil: bool = False) -> Kernel:
     files = _files_behind(function)
-    folder = _cache_root() / _digest((__file__, *sorted(files)))
+    folder = cache_folder() / _digest((__file__, *sorted(files)))
     allocates = _allocates(function)
     kernel: Kernel = _jit_into(folder, function, forceinline=inline, nogil=nogil, _nrt=allocates)
     if not isinstance(kernel, type(function)):
@@ -84,7 +84,8 @@ def _digest(files: tuple[str, ...]) -> str:
 
 
 @cache
-def _cache_root() -> Path:
+def cache_folder() -> Path:
+    """Return where compiled kernels are kept."""
     base = os.environ.get("NUMBA_CACHE_DIR")
     if base is None:
         base = os.environ.get("XDG_CACHE_HOME", "~/.cache")

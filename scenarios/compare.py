@@ -111,6 +111,13 @@ class Comparison:
         names = dict.fromkeys(run.scenario.name for run in self.runs)
         return {name: [run for run in self.runs if run.scenario.name == name] for name in names}
 
+    def as_plain_data(self) -> dict[str, Any]:
+        """Return what `comparison.json` holds."""
+        return {"command": self.command, "versions": self.versions,
+                "runs": [_plain(run) for run in self.runs], "refused": list(self.refused),
+                "partings": {name: [_plain_parting(one) for one in partings(runs)]
+                             for name, runs in self.groups().items()}}
+
 
 def default_resolvers(asked: Handles = "equalities") -> tuple[tuple[str, ...], dict[str, str]]:
     """Return those of DEFAULT_RESOLVERS that can run here, and of the others what brings them."""
@@ -257,11 +264,8 @@ def _interrupted(run: Run) -> bool:
 def _write(comparison: Comparison, folder: Path) -> None:
     from scenarios.report import page
 
-    data = {"command": comparison.command, "versions": comparison.versions,
-            "runs": [_plain(run) for run in comparison.runs], "refused": list(comparison.refused),
-            "partings": {name: [_plain_parting(one) for one in partings(runs)]
-                         for name, runs in comparison.groups().items()}}
-    write_text(folder / "comparison.json", json.dumps(data, indent=2, allow_nan=False) + "\n")
+    data = json.dumps(comparison.as_plain_data(), indent=2, allow_nan=False)
+    write_text(folder / "comparison.json", data + "\n")
     write_text(folder / "index.html", page(comparison))
 
 

@@ -1,5 +1,6 @@
 import importlib
 import json
+import os
 import subprocess
 import sys
 
@@ -245,3 +246,63 @@ def test_help_needs_none_of_the_heavy_packages():
             "print({'numpy', 'numba', 'pinocchio', 'pydantic', 'matplotlib'} & set(sys.modules))")
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.endswith("set()\n")
+
+
+def said(arguments, capsys, code=0):
+    """Run a command with --json and return what it printed, which is one JSON object."""
+    assert run_command([*arguments, "--json"]) == code
+    return json.loads(capsys.readouterr().out)
+
+
+def test_json_of_a_run_is_its_metrics_and_where_it_is(tmp_path, capsys):
+    found = said(["run", "ellipse", *SHORT, "--out", "a"], capsys)
+    kept = json.loads((tmp_path / "a" / "metrics.json").read_text())
+    assert found == {"scenario": "ellipse", "resolver": "tpm", "folder": "a", **kept}
+    assert found["ticks"] == 20
+
+
+def test_json_of_a_comparison_is_what_it_keeps(tmp_path, capsys):
+    found = said(["compare", "ellipse", "--resolvers", "tpm,augmented", *SHORT, "--out", "b"],
+                 capsys)
+    kept = json.loads((tmp_path / "b" / "comparison.json").read_text())
+    assert found == {"report": "b/index.html", **kept}
+    assert [run["resolver"] for run in found["runs"]] == ["tpm", "augmented"]
+
+
+def test_json_lists_what_there_is(capsys):
+    found = said(["list"], capsys)
+    assert "ellipse" in found["scenarios"]
+    assert "hcod" in found["resolvers"]
+    assert list(found) == ["scenarios", "sweeps", "resolvers", "tasks", "robots"]
+
+
+def test_json_of_a_check_is_the_whole_scenario(capsys):
+    found = said(["check", "ellipse", "--set", "pointing.alpha_d=35"], capsys)
+    assert found["pointing"]["alpha_d"] == 35.0
+    assert found["control"]["resolver"] == "tpm"
+
+
+def test_a_mistake_with_json_is_an_error_on_stderr_all_the_same(capsys):
+    assert "unknown scenario 'elipse'" in fails(["check", "elipse", "--json"], capsys)
+
+
+def test_the_list_fits_80_columns(capsys):
+    assert run_command(["list"]) == 0
+    assert max(map(len, capsys.readouterr().out.splitlines())) <= 80
+
+
+def completed(words):
+    """What bash would offer for the last of the words of a command line."""
+    done = subprocess.run(
+        [sys.executable, "-c", "from scenarios.cli import app; app(prog_name='hierarchy')"],
+        capture_output=True, text=True, check=False,
+        env={**os.environ, "_HIERARCHY_COMPLETE": "complete_bash", "COMP_WORDS": " ".join(words),
+             "COMP_CWORD": str(len(words) - 1)})
+    return done.stdout.split()
+
+
+def test_the_shell_completes_commands_scenarios_and_resolvers():
+    assert completed(["hierarchy", "comp"]) == ["compare"]
+    assert completed(["hierarchy", "run", "human-h"]) == ["human-hqp"]
+    assert completed(["hierarchy", "compare", "ellipse", "--resolvers", "tpm,hc"]) == ["tpm,hcod"]
+    assert completed(["hierarchy", "sweep", "ell"]) == ["ellipse-starts"]

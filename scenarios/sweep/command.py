@@ -13,9 +13,11 @@ from scenarios.sweep.engine import EngineError
 from scenarios.sweep.store import FullError
 from scenarios.sweep.terminal import show
 from scenarios.sweep.whole import sweep
+from scenarios.terminal import print_json
 
 
-def sweep_command(file: str, out: Path | None, workers: int | None, scheduler: str | None) -> int:
+def sweep_command(file: str, out: Path | None, workers: int | None, scheduler: str | None,
+                  as_json: bool = False) -> int:
     """Make a sweep, print what came of it, and return the exit code.
 
     That is 0 if every run has a row, 1 if the sweep could not go on or no run reached its end.
@@ -32,6 +34,12 @@ def sweep_command(file: str, out: Path | None, workers: int | None, scheduler: s
     except KeyboardInterrupt:
         print("hierarchy: interrupted; the same command goes on from here", file=sys.stderr)
         return 1
+    if as_json:
+        print_json({"folder": str(folder), "report": str(folder / "index.html"),
+                    "table": str(folder / "runs.parquet"), "runs": len(done.plan.runs),
+                    "made_now": done.made, "did_not_reach_their_end": done.failed,
+                    "refused": list(done.plan.refused)})
+        return int(done.failed == len(done.plan.runs))
     for name, results in done.found.items():
         show(name, results)
     if done.plan.refused:

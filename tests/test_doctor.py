@@ -1,0 +1,59 @@
+import json
+import sys
+from importlib.metadata import requires
+
+import pytest
+
+from scenarios import doctor
+from scenarios.cli import run_command
+
+
+def test_the_doctor_finds_all_well_here(capsys):
+    assert run_command(["doctor"]) == 0
+    out = capsys.readouterr().out
+    assert "All is well." in out
+    assert "20 of 20 answers certified" in out
+    assert "200 ticks of ellipse" in out
+
+
+def test_every_requirement_is_looked_at(monkeypatch):
+    monkeypatch.setattr(doctor, "_tests", lambda: iter(()))
+    looked_at = " ".join(f"{one.what} {one.found}" for one in doctor.examine())
+    core = [line for line in requires("task-hierarchy") if "extra" not in line]
+    assert len(core) > 10
+    for line in core:
+        assert line.split(">")[0] in looked_at
+    for extra in ("qp", "sim", "sweep", "view", "jax"):
+        assert any(one.what == extra and one.part.startswith("extras") for one in doctor.examine())
+
+
+@pytest.mark.parametrize(("broken", "named"), [
+    (lambda: (_ for _ in ()).throw(RuntimeError("no such kernel")), "RuntimeError: no such kernel"),
+    (lambda: ("tpm, recursive to 1e-01", False), "tpm, recursive to 1e-01")])
+def test_what_does_not_work_is_named_and_ends_with_1(broken, named, monkeypatch, capsys):
+    monkeypatch.setattr(doctor, "_resolvers_agree", broken)
+    assert run_command(["doctor", "--json"]) == 1
+    said = json.loads(capsys.readouterr().out)
+    assert said["well"] is False
+    bad = [one for one in said["findings"] if one["well"] is False]
+    assert [one["what"] for one in bad] == ["resolvers agree"]
+    assert named in bad[0]["found"]
+
+
+def test_a_missing_package_says_how_to_get_it(monkeypatch):
+    there = doctor._version
+    monkeypatch.setattr(doctor, "_version", lambda package: (
+        None if package in ("osqp", "viser") else there(package)))
+    found = {one.what: one for one in [*doctor._versions(), *doctor._extras()]}
+    assert found["osqp"].well is False
+    assert found["osqp"].remedy == "pip install osqp"
+    assert found["view"].remedy == "pip install 'task-hierarchy[view]'"
+    assert found["view"].well is None
+
+
+def test_a_cache_that_cannot_be_written_is_not_well(monkeypatch):
+    monkeypatch.setattr(doctor.os, "access", lambda path, mode: False)
+    cache = {one.what: one for one in doctor._kernels()}["cache"]
+    assert cache.well is False
+    assert "NUMBA_CACHE_DIR" in cache.remedy
+    assert sys.version.split()[0] in [one.found for one in doctor._versions()]
