@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hierarchy import HierarchyError, Robot, State
-from hierarchy.avoidance import Capsule, ControlPoint, Obstacles, link_capsules
+from hierarchy.avoidance import Capsule, ControlPoint, Obstacles
 from hierarchy.problem import Array
-from hierarchy.robots import TABLES
+from hierarchy.robots import TABLES, DHTable
 from scenarios.build import make_obstacles, make_robot, sensed_points
 from scenarios.levels import Levels, judge, order_names
 from scenarios.metrics import pointing_angle
@@ -125,13 +125,15 @@ class Scene:
 def stage(scenario: Scenario) -> Stage:
     """Return what there is to draw of a scenario before it runs."""
     robot, avoidance, pointing = make_robot(scenario.robot), scenario.avoidance, scenario.pointing
-    foot = scenario.sensor.foot if robot.name in TABLES else 0.0
+    foot = scenario.sensor.foot if isinstance(TABLES.get(robot.name), DHTable) else 0.0
+    links = capsules(robot, foot)
     axis = None if pointing is None else np.asarray(pointing.axis) / np.linalg.norm(pointing.axis)
-    return Stage(robot, capsules(robot, foot), sensed_points(robot),
+    return Stage(robot, links, sensed_points(robot),
                  make_obstacles(avoidance.placed if avoidance else ()),
                  _areas(avoidance.thresholds if avoidance else {}),
                  _areas(avoidance.tip_thresholds if avoidance else {}),
-                 axis, radians(pointing.alpha_d) if pointing else 0.0, -foot)
+                 axis, radians(pointing.alpha_d) if pointing else 0.0,
+                 -foot if foot else _lowest(robot, links))
 
 
 def scene(recording: Recording, rate: float = 30.0) -> Scene:
@@ -154,9 +156,17 @@ def scene(recording: Recording, rate: float = 30.0) -> Scene:
 
 
 def capsules(robot: Robot, foot: float = 0.0) -> tuple[Capsule, ...]:
-    """Return a robot's links; sticks from joint to joint where it has no capsules."""
-    if robot.name in TABLES:
-        return link_capsules(TABLES[robot.name], foot)
+    """Return a robot's links, sticks from joint to joint where it has no capsules.
+
+    With `foot` > 0 [m] the first is the column from there below the base up to it.
+    """
+    links = robot.capsules or _sticks(robot)
+    if foot == 0.0 or robot.base == "floating" or not links:
+        return links
+    return (Capsule("foot", 0, (0.0, 0.0, -foot), (0.0, 0.0, 0.0), links[0].radius), *links)
+
+
+def _sticks(robot: Robot) -> tuple[Capsule, ...]:
     end = robot.frame(robot.end_effector)
     sticks = [(body.name, body.parent, body.position) for body in robot.bodies()]
     sticks = [stick for stick in (*sticks, (end.name, end.joint, end.offset))
@@ -164,6 +174,12 @@ def capsules(robot: Robot, foot: float = 0.0) -> tuple[Capsule, ...]:
     radius = _STICK * max((float(np.linalg.norm(stick[2])) for stick in sticks), default=0.0)
     return tuple(Capsule(name, joint, (0.0, 0.0, 0.0), (float(x), float(y), float(z)), radius)
                  for name, joint, (x, y, z) in sticks)
+
+
+def _lowest(robot: Robot, links: Sequence[Capsule]) -> float:
+    """Height [m] of what is lowest of a robot at rest, or of its base."""
+    low = ends(links, robot.state(robot.rest).placements)[..., 2].min(axis=-1, initial=0.0)
+    return float((low - [link.radius for link in links]).min(initial=0.0))
 
 
 def ends(links: Sequence[Capsule], placements: Array) -> Array:

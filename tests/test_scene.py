@@ -6,6 +6,7 @@ from hierarchy import HierarchyError, Robot, State
 from hierarchy.avoidance import link_capsules
 from hierarchy.robots import TABLES
 from scenarios import load, simulate
+from scenarios.config import RobotSection
 from scenarios.controller import Controller
 from scenarios.levels import Fate, judge
 from scenarios.scene import capsules, ends, scene, stage
@@ -175,6 +176,14 @@ def test_a_robot_without_capsules_is_drawn_as_sticks(tmp_path):
     assert np.allclose(ends(links, state.placements)[0, 1], [0.0, 0.5, 0.0])
 
 
+@pytest.mark.parametrize("name", TABLES)
+def test_no_robot_at_rest_is_below_the_floor(name):
+    section = load("ellipse").model_copy(update={"robot": RobotSection(model=name)})
+    fixed = stage(section)
+    low = ends(fixed.capsules[1:], fixed.robot.state(fixed.robot.rest).placements)[..., 2].min()
+    assert low >= fixed.floor
+
+
 def test_the_arm_given_as_a_table_has_its_own_capsules():
-    assert capsules(Robot.named("kuka_lwr")) == link_capsules(TABLES["kuka_lwr"])
+    assert capsules(Robot.named("kuka_lwr"), 0.31) == link_capsules(TABLES["kuka_lwr"], 0.31)
     assert stage(load("ellipse")).floor == pytest.approx(-0.31)
