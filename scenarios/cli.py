@@ -43,6 +43,11 @@ Duration = Annotated[float | None, typer.Option(
 Out = Annotated[Path | None, typer.Option(
     "--out", metavar="FOLDER", help="Where to write; new or empty. Default: a new one in runs/.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object, and nothing else.")]
+PORT = 8080
+Port = Annotated[int, typer.Option("--port", metavar="N", min=0, max=65535,
+                                   help="Where the page is on 127.0.0.1; 0 for any free port.")]
+Browser = Annotated[bool, typer.Option("--browser/--no-browser",
+                                       help="Open the page, or only say where it is.")]
 
 class Bench(StrEnum):
     """What can be measured."""
@@ -196,6 +201,18 @@ def sweep(file: Annotated[str, typer.Argument(help="Name of a sweep, or a sweep 
     from scenarios.sweep.command import sweep_command
 
     return sweep_command(file, out, workers, scheduler, as_json)
+
+
+@app.command()
+def view(folders: Annotated[list[Path], typer.Argument(
+             metavar="RUN...", help="Folders that `hierarchy run` or `compare` wrote.")],
+         side_by_side: Annotated[bool, typer.Option(
+             "--side-by-side/--overlay", help="How several runs are placed.")] = True,
+         port: Port = PORT, browser: Browser = True) -> int:
+    """Show finished runs in the browser, in space and as curves; needs the extra `view`."""
+    from scenarios.viewer.command import view_command
+
+    return view_command(folders, port, side_by_side, browser)
 
 
 @app.command()

@@ -1,0 +1,97 @@
+"""The page's server, and how the page looks before anything is drawn."""
+
+from __future__ import annotations
+
+import io
+import socket
+import webbrowser
+from contextlib import closing, redirect_stdout
+from math import cos, radians, sin
+from typing import Any
+
+import numpy as np
+
+from hierarchy.errors import HierarchyError
+from hierarchy.problem import Array
+
+HOST = "127.0.0.1"
+_AZIMUTH, _ELEVATION = 150.0, 22.0  # [deg] from where the camera looks
+_FIELD_OF_VIEW = 38.0  # [deg]
+_WIDTH = 330  # [px] of the panels
+
+
+def open_server(port: int, label: str) -> Any:
+    """Return a viser server that listens on 127.0.0.1; port 0 takes a free one.
+
+    Raises HierarchyError where viser is not installed, or the port is taken.
+    """
+    try:
+        import viser
+    except ImportError as error:
+        raise HierarchyError("the page in the browser needs viser, which is not installed: "
+                             "pip install task-hierarchy[view]") from error
+    port = _free(port)
+    with redirect_stdout(io.StringIO()):  # it prints a table of its own
+        server = viser.ViserServer(host=HOST, port=port, label=label, verbose=False)
+    server.gui.configure_theme(show_logo=False, show_share_button=False, control_width="medium",
+                               brand_color=(0, 114, 178))
+    return server
+
+
+def address(server: Any) -> str:
+    """Return where the page is."""
+    return f"http://{HOST}:{server.get_port()}"
+
+
+def announce(server: Any, browser: bool) -> None:
+    """Say where the page is, and open it in a browser if that is wanted."""
+    print(f"Page: {address(server)}   (Ctrl-C ends)", flush=True)
+    if browser:
+        webbrowser.open(address(server))
+
+
+def right() -> Array:
+    """The direction (3,) to the right as the camera sees it at first, level."""
+    a = radians(_AZIMUTH)
+    return np.array([-sin(a), cos(a), 0.0])
+
+
+def look_at(server: Any, centre: Array, radius: float) -> None:
+    """Place the camera so that a ball of `radius` [m] about `centre` (3,) [m] fills the view."""
+    a, e = radians(_AZIMUTH), radians(_ELEVATION)
+    away = np.array([cos(e) * cos(a), cos(e) * sin(a), sin(e)])
+    camera = server.initial_camera
+    camera.fov = radians(_FIELD_OF_VIEW)
+    camera.position = centre + away * radius / sin(radians(_FIELD_OF_VIEW / 2))
+    camera.look_at = centre
+
+
+def lay_out(server: Any) -> Any:
+    """Dock the main panel to the right; return the one at the left, a context to fill."""
+    main, left = server.gui.main_panel, server.gui.add_panel()
+    main.dock_right()
+    main.set_width(_WIDTH)
+    left.dock_left()
+    left.set_width(_WIDTH)
+    return left.add_tab("Curves")
+
+
+def lay_floor(server: Any, height: float) -> None:
+    """Draw a grid at a height [m], and lights that cast shadows on it."""
+    server.scene.add_grid("/floor", 8.0, 8.0, cell_size=0.1, section_size=0.5,
+                          cell_color=(226, 230, 235), section_color=(196, 203, 211),
+                          plane_color=(247, 248, 250), plane_opacity=1.0, shadow_opacity=0.25,
+                          fade_distance=9.0, fade_from="origin", position=(0.0, 0.0, height))
+    server.scene.world_axes.visible = False
+    server.scene.configure_default_lights(cast_shadow=True)
+
+
+def _free(port: int) -> int:
+    """Return the port if nothing listens there, or any that is free for 0."""
+    with closing(socket.socket()) as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind((HOST, port))
+        except (OSError, OverflowError) as error:
+            raise HierarchyError(f"--port {port} cannot be used: {error}") from error
+        return int(probe.getsockname()[1])
