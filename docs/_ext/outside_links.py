@@ -12,7 +12,7 @@ _LINK = re.compile(r"(?<!!)\[([^\]]*)\]\((\.\.?/[^)#\s]+)(#[^)\s]*)?\)")
 def setup(app):
     """Rewrite each document before it is parsed."""
     app.connect("source-read", _rewrite)
-    return {"parallel_read_safe": True, "parallel_write_safe": True}
+    return {"version": "1", "parallel_read_safe": True, "parallel_write_safe": True}
 
 
 def _rewrite(app, docname, source):

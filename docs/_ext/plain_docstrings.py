@@ -16,7 +16,7 @@ def setup(app):
     """Convert every docstring that autodoc hands over."""
     app.connect("autodoc-process-docstring", lambda app, what, name, obj, options, lines:
                 lines.__setitem__(slice(None), converted(lines)))
-    return {"parallel_read_safe": True, "parallel_write_safe": True}
+    return {"version": "1", "parallel_read_safe": True, "parallel_write_safe": True}
 
 
 def converted(lines):
