@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -18,15 +19,11 @@ from hierarchy.avoidance.measurement import Measurement
 from hierarchy.avoidance.self_collision import Capsule
 from hierarchy.compiled import compiled
 from hierarchy.errors import RobotError, UnknownNameError
-from hierarchy.models import (
-    Found,
-    file_of,
-    from_table,
-    in_package,
-    points_along_chain,
-    read_file,
-)
-from hierarchy.models.found import is_floating
+from hierarchy.models.files import read_file
+from hierarchy.models.found import Found, is_floating
+from hierarchy.models.names import file_of, in_package
+from hierarchy.models.points import points_along_chain
+from hierarchy.models.tables import from_table
 from hierarchy.problem import Array
 from hierarchy.robots import TABLES
 from hierarchy.robots.table import Base
@@ -70,8 +67,9 @@ class Robot:
     `lower`, `upper` (nq,) [rad or m], `velocity_limit` (n,) [rad/s or m/s] and `effort_limit` (n,)
     [N m or N] are infinite where the model has none. `coordinates` (n,) says where in q the
     position that belongs to a velocity is, or begins. `parents` (joints + 1) has the joint that
-    carries each. `rest` (nq,) is where it starts unless told otherwise. `missing` are sentences on
-    what its file names and does not have.
+    carries each, `masses` (joints + 1) [kg] and `centres` (joints + 1, 3) [m] the body that each
+    moves. `rest` (nq,) is where it starts unless told otherwise. `missing` are sentences on what
+    its file names and does not have.
     """
 
     def __init__(self, model: Any, name: str, end_effector: str | None = None,
@@ -94,6 +92,9 @@ class Robot:
             self.lower[:7], self.upper[:7] = -np.inf, np.inf
             self.velocity_limit[:6] = self.effort_limit[:6] = np.inf
         self.coordinates = _coordinates(model)
+        inertias = list(model.inertias)
+        self.masses = np.array([0.0, *(float(inertia.mass) for inertia in inertias[1:])])
+        self.centres = np.array([np.zeros(3), *(inertia.lever for inertia in inertias[1:])])
         self.end_effector = end_effector or tuple(model.frames)[-1].name
         self.frame(self.end_effector)
         self.control_points, self.capsules = control_points, capsules
@@ -112,30 +113,36 @@ class Robot:
 
     @classmethod
     def from_file(cls, path: str | Path, end_effector: str | None = None,
-                  base: Base | None = None, shapes: bool = True) -> Robot:
+                  base: Base | None = None, shapes: bool = True,
+                  locked: Mapping[str, float] | None = None) -> Robot:
         """Read a URDF (.urdf) or MJCF (.xml, .mjcf) file; RobotError if it cannot be read.
 
         `end_effector` names a frame; without it one is proposed, see
-        `hierarchy.models.proposed_end_effector`. `base` None is that of the file: fixed, or
+        `hierarchy.models.points`. `base` None is that of the file: fixed, or
         floating for an MJCF with a free joint. Capsules are proposed from the collision
         geometry, unless `shapes` is False, and control points along the chain to the end effector.
+        `locked` joints are held at an angle [rad] or a way [m] and are no joints any more.
         """
-        found = read_file(path, base, shapes)
+        found = read_file(path, base, shapes, locked or {})
         return cls._of(found, Path(path).stem, end_effector)
 
     @classmethod
-    def load(cls, model: str, end_effector: str | None = None, base: Base | None = None) -> Robot:
+    def load(cls, model: str, end_effector: str | None = None, base: Base | None = None,
+             locked: Mapping[str, float] | None = None) -> Robot:
         """Make a robot by a name of `ROBOTS`, a file, or "package:name".
 
         Packages are example_robot_data and robot_descriptions (extra `robots`); the latter may
-        download. Raises RobotError and UnknownNameError.
+        download. `locked` joints of a file are held at an angle [rad] or a way [m] and are no
+        joints of the robot. Raises RobotError and UnknownNameError.
         """
         if in_package(model):
-            robot = cls.from_file(file_of(model), end_effector, base)
+            robot = cls.from_file(file_of(model), end_effector, base, locked=locked)
             robot.name = model.partition(":")[2]
             return robot
         if model.endswith((".urdf", ".xml", ".mjcf")):
-            return cls.from_file(model, end_effector, base)
+            return cls.from_file(model, end_effector, base, locked=locked)
+        if locked:
+            raise RobotError(f"robot {model!r} is a table, of which no joint can be locked")
         robot = cls.named(model, base)
         if end_effector is not None:
             robot.end_effector = robot.frame(end_effector).name
@@ -155,6 +162,13 @@ class Robot:
             raise UnknownNameError("joint", name, self.joint_names)
         return self.joint_names.index(name) + 1
 
+    def coordinate(self, name: str) -> int:
+        """Index in q of the position of the joint called `name`, which must have only one."""
+        joint = self.model.joints[self.joint(name)]
+        if joint.nq != 1:
+            raise RobotError(f"robot {self.name!r}: joint {name!r} has {joint.nq} coordinates")
+        return int(joint.idx_q)
+
     def frame(self, name: str) -> Frame:
         """Find the frame called `name`; UnknownNameError if there is none."""
         names = [frame.name for frame in self.model.frames]
@@ -169,6 +183,12 @@ class Robot:
         """Attach a point to the body that `joint` moves; offset (3,) [m] in that joint's frame."""
         return ControlPoint(name or f"{joint} {np.asarray(offset).tolist()}", self.joint(joint),
                             np.array(offset, dtype=float))
+
+    def control_point_of_frame(self, frame: str, offset: ArrayLike) -> ControlPoint:
+        """Attach a point to what carries `frame`; offset (3,) [m] in axes of that."""
+        held = self.frame(frame)
+        place = held.offset + held.rotation @ np.asarray(offset, dtype=float)
+        return ControlPoint(f"{frame} {np.asarray(offset).tolist()}", held.joint, place)
 
     def bodies(self) -> tuple[Body, ...]:
         """Return the robot's bodies in the order of its joints, for another engine to build."""

@@ -15,11 +15,9 @@ from hierarchy.avoidance import (
     Obstacles,
     Repulsion,
     SurveillanceAreas,
-    link_capsules,
 )
-from hierarchy.paths import Ellipse, Path, Shifted, Still, Waypoints
+from hierarchy.paths import Shifted, Still
 from hierarchy.problem import Array
-from hierarchy.robots import TABLES
 from hierarchy.tasks import (
     Avoidance,
     DangerBounds,
@@ -34,16 +32,19 @@ from hierarchy.tasks import (
 from hierarchy.tasks.self_separation import SelfSeparation
 from scenarios.config import (
     AvoidanceSection,
-    EllipseSection,
     ObstacleSection,
-    PathSection,
     RepulsionSection,
-    RobotSection,
     Scenario,
     ScenarioError,
     SeparationSection,
     StartSection,
-    WaypointsSection,
+)
+from scenarios.making import (
+    make_path,
+    make_robot,
+    make_tasks,
+    separable_pairs,
+    start_state,
 )
 from scenarios.order import Hierarchical, Order, Switched
 from scenarios.plants import Apart, Commanded, JointSensor, KinematicArm, PhysicsArm, Plant
@@ -52,13 +53,16 @@ from scenarios.sensors import ExactDistances, Sensor
 from scenarios.sensors.making import make_depth_sensor
 from solvers import make
 
+__all__ = ["Cell", "build", "make_obstacles", "make_path", "make_robot", "sensed_points"]
+
 
 @dataclass(frozen=True)
 class Cell:
     """A robot with its start, its tasks and what it senses: everything the loop needs.
 
     `order` says which tasks are in the stack, from the measurement and the cone error. `position`,
-    `pointing`, `limits` are the tasks of that name or None; `areas` those of Algorithm 1.
+    `pointing`, `limits` are the tasks of that name or None, `listed` those of `[[tasks]]`; `areas`
+    are those of Algorithm 1.
     """
 
     scenario: Scenario
@@ -72,6 +76,7 @@ class Cell:
     pointing: Pointing | None
     limits: JointLimits | None
     order: Order
+    listed: tuple[Task, ...] = ()
 
 
 def build(scenario: Scenario, kept: Cell | None = None) -> Cell:
@@ -89,37 +94,14 @@ def build(scenario: Scenario, kept: Cell | None = None) -> Cell:
     plant = kept.plant if kept else _started_plant(scenario, robot, sensor, obstacles)
     limits, first = _limits(scenario, robot)
     position, pointing = _position(scenario, robot), _pointing(scenario, robot)
-    last = _posture(scenario, robot, "task")
+    listed, last = _listed(scenario, robot), _posture(scenario, robot, "task")
     tasks = [*first, *_avoidance(scenario, robot),
-             *(task for task in (position, pointing, last) if task)]
+             *(task for task in (position, pointing, *listed, last) if task)]
     areas = (SurveillanceAreas(avoidance.near, avoidance.far, avoidance.end_effector)
              if isinstance(avoidance, AvoidanceSection) else None)
     return Cell(scenario, robot, state, plant,
                 Stack(tasks, control.level, _reference(scenario, robot)), sensor, areas,
-                position, pointing, limits, _order(scenario, areas, first, tasks))
-
-
-def make_robot(section: RobotSection) -> Robot:
-    """Make the robot of a scenario, with the control points the scenario asks for."""
-    if section.model.endswith((".urdf", ".xml", ".mjcf")):
-        robot = Robot.from_file(section.model, section.end_effector)
-    else:
-        robot = Robot.named(section.model)
-        if section.end_effector is not None:
-            robot.end_effector = robot.frame(section.end_effector).name
-    if section.control_points is not None:
-        robot.control_points = tuple(
-            robot.control_point(point.joint, point.offset) for point in section.control_points)
-    return robot
-
-
-def make_path(section: PathSection) -> Path:
-    """Make the path that a section describes."""
-    if isinstance(section, EllipseSection):
-        return Ellipse(section.centre, section.cosine, section.sine, section.rate)
-    if isinstance(section, WaypointsSection):
-        return Waypoints(section.times, section.points)
-    return Still(section.position)
+                position, pointing, limits, _order(scenario, areas, first, tasks), tuple(listed))
 
 
 def sensed_points(robot: Robot) -> tuple[ControlPoint, ...]:
@@ -144,11 +126,7 @@ def _obstacle(number: int, section: ObstacleSection) -> Obstacle:
 
 
 def _start(robot: Robot, section: StartSection) -> tuple[Array, Array]:
-    q = np.zeros(robot.nq) if section.q is None else section.q
-    try:
-        state = robot.state(q, section.v)
-    except HierarchyError as error:
-        raise ScenarioError(f"start: {error}") from error
+    state = start_state(robot, section)
     if section.end_effector is None:
         return state.q.copy(), state.v.copy()
     return _reach(robot, state.q.copy(), np.array(section.end_effector)), state.v.copy()
@@ -267,6 +245,13 @@ def _pointing(scenario: Scenario, robot: Robot) -> Pointing | None:
                     kind, section.stiffness, section.damping, section.gain)
 
 
+def _listed(scenario: Scenario, robot: Robot) -> list[Task]:
+    """The tasks of `[[tasks]]`, with what they leave open as it is at the start."""
+    if not scenario.tasks:
+        return []
+    return make_tasks(scenario.tasks, robot.state(*_start(robot, scenario.start)))
+
+
 def _limits(scenario: Scenario, robot: Robot) -> tuple[JointLimits | None, list[Task]]:
     """The joint limits, and the tasks that go first."""
     section = scenario.limits
@@ -302,11 +287,13 @@ def _separation(section: SeparationSection, robot: Robot, exact: bool) -> list[T
         tasks.append(Separation(sensed_points(robot), barrier,
                                 len(section.obstacles) if exact else None))
     if section.self_collision is not None:
-        if robot.name not in TABLES:
-            raise ScenarioError(f"avoidance.self_collision: robot {robot.name!r} has no capsules")
+        pairs = separable_pairs(robot)
+        if not pairs:
+            raise ScenarioError(f"avoidance.self_collision: robot {robot.name!r} has no capsules "
+                                "that could be kept apart; list them in robot.capsules")
         barrier = Barrier(section.self_collision, section.rate, section.influence,
                           section.recovery, section.limit)
-        tasks.append(SelfSeparation(link_capsules(TABLES[robot.name]), barrier))
+        tasks.append(SelfSeparation(robot.capsules, barrier, pairs))
     return tasks
 
 
@@ -329,7 +316,8 @@ def _posture(scenario: Scenario, robot: Robot, role: str) -> Posture | None:
     section = scenario.posture
     if section is None or section.role != role:
         return None
-    if len(section.target) != robot.n:
+    joints = robot.n - robot.actuated
+    if len(section.target) != joints:
         raise ScenarioError(f"posture.target has {len(section.target)} entries, robot "
-                            f"{robot.name!r} has {robot.n} joints")
+                            f"{robot.name!r} has {joints} joints")
     return Posture(section.target, section.stiffness, section.damping, section.gain)

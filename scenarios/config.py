@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 import tomllib
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 import tomli_w
 from pydantic import (
-    BaseModel,
     BeforeValidator,
-    ConfigDict,
     Discriminator,
     Field,
     Tag,
@@ -21,6 +20,24 @@ from pydantic import (
 )
 
 from hierarchy.errors import HierarchyError, UnknownNameError
+from hierarchy.models.names import in_package
+from hierarchy.robots.table import Base
+from scenarios.sections import (
+    EllipseSection,
+    Finite,
+    ListedPointing,
+    ListedTask,
+    NotNegative,
+    PathSection,
+    Positive,
+    StillSection,
+    Vector3,
+    WaypointsSection,
+)
+from scenarios.sections import Section as _Section
+
+__all__ = ["EllipseSection", "PathSection", "Scenario", "ScenarioError", "StillSection",
+           "WaypointsSection", "load", "shipped"]
 
 if TYPE_CHECKING:
     from solvers import Resolver
@@ -28,18 +45,9 @@ if TYPE_CHECKING:
 
 LIBRARY = Path(__file__).parent / "library"
 
-Finite = Annotated[float, Field(allow_inf_nan=False)]
-Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
-NotNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
-Vector3 = tuple[Finite, Finite, Finite]
-
 
 class ScenarioError(HierarchyError):
     """A scenario file, or a change to one, that cannot be used; names file and key."""
-
-
-class _Section(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=False)
 
 
 class ControlPointSection(_Section):
@@ -49,18 +57,57 @@ class ControlPointSection(_Section):
     offset: Vector3
 
 
+class RobotPointSection(_Section):
+    """A point on the body of `joint`, or fixed to `frame`, `offset` [m] in axes of that."""
+
+    joint: str | None = None
+    frame: str | None = None
+    offset: Vector3 = (0.0, 0.0, 0.0)
+
+    @model_validator(mode="after")
+    def _is_somewhere(self) -> Self:
+        if (self.joint is None) == (self.frame is None):
+            raise ValueError("give either a joint or a frame")
+        return self
+
+
+class CapsuleSection(_Section):
+    """All within `radius` [m] of the segment `start` to `end` [m], in the frame of `joint`.
+
+    Without a joint it is fixed to the base.
+    """
+
+    joint: str | None = None
+    start: Vector3
+    end: Vector3
+    radius: NotNegative
+
+
 class RobotSection(_Section):
-    """Which robot: a name of `hierarchy list`, or a URDF or MJCF file."""
+    """Which robot: a name of `hierarchy list`, a URDF or MJCF file, or "package:name".
+
+    Packages are example_robot_data and robot_descriptions (extra `robots`). `base` None is that of
+    the model. What `end_effector`, `control_points` and `capsules` do not say is as the robot's
+    table says, or for a file as `hierarchy check FILE` proposes. `locked` joints of a file are held
+    at an angle [rad] or a way [m] and are no joints any more.
+    """
 
     model: str
+    base: Base | None = None
     end_effector: str | None = None
-    control_points: tuple[ControlPointSection, ...] | None = None
+    control_points: tuple[RobotPointSection, ...] | None = None
+    capsules: tuple[CapsuleSection, ...] | None = None
+    locked: dict[str, Finite] = Field(default_factory=dict)
 
 
 class StartSection(_Section):
-    """Joint positions [rad or m] and velocities; `end_effector` [m] is reached from q first."""
+    """Positions `q` [rad or m] and velocities `v`; `end_effector` [m] is reached from q first.
+
+    Without q the robot starts in its own posture. `joints` by name go before either.
+    """
 
     q: tuple[Finite, ...] | None = None
+    joints: dict[str, Finite] = Field(default_factory=dict)
     v: tuple[Finite, ...] | None = None
     end_effector: Vector3 | None = None
 
@@ -145,35 +192,6 @@ class ControlSection(_Section):
         own = self.options.get(self.resolver, {})
         plain = {key: value for key, value in self.options.items() if key not in names()}
         return {**(own if isinstance(own, dict) else {self.resolver: own}), **plain}
-
-
-class StillSection(_Section):
-    """A point that does not move, `position` [m]."""
-
-    kind: Literal["still"]
-    position: Vector3
-
-
-class EllipseSection(_Section):
-    """p(t) = centre + cosine cos(rate t) + sine sin(rate t), [m] and [rad/s]."""
-
-    kind: Literal["ellipse"]
-    centre: Vector3
-    cosine: Vector3
-    sine: Vector3
-    rate: Finite = 1.0
-
-
-class WaypointsSection(_Section):
-    """From point to point [m] at increasing times [s], at rest at each."""
-
-    kind: Literal["waypoints"]
-    times: tuple[NotNegative, ...]
-    points: tuple[Vector3, ...]
-
-
-PathSection = Annotated[StillSection | EllipseSection | WaypointsSection,
-                        Field(discriminator="kind")]
 
 
 class PositionSection(_Section):
@@ -578,8 +596,9 @@ class FaultSection(_Section):
 class Scenario(_Section):
     """One scenario: a robot, a start, tasks, and how they are resolved.
 
-    Sections of tasks that are absent ask for nothing. `damping` and `posture` are the null-space
-    term of eq. (14), so only one of them may be given.
+    Sections of tasks that are absent ask for nothing. `tasks` are further ones, in order of
+    priority behind limits, avoidance, position and pointing. `damping` and `posture` are the
+    null-space term of eq. (14), so only one of them may be given.
     """
 
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$")]
@@ -596,13 +615,14 @@ class Scenario(_Section):
     limits: LimitsSection | None = None
     damping: DampingSection | None = None
     posture: PostureSection | None = None
+    tasks: tuple[ListedTask, ...] = ()
     faults: tuple[FaultSection, ...] = ()
 
     @model_validator(mode="after")
     def _asks_for_something(self) -> Self:
-        if not (self.position or self.pointing or self.avoidance):
+        if not (self.position or self.pointing or self.avoidance or self.tasks):
             raise ValueError("the stack is empty: give at least one of [position], [pointing], "
-                             "[avoidance]")
+                             "[avoidance], [[tasks]]")
         if self.damping and self.posture and self.posture.role == "null-space":
             raise ValueError("give [damping] or [posture], not both: each is the null-space term")
         if self.posture and self.posture.role == "task" and self.control.stack == "switched":
@@ -622,6 +642,17 @@ class Scenario(_Section):
             raise ValueError('limits.torque and limits.danger_reach need limits.place = "stack"')
         if self.limits and self.limits.torque and self.control.level == "velocity":
             raise ValueError("limits.torque needs control.level = \"acceleration\"")
+        return self
+
+    @model_validator(mode="after")
+    def _lists_tasks_apart(self) -> Self:
+        if self.tasks and self.control.stack == "switched":
+            raise ValueError('[[tasks]] goes with control.stack = "hierarchical"')
+        names = [task.title for task in self.tasks]
+        names += [name for name in ("position", "pointing", "posture") if getattr(self, name)]
+        for name, count in Counter(names).items():
+            if count > 1:
+                raise ValueError(f"{count} tasks are called {name!r}; give each a name of its own")
         return self
 
     @model_validator(mode="after")
@@ -655,7 +686,9 @@ class Scenario(_Section):
     def asks(self) -> Handles:
         """Which kind of rows its stack has, under the resolver that it names."""
         inequalities = self.control.stack == "hierarchical" and (
-            self.avoidance is not None or (self.pointing and self.pointing.kind == "inequality"))
+            self.avoidance is not None or (self.pointing and self.pointing.kind == "inequality")
+            or any(isinstance(task, ListedPointing) and task.rows == "inequality"
+                   for task in self.tasks))
         limits = self.limits if self.limits_in_stack else None
         if inequalities or (limits and limits.torque):
             return "inequalities"
@@ -719,7 +752,8 @@ def load(name_or_path: str | Path, changes: Sequence[str] | Mapping[str, Any] = 
     for key, value in changes.items():
         _change(data, key, value)
     robot = data.get("robot")
-    if isinstance(robot, dict) and str(robot.get("model", "")).endswith((".urdf", ".xml", ".mjcf")):
+    if isinstance(robot, dict) and not in_package(model := str(robot.get("model", ""))) and (
+            model.endswith((".urdf", ".xml", ".mjcf"))):
         robot["model"] = str(path.parent.resolve() / robot["model"])
     sensor = data.get("sensor")
     folder = sensor.get("folder") if isinstance(sensor, dict) else None

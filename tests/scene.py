@@ -5,7 +5,15 @@ import numpy as np
 from hierarchy import Robot
 from hierarchy.avoidance import Obstacle, Obstacles, Repulsion
 from hierarchy.paths import Ellipse
-from hierarchy.tasks import Avoidance, JointDamping, Pointing, Pose, Position, Posture
+from hierarchy.tasks import (
+    Avoidance,
+    CentreOfMass,
+    JointDamping,
+    Pointing,
+    Pose,
+    Position,
+    Posture,
+)
 from scenarios.sensors import ExactDistances
 
 ROBOT = Robot.named("kuka_lwr")
@@ -24,6 +32,8 @@ TASKS = {
     "avoidance 1-D": Avoidance(ROBOT.control_points, 1),
     "avoidance 3-D": Avoidance(ROBOT.control_points, 3),
     "pose": Pose(FRAME, PATH, np.eye(3)),
+    "centre of mass": CentreOfMass(ROBOT, PATH),
+    "centre of mass, x and z": CentreOfMass(ROBOT, PATH, (0, 2)),
     "posture": Posture((0.1,) * 7),
     "damping": JointDamping(7),
 }

@@ -17,7 +17,8 @@ def moved(q, v, step, task_state):
     return state
 
 
-@pytest.mark.parametrize("name", ["position", "pointing", "cone", "posture"])
+@pytest.mark.parametrize("name", ["position", "pointing", "cone", "posture", "centre of mass",
+                                  "centre of mass, x and z"])
 def test_jacobian_is_the_derivative_of_what_the_error_measures(name):
     task = TASKS[name]
     for q, v in STATES:

@@ -84,6 +84,26 @@ def pairs_of_chain(capsules: Sequence[Capsule]) -> tuple[tuple[int, int], ...]:
     return tuple((i, j) for i, j in combinations(range(len(capsules)), 2) if j > i + 1)
 
 
+def pairs_of_tree(capsules: Sequence[Capsule], parents: Sequence[int]) -> list[tuple[int, int]]:
+    """Every pair (i, j) of capsules on a tree of joints, but those on one joint and neighbours.
+
+    `parents` has the joint that carries each joint. Neighbours are a capsule and those on the
+    nearest joint below that has any, down to the base.
+    """
+    joints = {capsule.joint for capsule in capsules}
+
+    def carrier(joint: int) -> int:
+        while joint > 0:
+            joint = parents[joint]
+            if joint in joints:
+                return joint
+        return -1
+
+    return [(i, j) for i, j in combinations(range(len(capsules)), 2)
+            for a, b in [(capsules[i].joint, capsules[j].joint)]
+            if a != b and carrier(a) != b and carrier(b) != a]
+
+
 def pack_capsules(capsules: Sequence[Capsule]) -> tuple[NDArray[np.int64], Array]:
     """Joints (K,), and start, start to end, radius (K, 7) [m] of capsules, for the kernels."""
     joints = np.array([capsule.joint for capsule in capsules], dtype=np.int64)

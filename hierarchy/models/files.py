@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from types import MappingProxyType
 from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
 import pinocchio as pin
 
-from hierarchy.errors import RobotError
+from hierarchy.errors import RobotError, UnknownNameError
 from hierarchy.models.found import Found, is_floating, neutral_within_limits
 from hierarchy.models.points import proposed_end_effector
 from hierarchy.models.shapes import capsules_of
@@ -22,12 +23,13 @@ SUFFIXES = (".urdf", ".xml", ".mjcf")
 Element = ElementTree.Element
 
 
-def read_file(path: str | Path, base: Base | None = None, shapes: bool = True) -> Found:
+def read_file(path: str | Path, base: Base | None = None, shapes: bool = True,
+              locked: Mapping[str, float] = MappingProxyType({})) -> Found:
     """Read a robot from a URDF (.urdf) or MJCF (.xml, .mjcf) file.
 
     `base` None takes what the file has: fixed for a URDF, floating for an MJCF whose first body
-    has a free joint. Without `shapes` no collision geometry is looked for. Raises RobotError for a
-    file that cannot be read.
+    has a free joint. Without `shapes` no collision geometry is looked for. `locked` joints are held
+    at an angle [rad] or a way [m]. Raises RobotError for a file that cannot be read.
     """
     path = Path(path)
     if not path.is_file():
@@ -39,6 +41,7 @@ def read_file(path: str | Path, base: Base | None = None, shapes: bool = True) -
         model = _urdf_model(path, base) if urdf else _mjcf_model(path, base)
     except Exception as error:  # the parsers raise many kinds; all mean the file is bad
         raise RobotError(f"robot file {str(path)!r} cannot be read: {error}") from error
+    model = _without(model, locked, str(path))
     found = Found(model, proposed_end_effector(model), proposed=True,
                   rest=neutral_within_limits(model, pin.neutral(model)))
     if not shapes:
@@ -46,6 +49,23 @@ def read_file(path: str | Path, base: Base | None = None, shapes: bool = True) -
     geometries, missing = _geometry(path, model, _urdf_shapes if urdf else _mjcf_shapes)
     capsules, left_out = capsules_of(geometries)
     return replace(found, capsules=_held_by(model, capsules), missing=(*missing, *left_out))
+
+
+def _without(model: Any, locked: Mapping[str, float], file: str) -> Any:
+    """Return the model without the joints that are locked."""
+    if not locked:
+        return model
+    q, indices = np.array(pin.neutral(model)), []
+    for name, value in locked.items():
+        if name not in list(model.names)[1:]:
+            raise UnknownNameError("joint", name, list(model.names)[1:])
+        joint = model.joints[model.getJointId(name)]
+        if joint.nq != 1:
+            raise RobotError(f"robot file {file!r}: joint {name!r} has {joint.nq} coordinates and "
+                             "cannot be locked")
+        q[joint.idx_q] = value
+        indices.append(int(joint.id))
+    return pin.buildReducedModel(model, indices, q)
 
 
 def _urdf_model(path: Path, base: Base | None) -> Any:

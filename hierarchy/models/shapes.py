@@ -48,9 +48,9 @@ def _capsule_of(shape: Any, kind: str) -> tuple[Array, Array, float] | None:
 def _points_of(shape: Any, kind: str) -> Array | None:
     """Points whose convex hull is the shape, or contains it."""
     if kind == "Box":
-        return _CORNERS * np.asarray(shape.halfSide, dtype=float)
+        return np.asarray(_CORNERS * shape.halfSide, dtype=float)
     if kind == "Ellipsoid":  # the box around it
-        return _CORNERS * np.asarray(shape.radii, dtype=float)
+        return np.asarray(_CORNERS * shape.radii, dtype=float)
     if kind == "Cone":
         angles = 2 * np.pi * np.arange(_AROUND) / _AROUND
         rim = np.column_stack([shape.radius * np.cos(angles), shape.radius * np.sin(angles),

@@ -2,6 +2,7 @@
 
 from hierarchy.task import Task
 from hierarchy.tasks.avoidance import Avoidance
+from hierarchy.tasks.com import CentreOfMass
 from hierarchy.tasks.danger_bounds import DangerBounds
 from hierarchy.tasks.joint_limits import JointLimits
 from hierarchy.tasks.pointing import Pointing
@@ -13,11 +14,12 @@ from hierarchy.tasks.separation import Separation
 from hierarchy.tasks.torque_limits import TorqueLimits
 
 TASKS: dict[str, type[Task]] = {
-    "avoidance": Avoidance, "damping": JointDamping, "danger bounds": DangerBounds,
-    "joint limits": JointLimits, "pointing": Pointing, "pose": Pose, "position": Position,
-    "posture": Posture,
+    "avoidance": Avoidance, "centre of mass": CentreOfMass, "damping": JointDamping,
+    "danger bounds": DangerBounds, "joint limits": JointLimits, "pointing": Pointing, "pose": Pose,
+    "position": Position, "posture": Posture,
     "self-separation": SelfSeparation, "separation": Separation, "torque limits": TorqueLimits,
 }
 
-__all__ = ["TASKS", "Avoidance", "DangerBounds", "JointDamping", "JointLimits", "Pointing", "Pose",
-           "Position", "Posture", "SelfSeparation", "Separation", "TorqueLimits"]
+__all__ = ["TASKS", "Avoidance", "CentreOfMass", "DangerBounds", "JointDamping", "JointLimits",
+           "Pointing", "Pose", "Position", "Posture", "SelfSeparation", "Separation",
+           "TorqueLimits"]

@@ -99,16 +99,14 @@ class JointLimits(Task):
                level == "acceleration", A, lower, upper, row)
 
     def _positions(self, state: State) -> Array:
-        robot = self.robot
-        if robot.nq == robot.n:
-            return state.q
-        return np.asarray(state.q[robot.coordinates[robot.actuated:]])
+        robot, q = self.robot, np.asarray(state.q)
+        return q if robot.nq == robot.n else q[robot.coordinates[robot.actuated:]]
 
     def _rates(self, state: State, level: Level) -> Array:
         """The velocities (n,) from which the next ones are limited."""
         commanded = state.commanded if level == "velocity" else None
         rates = state.v if commanded is None else commanded
-        return rates if self.robot.actuated == 0 else rates[self.robot.actuated:]
+        return np.asarray(rates[self.robot.actuated:])
 
 
 @compiled

@@ -1,14 +1,24 @@
 """Position and orientation of a frame together (m = 6)."""
 
+# mypy: disable-error-code="no-untyped-def"
+
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from math import atan2, sqrt
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from hierarchy.binding import bind
+from hierarchy.compiled import compiled
 from hierarchy.kinematics import (
+    drift_of_point,
+    point_at,
     subtract_over_period,
+    velocity_of_point,
+    write_equality,
     write_point_jacobian,
     write_point_jacobian_derivative,
     write_rotation_jacobian,
@@ -16,11 +26,11 @@ from hierarchy.kinematics import (
 from hierarchy.paths import Path
 from hierarchy.problem import Array
 from hierarchy.robot import Frame, State
-from hierarchy.task import Task
+from hierarchy.task import BoundTask, Level
 
 
 @dataclass(frozen=True)
-class Pose(Task):
+class Pose(BoundTask):
     """Bring `frame` along `path` with the fixed orientation `rotation` (m = 6) [m, rad].
 
     The orientation error is the rotation vector from the actual to the desired orientation, in
@@ -34,6 +44,8 @@ class Pose(Task):
     damping: float = 20.0
     gain: float = 10.0
     name: str = "pose"
+    target: Array = field(default_factory=lambda: np.zeros((3, 3)), init=False, repr=False,
+                          compare=False)  # p_d, dp_d/dt, d2p_d/dt2 at the last write
 
     @property
     def dimension(self) -> int:
@@ -77,17 +89,88 @@ class Pose(Task):
         """Acceleration of the path, no rotation: (6,)."""
         return np.concatenate([self.path(state.t)[2], np.zeros(3)])
 
+    def bind_rows(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
+                  row: int) -> Callable[[], object]:
+        """See `BoundTask.bind_rows`."""
+        asked = np.array(self.rotation, dtype=float)
+        write_rows = bind(_write, *state.arrays, self.frame.joint, self.frame.offset,
+                          self.frame.rotation, asked, self.target, self.stiffness, self.damping,
+                          self.gain, level == "acceleration", A, lower, upper, row)
+        move_target = self.path.writer(self.target)
 
-def rotation_vector(R: Array) -> Array:
+        def write() -> None:
+            move_target(state.t)
+            write_rows()
+
+        return write
+
+
+@compiled
+def rotation_vector(R):
     """Rotation vector (3,) [rad] of a rotation matrix (3, 3), angle in 0 .. pi."""
     twist = np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]]) / 2
-    sine, cosine = float(np.linalg.norm(twist)), float(np.trace(R) - 1.0) / 2
-    angle = float(np.arctan2(sine, cosine))
+    sine = sqrt(twist[0] ** 2 + twist[1] ** 2 + twist[2] ** 2)
+    cosine = (R[0, 0] + R[1, 1] + R[2, 2] - 1.0) / 2
+    angle = atan2(sine, cosine)
     if sine > 1e-7:
-        return np.asarray(twist * (angle / sine))
+        return twist * (angle / sine)
     if cosine > 0.0:
         return twist
     # Half a turn: the axis is the column of R + I with the largest diagonal entry.
-    i = int(np.argmax(np.diag(R)))
-    axis = R[:, i] + np.eye(3)[i]
-    return np.asarray(axis * (angle / np.linalg.norm(axis)))
+    i = 0
+    for k in range(1, 3):
+        if R[k, k] > R[i, i]:
+            i = k
+    axis = R[:, i].copy()
+    axis[i] += 1.0
+    return axis * (angle / sqrt(axis[0] ** 2 + axis[1] ** 2 + axis[2] ** 2))
+
+
+@compiled
+def _turn(T, rotation, asked):
+    """R_d R^T (3, 3) of a frame with `rotation` on the body whose placement is T (12,)."""
+    R, turn = np.zeros((3, 3)), np.zeros((3, 3))
+    for i in range(3):
+        for j in range(3):
+            for k in range(3):
+                R[i, j] += T[3 * k + i] * rotation[k, j]
+    for i in range(3):
+        for j in range(3):
+            for k in range(3):
+                turn[i, j] += asked[i, k] * R[j, k]
+    return turn
+
+
+@compiled
+def _write(v, J, dJ, placements, supports, previous_J, previous_placements, period, joint, offset,
+           rotation, asked, target, stiffness, damping, gain, acceleration, A, lower, upper, row):
+    write_point_jacobian(J, placements, supports, joint, offset, A, row)
+    write_rotation_jacobian(J, supports, joint, A, row + 3)
+    error, velocity, drift = np.empty(6), np.zeros(6), np.zeros(6)
+    for i in range(3):
+        error[i] = target[0, i] - point_at(placements, joint, offset, i)
+    error[3:] = rotation_vector(_turn(placements[joint], rotation, asked))
+    if acceleration:
+        (velocity[0], velocity[1], velocity[2], drift[0], drift[1], drift[2], velocity[3],
+         velocity[4], velocity[5]) = drift_of_point(
+            v, J, dJ, placements, supports, previous_J, previous_placements, period, joint,
+            offset[0], offset[1], offset[2])
+        drift[3:] = _turning(v, J, dJ, supports, previous_J, period, joint)
+    for i in range(6):
+        rate, feedforward = (target[1, i], target[2, i]) if i < 3 else (0.0, 0.0)
+        if acceleration:
+            b = feedforward + damping * (rate - velocity[i]) + stiffness * error[i] - drift[i]
+        else:
+            b = rate + gain * error[i]
+        write_equality(lower, upper, row + i, b)
+
+
+@compiled
+def _turning(v, J, dJ, supports, previous_J, period, joint):
+    """Drift (3,) of the angular velocity: exact, or that of the backward difference."""
+    if period > 0.0:
+        _, _, _, x, y, z = velocity_of_point(J, supports, joint, v, 0.0, 0.0, 0.0)
+        _, _, _, bx, by, bz = velocity_of_point(previous_J, supports, joint, v, 0.0, 0.0, 0.0)
+        return np.array([x - bx, y - by, z - bz]) / period
+    _, _, _, x, y, z = velocity_of_point(dJ, supports, joint, v, 0.0, 0.0, 0.0)
+    return np.array([x, y, z])

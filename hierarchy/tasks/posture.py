@@ -75,7 +75,7 @@ class Posture(JointTask, BoundTask):
         if joints != robot.n - robot.actuated or joints != self.joints:
             raise HierarchyError(f"task {self.name!r}: {self.joints} targets for "
                                  f"{joints} joint positions")
-        return state.q[robot.nq - joints:]
+        return np.asarray(state.q[robot.nq - joints:])
 
     def bind_rows(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
                   row: int) -> Callable[[], object]:
