@@ -15,7 +15,7 @@ from hierarchy.avoidance import Capsule, ControlPoint, Obstacles
 from hierarchy.problem import Array
 from hierarchy.robots import TABLES, DHTable
 from scenarios.build import make_obstacles, make_robot, sensed_points
-from scenarios.levels import Levels, judge, order_names
+from scenarios.levels import Fate, Levels, judge, order_names
 from scenarios.metrics import pointing_angle
 from scenarios.sensors import ExactDistances
 
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from scenarios.recording import Recording
 
 _STICK = 0.08  # radius of a link without capsules, relative to the robot's longest link
+_SEPARATION = "separation"  # the task that keeps all points off all obstacles
 _SYMBOLS = {r"$\epsilon_1$": "ε₁", r"$\epsilon_2$": "ε₂", r"$\epsilon_{ee}$": "ε_ee",
             r"$d_{min}$": "d_min"}
 
@@ -81,7 +82,8 @@ class Scene:
     nearest (F, P, 3) : the point on an obstacle that is nearest to each, and distance (F, P) to it,
         from the scenario's geometry, also where the controller saw a camera's; NaN and infinite
         without obstacles.
-    active (F,) : the point that the stack keeps away from an obstacle, or -1.
+    active (F,) : the point that the stack keeps away from an obstacle, or -1. Under the task
+        `separation` it is the nearest point, in ticks in which one of its rows acts.
     centres (F, H, 3) : of the obstacles; shape, size and rotation are in `stage.obstacles`.
     axis (F, 3) : the end effector's z axis. desired (F, 3) : its path, or None.
     order (F,) : index into `orders`, whose entries name tasks, most important first.
@@ -147,11 +149,13 @@ def scene(recording: Recording, rate: float = 30.0) -> Scene:
     fixed, t = stage(recording.scenario), recording["t"][ticks]
     order = recording["order"].astype(np.int64)
     moved = _moved(fixed, recording, ticks)
-    return Scene(fixed, t, ticks, **moved, active=_active(recording, ticks, moved["distance"]),
+    levels = judge(recording, ticks)
+    return Scene(fixed, t, ticks, **moved,
+                 active=_active(recording, ticks, levels, moved["distance"]),
                  desired=recording["desired_position"][ticks]
                  if "desired_position" in recording else None,
                  order=order[ticks], orders=order_names(recording),
-                 levels=judge(recording, ticks), series=tuple(series(recording, ticks)),
+                 levels=levels, series=tuple(series(recording, ticks)),
                  switches=recording["t"][recording.switches()])
 
 
@@ -238,11 +242,12 @@ def _moved(fixed: Stage, recording: Recording, ticks: NDArray[np.int64]) -> dict
     return {name: np.array(kept) for name, kept in frames.items()}
 
 
-def _active(recording: Recording, ticks: NDArray[np.int64], distance: Array) -> NDArray[np.int64]:
-    avoidance = recording.scenario.avoidance
-    if avoidance is not None and getattr(avoidance, "kind", "") == "separation":
-        influence: float = getattr(avoidance, "influence", 0.0)
-        return np.where(distance.min(axis=1) < influence, distance.argmin(axis=1), -1)
+def _active(recording: Recording, ticks: NDArray[np.int64], levels: Levels,
+            distance: Array) -> NDArray[np.int64]:
+    if _SEPARATION in levels.names:
+        fate = levels.fate[:, levels.names.index(_SEPARATION)]
+        acting = np.isin(fate, (Fate.UNKNOWN, Fate.MET, Fate.MISSED))
+        return np.where(acting, distance.argmin(axis=1), -1)
     if "active_control_point" not in recording:
         return np.full(len(ticks), -1)
     return np.maximum(recording["active_control_point"][ticks].astype(np.int64) - 1, -1)
