@@ -3,6 +3,7 @@
 # make bench   time the resolvers, the control tick and the start, then all beside other packages
 # make stress  a resolver on a million generated problems, every answer certified; half an hour
 # make docs    build the documentation, any warning an error, and say where it is
+# make dist    build the wheel and the source archive, in dist/
 # make clean   remove what the targets above made
 #
 # PYTHON=/path/to/python3 chooses the interpreter; otherwise the first suitable one is taken.
@@ -14,7 +15,7 @@ BIN        := .venv/bin
 INSTALLED  := .venv/installed
 
 .DELETE_ON_ERROR:
-.PHONY: demo test bench stress docs clean set-up
+.PHONY: demo test bench stress docs dist clean set-up
 
 demo: $(INSTALLED)
 	@rm -rf runs/demo
@@ -39,6 +40,10 @@ stress: $(INSTALLED)
 docs: $(INSTALLED)
 	@$(BIN)/python -m sphinx -W --keep-going -q -b html docs build/docs
 	@echo "Documentation: build/docs/index.html"
+
+dist: $(INSTALLED)
+	@rm -rf dist
+	@$(BIN)/python -m build --no-isolation --outdir dist
 
 clean:
 	rm -rf .venv build dist runs *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache

@@ -81,19 +81,22 @@ class Row:
     cells: tuple[str, ...]
     notes: tuple[str, ...]
     best: frozenset[int]
+    name: str = ""
 
 
 @dataclass(frozen=True)
 class Comparison:
     """Runs in the order asked for, scenario by scenario.
 
-    `refused` says of each resolver that cannot resolve a scenario why it was not run.
+    `refused` says of each resolver that cannot resolve a scenario why it was not run; `folder` is
+    where the runs' folders lie, as it was named, or None if they were not kept.
     """
 
     runs: tuple[Run, ...]
     command: str
     versions: dict[str, str]
     refused: tuple[str, ...] = ()
+    folder: str | None = None
 
     @property
     def faults(self) -> list[Run]:
@@ -113,7 +116,10 @@ class Comparison:
 
     def as_plain_data(self) -> dict[str, Any]:
         """Return what `comparison.json` holds."""
+        from scenarios.report.verdict import verdict
+
         return {"command": self.command, "versions": self.versions,
+                "verdicts": {name: verdict(runs) for name, runs in self.groups().items()},
                 "runs": [_plain(run) for run in self.runs], "refused": list(self.refused),
                 "partings": {name: [_plain_parting(one) for one in partings(runs)]
                              for name, runs in self.groups().items()}}
@@ -124,7 +130,7 @@ def default_resolvers(asked: Handles = "equalities") -> tuple[tuple[str, ...], d
     from solvers.backends import BACKENDS, installed
 
     wanted = {spec: spec.partition(":backend=")[2] for spec in DEFAULT_RESOLVERS[asked]}
-    missing = {spec: "pip install task-hierarchy[qp]" for spec, backend in wanted.items()
+    missing = {spec: "pip install 'task-hierarchy[qp]'" for spec, backend in wanted.items()
                if backend in BACKENDS and not installed(backend)}
     return tuple(spec for spec in wanted if spec not in missing), missing
 
@@ -165,7 +171,7 @@ def compare(scenarios: Iterable[str | Scenario] | str, resolvers: Sequence[str] 
         if _interrupted(runs[-1]):
             break
     comparison = Comparison(tuple(runs), command or _command(planned, out), versions(),
-                            tuple(refused))
+                            tuple(refused), None if out is None else str(out))
     if folder is not None:
         folder.mkdir(exist_ok=True)
         _write(comparison, folder)
@@ -192,7 +198,8 @@ def _row(metric: Metric, found: Sequence[Metric | None], competes: Sequence[bool
     values = {i: m.value for i, m in enumerate(found)
               if m and m.value is not None and competes[i]}
     return Row(metric.label, metric.shown_unit, metric.group, cells,
-               tuple(m.note if m else "" for m in found), _best(values, metric.lower_is_better))
+               tuple(m.note if m else "" for m in found), _best(values, metric.lower_is_better),
+               metric.name)
 
 
 def _best(values: Mapping[int, float], lower: bool | None, tie: float = 0.01) -> frozenset[int]:

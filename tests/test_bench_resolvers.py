@@ -56,7 +56,7 @@ def test_the_share_that_each_backend_solves_is_counted(capsys, monkeypatch):
 def test_a_backend_that_is_not_installed_is_named_and_not_skipped_silently(monkeypatch):
     monkeypatch.setattr(candidates, "installed", lambda name: name != "daqp")
     field, missing = candidates.candidates()
-    assert missing["hqp daqp"] == missing["DAQP by hand"] == "pip install task-hierarchy[qp]"
+    assert missing["hqp daqp"] == missing["DAQP by hand"] == "pip install 'task-hierarchy[qp]'"
     assert not {"hqp daqp", "hqp daqp warm", "DAQP by hand"} & {one.label for one in field}
 
 

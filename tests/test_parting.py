@@ -102,4 +102,4 @@ def test_a_backend_that_is_not_installed_leaves_the_default_comparison_and_is_na
     monkeypatch.setattr(backends, "installed", lambda name: name != "daqp")
     rest, missing = default_resolvers()
     assert set(everything) - set(rest) == {"hqp:backend=daqp"}
-    assert missing == {"hqp:backend=daqp": "pip install task-hierarchy[qp]"}
+    assert missing == {"hqp:backend=daqp": "pip install 'task-hierarchy[qp]'"}

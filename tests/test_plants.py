@@ -457,7 +457,7 @@ def test_a_scenario_without_obstacles_has_physics_too(mujoco):
 def test_without_mujoco_the_extra_is_named(monkeypatch, capsys):
     monkeypatch.setitem(sys.modules, "mujoco", None)
     assert run_command(["run", "ellipse", "--set", "plant.kind=mujoco", "--duration", "0.01"]) == 2
-    assert "pip install task-hierarchy[sim]" in capsys.readouterr().err
+    assert "pip install 'task-hierarchy[sim]'" in capsys.readouterr().err
     simulate(load("ellipse", SHORT))
 
 

@@ -36,13 +36,13 @@ class Candidate:
 
 def candidates() -> tuple[list[Candidate], dict[str, str]]:
     """Return everyone who can be timed here, and by name why others cannot."""
-    missing = {f"hqp {name}": "pip install task-hierarchy[qp]"
+    missing = {f"hqp {name}": "pip install 'task-hierarchy[qp]'"
                for name in BACKENDS if not installed(name)}
     field = [Candidate(NUMPY, False, lambda h: lambda: plain_numpy(h))]
     if installed("daqp"):
         field.append(Candidate(DAQP, True, _daqp, _read_daqp))
     else:
-        missing[DAQP] = "pip install task-hierarchy[qp]"
+        missing[DAQP] = "pip install 'task-hierarchy[qp]'"
     cold = [*(make(name) for name in names() if name != "hqp"), make("tpm", form="published"),
             *(make("hqp", backend=name) for name in BACKENDS if installed(name))]
     warm = [resolver for resolver in cold if _starts(resolver)]

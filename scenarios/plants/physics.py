@@ -120,7 +120,7 @@ def _mujoco() -> Any:
         import mujoco
     except ImportError as error:
         raise ScenarioError('plant.kind = "mujoco" needs MuJoCo, which is not installed: '
-                            "pip install task-hierarchy[sim]") from error
+                            "pip install 'task-hierarchy[sim]'") from error
     return mujoco
 
 

@@ -1,0 +1,87 @@
+"""A wheel builds, and works in an environment that has the core's dependencies and nothing else."""
+
+import json
+import os
+import subprocess
+import sys
+import venv
+from importlib.metadata import distribution
+from pathlib import Path
+
+import pytest
+from packaging.requirements import Requirement
+
+ROOT = Path(__file__).parents[1]
+UNCOMPILED = {**os.environ, "NUMBA_DISABLE_JIT": "1"}  # kernels run as plain Python
+
+
+def run(*command, **kept):
+    done = subprocess.run(list(map(str, command)), capture_output=True, text=True, check=False,
+                          **kept)
+    assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-4000:]
+    return done.stdout
+
+
+def needed(package, extras=(), found=None):
+    """All distributions that a package needs to run, itself not among them."""
+    found = {} if found is None else found
+    for line in distribution(package).requires or ():
+        one = Requirement(line)
+        if one.marker and not any(one.marker.evaluate({"extra": e}) for e in ("", *extras)):
+            continue
+        if one.name not in found:
+            found[one.name] = distribution(one.name)
+            needed(one.name, one.extras, found)
+    return found
+
+
+@pytest.fixture(scope="module")
+def clean(tmp_path_factory):
+    """An environment with the wheel and what its core needs, linked from this one: no network."""
+    folder = tmp_path_factory.mktemp("dist")
+    source = folder / "source"
+    source.mkdir()
+    for path in run("git", "-C", ROOT, "ls-files", "-co", "--exclude-standard").splitlines():
+        there = source / path
+        if (ROOT / path).is_file():
+            there.parent.mkdir(parents=True, exist_ok=True)
+            there.write_bytes((ROOT / path).read_bytes())
+    run(sys.executable, "-m", "build", "--no-isolation", "--outdir", folder, source)
+    venv.create(folder / "venv", with_pip=False, symlinks=True)
+    python = folder / "venv" / "bin" / "python"
+    site = Path(run(python, "-c", "import sysconfig; print(sysconfig.get_path('purelib'))").strip())
+    for one in needed("task-hierarchy").values():
+        for top in {path.parts[0] for path in one.files} - {"..", "__pycache__"}:
+            if not (site / top).exists():
+                (site / top).symlink_to(Path(one.locate_file(top)).resolve())
+    [wheel] = folder.glob("*.whl")
+    run(sys.executable, "-m", "pip", "--python", python, "install", "--no-deps", "--no-index",
+        "--quiet", "--disable-pip-version-check", wheel)
+    return folder / "venv" / "bin"
+
+
+def test_it_runs_from_outside_the_source_with_core_dependencies_alone(clean, tmp_path):
+    found = json.loads(run(clean / "hierarchy", "run", "ellipse", "--duration", "0.02", "--out",
+                           "a", "--json", cwd=tmp_path, env=UNCOMPILED))
+    assert found["ticks"] == 20
+    assert found["fault"] is None
+    where = run(clean / "python", "-c", "import scenarios; print(scenarios.__file__)", cwd=tmp_path)
+    assert str(clean.parent) in where
+    assert (tmp_path / "a" / "run.npz").is_file()
+
+
+def test_what_needs_an_extra_says_which(clean, tmp_path):
+    for extra, command in {"sim": ["run", "human"], "sweep": ["sweep", "ellipse-starts"]}.items():
+        done = subprocess.run([str(clean / "hierarchy"), *command], capture_output=True, text=True,
+                              check=False, cwd=tmp_path, env=UNCOMPILED)
+        assert done.returncode == 2
+        assert f"pip install 'task-hierarchy[{extra}]'" in done.stderr
+        assert "Traceback" not in done.stderr
+
+
+def test_every_shipped_file_is_in_the_wheel(clean, tmp_path):
+    text = "from pathlib import Path; import scenarios; print(Path(scenarios.__file__).parent)"
+    installed = Path(run(clean / "python", "-c", text, cwd=tmp_path).strip())
+    tracked = run("git", "-C", ROOT, "ls-files", "scenarios").splitlines()
+    missing = [path for path in tracked if not (installed.parent / path).is_file()]
+    assert missing == []
