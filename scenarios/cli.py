@@ -216,6 +216,24 @@ def view(folders: Annotated[list[Path], typer.Argument(
 
 
 @app.command()
+def export(folder: Annotated[Path, typer.Argument(
+               metavar="RUN", help="Folder that `hierarchy run` wrote.")],
+           format: Annotated[str | None, typer.Option(
+               "--format", metavar="FORMAT", help="csv, parquet or mcap. Default: that of --out's "
+               "suffix, or csv.")] = None,
+           out: Annotated[Path | None, typer.Option(
+               "--out", metavar="FILE", help="A new file. Default: run.FORMAT in RUN.")] = None,
+           as_json: AsJson = False) -> None:
+    """Write a run as a file that other programs open; Parquet and MCAP need the extra `export`."""
+    from scenarios.export.command import export_command
+
+    files = [shown(path) for path in export_command(folder, format, out)]
+    if as_json:
+        return print_json({"files": files})
+    print(*files, sep="\n")
+
+
+@app.command()
 def check(file: Annotated[str, typer.Argument(help="A scenario file, or a scenario's name.",
                                               autocompletion=completion.scenarios)],
           changes: Changes = None, as_json: AsJson = False) -> None:

@@ -1,0 +1,64 @@
+"""Recordings in formats that other programs open: CSV, Parquet, MCAP with a layout for Foxglove."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from hierarchy.errors import HierarchyError, UnknownNameError
+from scenarios.folders import OutputError
+
+if TYPE_CHECKING:
+    from scenarios.recording import Recording
+
+# Each a module of this package with write(recording, path); what it needs, and the extra with it.
+FORMATS: dict[str, tuple[str, str]] = {"csv": ("csv", ""), "parquet": ("pyarrow", "export"),
+                                       "mcap": ("mcap", "export")}
+
+
+def export(recording: Recording, path: str | Path, format: str | None = None) -> list[Path]:
+    """Write a recording to a file of `format`, by default that of its suffix; return what there is.
+
+    With "mcap" a layout for Foxglove is written beside it, as `path`.layout.json. The same
+    recording gives the same bytes.
+
+    Raises
+    ------
+    UnknownNameError : no such format, with the nearest that there is.
+    OutputError : the file exists, or cannot be written.
+    HierarchyError : a package is not installed; says which extra brings it.
+    """
+    path = Path(path)
+    name = path.suffix.removeprefix(".") if format is None else format
+    if name not in FORMATS:
+        raise UnknownNameError("format", name, FORMATS)
+    package, extra = FORMATS[name]
+    try:
+        import_module(package)
+    except ImportError:
+        raise HierarchyError(f"{name} needs the package {package}; "
+                             f"pip install task-hierarchy[{extra}]") from None
+    written: list[Path] = import_module(f"scenarios.export.{name}").write(recording, path)
+    return written
+
+
+@contextmanager
+def new_file(path: Path) -> Iterator[Path]:
+    """Give a temporary name to write to; the file takes its own when all is there."""
+    partial = path.with_name(f".{path.name}.{os.getpid()}")
+    try:
+        if path.exists():
+            raise OutputError(f"{path} exists; choose another name, or remove it first")
+        path.parent.mkdir(parents=True, exist_ok=True)
+        partial.touch()
+    except OSError as error:
+        raise OutputError(f"{path} cannot be written: {error.strerror}") from error
+    try:
+        yield partial
+        partial.replace(path)
+    finally:
+        partial.unlink(missing_ok=True)

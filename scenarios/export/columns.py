@@ -1,0 +1,93 @@
+"""A recording as columns: one a number, with its unit, all as long as the run."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hierarchy import Robot
+from scenarios.making import make_robot
+
+if TYPE_CHECKING:
+    from scenarios.recording import Recording
+
+CONSTANTS = ("joint_lower", "joint_upper", "velocity_limit")
+_METRES = ("ee_position", "desired_position", "position_error", "true_ee_position",
+           "control_point_distance", "minimal_distance", "ee_distance", "contact_depth",
+           "obstacle_offset")
+
+
+@dataclass(frozen=True)
+class Column:
+    """One number or text a tick: its name, such as `q[0]`, its unit, "" for none, values (T,)."""
+
+    name: str
+    unit: str
+    values: NDArray[Any]
+
+    @property
+    def title(self) -> str:
+        """Name and unit."""
+        return f"{self.name} [{self.unit}]" if self.unit else self.name
+
+
+def columns(recording: Recording) -> Iterator[Column]:
+    """Yield every signal of the ticks number by number, then the stack and the events as text."""
+    units = signal_units(recording)
+    for name, signal in of_ticks(recording).items():
+        shape = signal.shape[1:]
+        unit_of = units.get(name, ("",))
+        for i, place in enumerate(np.ndindex(shape)):
+            index = "".join(f"[{k}]" for k in place)
+            unit = unit_of[i] if len(unit_of) == int(np.prod(shape)) else unit_of[0]
+            yield Column(name + index, unit, signal[(slice(None), *place)])
+    yield Column("stack", "", stacks(recording))
+    events = [""] * recording.ticks
+    for tick, kind, action in recording.events:
+        events[tick] += f"{'; ' if events[tick] else ''}{kind}: {action}"
+    yield Column("events", "", np.array(events, dtype=np.str_))
+
+
+def of_ticks(recording: Recording) -> dict[str, NDArray[Any]]:
+    """Return the signals that have an entry for each tick."""
+    return {name: signal for name, signal in recording.signals.items() if name not in CONSTANTS}
+
+
+def stacks(recording: Recording) -> NDArray[Any]:
+    """Return the tasks of each tick's stack (T,), most important first."""
+    names: NDArray[Any] = np.array(recording.orders or ("",), dtype=np.str_)
+    return np.asarray(names[recording["order"]])
+
+
+def signal_units(recording: Recording) -> dict[str, tuple[str, ...]]:
+    """Return the unit of each entry of the signals that have one; a single unit is that of all."""
+    positions, rates = joint_units(make_robot(recording.scenario.robot))
+    velocities = tuple(f"{unit}/s" for unit in rates)
+    accelerations = tuple(f"{unit}/s^2" for unit in rates)
+    commands = (accelerations if recording.scenario.control.level == "acceleration"
+                else velocities)
+    return {"t": ("s",), "q": positions, "true_q": positions, "v": velocities,
+            "true_v": velocities, "a": accelerations, "command": commands,
+            "contact_force": ("N",), **dict.fromkeys(_METRES, ("m",)),
+            **{name: ("s",) for name in recording.signals if name.startswith("time_")}}
+
+
+def joint_units(robot: Robot) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return the units of q (nq,) and of a small step (n,): "rad", "m", or "1" of a ratio."""
+    positions: list[str] = []
+    steps: list[str] = []
+    for joint in list(robot.model.joints)[1:]:
+        metres = _LENGTHS.get(joint.shortname().removeprefix("JointModel"), 0)
+        turns = "rad" if joint.nq == joint.nv else "1"
+        positions += ["m"] * metres + [turns] * (joint.nq - metres)
+        steps += ["m"] * metres + ["rad"] * (joint.nv - metres)
+    return tuple(positions), tuple(steps)
+
+
+# How many of a joint's first coordinates are lengths, by pinocchio's name; of all others none is.
+_LENGTHS = {"PX": 1, "PY": 1, "PZ": 1, "PrismaticUnaligned": 1, "Planar": 2, "Translation": 3,
+            "FreeFlyer": 3}

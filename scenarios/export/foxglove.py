@@ -1,0 +1,179 @@
+"""What Foxglove's 3D panel draws of a run: frames of the joints, links, obstacles, paths."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+
+from hierarchy.avoidance import Capsule
+from hierarchy.avoidance.obstacles import Obstacle
+from hierarchy.problem import Array
+from scenarios.scene import Scene
+
+WORLD = "world"
+Message = dict[str, Any]
+
+_ARM, _OBSTACLE, _TRACE, _ASKED = ((0.35, 0.42, 0.5, 1.0), (0.83, 0.23, 0.17, 0.9),
+                                   (0.0, 0.45, 0.7, 1.0), (0.6, 0.6, 0.6, 1.0))
+_POINT = 0.01      # [m] radius at which an obstacle that is a point is drawn
+_THICK = 2.0       # [px] of lines
+_STRIP, _LIST = 0, 2
+
+
+def transforms(scene: Scene, frame: int) -> Message:
+    """Return the placements of the joints, the end effector and the point asked for, in the world.
+
+    The point has no rotation of its own: it is given that of the world.
+    """
+    robot, t = scene.stage.robot, float(scene.t[frame])
+    rows = scene.placements[frame]
+    placed = [(name, rows[i, 9:], rows[i, :9].reshape(3, 3).T)
+              for i, name in enumerate(robot.joint_names, 1)]
+    tip = robot.frame(robot.end_effector)
+    turned = rows[tip.joint, :9].reshape(3, 3).T @ tip.rotation
+    placed.append(("end_effector", scene.points[frame, -1], turned))
+    if scene.desired is not None:
+        placed.append(("desired", scene.desired[frame], np.eye(3)))
+    return {"transforms": [{
+        "timestamp": time(t), "parent_frame_id": WORLD, "child_frame_id": name,
+        "translation": xyz(place), "rotation": xyzw(quaternion(rotation))}
+        for name, place, rotation in placed]}
+
+
+def scene_updates(scene: Scene, every: int) -> Iterator[tuple[int, Message]]:
+    """Yield a frame and what is drawn anew from there: what moves, only where it has moved.
+
+    Links hang on the frames of their joints and are sent once. The path taken is sent in pieces
+    of `every` frames.
+    """
+    for frame in range(len(scene.t)):
+        t, entities = float(scene.t[frame]), []
+        if frame == 0:
+            entities += [link(t, capsule, scene.stage.robot.joint_names)
+                         for capsule in scene.stage.capsules]
+            if scene.desired is not None:
+                entities.append(line(t, "path asked for", scene.desired, _ASKED))
+        moved = (scene.centres[frame] != scene.centres[max(frame - 1, 0)]).any(axis=1)
+        entities += [obstacle(t, h, body, scene.centres[frame, h])
+                     for h, body in enumerate(scene.stage.obstacles.obstacles)
+                     if frame == 0 or moved[h]]
+        if np.isfinite(scene.nearest[frame]).all() and scene.nearest.size:
+            k = int(scene.linked[frame])
+            pair = np.array([scene.points[frame, k], scene.nearest[frame, k]])
+            entities.append(line(t, "nearest", pair, _OBSTACLE))
+        if frame and (frame % every == 0 or frame == len(scene.t) - 1):
+            first = (frame - 1) // every * every
+            entities.append(line(t, f"path taken {first // every + 1}",
+                                 scene.traced[first:frame + 1], _TRACE))
+        if entities:
+            yield frame, {"deletions": [], "entities": entities}
+
+
+def link(t: float, capsule: Capsule, joints: Sequence[str]) -> Message:
+    """A capsule, fixed to the frame of its joint: a cylinder and two balls."""
+    start, end = np.array(capsule.start), np.array(capsule.end)
+    length, wide = float(np.linalg.norm(end - start)), 2.0 * capsule.radius
+    cylinders = [] if length == 0.0 else [_cylinder((start + end) / 2, _z_to(end - start), wide,
+                                                    length, _ARM)]
+    return entity(t, f"link {capsule.name}", joints[capsule.joint - 1] if capsule.joint else WORLD,
+                  cylinders=cylinders, spheres=[_body(place, wide, _ARM) for place in (start, end)])
+
+
+def obstacle(t: float, number: int, body: Obstacle, centre: Array) -> Message:
+    """An obstacle where it is now."""
+    turned, parts = np.asarray(body.rotation, dtype=float), dict[str, list[Message]]()
+    if body.shape == "box":
+        parts["cubes"] = [_body(centre, 2.0 * np.array(body.size), _OBSTACLE, turned)]
+    elif body.shape == "capsule":
+        radius, half = body.size
+        along = half * turned[:, 2]
+        parts["cylinders"] = [_cylinder(centre, turned, 2.0 * radius, 2.0 * half, _OBSTACLE)]
+        parts["spheres"] = [_body(centre + side * along, 2.0 * radius, _OBSTACLE)
+                            for side in (-1.0, 1.0)]
+    else:
+        radius = body.size[0] if body.size else _POINT
+        parts["spheres"] = [_body(centre, 2.0 * radius, _OBSTACLE)]
+    return entity(t, f"obstacle {number + 1}", WORLD, **parts)
+
+
+def line(t: float, name: str, points: Array, colour: tuple[float, ...]) -> Message:
+    """A line through points (P, 3) [m] of the world; those that are not finite are left out."""
+    kept = points[np.isfinite(points).all(axis=1)]
+    drawn = {"type": _STRIP, "pose": pose(np.zeros(3), np.eye(3)), "thickness": _THICK,
+             "scale_invariant": True, "points": [xyz(point) for point in kept],
+             "color": _rgba(colour), "colors": [], "indices": []}
+    return entity(t, name, WORLD, lines=[drawn])
+
+
+def entity(t: float, name: str, frame: str, **parts: list[Message]) -> Message:
+    """An entity that stays until another of its name comes."""
+    kinds = ("metadata", "arrows", "cubes", "spheres", "cylinders", "lines", "triangles", "texts",
+             "models")
+    return {"timestamp": time(t), "frame_id": frame, "id": name, "lifetime": time(0.0),
+            "frame_locked": True, **{kind: parts.get(kind, []) for kind in kinds}}
+
+
+def time(t: float) -> Message:
+    """A time [s] in Foxglove's form."""
+    return dict(zip(("sec", "nsec"), divmod(nanoseconds(t), 10**9), strict=True))
+
+
+def nanoseconds(t: float) -> int:
+    """A time [s] in [ns]."""
+    return round(t * 1e9)
+
+
+def pose(place: Array, rotation: Array) -> Message:
+    """A pose in Foxglove's form."""
+    return {"position": xyz(place), "orientation": xyzw(quaternion(rotation))}
+
+
+def xyz(vector: Array) -> Message:
+    """A vector in Foxglove's form."""
+    return dict(zip("xyz", np.asarray(vector, dtype=float).tolist(), strict=True))
+
+
+def xyzw(q: Array) -> Message:
+    """A quaternion in Foxglove's form."""
+    return dict(zip("xyzw", q.tolist(), strict=True))
+
+
+def quaternion(R: Array) -> Array:
+    """Return the unit quaternion (4,) x, y, z, w of a rotation (3, 3).
+
+    As the eigenvector of the greatest eigenvalue of Bar-Itzhack's matrix (2000), which is well
+    conditioned at every rotation.
+    """
+    K = np.array([
+        [R[0, 0] - R[1, 1] - R[2, 2], R[1, 0] + R[0, 1], R[2, 0] + R[0, 2], R[2, 1] - R[1, 2]],
+        [R[1, 0] + R[0, 1], R[1, 1] - R[0, 0] - R[2, 2], R[2, 1] + R[1, 2], R[0, 2] - R[2, 0]],
+        [R[2, 0] + R[0, 2], R[2, 1] + R[1, 2], R[2, 2] - R[0, 0] - R[1, 1], R[1, 0] - R[0, 1]],
+        [R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1], R[0, 0] + R[1, 1] + R[2, 2]]])
+    q = np.linalg.eigh(K)[1][:, -1]
+    return np.asarray(q if q[3] >= 0.0 else -q)
+
+
+def _z_to(direction: Array) -> Array:
+    """A rotation (3, 3) that takes the z axis to a direction (3,)."""
+    z = direction / np.linalg.norm(direction)
+    x = np.cross(np.eye(3)[int(np.abs(z).argmin())], z)
+    x /= np.linalg.norm(x)
+    return np.column_stack([x, np.cross(z, x), z])
+
+
+def _cylinder(centre: Array, rotation: Array, wide: float, long: float,
+              colour: tuple[float, ...]) -> Message:
+    return {"pose": pose(centre, rotation), "size": xyz(np.array([wide, wide, long])),
+            "bottom_scale": 1.0, "top_scale": 1.0, "color": _rgba(colour)}
+
+
+def _body(centre: Array, size: float | Array, colour: tuple[float, ...],
+          rotation: Array | None = None) -> Message:
+    return {"pose": pose(centre, np.eye(3) if rotation is None else rotation),
+            "size": xyz(np.broadcast_to(size, 3)), "color": _rgba(colour)}
+
+
+def _rgba(colour: tuple[float, ...]) -> Message:
+    return dict(zip("rgba", colour, strict=True))

@@ -1,0 +1,117 @@
+"""A recording as an MCAP file, and a layout of panels for it: every tick, and what to draw."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from numpy.typing import NDArray
+
+from scenarios.export import foxglove, new_file
+from scenarios.export.columns import of_ticks, signal_units, stacks
+from scenarios.export.layout import layout
+from scenarios.export.numbers import plain
+from scenarios.export.schemas import FOXGLOVE, INTEGER, NUMBER, TEXT, TRUTH, a_list, an_object
+from scenarios.scene import scene
+
+if TYPE_CHECKING:
+    from scenarios.recording import Recording
+
+FRAMES_A_SECOND = 30.0  # of what is drawn; numbers are there of every tick
+_WARNING = 3            # Foxglove's level of a log message
+
+# The channels of the signals; all others go to "/other".
+TOPICS = {
+    "/joints": ("q", "v", "a", "command", "true_q", "true_v"),
+    "/end_effector": ("ee_position", "desired_position", "position_error", "true_ee_position",
+                      "pointing_error"),
+    "/distances": ("control_point_distance", "minimal_distance", "ee_distance",
+                   "active_control_point"),
+    "/stack": ("order", "status", "iterations", "transition", "pointing_active",
+               "repulsion_active"),
+    "/times": ("time_kinematics", "time_rows", "time_resolve", "time_tick"),
+}
+_KINDS = {"f": NUMBER, "i": INTEGER, "u": INTEGER, "b": TRUTH, "U": TEXT}
+
+Entry = tuple[int, str, dict[str, Any]]  # [ns], topic, message
+
+
+def write(recording: Recording, path: Path) -> list[Path]:
+    """Write `path` and `path`.layout.json, times counted from zero.
+
+    Every signal of every tick is there under its name in `Recording`, in the channels of `TOPICS`;
+    numbers that are not finite are null. `/stack` has the tasks' names too, `/events` the trouble,
+    `/tf` and `/scene` what to draw.
+    """
+    from mcap.writer import Writer
+
+    groups = grouped(recording)
+    beside = path.with_name(f"{path.name}.layout.json")
+    with new_file(path) as partial, new_file(beside) as panels:
+        with partial.open("wb") as stream:
+            writer = Writer(stream)
+            _write(writer, recording, groups)
+        panels.write_text(json.dumps(layout(recording), indent=1) + "\n", encoding="utf-8")
+    return [path, beside]
+
+
+def grouped(recording: Recording) -> dict[str, dict[str, NDArray[Any]]]:
+    """Return the signals of the ticks by channel and name, without time."""
+    signals = {name: signal for name, signal in of_ticks(recording).items() if name != "t"}
+    home = {name: topic for topic, names in TOPICS.items() for name in names}
+    groups: dict[str, dict[str, NDArray[Any]]] = {topic: {} for topic in (*TOPICS, "/other")}
+    for name, signal in signals.items():
+        groups[home.get(name, "/other")][name] = signal
+    groups["/stack"]["tasks"] = stacks(recording)
+    return {topic: group for topic, group in groups.items() if group}
+
+
+def _write(writer: Any, recording: Recording, groups: dict[str, dict[str, NDArray[Any]]]) -> None:
+    writer.start(library="task-hierarchy")
+    units = signal_units(recording)
+    schemas = {topic: (f"hierarchy.{topic[1:]}", an_object(
+        **{name: {**_schema(signal), "description": " ".join(units.get(name, ()))}
+           for name, signal in group.items()})) for topic, group in groups.items()}
+    for topic, name in (("/tf", "foxglove.FrameTransforms"), ("/scene", "foxglove.SceneUpdate"),
+                        ("/events", "foxglove.Log")):
+        schemas[topic] = (name, FOXGLOVE[name])
+    channels = {}
+    for topic, (name, schema) in schemas.items():
+        number = writer.register_schema(name, "jsonschema", _bytes(schema))
+        channels[topic] = writer.register_channel(topic, "json", number)
+    for at, topic, message in sorted(_entries(recording, groups), key=lambda entry: entry[0]):
+        writer.add_message(channels[topic], at, _bytes(message), at)
+    writer.add_metadata("scenario", {"toml": recording.scenario.to_toml(),
+                                     "fault": recording.fault or ""})
+    writer.finish()
+
+
+def _entries(recording: Recording, groups: dict[str, dict[str, NDArray[Any]]]) -> Iterator[Entry]:
+    times = [foxglove.nanoseconds(t) for t in recording["t"]]
+    drawn = scene(recording, FRAMES_A_SECOND)
+    for frame, t in enumerate(drawn.t):
+        yield foxglove.nanoseconds(t), "/tf", foxglove.transforms(drawn, frame)
+    for frame, update in foxglove.scene_updates(drawn, round(FRAMES_A_SECOND)):
+        yield foxglove.nanoseconds(drawn.t[frame]), "/scene", update
+    for topic, group in groups.items():
+        names, rows = list(group), zip(*(plain(signal) for signal in group.values()), strict=True)
+        for at, row in zip(times, rows, strict=True):
+            yield at, topic, dict(zip(names, row, strict=True))
+    for tick, kind, action in recording.events:
+        t = float(recording["t"][tick])
+        yield times[tick], "/events", {
+            "timestamp": foxglove.time(t), "level": _WARNING, "message": f"{kind}: {action}",
+            "name": "policy", "file": "", "line": tick}
+
+
+def _schema(signal: NDArray[Any]) -> dict[str, Any]:
+    schema = _KINDS[signal.dtype.kind]
+    for _ in range(signal.ndim - 1):
+        schema = a_list(schema)
+    return schema
+
+
+def _bytes(message: dict[str, Any]) -> bytes:
+    return json.dumps(message, separators=(",", ":"), allow_nan=False).encode()

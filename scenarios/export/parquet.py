@@ -1,0 +1,41 @@
+"""A recording as a Parquet table, units in the fields' metadata, the scenario in the table's."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from scenarios.export import new_file
+from scenarios.export.columns import CONSTANTS, Column, columns
+from scenarios.export.numbers import plain
+
+if TYPE_CHECKING:
+    from scenarios.recording import Recording
+
+
+def write(recording: Recording, path: Path) -> list[Path]:
+    """Write `path`: a column a number, of the type it was recorded in, with metadata `unit`.
+
+    The table's metadata has `scenario` (TOML as run), `orders`, `limits` (JSON; null for a limit
+    that is not there) and `fault`.
+    """
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    table = list(columns(recording))
+    limits = {name: plain(recording[name]) for name in CONSTANTS if name in recording}
+    metadata = {"scenario": recording.scenario.to_toml(), "orders": json.dumps(recording.orders),
+                "limits": json.dumps(limits), "fault": recording.fault or ""}
+    schema = pa.schema([_field(pa, column) for column in table], metadata)
+    arrays = [pa.array(column.values.tolist() if column.values.dtype.kind == "U"
+                       else column.values) for column in table]
+    with new_file(path) as partial:
+        pq.write_table(pa.Table.from_arrays(arrays, schema=schema), partial)
+    return [path]
+
+
+def _field(pa: Any, column: Column) -> Any:
+    kind = pa.string() if column.values.dtype.kind == "U" else pa.from_numpy_dtype(
+        column.values.dtype)
+    return pa.field(column.name, kind, metadata={"unit": column.unit})

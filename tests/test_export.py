@@ -1,0 +1,295 @@
+"""Exports: read back by the packages that others read them with, they are the recording."""
+
+import csv
+import importlib
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hierarchy import HierarchyError, Robot
+from scenarios import load, simulate
+from scenarios.cli import run_command
+from scenarios.export import export, foxglove
+from scenarios.export.columns import CONSTANTS, columns, joint_units
+from scenarios.folders import OutputError
+from scenarios.recording import Event, save
+
+FORMATS = ("csv", "parquet", "mcap")
+
+
+@pytest.fixture(scope="module")
+def run():
+    recording = simulate(load("ellipse", ["control.duration=0.15"]))
+    recording.signals["ee_distance"][3] = np.nan
+    recording.signals["minimal_distance"][4] = np.inf
+    return replace(recording, events=(Event(5, "overrun", "hold"), Event(5, "inside", "brake")))
+
+
+def needs(format):
+    if format != "csv":
+        pytest.importorskip({"parquet": "pyarrow", "mcap": "mcap"}[format])
+
+
+# --- CSV ----------------------------------------------------------------------------------------
+
+
+def test_a_csv_has_units_in_its_header_and_every_number_to_the_last_bit(run, tmp_path):
+    export(run, tmp_path / "run.csv")
+    with (tmp_path / "run.csv").open(newline="", encoding="utf-8") as stream:
+        head, *lines = csv.reader(stream)
+    table = dict(zip(head, zip(*lines, strict=True), strict=True))
+    for j in range(7):
+        for name, unit in (("q", "rad"), ("v", "rad/s"), ("a", "rad/s^2"), ("command", "rad/s^2")):
+            np.testing.assert_array_equal(np.array(table[f"{name}[{j}] [{unit}]"], float),
+                                          run[name][:, j])
+    for name, unit in (("t", "s"), ("minimal_distance", "m"), ("time_tick", "s")):
+        np.testing.assert_array_equal(np.array(table[f"{name} [{unit}]"], float), run[name])
+    assert table["stack"][0] == run.orders[run["order"][0]]
+    assert table["events"][4:7] == ("", "overrun: hold; inside: brake", "")
+    assert set(table["repulsion_active"]) <= {"true", "false"}
+
+
+def test_every_signal_of_the_ticks_is_a_column(run):
+    names = {column.name.partition("[")[0] for column in columns(run)}
+    assert names == {*run.signals, "stack", "events"} - set(CONSTANTS)
+
+
+def test_units_follow_the_joints():
+    assert joint_units(Robot.named("kuka_lwr")) == (("rad",) * 7, ("rad",) * 7)
+
+
+def test_a_slide_is_measured_in_metres_and_a_wheel_by_cosine_and_sine(tmp_path):
+    (tmp_path / "cart.urdf").write_text("""<robot name="cart"><link name="a"/><link name="b"/>
+      <link name="c"/><joint name="slide" type="prismatic"><parent link="a"/><child link="b"/>
+      <axis xyz="1 0 0"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
+      <joint name="wheel" type="continuous"><parent link="b"/><child link="c"/>
+      <axis xyz="0 0 1"/></joint></robot>""")
+    robot = Robot.from_file(tmp_path / "cart.urdf")
+    assert joint_units(robot) == (("m", "1", "1"), ("m", "rad"))
+
+
+# --- Parquet ------------------------------------------------------------------------------------
+
+
+def test_a_parquet_table_is_the_recording_with_units_and_scenario(run, tmp_path):
+    parquet = pytest.importorskip("pyarrow.parquet")
+    export(run, tmp_path / "run.parquet")
+    table = parquet.read_table(tmp_path / "run.parquet")
+    for column in columns(run):
+        read = table[column.name].to_numpy()
+        if column.values.dtype.kind != "U":
+            assert read.dtype == column.values.dtype
+        np.testing.assert_array_equal(read, column.values)
+        assert table.schema.field(column.name).metadata[b"unit"].decode() == column.unit
+    metadata = table.schema.metadata
+    assert metadata[b"scenario"].decode() == run.scenario.to_toml()
+    assert json.loads(metadata[b"orders"]) == list(run.orders)
+    assert json.loads(metadata[b"limits"])["joint_upper"] == run["joint_upper"].tolist()
+
+
+# --- MCAP ---------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def messages(run, tmp_path_factory):
+    """Messages by topic: (time [ns], content), and the layout."""
+    reader = pytest.importorskip("mcap.reader")
+    path = tmp_path_factory.mktemp("mcap") / "run.mcap"
+    written = export(run, path)
+    assert [one.name for one in written] == ["run.mcap", "run.mcap.layout.json"]
+    found, schemas = {}, {}
+    with path.open("rb") as stream:
+        for schema, channel, message in reader.make_reader(stream).iter_messages():
+            assert (schema.encoding, channel.message_encoding) == ("jsonschema", "json")
+            schemas[channel.topic] = (schema.name, json.loads(schema.data))
+            found.setdefault(channel.topic, []).append(
+                (message.log_time, json.loads(message.data)))
+    return found, schemas, json.loads(written[1].read_text())
+
+
+def test_an_mcap_file_has_every_signal_of_every_tick(run, messages):
+    found, _, _ = messages
+    read = {}
+    for topic in ("/joints", "/end_effector", "/distances", "/stack", "/times"):
+        assert [at for at, _ in found[topic]] == [round(t * 1e9) for t in run["t"]]
+        for name in found[topic][0][1]:
+            read[name] = [message[name] for _, message in found[topic]]
+    assert read.pop("tasks") == [run.orders[i] for i in run["order"]]
+    assert set(read) | {"t"} == set(run.signals) - set(CONSTANTS)
+    for name, values in read.items():
+        signal = run[name].astype(float)
+        np.testing.assert_array_equal(np.array(values, dtype=float),
+                                      np.where(np.isfinite(signal), signal, np.nan))
+
+
+def test_schemas_tell_units_and_foxglove_what_it_can_draw(messages):
+    _, schemas, _ = messages
+    assert schemas["/joints"][1]["properties"]["v"]["description"].split() == ["rad/s"] * 7
+    assert schemas["/tf"][0] == "foxglove.FrameTransforms"
+    assert schemas["/scene"][0] == "foxglove.SceneUpdate"
+    assert schemas["/events"][0] == "foxglove.Log"
+
+
+def test_every_message_is_as_its_schema_says(messages):
+    found, schemas, _ = messages
+    for topic, entries in found.items():
+        for _, message in entries:
+            assert_fits(message, schemas[topic][1], topic)
+
+
+def assert_fits(value, schema, where):
+    kinds = {"object": dict, "array": list, "string": str, "integer": int, "boolean": bool,
+             "number": (int, float), "null": type(None)}
+    asked = schema["type"] if isinstance(schema["type"], list) else [schema["type"]]
+    assert any(isinstance(value, kinds[kind]) for kind in asked), where
+    if isinstance(value, dict):
+        assert set(value) == set(schema["properties"]) or not schema["properties"], where
+        for name, part in value.items():
+            assert_fits(part, schema["properties"][name], f"{where}.{name}")
+    if isinstance(value, list):
+        for part in value:
+            assert_fits(part, schema["items"], f"{where}[]")
+
+
+def test_frames_are_where_the_robot_is(run, messages):
+    found, _, _ = messages
+    robot = Robot.named("kuka_lwr")
+    for at, message in found["/tf"]:
+        frames = {one["child_frame_id"]: one for one in message["transforms"]}
+        tick = int(np.abs(run["t"] - at * 1e-9).argmin())
+        state = robot.state(run["q"][tick])
+        placed = [*frames["end_effector"]["translation"].values()]
+        np.testing.assert_allclose(placed, run["ee_position"][tick], atol=1e-9)
+        np.testing.assert_allclose([*frames["desired"]["translation"].values()],
+                                   run["desired_position"][tick], atol=1e-9)
+        for i, name in enumerate(robot.joint_names, 1):
+            np.testing.assert_allclose([*frames[name]["translation"].values()],
+                                       state.placements[i, 9:], atol=1e-12)
+            np.testing.assert_allclose(rotation(frames[name]["rotation"]),
+                                       state.placements[i, :9].reshape(3, 3).T, atol=1e-9)
+
+
+def rotation(q):
+    x, y, z, w = (q[name] for name in "xyzw")
+    return np.eye(3) + 2 * np.array([[-y * y - z * z, x * y - z * w, x * z + y * w],
+                                     [x * y + z * w, -x * x - z * z, y * z - x * w],
+                                     [x * z - y * w, y * z + x * w, -x * x - y * y]])
+
+
+def test_the_arm_hangs_on_its_joints_and_obstacles_stand_in_the_world(run, messages):
+    entities = {one["id"]: one for one in messages[0]["/scene"][0][1]["entities"]}
+    links = [one for name, one in entities.items() if name.startswith("link")]
+    assert {one["frame_id"] for one in links} <= {"world", *Robot.named("kuka_lwr").joint_names}
+    assert all(one["frame_locked"] and len(one["spheres"]) == 2 for one in links)
+    centres = [[*entities[f"obstacle {h}"]["spheres"][0]["pose"]["position"].values()]
+               for h in (1, 2, 3)]
+    np.testing.assert_allclose(centres, [o.centre for o in run.scenario.avoidance.placed])
+    later = [one["id"] for _, update in messages[0]["/scene"][1:] for one in update["entities"]]
+    assert set(later) <= {"nearest", "path taken 1"}  # what stays is sent once
+
+
+def test_events_are_log_messages(messages):
+    assert [message["message"] for _, message in messages[0]["/events"]] == [
+        "overrun: hold", "inside: brake"]
+
+
+def test_the_layout_shows_only_what_the_file_has(messages):
+    found, _, layout = messages
+    panels = layout["configById"]
+    assert leaves(layout["layout"]) == set(panels)
+    values = [path["value"] for panel in panels.values() for path in panel.get("paths", [])]
+    assert len(values) > 10
+    for value in values:
+        topic, _, rest = value.partition(".")
+        name, _, index = rest.partition("[")
+        entry = found[topic][0][1][name]
+        assert not index or int(index.rstrip("]")) < len(entry)
+
+
+def leaves(node):
+    if isinstance(node, str):
+        return {node}
+    return leaves(node["first"]) | leaves(node["second"])
+
+
+@pytest.mark.parametrize("shape", ["box", "capsule", "point"])
+def test_every_shape_of_an_obstacle_is_drawn_at_its_size(shape):
+    from hierarchy.avoidance import Obstacle
+
+    size = {"box": (0.1, 0.2, 0.3), "capsule": (0.05, 0.2), "point": ()}[shape]
+    drawn = foxglove.obstacle(0.0, 0, Obstacle(shape, (1.0, 2.0, 3.0), size), np.array([1., 2, 3]))
+    part = drawn[{"box": "cubes", "capsule": "cylinders", "point": "spheres"}[shape]][0]
+    expected = {"box": [0.2, 0.4, 0.6], "capsule": [0.1, 0.1, 0.4], "point": [0.02] * 3}[shape]
+    np.testing.assert_allclose([*part["size"].values()], expected)
+    assert len(drawn["spheres"]) == {"box": 0, "capsule": 2, "point": 1}[shape]
+
+
+def test_quaternions_are_those_of_every_rotation():
+    rng = np.random.default_rng(0)
+    half_turns = [np.diag(np.roll([1.0, -1.0, -1.0], k)) for k in range(3)]
+    for Q in [np.eye(3), *half_turns, *(np.linalg.qr(rng.normal(size=(3, 3)))[0]
+                                        for _ in range(20))]:
+        R = Q * np.linalg.det(Q)
+        np.testing.assert_allclose(rotation(foxglove.xyzw(foxglove.quaternion(R))), R, atol=1e-12)
+
+
+# --- all of them --------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("format", FORMATS)
+def test_the_same_recording_gives_the_same_bytes(run, format, tmp_path):
+    needs(format)
+    first, second = (export(run, tmp_path / folder / f"run.{format}") for folder in "ab")
+    assert [one.read_bytes() for one in first] == [one.read_bytes() for one in second]
+
+
+@pytest.mark.parametrize("format", FORMATS)
+def test_an_export_that_breaks_leaves_nothing_behind(run, format, tmp_path, monkeypatch):
+    needs(format)
+
+    def broken(*_):
+        raise KeyboardInterrupt
+
+    module = importlib.import_module(f"scenarios.export.{format}")
+    if format == "csv":
+        monkeypatch.setattr(module, "_texts", broken)
+    elif format == "parquet":
+        monkeypatch.setattr("pyarrow.parquet.write_table", broken)
+    else:
+        monkeypatch.setattr(module, "_entries", broken)
+    with pytest.raises(KeyboardInterrupt):
+        export(run, tmp_path / f"run.{format}")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_file_that_exists_is_left_alone(run, tmp_path):
+    (tmp_path / "run.csv").write_text("mine")
+    with pytest.raises(OutputError, match="exists"):
+        export(run, tmp_path / "run.csv")
+    assert (tmp_path / "run.csv").read_text() == "mine"
+
+
+def test_a_format_that_is_not_known_names_the_nearest(run, tmp_path):
+    with pytest.raises(HierarchyError, match="unknown format 'parket'; did you mean 'parquet'"):
+        export(run, tmp_path / "run.parket")
+
+
+def test_a_package_that_is_missing_names_its_extra(run, tmp_path, monkeypatch):
+    monkeypatch.setitem(importlib.import_module("scenarios.export").FORMATS, "mcap",
+                        ("no_such_package", "export"))
+    with pytest.raises(HierarchyError, match=r"pip install task-hierarchy\[export\]"):
+        export(run, tmp_path / "run.mcap")
+
+
+def test_the_command_exports_a_run_beside_it_or_where_it_is_told(run, tmp_path, capsys):
+    folder = save(run, tmp_path / "run", figures=False)
+    assert run_command(["export", str(folder), "--format", "csv"]) == 0
+    assert (folder / "run.csv").exists()
+    assert run_command(["export", str(folder), "--out", str(tmp_path / "other.csv")]) == 0
+    assert (tmp_path / "other.csv").read_bytes() == (folder / "run.csv").read_bytes()
+    assert "other.csv" in capsys.readouterr().out
+    assert run_command(["export", str(folder), "--format", "cvs"]) == 2
+    assert "did you mean 'csv'" in capsys.readouterr().err
+    assert run_command(["export", str(tmp_path / "none"), "--format", "csv"]) == 2
