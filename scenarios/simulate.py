@@ -56,18 +56,13 @@ def _audits(scenario: Scenario, ticks: int, certified: bool) -> list[Audit]:
 def _run(controller: Controller, recorder: Recorder, period: float, ticks: int,
          progress: Callable[[int, int], None], audits: list[Audit],
          faults: Faults | None) -> str | None:
-    plant, policy = controller.cell.plant, controller.policy
+    policy = controller.policy
     for k in range(ticks):
         if k % _REPORT_EVERY == 0:
             progress(k, ticks)
-        if faults is None:
-            plant.act(controller.command(k * period, plant.q, plant.v))
-        else:
-            plant.act(controller.command(k * period, *faults.measure(k * period)))
-        sound = recorder.write()
-        recorder.stamp(controller.clock())
-        if not sound or (policy.events and not _finite(plant.q, plant.v)):
-            return f"{_unsound(controller)} from tick {k} on (t = {k * period:.3f} s)"
+        broken = tick(controller, recorder, k * period, faults)
+        if broken:
+            return f"{broken} from tick {k} on (t = {k * period:.3f} s)"
         if controller.answered:
             for audit in audits:
                 audit.look(k, controller)
@@ -75,6 +70,21 @@ def _run(controller: Controller, recorder: Recorder, period: float, ticks: int,
             return policy.fault
     progress(ticks, ticks)
     return policy.fault
+
+
+def tick(controller: Controller, recorder: Recorder, t: float,
+         faults: Faults | None = None) -> str | None:
+    """Command, act and record once, at time t [s]; say what is wrong with the state, or None."""
+    plant = controller.cell.plant
+    if faults is None:
+        plant.act(controller.command(t, plant.q, plant.v))
+    else:
+        plant.act(controller.command(t, *faults.measure(t)))
+    sound = recorder.write()
+    recorder.stamp(controller.clock())
+    if not sound or (controller.policy.events and not _finite(plant.q, plant.v)):
+        return _unsound(controller)
+    return None
 
 
 def _unsound(controller: Controller) -> str:
