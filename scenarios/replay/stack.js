@@ -1,0 +1,85 @@
+// The stack of each run as a live list: what is met, what does not act, what is given up.
+
+const ROW = 26;  // px
+const SAYS = {met: "met", free: "not acting", unknown: "in the stack", absent: "not in the stack"};
+
+class StackList {
+  constructor(run, fates, several) {
+    this.run = run;
+    this.fates = Object.fromEntries(Object.entries(fates).map(([name, value]) => [value, name]));
+    this.rows = run.tasks.map(task => {
+      const parts = {rank: element("b"), said: element("em")};
+      parts.row = element("li", {"data-task": task}, parts.rank, element("span", {}, task),
+                          parts.said);
+      return parts;
+    });
+    this.list = element("ol", {class: "order", style: `height: ${ROW * run.tasks.length}px`},
+                        ...this.rows.map(parts => parts.row));
+    this.near = element("p");
+    this.note = element("p");
+    const head = element("h2", {}, ...(several ? [sample(run)] : []), run.label, element("small", {}, run.scenario));
+    this.card = element("article", {class: "card"}, head, this.list, ...this.joint_row(),
+                        this.near, this.note);
+    this.note.hidden = !run.fault;
+    this.frame = -1;
+  }
+
+  joint_row() {
+    if (!this.run.limited) return [];
+    this.joints = Array.from({length: this.run.saturated.width}, (_, j) =>
+      element("i", {}, `${j + 1}`));
+    this.joints_say = element("span");
+    return [element("div", {class: "joints"}, element("span", {}, "limits"), ...this.joints,
+                    this.joints_say)];
+  }
+
+  follow(t) {
+    const {frame} = this.run.at(t);
+    if (frame === this.frame) return;
+    this.frame = frame;
+    this.order(frame);
+    this.limits(frame);
+    this.distance(frame);
+    if (this.run.fault) {
+      this.note.replaceChildren(element("b", {}, frame === this.run.frames - 1 ?
+        `stopped: ${this.run.fault}` : `will stop at ${this.run.end.toFixed(2)} s`));
+    }
+  }
+
+  order(frame) {
+    const {run} = this, order = run.order_at(frame);
+    const fates = run.row("fate", frame), violations = run.row("violation", frame);
+    const absent = run.tasks.filter(task => !order.includes(task));
+    run.tasks.forEach((task, n) => {
+      const {row, rank, said} = this.rows[n], place = order.indexOf(task);
+      const fate = this.fates[fates[n]];
+      const at = place < 0 ? order.length + absent.indexOf(task) : place;
+      row.className = fate;
+      row.style.transform = `translateY(${at * ROW}px)`;
+      rank.textContent = place < 0 ? "–" : `${place + 1}`;
+      said.textContent = fate === "missed" ? `gives up ${short(violations[n])}` : SAYS[fate];
+      row.title = fate === "missed" ?
+        "Norm of what its rows are missed by, in their own unit" : "";
+    });
+  }
+
+  limits(frame) {
+    if (!this.joints) return;
+    const sides = this.run.row("saturated", frame);
+    this.joints.forEach((joint, j) => {
+      joint.className = sides[j] ? "at" : "";
+      joint.textContent = `${j + 1}${sides[j] > 0 ? "↑" : sides[j] < 0 ? "↓" : ""}`;
+    });
+    const any = sides.some(side => side !== 0);
+    this.joints_say.textContent = any ? "saturated" : "no joint is saturated";
+  }
+
+  distance(frame) {
+    const {run} = this, linked = run.linked.values[frame], distance = run.distance.values[frame];
+    if (!Number.isFinite(distance)) return;
+    const what = linked === run.points.width / 3 - 1 ? "end effector" : `point ${linked + 1}`;
+    const active = run.active.values[frame] === linked;
+    this.near.replaceChildren(active ? element("b", {}, what) : what,
+      `: ${(1e3 * distance).toFixed(0)} mm from an obstacle${active ? ", kept away" : ""}`);
+  }
+}

@@ -1,0 +1,127 @@
+"""A page in headless Chromium, through the DevTools protocol; skipped where there is none."""
+
+from __future__ import annotations
+
+import base64
+import json
+import shutil
+import subprocess
+import tempfile
+import time
+from contextlib import contextmanager
+from pathlib import Path
+from urllib.request import Request, urlopen
+
+import pytest
+
+_NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
+_FLAGS = ("--headless", "--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader",
+          "--enable-unsafe-swiftshader", "--disable-background-networking", "--no-first-run",
+          "--disable-sync", "--hide-scrollbars", "--remote-debugging-port=0")
+_PATIENCE = 20.0  # [s]
+
+
+class Page:
+    """One page: run script in it, press its buttons, look at it."""
+
+    def __init__(self, socket):
+        self._socket, self._number = socket, 0
+        self.complaints = []  # errors and warnings of the console, exceptions
+
+    def call(self, method, **parameters):
+        self._number += 1
+        self._socket.send(json.dumps({"id": self._number, "method": method,
+                                      "params": parameters}))
+        while True:
+            message = json.loads(self._socket.recv(timeout=_PATIENCE))
+            if message.get("id") == self._number:
+                assert "error" not in message, message
+                return message["result"]
+            self._listen(message)
+
+    def _listen(self, message):
+        kind, data = message.get("method"), message.get("params", {})
+        if kind == "Runtime.exceptionThrown":
+            details = data["exceptionDetails"]
+            self.complaints.append(details.get("exception", {}).get("description", str(details)))
+        elif kind == "Runtime.consoleAPICalled" and data["type"] in ("error", "warning", "assert"):
+            self.complaints.append(str([arg.get("value") for arg in data["args"]]))
+        elif kind == "Log.entryAdded" and data["entry"]["level"] in ("error", "warning"):
+            self.complaints.append(data["entry"]["text"])
+
+    def look_at(self, address, width=1400, height=900, dark=False):
+        """Open an address in a window of this size."""
+        for domain in ("Page", "Runtime", "Log"):
+            self.call(f"{domain}.enable")
+        self.call("Emulation.setDeviceMetricsOverride", width=width, height=height,
+                  deviceScaleFactor=1, mobile=width < 600)
+        self.call("Emulation.setEmulatedMedia", features=[
+            {"name": "prefers-color-scheme", "value": "dark" if dark else "light"}])
+        self.call("Page.navigate", url=address)
+        self.wait("document.readyState === 'complete'")
+
+    def run(self, script):
+        """Evaluate an expression, awaited if it is a promise, and return its value."""
+        answer = self.call("Runtime.evaluate", expression=script, returnByValue=True,
+                           awaitPromise=True)
+        assert "exceptionDetails" not in answer, answer["exceptionDetails"]
+        return answer["result"].get("value")
+
+    def wait(self, condition):
+        """Wait until an expression holds."""
+        end = time.monotonic() + _PATIENCE
+        while not self.run(condition):
+            assert time.monotonic() < end, f"{condition} does not come to hold"
+            time.sleep(0.05)
+
+    def painted(self):
+        """Wait until what was asked for is on the screen."""
+        self.run("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
+
+    def screenshot(self):
+        """The window as PNG."""
+        self.painted()
+        return base64.b64decode(self.call("Page.captureScreenshot", format="png")["data"])
+
+    def press(self, key, code=None):
+        for kind in ("keyDown", "keyUp"):
+            self.call("Input.dispatchKeyEvent", type=kind, key=key, code=code or key,
+                      text=key if len(key) == 1 and kind == "keyDown" else "")
+
+    def mouse(self, *steps, **parameters):
+        """Send mouse events (kind, x, y)."""
+        for kind, x, y in steps:
+            self.call("Input.dispatchMouseEvent", type=kind, x=x, y=y,
+                      **{"button": "left", "buttons": kind != "mouseReleased",
+                         "clickCount": 1, **parameters})
+
+
+@contextmanager
+def chromium():
+    """Start a browser and give its Page; the test is skipped where there is no Chromium."""
+    connect = pytest.importorskip("websockets.sync.client", reason="needs websockets").connect
+    program = next((path for path in map(shutil.which, _NAMES) if path), None)
+    if program is None:
+        pytest.skip("needs Chromium")
+    with (tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder,
+          subprocess.Popen([program, *_FLAGS, f"--user-data-dir={folder}", "about:blank"],
+                           stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process):
+        try:
+            address = _page_address(Path(folder) / "DevToolsActivePort", process)
+            with connect(address, max_size=None, open_timeout=_PATIENCE) as socket:
+                yield Page(socket)
+        finally:
+            process.terminate()
+            process.wait(_PATIENCE)
+
+
+def _page_address(file, process):
+    end = time.monotonic() + _PATIENCE
+    while not (file.is_file() and "\n" in file.read_text()):
+        if process.poll() is not None or time.monotonic() > end:
+            pytest.skip("Chromium does not start here")
+        time.sleep(0.05)
+    port = file.read_text().split()[0]
+    with urlopen(Request(f"http://127.0.0.1:{port}/json/list")) as answer:
+        return next(one for one in json.load(answer) if one["type"] == "page")[
+            "webSocketDebuggerUrl"]
