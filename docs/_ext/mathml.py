@@ -1,11 +1,17 @@
 """Equations as MathML, which browsers draw themselves: no script, no font, no network."""
 
+import re
+
 from docutils import nodes
 from docutils.utils.math import MathError
 from docutils.utils.math.latex2mathml import tex2mathml
 from sphinx.util import logging
 
 _log = logging.getLogger(__name__)
+# docutils puts the index of an accented letter below it, as if it were a sum; and what is marked as
+# an accent lies on its letter where there is no font for mathematics.
+_ACCENTED = re.compile(r'<munderover>(\s*<mi>[^<]*</mi>)(.*?)(<mo stretchy="false">[¨˙ˆˉ]</mo>\s*)'
+                       r"</munderover>", re.DOTALL)
 
 
 def setup(app):
@@ -26,7 +32,9 @@ def _block(writer, node):
 
 def _drawn(node, as_block):
     try:
-        return tex2mathml(node.astext(), as_block=as_block)
+        drawn = tex2mathml(node.astext(), as_block=as_block)
     except MathError as error:
         _log.warning("equation %r: %s", node.astext(), error, location=node)
         return f"<code>{node.astext()}</code>"
+    drawn = _ACCENTED.sub(r"<msub><mover>\1\3</mover>\2</msub>", drawn)
+    return drawn.replace('<mover accent="true">', "<mover>")
