@@ -42,8 +42,8 @@ def write(recording: Recording, path: Path) -> list[Path]:
     """Write `path` and `path`.layout.json, times counted from zero.
 
     Every signal of every tick is there under its name in `Recording`, in the channels of `TOPICS`;
-    numbers that are not finite are null. `/stack` has the tasks' names too, `/events` the trouble,
-    `/tf` and `/scene` what to draw.
+    numbers that are not finite are null, and what has several indices is one list. `/stack` has
+    the tasks' names too, `/events` the trouble, `/tf` and `/scene` what to draw.
     """
     from mcap.writer import Writer
 
@@ -63,7 +63,8 @@ def grouped(recording: Recording) -> dict[str, dict[str, NDArray[Any]]]:
     home = {name: topic for topic, names in TOPICS.items() for name in names}
     groups: dict[str, dict[str, NDArray[Any]]] = {topic: {} for topic in (*TOPICS, "/other")}
     for name, signal in signals.items():
-        groups[home.get(name, "/other")][name] = signal
+        flat = signal.reshape(len(signal), -1) if signal.ndim > 2 else signal
+        groups[home.get(name, "/other")][name] = flat
     groups["/stack"]["tasks"] = stacks(recording)
     return {topic: group for topic, group in groups.items() if group}
 
@@ -108,9 +109,7 @@ def _entries(recording: Recording, groups: dict[str, dict[str, NDArray[Any]]]) -
 
 def _schema(signal: NDArray[Any]) -> dict[str, Any]:
     schema = _KINDS[signal.dtype.kind]
-    for _ in range(signal.ndim - 1):
-        schema = a_list(schema)
-    return schema
+    return a_list(schema) if signal.ndim > 1 else schema
 
 
 def _bytes(message: dict[str, Any]) -> bytes:

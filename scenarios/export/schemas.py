@@ -1,14 +1,15 @@
 """JSON Schemas of the messages in an MCAP file.
 
 Foxglove knows what it can draw by the schema's name; the fields are those of its published message
-types, as far as they are used here.
+types, as far as they are used here. Its reader takes one type a field, so that a number that may be
+null is a number here.
 """
 
 from __future__ import annotations
 
 from typing import Any
 
-NUMBER: dict[str, Any] = {"type": ["number", "null"]}
+NUMBER: dict[str, Any] = {"type": "number"}
 INTEGER: dict[str, Any] = {"type": "integer"}
 TEXT: dict[str, Any] = {"type": "string"}
 TRUTH: dict[str, Any] = {"type": "boolean"}
