@@ -71,7 +71,7 @@ def measure(recording: Recording, settle: float = 2.0,
     if recording.ticks == 0:
         return {}
     found = (*_tracking(recording, settle), *_pointing(recording, cone_tolerance_deg),
-             *_strictness(recording),
+             *_listed(recording, settle), *_strictness(recording),
              *_distances(recording), *_contacts(recording), *_motion(recording),
              *_switching(recording), *_troubles(recording), *_time(recording))
     return {metric.name: metric for metric in found}
@@ -125,6 +125,26 @@ def _pointing(recording: Recording, tolerance: float) -> Iterator[Metric]:
     yield Metric("cone_violation_share", "Time outside the cone",
                  float(np.mean(beyond > tolerance)), "share", group="Tracking",
                  note=f"outside by more than {tolerance:g}°")
+
+
+def _listed(recording: Recording, settle: float) -> Iterator[Metric]:
+    """Errors of the tasks of `[[tasks]]`, each under its name."""
+    if not recording.scenario.tasks:
+        return
+    from scenarios.listed import errors  # here, since it loads the tasks
+
+    after = recording["t"] - recording["t"][0] >= settle
+    for section, unit, error in errors(recording):
+        turned = section.kind == "pose" and unit == "deg"
+        title = section.title[0].upper() + section.title[1:] + (", turned" if turned else "")
+        key = f"task_{section.title}{' turned' if turned else ''}".replace(" ", "_")
+        lower = None if section.kind == "posture" else True  # it gets what is left
+        yield Metric(f"{key}_rms", f"{title}: error, rms", _finite(np.sqrt(np.mean(error**2))),
+                     unit, lower, "Tracking")
+        yield Metric(f"{key}_max_settled", f"{title}: after {settle:g} s, max",
+                     _largest(error[after]), unit, lower, "Tracking")
+        yield Metric(f"{key}_end", f"{title}: at the end", _finite(error[-1]), unit, lower,
+                     "Tracking", detail=True)
 
 
 def pointing_angle(recording: Recording) -> Array:

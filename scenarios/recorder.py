@@ -12,6 +12,7 @@ from hierarchy.compiled import compiled
 from hierarchy.kinematics import point_at
 from hierarchy.problem import Array
 from hierarchy.robot import Frame, Robot, State
+from scenarios import listed
 from scenarios.config import Scenario
 from scenarios.controller import Controller
 from scenarios.recording import Event, Recording
@@ -102,6 +103,8 @@ class Recorder:
         if self._cell.pointing is not None:
             asked = np.array(["pointing" in names for names in orders])
             signals |= {"pointing_error": cone[:, 0], "pointing_active": asked[order]}
+        if self._cell.listed:
+            signals |= listed.signals(robot, self._cell.listed, t[:, 0], q, v)
         if self._blend is not None:
             signals["transition"] = self._weights[rows].copy()
         signals |= {name: values[rows].copy() for name, values in self._extra.items()}

@@ -50,6 +50,8 @@ class Recording:
     ee_position, desired_position, position_error (T, 3) [m], error = desired - actual
     pointing_error (T,) cos(alpha_d) - cos(alpha), positive outside the cone
     pointing_active (T,) bool, whether the pointing task was in the stack
+    task_error_NAME (T, m) of each task of `[[tasks]]`, a space of its name being "_", as the task
+    defines it; task_position_NAME (T, 3) [m] of the point or centre of mass that it moves
     control_point_distance (T, K) [m] to the nearest obstacle; minimal_distance (T,) [m], eq. (31)
     active_control_point (T,) number 1..K of the point whose avoidance was in the stack, or -1
     ee_distance (T,) [m]; repulsion_active (T,) bool, whether eq. (30) was in force
