@@ -234,6 +234,22 @@ def export(folder: Annotated[Path, typer.Argument(
 
 
 @app.command()
+def replay(folders: Annotated[list[Path], typer.Argument(
+               metavar="RUN...", help="Folders that `hierarchy run` or `compare` wrote.")],
+           out: Annotated[Path | None, typer.Option(
+               "--out", metavar="FILE",
+               help="HTML file to write. Default: RUN/replay.html.")] = None,
+           video: Annotated[Path | None, typer.Option(
+               "--video", metavar="FILE", help="Video of one run to write, by ffmpeg.")] = None,
+           rate: Annotated[float, typer.Option(
+               "--rate", metavar="HZ", help="Frames a second.")] = 30.0) -> int:
+    """Write finished runs as one HTML file that plays without a server, or one as a video."""
+    from scenarios.replay.command import replay_command
+
+    return replay_command(folders, out, video, rate)
+
+
+@app.command()
 def check(file: Annotated[str, typer.Argument(help="A scenario file, or a scenario's name.",
                                               autocompletion=completion.scenarios)],
           changes: Changes = None, as_json: AsJson = False) -> None:
