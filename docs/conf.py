@@ -7,6 +7,11 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 sys.path[:0] = [str(ROOT), str(Path(__file__).parent / "_ext")]
 
+import scenarios  # noqa: E402
+
+for _name in scenarios.__all__:  # they are imported when first used, and autodoc sees what is there
+    getattr(scenarios, _name)
+
 project = "task-hierarchy"
 author = "the contributors of task-hierarchy"
 suppress_warnings = ["toc.not_readable"]
