@@ -114,8 +114,17 @@ def run(scenario: Annotated[str, typer.Argument(
         changes: Changes = None, duration: Duration = None, out: Out = None,
         certify: Annotated[bool, typer.Option(
             "--certify", help="Certify the answer of every tick, outside the times measured.")
-            ] = False, as_json: AsJson = False) -> int:
+            ] = False, as_json: AsJson = False,
+        live: Annotated[bool, typer.Option(
+            "--live", help="Show it in the browser while it runs, and change it by hand; needs "
+                           "the extra `view`.")] = False,
+        speed: Annotated[float, typer.Option(
+            "--speed", metavar="X", min=0.01, max=100.0,
+            help="With --live: seconds of the run a second.")] = 1.0,
+        port: Port = PORT, browser: Browser = True) -> int:
     """Run one scenario, measure it, keep the run in a folder."""
+    if live and (certify or as_json):
+        raise typer.BadParameter("goes with neither --certify nor --json", param_hint="--live")
     chosen = _load(scenario, changes, duration)
     if resolver is not None:
         chosen = chosen.with_resolver(resolver)
@@ -123,6 +132,10 @@ def run(scenario: Annotated[str, typer.Argument(
 
     name = f"{chosen.name}-{chosen.control.resolver}"
     folder = claim(out if out is not None else next_free(Path("runs") / name))
+    if live:
+        from scenarios.viewer.command import live_command
+
+        return live_command(chosen, folder, port, speed, browser)
     from scenarios.progress import bar
     from scenarios.recording import save
     from scenarios.simulate import simulate

@@ -1,9 +1,17 @@
-"""What `hierarchy view` does."""
+"""What `hierarchy view` and `hierarchy run --live` do."""
 
 from __future__ import annotations
 
+import itertools
+import sys
+import time
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from scenarios.config import Scenario
+    from scenarios.viewer.live_page import LivePage
 
 
 def view_command(folders: Sequence[Path], port: int, side_by_side: bool, browser: bool) -> int:
@@ -23,3 +31,54 @@ def view_command(folders: Sequence[Path], port: int, side_by_side: bool, browser
     finally:
         server.stop()
     return 0
+
+
+def live_command(scenario: Scenario, folder: Path, port: int, speed: float, browser: bool) -> int:
+    """Run a scenario while it is watched, keep the run, and return 1 if it ended in a fault.
+
+    The run is kept when it ends or at Ctrl-C, in `folder` or, after a restart, beside it; one that
+    is restarted before its end is not kept.
+    """
+    from scenarios.viewer.live import Live
+    from scenarios.viewer.live_page import LivePage
+    from scenarios.viewer.server import announce, open_server
+
+    live = Live(scenario)
+    server = open_server(port, f"hierarchy run {scenario.name} --live")
+    try:
+        page = LivePage(server, live, speed)
+        announce(server, browser)
+        _serve(page, folder)
+    except KeyboardInterrupt:
+        print()
+        if not live.over:
+            _keep(page, folder)
+    finally:
+        server.stop()
+    return 1 if live.fault else 0
+
+
+def _serve(page: LivePage, folder: Path) -> None:
+    """Let the run go on until Ctrl-C, and keep it whenever it ends."""
+    from scenarios.viewer.live_page import FRAMES
+
+    last, kept = time.monotonic(), None
+    while True:
+        time.sleep(1.0 / FRAMES)
+        now = time.monotonic()
+        page.step(now - last)
+        last = now
+        if page.live.over and kept is not page.live.recorder:
+            kept = page.live.recorder
+            _keep(page, folder)
+
+
+def _keep(page: LivePage, folder: Path) -> None:
+    """Write the run's folder, or where there is one from before the next that is free beside it."""
+    beside = (folder.with_name(f"{folder.name}-{i}") for i in itertools.count(2))
+    free = next(path for path in itertools.chain([folder], beside)
+                if not path.exists() or not any(path.iterdir()))
+    recording = page.live.save(free)
+    print(f"{recording.ticks} ticks in {free}", flush=True)
+    if recording.fault:
+        print(f"hierarchy: fault: {recording.fault}", file=sys.stderr)

@@ -50,7 +50,8 @@ class Model:
         self._areas: list[Any] = []
         self._cone: Any = None
         self.set_stage(stage)
-        self._pointer()
+        self._painted = [*(node for node in self._solid if tuple(node.color) == self._colour),
+                         self._pointer()]
         self._active = self._ball("/active", 1.7 * _DOT, rgb(ALERT))
         self._target = self._ball("/target", 1.3 * _DOT, rgb(INK))
         self._path = self._lines("/path", _segments(path), rgb(INK), 1.5)
@@ -81,15 +82,30 @@ class Model:
         for area in self._areas:
             area.visible = opacity is None
 
-    def show(self, now: Moment, trace: Array, path: Array | None = None) -> None:
-        """Bring everything to a moment; trace (N, 3) [m] is where the end effector was."""
+    def paint(self, colour: str) -> None:
+        """Give the arm the colour of another resolver."""
+        if rgb(colour) != self._colour:
+            self._colour = rgb(colour)
+            for node in self._painted:
+                node.color = self._colour
+
+    def set_path(self, path: Array | None) -> None:
+        """Draw another desired path (N, 3) [m]."""
+        self._path.points = _segments(path)
+
+    def show(self, now: Moment, trace: Array, colours: NDArray[Any] | None = None) -> None:
+        """Bring everything to a moment; trace (N, 3) [m] is where the end effector was.
+
+        `colours` (N, 3) of it, from 0 to 255; that of the run if None.
+        """
         for frame, row in zip(self._joints, now.placements, strict=True):
             frame.wxyz, frame.position = _quaternion(row[:9].reshape(3, 3).T), row[9:]
         for frame, centre in zip(self._obstacles, now.centres, strict=True):
             frame.position = centre
         self._trace.points = _segments(trace)
-        if path is not None:
-            self._path.points = _segments(path)
+        if colours is not None and len(trace) > 1:
+            kept = colours[_thinned(len(colours))]
+            self._trace.colors = np.stack([kept[:-1], kept[1:]], axis=1).astype(np.uint8)
         self._show_target(now)
         self._show_nearest(now)
         if self._stage.axis is not None:
@@ -138,12 +154,13 @@ class Model:
                            position=point.offset)
                 for k, point in enumerate(self._stage.points[:-1])]
 
-    def _pointer(self) -> None:
+    def _pointer(self) -> Any:
         """The end effector's z axis."""
         frame = self._stage.robot.frame(self._stage.robot.end_effector)
         end = frame.offset + 0.85 * _AXIS * frame.rotation[:, 2]
-        self._add_mesh(f"/joint{frame.joint}/axis",
-                       hull_of_balls((frame.offset, end), (_AXIS_WIDTH, _AXIS_WIDTH)), self._colour)
+        return self._add_mesh(
+            f"/joint{frame.joint}/axis",
+            hull_of_balls((frame.offset, end), (_AXIS_WIDTH, _AXIS_WIDTH)), self._colour)
 
     def _draw_obstacles(self) -> None:
         for h, obstacle in enumerate(self._stage.obstacles.obstacles):
@@ -175,8 +192,12 @@ def _segments(points: Array | None) -> Segments:
     """The line through points (N, 3), thinned, as segments (M, 2, 3)."""
     if points is None or len(points) < 2:
         return np.zeros((1, 2, 3), np.float32)
-    kept = points[np.unique(np.linspace(0, len(points) - 1, _PATH_VERTICES).astype(int))]
+    kept = points[_thinned(len(points))]
     return np.stack([kept[:-1], kept[1:]], axis=1).astype(np.float32)
+
+
+def _thinned(count: int) -> NDArray[np.int64]:
+    return np.unique(np.linspace(0, count - 1, _PATH_VERTICES).astype(np.int64))
 
 
 def _turn_z_to(axis: Array) -> Array:

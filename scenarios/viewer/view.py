@@ -137,8 +137,7 @@ class View:
 
 
 def labelled(folders: Sequence[Path], recordings: Sequence[Recording]) -> dict[str, Recording]:
-    """Return recordings by the labels of their resolvers; with the folder where two are the same.
-    """
+    """Return recordings by their resolvers' labels; with the folder where two are the same."""
     labels = [str(one.scenario.make_resolver().label) for one in recordings]
     if len({one.scenario.name for one in recordings}) > 1:
         labels = [f"{label} {one.scenario.name}"

@@ -1,0 +1,45 @@
+"""The last seconds of a live run as curves."""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import Any
+
+import numpy as np
+
+from hierarchy.problem import Array
+from scenarios.controller import Controller
+from scenarios.recording import Recording
+from scenarios.scene import Series, series
+
+
+class Lately:
+    """Keeps the last `length` moments that it is shown; `curves` are those of a recording."""
+
+    def __init__(self, length: int) -> None:
+        self._kept: deque[dict[str, Any]] = deque(maxlen=length)
+
+    def clear(self) -> None:
+        """Forget all."""
+        self._kept.clear()
+
+    def add(self, controller: Controller) -> None:
+        """Note what a controller did in its last tick."""
+        cell = controller.cell
+        now: dict[str, Any] = {"t": cell.state.t, "v": cell.state.v.copy()}
+        if cell.position is not None:
+            now["position_error"] = (cell.position.target[0]
+                                     - cell.state.position(cell.position.frame))
+        if cell.pointing is not None:
+            now["pointing_error"] = controller.cone_error
+        if cell.sensor is not None:
+            seen = cell.sensor.measurement
+            now |= {"minimal_distance": seen.minimal_distance,
+                    "ee_distance": seen.end_effector_distance}
+        self._kept.append(now)
+
+    def curves(self, controller: Controller) -> tuple[Array, tuple[Series, ...]]:
+        """Return the times (F,) [s] and the curves of what is kept."""
+        signals = {name: np.array([now[name] for now in self._kept]) for name in self._kept[-1]}
+        recording = Recording(signals, (), controller.cell.scenario)
+        return signals["t"], tuple(series(recording, np.arange(len(self._kept))))

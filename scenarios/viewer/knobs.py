@@ -1,0 +1,54 @@
+"""The settings that have a slider while a run is live."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from scenarios.config import Scenario
+
+
+@dataclass(frozen=True)
+class Knob:
+    """A number of a scenario, by its dotted key, and the range of its slider."""
+
+    key: str
+    label: str
+    high: float
+    step: float
+
+    def value(self, scenario: Scenario) -> float | None:
+        """Return its value; None where the scenario has no such number."""
+        found: object = scenario
+        for name in self.key.split("."):
+            found = getattr(found, name, None)
+        return float(found) if isinstance(found, int | float) else None
+
+
+_BOTH = (
+    Knob("pointing.alpha_d", "cone: half-angle α_d [deg]", 90.0, 0.5),
+    Knob("avoidance.near", "avoidance: ε₁ [m]", 0.4, 0.005),
+    Knob("avoidance.far", "avoidance: ε₂ [m]", 0.4, 0.005),
+    Knob("avoidance.end_effector", "avoidance: ε_ee [m]", 0.4, 0.005),
+    Knob("avoidance.distance", "separation: distance kept [m]", 0.3, 0.005),
+    Knob("avoidance.influence", "separation: influence [m]", 0.8, 0.01),
+    Knob("avoidance.rate", "separation: rate [1/s]", 40.0, 0.5),
+    Knob("limits.acceleration", "limits: acceleration [rad/s²]", 40.0, 0.5),
+    Knob("damping.value", "joint damping [1/s]", 20.0, 0.1))
+_ACCELERATION = (
+    Knob("position.stiffness", "position: stiffness [1/s²]", 200.0, 1.0),
+    Knob("position.damping", "position: damping [1/s]", 60.0, 0.5),
+    Knob("pointing.stiffness", "pointing: stiffness [1/s²]", 100.0, 0.5),
+    Knob("pointing.damping", "pointing: damping [1/s]", 40.0, 0.5))
+_VELOCITY = (
+    Knob("position.gain", "position: gain [1/s]", 50.0, 0.5),
+    Knob("pointing.gain", "pointing: gain [1/s]", 50.0, 0.5))
+
+
+def knobs(scenario: Scenario) -> Iterator[tuple[Knob, float]]:
+    """Yield the settings that act in a scenario, with their values."""
+    gains = _ACCELERATION if scenario.control.level == "acceleration" else _VELOCITY
+    for knob in (*_BOTH, *gains):
+        value = knob.value(scenario)
+        if value is not None:
+            yield knob, value
