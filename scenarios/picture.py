@@ -14,6 +14,7 @@ from scenarios import drawing
 from scenarios.drawing import ALERT, INK, Array
 
 if TYPE_CHECKING:
+    from hierarchy import Robot
     from scenarios.recording import Recording
 
 _VERTICES = 1200
@@ -21,17 +22,26 @@ _OTHER_POSES = 5
 _AREA_ALPHAS = (0.08, 0.18)  # of the outer and the inner area
 
 
-def picture(recordings: Mapping[str, Recording]) -> Figure:
+def picture(recordings: Mapping[str, Recording], colours: Mapping[str, str] | None = None
+            ) -> Figure:
     """Return the scene, after figure 3 of the letter.
 
     The arm is that of the first run, in full where its body is nearest to an obstacle, with the
-    line to it and with its control points; every run's path has the colour of its label.
+    line to it and with its control points; every run's path has the colour of its label, or that
+    given for it. A robot that branches is drawn by `scenarios.bodies`.
     """
-    fig, (ax,) = drawing.figure(width=4.9, height=3.9)
+    from scenarios import bodies
+    from scenarios.making import make_robot
+
     first = next(iter(recordings.values()))
+    robot = make_robot(first.scenario.robot)
+    if bodies.branches(robot):
+        return bodies.picture(robot, recordings, colours or drawing.colours(recordings))
+    fig, (ax,) = drawing.figure(width=4.9, height=3.9)
     _obstacles(ax, first)
-    _arms(ax, first)
-    for label, colour in reversed(drawing.colours(recordings).items()):
+    _arms(ax, robot, first)
+    chosen = drawing.colours(recordings) if colours is None else colours
+    for label, colour in reversed(list(chosen.items())):
         _line(ax, recordings[label]["ee_position"], color=colour, linewidth=1.8)
     if "desired_position" in first:
         _line(ax, first["desired_position"], color=INK, linewidth=0.9, linestyle=(0, (3, 3)))
@@ -62,11 +72,9 @@ def _obstacles(ax: Axes, recording: Recording) -> None:
         ax.plot(x, y, "o", color=ALERT, markersize=5)
 
 
-def _arms(ax: Axes, recording: Recording) -> None:
-    from scenarios.build import make_robot
+def _arms(ax: Axes, robot: Robot, recording: Recording) -> None:
     from scenarios.scene import place
 
-    robot = make_robot(recording.scenario.robot)
     nearest = (int(np.argmin(recording["minimal_distance"]))
                if "minimal_distance" in recording else recording.ticks - 1)
     others = np.linspace(0, recording.ticks - 1, _OTHER_POSES).astype(int)

@@ -87,7 +87,7 @@ def _trunk() -> tuple[TreeJoint, ...]:
     """Yaw and pitch just above the hips."""
     return (
         _joint("trunk_yaw", "", _HERE, "z", (-45, 45), 4.0, 90.0),
-        _joint("trunk_pitch", "trunk_yaw", _HERE, "y", (-20, 60), 4.0, 120.0,
+        _joint("trunk_pitch", "trunk_yaw", _HERE, "y", (-30, 60), 4.0, 120.0,
                Link((0.0, 0.0, _TRUNK - 0.06), 0.11, (0.139 + 0.216) * MASS, (0.0, 0.0, 0.16))),
     )
 
