@@ -24,7 +24,7 @@ from scenarios.simulate import simulate
 if TYPE_CHECKING:
     from scenarios.recording import Recording
 
-FOLDER = Path(__file__).parents[1] / "docs" / "images" / "gallery"
+FOLDER = Path("docs/images/gallery")  # from the root of the repository
 
 _DPI = 130
 _COLOURS = 64  # of the palette: enough for flat drawings, a quarter of the bytes

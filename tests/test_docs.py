@@ -17,6 +17,7 @@ import scenarios
 import solvers
 from hierarchy.tasks import TASKS
 from scenarios.config import shipped
+from scenarios.gallery import main as draw_gallery
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
@@ -147,3 +148,11 @@ def test_every_scenario_is_in_the_gallery_with_a_picture(name):
     assert shown, (f"run `python -m scenarios.gallery {name}` and give it a section in "
                    "docs/gallery.md, as the others have it")
     assert picture.stat().st_size < LARGEST
+
+
+def test_the_command_of_the_gallery_draws_a_picture_and_prints_numbers(tmp_path, capsys):
+    draw_gallery(["strictness", "--out", str(tmp_path / "new")])
+    picture = (tmp_path / "new" / "strictness.png").read_bytes()
+    assert picture.startswith(b"\x89PNG")
+    assert len(picture) < LARGEST
+    assert re.match(r"strictness: .*Joint speed, max 3.56\d rad/s", capsys.readouterr().out)
