@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -211,7 +210,7 @@ class LivePage:
         points = np.vstack(seen)
         low, high = points.min(axis=0), points.max(axis=0)
         low[2] = max(low[2], self._stage.floor)
-        look_at(self.server, (low + high) / 2, 0.5 * float(np.linalg.norm(high - low)))
+        look_at(self.server, (low + high) / 2, 0.42 * float(np.linalg.norm(high - low)))
 
     def _show_handles(self, now: Moment) -> None:
         for h, centre in enumerate(now.centres):
@@ -243,10 +242,11 @@ class LivePage:
         self._stack = gui.add_html("")
         self._sliders = {}
         with gui.add_folder("Settings"):
-            shown = gui.add_checkbox("Handles to drag obstacles and path", initial_value=True)
+            shown = gui.add_checkbox("Handles to drag", initial_value=True)
             requests.when_changed(shown, "handles")
             for knob, value in knobs(scenario):
-                slider = gui.add_slider(knob.label, 0.0, max(knob.high, value), knob.step, value)
+                slider = gui.add_slider(knob.label, 0.0, max(knob.high, value), knob.step, value,
+                                        hint=knob.key)
                 requests.when_changed(slider, knob.key)
                 self._sliders[knob.key] = slider
         obstacles = self.live.obstacles

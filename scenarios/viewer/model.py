@@ -104,8 +104,8 @@ class Model:
             frame.position = centre
         self._trace.points = _segments(trace)
         if colours is not None and len(trace) > 1:
-            kept = colours[_thinned(len(colours))]
-            self._trace.colors = np.stack([kept[:-1], kept[1:]], axis=1).astype(np.uint8)
+            kept = _linear(colours[_thinned(len(colours))])
+            self._trace.colors = np.stack([kept[:-1], kept[1:]], axis=1)
         self._show_target(now)
         self._show_nearest(now)
         if self._stage.axis is not None:
@@ -198,6 +198,11 @@ def _segments(points: Array | None) -> Segments:
 
 def _thinned(count: int) -> NDArray[np.int64]:
     return np.unique(np.linspace(0, count - 1, _PATH_VERTICES).astype(np.int64))
+
+
+def _linear(colours: NDArray[Any]) -> NDArray[np.uint8]:
+    """Colours from 0 to 255 as the page takes those of vertices: linear, not sRGB."""
+    return np.rint(255.0 * (colours / 255.0) ** 2.2).astype(np.uint8)
 
 
 def _turn_z_to(axis: Array) -> Array:
