@@ -12,6 +12,7 @@ RUNS = {"ellipse": ["control.duration=0.2"],
         "ellipse-hqp": ["control.duration=0.05"],
         "ellipse-noisy": ["control.duration=0.1", "plant.measurement.position_noise=0.001",
                           "plant.measurement.seed=3"],
+        "humanoid": ["control.duration=0.1"],
         "human": ["control.duration=0.1", "sensor.seed=4"]}
 
 

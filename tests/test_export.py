@@ -12,7 +12,7 @@ from hierarchy import HierarchyError, Robot
 from scenarios import load, simulate
 from scenarios.cli import run_command
 from scenarios.export import export, foxglove
-from scenarios.export.columns import CONSTANTS, columns, joint_units
+from scenarios.export.columns import CONSTANTS, columns, joint_names, joint_units
 from scenarios.folders import OutputError
 from scenarios.recording import Event, save
 
@@ -68,6 +68,15 @@ def test_a_slide_is_measured_in_metres_and_a_wheel_by_cosine_and_sine(tmp_path):
       <axis xyz="0 0 1"/></joint></robot>""")
     robot = Robot.from_file(tmp_path / "cart.urdf")
     assert joint_units(robot) == (("m", "1", "1"), ("m", "rad"))
+    assert joint_names(robot) == ("slide", "wheel")
+
+
+def test_a_floating_base_has_metres_first_and_numbered_velocities():
+    robot = Robot.named("kuka_lwr", base="floating")
+    positions, steps = joint_units(robot)
+    assert positions[:8] == ("m",) * 3 + ("1",) * 4 + ("rad",)
+    assert steps[:7] == ("m",) * 3 + ("rad",) * 4
+    assert joint_names(robot)[5:7] == (f"{robot.joint_names[0]} 6", "joint_1")
 
 
 # --- Parquet ------------------------------------------------------------------------------------
@@ -85,6 +94,7 @@ def test_a_parquet_table_is_the_recording_with_units_and_scenario(run, tmp_path)
         assert table.schema.field(column.name).metadata[b"unit"].decode() == column.unit
     metadata = table.schema.metadata
     assert metadata[b"scenario"].decode() == run.scenario.to_toml()
+    assert json.loads(metadata[b"joints"]) == list(Robot.named("kuka_lwr").joint_names)
     assert json.loads(metadata[b"orders"]) == list(run.orders)
     assert json.loads(metadata[b"limits"])["joint_upper"] == run["joint_upper"].tolist()
 
@@ -179,7 +189,7 @@ def rotation(q):
 
 def test_the_arm_hangs_on_its_joints_and_obstacles_stand_in_the_world(run, messages):
     entities = {one["id"]: one for one in messages[0]["/scene"][0][1]["entities"]}
-    links = [one for name, one in entities.items() if name.startswith("link")]
+    links = [one for name, one in entities.items() if name.startswith("body")]
     assert {one["frame_id"] for one in links} <= {"world", *Robot.named("kuka_lwr").joint_names}
     assert all(one["frame_locked"] and len(one["spheres"]) == 2 for one in links)
     centres = [[*entities[f"obstacle {h}"]["spheres"][0]["pose"]["position"].values()]

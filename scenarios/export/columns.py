@@ -88,6 +88,13 @@ def joint_units(robot: Robot) -> tuple[tuple[str, ...], tuple[str, ...]]:
     return tuple(positions), tuple(steps)
 
 
+def joint_names(robot: Robot) -> tuple[str, ...]:
+    """Return a name for each velocity (n,): that of its joint, numbered where it has several."""
+    return tuple(name if joint.nv == 1 else f"{name} {i + 1}"
+                 for name, joint in zip(robot.joint_names, list(robot.model.joints)[1:],
+                                        strict=True) for i in range(joint.nv))
+
+
 # How many of a joint's first coordinates are lengths, by pinocchio's name; of all others none is.
 _LENGTHS = {"PX": 1, "PY": 1, "PZ": 1, "PrismaticUnaligned": 1, "Planar": 2, "Translation": 3,
             "FreeFlyer": 3}

@@ -77,7 +77,7 @@ def link(t: float, capsule: Capsule, joints: Sequence[str]) -> Message:
     length, wide = float(np.linalg.norm(end - start)), 2.0 * capsule.radius
     cylinders = [] if length == 0.0 else [_cylinder((start + end) / 2, _z_to(end - start), wide,
                                                     length, _ARM)]
-    return entity(t, f"link {capsule.name}", joints[capsule.joint - 1] if capsule.joint else WORLD,
+    return entity(t, f"body {capsule.name}", joints[capsule.joint - 1] if capsule.joint else WORLD,
                   cylinders=cylinders, spheres=[_body(place, wide, _ARM) for place in (start, end)])
 
 

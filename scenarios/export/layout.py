@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from scenarios.export.columns import joint_names
+from scenarios.scene import stage
+
 if TYPE_CHECKING:
     from scenarios.recording import Recording
 
@@ -12,11 +15,11 @@ Panel = dict[str, Any]
 
 def layout(recording: Recording) -> Panel:
     """Return the layout: the arm in space at the left, curves, stack and events at the right."""
-    joints = recording["v"].shape[1]
+    fixed = stage(recording.scenario)
     panels: dict[str, Panel] = {
-        "3D!arm": _space(),
-        "Plot!speeds": _plot("Joint speeds", [(f"/joints.v[{j}]", f"joint {j + 1}")
-                                              for j in range(joints)]),
+        "3D!arm": _space(fixed.floor),
+        "Plot!speeds": _plot("Joint speeds", [
+            (f"/joints.v[{j}]", name) for j, name in enumerate(joint_names(fixed.robot))]),
         "StateTransitions!stack": {"paths": [{"value": "/stack.tasks", "label": "stack",
                                               "timestampMethod": "receiveTime"}]},
         "Log!events": {"searchTerms": [], "minLogLevel": 1, "topicToRender": "/events"}}
@@ -51,10 +54,10 @@ def _plot(title: str, paths: list[tuple[str, str]]) -> Panel:
                        "timestampMethod": "receiveTime"} for value, label in paths]}
 
 
-def _space() -> Panel:
+def _space(floor: float) -> Panel:
     return {"followMode": "follow-none", "followTf": "world", "scene": {},
             "cameraState": {"perspective": True, "distance": 2.6, "phi": 65.0, "thetaOffset": 60.0,
-                            "targetOffset": [0.0, 0.0, 0.5], "target": [0.0, 0.0, 0.0],
+                            "targetOffset": [0.0, 0.0, floor + 0.6], "target": [0.0, 0.0, 0.0],
                             "targetOrientation": [0.0, 0.0, 0.0, 1.0], "fovy": 45.0, "near": 0.01,
                             "far": 100.0},
             "transforms": {}, "publish": {}, "imageMode": {},
@@ -62,4 +65,5 @@ def _space() -> Panel:
             "layers": {"grid": {"visible": True, "frameLocked": True, "label": "Grid",
                                 "instanceId": "grid", "layerId": "foxglove.Grid", "size": 4,
                                 "divisions": 20, "lineWidth": 1, "color": "#8884",
-                                "position": [0, 0, 0], "rotation": [0, 0, 0], "frameId": "world"}}}
+                                "position": [0, 0, floor], "rotation": [0, 0, 0],
+                                "frameId": "world"}}}

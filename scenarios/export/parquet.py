@@ -7,8 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from scenarios.export import new_file
-from scenarios.export.columns import CONSTANTS, Column, columns
+from scenarios.export.columns import CONSTANTS, Column, columns, joint_names
 from scenarios.export.numbers import plain
+from scenarios.making import make_robot
 
 if TYPE_CHECKING:
     from scenarios.recording import Recording
@@ -17,16 +18,18 @@ if TYPE_CHECKING:
 def write(recording: Recording, path: Path) -> list[Path]:
     """Write `path`: a column a number, of the type it was recorded in, with metadata `unit`.
 
-    The table's metadata has `scenario` (TOML as run), `orders`, `limits` (JSON; null for a limit
-    that is not there) and `fault`.
+    The table's metadata has `scenario` (TOML as run), `joints` (the name of each velocity),
+    `orders`, `limits` (JSON; null for a limit that is not there) and `fault`.
     """
     import pyarrow as pa
     import pyarrow.parquet as pq
 
     table = list(columns(recording))
     limits = {name: plain(recording[name]) for name in CONSTANTS if name in recording}
-    metadata = {"scenario": recording.scenario.to_toml(), "orders": json.dumps(recording.orders),
-                "limits": json.dumps(limits), "fault": recording.fault or ""}
+    joints = joint_names(make_robot(recording.scenario.robot))
+    metadata = {"scenario": recording.scenario.to_toml(), "joints": json.dumps(joints),
+                "orders": json.dumps(recording.orders), "limits": json.dumps(limits),
+                "fault": recording.fault or ""}
     schema = pa.schema([_field(pa, column) for column in table], metadata)
     arrays = [pa.array(column.values.tolist() if column.values.dtype.kind == "U"
                        else column.values) for column in table]
