@@ -22,6 +22,7 @@ class HandMadeScenario:
     title: str = "A run made by hand"
     description: str = "Nothing was simulated."
     resolver: str = "tpm"
+    tasks: tuple[Any, ...] = ()
     pointing: Any = field(default_factory=lambda: SimpleNamespace(
         alpha_d=60.0, kind="inequality", axis=(1.0, 0.0, 0.0)))
     avoidance: Any = field(default_factory=lambda: SimpleNamespace(
