@@ -233,6 +233,39 @@ def test_a_task_of_pink_refuses_another_robot_and_accelerations(robot, configura
         Stack([PinkTask(posture_task(Q), strange, DT)], "velocity").hierarchy(robot.state(Q))
 
 
+def test_costs_may_change_but_not_which_rows_cost_something(robot, configuration):
+    hand = frame_task(configuration, orientation=0.0)
+    stack, state = Stack([PinkTask(hand, configuration, DT)], "velocity"), robot.state(Q)
+    before = stack.hierarchy(state).A.copy()
+    hand.set_position_cost(2.0)
+    np.testing.assert_allclose(stack.hierarchy(state).A, 2.0 * before)
+    hand.set_orientation_cost(1.0)
+    with pytest.raises(HierarchyError, match="6 of its rows cost something, 3 did"):
+        stack.hierarchy(state)
+
+
+def test_feet_and_centre_of_mass_of_a_floating_base_are_what_pink_finds():
+    pink = pytest.importorskip("pink")
+    pytest.importorskip("quadprog")
+    import pinocchio as pin
+    from pink.tasks import ComTask
+
+    robot = Robot.named("humanoid")
+    configuration = pink.Configuration(robot.model, robot.model.createData(), robot.rest)
+    feet = [frame_task(configuration, foot, (0.0, 0.0, 0.0), 0.0, 1.0, 1.0, 1.0)
+            for foot in ("left_foot", "right_foot")]
+    com = ComTask(cost=1.0)
+    centre = pin.centerOfMass(robot.model, robot.model.createData(), robot.rest)
+    com.set_target(centre + np.array([0.001, 0.0, -0.002]))
+    tasks = [*feet, com, posture_task(robot.rest, cost=1.0)]
+    theirs = pink.solve_ik(configuration, tasks, DT, "quadprog")
+    np.testing.assert_allclose(solve_ik(configuration, [tasks], DT), theirs, atol=1e-9)
+    strict = solve_ik(configuration, [feet, *tasks[2:]], DT)
+    for task in tasks[:3]:
+        asked, given = speed_of(task, configuration, strict)
+        np.testing.assert_allclose(given, asked, atol=1e-9)
+
+
 def test_rows_on_one_joint_become_a_box_unless_they_contradict_each_other():
     rows = (np.array([[2.0, 0.0], [-1.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]),
             np.array([4.0, 1.0, 1.0, 3.0, np.inf]))

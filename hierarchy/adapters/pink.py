@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from hierarchy.adapters import displacements
 from hierarchy.errors import HierarchyError
-from hierarchy.problem import Array, Hierarchy
+from hierarchy.problem import Array, Hierarchy, check_rows
 from hierarchy.robot import State
-from hierarchy.task import Task
+from hierarchy.task import Level, Task
 
 
 @dataclass(frozen=True)
@@ -35,6 +35,7 @@ class PinkTask(Task):
     configuration: Any
     period: float
     name: str = ""
+    rows: int = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         if not self.name:
@@ -42,7 +43,7 @@ class PinkTask(Task):
         if not 0.0 < self.period < np.inf:
             raise HierarchyError(f"task {self.name!r}: period {self.period} s must be positive "
                                  "and finite")
-        self._residual()
+        object.__setattr__(self, "rows", len(self._residual()[1]))
 
     @property
     def gain(self) -> float:  # type: ignore[override]
@@ -52,7 +53,7 @@ class PinkTask(Task):
     @property
     def dimension(self) -> int:
         """Number of rows that cost something."""
-        return len(self._residual()[1])
+        return self.rows
 
     def error(self, state: State) -> Array:
         """Minus pink's error, times the costs: (m,)."""
@@ -63,6 +64,21 @@ class PinkTask(Task):
         """Pink's Jacobian, times the costs: (m, n)."""
         self._follow(state)
         return self._residual()[0]
+
+    def write(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
+              row: int) -> None:
+        """See `Task.write`; asks pink once."""
+        if level == "acceleration":
+            self.jacobian_derivative(state)
+        self._follow(state)
+        J, r = self._residual()
+        if len(r) != self.rows:
+            raise HierarchyError(f"task {self.name!r}: {len(r)} of its rows cost something, "
+                                 f"{self.rows} did when it was made; make it anew")
+        own = slice(row, row + self.rows)
+        A[own], lower[own] = J, self.gain * r
+        upper[own] = lower[own]
+        check_rows(f"task {self.name!r}", A[own], lower[own], upper[own])
 
     def jacobian_derivative(self, state: State) -> Array:
         """Raise HierarchyError: pink has none."""
