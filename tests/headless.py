@@ -26,6 +26,7 @@ class Page:
 
     def __init__(self, socket):
         self._socket, self._number = socket, 0
+        self.address = ""
         self.complaints = []  # errors and warnings of the console, exceptions
 
     def call(self, method, **parameters):
@@ -51,6 +52,7 @@ class Page:
 
     def look_at(self, address, width=1400, height=900, dark=False):
         """Open an address in a window of this size."""
+        self.address = address
         for domain in ("Page", "Runtime", "Log"):
             self.call(f"{domain}.enable")
         self.call("Emulation.setDeviceMetricsOverride", width=width, height=height,
@@ -92,7 +94,7 @@ class Page:
         """Send mouse events (kind, x, y)."""
         for kind, x, y in steps:
             self.call("Input.dispatchMouseEvent", type=kind, x=x, y=y,
-                      **{"button": "left", "buttons": kind != "mouseReleased",
+                      **{"button": "left", "buttons": int(kind != "mouseReleased"),
                          "clickCount": 1, **parameters})
 
 

@@ -1,0 +1,332 @@
+import json
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hand_made import recording as hand_made
+from headless import chromium
+
+from hierarchy import HierarchyError
+from scenarios import load, save, simulate
+from scenarios.cli import run_command
+from scenarios.replay import html
+from scenarios.replay.data import packed, unpacked
+from scenarios.scene import scene
+
+VOID = {"meta", "input", "br", "link", "img"}
+
+
+@pytest.fixture(scope="module")
+def runs():
+    """Two ways of resolving two seconds, in which the order of the stack changes."""
+    asked = load("ellipse", ["control.duration=2.0"])
+    return {"tpm published": simulate(asked),
+            "recursive": simulate(asked.with_resolver("recursive"))}
+
+
+@pytest.fixture(scope="module")
+def document(runs):
+    return html(runs, "An <ellipse> & two ways")
+
+
+def data_of(document):
+    found = re.search(r'<script type="application/json" id="data">(.*?)</script>', document, re.S)
+    return json.loads(found[1])
+
+
+class Balanced(HTMLParser):
+    """Fails where a tag is closed that is not the last one opened."""
+
+    def __init__(self):
+        super().__init__()
+        self.open = []
+
+    def handle_starttag(self, tag, attributes):
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+
+def test_the_document_is_whole(document):
+    parser = Balanced()
+    parser.feed(document)
+    parser.close()
+    assert parser.open == []
+    assert "<h1>An &lt;ellipse&gt; &amp; two ways</h1>" in document
+
+
+def test_the_document_refers_to_nothing_outside_itself(document):
+    allowed = "http://www.w3.org/2000/svg"  # a name, which is not fetched
+    assert set(re.findall(r"https?://[^\s\"'<>]+", document)) <= {allowed}
+    assert not re.search(r"""(?:src|href)\s*=|@import|url\(|\bimport\b|fetch\(|XMLHttp""", document)
+    assert "default-src 'none'" in document
+
+
+def test_a_label_cannot_end_the_data(runs):
+    name = "</script><script>alert(1)</script>"
+    text = html({name: runs["recursive"]}, "x")
+    assert text.count("</script>") == 2
+    assert data_of(text)["runs"][0]["label"] == name
+
+
+def test_the_data_are_those_of_the_recording(runs, document):
+    for run, (label, recording) in zip(data_of(document)["runs"], runs.items(), strict=True):
+        shown = scene(recording)
+        assert run["label"] == label
+        assert np.allclose(unpacked(run["t"]), recording["t"][shown.ticks], atol=1e-6)
+        assert np.allclose(unpacked(run["points"])[:, -1], recording["ee_position"][shown.ticks],
+                           atol=1e-4)  # m, a step of what is kept is below 0.1 mm
+        assert np.allclose(unpacked(run["links"]), shown.links, atol=1e-4)
+        assert np.array_equal(unpacked(run["order"]), recording["order"][shown.ticks])
+        assert np.array_equal(unpacked(run["fate"]), shown.levels.fate)
+        assert np.allclose(unpacked(run["violation"]), shown.levels.violation, equal_nan=True)
+        assert [" > ".join(order) for order in run["orders"]] == list(recording.orders)
+        error = unpacked(run["series"][0]["value"])[:, 0]
+        assert np.allclose(
+            error, 1e3 * np.linalg.norm(recording["position_error"][shown.ticks], axis=1))
+
+
+@pytest.mark.parametrize("values", [
+    np.array([[1.5, -2.0], [0.25, 1e-9]]), np.array([[np.nan, 1.0]]), np.zeros((0, 3)),
+    np.arange(-5, 400), np.array([-1, 0, 1], np.int8), np.full((2, 2), 7.0)],
+    ids=["numbers", "not a number", "none", "whole", "small", "all the same"])
+@pytest.mark.parametrize("steps", [False, True])
+def test_what_is_packed_is_unpacked(values, steps):
+    found = unpacked(packed(values.astype(float) if steps else values, steps))
+    assert found.shape == values.shape
+    step = np.ptp(values[np.isfinite(values)]) / 65534 if steps and values.size else 0.0
+    assert np.allclose(found, values, rtol=1e-6, atol=step, equal_nan=True)
+
+
+def test_a_minute_at_30_hz_takes_less_than_a_megabyte_and_a_half(runs, document):
+    """Size grows with the frames: 60 a run here, of which a minute has 1800."""
+    code = len(html({"x": hand_made()}, "x"))
+    for_a_frame = (len(document) - code) / sum(len(scene(run).t) for run in runs.values())
+    assert for_a_frame * 1800 + code < 1.5e6
+
+
+@pytest.mark.parametrize("run", [
+    hand_made(), hand_made(t=[0.0]), hand_made(fault="stopped by hand")],
+    ids=["quiet", "one tick", "a fault"])
+def test_runs_of_any_kind_make_a_document(run):
+    assert data_of(html({"a": run}, "x"))["runs"][0]["fault"] == run.fault
+
+
+def test_a_replay_of_nothing_is_refused():
+    with pytest.raises(HierarchyError, match="at least one run"):
+        html({}, "x")
+
+
+# In a browser.
+
+
+@pytest.fixture(scope="module")
+def browser():
+    with chromium() as page:
+        yield page
+
+
+@pytest.fixture(scope="module")
+def opened(browser, document, tmp_path_factory):
+    file = tmp_path_factory.mktemp("page") / "replay.html"
+    file.write_text(document, encoding="utf-8")
+    browser.look_at(file.as_uri())
+    return browser
+
+
+@pytest.fixture
+def page(opened):
+    """The page, paused at its begin."""
+    opened.run("""if (player.playing) player.toggle();
+        document.getElementById('speed').value = '1'; player.stage.camera.reset();
+        document.querySelectorAll('#legend [aria-pressed="false"]').forEach(one => one.click());
+        player.arrange(false); player.seek(0)""")
+    opened.painted()
+    yield opened
+    assert opened.complaints == []
+
+
+def test_the_page_shows_the_arm_in_space(page):
+    assert page.run("player.stage !== undefined && document.getElementById('notice').hidden")
+    colours = page.run("""(() => { player.stage.draw(0.5, false);
+        const {gl} = player.stage.painter, seen = new Set();
+        const one = new Uint8Array(4 * 300 * 300);
+        gl.readPixels(200, 200, 300, 300, gl.RGBA, gl.UNSIGNED_BYTE, one);
+        for (let i = 0; i < one.length; i += 4) seen.add(one.slice(i, i + 3).join());
+        return seen.size; })()""")
+    assert colours > 100  # lit solids, not an empty floor
+
+
+def test_play_moves_the_arm_and_pause_stops_it(page):
+    before, at_first = page.screenshot(), page.run("player.t")
+    page.press(" ", "Space")
+    page.wait("player.t > 0.3")
+    page.press(" ", "Space")
+    stopped = page.run("player.t")
+    assert not page.run("player.playing")
+    assert stopped > at_first
+    assert page.screenshot() != before
+    assert page.run("player.t") == stopped
+
+
+def test_play_ends_at_the_end_and_begins_anew(page):
+    page.run("player.seek(player.end - 0.05)")
+    page.run("document.getElementById('play').click()")
+    page.wait("!player.playing")
+    assert page.run("player.t === player.end")
+    page.run("document.getElementById('play').click()")
+    page.wait("player.t < 1")
+    page.run("document.getElementById('play').click()")
+
+
+def test_the_speed_is_that_of_time(page):
+    page.run("document.getElementById('speed').value = '0.1'")
+    page.run("player.toggle()")
+    passed = page.run("""new Promise(done => { const t = player.t, now = performance.now();
+        setTimeout(() => done((player.t - t) / (performance.now() - now) * 1e3), 500); })""")
+    page.run("player.toggle()")
+    assert passed == pytest.approx(0.1, abs=0.06)
+
+
+def test_scrubbing_moves_the_cursor_of_every_curve(page):
+    places = "player.curves.cursors.map(cursor => +cursor.getAttribute('x1'))"
+    assert len(set(page.run(places))) == 1
+    page.run("""(() => { const scrub = document.getElementById('scrub');
+        scrub.value = 1.0; scrub.dispatchEvent(new Event('input')); })()""")
+    after = page.run(places)
+    assert after == [page.run("player.curves.x(1)")] * len(after)
+    assert page.run("player.t") == 1.0
+
+
+def test_a_click_in_a_curve_goes_there(page):
+    box = page.run("""(() => { const box = document.querySelectorAll('.curve svg')[2]
+        .getBoundingClientRect(); return [box.left, box.top, box.width]; })()""")
+    x = page.run("player.curves.x(0.5)")
+    place = box[0] + x, box[1] + 30
+    page.mouse(("mousePressed", *place), ("mouseReleased", *place))
+    assert page.run("player.t") == pytest.approx(0.5, abs=0.02)
+
+
+def test_keys_step_by_a_frame_and_by_a_second(page):
+    page.run("player.seek(0)")
+    page.press("ArrowRight")
+    assert page.run("player.t") == pytest.approx(1 / 30, abs=2e-3)
+    page.press("End")
+    assert page.run("player.t === player.end")
+    page.press("Home")
+    assert page.run("player.t") == 0.0
+
+
+def test_the_list_is_the_order_of_the_stack_and_says_what_is_given_up(page, runs):
+    recording = runs["tpm published"]
+    shown = scene(recording)
+    for f in (0, *(int(np.searchsorted(shown.t, t)) for t in shown.switches[:3])):
+        page.run(f"player.seek({float(shown.t[f])} + 1e-4)")
+        listed = page.run("""[...document.querySelectorAll('.card')[0].querySelectorAll('li')]
+            .filter(li => li.className !== 'absent')
+            .sort((a, b) => +a.querySelector('b').textContent - +b.querySelector('b').textContent)
+            .map(li => [li.dataset.task, li.className])""")
+        assert tuple(task for task, _ in listed) == shown.orders[shown.order[f]]
+        for task, fate in listed:
+            found = shown.levels.fate[f, shown.levels.names.index(task)]
+            assert fate == {2: "free", 3: "met", 4: "missed"}[int(found)]
+
+
+def test_runs_stand_side_by_side_and_can_be_hidden(page):
+    page.press("s")
+    page.painted()
+    assert page.run("[...document.querySelectorAll('#names span')].map(s => s.textContent)") == [
+        "tpm published", "recursive"]
+    page.run("document.querySelectorAll('#legend button')[1].click()")
+    page.painted()
+    assert page.run("document.querySelectorAll('.card')[1].hidden")
+    assert page.run("document.querySelectorAll('#names span').length") == 1
+
+
+def test_the_mouse_turns_and_the_wheel_zooms(page):
+    before = page.run("[player.stage.camera.azimuth, player.stage.camera.zoom]")
+    page.mouse(("mousePressed", 300, 400), ("mouseMoved", 360, 420), ("mouseReleased", 360, 420))
+    page.mouse(("mouseWheel", 300, 400), deltaX=0, deltaY=-120, button="none", buttons=0)
+    page.wait(f"player.stage.camera.zoom > {before[1]}")
+    assert page.run("player.stage.camera.azimuth") != before[0]
+
+
+@pytest.mark.parametrize("width", [360, 800, 1400])
+@pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
+def test_nothing_is_wider_than_the_window(page, width, dark):
+    page.look_at(page.address, width, 740, dark)
+    page.painted()
+    assert page.run("document.documentElement.scrollWidth") <= width
+    assert page.run("document.getElementById('play').getBoundingClientRect().bottom") <= 740
+
+
+def test_without_webgl_it_says_so_and_shows_the_rest(page):
+    page.call("Page.addScriptToEvaluateOnNewDocument",
+              source="if (location.hash === '#flat') HTMLCanvasElement.prototype.getContext = "
+                     "() => null")
+    address = page.address
+    page.look_at("about:blank")
+    page.look_at(f"{address}#flat")
+    assert "WebGL is missing" in page.run("document.getElementById('notice').textContent")
+    assert page.run("document.querySelectorAll('.curve').length") > 4
+
+
+def test_embedded_it_fills_the_frame_around_it(browser, runs, tmp_path):
+    inner = html(runs, "x", embedded=True).replace("&", "&amp;").replace('"', "&quot;")
+    file = tmp_path / "outer.html"
+    file.write_text(f'<!DOCTYPE html><meta charset="utf-8"><iframe id="f" srcdoc="{inner}" '
+                    'style="width: 100%; height: 640px; border: 0"></iframe>', encoding="utf-8")
+    browser.complaints.clear()
+    browser.look_at(file.as_uri(), 1000, 700)
+    inside = "document.getElementById('f').contentDocument.documentElement"
+    browser.wait(f"{inside}.querySelectorAll('.curve').length > 4")
+    assert browser.run(f"{inside}.querySelector('#notice').hidden")
+    assert browser.run(f"{inside}.scrollHeight") <= 640
+    assert browser.run(f"{inside}.querySelector('header').offsetHeight") == 0
+    assert browser.complaints == []
+
+
+# On the command line.
+
+
+@pytest.fixture(scope="module")
+def short():
+    return simulate(load("ellipse", ["control.duration=0.2"]))
+
+
+@pytest.fixture
+def folder(short, tmp_path):
+    return save(short, tmp_path / "run", figures=False)
+
+
+def test_the_command_writes_a_file_beside_the_run(folder, capsys):
+    assert run_command(["replay", str(folder)]) == 0
+    assert (folder / "replay.html").read_text(encoding="utf-8").startswith("<!DOCTYPE html>")
+    assert "replay.html" in capsys.readouterr().out
+
+
+def test_the_command_takes_several_runs_and_a_name(folder, short, tmp_path):
+    other = save(short, tmp_path / "other", figures=False)
+    file = tmp_path / "new" / "two.html"
+    assert run_command(["replay", str(folder), str(other), "--out", str(file)]) == 0
+    assert len(data_of(file.read_text(encoding="utf-8"))["runs"]) == 2
+
+
+def test_the_same_run_gives_the_same_file(folder, tmp_path):
+    files = [tmp_path / name for name in ("a.html", "b.html")]
+    for file in files:
+        run_command(["replay", str(folder), "--out", str(file)])
+    assert files[0].read_bytes() == files[1].read_bytes()
+
+
+@pytest.mark.parametrize("arguments", [["--rate", "0"], ["--video", "x.mp4", "second"]],
+                         ids=["no rate", "two runs in a video"])
+def test_a_wrong_command_line_is_refused(folder, arguments, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    arguments = [str(folder) if one == "second" else one for one in arguments]
+    assert run_command(["replay", str(folder), *arguments]) == 2
+    assert list(Path.cwd().glob("*.mp4")) == []
