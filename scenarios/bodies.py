@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from scenarios.recording import Recording
 
 _POSES = 4
+_APART = 1.1    # of the bodies, in widths of the widest
+_WIDTH, _HEADROOM = 6.4, 0.5  # of the figure [in]
 _AZIMUTH, _ELEVATION = 40.0, 12.0  # [deg] of the camera: in front of a robot that looks along x
 _AROUND = np.linspace(0.0, np.pi, 13)  # of half a rim
 _VERTICES = 400
@@ -38,10 +40,12 @@ def picture(robot: Robot, recordings: Mapping[str, Recording],
 
     Paths asked for are dashed; those taken, up to the time of the body, have the run's colour.
     """
-    fig, (ax,) = drawing.figure(width=6.4, height=3.6)
     first = next(iter(recordings.values()))
     ticks = np.linspace(0, first.ticks - 1, _POSES).astype(int)
-    apart = _width(robot, first, ticks)
+    width, lowest, highest = _extent(robot, first, ticks)
+    apart = _APART * width
+    fig, (ax,) = drawing.figure(width=_WIDTH, height=_HEADROOM + _WIDTH * (highest - lowest) / (
+        _POSES * apart))
     for i, k in enumerate(ticks):
         aside = np.array([i * apart, 0.0])
         _body(ax, robot, first["q"][k], aside)
@@ -55,7 +59,7 @@ def picture(robot: Robot, recordings: Mapping[str, Recording],
                         _line(ax, path + error[:, :3], aside, color=INK, linewidth=0.7,
                               linestyle=(0, (3, 3)))
                 _line(ax, path[:k + 1], aside, color=colour, linewidth=1.6)
-        ax.text(i * apart, _lowest(robot, first["q"][k]) - 0.06, f"{first['t'][k]:.1f} s",
+        ax.text(i * apart, lowest - 0.03, f"{first['t'][k]:.1f} s",
                 ha="center", va="top")
     ax.set_aspect("equal")
     ax.autoscale_view()
@@ -107,13 +111,11 @@ def _line(ax: Axes, path: Array, aside: Array, **style: object) -> None:
     ax.plot(*(aside + _flat(kept)).T, **style)  # type: ignore[arg-type]
 
 
-def _width(robot: Robot, recording: Recording, ticks: Array) -> float:
-    """How far apart [m] the bodies are drawn: as wide as the widest, and some air."""
+def _extent(robot: Robot, recording: Recording, ticks: Array) -> tuple[float, float, float]:
+    """Greatest width [m] of the bodies that are drawn, their lowest and their highest place."""
     links = capsules(robot)
-    widths = [np.ptp(_flat(ends(links, robot.state(recording["q"][k]).placements))[..., 0])
-              for k in ticks]
-    return float(1.15 * max(widths) + 2 * max(link.radius for link in links))
-
-
-def _lowest(robot: Robot, q: Array) -> float:
-    return float(_flat(ends(capsules(robot), robot.state(q).placements))[..., 1].min())
+    radii = np.array([[link.radius] for link in links])
+    flat = [_flat(ends(links, robot.state(recording["q"][k]).placements)) for k in ticks]
+    low = np.array([(body - radii[..., None]).min(axis=(0, 1)) for body in flat])
+    high = np.array([(body + radii[..., None]).max(axis=(0, 1)) for body in flat])
+    return float((high - low)[:, 0].max()), float(low[:, 1].min()), float(high[:, 1].max())
