@@ -91,13 +91,12 @@ def limit_level(limits: Iterable[tuple[Any, Any]], n: int, period: float
     h = np.concatenate([np.empty(0), *(h for _, h in pairs)]) / period
     G, h = G[h != np.inf], h[h != np.inf]
     single = np.count_nonzero(G, axis=1) == 1
+    joint = np.argmax(G[single] != 0.0, axis=1)
+    factor = G[single, joint]
+    side, up = h[single] / factor, factor > 0.0
     lower, upper = np.full(n, -np.inf), np.full(n, np.inf)
-    for row, side in zip(G[single], h[single], strict=True):
-        joint = int(np.flatnonzero(row)[0])
-        if row[joint] > 0.0:
-            upper[joint] = np.minimum(upper[joint], side / row[joint])
-        else:
-            lower[joint] = np.maximum(lower[joint], side / row[joint])
+    np.minimum.at(upper, joint[up], side[up])
+    np.maximum.at(lower, joint[~up], side[~up])
     empty = lower > upper  # such a joint keeps a row for each side, one of which must be broken
     boxed = ~empty & ((lower != -np.inf) | (upper != np.inf))
     none = np.full(np.count_nonzero(empty), np.inf)
