@@ -17,7 +17,8 @@ author = "the contributors of task-hierarchy"
 suppress_warnings = ["toc.not_readable"]
 release = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"]
 
-extensions = ["myst_parser", "sphinx.ext.autodoc", "mathml", "outside_links", "plain_docstrings"]
+extensions = ["myst_parser", "sphinx.ext.autodoc", "mathml", "outside_links", "plain_docstrings",
+              "scenario_keys"]
 exclude_patterns = ["_build", "_ext"]
 myst_enable_extensions = ["dollarmath"]
 myst_heading_anchors = 3
@@ -26,7 +27,7 @@ highlight_language = "none"
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
 autodoc_preserve_defaults = True
-autodoc_type_aliases = {"Array": "Array"}
+autodoc_type_aliases = {name: name for name in ("Array", "ArrayLike")}
 toc_object_entries_show_parents = "hide"
 
 html_theme = "furo"
