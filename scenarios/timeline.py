@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -28,33 +28,30 @@ _GRAVE = ("stop", "brake", "contact", "no answer")
 Mask = NDArray[np.bool_]
 
 
-def timeline(recording: Recording, legend: bool = True, end: float | None = None) -> Figure:
+def timeline(recording: Recording, beside: Sequence[Recording] = ()) -> Figure:
     """Return bands that show which task has which place of the stack, and a row for each event.
 
     Place 1 is the first priority. Below are the ticks with contact, without an answer, and with
-    each kind of trouble and what was done; a fault is a line where the run ended. `end` [s] is that
-    of the time axis.
+    each kind of trouble and what was done; a fault is a line where the run ended. `beside` are the
+    runs that are shown together with this one, itself among them: it then has their rows, colours
+    and time axis, and no legend or title of its own.
     """
-    t, stacks = recording["t"], order_names(recording)
-    places, rows = max((len(stack) for stack in stacks), default=0), list(_rows(recording))
-    fig, (ax,) = drawing.figure(width=4.9, height=0.3 + 0.24 * (places + len(rows)) + 0.8 * legend)
-    colours = task_colours(tasks([recording]))
-    end = float(t[-1]) if end is None else end
+    alone, beside = not beside, beside or (recording,)
+    places = max(len(stack) for one in beside for stack in ((), *order_names(one)))
+    rows = list(dict.fromkeys(name for one in beside for name in happened(one)))
+    colours, end = task_colours(tasks(beside)), max(float(one["t"][-1]) for one in beside)
+    fig, (ax,) = drawing.figure(width=4.9, height=0.3 + 0.24 * (places + len(rows)) + 0.8 * alone)
     for place in range(places):
         for task, colour in colours.items():
             _band(ax, recording, place, task, colour, end)
-    for i, (name, mask) in enumerate(rows):
-        _marks(ax, t, mask, places + i, ALERT if name.endswith(_GRAVE) else INK, end)
-    _frame(ax, [*(str(k + 1) for k in range(places)), *(name for name, _ in rows)], t[0], end)
+    for name, mask in happened(recording).items():
+        _marks(ax, recording["t"], mask, places + rows.index(name),
+               ALERT if name.endswith(_GRAVE) else INK, end)
+    _frame(ax, [*(str(k + 1) for k in range(places)), *rows], float(recording["t"][0]), end)
     if recording.fault:
-        _ended(ax, float(t[-1]), end)
-    if legend and colours:
-        fig.legend(handles=[Patch(color=c, label=task) for task, c in colours.items()],
-                   loc="outside lower center", ncols=4, fontsize="small", handlelength=1.0)
-    if legend:
-        changes = recording.switches().size
-        ax.set_title(f"Place in the stack, {changes} change{'' if changes == 1 else 's'}")
-        ax.set_xlabel("time [s]")
+        _ended(ax, float(recording["t"][-1]), end)
+    if alone:
+        _explain(fig, ax, colours, recording.switches().size)
     return fig
 
 
@@ -64,15 +61,17 @@ def tasks(recordings: Iterable[Recording]) -> list[str]:
                               for task in stack))
 
 
-def _rows(recording: Recording) -> Iterator[tuple[str, Mask]]:
-    """Yield what happened beside the changes of the stack: its name, and in which ticks (T,)."""
+def happened(recording: Recording) -> dict[str, Mask]:
+    """Return what happened beside the changes of the stack: its name, and in which ticks (T,)."""
+    rows: dict[str, Mask] = {}
     if "contacts" in recording and (touched := recording["contacts"] > 0).any():
-        yield "contact", touched
+        rows["contact"] = touched
     troubles = recording.troubles()
     for (kind, action), ticks in troubles.items():
-        yield f"{kind.replace('_', ' ')}: {action}", _at(ticks, recording.ticks)
+        rows[f"{kind.replace('_', ' ')}: {action}"] = _at(ticks, recording.ticks)
     if "status" in recording and not troubles and (failed := recording["status"] != 0).any():
-        yield "no answer", failed
+        rows["no answer"] = failed
+    return rows
 
 
 def _at(ticks: list[int], count: int) -> Mask:
@@ -108,6 +107,13 @@ def _frame(ax: Axes, names: list[str], start: float, end: float) -> None:
     ax.grid(False, axis="y")
     ax.set_axisbelow(True)
     ax.spines["left"].set_visible(False)
+
+
+def _explain(fig: Figure, ax: Axes, colours: Mapping[str, str], changes: int) -> None:
+    fig.legend(handles=[Patch(color=colour, label=task) for task, colour in colours.items()],
+               loc="outside lower center", ncols=4, fontsize="small", handlelength=1.0)
+    ax.set_title(f"Place in the stack, {changes} change{'' if changes == 1 else 's'}")
+    ax.set_xlabel("time [s]")
 
 
 def _ended(ax: Axes, t: float, end: float) -> None:

@@ -10,6 +10,10 @@ from scenarios.picture import picture
 from scenarios.report.figures import side_by_side
 
 
+def beside(panel, recordings):
+    return side_by_side(panel, recordings, palette.looks(recordings))
+
+
 def spiky(ticks=20_000):
     values = np.sin(np.linspace(0, 9, ticks))
     values[12_345] = 7.0
@@ -130,7 +134,7 @@ def test_the_picture_is_seen_without_distortion():
 def test_every_panel_draws_a_run_that_has_its_signal(panel):
     run = recording()
     assert panel.fits(run)
-    drawn = side_by_side(panel, {"tpm published": run, "hqp": run})
+    drawn = beside(panel, {"tpm published": run, "hqp": run})
     assert list(drawn) == ["tpm published", "hqp"]
     assert drawn["hqp"].axes[0].get_ylim() == drawn["tpm published"].axes[0].get_ylim()
 
@@ -139,14 +143,14 @@ def test_every_panel_draws_a_run_that_has_its_signal(panel):
 def test_a_panel_without_its_signal_is_left_out_and_not_drawn_empty(panel):
     run = recording()
     del run.signals[panel.signal]
-    assert side_by_side(panel, {"hqp": run}) == {}
+    assert beside(panel, {"hqp": run}) == {}
 
 
 def test_a_run_far_beyond_the_others_is_cut_and_says_so():
     quiet = recording(v=np.eye(5, 7))
     wild = recording(v=1000.0 * np.eye(5, 7))
     velocities = panels.PANELS[0]
-    drawn = side_by_side(velocities, {"a": quiet, "b": quiet, "c": wild})
+    drawn = beside(velocities, {"a": quiet, "b": quiet, "c": wild})
     texts = [text.get_text() for text in drawn["c"].axes[0].texts]
     assert any("cut" in text for text in texts)
     assert drawn["a"].axes[0].get_ylim()[1] < 10.0
@@ -155,7 +159,7 @@ def test_a_run_far_beyond_the_others_is_cut_and_says_so():
 def test_the_stretches_in_which_a_task_is_active_are_red():
     run = recording(pointing_active=[False, True, True, False, False],
                     pointing_error=[0.0, 1.0, 2.0, 3.0, 4.0])
-    fig = side_by_side(panels.PANEL["pointing-error"], {"hqp": run})["hqp"]
+    fig = beside(panels.PANEL["pointing-error"], {"hqp": run})["hqp"]
     (red,) = [line for line in fig.axes[0].lines if line.get_color() == drawing.ALERT]
     np.testing.assert_array_equal(red.get_ydata(), [np.nan, 1.0, 2.0, np.nan, np.nan])
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -11,23 +11,24 @@ from matplotlib.ticker import MaxNLocator
 
 from scenarios import drawing
 from scenarios.drawing import ALERT, INK, Array
+from scenarios.palette import Look
 from scenarios.panels import Draw, Panel
 
 if TYPE_CHECKING:
     from scenarios.recording import Recording
 
 
-def side_by_side(panel: Panel, recordings: Mapping[str, Recording]) -> dict[str, Figure]:
+def side_by_side(panel: Panel, recordings: Mapping[str, Recording], looks: Mapping[str, Look]
+                 ) -> dict[str, Figure]:
     """Return one small figure of `panel` a run, by label, with the same limits for all.
 
     A run whose values are far beyond the others' is cut, and its panel says where it goes.
     """
-    chosen = drawing.colours(recordings)
     drawn = {}
     for label, recording in recordings.items():
         if panel.fits(recording):
             fig, (ax,) = drawing.figure()
-            panel.draw(ax, recording, chosen[label])
+            panel.draw(ax, recording, looks[label].colour)
             drawn[label] = fig
     if drawn:
         _share_limits(list(drawn.values()), [recordings[label]["t"] for label in drawn])
@@ -52,40 +53,43 @@ def _share_limits(figures: Sequence[Figure], times: Sequence[Array]) -> None:
                     ha="right", va="top", transform=ax.transAxes)
 
 
-def overlay(draw: Draw, recordings: Mapping[str, Recording]) -> Figure:
-    """Return one figure with a curve a run, in each resolver's colour."""
+def overlay(draw: Draw, recordings: Mapping[str, Recording], looks: Mapping[str, Look]) -> Figure:
+    """Return one figure with a curve a run, in its label's colour and dashes."""
     fig, (ax,) = drawing.figure(width=4.9, height=2.7)
-    for label, colour in drawing.colours(recordings).items():
-        draw(ax, recordings[label], colour)
+    for label, recording in recordings.items():
+        before = len(ax.lines)
+        draw(ax, recording, looks[label].colour)
+        for line in ax.lines[before:]:
+            line.set_linestyle(_dashed(looks[label]))
     ax.set_xlabel("time [s]")
     return fig
 
 
-def departure(recordings: Mapping[str, Recording]) -> Figure:
+def departure(recordings: Mapping[str, Recording], looks: Mapping[str, Look]) -> Figure:
     """Return how far each run's joints depart from the first run's [rad], logarithmic."""
     fig, (ax,) = drawing.figure(width=4.9, height=2.7)
     first, *others = recordings
     reference = recordings[first]
-    for label, colour in drawing.colours(recordings).items():
-        if label in others:
-            ticks = min(reference.ticks, recordings[label].ticks)
-            apart = np.abs(recordings[label]["q"][:ticks] - reference["q"][:ticks]).max(axis=1)
-            drawing.curve(ax, reference["t"][:ticks], np.maximum(apart, 1e-16), color=colour)
+    for label in others:
+        ticks = min(reference.ticks, recordings[label].ticks)
+        apart = np.abs(recordings[label]["q"][:ticks] - reference["q"][:ticks]).max(axis=1)
+        drawing.curve(ax, reference["t"][:ticks], np.maximum(apart, 1e-16),
+                      color=looks[label].colour, linestyle=_dashed(looks[label]))
     ax.set_yscale("log")
     ax.set_xlabel("time [s]")
     return fig
 
 
-def computing_time(recordings: Mapping[str, Recording]) -> Figure:
+def computing_time(recordings: Mapping[str, Recording], looks: Mapping[str, Look]) -> Figure:
     """Return the median time of a tick's parts [us], with the whole tick's median and 99.9 %."""
     fig, (ax,) = drawing.figure(width=4.9, height=0.7 + 0.4 * len(recordings))
     parts = (("time_kinematics", 0.35), ("time_rows", 0.6), ("time_resolve", 1.0))
-    chosen = drawing.colours(recordings)
     for row, (label, recording) in enumerate(recordings.items()):
         left = 0.0
         for signal, alpha in parts:
             width = 1e6 * float(np.median(recording[signal])) if signal in recording else 0.0
-            ax.barh(row, width, left=left, color=chosen[label], alpha=alpha, height=0.6)
+            ax.barh(row, width, left=left, color=looks[label].colour, alpha=alpha,
+                    height=0.6)
             left += width
         if "time_tick" in recording:
             for percent, mark in ((50.0, "|"), (99.9, "x")):
@@ -97,6 +101,11 @@ def computing_time(recordings: Mapping[str, Recording]) -> Figure:
     ax.set_xscale("log") if _wide(recordings) else ax.set_xlim(left=0.0)
     ax.set_xlabel("µs a tick")
     return fig
+
+
+def _dashed(look: Look) -> Any:
+    """Return a look's dashes as matplotlib takes them."""
+    return (0, look.dash) if look.dash else "-"
 
 
 def _wide(recordings: Mapping[str, Recording]) -> bool:

@@ -2,41 +2,59 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
-import numpy as np
+from scenarios.report.motions import ALIKE, departure, motions
 
 if TYPE_CHECKING:
     from scenarios.compare import Run
 
 _NUMBERS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten")
+TIE = 0.05  # within which, relative to the better one, two values are not told apart in words
+
+Clause = tuple[str, str]  # who, or "", and what is said
 
 
-def verdict(runs: Sequence[Run], alike: float = 1e-6, nearly: float = 1e-2) -> str:
+def verdict(runs: Sequence[Run], alike: float = ALIKE, nearly: float = 1e-2) -> str:
     """Return the sentence about runs side by side; only what was measured enters it.
 
-    Runs whose joints stay within `alike` [rad] of the first run's count as the same motion, and
-    those within `nearly` are said to be near it.
+    Who reached the end, who moved alike, who tracked best, who kept the most distance, who touched
+    something or passed a limit, who had trouble, and who computes fastest. Runs whose joints stay
+    within `alike` [rad] of each other's count as the same motion, and those within `nearly` of the
+    first run's are said to be near it. What a run that did not reach its end did is not compared.
     """
     finished = [run for run in runs if run.fault is None]
-    parts = [_completion(runs, finished)]
+    clauses: list[Clause] = [("", _completion(runs, finished))]
     if len({run.scenario.name for run in runs}) > 1:
-        parts += [_collision(finished), *_contrasts(finished)]
+        clauses += [*_contacts(finished), *_contrasts(finished)]
     elif finished:
-        same, others, apart = _groups(finished, alike)
-        near, others, near_apart = _groups(others, nearly, finished[0])
-        parts += [_agreement(same, near, others, apart),
-                  _nearness(near, finished[0], near_apart), _collision(finished)]
-        parts += [] if others and len(same) > 1 else [_distance(finished), _tracking(finished)]
-        parts += [_speed(finished)]
-    return "; ".join(part for part in parts if part) + "."
+        for said in (_sameness(finished, alike, nearly), _tracking(finished), _distance(finished),
+                     _contacts(finished), _excess(finished), _troubles(finished), _speed(finished)):
+            clauses += said
+    return _joined(clauses)
+
+
+def _joined(clauses: Sequence[Clause]) -> str:
+    """Join clauses to a sentence, naming who is meant once where two in a row are of the same."""
+    text, last = "", ""
+    for who, what in clauses:
+        if who and who == last:
+            text, last = f"{text} and {what}", ""
+        else:
+            text, last = f"{text}{'; ' if text else ''}{who}{' ' if who else ''}{what}", who
+    return f"{text}."
 
 
 def in_words(count: int) -> str:
     """Return a small number as a word."""
     return _NUMBERS[count] if count < len(_NUMBERS) else str(count)
+
+
+def listed(names: Sequence[str]) -> str:
+    """Return names as they are listed in a sentence."""
+    *first, last = names
+    return f"{', '.join(first)} and {last}" if first else last
 
 
 def _completion(runs: Sequence[Run], finished: Sequence[Run]) -> str:
@@ -48,113 +66,146 @@ def _completion(runs: Sequence[Run], finished: Sequence[Run]) -> str:
     if len(finished) == len(runs):
         every = "Both" if len(runs) == 2 else f"All {in_words(len(runs))}"
         return f"{every} {noun} ran the whole {seconds}"
-    stopped = ", ".join(run.label for run in runs if run.fault)
     some = f"{in_words(len(finished)).capitalize()} of {in_words(len(runs))} {noun}"
-    return f"{some if finished else f'No {noun[:-1]}'} ran the whole {seconds} ({stopped} did not)"
+    return (f"{some if finished else f'No {noun[:-1]}'} ran the whole {seconds} "
+            f"({'; '.join(failures(runs))})")
 
 
-def _groups(runs: Sequence[Run], alike: float, first: Run | None = None
-            ) -> tuple[list[Run], list[Run], float]:
-    """Return the runs that move as the first one does, the others, and how far the first differ."""
-    apart = {run.label: departure(run, first or runs[0]) for run in runs}
-    same = [run for run in runs if apart[run.label] <= alike]
-    others = [run for run in runs if apart[run.label] > alike]
-    return same, others, max((apart[run.label] for run in same), default=0.0)
+def failures(runs: Sequence[Run]) -> list[str]:
+    """Say which runs did not reach their end, those together that ended for the same reason."""
+    why: dict[str, list[str]] = {}
+    for run in runs:
+        if run.fault:
+            why.setdefault(run.fault, []).append(run.label)
+    return [f"{listed(labels)} did not: {fault}" for fault, labels in why.items()]
 
 
-def departure(run: Run, other: Run) -> float:
-    """Return the largest difference of any joint between two runs [rad]; infinite if unknown."""
-    if run.recording is None or other.recording is None:
-        return math.inf
-    q, reference = run.recording["q"], other.recording["q"]
-    if q.shape != reference.shape:
-        return math.inf
-    largest = float(np.abs(q - reference).max())
-    return math.inf if math.isnan(largest) else largest
+def _sameness(runs: Sequence[Run], alike: float, nearly: float) -> Iterator[Clause]:
+    found = motions(runs, alike)
+    if len(runs) < 2 or not found:
+        return
+    for motion in found:
+        if len(motion.runs) > 1:
+            how = f"alike to {motion.apart:.0e} rad" if motion.apart else "alike to the last bit"
+            yield _who(motion.runs, runs), f"moved the arm {how}"
+    first = found[0].runs[0]
+    apart = {one.label: departure(one.runs[0], first) for one in found[1:]}
+    near = [one for one in found[1:] if apart[one.label] <= nearly]
+    if near:
+        yield (listed([label for one in near for label in one.labels]),
+               f"stayed within {max(apart[one.label] for one in near):.0e} rad of {first.label}")
+    if len(found) == len(runs) and not near:
+        yield "", "no two moved the arm alike"
 
 
-def _agreement(same: Sequence[Run], near: Sequence[Run], others: Sequence[Run], apart: float
-               ) -> str:
-    if len(same) < 2:
-        return "no two moved the arm alike" if others and not near else ""
-    to = f"alike to {apart:.0e} rad" if apart > 0.0 else "alike to the last bit"
-    if not others:
-        return f"{_listed(same) if near else 'all'} moved the arm {to}"
-    return f"{_listed(same)} moved the arm {to}, {_listed(others)} did not{_instead(same, others)}"
+def _tracking(runs: Sequence[Run]) -> Iterator[Clause]:
+    values = _values(runs, "position_error_median_settled")
+    best, worst = min(values.values(), default=0.0), max(values.values(), default=0.0)
+    if values and worst <= (1.0 + TIE) * best:
+        yield "", f"half of the time the tool was within {_mm(best)} of its path"
+    elif values:
+        yield (_who(_within(values, runs, best), runs),
+               f"tracked best (median path error {_mm(best)}, {_at(values, worst)} {_mm(worst)})")
 
 
-def _nearness(near: Sequence[Run], first: Run, apart: float) -> str:
-    return f"{_listed(near)} stayed within {apart:.0e} rad of {first.label}" if near else ""
+def _distance(runs: Sequence[Run]) -> Iterator[Clause]:
+    values = _values(runs, "body_distance_min")
+    values = {label: value for label, value in values.items() if value > 0.0}
+    best, worst = max(values.values(), default=0.0), min(values.values(), default=0.0)
+    if values and best <= (1.0 + TIE) * worst:
+        yield "", f"the body kept at least {_mm(worst)} from every obstacle"
+    elif values:
+        yield (_who(_within(values, runs, best), runs), "kept the most distance from obstacles "
+               f"({_mm(best)}, {_at(values, worst)} {_mm(worst)})")
 
 
-def _instead(same: Sequence[Run], others: Sequence[Run]) -> str:
-    """Return in brackets what the others did worse or better, where it can be seen."""
-    said = []
-    for what, name, largest in (("body to obstacle", "body_distance_min", False),
-                                ("median path error", "position_error_median_settled", True)):
-        (known, usual), (one, value) = _extreme(same[:1], name, largest), _extreme(
-            others, name, largest)
-        if known and one and abs(value - usual) > 0.05 * abs(usual):
-            said.append(f"{what} {_mm(value)} against {_mm(usual)}")
-    return f" ({', '.join(said)})" if said else ""
+def _contacts(runs: Sequence[Run]) -> Iterator[Clause]:
+    distance, ticks = _values(runs, "body_distance_min"), _values(runs, "contact_ticks")
+    touched = [run for run in runs if distance.get(run.label, 1.0) <= 0.0]
+    if touched:
+        yield _who(touched, runs), "touched an obstacle with the body"
+    touched = [run for run in runs if ticks.get(run.label, 0.0) > 0.0 and run not in touched]
+    if touched:
+        most = max(ticks[run.label] for run in touched)
+        yield _who(touched, runs), f"touched something, for {most:.0f} ticks at most"
 
 
-def _contrasts(runs: Sequence[Run]) -> list[str]:
-    """Return where scenarios differ by half and more in what they ask of the arm."""
-    said = []
+def _excess(runs: Sequence[Run], least: float = 1e-3) -> Iterator[Clause]:
+    """Yield who passed a joint limit by more than `least` [rad]."""
+    values = {label: value for label, value in _values(runs, "joint_limit_excess").items()
+              if value > least}
+    beyond = [run for run in runs if run.label in values]
+    if beyond:
+        yield (_who(beyond, runs),
+               f"passed a joint limit, by {_digits(max(values.values()))} rad at most")
+
+
+_DONE = {"stop": "was stopped", "brake": "braked", "hold": "held its last command",
+         "use": "had trouble", "clamp": "was clamped to its limits"}
+
+
+def _troubles(runs: Sequence[Run]) -> Iterator[Clause]:
+    """Yield what was done in ticks with trouble, and who had no answer without that."""
+    said: dict[str, list[Run]] = {}
+    for run in runs:
+        events = run.recording.events if run.recording else ()
+        unsolved = _values([run], "ticks_not_solved").get(run.label, 0.0)
+        for action, done in _DONE.items():
+            if ticks := {event.tick for event in events if event.action == action}:
+                said.setdefault(f"{done} in {_ticks(len(ticks))}", []).append(run)
+        if unsolved and not events:
+            said.setdefault(f"had no answer in {_ticks(int(unsolved))}", []).append(run)
+    for what, some in said.items():
+        yield _who(some, runs), what
+
+
+def _ticks(count: int) -> str:
+    return f"{count} tick{'' if count == 1 else 's'}"
+
+
+def _contrasts(runs: Sequence[Run]) -> Iterator[Clause]:
+    """Yield where scenarios differ by half and more in what they ask of the arm."""
     for what, name, scale, unit in (("the largest joint speed step is", "velocity_step_max", 1.0,
                                      "rad/s"),
                                     ("the body came within", "body_distance_min", 1e3, "mm")):
-        (least, low), (most, high) = (_extreme(runs, name, largest=False),
-                                      _extreme(runs, name, largest=True))
-        if least and most and high > 1.5 * low:
-            said.append(f"{what} {_digits(scale * low)} {unit} in {least.label}, "
-                        f"{_digits(scale * high)} {unit} in {most.label}")
-    return said
+        values = _values(runs, name)
+        low, high = min(values.values(), default=0.0), max(values.values(), default=0.0)
+        if high > 1.5 * low:
+            yield "", (f"{what} {_digits(scale * low)} {unit} in {_at(values, low)}, "
+                       f"{_digits(scale * high)} {unit} in {_at(values, high)}")
 
 
-def _collision(runs: Sequence[Run]) -> str:
-    touched = [run for run in runs
-               if (distance := run.metrics.get("body_distance_min")) is not None
-               and distance.value is not None and distance.value <= 0.0]
-    return f"{_listed(touched)} touched an obstacle with the body" if touched else ""
+def _speed(runs: Sequence[Run]) -> Iterator[Clause]:
+    values = _values(runs, "time_resolve_median")
+    low, high = min(values.values(), default=0.0), max(values.values(), default=0.0)
+    against = f", {_at(values, high)} in {_digits(1e6 * high)} µs" if high > 1.2 * low else ""
+    if values:
+        yield _at(values, low), f"resolves a tick in {_digits(1e6 * low)} µs{against}"
 
 
-def _distance(runs: Sequence[Run]) -> str:
-    nearest, value = _extreme(runs, "body_distance_min", largest=False)
-    if nearest is None or value <= 0.0:
-        return ""
-    return f"the body kept at least {_mm(value)} from every obstacle"
+def _values(runs: Sequence[Run], name: str) -> dict[str, float]:
+    """Return a metric by label, of the runs that have it."""
+    return {run.label: value for run in runs
+            if name in run.metrics and (value := run.metrics[name].value) is not None}
 
 
-def _tracking(runs: Sequence[Run]) -> str:
-    name = "position_error_median_settled"
-    best, low = _extreme(runs, name, largest=False)
-    worst, high = _extreme(runs, name, largest=True)
-    if best is None or worst is None:
-        return ""
-    if len(runs) == 1 or high <= 1.05 * low:
-        return f"half of the time the tool was within {_mm(low)} of its path"
-    return (f"half of the time the tool was within {_mm(low)} of its path under {best.label}, "
-            f"{_mm(high)} under {worst.label}")
+def _within(values: dict[str, float], runs: Sequence[Run], best: float) -> list[Run]:
+    """Return the runs whose value is about the best."""
+    return [run for run in runs if run.label in values
+            and abs(values[run.label] - best) <= TIE * max(abs(best), abs(values[run.label]))]
 
 
-def _speed(runs: Sequence[Run]) -> str:
-    name = "time_resolve_median"
-    best, low = _extreme(runs, name, largest=False)
-    worst, high = _extreme(runs, name, largest=True)
-    if best is None or worst is None:
-        return ""
-    against = f", {worst.label} in {_digits(1e6 * high)} µs" if high > 1.2 * low else ""
-    return f"{best.label} resolves a tick in {_digits(1e6 * low)} µs{against}"
+def _at(values: dict[str, float], value: float) -> str:
+    return next(label for label, one in values.items() if one == value)
 
 
-def _extreme(runs: Sequence[Run], name: str, largest: bool) -> tuple[Run | None, float]:
-    """Return the run with the smallest or largest value of a metric, and that value."""
-    values = [(run, run.metrics[name].value) for run in runs if name in run.metrics]
-    known = sorted(((value, i, run) for i, (run, value) in enumerate(values) if value is not None),
-                   reverse=largest)
-    return (known[0][2], known[0][0]) if known else (None, 0.0)
+def _who(some: Sequence[Run], runs: Sequence[Run]) -> str:
+    """Name some of the runs in the shortest way that is clear."""
+    others = [run.label for run in runs if run not in some]
+    if not others:
+        return "it" if len(runs) == 1 else "both" if len(runs) == 2 else "all"
+    return f"all but {listed(others)}" if len(others) < min(len(some), 3) else listed(
+        [run.label for run in some])
 
 
 def _mm(metres: float) -> str:
@@ -164,8 +215,3 @@ def _mm(metres: float) -> str:
 def _digits(value: float) -> str:
     """Return two digits, and all that stand before the point: 0.14, 1.9, 254."""
     return f"{value:.0f}" if abs(value) >= 10.0 else f"{value:.2g}"
-
-
-def _listed(runs: Sequence[Run]) -> str:
-    *first, last = [run.label for run in runs]
-    return f"{', '.join(first)} and {last}" if first else last

@@ -1,0 +1,91 @@
+"""The commands that make a comparison again, run by run."""
+
+from __future__ import annotations
+
+import json
+import shlex
+from collections.abc import Iterator, Sequence
+from pathlib import PurePath
+from typing import TYPE_CHECKING, Any
+
+from hierarchy.errors import HierarchyError
+
+if TYPE_CHECKING:
+    from scenarios.compare import Comparison, Run
+    from scenarios.config import Scenario
+
+
+def run_command(run: Run, folder: str) -> str:
+    """Return the command that makes a run again.
+
+    By the scenario's name and what was changed in it, if that gives the same scenario; by the file
+    in the run's own folder if not.
+    """
+    changes = _changes(run)
+    if changes is None:
+        return _shell("hierarchy", "run", str(PurePath(folder, run.folder, "scenario.toml")))
+    sets = [part for change in changes for part in ("--set", change)]
+    return _shell("hierarchy", "run", run.scenario.name, "--resolver", run.spec, *sets)
+
+
+def commands(comparison: Comparison, runs: Sequence[Run]) -> list[tuple[str, str]]:
+    """Return what each command is for, and the command, for runs that stand side by side."""
+    folder = comparison.folder or ""
+    kept = [run for run in runs if run.recording is not None]
+    found = [(f"{run.label}, run again", run_command(run, folder)) for run in runs]
+    if kept:
+        first = str(PurePath(folder, kept[0].folder))
+        every = [str(PurePath(folder, run.folder)) for run in kept]
+        found += [("See a run in the browser, in three dimensions",
+                   _shell("hierarchy", "view", first)),
+                  ("The replay alone, as one file", _shell("hierarchy", "replay", *every)),
+                  ("A run's figures for a paper, as PDF",
+                   _shell("hierarchy", "figures", first, "--style", "paper"))]
+    return found
+
+
+def _shell(*words: str) -> str:
+    return shlex.join(words)
+
+
+def _changes(run: Run) -> list[str] | None:
+    """Return what to set in the shipped scenario to get the run's, or None if that cannot be."""
+    from scenarios.config import Scenario, load, shipped
+
+    scenario = run.scenario
+    if not isinstance(scenario, Scenario) or scenario.name not in shipped():
+        return None
+    asked = load(scenario.name).with_resolver(run.spec)
+    try:
+        changes = list(_differences(_plain(asked), _plain(scenario)))
+        same = load(scenario.name, changes).with_resolver(run.spec) == scenario
+    except (HierarchyError, TypeError):
+        return None
+    return changes if same else None
+
+
+def _plain(scenario: Scenario) -> dict[str, Any]:
+    return scenario.model_dump(mode="json")
+
+
+def _differences(asked: dict[str, Any], found: dict[str, Any], under: str = "") -> Iterator[str]:
+    """Yield KEY=VALUE of every value that another one took the place of."""
+    for key, value in found.items():
+        if value == asked.get(key):
+            continue
+        if isinstance(value, dict) and isinstance(asked.get(key), dict):
+            yield from _differences(asked[key], value, f"{under}{key}.")
+        else:
+            yield f"{under}{key}={_toml(value)}"
+
+
+def _toml(value: Any) -> str:
+    """Return a value as TOML; TypeError for what it cannot hold."""
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{key} = {_toml(one)}" for key, one in value.items()
+                               if one is not None) + "}"
+    if isinstance(value, list):
+        return "[" + ", ".join(map(_toml, value)) + "]"
+    if value is None:
+        raise TypeError("TOML has no null")
+    return json.dumps(value)

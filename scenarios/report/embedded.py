@@ -1,0 +1,58 @@
+"""The replay inside the report: in the page's own file, but not drawn before it is looked at."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from html import escape
+from typing import TYPE_CHECKING
+
+from hierarchy.errors import HierarchyError
+from scenarios.report.motions import Motion
+from scenarios.report.parts import section
+from scenarios.report.verdict import in_words, listed
+
+if TYPE_CHECKING:
+    from scenarios.recording import Recording
+
+MOST = 4               # motions in one replay
+_MOST_BYTES = 3_000_000  # of one replay; above it, fewer frames a second are kept
+_RATES = (30.0, 15.0, 6.0)  # [Hz]
+
+
+def replay(name: str, found: Sequence[Motion]) -> str:
+    """Return the section with the replay of up to MOST motions; empty if there is none to show."""
+    shown = list(found[:MOST])
+    try:
+        document, rate = _document(name, shown)
+    except HierarchyError as error:
+        return section("Replay", f'<p class="quiet">There is none: {escape(str(error))}.</p>')
+    held = document.replace("&", "&amp;").replace("'", "&#39;")
+    return section("Replay", f"""<div class="stage">
+<iframe title="Replay of {escape(name)}" data-document='{held}'></iframe>
+<noscript><p>The replay is drawn by a script, which is switched off here.</p></noscript></div>""",
+                   _said(shown, found, rate))
+
+
+def _document(name: str, shown: Sequence[Motion]) -> tuple[str, float]:
+    from scenarios.replay import html
+
+    recordings: dict[str, Recording] = {one.label: one.recording for one in shown}
+    for rate in _RATES:
+        document = html(recordings, name, rate=rate, embedded=True)
+        if len(document) <= _MOST_BYTES:
+            break
+    return document, rate
+
+
+def _said(shown: Sequence[Motion], found: Sequence[Motion], rate: float) -> str:
+    """Say which runs are shown and which coincide with them."""
+    said = f"Shown: {listed([one.label for one in shown])}, {rate:g} pictures a second."
+    for one in shown:
+        if len(one.runs) > 1:
+            moves = "moves" if len(one.runs) == 2 else "move"
+            said += f" {listed(one.labels[1:])} {moves} as {one.label} does."
+    left = found[len(shown):]
+    if left:
+        said += (f" Not shown: {listed([label for one in left for label in one.labels])}; a replay "
+                 f"here has {in_words(MOST)} motions at most.")
+    return said
