@@ -187,3 +187,10 @@ def test_no_robot_at_rest_is_below_the_floor(name):
 def test_the_arm_given_as_a_table_has_its_own_capsules():
     assert capsules(Robot.named("kuka_lwr"), 0.31) == link_capsules(TABLES["kuka_lwr"], 0.31)
     assert stage(load("ellipse")).floor == pytest.approx(-0.31)
+
+
+def test_a_floating_base_has_no_limits_to_be_at():
+    recording = simulate(load("humanoid-reach", ["control.duration=0.02"]))
+    levels = judge(recording, [0, 1, 2, 3])
+    assert levels.saturated.shape == (4, recording["v"].shape[1])
+    assert (levels.saturated[:, :6] == 0).all()
