@@ -38,7 +38,7 @@ class Live:
         rehearsal = Controller(scenario)
         rehearsal.rehearse()
         Recorder(rehearsal, 1).write()
-        self.scenario = scenario
+        self.scenario = self._first = scenario
         self.restart()
 
     def restart(self) -> None:
@@ -84,7 +84,9 @@ class Live:
 
     def switch(self, spec: str) -> None:
         """Go on with another resolver, "name" or "name:setting=value"."""
-        scenario = self.scenario.with_resolver(spec)
+        control = self._first.with_resolver(spec).control  # not with what an earlier spec set
+        scenario = self.scenario.with_changes({"control.resolver": control.resolver,
+                                               "control.options": control.options})
         resolver = scenario.make_resolver()
         if not resolver.can_resolve(scenario.asks):
             raise ScenarioError(f"{spec} cannot resolve the {scenario.asks} of this stack")

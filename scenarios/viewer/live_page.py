@@ -1,4 +1,4 @@
-"""A live run on a page: drawn while it goes on, with everything that can be changed."""
+"""A live run on a page: drawn while it goes on, and changed by what is done there."""
 
 from __future__ import annotations
 
@@ -10,53 +10,53 @@ import numpy as np
 
 from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array
-from scenarios.config import Scenario
-from scenarios.drawing import INK, colours
+from scenarios.drawing import colours
 from scenarios.scene import stage
 from scenarios.viewer.curves import Lately
-from scenarios.viewer.handles import Handles
-from scenarios.viewer.knobs import knobs
 from scenarios.viewer.live import Live
-from scenarios.viewer.model import Model, rgb
+from scenarios.viewer.live_panel import LivePanel, resolvers
+from scenarios.viewer.model import Model, Rgb, rgb
 from scenarios.viewer.moment import Moment, Watched
-from scenarios.viewer.playback import PlayButton, Requests, add_speed
-from scenarios.viewer.plots import Plots
-from scenarios.viewer.server import lay_floor, lay_out, look_at
+from scenarios.viewer.playback import Requests
+from scenarios.viewer.server import lay_floor, look_at
 from scenarios.viewer.stack_list import stack_html
 
-FRAMES = 30.0     # drawn a second
-_CURVES = 4.0     # times a second that the curves are drawn anew
-_LATELY = 10.0    # [s] that the curves show
-_TRACE = 600      # frames that the trace is long
-_BUSY = 0.05      # [s] of ticks between two drawings, at most
-_REACH = 0.75     # [m] about the base that the camera sees at least
-_TARGET = 1.0     # [m/s] at most, of a path that is dragged
+FRAMES = 30.0   # drawn a second
+_CURVES = 4.0   # times a second that the curves are drawn anew
+_LATELY = 10.0  # [s] that the curves show
+_TRACE = 600    # frames that the trace is long, points that the path has
+_BUSY = 0.05    # [s] of ticks between two drawings, at most
+_HAND = 1.0     # [m/s] at most, of a path that is dragged
+_REACH = 0.4    # [m] about the base that the camera sees at least
 
 
 class LivePage:
-    """A live run drawn into a server. `step` makes the ticks that are due, does what was asked for
-    on the page before them, and draws.
+    """A live run drawn into a server.
 
-    Public for tests: `requests`, `list` (the stack's HTML), `refused` (the last refusal).
+    `step` does what was asked for on the page, makes the ticks that are due, and draws; nothing
+    else touches the run. `requests` takes what is asked for; `list` is the stack's HTML, `refused`
+    says why the last request that could not be was refused.
     """
 
     def __init__(self, server: Any, live: Live, speed: float = 1.0) -> None:
         self.server, self.live, self.requests = server, live, Requests()
-        self.speed, self.playing, self.restarted = speed, True, False
+        self.speed, self.playing = speed, True
         self.list, self.refused = "", ""
         self.specs = resolvers(live.scenario)
         self._colours = colours(self.specs)
-        self._due = 0.0
-        self._stage = stage(live.scenario)
-        self._path_wanted = np.array(self._path_offset())
+        self._due, self._curves_at = 0.0, -np.inf
+        self._stage, self._watched = stage(live.scenario), Watched(live.controller)
+        self._lately = Lately(int(_LATELY * FRAMES))
+        self._trace: deque[tuple[Array, Rgb]] = deque(maxlen=_TRACE)
+        self._middle, self._path_wanted = np.zeros(3), self._path_offset()
         lay_floor(server, self._stage.floor)
-        self._watched, self._lately = Watched(live.controller), Lately(int(_LATELY * FRAMES))
-        self._trace: deque[tuple[Array, tuple[int, int, int]]] = deque(maxlen=_TRACE)
-        self._model = Model(server, "/run", self._stage, self._colour, self._path())
-        self._camera()
+        path = self._path()
+        self._model = Model(server, "/run", self._stage, self._colour, path)
+        self._place_camera(path)
         self._first_tick()
-        self._panel()
-        self._curves_at = -np.inf
+        self.panel = LivePanel(
+            server, self.requests, live.scenario, list(self.specs),
+            self._lately.curves(live.controller), speed, len(self._stage.obstacles))
         self.draw()
 
     @property
@@ -76,21 +76,21 @@ class LivePage:
     def draw(self) -> None:
         """Show the run as it is."""
         now = self._watched.moment()
+        points, shades = zip(*self._trace, strict=True)
         with self.server.atomic():
-            points, shades = zip(*self._trace, strict=True) if self._trace else ((), ())
-            self._model.show(now, np.array(points).reshape(-1, 3), colours=np.array(shades))
-            self._show_handles(now)
+            self._model.show(now, np.array(points), np.array(shades))
+            for h, centre in enumerate(now.centres):
+                self.panel.handles.follow(f"obstacle {h}", centre)
+            self.panel.handles.follow("path", self._middle + self._path_offset())
         self._show_list(now)
-        self._button.show(self.playing and not self.live.over)
         if time.monotonic() - self._curves_at > 1.0 / _CURVES:
             self._curves_at = time.monotonic()
-            self._plots.roll({"run": self._lately.curves(self.live.controller)})
+            self.panel.roll(self._lately.curves(self.live.controller))
 
     def _make_ticks(self, seconds: float) -> None:
         """Catch up with the clock as far as there is time; what cannot be caught up is left."""
-        live, period = self.live, self.live.scenario.control.period
-        self._due = min(self._due + self.speed * seconds / period,
-                        self.speed * 2.0 / (FRAMES * period) + 1.0)
+        live, a_second = self.live, self.speed / self.live.scenario.control.period
+        self._due = min(self._due + a_second * seconds, a_second * 2.0 / FRAMES + 1.0)
         end = time.perf_counter() + _BUSY
         while self._due >= 1.0 and not live.over and time.perf_counter() < end:
             live.tick()
@@ -103,41 +103,36 @@ class LivePage:
         self._note()
 
     def _note(self) -> None:
-        now = self._watched.moment()
-        self._trace.append((now.points[-1], rgb(self._colour)))
+        self._trace.append((self._watched.moment().points[-1], rgb(self._colour)))
         self._lately.add(self.live.controller)
 
     def _do(self, what: str, value: Any) -> None:
         try:
-            if what == "toggle":
-                self._toggle()
-            elif what == "restart":
+            if what == "toggle" and not self.live.over:
+                self.playing = not self.playing
+            elif what in ("toggle", "restart"):
                 self._restart()
             elif what == "speed":
                 self.speed = value
             elif what == "handles":
-                self._handles.set_visible(value)
+                self.panel.handles.set_visible(value)
             elif what == "path":
                 self._path_wanted = value - self._middle
             elif what.startswith("obstacle "):
                 self._drag(int(what.removeprefix("obstacle ")), value)
-            elif what == "resolver":
-                self.live.switch(self.specs[value])
-                self._follow()
             else:
-                self.live.change({what: value})
-                self._follow()
+                self._change(what, value)
         except HierarchyError as error:
             self._refuse(str(error))
 
-    def _toggle(self) -> None:
-        if self.live.over:
-            self._restart()
+    def _change(self, what: str, value: Any) -> None:
+        if what == "resolver":
+            self.live.switch(self.specs[value])
         else:
-            self.playing = not self.playing
+            self.live.change({what: value})
+        self._follow()
 
     def _restart(self) -> None:
-        self.restarted = True
         self.live.restart()
         self._trace.clear()
         self._lately.clear()
@@ -152,49 +147,41 @@ class LivePage:
 
     def _drag_path(self, seconds: float) -> None:
         """Bring the path nearer to where it is dragged."""
-        here = np.array(self._path_offset())
+        here = self._path_offset()
         way = self._path_wanted - here
         length = float(np.linalg.norm(way))
         if length > 0.0:
-            step = min(1.0, _TARGET * seconds / length)
+            step = min(1.0, _HAND * seconds / length)
             self._do("position.offset", (here + step * way).tolist())
-            if (here == self._path_offset()).all():  # refused
+            if (here == self._path_offset()).all():  # it was refused
                 self._path_wanted = here
 
     def _follow(self) -> None:
         """Draw what has changed with the scenario."""
         self._watched = Watched(self.live.controller)
-        fresh = stage(self.live.scenario)
-        if (fresh.areas, fresh.half_angle) != (self._stage.areas, self._stage.half_angle):
-            self._model.set_stage(fresh)
-        self._stage = fresh
+        before, self._stage = self._stage, stage(self.live.scenario)
+        if (before.areas, before.half_angle) != (self._stage.areas, self._stage.half_angle):
+            self._model.set_stage(self._stage)
         self._model.paint(self._colour)
         self._model.set_path(self._path())
-        self._choice.value = self._chosen
 
     def _refuse(self, why: str) -> None:
-        """Say why something was not done, and put the sliders back to what is so."""
+        """Say why something was not done, and put the inputs back to what is so."""
         self.refused = why
         for client in self.server.get_clients().values():
             client.add_notification("Not changed", why, color="red", auto_close_seconds=6.0)
-        for knob, value in knobs(self.live.scenario):
-            self._sliders[knob.key].value = value
-        self._choice.value = self._chosen
-
-    @property
-    def _chosen(self) -> str:
-        return self.label if self.label in self.specs else next(iter(self.specs))
+        self.panel.set_to(self.live.scenario, self.label)
 
     @property
     def _colour(self) -> str:
-        return self._colours.get(self.label, INK)
+        return self._colours[self.label]
 
-    def _path_offset(self) -> tuple[float, float, float]:
+    def _path_offset(self) -> Array:
         position = self.live.scenario.position
-        return (0.0, 0.0, 0.0) if position is None else position.offset
+        return np.array(position.offset) if position else np.zeros(3)
 
     def _path(self) -> Array | None:
-        """The desired path over the run, (N, 3) [m]; `_middle` is that of it without its offset."""
+        """The desired path (N, 3) [m]; `_middle` becomes the middle of that without its offset."""
         position = self.live.controller.cell.position
         if position is None:
             return None
@@ -203,73 +190,17 @@ class LivePage:
         self._middle = (path.min(axis=0) + path.max(axis=0)) / 2 - self._path_offset()
         return path
 
-    def _camera(self) -> None:
-        path = self._path()
-        seen = [np.full((1, 3), -_REACH / 2), np.full((1, 3), _REACH / 2),
-                self._stage.obstacles.centres, np.zeros((0, 3)) if path is None else path]
-        points = np.vstack(seen)
+    def _place_camera(self, path: Array | None) -> None:
+        about = [np.full(3, -_REACH), np.full(3, _REACH), *self._stage.obstacles.centres]
+        points = np.vstack([*about, *(path if path is not None else ())])
         low, high = points.min(axis=0), points.max(axis=0)
-        low[2] = max(low[2], self._stage.floor)
         look_at(self.server, (low + high) / 2, 0.42 * float(np.linalg.norm(high - low)))
-
-    def _show_handles(self, now: Moment) -> None:
-        for h, centre in enumerate(now.centres):
-            self._handles.follow(f"obstacle {h}", centre)
-        if now.desired is not None:
-            self._handles.follow("path", self._middle + self._path_offset())
 
     def _show_list(self, now: Moment) -> None:
         live = self.live
         note = f"t = {now.t:.1f} of {live.ticks * live.scenario.control.period:.1f} s"
         if live.over:
             note += f", {live.fault or 'ended'}"
-        html = stack_html(self.label, self._colour, now, live.controller.cell.stack.names, note)
-        if html != self.list:
-            self.list = self._stack.content = html
-
-    def _panel(self) -> None:
-        gui, requests, scenario = self.server.gui, self.requests, self.live.scenario
-        with lay_out(self.server):
-            self._plots = Plots(gui, {"run": self._lately.curves(self.live.controller)},
-                                {"run": INK}, rolling=True)
-        self._button = PlayButton(gui, requests)
-        requests.when_pressed(gui.add_button("Restart", icon="player-skip-back", color="gray"),
-                              "restart")
-        add_speed(gui, requests, self.speed)
-        self._choice = gui.add_dropdown("Resolver", list(self.specs), initial_value=self._chosen)
-        requests.when_changed(self._choice, "resolver")
-        gui.add_markdown("**Stack**, most important first")
-        self._stack = gui.add_html("")
-        self._sliders = {}
-        with gui.add_folder("Settings"):
-            shown = gui.add_checkbox("Handles to drag", initial_value=True)
-            requests.when_changed(shown, "handles")
-            for knob, value in knobs(scenario):
-                slider = gui.add_slider(knob.label, 0.0, max(knob.high, value), knob.step, value,
-                                        hint=knob.key)
-                requests.when_changed(slider, knob.key)
-                self._sliders[knob.key] = slider
-        obstacles = self.live.obstacles
-        self._handles = Handles(self.server, requests, len(obstacles) if obstacles else 0,
-                                scenario.position is not None)
-
-
-def resolvers(scenario: Scenario) -> dict[str, str]:
-    """Return specs of the resolvers that can resolve a scenario's stack, by their labels.
-
-    The scenario's own is the first.
-    """
-    from scenarios.compare import default_resolvers
-    from solvers import names
-
-    own = scenario.control.resolver
-    found: dict[str, str] = {}
-    for spec in (own, *default_resolvers(scenario.asks)[0], *names()):
-        try:
-            other = scenario if spec == own else scenario.with_resolver(spec)
-            resolver = other.make_resolver()
-        except HierarchyError:
-            continue
-        if resolver.can_resolve(other.asks):
-            found.setdefault(str(resolver.label), spec)
-    return found
+        self.list = stack_html(self.label, self._colour, now, live.controller.cell.stack.names,
+                               note)
+        self.panel.show(self.playing and not live.over, self.list)

@@ -1,0 +1,416 @@
+"""The page in the browser: what it shows, and what is asked for on it."""
+
+import time
+
+import numpy as np
+import pytest
+from headless import chromium
+
+from hierarchy.avoidance import Obstacle
+from hierarchy.avoidance.obstacles import distance_to_obstacle
+from hierarchy.errors import HierarchyError
+from scenarios.cli import run_command
+from scenarios.config import load
+from scenarios.controller import Controller
+from scenarios.levels import Fate
+from scenarios.recorder import Recorder
+from scenarios.recording import load_run, save
+from scenarios.scene import scene
+from scenarios.simulate import simulate, tick
+from scenarios.viewer.live import Live
+from scenarios.viewer.moment import Became, Watched, of_scene
+from scenarios.viewer.playback import Playback, Requests
+from scenarios.viewer.stack_list import stack_html
+
+LIMITED = load("ellipse-limits", ["control.duration=0.6"])
+
+
+def ticks(live, count):
+    for _ in range(count):
+        live.tick()
+
+
+@pytest.fixture(scope="module")
+def recording():
+    return simulate(LIMITED)
+
+
+@pytest.fixture
+def server():
+    pytest.importorskip("viser", reason="needs the extra view")
+    from scenarios.viewer.server import open_server
+
+    opened = open_server(0, "test")
+    yield opened
+    opened.stop()
+
+
+# Time
+
+
+def test_time_stands_until_it_is_played_and_stops_at_the_end():
+    playback = Playback(1.0, 3.0, speed=2.0)
+    playback.advance(0.5)
+    assert playback.t == 1.0
+    playback.play()
+    playback.advance(0.5)
+    assert (playback.t, playback.playing) == (2.0, True)
+    playback.advance(9.0)
+    assert (playback.t, playback.playing) == (3.0, False)
+
+
+def test_play_at_the_end_begins_anew_and_elsewhere_goes_on():
+    playback = Playback(0.0, 3.0)
+    playback.seek(3.0)
+    playback.play()
+    assert playback.t == 0.0
+    playback.seek(2.0)
+    playback.play()
+    assert playback.t == 2.0
+
+
+@pytest.mark.parametrize(("asked", "there"), [(-1.0, 0.0), (1.5, 1.5), (9.0, 3.0)])
+def test_scrubbing_pauses_at_the_nearest_time_there_is(asked, there):
+    playback = Playback(0.0, 3.0)
+    playback.play()
+    playback.seek(asked)
+    assert (playback.t, playback.playing) == (there, False)
+
+
+def test_of_requests_for_one_thing_the_last_is_kept_and_all_in_order():
+    requests = Requests()
+    for what, value in (("a", 1), ("b", 2), ("a", 3)):
+        requests.put(what, value)
+    assert requests.take() == [("b", 2), ("a", 3)]
+    assert requests.take() == []
+
+
+# The moment that is drawn
+
+
+def test_a_controller_at_work_and_its_recording_show_the_same_moments():
+    controller = Controller(LIMITED)
+    recorder, watched, live = Recorder(controller, 600), Watched(controller), {}
+    for k in range(600):
+        tick(controller, recorder, k * 0.001)
+        live[k] = watched.moment() if k % 20 == 0 else None
+    recorded = scene(recorder.finish(LIMITED, None), rate=50.0)
+    for f, k in enumerate(recorded.ticks.tolist()):
+        if live.get(k) is None:
+            continue
+        one, other = of_scene(recorded, f), live[k]
+        assert one.order == other.order
+        assert (one.active, one.linked) == (other.active, other.linked)
+        assert {name: became.fate for name, became in one.became.items()} == {
+            name: became.fate for name, became in other.became.items()}
+        assert (one.saturated == other.saturated).all()
+        for name in ("placements", "points", "nearest", "centres", "axis", "desired"):
+            assert getattr(one, name) == pytest.approx(getattr(other, name), abs=1e-9), name
+
+
+def test_the_list_says_what_is_active_given_up_saturated_and_out_of_the_stack(recording):
+    now = of_scene(scene(recording), 0)
+    saturated = np.array([0, 1, 0, 0, -1, 0, 0], np.int8)
+    now = type(now)(**{**vars(now), "order": ("position", "<pointing>"), "saturated": saturated,
+                       "became": {"position": Became(Fate.MET, 0.0),
+                                  "<pointing>": Became(Fate.MISSED, 0.123)}})
+    html = stack_html("tpm", "#123456", now, ["position", "avoidance"])
+    assert html.index("position") < html.index("&lt;pointing&gt;") < html.index("avoidance")
+    for said in ("active, met", "given up: off by 0.12", "not in the stack",
+                 "saturated: joint 2 (upper), 5 (lower)", "#123456"):
+        assert said in html
+
+
+@pytest.mark.parametrize("obstacle", [
+    Obstacle("point", (0, 0, 0)), Obstacle("sphere", (0, 0, 0), (0.1,)),
+    Obstacle("capsule", (0, 0, 0), (0.1, 0.2)), Obstacle("box", (0, 0, 0), (0.1, 0.2, 0.3)),
+], ids=lambda obstacle: obstacle.shape)
+def test_an_area_is_drawn_at_its_distance_from_the_obstacle(obstacle):
+    pytest.importorskip("trimesh", reason="comes with the extra view")
+    from scenarios.viewer.meshes import obstacle_mesh
+
+    vertices, faces = obstacle_mesh(obstacle, 0.05)
+    away = np.empty(3)
+    distance = [distance_to_obstacle(obstacle.packed(), *vertex, away) for vertex in vertices]
+    assert distance == pytest.approx([0.05] * len(vertices), abs=1e-9)
+    corners = vertices[faces]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    assert ((normal * corners.mean(axis=1)).sum(axis=1) > 0.0).all()  # outward
+
+
+# A live run
+
+
+def test_a_live_run_that_nobody_touches_is_the_run_itself(recording):
+    live = Live(LIMITED)
+    ticks(live, 700)
+    assert live.over
+    assert live.recording().fault is None
+    found = live.recording()
+    assert "changed" not in found
+    for name in ("t", "q", "v", "command", "order"):
+        assert (found[name] == recording[name]).all(), name
+
+
+def test_the_resolver_is_switched_in_mid_motion_and_back():
+    live = Live(load("ellipse", ["control.duration=0.6"]))
+    ticks(live, 100)
+    q = live.controller.cell.plant.q.copy()
+    for spec, label in (("tpm:form=staircase", "tpm"), ("hcod", "hcod"), ("tpm", "tpm published")):
+        live.switch(spec)
+        assert live.controller.resolver.label == label
+        assert live.controller.cell.plant.q == pytest.approx(q, abs=0.01)
+        ticks(live, 5)
+    found = live.recording()
+    assert np.abs(np.diff(found["v"], axis=0)).max() < 0.1  # rad/s
+    assert found["changed"].tolist() == [False] * 100 + [True] * 10 + [False] * 5
+
+
+def test_an_obstacle_that_is_dragged_goes_there_no_faster_than_a_hand():
+    live = Live(load("ellipse", ["control.duration=0.6"]))
+    ticks(live, 10)
+    live.drag(0, (0.0, 0.0, 0.1))
+    ticks(live, 50)
+    assert live.obstacles.centres[0] == pytest.approx([0.1, 0.5, 0.15])
+    ticks(live, 100)
+    assert live.obstacles.centres[0] == pytest.approx([0.1, 0.5, 0.2])
+    found = live.recording()
+    assert found["changed"].tolist() == [False] * 10 + [True] * 150
+    drawn = scene(found)
+    assert drawn.centres[-1, 0] == pytest.approx([0.1, 0.5, 0.2])
+    assert drawn.levels.known[0]
+    assert not drawn.levels.known[-1]
+
+
+@pytest.mark.parametrize(("key", "value", "read"), [
+    ("pointing.alpha_d", 35.0, lambda cell: np.degrees(cell.pointing.half_angle)),
+    ("avoidance.near", 0.1, lambda cell: cell.areas.near),
+    ("avoidance.end_effector", 0.2, lambda cell: cell.position.repulsion_within),
+    ("position.stiffness", 60.0, lambda cell: cell.position.stiffness),
+    ("damping.value", 2.0, lambda cell: cell.stack.reference.damping),
+], ids=lambda one: one if isinstance(one, str) else "")
+def test_a_setting_that_is_changed_holds_from_the_next_tick_on(key, value, read):
+    live = Live(LIMITED)
+    ticks(live, 20)
+    live.change({key: value})
+    ticks(live, 20)
+    assert read(live.controller.cell) == pytest.approx(value)
+    assert live.changes == [{"t": pytest.approx(0.02), "key": key, "value": value}]
+
+
+@pytest.mark.parametrize("spoil", [
+    lambda live: live.change({"avoidance.near": 0.3}),
+    lambda live: live.change({"pointing.alpha_d": float("nan")}),
+    lambda live: live.change({"position.stiffness": -1.0}),
+    lambda live: live.switch("recursive"),
+    lambda live: live.switch("tmp"),
+    lambda live: live.drag(7, (0.0, 0.0, 0.0)),
+    lambda live: live.drag(0, (0.0, 0.0, float("inf"))),
+], ids=["far below near", "nan", "negative", "no bounds", "no such", "no obstacle", "infinite"])
+def test_what_cannot_be_is_refused_and_the_run_goes_on(spoil, recording):
+    live = Live(LIMITED)
+    ticks(live, 300)
+    with pytest.raises(HierarchyError):
+        spoil(live)
+    ticks(live, 300)
+    assert live.over
+    assert (live.recording()["q"] == recording["q"]).all()
+    assert live.changes == []
+
+
+def test_a_restart_keeps_the_settings_and_puts_obstacles_back(tmp_path, monkeypatch):
+    monkeypatch.setattr("scenarios.figures.write_all", lambda *_: None)
+    live = Live(LIMITED)
+    live.change({"pointing.alpha_d": 20.0})
+    live.drag(1, (0.0, 0.1, 0.0))
+    ticks(live, 50)
+    live.restart()
+    assert live.t == 0.0
+    assert live.obstacles.offset.tolist() == [[0.0] * 3] * 3
+    ticks(live, 30)
+    live.change({"avoidance.far": 0.2})
+    ticks(live, 30)
+    live.save(tmp_path / "run")
+    kept = load_run(tmp_path / "run")
+    assert kept.scenario.pointing.alpha_d == 20.0
+    assert (kept.ticks, kept.fault) == (60, "interrupted at tick 60")
+    assert '"avoidance.far"' in (tmp_path / "run" / "changes.json").read_text()
+
+
+def test_a_live_run_takes_no_faults():
+    with pytest.raises(HierarchyError, match="injects no"):
+        Live(load("ellipse", {"faults": [{"kind": "stale", "at": 0.1, "duration": 0.1}]}))
+
+
+# Pages, without a browser
+
+
+def test_a_page_plays_and_scrubs_runs_of_different_length(server, recording):
+    from scenarios.viewer.view import View, labelled
+
+    longer = simulate(LIMITED.with_resolver("hcod").with_changes({"control.duration": 0.8}))
+    runs = labelled(["a", "b"], [recording, longer])
+    view = View(server, runs)
+    assert set(view.lists) == {"tpm", "hcod"}
+    view.requests.put("toggle")
+    view.step(0.3)
+    assert view.playback.t == pytest.approx(0.3)
+    view.requests.put("seek", 0.75)
+    view.requests.put("layout", "overlaid")
+    view.step(0.1)
+    assert view.playback.t == 0.75
+    assert "ended" in view.lists["tpm"]
+    assert "ended" not in view.lists["hcod"]
+    assert view.models["hcod"]._root.position.tolist() == [0.0] * 3
+
+
+def test_runs_of_the_same_resolver_are_told_apart_by_their_folders(recording):
+    from scenarios.viewer.view import labelled
+
+    assert list(labelled(["a", "b"], [recording, recording])) == ["tpm in a", "tpm in b"]
+
+
+def test_a_live_page_does_what_is_asked_for_and_says_what_it_refuses(server):
+    from scenarios.viewer.live_page import LivePage
+
+    page = LivePage(server, Live(LIMITED))
+    higher = page._middle + np.array([0.0, 0.02, 0.0])
+    for what, value in (("resolver", "hcod"), ("obstacle 0", np.array([0.1, 0.5, 0.2])),
+                        ("path", higher), ("pointing.alpha_d", 15.0)):
+        page.requests.put(what, value)
+    for _ in range(4):
+        page.step(0.03)
+    assert page.live.t == pytest.approx(0.12, abs=0.02)
+    assert ">hcod<" in page.list
+    assert page.live.scenario.position.offset == pytest.approx((0.0, 0.02, 0.0))
+    assert page.live.obstacles.offset[0, 2] > 0.05
+    assert page.refused == ""
+    page.panel.sliders["avoidance.near"].value = 0.3
+    page.requests.put("avoidance.near", 0.3)
+    page.step(0.03)
+    assert "near = 0.3 m is beyond far" in page.refused
+    assert page.panel.sliders["avoidance.near"].value == 0.05
+    page.requests.put("toggle")
+    page.step(0.03)
+    t = page.live.t
+    page.step(0.03)
+    assert page.live.t == t
+
+
+def test_a_live_page_at_its_end_begins_anew_when_it_is_played(server):
+    from scenarios.viewer.live_page import LivePage
+
+    page = LivePage(server, Live(load("ellipse", ["control.duration=0.05"])))
+    page.step(0.06)
+    assert page.live.over
+    assert "ended" in page.list
+    page.requests.put("toggle")
+    page.step(0.01)
+    assert not page.live.over
+
+
+@pytest.mark.parametrize("arguments", [
+    ["view", "nowhere", "--no-browser"], ["view", "nowhere", "--port", "70000"],
+    ["run", "ellipse", "--live", "--certify"], ["run", "ellipse", "--live", "--json"]])
+def test_a_wrong_command_line_is_told_before_anything_is_opened(arguments, capsys, tmp_path,
+                                                                monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert run_command(arguments) == 2
+    assert capsys.readouterr().err.startswith("hierarchy: error: ")
+
+
+def test_the_page_is_served_to_this_machine_alone(server):
+    assert server.get_host() == "127.0.0.1"
+
+
+def test_a_port_that_is_taken_is_told(server):
+    from scenarios.viewer.server import open_server
+
+    with pytest.raises(HierarchyError, match=r"--port \d+ cannot be used"):
+        open_server(server.get_port(), "second")
+
+
+# In a browser
+
+_SECONDS = 25.0
+_WINDOW = (900, 600)  # [px], since the browser renders without a GPU
+
+
+def until(done, step, what):
+    """Let a page step until something holds."""
+    end = time.monotonic() + _SECONDS
+    while not done():
+        assert time.monotonic() < end, f"{what}: not within {_SECONDS:g} s"
+        step(0.02)
+        time.sleep(0.02)
+
+
+def shown(browser, text):
+    return lambda: text in browser.run("document.body.innerText")
+
+
+def press(browser, text):
+    """Click on the smallest element that says this."""
+    x, y = browser.run(f"""(() => {{
+        const said = [...document.querySelectorAll('button, [role=option], span, div, input')]
+            .filter(one => (one.innerText || one.value || '').trim() === {text!r}
+                           && one.offsetParent !== null);
+        const box = said.at(-1).getBoundingClientRect();
+        return [box.x + box.width / 2, box.y + box.height / 2];
+    }})()""")
+    browser.mouse(("mousePressed", x, y), ("mouseReleased", x, y))
+
+
+def errors(browser):
+    """What the page complained of, but for a warning of viser's own."""
+    return [one for one in browser.complaints if "THREE.Clock" not in one]
+
+
+def test_in_a_browser_play_moves_the_arm(server, recording):
+    from scenarios.viewer.server import address
+    from scenarios.viewer.view import View
+
+    view = View(server, {"tpm": recording})
+    with chromium() as browser:
+        browser.look_at(address(server), *_WINDOW)
+        until(shown(browser, "Joint speeds"), view.step, "the curves are shown")
+        until(shown(browser, "active, met"), view.step, "the stack is shown")
+        before = browser.screenshot()
+        press(browser, "Play")
+        until(lambda: view.playback.t > 0.3, view.step, "time plays")
+        until(lambda: not view.playback.playing, view.step, "the run comes to its end")
+        until(lambda: browser.screenshot() != before, view.step, "the picture changes")
+        assert errors(browser) == []
+
+
+def test_in_a_browser_the_resolver_is_switched_in_mid_motion(server):
+    from scenarios.viewer.live_page import LivePage
+    from scenarios.viewer.server import address
+
+    page = LivePage(server, Live(load("ellipse-limits", ["control.duration=60.0"])))
+    with chromium() as browser:
+        browser.look_at(address(server), *_WINDOW)
+        until(shown(browser, "Restart"), page.step, "the panel is shown")
+        until(shown(browser, "joint limits"), page.step, "the stack is shown")
+        press(browser, "tpm")
+        until(shown(browser, "sns"), page.step, "the resolvers are shown")
+        t = page.live.t
+        press(browser, "hcod")
+        until(lambda: page.live.controller.resolver.name == "hcod", page.step, "it is switched")
+        until(lambda: "hcod t =" in browser.run("document.body.innerText").replace("\n", " "),
+              page.step, "the list says so")
+        assert page.live.t > t > 0.0
+        assert errors(browser) == []
+
+
+def test_a_run_is_shown_by_its_folder(tmp_path, recording, monkeypatch, capsys):
+    pytest.importorskip("viser", reason="needs the extra view")
+    from scenarios.viewer.view import View
+
+    def interrupt(view):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(View, "serve", interrupt)
+    save(recording, tmp_path / "a", figures=False)
+    assert run_command(["view", str(tmp_path / "a"), "--no-browser", "--port", "0"]) == 0
+    assert "Page: http://127.0.0.1:" in capsys.readouterr().out
