@@ -156,6 +156,18 @@ class Robot:
             robot.control_points = points_along_chain(found.model, robot.end_effector)
         return robot
 
+    @property
+    def frame_names(self) -> list[str]:
+        """Names of all frames, those of joints and links too."""
+        return [str(frame.name) for frame in self.model.frames]
+
+    @property
+    def velocity_names(self) -> list[str]:
+        """The joint of each velocity (n), by name, with a number where a joint has several."""
+        return [f"{name} {i + 1}" if joint.nv > 1 else name
+                for name, joint in zip(self.joint_names, list(self.model.joints)[1:], strict=True)
+                for i in range(joint.nv)]
+
     def joint(self, name: str) -> int:
         """Index of the joint called `name`, as used by frames and control points."""
         if name not in self.joint_names:
@@ -171,7 +183,7 @@ class Robot:
 
     def frame(self, name: str) -> Frame:
         """Find the frame called `name`; UnknownNameError if there is none."""
-        names = [frame.name for frame in self.model.frames]
+        names = self.frame_names
         if name not in names:
             raise UnknownNameError("frame", name, names)
         frame = self.model.frames[names.index(name)]

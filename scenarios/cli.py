@@ -263,10 +263,35 @@ def replay(folders: Annotated[list[Path], typer.Argument(
 
 
 @app.command()
-def check(file: Annotated[str, typer.Argument(help="A scenario file, or a scenario's name.",
+def figures(folder: Annotated[Path, typer.Argument(
+                metavar="RUN", help="Folder that `hierarchy run` or `compare` wrote.")],
+            style: Annotated[str, typer.Option(
+                "--style", metavar="STYLE",
+                help="screen: SVG and PNG. paper: PDF, one column of a journal wide.")] = "screen",
+            out: Annotated[Path | None, typer.Option(
+                "--out", metavar="FOLDER",
+                help="Where to write; new or empty. Default: the run's own folder.")] = None,
+            as_json: AsJson = False) -> None:
+    """Draw a run's figures anew, for the screen or for a paper."""
+    from scenarios.redraw import redraw
+
+    files = [shown(file) for file in redraw(folder, style, out)]
+    if as_json:
+        return print_json({"files": files})
+    print(*files, sep="\n")
+
+
+@app.command()
+def check(file: Annotated[str, typer.Argument(help="A scenario, or a robot: file or name.",
                                               autocompletion=completion.scenarios)],
           changes: Changes = None, as_json: AsJson = False) -> None:
-    """Read a scenario file and say what was understood."""
+    """Read a scenario file, or a robot's, and say what was understood."""
+    from scenarios import robot_check
+
+    if robot_check.is_robot(file):
+        found = robot_check.look_at(file, changes or [])
+        return print_json(robot_check.as_plain_data(*found)) if as_json else print(
+            robot_check.say(*found))
     scenario = _load(file, changes, None)
     if as_json:
         return print_json(scenario.model_dump(mode="json"))

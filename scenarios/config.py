@@ -762,6 +762,13 @@ def load(name_or_path: str | Path, changes: Sequence[str] | Mapping[str, Any] = 
     return _validated(data, str(path) if path.parent != LIBRARY else f"scenario {path.stem!r}")
 
 
+def changed(data: dict[str, Any], changes: Sequence[str]) -> dict[str, Any]:
+    """Apply "dotted.key=value" texts to `data`, which is changed, and return it."""
+    for key, value in _parse_changes(changes, what="--set").items():
+        _change(data, key, value)
+    return data
+
+
 def _read_extended(path: Path, below: tuple[Path, ...] = ()) -> dict[str, Any]:
     """Read a file and, under it, the shipped scenario or the file that its `extends` names."""
     data = _read(path)
