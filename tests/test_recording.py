@@ -54,7 +54,8 @@ def test_a_save_that_breaks_leaves_nothing_behind(tmp_path):
     def broken():
         raise KeyboardInterrupt
 
-    scenario = SimpleNamespace(pointing=None, to_toml=broken, control=SimpleNamespace(period=1.0))
+    scenario = SimpleNamespace(pointing=None, to_toml=broken, tasks=(),
+                               control=SimpleNamespace(period=1.0))
     with pytest.raises(KeyboardInterrupt):
         save(recording(scenario), tmp_path / "run", figures=False)
     assert list(tmp_path.iterdir()) == []
