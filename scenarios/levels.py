@@ -97,18 +97,15 @@ def fates(h: Hierarchy, x: Array, near: float) -> list[Fate]:
 
 
 def saturated(cell: Cell, h: Hierarchy, x: Array, near: float) -> NDArray[np.int8]:
-    """Side -1 or 1 of the cell's joint limits at which each entry of x (n,) is, else 0.
-
-    A floating base has no limits.
-    """
-    limits = cell.limits
+    """Side -1 or 1 of the cell's joint limits at which each entry of x (n,) is, else 0."""
+    sides, limits = np.zeros(len(x), np.int8), cell.limits
     if limits is None:
-        return np.zeros(len(x), np.int8)
+        return sides
     lower, upper = (limits.box(cell.state, cell.stack.level) if limits.name not in h.names
                     else list(h.levels())[h.names.index(limits.name)][1:])
-    side, moved = np.zeros(len(x), np.int8), x[-len(lower):]
-    side[-len(lower):] = np.int8(moved >= upper - near) - np.int8(moved <= lower + near)
-    return side
+    joints = slice(len(x) - len(lower), None)  # a floating base has no limits
+    sides[joints] = 1 * (x[joints] >= upper - near) - (x[joints] <= lower + near)
+    return sides
 
 
 def tolerance(accuracy: float, x: Array) -> float:

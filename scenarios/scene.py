@@ -14,6 +14,7 @@ from hierarchy import HierarchyError, Robot, State
 from hierarchy.avoidance import Capsule, ControlPoint, Obstacles
 from hierarchy.problem import Array
 from hierarchy.robots import TABLES, DHTable
+from scenarios import listed
 from scenarios.build import make_obstacles, make_robot, sensed_points
 from scenarios.levels import Fate, Levels, judge, order_names
 from scenarios.metrics import pointing_angle
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from scenarios.recording import Recording
 
 _STICK = 0.08  # radius of a link without capsules, relative to the robot's longest link
+_ERRORS = {"m": "positions", "deg": "directions", "rad": "postures"}
 _SEPARATION = "separation"  # the task that keeps all points off all obstacles
 _SYMBOLS = {r"$\epsilon_1$": "ε₁", r"$\epsilon_2$": "ε₂", r"$\epsilon_{ee}$": "ε_ee",
             r"$d_{min}$": "d_min"}
@@ -71,6 +73,15 @@ class Series:
 
 
 @dataclass(frozen=True)
+class Moved:
+    """Where the point was that a task moves (F, 3) [m], and where it was wanted, or None."""
+
+    task: str
+    actual: Array
+    wanted: Array | None
+
+
+@dataclass(frozen=True)
 class Scene:
     """What is drawn of a run, in F frames; J joints, P points, H obstacles. Metres, seconds.
 
@@ -87,6 +98,7 @@ class Scene:
     centres (F, H, 3) : of the obstacles; shape, size and rotation are in `stage.obstacles`.
     axis (F, 3) : the end effector's z axis. desired (F, 3) : its path, or None.
     order (F,) : index into `orders`, whose entries name tasks, most important first.
+    paths : of what the scenario's listed tasks move.
     levels : what became of each task, see scenarios.levels.
     series : curves. switches (S,) : when the order changed.
     """
@@ -104,6 +116,7 @@ class Scene:
     desired: Array | None
     order: NDArray[np.int64]
     orders: tuple[tuple[str, ...], ...]
+    paths: tuple[Moved, ...]
     levels: Levels
     series: tuple[Series, ...]
     switches: Array
@@ -155,7 +168,8 @@ def scene(recording: Recording, rate: float = 30.0) -> Scene:
                  desired=recording["desired_position"][ticks]
                  if "desired_position" in recording else None,
                  order=order[ticks], orders=order_names(recording),
-                 levels=levels, series=tuple(series(recording, ticks)),
+                 paths=tuple(_paths(recording, ticks)), levels=levels,
+                 series=tuple(series(recording, ticks)),
                  switches=recording["t"][recording.switches()])
 
 
@@ -253,6 +267,16 @@ def _active(recording: Recording, ticks: NDArray[np.int64], levels: Levels,
     return np.maximum(recording["active_control_point"][ticks].astype(np.int64) - 1, -1)
 
 
+def _paths(recording: Recording, ticks: NDArray[np.int64]) -> Iterator[Moved]:
+    for section in getattr(recording.scenario, "tasks", ()):
+        if listed.position_of(section.title) not in recording:
+            continue
+        actual = recording[listed.position_of(section.title)][ticks]
+        error = recording[listed.error_of(section.title)][ticks]
+        at_a_point = section.kind in ("position", "pose")
+        yield Moved(section.title, actual, actual + error[:, :3] if at_a_point else None)
+
+
 def _areas(thresholds: dict[str, float]) -> Areas:
     return tuple((_SYMBOLS.get(name, name.strip("$")), radius)
                  for name, radius in thresholds.items())
@@ -275,8 +299,21 @@ def series(recording: Recording, ticks: NDArray[np.int64]) -> Iterator[Series]:
                   else scenario.avoidance.tip_thresholds)
             yield _sampled(name, "m", (name.partition(" to ")[0].lower(),), recording[signal],
                            ticks, _areas(at))
+    yield from _task_errors(recording, ticks)
     joints = tuple(f"joint {j + 1}" for j in range(recording["v"].shape[1]))
     yield _sampled("Joint speeds", "rad/s", joints, recording["v"], ticks)
+
+
+def _task_errors(recording: Recording, ticks: NDArray[np.int64]) -> Iterator[Series]:
+    """Errors of listed tasks, one series for each unit."""
+    if not getattr(recording.scenario, "tasks", ()):
+        return
+    found: dict[str, dict[str, Array]] = {}
+    for section, unit, error in listed.errors(recording):
+        found.setdefault(unit, {})[section.title] = error
+    for unit, errors in found.items():
+        yield _sampled(f"Errors of tasks, {_ERRORS[unit]}", unit, tuple(errors),
+                       np.column_stack(list(errors.values())), ticks)
 
 
 def _sampled(name: str, unit: str, labels: tuple[str, ...], values: Array,

@@ -194,3 +194,22 @@ def test_a_floating_base_has_no_limits_to_be_at():
     levels = judge(recording, [0, 1, 2, 3])
     assert levels.saturated.shape == (4, recording["v"].shape[1])
     assert (levels.saturated[:, :6] == 0).all()
+
+
+def test_listed_tasks_have_their_paths_and_errors():
+    shown = scene(simulate(load("humanoid-reach", ["control.duration=0.4"])))
+    paths = {path.task: path for path in shown.paths}
+    assert {"left foot", "right hand", "centre of mass"} <= set(paths)
+    assert paths["centre of mass"].wanted is None
+    errors = next(one for one in shown.series if one.name == "Errors of tasks, positions")
+    hand = errors.value[:, errors.labels.index("right hand")]
+    missed = np.linalg.norm(paths["right hand"].wanted - paths["right hand"].actual, axis=1)
+    assert np.allclose(hand, missed)
+
+
+def test_the_limits_of_a_floating_robot_are_those_of_its_joints():
+    recording = simulate(load("humanoid-reach", ["control.duration=1.8"]))
+    levels = judge(recording, range(340, 360))
+    assert levels.known.all()
+    assert not levels.saturated[:, :6].any()
+    assert levels.saturated.any()

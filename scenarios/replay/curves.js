@@ -1,6 +1,6 @@
 // Curves over time, and what became of each task, under one cursor that can be put anywhere.
 
-const LEFT = 66, RIGHT = 8, TOP = 5, BELOW = 15, HEIGHT = 104, LANE = 15;
+const RIGHT = 8, TOP = 5, BELOW = 15, HEIGHT = 104, LANE = 15;
 const DAMPED = 4;  // a range this many times the usual one would flatten the others: it is cut
 
 function element(name, attributes = {}, ...children) {
@@ -21,11 +21,15 @@ function sample(run) {
                      ...dashed(run)}));
 }
 
+const KEY = [["met", "met", "met-soft"], ["not acting", "free", "free"],
+  ["given up, in part or whole", "missed", "missed-soft"],
+  ["in the stack, not judged", "unknown", "unknown"]];
+
 // What the colours of the lanes mean.
-function key() {
-  const fates = [["met-soft", "met"], ["free", "not acting"], ["missed-soft", "given up, in part or whole"]];
-  return element("span", {class: "key"}, ...fates.map(([name, text]) => element("span", {},
-    element("i", {style: `background: var(--${name})`}), text)));
+function key(present) {
+  return element("span", {class: "key"}, ...KEY.filter(([, fate]) => present.has(fate))
+    .map(([text, , colour]) => element("span", {},
+      element("i", {style: `background: var(--${colour})`}), text)));
 }
 
 class Curves {
@@ -37,7 +41,7 @@ class Curves {
     this.lay_out();
   }
 
-  x(t) { return LEFT + (this.width - LEFT - RIGHT) * t / this.end; }
+  x(t) { return this.left + (this.width - this.left - RIGHT) * t / this.end; }
 
   lay_out() {
     this.width = this.place.clientWidth;
@@ -45,7 +49,9 @@ class Curves {
     this.outputs = [];
     const shown = this.runs.filter(run => run.visible && run.frames > 1);
     const names = [...new Set(shown.flatMap(run => run.series.map(one => one.name)))];
-    this.place.replaceChildren(...(this.width > LEFT + RIGHT ?
+    this.left = Math.max(44, ...shown.flatMap(run => run.tasks).map(task => 5.6 * task.length + 10));
+    this.left = Math.min(this.left, this.width / 3);
+    this.place.replaceChildren(...(this.width > 100 ?
       [...shown.map((run, i) => this.lanes(run, shown.length > 1, i === 0)),
        ...names.map(name => this.plot(name, shown))] : []));
     if (this.now) this.follow(...this.now);
@@ -58,7 +64,7 @@ class Curves {
     this.cursors.push(cursor);
     const put = event => {
       const box = svg.getBoundingClientRect();
-      const share = (event.clientX - box.left - LEFT) / (box.width - LEFT - RIGHT);
+      const share = (event.clientX - box.left - this.left) / (box.width - this.left - RIGHT);
       this.seek(this.end * Math.min(Math.max(share, 0), 1));
     };
     svg.addEventListener("pointerdown", event => {
@@ -78,10 +84,10 @@ class Curves {
   // What became of each task of a run: a lane a task, with its place in the order.
   lanes(run, several, first) {
     const children = [], title = element("figcaption", {},
-      element("b", {}, several ? `The stack: ${run.label}` : "The stack"), ...(first ? [key()] : []));
+      element("b", {}, several ? `The stack: ${run.label}` : "The stack"), ...(first ? [key(this.present())] : []));
     run.tasks.forEach((task, n) => {
       const y = TOP + n * LANE;
-      children.push(element("text", {x: LEFT - 5, y: y + 10, "text-anchor": "end"}, task));
+      children.push(element("text", {x: this.left - 5, y: y + 10, "text-anchor": "end"}, task));
       for (const {from, to, fate, rank} of this.spans(run, n)) {
         const x = this.x(from), wide = Math.max(this.x(to) - x, 0.6);
         children.push(element("rect", {class: fate, x, y: y + 1, width: wide, height: LANE - 3}));
@@ -92,6 +98,13 @@ class Curves {
       }
     });
     return this.figure(title, TOP + run.tasks.length * LANE + BELOW, children);
+  }
+
+  // The fates that come up in the runs that are shown.
+  present() {
+    const values = new Set(this.runs.filter(run => run.visible)
+      .flatMap(run => [...new Set(run.fate.values)]));
+    return new Set(Object.keys(this.fates).filter(name => values.has(this.fates[name])));
   }
 
   spans(run, task) {
@@ -113,22 +126,22 @@ class Curves {
     const {one} = drawn[0], scale = new Scale(drawn, one), children = [];
     for (const value of scale.ticks()) {
       const y = scale.y(value);
-      children.push(element("line", {class: "grid", x1: LEFT, x2: this.width - RIGHT, y1: y, y2: y}),
-                    element("text", {x: LEFT - 5, y: y + 3, "text-anchor": "end"}, short(value)));
+      children.push(element("line", {class: "grid", x1: this.left, x2: this.width - RIGHT, y1: y, y2: y}),
+                    element("text", {x: this.left - 5, y: y + 3, "text-anchor": "end"}, short(value)));
     }
     for (const [symbol, value] of one.marks) {
       const y = scale.y(value);
       if (y < TOP || y > HEIGHT - BELOW) continue;
-      children.push(element("line", {class: "mark", x1: LEFT, x2: this.width - RIGHT, y1: y, y2: y}),
+      children.push(element("line", {class: "mark", x1: this.left, x2: this.width - RIGHT, y1: y, y2: y}),
                     element("text", {x: this.width - RIGHT, y: y - 2, "text-anchor": "end"}, symbol));
     }
     for (const channel of [...drawn].reverse()) {
       children.push(element("path", {class: "line", stroke: channel.colour,
                                      ...(channel.label ? {} : dashed(channel.run)), d: this.path(channel, scale)}));
     }
-    const output = element("output"), fastest = drawn.some(channel => channel.fastest);
+    const output = element("output"), largest = drawn.some(channel => channel.largest);
     this.outputs.push({output, drawn});
-    const heading = element("figcaption", {}, element("b", {}, fastest ? "Fastest joint" : name),
+    const heading = element("figcaption", {}, element("b", {}, largest ? `${name}, largest` : name),
                             element("small", {}, `[${one.unit}]`), output);
     return this.figure(heading, HEIGHT, children);
   }
@@ -147,7 +160,7 @@ class Curves {
       });
       const most = largest(values);
       return [{run, one, colour: run.colour, value: most, low: most, high: largest(low, high),
-               fastest: true}];
+               largest: true}];
     }
     const column = (all, c) => Float32Array.from({length: rows}, (_, f) => all[f * width + c]);
     return Array.from({length: width}, (_, c) => ({
@@ -175,9 +188,11 @@ class Curves {
     }
     if (!moved) return;
     for (const {output, drawn} of this.outputs) {
-      output.replaceChildren(...drawn.map(({run, value, colour, label}) => element("span",
-        {style: drawn.length > 1 ? `color: ${colour}` : "", title: label || run.label},
-        short(value[run.at(t).frame]))));
+      const now = ({run, value}) => value[run.at(t).frame];
+      const most = drawn.reduce((a, b) => Math.abs(now(b)) > Math.abs(now(a)) ? b : a);
+      output.replaceChildren(...(most.label ? [most] : drawn).map(channel => element("span",
+        {style: drawn.length > 1 ? `color: ${channel.colour}` : ""},
+        `${channel.label ? `${channel.label}: ` : ""}${short(now(channel))}`)));
     }
   }
 }
@@ -189,6 +204,10 @@ class Scale {
     const ranges = drawn.map(({low, high}) => [finite(low), finite(high)])
       .filter(([low]) => low.length).map(([low, high]) => [
         low.reduce((a, b) => Math.min(a, b)), high.reduce((a, b) => Math.max(a, b))]);
+    if (drawn[0].label) {  // of one run: nothing is cut
+      ranges.splice(0, ranges.length, [Math.min(...ranges.map(range => range[0])),
+                                       Math.max(...ranges.map(range => range[1]))]);
+    }
     const widths = ranges.map(([low, high]) => high - low).sort((a, b) => a - b);
     const usual = DAMPED * (widths[Math.floor((widths.length - 1) / 2)] || Infinity);
     const kept = ranges.filter(([low, high]) => this.logarithmic || high - low <= usual);

@@ -21,6 +21,8 @@ class Run {
     }
     this.series = data.series.map(one => ({...one, value: unpack(one.value), low: unpack(one.low),
                                            high: unpack(one.high)}));
+    this.paths = data.paths.map(({task, actual, wanted}) =>
+      ({task, actual: unpack(actual), wanted: wanted && unpack(wanted)}));
     this.frames = this.t.rows;
     this.end = this.t.values[this.frames - 1];
     this.visible = true;

@@ -67,6 +67,9 @@ def run_data(scene: Scene, about: dict[str, Any]) -> dict[str, Any]:
             "areas": fixed.areas, "floor": fixed.floor, "halfAngle": fixed.half_angle,
             "wanted": None if fixed.axis is None else fixed.axis.tolist(),
             "orders": scene.orders, "tasks": levels.names,
+            "paths": [{"task": path.task, "actual": packed(path.actual, steps=True),
+                       "wanted": None if path.wanted is None else packed(path.wanted, steps=True)}
+                      for path in scene.paths],
             "switches": packed(scene.switches),
             **{name: packed(values, steps=True) for name, values in places.items()},
             **{name: packed(values) for name, values in others.items()},

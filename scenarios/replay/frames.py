@@ -85,10 +85,12 @@ class Frames:
         scene, tip = self.scene, self.scene.traced[f]
         for line in self._grid:
             _polyline(draw, picture, line, (*_LINE, 255), 1)
-        if scene.desired is not None:
-            _polyline(draw, picture, scene.desired, (*_INK, 120), 1)
-        _polyline(draw, picture, scene.traced, (*self.colour, 70), 2)
-        _polyline(draw, picture, scene.traced[:f + 1], (*self.colour, 255), 3)
+        wanted = [scene.desired, *(path.wanted for path in scene.paths)]
+        for line in (path for path in wanted if path is not None):
+            _polyline(draw, picture, line, (*_INK, 120), 1)
+        for line in (scene.traced, *(path.actual for path in scene.paths)):
+            _polyline(draw, picture, line, (*self.colour, 70), 2)
+            _polyline(draw, picture, line[:f + 1], (*self.colour, 255), 3)
         if scene.stage.axis is not None:
             self._cone(draw, tip, scene.stage.axis, scene.stage.half_angle)
         _line(draw, self._pinhole, np.array([tip, tip + _CONE * scene.axis[f]]), self.colour, 3)
@@ -147,7 +149,8 @@ def _head(scene: Scene) -> int:
 def _camera(scene: Scene, size: int) -> Pinhole:
     """A camera that has all of the scene in its picture of size x size [px]."""
     links = scene.links.reshape(-1, 3)
-    known = np.vstack([links, scene.points.reshape(-1, 3), scene.centres.reshape(-1, 3)])
+    known = np.vstack([links, scene.points.reshape(-1, 3), scene.centres.reshape(-1, 3),
+                       *(path.wanted for path in scene.paths if path.wanted is not None)])
     low, high = known.min(axis=0) - 0.06, known.max(axis=0) + 0.06
     middle, reach = (low + high) / 2, float(np.linalg.norm(high - low)) / 2
     eye = middle + 0.9 * reach / np.sin(_FIELD / 2) * _DIRECTION / np.linalg.norm(_DIRECTION)

@@ -62,7 +62,7 @@ void main() {
 
 const SUN = unit([0.25, 0.35, 0.9]);
 const LIT = 0, BUBBLE = 1, FLAT = 2, SHADOW = 3;
-const QUARTER = 8;  // steps of a quarter circle
+const QUARTER = 14;  // steps of a quarter circle
 
 // Every octant of a sphere apart, so that moving them apart by `corner` rounds a box.
 function rounded_box() {

@@ -6,6 +6,7 @@ const SAYS = {met: "met", free: "not acting", unknown: "in the stack", absent: "
 class StackList {
   constructor(run, fates, several) {
     this.run = run;
+    this.unknown = fates.unknown;
     this.fates = Object.fromEntries(Object.entries(fates).map(([name, value]) => [value, name]));
     this.rows = run.tasks.map(task => {
       const parts = {rank: element("b"), said: element("em")};
@@ -20,12 +21,15 @@ class StackList {
     const head = element("h2", {}, ...(several ? [sample(run)] : []), run.label, element("small", {}, run.scenario));
     this.card = element("article", {class: "card"}, head, this.list, ...this.joint_row(),
                         this.near, this.note);
-    this.note.hidden = !run.fault;
+    const judged = !run.fate.values.includes(this.unknown);
+    this.doubt = judged ? [] : ["Not judged where the rows cannot be written again, as after a camera."];
+    this.note.hidden = judged && !run.fault;
+    this.note.append(...this.doubt);
     this.frame = -1;
   }
 
   joint_row() {
-    if (!this.run.limited) return [];
+    if (!this.run.limited || this.run.fate.values.includes(this.unknown)) return [];
     this.joints = Array.from({length: this.run.saturated.width}, (_, j) =>
       element("i", {}, `${j + 1}`));
     this.joints_say = element("span");
@@ -41,7 +45,7 @@ class StackList {
     this.limits(frame);
     this.distance(frame);
     if (this.run.fault) {
-      this.note.replaceChildren(element("b", {}, frame === this.run.frames - 1 ?
+      this.note.replaceChildren(...this.doubt, element("b", {}, frame === this.run.frames - 1 ?
         `stopped: ${this.run.fault}` : `will stop at ${this.run.end.toFixed(2)} s`));
     }
   }
@@ -66,7 +70,9 @@ class StackList {
   limits(frame) {
     if (!this.joints) return;
     const sides = this.run.row("saturated", frame);
+    const few = this.joints.length <= 12;
     this.joints.forEach((joint, j) => {
+      joint.hidden = !few && !sides[j];
       joint.className = sides[j] ? "at" : "";
       joint.textContent = `${j + 1}${sides[j] > 0 ? "↑" : sides[j] < 0 ? "↓" : ""}`;
     });

@@ -54,8 +54,10 @@ class Stage {
   prepare() {
     this.painter = new Painter(this.canvas);
     this.paths = new Map(this.runs.map(run => [run, {
-      traced: this.painter.segments(joined(run.points, run.points.width - 3)),
-      desired: run.desired && this.painter.segments(joined(run.desired, 0)),
+      traced: [[run.points, run.points.width - 3], ...run.paths.map(path => [path.actual, 0])]
+        .map(([points, first]) => this.painter.segments(joined(points, first))),
+      desired: [run.desired, ...run.paths.map(path => path.wanted)].filter(points => points)
+        .map(points => this.painter.segments(joined(points, 0))),
       cone: run.wanted && this.painter.mesh(cone(run.halfAngle))}]));
     this.grid = this.painter.segments(grid(this.camera, this.floor));
   }
@@ -98,7 +100,7 @@ class Stage {
       const stands = Math.abs(a[2] - run.floor) < 1e-6 && b[2] > a[2] + radius;
       if (stands) a[2] += radius;
       moment.arm.push(capsule(a, b, radius, [...tint, 1]), stands ?
-        plate(a, radius, run.floor, [...joint, 1]) : ball(a, 1.1 * radius, [...joint, 1]));
+        plate(a, radius, run.floor, [...joint, 1]) : ball(a, 1.085 * radius, [...joint, 1]));
     });
     this.obstacles(moment, colours);
     const active = run.active.values[at.frame];
@@ -127,9 +129,11 @@ class Stage {
 
   lines({run, at, tip, points, axis}, colours, ratio) {
     const painter = this.painter, {traced, desired} = this.paths.get(run), own = rgb(run.colour);
-    painter.line(traced, [...own, 0.22], 2 * ratio);
-    if (desired) painter.line(desired, [...colours.ink, 0.75], 1.2 * ratio, {dash: 0.02});
-    painter.line(traced, [...own, 1], 2.6 * ratio, {last: at.frame});
+    for (const path of traced) painter.line(path, [...own, 0.22], 2 * ratio);
+    for (const path of desired) {
+      painter.line(path, [...colours.ink, 0.75], 1.2 * ratio, {dash: 0.02});
+    }
+    for (const path of traced) painter.line(path, [...own, 1], 2.6 * ratio, {last: at.frame});
     const passing = (pairs, colour, width, options) =>
       painter.line(painter.segments(pairs, false), colour, width * ratio, options);
     passing([[tip, add(tip, scale(axis, AXIS_LENGTH))]], [...own, 1], 2.4);
@@ -156,13 +160,10 @@ function bounds(runs) {
     high[i] = Math.max(high[i], value + more);
   });
   for (const run of runs) {
-    const radius = Math.max(...run.radii, 0);
-    for (const name of ["links", "points", "desired"]) {
-      if (!run[name]) continue;
-      for (let k = 0; k < run[name].values.length / 3; k++) take(run[name].values, k, radius);
+    const radius = Math.max(...run.radii, 0), wanted = run.paths.map(path => path.wanted);
+    for (const all of [run.links, run.points, run.desired, run.centres, ...wanted]) {
+      for (let k = 0; all && k < all.values.length / 3; k++) take(all.values, k, radius);
     }
-    const centres = run.centres.values;
-    for (let k = 0; k < centres.length / 3; k++) take(centres, k, 0.05);
   }
   return [low, high];
 }
