@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -53,22 +53,28 @@ def write_all(recording: Recording, folder: Path) -> None:
 
     As SVG and PNG, or as the present style says, see `drawing.styled`.
     """
+    with drawing.styled(drawing.present()):
+        for name, fig in _all(recording):
+            drawing.write(fig, str(folder / name))
+
+
+def _all(recording: Recording) -> Iterator[tuple[str, Figure]]:
     for wanted in EXPERIMENT if recording.scenario.is_experiment else SIMULATION:
         panels = [p for p in map(PANEL.__getitem__, wanted.panels) if p.fits(recording)]
         if panels:
-            drawing.write(stacked(recording, panels, wanted.title), str(folder / wanted.name))
+            yield wanted.name, stacked(recording, panels, wanted.title)
     if "ee_position" in recording and recording.ticks > 1:
-        drawing.write(picture({label_of(recording): recording}), str(folder / "picture"))
+        yield "picture", picture({label_of(recording): recording})
     if recording.ticks > 1:
-        drawing.write(timeline(recording), str(folder / "stack"))
+        yield "stack", timeline(recording)
     seen = recording.scenario.is_experiment and recording.scenario.sensor.kind == "camera"
     if seen and np.isfinite(recording["ee_distance"]).any():
         from scenarios.depth_figure import depth_figure
 
         nearest = float(recording["t"][int(np.argmin(recording["ee_distance"]))])
-        drawing.write(depth_figure(recording, nearest), str(folder / "figure-8-depth-image"))
+        yield "figure-8-depth-image", depth_figure(recording, nearest)
     if "time_tick" in recording and recording.ticks > 1:
-        drawing.write(tick_times(recording), str(folder / "tick-times"))
+        yield "tick-times", tick_times(recording)
 
 
 def stacked(recording: Recording, panels: Sequence[Panel], title: str) -> Figure:
@@ -78,7 +84,7 @@ def stacked(recording: Recording, panels: Sequence[Panel], title: str) -> Figure
     colour = drawing.colours([label])[label]
     for ax, panel in zip(axes, panels, strict=True):
         panel.draw(ax, recording, colour)
-        ax.set_title(f"{panel.title} [{panel.unit}]")
+        ax.set_title(f"{panel.title} [{panel.unit}]", loc="left")
     if "joint-velocities" in [panel.name for panel in panels]:
         fig.legend(*axes[0].get_legend_handles_labels(), ncols=8 if drawing.present().titled else 4,
                    fontsize="small", frameon=False, loc="outside lower center", handlelength=1.8,
@@ -106,7 +112,7 @@ def tick_times(recording: Recording) -> Figure:
     ax.set_ylabel("ticks")
     run = f"{recording.scenario.name}, {label}: " if drawing.present().titled else ""
     ax.set_title(f"{run}{np.mean(times <= period):.2%} of {recording.ticks} ticks within the "
-                 "period")
+                 "period", loc="left")
     return fig
 
 

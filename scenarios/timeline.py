@@ -112,7 +112,7 @@ def _frame(ax: Axes, names: list[str], start: float, end: float) -> None:
 def _explain(fig: Figure, ax: Axes, colours: Mapping[str, str], changes: int) -> None:
     fig.legend(handles=[Patch(color=colour, label=task) for task, colour in colours.items()],
                loc="outside lower center", ncols=4, fontsize="small", handlelength=1.0)
-    ax.set_title(f"Place in the stack, {changes} change{'' if changes == 1 else 's'}")
+    ax.set_title(f"Place in the stack, {changes} change{'' if changes == 1 else 's'}", loc="left")
     ax.set_xlabel("time [s]")
 
 

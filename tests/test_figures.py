@@ -1,13 +1,26 @@
+import dataclasses
 import itertools
+import os
+import re
+import subprocess
+import sys
 
 import numpy as np
 import pytest
 from hand_made import recording
+from matplotlib.colors import to_hex
+from matplotlib.patches import Patch
 
 import solvers
+from hierarchy import HierarchyError
 from scenarios import drawing, figures, palette, panels
+from scenarios.config import load
 from scenarios.picture import picture
-from scenarios.report.figures import side_by_side
+from scenarios.recording import Event, save
+from scenarios.redraw import redraw
+from scenarios.report.figures import computing_time, overlay, side_by_side
+from scenarios.simulate import simulate
+from scenarios.timeline import timeline
 
 
 def beside(panel, recordings):
@@ -196,3 +209,97 @@ def test_an_inline_svg_follows_the_page_and_brings_no_ids_that_could_clash():
     assert drawing.INK not in text
     assert 'id="figure_1"' not in text
     assert "<metadata" not in text
+
+
+@pytest.fixture(scope="module")
+def run_folder(tmp_path_factory):
+    short = load("ellipse", ["control.duration=0.3"])
+    return save(simulate(short), tmp_path_factory.mktemp("runs") / "run", figures=False)
+
+
+@pytest.fixture(scope="module")
+def paper(run_folder):
+    return redraw(run_folder, "paper", run_folder.parent / "paper")
+
+
+def test_figures_for_a_paper_are_vectors_one_column_wide_with_their_fonts_inside(paper):
+    assert {file.suffix for file in paper} == {".pdf"}
+    assert {"figure-5-distances", "picture", "stack"} <= {file.stem for file in paper}
+    for file in paper:
+        content = file.read_bytes()
+        assert re.findall(rb"/MediaBox \[ *0 0 ([0-9.]+) ", content) == [b"252"]  # 3.5 inch
+        assert b"/Subtype /Image" not in content
+        assert b"/Subtype /Type3" not in content
+        assert b"/CreationDate" not in content
+        assert (b"/FontFile2" in content) is (file.stem != "picture")  # which has no letters
+
+
+def test_figures_for_a_paper_are_the_same_bytes_in_another_process(run_folder, paper, tmp_path):
+    subprocess.run([sys.executable, "-c", "import sys; from scenarios.redraw import redraw; "
+                    "redraw(sys.argv[1], 'paper', sys.argv[2])", run_folder, tmp_path / "there"],
+                   check=True, env={**os.environ, "PYTHONHASHSEED": "5"})
+    for file in paper:
+        assert file.read_bytes() == (tmp_path / "there" / file.name).read_bytes()
+
+
+def test_joints_of_a_paper_figure_are_told_apart_in_grey_too():
+    with drawing.styled(drawing.PAPER):
+        fig = beside(panels.PANEL["joint-velocities"], {"hqp": recording()})["hqp"]
+    assert len({line.get_linestyle() for line in fig.axes[0].lines}) >= 4
+    plain = beside(panels.PANEL["joint-velocities"], {"hqp": recording()})["hqp"]
+    assert {line.get_linestyle() for line in plain.axes[0].lines} == {"-"}
+
+
+def test_figures_drawn_anew_take_the_place_of_those_in_the_run_folder(run_folder, monkeypatch):
+    for text in ("old", "new"):
+        monkeypatch.setattr(figures, "write_all",
+                            lambda recording, folder, text=text: [
+                                (folder / name).write_text(text) for name in ("a.svg", "b.svg")])
+        assert redraw(run_folder) == [run_folder / "a.svg", run_folder / "b.svg"]
+    assert (run_folder / "b.svg").read_text() == "new"
+    assert (run_folder / "run.npz").exists()
+    assert not [path for path in run_folder.iterdir() if path.name.startswith(".")]
+
+
+def test_a_style_or_folder_that_is_not_there_is_an_error_that_names_it(run_folder, tmp_path):
+    with pytest.raises(HierarchyError, match="unknown style 'papr'; did you mean 'paper'"):
+        redraw(run_folder, "papr")
+    with pytest.raises(HierarchyError, match="nothing"):
+        redraw(tmp_path / "nothing")
+
+
+@pytest.mark.parametrize("label", ["tpm published", "recursive", "hqp osqp"])
+def test_a_resolver_has_its_colour_in_every_figure(label):
+    runs, wanted = {label: recording(), "hcod": recording()}, palette.colour(label)
+    looks = palette.looks(runs)
+    drawn = [side_by_side(panels.PANEL["body-distance"], runs, looks)[label].axes[0].lines,
+             overlay(panels.position_error, runs, looks).axes[0].lines,
+             picture(runs).axes[0].lines, computing_time(runs, looks).axes[0].patches]
+    for artists in drawn:
+        colours = [to_hex(one.get_facecolor() if isinstance(one, Patch) else one.get_color())
+                   for one in artists]
+        assert wanted in colours
+
+
+def test_the_stack_over_time_has_a_band_for_each_place_and_a_row_for_each_event():
+    run = dataclasses.replace(recording(orders=("a > b", "b"), order=[0, 0, 1, 1, 0]),
+                              fault="stopped", events=(Event(2, "overrun", "use"),))
+    (ax,) = timeline(run).axes
+    assert [text.get_text() for text in ax.get_yticklabels()] == ["1", "2", "overrun: use"]
+    assert ax.get_title(loc="left") == "Place in the stack, 2 changes"
+    assert "fault" in [text.get_text() for text in ax.texts]
+
+
+def test_stacks_beside_each_other_have_the_same_rows_and_time():
+    quiet, short = recording(), dataclasses.replace(
+        recording(t=[0.0, 1.0], orders=("a > b > c",)), events=(Event(1, "stale", "brake"),))
+    axes = [timeline(run, [quiet, short]).axes[0] for run in (quiet, short)]
+    rows = [[text.get_text() for text in ax.get_yticklabels()] for ax in axes]
+    assert rows[0] == rows[1] == ["1", "2", "3", "stale: brake"]
+    assert axes[0].get_xlim() == axes[1].get_xlim() == (0.0, 4.0)
+
+
+def test_a_stack_that_changes_at_every_tick_is_still_a_small_figure():
+    ticks = 20_000
+    run = recording(t=np.arange(ticks) * 1e-3, order=np.arange(ticks) % 2)
+    assert len(drawing.svg(timeline(run), "stack")) < 300_000

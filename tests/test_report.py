@@ -20,7 +20,6 @@ from scenarios.report.motions import motions
 from scenarios.report.verdict import verdict
 from scenarios.simulate import simulate
 
-
 SOFTLY = {"contact_depth": np.zeros(5), "contact_force": np.zeros(5)}
 
 
