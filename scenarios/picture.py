@@ -15,11 +15,14 @@ from scenarios.drawing import ALERT, INK, Array
 
 if TYPE_CHECKING:
     from hierarchy import Robot
+    from hierarchy.avoidance import Obstacle, Obstacles
     from scenarios.recording import Recording
 
 _VERTICES = 1200
 _OTHER_POSES = 5
 _AREA_ALPHAS = (0.08, 0.18)  # of the outer and the inner area
+_BALLS = 24  # that a capsule is drawn with
+_NEAR = 1.0  # [m] from the end effector: what moves farther away is left out
 
 
 def picture(recordings: Mapping[str, Recording], colours: Mapping[str, str] | None = None
@@ -56,27 +59,65 @@ def _line(ax: Axes, path: Array, **style: object) -> None:
 
 
 def _obstacles(ax: Axes, recording: Recording) -> None:
-    """Draw each obstacle that stands still as the ball around it, with its areas."""
+    """Draw each obstacle that stands still with its areas, and those that move if they are near."""
     avoidance = recording.scenario.avoidance
     if avoidance is None:
         return
-    for obstacle in avoidance.obstacles:
-        place = getattr(obstacle, "centre", obstacle)
-        if place is None:
+    areas = sorted(avoidance.thresholds.values(), reverse=True)
+    tick = _nearest(recording)
+    there, tip = _obstacles_at(recording, tick), recording["ee_position"][tick]
+    for obstacle, centre in zip(there.obstacles, there.centres, strict=True):
+        if obstacle.path is not None and np.linalg.norm(centre - tip) > _NEAR:
             continue
-        x, y = drawing.project(np.asarray(place, dtype=float))
-        size = getattr(obstacle, "radius", None) or 0.0
-        areas = sorted(avoidance.thresholds.values(), reverse=True)
-        for radius, alpha in zip((*areas, 0.0), (*_AREA_ALPHAS[-len(areas):], 1.0), strict=True):
-            ax.add_patch(Circle((x, y), size + radius, color=ALERT, alpha=alpha, linewidth=0))
-        ax.plot(x, y, "o", color=ALERT, markersize=5)
+        radius = obstacle.size[0] if obstacle.size and obstacle.shape != "box" else 0.0
+        for place in _along(obstacle, centre):
+            _ball(ax, place, radius, 1.0)
+        ax.plot(*drawing.project(centre), "o", color=ALERT, markersize=5)
+        if obstacle.path is None:
+            for area, alpha in zip(areas, _AREA_ALPHAS[-len(areas):], strict=True):
+                _ball(ax, centre, radius + area, alpha)
+
+
+def _ball(ax: Axes, centre: Array, radius: float, alpha: float) -> None:
+    x, y = drawing.project(centre)
+    ax.add_patch(Circle((x, y), radius, color=ALERT, alpha=alpha, linewidth=0))
+
+
+def _obstacles_at(recording: Recording, tick: int) -> Obstacles:
+    from scenarios.build import make_obstacles
+
+    avoidance = recording.scenario.avoidance
+    obstacles = make_obstacles(avoidance.placed if avoidance else ())
+    obstacles.at(float(recording["t"][tick]))
+    return obstacles
+
+
+def _along(obstacle: Obstacle, centre: Array) -> Array:
+    """Return places (P, 3) [m] such that balls around them make up a capsule; or the centre."""
+    if obstacle.shape != "capsule":
+        return centre[None]
+    axis = np.asarray(obstacle.rotation, dtype=float)[:, 2] * obstacle.size[1]
+    return np.asarray(centre + np.linspace(-1.0, 1.0, _BALLS)[:, None] * axis)
+
+
+def _nearest(recording: Recording) -> int:
+    """Return the tick in which the body is nearest to an obstacle, the last without any.
+
+    Of distances seen by a camera it is that of the end effector, as in figure 8: the body's are
+    often those to what an obstacle hides.
+    """
+    seen = "minimal_distance" if _exact(recording) else "ee_distance"
+    return int(np.argmin(recording[seen])) if seen in recording else recording.ticks - 1
+
+
+def _exact(recording: Recording) -> bool:
+    return recording.scenario.sensor.kind == "exact"
 
 
 def _arms(ax: Axes, robot: Robot, recording: Recording) -> None:
     from scenarios.scene import place
 
-    nearest = (int(np.argmin(recording["minimal_distance"]))
-               if "minimal_distance" in recording else recording.ticks - 1)
+    nearest = _nearest(recording)
     others = np.linspace(0, recording.ticks - 1, _OTHER_POSES).astype(int)
     for k, alpha in (*((int(k), 0.16) for k in others), (nearest, 0.9)):
         placements = robot.state(recording["q"][k]).placements
@@ -95,10 +136,8 @@ def _arms(ax: Axes, robot: Robot, recording: Recording) -> None:
 
 def _shortest(ax: Axes, recording: Recording, k: int, body: Array) -> None:
     """Link the control point that is nearest to an obstacle with it, as figure 3 does."""
-    avoidance = recording.scenario.avoidance
-    still = [getattr(o, "centre", o) for o in avoidance.obstacles] if avoidance else []
-    ends = np.array([place for place in still if place is not None], dtype=float)
-    if ends.size and "control_point_distance" in recording:
+    ends = _obstacles_at(recording, k).centres
+    if ends.size and "control_point_distance" in recording and _exact(recording):
         point = body[int(np.argmin(recording["control_point_distance"][k]))]
         end = ends[int(np.argmin(np.linalg.norm(ends - point, axis=1)))]
         ax.plot(*drawing.project(np.array([point, end])).T, color=ALERT, linewidth=1.2)
