@@ -104,7 +104,7 @@ def _source(model: str) -> str:
 
 def _joints(robot: Robot) -> list[dict[str, Any]]:
     """Joints with a motor: names, kinds and limits."""
-    lower, upper = robot.lower[robot.coordinates], robot.upper[robot.coordinates]
+    lower, upper = robot.position_limits()
     names = robot.velocity_names
     return [{"name": names[i], "lower": _or_none(lower[i]), "upper": _or_none(upper[i]),
              "velocity": _or_none(robot.velocity_limit[i]),

@@ -1,0 +1,421 @@
+"""Robots out of files that the tests write: what is read, what is proposed, what is missing."""
+
+import json
+import sys
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+from hierarchy import HierarchyError, Robot
+from hierarchy.avoidance.self_collision import pairs_of_tree
+from hierarchy.errors import RobotError, UnknownNameError
+from hierarchy.models.shapes import bounding_capsule
+from hierarchy.tasks import DangerBounds, JointLimits, Posture, TorqueLimits
+from scenarios.cli import run_command
+from scenarios.config import RobotSection
+from scenarios.making import make_robot, separable_pairs
+from scenarios.robot_check import look_at, paste
+
+ARM = """<robot name="arm">
+  <link name="base"><collision><geometry><box size="0.2 0.2 0.1"/></geometry></collision></link>
+  <link name="upper"><inertial><mass value="2"/><origin xyz="0 0 0.2"/>
+    <inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial>
+    <collision><origin xyz="0 0 0.2"/><geometry><cylinder radius="0.05" length="0.4"/></geometry>
+    </collision></link>
+  <link name="fore"><collision><origin xyz="0 0 0.15"/>
+    <geometry>{shape}</geometry></collision></link>
+  <link name="wrist"/><link name="tool0"/><link name="sensor"/>
+  <joint name="shoulder" type="{kind}"><parent link="base"/><child link="upper"/>
+    <origin xyz="0 0 0.1"/><axis xyz="0 1 0"/>{limit}</joint>
+  <joint name="elbow" type="{kind}"><parent link="upper"/><child link="fore"/>
+    <origin xyz="0 0 0.4"/><axis xyz="0 1 0"/>{limit}</joint>
+  <joint name="turn" type="{kind}"><parent link="fore"/><child link="wrist"/>
+    <origin xyz="0 0 0.3"/><axis xyz="0 0 1"/>{limit}</joint>
+  <joint name="flange" type="fixed"><parent link="wrist"/><child link="tool0"/>
+    <origin xyz="0 0 0.1"/></joint>
+  <joint name="mount" type="fixed"><parent link="base"/><child link="sensor"/></joint>
+</robot>"""
+LIMIT = '<limit lower="0.5" upper="2" velocity="3" effort="10"/>'
+SPHERE = '<sphere radius="0.04"/>'
+
+MJCF = """<mujoco><compiler angle="radian"/><asset><mesh name="shell" file="shell.stl"/></asset>
+<worldbody><body name="trunk">{joint}<inertial mass="3" pos="0 0 0" diaginertia="1 1 1"/>
+<geom type="box" size="0.1 0.2 0.3"/><body name="arm">
+<joint name="hinge" type="hinge" axis="0 1 0" range="-1 1"/>
+<geom type="capsule" size="0.05" fromto="0 0 0 0 0 -1"/>
+<geom name="shell" type="mesh" mesh="shell"/><site name="tip" pos="0 0 -1"/>
+</body></body></worldbody></mujoco>"""
+
+
+@pytest.fixture
+def arm(tmp_path):
+    def write(shape=SPHERE, limit=LIMIT, kind="revolute"):
+        path = tmp_path / "arm.urdf"
+        path.write_text(ARM.format(shape=shape, limit=limit, kind=kind))
+        return path
+    return write
+
+
+@pytest.fixture
+def body(tmp_path):
+    def write(joint="<freejoint/>"):
+        path = tmp_path / "body.xml"
+        path.write_text(MJCF.format(joint=joint))
+        return path
+    return write
+
+
+def write_mesh(path, corners):
+    """A tetrahedron as text of the STL format."""
+    faces = [(0, 1, 2), (0, 1, 3), (0, 2, 3), (1, 2, 3)]
+    lines = ["solid tetrahedron"]
+    for face in faces:
+        lines += ["facet normal 0 0 0", "outer loop",
+                  *(f"vertex {x} {y} {z}" for x, y, z in (corners[i] for i in face)),
+                  "endloop", "endfacet"]
+    path.write_text("\n".join([*lines, "endsolid"]))
+
+
+TETRAHEDRON = [(0.0, 0.0, 0.0), (0.05, 0.0, 0.0), (0.0, 0.05, 0.0), (0.0, 0.0, 0.3)]
+
+
+def holds(capsule, point):
+    start, way = np.array(capsule.start), np.subtract(capsule.end, capsule.start)
+    share = np.clip((point - start) @ way / max(way @ way, 1e-300), 0.0, 1.0)
+    return np.linalg.norm(point - start - share * way) <= capsule.radius + 1e-9
+
+
+def test_the_end_effector_proposed_is_the_frame_with_a_tools_name(arm):
+    assert Robot.from_file(arm()).end_effector == "tool0"
+    assert Robot.from_file(arm(), "fore").end_effector == "fore"
+
+
+def test_capsules_are_proposed_from_primitives(arm):
+    upper = Robot.from_file(arm()).capsules[1]
+    assert (upper.joint, upper.radius) == (1, 0.05)
+    np.testing.assert_allclose([upper.start, upper.end], [(0, 0, 0), (0, 0, 0.4)], atol=1e-12)
+    ball = Robot.from_file(arm()).capsules[2]
+    assert (ball.joint, ball.radius, ball.start) == (2, 0.04, (0.0, 0.0, 0.15))
+
+
+def test_the_capsule_of_a_box_holds_its_corners(arm):
+    base = Robot.from_file(arm()).capsules[0]
+    assert base.joint == 0
+    for corner in np.array(np.meshgrid(*[(-0.1, 0.1)] * 2, (-0.05, 0.05))).reshape(3, -1).T:
+        assert holds(base, corner)
+
+
+def test_the_capsule_of_a_mesh_holds_its_corners(arm, tmp_path):
+    write_mesh(tmp_path / "part.stl", TETRAHEDRON)
+    robot = Robot.from_file(arm('<mesh filename="part.stl"/>'))
+    assert robot.missing == ()
+    capsule = robot.capsules[2]
+    for corner in TETRAHEDRON:
+        assert holds(capsule, np.add(corner, (0, 0, 0.15)))
+    assert capsule.radius < 0.06, "along the mesh, not across it"
+
+
+def test_a_mesh_of_a_package_is_found_in_the_folders_above(arm, tmp_path):
+    (tmp_path / "parts" / "meshes").mkdir(parents=True)
+    write_mesh(tmp_path / "parts" / "meshes" / "part.stl", TETRAHEDRON)
+    robot = Robot.from_file(arm('<mesh filename="package://parts/meshes/part.stl"/>'))
+    assert robot.missing == ()
+    assert len(robot.capsules) == 3
+
+
+@pytest.mark.parametrize("name", ["part.stl", "package://some/part.stl"])
+def test_a_mesh_that_is_missing_is_said_and_not_fatal(arm, name):
+    robot = Robot.from_file(arm(f'<mesh filename="{name}"/>'))
+    assert robot.missing == (f"mesh {name!r} of link 'fore' is not there",)
+    assert [capsule.joint for capsule in robot.capsules] == [0, 1]
+
+
+def test_a_mesh_that_cannot_be_read_leaves_the_other_shapes(arm, tmp_path):
+    (tmp_path / "part.stl").write_text("no mesh")
+    robot = Robot.from_file(arm('<mesh filename="part.stl"/>'))
+    assert "meshes cannot be read" in robot.missing[0]
+    assert [capsule.joint for capsule in robot.capsules] == [0, 1]
+
+
+def test_an_mjcf_without_its_mesh_keeps_its_primitives(body):
+    robot = Robot.from_file(body())
+    assert robot.missing == ("mesh 'shell.stl' is not there",)
+    assert [capsule.radius for capsule in robot.capsules][1] == 0.05
+    assert len(robot.capsules) == 2
+
+
+def test_an_mjcf_with_its_mesh_has_a_capsule_for_it(body, tmp_path):
+    write_mesh(tmp_path / "shell.stl", TETRAHEDRON)
+    robot = Robot.from_file(body())
+    assert robot.missing == ()
+    assert len(robot.capsules) == 3
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_bounding_capsule_holds_all_points(seed):
+    rng = np.random.default_rng(seed)
+    points = rng.normal(size=(300, 3)) * rng.uniform(0.1, 1.0, 3)
+    start, end, radius = bounding_capsule(points)
+    way = end - start
+    share = np.clip((points - start) @ way / max(way @ way, 1e-300), 0.0, 1.0)
+    off = np.linalg.norm(points - start - share[:, None] * way, axis=1)
+    assert off.max() == pytest.approx(radius, abs=1e-9)
+
+
+def test_a_start_beyond_the_limits_is_put_midway(arm):
+    np.testing.assert_allclose(Robot.from_file(arm()).rest, [1.25, 1.25, 1.25])
+
+
+def test_a_file_without_limits_has_infinite_ones(arm):
+    robot = Robot.from_file(arm(limit="", kind="continuous"))
+    assert (robot.n, robot.nq) == (3, 6)
+    for limit in (*robot.position_limits(), robot.velocity_limit, robot.effort_limit):
+        assert np.isinf(limit).all()
+
+
+def test_control_points_are_spread_evenly_over_the_chain(arm):
+    robot = Robot.from_file(arm())
+    state, end = robot.state([0.7, 0.9, 0.6]), robot.frame("tool0")
+    places = [state._placement(p.joint)[1] + state._placement(p.joint)[0] @ p.offset
+              for p in robot.control_points]
+    places = np.array([*places, state.position(end)])
+    steps = np.linalg.norm(np.diff(places, axis=0), axis=1)
+    np.testing.assert_allclose(steps, steps[0])
+    assert len(robot.control_points) == 8
+    assert {p.joint for p in robot.control_points} == {3}, "from the third joint on"
+
+
+def test_a_base_floats_where_it_is_asked_to(arm, body):
+    assert Robot.from_file(arm()).base == "fixed"
+    floating = Robot.from_file(arm(), base="floating")
+    assert (floating.base, floating.n, floating.nq, floating.actuated) == ("floating", 9, 10, 6)
+    assert Robot.from_file(body()).base == "floating", "the file has a free joint"
+    fixed = Robot.from_file(body(), base="fixed")
+    assert (fixed.n, fixed.joint_names) == (1, ("hinge",))
+    assert fixed.capsules[0].joint == 0
+
+
+def test_a_floating_base_has_no_limits(body):
+    robot = Robot.from_file(body())
+    lower, upper = robot.position_limits()
+    assert np.isinf(lower[:6]).all()
+    assert np.isinf(upper[:6]).all()
+    np.testing.assert_allclose([lower[6], upper[6]], [-1, 1])
+
+
+def test_the_state_of_a_floating_base_has_exact_derivatives(arm):
+    robot, h = Robot.from_file(arm(), base="floating"), 1e-6
+    rng = np.random.default_rng(3)
+    q = robot.integrate(robot.rest, rng.normal(size=robot.n))
+    v, frame = rng.normal(size=robot.n), robot.frame("tool0")
+
+    def position(step):
+        return robot.state(robot.integrate(q, step)).position(frame)
+
+    state = robot.state(q, v)
+    columns = [(position(h * e) - position(-h * e)) / (2 * h) for e in np.eye(robot.n)]
+    from hierarchy.paths import Still
+    from hierarchy.tasks import Position
+    task = Position(frame, Still((0.0, 0.0, 0.0)))
+    J = task.jacobian(state)
+    np.testing.assert_allclose(J, np.transpose(columns), atol=1e-8)
+    later, before = (robot.state(robot.integrate(q, s * h * v), v) for s in (1, -1))
+    np.testing.assert_allclose(
+        task.jacobian_derivative(state),
+        (task.jacobian(later) - task.jacobian(before)) / (2 * h), atol=1e-8)
+
+
+def test_joint_limits_leave_the_base_alone(arm):
+    robot = Robot.from_file(arm(), base="floating")
+    task = JointLimits(robot, 5.0, 0.01)
+    state = robot.state(robot.rest)
+    assert task.dimension == 3
+    np.testing.assert_array_equal(task.jacobian(state), np.eye(9)[6:])
+    A, lower, upper = np.full((3, 9), 7.0), np.zeros(3), np.zeros(3)
+    task.write(state, "acceleration", A, lower, upper, 0)
+    np.testing.assert_array_equal(A, np.eye(9)[6:])
+    x = np.array([np.nan, 1e6, 0, 0, 0, 0, 1e6, np.nan, 0.0])
+    sent = task.clamp(state, "acceleration", x)
+    np.testing.assert_allclose(sent, [0, 1e6, 0, 0, 0, 0, 5, 0, 0])
+
+
+def test_what_cannot_be_said_of_a_floating_base_is_refused(arm):
+    robot = Robot.from_file(arm(), base="floating")
+    with pytest.raises(HierarchyError, match="contact forces"):
+        TorqueLimits(robot)
+    with pytest.raises(HierarchyError, match="floating base"):
+        DangerBounds(JointLimits(robot, 5.0, 0.01), robot.control_points)
+
+
+def test_a_posture_is_that_of_the_joints_behind_a_floating_base(arm):
+    robot = Robot.from_file(arm(), base="floating")
+    task, state = Posture((1.0, 1.0, 1.0)), robot.state(robot.rest)
+    np.testing.assert_allclose(task.error(state), [-0.25] * 3)
+    np.testing.assert_array_equal(task.jacobian(state), np.eye(9)[6:])
+    with pytest.raises(HierarchyError, match="2 targets for 3 joint positions"):
+        Posture((0.0, 0.0)).error(state)
+
+
+def test_locked_joints_are_no_joints(arm):
+    robot = Robot.load(str(arm()), locked={"elbow": 0.8})
+    assert robot.joint_names == ("shoulder", "turn")
+    free = Robot.load(str(arm()))
+    np.testing.assert_allclose(
+        robot.state([0.6, 0.7]).position(robot.frame("tool0")),
+        free.state([0.6, 0.8, 0.7]).position(free.frame("tool0")))
+    with pytest.raises(UnknownNameError, match="did you mean 'elbow'"):
+        Robot.load(str(arm()), locked={"elbo": 0.0})
+    with pytest.raises(RobotError, match="no joint can be locked"):
+        Robot.load("kuka_lwr", locked={"joint_1": 0.0})
+
+
+def test_a_section_lists_its_own_points_and_capsules(arm):
+    robot = make_robot(RobotSection.model_validate({
+        "model": str(arm()),
+        "control_points": [{"frame": "tool0", "offset": [0, 0, 0.1]}, {"joint": "elbow"}],
+        "capsules": [{"start": [0, 0, 0], "end": [0, 0, 0.1], "radius": 0.1},
+                     {"joint": "elbow", "start": [0, 0, 0], "end": [0, 0, 0.3], "radius": 0.05}]}))
+    assert [point.joint for point in robot.control_points] == [3, 2]
+    np.testing.assert_allclose(robot.control_points[0].offset, [0, 0, 0.2])
+    assert [capsule.joint for capsule in robot.capsules] == [0, 2]
+
+
+def test_neighbours_of_the_tree_are_not_kept_apart(arm):
+    robot = Robot.from_file(arm())
+    assert pairs_of_tree(robot.capsules, robot.parents) == [(0, 2)]
+    kuka = Robot.named("kuka_lwr")
+    assert separable_pairs(kuka) == [(0, 2)], "as in a chain"
+    humanoid = Robot.named("humanoid")
+    for i, j in separable_pairs(humanoid):
+        assert humanoid.capsules[i].joint != humanoid.parents[humanoid.capsules[j].joint]
+
+
+def test_check_says_what_was_found_and_gives_a_section_that_makes_the_same_robot(arm, capsys,
+                                                                                 tmp_path):
+    path = str(arm('<mesh filename="part.stl"/>'))
+    assert run_command(["check", path]) == 0
+    said = capsys.readouterr().out
+    for part in ("base            fixed, 3 velocities", "elbow", "0.5         2         3",
+                 "end effector    tool0, proposed; 3 joints move it",
+                 "capsules        2, proposed from the collision geometry",
+                 "missing         mesh 'part.stl' of link 'fore' is not there", "[robot]"):
+        assert part in said
+    import tomllib
+    section = tomllib.loads(said[said.index("[robot]"):])["robot"]
+    again, before = make_robot(RobotSection.model_validate(section)), Robot.load(path)
+    assert again.end_effector == before.end_effector
+    for one, other in zip(again.control_points, before.control_points, strict=True):
+        assert one.joint == other.joint
+        np.testing.assert_allclose(one.offset, other.offset, atol=1e-4)
+    assert [c.joint for c in again.capsules] == [c.joint for c in before.capsules]
+
+
+def test_check_says_which_limits_and_masses_there_are_not(arm, capsys):
+    assert run_command(["check", str(arm(limit="", kind="continuous"))]) == 0
+    said = capsys.readouterr().out
+    assert "missing         position limits of shoulder, elbow, turn" in said
+    assert "effort limits of shoulder" in said
+
+
+def test_check_of_a_robot_as_json(arm, capsys):
+    assert run_command(["check", str(arm()), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["base"] == "fixed"
+    assert [joint["name"] for joint in found["joints"]] == ["shoulder", "elbow", "turn"]
+
+
+def test_check_takes_changes_of_the_robot(arm):
+    section, robot = look_at(str(arm()), ["robot.base=floating", "robot.end_effector=fore"])
+    assert robot.base == "floating"
+    assert 'base = "floating"' in paste(section, robot)
+    with pytest.raises(HierarchyError, match=r"robot\.base"):
+        look_at(str(arm()), ["robot.base=flying"])
+    with pytest.raises(HierarchyError, match="only keys of robot"):
+        look_at(str(arm()), ["control.period=0.1"])
+
+
+@pytest.mark.parametrize("package", ["example_robot_data", "robot_descriptions"])
+def test_a_package_that_is_missing_is_named_with_its_extra(package, monkeypatch):
+    import hierarchy.models.names as names
+
+    def absent(name):
+        raise names.PackageNotFoundError(name)
+
+    monkeypatch.setattr(names, "distribution", absent)
+    monkeypatch.setitem(sys.modules, "robot_descriptions", None)
+    monkeypatch.setitem(sys.modules, "robot_descriptions._descriptions", None)
+    with pytest.raises(RobotError, match=r"pip install task-hierarchy\[robots\]"):
+        Robot.load(f"{package}:panda")
+
+
+def test_a_robot_of_robot_descriptions_is_read_from_where_it_was_downloaded(arm, monkeypatch):
+    index, module = ModuleType("_descriptions"), ModuleType("some_description")
+    index.DESCRIPTIONS = {"some_description": None}
+    module.URDF_PATH = str(arm())
+    package = ModuleType("robot_descriptions")
+    for name, value in [("robot_descriptions", package),
+                        ("robot_descriptions._descriptions", index),
+                        ("robot_descriptions.some_description", module)]:
+        monkeypatch.setitem(sys.modules, name, value)
+    robot = Robot.load("robot_descriptions:some")
+    assert (robot.name, robot.n) == ("some", 3)
+    with pytest.raises(UnknownNameError, match="did you mean 'some_description'"):
+        Robot.load("robot_descriptions:sum_description")
+
+
+def test_a_robot_that_cannot_be_downloaded_is_no_crash(monkeypatch):
+    index = ModuleType("_descriptions")
+    index.DESCRIPTIONS = {"some_description": None}
+    monkeypatch.setitem(sys.modules, "robot_descriptions", ModuleType("robot_descriptions"))
+    monkeypatch.setitem(sys.modules, "robot_descriptions._descriptions", index)
+    with pytest.raises(RobotError, match="could not be downloaded"):
+        Robot.load("robot_descriptions:some_description")
+
+
+@pytest.fixture
+def example_robot_data():
+    from importlib.metadata import PackageNotFoundError, distribution
+    try:
+        distribution("example-robot-data")
+    except PackageNotFoundError:
+        pytest.skip("example-robot-data is not installed")
+
+
+@pytest.mark.usefixtures("example_robot_data")
+@pytest.mark.parametrize(("name", "joints", "end"), [("panda", 9, "panda_hand_tcp"),
+                                                     ("xarm7", 7, "link_eef")])
+def test_arms_of_example_robot_data_are_read_with_their_meshes(name, joints, end):
+    robot = Robot.load(f"example_robot_data:{name}")
+    assert (robot.n, robot.end_effector, robot.missing) == (joints, end, ())
+    assert len(robot.capsules) >= 8
+    assert len(robot.control_points) == 8
+    assert np.isfinite([robot.lower, robot.upper]).all()
+
+
+@pytest.mark.usefixtures("example_robot_data")
+def test_an_unknown_name_comes_with_the_nearest():
+    with pytest.raises(UnknownNameError, match="did you mean 'panda'"):
+        Robot.load("example_robot_data:pandda")
+
+
+@pytest.mark.usefixtures("example_robot_data")
+@pytest.mark.parametrize("resolver", ["recursive", "hcod"])
+def test_strict_resolvers_move_the_panda_alike(resolver):
+    from scenarios import load, simulate
+
+    scenario = load("panda-ellipse", ["control.duration=0.5"])
+    one, other = simulate(scenario), simulate(scenario.with_resolver(resolver))
+    assert abs(one["q"] - other["q"]).max() < 1e-6
+
+
+@pytest.mark.usefixtures("example_robot_data")
+def test_the_panda_follows_its_ellipse_within_its_limits():
+    from scenarios import load, simulate
+
+    run = simulate(load("panda-ellipse"))
+    error = np.linalg.norm(run["position_error"], axis=1)
+    assert error[run["t"] > 2.0].max() < 1e-3
+    assert (run["q"] >= run["joint_lower"]).all()
+    assert (run["q"] <= run["joint_upper"]).all()
+    assert run["minimal_distance"].min() > 0.05
