@@ -67,8 +67,8 @@ class Loop:
         t [s] is the planned time of the tick since the loop began. Without `send`, `step` sends by
         itself. `record` is the size of the commands to keep in the log.
 
-        However the loop ends, `safe_stop` is called: once; a second time only if a command may have
-        been sent after the watchdog called it. An exception of any of the functions, and Ctrl-C,
+        However the loop ends, `safe_stop` is called: once; a second time if the watchdog called it
+        and a command may have been sent since. An exception of any of the functions, and Ctrl-C,
         goes on to the caller after that.
         """
         _require(0.0 < duration < np.inf, f"duration {duration} s must be positive and finite")
@@ -81,6 +81,7 @@ class Loop:
                 log.ended = self._run(step, safe_stop, send, ticks, dog)
             except BaseException as error:
                 log.ended = f"{type(error).__name__} after {log.count} ticks: {error}"
+                _stop_again(dog, safe_stop)
                 raise
             finally:
                 stop()
@@ -106,7 +107,7 @@ class Loop:
             end = self.clock()
             self.log.write(tick, begin - planned, end - begin, command)
             if dog.fired:
-                safe_stop()
+                _stop_again(dog, safe_stop)
                 return f"the watchdog fired in tick {tick}"
             dog.feed()
             late = end - (planned + self.period)
@@ -127,6 +128,13 @@ class Loop:
             self.sleep(left - self.spin)
         while self.clock() < until:
             pass
+
+
+def _stop_again(dog: Watchdog, safe_stop: Callable[[], object]) -> None:
+    """Stop what a command may have set going after the watchdog stopped it."""
+    if dog.fired:
+        dog.settle()
+        safe_stop()
 
 
 @contextmanager

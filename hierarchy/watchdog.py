@@ -17,7 +17,7 @@ class Watchdog:
                  clock: Callable[[], float] = time.monotonic) -> None:
         self.limit, self.fired = limit, False
         self.error: BaseException | None = None
-        self._stop, self._clock, self._over = stop, clock, Event()
+        self._stop, self._clock, self._over, self._stopped = stop, clock, Event(), Event()
         self._fed = clock()
         self._thread = Thread(target=self._watch, name="watchdog", daemon=True)
 
@@ -33,7 +33,12 @@ class Watchdog:
                 self._stop()
             except BaseException as error:
                 self.error = error
+            self._stopped.set()
         return self.fired
+
+    def settle(self) -> None:
+        """Wait until `stop` has returned, but no longer than the limit."""
+        self._stopped.wait(self.limit)
 
     def __enter__(self) -> Watchdog:
         self.feed()

@@ -215,6 +215,22 @@ def test_a_command_that_may_have_left_after_the_stop_is_stopped_again():
     assert (robot.stops, len(robot.sent)) == (2, 1)
 
 
+def test_a_send_that_fails_after_the_stop_is_stopped_again_and_goes_on():
+    stopped, robot = Event(), Robot()
+
+    def fails(command):
+        assert stopped.wait(30.0)
+        raise OSError("half sent")
+
+    def stop():
+        robot.stop()
+        stopped.set()
+
+    with pytest.raises(OSError, match="half sent"):
+        Loop(0.001, watchdog=0.01).run(robot.step, stop, 1.0, fails)
+    assert robot.stops == 2
+
+
 def test_a_safe_stop_that_fails_in_the_watchdog_is_reported():
     called = Event()
 
