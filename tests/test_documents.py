@@ -23,6 +23,9 @@ TEXTS = {str(path.relative_to(ROOT)): path.read_text(encoding="utf-8")
          for path in [ROOT / "README.md", ROOT / "CONTRIBUTING.md",
                       *sorted(path for path in (ROOT / "docs").rglob("*.md")
                               if "_build" not in path.parts)]}
+FENCE = re.compile(r"^(\s*)```(.*)$", re.MULTILINE)
+CHECKED = {"", "python", "toml", "sh", "console", "bash"}
+OF_THE_SITE = {"{toctree}", "{eval-rst}"}
 FOLLOWED = "docs/tutorial.md"  # whose commands are run, not only read
 COMMANDS = typer.main.get_command(app).commands
 
@@ -54,6 +57,13 @@ def _in_a_folder_of_its_own(tmp_path, monkeypatch):
     for registry, before in kept:
         registry.clear()
         registry.update(before)
+
+
+@pytest.mark.parametrize("name", TEXTS)
+def test_no_block_of_a_document_escapes_these_tests(name):
+    fences = FENCE.findall(TEXTS[name])
+    assert {language for _, language in fences} <= CHECKED | OF_THE_SITE
+    assert not any(indent.strip("\n") for indent, _ in fences)
 
 
 @pytest.mark.parametrize("name", having(lambda name: name != FOLLOWED and blocks(name, "python")))
