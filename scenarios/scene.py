@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from math import radians
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,21 +16,19 @@ from hierarchy.problem import Array
 from hierarchy.robots import TABLES, DHTable
 from scenarios import listed
 from scenarios.build import make_obstacles, make_robot, sensed_points
+from scenarios.curves import Areas, Series, marks_of, series
 from scenarios.levels import Fate, Levels, judge, order_names
-from scenarios.metrics import pointing_angle
+from scenarios.links import capsules, ends, lowest, place
 from scenarios.sensors import ExactDistances
 
 if TYPE_CHECKING:
     from scenarios.config import Scenario
     from scenarios.recording import Recording
 
-_STICK = 0.08  # radius of a link without capsules, relative to the robot's longest link
-_ERRORS = {"m": "positions", "deg": "directions", "rad": "postures"}
-_SEPARATION = "separation"  # the task that keeps all points off all obstacles
-_SYMBOLS = {r"$\epsilon_1$": "ε₁", r"$\epsilon_2$": "ε₂", r"$\epsilon_{ee}$": "ε_ee",
-            r"$d_{min}$": "d_min"}
+__all__ = ["Moved", "Scene", "Series", "Stage", "capsules", "ends", "place", "scene", "series",
+           "stage"]
 
-Areas = tuple[tuple[str, float], ...]
+_SEPARATION = "separation"  # the task that keeps all points off all obstacles
 
 
 @dataclass(frozen=True)
@@ -53,23 +51,12 @@ class Stage:
     half_angle: float
     floor: float
 
-
-@dataclass(frozen=True)
-class Series:
-    """A quantity over the frames: value, and its extremes since the frame before, (F, C) each.
-
-    A mark is a name and the value of a line to compare with. `logarithmic` says on which scale it
-    is best drawn.
-    """
-
-    name: str
-    unit: str
-    labels: tuple[str, ...]
-    value: Array
-    low: Array
-    high: Array
-    marks: Areas = ()
-    logarithmic: bool = False
+    @property
+    def azimuth(self) -> float:
+        """Where to look from [rad]: a robot that branches is looked at from before, along -x."""
+        parents = self.robot.parents[1:]
+        chain = self.robot.base == "fixed" and parents == tuple(range(len(parents)))
+        return radians(135.0 if chain else 40.0)
 
 
 @dataclass(frozen=True)
@@ -145,10 +132,10 @@ def stage(scenario: Scenario) -> Stage:
     axis = None if pointing is None else np.asarray(pointing.axis) / np.linalg.norm(pointing.axis)
     return Stage(robot, links, sensed_points(robot),
                  make_obstacles(avoidance.placed if avoidance else ()),
-                 _areas(avoidance.thresholds if avoidance else {}),
-                 _areas(avoidance.tip_thresholds if avoidance else {}),
+                 marks_of(avoidance.thresholds if avoidance else {}),
+                 marks_of(avoidance.tip_thresholds if avoidance else {}),
                  axis, radians(pointing.alpha_d) if pointing else 0.0,
-                 -foot if foot else _lowest(robot, links))
+                 -foot if foot else lowest(robot, links))
 
 
 def scene(recording: Recording, rate: float = 30.0) -> Scene:
@@ -171,51 +158,6 @@ def scene(recording: Recording, rate: float = 30.0) -> Scene:
                  paths=tuple(_paths(recording, ticks)), levels=levels,
                  series=tuple(series(recording, ticks)),
                  switches=recording["t"][recording.switches()])
-
-
-def capsules(robot: Robot, foot: float = 0.0) -> tuple[Capsule, ...]:
-    """Return a robot's links, sticks from joint to joint where it has no capsules.
-
-    With `foot` > 0 [m] the first is the column from there below the base up to it.
-    """
-    links = robot.capsules or _sticks(robot)
-    if foot == 0.0 or robot.base == "floating" or not links:
-        return links
-    return (Capsule("foot", 0, (0.0, 0.0, -foot), (0.0, 0.0, 0.0), links[0].radius), *links)
-
-
-def _sticks(robot: Robot) -> tuple[Capsule, ...]:
-    end = robot.frame(robot.end_effector)
-    sticks = [(body.name, body.parent, body.position) for body in robot.bodies()]
-    sticks = [stick for stick in (*sticks, (end.name, end.joint, end.offset))
-              if np.linalg.norm(stick[2]) > 0.0]
-    radius = _STICK * max((float(np.linalg.norm(stick[2])) for stick in sticks), default=0.0)
-    return tuple(Capsule(name, joint, (0.0, 0.0, 0.0), (float(x), float(y), float(z)), radius)
-                 for name, joint, (x, y, z) in sticks)
-
-
-def _lowest(robot: Robot, links: Sequence[Capsule]) -> float:
-    """Height [m] of what is lowest of a robot at rest, or of its base."""
-    low = ends(links, robot.state(robot.rest).placements)[..., 2].min(axis=-1, initial=0.0)
-    return float((low - [link.radius for link in links]).min(initial=0.0))
-
-
-def ends(links: Sequence[Capsule], placements: Array) -> Array:
-    """Return start and end of each capsule in the world: (..., C, 2, 3) [m].
-
-    placements (..., J + 1, 12), as in a State.
-    """
-    joints = np.array([link.joint for link in links], dtype=np.int64)
-    return np.stack([place(placements, joints, [getattr(link, side) for link in links])
-                     for side in ("start", "end")], axis=-2)
-
-
-def place(placements: Array, joints: Any, offsets: Any) -> Array:
-    """Return the world positions (..., K, 3) [m] of offsets (K, 3) in the frames of joints (K,)."""
-    rows = placements[..., np.asarray(joints, dtype=np.int64), :]
-    columns = rows[..., :9].reshape(*rows.shape[:-1], 3, 3)
-    turned = np.einsum("...kci,kc->...ki", columns, np.reshape(offsets, (-1, 3)))
-    return np.asarray(turned + rows[..., 9:])
 
 
 def _frames(recording: Recording, rate: float) -> NDArray[np.int64]:
@@ -275,51 +217,3 @@ def _paths(recording: Recording, ticks: NDArray[np.int64]) -> Iterator[Moved]:
         error = recording[listed.error_of(section.title)][ticks]
         at_a_point = section.kind in ("position", "pose")
         yield Moved(section.title, actual, actual + error[:, :3] if at_a_point else None)
-
-
-def _areas(thresholds: dict[str, float]) -> Areas:
-    return tuple((_SYMBOLS.get(name, name.strip("$")), radius)
-                 for name, radius in thresholds.items())
-
-
-def series(recording: Recording, ticks: NDArray[np.int64]) -> Iterator[Series]:
-    """Yield the curves that a recording has the signals for, at some ticks."""
-    scenario = recording.scenario
-    if "position_error" in recording:
-        error = 1e3 * np.linalg.norm(recording["position_error"], axis=1)
-        yield _sampled("Distance from the path", "mm", ("end effector",), error, ticks,
-                       logarithmic=True)
-    if "pointing_error" in recording and scenario.pointing is not None:
-        yield _sampled("Angle to the cone's axis", "deg", ("end effector",),
-                       pointing_angle(recording), ticks, (("α_d", scenario.pointing.alpha_d),))
-    for name, signal in (("Body to the nearest obstacle", "minimal_distance"),
-                         ("End effector to the nearest obstacle", "ee_distance")):
-        if signal in recording and scenario.avoidance is not None:
-            at = (scenario.avoidance.thresholds if signal == "minimal_distance"
-                  else scenario.avoidance.tip_thresholds)
-            yield _sampled(name, "m", (name.partition(" to ")[0].lower(),), recording[signal],
-                           ticks, _areas(at))
-    yield from _task_errors(recording, ticks)
-    joints = tuple(f"joint {j + 1}" for j in range(recording["v"].shape[1]))
-    yield _sampled("Joint speeds", "rad/s", joints, recording["v"], ticks)
-
-
-def _task_errors(recording: Recording, ticks: NDArray[np.int64]) -> Iterator[Series]:
-    """Errors of listed tasks, one series for each unit."""
-    if not getattr(recording.scenario, "tasks", ()):
-        return
-    found: dict[str, dict[str, Array]] = {}
-    for section, unit, error in listed.errors(recording):
-        found.setdefault(unit, {})[section.title] = error
-    for unit, errors in found.items():
-        yield _sampled(f"Errors of tasks, {_ERRORS[unit]}", unit, tuple(errors),
-                       np.column_stack(list(errors.values())), ticks)
-
-
-def _sampled(name: str, unit: str, labels: tuple[str, ...], values: Array,
-             ticks: NDArray[np.int64], marks: Areas = (), logarithmic: bool = False) -> Series:
-    values = values.reshape(len(values), -1)
-    first = np.concatenate(([0], ticks[:-1] + 1))  # so no peak between two frames is lost
-    upto = values[:ticks[-1] + 1]
-    return Series(name, unit, labels, values[ticks], np.fmin.reduceat(upto, first, axis=0),
-                  np.fmax.reduceat(upto, first, axis=0), marks, logarithmic)

@@ -23,6 +23,7 @@ class Run {
                                            high: unpack(one.high)}));
     this.paths = data.paths.map(({task, actual, wanted}) =>
       ({task, actual: unpack(actual), wanted: wanted && unpack(wanted)}));
+    this.surroundings = JSON.stringify([data.obstacles, data.areas, data.centres]);
     this.frames = this.t.rows;
     this.end = this.t.values[this.frames - 1];
     this.visible = true;

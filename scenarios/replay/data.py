@@ -64,7 +64,8 @@ def run_data(scene: Scene, about: dict[str, Any]) -> dict[str, Any]:
             "obstacles": [{"shape": obstacle.shape, "size": list(obstacle.size),
                            "rotation": np.asarray(obstacle.rotation, float).ravel().tolist()}
                           for obstacle in fixed.obstacles.obstacles],
-            "areas": fixed.areas, "floor": fixed.floor, "halfAngle": fixed.half_angle,
+            "areas": fixed.areas, "floor": fixed.floor, "azimuth": fixed.azimuth,
+            "halfAngle": fixed.half_angle,
             "wanted": None if fixed.axis is None else fixed.axis.tolist(),
             "orders": scene.orders, "tasks": levels.names,
             "paths": [{"task": path.task, "actual": packed(path.actual, steps=True),

@@ -2,39 +2,31 @@
 
 from __future__ import annotations
 
-import io
 import itertools
 from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
-import matplotlib
 import numpy as np
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
-from PIL import Image, ImageDraw, ImageFont
+from PIL import Image, ImageDraw
 
 from hierarchy.avoidance import Capsule, Obstacle, Obstacles
 from hierarchy.avoidance.obstacles import SHAPES
 from hierarchy.problem import Array
-from scenarios import drawing
-from scenarios.levels import Fate
+from scenarios.replay.beside import Beside
 from scenarios.replay.solid import Colour, Picture
-from scenarios.scene import Scene, Series
+from scenarios.scene import Scene
 from scenarios.sensors.camera import Pinhole, looking_at
 
 Frame = NDArray[np.uint8]
 
 SIZE = (1280, 720)  # [px], the picture in space as wide as high
 _FINER = 2          # pixels drawn for each one shown
-_DIRECTION = np.array([-0.65, 0.66, 0.39])  # from what is looked at to the eye
+_ELEVATION = 0.4    # [rad] of the eye above what is looked at
 _FIELD = 0.6        # [rad]
 _SKY, _INK, _QUIET, _LINE = (238, 241, 244), (26, 29, 33), (92, 101, 112), (200, 205, 211)
 _LINK, _JOINT, _ALERT = (219, 224, 230), (102, 112, 128), (211, 58, 44)
-_ROWS = {Fate.MET: ((207, 230, 218), "met"), Fate.FREE: ((227, 231, 236), "not acting"),
-         Fate.MISSED: ((243, 201, 139), "gives up {:.3g}"),
-         Fate.UNKNOWN: ((227, 231, 236), "in the stack")}
 _FOOT = "foot"  # the column's name in scene.capsules
 _DOT, _CELL, _CONE = 0.011, 0.25, 0.3  # [m]
 
@@ -44,13 +36,13 @@ class Frames:
 
     def __init__(self, scene: Scene, label: str, colour: str,
                  size: tuple[int, int] = SIZE) -> None:
-        self.scene, self.label, self.size = scene, label, size
+        self.scene, self.size = scene, size
         self.colour: Colour = tuple(bytes.fromhex(colour[1:]))  # type: ignore[assignment]
         self._pinhole, self._grid = _camera(scene, _FINER * size[1]), _grid(scene)
         self._links, self._plate = _standing(scene)
         self._joints = [Capsule(link.name, link.joint, link.start, link.start, 1.1 * link.radius)
                         for link in self._links if link.name != _FOOT]
-        self._curves, self._cursor = _curves(scene, colour, (size[0] - size[1], size[1]))
+        self._beside = Beside(scene, label, colour, (size[0] - size[1], size[1]))
         self._obstacles = Obstacles(scene.stage.obstacles.obstacles)
 
     def __len__(self) -> int:
@@ -64,7 +56,7 @@ class Frames:
         height = self.size[1]
         image = Image.new("RGB", self.size, "white")
         image.paste(self._space(f).resize((height, height), Image.Resampling.BOX), (0, 0))
-        image.paste(self._beside(f), (height, 0))
+        image.paste(self._beside.draw(f), (height, 0))
         return np.asarray(image)
 
     def _space(self, f: int) -> Image.Image:
@@ -113,38 +105,6 @@ class Frames:
         for a, b in itertools.pairwise(rim):
             draw.polygon([tuple(p[:2]) for p in (apex, a, b)], fill=(*self.colour, 60))
 
-    def _beside(self, f: int) -> Image.Image:
-        """The stack as a list, and the curves with the cursor."""
-        scene, image = self.scene, self._curves.copy()
-        draw, bold, plain = ImageDraw.Draw(image), _font("DejaVuSans-Bold"), _font("DejaVuSans")
-        draw.text((16, 10), self.label, _INK, bold)
-        draw.text((image.width - 16, 10), f"{scene.t[f]:.2f} s", _INK, plain, anchor="ra")
-        order = scene.orders[scene.order[f]]
-        for rank, task in enumerate(order):
-            n = scene.levels.names.index(task)
-            colour, says = _ROWS[Fate(int(scene.levels.fate[f, n]))]
-            y = 36 + 26 * rank
-            draw.rounded_rectangle((14, y, image.width - 14, y + 23), 5, colour)
-            draw.text((22, y + 3), f"{rank + 1}   {task}", _INK, plain)
-            draw.text((image.width - 22, y + 3), says.format(scene.levels.violation[f, n]), _INK,
-                      plain, anchor="ra")
-        x, tops = self._cursor(scene.t[f])
-        for top, bottom in tops:
-            draw.line((x, top, x, bottom), _INK, 1)
-        draw.text((16, _head(scene) - 22), _saturated(scene, f), _QUIET, plain)
-        return image
-
-
-def _saturated(scene: Scene, f: int) -> str:
-    joints = [f"{j + 1}{'+' if side > 0 else '-'}"
-              for j, side in enumerate(scene.levels.saturated[f]) if side]
-    return f"joints at a limit: {', '.join(joints)}" if joints else ""
-
-
-def _head(scene: Scene) -> int:
-    """Height [px] of what is above the curves."""
-    return 62 + 26 * max((len(order) for order in scene.orders), default=0)
-
 
 def _camera(scene: Scene, size: int) -> Pinhole:
     """A camera that has all of the scene in its picture of size x size [px]."""
@@ -153,7 +113,9 @@ def _camera(scene: Scene, size: int) -> Pinhole:
                        *(path.wanted for path in scene.paths if path.wanted is not None)])
     low, high = known.min(axis=0) - 0.06, known.max(axis=0) + 0.06
     middle, reach = (low + high) / 2, float(np.linalg.norm(high - low)) / 2
-    eye = middle + 0.9 * reach / np.sin(_FIELD / 2) * _DIRECTION / np.linalg.norm(_DIRECTION)
+    a, e = scene.stage.azimuth, _ELEVATION
+    away = np.array([np.cos(a) * np.cos(e), np.sin(a) * np.cos(e), np.sin(e)])
+    eye = middle + 0.9 * reach / np.sin(_FIELD / 2) * away
     focus = size / 2 / np.tan(_FIELD / 2)
     return Pinhole(size, size, focus, focus, position=eye, rotation=looking_at(eye, middle))
 
@@ -210,42 +172,3 @@ def _dot(draw: ImageDraw.ImageDraw, pinhole: Pinhole, point: Array, radius: floa
     u, v, depth = pinhole.project(point)
     r = pinhole.fx * radius / depth
     draw.ellipse((u - r, v - r, u + r, v + r), colour)
-
-
-def _curves(scene: Scene, colour: str, size: tuple[int, int]) -> tuple[Image.Image, Any]:
-    """The curves as an image, and a function of t [s] that says where the cursor is in it."""
-    head, dots = _head(scene), 100.0
-    with matplotlib.rc_context(drawing.style()):
-        fig = Figure(figsize=(size[0] / dots, (size[1] - head) / dots), dpi=dots,
-                     layout="constrained", facecolor="white")
-        axes = fig.subplots(len(scene.series), 1, sharex=True, squeeze=False)[:, 0]
-        for ax, series in zip(axes, scene.series, strict=True):
-            _curve(ax, scene.t, series, colour)
-        written = io.BytesIO()
-        fig.savefig(written, format="png", dpi=dots)
-    drawn = Image.open(written).convert("RGB")
-    image = Image.new("RGB", size, "white")
-    image.paste(drawn, (0, head))
-    bottom = head + drawn.height
-    spans = [(bottom - ax.bbox.y1, bottom - ax.bbox.y0) for ax in axes]
-    return image, lambda t: (float(axes[0].transData.transform((t, 1.0))[0]), spans)
-
-
-def _curve(ax: Any, t: Array, series: Series, colour: str) -> None:
-    for c in range(series.value.shape[1]):
-        one = colour if series.value.shape[1] == 1 else drawing.JOINTS[c % len(drawing.JOINTS)]
-        ax.fill_between(t, series.low[:, c], series.high[:, c], color=one, linewidth=0.6)
-        ax.plot(t, series.value[:, c], color=one, linewidth=0.9)
-    for symbol, value in series.marks:
-        ax.axhline(value, color=drawing.ALERT, linewidth=0.7, linestyle=(0, (4, 3)))
-        ax.annotate(symbol, (1.0, value), xycoords=("axes fraction", "data"), ha="right",
-                    va="bottom", fontsize=7)
-    if series.logarithmic:
-        ax.set_yscale("log", nonpositive="clip")
-    ax.set_title(f"{series.name} [{series.unit}]", fontsize=8, pad=2)
-    ax.tick_params(labelsize=7)
-    ax.set_xlim(t[0], max(t[-1], t[0] + 1e-9))
-
-
-def _font(name: str) -> Any:
-    return ImageFont.truetype(str(Path(matplotlib.get_data_path()) / f"fonts/ttf/{name}.ttf"), 14)

@@ -27,14 +27,15 @@ function axes_along(direction) {
 const FIELD = 0.6;  // rad, of view from top to bottom
 
 class Camera {
-  constructor(low, high) {
+  constructor(low, high, azimuth) {
+    this.from = azimuth;
     this.centre = scale(add(low, high), 0.5);
     this.reach = Math.hypot(...subtract(high, low)) / 2 || 1;
     this.reset();
   }
 
   reset() {
-    [this.azimuth, this.elevation, this.zoom] = [2.35, 0.4, 1];
+    [this.azimuth, this.elevation, this.zoom] = [this.from, 0.4, 1];
     this.target = this.centre.slice();
   }
 

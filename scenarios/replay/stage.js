@@ -46,7 +46,7 @@ class Stage {
   constructor(canvas, runs) {
     this.canvas = canvas;
     this.runs = runs;
-    this.camera = new Camera(...bounds(runs));
+    this.camera = new Camera(...bounds(runs), runs[0].azimuth);
     this.floor = Math.min(...runs.map(run => run.floor));
     this.prepare();
   }
@@ -73,7 +73,9 @@ class Stage {
   }
 
   picture(area, runs, t, colours) {
-    const painter = this.painter, moments = runs.map(run => this.moment(run, t, colours));
+    const painter = this.painter;
+    const moments = runs.map((run, i) => this.moment(run, t, colours,
+      runs.slice(0, i).every(other => other.surroundings !== run.surroundings)));
     const all = name => moments.flatMap(moment => moment[name]);
     const ratio = this.canvas.width / (this.canvas.clientWidth || 1);
     painter.look(area, this.camera, this.floor);
@@ -87,7 +89,7 @@ class Stage {
     painter.draw(all("dots"), LIT, {depth: false, write: false});
   }
 
-  moment(run, t, colours) {
+  moment(run, t, colours, surrounded) {
     const at = run.at(t), several = this.runs.filter(one => one.visible).length > 1;
     const links = run.between("links", at), points = run.between("points", at);
     const tint = several ? mixed(rgb(run.colour), [1, 1, 1], 0.1 + run.paler) : colours.link;
@@ -102,7 +104,7 @@ class Stage {
       moment.arm.push(capsule(a, b, radius, [...tint, 1]), stands ?
         plate(a, radius, run.floor, [...joint, 1]) : ball(a, 1.085 * radius, [...joint, 1]));
     });
-    this.obstacles(moment, colours);
+    if (surrounded) this.obstacles(moment, colours);
     const active = run.active.values[at.frame];
     for (let k = 0; k <= last; k++) {
       const colour = k === active ? colours.alert : k === last ? rgb(run.colour) : colours.ink;

@@ -1,0 +1,90 @@
+"""Curves of a run over the frames that are shown of it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hierarchy.problem import Array
+from scenarios import listed
+from scenarios.metrics import pointing_angle
+
+if TYPE_CHECKING:
+    from scenarios.recording import Recording
+
+_ERRORS = {"m": "positions", "deg": "directions", "rad": "postures"}
+_SYMBOLS = {r"$\epsilon_1$": "ε₁", r"$\epsilon_2$": "ε₂", r"$\epsilon_{ee}$": "ε_ee",
+            r"$d_{min}$": "d_min"}
+
+Areas = tuple[tuple[str, float], ...]
+
+
+@dataclass(frozen=True)
+class Series:
+    """A quantity over the frames: value, and its extremes since the frame before, (F, C) each.
+
+    A mark is a name and the value of a line to compare with. `logarithmic` says on which scale it
+    is best drawn.
+    """
+
+    name: str
+    unit: str
+    labels: tuple[str, ...]
+    value: Array
+    low: Array
+    high: Array
+    marks: Areas = ()
+    logarithmic: bool = False
+
+
+def marks_of(thresholds: dict[str, float]) -> Areas:
+    """Return thresholds by symbol as (symbol in plain text, value)."""
+    return tuple((_SYMBOLS.get(name, name.strip("$")), radius)
+                 for name, radius in thresholds.items())
+
+
+def series(recording: Recording, ticks: NDArray[np.int64]) -> Iterator[Series]:
+    """Yield the curves that a recording has the signals for, at some ticks."""
+    scenario = recording.scenario
+    if "position_error" in recording:
+        error = 1e3 * np.linalg.norm(recording["position_error"], axis=1)
+        yield _sampled("Distance from the path", "mm", ("end effector",), error, ticks,
+                       logarithmic=True)
+    if "pointing_error" in recording and scenario.pointing is not None:
+        yield _sampled("Angle to the cone's axis", "deg", ("end effector",),
+                       pointing_angle(recording), ticks, (("α_d", scenario.pointing.alpha_d),))
+    for name, signal in (("Body to the nearest obstacle", "minimal_distance"),
+                         ("End effector to the nearest obstacle", "ee_distance")):
+        if signal in recording and scenario.avoidance is not None:
+            at = (scenario.avoidance.thresholds if signal == "minimal_distance"
+                  else scenario.avoidance.tip_thresholds)
+            yield _sampled(name, "m", (name.partition(" to ")[0].lower(),), recording[signal],
+                           ticks, marks_of(at))
+    yield from _task_errors(recording, ticks)
+    joints = tuple(f"joint {j + 1}" for j in range(recording["v"].shape[1]))
+    yield _sampled("Joint speeds", "rad/s", joints, recording["v"], ticks)
+
+
+def _task_errors(recording: Recording, ticks: NDArray[np.int64]) -> Iterator[Series]:
+    """Errors of listed tasks, one series for each unit."""
+    if not getattr(recording.scenario, "tasks", ()):
+        return
+    found: dict[str, dict[str, Array]] = {}
+    for section, unit, error in listed.errors(recording):
+        found.setdefault(unit, {})[section.title] = error
+    for unit, errors in found.items():
+        yield _sampled(f"Errors of tasks, {_ERRORS[unit]}", unit, tuple(errors),
+                       np.column_stack(list(errors.values())), ticks)
+
+
+def _sampled(name: str, unit: str, labels: tuple[str, ...], values: Array,
+             ticks: NDArray[np.int64], marks: Areas = (), logarithmic: bool = False) -> Series:
+    values = values.reshape(len(values), -1)
+    first = np.concatenate(([0], ticks[:-1] + 1))  # so no peak between two frames is lost
+    upto = values[:ticks[-1] + 1]
+    return Series(name, unit, labels, values[ticks], np.fmin.reduceat(upto, first, axis=0),
+                  np.fmax.reduceat(upto, first, axis=0), marks, logarithmic)
