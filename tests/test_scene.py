@@ -182,6 +182,7 @@ def test_no_robot_at_rest_is_below_the_floor(name):
     fixed = stage(section)
     low = ends(fixed.capsules[1:], fixed.robot.state(fixed.robot.rest).placements)[..., 2].min()
     assert low >= fixed.floor
+    assert stage(load("humanoid")).floor == pytest.approx(0.0, abs=1e-6)  # it stands on it
 
 
 def test_the_arm_given_as_a_table_has_its_own_capsules():
