@@ -1,7 +1,9 @@
 """Docstrings are plain text; this makes reStructuredText of them, whatever characters they have.
 
-Known are paragraphs, lists with "- ", indented code, headings underlined with "---", and entries
-`name : text`, whose further lines may be indented. A name in backticks links to what it names.
+Known are paragraphs, lists with "- ", indented code, headings underlined with "---", whose text
+keeps its lines, and entries `name : text`, whose further lines may be indented. A name in backticks
+links to what it names. Sections of a scenario file are shown without a signature: what keys they
+have is on a page of its own.
 """
 
 import re
@@ -16,6 +18,8 @@ def setup(app):
     """Convert every docstring that autodoc hands over."""
     app.connect("autodoc-process-docstring", lambda app, what, name, obj, options, lines:
                 lines.__setitem__(slice(None), converted(lines)))
+    app.connect("autodoc-process-signature", lambda app, what, name, obj, *rest:
+                ("", None) if hasattr(obj, "model_fields") else None)
     return {"version": "1", "parallel_read_safe": True, "parallel_write_safe": True}
 
 
@@ -26,8 +30,10 @@ def converted(lines):
 
 
 def _block(lines):
-    if len(lines) > 1 and re.fullmatch(r"-{3,}", lines[1].strip()):
-        return [f"**{_marked(lines[0])}**", "", *(_block(lines[2:]) if lines[2:] else [])]
+    if len(lines) > 2 and re.fullmatch(r"-{3,}", lines[1].strip()):
+        below = lines[2:]
+        return [f"**{_marked(lines[0])}**", "", *(_block(below) if _ENTRY.fullmatch(below[0])
+                                                  else [f"| {_marked(line)}" for line in below])]
     if lines[0].startswith(" "):
         return ["::", "", *(f"    {line}" for line in lines)]
     if lines[0].startswith("- "):
