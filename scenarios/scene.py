@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 __all__ = ["Moved", "Scene", "Series", "Stage", "capsules", "ends", "place", "scene", "series",
            "stage"]
 
-_SEPARATION = "separation"  # the task that keeps all points off all obstacles
+SEPARATION = "separation"  # the task that keeps all points off all obstacles
 
 
 @dataclass(frozen=True)
@@ -200,8 +200,8 @@ def _moved(fixed: Stage, recording: Recording, ticks: NDArray[np.int64]) -> dict
 
 def _active(recording: Recording, ticks: NDArray[np.int64], levels: Levels,
             distance: Array) -> NDArray[np.int64]:
-    if _SEPARATION in levels.names:
-        fate = levels.fate[:, levels.names.index(_SEPARATION)]
+    if SEPARATION in levels.names:
+        fate = levels.fate[:, levels.names.index(SEPARATION)]
         acting = np.isin(fate, (Fate.UNKNOWN, Fate.MET, Fate.MISSED))
         return np.where(acting, distance.argmin(axis=1), -1)
     if "active_control_point" not in recording:

@@ -11,6 +11,7 @@ from hierarchy.problem import Array
 from scenarios.controller import Controller
 from scenarios.recording import Recording
 from scenarios.scene import Series, series
+from scenarios.viewer.moment import Watched
 
 
 class Lately:
@@ -23,10 +24,11 @@ class Lately:
         """Forget all."""
         self._kept.clear()
 
-    def add(self, controller: Controller) -> None:
-        """Note what a controller did in its last tick."""
-        cell = controller.cell
+    def add(self, watched: Watched) -> None:
+        """Note what a controller did in its last tick, after a look at the moment."""
+        controller, cell = watched.controller, watched.controller.cell
         now: dict[str, Any] = {"t": cell.state.t, "v": cell.state.v.copy()}
+        now |= {name: rows[0] for name, rows in watched.listed.items()}
         if cell.position is not None:
             now["position_error"] = (cell.position.target[0]
                                      - cell.state.position(cell.position.frame))

@@ -10,15 +10,16 @@ import numpy as np
 
 from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array
+from hierarchy.tasks import Pose, Position
 from scenarios.drawing import colours
-from scenarios.scene import stage
+from scenarios.scene import ends, stage
 from scenarios.viewer.curves import Lately
 from scenarios.viewer.live import Live
 from scenarios.viewer.live_panel import LivePanel, resolvers
 from scenarios.viewer.model import Model, Rgb, rgb
 from scenarios.viewer.moment import Moment, Watched
 from scenarios.viewer.playback import Requests
-from scenarios.viewer.server import lay_floor, look_at
+from scenarios.viewer.server import lay_floor, look_at_box
 from scenarios.viewer.stack_list import stack_html
 
 FRAMES = 30.0   # drawn a second
@@ -27,7 +28,7 @@ _LATELY = 10.0  # [s] that the curves show
 _TRACE = 600    # frames that the trace is long, points that the path has
 _BUSY = 0.05    # [s] of ticks between two drawings, at most
 _HAND = 1.0     # [m/s] at most, of a path that is dragged
-_REACH = 0.4    # [m] about the base that the camera sees at least
+_NEAR = 1.0     # [m] from the base: obstacles that the camera sees at first
 
 
 class LivePage:
@@ -47,12 +48,12 @@ class LivePage:
         self._due, self._curves_at = 0.0, -np.inf
         self._stage, self._watched = stage(live.scenario), Watched(live.controller)
         self._lately = Lately(int(_LATELY * FRAMES))
-        self._trace: deque[tuple[Array, Rgb]] = deque(maxlen=_TRACE)
+        self._trace: deque[tuple[list[Array], Rgb]] = deque(maxlen=_TRACE)
         self._middle, self._path_wanted = np.zeros(3), self._path_offset()
         lay_floor(server, self._stage.floor)
-        path = self._path()
-        self._model = Model(server, "/run", self._stage, self._colour, path)
-        self._place_camera(path)
+        paths = self._paths()
+        self._model = Model(server, "/run", self._stage, self._colour, paths)
+        self._place_camera(paths)
         self._first_tick()
         self.panel = LivePanel(
             server, self.requests, live.scenario, list(self.specs),
@@ -76,9 +77,9 @@ class LivePage:
     def draw(self) -> None:
         """Show the run as it is."""
         now = self._watched.moment()
-        points, shades = zip(*self._trace, strict=True)
+        tips, shades = zip(*self._trace, strict=True)
         with self.server.atomic():
-            self._model.show(now, np.array(points), np.array(shades))
+            self._model.show(now, list(np.swapaxes(tips, 0, 1)), np.array(shades))
             for h, centre in enumerate(now.centres):
                 self.panel.handles.follow(f"obstacle {h}", centre)
             self.panel.handles.follow("path", self._middle + self._path_offset())
@@ -103,8 +104,8 @@ class LivePage:
         self._note()
 
     def _note(self) -> None:
-        self._trace.append((self._watched.moment().points[-1], rgb(self._colour)))
-        self._lately.add(self.live.controller)
+        self._trace.append((self._watched.moment().tips, rgb(self._colour)))
+        self._lately.add(self._watched)
 
     def _do(self, what: str, value: Any) -> None:
         try:
@@ -163,7 +164,7 @@ class LivePage:
         if (before.areas, before.half_angle) != (self._stage.areas, self._stage.half_angle):
             self._model.set_stage(self._stage)
         self._model.paint(self._colour)
-        self._model.set_path(self._path())
+        self._model.set_paths(self._paths())
 
     def _refuse(self, why: str) -> None:
         """Say why something was not done, and put the inputs back to what is so."""
@@ -180,21 +181,22 @@ class LivePage:
         position = self.live.scenario.position
         return np.array(position.offset) if position else np.zeros(3)
 
-    def _path(self) -> Array | None:
-        """The desired path (N, 3) [m]; `_middle` becomes the middle of that without its offset."""
-        position = self.live.controller.cell.position
-        if position is None:
-            return None
+    def _paths(self) -> list[Array]:
+        """Desired paths (N, 3) [m]; the first, without its offset, is about `_middle`."""
+        cell = self.live.controller.cell
         times = np.linspace(0.0, self.live.scenario.control.duration, _TRACE)
-        path = np.array([position.path(t)[0] for t in times])
-        self._middle = (path.min(axis=0) + path.max(axis=0)) / 2 - self._path_offset()
-        return path
+        paths = [np.array([task.path(t)[0] for t in times])
+                 for task in (cell.position, *cell.listed) if isinstance(task, Position | Pose)]
+        if cell.position is not None:
+            self._middle = (paths[0].min(axis=0) + paths[0].max(axis=0)) / 2 - self._path_offset()
+        return paths
 
-    def _place_camera(self, path: Array | None) -> None:
-        about = [np.full(3, -_REACH), np.full(3, _REACH), *self._stage.obstacles.centres]
-        points = np.vstack([*about, *(path if path is not None else ())])
-        low, high = points.min(axis=0), points.max(axis=0)
-        look_at(self.server, (low + high) / 2, 0.42 * float(np.linalg.norm(high - low)))
+    def _place_camera(self, paths: list[Array]) -> None:
+        stage, placements = self._stage, self._watched.moment().placements
+        points = np.vstack([*paths, ends(stage.capsules, placements).reshape(-1, 3),
+                            *(place[None] for place in stage.obstacles.centres
+                              if np.linalg.norm(place) < _NEAR)])
+        look_at_box(self.server, points.min(axis=0), points.max(axis=0), stage.azimuth)
 
     def _show_list(self, now: Moment) -> None:
         live = self.live

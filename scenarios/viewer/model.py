@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,7 @@ from numpy.typing import NDArray
 
 from hierarchy.problem import Array
 from scenarios.drawing import ALERT, INK
-from scenarios.scene import Stage
+from scenarios.scene import Stage, ends, place
 from scenarios.viewer.meshes import Mesh, cone_mesh, hull_of_balls, obstacle_mesh
 from scenarios.viewer.moment import Moment
 
@@ -21,6 +22,7 @@ _TIP = 0.012            # [m] radius at the end effector
 _DOT = 0.012            # [m] radius of a control point
 _AXIS = 0.3             # [m] length of the cone
 _BAND = 0.002           # [m] by which control points stand out of the links
+_ON_AXIS = 0.3          # of a link's radius: how far off its axis a point may be to be on it
 _AXIS_WIDTH = 0.003     # [m]
 _AREA_OPACITIES = (0.20, 0.08)  # of the inner and the outer area
 _PATH_VERTICES = 400
@@ -39,11 +41,12 @@ class Model:
     """
 
     def __init__(self, server: Any, name: str, stage: Stage, colour: str,
-                 path: Array | None = None) -> None:
+                 paths: Sequence[Array] = ()) -> None:
         self._scene, self._name, self._stage = server.scene, name, stage
         self._colour = rgb(colour)
         self._root = self._frame("")
-        self._joints = [self._frame(f"/joint{j}") for j in range(stage.robot.n + 1)]
+        self._joints = [self._frame(f"/joint{j}")
+                        for j in range(len(stage.robot.joint_names) + 1)]
         self._solid = [*self._links(), *self._control_points()]
         self._obstacles = [self._frame(f"/obstacle{h}") for h in range(len(stage.obstacles))]
         self._draw_obstacles()
@@ -53,10 +56,11 @@ class Model:
         self._painted = [*(node for node in self._solid if tuple(node.color) == self._colour),
                          self._pointer()]
         self._active = self._ball("/active", 1.7 * _DOT, rgb(ALERT))
-        self._target = self._ball("/target", 1.3 * _DOT, rgb(INK))
-        self._path = self._lines("/path", _segments(path), rgb(INK), 1.5)
-        self._trace = self._lines("/trace", _segments(None), self._colour, 4.0)
-        self._link = self._lines("/link", _segments(None), rgb(ALERT), 3.0)
+        self._link = self._lines("/link", _segments(()), rgb(ALERT), 3.0)
+        self._paths: list[Any] = []
+        self._traces: list[Any] = []
+        self._goals: list[Any] = []
+        self.set_paths(paths)
 
     def set_stage(self, stage: Stage) -> None:
         """Draw areas and cone as they are now."""
@@ -89,32 +93,40 @@ class Model:
             for node in self._painted:
                 node.color = self._colour
 
-    def set_path(self, path: Array | None) -> None:
-        """Draw another desired path (N, 3) [m]."""
-        self._path.points = _segments(path)
+    def set_paths(self, paths: Sequence[Array]) -> None:
+        """Draw the desired paths, (N, 3) [m] each; always as many."""
+        for i, path in enumerate(paths):
+            if i == len(self._paths):
+                self._paths.append(self._lines(f"/path{i}", _segments(()), rgb(INK), 1.5))
+            self._paths[i].points = _segments(path)
 
-    def show(self, now: Moment, trace: Array, colours: NDArray[Any] | None = None) -> None:
-        """Bring everything to a moment; trace (N, 3) [m] is where the end effector was.
+    def show(self, now: Moment, traces: Sequence[Array],
+             colours: NDArray[Any] | None = None) -> None:
+        """Bring everything to a moment; traces (N, 3) [m] are where points were.
 
-        `colours` (N, 3) of it, from 0 to 255; that of the run if None.
+        `colours` (N, 3) of them, from 0 to 255; that of the run if None.
         """
         for frame, row in zip(self._joints, now.placements, strict=True):
             frame.wxyz, frame.position = _quaternion(row[:9].reshape(3, 3).T), row[9:]
         for frame, centre in zip(self._obstacles, now.centres, strict=True):
             frame.position = centre
-        self._trace.points = _segments(trace)
-        if colours is not None and len(trace) > 1:
-            kept = _linear(colours[_thinned(len(colours))])
-            self._trace.colors = np.stack([kept[:-1], kept[1:]], axis=1)
-        self._show_target(now)
+        self._show_traces(traces, colours)
+        for i, goal in enumerate(now.goals):
+            if i == len(self._goals):
+                self._goals.append(self._ball(f"/goal{i}", 1.3 * _DOT, rgb(INK)))
+            self._goals[i].position = goal
         self._show_nearest(now)
         if self._stage.axis is not None:
             self._show_cone(now, self._stage.axis)
 
-    def _show_target(self, now: Moment) -> None:
-        self._target.visible = now.desired is not None
-        if now.desired is not None:
-            self._target.position = now.desired
+    def _show_traces(self, traces: Sequence[Array], colours: NDArray[Any] | None) -> None:
+        for i, trace in enumerate(traces):
+            if i == len(self._traces):
+                self._traces.append(self._lines(f"/trace{i}", _segments(()), self._colour, 4.0))
+            self._traces[i].points = _segments(trace)
+            if colours is not None and len(trace) > 1:
+                kept = _linear(colours[_thinned(len(colours))])
+                self._traces[i].colors = np.stack([kept[:-1], kept[1:]], axis=1)
 
     def _show_nearest(self, now: Moment) -> None:
         self._active.visible = now.active >= 0
@@ -148,11 +160,10 @@ class Model:
         return drawn
 
     def _control_points(self) -> list[Any]:
-        """Bands about the links, whose axes the points are on."""
-        thickest = max((_SLIM * capsule.radius for capsule in self._stage.capsules), default=0.0)
-        return [self._ball(f"/joint{point.joint}/point{k}", max(thickest, _DOT) + _BAND, _DARK,
-                           position=point.offset)
-                for k, point in enumerate(self._stage.points[:-1])]
+        """Bands about links where points are on their axes, dots elsewhere."""
+        return [self._ball(f"/joint{point.joint}/point{k}", radius, _DARK, position=point.offset)
+                for k, (point, radius) in enumerate(zip(self._stage.points[:-1],
+                                                        _widths(self._stage), strict=False))]
 
     def _pointer(self) -> Any:
         """The end effector's z axis."""
@@ -188,12 +199,26 @@ class Model:
         return self._scene.add_mesh_simple(self._name + name, *mesh, color=colour, **look)
 
 
-def _segments(points: Array | None) -> Segments:
+def _segments(points: Array | tuple[()]) -> Segments:
     """The line through points (N, 3), thinned, as segments (M, 2, 3)."""
-    if points is None or len(points) < 2:
+    if len(points) < 2:
         return np.zeros((1, 2, 3), np.float32)
-    kept = points[_thinned(len(points))]
+    kept = np.asarray(points)[_thinned(len(points))]
     return np.stack([kept[:-1], kept[1:]], axis=1).astype(np.float32)
+
+
+def _widths(stage: Stage) -> Array:
+    """Radius [m] at which each of the stage's points can be seen, on whatever link it is."""
+    placements = stage.robot.state(stage.robot.rest).placements
+    points = place(placements, [point.joint for point in stage.points],
+                   [point.offset for point in stage.points])
+    radii = np.array([capsule.radius for capsule in stage.capsules])
+    start, end = np.moveaxis(ends(stage.capsules, placements), -2, 0)
+    along, from_start = end - start, points[:, None] - start
+    share = np.clip((from_start * along).sum(-1) / np.maximum((along * along).sum(-1), 1e-12), 0, 1)
+    off = np.linalg.norm(from_start - share[..., None] * along, axis=-1)  # (P, C)
+    on = np.where(off < _ON_AXIS * radii, _SLIM * radii + _BAND, _DOT)
+    return np.asarray(on.max(axis=1, initial=_DOT))
 
 
 def _thinned(count: int) -> NDArray[np.int64]:

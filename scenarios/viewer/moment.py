@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -13,8 +13,9 @@ from hierarchy import State
 from hierarchy.allocation import AVOIDANCE
 from hierarchy.avoidance import Obstacles
 from hierarchy.problem import Array
+from scenarios import listed
 from scenarios.levels import Fate, fates, saturated, tolerance
-from scenarios.scene import Scene
+from scenarios.scene import SEPARATION, Scene
 from scenarios.sensors import ExactDistances
 
 if TYPE_CHECKING:
@@ -36,7 +37,8 @@ class Moment:
     to link with point `linked`, or None; active, the point that the stack keeps away, or -1;
     centres (H, 3); axis (3,); desired (3,) or None; angle [rad] between the axis and that of the
     cone, or None. `order` names the tasks in the stack, most important first, `became` has each of
-    them; saturated (n,) says which side -1 or 1 of its limits each joint is at.
+    them; saturated (n,) says which side -1 or 1 of its limits each joint is at. `moved` has the
+    point that each listed task moves and where it is wanted, if it says so.
     """
 
     t: float
@@ -51,6 +53,18 @@ class Moment:
     order: tuple[str, ...]
     became: Mapping[str, Became]
     saturated: NDArray[np.int8]
+    moved: tuple[tuple[Array, Array | None], ...] = ()
+
+    @property
+    def goals(self) -> list[Array]:
+        """Where points are wanted now: (3,) [m] each."""
+        wanted = [self.desired, *(goal for _, goal in self.moved)]
+        return [goal for goal in wanted if goal is not None]
+
+    @property
+    def tips(self) -> list[Array]:
+        """What leaves a trace: the end effector, or the points that listed tasks move, (3,) [m]."""
+        return [place for place, _ in self.moved] or [self.points[-1]]
 
 
 def of_scene(scene: Scene, f: int) -> Moment:
@@ -63,18 +77,21 @@ def of_scene(scene: Scene, f: int) -> Moment:
         _where_finite(scene.nearest[f, linked]), linked, int(scene.active[f]), scene.centres[f],
         scene.axis[f], None if scene.desired is None else scene.desired[f], order,
         {name: Became(Fate(levels.fate[f, column]), float(levels.violation[f, column]))
-         for name, column in zip(order, columns, strict=True)}, levels.saturated[f])
+         for name, column in zip(order, columns, strict=True)}, levels.saturated[f],
+        tuple((path.actual[f], None if path.wanted is None else path.wanted[f])
+              for path in scene.paths))
 
 
 class Watched:
     """A controller that is at work, looked at between two ticks.
 
     Distances are measured once more, from known geometry and at the true joints, also where the
-    controller sees a camera's.
+    controller sees a camera's. After `moment`, `listed` has the signals of listed tasks, one row
+    each, see scenarios.listed.
     """
 
     def __init__(self, controller: Controller) -> None:
-        self.controller = controller
+        self.controller, self.listed = controller, dict[str, Array]()
         cell = controller.cell
         self._state, self._at_rest = State(cell.robot), np.zeros(cell.robot.n)
         obstacles = cell.sensor.obstacles if cell.sensor else Obstacles()
@@ -87,28 +104,40 @@ class Watched:
         q = cell.plant.extra.get("true_q", cell.state.q)
         self._state.move(cell.state.t, np.asarray(q), self._at_rest)
         self._exact.measure(self._state)
-        active, linked = self._active(), int(np.argmin(seen.distance))
-        linked = active if active >= 0 else linked
-        nearest = seen.points[linked] - seen.distance[linked] * seen.direction[linked]
         order = controller.allocation.order
+        became = self._became(order)
+        active, linked = self._active(became), int(np.argmin(seen.distance))
+        linked = active if active >= 0 else linked
+        D = seen.distance[linked]
+        nearest = seen.points[linked] - D * seen.direction[linked] if D < np.inf else None
         return Moment(
-            cell.state.t, self._state.placements.copy(), seen.points.copy(),
-            _where_finite(nearest), linked, active, self._exact.obstacles.centres.copy(),
-            self._state.rotation(self._tip)[:, 2],
-            cell.position.target[0].copy() if cell.position else None, order,
-            self._became(order), self._saturated())
+            cell.state.t, self._state.placements.copy(), seen.points.copy(), nearest, linked,
+            active, self._exact.obstacles.centres.copy(), self._state.rotation(self._tip)[:, 2],
+            cell.position.target[0].copy() if cell.position else None, order, became,
+            self._saturated(), tuple(self._moved()))
 
-    def _active(self) -> int:
-        """The point of an avoidance in the stack; of rows for all, the nearest that has some."""
-        controller, cell = self.controller, self.controller.cell
-        section = cell.scenario.avoidance
-        if section is None or cell.sensor is None:
+    def _active(self, became: Mapping[str, Became]) -> int:
+        """The point that is kept away, as `scenarios.scene.Scene` has it."""
+        cell = self.controller.cell
+        if cell.sensor is None:
             return -1
-        if section.kind == "separation":
-            distance = self._exact.measurement.distance
-            return int(distance.argmin()) if distance.min() < section.influence else -1
-        asked = AVOIDANCE in controller.allocation.order
-        return cell.sensor.measurement.active if asked else -1
+        if SEPARATION in became:
+            idle = became[SEPARATION].fate is Fate.FREE
+            return -1 if idle else int(self._exact.measurement.distance.argmin())
+        return cell.sensor.measurement.active if AVOIDANCE in became else -1
+
+    def _moved(self) -> Iterator[tuple[Array, Array | None]]:
+        state, cell = self._state, self.controller.cell
+        if not cell.listed:
+            return
+        self.listed = listed.signals(cell.robot, cell.listed, np.array([state.t]),
+                                     state.q[None], state.v[None])
+        for section in cell.scenario.tasks:
+            here = self.listed.get(listed.position_of(section.title))
+            if here is not None:
+                error = self.listed[listed.error_of(section.title)]
+                at_a_point = section.kind in ("position", "pose")
+                yield here[0], here[0] + error[0, :3] if at_a_point else None
 
     def _became(self, order: tuple[str, ...]) -> dict[str, Became]:
         controller = self.controller

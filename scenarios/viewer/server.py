@@ -15,7 +15,7 @@ from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array
 
 HOST = "127.0.0.1"
-_AZIMUTH, _ELEVATION = 150.0, 22.0  # [deg] from where the camera looks
+_ELEVATION = 22.0  # [deg] from where the camera looks
 _FIELD_OF_VIEW = 38.0  # [deg]
 _WIDTH = 330  # [px] of the panels
 
@@ -50,20 +50,22 @@ def announce(server: Any, browser: bool) -> None:
         webbrowser.open(address(server))
 
 
-def right() -> Array:
-    """The direction (3,) to the right as the camera sees it at first, level."""
-    a = radians(_AZIMUTH)
-    return np.array([-sin(a), cos(a), 0.0])
+def right(azimuth: float) -> Array:
+    """The direction (3,) to the right of a camera that looks from an azimuth [rad], level."""
+    return np.array([-sin(azimuth), cos(azimuth), 0.0])
 
 
-def look_at(server: Any, centre: Array, radius: float) -> None:
-    """Place the camera so that a ball of `radius` [m] about `centre` (3,) [m] fills the view."""
-    a, e = radians(_AZIMUTH), radians(_ELEVATION)
-    away = np.array([cos(e) * cos(a), cos(e) * sin(a), sin(e)])
-    camera = server.initial_camera
-    camera.fov = radians(_FIELD_OF_VIEW)
-    camera.position = centre + away * radius / sin(radians(_FIELD_OF_VIEW / 2))
-    camera.look_at = centre
+def look_at_box(server: Any, low: Array, high: Array, azimuth: float) -> None:
+    """Place the camera so that the box between two corners (3,) [m] fills the view.
+
+    It looks from an azimuth [rad].
+    """
+    e, half_field = radians(_ELEVATION), radians(_FIELD_OF_VIEW / 2)
+    away = np.array([cos(e) * cos(azimuth), cos(e) * sin(azimuth), sin(e)])
+    radius, camera = 0.5 * float(np.linalg.norm(high - low)), server.initial_camera
+    camera.fov = 2.0 * half_field
+    camera.position = (low + high) / 2 + away * radius / sin(half_field)
+    camera.look_at = (low + high) / 2
 
 
 def lay_out(server: Any) -> Any:

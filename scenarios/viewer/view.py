@@ -17,7 +17,7 @@ from scenarios.viewer.model import Model
 from scenarios.viewer.moment import of_scene
 from scenarios.viewer.playback import Playback, PlayButton, Requests, add_speed
 from scenarios.viewer.plots import Plots
-from scenarios.viewer.server import lay_floor, lay_out, look_at, right
+from scenarios.viewer.server import lay_floor, lay_out, look_at_box, right
 from scenarios.viewer.stack_list import stack_html
 
 FRAMES = 30.0  # a second
@@ -41,7 +41,7 @@ class View:
                                  float(max(one.t[-1] for one in self.scenes.values())))
         lay_floor(server, min(one.stage.floor for one in self.scenes.values()))
         self.models = {label: Model(server, f"/run{i}", one.stage, self.colours[label],
-                                    _once_around(one))
+                                    _paths(one))
                        for i, (label, one) in enumerate(self.scenes.items())}
         self._shown: dict[str, int] = {}
         self._cursor, self._cursor_at = np.nan, -np.inf
@@ -80,7 +80,8 @@ class View:
 
     def _draw_run(self, label: str, one: Scene, f: int) -> None:
         now = of_scene(one, f)
-        self.models[label].show(now, one.traced[:f + 1])
+        traces = [path.actual[:f + 1] for path in one.paths] or [one.traced[:f + 1]]
+        self.models[label].show(now, traces)
         note = "ended" if self.playback.t > one.t[-1] else ""
         html = stack_html(label, self.colours[label], now, one.levels.names, note)
         if html != self.lists.get(label):
@@ -127,13 +128,14 @@ class View:
         low, high = (np.array(side).min(axis=0) for side in ([b[0] for b in bounds],
                                                              [-b[1] for b in bounds]))
         high = -high
-        apart = right() * (0.9 * np.linalg.norm((high - low)[:2]))
+        azimuth = next(iter(self.scenes.values())).stage.azimuth
+        apart = right(azimuth) * (0.8 * np.linalg.norm((high - low)[:2]))
         for i, model in enumerate(self.models.values()):
             model.place(apart * i if side_by_side else np.zeros(3))
             model.fade(_SEE_THROUGH if i and not side_by_side else None)
-        span = (len(self.models) - 1) * apart * side_by_side
-        radius = 0.5 * float(np.linalg.norm(high - low)) + 0.32 * float(np.linalg.norm(span))
-        look_at(self.server, (low + high + span) / 2, 0.86 * radius)
+        last = (len(self.models) - 1) * apart * side_by_side
+        look_at_box(self.server, np.minimum(low, low + last), np.maximum(high, high + last),
+                    azimuth)
 
 
 def labelled(folders: Sequence[Path], recordings: Sequence[Recording]) -> dict[str, Recording]:
@@ -158,11 +160,14 @@ def _bounds(one: Scene) -> tuple[Array, Array]:
     return points.min(axis=0), points.max(axis=0)
 
 
-def _once_around(one: Scene) -> Array | None:
-    """The desired path until it comes back to its begin, if it does."""
-    path = one.desired
-    if path is None:
-        return None
+def _paths(one: Scene) -> list[Array]:
+    """What is wanted of points over the run: (N, 3) [m] each."""
+    wanted = [one.desired, *(path.wanted for path in one.paths)]
+    return [_once_around(path) for path in wanted if path is not None]
+
+
+def _once_around(path: Array) -> Array:
+    """The path until it comes back to its begin, if it does."""
     far = np.linalg.norm(path - path[0], axis=1)
     step = np.linalg.norm(np.diff(path, axis=0), axis=1).max(initial=0.0)
     left = int(np.argmax(far > 2.0 * step))
