@@ -314,6 +314,8 @@ def check(file: Annotated[str, typer.Argument(help="A scenario, or a robot: file
         print(f"  limits    positions and velocities of the robot, "
               f"{scenario.limits.acceleration} rad/s^2, "
               f"{'in the stack' if scenario.limits_in_stack else 'as a guard outside the stack'}")
+    for i, task in enumerate(scenario.tasks, 1):
+        print(f"  task {i:<4} {task.title}" + (f", {task.kind}" if task.name else ""))
     print("The file is right.")
 
 

@@ -50,8 +50,12 @@ class Faults:
         self._place_obstacles()
         if not any(self.now("stale")):
             q, v = self._plant.q.copy(), self._plant.v.copy()
-            _spoil(q, [fault.joint for fault in self.now("nan_position")])
-            _spoil(v, [fault.joint for fault in self.now("nan_velocity")])
+            base = self._robot.actuated
+            positions = self._robot.coordinates[base:] + 1
+            _spoil(q, [int(positions[fault.joint - 1]) if fault.joint else None
+                       for fault in self.now("nan_position")])
+            _spoil(v, [base + fault.joint if fault.joint else None
+                       for fault in self.now("nan_velocity")])
             self._last = q, v, t
         return self._last
 
@@ -138,8 +142,8 @@ def _with_room_for_obstacles(scenario: Scenario) -> Scenario:
 
 
 def _check(where: str, fault: FaultSection, robot: Robot) -> None:
-    points = len(robot.control_points) + 1
-    for key, value, most in (("joint", fault.joint, robot.n), ("point", fault.point, points)):
+    joints, points = robot.n - robot.actuated, len(robot.control_points) + 1
+    for key, value, most in (("joint", fault.joint, joints), ("point", fault.point, points)):
         if value is not None and value > most:
             raise ScenarioError(f"{where}.{key} = {value}: robot {robot.name!r} has {most}")
     if fault.place is not None:

@@ -12,15 +12,16 @@ from pydantic import ValidationError
 from hierarchy import Robot
 from hierarchy.models.names import file_of, in_package
 from hierarchy.robots import TABLES
-from scenarios.config import RobotSection, ScenarioError, changed
+from scenarios.config import RobotSection, ScenarioError, changed, shipped
 
 _FRAMES = 12   # named before "and so on"
 _ROUND = 4     # decimals of proposed places [m]
 
 
 def is_robot(text: str) -> bool:
-    """Whether the command line names a robot and not a scenario."""
-    return text in TABLES or in_package(text) or text.endswith((".urdf", ".xml", ".mjcf"))
+    """Whether the command line names a robot; what is a scenario's name too is a scenario."""
+    of_file = in_package(text) or text.endswith((".urdf", ".xml", ".mjcf"))
+    return of_file or (text in TABLES and text not in shipped())
 
 
 def look_at(model: str, changes: Sequence[str] = ()) -> tuple[RobotSection, Robot]:
