@@ -38,6 +38,7 @@ SIMULATION = (
                                                                   "body-distance")),
     LetterFigure("figure-7-pointing-error", "Figure 7", ("pointing-error",)),
     LetterFigure("position-error", "Position error", ("position-error",)),
+    LetterFigure("task-errors", "Errors of the tasks", ("task-errors", "task-angles")),
 )
 EXPERIMENT = (
     LetterFigure("figure-9-velocities-and-accelerations", "Figure 9",
@@ -85,10 +86,10 @@ def stacked(recording: Recording, panels: Sequence[Panel], title: str) -> Figure
     for ax, panel in zip(axes, panels, strict=True):
         panel.draw(ax, recording, colour)
         ax.set_title(f"{panel.title} [{panel.unit}]", loc="left")
-    if "joint-velocities" in [panel.name for panel in panels]:
-        fig.legend(*axes[0].get_legend_handles_labels(), ncols=8 if drawing.present().titled else 4,
-                   fontsize="small", frameon=False, loc="outside lower center", handlelength=1.8,
-                   columnspacing=1.0)
+    lines = axes[0].get_legend_handles_labels()
+    if lines[0]:
+        fig.legend(*lines, ncols=8 if drawing.present().titled else 4, fontsize="small",
+                   frameon=False, loc="outside lower center", handlelength=1.8, columnspacing=1.0)
     axes[-1].set_xlabel("time [s]")
     if drawing.present().titled:
         fig.suptitle(f"{title}: {recording.scenario.name}, {label}", x=0.01, ha="left",

@@ -73,8 +73,8 @@ def task_colours(names: Iterable[str]) -> dict[str, str]:
     """Return a light colour for each task: of its own, or the next of those that are left."""
     names = list(dict.fromkeys(names))
     others = [name for name in names if name not in _TASKS]
-    return {name: _TASKS.get(name) or _MORE_TASKS[others.index(name) % len(_MORE_TASKS)]
-            for name in names}
+    left = (*_MORE_TASKS, *(shade for name, shade in _TASKS.items() if name not in names))
+    return {name: _TASKS.get(name) or left[others.index(name) % len(left)] for name in names}
 
 
 def _resolver(label: str) -> str:

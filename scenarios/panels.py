@@ -12,6 +12,7 @@ from matplotlib.axes import Axes
 
 from scenarios import drawing
 from scenarios.drawing import ALERT, INK, Array
+from scenarios.listed import errors
 
 if TYPE_CHECKING:
     from scenarios.recording import Recording
@@ -21,7 +22,10 @@ Draw = Callable[[Axes, "Recording", str], None]
 
 @dataclass(frozen=True)
 class Panel:
-    """One quantity of a run over time: what it is, the signal it needs, how it is drawn."""
+    """One quantity of a run over time: what it is, the signal it needs, how it is drawn.
+
+    A `signal` that ends in "_" stands for all that begin with it.
+    """
 
     name: str
     title: str
@@ -32,7 +36,9 @@ class Panel:
 
     def fits(self, recording: Recording) -> bool:
         """Whether the recording has what this panel draws."""
-        return self.signal in recording and recording.ticks > 1
+        known = (any(name.startswith(self.signal) for name in recording.signals)
+                 if self.signal.endswith("_") else self.signal in recording)
+        return known and recording.ticks > 1
 
 
 def joint_velocities(ax: Axes, recording: Recording, colour: str) -> None:
@@ -99,6 +105,26 @@ def position_error(ax: Axes, recording: Recording, colour: str) -> None:
     ax.set_yscale("log")
 
 
+def task_errors(ax: Axes, recording: Recording, colour: str) -> None:
+    """Draw the errors of the listed tasks that are lengths [mm], on a logarithmic scale."""
+    _listed(ax, recording, "m", 1e3)
+
+
+def task_angles(ax: Axes, recording: Recording, colour: str) -> None:
+    """Draw the errors of the listed tasks that are angles of a body [deg], logarithmic."""
+    _listed(ax, recording, "deg", 1.0)
+
+
+def _listed(ax: Axes, recording: Recording, unit: str, scale: float) -> None:
+    titles = [section.title for section in recording.scenario.tasks]
+    for section, of, error in errors(recording):
+        if of == unit:
+            drawing.curve(ax, recording["t"], np.maximum(scale * error, 1e-6),
+                          **drawing.joint_line(titles.index(section.title)), linewidth=0.9,
+                          label=section.title)
+    ax.set_yscale("log")
+
+
 PANELS = (
     Panel("joint-velocities", "Joint velocities", "rad/s", "v", joint_velocities,
           "Figure 4: continuous at acceleration level, with jumps at velocity level."),
@@ -115,7 +141,13 @@ PANELS = (
     Panel("pointing-error", "Pointing error", "cos α_d − cos α", "pointing_error", pointing_error,
           "Figure 7: above zero the axis is outside the cone; red while the task is in the stack."),
 )
-PANEL = {panel.name: panel for panel in PANELS}
+TASK_PANELS = (
+    Panel("task-errors", "Errors of the tasks, lengths", "mm, logarithmic", "task_error_",
+          task_errors, "Each task's own error, whatever its place in the stack."),
+    Panel("task-angles", "Errors of the tasks, angles", "°, logarithmic", "task_error_",
+          task_angles),
+)
+PANEL = {panel.name: panel for panel in (*PANELS, *TASK_PANELS)}
 
 
 def _in_red(ax: Axes, t: Array, y: Array, mask: Array) -> None:

@@ -4,10 +4,11 @@ import os
 import re
 import subprocess
 import sys
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from hand_made import recording
+from hand_made import HandMadeScenario, recording
 from matplotlib.colors import to_hex
 from matplotlib.patches import Patch
 
@@ -159,6 +160,16 @@ def test_a_panel_without_its_signal_is_left_out_and_not_drawn_empty(panel):
     assert beside(panel, {"hqp": run}) == {}
 
 
+def test_the_errors_of_listed_tasks_are_drawn_with_a_line_for_each():
+    asked = HandMadeScenario(tasks=(SimpleNamespace(title="left foot", kind="position"),
+                                    SimpleNamespace(title="right foot", kind="position")))
+    run = recording(asked, task_error_left_foot=np.ones((5, 3)),
+                    task_error_right_foot=np.full((5, 3), 1e-3))
+    (ax,) = beside(panels.PANEL["task-errors"], {"hqp": run})["hqp"].axes
+    assert [line.get_label() for line in ax.lines] == ["left foot", "right foot"]
+    np.testing.assert_allclose(ax.lines[1].get_ydata(), np.sqrt(3.0))  # [mm]
+
+
 def test_a_run_far_beyond_the_others_is_cut_and_says_so():
     quiet = recording(v=np.eye(5, 7))
     wild = recording(v=1000.0 * np.eye(5, 7))
@@ -180,7 +191,7 @@ def test_the_stretches_in_which_a_task_is_active_are_red():
 def test_all_figures_of_a_run_are_written_as_svg_and_png(tmp_path):
     figures.write_all(recording(), tmp_path)
     stems = {path.stem for path in tmp_path.iterdir()}
-    letter = {figure.name for figure in figures.SIMULATION}
+    letter = {figure.name for figure in figures.SIMULATION} - {"task-errors"}  # it lists none
     assert stems == letter | {"picture", "stack", "tick-times"}
     assert len(list(tmp_path.iterdir())) == 2 * len(stems)
 

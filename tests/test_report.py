@@ -4,6 +4,7 @@ import itertools
 import re
 import shlex
 from html.parser import HTMLParser
+from types import SimpleNamespace
 
 import hand_made
 import numpy as np
@@ -85,6 +86,15 @@ def test_the_verdict_says_who_tracked_best():
     runs = [made("tpm"), made("recursive"), made("augmented", position_error=off)]
     assert ("all but augmented tracked best (median path error 0 mm, augmented 2 mm)"
             in verdict(runs))
+
+
+def test_the_verdict_says_who_served_the_scenarios_own_tasks_best():
+    asked = HandMadeScenario(tasks=(SimpleNamespace(title="left foot", kind="position"),
+                                    SimpleNamespace(title="gaze", kind="position")))
+    runs = [made(spec, scenario=asked, task_error_left_foot=np.full((5, 1), error),
+                 task_error_gaze=np.ones((5, 1)))
+            for spec, error in (("recursive", 1e-3), ("augmented", 5e-3))]
+    assert "recursive served left foot best (rms error 1 mm, augmented 5 mm)" in verdict(runs)
 
 
 def test_the_verdict_finds_no_winner_where_all_agree():

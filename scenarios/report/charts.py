@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from html import escape
 from typing import TYPE_CHECKING
 
-from scenarios import panels
+from scenarios import drawing, panels
 from scenarios.palette import Look, task_colours
 from scenarios.report import figures
 from scenarios.report.motions import ALIKE, Motion, motions
@@ -21,7 +21,8 @@ if TYPE_CHECKING:
 
 def same_motion(found: Sequence[Motion]) -> str:
     """Say which runs are drawn once because they are the same motion; empty if none are."""
-    said = [f"{listed(one.labels)} are the same motion to {max(one.apart, 1e-16):.0e} rad"
+    said = [f"{listed(one.labels)} are the same motion "
+            + (f"to {one.apart:.0e} rad" if one.apart else "to the last bit")
             for one in found if len(one.runs) > 1]
     return f"Drawn once: {'; '.join(said)} (runs within {ALIKE:.0e} rad are)." if said else ""
 
@@ -57,12 +58,12 @@ def multiples(name: str, found: Sequence[Motion], looks: Mapping[str, Look]) -> 
     recordings = {one.label: one.recording for one in found}
     captions = {one.label: _caption(one, looks) for one in found}
     cards = []
-    for panel in panels.PANELS:
+    for panel in (*panels.PANELS, *panels.TASK_PANELS):
         drawn = figures.side_by_side(panel, recordings, looks)
         body = "".join(picture(captions[label], fig, f"{name}, {label}: {panel.title}")
                        for label, fig in drawn.items())
         if drawn:
-            key = joints(_joints(recordings)) if panel.name == "joint-velocities" else ""
+            key = _key(panel.name, recordings)
             cards.append(f'<div class="card"><h3>{escape(panel.title)} <small class="quiet">'
                          f"[{escape(panel.unit)}]</small></h3>"
                          f'<p class="quiet">{escape(panel.explains)}</p>{key}'
@@ -72,8 +73,17 @@ def multiples(name: str, found: Sequence[Motion], looks: Mapping[str, Look]) -> 
                    f"{''.join(cards)}</div>", said) if cards else ""
 
 
-def _joints(recordings: Mapping[str, Recording]) -> int:
-    return max(int(recording["v"].shape[1]) for recording in recordings.values())
+def _key(panel: str, recordings: Mapping[str, Recording]) -> str:
+    """Return what the colours of a panel's lines mean, if they mean the same in all runs."""
+    count = max(int(recording["v"].shape[1]) for recording in recordings.values())
+    if panel == "joint-velocities" and count <= len(drawing.JOINTS):
+        return joints(count)
+    if panel in ("task-errors", "task-angles"):
+        first = next(iter(recordings.values()))
+        return squares({section.title: drawing.joint_colour(i)
+                        for i, section in enumerate(first.scenario.tasks)
+                        if section.kind != "posture"})
+    return ""
 
 
 def overlays(name: str, runs: Sequence[Run], found: Sequence[Motion],

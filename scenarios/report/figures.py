@@ -109,5 +109,6 @@ def _dashed(look: Look) -> Any:
 
 
 def _wide(recordings: Mapping[str, Recording]) -> bool:
-    medians = [float(np.median(r["time_tick"])) for r in recordings.values() if "time_tick" in r]
-    return bool(medians) and max(medians) > 20 * min(medians)
+    times = [np.percentile(r["time_tick"], [50.0, 99.9]) for r in recordings.values()
+             if "time_tick" in r]
+    return bool(times) and bool(np.max(times) > 20 * np.min(times))

@@ -84,8 +84,13 @@ def _picture(name: str, found: Sequence[Motion], look: Mapping[str, Look]) -> st
     if not drawn:
         return ""
     colours = {label: look[label].colour for label in drawn}
-    caption = ("Dashed: the path asked for. Red: obstacles with ε₁ and ε₂ around them, and control "
-               f"points. The arm is that of {next(iter(drawn))}, where it is nearest to one.")
+    first = next(iter(drawn.values()))
+    caption = f"Drawn is the robot of {next(iter(drawn))}."
+    if "desired_position" in first:
+        caption += " Dashed: the path asked for."
+    if first.scenario.avoidance is not None:
+        caption += (" Red: obstacles with ε₁ and ε₂ around them, and control points; in full where "
+                    "it is nearest to an obstacle.")
     return (f'<figure>{drawing.svg(picture(drawn, colours), f"{name}: the paths taken")}'
             f'<figcaption class="quiet">{escape(caption)}</figcaption></figure>')
 

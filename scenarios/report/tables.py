@@ -29,10 +29,14 @@ def numbers(runs: Sequence[Run], looks: Mapping[str, Look]) -> str:
     from scenarios.compare import table
 
     rows = table(runs, details=False)
-    first = [row for row in rows if row.name in _FIRST]
-    rest = [row for row in rows if row.name not in _FIRST]
+    first = [row for row in rows if _is_first(row.name)]
+    rest = [row for row in rows if not _is_first(row.name)]
     more = folded(f"{len(rest)} more rows", _table(rest, runs, looks)) if rest else ""
     return section("In numbers", _table(first, runs, looks) + more, _marks(runs)) if rows else ""
+
+
+def _is_first(name: str) -> bool:
+    return name in _FIRST or (name.startswith("task_") and name.endswith("_rms"))
 
 
 def _marks(runs: Sequence[Run]) -> str:

@@ -29,7 +29,8 @@ def verdict(runs: Sequence[Run], alike: float = ALIKE, nearly: float = 1e-2) -> 
     if len({run.scenario.name for run in runs}) > 1:
         clauses += [*_contacts(finished), *_contrasts(finished)]
     elif finished:
-        for said in (_sameness(finished, alike, nearly), _tracking(finished), _distance(finished),
+        for said in (_sameness(finished, alike, nearly), _tracking(finished),
+                     _listed_tasks(finished), _distance(finished),
                      _contacts(finished), _excess(finished), _troubles(finished), _speed(finished)):
             clauses += said
     return _joined(clauses)
@@ -106,6 +107,24 @@ def _tracking(runs: Sequence[Run]) -> Iterator[Clause]:
     elif values:
         yield (_who(_within(values, runs, best), runs),
                f"tracked best (median path error {_mm(best)}, {_at(values, worst)} {_mm(worst)})")
+
+
+def _listed_tasks(runs: Sequence[Run]) -> Iterator[Clause]:
+    """Yield in which of the scenario's own tasks the runs differ most, relative to the worst."""
+    found = []
+    for metric in runs[0].metrics.values():
+        values = _values(runs, metric.name)
+        if metric.name.startswith("task_") and metric.name.endswith("_rms") and values \
+                and metric.lower_is_better:
+            best, worst = min(values.values()), max(values.values())
+            found.append((1.0 - best / worst if worst else 0.0, metric, values))
+    found = sorted((one for one in found if one[0] > TIE), key=lambda one: -one[0])
+    for _, metric, values in found[:1]:
+        best, worst = min(values.values()), max(values.values())
+        said = [f"{_digits(metric.scale * value)} {metric.shown_unit}" for value in (best, worst)]
+        yield (_who(_within(values, runs, best), runs),
+               f"served {metric.label.partition(':')[0].lower()} best (rms error {said[0]}, "
+               f"{_at(values, worst)} {said[1]})")
 
 
 def _distance(runs: Sequence[Run]) -> Iterator[Clause]:
