@@ -17,7 +17,7 @@ class Player {
     this.make_stage();
     this.make_controls();
     this.make_legend();
-    this.seek(0);
+    this.seek(+(/^#t=([\d.]+)$/.exec(location.hash) || [0, 0])[1]);
   }
 
   make_stage() {

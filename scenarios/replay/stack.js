@@ -53,6 +53,7 @@ class StackList {
   order(frame) {
     const {run} = this, order = run.order_at(frame);
     const fates = run.row("fate", frame), violations = run.row("violation", frame);
+    this.list.setAttribute("aria-label", `Stack: ${order.join(", then ")}`);
     const absent = run.tasks.filter(task => !order.includes(task));
     run.tasks.forEach((task, n) => {
       const {row, rank, said} = this.rows[n], place = order.indexOf(task);
