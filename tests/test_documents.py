@@ -127,8 +127,8 @@ def check_hierarchy(command, arguments):
 
 
 def is_name(text):
-    """Whether it names something shipped: no path, and no placeholder such as FILE."""
-    return bool(text) and "." not in text and "/" not in text and not text.isupper()
+    """Whether it names something shipped: no path, no robot of a package, no placeholder FILE."""
+    return bool(text) and not set("./:") & set(text) and not text.isupper()
 
 
 def test_the_tutorial_can_be_followed_from_top_to_bottom(tmp_path, monkeypatch):
