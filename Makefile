@@ -38,7 +38,7 @@ stress: $(INSTALLED)
 	@$(BIN)/python -m scenarios.bench.stress --count $(COUNT) --resolver $(RESOLVER)
 
 docs: $(INSTALLED)
-	@$(BIN)/python -m sphinx -W --keep-going -q -b html docs build/docs
+	@$(BIN)/python -m sphinx -E -W --keep-going -q -b html docs build/docs
 	@echo "Documentation: build/docs/index.html"
 
 dist: $(INSTALLED)
