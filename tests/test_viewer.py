@@ -17,6 +17,7 @@ from scenarios.recorder import Recorder
 from scenarios.recording import load_run, save
 from scenarios.scene import scene
 from scenarios.simulate import simulate, tick
+from scenarios.viewer.curves import Lately
 from scenarios.viewer.live import Live
 from scenarios.viewer.moment import Became, Watched, of_scene
 from scenarios.viewer.playback import Playback, Requests
@@ -240,6 +241,19 @@ def test_a_restart_keeps_the_settings_and_puts_obstacles_back(tmp_path, monkeypa
 def test_a_live_run_takes_no_faults():
     with pytest.raises(HierarchyError, match="injects no"):
         Live(load("ellipse", {"faults": [{"kind": "stale", "at": 0.1, "duration": 0.1}]}))
+
+
+def test_curves_of_what_was_before_stay_when_the_cone_is_another():
+    live = Live(LIMITED)
+    watched, lately = Watched(live.controller), Lately(10)
+    ticks(live, 30)
+    lately.add(watched)
+    (angle,) = (one.value[0, 0] for one in lately.curves(live.controller)[1]
+                if one.unit == "deg")
+    live.change({"pointing.alpha_d": 30.0})
+    found = next(one for one in lately.curves(live.controller)[1] if one.unit == "deg")
+    assert found.value[0, 0] == pytest.approx(angle)
+    assert found.marks == (("α_d", 30.0),)
 
 
 # Pages, without a browser

@@ -33,7 +33,8 @@ class Lately:
             now["position_error"] = (cell.position.target[0]
                                      - cell.state.position(cell.position.frame))
         if cell.pointing is not None:
-            now["pointing_error"] = controller.cone_error
+            # without alpha_d, which may be another one when this is drawn
+            now["pointing_error"] = controller.cone_error - cell.pointing.cos_alpha_d
         if cell.sensor is not None:
             seen = cell.sensor.measurement
             now |= {"minimal_distance": seen.minimal_distance,
@@ -43,5 +44,7 @@ class Lately:
     def curves(self, controller: Controller) -> tuple[Array, tuple[Series, ...]]:
         """Return the times (F,) [s] and the curves of what is kept."""
         signals = {name: np.array([now[name] for now in self._kept]) for name in self._kept[-1]}
+        if controller.cell.pointing is not None:
+            signals["pointing_error"] += controller.cell.pointing.cos_alpha_d
         recording = Recording(signals, (), controller.cell.scenario)
         return signals["t"], tuple(series(recording, np.arange(len(self._kept))))

@@ -28,6 +28,7 @@ _LATELY = 10.0  # [s] that the curves show
 _TRACE = 600    # frames that the trace is long, points that the path has
 _BUSY = 0.05    # [s] of ticks between two drawings, at most
 _HAND = 1.0     # [m/s] at most, of a path that is dragged
+_MARGIN = 0.12  # [m] about what there is at first, that the camera sees
 _NEAR = 1.0     # [m] from the base: obstacles that the camera sees at first
 
 
@@ -196,7 +197,8 @@ class LivePage:
         points = np.vstack([*paths, ends(stage.capsules, placements).reshape(-1, 3),
                             *(place[None] for place in stage.obstacles.centres
                               if np.linalg.norm(place) < _NEAR)])
-        look_at_box(self.server, points.min(axis=0), points.max(axis=0), stage.azimuth)
+        look_at_box(self.server, points.min(axis=0) - _MARGIN, points.max(axis=0) + _MARGIN,
+                    stage.azimuth)
 
     def _show_list(self, now: Moment) -> None:
         live = self.live

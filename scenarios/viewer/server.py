@@ -62,7 +62,7 @@ def look_at_box(server: Any, low: Array, high: Array, azimuth: float) -> None:
     """
     e, half_field = radians(_ELEVATION), radians(_FIELD_OF_VIEW / 2)
     away = np.array([cos(e) * cos(azimuth), cos(e) * sin(azimuth), sin(e)])
-    radius, camera = 0.5 * float(np.linalg.norm(high - low)), server.initial_camera
+    radius, camera = 0.45 * float(np.linalg.norm(high - low)), server.initial_camera
     camera.fov = 2.0 * half_field
     camera.position = (low + high) / 2 + away * radius / sin(half_field)
     camera.look_at = (low + high) / 2

@@ -43,6 +43,7 @@ class View:
         self.models = {label: Model(server, f"/run{i}", one.stage, self.colours[label],
                                     _paths(one))
                        for i, (label, one) in enumerate(self.scenes.items())}
+        self._names = self._name_runs()
         self._shown: dict[str, int] = {}
         self._cursor, self._cursor_at = np.nan, -np.inf
         self._panel(side_by_side)
@@ -122,6 +123,14 @@ class View:
         gui.add_markdown("**Stack**, most important first")
         self._stacks = {label: gui.add_html("") for label in self.scenes}
 
+    def _name_runs(self) -> list[Any]:
+        """Labels above the runs, where there are several."""
+        top = max(_bounds(one)[1][2] for one in self.scenes.values()) + 0.08
+        labels = list(self.scenes) if len(self.scenes) > 1 else []
+        return [self.server.scene.add_label(f"/run{i}/label", label, position=(0.0, 0.0, top),
+                                            anchor="bottom-center")
+                for i, label in enumerate(labels)]
+
     def _arrange(self, side_by_side: bool) -> None:
         """Put the runs beside each other, or into one place with all but the first see-through."""
         bounds = [_bounds(one) for one in self.scenes.values()]
@@ -133,6 +142,8 @@ class View:
         for i, model in enumerate(self.models.values()):
             model.place(apart * i if side_by_side else np.zeros(3))
             model.fade(_SEE_THROUGH if i and not side_by_side else None)
+        for name in self._names:
+            name.visible = side_by_side
         last = (len(self.models) - 1) * apart * side_by_side
         look_at_box(self.server, np.minimum(low, low + last), np.maximum(high, high + last),
                     azimuth)
