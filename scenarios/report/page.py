@@ -17,7 +17,7 @@ from scenarios.report import charts, tables
 from scenarios.report.commands import commands
 from scenarios.report.embedded import replay
 from scenarios.report.motions import Motion, motions
-from scenarios.report.parts import legend, plain_table, section
+from scenarios.report.parts import legend, plain_table, section, unbroken
 from scenarios.report.verdict import in_words, verdict
 
 if TYPE_CHECKING:
@@ -41,8 +41,8 @@ def _contents(groups: Mapping[str, Sequence[Run]]) -> str:
     """Return the verdict of each group with a link to it, where there are several."""
     if len(groups) < 2:
         return ""
-    items = "".join(f'<li><a href="#{slug(name)}">{escape(name)}</a>: {escape(verdict(runs))}</li>'
-                    for name, runs in groups.items())
+    items = "".join(f'<li><a href="#{slug(name)}">{escape(name)}</a>: '
+                    f"{unbroken(verdict(runs))}</li>" for name, runs in groups.items())
     return (f'<nav><h1>{in_words(len(groups)).capitalize()} scenarios compared</h1>'
             f"<ul>{items}</ul></nav>")
 
@@ -73,7 +73,7 @@ def _lead(name: str, runs: Sequence[Run], found: Sequence[Motion], look: Mapping
     return f"""<header class="lead"><div>
 <p class="quiet">hierarchy compare · <b>{escape(name)}</b></p>
 <h1>{escape(title)}</h1>
-<p class="verdict">{escape(verdict(runs))}</p>
+<p class="verdict">{unbroken(verdict(runs))}</p>
 {legend(look)}
 {about}</div>
 {_picture(name, found, look)}</header>"""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 
@@ -49,6 +50,11 @@ def section(title: str, body: str, said: str = "", unit: str = "") -> str:
     small = f" <small class='quiet'>{escape(unit)}</small>" if unit else ""
     lead = f'<p class="quiet">{escape(said)}</p>' if said else ""
     return f"<section><h2>{escape(title)}{small}</h2>\n{lead}{body}</section>"
+
+
+def unbroken(text: str) -> str:
+    """Return text as HTML in which no line ends inside a number such as 4e-08."""
+    return re.sub(r"[0-9.]+e-[0-9]+", r'<span class="number">\g<0></span>', escape(text))
 
 
 def plain_table(rows: Iterable[Sequence[str]], head: Sequence[str] = ()) -> str:

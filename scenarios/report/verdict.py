@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from itertools import groupby
+from operator import itemgetter
 from typing import TYPE_CHECKING
 
 from scenarios.report.motions import ALIKE, departure, motions
@@ -37,14 +39,10 @@ def verdict(runs: Sequence[Run], alike: float = ALIKE, nearly: float = 1e-2) -> 
 
 
 def _joined(clauses: Sequence[Clause]) -> str:
-    """Join clauses to a sentence, naming who is meant once where two in a row are of the same."""
-    text, last = "", ""
-    for who, what in clauses:
-        if who and who == last:
-            text, last = f"{text} and {what}", ""
-        else:
-            text, last = f"{text}{'; ' if text else ''}{who}{' ' if who else ''}{what}", who
-    return f"{text}."
+    """Join clauses to a sentence, naming those once of whom several in a row are said."""
+    said = [(who, listed([what for _, what in some]) if who else "; ".join(w for _, w in some))
+            for who, some in ((who, list(some)) for who, some in groupby(clauses, itemgetter(0)))]
+    return "; ".join(f"{who} {what}".strip() for who, what in said) + "."
 
 
 def in_words(count: int) -> str:
@@ -199,7 +197,7 @@ def _speed(runs: Sequence[Run]) -> Iterator[Clause]:
     low, high = min(values.values(), default=0.0), max(values.values(), default=0.0)
     against = f", {_at(values, high)} in {_digits(1e6 * high)} µs" if high > 1.2 * low else ""
     if values:
-        yield _at(values, low), f"resolves a tick in {_digits(1e6 * low)} µs{against}"
+        yield "", f"{_at(values, low)} resolves a tick in {_digits(1e6 * low)} µs{against}"
 
 
 def _values(runs: Sequence[Run], name: str) -> dict[str, float]:
