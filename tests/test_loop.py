@@ -13,7 +13,7 @@ import pytest
 
 from hierarchy import HierarchyError
 from hierarchy.loop import Loop
-from hierarchy.watchdog import Once, Watchdog
+from hierarchy.loop.watchdog import Once, Watchdog
 
 PERIOD = 0.25  # with steps of eighths every time is exact
 

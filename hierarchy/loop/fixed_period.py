@@ -1,9 +1,4 @@
-"""A loop for hardware of one's own: fixed period, overruns, watchdog, a log of every tick.
-
-No robot's interface is assumed: what to compute, how to send it and how to stop safely are the
-user's functions. This is Python on an ordinary operating system: the period is kept as well as the
-log says, and a stop by the robot's own controller is still needed.
-"""
+"""The loop itself: planned times, overruns, priority, and how it ends."""
 
 from __future__ import annotations
 
@@ -17,10 +12,8 @@ from typing import Any, Literal
 import numpy as np
 
 from hierarchy.errors import HierarchyError, UnknownNameError
-from hierarchy.tick_log import Log
-from hierarchy.watchdog import Once, Watchdog
-
-__all__ = ["Log", "Loop", "Watchdog"]
+from hierarchy.loop.log import Log
+from hierarchy.loop.watchdog import Once, Watchdog
 
 Overrun = Literal["skip", "catch up", "stop"]
 OVERRUNS = ("skip", "catch up", "stop")
