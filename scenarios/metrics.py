@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from scenarios.recording import Recording
 
 Array = NDArray[np.float64]
+_NOTHING = 1e-9  # errors of listed tasks below this are rounding and count as zero [m, deg, rad]
 
 # Display units by SI unit: how many of them make one, what it is called, decimals.
 _SHOWN = {"m": (1e3, "mm", 3), "s": (1e6, "µs", 2), "deg": (1.0, "°", 3), "share": (100.0, "%", 2),
@@ -134,7 +135,8 @@ def _listed(recording: Recording, settle: float) -> Iterator[Metric]:
     from scenarios.listed import errors  # here, since it loads the tasks
 
     after = recording["t"] - recording["t"][0] >= settle
-    for section, unit, error in errors(recording):
+    for section, unit, exact in errors(recording):
+        error = np.where(exact < _NOTHING, 0.0, exact)
         turned = section.kind == "pose" and unit == "deg"
         title = section.title[0].upper() + section.title[1:] + (", turned" if turned else "")
         key = f"task_{section.title}{' turned' if turned else ''}".replace(" ", "_")
