@@ -16,6 +16,8 @@ import numpy as np
 from scenarios import drawing
 from scenarios.folders import slug
 from scenarios.metrics import Metric
+from scenarios.palette import looks
+from scenarios.report.parts import chip
 from scenarios.sweep import figures
 from scenarios.sweep.planning import Plan, Planned
 from scenarios.sweep.results import Results, Worst, summary
@@ -135,8 +137,8 @@ farthest.</p><div class="spreads">{panels}</div>""" if panels else ""
 
 
 def _numbers(results: Results) -> str:
-    heads = "".join(f"<th>{_chip(colour)}{escape(label)}</th>"
-                    for label, colour in drawing.colours(results.labels).items())
+    heads = "".join(f"<th>{chip(look)}{escape(label)}</th>"
+                    for label, look in looks(results.labels).items())
     body = []
     for group, metrics in groupby(results.shown(), key=lambda metric: metric.group):
         body.append(f'<tr class="group"><th colspan="{len(results.labels) + 1}">{escape(group)}'
@@ -178,10 +180,6 @@ def _count(number: int, noun: str) -> str:
 def _listed(names: Sequence[str]) -> str:
     *first, last = names
     return f"{', '.join(first)} and {last}" if first else last
-
-
-def _chip(colour: str) -> str:
-    return f'<span class="chip" style="background:{colour}"></span>'
 
 
 def _pairs(pairs: Mapping[str, str]) -> str:
