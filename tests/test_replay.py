@@ -134,7 +134,7 @@ def browser():
 def opened(browser, document, tmp_path_factory):
     file = tmp_path_factory.mktemp("page") / "replay.html"
     file.write_text(document, encoding="utf-8")
-    browser.look_at(file.as_uri())
+    browser.look_at(file.as_uri(), 1000, 600)  # small, since there is no graphics card
     return browser
 
 
@@ -155,7 +155,7 @@ def test_the_page_shows_the_arm_in_space(page):
     colours = page.run("""(() => { player.stage.draw(0.5, false);
         const {gl} = player.stage.painter, seen = new Set();
         const one = new Uint8Array(4 * 300 * 300);
-        gl.readPixels(200, 200, 300, 300, gl.RGBA, gl.UNSIGNED_BYTE, one);
+        gl.readPixels(150, 150, 300, 300, gl.RGBA, gl.UNSIGNED_BYTE, one);
         for (let i = 0; i < one.length; i += 4) seen.add(one.slice(i, i + 3).join());
         return seen.size; })()""")
     assert colours > 100  # lit solids, not an empty floor
@@ -201,8 +201,9 @@ def test_scrubbing_moves_the_cursor_of_every_curve(page):
 
 
 def test_a_click_in_a_curve_goes_there(page):
-    box = page.run("""(() => { const box = document.querySelectorAll('.curve svg')[2]
-        .getBoundingClientRect(); return [box.left, box.top, box.width]; })()""")
+    box = page.run("""(() => { const svg = document.querySelectorAll('.curve svg')[2];
+        svg.scrollIntoView();
+        const box = svg.getBoundingClientRect(); return [box.left, box.top, box.width]; })()""")
     x = page.run("player.curves.x(0.5)")
     place = box[0] + x, box[1] + 30
     page.mouse(("mousePressed", *place), ("mouseReleased", *place))
@@ -281,10 +282,10 @@ def test_the_arm_is_drawn_again_after_the_graphics_card_was_lost(page):
 def test_a_time_in_the_address_is_where_it_begins(page):
     address = page.address
     page.look_at("about:blank")
-    page.look_at(f"{address}#t=1.5")
+    page.look_at(f"{address}#t=1.5", 1000, 600)
     assert page.run("player.t") == 1.5
     page.look_at("about:blank")
-    page.look_at(address)
+    page.look_at(address, 1000, 600)
 
 
 @pytest.mark.parametrize("width", [360, 800, 1400])
@@ -296,15 +297,46 @@ def test_nothing_is_wider_than_the_window(page, width, dark):
     assert page.run("document.getElementById('play').getBoundingClientRect().bottom") <= 740
 
 
-def test_without_webgl_it_says_so_and_shows_the_rest(page):
-    page.call("Page.addScriptToEvaluateOnNewDocument",
-              source="if (location.hash === '#flat') HTMLCanvasElement.prototype.getContext = "
-                     "() => null")
-    address = page.address
-    page.look_at("about:blank")
-    page.look_at(f"{address}#flat")
-    assert "WebGL is missing" in page.run("document.getElementById('notice').textContent")
+@pytest.fixture
+def without(page):
+    """Open the page where the contexts of a canvas that are named are missing."""
+    added, address = [], page.address
+
+    def opened(*kinds):
+        added.append(page.call("Page.addScriptToEvaluateOnNewDocument", source=f"""
+            const get = HTMLCanvasElement.prototype.getContext;
+            HTMLCanvasElement.prototype.getContext = function(kind, ...rest) {{
+                return {json.dumps(kinds)}.includes(kind) ? null : get.call(this, kind, ...rest); }}
+            """)["identifier"])
+        page.look_at("about:blank")
+        page.look_at(address, 1000, 600)
+        return page
+
+    yield opened
+    for script in added:
+        page.call("Page.removeScriptToEvaluateOnNewDocument", identifier=script)
+    page.look_at(address, 1000, 600)
+
+
+def test_without_webgl_the_arm_is_sketched_and_moves(without):
+    page = without("webgl")
+    assert page.run("player.stage.flat")
+    first = page.screenshot()
+    page.run("player.seek(1.5)")
+    assert page.screenshot() != first
+    colours = page.run("""(() => { const seen = new Set(), {pen} = player.stage.painter;
+        const {data} = pen.getImageData(150, 150, 300, 300);
+        for (let i = 0; i < data.length; i += 4) seen.add(data.slice(i, i + 3).join());
+        return seen.size; })()""")
+    assert colours > 20
+
+
+def test_without_any_canvas_it_says_so_and_shows_the_rest(without):
+    page = without("webgl", "2d")
+    assert "cannot be drawn" in page.run("document.getElementById('notice').textContent")
     assert page.run("document.querySelectorAll('.curve').length") > 4
+    page.run("player.seek(1)")
+    assert page.run("player.t") == 1.0
 
 
 def test_embedded_it_fills_the_frame_around_it(browser, runs, tmp_path):

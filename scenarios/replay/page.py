@@ -18,7 +18,8 @@ from scenarios.scene import scene
 if TYPE_CHECKING:
     from scenarios.recording import Recording
 
-_SCRIPTS = ("data.js", "space.js", "painter.js", "stage.js", "curves.js", "stack.js", "player.js")
+_SCRIPTS = ("data.js", "space.js", "painter.js", "sketch.js", "stage.js", "curves.js",
+            "stack.js", "player.js")
 
 
 def html(recordings: Mapping[str, Recording], title: str, *, rate: float = 30.0,

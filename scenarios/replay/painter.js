@@ -105,8 +105,7 @@ function cone(half_angle) {
 
 class Painter {
   constructor(canvas) {
-    const gl = this.gl = canvas.getContext("webgl", {antialias: true, stencil: true, alpha: false});
-    if (!gl) throw new Error("WebGL is missing");
+    const gl = this.gl = canvas.getContext("webgl");  // as the stage has asked for it
     this.canvas = canvas;
     this.solids = this.program(SOLID, SOLID_COLOUR, ["normal", "corner"]);
     this.lines = this.program(LINE, LINE_COLOUR, ["from", "to", "at"]);
@@ -196,6 +195,8 @@ class Painter {
     gl.disable(gl.POLYGON_OFFSET_FILL);
     gl.disable(gl.STENCIL_TEST);
   }
+
+  finish() {}
 
   bind(mesh, attributes, stride) {
     const gl = this.gl;

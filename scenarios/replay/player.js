@@ -30,6 +30,7 @@ class Player {
         "those of the run.";
       return;
     }
+    if (this.stage.flat) this.parts.space.title = "Drawn without WebGL";
     space.addEventListener("webglcontextlost", event => event.preventDefault());
     space.addEventListener("webglcontextrestored", () => { this.stage.prepare(); this.redraw(); });
     new ResizeObserver(() => this.redraw()).observe(space);

@@ -52,7 +52,9 @@ class Stage {
   }
 
   prepare() {
-    this.painter = new Painter(this.canvas);
+    const webgl = {antialias: true, stencil: true, alpha: false};
+    this.flat = !this.canvas.getContext("webgl", webgl);
+    this.painter = this.flat ? new Sketch(this.canvas) : new Painter(this.canvas);
     this.paths = new Map(this.runs.map(run => [run, {
       traced: [[run.points, run.points.width - 3], ...run.paths.map(path => [path.actual, 0])]
         .map(([points, first]) => this.painter.segments(joined(points, first))),
@@ -79,7 +81,7 @@ class Stage {
     const all = name => moments.flatMap(moment => moment[name]);
     const ratio = this.canvas.width / (this.canvas.clientWidth || 1);
     painter.look(area, this.camera, this.floor);
-    painter.line(this.grid, [...colours.quiet, colours.dark ? 0.3 : 0.22], ratio);
+    painter.line(this.grid, [...colours.quiet, colours.dark ? 0.3 : 0.22], ratio, {under: true});
     painter.draw([...all("arm"), ...all("obstacles")], SHADOW);
     moments.forEach((moment, i) => painter.draw(moment.arm, LIT, {behind: i}));
     painter.draw(all("obstacles"), LIT);
@@ -87,6 +89,7 @@ class Stage {
     painter.draw(all("cones"), FLAT);
     painter.draw(all("areas"), BUBBLE);
     painter.draw(all("dots"), LIT, {depth: false, write: false});
+    painter.finish();
   }
 
   moment(run, t, colours, surrounded) {
