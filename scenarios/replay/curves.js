@@ -137,7 +137,7 @@ class Curves {
     }
     for (const channel of [...drawn].reverse()) {
       children.push(element("path", {class: "line", stroke: channel.colour,
-                                     ...(channel.label ? {} : dashed(channel.run)), d: this.path(channel, scale)}));
+                                     ...(shown.length > 1 ? dashed(channel.run) : {}), d: this.path(channel, scale)}));
     }
     const output = element("output"), largest = drawn.some(channel => channel.largest);
     this.outputs.push({output, drawn});
