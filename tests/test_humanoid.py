@@ -327,3 +327,17 @@ def test_links_of_the_dual_arm_can_be_kept_apart():
     cell = build(Scenario.model_validate(data))
     assert cell.stack.names == ("self-separation", "position")
     assert simulate(Scenario.model_validate(data)).fault is None
+
+
+def test_romeo_out_of_its_package_moves_alike_under_strict_resolvers():
+    from importlib.metadata import PackageNotFoundError, distribution
+    try:
+        distribution("example-robot-data")
+    except PackageNotFoundError:
+        pytest.skip("example-robot-data is not installed")
+    scenario = load("romeo", ["control.duration=0.5"])
+    runs = {name: simulate(scenario.with_resolver(name)) for name in ("tpm", "recursive", "hcod")}
+    for run in runs.values():
+        assert abs(run["q"] - runs["tpm"]["q"]).max() < 1e-6
+        assert np.linalg.norm(run["task_error_left_foot"], axis=1).max() < 1e-5
+        assert np.linalg.norm(run["task_error_right_hand"], axis=1).max() < 1e-4
