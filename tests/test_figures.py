@@ -1,5 +1,6 @@
 import dataclasses
 import itertools
+import json
 import os
 import re
 import subprocess
@@ -15,6 +16,7 @@ from matplotlib.patches import Patch
 import solvers
 from hierarchy import HierarchyError
 from scenarios import drawing, figures, palette, panels
+from scenarios.cli import run_command
 from scenarios.config import load
 from scenarios.picture import picture
 from scenarios.recording import Event, save
@@ -279,17 +281,37 @@ def test_a_style_or_folder_that_is_not_there_is_an_error_that_names_it(run_folde
         redraw(tmp_path / "nothing")
 
 
+def test_the_command_says_which_files_it_drew(run_folder, monkeypatch, capsys):
+    monkeypatch.setattr(figures, "write_all",
+                        lambda recording, folder: (folder / "a.pdf").write_text("drawn"))
+    assert run_command(["figures", str(run_folder), "--style", "paper", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == {"files": [str(run_folder / "a.pdf")]}
+    assert run_command(["figures", str(run_folder), "--style", "papr"]) == 2
+
+
 @pytest.mark.parametrize("label", ["tpm published", "recursive", "hqp osqp"])
 def test_a_resolver_has_its_colour_in_every_figure(label):
     runs, wanted = {label: recording(), "hcod": recording()}, palette.colour(label)
     looks = palette.looks(runs)
     drawn = [side_by_side(panels.PANEL["body-distance"], runs, looks)[label].axes[0].lines,
              overlay(panels.position_error, runs, looks).axes[0].lines,
-             picture(runs).axes[0].lines, computing_time(runs, looks).axes[0].patches]
+             picture(runs).axes[0].lines, computing_time(runs, looks)[0].axes[0].patches]
     for artists in drawn:
         colours = [to_hex(one.get_facecolor() if isinstance(one, Patch) else one.get_color())
                    for one in artists]
         assert wanted in colours
+
+
+def test_times_far_apart_are_dots_and_a_tick_far_slower_than_its_bar_is_a_number():
+    near = {"tpm": recording(), "hcod": recording(time_tick=[4e-6, 4e-6, 4e-6, 4e-6, 4e-3])}
+    fig, marks = computing_time(near, palette.looks(near))
+    assert "light to full" in marks
+    assert [text.get_text()[0] for text in fig.axes[0].texts] == ["×"]
+    far = {"tpm": recording(), "hqp": recording(time_tick=np.full(5, 1e-3))}
+    fig, marks = computing_time(far, palette.looks(far))
+    assert fig.axes[0].get_xscale() == "log"
+    assert not fig.axes[0].patches
+    assert "dot" in marks
 
 
 def test_the_stack_over_time_has_a_band_for_each_place_and_a_row_for_each_event():

@@ -100,8 +100,8 @@ def overlays(name: str, runs: Sequence[Run], found: Sequence[Motion],
         drawn.append((f"How far the joints depart from those of {next(iter(recordings))} [rad]",
                       figures.departure(recordings, looks)))
     if all("time_tick" in one for one in recordings.values()):
-        drawn.append(("Time per tick: kinematics, rows, resolve (light to full, medians); "
-                      "whole tick | median, × 99.9 %", figures.computing_time(recordings, looks)))
+        timed, marks = figures.computing_time(recordings, looks)
+        drawn.append((f"Time per tick: {marks}", timed))
     body = "".join(picture(f"<b>{escape(title)}</b>", fig, f"{name}: {title}")
                    for title, fig in drawn)
     return section("Laid over each other",

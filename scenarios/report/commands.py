@@ -9,6 +9,7 @@ from pathlib import PurePath
 from typing import TYPE_CHECKING, Any
 
 from hierarchy.errors import HierarchyError
+from scenarios.report.motions import motions
 
 if TYPE_CHECKING:
     from scenarios.compare import Comparison, Run
@@ -35,10 +36,11 @@ def commands(comparison: Comparison, runs: Sequence[Run]) -> list[tuple[str, str
     found = [(f"{run.label}, run again", run_command(run, folder)) for run in runs]
     if kept:
         first = str(PurePath(folder, kept[0].folder))
-        every = [str(PurePath(folder, run.folder)) for run in kept]
+        every = [str(PurePath(folder, one.runs[0].folder)) for one in motions(kept)] or [first]
         found += [("See a run in the browser, in three dimensions",
                    _shell("hierarchy", "view", first)),
-                  ("The replay alone, as one file", _shell("hierarchy", "replay", *every)),
+                  ("The replay alone, as one file; each motion once",
+                   _shell("hierarchy", "replay", *every)),
                   ("A run's figures for a paper, as PDF",
                    _shell("hierarchy", "figures", first, "--style", "paper"))]
     return found

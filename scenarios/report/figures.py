@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
@@ -80,27 +81,55 @@ def departure(recordings: Mapping[str, Recording], looks: Mapping[str, Look]) ->
     return fig
 
 
-def computing_time(recordings: Mapping[str, Recording], looks: Mapping[str, Look]) -> Figure:
-    """Return the median time of a tick's parts [us], with the whole tick's median and 99.9 %."""
+def computing_time(recordings: Mapping[str, Recording], looks: Mapping[str, Look]
+                   ) -> tuple[Figure, str]:
+    """Return the times of a tick [us], a row for each run, and what the marks in it mean.
+
+    The medians of its parts as a bar, or, where some runs take much longer than others, one dot on
+    a logarithmic axis; with the whole tick's median and 99.9 %.
+    """
     fig, (ax,) = drawing.figure(width=4.9, height=0.7 + 0.4 * len(recordings))
-    parts = (("time_kinematics", 0.35), ("time_rows", 0.6), ("time_resolve", 1.0))
+    wide = _wide(recordings)
     for row, (label, recording) in enumerate(recordings.items()):
-        left = 0.0
-        for signal, alpha in parts:
-            width = 1e6 * float(np.median(recording[signal])) if signal in recording else 0.0
-            ax.barh(row, width, left=left, color=looks[label].colour, alpha=alpha,
-                    height=0.6)
-            left += width
-        if "time_tick" in recording:
-            for percent, mark in ((50.0, "|"), (99.9, "x")):
-                ax.plot(1e6 * np.percentile(recording["time_tick"], percent), row, mark,
-                        color=INK, markersize=7)
+        if wide:
+            ax.plot(_micro(recording, "time_resolve", 50.0), row, "o", color=looks[label].colour)
+        else:
+            _bar(ax, row, recording, looks[label].colour)
+        ax.plot(_micro(recording, "time_tick", 50.0), row, "|", color=INK, markersize=8)
+    ax.set_xscale("log") if wide else ax.set_xlim(left=0.0)
+    _slowest(ax, recordings, wide)
     ax.set_yticks(range(len(recordings)), list(recordings))
-    ax.invert_yaxis()
+    ax.set_ylim(len(recordings) - 0.5, -0.5)
     ax.grid(axis="y", visible=False)
-    ax.set_xscale("log") if _wide(recordings) else ax.set_xlim(left=0.0)
     ax.set_xlabel("µs a tick")
-    return fig
+    bars = "kinematics, rows, resolve (light to full), medians"
+    return fig, f"{'dot: resolve, median' if wide else bars}; whole tick | median, × 99.9 %"
+
+
+def _bar(ax: Axes, row: int, recording: Recording, colour: str) -> None:
+    left = 0.0
+    for signal, alpha in (("time_kinematics", 0.35), ("time_rows", 0.6), ("time_resolve", 1.0)):
+        width = _micro(recording, signal, 50.0)
+        ax.barh(row, width, left=left, color=colour, alpha=alpha, height=0.6)
+        left += width
+
+
+def _slowest(ax: Axes, recordings: Mapping[str, Recording], wide: bool) -> None:
+    """Mark what 99.9 % of the ticks keep to; far from all bars it is a number at the edge."""
+    edge = ax.get_xlim()[1] * (100.0 if wide else 1.6)
+    for row, recording in enumerate(recordings.values()):
+        slow = _micro(recording, "time_tick", 99.9)
+        if slow <= edge:
+            ax.plot(slow, row, "x", color=INK, markersize=6)
+        else:
+            ax.annotate(f"× {slow:.0f} \N{RIGHTWARDS ARROW}", (1.0, row), ha="right", va="center",
+                        xycoords=("axes fraction", "data"), fontsize=8, color=INK)
+    if not wide:
+        ax.set_xlim(0.0, edge)
+
+
+def _micro(recording: Recording, signal: str, percent: float) -> float:
+    return 1e6 * float(np.percentile(recording[signal], percent)) if signal in recording else 0.0
 
 
 def _dashed(look: Look) -> Any:
@@ -109,6 +138,5 @@ def _dashed(look: Look) -> Any:
 
 
 def _wide(recordings: Mapping[str, Recording]) -> bool:
-    times = [np.percentile(r["time_tick"], [50.0, 99.9]) for r in recordings.values()
-             if "time_tick" in r]
-    return bool(times) and bool(np.max(times) > 20 * np.min(times))
+    medians = [_micro(recording, "time_tick", 50.0) for recording in recordings.values()]
+    return max(medians) > 20 * min(medians)
