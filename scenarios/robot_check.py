@@ -68,7 +68,7 @@ def say(section: RobotSection, robot: Robot) -> str:
     end = "as given" if section.end_effector else listed.replace("them", "it")
     lines = [f"{robot.name}: {_source(section.model)}",
              f"  base            {robot.base}, {robot.n} velocities, {robot.nq} positions",
-             f"  mass            {found['mass_kg']:.3g} kg",
+             f"  mass            {found['mass_kg']:.3g} kg, of what moves",
              f"  joints          {len(found['joints'])} with a motor",
              *_joint_table(found["joints"]),
              f"  frames          {_some(found['frames'])}",
@@ -113,6 +113,8 @@ def _joints(robot: Robot) -> list[dict[str, Any]]:
 
 
 def _joint_table(joints: list[dict[str, Any]]) -> list[str]:
+    if not joints:
+        return []
     width = max(len(joint["name"]) for joint in joints)
     rows = [("", "lower", "upper", "velocity", "effort"), *(
         (joint["name"], *(_shown(joint[key]) for key in ("lower", "upper", "velocity", "effort")))

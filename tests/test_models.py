@@ -91,6 +91,12 @@ def test_the_end_effector_proposed_is_the_frame_with_a_tools_name(arm):
     assert Robot.from_file(arm(), "fore").end_effector == "fore"
 
 
+def test_without_a_tools_name_it_is_the_last_frame_that_most_joints_move(arm):
+    path = arm()
+    path.write_text(path.read_text().replace("tool0", "palm").replace("flange", "mounted"))
+    assert Robot.from_file(path).end_effector == "palm", "not the sensor on the base"
+
+
 def test_capsules_are_proposed_from_primitives(arm):
     upper = Robot.from_file(arm()).capsules[1]
     assert (upper.joint, upper.radius) == (1, 0.05)

@@ -18,7 +18,7 @@ _NAMED_SO = re.compile(r"(^|[_\W])(tcp|tool\d*|eef?|end_?effector|gripper|flange
 
 
 def proposed_end_effector(model: Any) -> str:
-    """Return the last frame whose name is usual for a tool's, or the last frame of the file.
+    """Return the last frame whose name is usual for a tool's, or the last that most joints move.
 
     Usual are tcp, tool, ee, eef, end_effector, gripper and flange, as a part between underscores;
     a frame that no joint moves does not count, and a joint's own frame neither.
@@ -28,7 +28,10 @@ def proposed_end_effector(model: Any) -> str:
     named = [frame.name for frame in frames if frame.parentJoint > 0
              and frame.name not in joints and _NAMED_SO.search(frame.name)]
     links = [name for name in named if not name.endswith("joint")]
-    return str((links or named or [frames[-1].name])[-1])
+    carried = [len(model.supports[frame.parentJoint]) for frame in frames]
+    farthest = [frame.name for frame, count in zip(frames, carried, strict=True)
+                if count == max(carried)]
+    return str((links or named or farthest)[-1])
 
 
 def points_along_chain(model: Any, end_effector: str, count: int = COUNT,
