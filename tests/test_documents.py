@@ -110,8 +110,8 @@ def check(words):
 def check_hierarchy(command, arguments):
     if command.startswith("-"):
         return
-    if not arguments:  # a command that is only mentioned
-        assert command in COMMANDS
+    if all(word.startswith("-") for word in arguments):  # a command that is only mentioned
+        assert set(arguments) <= {opt for one in COMMANDS[command].params for opt in one.opts}
         return
     asked = COMMANDS[command].make_context(command, list(arguments)).params
     named = [*asked.get("scenarios", ()), asked.get("scenario"), asked.get("file")]
