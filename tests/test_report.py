@@ -17,6 +17,7 @@ from scenarios.config import load
 from scenarios.recording import Event
 from scenarios.report import page
 from scenarios.report.commands import run_command
+from scenarios.report.embedded import replay
 from scenarios.report.motions import motions
 from scenarios.report.verdict import verdict
 from scenarios.simulate import simulate
@@ -294,6 +295,15 @@ def test_the_replay_is_in_the_page_and_says_who_moves_as_whom(short_comparison):
     assert len(re.findall(r"<iframe [^>]*data-document='", text)) == 1
     assert "recursive moves as tpm does" in text
     assert len(text) < 3_000_000
+
+
+def test_a_replay_that_would_be_too_large_has_fewer_pictures():
+    run = simulate(load("ellipse", ["control.duration=1.0"]))
+    found = motions([Run(run.scenario, "tpm", "tpm", run)])
+    small, large = (replay("ellipse", found, most) for most in (1, 10**7))
+    assert "5 pictures a second" in small
+    assert "30 pictures a second" in large
+    assert len(small) < len(large)
 
 
 def test_a_page_in_a_browser_fits_its_window_and_has_no_complaints(short_comparison):

@@ -14,16 +14,18 @@ from scenarios.report.verdict import in_words, listed
 if TYPE_CHECKING:
     from scenarios.recording import Recording
 
-MOST = 4               # motions in one replay
-_MOST_BYTES = 3_000_000  # of one replay; above it, fewer frames a second are kept
-_RATES = (30.0, 15.0, 6.0)  # [Hz]
+MOST = 4  # motions in one replay
+_FASTEST, _SLOWEST = 30.0, 5.0  # [Hz] of the pictures kept
 
 
-def replay(name: str, found: Sequence[Motion]) -> str:
-    """Return the section with the replay of up to MOST motions; empty if there is none to show."""
+def replay(name: str, found: Sequence[Motion], most_bytes: int) -> str:
+    """Return the section with the replay of up to MOST motions.
+
+    Where it would be larger than `most_bytes`, fewer pictures a second are kept.
+    """
     shown = list(found[:MOST])
     try:
-        document, rate = _document(name, shown)
+        document, rate = _document(name, shown, most_bytes)
     except HierarchyError as error:
         return section("Replay", f'<p class="quiet">There is none: {escape(str(error))}.</p>')
     held = document.replace("&", "&amp;").replace("'", "&#39;")
@@ -33,14 +35,14 @@ def replay(name: str, found: Sequence[Motion]) -> str:
                    _said(shown, found, rate))
 
 
-def _document(name: str, shown: Sequence[Motion]) -> tuple[str, float]:
+def _document(name: str, shown: Sequence[Motion], most_bytes: int) -> tuple[str, float]:
     from scenarios.replay import html
 
     recordings: dict[str, Recording] = {one.label: one.recording for one in shown}
-    for rate in _RATES:
+    document, rate = html(recordings, name, rate=_FASTEST, embedded=True), _FASTEST
+    if len(document) > most_bytes:
+        rate = max(_SLOWEST, float(int(_FASTEST * most_bytes / len(document))))
         document = html(recordings, name, rate=rate, embedded=True)
-        if len(document) <= _MOST_BYTES:
-            break
     return document, rate
 
 

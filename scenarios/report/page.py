@@ -23,6 +23,8 @@ from scenarios.report.verdict import in_words, verdict
 if TYPE_CHECKING:
     from scenarios.compare import Comparison, Run
 
+_REPLAY_BYTES, _REPLAYS_BYTES = 3_000_000, 8_000_000  # of one replay, and of all on a page
+
 
 def page(comparison: Comparison) -> str:
     """Return the page; it refers to nothing outside itself but the run folders beside it."""
@@ -50,7 +52,8 @@ def _contents(groups: Mapping[str, Sequence[Run]]) -> str:
 def _group(comparison: Comparison, name: str, runs: Sequence[Run]) -> str:
     found, look = motions(runs), looks(run.label for run in runs)
     parts = [_lead(name, runs, found, look)]
-    parts += [replay(name, found)] if found else []
+    room = min(_REPLAY_BYTES, _REPLAYS_BYTES // len(comparison.groups()))
+    parts += [replay(name, found, room)] if found else []
     parts += [tables.numbers(runs, look), _over_time(name, runs, look)]
     if found:
         parts += [charts.multiples(name, found, look), charts.overlays(name, runs, found, look)]
