@@ -90,6 +90,7 @@ def list_(as_json: AsJson = False) -> None:
     """List the scenarios, sweeps, resolvers, tasks and robots there are."""
     import solvers
     from hierarchy.robot import ROBOTS
+    from hierarchy.robots.table import in_words
     from hierarchy.tasks import TASKS
     from scenarios.config import load, shipped
     from scenarios.sweep.config import load_sweep, shipped_sweeps
@@ -98,7 +99,7 @@ def list_(as_json: AsJson = False) -> None:
                "sweeps": {name: load_sweep(name).title for name in shipped_sweeps()},
                "resolvers": {name: first_line(solvers.make(name)) for name in solvers.names()},
                "tasks": {name: first_line(task) for name, task in TASKS.items()},
-               "robots": dict.fromkeys(ROBOTS, "")}
+               "robots": {name: in_words(table) for name, table in ROBOTS.items()}}
     if as_json:
         return print_json(entries)
     for what, named in entries.items():

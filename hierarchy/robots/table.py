@@ -99,3 +99,11 @@ class TreeTable:
 
 
 Table = DHTable | TreeTable
+
+
+def in_words(table: Table) -> str:
+    """Return what a table is, for a list of robots."""
+    if isinstance(table, DHTable):
+        return f"an arm of {len(table.d)} joints"
+    floating = ", on a floating base" if table.base == "floating" else ""
+    return f"{len(table.joints)} joints that branch{floating}"
