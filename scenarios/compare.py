@@ -202,13 +202,17 @@ def _row(metric: Metric, found: Sequence[Metric | None], competes: Sequence[bool
                metric.name)
 
 
-def _best(values: Mapping[int, float], lower: bool | None, tie: float = 0.01) -> frozenset[int]:
-    """Return which of the values are within `tie`, relative, of the best; empty if all are."""
+def _best(values: Mapping[int, float], lower: bool | None, tie: float = 0.01,
+          rounding: float = 1e-12) -> frozenset[int]:
+    """Return which of the values are as good as the best; empty if all are.
+
+    That is within `tie`, relative, or within what rounding makes of nothing [SI units].
+    """
     if lower is None or not values:
         return frozenset()
     winner = min(values.values()) if lower else max(values.values())
     best = frozenset(i for i, value in values.items()
-                     if abs(value - winner) <= tie * max(abs(value), abs(winner)))
+                     if abs(value - winner) <= max(tie * max(abs(value), abs(winner)), rounding))
     return best if len(best) < len(values) else frozenset()
 
 

@@ -57,6 +57,11 @@ def test_values_within_a_percent_are_equally_good():
     assert row(runs, "Joint acceleration").best == {0, 1}
 
 
+def test_what_rounding_makes_of_nothing_is_nothing():
+    runs = [made("tpm", a=np.full((5, 7), 1e-17)), made("hqp", a=np.zeros((5, 7)))]
+    assert row(runs, "Joint acceleration, max").best == set()
+
+
 def test_where_all_are_equally_good_none_is_marked():
     assert all(not line.best for line in table([made("tpm"), made("hqp")]))
 
