@@ -99,14 +99,15 @@ class JointLimits(Task):
                level == "acceleration", A, lower, upper, row)
 
     def _positions(self, state: State) -> Array:
-        robot, q = self.robot, np.asarray(state.q)
+        robot, q = self.robot, state.q
         return q if robot.nq == robot.n else q[robot.coordinates[robot.actuated:]]
 
     def _rates(self, state: State, level: Level) -> Array:
         """The velocities (n,) from which the next ones are limited."""
         commanded = state.commanded if level == "velocity" else None
-        rates = state.v if commanded is None else commanded
-        return np.asarray(rates[self.robot.actuated:])
+        rates: Array = state.v if commanded is None else commanded
+        first = self.robot.actuated
+        return rates[first:] if first else rates
 
 
 @compiled
