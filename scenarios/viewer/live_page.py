@@ -19,7 +19,7 @@ from scenarios.viewer.live_panel import LivePanel, resolvers
 from scenarios.viewer.model import Model, Rgb, rgb
 from scenarios.viewer.moment import Moment, Watched
 from scenarios.viewer.playback import Requests
-from scenarios.viewer.server import lay_floor, look_at_box
+from scenarios.viewer.server import lay_floor, look_at_all
 from scenarios.viewer.stack_list import stack_html
 
 FRAMES = 30.0   # drawn a second
@@ -194,11 +194,10 @@ class LivePage:
 
     def _place_camera(self, paths: list[Array]) -> None:
         stage, placements = self._stage, self._watched.moment().placements
-        points = np.vstack([*paths, ends(stage.capsules, placements).reshape(-1, 3),
-                            *(place[None] for place in stage.obstacles.centres
-                              if np.linalg.norm(place) < _NEAR)])
-        look_at_box(self.server, points.min(axis=0) - _MARGIN, points.max(axis=0) + _MARGIN,
-                    stage.azimuth)
+        arm = ends(stage.capsules, placements).reshape(-1, 3)
+        near = [place for place in stage.obstacles.centres if np.linalg.norm(place) < _NEAR]
+        points = np.vstack([*paths, arm, *near])
+        look_at_all(self.server, np.vstack([points - _MARGIN, points + _MARGIN]), stage.azimuth)
 
     def _show_list(self, now: Moment) -> None:
         live = self.live

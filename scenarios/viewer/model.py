@@ -53,8 +53,9 @@ class Model:
         self._areas: list[Any] = []
         self._cone: Any = None
         self.set_stage(stage)
-        self._painted = [*(node for node in self._solid if tuple(node.color) == self._colour),
-                         self._pointer()]
+        self._painted = [node for node in self._solid if tuple(node.color) == self._colour]
+        if stage.axis is not None:
+            self._painted.append(self._pointer())
         self._active = self._ball("/active", 1.7 * _DOT, rgb(ALERT))
         self._link = self._lines("/link", _segments(()), rgb(ALERT), 3.0)
         self._paths: list[Any] = []
@@ -155,7 +156,7 @@ class Model:
             hull = hull_of_balls(ends, (radius, _TIP if last else radius))
             drawn.append(self._add_mesh(f"/joint{capsule.joint}/link{i}", hull, _PALE))
             for k, end in enumerate(ends[:1] if last else ends):
-                drawn.append(self._ball(f"/joint{capsule.joint}/ball{i}{k}", 1.18 * radius,
+                drawn.append(self._ball(f"/joint{capsule.joint}/ball{i}{k}", 1.12 * radius,
                                         self._colour, position=end))
         return drawn
 

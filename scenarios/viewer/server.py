@@ -6,7 +6,7 @@ import io
 import socket
 import webbrowser
 from contextlib import closing, redirect_stdout
-from math import cos, radians, sin
+from math import cos, radians, sin, tan
 from typing import Any
 
 import numpy as np
@@ -17,6 +17,8 @@ from hierarchy.problem import Array
 HOST = "127.0.0.1"
 _ELEVATION = 22.0  # [deg] from where the camera looks
 _FIELD_OF_VIEW = 38.0  # [deg]
+_ASPECT = 0.9  # width over height of what is left between the panels
+_ROOM = 1.06   # of the distance at which all points are just seen
 _WIDTH = 330  # [px] of the panels
 
 
@@ -55,17 +57,18 @@ def right(azimuth: float) -> Array:
     return np.array([-sin(azimuth), cos(azimuth), 0.0])
 
 
-def look_at_box(server: Any, low: Array, high: Array, azimuth: float) -> None:
-    """Place the camera so that the box between two corners (3,) [m] fills the view.
-
-    It looks from an azimuth [rad].
-    """
+def look_at_all(server: Any, points: Array, azimuth: float) -> None:
+    """Place the camera, from an azimuth [rad], so that points (N, 3) [m] fill the view."""
     e, half_field = radians(_ELEVATION), radians(_FIELD_OF_VIEW / 2)
     away = np.array([cos(e) * cos(azimuth), cos(e) * sin(azimuth), sin(e)])
-    radius, camera = 0.45 * float(np.linalg.norm(high - low)), server.initial_camera
-    camera.fov = 2.0 * half_field
-    camera.position = (low + high) / 2 + away * radius / sin(half_field)
-    camera.look_at = (low + high) / 2
+    axes = np.array([right(azimuth), np.cross(away, right(azimuth)), away])
+    seen = points @ axes.T
+    middle = (seen.min(axis=0) + seen.max(axis=0)) / 2
+    off = np.abs(seen - middle) / (_ASPECT, 1.0, 1.0)
+    distance = float((off[:, :2].max(axis=1) / tan(half_field) + seen[:, 2] - middle[2]).max())
+    camera = server.initial_camera
+    camera.fov, camera.look_at = 2.0 * half_field, middle @ axes
+    camera.position = middle @ axes + _ROOM * distance * away
 
 
 def lay_out(server: Any) -> Any:

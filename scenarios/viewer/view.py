@@ -17,12 +17,15 @@ from scenarios.viewer.model import Model
 from scenarios.viewer.moment import of_scene
 from scenarios.viewer.playback import Playback, PlayButton, Requests, add_speed
 from scenarios.viewer.plots import Plots
-from scenarios.viewer.server import lay_floor, lay_out, look_at_box, right
+from scenarios.viewer.server import lay_floor, lay_out, look_at_all, right
 from scenarios.viewer.stack_list import stack_html
 
 FRAMES = 30.0  # a second
 _CURSORS = 8.0  # moves of the plots' cursor a second while it plays
 _SEE_THROUGH = 0.35
+_APART = 1.15   # of a run's width, from one to the next
+_POSES = 50     # of the arm that the camera sees
+_ABOVE = 0.08   # [m] of a run's label over all of it
 _BESIDE, _OVERLAID = "side by side", "overlaid"
 
 
@@ -124,28 +127,27 @@ class View:
         self._stacks = {label: gui.add_html("") for label in self.scenes}
 
     def _name_runs(self) -> list[Any]:
-        """Labels above the runs, where there are several."""
-        top = max(_bounds(one)[1][2] for one in self.scenes.values()) + 0.08
-        labels = list(self.scenes) if len(self.scenes) > 1 else []
-        return [self.server.scene.add_label(f"/run{i}/label", label, position=(0.0, 0.0, top),
-                                            anchor="bottom-center")
-                for i, label in enumerate(labels)]
+        """Labels above the runs, seen where there are several."""
+        names = []
+        for i, (label, one) in enumerate(self.scenes.items()):
+            points = _points(one)
+            above = (*points.mean(axis=0)[:2], points[:, 2].max() + _ABOVE)
+            names.append(self.server.scene.add_label(f"/run{i}/label", label, position=above,
+                                                     anchor="bottom-center"))
+        return names
 
     def _arrange(self, side_by_side: bool) -> None:
         """Put the runs beside each other, or into one place with all but the first see-through."""
-        bounds = [_bounds(one) for one in self.scenes.values()]
-        low, high = (np.array(side).min(axis=0) for side in ([b[0] for b in bounds],
-                                                             [-b[1] for b in bounds]))
-        high = -high
         azimuth = next(iter(self.scenes.values())).stage.azimuth
-        apart = right(azimuth) * (0.8 * np.linalg.norm((high - low)[:2]))
+        points = [_points(one) for one in self.scenes.values()]
+        across = np.vstack(points) @ right(azimuth)
+        apart = right(azimuth) * (_APART * np.ptp(across)) * side_by_side
         for i, model in enumerate(self.models.values()):
-            model.place(apart * i if side_by_side else np.zeros(3))
+            model.place(apart * i)
             model.fade(_SEE_THROUGH if i and not side_by_side else None)
         for name in self._names:
-            name.visible = side_by_side
-        last = (len(self.models) - 1) * apart * side_by_side
-        look_at_box(self.server, np.minimum(low, low + last), np.maximum(high, high + last),
+            name.visible = side_by_side and len(self._names) > 1
+        look_at_all(self.server, np.vstack([seen + apart * i for i, seen in enumerate(points)]),
                     azimuth)
 
 
@@ -164,11 +166,10 @@ def _frame_at(one: Scene, t: float) -> int:
     return max(int(np.searchsorted(one.t, t + 1e-9, side="right")) - 1, 0)
 
 
-def _bounds(one: Scene) -> tuple[Array, Array]:
-    """Lowest and highest coordinates (3,) [m] of arm and path, and of obstacles where they rest."""
-    points = np.vstack([one.links.reshape(-1, 3), one.traced,
-                        one.centres[0] if one.centres.size else np.empty((0, 3))])
-    return points.min(axis=0), points.max(axis=0)
+def _points(one: Scene) -> Array:
+    """Points (N, 3) [m] of arm and path, and of obstacles where they are at first."""
+    links = one.links[:: max(len(one.t) // _POSES, 1)].reshape(-1, 3)
+    return np.vstack([links, one.traced, one.centres[0] if one.centres.size else links[:0]])
 
 
 def _paths(one: Scene) -> list[Array]:
