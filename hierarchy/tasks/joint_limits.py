@@ -99,7 +99,8 @@ class JointLimits(Task):
                level == "acceleration", A, lower, upper, row)
 
     def _positions(self, state: State) -> Array:
-        robot, q = self.robot, state.q
+        robot = self.robot
+        q: Array = state.q
         return q if robot.nq == robot.n else q[robot.coordinates[robot.actuated:]]
 
     def _rates(self, state: State, level: Level) -> Array:
