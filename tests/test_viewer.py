@@ -1,5 +1,6 @@
 """The page in the browser: what it shows, and what is asked for on it."""
 
+import sys
 import time
 
 import numpy as np
@@ -11,9 +12,9 @@ from hierarchy.avoidance.obstacles import distance_to_obstacle
 from hierarchy.errors import HierarchyError
 from scenarios.cli import run_command
 from scenarios.config import load
-from scenarios.controller import Controller
-from scenarios.levels import Fate
-from scenarios.recorder import Recorder
+from scenarios.control.controller import Controller
+from scenarios.scene.levels import Fate
+from scenarios.control.recorder import Recorder
 from scenarios.recording import load_run, save
 from scenarios.scene import scene
 from scenarios.simulate import simulate, tick
@@ -220,7 +221,7 @@ def test_what_cannot_be_is_refused_and_the_run_goes_on(spoil, recording):
 
 
 def test_a_restart_keeps_the_settings_and_puts_obstacles_back(tmp_path, monkeypatch):
-    monkeypatch.setattr("scenarios.figures.write_all", lambda *_: None)
+    monkeypatch.setattr("scenarios.figures.letter.write_all", lambda *_: None)
     live = Live(LIMITED)
     live.change({"pointing.alpha_d": 20.0})
     live.drag(1, (0.0, 0.1, 0.0))
@@ -321,6 +322,32 @@ def test_a_live_page_at_its_end_begins_anew_when_it_is_played(server):
     page.requests.put("toggle")
     page.step(0.01)
     assert not page.live.over
+
+
+def test_a_missing_extra_is_named(monkeypatch):
+    from scenarios.viewer.server import open_server
+
+    monkeypatch.setitem(sys.modules, "viser", None)
+    with pytest.raises(HierarchyError, match=r"pip install 'task-hierarchy\[view\]'"):
+        open_server(0, "test")
+
+
+def test_a_live_run_is_kept_at_ctrl_c(tmp_path, monkeypatch, capsys):
+    pytest.importorskip("viser", reason="needs the extra view")
+    from scenarios.viewer.live_page import LivePage
+
+    def interrupted(page, seconds):
+        ticks(page.live, 20)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(LivePage, "step", interrupted)
+    monkeypatch.setattr("scenarios.figures.letter.write_all", lambda *_: None)
+    line = ["run", "ellipse", "--live", "--no-browser", "--port", "0", "--out"]
+    assert run_command([*line, str(tmp_path / "a")]) == 1
+    assert load_run(tmp_path / "a").ticks == 21
+    out, err = capsys.readouterr()
+    assert "21 ticks in" in out
+    assert "fault: interrupted at tick 21" in err
 
 
 @pytest.mark.parametrize("arguments", [

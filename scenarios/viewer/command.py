@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 def view_command(folders: Sequence[Path], port: int, side_by_side: bool, browser: bool) -> int:
     """Show finished runs until Ctrl-C, and return the exit code 0."""
     from scenarios.recording import load_run
-    from scenarios.viewer.server import announce, open_server
+    from scenarios.viewer.server import announce, close, open_server
     from scenarios.viewer.view import View, labelled
 
     runs = labelled(folders, [load_run(folder) for folder in folders])
@@ -29,24 +29,24 @@ def view_command(folders: Sequence[Path], port: int, side_by_side: bool, browser
     except KeyboardInterrupt:
         print()
     finally:
-        server.stop()
+        close(server)
     return 0
 
 
 def live_command(scenario: Scenario, folder: Path, port: int, speed: float, browser: bool) -> int:
-    """Run a scenario while it is watched, keep the run, and return 1 if it ended in a fault.
+    """Run a scenario while it is watched, keep the run, and return 1 if it came to no end.
 
     The run is kept when it ends or at Ctrl-C, in `folder` or, after a restart, beside it; one that
     is restarted before its end is not kept.
     """
     from scenarios.viewer.live import Live
     from scenarios.viewer.live_page import LivePage
-    from scenarios.viewer.server import announce, open_server
+    from scenarios.viewer.server import announce, close, open_server
 
     live = Live(scenario)
     server = open_server(port, f"hierarchy run {scenario.name} --live")
+    page = LivePage(server, live, speed)
     try:
-        page = LivePage(server, live, speed)
         announce(server, browser)
         _serve(page, folder)
     except KeyboardInterrupt:
@@ -54,8 +54,8 @@ def live_command(scenario: Scenario, folder: Path, port: int, speed: float, brow
         if not live.over:
             _keep(page, folder)
     finally:
-        server.stop()
-    return 1 if live.fault else 0
+        close(server)
+    return 1 if live.recording().fault else 0
 
 
 def _serve(page: LivePage, folder: Path) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from hierarchy.problem import Array
-from scenarios.controller import Controller
+from scenarios.control.controller import Controller
 from scenarios.recording import Recording
 from scenarios.scene import Series, series
 from scenarios.viewer.moment import Watched

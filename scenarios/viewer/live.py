@@ -14,8 +14,8 @@ from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array
 from scenarios.build import build
 from scenarios.config import Scenario, ScenarioError
-from scenarios.controller import Controller
-from scenarios.recorder import Recorder
+from scenarios.control.controller import Controller
+from scenarios.control.recorder import Recorder
 from scenarios.recording import Recording, save
 from scenarios.simulate import tick
 

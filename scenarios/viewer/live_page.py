@@ -11,7 +11,7 @@ import numpy as np
 from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array
 from hierarchy.tasks import Pose, Position
-from scenarios.drawing import colours
+from scenarios.figures.drawing import colours
 from scenarios.scene import ends, stage
 from scenarios.viewer.curves import Lately
 from scenarios.viewer.live import Live

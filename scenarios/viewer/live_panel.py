@@ -7,7 +7,7 @@ from typing import Any
 
 from hierarchy.errors import HierarchyError
 from scenarios.config import Scenario
-from scenarios.drawing import INK
+from scenarios.figures.drawing import INK
 from scenarios.viewer.handles import Handles
 from scenarios.viewer.knobs import knobs
 from scenarios.viewer.playback import PlayButton, Requests, add_speed

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hierarchy.problem import Array
-from scenarios.drawing import ALERT, INK
+from scenarios.figures.drawing import ALERT, INK
 from scenarios.scene import Stage, ends, place
 from scenarios.viewer.meshes import Mesh, cone_mesh, hull_of_balls, obstacle_mesh
 from scenarios.viewer.moment import Moment

@@ -13,13 +13,13 @@ from hierarchy import State
 from hierarchy.allocation import AVOIDANCE
 from hierarchy.avoidance import Obstacles
 from hierarchy.problem import Array
-from scenarios import listed
-from scenarios.levels import Fate, fates, saturated, tolerance
+from scenarios.control import listed
+from scenarios.scene.levels import Fate, fates, saturated, tolerance
 from scenarios.scene import SEPARATION, Scene
 from scenarios.sensors import ExactDistances
 
 if TYPE_CHECKING:
-    from scenarios.controller import Controller
+    from scenarios.control.controller import Controller
 
 
 class Became(NamedTuple):
@@ -87,7 +87,7 @@ class Watched:
 
     Distances are measured once more, from known geometry and at the true joints, also where the
     controller sees a camera's. After `moment`, `listed` has the signals of listed tasks, one row
-    each, see scenarios.listed.
+    each, see scenarios.control.listed.
     """
 
     def __init__(self, controller: Controller) -> None:

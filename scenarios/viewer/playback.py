@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from queue import Empty, SimpleQueue
+from queue import SimpleQueue
 from typing import Any
 
 SPEEDS = (0.1, 0.25, 0.5, 1.0, 2.0, 4.0)
@@ -60,13 +60,11 @@ class Requests:
     def take(self) -> list[tuple[str, Any]]:
         """Return what was asked for since; of what was asked for more than once, the last."""
         taken: dict[str, Any] = {}
-        while True:
-            try:
-                what, value = self._queue.get_nowait()
-            except Empty:
-                return list(taken.items())
+        for _ in range(self._queue.qsize()):
+            what, value = self._queue.get()
             taken.pop(what, None)
             taken[what] = value
+        return list(taken.items())
 
     def when_changed(self, handle: Any, what: str,
                      read: Callable[[Any], Any] = lambda handle: handle.value) -> None:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from hierarchy.problem import Array
-from scenarios.drawing import ALERT, INK, JOINTS
+from scenarios.figures.drawing import ALERT, INK, JOINTS
 from scenarios.scene import Series
 
 _POINTS = 500   # of each curve

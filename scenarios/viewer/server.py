@@ -31,13 +31,19 @@ def open_server(port: int, label: str) -> Any:
         import viser
     except ImportError as error:
         raise HierarchyError("the page in the browser needs viser, which is not installed: "
-                             "pip install task-hierarchy[view]") from error
+                             "pip install 'task-hierarchy[view]'") from error
     port = _free(port)
     with redirect_stdout(io.StringIO()):  # it prints a table of its own
         server = viser.ViserServer(host=HOST, port=port, label=label, verbose=False)
     server.gui.configure_theme(show_logo=False, show_share_button=False, control_width="medium",
                                brand_color=(0, 114, 178))
     return server
+
+
+def close(server: Any) -> None:
+    """Stop the server."""
+    with redirect_stdout(io.StringIO()):
+        server.stop()
 
 
 def address(server: Any) -> str:

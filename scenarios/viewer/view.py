@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from hierarchy.problem import Array
-from scenarios.drawing import colours
+from scenarios.figures.drawing import colours
 from scenarios.recording import Recording
 from scenarios.scene import Scene, scene
 from scenarios.viewer.model import Model
