@@ -14,7 +14,6 @@ for _name in scenarios.__all__:  # they are imported when first used, and autodo
 
 project = "task-hierarchy"
 author = "the contributors of task-hierarchy"
-suppress_warnings = ["toc.not_readable"]
 release = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"]
 
 extensions = ["myst_parser", "sphinx.ext.autodoc", "mathml", "outside_links", "plain_docstrings",
