@@ -26,7 +26,7 @@ from hierarchy.models.points import points_along_chain
 from hierarchy.models.tables import from_table
 from hierarchy.problem import Array
 from hierarchy.robots import TABLES
-from hierarchy.robots.table import Base
+from hierarchy.robots.table import Base, Table
 
 ROBOTS = TABLES
 
@@ -69,7 +69,7 @@ class Robot:
     position that belongs to a velocity is, or begins. `parents` (joints + 1) has the joint that
     carries each, `masses` (joints + 1) [kg] and `centres` (joints + 1, 3) [m] the body that each
     moves. `rest` (nq,) is where it starts unless told otherwise. `missing` are sentences on what
-    its file names and does not have.
+    its file names and does not have; `table` is the table that it was made from, or None.
     """
 
     def __init__(self, model: Any, name: str, end_effector: str | None = None,
@@ -100,6 +100,7 @@ class Robot:
         self.control_points, self.capsules = control_points, capsules
         self.rest = np.array(pin.neutral(model)) if rest is None else rest
         self.missing = missing
+        self.table: Table | None = None
 
     @classmethod
     def named(cls, name: str, base: Base | None = None) -> Robot:
@@ -109,7 +110,9 @@ class Robot:
         """
         if name not in TABLES:
             raise UnknownNameError("robot", name, TABLES)
-        return cls._of(from_table(TABLES[name], base), name)
+        robot = cls._of(from_table(TABLES[name], base), name)
+        robot.table = TABLES[name]
+        return robot
 
     @classmethod
     def from_file(cls, path: str | Path, end_effector: str | None = None,

@@ -12,7 +12,6 @@ from hierarchy.avoidance.self_collision import measure_capsules, pack_capsules, 
 from hierarchy.errors import UnknownNameError
 from hierarchy.paths import Ellipse, Path, Shifted, Still, Waypoints
 from hierarchy.problem import Array
-from hierarchy.robots import TABLES
 from hierarchy.tasks import CentreOfMass, Pointing, Pose, Position, Posture
 from scenarios.config import RobotSection, ScenarioError, StartSection
 from scenarios.sections import (
@@ -53,7 +52,7 @@ def separable_pairs(robot: Robot) -> list[tuple[int, int]]:
     stand out, no pair counts that overlaps in the robot's own posture.
     """
     pairs = pairs_of_tree(robot.capsules, robot.parents)
-    if robot.name in TABLES or not pairs:
+    if robot.table is not None or not pairs:
         return pairs
     distances = measure_capsules(robot.state(robot.rest).placements,
                                  *pack_capsules(robot.capsules), np.array(pairs))[:, 0]

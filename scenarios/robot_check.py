@@ -59,7 +59,7 @@ def as_plain_data(section: RobotSection, robot: Robot) -> dict[str, Any]:
 def say(section: RobotSection, robot: Robot) -> str:
     """Return what was found as text, with a [robot] section to paste."""
     found = as_plain_data(section, robot)
-    of_table = robot.name in TABLES
+    of_table = robot.table is not None
     listed = "as its table has them" if of_table else "proposed"
     capsules = ("none" if not robot.capsules else f"{len(robot.capsules)}, "
                 + ("as listed" if section.capsules is not None or of_table
@@ -87,7 +87,7 @@ def paste(section: RobotSection, robot: Robot) -> str:
     if section.locked:
         locked = ", ".join(f"{_quoted(name)} = {value}" for name, value in section.locked.items())
         lines.append(f"locked = {{ {locked} }}")
-    if robot.name in TABLES:
+    if robot.table is not None:
         return "\n".join(lines)
     found = as_plain_data(section, robot)
     for key in ("control_points", "capsules"):

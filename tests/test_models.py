@@ -263,6 +263,13 @@ def test_a_posture_is_that_of_the_joints_behind_a_floating_base(arm):
         Posture((0.0, 0.0)).error(state)
 
 
+def test_a_file_with_the_name_of_a_table_is_not_that_table(arm):
+    robot = Robot.load(str(arm().rename(arm().with_name("humanoid.urdf"))))
+    assert (robot.name, robot.table) == ("humanoid", None)
+    assert Robot.load("humanoid").table is not None
+    assert separable_pairs(robot) == [(0, 2)]
+
+
 def test_locked_joints_are_no_joints(arm):
     robot = Robot.load(str(arm()), locked={"elbow": 0.8})
     assert robot.joint_names == ("shoulder", "turn")

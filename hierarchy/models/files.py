@@ -42,7 +42,7 @@ def read_file(path: str | Path, base: Base | None = None, shapes: bool = True,
     except Exception as error:  # the parsers raise many kinds; all mean the file is bad
         raise RobotError(f"robot file {str(path)!r} cannot be read: {error}") from error
     model = _without(model, locked, str(path))
-    found = Found(model, proposed_end_effector(model), proposed=True,
+    found = Found(model, proposed_end_effector(model),
                   rest=neutral_within_limits(model, pin.neutral(model)))
     if not shapes:
         return found

@@ -17,8 +17,7 @@ class Found:
     """A pinocchio model, its shape, and what could not be found.
 
     `end_effector` is a frame's name; `rest` (nq,) the configuration in which it starts, or None;
-    `missing` are sentences. `control_points` is None where they are to be proposed, and `proposed`
-    says that the capsules were made from collision geometry.
+    `missing` are sentences. `control_points` is None where they are to be proposed.
     """
 
     model: Any
@@ -27,7 +26,6 @@ class Found:
     control_points: tuple[ControlPoint, ...] | None = None
     rest: Array | None = None
     missing: tuple[str, ...] = ()
-    proposed: bool = False
 
 
 def is_floating(model: Any) -> bool:

@@ -40,7 +40,7 @@ class PhysicsArm:
                  joints: JointsSection | None = None) -> None:
         mujoco = _mujoco()
         servo, joints = servo or ServoSection(), joints or JointsSection()
-        if robot.name not in _ARMS:
+        if not isinstance(robot.table, DHTable):
             raise ScenarioError(f'plant.kind = "mujoco": robot {robot.name!r} is not one of '
                                 f"{', '.join(_ARMS)}, the arms given as tables")
         self._steps = ceil(period * servo.rate - _ROUNDING)
