@@ -39,6 +39,7 @@ from scenarios.config import (
     SeparationSection,
     StartSection,
 )
+from scenarios.control.order import Hierarchical, Order, Switched
 from scenarios.making import (
     make_path,
     make_robot,
@@ -46,7 +47,6 @@ from scenarios.making import (
     separable_pairs,
     start_state,
 )
-from scenarios.order import Hierarchical, Order, Switched
 from scenarios.plants import Apart, Commanded, JointSensor, KinematicArm, PhysicsArm, Plant
 from scenarios.published import PublishedAvoidance
 from scenarios.sensors import ExactDistances, Sensor

@@ -274,7 +274,7 @@ def figures(folder: Annotated[Path, typer.Argument(
                 help="Where to write; new or empty. Default: the run's own folder.")] = None,
             as_json: AsJson = False) -> None:
     """Draw a run's figures anew, for the screen or for a paper."""
-    from scenarios.redraw import redraw
+    from scenarios.figures.redraw import redraw
 
     files = [shown(file) for file in redraw(folder, style, out)]
     if as_json:

@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING
 import matplotlib
 from PIL import Image
 
-from scenarios import drawing
 from scenarios.config import load, shipped
+from scenarios.figures import drawing
+from scenarios.figures.picture import picture
 from scenarios.folders import write_bytes
 from scenarios.metrics import measure
-from scenarios.picture import picture
 from scenarios.simulate import simulate
 
 if TYPE_CHECKING:

@@ -132,7 +132,7 @@ def _listed(recording: Recording, settle: float) -> Iterator[Metric]:
     """Errors of the tasks of `[[tasks]]`, each under its name."""
     if not recording.scenario.tasks:
         return
-    from scenarios.listed import errors  # here, since it loads the tasks
+    from scenarios.control.listed import errors  # here, since it loads the tasks
 
     after = recording["t"] - recording["t"][0] >= settle
     for section, unit, exact in errors(recording):

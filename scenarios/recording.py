@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 class Event(NamedTuple):
-    """What kind of trouble a tick had and what was done; the kinds of `scenarios.policy`."""
+    """What kind of trouble a tick had, as in `scenarios.control.policy`, and what was done."""
 
     tick: int
     kind: str
@@ -118,8 +118,8 @@ def save(recording: Recording, folder: str | Path, figures: bool = True) -> Path
         _write_json(partial / "versions.json", versions())
         (partial / "scenario.toml").write_text(recording.scenario.to_toml(), encoding="utf-8")
         if figures:
-            from scenarios import figures as drawing
-            drawing.write_all(recording, partial)
+            from scenarios.figures import letter
+            letter.write_all(recording, partial)
     return Path(folder)
 
 

@@ -7,11 +7,11 @@ from collections.abc import Callable
 import numpy as np
 
 from hierarchy.problem import Array
-from scenarios.audit import Audit, Certified, Strictness
 from scenarios.config import Scenario
-from scenarios.controller import Controller
-from scenarios.faults import Faults
-from scenarios.recorder import FASTEST, Recorder
+from scenarios.control.audit import Audit, Certified, Strictness
+from scenarios.control.controller import Controller
+from scenarios.control.faults import Faults
+from scenarios.control.recorder import FASTEST, Recorder
 from scenarios.recording import Recording
 
 _REPORT_EVERY = 500  # ticks between two calls of `progress`
@@ -26,7 +26,7 @@ def simulate(scenario: Scenario, progress: Callable[[int, int], None] | None = N
     ends early: the Recording has all ticks
     so far and says why in `fault`. With `certified`, every answer is judged by `solvers.certify`
     after its tick was timed, and the Recording has the verdicts as its signal `certified`; with
-    `control.strictness` it has `moved_by_lower`, see scenarios.audit.Strictness. Raises
+    `control.strictness` it has `moved_by_lower`, see scenarios.control.audit.Strictness. Raises
     HierarchyError where the scenario does not fit its robot or resolver.
     """
     rehearsal = Controller(scenario)

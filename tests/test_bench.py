@@ -5,7 +5,7 @@ import numpy as np
 from scenarios.bench.plain import PlainTick
 from scenarios.build import build
 from scenarios.config import load
-from scenarios.controller import Controller
+from scenarios.control.controller import Controller
 from scenarios.simulate import simulate
 
 

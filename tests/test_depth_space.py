@@ -11,7 +11,7 @@ from hierarchy.robots import TABLES
 from scenarios import load, simulate
 from scenarios.build import build
 from scenarios.config import ScenarioError
-from scenarios.depth_figure import depth_figure
+from scenarios.figures.depth import depth_figure
 from scenarios.sensors import DepthSensor
 from scenarios.sensors.camera import DepthCamera, Pinhole, looking_at
 from scenarios.sensors.depth_space import DepthSpace, ObstacleImage

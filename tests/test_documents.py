@@ -134,7 +134,7 @@ def is_name(text):
 def test_the_tutorial_can_be_followed_from_top_to_bottom(tmp_path, monkeypatch):
     """Files get the name in their first line, commands are run (but for figures), Python goes on.
     """
-    monkeypatch.setattr("scenarios.figures.write_all", lambda recording, folder: None)
+    monkeypatch.setattr("scenarios.figures.letter.write_all", lambda recording, folder: None)
     names, followed = {"__name__": "document"}, set()
     for language, text in BLOCK.findall(TEXTS[FOLLOWED]):
         followed.add(language)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from scenarios.config import load
-from scenarios.controller import Controller
+from scenarios.control.controller import Controller
 from scenarios.simulate import simulate
 from solvers import Status, certify, make, names
 from solvers.backends import BACKENDS

@@ -9,7 +9,7 @@ from hierarchy import HierarchyError
 from scenarios.build import build
 from scenarios.cli import run_command
 from scenarios.config import load
-from scenarios.faults import Faults
+from scenarios.control.faults import Faults
 from scenarios.metrics import measure
 from scenarios.recording import load_run, save
 from scenarios.simulate import simulate

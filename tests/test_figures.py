@@ -15,15 +15,15 @@ from matplotlib.patches import Patch
 
 import solvers
 from hierarchy import HierarchyError
-from scenarios import drawing, figures, palette, panels
 from scenarios.cli import run_command
 from scenarios.config import load
-from scenarios.picture import picture
+from scenarios.figures import drawing, letter, palette, panels
+from scenarios.figures.picture import picture
+from scenarios.figures.redraw import redraw
+from scenarios.figures.timeline import timeline
 from scenarios.recording import Event, save
-from scenarios.redraw import redraw
 from scenarios.report.figures import computing_time, overlay, side_by_side
 from scenarios.simulate import simulate
-from scenarios.timeline import timeline
 
 
 def beside(panel, recordings):
@@ -191,17 +191,17 @@ def test_the_stretches_in_which_a_task_is_active_are_red():
 
 
 def test_all_figures_of_a_run_are_written_as_svg_and_png(tmp_path):
-    figures.write_all(recording(), tmp_path)
+    letter.write_all(recording(), tmp_path)
     stems = {path.stem for path in tmp_path.iterdir()}
-    letter = {figure.name for figure in figures.SIMULATION} - {"task-errors"}  # it lists none
-    assert stems == letter | {"picture", "stack", "tick-times"}
+    drawn = {figure.name for figure in letter.SIMULATION} - {"task-errors"}  # it lists none
+    assert stems == drawn | {"picture", "stack", "tick-times"}
     assert len(list(tmp_path.iterdir())) == 2 * len(stems)
 
 
 def test_the_same_figure_is_the_same_file(tmp_path):
     for name in ("a", "b"):
         (tmp_path / name).mkdir()
-        figures.write_all(recording(), tmp_path / name)
+        letter.write_all(recording(), tmp_path / name)
     first, second = sorted((tmp_path / "a").glob("*.svg")), sorted((tmp_path / "b").glob("*.svg"))
     assert [path.read_bytes() for path in first] == [path.read_bytes() for path in second]
 
@@ -248,7 +248,8 @@ def test_figures_for_a_paper_are_vectors_one_column_wide_with_their_fonts_inside
 
 
 def test_figures_for_a_paper_are_the_same_bytes_in_another_process(run_folder, paper, tmp_path):
-    subprocess.run([sys.executable, "-c", "import sys; from scenarios.redraw import redraw; "
+    subprocess.run([sys.executable, "-c", "import sys\n"
+                    "from scenarios.figures.redraw import redraw\n"
                     "redraw(sys.argv[1], 'paper', sys.argv[2])", run_folder, tmp_path / "there"],
                    check=True, env={**os.environ, "PYTHONHASHSEED": "5"})
     for file in paper:
@@ -265,7 +266,7 @@ def test_joints_of_a_paper_figure_are_told_apart_in_grey_too():
 
 def test_figures_drawn_anew_take_the_place_of_those_in_the_run_folder(run_folder, monkeypatch):
     for text in ("old", "new"):
-        monkeypatch.setattr(figures, "write_all",
+        monkeypatch.setattr(letter, "write_all",
                             lambda recording, folder, text=text: [
                                 (folder / name).write_text(text) for name in ("a.svg", "b.svg")])
         assert redraw(run_folder) == [run_folder / "a.svg", run_folder / "b.svg"]
@@ -282,7 +283,7 @@ def test_a_style_or_folder_that_is_not_there_is_an_error_that_names_it(run_folde
 
 
 def test_the_command_says_which_files_it_drew(run_folder, monkeypatch, capsys):
-    monkeypatch.setattr(figures, "write_all",
+    monkeypatch.setattr(letter, "write_all",
                         lambda recording, folder: (folder / "a.pdf").write_text("drawn"))
     assert run_command(["figures", str(run_folder), "--style", "paper", "--json"]) == 0
     assert json.loads(capsys.readouterr().out) == {"files": [str(run_folder / "a.pdf")]}

@@ -12,7 +12,7 @@ from scenarios import load, simulate
 from scenarios.build import build
 from scenarios.cli import run_command
 from scenarios.config import JointsSection, MeasurementSection, ScenarioError, ServoSection
-from scenarios.controller import Controller
+from scenarios.control.controller import Controller
 from scenarios.metrics import measure
 from scenarios.plants import Apart, JointSensor, KinematicArm, PhysicsArm
 from scenarios.recording import load_run, save

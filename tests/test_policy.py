@@ -6,8 +6,8 @@ import pytest
 from hierarchy import HierarchyError, Robot
 from hierarchy.tasks import JointLimits
 from scenarios.config import PolicySection, load
-from scenarios.controller import Controller
-from scenarios.policy import Policy
+from scenarios.control.controller import Controller
+from scenarios.control.policy import Policy
 from solvers import Resolution, Status
 
 PERIOD = 0.001

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from scenarios.config import load
-from scenarios.controller import Controller
+from scenarios.control.controller import Controller
 from scenarios.simulate import simulate
 
 DATA = Path(__file__).parent / "data" / "ellipse"

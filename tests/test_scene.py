@@ -7,9 +7,9 @@ from hierarchy.avoidance import link_capsules
 from hierarchy.robots import TABLES
 from scenarios import load, simulate
 from scenarios.config import RobotSection
-from scenarios.controller import Controller
-from scenarios.levels import Fate, judge
+from scenarios.control.controller import Controller
 from scenarios.scene import capsules, ends, scene, stage
+from scenarios.scene.levels import Fate, judge
 
 SHORT = ["control.duration=1.5"]
 NAMES = ("ellipse", "ellipse-velocity", "ellipse-published", "ellipse-limits", "ellipse-hqp")

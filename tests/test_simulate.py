@@ -6,7 +6,7 @@ import pytest
 import scenarios.simulate
 from hierarchy import HierarchyError
 from scenarios.config import ScenarioError, load
-from scenarios.controller import Controller
+from scenarios.control.controller import Controller
 from scenarios.simulate import simulate
 from solvers import Resolution, Status
 

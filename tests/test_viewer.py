@@ -13,10 +13,10 @@ from hierarchy.errors import HierarchyError
 from scenarios.cli import run_command
 from scenarios.config import load
 from scenarios.control.controller import Controller
-from scenarios.scene.levels import Fate
 from scenarios.control.recorder import Recorder
 from scenarios.recording import load_run, save
 from scenarios.scene import scene
+from scenarios.scene.levels import Fate
 from scenarios.simulate import simulate, tick
 from scenarios.viewer.curves import Lately
 from scenarios.viewer.live import Live

@@ -47,7 +47,7 @@ def run(out: Path | None = None, arms: int = ARMS, checked: int = CHECKED,
     Console(highlight=False, markup=False).print(NOTES)
     if out is not None:
         from scenarios.bench.growth_figure import time_over_size
-        from scenarios.drawing import write
+        from scenarios.figures.drawing import write
 
         out.mkdir(parents=True, exist_ok=True)
         _write(errors, out / "errors.csv")

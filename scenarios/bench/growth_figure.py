@@ -11,10 +11,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator, ScalarFormatter
 
-from scenarios import drawing
 from scenarios.bench.candidates import NUMPY
 from scenarios.bench.growth import LEVEL_LESS, ROWS, exponents
-from scenarios.drawing import INK, Array
+from scenarios.figures import drawing
+from scenarios.figures.drawing import INK, Array
 
 _PANELS = {"tasks": ("number of tasks $l$", "l"), "joints": ("number of joints $n$", "n")}
 _NUMPY = "#8a8f98"   # as in the benchmark of resolvers

@@ -194,7 +194,7 @@ def _digits(value: float | None) -> str:
 
 def _write(rows: list[dict[str, Any]], out: Path) -> None:
     from scenarios.bench.figure import time_against_accuracy
-    from scenarios.drawing import write
+    from scenarios.figures.drawing import write
 
     out.mkdir(parents=True, exist_ok=True)
     with (out / "resolvers.csv").open("w", newline="") as file:

@@ -114,7 +114,7 @@ def _digits(value: float) -> str:
 def _write(rows: Sequence[dict[str, Any]], out: Path) -> None:
     from scenarios.bench.machine import machine
     from scenarios.bench.scaling_figure import time_over_sizes
-    from scenarios.drawing import write
+    from scenarios.figures.drawing import write
 
     out.mkdir(parents=True, exist_ok=True)
     with (out / "scaling.csv").open("w", newline="") as file:

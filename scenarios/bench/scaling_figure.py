@@ -8,11 +8,11 @@ from typing import Any
 import matplotlib
 from matplotlib.figure import Figure
 
-from scenarios import drawing
 from scenarios.bench.candidates import NUMPY
 from scenarios.bench.growth import LEVEL_LESS
 from scenarios.bench.growth_figure import draw_band, name_lines, scale_axes
 from scenarios.bench.scaling import PARTS, fixed
+from scenarios.figures import drawing
 
 _PANELS = {"tasks": ("number of tasks $l$", "l"), "rows": ("number of rows $m$", "m"),
            "joints": ("number of joints $n$", "n"),

@@ -13,7 +13,7 @@ from scenarios.bench.accuracy import entrants
 from scenarios.bench.growth import LEVEL_LESS, Timed
 from scenarios.bench.scaling import PARTS, Size
 from scenarios.config import Scenario, load
-from scenarios.controller import Controller
+from scenarios.control.controller import Controller
 from solvers import Status
 
 _BLOCK = 25          # ticks of one candidate in its turn

@@ -45,7 +45,7 @@ make("tpm").solve(h)"""
 _TICK = """\
 from scenarios.build import build
 from scenarios.config import load
-from scenarios.controller import Controller
+from scenarios.control.controller import Controller
 controller = Controller(load("ellipse"))
 plant = controller.cell.plant
 controller.command(0.0, plant.q, plant.v)"""

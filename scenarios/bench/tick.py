@@ -15,8 +15,8 @@ from hierarchy.problem import Array
 from scenarios.bench.plain import PlainTick
 from scenarios.build import build
 from scenarios.config import load
-from scenarios.controller import Controller
-from scenarios.recorder import Recorder
+from scenarios.control.controller import Controller
+from scenarios.control.recorder import Recorder
 from scenarios.recording import Recording
 from scenarios.simulate import simulate
 

@@ -11,7 +11,7 @@ from string import Template
 from typing import TYPE_CHECKING, Any
 
 from hierarchy.errors import HierarchyError
-from scenarios.palette import looks
+from scenarios.figures.palette import looks
 from scenarios.replay.data import fates, run_data
 from scenarios.scene import scene
 
@@ -29,7 +29,7 @@ def html(recordings: Mapping[str, Recording], title: str, *, rate: float = 30.0,
     `rate` [Hz] is that of the frames kept. With `embedded` it has no heading, fills its frame and
     leaves the wheel to the page around it. Raises HierarchyError where there is nothing to show.
     """
-    from scenarios.drawing import JOINTS  # here, since it brings matplotlib
+    from scenarios.figures.drawing import JOINTS  # here, since it brings matplotlib
 
     if not recordings:
         raise HierarchyError("a replay needs at least one run")

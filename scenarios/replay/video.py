@@ -28,7 +28,7 @@ def write_video(recording: Recording, path: Path, *, rate: float = 30.0,
     if program is None:
         raise HierarchyError("a video needs the program ffmpeg, which is not on the path: install "
                              "it, or write --out FILE.html, which plays in a browser")
-    from scenarios.palette import colour
+    from scenarios.figures.palette import colour
     from scenarios.replay.frames import Frames
     from scenarios.scene import scene
 

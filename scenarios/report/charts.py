@@ -6,13 +6,13 @@ from collections.abc import Mapping, Sequence
 from html import escape
 from typing import TYPE_CHECKING
 
-from scenarios import drawing, panels
-from scenarios.palette import Look, task_colours
+from scenarios.figures import drawing, panels
+from scenarios.figures.palette import Look, task_colours
+from scenarios.figures.timeline import tasks, timeline
 from scenarios.report import figures
 from scenarios.report.motions import ALIKE, Motion, motions
 from scenarios.report.parts import chip, joints, legend, picture, section, squares
 from scenarios.report.verdict import listed
-from scenarios.timeline import tasks, timeline
 
 if TYPE_CHECKING:
     from scenarios.compare import Run

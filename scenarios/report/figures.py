@@ -10,10 +10,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from scenarios import drawing
-from scenarios.drawing import ALERT, INK, Array
-from scenarios.palette import Look
-from scenarios.panels import Draw, Panel
+from scenarios.figures import drawing
+from scenarios.figures.drawing import ALERT, INK, Array
+from scenarios.figures.palette import Look
+from scenarios.figures.panels import Draw, Panel
 
 if TYPE_CHECKING:
     from scenarios.recording import Recording

@@ -9,10 +9,10 @@ from importlib.resources import files
 from string import Template
 from typing import TYPE_CHECKING
 
-from scenarios import drawing
+from scenarios.figures import drawing
+from scenarios.figures.palette import Look, looks
+from scenarios.figures.picture import picture
 from scenarios.folders import slug
-from scenarios.palette import Look, looks
-from scenarios.picture import picture
 from scenarios.report import charts, tables
 from scenarios.report.commands import commands
 from scenarios.report.embedded import replay

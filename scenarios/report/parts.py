@@ -8,8 +8,8 @@ from html import escape
 
 from matplotlib.figure import Figure
 
-from scenarios import drawing
-from scenarios.palette import Look
+from scenarios.figures import drawing
+from scenarios.figures.palette import Look
 
 
 def chip(look: Look) -> str:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from scenarios.palette import Look
+from scenarios.figures.palette import Look
 from scenarios.parting import BOUND, partings
 from scenarios.report.parts import chip, folded, plain_table, section
 

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from scenarios import drawing
+from scenarios.figures import drawing
 from scenarios.metrics import Metric
 from scenarios.sweep.results import Results
 

@@ -13,10 +13,10 @@ from string import Template
 
 import numpy as np
 
-from scenarios import drawing
+from scenarios.figures import drawing
+from scenarios.figures.palette import looks
 from scenarios.folders import slug
 from scenarios.metrics import Metric
-from scenarios.palette import looks
 from scenarios.report.parts import chip
 from scenarios.sweep import figures
 from scenarios.sweep.planning import Plan, Planned

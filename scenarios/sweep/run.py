@@ -15,10 +15,9 @@ from time import perf_counter
 from scenarios.metrics import Metric
 
 # What only asks for runs or shows them; a change to it does not change what is measured.
-_NOT_IN_A_RUN = ("bench/", "report/", "sweep/", "library/", "cli.py", "compare.py", "figures.py",
-                 "depth_figure.py", "picture.py", "drawing.py", "palette.py", "panels.py",
-                 "timeline.py", "redraw.py", "parting.py", "progress.py", "folders.py", "scene.py",
-                 "viewer/", "replay/", "export/")
+_NOT_IN_A_RUN = ("bench/", "report/", "sweep/", "library/", "figures/", "scene/", "viewer/",
+                 "replay/", "export/", "cli.py", "terminal.py", "completion.py", "doctor.py",
+                 "compare.py", "parting.py", "gallery.py", "progress.py", "folders.py")
 _PLACE = ("system", "processor")  # of versions(): on which machine, not with what
 _ONE_AT_A_TIME = threading.Lock()  # the kernels' work arrays belong to the process
 

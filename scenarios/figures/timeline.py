@@ -11,10 +11,10 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-from scenarios import drawing
-from scenarios.drawing import ALERT, INK
-from scenarios.levels import order_names
-from scenarios.palette import task_colours
+from scenarios.figures import drawing
+from scenarios.figures.drawing import ALERT, INK
+from scenarios.figures.palette import task_colours
+from scenarios.scene.levels import order_names
 
 if TYPE_CHECKING:
     from scenarios.recording import Recording

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
-from scenarios import drawing
-from scenarios.drawing import INK
-from scenarios.panels import PANEL, Panel
-from scenarios.picture import picture
-from scenarios.timeline import timeline
+from scenarios.figures import drawing
+from scenarios.figures.drawing import INK
+from scenarios.figures.panels import PANEL, Panel
+from scenarios.figures.picture import picture
+from scenarios.figures.timeline import timeline
 
 if TYPE_CHECKING:
     from scenarios.recording import Recording
@@ -70,7 +70,7 @@ def _all(recording: Recording) -> Iterator[tuple[str, Figure]]:
         yield "stack", timeline(recording)
     seen = recording.scenario.is_experiment and recording.scenario.sensor.kind == "camera"
     if seen and np.isfinite(recording["ee_distance"]).any():
-        from scenarios.depth_figure import depth_figure
+        from scenarios.figures.depth import depth_figure
 
         nearest = float(recording["t"][int(np.argmin(recording["ee_distance"]))])
         yield "figure-8-depth-image", depth_figure(recording, nearest)

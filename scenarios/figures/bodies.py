@@ -11,8 +11,8 @@ from matplotlib.collections import PatchCollection
 from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 
-from scenarios import drawing
-from scenarios.drawing import INK, Array
+from scenarios.figures import drawing
+from scenarios.figures.drawing import INK, Array
 from scenarios.scene import capsules, ends
 
 if TYPE_CHECKING:

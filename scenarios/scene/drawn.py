@@ -14,19 +14,16 @@ from hierarchy import HierarchyError, Robot, State
 from hierarchy.avoidance import Capsule, ControlPoint, Obstacles
 from hierarchy.problem import Array
 from hierarchy.robots import TABLES, DHTable
-from scenarios import listed
 from scenarios.build import make_obstacles, make_robot, sensed_points
-from scenarios.curves import Areas, Series, marks_of, series
-from scenarios.levels import Fate, Levels, judge, order_names
-from scenarios.links import capsules, ends, lowest, place
+from scenarios.control import listed
+from scenarios.scene.curves import Areas, Series, marks_of, series
+from scenarios.scene.levels import Fate, Levels, judge, order_names
+from scenarios.scene.links import capsules, ends, lowest
 from scenarios.sensors import ExactDistances
 
 if TYPE_CHECKING:
     from scenarios.config import Scenario
     from scenarios.recording import Recording
-
-__all__ = ["Moved", "Scene", "Series", "Stage", "capsules", "ends", "place", "scene", "series",
-           "stage"]
 
 SEPARATION = "separation"  # the task that keeps all points off all obstacles
 
@@ -86,7 +83,7 @@ class Scene:
     axis (F, 3) : the end effector's z axis. desired (F, 3) : its path, or None.
     order (F,) : index into `orders`, whose entries name tasks, most important first.
     paths : of what the scenario's listed tasks move.
-    levels : what became of each task, see scenarios.levels.
+    levels : what became of each task, see scenarios.scene.levels.
     series : curves. switches (S,) : when the order changed.
     """
 

@@ -20,7 +20,7 @@ def redraw(run: str | Path, style: str = "screen", out: str | Path | None = None
         the folder cannot be written.
     """
     from hierarchy.errors import UnknownNameError
-    from scenarios import drawing, figures
+    from scenarios.figures import drawing, letter
     from scenarios.recording import load_run
 
     if style not in drawing.STYLES:
@@ -29,9 +29,9 @@ def redraw(run: str | Path, style: str = "screen", out: str | Path | None = None
     recording = load_run(run)
     with drawing.styled(drawing.STYLES[style]):
         if folder is None:
-            return _into(Path(run), lambda partial: figures.write_all(recording, partial))
+            return _into(Path(run), lambda partial: letter.write_all(recording, partial))
         with whole(folder) as partial:
-            figures.write_all(recording, partial)
+            letter.write_all(recording, partial)
         return sorted(folder.iterdir())
 
 

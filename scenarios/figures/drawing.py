@@ -17,7 +17,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from scenarios.palette import looks
+from scenarios.figures.palette import looks
 
 Array = NDArray[np.float64]
 

@@ -11,8 +11,8 @@ from matplotlib.figure import Figure
 
 from hierarchy import HierarchyError
 from hierarchy.problem import Array
-from scenarios import drawing
 from scenarios.build import build
+from scenarios.figures import drawing
 from scenarios.sensors import DepthSensor
 
 if TYPE_CHECKING:

@@ -12,9 +12,9 @@ from hierarchy.compiled import compiled
 from hierarchy.kinematics import point_at
 from hierarchy.problem import Array
 from hierarchy.robot import Frame, Robot, State
-from scenarios import listed
 from scenarios.config import Scenario
-from scenarios.controller import Controller
+from scenarios.control import listed
+from scenarios.control.controller import Controller
 from scenarios.recording import Event, Recording
 
 FASTEST = 1e3  # [rad/s or m/s] of a joint; what moves faster has diverged

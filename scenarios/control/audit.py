@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from hierarchy.problem import Hierarchy
 from scenarios.config import Scenario
-from scenarios.controller import Controller
+from scenarios.control.controller import Controller
 from solvers import Resolver, Status, certify
 
 

@@ -15,8 +15,8 @@ from hierarchy.binding import bind
 from hierarchy.problem import Array, Hierarchy
 from scenarios.build import Cell, build
 from scenarios.config import Scenario
-from scenarios.policy import Policy, smallest
-from scenarios.transition import Blend
+from scenarios.control.policy import Policy, smallest
+from scenarios.control.transition import Blend
 from solvers import Resolution, Resolver, Status
 
 _REHEARSALS = 20

@@ -10,8 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
-from scenarios import drawing
-from scenarios.drawing import ALERT, INK, Array
+from scenarios.figures import drawing
+from scenarios.figures.drawing import ALERT, INK, Array
 
 if TYPE_CHECKING:
     from hierarchy import Robot
@@ -31,9 +31,9 @@ def picture(recordings: Mapping[str, Recording], colours: Mapping[str, str] | No
 
     The arm is that of the first run, in full where its body is nearest to an obstacle, with the
     line to it and with its control points; every run's path has the colour of its label, or that
-    given for it. A robot that branches is drawn by `scenarios.bodies`.
+    given for it. A robot that branches is drawn by `scenarios.figures.bodies`.
     """
-    from scenarios import bodies
+    from scenarios.figures import bodies
     from scenarios.making import make_robot
 
     first = next(iter(recordings.values()))

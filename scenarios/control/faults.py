@@ -14,7 +14,7 @@ from hierarchy.problem import Array, Hierarchy
 from hierarchy.robot import Frame, Robot, State
 from scenarios.build import build
 from scenarios.config import FaultSection, ObstacleSection, Scenario, ScenarioError
-from scenarios.controller import Controller
+from scenarios.control.controller import Controller
 from scenarios.sensors import DepthSensor, ExactDistances, Sensor
 from solvers import Resolution, Resolver, Status
 

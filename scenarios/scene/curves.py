@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hierarchy.problem import Array
-from scenarios import listed
+from scenarios.control import listed
 from scenarios.metrics import pointing_angle
 
 if TYPE_CHECKING:

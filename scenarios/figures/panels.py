@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.axes import Axes
 
-from scenarios import drawing
-from scenarios.drawing import ALERT, INK, Array
-from scenarios.listed import errors
+from scenarios.control.listed import errors
+from scenarios.figures import drawing
+from scenarios.figures.drawing import ALERT, INK, Array
 
 if TYPE_CHECKING:
     from scenarios.recording import Recording
