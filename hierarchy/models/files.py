@@ -40,7 +40,8 @@ def read_file(path: str | Path, base: Base | None = None, shapes: bool = True,
     try:
         model = _urdf_model(path, base) if urdf else _mjcf_model(path, base)
     except Exception as error:  # the parsers raise many kinds; all mean the file is bad
-        raise RobotError(f"robot file {str(path)!r} cannot be read: {error}") from error
+        raise RobotError(f"robot file {str(path)!r} cannot be read: {_in_one_line(error)}"
+                         ) from error
     model = _without(model, locked, str(path))
     found = Found(model, proposed_end_effector(model),
                   rest=neutral_within_limits(model, pin.neutral(model)))
