@@ -102,7 +102,7 @@ def _geometry(path: Path, model: Any, read: Shapes) -> tuple[Any, list[str]]:
 
 def _in_one_line(error: Exception) -> str:
     lines = [line.strip() for line in str(error).splitlines()]
-    of_use = [line.removeprefix("message: ") for line in lines
+    of_use = [line.removeprefix("message:").strip() for line in lines
               if line and not line.startswith(("From file", "in function", "at line"))]
     return " ".join(of_use)[:200] or type(error).__name__
 
