@@ -104,7 +104,7 @@ def _in_one_line(error: Exception) -> str:
     lines = [line.strip() for line in str(error).splitlines()]
     of_use = [line.removeprefix("message:").strip() for line in lines
               if line and not line.startswith(("From file", "in function", "at line"))]
-    return " ".join(of_use)[:200] or type(error).__name__
+    return " ".join(of_use).strip()[:200] or type(error).__name__
 
 
 def _urdf_shapes(path: Path, model: Any, meshes: bool) -> tuple[Any, list[str]]:
