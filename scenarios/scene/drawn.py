@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from hierarchy import HierarchyError, Robot, State
 from hierarchy.avoidance import Capsule, ControlPoint, Obstacles
 from hierarchy.problem import Array
-from hierarchy.robots import TABLES, DHTable
+from hierarchy.robots import DHTable
 from scenarios.build import make_obstacles, make_robot, sensed_points
 from scenarios.control import listed
 from scenarios.scene.curves import Areas, Series, marks_of, series
@@ -124,7 +124,7 @@ class Scene:
 def stage(scenario: Scenario) -> Stage:
     """Return what there is to draw of a scenario before it runs."""
     robot, avoidance, pointing = make_robot(scenario.robot), scenario.avoidance, scenario.pointing
-    foot = scenario.sensor.foot if isinstance(TABLES.get(robot.name), DHTable) else 0.0
+    foot = scenario.sensor.foot if isinstance(robot.table, DHTable) else 0.0
     links = capsules(robot, foot)
     axis = None if pointing is None else np.asarray(pointing.axis) / np.linalg.norm(pointing.axis)
     return Stage(robot, links, sensed_points(robot),
