@@ -93,8 +93,11 @@ def _sameness(runs: Sequence[Run], alike: float, nearly: float) -> Iterator[Clau
     if near:
         yield (listed([label for one in near for label in one.labels]),
                f"stayed within {max(apart[one.label] for one in near):.0e} rad of {first.label}")
+    other = [one for one in found[1:] if apart[one.label] > nearly]
     if len(found) == len(runs) and not near:
         yield "", "no two moved the arm alike"
+    elif other:
+        yield listed([label for one in other for label in one.labels]), "moved otherwise"
 
 
 def _tracking(runs: Sequence[Run]) -> Iterator[Clause]:
