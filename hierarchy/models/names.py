@@ -9,7 +9,7 @@ from pathlib import Path
 from hierarchy.errors import RobotError, UnknownNameError
 
 PACKAGES = ("example_robot_data", "robot_descriptions")
-_REMEDY = "pip install task-hierarchy[robots]"
+_REMEDY = "pip install 'task-hierarchy[robots]'"
 
 
 def in_package(model: str) -> bool:

@@ -41,7 +41,7 @@ def export(recording: Recording, path: str | Path, format: str | None = None) ->
         import_module(package)
     except ImportError:
         raise HierarchyError(f"{name} needs the package {package}; "
-                             f"pip install task-hierarchy[{extra}]") from None
+                             f"pip install 'task-hierarchy[{extra}]'") from None
     written: list[Path] = import_module(f"scenarios.export.{name}").write(recording, path)
     return written
 
