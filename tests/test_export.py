@@ -299,7 +299,7 @@ def test_a_format_that_is_not_known_names_the_nearest(run, tmp_path):
 def test_a_package_that_is_missing_names_its_extra(run, tmp_path, monkeypatch):
     monkeypatch.setitem(importlib.import_module("scenarios.export").FORMATS, "mcap",
                         ("no_such_package", "export"))
-    with pytest.raises(HierarchyError, match=r"pip install task-hierarchy\[export\]"):
+    with pytest.raises(HierarchyError, match=r"pip install 'task-hierarchy\[export\]'"):
         export(run, tmp_path / "run.mcap")
 
 
