@@ -10,7 +10,6 @@ from __future__ import annotations
 import os
 import shlex
 import sys
-from enum import StrEnum
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -49,18 +48,9 @@ Port = Annotated[int, typer.Option("--port", metavar="N", min=0, max=65535,
 Browser = Annotated[bool, typer.Option("--browser/--no-browser",
                                        help="Open the page, or only say where it is.")]
 
-class Bench(StrEnum):
-    """What can be measured."""
-
-    resolvers = "resolvers"
-    tick = "tick"
-    first_paper = "first-paper"
-    strictness = "strictness"
-    start = "start"
-    peers = "peers"
-
-
-_ASKED_FOR = (Bench.peers,)  # minutes, and packages of others
+# What can be measured: names of modules of scenarios.bench, written with hyphens.
+BENCHMARKS = ("resolvers", "tick", "first-paper", "strictness", "start", "peers")
+_ASKED_FOR = ("peers",)  # minutes, and packages of others
 
 
 def main() -> None:
@@ -329,17 +319,22 @@ def doctor(as_json: AsJson = False) -> int:
 
 
 @app.command()
-def bench(what: Annotated[Bench | None, typer.Argument(
-        help="Only this. Default: all but peers.")] = None, out: Out = None) -> None:
+def bench(what: Annotated[str | None, typer.Argument(
+        metavar="|".join(BENCHMARKS), help="Only this. Default: all but peers.",
+        autocompletion=lambda incomplete: [b for b in BENCHMARKS if b.startswith(incomplete)]),
+        ] = None, out: Out = None) -> None:
     """Time resolvers, control tick, start, others' packages; judge errors and strictness."""
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy is loaded: one core is timed
     from importlib import import_module
 
+    from hierarchy.errors import UnknownNameError
     from scenarios.folders import claim, next_free
 
+    if what is not None and what not in BENCHMARKS:
+        raise UnknownNameError("benchmark", what, BENCHMARKS)
     folder = claim(out if out is not None else next_free(Path("runs") / "bench"))
-    for wanted in [what] if what is not None else [b for b in Bench if b not in _ASKED_FOR]:
-        import_module(f"scenarios.bench.{wanted.name}").run(folder)
+    for wanted in [what] if what is not None else [b for b in BENCHMARKS if b not in _ASKED_FOR]:
+        import_module(f"scenarios.bench.{wanted.replace('-', '_')}").run(folder)
     print(f"\nNumbers: {shown(folder)}")
 
 

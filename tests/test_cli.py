@@ -306,3 +306,7 @@ def test_the_shell_completes_commands_scenarios_and_resolvers():
     assert completed(["hierarchy", "run", "human-h"]) == ["human-hqp"]
     assert completed(["hierarchy", "compare", "ellipse", "--resolvers", "tpm,hc"]) == ["tpm,hcod"]
     assert completed(["hierarchy", "sweep", "ell"]) == ["ellipse-starts"]
+
+
+def test_a_benchmark_that_is_not_there_is_answered_with_the_nearest(capsys):
+    assert "unknown benchmark 'tik'; did you mean 'tick'?" in fails(["bench", "tik"], capsys)
