@@ -8,7 +8,7 @@ import numpy as np
 
 from hierarchy.problem import Array
 from scenarios.config import Scenario
-from scenarios.control.audit import Audit, Certified, Strictness
+from scenarios.control.audit import Audit, Certified, Judged, Strictness
 from scenarios.control.controller import Controller
 from scenarios.control.faults import Faults
 from scenarios.control.recorder import FASTEST, Recorder
@@ -23,11 +23,11 @@ def simulate(scenario: Scenario, progress: Callable[[int, int], None] | None = N
 
     `progress(done, total)` is called now and then. A run that is interrupted (Ctrl-C), that is
     stopped by its policy, whose state stops being finite or whose joints pass `recorder.FASTEST`
-    ends early: the Recording has all ticks
-    so far and says why in `fault`. With `certified`, every answer is judged by `solvers.certify`
-    after its tick was timed, and the Recording has the verdicts as its signal `certified`; with
-    `control.strictness` it has `moved_by_lower`, see scenarios.control.audit.Strictness. Raises
-    HierarchyError where the scenario does not fit its robot or resolver.
+    ends early: the Recording has all ticks so far and says why in `fault`. With `certified`, every
+    answer is judged by `solvers.certify` after its tick was timed, and the Recording has the
+    verdicts as its signal `certified`; with `control.strictness` it has `moved_by_lower`, see
+    scenarios.control.audit.Strictness; with a camera it has what became of each level, see `Judged`
+    there. Raises HierarchyError where the scenario does not fit its robot or resolver.
     """
     rehearsal = Controller(scenario)
     rehearsal.rehearse()
@@ -36,7 +36,7 @@ def simulate(scenario: Scenario, progress: Callable[[int, int], None] | None = N
     controller = Controller(scenario) if faults is None else faults.controller
     ticks = max(1, round(scenario.control.duration / scenario.control.period))
     recorder = Recorder(controller, ticks)
-    audits = _audits(scenario, ticks, certified)
+    audits = _audits(controller, scenario, ticks, certified)
     try:
         fault = _run(controller, recorder, scenario.control.period, ticks, progress or _silent,
                      audits, faults)
@@ -44,13 +44,19 @@ def simulate(scenario: Scenario, progress: Callable[[int, int], None] | None = N
         fault = f"interrupted at tick {recorder.ticks}"
     recording = recorder.finish(scenario, fault)
     for audit in audits:
-        recording.signals[audit.name] = audit.values[:recording.ticks]
+        recording.signals.update((name, values[:recording.ticks])
+                                 for name, values in audit.signals.items())
     return recording
 
 
-def _audits(scenario: Scenario, ticks: int, certified: bool) -> list[Audit]:
+def _audits(controller: Controller, scenario: Scenario, ticks: int, certified: bool
+            ) -> list[Audit]:
     audits: list[Audit] = [Certified(ticks)] if certified else []
-    return [*audits, Strictness(ticks, scenario)] if scenario.control.strictness else audits
+    if scenario.control.strictness:
+        audits.append(Strictness(ticks, scenario))
+    if scenario.sensor.kind != "exact":  # rows cannot be written again without the images
+        audits.append(Judged(ticks, controller))
+    return audits
 
 
 def _run(controller: Controller, recorder: Recorder, period: float, ticks: int,

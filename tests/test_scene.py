@@ -8,8 +8,9 @@ from hierarchy.robots import TABLES
 from scenarios import load, simulate
 from scenarios.config import RobotSection
 from scenarios.control.controller import Controller
+from scenarios.control.fate import Fate
 from scenarios.scene import capsules, ends, scene, stage
-from scenarios.scene.levels import Fate, judge
+from scenarios.scene.levels import judge
 
 SHORT = ["control.duration=1.5"]
 NAMES = ("ellipse", "ellipse-velocity", "ellipse-published", "ellipse-limits", "ellipse-hqp")
@@ -214,3 +215,24 @@ def test_the_limits_of_a_floating_robot_are_those_of_its_joints():
     assert levels.known.all()
     assert not levels.saturated[:, :6].any()
     assert levels.saturated.any()
+
+
+def test_after_a_camera_levels_are_those_judged_in_the_run():
+    """The kinematic arm, small images of something near: fates as of the same rows in the loop."""
+    near = "avoidance.obstacles=[{shape='sphere', radius=0.06, centre=[0.3, 0.45, 0.1]}]"
+    scenario = load("human", ["control.duration=0.5", "plant={kind='kinematic'}", near,
+                              "sensor.width=160", "sensor.height=120", "sensor.fx=131.25",
+                              "sensor.fy=131.25"])
+    recording = simulate(scenario)
+    levels = judge(recording, range(recording.ticks))
+    assert levels.known[1:].all()
+    given_up = levels.fate == Fate.MISSED
+    assert given_up.any()
+    assert (levels.violation[given_up] > 0.0).all()
+    absent = levels.fate == Fate.ABSENT
+    assert np.isnan(levels.violation[absent]).all()
+    for f, order in enumerate(recording["order"]):
+        there = {name for name, gone in zip(levels.names, absent[f], strict=True) if not gone}
+        assert there == set(recording.orders[order].split(" > "))
+    at = np.abs(recording["command"]) >= scenario.limits.acceleration * (1 - 1e-6)
+    assert (levels.saturated[at] != 0).all()

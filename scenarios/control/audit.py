@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, Protocol, final
 
 import numpy as np
@@ -10,14 +11,16 @@ from numpy.typing import NDArray
 from hierarchy.problem import Hierarchy
 from scenarios.config import Scenario
 from scenarios.control.controller import Controller
+from scenarios.control.fate import fates, saturated, tolerance
 from solvers import Resolver, Status, certify
 
 
 class Audit(Protocol):
-    """One number a tick, kept as the signal `name` of the Recording."""
+    """Numbers of every tick, kept as `signals` of the Recording."""
 
-    name: str
-    values: NDArray[Any]
+    @property
+    def signals(self) -> Mapping[str, NDArray[Any]]:
+        """Return the signals by name, a row a tick."""
 
     def look(self, tick: int, controller: Controller) -> None:
         """Look at the tick that the controller has just answered."""
@@ -27,10 +30,9 @@ class Audit(Protocol):
 class Certified:
     """Whether `solvers.certify` accepts the answer."""
 
-    name = "certified"
-
     def __init__(self, ticks: int) -> None:
         self.values = np.zeros(ticks, dtype=bool)
+        self.signals = {"certified": self.values}
 
     def look(self, tick: int, controller: Controller) -> None:
         """Judge the answer of a tick."""
@@ -45,10 +47,9 @@ class Strictness:
     where either is not solved.
     """
 
-    name = "moved_by_lower"
-
     def __init__(self, ticks: int, scenario: Scenario) -> None:
         self.values = np.full(ticks, np.nan)
+        self.signals = {"moved_by_lower": self.values}
         period = scenario.control.period
         self._share = period if scenario.control.level == "velocity" else period**2 / 2
         self._memory: Any = None
@@ -67,6 +68,32 @@ class Strictness:
         res = resolver.solve(h, self._memory)
         self._memory = res.memory
         return res.x if res.status is Status.SOLVED else None
+
+
+@final
+class Judged:
+    """What became of each task of the stack at the command that was sent, see `fate`.
+
+    Signals level_fate (T, N), level_violation (T, N) in the unit of the rows, NaN for a task that
+    is not in the stack, and saturated (T, n); N tasks as in `stack.names`.
+    """
+
+    def __init__(self, ticks: int, controller: Controller) -> None:
+        self._names = controller.cell.stack.names
+        shape = ticks, len(self._names)
+        self.fate, self.violation = np.zeros(shape, np.int8), np.full(shape, np.nan)
+        self.saturated = np.zeros((ticks, controller.cell.robot.n), np.int8)
+        self.signals = {"level_fate": self.fate, "level_violation": self.violation,
+                        "saturated": self.saturated}
+
+    def look(self, tick: int, controller: Controller) -> None:
+        """Judge the command of a tick."""
+        h, x = controller.hierarchy, controller.sent
+        near = tolerance(controller.resolver.accuracy, x)
+        columns = [self._names.index(name) for name in h.names]
+        self.fate[tick, columns] = fates(h, x, near)
+        self.violation[tick, columns] = h.violations(x)
+        self.saturated[tick] = saturated(controller.cell, h, x, near)
 
 
 def upper_levels(h: Hierarchy, count: int) -> Hierarchy:

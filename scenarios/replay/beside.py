@@ -11,9 +11,9 @@ from matplotlib.figure import Figure
 from PIL import Image, ImageDraw, ImageFont
 
 from hierarchy.problem import Array
+from scenarios.control.fate import Fate
 from scenarios.figures import drawing
 from scenarios.scene import Scene, Series
-from scenarios.scene.levels import Fate
 
 _INK, _QUIET = (26, 29, 33), (92, 101, 112)
 _ROWS = {Fate.MET: ((207, 230, 218), "met"), Fate.FREE: ((227, 231, 236), "not acting"),

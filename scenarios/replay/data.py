@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from scenarios.control.fate import Fate
 from scenarios.scene import Scene, Series
-from scenarios.scene.levels import Fate
 
 _NOTHING = 65535  # stands for NaN and for infinite
 _STEPS = 65534

@@ -22,7 +22,7 @@ class StackList {
     this.card = element("article", {class: "card"}, head, this.list, ...this.joint_row(),
                         this.near, this.note);
     const judged = !run.fate.values.includes(this.unknown);
-    this.doubt = judged ? [] : ["Not judged where the rows cannot be written again, as after a camera."];
+    this.doubt = judged ? [] : ["Not judged where the rows cannot be written again, as after a change by hand."];
     this.note.hidden = judged && !run.fault;
     this.note.append(...this.doubt);
     this.frame = -1;

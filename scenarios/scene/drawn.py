@@ -16,8 +16,9 @@ from hierarchy.problem import Array
 from hierarchy.robots import DHTable
 from scenarios.build import make_obstacles, make_robot, sensed_points
 from scenarios.control import listed
+from scenarios.control.fate import Fate
 from scenarios.scene.curves import Areas, Series, marks_of, series
-from scenarios.scene.levels import Fate, Levels, judge, order_names
+from scenarios.scene.levels import Levels, judge, order_names
 from scenarios.scene.links import capsules, ends, lowest
 from scenarios.sensors import ExactDistances
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from enum import IntEnum
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,23 +12,13 @@ from numpy.typing import NDArray
 from hierarchy.avoidance import Measurement
 from hierarchy.problem import Array, Hierarchy
 from scenarios.build import Cell, build
-from scenarios.config import PlantSection
-from solvers.certificate import TOLERANCE
+from scenarios.config import PlantSection, Scenario
+from scenarios.control.fate import Fate, fates, saturated, tolerance
 
 if TYPE_CHECKING:
     from scenarios.recording import Recording
 
 _SAME = 1e-9  # [m] of distances that are those recorded
-
-
-class Fate(IntEnum):
-    """What became of a task in a tick."""
-
-    ABSENT = 0   # not in the stack
-    UNKNOWN = 1  # in the stack; its rows cannot be written again from the recording
-    FREE = 2     # one-sided rows, none of them at a side: it holds nothing back
-    MET = 3      # rows that act, and are met
-    MISSED = 4   # given up, as far as its violation says
 
 
 @dataclass(frozen=True)
@@ -61,14 +50,17 @@ def order_names(recording: Recording) -> tuple[tuple[str, ...], ...]:
 def judge(recording: Recording, ticks: Sequence[int] | NDArray[np.int64]) -> Levels:
     """Write the rows of some ticks again, and judge by them the command that was sent.
 
-    The rows follow from the recorded joints, if the distances do. Where these were seen by a
-    camera, or are not those recorded, or settings had been changed, levels are UNKNOWN.
+    The rows follow from the recorded joints, if the distances do; where these were seen by a
+    camera, `simulate` has judged every tick. Where distances are not those recorded, or settings
+    had been changed, levels are UNKNOWN.
     """
     orders = order_names(recording)
     names = tuple(dict.fromkeys(name for order in orders for name in order))
     shape = len(ticks), len(names)
     levels = Levels(names, np.zeros(shape, np.int8), np.full(shape, np.nan),
                     np.zeros((len(ticks), recording["v"].shape[1]), np.int8))
+    if "level_fate" in recording:
+        return _as_judged(recording, levels, ticks)
     rows = _Rows(recording) if recording.scenario.sensor.kind == "exact" else None
     accuracy = recording.scenario.make_resolver().accuracy
     changed = recording.signals.get("changed", np.zeros(recording.ticks, bool))
@@ -86,31 +78,22 @@ def judge(recording: Recording, ticks: Sequence[int] | NDArray[np.int64]) -> Lev
     return levels
 
 
-def fates(h: Hierarchy, x: Array, near: float) -> list[Fate]:
-    """What became of each level at x (n,); a row this near to a side is on it."""
-    found = []
-    for violation, (A, lower, upper) in zip(h.violations(x), h.levels(), strict=True):
-        at_a_side = np.minimum(A @ x - lower, upper - A @ x) <= near
-        found.append(Fate.MISSED if violation > near else
-                     Fate.MET if at_a_side.any() else Fate.FREE)
-    return found
+def _as_judged(recording: Recording, levels: Levels, ticks: Sequence[int] | NDArray[np.int64]
+               ) -> Levels:
+    """Fill in what was judged while the run was made."""
+    columns = [_without_plant(recording.scenario).stack.names.index(name) for name in levels.names]
+    levels.fate[:] = recording["level_fate"][ticks][:, columns]
+    levels.violation[:] = recording["level_violation"][ticks][:, columns]
+    levels.saturated[:] = recording["saturated"][ticks]
+    orders = order_names(recording)
+    for f, k in enumerate(ticks):  # ticks without an answer were not judged
+        unknown = [levels.names.index(name) for name in orders[recording["order"][k]]]
+        levels.fate[f, unknown] = np.maximum(levels.fate[f, unknown], Fate.UNKNOWN)
+    return levels
 
 
-def saturated(cell: Cell, h: Hierarchy, x: Array, near: float) -> NDArray[np.int8]:
-    """Side -1 or 1 of the cell's joint limits at which each entry of x (n,) is, else 0."""
-    sides, limits = np.zeros(len(x), np.int8), cell.limits
-    if limits is None:
-        return sides
-    lower, upper = (limits.box(cell.state, cell.stack.level) if limits.name not in h.names
-                    else list(h.levels())[h.names.index(limits.name)][1:])
-    joints = slice(len(x) - len(lower), None)  # a floating base has no limits
-    sides[joints] = 1 * (x[joints] >= upper - near) - (x[joints] <= lower + near)
-    return sides
-
-
-def tolerance(accuracy: float, x: Array) -> float:
-    """How far off a side a row may be to be on it, at an answer x (n,) of a resolver."""
-    return max(TOLERANCE, accuracy) * (1.0 + float(np.linalg.norm(x)))
+def _without_plant(scenario: Scenario) -> Cell:
+    return build(scenario.model_copy(update={"plant": PlantSection()}))
 
 
 class _Rows:
@@ -119,7 +102,7 @@ class _Rows:
     def __init__(self, recording: Recording) -> None:
         scenario = recording.scenario
         self._recording, self._level = recording, scenario.control.level
-        self.cell: Cell = build(scenario.model_copy(update={"plant": PlantSection()}))
+        self.cell = _without_plant(scenario)
 
     def hierarchy(self, k: int, order: tuple[str, ...]) -> Hierarchy | None:
         """The rows of tick k, valid until the next; None if they are not those of the run."""

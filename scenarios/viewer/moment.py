@@ -14,8 +14,8 @@ from hierarchy.allocation import AVOIDANCE
 from hierarchy.avoidance import Obstacles
 from hierarchy.problem import Array
 from scenarios.control import listed
+from scenarios.control.fate import Fate, fates, saturated, tolerance
 from scenarios.scene import SEPARATION, Scene
-from scenarios.scene.levels import Fate, fates, saturated, tolerance
 from scenarios.sensors import ExactDistances
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ from html import escape
 
 import numpy as np
 
-from scenarios.scene.levels import Fate
+from scenarios.control.fate import Fate
 from scenarios.viewer.moment import Became, Moment
 
 _PILLS = {  # text colour, background
