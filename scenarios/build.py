@@ -30,15 +30,14 @@ from hierarchy.tasks import (
     TorqueLimits,
 )
 from hierarchy.tasks.self_separation import SelfSeparation
-from scenarios.config import (
+from scenarios.config import Scenario, ScenarioError
+from scenarios.config.avoidance import (
     AvoidanceSection,
     ObstacleSection,
     RepulsionSection,
-    Scenario,
-    ScenarioError,
     SeparationSection,
-    StartSection,
 )
+from scenarios.config.robot import StartSection
 from scenarios.control.order import Hierarchical, Order, Switched
 from scenarios.making import (
     make_path,

@@ -13,8 +13,9 @@ from hierarchy.errors import UnknownNameError
 from hierarchy.paths import Ellipse, Path, Shifted, Still, Waypoints
 from hierarchy.problem import Array
 from hierarchy.tasks import CentreOfMass, Pointing, Pose, Position, Posture
-from scenarios.config import RobotSection, ScenarioError, StartSection
-from scenarios.sections import (
+from scenarios.config import ScenarioError
+from scenarios.config.robot import RobotSection, StartSection
+from scenarios.config.sections import (
     EllipseSection,
     ListedCentreOfMass,
     ListedPointing,

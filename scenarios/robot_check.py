@@ -12,7 +12,9 @@ from pydantic import ValidationError
 from hierarchy import Robot
 from hierarchy.models.names import file_of, in_package
 from hierarchy.robots import TABLES
-from scenarios.config import RobotSection, ScenarioError, changed, shipped
+from scenarios.config import ScenarioError, shipped
+from scenarios.config.changes import changed
+from scenarios.config.robot import RobotSection
 
 _FRAMES = 12   # named before "and so on"
 _ROUND = 4     # decimals of proposed places [m]

@@ -9,7 +9,8 @@ import numpy as np
 from hierarchy.problem import Array
 
 if TYPE_CHECKING:
-    from scenarios.config import Obstacles, VariationSection, WaypointsSection
+    from scenarios.config.avoidance import Obstacles, VariationSection
+    from scenarios.config.sections import WaypointsSection
 
 
 def varied(obstacles: Obstacles, variation: VariationSection) -> Obstacles:

@@ -8,7 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from scenarios.config import ObstacleSection, RobotSection, SensorSection
+from scenarios.config.avoidance import ObstacleSection
+from scenarios.config.robot import RobotSection
+from scenarios.config.sensor import SensorSection
 from scenarios.recording import Recording
 
 LABELS = {"tpm": "tpm published", "tpm:form=staircase": "tpm"}

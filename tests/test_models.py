@@ -13,7 +13,7 @@ from hierarchy.errors import RobotError, UnknownNameError
 from hierarchy.models.shapes import bounding_capsule
 from hierarchy.tasks import DangerBounds, JointLimits, Posture, TorqueLimits
 from scenarios.cli import run_command
-from scenarios.config import RobotSection
+from scenarios.config.robot import RobotSection
 from scenarios.making import make_robot, separable_pairs
 from scenarios.robot_check import look_at, paste
 

@@ -11,7 +11,8 @@ from hierarchy.paths import Waypoints
 from scenarios import load, simulate
 from scenarios.build import build
 from scenarios.cli import run_command
-from scenarios.config import JointsSection, MeasurementSection, ScenarioError, ServoSection
+from scenarios.config import ScenarioError
+from scenarios.config.plant import JointsSection, MeasurementSection, ServoSection
 from scenarios.control.controller import Controller
 from scenarios.metrics import measure
 from scenarios.plants import Apart, JointSensor, KinematicArm, PhysicsArm

@@ -5,7 +5,8 @@ import pytest
 
 from hierarchy import HierarchyError, Robot
 from hierarchy.tasks import JointLimits
-from scenarios.config import PolicySection, load
+from scenarios.config import load
+from scenarios.config.control import PolicySection
 from scenarios.control.controller import Controller
 from scenarios.control.policy import Policy
 from solvers import Resolution, Status

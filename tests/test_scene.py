@@ -6,7 +6,7 @@ from hierarchy import HierarchyError, Robot, State
 from hierarchy.avoidance import link_capsules
 from hierarchy.robots import TABLES
 from scenarios import load, simulate
-from scenarios.config import RobotSection
+from scenarios.config.robot import RobotSection
 from scenarios.control.controller import Controller
 from scenarios.control.fate import Fate
 from scenarios.scene import capsules, ends, scene, stage

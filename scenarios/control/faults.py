@@ -13,7 +13,9 @@ from hierarchy.avoidance import Measurement
 from hierarchy.problem import Array, Hierarchy
 from hierarchy.robot import Frame, Robot, State
 from scenarios.build import build
-from scenarios.config import FaultSection, ObstacleSection, Scenario, ScenarioError
+from scenarios.config import Scenario, ScenarioError
+from scenarios.config.avoidance import ObstacleSection
+from scenarios.config.faults import FaultSection
 from scenarios.control.controller import Controller
 from scenarios.sensors import DepthSensor, ExactDistances, Sensor
 from solvers import Resolution, Resolver, Status

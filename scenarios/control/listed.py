@@ -12,8 +12,8 @@ from hierarchy.problem import Array
 from hierarchy.tasks import CentreOfMass, Pose, Position
 
 if TYPE_CHECKING:
+    from scenarios.config.sections import ListedTask
     from scenarios.recording import Recording
-    from scenarios.sections import ListedTask
 
 
 def error_of(name: str) -> str:

@@ -12,7 +12,7 @@ import numpy as np
 from hierarchy.compiled import compiled
 from hierarchy.problem import Array
 from hierarchy.task import Level
-from scenarios.config import PolicySection
+from scenarios.config.control import PolicySection
 
 _ORDER = ("use", "hold", "brake", "stop")  # the last that a trouble of the tick asks for is done
 _BRAKE = 10.0    # [1/s] deceleration per velocity

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hierarchy.problem import Array
-from scenarios.config import MeasurementSection, ScenarioError
+from scenarios.config import ScenarioError
+from scenarios.config.plant import MeasurementSection
 from scenarios.plants.plant import Driven, Plant
 
 _WHOLE = 1e-6  # of a period: a delay this near to a whole number of periods is one

@@ -12,7 +12,8 @@ from hierarchy import Robot
 from hierarchy.avoidance import Capsule, Obstacle
 from hierarchy.problem import Array
 from hierarchy.robot import Body
-from scenarios.config import JointsSection, ScenarioError, ServoSection
+from scenarios.config import ScenarioError
+from scenarios.config.plant import JointsSection, ServoSection
 
 GRAVITY = 9.81     # [m/s^2], along -z of the world, as in the robot's own model
 _SOFTNESS = 0.02   # [s] in which a contact comes to rest: some mm at usual speeds

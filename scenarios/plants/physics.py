@@ -16,7 +16,8 @@ from hierarchy.compiled import compiled
 from hierarchy.problem import Array
 from hierarchy.robots import TABLES, DHTable
 from hierarchy.task import Level
-from scenarios.config import JointsSection, ScenarioError, ServoSection
+from scenarios.config import ScenarioError
+from scenarios.config.plant import JointsSection, ServoSection
 from scenarios.plants.mjcf import each, scene
 
 _ROUNDING = 1e-9  # of a number of steps

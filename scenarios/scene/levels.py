@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from hierarchy.avoidance import Measurement
 from hierarchy.problem import Array, Hierarchy
 from scenarios.build import Cell, build
-from scenarios.config import PlantSection, Scenario
+from scenarios.config import Scenario
+from scenarios.config.plant import PlantSection
 from scenarios.control.fate import Fate, fates, saturated, tolerance
 
 if TYPE_CHECKING:

@@ -26,7 +26,7 @@ from hierarchy import HierarchyError, Robot, State
 from hierarchy.avoidance import Obstacles
 from hierarchy.errors import UnknownNameError
 from hierarchy.problem import Array
-from scenarios.config import LIBRARY
+from scenarios.config.reading import LIBRARY
 from scenarios.sensors.camera import Pinhole
 from scenarios.sensors.errors import Image
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from hierarchy import HierarchyError, Robot
 from hierarchy.avoidance import Capsule, Repulsion
-from scenarios.config import SensorSection
+from scenarios.config.sensor import SensorSection
 from scenarios.sensors.camera import DepthCamera, Pinhole, looking_at
 from scenarios.sensors.depth_sensor import DepthSensor, Source
 from scenarios.sensors.depth_space import DepthSpace

@@ -1,0 +1,165 @@
+"""The keys of [avoidance]: obstacles, thresholds, repulsion or separation."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
+
+from scenarios.config.sections import (
+    NotNegative,
+    PathSection,
+    Positive,
+    Section,
+    Vector3,
+    WaypointsSection,
+)
+
+
+class RepulsionSection(Section):
+    """Magnitude of the repulsion, eq. (23); see hierarchy.avoidance.Repulsion."""
+
+    maximum: Positive
+    reach: Positive
+    shape: Positive
+    scale: Positive = 2.0
+
+
+class ObstacleSection(Section):
+    """An obstacle: shape, centre [m], sizes [m], rotation rows, and a path if it moves."""
+
+    shape: Literal["point", "sphere", "capsule", "box"] = "point"
+    centre: Vector3 | None = None
+    radius: Positive | None = None
+    half_length: Positive | None = None
+    half_lengths: tuple[Positive, Positive, Positive] | None = None
+    rotation: tuple[Vector3, Vector3, Vector3] = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
+    path: PathSection | None = None
+
+    @model_validator(mode="after")
+    def _complete(self) -> Self:
+        needs = {"point": (), "sphere": ("radius",), "capsule": ("radius", "half_length"),
+                 "box": ("half_lengths",)}[self.shape]
+        for key in ("radius", "half_length", "half_lengths"):
+            if (getattr(self, key) is None) == (key in needs):
+                raise ValueError(f"a {self.shape} takes {' and '.join(needs) or 'no size'}")
+        if (self.centre is None) == (self.path is None):
+            raise ValueError("give either a centre or a path")
+        return self
+
+
+def _point_as_table(obstacle: Any) -> Any:
+    """[x, y, z] is short for a point obstacle."""
+    return {"centre": obstacle} if isinstance(obstacle, list | tuple) else obstacle
+
+
+Obstacles = tuple[Annotated[ObstacleSection, BeforeValidator(_point_as_table)], ...]
+
+
+class VariationSection(Section):
+    """Obstacles on slightly other paths, which follow from `seed`.
+
+    Every waypoint is moved by up to `spread` [m] in any direction, points at which an obstacle
+    rests as one; every time but the first by up to the share `timing` of half the shorter span
+    beside it. Obstacles without waypoints stay as they are.
+    """
+
+    seed: Annotated[int, Field(ge=0)]
+    spread: NotNegative = 0.05
+    timing: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.1
+
+
+class _Avoiding(Section):
+    obstacles: Obstacles
+    variation: VariationSection | None = None
+
+    @property
+    def placed(self) -> Obstacles:
+        """The obstacles on the paths that `variation` leads them."""
+        from scenarios.variation import varied
+
+        return self.obstacles if self.variation is None else varied(self.obstacles, self.variation)
+
+    @model_validator(mode="after")
+    def _varies_something(self) -> Self:
+        if self.variation and not any(isinstance(obstacle.path, WaypointsSection)
+                                      for obstacle in self.obstacles):
+            raise ValueError("variation needs an obstacle with a path of waypoints")
+        return self
+
+
+class AvoidanceSection(_Avoiding):
+    """Avoidance by the body and repulsion of the end effector, switched by Algorithm 1."""
+
+    kind: Literal["repulsion"] = "repulsion"
+    dimension: Literal[1, 3] = 1
+    direction: Literal["nearest", "mean"] = "nearest"
+    near: NotNegative
+    far: NotNegative
+    end_effector: NotNegative
+    body: RepulsionSection
+    tip: RepulsionSection
+    jacobian: Literal["exact", "published"] = "exact"
+
+    @model_validator(mode="after")
+    def _areas_nested(self) -> Self:
+        if self.near > self.far:
+            raise ValueError(f"near = {self.near} m is beyond far = {self.far} m")
+        return self
+
+    @property
+    def thresholds(self) -> dict[str, float]:
+        """Distances of the body [m] at which something changes, by symbol."""
+        outer = {r"$\epsilon_2$": self.far} if self.far > self.near else {}
+        return {r"$\epsilon_1$": self.near} | outer
+
+    @property
+    def tip_thresholds(self) -> dict[str, float]:
+        """The same for the end effector."""
+        return {r"$\epsilon_{ee}$": self.end_effector}
+
+
+class SeparationSection(_Avoiding):
+    """All control points and the end effector kept off all obstacles, as one-sided rows.
+
+    `distance` [m] that is kept; `rate` [1/s] at which it may be approached; obstacles beyond
+    `influence` [m] ask for nothing; one that is too near is left at up to `recovery` [m/s], with up
+    to `limit` [m/s^2]. `self_collision` is the distance [m] kept between links that are no
+    neighbours, None for any. See hierarchy.avoidance.Barrier.
+    """
+
+    kind: Literal["separation"]
+    distance: NotNegative = 0.03
+    rate: Positive = 10.0
+    influence: Positive = 0.3
+    recovery: NotNegative = 0.2
+    limit: Positive = 50.0
+    self_collision: NotNegative | None = None
+    obstacles: Obstacles = ()
+
+    @model_validator(mode="after")
+    def _areas_nested(self) -> Self:
+        if self.distance >= self.influence:
+            raise ValueError(f"distance = {self.distance} m is not below influence = "
+                             f"{self.influence} m")
+        return self
+
+    @property
+    def thresholds(self) -> dict[str, float]:
+        """Distances of the body [m] at which something changes, by symbol."""
+        return {r"$d_{min}$": self.distance}
+
+    @property
+    def tip_thresholds(self) -> dict[str, float]:
+        """The same for the end effector."""
+        return self.thresholds
+
+
+def _avoidance_kind(section: Any) -> str:
+    return (str(section.get("kind", "repulsion")) if isinstance(section, dict)
+            else str(getattr(section, "kind", "repulsion")))
+
+
+AvoidanceKind = Annotated[
+    Annotated[AvoidanceSection, Tag("repulsion")] | Annotated[SeparationSection, Tag("separation")],
+    Discriminator(_avoidance_kind)]

@@ -1,0 +1,89 @@
+"""How a scenario file is read: by name or path, over what it extends, with changes."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from hierarchy.errors import UnknownNameError
+from hierarchy.models.names import in_package
+from scenarios.config.changes import change, parse_changes
+from scenarios.config.errors import ScenarioError
+from scenarios.config.scenario import Scenario
+from scenarios.config.validation import validated
+
+LIBRARY = Path(__file__).parents[1] / "library"
+
+
+def shipped() -> tuple[str, ...]:
+    """Names of the scenarios that come with the package."""
+    return tuple(sorted(path.stem for path in LIBRARY.glob("*.toml")))
+
+
+def load(name_or_path: str | Path, changes: Sequence[str] | Mapping[str, Any] = ()) -> Scenario:
+    """Read a shipped scenario by name, or a scenario file by path, and apply changes to it.
+
+    A file may begin with `extends = "ellipse"` (a shipped name or a path beside it) and then gives
+    only what differs. `changes` are "dotted.key=value" texts with TOML values, or a mapping of
+    dotted keys. Raises ScenarioError, naming the file and the key, and UnknownNameError for a name
+    that is not shipped.
+    """
+    path = Path(name_or_path)
+    if path.suffix != ".toml":
+        if str(name_or_path) not in shipped():
+            raise UnknownNameError("scenario", str(name_or_path), shipped())
+        path = LIBRARY / f"{name_or_path}.toml"
+    data = _read_extended(path)
+    if not isinstance(changes, Mapping):
+        changes = parse_changes(changes, what="--set")
+    for key, value in changes.items():
+        change(data, key, value)
+    robot = data.get("robot")
+    if isinstance(robot, dict) and not in_package(model := str(robot.get("model", ""))) and (
+            model.endswith((".urdf", ".xml", ".mjcf"))):
+        robot["model"] = str(path.parent.resolve() / robot["model"])
+    sensor = data.get("sensor")
+    folder = sensor.get("folder") if isinstance(sensor, dict) else None
+    if isinstance(folder, str) and not (LIBRARY / "frames" / folder).is_dir():
+        data["sensor"]["folder"] = str(path.parent.resolve() / folder)
+    what = str(path) if path.parent != LIBRARY else f"scenario {path.stem!r}"
+    return validated(Scenario, data, what)
+
+
+def _read_extended(path: Path, below: tuple[Path, ...] = ()) -> dict[str, Any]:
+    """Read a file and, under it, the shipped scenario or the file that its `extends` names."""
+    data = _read(path)
+    base = data.pop("extends", None)
+    if base is None:
+        return data
+    if not isinstance(base, str):
+        raise ScenarioError(f"{path}: extends: expected a name or a path, got {base!r}")
+    source = LIBRARY / f"{base}.toml" if base in shipped() else path.parent / base
+    if source.resolve() in (*below, path.resolve()):
+        raise ScenarioError(f"{path}: extends: {base!r} extends this file in turn")
+    if source.suffix != ".toml":
+        raise ScenarioError(f"{path}: extends: {UnknownNameError('scenario', base, shipped())}")
+    return _laid_over(_read_extended(source, (*below, path.resolve())), data)
+
+
+def _laid_over(below: dict[str, Any], above: dict[str, Any]) -> dict[str, Any]:
+    merged = dict(below)
+    for key, value in above.items():
+        both = isinstance(value, dict) and isinstance(merged.get(key), dict)
+        merged[key] = _laid_over(merged[key], value) if both else value
+    return merged
+
+
+def _read(path: Path) -> dict[str, Any]:
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError as error:
+        raise ScenarioError(f"scenario file {str(path)!r} does not exist") from error
+    except OSError as error:
+        raise ScenarioError(f"scenario file {str(path)!r}: {error.strerror}") from error
+    except UnicodeDecodeError as error:
+        raise ScenarioError(f"scenario file {str(path)!r} is not UTF-8 text") from error
+    except tomllib.TOMLDecodeError as error:  # its text says line and column
+        raise ScenarioError(f"scenario file {str(path)!r}: {error}") from error

@@ -1,0 +1,167 @@
+"""A whole scenario in its validated form."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections import Counter
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Annotated, Any, Self
+
+import tomli_w
+from pydantic import Field, model_validator
+
+from scenarios.config.avoidance import AvoidanceKind
+from scenarios.config.changes import change, parse_changes, without_none
+from scenarios.config.control import ControlSection
+from scenarios.config.faults import FaultSection
+from scenarios.config.plant import PlantSection
+from scenarios.config.robot import RobotSection, StartSection
+from scenarios.config.sections import ListedPointing, ListedTask, Section
+from scenarios.config.sensor import SensorSection
+from scenarios.config.tasks import (
+    DampingSection,
+    LimitsSection,
+    PointingSection,
+    PositionSection,
+    PostureSection,
+)
+from scenarios.config.validation import validated
+
+if TYPE_CHECKING:
+    from solvers import Resolver
+    from solvers.resolver import Handles
+
+
+class Scenario(Section):
+    """One scenario: a robot, a start, tasks, and how they are resolved.
+
+    Sections of tasks that are absent ask for nothing. `tasks` are further ones, in order of
+    priority behind limits, avoidance, position and pointing. `damping` and `posture` are the
+    null-space term of eq. (14), so only one of them may be given.
+    """
+
+    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$")]
+    title: str = ""
+    description: str = ""
+    robot: RobotSection
+    start: StartSection = StartSection()
+    control: ControlSection
+    plant: PlantSection = PlantSection()
+    sensor: SensorSection = SensorSection()
+    position: PositionSection | None = None
+    pointing: PointingSection | None = None
+    avoidance: AvoidanceKind | None = None
+    limits: LimitsSection | None = None
+    damping: DampingSection | None = None
+    posture: PostureSection | None = None
+    tasks: tuple[ListedTask, ...] = ()
+    faults: tuple[FaultSection, ...] = ()
+
+    @model_validator(mode="after")
+    def _asks_for_something(self) -> Self:
+        if not (self.position or self.pointing or self.avoidance or self.tasks):
+            raise ValueError("the stack is empty: give at least one of [position], [pointing], "
+                             "[avoidance], [[tasks]]")
+        if self.damping and self.posture and self.posture.role == "null-space":
+            raise ValueError("give [damping] or [posture], not both: each is the null-space term")
+        if self.posture and self.posture.role == "task" and self.control.stack == "switched":
+            raise ValueError('posture.role = "task" goes with control.stack = "hierarchical"')
+        if self.control.strictness and not self.position:
+            raise ValueError("control.strictness needs [position]")
+        switched = self.control.stack == "switched"
+        if self.avoidance and switched != (self.avoidance.kind == "repulsion"):
+            raise ValueError('avoidance.kind = "repulsion" goes with control.stack = "switched", '
+                             '"separation" with "hierarchical"')
+        if self.avoidance and switched and not self.position:
+            raise ValueError("[avoidance] needs [position]: Algorithm 1 orders one by the other")
+        if self.limits and self.limits.danger_reach and not self.avoidance:
+            raise ValueError("limits.danger_reach needs [avoidance], whose obstacles it sees")
+        if self.limits and self.limits.place != "stack" and (
+                self.limits.torque or self.limits.danger_reach):
+            raise ValueError('limits.torque and limits.danger_reach need limits.place = "stack"')
+        if self.limits and self.limits.torque and self.control.level == "velocity":
+            raise ValueError("limits.torque needs control.level = \"acceleration\"")
+        return self
+
+    @model_validator(mode="after")
+    def _lists_tasks_apart(self) -> Self:
+        if self.tasks and self.control.stack == "switched":
+            raise ValueError('[[tasks]] goes with control.stack = "hierarchical"')
+        names = [task.title for task in self.tasks]
+        names += [name for name in ("position", "pointing", "posture") if getattr(self, name)]
+        for name, count in Counter(names).items():
+            if count > 1:
+                raise ValueError(f"{count} tasks are called {name!r}; give each a name of its own")
+        return self
+
+    @model_validator(mode="after")
+    def _faults_have_a_sensor(self) -> Self:
+        blind = next((fault.kind for fault in self.faults
+                      if fault.kind in ("nan_distance", "obstacle")), None)
+        if blind and not self.avoidance:
+            raise ValueError(f"a fault of kind {blind!r} needs [avoidance]")
+        kinds, sensor = {fault.kind for fault in self.faults}, self.sensor.kind
+        if sensor != "exact" and not self.avoidance:
+            raise ValueError(f"sensor.kind = {sensor!r} needs [avoidance], which it serves")
+        if sensor == "exact" and kinds & {"no_frames", "dark_frames"}:
+            raise ValueError("faults of frames need a sensor of kind \"camera\" or \"frames\"")
+        if sensor == "frames" and "obstacle" in kinds:
+            raise ValueError("a fault of kind 'obstacle' would not be in the recorded frames")
+        return self
+
+    @property
+    def is_experiment(self) -> bool:
+        """Whether it stands for the letter's section IV-B: physics, or distances seen."""
+        return self.plant.kind != "kinematic" or self.sensor.kind != "exact"
+
+    @property
+    def limits_in_stack(self) -> bool:
+        """Whether the joint limits are a level of the stack, under the resolver that it names."""
+        if self.limits is None or self.limits.place == "guard":
+            return False
+        return self.limits.place == "stack" or self.make_resolver().handles != "equalities"
+
+    @property
+    def asks(self) -> Handles:
+        """Which kind of rows its stack has, under the resolver that it names."""
+        inequalities = self.control.stack == "hierarchical" and (
+            self.avoidance is not None or (self.pointing and self.pointing.kind == "inequality")
+            or any(isinstance(task, ListedPointing) and task.rows == "inequality"
+                   for task in self.tasks))
+        limits = self.limits if self.limits_in_stack else None
+        if inequalities or (limits and limits.torque):
+            return "inequalities"
+        return "bounds" if limits else "equalities"
+
+    def make_resolver(self) -> Resolver:
+        """Make the resolver that `control.resolver` and `control.options` describe."""
+        from solvers import make
+
+        return make(self.control.resolver, **self.control.settings())
+
+    def with_resolver(self, spec: str) -> Scenario:
+        """Return this scenario under another resolver.
+
+        `spec` is `name` or `name:setting=value:setting=value`. The scenario's settings are kept
+        where the named resolver has them; those of the spec go before them.
+        """
+        from solvers import make
+
+        name, *settings = spec.split(":")
+        own = {field.name for field in dataclasses.fields(make(name))}
+        kept = {key: value for key, value in self.control.options.items()
+                if key in own or isinstance(value, dict)}
+        options = {**kept, **parse_changes(settings, what=f"resolver {spec!r}")}
+        control = {**self.control.model_dump(), "resolver": name, "options": options}
+        return validated(Scenario, {**self.model_dump(), "control": control}, f"resolver {spec!r}")
+
+    def with_changes(self, changes: Mapping[str, Any]) -> Scenario:
+        """Return this scenario with other values of dotted keys; ScenarioError as `load` does."""
+        data = self.model_dump()
+        for key, value in changes.items():
+            change(data, key, value)
+        return validated(Scenario, data, f"scenario {self.name!r}")
+
+    def to_toml(self) -> str:
+        """Return the scenario as a file that `load` reads back."""
+        return tomli_w.dumps(without_none(self.model_dump(mode="json")))

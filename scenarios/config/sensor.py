@@ -1,0 +1,82 @@
+"""The keys of [sensor]."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from scenarios.config.sections import Finite, NotNegative, Positive, Section, Vector3
+
+Share = Annotated[float, Field(ge=0.0, le=1.0)]
+
+
+class SensorSection(Section):
+    """Where distances come from; settings that the kind does not use have no effect.
+
+    "exact": known geometry. "camera": a simulated depth camera that sees obstacles and robot.
+    "frames": depth images from a `folder`, or a shipped one by name, that also says which camera
+    took them and when; see scenarios.sensors.frames.
+
+    Of both kinds with images, see scenarios.sensors.depth_space: a frame is used from `latency` [s]
+    after it was taken. Without a new frame for more than `stale_after` [s] the camera is blind and
+    `control.policy.stale` acts; one with a reading in less than the share `least_readings` of its
+    pixels is none. The robot, made of capsules with a column of height `foot` [m] below its base,
+    is taken out with a `margin` [m]. Obstacles within `region` [m] of a point are seen, None for
+    the largest distance at which avoidance acts. `thin` [m] is how far obstacles reach behind their
+    surface, None for any distance. A pixel counts if `support` of the nine around it agree within
+    `band` [m].
+
+    Of the camera, see scenarios.sensors.camera: image size, focal lengths and centre [px], None for
+    the middle; position [m]; a point [m] to look at, or a rotation, which goes before it: rows,
+    whose columns are the camera's axes right, down and forward in the world. `rate` [Hz], `jitter`
+    [s] of the frames; `seed` of all chance. `ideal`: without the errors, which are those of
+    scenarios.sensors.errors. `backdrop` [m] is the depth of a wall, 0 for none, which may
+    leave too few readings; `point_radius` [m] is that of the balls as which points are seen.
+    """
+
+    kind: Literal["exact", "camera", "frames"] = "exact"
+    folder: str | None = None
+    latency: NotNegative = 0.0
+    stale_after: NotNegative = 0.2
+    least_readings: Share = 0.1
+    foot: NotNegative = 0.31
+    margin: NotNegative = 0.05
+    region: Positive | None = None
+    thin: NotNegative | None = None
+    support: Annotated[int, Field(ge=1, le=9)] = 3
+    band: NotNegative = 0.05
+    width: Annotated[int, Field(ge=1)] = 640
+    height: Annotated[int, Field(ge=1)] = 480
+    fx: Positive = 525.0
+    fy: Positive = 525.0
+    cx: Finite | None = None
+    cy: Finite | None = None
+    position: Vector3 = (0.0, 2.0, 0.7)
+    look_at: Vector3 = (0.0, 0.3, 0.1)
+    rotation: tuple[Vector3, Vector3, Vector3] | None = None
+    rate: Positive = 30.0
+    jitter: NotNegative = 0.0
+    seed: Annotated[int, Field(ge=0)] = 0
+    ideal: bool = False
+    noise_floor: NotNegative = 1.2e-3
+    noise_growth: NotNegative = 1.9e-3
+    noise_from: NotNegative = 0.4
+    rounding: Literal["disparity", "step"] = "disparity"
+    step: NotNegative = 2.85e-3
+    near: NotNegative = 0.5
+    far: Positive = 5.0
+    missing: Share = 0.002
+    missing_at_edges: Share = 0.3
+    outliers: Share = 0.02
+    outlier_size: Annotated[int, Field(ge=0)] = 2
+    point_radius: NotNegative = 0.02
+    backdrop: NotNegative = 4.0
+
+    @model_validator(mode="after")
+    def _complete(self) -> Self:
+        if self.model_fields_set and "kind" not in self.model_fields_set:
+            raise ValueError("give its kind: exact, camera or frames")
+        if self.kind == "frames" and self.folder is None:
+            raise ValueError('kind = "frames" needs a folder')
+        return self

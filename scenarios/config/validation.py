@@ -1,0 +1,66 @@
+"""From plain data to a validated section, with errors that name the key and the value."""
+
+from __future__ import annotations
+
+from typing import Any, TypeVar
+
+from pydantic import ValidationError
+
+from hierarchy.errors import HierarchyError, UnknownNameError
+from scenarios.config.errors import ScenarioError
+from scenarios.config.sections import Section
+
+Kind = TypeVar("Kind", bound=Section)
+
+
+def validated(kind: type[Kind], data: dict[str, Any], what: str) -> Kind:
+    """Return data as a section of this kind; ScenarioError names the key, and the nearest known."""
+    try:
+        return kind.model_validate(data)
+    except ValidationError as error:
+        raise ScenarioError("\n".join(_say(kind, what, e) for e in error.errors())) from error
+    except HierarchyError as error:  # what a resolver says of its settings
+        raise ScenarioError(f"{what}: control: {error}") from error
+
+
+def _say(root: type[Section], what: str, error: Any) -> str:
+    keys = _without_kinds(root, [str(key) for key in error["loc"]])
+    where = ".".join(keys) or "file"
+    if error["type"] == "extra_forbidden":
+        return f"{what}: {UnknownNameError('key', where, _keys_beside(root, keys))}"
+    text = error["msg"].removeprefix("Value error, ")
+    value = "" if isinstance(error["input"], dict) else f", got {error['input']!r}"
+    return f"{what}: {where}: {text}{value}"
+
+
+def _without_kinds(root: type[Section], loc: list[str]) -> list[str]:
+    """Leave out what pydantic puts into a place for the kind that was chosen there."""
+    return [key for i, key in enumerate(loc)
+            if i in (0, len(loc) - 1) or key not in _kinds_at(root, loc[:i])]
+
+
+def _keys_beside(root: type[Section], keys: list[str]) -> list[str]:
+    """Full names of the keys that may stand where the last of `keys` stands."""
+    beside = _sections_at(root, keys[:-1])
+    known = dict.fromkeys(key for section in beside for key in section.model_fields)
+    return [".".join([*keys[:-1], key]) for key in known]
+
+
+def _kinds_at(root: type[Section], path: list[str]) -> set[str]:
+    found = (section.model_fields.get("kind") for section in _sections_at(root, path))
+    return {kind for field in found if field for kind in getattr(field.annotation, "__args__", ())}
+
+
+def _sections_at(root: type[Section], path: list[str]) -> list[Any]:
+    """The sections that may stand at a path: more than one where a kind decides."""
+    sections: list[Any] = [root]
+    for key in (key for key in path if not key.isdigit()):  # a place in a list is no key
+        fields = [section.model_fields[key] for section in sections if key in section.model_fields]
+        sections = [found for field in fields for found in _sections_in(field.annotation)]
+    return sections
+
+
+def _sections_in(annotation: Any) -> list[Any]:
+    if isinstance(annotation, type) and issubclass(annotation, Section):
+        return [annotation]
+    return [found for part in getattr(annotation, "__args__", ()) for found in _sections_in(part)]
