@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from hierarchy.problem import Hierarchy
 from scenarios.config import Scenario
 from scenarios.control.controller import Controller
-from scenarios.control.fate import fates, saturated, tolerance
+from scenarios.control.fate import judged
 from solvers import Resolver, Status, certify
 
 
@@ -88,12 +88,11 @@ class Judged:
 
     def look(self, tick: int, controller: Controller) -> None:
         """Judge the command of a tick."""
-        h, x = controller.hierarchy, controller.sent
-        near = tolerance(controller.resolver.accuracy, x)
+        h = controller.hierarchy
+        found = judged(controller.cell, h, controller.sent, controller.resolver.accuracy)
         columns = [self._names.index(name) for name in h.names]
-        self.fate[tick, columns] = fates(h, x, near)
-        self.violation[tick, columns] = h.violations(x)
-        self.saturated[tick] = saturated(controller.cell, h, x, near)
+        self.fate[tick, columns], self.violation[tick, columns] = found.fate, found.violation
+        self.saturated[tick] = found.saturated
 
 
 def upper_levels(h: Hierarchy, count: int) -> Hierarchy:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from enum import IntEnum
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,10 +23,24 @@ class Fate(IntEnum):
     MISSED = 4   # given up, as far as its violation says
 
 
-def fates(h: Hierarchy, x: Array, near: float) -> list[Fate]:
+class Judged(NamedTuple):
+    """Fate (L,) and violation (L,) of each level, and the `saturated` entries (n,) of x."""
+
+    fate: list[Fate]
+    violation: Array
+    saturated: NDArray[np.int8]
+
+
+def judged(cell: Cell, h: Hierarchy, x: Array, accuracy: float) -> Judged:
+    """Judge a command x (n,) by the rows of its tick; `accuracy` is that of the resolver."""
+    near, violation = tolerance(accuracy, x), h.violations(x)
+    return Judged(fates(h, x, violation, near), violation, saturated(cell, h, x, near))
+
+
+def fates(h: Hierarchy, x: Array, violations: Array, near: float) -> list[Fate]:
     """What became of each level at x (n,); a row this near to a side is on it."""
     found = []
-    for violation, (A, lower, upper) in zip(h.violations(x), h.levels(), strict=True):
+    for violation, (A, lower, upper) in zip(violations, h.levels(), strict=True):
         at_a_side = np.minimum(A @ x - lower, upper - A @ x) <= near
         found.append(Fate.MISSED if violation > near else
                      Fate.MET if at_a_side.any() else Fate.FREE)

@@ -14,7 +14,7 @@ from hierarchy.problem import Array, Hierarchy
 from scenarios.build import Cell, build
 from scenarios.config import Scenario
 from scenarios.config.plant import PlantSection
-from scenarios.control.fate import Fate, fates, saturated, tolerance
+from scenarios.control.fate import Fate, judged
 
 if TYPE_CHECKING:
     from scenarios.recording import Recording
@@ -71,18 +71,17 @@ def judge(recording: Recording, ticks: Sequence[int] | NDArray[np.int64]) -> Lev
         levels.fate[f, columns] = Fate.UNKNOWN
         h = rows.hierarchy(k, order) if rows and order and not changed[k] else None
         if rows and h:
-            x = recording["command"][k]
-            near = tolerance(accuracy, x)
-            levels.violation[f, columns] = h.violations(x)
-            levels.fate[f, columns] = fates(h, x, near)
-            levels.saturated[f] = saturated(rows.cell, h, x, near)
+            found = judged(rows.cell, h, recording["command"][k], accuracy)
+            levels.fate[f, columns], levels.violation[f, columns] = found.fate, found.violation
+            levels.saturated[f] = found.saturated
     return levels
 
 
 def _as_judged(recording: Recording, levels: Levels, ticks: Sequence[int] | NDArray[np.int64]
                ) -> Levels:
     """Fill in what was judged while the run was made."""
-    columns = [_without_plant(recording.scenario).stack.names.index(name) for name in levels.names]
+    judged_names = _without_plant(recording.scenario).stack.names
+    columns = [judged_names.index(name) for name in levels.names]
     levels.fate[:] = recording["level_fate"][ticks][:, columns]
     levels.violation[:] = recording["level_violation"][ticks][:, columns]
     levels.saturated[:] = recording["saturated"][ticks]

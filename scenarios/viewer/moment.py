@@ -14,7 +14,7 @@ from hierarchy.allocation import AVOIDANCE
 from hierarchy.avoidance import Obstacles
 from hierarchy.problem import Array
 from scenarios.control import listed
-from scenarios.control.fate import Fate, fates, saturated, tolerance
+from scenarios.control.fate import Fate, Judged, judged
 from scenarios.scene import SEPARATION, Scene
 from scenarios.sensors import ExactDistances
 
@@ -105,7 +105,9 @@ class Watched:
         self._state.move(cell.state.t, np.asarray(q), self._at_rest)
         self._exact.measure(self._state)
         order = controller.allocation.order
-        became = self._became(order)
+        found = self._judged()
+        became = {name: Became(*one) for name, *one in zip(
+            order, found.fate, found.violation.tolist(), strict=True)}
         active, linked = self._active(became), int(np.argmin(seen.distance))
         linked = active if active >= 0 else linked
         D = seen.distance[linked]
@@ -114,7 +116,7 @@ class Watched:
             cell.state.t, self._state.placements.copy(), seen.points.copy(), nearest, linked,
             active, self._exact.obstacles.centres.copy(), self._state.rotation(self._tip)[:, 2],
             cell.position.target[0].copy() if cell.position else None, order, became,
-            self._saturated(), tuple(self._moved()))
+            found.saturated, tuple(self._moved()))
 
     def _active(self, became: Mapping[str, Became]) -> int:
         """The point that is kept away, as `scenarios.scene.Scene` has it."""
@@ -139,24 +141,14 @@ class Watched:
                 at_a_point = section.kind in ("position", "pose")
                 yield here[0], here[0] + error[0, :3] if at_a_point else None
 
-    def _became(self, order: tuple[str, ...]) -> dict[str, Became]:
+    def _judged(self) -> Judged:
         controller = self.controller
         if not controller.answered:
-            return dict.fromkeys(order, Became(Fate.UNKNOWN, np.nan))
-        h, x = controller.hierarchy, controller.sent
-        found = fates(h, x, self._tolerance())
-        return {name: Became(*one)
-                for name, *one in zip(order, found, h.violations(x).tolist(), strict=True)}
-
-    def _saturated(self) -> NDArray[np.int8]:
-        controller = self.controller
-        if not controller.answered:
-            return np.zeros(len(controller.sent), np.int8)
-        return saturated(controller.cell, controller.hierarchy, controller.sent,
-                         self._tolerance())
-
-    def _tolerance(self) -> float:
-        return tolerance(self.controller.resolver.accuracy, self.controller.sent)
+            levels = len(controller.allocation.order)
+            return Judged([Fate.UNKNOWN] * levels, np.full(levels, np.nan),
+                          np.zeros(len(controller.sent), np.int8))
+        return judged(controller.cell, controller.hierarchy, controller.sent,
+                      controller.resolver.accuracy)
 
 
 def _where_finite(point: Array) -> Array | None:
