@@ -11,7 +11,6 @@ processor, no GPU was at hand.
 from __future__ import annotations
 
 import argparse
-import csv
 import sys
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
@@ -27,6 +26,7 @@ from rich.table import Table
 from hierarchy.problem import Hierarchy
 from scenarios.bench.families import family
 from scenarios.bench.machine import machine
+from scenarios.bench.rows import write_rows
 from solvers import Resolver, make
 from solvers.batch import Batch, cores, solve
 
@@ -145,11 +145,7 @@ def _print(console: Console, title: str, rows: Sequence[dict[str, Any]]) -> None
 
 
 def _write(rows: Sequence[dict[str, Any]], out: Path) -> None:
-    out.mkdir(parents=True, exist_ok=True)
-    with (out / "batch.csv").open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, list(rows[0]))
-        writer.writeheader()
-        writer.writerows(rows)
+    write_rows(rows, out / "batch.csv")
 
 
 def main() -> int:

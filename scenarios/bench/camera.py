@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import os
 from collections.abc import Callable
 from functools import partial
@@ -16,6 +15,7 @@ from rich.table import Table
 
 from hierarchy.problem import Array
 from scenarios.bench.machine import one_core
+from scenarios.bench.rows import write_rows
 from scenarios.build import Cell, build
 from scenarios.config import Scenario, load
 from scenarios.sensors import DepthSensor
@@ -45,11 +45,7 @@ def run(out: Path | None = None) -> list[dict[str, Any]]:
                                                        f"avoidance.obstacles={obstacles}"]))]
     _print(rows)
     if out is not None:
-        out.mkdir(parents=True, exist_ok=True)
-        with (out / "camera.csv").open("w", newline="") as file:
-            writer = csv.DictWriter(file, list(rows[0]))
-            writer.writeheader()
-            writer.writerows(rows)
+        write_rows(rows, out / "camera.csv")
     return rows
 
 

@@ -7,7 +7,6 @@ has to be done without one: `tpm` from the rows in their new order.
 from __future__ import annotations
 
 import argparse
-import csv
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -21,6 +20,7 @@ from rich.table import Table
 
 from hierarchy.problem import Array
 from scenarios.bench.machine import one_core
+from scenarios.bench.rows import write_rows
 from solvers import make
 from solvers.factorization import Factorization
 
@@ -79,11 +79,7 @@ def run(out: Path | None = None, seconds: float = SECONDS,
     for count in levels:
         _print(console, [row for row in rows if row["levels"] == count])
     if out is not None:
-        out.mkdir(parents=True, exist_ok=True)
-        with (out / "edits.csv").open("w", newline="") as file:
-            writer = csv.DictWriter(file, list(rows[0]))
-            writer.writeheader()
-            writer.writerows(rows)
+        write_rows(rows, out / "edits.csv")
     return rows
 
 

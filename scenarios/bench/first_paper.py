@@ -8,11 +8,9 @@ joints. `hierarchy bench first-paper`, or with options `python -m scenarios.benc
 from __future__ import annotations
 
 import argparse
-import csv
 import json
 import os
 import sys
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -47,22 +45,14 @@ def run(out: Path | None = None, arms: int = ARMS, checked: int = CHECKED,
     Console(highlight=False, markup=False).print(NOTES)
     if out is not None:
         from scenarios.bench.growth_figure import time_over_size
+        from scenarios.bench.rows import write_rows
         from scenarios.figures.drawing import write
 
-        out.mkdir(parents=True, exist_ok=True)
-        _write(errors, out / "errors.csv")
-        _write(times, out / "growth.csv")
+        write_rows(errors, out / "errors.csv")
+        write_rows(times, out / "growth.csv")
         (out / "machine.json").write_text(json.dumps(machine(), indent=2) + "\n")
         write(time_over_size(times), str(out / "growth"))
     return errors, times
-
-
-def _write(rows: Sequence[dict[str, Any]], path: Path) -> None:
-    columns = list(dict.fromkeys(key for row in rows for key in row))  # tasks differ in number
-    with path.open("w", newline="") as file:
-        writer = csv.DictWriter(file, columns)
-        writer.writeheader()
-        writer.writerows(rows)
 
 
 def main() -> int:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -16,6 +15,7 @@ from rich.table import Table
 from scenarios.bench.candidates import DAQP, NUMPY, Call, Candidate, candidates
 from scenarios.bench.families import DATA, FAMILIES, Problem, family, well_posed_levels
 from scenarios.bench.machine import machine, one_core
+from scenarios.bench.rows import write_rows
 from solvers import Status, certify
 
 RIGHT = 1e-6        # a level's violation off by more than this is wrong; tolerance of `certify`
@@ -196,10 +196,6 @@ def _write(rows: list[dict[str, Any]], out: Path) -> None:
     from scenarios.bench.figure import time_against_accuracy
     from scenarios.figures.drawing import write
 
-    out.mkdir(parents=True, exist_ok=True)
-    with (out / "resolvers.csv").open("w", newline="") as file:
-        writer = csv.DictWriter(file, list(rows[0]))
-        writer.writeheader()
-        writer.writerows(rows)
+    write_rows(rows, out / "resolvers.csv")
     (out / "machine.json").write_text(json.dumps(machine(), indent=2) + "\n")
     write(time_against_accuracy(rows), str(out / "time-accuracy"))

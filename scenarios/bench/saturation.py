@@ -10,7 +10,6 @@ accepts it from the data alone.
 from __future__ import annotations
 
 import argparse
-import csv
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -26,6 +25,7 @@ from rich.table import Table
 from hierarchy.problem import Array, Hierarchy
 from scenarios.bench.candidates import moved
 from scenarios.bench.machine import machine, one_core
+from scenarios.bench.rows import write_rows
 from solvers import Resolver, Status, certify, make, names
 from solvers.problems import Recipe, written
 
@@ -156,11 +156,7 @@ def run(out: Path | None = None, count: int = 1000, entrants: Sequence[Resolver]
         _print_family(console, family, found, count, left_out)
     console.print(NOTES)
     if out is not None:
-        out.mkdir(parents=True, exist_ok=True)
-        with (out / "saturation.csv").open("w", newline="") as file:
-            writer = csv.DictWriter(file, list(dict.fromkeys(key for row in rows for key in row)))
-            writer.writeheader()
-            writer.writerows(rows)
+        write_rows(rows, out / "saturation.csv")
     return rows
 
 

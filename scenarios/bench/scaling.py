@@ -7,7 +7,6 @@ One solve over tasks, rows and joints, by everyone that keeps priorities; and a 
 from __future__ import annotations
 
 import argparse
-import csv
 import json
 import os
 import sys
@@ -113,14 +112,11 @@ def _digits(value: float) -> str:
 
 def _write(rows: Sequence[dict[str, Any]], out: Path) -> None:
     from scenarios.bench.machine import machine
+    from scenarios.bench.rows import write_rows
     from scenarios.bench.scaling_figure import time_over_sizes
     from scenarios.figures.drawing import write
 
-    out.mkdir(parents=True, exist_ok=True)
-    with (out / "scaling.csv").open("w", newline="") as file:
-        writer = csv.DictWriter(file, list(dict.fromkeys(key for row in rows for key in row)))
-        writer.writeheader()
-        writer.writerows(rows)
+    write_rows(rows, out / "scaling.csv")
     (out / "machine.json").write_text(json.dumps(machine(), indent=2) + "\n")
     write(time_over_sizes(rows), str(out / "scaling"))
 

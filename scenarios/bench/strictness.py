@@ -9,7 +9,6 @@ whose answer is cut off at the limits is the yardstick of what is not strict.
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -22,6 +21,7 @@ from rich.table import Table
 from hierarchy import Hierarchy, Robot, State
 from hierarchy.kinematics import write_point_jacobian
 from hierarchy.problem import Array
+from scenarios.bench.rows import write_rows
 from solvers import Resolution, Resolver, Status, make, names
 from solvers.backends import BACKENDS, installed
 from solvers.resolver import Handles
@@ -148,11 +148,7 @@ def run(out: Path | None = None, resolvers: Iterable[Resolver] | None = None,
     found = [strictness(resolver, duration) for resolver in chosen]
     _print(found)
     if out is not None:
-        out.mkdir(parents=True, exist_ok=True)
-        with (out / "strictness.csv").open("w", newline="") as file:
-            writer = csv.DictWriter(file, list(asdict(found[0])))
-            writer.writeheader()
-            writer.writerows(asdict(one) for one in found)
+        write_rows([asdict(one) for one in found], out / "strictness.csv")
     return found
 
 

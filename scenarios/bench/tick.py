@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -13,6 +12,7 @@ from rich.table import Table
 
 from hierarchy.problem import Array
 from scenarios.bench.plain import PlainTick
+from scenarios.bench.rows import write_rows
 from scenarios.build import build
 from scenarios.config import load
 from scenarios.control.controller import Controller
@@ -53,11 +53,7 @@ def run(out: Path | None = None) -> list[dict[str, Any]]:
         row["times_faster_than_plain"] = slow / row["median_us"]
     _print(rows)
     if out is not None:
-        out.mkdir(parents=True, exist_ok=True)
-        with (out / "tick.csv").open("w", newline="") as file:
-            writer = csv.DictWriter(file, list(rows[0]))
-            writer.writeheader()
-            writer.writerows(rows)
+        write_rows(rows, out / "tick.csv")
     return rows
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import os
 import tempfile
@@ -24,6 +23,7 @@ from scenarios.bench.peers.environments import MissingError
 from scenarios.bench.peers.process import Process, after_nan, stage
 from scenarios.bench.peers.scene import Scene, write_scenes
 from scenarios.bench.peers.urdf import urdf
+from scenarios.bench.rows import write_rows
 
 TURN = 1000        # ticks before the next entrant has its turn
 REHEARSED = 50     # ticks at the beginning of a turn that do not count: caches are cold
@@ -226,8 +226,5 @@ def _write(rows: list[dict[str, Any]], missing: dict[str, str], out: Path) -> No
     (out / "missing.json").write_text(json.dumps(missing, indent=2) + "\n")
     (out / "machine.json").write_text(json.dumps(machine(), indent=2) + "\n")
     if rows:
-        with (out / "peers.csv").open("w", newline="") as file:
-            writer = csv.DictWriter(file, list(rows[0]))
-            writer.writeheader()
-            writer.writerows(rows)
+        write_rows(rows, out / "peers.csv")
         write(bars(rows), str(out / "peers"))
