@@ -4,6 +4,8 @@
         h = generate(seed)
         assert certify(h, make("hcod").solve(h).x).certified
 
+`family` gives fresh problems of the same make as the reference families.
+
 All unit rows of a hierarchy are written around one point x*, so that sides can pass through the
 same vertex; then they are scaled. `strategy` gives the same problems to hypothesis.
 """
@@ -21,6 +23,8 @@ from numpy.linalg import norm
 
 from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array, Hierarchy
+from solvers.problem_families import FAMILIES as FAMILIES
+from solvers.problem_families import family as family
 
 if TYPE_CHECKING:
     from hypothesis.strategies import SearchStrategy
