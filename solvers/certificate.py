@@ -1,20 +1,29 @@
 """Is this x the answer of a hierarchy? Judged from the data alone, trusting no solver.
 
-Let w_k be the violation of level k at x, and F_(k-1) all y at which every row of the levels above
-has the violation that it has at x: an equality and a violated row keep their value, the others stay
-inside their sides. F_(k-1) is convex, so x is optimal for level k exactly when the gradient
-A_k^T w_k is balanced by the normal cone of F_(k-1) at x,
+Every row is judged by its own norm. Let t_i be the violation of row i at x divided by the norm of
+the row: a length in the space of x. Let F_(k-1) be all y at which every row of the levels above has
+the violation that it has at x: an equality and a violated row keep their value, the others stay
+inside their sides. F_(k-1) is convex, so x is optimal for level k exactly when the normal cone of
+F_(k-1) at x balances the gradient (Karush-Kuhn-Tucker), that is when
 
-    -A_k^T w_k in span{a_i : equality or violated} + cone{+a_i : on upper, -a_i : on lower},
+    sum_i |a_i|^2 t_i u_i + sum_j y_j u_j + sum_l z_l c_l = 0,   y >= 0,  z >= 0,          (1)
 
-with rows a_i of the levels above (Karush-Kuhn-Tucker). x is the answer when that holds for every
-level, and for x - reference with the rows of all levels. The projection d of -A_k^T w_k on the
-polar of that cone, found with a QR factorisation for the span and non-negative least squares for
-the cone, is the feasible direction of steepest descent (Moreau); |d|^2 / |A_k d| is what the
-violation loses along it to first order. This is the residual: zero at the answer, of the order of
-the error in A_k x elsewhere, at most |w_k| always. It is a lower bound: where rows of a level are
-nearly parallel, more could be gained than the steepest direction shows, and the level named may be
-one below the level at fault.
+modulo the span of the equalities and violated rows above. The u_i are the unit rows of the level
+that are equalities or violated, the u_j those that are on a side, and the c_l the unit rows above
+that are on a side, all pointing outwards.
+
+The residual of a level is the least change of t for which (1) holds: the Euclidean norm over the
+rows of the level, relative to 1 + |x|. So an x is accepted where it is exactly optimal once each
+side is moved by no more than `tolerance` (1 + |x|) in the direction of its row, whatever the norm
+of the row. A level may be improved, and x is rejected, where no such shift explains it. The same
+test, with the rows of all levels above and x - reference for t, tells whether x is the nearest.
+
+The test has one limit. Rows that agree up to an angle of `parallel` count as dependent: the data do
+not say, in double precision, what lies between them. A direction that only such rows can see is
+then free, and levels below may use it.
+
+The least change is a non-negative least-squares problem in coordinates in which large rows come
+first, so that rounding in rows of norm 1000 does not hide a row of norm 0.001.
 """
 
 from __future__ import annotations
@@ -29,10 +38,14 @@ from numpy.typing import ArrayLike, NDArray
 from hierarchy.problem import Array, Hierarchy
 
 TOLERANCE = 1e-8
-"""Largest relative residual of an answer, and distance to a side, relative to 1 + |x|, up to which
-a row is on it."""
-PARALLEL = 1e-9  # a unit row with no more than this outside a span lies in it
-_FLAT = 1e-4     # curvature of a level along d, relative to its largest row, not told from zero
+"""Largest residual of an answer, and distance to a side, relative to 1 + |x|, up to which a row is
+on it."""
+PARALLEL = 1e-8
+"""Angle [rad] up to which a row counts as lying in the span of others."""
+_SMALLEST = 1e-30   # norm of a row of a level relative to the largest: smaller ones count as this
+_UNSEEN = 1e4       # weight of what no row of a level can see, relative to what they see least
+_LARGEST = 1e150    # of a length: its square is finite
+_SMALL = 1e-15      # relative: steps and pivots below it are rounding
 _ROUNDING = 64 * float(np.finfo(float).eps)
 
 Mask = NDArray[np.bool_]
@@ -46,9 +59,8 @@ class Certificate:
     Attributes
     ----------
     violations : (L,) Euclidean norm of each level's violation.
-    stationarity : (L,) how much of it could be removed without touching the levels above, to first
-        order, relative to |A_k| (1 + |x|), where |A_k| is the norm of the rows that are equalities
-        or violated.
+    stationarity : (L,) how far the sides of each level would have to be moved for x to be optimal,
+        in units of length (violation divided by the norm of the row), relative to 1 + |x|.
     nearest : length of the step towards the reference that no level would feel, relative to
         1 + |x|.
     tolerance : what residuals were compared with.
@@ -94,133 +106,295 @@ class Certificate:
                 f"{worst:.1e}")
 
 
-def certify(h: Hierarchy, x: ArrayLike, tolerance: float = TOLERANCE) -> Certificate:
+def certify(h: Hierarchy, x: ArrayLike, tolerance: float = TOLERANCE,
+            parallel: float = PARALLEL) -> Certificate:
     """Judge whether x (n,) is the answer of h, level by level; see the module's text.
 
     A row's side counts as reached when x is within `tolerance` (1 + |x|) of its hyperplane, and as
     violated beyond. Within, the row may push to its own side only: exact where it is satisfied, and
-    where it is violated by so little, its own level holds it there. Rows that are dependent up to
-    an angle of 1e-9 count as dependent, and what rounding alone can leave of a gradient counts as
-    zero. An x, or data, that is not finite is never certified.
+    where it is violated by so little, its own level holds it there. What rounding alone can leave
+    of a residual counts as zero. An x, or data, that is not finite, or whose lengths overflow when
+    they are squared, is never certified.
+
+    parallel : angle [rad] up to which rows count as dependent.
 
     Raises
     ------
     HierarchyError : x has the wrong shape.
     """
-    with np.errstate(over="ignore", invalid="ignore"):
+    with np.errstate(all="ignore"):
         slack = h.slacks(x)
         x = np.asarray(x, dtype=np.float64)
-        size = np.sqrt(np.einsum("ij,ij->i", h.A, h.A))
-        reach = 1.0 + float(np.sqrt(x @ x))
-        gap = x - h.reference
-        sane = np.isfinite([reach, size @ size, gap @ gap, slack @ slack]).all()
-    if not sane or np.isnan(h.lower).any() or np.isnan(h.upper).any():
-        unknown = np.full(len(h.sizes), np.inf)
-        return Certificate(unknown, unknown.copy(), np.inf, tolerance, h.names)
-    pairs = list(zip(h.offsets[:-1].tolist(), h.offsets[1:].tolist(), strict=True))
-    violations = np.array([np.sqrt(slack[i:j] @ slack[i:j]) for i, j in pairs])
-    stationarity = np.zeros(len(pairs))
-    held, unit = _held(h, x, slack, size, reach * tolerance)
-    cone = _NormalCone(h.n)
-    for k, (i, j) in enumerate(pairs):
-        if cone.rank == h.n:
-            break
-        if slack[i:j].any():
-            stationarity[k] = _residual(cone, h, slack, size, slice(i, j)) / reach
-        cone.add(unit[i:j], *(mask[i:j] for mask in held))
-    d = cone.descent(gap, float(norm(gap)))
-    return Certificate(violations, stationarity, float(norm(d)) / reach, tolerance, h.names)
+        pairs = list(zip(h.offsets[:-1].tolist(), h.offsets[1:].tolist(), strict=True))
+        violations = np.array([_length(slack[i:j]) for i, j in pairs])
+        rows = _Rows.of(h, x, tolerance)
+        if rows is None:
+            unknown = np.full(len(pairs), np.inf)
+            return Certificate(unknown, unknown.copy(), np.inf, tolerance, h.names)
+        stationarity = np.zeros(len(pairs))
+        cone = _NormalCone(h.n, parallel)
+        for k, (i, j) in enumerate(pairs):
+            if cone.Z.shape[1] == 0:
+                break
+            level = rows.part(slice(i, j))
+            stationarity[k] = _residual(cone, level, tolerance * rows.reach) / rows.reach
+            cone.add(level)
+        nearest = _projected(cone.Z.T @ (x - h.reference), cone) / rows.reach
+        return Certificate(violations, stationarity, nearest, tolerance, h.names)
 
 
-def _held(h: Hierarchy, x: Array, slack: Array, size: Array,
-          band: float) -> tuple[tuple[Mask, Mask, Mask], Array]:
-    """Rows that must keep their value, that are on their upper and lower side; unit rows (m, n)."""
-    near = band * size
-    value = h.A @ x
-    fixed = (h.lower == h.upper) | (np.abs(slack) > near)
-    upper = ~fixed & (value >= h.upper - near)
-    lower = ~fixed & (value <= h.lower + near)
-    return (fixed, upper, lower), h.A / np.where(size > 0.0, size, 1.0)[:, None]
+@final
+@dataclass(frozen=True)
+class _Rows:
+    """Unit rows, and where x stands: in lengths, so that every row is judged by its own norm.
 
+    unit (m, n); size (m,) logarithm of the norm; t (m,) signed distance beyond a side; fixed,
+    upper, lower (m,): must keep its value, on its upper side, on its lower side; reach = 1 + |x|.
+    """
 
-def _residual(cone: _NormalCone, h: Hierarchy, slack: Array, size: Array, rows: slice) -> float:
-    """What the violation of one level can still lose, relative to the norm of its rows in play."""
-    play = (slack[rows] != 0.0) | (h.lower[rows] == h.upper[rows])
-    largest = float(size[rows][play].max())
-    if largest == 0.0:
-        return 0.0
-    A, w = h.A[rows][play] / largest, slack[rows][play] / largest
-    length = size[rows][play] / largest
-    d = cone.descent(A.T @ w, float(length @ np.abs(w)))
-    steep = float(d @ d)
-    if steep == 0.0:
-        return 0.0
-    curved = max(float(norm(A @ d)), _FLAT * np.sqrt(steep))
-    return float(min(steep / curved, norm(w)) / norm(length))
+    unit: Array
+    size: Array
+    t: Array
+    fixed: Mask
+    upper: Mask
+    lower: Mask
+    reach: float
+
+    @staticmethod
+    def of(h: Hierarchy, x: Array, tolerance: float) -> _Rows | None:
+        """Return the rows of all levels, or None where numbers are not finite or too large."""
+        largest = np.abs(h.A).max(axis=1, initial=0.0)
+        seen = largest > 0.0
+        scale = np.where(seen, largest, 1.0)
+        unit = h.A / scale[:, None]
+        length = np.where(seen, np.sqrt(np.einsum("ij,ij->i", unit, unit)), 1.0)
+        unit = unit / length[:, None]
+        low = np.where(seen, h.lower / scale / length, -np.inf)  # a zero row asks nothing of x
+        up = np.where(seen, h.upper / scale / length, np.inf)
+        value, reach = unit @ x, 1.0 + _length(x)
+        t = np.maximum(value - up, 0.0) - np.maximum(low - value, 0.0)
+        known = [reach, _length(x - h.reference), *np.abs(t), *np.abs(value)]
+        if not (np.array(known) < _LARGEST).all() or np.isnan([h.lower, h.upper]).any():
+            return None
+        band = tolerance * reach
+        fixed = (h.lower == h.upper) | (np.abs(t) > band)
+        return _Rows(unit, np.log(scale) + np.log(length), t, fixed & seen,
+                     ~fixed & (value >= up - band), ~fixed & (value <= low + band), reach)
+
+    def part(self, rows: slice) -> _Rows:
+        """Return the rows of one level."""
+        return _Rows(self.unit[rows], self.size[rows], self.t[rows], self.fixed[rows],
+                     self.upper[rows], self.lower[rows], self.reach)
 
 
 class _NormalCone:
-    """Normal cone of F_k at x: a span with orthonormal basis Q (n, rank), and signed unit rows."""
+    """Normal cone of F_k at x: Z (n, p), a basis of what the span leaves, and unit rows in it."""
 
-    def __init__(self, n: int) -> None:
-        self.Q = np.empty((n, 0))
-        self._rows = np.empty((0, n))
-        self._seen = np.empty((0, n))  # the same rows outside the span, unit again
-        self._thinnest = 1.0  # smallest pivot that was not taken for zero: rounding grows by it
+    def __init__(self, n: int, parallel: float) -> None:
+        self.Z = np.eye(n)
+        self.parallel = parallel
+        self.rows = np.empty((0, n))   # coordinates in Z of rows on a side, unit again
+        self._kept = np.empty((0, n))  # the same rows as they are given
+        self.thinnest = 1.0  # smallest pivot that was not taken for zero: rounding grows by it
+
+    def add(self, level: _Rows) -> None:
+        """Take in a level: rows in the span, rows on their upper or lower side."""
+        if level.fixed.any():
+            self._narrow(level.unit[level.fixed])
+        if level.upper.any() or level.lower.any():
+            self._kept = np.vstack([self._kept, level.unit[level.upper], -level.unit[level.lower]])
+        seen = self._kept @ self.Z
+        left = np.sqrt(np.einsum("ij,ij->i", seen, seen))
+        seen_at_all = left > self.parallel
+        self._kept = self._kept[seen_at_all]
+        self.rows = seen[seen_at_all] / left[seen_at_all, None]
+        self.thinnest = min(self.thinnest, float(left[seen_at_all].min(initial=1.0)))
+
+    def _narrow(self, rows: Array) -> None:
+        from scipy.linalg import qr  # type: ignore[import-untyped]
+
+        q, r, _ = qr((rows @ self.Z).T, pivoting=True, check_finite=False)
+        pivots = np.abs(np.diagonal(r))
+        rank = int(np.count_nonzero(pivots > self.parallel))
+        if rank:
+            self.thinnest = min(self.thinnest, float(pivots[rank - 1]))
+            self.Z = self.Z @ q[:, rank:]
+
+
+def _residual(cone: _NormalCone, level: _Rows, enough: float) -> float:
+    """Least change of t that balances the gradient of a level: a length."""
+    all_of_it = _length(level.t)
+    if all_of_it <= enough:  # no violation at all would do
+        return all_of_it
+    size = np.exp(np.maximum(level.size - level.size[level.fixed].max(), np.log(_SMALLEST)))
+    view = _View.of(level.unit[level.fixed] @ cone.Z, size[level.fixed], cone.parallel)
+    t = level.t[level.fixed]
+    on = [(level.unit[level.upper], size[level.upper], level.t[level.upper]),
+          (-level.unit[level.lower], size[level.lower], -level.t[level.lower])]
+    own, own_size, own_t = (np.concatenate(part) for part in zip(*on, strict=True))
+    own_t = np.maximum(own_t, 0.0)
+    C = np.hstack([view.weighted(cone.rows),
+                   view.weighted((own @ cone.Z) * own_size[:, None]**2)])
+    C = np.vstack([C, np.eye(len(own_t), C.shape[1], len(cone.rows))])
+    f = np.concatenate([view.Q.T @ t, np.zeros(len(C) - view.rank - len(own_t)), -own_t])
+    noise = np.concatenate([np.abs(view.Q).T @ np.abs(t), np.zeros(len(f) - view.rank)])
+    found = _balanced(C, f, noise, min(cone.thinnest, view.thinnest), 1e-3 * enough)
+    return min(found, all_of_it)
+
+
+def _projected(gap: Array, cone: _NormalCone) -> float:
+    """Length of the projection of -gap on the polar cone."""
+    return _balanced(cone.rows.T, gap, np.abs(gap), cone.thinnest, 0.0)
+
+
+def _balanced(C: Array, f: Array, size: Array, thinnest: float, enough: float) -> float:
+    """Least |C z + f| for z >= 0, without what rounding can make of terms of this size."""
+    z = _non_negative(C, -f, enough)
+    left = C @ z + f
+    noise = _ROUNDING * (size + np.abs(C) @ z) / thinnest
+    return _length(left[np.abs(left) > noise])
+
+
+@final
+@dataclass(frozen=True)
+class _View:
+    """What the rows of a level see of p coordinates, large rows first.
+
+    Q (m, rank) : orthonormal; |Q^T t| is the least change of t without help from the cone.
+    directions (p, rank) and rest (p, p - rank) : bases of what the rows see, and of the rest.
+    """
+
+    Q: Array
+    R: Array
+    order: NDArray[np.int64]
+    directions: Array
+    rest: Array
+    thinnest: float
+    parallel: float
 
     @property
     def rank(self) -> int:
-        """Dimension of the span."""
-        return self.Q.shape[1]
+        """Number of directions that the rows see."""
+        return int(self.Q.shape[1])
 
-    def add(self, rows: Array, fixed: Mask, upper: Mask, lower: Mask) -> None:
-        """Take in unit rows of a level: those in the span, those on their upper or lower side."""
-        if fixed.any():
-            self._widen(rows[fixed])
-        if upper.any() or lower.any():
-            self._rows = np.vstack([self._rows, rows[upper], -rows[lower]])
-        if self._rows.size:
-            seen = self._outside(self._rows)
-            left = np.sqrt(np.einsum("ij,ij->i", seen, seen))
-            kept = left > PARALLEL
-            self._rows, self._seen = self._rows[kept], seen[kept] / left[kept, None]
-            self._thinnest = float(left[kept].min(initial=self._thinnest))
+    @staticmethod
+    def of(P: Array, size: Array, parallel: float) -> _View:
+        """Factorise rows P (m, p), parts of unit rows, that stand for rows of these sizes."""
+        from scipy.linalg import qr
 
-    def descent(self, gradient: Array, size: float) -> Array:
-        """Projection of -gradient on the polar cone; zero where rounding could have made it.
+        V, T, thinnest, rank = _graded(P, size, parallel)
+        by_size = np.argsort(-size, kind="stable")
+        q, R, order = qr((T[:rank] * size**2).T[by_size], mode="economic", pivoting=True,
+                         check_finite=False)
+        Q = np.empty_like(q)
+        Q[by_size] = q
+        return _View(Q, R, order, V[:, :rank], V[:, rank:], thinnest, parallel)
 
-        size : of the terms that the gradient was summed from.
-        """
-        wanted = -self._outside(gradient)
-        weights = 0.0
-        if self._seen.size and wanted.any():
-            multipliers = _nonnegative(self._seen.T, wanted)
-            weights = float(multipliers.sum())
-            wanted = wanted - self._seen.T @ multipliers
-        noise = _ROUNDING * (size + weights) / self._thinnest
-        return wanted if norm(wanted) > noise else np.zeros_like(wanted)
+    def weighted(self, rows: Array) -> Array:
+        """Return what rows (k, p) do to a balance, as columns (p, k), in lengths of the level."""
+        from scipy.linalg import solve_triangular
 
-    def _outside(self, rows: Array) -> Array:
-        for _ in range(2):  # once more, for rows that lie almost inside
-            rows = rows - (rows @ self.Q) @ self.Q.T
-        return rows
-
-    def _widen(self, rows: Array) -> None:
-        from scipy.linalg import qr  # type: ignore[import-untyped]
-
-        q, r, _ = qr(self._outside(rows).T, mode="economic", pivoting=True, check_finite=False)
-        pivots = np.abs(np.diagonal(r))
-        rank = int(np.count_nonzero(pivots > PARALLEL))
-        if rank:
-            self._thinnest = min(self._thinnest, float(pivots[rank - 1]))
-            self.Q = np.hstack([self.Q, q[:, :rank]])
+        if not len(rows):
+            return np.empty((len(self.directions), 0))
+        outside = rows @ self.rest
+        length = norm(rows, axis=1)
+        outside[norm(outside, axis=1) <= self.parallel * length] = 0.0
+        if not self.rank:
+            return np.asarray(outside.T)
+        inside = solve_triangular(self.R, (rows @ self.directions)[:, self.order].T, trans="T",
+                                  check_finite=False)
+        least = float(np.abs(np.diagonal(self.R)).min())
+        return np.vstack([inside, (_UNSEEN / least) * outside.T])
 
 
-def _nonnegative(C: Array, b: Array) -> Array:
-    """Multipliers >= 0 that minimise |C multipliers - b|; zeros if no method ends."""
-    from scipy.optimize import lsq_linear, nnls  # type: ignore[import-untyped]
+def _graded(P: Array, size: Array, parallel: float) -> tuple[Array, Array, float, int]:
+    """Orthonormal basis V (p, p), T = V^T P^T, its thinnest pivot, and the rank of T.
 
-    try:
-        return np.asarray(nnls(C, b, maxiter=10 * sum(C.shape))[0])
-    except RuntimeError:  # its bound on iterations
-        return np.asarray(lsq_linear(C, b, (0.0, np.inf), method="bvls", tol=1e-15).x)
+    Pivots are chosen by the size of what is left of a row. A row that has no more than `parallel`
+    of itself left is not a pivot, and nothing is left of it.
+    """
+    from scipy.linalg import qr
+
+    candidate = norm(P, axis=1) > parallel
+    while True:
+        chosen = np.flatnonzero(candidate)
+        V, R, order = qr((P[chosen] * size[chosen, None]).T, pivoting=True, check_finite=False)
+        pivots = np.abs(np.diagonal(R)) / size[chosen[order]][:min(R.shape)]
+        lost = pivots <= parallel
+        if not lost.any():
+            break
+        candidate[chosen[order[int(np.argmax(lost))]]] = False
+    T = V.T @ P.T
+    left = np.sqrt(np.cumsum(T[::-1]**2, axis=0)[::-1])
+    T[left <= parallel] = 0.0
+    T[len(pivots):] = 0.0
+    return V, T, float(pivots.min(initial=1.0)), len(pivots)
+
+
+def _non_negative(C: Array, b: Array, enough: float) -> Array:
+    """Return z >= 0 that minimises |C z - b| (Lawson and Hanson 1974, ch. 23).
+
+    Ends early where |C z - b| <= enough, and in any case after three steps a column.
+    """
+    z = np.zeros(C.shape[1])
+    length = np.sqrt(np.einsum("ij,ij->j", C, C))
+    usable = length > 0.0
+    if not usable.any() or not b.any():
+        return z
+    heavy = np.argsort(-np.abs(C).max(axis=1), kind="stable")  # for rows of different weight
+    D, target = (C[:, usable] / length[usable])[heavy], b[heavy]
+    y, left = np.zeros(D.shape[1]), target
+    free = np.zeros(len(y), dtype=bool)
+    refused = free.copy()
+    for _ in range(3 * len(y) + 3):
+        slope = np.where(free | refused, 0.0, D.T @ left)
+        best = int(np.argmax(slope))
+        if norm(left) <= enough or slope[best] <= _SMALL * norm(left):
+            break
+        moved = _freed(D, target, y, free, best)
+        if moved is None:
+            refused[best] = True
+        else:
+            y, left, free = moved
+            refused[:] = False
+    z[usable] = y / length[usable]
+    return z
+
+
+def _freed(D: Array, b: Array, y: Array, free: Mask, new: int) -> tuple[Array, Array, Mask] | None:
+    """Return the least squares y >= 0 after one more entry is freed, what it leaves, and the mask.
+
+    None where the new entry would become negative: rounding chose it.
+    """
+    free = free.copy()
+    free[new] = True
+    for first in (True, *[False] * len(y)):
+        s, left = _least_squares(D, b, free)
+        if first and s[new] <= 0.0:
+            return None
+        stop = free & (s <= 0.0)
+        if not stop.any():
+            break
+        share = y[stop] / (y[stop] - s[stop])
+        y = y + float(share.min()) * (s - y)
+        free[np.flatnonzero(stop)[share <= share.min()]] = False
+        y[~free] = 0.0
+    return s, left, free
+
+
+def _least_squares(D: Array, b: Array, free: Mask) -> tuple[Array, Array]:
+    """Least squares of the free columns, and what it leaves; QR with pivoting, heavy rows first."""
+    from scipy.linalg import qr, solve_triangular
+
+    q, r, order = qr(D[:, free], mode="economic", pivoting=True, check_finite=False)
+    inside, s = q.T @ b, np.zeros(D.shape[1])
+    rank = int(np.count_nonzero(np.abs(np.diagonal(r)) > _SMALL * np.abs(r[0, 0])))
+    solved = solve_triangular(r[:rank, :rank], inside[:rank], check_finite=False)
+    s[np.flatnonzero(free)[order[:rank]]] = solved
+    return s, b - q[:, :rank] @ inside[:rank]
+
+
+def _length(v: Array) -> float:
+    """Euclidean norm, without overflow inside."""
+    largest = float(np.abs(v).max(initial=0.0))
+    return largest * float(norm(v / largest)) if 0.0 < largest < np.inf else largest

@@ -148,10 +148,12 @@ def save(h: Hierarchy, path: str | Path) -> None:
 
 
 def load(path: str | Path) -> Hierarchy:
-    """Read the hierarchy that `save` wrote."""
+    """Read the hierarchy that `save` wrote. The names may be missing from the file."""
     with np.load(path, allow_pickle=False) as file:
-        return Hierarchy(file["A"], file["lower"], file["upper"], file["sizes"],
-                         file["reference"], tuple(map(str, file["names"])))
+        sizes = file["sizes"]
+        names = (tuple(map(str, file["names"])) if "names" in file
+                 else tuple(f"level {k + 1}" for k in range(len(sizes))))
+        return Hierarchy(file["A"], file["lower"], file["upper"], sizes, file["reference"], names)
 
 
 def _directions(rng: Random, size: int, above: Array, recipe: Recipe) -> Array:
