@@ -343,9 +343,8 @@ def _non_negative(C: Array, b: Array, enough: float) -> Array:
         return z
     heavy = np.argsort(-np.abs(C).max(axis=1), kind="stable")  # for rows of different weight
     D, target = (C[:, usable] / length[usable])[heavy], b[heavy]
-    y, left = np.zeros(D.shape[1]), target
-    free = np.zeros(len(y), dtype=bool)
-    refused = free.copy()
+    y, left, free = _begun(D, target)
+    refused = np.zeros(len(y), dtype=bool)
     for _ in range(3 * len(y) + 3):
         slope = np.where(free | refused, 0.0, D.T @ left)
         best = int(np.argmax(slope))
@@ -359,6 +358,17 @@ def _non_negative(C: Array, b: Array, enough: float) -> Array:
             refused[:] = False
     z[usable] = y / length[usable]
     return z
+
+
+def _begun(D: Array, b: Array) -> tuple[Array, Array, Mask]:
+    """Least squares of all columns, then again without those that came out negative."""
+    free = np.ones(D.shape[1], dtype=bool)
+    while free.any():
+        y, left = _least_squares(D, b, free)
+        if (y[free] > 0.0).all():
+            return y, left, free
+        free &= y > 0.0
+    return np.zeros(D.shape[1]), b, free
 
 
 def _freed(D: Array, b: Array, y: Array, free: Mask, new: int) -> tuple[Array, Array, Mask] | None:
