@@ -343,14 +343,14 @@ def _non_negative(C: Array, b: Array, enough: float) -> Array:
     usable = (peak > 0.0) & (peak < np.inf)
     if not usable.any() or largest == 0.0:
         return z
-    D = C[:, usable] / peak[usable]
-    length = np.sqrt(np.einsum("ij,ij->j", D, D))
     heavy = np.argsort(-np.abs(C).max(axis=1), kind="stable")  # for rows of different weight
-    D, target = (D / length)[heavy], b[heavy] / largest
+    D, target = C[:, usable][heavy], b[heavy] / largest
+    unit = D / peak[usable]
+    unit = unit / np.sqrt(np.einsum("ij,ij->j", unit, unit))
     y, left, free = _begun(D, target)
     refused = np.zeros(len(y), dtype=bool)
     for _ in range(3 * len(y) + 3):
-        slope = np.where(free | refused, 0.0, D.T @ left)
+        slope = np.where(free | refused, 0.0, unit.T @ left)
         best = int(np.argmax(slope))
         if norm(left) * largest <= enough or slope[best] <= _SMALL * norm(left):
             break
@@ -360,7 +360,7 @@ def _non_negative(C: Array, b: Array, enough: float) -> Array:
         else:
             y, left, free = moved
             refused[:] = False
-    z[usable] = y * largest / length / peak[usable]
+    z[usable] = y * largest
     return z
 
 
@@ -402,7 +402,8 @@ def _least_squares(D: Array, b: Array, free: Mask) -> tuple[Array, Array]:
 
     q, r, order = qr(D[:, free], mode="economic", pivoting=True, check_finite=False)
     inside, s = q.T @ b, np.zeros(D.shape[1])
-    rank = int(np.count_nonzero(np.abs(np.diagonal(r)) > _SMALL * np.abs(r[0, 0])))
+    pivots = np.abs(np.diagonal(r)) > _SMALL * norm(r, axis=0)[:min(r.shape)]
+    rank = len(pivots) if pivots.all() else int(np.argmin(pivots))
     solved = solve_triangular(r[:rank, :rank], inside[:rank], check_finite=False)
     s[np.flatnonzero(free)[order[:rank]]] = solved
     return s, b - q[:, :rank] @ inside[:rank]
