@@ -289,8 +289,8 @@ def _happens(rng: Random, chance: float) -> bool:
 
 
 _MAKERS: dict[str, Callable[[Random], Levels]] = {
-    "singular_arm": _singular_arm, "dusty_arm": _dusty_arm, "tied_box": _tied_box, "opposed": _opposed,
-    "contacts": _contacts, "nested": _nested, "mixed_units": _mixed_units,
+    "singular_arm": _singular_arm, "dusty_arm": _dusty_arm, "tied_box": _tied_box,
+    "opposed": _opposed, "contacts": _contacts, "nested": _nested, "mixed_units": _mixed_units,
     "integers": _integers, "chain": _chain, "signs": _signs, "one_unknown": _one_unknown,
     "sixty_unknowns": _sixty_unknowns, "fifteen_levels": _fifteen_levels,
     "near_ties": _near_ties, "nearly_parallel": _nearly_parallel, "tiny_rows": _tiny_rows,
