@@ -251,27 +251,30 @@ def _residual(cone: _NormalCone, level: _Rows, enough: float) -> float:
     on = [(level.unit[level.upper], size[level.upper], level.t[level.upper]),
           (-level.unit[level.lower], size[level.lower], -level.t[level.lower])]
     own, own_size, own_t = (np.concatenate(part) for part in zip(*on, strict=True))
-    C = np.hstack([view.weighted(cone.rows @ (cone.Z.T @ Z)),
-                   view.weighted((own @ Z) * own_size[:, None]**2)])
-    C = np.vstack([C, np.eye(len(own_t), C.shape[1], len(cone.rows))])
-    none = np.zeros(len(C) - view.rank - len(own_t))
-    t = level.t[judged]
+    columns = [view.weighted(cone.rows @ (cone.Z.T @ Z)),
+               view.weighted((own @ Z) * own_size[:, None]**2)]
+    C, terms = (np.hstack(part) for part in zip(*columns, strict=True))
+    held = np.eye(len(own_t), C.shape[1], len(cone.rows))
+    none, t = np.zeros(len(C) - view.rank), level.t[judged]
     f = np.concatenate([view.Q.T @ t, none, -np.maximum(own_t, 0.0)])
-    noise = np.concatenate([np.abs(view.Q).T @ np.abs(t), none, np.zeros(len(own_t))])
-    found = _balanced(C, f, noise, min(cone.thinnest, view.thinnest), 1e-3 * enough)
+    size = np.concatenate([np.abs(view.Q).T @ np.abs(t), none, np.zeros(len(own_t))])
+    found = _balanced(np.vstack([C, held]), np.vstack([terms, held]), f, size,
+                      min(cone.thinnest, view.thinnest), 1e-3 * enough)
     return min(found, all_of_it)
 
 
 def _projected(gap: Array, cone: _NormalCone) -> float:
     """Length of the projection of -gap on the polar cone."""
-    return _balanced(cone.rows.T, gap, np.abs(gap), cone.thinnest, 0.0)
+    C, size = cone.rows.T, np.full(len(gap), norm(gap))
+    return _balanced(C, np.ones_like(C), gap, size, cone.thinnest, 0.0)
 
 
-def _balanced(C: Array, f: Array, size: Array, thinnest: float, enough: float) -> float:
-    """Least |C z + f| for z >= 0, without what rounding can make of terms of this size."""
+def _balanced(C: Array, terms: Array, f: Array, size: Array, thinnest: float, enough: float
+              ) -> float:
+    """Least |C z + f| for z >= 0, without what rounding can make of terms of these sizes."""
     z = _non_negative(C, -f, enough)
     left = C @ z + f
-    noise = _ROUNDING * (size + np.abs(C) @ z) / thinnest
+    noise = _ROUNDING * (size + terms @ z) / thinnest
     return _length(left[np.abs(left) > noise])
 
 
@@ -310,21 +313,24 @@ class _View:
         Q[by_size] = q
         return _View(Q, R, order, V[:, :rank], V[:, rank:], thinnest, parallel)
 
-    def weighted(self, rows: Array) -> Array:
-        """Return what rows (k, p) do to a balance, as columns (p, k), in lengths of the level."""
+    def weighted(self, rows: Array) -> tuple[Array, Array]:
+        """Return what rows (k, p) do to a balance, as columns (p, k), in lengths of the level.
+
+        And the size of the terms that its entries were summed from: rounding is relative to them.
+        """
         from scipy.linalg import solve_triangular
 
         if not len(rows):
-            return np.empty((len(self.directions), 0))
-        outside = rows @ self.rest
-        length = norm(rows, axis=1)
+            return np.empty((len(self.directions), 0)), np.empty((len(self.directions), 0))
+        outside, length = rows @ self.rest, norm(rows, axis=1)
         outside[norm(outside, axis=1) <= self.parallel * length] = 0.0
         if not self.rank:
-            return np.asarray(outside.T)
+            return np.asarray(outside.T), np.tile(length, (outside.shape[1], 1))
         inside = solve_triangular(self.R, (rows @ self.directions)[:, self.order].T, trans="T",
                                   check_finite=False)
-        least = float(np.abs(np.diagonal(self.R)).min())
-        return np.vstack([inside, (_UNSEEN / least) * outside.T])
+        weight = _UNSEEN / float(np.abs(np.diagonal(self.R)).min())
+        return (np.vstack([inside, weight * outside.T]),
+                np.vstack([np.abs(inside), np.tile(weight * length, (outside.shape[1], 1))]))
 
 
 def _graded(P: Array, size: Array, parallel: float) -> tuple[Array, Array, float, int]:

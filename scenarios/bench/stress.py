@@ -1,11 +1,13 @@
 """A resolver on a million generated problems, every answer certified.
 
-    python -m scenarios.bench.stress --count 1000000 --resolver hcod
+    python -m scenarios.bench.stress --count 1000000 --resolver hcod --kind all
 
-Exit code 1 if it raised, gave a number that is not finite, called solved what `certify` rejects, or
-ended its process. A problem that fails is shrunk while it still fails in the same way, and kept as
-a file that `solvers.problems.load` reads. With NUMBA_BOUNDSCHECK=1 (and a NUMBA_CACHE_DIR of its
-own) a kernel that reads or writes outside its arrays raises where it would corrupt memory.
+The problems are of `solvers.problems`: the recipe ("recipe"), and every structured kind by its
+name. Exit code 1 if the resolver raised, gave a number that is not finite, called solved what
+`certify` rejects, or ended its process. A problem that fails is shrunk while it still fails in the
+same way, and kept as a file that `solvers.problems.load` reads. With NUMBA_BOUNDSCHECK=1 (and a
+NUMBA_CACHE_DIR of its own) a kernel that reads or writes outside its arrays raises where it would
+corrupt memory.
 """
 
 from __future__ import annotations
@@ -35,16 +37,22 @@ CRASHED = "not judged, a process died"
 _CHUNK = 500  # seeds a process takes at a time
 _KEPT = 20    # failing problems that are shrunk and written, at most
 _TRIALS = 3000  # of one shrinking
+RECIPE, ALL = "recipe", "all"
+KINDS = (RECIPE, *problems.KINDS)
 
 
 @final
 @dataclass
 class Tally:
-    """How many problems ended how, the seeds of those that failed, and those not judged."""
+    """How many problems ended how, the seeds of those that failed, and those not judged.
+
+    effort : how often the iterations were so many hundredths of the number of rows.
+    """
 
     counts: Counter[str] = field(default_factory=Counter)
     failing: list[tuple[int, str]] = field(default_factory=list)
     lost: list[range] = field(default_factory=list)
+    effort: Counter[int] = field(default_factory=Counter)
 
     @property
     def passed(self) -> bool:
@@ -56,6 +64,17 @@ class Tally:
         self.counts.update(other.counts)
         self.failing += other.failing
         self.lost += other.lost
+        self.effort.update(other.effort)
+
+    def iterations_per_row(self) -> tuple[float, float, float]:
+        """Median, 99.9th percentile and largest of iterations divided by rows; zeros if none."""
+        if not self.effort:
+            return 0.0, 0.0, 0.0
+        value = np.array(sorted(self.effort)) / 100.0
+        reached = np.cumsum([self.effort[i] for i in sorted(self.effort)])
+        median, rare = (float(value[np.searchsorted(reached, share * reached[-1])])
+                        for share in (0.5, 0.999))
+        return median, rare, float(value[-1])
 
     def __str__(self) -> str:
         always = dict.fromkeys((CERTIFIED, *FAILURES), 0)
@@ -64,15 +83,20 @@ class Tally:
 
 def outcome(resolver: Resolver, h: Hierarchy) -> str:
     """Return how a solve ended: certified, one of FAILURES, or the name of another Status."""
+    return _solved(resolver, h)[0]
+
+
+def _solved(resolver: Resolver, h: Hierarchy) -> tuple[str, int]:
+    """Return how a solve ended, and its iterations; zero where it raised."""
     try:
         res = resolver.solve(h)
     except Exception:  # whatever it is, a solve must not raise it
-        return RAISED
+        return RAISED, 0
     if not np.isfinite(res.x).all():
-        return NOT_FINITE
+        return NOT_FINITE, res.iterations
     if res.status is not Status.SOLVED:
-        return res.status.name
-    return CERTIFIED if certify(h, res.x).certified else WRONG
+        return res.status.name, res.iterations
+    return CERTIFIED if certify(h, res.x).certified else WRONG, res.iterations
 
 
 def recipe_for(resolver: Resolver) -> problems.Recipe:
@@ -80,13 +104,22 @@ def recipe_for(resolver: Resolver) -> problems.Recipe:
     return problems.Recipe(equalities_only=resolver.handles != "inequalities")
 
 
-def tally(name: str, seeds: range) -> Tally:
+def problem(resolver: Resolver, kind: str, seed: int) -> Hierarchy:
+    """Return the problem of a kind and a seed that the resolver can be asked for."""
+    recipe = recipe_for(resolver)
+    if kind == RECIPE:
+        return problems.generate(seed, recipe)
+    return problems.structured(seed, (kind,), recipe.equalities_only)
+
+
+def tally(name: str, seeds: range, kind: str = RECIPE) -> Tally:
     """Judge the resolver called `name` on the problems of these seeds."""
     resolver, found = make(name), Tally()
-    recipe = recipe_for(resolver)
     for seed in seeds:
-        what = outcome(resolver, problems.generate(seed, recipe))
+        h = problem(resolver, kind, seed)
+        what, iterations = _solved(resolver, h)
         found.counts[what] += 1
+        found.effort[round(100 * iterations / max(1, h.m))] += 1
         if what in FAILURES:
             found.failing.append((seed, what))
     return found
@@ -125,30 +158,51 @@ def _smaller(h: Hierarchy) -> Iterator[Hierarchy]:
 
 
 def run(count: int, name: str, first: int = 0, processes: int | None = None,
-        out: Path = Path("runs/stress")) -> Tally:
+        out: Path = Path("runs/stress"), kind: str = RECIPE) -> Tally:
     """Judge a resolver on `count` problems from seed `first` on; print the counts and return them.
 
     processes : how many at once; None for one a core.
     out : folder for failing problems, made when there is one.
+    kind : one of KINDS, or "all": then `count` problems are spread evenly over them.
     """
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # read by the processes when they start
-    chunks = [range(i, min(i + _CHUNK, first + count)) for i in range(first, first + count, _CHUNK)]
-    found = Tally()
+    kinds = KINDS if kind == ALL else (kind,)
+    each = -(-count // len(kinds))
+    found = {one: Tally() for one in kinds}
     columns = (TextColumn(name), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn(),
                TextColumn("failed: {task.fields[failed]}"))
     context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(processes, context) as pool, Progress(*columns) as bar:
-        task = bar.add_task(name, total=count, failed=0)
-        parts = {pool.submit(tally, name, chunk): chunk for chunk in chunks}
+        task = bar.add_task(name, total=each * len(kinds), failed=0)
+        parts = {pool.submit(tally, name, chunk, one): (one, chunk) for one in kinds
+                 for chunk in _chunks(first, each)}
         for part in as_completed(parts):
-            found.add(_judged(part, parts[part]))
-            bar.update(task, completed=found.counts.total(), failed=len(found.failing))
-    print(f"{name}, {count} problems: {found}")
+            one, chunk = parts[part]
+            found[one].add(_judged(part, chunk))
+            bar.update(task, completed=sum(some.counts.total() for some in found.values()),
+                       failed=sum(len(some.failing) for some in found.values()))
+    everything = Tally()
+    for one, some in found.items():
+        _print_kind(name, one, some, out)
+        everything.add(some)
+    if len(kinds) > 1:
+        print(f"{name}, {everything.counts.total()} problems: {everything}")
+    return everything
+
+
+def _chunks(first: int, count: int) -> list[range]:
+    return [range(i, min(i + _CHUNK, first + count)) for i in range(first, first + count, _CHUNK)]
+
+
+def _print_kind(name: str, kind: str, found: Tally, out: Path) -> None:
+    """Print how the problems of one kind ended; keep those that failed."""
+    print(f"{name}, {found.counts.total()} problems, {kind}: {found}")
+    median, rare, most = found.iterations_per_row()
+    print(f"  iterations / rows: median {median:.2f}, p99.9 {rare:.2f}, largest {most:.2f}")
     for seed, what in sorted(found.failing)[:_KEPT]:
-        print(f"  seed {seed}, {what}: {keep(name, seed, what, out)}")
+        print(f"  seed {seed}, {what}: {keep(name, seed, what, out, kind)}")
     for chunk in sorted(found.lost, key=lambda seeds: seeds.start)[:_KEPT]:
         print(f"  seeds {chunk.start} to {chunk.stop - 1}: {CRASHED}")
-    return found
 
 
 def _judged(part: Future[Tally], seeds: range) -> Tally:
@@ -159,13 +213,13 @@ def _judged(part: Future[Tally], seeds: range) -> Tally:
         return Tally(Counter({CRASHED: len(seeds)}), lost=[seeds])
 
 
-def keep(name: str, seed: int, what: str, out: Path) -> Path:
+def keep(name: str, seed: int, what: str, out: Path, kind: str = RECIPE) -> Path:
     """Shrink the problem of a seed while it ends the same way; write it and return the file."""
     resolver = make(name)
-    h = problems.generate(seed, recipe_for(resolver))
-    smallest = shrunk(h, lambda smaller: outcome(resolver, smaller) == what)
+    smallest = shrunk(problem(resolver, kind, seed),
+                      lambda smaller: outcome(resolver, smaller) == what)
     out.mkdir(parents=True, exist_ok=True)
-    file = out / f"{name}-{seed}.npz"
+    file = out / (f"{name}-{seed}.npz" if kind == RECIPE else f"{name}-{kind}-{seed}.npz")
     problems.save(smallest, file)
     return file
 
@@ -180,8 +234,9 @@ def main() -> int:
     parser.add_argument("--processes", type=int, default=None, help="default: one a core")
     parser.add_argument("--out", type=Path, default=Path("runs/stress"),
                         help="folder for problems that fail")
+    parser.add_argument("--kind", default=ALL, choices=(ALL, *KINDS), help="default: all")
     given = parser.parse_args()
-    found = run(given.count, given.resolver, given.first, given.processes, given.out)
+    found = run(given.count, given.resolver, given.first, given.processes, given.out, given.kind)
     return 0 if found.passed else 1
 
 
