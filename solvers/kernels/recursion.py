@@ -12,15 +12,8 @@ import numpy as np
 
 from hierarchy.compiled import compiled
 from solvers.kernels.block import solve_block
-from solvers.kernels.rows import (
-    SOLVED,
-    TOO_SMALL,
-    ZERO,
-    finish,
-    largest_row,
-    load_rows,
-    swap_rows,
-)
+from solvers.kernels.rows import ZERO, finish, largest_row, load_rows, swap_rows
+from solvers.status import SOLVED, TOO_SMALL
 
 SHRUNK = 0.01  # squared norm that a row may lose by projection before it is projected once more
 

@@ -16,8 +16,9 @@ from __future__ import annotations
 import numpy as np
 
 from hierarchy.compiled import compiled
-from solvers.kernels.rows import NUMERICAL_FAILURE, SOLVED, TOO_SMALL, finish
+from solvers.kernels.rows import finish
 from solvers.kernels.staircase import staircase, staircase_work
+from solvers.status import NUMERICAL_FAILURE, SOLVED, TOO_SMALL
 
 
 @compiled

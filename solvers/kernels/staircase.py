@@ -14,15 +14,9 @@ import numpy as np
 
 from hierarchy.compiled import compiled
 from solvers.kernels.block import solve_block
-from solvers.kernels.rows import (
-    SOLVED,
-    TOO_SMALL,
-    ZERO,
-    factor_level,
-    finish,
-    load_rows,
-    reflect_rows,
-)
+from solvers.kernels.flat import factor_level, reflect_rows
+from solvers.kernels.rows import ZERO, finish, load_rows
+from solvers.status import SOLVED, TOO_SMALL
 
 
 @compiled
