@@ -5,7 +5,10 @@ from __future__ import annotations
 import dataclasses
 import math
 from abc import ABC, abstractmethod
+from functools import cached_property
 from typing import Any, ClassVar, Literal, TypeVar
+
+import numpy as np
 
 from hierarchy.errors import HierarchyError, UnknownNameError
 from hierarchy.problem import Array, Hierarchy
@@ -100,6 +103,11 @@ class Resolver(ABC):
         """Error of x to expect on a well-conditioned hierarchy, relative to 1 + |x|."""
         return 1e-9
 
+    @cached_property
+    def _settings(self) -> Array:
+        """The settings in one array, as kernels take them: `Settings` first."""
+        return np.array([self.damping, self.threshold, self.rank_tolerance])
+
     @abstractmethod
     def solve(self, h: Hierarchy, memory: Any = None) -> Resolution:
         """Resolve h, starting from the memory of an earlier resolution if given.
@@ -121,9 +129,9 @@ class Resolver(ABC):
         if getattr(self, setting) not in allowed:
             raise UnknownNameError(f"{setting} of {self.name}", getattr(self, setting), allowed)
 
-    def _otherwise(self, h: Hierarchy, x: Array, code: int, memory: Any) -> Resolution:
-        """What follows a kernel's code other than SOLVED: more room, a refused row, a failure."""
-        if code == TOO_SMALL:
+    def _otherwise(self, h: Hierarchy, x: Array, code: int, memory: Any = None) -> Resolution:
+        """What follows a kernel's code other than SOLVED: a refused row, or a failure."""
+        if code == TOO_SMALL:  # for tpm.py until it is replaced, which does not `run` its kernels
             WORKSPACE.double()
             return self.solve(h, memory)
         if code < 0:

@@ -51,10 +51,16 @@ def load_rows(W, zero, A, lower, upper, x, rank_tolerance):
         zero[i] = rank_tolerance * rank_tolerance * square
         if not (np.isfinite(square) and np.isfinite(lower[i])):
             return NUMERICAL_FAILURE
-    for c in range(n):
+    return SOLVED if all_finite(x) else NUMERICAL_FAILURE
+
+
+@inlined
+def all_finite(x):
+    """Whether every entry is."""
+    for c in range(x.size):
         if not np.isfinite(x[c]):
-            return NUMERICAL_FAILURE
-    return SOLVED
+            return False
+    return True
 
 
 @compiled
@@ -130,6 +136,13 @@ def reflect(basis, k0, k1, W, i0, i1):
 
 
 @inlined
+def reflect_back(basis, rank, W, i0, i1):
+    """Apply reflectors rank - 1 .. 0: rows i0 .. i1 - 1 of W, given in Q, are then in x."""
+    for k in range(rank - 1, -1, -1):
+        reflect(basis, k, k + 1, W, i0, i1)
+
+
+@inlined
 def make_reflector(basis, k, w, square):
     """Make reflector k map the row w onto unit vector k; apply it to no row.
 
@@ -185,9 +198,8 @@ def grown(lower, upper, active, scale, x, reference):
 @compiled
 def finish(x, code):
     """Return code if x is finite; otherwise, or if code is no success, make x zero and say so."""
-    for i in range(x.size):
-        if not np.isfinite(x[i]) and code == SOLVED:
-            code = NUMERICAL_FAILURE
+    if code == SOLVED and not all_finite(x):
+        code = NUMERICAL_FAILURE
     if code != SOLVED:
         for i in range(x.size):
             x[i] = 0.0

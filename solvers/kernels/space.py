@@ -46,6 +46,29 @@ class Rows(NamedTuple):
     miss: View
 
 
+class Block(NamedTuple):
+    """One level's part of a staircase: rows i0 .. i1 - 1, and the columns k0 .. k1 - 1 it adds."""
+
+    i0: View
+    i1: View
+    k0: View
+    k1: View
+
+
+class Settings(NamedTuple):
+    """What all resolvers share, see `Resolver`; the first numbers of the array of settings."""
+
+    damping: View
+    threshold: View
+    rank_tolerance: View
+
+
+@inlined
+def shared(settings):
+    """Return the Settings at the beginning of an array of settings."""
+    return Settings(settings[0], settings[1], settings[2])
+
+
 @inlined
 def vector(work, at, size):
     """Return the next `size` numbers, none if there are not so many, and where they end."""
