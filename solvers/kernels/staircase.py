@@ -10,11 +10,48 @@ recursion (5), (13) in other coordinates. The columns of Q that no level took ca
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 from hierarchy.compiled import compiled, inlined
 from solvers.kernels.block import solve_level
 from solvers.kernels.rows import ZERO, factor_level, finish, load_rows, reflect, reflect_back
-from solvers.kernels.space import Block, carve_basis, carve_rows, matrix, shared, vector
+from solvers.kernels.space import (
+    Basis,
+    Block,
+    Rows,
+    View,
+    carve_basis,
+    carve_rows,
+    matrix,
+    shared,
+    vector,
+)
 from solvers.status import SOLVED, TOO_SMALL
+
+
+class Staircase(NamedTuple):
+    """The rows in coordinates of Q.
+
+    basis: the reflectors of Q. rows: the rows of J Q. y (n,): the answer in the columns that the
+    levels took. of_x (1, n): x, to be reflected. of_block: work space of `solve_level`.
+    """
+
+    basis: Basis
+    rows: Rows
+    y: View
+    of_x: View
+    of_block: View
+
+
+@inlined
+def carve_staircase(work, at, m, n):
+    """Return a Staircase for m rows of n unknowns, and where it ends."""
+    basis, at = carve_basis(work, at, n, n)
+    rows, at = carve_rows(work, at, m, n)
+    y, at = vector(work, at, n)
+    of_x, at = matrix(work, at, 1, n)
+    of_block, at = vector(work, at, (m + n) * (n + 1))
+    return Staircase(basis, rows, y, of_x, of_block), at
 
 
 @compiled
@@ -25,11 +62,7 @@ def solve_by_staircase(A, lower, upper, sizes, x, settings, work):
     Returns SOLVED, NUMERICAL_FAILURE, TOO_SMALL, or -(i + 1) where row i is an inequality.
     """
     m, n = A.shape
-    basis, at = carve_basis(work, 0, n, n)
-    rows, at = carve_rows(work, at, m, n)
-    of_x, at = matrix(work, at, 1, n)
-    y, at = vector(work, at, n)
-    of_block, at = vector(work, at, (m + n) * (n + 1))
+    (basis, rows, y, of_x, of_block), at = carve_staircase(work, 0, m, n)
     if at > work.size:
         return TOO_SMALL
     settings = shared(settings)
@@ -61,8 +94,10 @@ def _ask(rows, b, first, last):
 def subtract(rows, y, first, last, above):
     """Take what y reaches in columns 0 .. above - 1 out of what a level misses."""
     for i in range(first, last):
+        miss = rows.miss[i]
         for c in range(above):
-            rows.miss[i] -= rows.W[i, c] * y[c]
+            miss -= rows.W[i, c] * y[c]
+        rows.miss[i] = miss
 
 
 @inlined
