@@ -2,7 +2,7 @@
 
 numba caches machine code per source file but does not notice when a helper in *another* file
 changed. Here the cache folder carries a digest of the kernel's own file, of every file it calls
-into, and of this one, so a stale kernel cannot be loaded.
+into, of the constants that it reads, and of this one, so a stale kernel cannot be loaded.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import numba
+import numpy as np
 from numba.core import event
 
 # What makes an array; a kernel that uses another way of numpy fails to compile, and belongs here.
@@ -48,12 +49,13 @@ def inlined(function: Kernel) -> Kernel:
 
 
 def _compiled(function: Kernel, inline: bool = False, nogil: bool = False) -> Kernel:
-    files = _files_behind(function)
-    folder = cache_folder() / _digest((__file__, *sorted(files)))
+    files, constants = _files_behind(function), _constants_behind(function)
+    folder = cache_folder() / _digest((__file__, *sorted(files)), tuple(sorted(constants)))
     allocates = _allocates(function)
     kernel: Kernel = _jit_into(folder, function, forceinline=inline, nogil=nogil, _nrt=allocates)
     if not isinstance(kernel, type(function)):
         kernel.source_files = files  # type: ignore[attr-defined]
+        kernel.constants = constants  # type: ignore[attr-defined]
         kernel.allocates = allocates  # type: ignore[attr-defined]
     return kernel
 
@@ -61,6 +63,14 @@ def _compiled(function: Kernel, inline: bool = False, nogil: bool = False) -> Ke
 def _files_behind(function: Kernel) -> frozenset[str]:
     behind = (getattr(kernel, "source_files", ()) for kernel in _called(function))
     return frozenset({function.__code__.co_filename}).union(*behind)
+
+
+def _constants_behind(function: Kernel) -> frozenset[str]:
+    """Return what a kernel, and those that it calls, read of numbers in other files."""
+    behind = (getattr(kernel, "constants", ()) for kernel in _called(function))
+    own = zip(function.__code__.co_names, _called(function), strict=True)
+    return frozenset(f"{name} = {value!r}" for name, value in own
+                     if isinstance(value, (int, float, np.integer))).union(*behind)
 
 
 def _allocates(function: Kernel) -> bool:
@@ -78,9 +88,10 @@ def _called(function: Kernel) -> list[Any]:
 
 
 @cache
-def _digest(files: tuple[str, ...]) -> str:
+def _digest(files: tuple[str, ...], constants: tuple[str, ...]) -> str:
     content = b"".join(Path(file).read_bytes() for file in files)
-    return hashlib.sha256(content + numba.__version__.encode()).hexdigest()[:16]
+    more = "\n".join((*constants, numba.__version__))
+    return hashlib.sha256(content + more.encode()).hexdigest()[:16]
 
 
 @cache

@@ -23,9 +23,9 @@ from hierarchy.problem import Array, Hierarchy
 from solvers.hcod import Hcod
 from solvers.kernels.batch import batch_hcod, batch_saturation, batch_stages, batch_staircase
 from solvers.kernels.hcod import UNPROVED
-from solvers.kernels.rows import INACCURATE, NUMERICAL_FAILURE
 from solvers.kernels.saturation import NO_LIMITS
-from solvers.resolver import Resolver, Status, make, refuse_inequality
+from solvers.resolver import Resolver, make, refuse_inequality
+from solvers.status import INACCURATE, NUMERICAL_FAILURE, Status
 from solvers.tpm import Tpm
 from solvers.workspace import WORKSPACE
 

@@ -17,7 +17,7 @@ from solvers.kernels.factorization import (
     resolve,
     resolve_units,
 )
-from solvers.resolver import Status
+from solvers.status import Status
 from solvers.tpm import Tpm
 
 FEWEST = 8   # rows that there is always room for

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array, Hierarchy
-from solvers.kernels.rows import TOO_SMALL
 from solvers.kernels.sns import CONTRADICTION, sns
-from solvers.resolver import Handles, Resolution, Resolver, Status, register
+from solvers.resolver import Handles, Resolution, Resolver, register
+from solvers.status import TOO_SMALL, Status
 from solvers.workspace import WORKSPACE
 
 FORMS = ("basic", "optimal")

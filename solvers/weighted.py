@@ -14,11 +14,11 @@ from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array, Hierarchy
 from solvers.backends import BACKENDS, backend_of
 from solvers.hcod import Hcod
-from solvers.kernels.rows import TOO_SMALL
 from solvers.kernels.weighted import UNPROVED, weighted, weighted_steps
 from solvers.programs import slack_program
 from solvers.refinement import Rows
-from solvers.resolver import Handles, Resolution, Resolver, Status, register
+from solvers.resolver import Handles, Resolution, Resolver, register
+from solvers.status import TOO_SMALL, Status
 from solvers.workspace import WORKSPACE
 
 OWN = "own"

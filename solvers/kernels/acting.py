@@ -21,7 +21,9 @@ import numpy as np
 
 from hierarchy.compiled import compiled, inlined
 from solvers.kernels.block import variable_damping
-from solvers.kernels.rows import FREE, ROUNDING, ZERO, factor_level, reflect_rows
+from solvers.kernels.flat import factor_level, reflect_rows
+from solvers.kernels.rows import ROUNDING, ZERO
+from solvers.status import FREE
 
 SCALE, PUSH, NOISE, DOUBT, ROW, NOTHING, MISS = range(7)  # rows of R
 EXACT, CLOSE = 1e-12, 1e-7  # shares left of a row behind others between which it is ill-posed

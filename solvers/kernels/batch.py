@@ -11,10 +11,10 @@ from __future__ import annotations
 
 from hierarchy.compiled import unlocked
 from solvers.kernels.hcod import UNPROVED, hcod, hcod_equalities
-from solvers.kernels.rows import TOO_SMALL
 from solvers.kernels.saturation import saturation
 from solvers.kernels.stages import solve_by_stages
 from solvers.kernels.staircase import staircase
+from solvers.status import TOO_SMALL
 
 
 @unlocked

@@ -20,14 +20,9 @@ import numpy as np
 
 from hierarchy.compiled import compiled, inlined
 from solvers.kernels.block import solve_block
-from solvers.kernels.rows import (
-    NUMERICAL_FAILURE,
-    SOLVED,
-    ZERO,
-    factor_level,
-    finish,
-    reflect_rows,
-)
+from solvers.kernels.flat import factor_level, reflect_rows
+from solvers.kernels.rows import ZERO, finish
+from solvers.status import NUMERICAL_FAILURE, SOLVED
 
 ROUNDED = 1e-14  # share of a row outside the basis that is its rounding, and no direction
 PASSES = 4       # bound; two are enough where the row is not rounding

@@ -20,6 +20,7 @@ import numpy as np
 
 from hierarchy.compiled import compiled, inlined
 from solvers.kernels.block import solve_block
+from solvers.kernels.flat import factor_level, reflect_rows
 from solvers.kernels.rows import (
     DOUBT,
     EQUAL,
@@ -31,11 +32,9 @@ from solvers.kernels.rows import (
     SOLVED,
     TOO_SMALL,
     ZERO,
-    factor_level,
     finish,
     grown,
     prepare,
-    reflect_rows,
 )
 from solvers.kernels.staircase import staircase, staircase_work
 

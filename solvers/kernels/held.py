@@ -13,7 +13,8 @@ follows is free. Rows of the matrix W of `sns`, by `places`:
 from __future__ import annotations
 
 from hierarchy.compiled import compiled, inlined
-from solvers.kernels.rows import ROUNDING, ZERO, make_reflector, reflect_rows
+from solvers.kernels.flat import make_reflector, reflect_rows
+from solvers.kernels.rows import ROUNDING, ZERO
 
 SLACK = 1e-12  # by which a joint may pass a bound before it is put back, relative to 1 + |bound|
 NO_JOINT = -1

@@ -13,16 +13,10 @@ import numpy as np
 
 from hierarchy.compiled import compiled
 from solvers.kernels.block import invert_triangle, orthogonalise_rows, smallest_square
-from solvers.kernels.rows import (
-    SOLVED,
-    TOO_SMALL,
-    ZERO,
-    finish,
-    load_rows,
-    make_reflector,
-    reflect_rows,
-)
+from solvers.kernels.flat import make_reflector, reflect_rows
+from solvers.kernels.rows import ZERO, finish, load_rows
 from solvers.kernels.staircase import staircase, staircase_work
+from solvers.status import SOLVED, TOO_SMALL
 
 
 @compiled

@@ -29,6 +29,7 @@ import numpy as np
 
 from hierarchy.compiled import compiled, inlined
 from solvers.kernels.block import solve_block
+from solvers.kernels.flat import factor_level, reflect_rows
 from solvers.kernels.rows import (
     FREE,
     INACCURATE,
@@ -38,9 +39,7 @@ from solvers.kernels.rows import (
     SOLVED,
     TOO_SMALL,
     ZERO,
-    factor_level,
     finish,
-    reflect_rows,
 )
 
 NO_LIMITS = 9  # no value of solvers.Status: all rows are equalities, `staircase` is to be called

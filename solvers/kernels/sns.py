@@ -21,6 +21,7 @@ import numpy as np
 
 from hierarchy.compiled import compiled, inlined
 from solvers.kernels.block import solve_block
+from solvers.kernels.flat import factor_level
 from solvers.kernels.held import (
     NO_JOINT,
     SLACK,
@@ -31,16 +32,9 @@ from solvers.kernels.held import (
     places,
     to_reference,
 )
-from solvers.kernels.rows import (
-    NUMERICAL_FAILURE,
-    SOLVED,
-    TOO_SMALL,
-    ZERO,
-    factor_level,
-    finish,
-    load_rows,
-)
+from solvers.kernels.rows import ZERO, finish, load_rows
 from solvers.kernels.staircase import staircase
+from solvers.status import NUMERICAL_FAILURE, SOLVED, TOO_SMALL
 
 CONTRADICTION = 9  # no value of solvers.Status: two bounds of one unknown exclude each other
 

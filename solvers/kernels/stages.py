@@ -21,6 +21,7 @@ import numpy as np
 
 from hierarchy.compiled import compiled, inlined
 from solvers.kernels.block import solve_damped, variable_damping
+from solvers.kernels.flat import factor_level, make_reflector, reflect_rows
 from solvers.kernels.rows import (
     DOUBT,
     EQUAL,
@@ -33,12 +34,9 @@ from solvers.kernels.rows import (
     SOLVED,
     TOO_SMALL,
     ZERO,
-    factor_level,
     finish,
     grown,
-    make_reflector,
     prepare,
-    reflect_rows,
 )
 
 # State of a row; 0 while its level is still to come. PARALLEL: the held rows keep it where it is.

@@ -19,7 +19,8 @@ import numpy as np
 
 from hierarchy.compiled import compiled, inlined
 from solvers.kernels.acting import DOUBT, NOISE, PUSH, SCALE, length_of, side_of, solve_acting
-from solvers.kernels.rows import (
+from solvers.kernels.rows import ZERO, finish
+from solvers.status import (
     EQUAL,
     FREE,
     INACCURATE,
@@ -27,8 +28,6 @@ from solvers.kernels.rows import (
     NUMERICAL_FAILURE,
     SOLVED,
     TOO_SMALL,
-    ZERO,
-    finish,
 )
 
 UNPROVED = 7  # no value of solvers.Status
