@@ -47,7 +47,7 @@ def reverse(A, lower, upper, sizes, x, settings, work):
         for c in range(n):
             d[c] = 0.0 if k > 0 else reference[c]  # nothing sees what J_RA of all levels leaves
         _ask(A, lower, x, asked, first, last)
-        two = _parts(sizes, parts, k, m - last, settings[3] > 0.0)
+        two = parts[k:_end_of_parts(sizes, parts, k, m - last, settings[3] > 0.0)]
         code = solve_by_staircase(A[first:], asked[first:], asked[first:], two, d, settings,
                                   work[at:])
         if code != SOLVED:
@@ -72,11 +72,11 @@ def _ask(A, b, x, asked, first, last):
 
 
 @inlined
-def _parts(sizes, parts, k, below, in_order):
-    """Return the rows of level k, and of all below it: of each, or of all as one level."""
+def _end_of_parts(sizes, parts, k, below, in_order):
+    """Write the rows of level k, and of each below it or of all as one; return where they end."""
+    levels = sizes.size
     parts[k] = sizes[k]
-    if in_order:
-        return parts[k:]
-    if k + 1 < sizes.size:
-        parts[k + 1] = below
-    return parts[k:k + 2]
+    if in_order or k + 1 == levels:
+        return levels
+    parts[k + 1] = below
+    return k + 2
