@@ -226,6 +226,8 @@ def _residual(cone: _NormalCone, level: _Rows, enough: float) -> float:
     all_of_it = _length(level.t)
     if all_of_it <= enough:  # no violation at all would do
         return all_of_it
+    if not level.fixed.any():  # here too: each row is on its side
+        return float(np.abs(level.t).max())
     size = np.exp(np.maximum(level.size - level.size[level.fixed].max(), np.log(_SMALLEST)))
     view = _View.of(level.unit[level.fixed] @ cone.Z, size[level.fixed], cone.parallel)
     t = level.t[level.fixed]
@@ -326,7 +328,7 @@ def _graded(P: Array, size: Array, parallel: float) -> tuple[Array, Array, float
         candidate[chosen[order[int(np.argmax(lost))]]] = False
     T = V.T @ P.T
     left = np.sqrt(np.cumsum(T[::-1]**2, axis=0)[::-1])
-    T[left <= parallel] = 0.0
+    T[left <= 0.5 * parallel] = 0.0  # half: what is left of a pivot stays, after rounding too
     T[len(pivots):] = 0.0
     return V, T, float(pivots.min(initial=1.0)), len(pivots)
 
@@ -336,19 +338,21 @@ def _non_negative(C: Array, b: Array, enough: float) -> Array:
 
     Ends early where |C z - b| <= enough, and in any case after three steps a column.
     """
-    z = np.zeros(C.shape[1])
-    length = np.sqrt(np.einsum("ij,ij->j", C, C))
-    usable = length > 0.0
-    if not usable.any() or not b.any():
+    z, largest = np.zeros(C.shape[1]), float(np.abs(b).max(initial=0.0))
+    peak = np.abs(C).max(axis=0, initial=0.0)
+    usable = (peak > 0.0) & (peak < np.inf)
+    if not usable.any() or largest == 0.0:
         return z
+    D = C[:, usable] / peak[usable]
+    length = np.sqrt(np.einsum("ij,ij->j", D, D))
     heavy = np.argsort(-np.abs(C).max(axis=1), kind="stable")  # for rows of different weight
-    D, target = (C[:, usable] / length[usable])[heavy], b[heavy]
+    D, target = (D / length)[heavy], b[heavy] / largest
     y, left, free = _begun(D, target)
     refused = np.zeros(len(y), dtype=bool)
     for _ in range(3 * len(y) + 3):
         slope = np.where(free | refused, 0.0, D.T @ left)
         best = int(np.argmax(slope))
-        if norm(left) <= enough or slope[best] <= _SMALL * norm(left):
+        if norm(left) * largest <= enough or slope[best] <= _SMALL * norm(left):
             break
         moved = _freed(D, target, y, free, best)
         if moved is None:
@@ -356,7 +360,7 @@ def _non_negative(C: Array, b: Array, enough: float) -> Array:
         else:
             y, left, free = moved
             refused[:] = False
-    z[usable] = y / length[usable]
+    z[usable] = y * largest / length / peak[usable]
     return z
 
 

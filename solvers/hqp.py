@@ -11,7 +11,7 @@ from numpy.linalg import norm
 from hierarchy.problem import Array, Hierarchy
 from solvers.backends import Backend, backend_of
 from solvers.programs import null_space_program, slack_program
-from solvers.refinement import EXACT, Rows, refined, split
+from solvers.refinement import EXACT, Rows, below_largest, refined, split
 from solvers.resolver import Handles, Resolution, Resolver, register
 from solvers.status import Status
 
@@ -91,10 +91,12 @@ class Hqp(Resolver):
         return backend_of(self.backend).accuracy
 
     def solve(self, h: Hierarchy, memory: Any = None) -> Resolution:
-        """Resolve h; a failed program ends it with the x of the levels that were finished."""
-        finite = np.isfinite(h.A).all() and np.isfinite(h.reference).all()
-        sides = (h.lower <= h.upper) & (h.lower < np.inf) & (h.upper > -np.inf)
-        if not finite or not sides.all():
+        """Resolve h; a failed program ends it with the x of the levels that were finished.
+
+        NUMERICAL_FAILURE and x = 0 where numbers are not finite, or so large that products of a
+        few of them overflow: some backends end the process on those.
+        """
+        if not _in_range(h):
             return Resolution(np.zeros(h.n), Status.NUMERICAL_FAILURE)
         known = memory.steps if isinstance(memory, Memory) else ()
         starts = known if len(known) == len(h.sizes) + 1 and known[0].shape == (h.n,) else ()
@@ -103,6 +105,23 @@ class Hqp(Resolver):
                 return _Cascade(self, h, backend_of(self.backend), starts).run()
             except np.linalg.LinAlgError:  # an SVD of numbers beyond what a float can square
                 return Resolution(np.zeros(h.n), Status.NUMERICAL_FAILURE)
+
+
+def _in_range(h: Hierarchy) -> bool:
+    """Whether the sides admit values, and all numbers are finite and below LARGEST.
+
+    Sides are taken relative to the largest entry of their level.
+    """
+    sides = (h.lower <= h.upper) & (h.lower < np.inf) & (h.upper > -np.inf)
+    if not sides.all() or not below_largest(h.A, h.reference):
+        return False
+    with np.errstate(over="ignore"):
+        for A, lower, upper in h.levels():
+            scale = float(abs(A).max(initial=0.0))
+            finite = np.concatenate([lower[lower > -np.inf], upper[upper < np.inf]])
+            if scale > 0.0 and not below_largest(finite / scale):
+                return False
+    return True
 
 
 class _StopError(Exception):

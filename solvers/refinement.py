@@ -15,6 +15,7 @@ REFINEMENTS = 25  # bound on the steps from a backend's active set to the exact 
 AT_ONCE = 10  # of them change all rows that are on the wrong side, the others one row at a time
 EXACT = 1e-10  # relative tolerance of the optimality conditions
 LITTLE = 1e-3  # rows broken by less are thought to hold at a nearby minimiser
+LARGEST = 1e100  # of an entry: products of three are finite; nnls ends the process on infinite ones
 ACTIVE = 1e-6  # distance to its side, relative to 1 + |side|, at which a row is a candidate
 
 
@@ -190,10 +191,17 @@ def _multipliers(side: Array, A: Array, gradient: Array) -> tuple[Array, float]:
     return found, rest
 
 
+def below_largest(*arrays: Array) -> bool:
+    """Whether all entries are finite and smaller than LARGEST."""
+    return all(bool((np.abs(array) < LARGEST).all()) for array in arrays)
+
+
 def _non_negative(A: Array, b: Array) -> tuple[Array, float]:
     """Return u >= 0 that minimises ||A u - b||, and that norm; infinite where none was found."""
     from scipy.optimize import nnls  # type: ignore[import-untyped]
 
+    if not below_largest(A, b):
+        return np.zeros(A.shape[1]), np.inf
     try:
         u, rest = nnls(A, b)
     except RuntimeError:  # its bound on iterations

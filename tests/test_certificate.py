@@ -209,3 +209,80 @@ def test_the_certificate_shares_no_code_with_any_solver():
     imported |= {alias.name.partition(".")[0] for node in ast.walk(tree)
                  if isinstance(node, ast.Import) for alias in node.names}
     assert imported == {"__future__", "dataclasses", "typing", "numpy", "scipy", "hierarchy"}
+
+
+def test_each_row_is_judged_by_its_own_norm():
+    rows, sides = np.diag([1e3, 1e-3]), np.array([1e3, 1e-3])
+    h = Hierarchy.from_levels([(rows, sides)])
+    assert certify(h, [1.0, 1.0]).certified
+    for off in ([OFF, 0.0], [0.0, OFF]):
+        assert certify(h, np.ones(2) + off).stationarity[0] == pytest.approx(
+            OFF / (1.0 + np.sqrt(2.0)), rel=1e-3)
+
+
+@pytest.mark.parametrize("seed", range(200))
+@pytest.mark.parametrize("spread", [1e3, 1e6])
+def test_units_mixed_inside_a_level_change_neither_what_is_accepted_nor_what_is_rejected(
+        seed, spread):
+    """Levels that can be met: their answer does not depend on the norms of the rows."""
+    h, r = generate(seed, TINY), rng(seed)
+    answer = lexicographic.solve(h)
+    if h.violations(answer).max() > 1e-9:
+        return
+    scale = spread ** r.uniform(-1.0, 1.0, h.m)
+    mixed = Hierarchy(h.A * scale[:, None], h.lower * scale, h.upper * scale, h.sizes,
+                      h.reference, h.names)
+    assert certify(mixed, answer).certified
+    for x in candidates(h, answer, r):
+        assert certify(mixed, x).certified == certify(h, x).certified
+
+
+def test_a_satisfied_large_row_on_its_side_does_not_pull():
+    """It may only push outwards: a small row that asks to move away from it is not balanced."""
+    level = (np.array([[1e3, 0.0], [1e-3, 0.0]]), [-np.inf, -1e-3], [0.0, -1e-3])
+    h = Hierarchy.from_levels([level])
+    assert certify(h, [-1.0, 0.0]).certified
+    assert certify(h, [0.0, 0.0]).level == 0
+
+
+def test_sides_of_zero_have_the_floor_of_one_plus_the_length_of_x():
+    h = Hierarchy.from_levels([(np.eye(2), [0.0, 0.0]), (np.eye(2), [1.0, 0.0])])
+    assert certify(h, [0.0, 0.0]).certified
+    assert certify(h, [0.1 * certificate.TOLERANCE, 0.0]).certified
+    assert not certify(h, [10.0 * certificate.TOLERANCE, 0.0]).certified
+
+
+@pytest.mark.parametrize(("angle", "counts"), [(1e-10, False), (1e-9, False), (1e-7, True),
+                                               (1e-5, True)])
+def test_rows_count_as_parallel_up_to_an_angle_of_1e_8(angle, counts):
+    """A level below may use what only nearly parallel rows above can see."""
+    above = (np.array([[1.0, 0.0], [1.0, angle]]), [1.0, 1.0])
+    h = Hierarchy.from_levels([above, ([[0.0, 1.0]], [0.5])])
+    assert certify(h, [1.0, 0.0]).certified == counts
+    assert certify(h, [1.0, 0.5]).certified != counts
+    assert certify(h, [1.0, 0.0], parallel=0.1 * angle).certified
+
+
+EXTREMES = (0.0, 5e-324, 1e-310, 1e-200, 1e-160, 1e-8, 1.0, 1e8, 1e153, 1e160, 1.6e308)
+
+
+@pytest.mark.parametrize("seed", range(300))
+def test_no_number_is_too_large_or_too_small_to_be_judged(seed):
+    r = rng(seed)
+    levels = []
+    for size in r.integers(0, 5, r.integers(1, 4)):
+        n = 1 + seed % 4
+        A, low, up = (r.choice(EXTREMES, s) * r.choice([-1.0, 1.0], s)
+                      for s in ((size, n), size, size))
+        low, up = np.minimum(low, up), np.maximum(low, up)
+        levels.append((A, np.where(r.random(size) < 0.3, -np.inf, low), up))
+    h = Hierarchy.from_levels(levels)
+    for x in (np.zeros(h.n), r.normal(size=h.n), r.choice(EXTREMES, h.n)):
+        assert str(certify(h, x))
+
+
+def test_the_same_question_has_the_same_answer_to_the_last_bit():
+    for h, x in well_posed("HUM38")[:5]:
+        first, again = certify(h, x), certify(h, x)
+        assert np.array_equal(first.stationarity, again.stationarity)
+        assert first.nearest == again.nearest
