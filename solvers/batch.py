@@ -21,9 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array, Hierarchy
 from solvers.hcod import Hcod
-from solvers.kernels.batch import batch_hcod, batch_saturation, batch_stages, batch_staircase
-from solvers.kernels.hcod import UNPROVED
-from solvers.kernels.saturation import NO_LIMITS
+from solvers.kernels.batch import batch_bounds, batch_exact, batch_staircase
 from solvers.resolver import Resolver, make, refuse_inequality
 from solvers.status import INACCURATE, NUMERICAL_FAILURE, Status
 from solvers.tpm import Tpm
@@ -147,7 +145,7 @@ def solve(batch: Batch, resolver: Resolver | None = None, threads: int | None = 
     if threads is not None and threads < 1:
         raise HierarchyError(f"threads = {threads}, expected at least 1")
     run = _Run(batch, resolver, cores() if threads is None else threads, memory)
-    return run.by_tpm() if isinstance(resolver, Tpm) else run.by_hcod(resolver)
+    return run.by_tpm() if isinstance(resolver, Tpm) else run.by_hcod()
 
 
 class _Run:
@@ -166,7 +164,7 @@ class _Run:
         self.x = np.empty((count, n))
         self.codes = np.zeros(count, dtype=np.int64)
         self.record = np.empty((count, 0))
-        self.settings = np.array([resolver.damping, resolver.threshold, resolver.rank_tolerance])
+        self.settings = resolver._settings
 
     def by_tpm(self) -> BatchResolution:
         """Resolve equalities by the staircase; with bounds, or a memory, by saturation."""
@@ -175,7 +173,7 @@ class _Run:
         if bounded.size == 0:
             return BatchResolution(self.x, self.codes, np.ones_like(self.codes), None)
         self.record = self._remembered(self.resolver.damping == 0.0)
-        self._call(batch_saturation, bounded)
+        self._call(batch_bounds, bounded)
         self._one_by_one(np.flatnonzero(self.codes == INACCURATE))
         unlimited = self.codes == NO_LIMITS
         self._call(batch_staircase, np.flatnonzero(unlimited))
@@ -185,13 +183,10 @@ class _Run:
         steps = np.maximum(self.record[:, -1], 1.0)
         return BatchResolution(self.x, self.codes, steps.astype(np.int64), self.record)
 
-    def by_hcod(self, resolver: Hcod) -> BatchResolution:
-        """Resolve by guesses, what they do not prove by stages, and what is in doubt alone."""
-        self.settings = np.array([*self.settings, resolver.tolerance, resolver.guesses,
-                                  resolver.max_iterations])
+    def by_hcod(self) -> BatchResolution:
+        """Resolve by the exact engine, and what is in doubt alone."""
         self.record = self._remembered()
-        self._call(batch_hcod, np.arange(len(self.batch)))
-        self._call(batch_stages, np.flatnonzero(self.codes == UNPROVED))
+        self._call(batch_exact, np.arange(len(self.batch)))
         self._one_by_one(np.flatnonzero(self.codes == INACCURATE))
         steps = self.record[:, -3] + self.record[:, -2]
         return BatchResolution(self.x, self.codes, steps.astype(np.int64), self.record)

@@ -72,7 +72,7 @@ class Resolver(ABC):
 
     damping: float = 0.0
     threshold: float = 0.1
-    rank_tolerance: float = 1e-9
+    rank_tolerance: float = 1e-8
 
     name: ClassVar[str]
     handles: ClassVar[Handles] = "equalities"
@@ -131,9 +131,6 @@ class Resolver(ABC):
 
     def _otherwise(self, h: Hierarchy, x: Array, code: int, memory: Any = None) -> Resolution:
         """What follows a kernel's code other than SOLVED: a refused row, or a failure."""
-        if code == TOO_SMALL:  # for tpm.py until it is replaced, which does not `run` its kernels
-            WORKSPACE.double()
-            return self.solve(h, memory)
         if code < 0:
             refuse_inequality(self, h, -code - 1)
         return Resolution(x, Status(code))
