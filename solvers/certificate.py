@@ -18,9 +18,11 @@ side is moved by no more than `tolerance` (1 + |x|) in the direction of its row,
 of the row. A level may be improved, and x is rejected, where no such shift explains it. The same
 test, with the rows of all levels above and x - reference for t, tells whether x is the nearest.
 
-The test has one limit. Rows that agree up to an angle of `parallel` count as dependent: the data do
-not say, in double precision, what lies between them. A direction that only such rows can see is
-then free, and levels below may use it.
+There are two limits to what double precision can tell. Rows that agree up to an angle of `parallel`
+count as dependent: a direction that only their difference can see is free, and levels below may use
+it. From a quarter of that angle to four times it, x may be right in either reading. And a row
+smaller than 1e-13 of the largest row of its level is dust: rounding in the large row could have
+made it. An x that meets it is accepted, and so is one that ignores it.
 
 The least change is a non-negative least-squares problem in coordinates in which large rows come
 first, so that rounding in rows of norm 1000 does not hide a row of norm 0.001.
@@ -42,6 +44,8 @@ TOLERANCE = 1e-8
 on it."""
 PARALLEL = 1e-8
 """Angle [rad] up to which a row counts as lying in the span of others."""
+_EITHER = 4.0       # up to this factor from `parallel`, rows may count as dependent or not
+_DUST = 1e-13       # norm of a row of a level relative to the largest: smaller ones are not judged
 _SMALLEST = 1e-30   # norm of a row of a level relative to the largest: smaller ones count as this
 _UNSEEN = 1e4       # weight of what no row of a level can see, relative to what they see least
 _LARGEST = 1e150    # of a length: its square is finite
@@ -131,16 +135,24 @@ def certify(h: Hierarchy, x: ArrayLike, tolerance: float = TOLERANCE,
         if rows is None:
             unknown = np.full(len(pairs), np.inf)
             return Certificate(unknown, unknown.copy(), np.inf, tolerance, h.names)
-        stationarity = np.zeros(len(pairs))
-        cone = _NormalCone(h.n, parallel)
-        for k, (i, j) in enumerate(pairs):
-            if cone.Z.shape[1] == 0:
-                break
-            level = rows.part(slice(i, j))
-            stationarity[k] = _residual(cone, level, tolerance * rows.reach) / rows.reach
-            cone.add(level)
-        nearest = _projected(cone.Z.T @ (x - h.reference), cone) / rows.reach
-        return Certificate(violations, stationarity, nearest, tolerance, h.names)
+        levels = [rows.part(slice(i, j)) for i, j in pairs]
+        verdicts = (Certificate(violations, *_judged(levels, x - h.reference, rows.reach, tolerance,
+                                                     angle), tolerance, h.names)
+                    for angle in (parallel, parallel / _EITHER, parallel * _EITHER))
+        first = next(verdicts)
+        return first if first.certified else next((v for v in verdicts if v.certified), first)
+
+
+def _judged(levels: list[_Rows], gap: Array, reach: float, tolerance: float, parallel: float
+            ) -> tuple[Array, float]:
+    """Residual of each level, and of the distance to the reference, relative to reach."""
+    stationarity, cone = np.zeros(len(levels)), _NormalCone(len(gap), parallel)
+    for k, level in enumerate(levels):
+        if cone.Z.shape[1] == 0:
+            break
+        stationarity[k] = _residual(cone, level, tolerance * reach) / reach
+        cone.add(level)
+    return stationarity, _projected(cone.Z.T @ gap, cone) / reach
 
 
 @final
@@ -200,7 +212,8 @@ class _NormalCone:
     def add(self, level: _Rows) -> None:
         """Take in a level: rows in the span, rows on their upper or lower side."""
         if level.fixed.any():
-            self._narrow(level.unit[level.fixed])
+            self.Z, pivot = _complement(self.Z, level.unit[level.fixed], self.parallel)
+            self.thinnest = min(self.thinnest, pivot)
         if level.upper.any() or level.lower.any():
             self._kept = np.vstack([self._kept, level.unit[level.upper], -level.unit[level.lower]])
         seen = self._kept @ self.Z
@@ -210,15 +223,15 @@ class _NormalCone:
         self.rows = seen[seen_at_all] / left[seen_at_all, None]
         self.thinnest = min(self.thinnest, float(left[seen_at_all].min(initial=1.0)))
 
-    def _narrow(self, rows: Array) -> None:
-        from scipy.linalg import qr  # type: ignore[import-untyped]
 
-        q, r, _ = qr((rows @ self.Z).T, pivoting=True, check_finite=False)
-        pivots = np.abs(np.diagonal(r))
-        rank = int(np.count_nonzero(pivots > self.parallel))
-        if rank:
-            self.thinnest = min(self.thinnest, float(pivots[rank - 1]))
-            self.Z = self.Z @ q[:, rank:]
+def _complement(Z: Array, rows: Array, parallel: float) -> tuple[Array, float]:
+    """Basis of what unit rows leave of Z (n, p), and the smallest pivot not taken for zero."""
+    from scipy.linalg import qr  # type: ignore[import-untyped]
+
+    q, r, _ = qr((rows @ Z).T, pivoting=True, check_finite=False)
+    pivots = np.abs(np.diagonal(r))
+    rank = int(np.count_nonzero(pivots > parallel))
+    return Z @ q[:, rank:], float(pivots[:rank].min(initial=1.0))
 
 
 def _residual(cone: _NormalCone, level: _Rows, enough: float) -> float:
@@ -226,20 +239,25 @@ def _residual(cone: _NormalCone, level: _Rows, enough: float) -> float:
     all_of_it = _length(level.t)
     if all_of_it <= enough:  # no violation at all would do
         return all_of_it
-    if not level.fixed.any():  # here too: each row is on its side
-        return float(np.abs(level.t).max())
-    size = np.exp(np.maximum(level.size - level.size[level.fixed].max(), np.log(_SMALLEST)))
-    view = _View.of(level.unit[level.fixed] @ cone.Z, size[level.fixed], cone.parallel)
-    t = level.t[level.fixed]
+    largest = level.size[level.fixed | level.upper | level.lower].max()
+    size = np.exp(np.maximum(level.size - largest, np.log(_SMALLEST)))
+    Z, judged = cone.Z, level.fixed & (size > _DUST)
+    dust = level.fixed & ~judged
+    if not judged.any():  # here too: each row is on its side
+        return float(np.abs(level.t[~dust]).max(initial=0.0))
+    if dust.any():
+        Z = _complement(Z, level.unit[dust], cone.parallel)[0]
+    view = _View.of(level.unit[judged] @ Z, size[judged], cone.parallel)
     on = [(level.unit[level.upper], size[level.upper], level.t[level.upper]),
           (-level.unit[level.lower], size[level.lower], -level.t[level.lower])]
     own, own_size, own_t = (np.concatenate(part) for part in zip(*on, strict=True))
-    own_t = np.maximum(own_t, 0.0)
-    C = np.hstack([view.weighted(cone.rows),
-                   view.weighted((own @ cone.Z) * own_size[:, None]**2)])
+    C = np.hstack([view.weighted(cone.rows @ (cone.Z.T @ Z)),
+                   view.weighted((own @ Z) * own_size[:, None]**2)])
     C = np.vstack([C, np.eye(len(own_t), C.shape[1], len(cone.rows))])
-    f = np.concatenate([view.Q.T @ t, np.zeros(len(C) - view.rank - len(own_t)), -own_t])
-    noise = np.concatenate([np.abs(view.Q).T @ np.abs(t), np.zeros(len(f) - view.rank)])
+    none = np.zeros(len(C) - view.rank - len(own_t))
+    t = level.t[judged]
+    f = np.concatenate([view.Q.T @ t, none, -np.maximum(own_t, 0.0)])
+    noise = np.concatenate([np.abs(view.Q).T @ np.abs(t), none, np.zeros(len(own_t))])
     found = _balanced(C, f, noise, min(cone.thinnest, view.thinnest), 1e-3 * enough)
     return min(found, all_of_it)
 
@@ -343,14 +361,14 @@ def _non_negative(C: Array, b: Array, enough: float) -> Array:
     usable = (peak > 0.0) & (peak < np.inf)
     if not usable.any() or largest == 0.0:
         return z
-    D = C[:, usable] / peak[usable]
-    length = np.sqrt(np.einsum("ij,ij->j", D, D))
     heavy = np.argsort(-np.abs(C).max(axis=1), kind="stable")  # for rows of different weight
-    D, target = (D / length)[heavy], b[heavy] / largest
+    D, target = C[:, usable][heavy], b[heavy] / largest
+    unit = D / peak[usable]
+    unit = unit / np.sqrt(np.einsum("ij,ij->j", unit, unit))
     y, left, free = _begun(D, target)
     refused = np.zeros(len(y), dtype=bool)
     for _ in range(3 * len(y) + 3):
-        slope = np.where(free | refused, 0.0, D.T @ left)
+        slope = np.where(free | refused, 0.0, unit.T @ left)
         best = int(np.argmax(slope))
         if norm(left) * largest <= enough or slope[best] <= _SMALL * norm(left):
             break
@@ -360,7 +378,7 @@ def _non_negative(C: Array, b: Array, enough: float) -> Array:
         else:
             y, left, free = moved
             refused[:] = False
-    z[usable] = y * largest / length / peak[usable]
+    z[usable] = y * largest
     return z
 
 
@@ -402,7 +420,8 @@ def _least_squares(D: Array, b: Array, free: Mask) -> tuple[Array, Array]:
 
     q, r, order = qr(D[:, free], mode="economic", pivoting=True, check_finite=False)
     inside, s = q.T @ b, np.zeros(D.shape[1])
-    rank = int(np.count_nonzero(np.abs(np.diagonal(r)) > _SMALL * np.abs(r[0, 0])))
+    pivots = np.abs(np.diagonal(r)) > _SMALL * norm(r, axis=0)[:min(r.shape)]
+    rank = len(pivots) if pivots.all() else int(np.argmin(pivots))
     solved = solve_triangular(r[:rank, :rank], inside[:rank], check_finite=False)
     s[np.flatnonzero(free)[order[:rank]]] = solved
     return s, b - q[:, :rank] @ inside[:rank]

@@ -4,7 +4,8 @@
         h = generate(seed)
         assert certify(h, make("hcod").solve(h).x).certified
 
-`family` gives fresh problems of the same make as the reference families.
+`family` gives fresh problems of the same make as the reference families, `structured` those of
+singular arms, tied boxes, contacts, nested levels and mixed units.
 
 All unit rows of a hierarchy are written around one point x*, so that sides can pass through the
 same vertex; then they are scaled. `strategy` gives the same problems to hypothesis.
@@ -25,6 +26,8 @@ from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array, Hierarchy
 from solvers.problem_families import FAMILIES as FAMILIES
 from solvers.problem_families import family as family
+from solvers.problem_kinds import KINDS as KINDS
+from solvers.problem_kinds import structured as structured
 
 if TYPE_CHECKING:
     from hypothesis.strategies import SearchStrategy

@@ -9,8 +9,8 @@ import pytest
 from rank_cases import CASES, build, family, rng
 
 from hierarchy import Hierarchy, HierarchyError
-from solvers import certificate, certify, make
-from solvers.problems import Recipe, generate
+from solvers import Status, certificate, certify, make
+from solvers.problems import KINDS, Recipe, generate, structured
 
 FAMILIES = ("EQ7", "EQ7over", "EQ7sing", "EQ30L8", "EQ30L10", "INEQ7", "HUM38", "DEGEN7")
 TINY = Recipe(joints=(2, 3), levels=(2, 4), rows=(1, 3), scales=(1.0, 1.0), spread=1.0,
@@ -286,3 +286,44 @@ def test_the_same_question_has_the_same_answer_to_the_last_bit():
         first, again = certify(h, x), certify(h, x)
         assert np.array_equal(first.stationarity, again.stationarity)
         assert first.nearest == again.nearest
+
+
+def test_rows_at_an_angle_near_1e_8_may_count_either_way():
+    above = (np.array([[1.0, 0.0], [1.0, 1e-8]]), [1.0, 1.1])
+    h = Hierarchy.from_levels([above, ([[0.0, 1.0]], [0.5])])
+    assert certify(h, [1.0, 1e7]).certified
+    assert certify(h, [1.05, 0.5]).certified
+    assert not certify(h, [1.0, 0.5]).certified
+
+
+def test_dust_beside_a_large_row_may_be_met_or_ignored():
+    h = Hierarchy.from_levels([(np.diag([1.0, 1e-17]), [1.0, 1.0])])
+    assert certify(h, [1.0, 1e17]).certified
+    assert certify(h, [1.0, 0.0]).certified
+    assert not certify(h, [1.1, 0.0]).certified
+
+
+def test_dust_in_a_level_of_its_own_is_a_row_like_any_other():
+    h = Hierarchy.from_levels([(np.diag([1.0, 1.0])[:1], [1.0]), ([[0.0, 1e-17]], [1e-17])])
+    assert certify(h, [1.0, 1.0]).certified
+    assert certify(h, [1.0, 0.0]).level == 1
+
+
+def certified_kinds(kind):
+    """Answers of hcod, and whether each is certified: a certificate that is too strict shows."""
+    for seed in range(30):
+        h = structured(seed, (kind,))
+        res = make("hcod").solve(h)
+        if res.status is Status.SOLVED:
+            yield h, res.x
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_answers_to_structured_problems_are_certified_and_others_are_not(kind):
+    r = rng()
+    answers = list(certified_kinds(kind))
+    right = [(h, x) for h, x in answers if certify(h, x).certified]
+    assert len(right) >= 0.9 * len(answers)
+    for h, x in right:
+        step = OFF * (1.0 + np.linalg.norm(x)) * r.normal(size=h.n)
+        assert not certify(h, x + step).certified
