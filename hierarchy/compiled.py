@@ -17,7 +17,9 @@ from typing import Any
 
 import numba
 import numpy as np
-from numba.core import event
+from numba.core import event, types
+from numba.extending import intrinsic
+from numba.np import arrayobj
 
 # What makes an array; a kernel that uses another way of numpy fails to compile, and belongs here.
 _MAKERS = {"empty", "empty_like", "zeros", "zeros_like", "ones", "full", "eye", "copy", "array"}
@@ -46,6 +48,35 @@ def inlined(function: Kernel) -> Kernel:
     A call between compiled functions costs some 2 ns for each array handed over.
     """
     return _compiled(function, inline=True)
+
+
+def _as_matrix(context: Any, numbers: Any, rows: Any, columns: Any) -> Any:
+    """Return the view (rows, columns) of contiguous numbers, of which there must be so many.
+
+    In kernels, where `reshape` costs a call of its own.
+    """
+    kind = types.Array(numbers.dtype, 2, "C")
+
+    def write(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        flat = arrayobj.make_array(numbers)(context, builder, arguments[0])
+        view = arrayobj.make_array(kind)(context, builder)
+        width = builder.mul(arguments[2], flat.itemsize)
+        arrayobj.populate_array(view, data=flat.data, shape=arguments[1:],
+                                strides=[width, flat.itemsize], itemsize=flat.itemsize,
+                                meminfo=flat.meminfo, parent=flat.parent)
+        if context.enable_nrt:
+            context.nrt.incref(builder, kind, view._getvalue())
+        return view._getvalue()
+
+    return kind(numbers, types.intp, types.intp), write
+
+
+if numba.config.DISABLE_JIT:
+    def as_matrix(numbers: Any, rows: int, columns: int) -> Any:
+        """See `_as_matrix`."""
+        return numbers.reshape((rows, columns))
+else:
+    as_matrix = intrinsic(_as_matrix)
 
 
 def _compiled(function: Kernel, inline: bool = False, nogil: bool = False) -> Kernel:

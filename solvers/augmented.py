@@ -8,7 +8,7 @@ from typing import Any, ClassVar, final
 from hierarchy.problem import Hierarchy
 from solvers.kernels.staircase import solve_by_staircase
 from solvers.resolver import Resolution, Resolver, register
-from solvers.workspace import run
+from solvers.workspace import WORKSPACE
 
 
 @final
@@ -31,5 +31,6 @@ class Augmented(Resolver):
     def solve(self, h: Hierarchy, memory: Any = None) -> Resolution:
         """Resolve h; direct, `memory` is not used."""
         x, whole = h.reference.copy(), h.offsets[-1:]  # one level of m rows
-        code = run(solve_by_staircase, h.A, h.lower, h.upper, whole, x, self._settings)
+        code = solve_by_staircase(h.A, h.lower, h.upper, whole, x, self._settings,
+                                  WORKSPACE.array)
         return self._otherwise(h, x, code) if code else Resolution(x)

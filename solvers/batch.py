@@ -23,9 +23,9 @@ from hierarchy.problem import Array, Hierarchy
 from solvers.hcod import Hcod
 from solvers.kernels.batch import batch_bounds, batch_exact, batch_staircase
 from solvers.resolver import Resolver, make, refuse_inequality
-from solvers.status import INACCURATE, NUMERICAL_FAILURE, Status
+from solvers.status import INACCURATE, NO_LIMITS, NUMERICAL_FAILURE, Status
 from solvers.tpm import Tpm
-from solvers.workspace import WORKSPACE
+from solvers.workspace import run
 
 Indices = NDArray[np.int64]
 ENOUGH = 2**15  # entries of A, half a millisecond or more, that are worth starting a thread for
@@ -160,10 +160,9 @@ class _Run:
         self.warm: NDArray[np.bool_] = np.zeros(count, dtype=bool)
         if self.before is not None:
             self.warm |= (self.before != 0.0).any(axis=1)
-        self.shape = shape
-        self.x = np.empty((count, n))
-        self.codes = np.zeros(count, dtype=np.int64)
-        self.record = np.empty((count, 0))
+        self.answers = np.zeros((count, n + shape[1] + 1))
+        self.x, self.record = self.answers[:, :n], self.answers[:, n:-1]
+        self.codes = self.answers[:, -1]
         self.settings = resolver._settings
 
     def by_tpm(self) -> BatchResolution:
@@ -171,8 +170,9 @@ class _Run:
         self._call(batch_staircase, np.flatnonzero(~self.warm))
         bounded = np.flatnonzero(self.warm | (self.codes < 0))
         if bounded.size == 0:
-            return BatchResolution(self.x, self.codes, np.ones_like(self.codes), None)
-        self.record = self._remembered(self.resolver.damping == 0.0)
+            return self._answer(np.ones(len(self.codes)), None)
+        if self.resolver.damping == 0.0:
+            self._remember()
         self._call(batch_bounds, bounded)
         self._one_by_one(np.flatnonzero(self.codes == INACCURATE))
         unlimited = self.codes == NO_LIMITS
@@ -181,20 +181,25 @@ class _Run:
             refuse_inequality(self.resolver, self.batch[p], -int(self.codes[p]) - 1)
         self.record[unlimited | (self.codes == NUMERICAL_FAILURE)] = 0.0
         steps = np.maximum(self.record[:, -1], 1.0)
-        return BatchResolution(self.x, self.codes, steps.astype(np.int64), self.record)
+        return self._answer(steps, self.record.copy())
 
     def by_hcod(self) -> BatchResolution:
         """Resolve by the exact engine, and what is in doubt alone."""
-        self.record = self._remembered()
+        self._remember()
         self._call(batch_exact, np.arange(len(self.batch)))
         self._one_by_one(np.flatnonzero(self.codes == INACCURATE))
         steps = self.record[:, -3] + self.record[:, -2]
-        return BatchResolution(self.x, self.codes, steps.astype(np.int64), self.record)
+        return self._answer(steps, self.record.copy())
 
-    def _remembered(self, used: bool = True) -> Array:
-        return self.before.copy() if used and self.before is not None else np.zeros(self.shape)
+    def _remember(self) -> None:
+        if self.before is not None:
+            self.record[:] = self.before
 
-    def _call(self, kernel: Callable[..., bool], which: Indices) -> None:
+    def _answer(self, steps: Array, memory: Array | None) -> BatchResolution:
+        return BatchResolution(self.x.copy(), self.codes.astype(np.int64), steps.astype(np.int64),
+                               memory)
+
+    def _call(self, kernel: Callable[..., int], which: Indices) -> None:
         """Run a kernel over the problems `which`, in parts on several threads if there are many."""
         self.x[which] = self.batch.reference[which]
         threads = min(self.threads, len(which) * self.batch.A[:1].size // ENOUGH)
@@ -205,11 +210,9 @@ class _Run:
         with ThreadPoolExecutor(threads) as pool:
             list(pool.map(partial(self._call_part, kernel), parts))
 
-    def _call_part(self, kernel: Callable[..., bool], which: Indices) -> None:
+    def _call_part(self, kernel: Callable[..., int], which: Indices) -> None:
         b = self.batch
-        while not kernel(b.A, b.lower, b.upper, b.sizes, self.x, self.record, self.codes,
-                         self.settings, which, WORKSPACE.array):
-            WORKSPACE.double()
+        run(kernel, b.A, b.lower, b.upper, b.sizes, self.answers, self.settings, which)
 
     def _one_by_one(self, which: Indices) -> None:
         """Resolve anew, by the resolver itself, which asks `certify`."""

@@ -14,8 +14,8 @@ from hierarchy.problem import Array, Hierarchy
 from solvers.certificate import certify
 from solvers.kernels.exact import solve_exactly
 from solvers.resolver import Handles, Resolution, Resolver, register
-from solvers.status import Status
-from solvers.workspace import run
+from solvers.status import TOO_SMALL, Status
+from solvers.workspace import WORKSPACE
 
 
 @final
@@ -112,7 +112,11 @@ class Hcod(Resolver):
         size = 3 * len(h.lower) + 3
         known = memory is not None and len(memory) == size
         record = memory.copy() if known else np.zeros(size)
-        code = run(solve_exactly, h.A, h.lower, h.upper, h.sizes, x, record, self._settings)
+        code = solve_exactly(h.A, h.lower, h.upper, h.sizes, x, record, self._settings,
+                             WORKSPACE.array)
+        if code == TOO_SMALL:
+            WORKSPACE.double()
+            return self.solve(h, memory)
         if code == 0 or (code == _INACCURATE and certify(h, x).certified):
             return ActiveSetResolution(x, _SOLVED, record)
         return ActiveSetResolution(x, Status(code), record)

@@ -130,7 +130,10 @@ class Resolver(ABC):
             raise UnknownNameError(f"{setting} of {self.name}", getattr(self, setting), allowed)
 
     def _otherwise(self, h: Hierarchy, x: Array, code: int, memory: Any = None) -> Resolution:
-        """What follows a kernel's code other than SOLVED: a refused row, or a failure."""
+        """What follows a kernel's code other than SOLVED: more room, a refused row, a failure."""
+        if code == TOO_SMALL:
+            WORKSPACE.double()
+            return self.solve(h, memory)
         if code < 0:
             refuse_inequality(self, h, -code - 1)
         return Resolution(x, Status(code))

@@ -11,7 +11,7 @@ import numpy as np
 from hierarchy.problem import Array, Hierarchy
 from solvers.kernels.reverse import reverse
 from solvers.resolver import Resolution, Resolver, register
-from solvers.workspace import run
+from solvers.workspace import WORKSPACE
 
 FORMS = ("published", "in-order")
 
@@ -62,5 +62,5 @@ class Reverse(Resolver):
     def solve(self, h: Hierarchy, memory: Any = None) -> Resolution:
         """Resolve h; direct, `memory` is not used."""
         x = h.reference.copy()
-        code = run(reverse, h.A, h.lower, h.upper, h.sizes, x, self._settings)
+        code = reverse(h.A, h.lower, h.upper, h.sizes, x, self._settings, WORKSPACE.array)
         return self._otherwise(h, x, code) if code else Resolution(x)

@@ -13,8 +13,8 @@ from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array, Hierarchy
 from solvers.kernels.sns import sns
 from solvers.resolver import Handles, Resolution, Resolver, register
-from solvers.status import CONTRADICTION, Status
-from solvers.workspace import run
+from solvers.status import CONTRADICTION, TOO_SMALL, Status
+from solvers.workspace import WORKSPACE
 
 FORMS = ("basic", "optimal")
 SCALES = ("target", "miss")
@@ -124,10 +124,10 @@ class Sns(Resolver):
         """Resolve h; `memory` is not used. Gives a `SaturatedResolution`."""
         x = h.reference.copy()
         record = np.empty(len(x) + len(h.sizes) + 1)
-        code = run(sns, h.A, h.lower, h.upper, h.sizes, x, record, self._settings)
+        code = sns(h.A, h.lower, h.upper, h.sizes, x, record, self._settings, WORKSPACE.array)
         if code == CONTRADICTION:
             _refuse_contradiction(h, int(record[-1]))
-        if code < 0:
+        if code < 0 or code == TOO_SMALL:
             return self._otherwise(h, x, code)
         return SaturatedResolution(x, Status(code), record)
 

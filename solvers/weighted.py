@@ -18,8 +18,8 @@ from solvers.kernels.weighted import weighted, weighted_steps
 from solvers.programs import slack_program
 from solvers.refinement import Rows
 from solvers.resolver import Handles, Resolution, Resolver, register
-from solvers.status import SOLVED, UNPROVED, Status
-from solvers.workspace import run
+from solvers.status import SOLVED, TOO_SMALL, UNPROVED, Status
+from solvers.workspace import WORKSPACE, run
 
 OWN = "own"
 _OUTSIDE = 1e-9  # of |a| |x| + |side|, by which constraints are missed that exclude each other
@@ -125,9 +125,11 @@ class Weighted(Resolver):
         fits = memory is not None and len(memory) == size
         record = memory.copy() if fits else np.zeros(size)
         settings = self._settings_for(len(h.sizes))
-        code = run(weighted, h.A, h.lower, h.upper, h.sizes, x, record, settings)
+        code = weighted(h.A, h.lower, h.upper, h.sizes, x, record, settings, WORKSPACE.array)
         if code == SOLVED:
             return Resolution(x, Status.SOLVED, int(record[-1]), record)
+        if code == TOO_SMALL:
+            return self._otherwise(h, x, code, memory)
         if code == UNPROVED:
             return self._farther(h, settings, record)
         return Resolution(x, Status(code), int(record[-1]), record)

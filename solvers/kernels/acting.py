@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hierarchy.compiled import compiled, inlined
+from hierarchy.compiled import as_matrix, compiled, inlined
 from solvers.kernels.block import level_damping
 from solvers.kernels.rows import ROUNDING, ZERO, factor_level, reflect, reflect_back
 from solvers.kernels.space import (
@@ -213,7 +213,7 @@ def _least_squares(factors, at, mu):
     (W, _, _, miss), y, diagonal = factors.rows, factors.y, factors.diagonal
     rows, q = at.i1 - at.i0, at.k1 - at.k0
     height = rows + q
-    T = factors.of_block[:height * (q + 1)].reshape((q + 1, height))  # a column lies as a row
+    T = as_matrix(factors.of_block[:height * (q + 1)], q + 1, height)  # a column lies as a row
     b = T[q]
     for k in range(q + 1):
         for i in range(rows):

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hierarchy.compiled import compiled, inlined
+from hierarchy.compiled import as_matrix, compiled, inlined
 from solvers.kernels.space import Block, Settings
 
 SWEEPS = 40  # bound; Jacobi needs 6 to 10
@@ -59,13 +59,13 @@ def level_damping(M, at, settings, work):
     p, threshold = at.k1 - at.k0, settings.threshold
     if at.i1 - at.i0 > p:
         return settings.damping
-    L = work[:p * p].reshape((p, p))
+    L = as_matrix(work[:p * p], p, p)
     if invert_triangle(M, L, at.i0, at.k0, p) * threshold * threshold <= 1.0:
         return 0.0
     for i in range(p):
         for j in range(p):
             L[i, j] = M[at.i0 + i, at.k0 + j] if i >= j else 0.0
-    orthogonalise_rows(L, work[:0].reshape((p, 0)))
+    orthogonalise_rows(L, as_matrix(work[:0], p, 0))
     ratio = smallest_square(L) / (threshold * threshold)
     return settings.damping * np.sqrt(1.0 - ratio) if ratio < 1.0 else 0.0
 
@@ -160,7 +160,7 @@ def _least_squares(M, r, y, at, damped, work):
     """Write the minimiser into y, by Householder reflections of [M r; lambda I 0]."""
     p, rows = at.k1 - at.k0, at.i1 - at.i0
     height = rows + p if damped > 0.0 else rows
-    T = work[:height * (p + 1)].reshape((height, p + 1))
+    T = as_matrix(work[:height * (p + 1)], height, p + 1)
     for i in range(height):
         for k in range(p + 1):
             T[i, k] = 0.0

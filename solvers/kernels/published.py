@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hierarchy.compiled import compiled, inlined
+from hierarchy.compiled import as_matrix, compiled, inlined
 from solvers.kernels.block import invert_triangle, orthogonalise_rows, smallest_square
 from solvers.kernels.rows import ZERO, finish, load_rows, make_reflector, reflect, reflect_back
 from solvers.kernels.space import (
@@ -146,7 +146,8 @@ def _fill(A, lower, upper, sizes, x, matrices, settings):
     first = ZERO
     for level in range(sizes.size):
         last = first + sizes[level]
-        D = of_pivot[:(last - first) * (last - first)].reshape((last - first, last - first))
+        p = last - first
+        D = as_matrix(of_pivot[:p * p], p, p)
         _invert_pivot(F, T, first, settings, tolerance, D, of_pivot[D.size:])
         _eliminate(F, D, entries, first, last)
         first = last
@@ -220,7 +221,7 @@ def _invert_pivot(F, T, first, settings, tolerance, D, work):
     enough = max(tolerance, threshold) if damping > 0.0 else tolerance
     if square * enough * enough < 1.0:
         return
-    S, U = work[:p * p].reshape((p, p)), work[p * p:2 * p * p].reshape((p, p))
+    S, U = as_matrix(work[:p * p], p, p), as_matrix(work[p * p:2 * p * p], p, p)
     for i in range(p):
         for j in range(p):
             U[i, j] = 1.0 if i == j else 0.0

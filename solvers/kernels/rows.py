@@ -45,10 +45,10 @@ def load_rows(W, zero, A, lower, upper, x, rank_tolerance):
 @inlined
 def all_finite(x):
     """Whether every entry is."""
+    finite = True
     for c in range(x.size):
-        if not np.isfinite(x[c]):
-            return False
-    return True
+        finite &= np.isfinite(x[c])
+    return finite
 
 
 @inlined

@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hierarchy.compiled import inlined
+from hierarchy.compiled import as_matrix, inlined
 
 View = Any  # numpy to the reader, a type of its own to numba
 
@@ -87,7 +87,7 @@ def integers(work, at, size):
 def matrix(work, at, rows, columns):
     """Like `vector`, as (rows, columns); no rows if they do not fit."""
     numbers, end = vector(work, at, rows * columns)
-    return numbers.reshape((rows if end <= work.size else 0, columns)), end
+    return as_matrix(numbers, rows if end <= work.size else 0, columns), end
 
 
 @inlined
