@@ -72,8 +72,9 @@ class ActiveSetResolution(Resolution):
 @register
 @dataclass(frozen=True, kw_only=True)
 class Hcod(Resolver):
-    """Exact at any rank, equalities and two-sided inequalities at every level: an active set on a
-    hierarchical factorisation. (Not the decomposition of Escande, Mansard, Wieber; see docs/hcod.md.)
+    """Active set on a hierarchical factorisation, exact at any rank, inequalities at every level.
+
+    It is not the decomposition of Escande, Mansard and Wieber; docs/hcod.md says how it differs.
 
     Equalities alone are resolved by the staircase of `tpm`, to the last digit. With the memory of
     the tick before, its active set is solved and proved by its multipliers; where that fails within

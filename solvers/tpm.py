@@ -17,7 +17,7 @@ from solvers.kernels.published import matrix_as_published, solve_as_published
 from solvers.kernels.staircase import solve_by_staircase
 from solvers.resolver import Handles, Resolution, Resolver, refuse_inequality, register
 from solvers.status import NO_LIMITS, NUMERICAL_FAILURE, SOLVED, Status
-from solvers.workspace import run
+from solvers.workspace import WORKSPACE, run
 
 FORMS = ("staircase", "published")
 _OF_THE_ENGINE = (1e-10, 3, 1000)  # tolerance, guesses, max_iterations, as those of `hcod`
@@ -120,11 +120,11 @@ class Tpm(Resolver):
             return self._within_bounds(h, memory)
         x = h.reference.copy()
         kernel = solve_by_staircase if staircased else solve_as_published
-        code = run(kernel, h.A, h.lower, h.upper, h.sizes, x, self._settings)
+        code = kernel(h.A, h.lower, h.upper, h.sizes, x, self._settings, WORKSPACE.array)
         if code == 0:
             return Resolution(x)
         return (self._within_bounds(h, None) if code < 0 and staircased
-                else self._otherwise(h, x, code))
+                else self._otherwise(h, x, code, memory))
 
     @cached_property
     def _settings(self) -> Array:

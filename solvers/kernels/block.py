@@ -7,7 +7,6 @@ from __future__ import annotations
 import numpy as np
 
 from hierarchy.compiled import as_matrix, compiled, inlined
-from solvers.kernels.space import Block, Settings
 
 SWEEPS = 40  # bound; Jacobi needs 6 to 10
 

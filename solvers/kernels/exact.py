@@ -1,4 +1,4 @@
-"""The exact engine: equalities by the staircase, a known working set by proof, all else by levels."""
+"""The exact engine: equalities by staircase, a known working set by proof, all else by levels."""
 
 # mypy: disable-error-code="no-untyped-def"
 
@@ -39,7 +39,7 @@ def solve_exactly(A, lower, upper, sizes, x, record, settings, work):
 @inlined
 def all_equal(lower, upper):
     """Whether all rows are equalities."""
+    equal = True
     for i in range(lower.size):
-        if lower[i] != upper[i]:
-            return False
-    return True
+        equal &= lower[i] == upper[i]
+    return equal

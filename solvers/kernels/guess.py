@@ -281,7 +281,7 @@ def _write_x(s):
 
 @inlined
 def _prove(s, whole):
-    """Say whether a guess is right; otherwise make the next: violated rows act, rows that pull rest.
+    """Say whether a guess is right; if not, make the next: violated rows act, rows that pull rest.
 
     A guess in which a row is hardly independent of others is unclear.
     """
@@ -291,7 +291,8 @@ def _prove(s, whole):
         return UNCLEAR
     for k in range(levels + 1):
         above = guess.rank[k]
-        if k == whole or k == levels:
+        at_goal = k in (whole, levels)
+        if at_goal:
             goal = guess.goal if k == whole else guess.reference
             weight = s.problem.entry[guess.rows[guess.first[k]]] ** 2 if k == whole else 1.0
             missed = above > 0 and _pull_of_goal(s, goal, weight, above)
@@ -301,7 +302,7 @@ def _prove(s, whole):
             missed, said = _pull_of_level(s, k, above)
             verdict = max(verdict, said)
         if missed:
-            verdict = max(verdict, _check_forces(s, k, above, k == whole or k == levels))
+            verdict = max(verdict, _check_forces(s, k, above, at_goal))
         if verdict != RIGHT:
             break
     return verdict

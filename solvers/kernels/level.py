@@ -21,8 +21,7 @@ from solvers.kernels.tolerances import CANCELLED
 
 
 class Part(NamedTuple):
-    """A level's part of the tableau: rows q0 .. q1 - 1 of a list, `rank` basis vectors from `begin`.
-    """
+    """A level's part: rows q0 .. q1 - 1 of a list, and `rank` basis vectors from `begin` on."""
 
     q0: View
     q1: View
@@ -94,9 +93,9 @@ def least_squares_part(problem, T, rows, part, rest, y, w, room, damped):
 def least_squares(T, y, diagonal, s, r):
     """Write into y[:r] what minimises |T y - b|, for T (r + 1, s) by columns with b the last.
 
-    b goes out as what is still missed. It comes out of the reflections, not as a difference, so the
-    little that a heavy row misses is as exact as the rest (Cox, Higham 1998). The rows come in pivot
-    order, the heaviest first. diagonal (r,) is scratch.
+    b goes out as what is still missed. It comes out of the reflections, not as a difference, so
+    the little that a heavy row misses is as exact as the rest (Cox, Higham 1998). The rows come in
+    pivot order, the heaviest first. diagonal (r,) is scratch.
     """
     b = T[r]
     for k in range(r):

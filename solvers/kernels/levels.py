@@ -569,7 +569,7 @@ def _put_back(s, last):
 
 @inlined
 def _worst(s, whole):
-    """Return the row that holds x back the wrong way most, by Bland's rule the first; -1 if none."""
+    """Return the row that holds x back the wrong way most, or the first by Bland; -1 if none."""
     count, owner, soft = s.working.count, s.working.owner, s.working.soft
     fixed, hard = count[FIX], count[HARD]
     s.working.number[SIZE] = max(s.working.number[SIZE], length_of(s.point.x))
@@ -661,7 +661,7 @@ def _force_of_rows(s):
 
 @inlined
 def _settle(s, k, whole):
-    """Make the rows that a level decided equalities for good; the others of its working set stay."""
+    """Make the rows that a level decided equalities for good; its other rows stay held."""
     count, state, record, owner = s.working.count, s.working.state, s.record, s.working.owner
     fixed, end, n = count[FIX], count[FIX] + count[HARD], s.T.M.shape[0]
     least = smallest_share(s.problem, s.T, owner, fixed, end)

@@ -18,7 +18,6 @@ from solvers.kernels.block import invert_triangle, orthogonalise_rows, smallest_
 from solvers.kernels.rows import ZERO, finish, load_rows, make_reflector, reflect, reflect_back
 from solvers.kernels.space import (
     Basis,
-    Settings,
     View,
     carve_basis,
     integers,

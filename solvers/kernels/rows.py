@@ -13,7 +13,6 @@ from __future__ import annotations
 import numpy as np
 
 from hierarchy.compiled import compiled, inlined
-
 from solvers.status import NUMERICAL_FAILURE, SOLVED
 
 ZERO = np.int64(0)

@@ -1,4 +1,4 @@
-"""An orthogonal tableau: the rows of a hierarchy in the coordinates of a basis that turns with them.
+"""An orthogonal tableau: the rows of a hierarchy in a basis that turns with the working set.
 
 The tableau is M = Q^T [A^T, I] (n, g + n), one row for each basis vector: the coordinates of the g
 rows of A with more than one entry, then the basis vector itself. A row of A with a single entry is
@@ -93,7 +93,7 @@ def carve_tableau(work, at, m, n, general):
 
 @compiled
 def look_at_rows(problem, record, x):
-    """Check all data and begin the record; return how many rows have more than one entry, -1 if bad.
+    """Check all data, begin the record; return how many rows have several entries, -1 if bad.
 
     An active inequality whose side is missing is set free.
     """
