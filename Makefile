@@ -12,6 +12,10 @@ SHELL      := /bin/bash
 PYTHON     ?=
 CANDIDATES := $(PYTHON) $(if $(PYTHON),,python3.11 python3.12 python3.13 python3)
 BIN        := .venv/bin
+
+# Small matrices: threads of the linear algebra library only wait for each other.
+export OPENBLAS_NUM_THREADS := 1
+
 INSTALLED  := .venv/installed
 
 .DELETE_ON_ERROR:

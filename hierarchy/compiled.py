@@ -2,7 +2,7 @@
 
 numba caches machine code per source file but does not notice when a helper in *another* file
 changed. Here the cache folder carries a digest of the kernel's own file, of every file it calls
-into, and of this one, so a stale kernel cannot be loaded.
+into, of the constants that it reads, and of this one, so a stale kernel cannot be loaded.
 """
 
 from __future__ import annotations
@@ -16,7 +16,10 @@ from pathlib import Path
 from typing import Any
 
 import numba
-from numba.core import event
+import numpy as np
+from numba.core import event, types
+from numba.extending import intrinsic
+from numba.np import arrayobj
 
 # What makes an array; a kernel that uses another way of numpy fails to compile, and belongs here.
 _MAKERS = {"empty", "empty_like", "zeros", "zeros_like", "ones", "full", "eye", "copy", "array"}
@@ -47,13 +50,43 @@ def inlined(function: Kernel) -> Kernel:
     return _compiled(function, inline=True)
 
 
+def _as_matrix(context: Any, numbers: Any, rows: Any, columns: Any) -> Any:
+    """Return the view (rows, columns) of contiguous numbers, of which there must be so many.
+
+    In kernels, where `reshape` costs a call of its own.
+    """
+    kind = types.Array(numbers.dtype, 2, "C")
+
+    def write(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        flat = arrayobj.make_array(numbers)(context, builder, arguments[0])
+        view = arrayobj.make_array(kind)(context, builder)
+        width = builder.mul(arguments[2], flat.itemsize)
+        arrayobj.populate_array(view, data=flat.data, shape=arguments[1:],
+                                strides=[width, flat.itemsize], itemsize=flat.itemsize,
+                                meminfo=flat.meminfo, parent=flat.parent)
+        if context.enable_nrt:
+            context.nrt.incref(builder, kind, view._getvalue())
+        return view._getvalue()
+
+    return kind(numbers, types.intp, types.intp), write
+
+
+if numba.config.DISABLE_JIT:
+    def as_matrix(numbers: Any, rows: int, columns: int) -> Any:
+        """See `_as_matrix`."""
+        return numbers.reshape((rows, columns))
+else:
+    as_matrix = intrinsic(_as_matrix)
+
+
 def _compiled(function: Kernel, inline: bool = False, nogil: bool = False) -> Kernel:
-    files = _files_behind(function)
-    folder = cache_folder() / _digest((__file__, *sorted(files)))
+    files, constants = _files_behind(function), _constants_behind(function)
+    folder = cache_folder() / _digest((__file__, *sorted(files)), tuple(sorted(constants)))
     allocates = _allocates(function)
     kernel: Kernel = _jit_into(folder, function, forceinline=inline, nogil=nogil, _nrt=allocates)
     if not isinstance(kernel, type(function)):
         kernel.source_files = files  # type: ignore[attr-defined]
+        kernel.constants = constants  # type: ignore[attr-defined]
         kernel.allocates = allocates  # type: ignore[attr-defined]
     return kernel
 
@@ -61,6 +94,14 @@ def _compiled(function: Kernel, inline: bool = False, nogil: bool = False) -> Ke
 def _files_behind(function: Kernel) -> frozenset[str]:
     behind = (getattr(kernel, "source_files", ()) for kernel in _called(function))
     return frozenset({function.__code__.co_filename}).union(*behind)
+
+
+def _constants_behind(function: Kernel) -> frozenset[str]:
+    """Return what a kernel, and those that it calls, read of numbers in other files."""
+    behind = (getattr(kernel, "constants", ()) for kernel in _called(function))
+    own = zip(function.__code__.co_names, _called(function), strict=True)
+    return frozenset(f"{name} = {value!r}" for name, value in own
+                     if isinstance(value, (int, float, np.integer))).union(*behind)
 
 
 def _allocates(function: Kernel) -> bool:
@@ -78,9 +119,10 @@ def _called(function: Kernel) -> list[Any]:
 
 
 @cache
-def _digest(files: tuple[str, ...]) -> str:
+def _digest(files: tuple[str, ...], constants: tuple[str, ...]) -> str:
     content = b"".join(Path(file).read_bytes() for file in files)
-    return hashlib.sha256(content + numba.__version__.encode()).hexdigest()[:16]
+    more = "\n".join((*constants, numba.__version__))
+    return hashlib.sha256(content + more.encode()).hexdigest()[:16]
 
 
 @cache

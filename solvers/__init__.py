@@ -10,6 +10,7 @@ from solvers import tpm as tpm
 from solvers import weighted as weighted
 from solvers.certificate import Certificate, certify
 from solvers.explain import explain
-from solvers.resolver import Resolution, Resolver, Status, make, names
+from solvers.resolver import Resolution, Resolver, make, names
+from solvers.status import Status
 
 __all__ = ["Certificate", "Resolution", "Resolver", "Status", "certify", "explain", "make", "names"]

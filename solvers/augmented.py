@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, final
 
 from hierarchy.problem import Hierarchy
-from solvers.kernels.staircase import staircase
+from solvers.kernels.staircase import solve_by_staircase
 from solvers.resolver import Resolution, Resolver, register
 from solvers.workspace import WORKSPACE
 
@@ -31,6 +31,6 @@ class Augmented(Resolver):
     def solve(self, h: Hierarchy, memory: Any = None) -> Resolution:
         """Resolve h; direct, `memory` is not used."""
         x, whole = h.reference.copy(), h.offsets[-1:]  # one level of m rows
-        code = staircase(h.A, h.lower, h.upper, whole, x, self.damping, self.threshold,
-                         self.rank_tolerance, WORKSPACE.array)
-        return self._otherwise(h, x, code, memory) if code else Resolution(x)
+        code = solve_by_staircase(h.A, h.lower, h.upper, whole, x, self._settings,
+                                  WORKSPACE.array)
+        return self._otherwise(h, x, code) if code else Resolution(x)

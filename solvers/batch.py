@@ -21,13 +21,11 @@ from numpy.typing import ArrayLike, NDArray
 from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array, Hierarchy
 from solvers.hcod import Hcod
-from solvers.kernels.batch import batch_hcod, batch_saturation, batch_stages, batch_staircase
-from solvers.kernels.hcod import UNPROVED
-from solvers.kernels.rows import INACCURATE, NUMERICAL_FAILURE
-from solvers.kernels.saturation import NO_LIMITS
-from solvers.resolver import Resolver, Status, make, refuse_inequality
+from solvers.kernels.batch import batch_bounds, batch_exact, batch_staircase
+from solvers.resolver import Resolver, make, refuse_inequality
+from solvers.status import INACCURATE, NO_LIMITS, NUMERICAL_FAILURE, Status
 from solvers.tpm import Tpm
-from solvers.workspace import WORKSPACE
+from solvers.workspace import run
 
 Indices = NDArray[np.int64]
 ENOUGH = 2**15  # entries of A, half a millisecond or more, that are worth starting a thread for
@@ -147,7 +145,7 @@ def solve(batch: Batch, resolver: Resolver | None = None, threads: int | None = 
     if threads is not None and threads < 1:
         raise HierarchyError(f"threads = {threads}, expected at least 1")
     run = _Run(batch, resolver, cores() if threads is None else threads, memory)
-    return run.by_tpm() if isinstance(resolver, Tpm) else run.by_hcod(resolver)
+    return run.by_tpm() if isinstance(resolver, Tpm) else run.by_hcod()
 
 
 class _Run:
@@ -162,20 +160,20 @@ class _Run:
         self.warm: NDArray[np.bool_] = np.zeros(count, dtype=bool)
         if self.before is not None:
             self.warm |= (self.before != 0.0).any(axis=1)
-        self.shape = shape
-        self.x = np.empty((count, n))
-        self.codes = np.zeros(count, dtype=np.int64)
-        self.record = np.empty((count, 0))
-        self.settings = np.array([resolver.damping, resolver.threshold, resolver.rank_tolerance])
+        self.answers = np.zeros((count, n + shape[1] + 1))
+        self.x, self.record = self.answers[:, :n], self.answers[:, n:-1]
+        self.codes = self.answers[:, -1]
+        self.settings = resolver._settings
 
     def by_tpm(self) -> BatchResolution:
         """Resolve equalities by the staircase; with bounds, or a memory, by saturation."""
         self._call(batch_staircase, np.flatnonzero(~self.warm))
         bounded = np.flatnonzero(self.warm | (self.codes < 0))
         if bounded.size == 0:
-            return BatchResolution(self.x, self.codes, np.ones_like(self.codes), None)
-        self.record = self._remembered(self.resolver.damping == 0.0)
-        self._call(batch_saturation, bounded)
+            return self._answer(np.ones(len(self.codes)), None)
+        if self.resolver.damping == 0.0:
+            self._remember()
+        self._call(batch_bounds, bounded)
         self._one_by_one(np.flatnonzero(self.codes == INACCURATE))
         unlimited = self.codes == NO_LIMITS
         self._call(batch_staircase, np.flatnonzero(unlimited))
@@ -183,23 +181,25 @@ class _Run:
             refuse_inequality(self.resolver, self.batch[p], -int(self.codes[p]) - 1)
         self.record[unlimited | (self.codes == NUMERICAL_FAILURE)] = 0.0
         steps = np.maximum(self.record[:, -1], 1.0)
-        return BatchResolution(self.x, self.codes, steps.astype(np.int64), self.record)
+        return self._answer(steps, self.record.copy())
 
-    def by_hcod(self, resolver: Hcod) -> BatchResolution:
-        """Resolve by guesses, what they do not prove by stages, and what is in doubt alone."""
-        self.settings = np.array([*self.settings, resolver.tolerance, resolver.guesses,
-                                  resolver.max_iterations])
-        self.record = self._remembered()
-        self._call(batch_hcod, np.arange(len(self.batch)))
-        self._call(batch_stages, np.flatnonzero(self.codes == UNPROVED))
+    def by_hcod(self) -> BatchResolution:
+        """Resolve by the exact engine, and what is in doubt alone."""
+        self._remember()
+        self._call(batch_exact, np.arange(len(self.batch)))
         self._one_by_one(np.flatnonzero(self.codes == INACCURATE))
         steps = self.record[:, -3] + self.record[:, -2]
-        return BatchResolution(self.x, self.codes, steps.astype(np.int64), self.record)
+        return self._answer(steps, self.record.copy())
 
-    def _remembered(self, used: bool = True) -> Array:
-        return self.before.copy() if used and self.before is not None else np.zeros(self.shape)
+    def _remember(self) -> None:
+        if self.before is not None:
+            self.record[:] = self.before
 
-    def _call(self, kernel: Callable[..., bool], which: Indices) -> None:
+    def _answer(self, steps: Array, memory: Array | None) -> BatchResolution:
+        return BatchResolution(self.x.copy(), self.codes.astype(np.int64), steps.astype(np.int64),
+                               memory)
+
+    def _call(self, kernel: Callable[..., int], which: Indices) -> None:
         """Run a kernel over the problems `which`, in parts on several threads if there are many."""
         self.x[which] = self.batch.reference[which]
         threads = min(self.threads, len(which) * self.batch.A[:1].size // ENOUGH)
@@ -210,11 +210,9 @@ class _Run:
         with ThreadPoolExecutor(threads) as pool:
             list(pool.map(partial(self._call_part, kernel), parts))
 
-    def _call_part(self, kernel: Callable[..., bool], which: Indices) -> None:
+    def _call_part(self, kernel: Callable[..., int], which: Indices) -> None:
         b = self.batch
-        while not kernel(b.A, b.lower, b.upper, b.sizes, self.x, self.record, self.codes,
-                         self.settings, which, WORKSPACE.array):
-            WORKSPACE.double()
+        run(kernel, b.A, b.lower, b.upper, b.sizes, self.answers, self.settings, which)
 
     def _one_by_one(self, which: Indices) -> None:
         """Resolve anew, by the resolver itself, which asks `certify`."""

@@ -16,8 +16,8 @@ import numpy as np
 
 from hierarchy.errors import HierarchyError
 from solvers.batch import Batch, BatchResolution
-from solvers.kernels.rows import NUMERICAL_FAILURE, SOLVED
 from solvers.resolver import Resolver, make, refuse_inequality
+from solvers.status import NUMERICAL_FAILURE, SOLVED
 from solvers.tpm import Tpm
 
 try:

@@ -17,7 +17,7 @@ from solvers.kernels.factorization import (
     resolve,
     resolve_units,
 )
-from solvers.resolver import Status
+from solvers.status import Status
 from solvers.tpm import Tpm
 
 FEWEST = 8   # rows that there is always room for
@@ -46,6 +46,7 @@ class FactoredRows:
     def __init__(self, n: int, room: int, settings: Tpm) -> None:
         widest = min(room, n)
         self._settings, self._r, self._width = settings, 0, 0
+        self._numbers = np.array([settings.damping, settings.threshold, settings.rank_tolerance])
         self._Q = np.empty((widest + 1, n))  # its rows are the columns of the letter's Q
         self._C, self._squares = np.empty((room, _rounded_up(widest))), np.empty(room)
         self._pivots = np.empty(room, dtype=np.int64)
@@ -93,7 +94,7 @@ class FactoredRows:
         if self.kept < count or self.status is not Status.SOLVED:
             self._list(levels, self.kept)
             self.status = Status(refactor(
-                self._C, self._squares, self._table, self.kept, self._W, len(self.J), self._pivots,
+                self._C, self._squares, self._table, self.kept, self._W, self._pivots,
                 self._settings.rank_tolerance, self._work))
             self.kept = count if self.status is Status.SOLVED else 0
         elif len(self._table) > count:
@@ -102,14 +103,13 @@ class FactoredRows:
 
     def resolve(self, b: Array, x: Array) -> int:
         """Turn x (n,), a reference, into the answer for targets b (m,); a code of the kernel."""
-        return int(resolve(b, x, self._r, self._Q, self._table, self._W, len(self.J), self._pivots,
-                           self._settings.damping, self._settings.threshold, self._work))
+        return int(resolve(b, x, self.basis, self._table, self._W, self._pivots,
+                           self._numbers, self._work))
 
     def units(self, m: int) -> Array:
         """Answers to m targets that are 1, one at a time, in the basis: (m, r)."""
         Z = np.empty((m, self._width))
-        resolve_units(Z, self._table, self._W, len(self.J), self._pivots, self._settings.damping,
-                      self._settings.threshold, self._work)
+        resolve_units(Z, self._table, self._W, self._pivots, self._numbers, self._work)
         return Z[:, :self._r]
 
     def _list(self, levels: Sequence[Held], kept: int) -> None:

@@ -11,7 +11,8 @@ from numpy.typing import ArrayLike
 from hierarchy.errors import HierarchyError, UnknownNameError
 from hierarchy.problem import Array, Hierarchy, check_rows
 from solvers.factored_rows import FEWEST, FactoredRows, Held
-from solvers.resolver import Resolution, Status
+from solvers.resolver import Resolution
+from solvers.status import Status
 from solvers.tpm import Tpm
 
 Level = int | str

@@ -12,7 +12,8 @@ from hierarchy.problem import Array, Hierarchy
 from solvers.backends import Backend, backend_of
 from solvers.programs import null_space_program, slack_program
 from solvers.refinement import EXACT, Rows, below_largest, refined, split
-from solvers.resolver import Handles, Resolution, Resolver, Status, register
+from solvers.resolver import Handles, Resolution, Resolver, register
+from solvers.status import Status
 
 FORMS = ("null-space", "slack")
 

@@ -26,6 +26,5 @@ class Recursive(Resolver):
     def solve(self, h: Hierarchy, memory: Any = None) -> Resolution:
         """Resolve h; direct, `memory` is not used."""
         x = h.reference.copy()
-        code = recursion(h.A, h.lower, h.upper, h.sizes, x, self.damping, self.threshold,
-                         self.rank_tolerance, WORKSPACE.array)
+        code = recursion(h.A, h.lower, h.upper, h.sizes, x, self._settings, WORKSPACE.array)
         return self._otherwise(h, x, code, memory) if code else Resolution(x)

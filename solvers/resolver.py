@@ -5,46 +5,16 @@ from __future__ import annotations
 import dataclasses
 import math
 from abc import ABC, abstractmethod
-from enum import IntEnum
+from functools import cached_property
 from typing import Any, ClassVar, Literal, TypeVar
+
+import numpy as np
 
 from hierarchy.errors import HierarchyError, UnknownNameError
 from hierarchy.problem import Array, Hierarchy
-from solvers.kernels.rows import TOO_SMALL
+from solvers.status import TOO_SMALL
+from solvers.status import Status as Status
 from solvers.workspace import WORKSPACE
-
-
-class Status(IntEnum):
-    """How a solve ended. The text of a status is its remedy."""
-
-    SOLVED = 0
-    ITERATION_LIMIT = 1
-    NUMERICAL_FAILURE = 2
-    BACKEND_FAILURE = 3
-    INACCURATE = 4
-
-    @property
-    def remedy(self) -> str:
-        """What to do about it, as a sentence."""
-        return _REMEDIES[self]
-
-    def __str__(self) -> str:
-        return f"{self.name.lower().replace('_', ' ')}: {self.remedy}"
-
-
-_REMEDIES = {
-    Status.SOLVED: "nothing to do",
-    Status.ITERATION_LIMIT: "raise max_iterations, or hand over the memory of the tick before; "
-                            "x keeps the levels that were finished",
-    Status.NUMERICAL_FAILURE: "x is zero; look for NaN or infinite entries in the rows, or for "
-                              "entries so large that their squares overflow",
-    Status.BACKEND_FAILURE: "x keeps the levels that were finished; try another backend, or scale "
-                            "the rows to a similar norm",
-    Status.INACCURATE: "an answer was found but not shown to be right: rows that are nearly "
-                       "parallel, or of very different scale, leave a doubt; try another "
-                       "resolver or backend",
-}
-
 
 Handles = Literal["equalities", "bounds", "inequalities"]
 _KINDS: tuple[Handles, ...] = ("equalities", "bounds", "inequalities")
@@ -102,7 +72,7 @@ class Resolver(ABC):
 
     damping: float = 0.0
     threshold: float = 0.1
-    rank_tolerance: float = 1e-9
+    rank_tolerance: float = 1e-8
 
     name: ClassVar[str]
     handles: ClassVar[Handles] = "equalities"
@@ -133,6 +103,11 @@ class Resolver(ABC):
         """Error of x to expect on a well-conditioned hierarchy, relative to 1 + |x|."""
         return 1e-9
 
+    @cached_property
+    def _settings(self) -> Array:
+        """The settings in one array, as kernels take them: `Settings` first."""
+        return np.array([self.damping, self.threshold, self.rank_tolerance])
+
     @abstractmethod
     def solve(self, h: Hierarchy, memory: Any = None) -> Resolution:
         """Resolve h, starting from the memory of an earlier resolution if given.
@@ -154,7 +129,7 @@ class Resolver(ABC):
         if getattr(self, setting) not in allowed:
             raise UnknownNameError(f"{setting} of {self.name}", getattr(self, setting), allowed)
 
-    def _otherwise(self, h: Hierarchy, x: Array, code: int, memory: Any) -> Resolution:
+    def _otherwise(self, h: Hierarchy, x: Array, code: int, memory: Any = None) -> Resolution:
         """What follows a kernel's code other than SOLVED: more room, a refused row, a failure."""
         if code == TOO_SMALL:
             WORKSPACE.double()

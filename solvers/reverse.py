@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, ClassVar, final
 
-from hierarchy.problem import Hierarchy
+import numpy as np
+
+from hierarchy.problem import Array, Hierarchy
 from solvers.kernels.reverse import reverse
 from solvers.resolver import Resolution, Resolver, register
 from solvers.workspace import WORKSPACE
@@ -47,6 +50,10 @@ class Reverse(Resolver):
         """Whether priorities are respected exactly at any rank: in the form in-order."""
         return self.form == "in-order"
 
+    @cached_property
+    def _settings(self) -> Array:
+        return np.array([self.damping, self.threshold, self.rank_tolerance, self.strict])
+
     @property
     def label(self) -> str:
         """`reverse`, or `reverse in-order`."""
@@ -55,6 +62,5 @@ class Reverse(Resolver):
     def solve(self, h: Hierarchy, memory: Any = None) -> Resolution:
         """Resolve h; direct, `memory` is not used."""
         x = h.reference.copy()
-        code = reverse(h.A, h.lower, h.upper, h.sizes, x, self.strict, self.damping,
-                       self.threshold, self.rank_tolerance, WORKSPACE.array)
-        return self._otherwise(h, x, code, memory) if code else Resolution(x)
+        code = reverse(h.A, h.lower, h.upper, h.sizes, x, self._settings, WORKSPACE.array)
+        return self._otherwise(h, x, code) if code else Resolution(x)

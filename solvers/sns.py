@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array, Hierarchy
-from solvers.kernels.rows import TOO_SMALL
-from solvers.kernels.sns import CONTRADICTION, sns
-from solvers.resolver import Handles, Resolution, Resolver, Status, register
+from solvers.kernels.sns import sns
+from solvers.resolver import Handles, Resolution, Resolver, register
+from solvers.status import CONTRADICTION, TOO_SMALL, Status
 from solvers.workspace import WORKSPACE
 
 FORMS = ("basic", "optimal")
@@ -128,7 +128,7 @@ class Sns(Resolver):
         if code == CONTRADICTION:
             _refuse_contradiction(h, int(record[-1]))
         if code < 0 or code == TOO_SMALL:
-            return self._otherwise(h, x, code, memory)
+            return self._otherwise(h, x, code)
         return SaturatedResolution(x, Status(code), record)
 
 

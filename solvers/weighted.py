@@ -14,12 +14,12 @@ from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array, Hierarchy
 from solvers.backends import BACKENDS, backend_of
 from solvers.hcod import Hcod
-from solvers.kernels.rows import TOO_SMALL
-from solvers.kernels.weighted import UNPROVED, weighted, weighted_steps
+from solvers.kernels.weighted import weighted, weighted_steps
 from solvers.programs import slack_program
 from solvers.refinement import Rows
-from solvers.resolver import Handles, Resolution, Resolver, Status, register
-from solvers.workspace import WORKSPACE
+from solvers.resolver import Handles, Resolution, Resolver, register
+from solvers.status import SOLVED, TOO_SMALL, UNPROVED, Status
+from solvers.workspace import WORKSPACE, run
 
 OWN = "own"
 _OUTSIDE = 1e-9  # of |a| |x| + |side|, by which constraints are missed that exclude each other
@@ -106,25 +106,32 @@ class Weighted(Resolver):
         return self.name + ratio + (f" {self.backend}" if self.backend != OWN else "")
 
     @cached_property
-    def _settings(self) -> Array:
-        return np.array([self.regularisation, self.damping, self.threshold, self.rank_tolerance,
-                         self.tolerance, self.hard_levels, self.guesses, self.max_iterations])
+    def _known(self) -> dict[int, Array]:
+        """What `_settings_for` has returned."""
+        return {}
+
+    def _settings_for(self, levels: int) -> Array:
+        """What the kernels take: `Options`, with a weight for each level at the end."""
+        if levels not in self._known:
+            self._known[levels] = np.array([
+                self.damping, self.threshold, self.rank_tolerance, self.regularisation,
+                self.tolerance, self.hard_levels, self.guesses, self.max_iterations,
+                *self._weights(levels)])
+        return self._known[levels]
 
     def solve(self, h: Hierarchy, memory: Any = None) -> Resolution:
         """Resolve h, beginning with what the rows did in an earlier resolution if one is given."""
         x, size = h.reference.copy(), 2 * len(h.lower) + 1
         fits = memory is not None and len(memory) == size
         record = memory.copy() if fits else np.zeros(size)
-        weights = self._weights(len(h.sizes))
-        code = weighted(h.A, h.lower, h.upper, h.sizes, weights, x, record, self._settings,
-                        WORKSPACE.array)
-        if code == 0:
+        settings = self._settings_for(len(h.sizes))
+        code = weighted(h.A, h.lower, h.upper, h.sizes, x, record, settings, WORKSPACE.array)
+        if code == SOLVED:
             return Resolution(x, Status.SOLVED, int(record[-1]), record)
         if code == TOO_SMALL:
-            WORKSPACE.double()
-            return self.solve(h, memory)
+            return self._otherwise(h, x, code, memory)
         if code == UNPROVED:
-            return self._farther(h, weights, record)
+            return self._farther(h, settings, record)
         return Resolution(x, Status(code), int(record[-1]), record)
 
     def _weights(self, levels: int) -> Array:
@@ -134,7 +141,7 @@ class Weighted(Resolver):
             raise HierarchyError(f"weighted: {len(self.weights)} weights for {levels} levels")
         return np.array(self.weights)
 
-    def _farther(self, h: Hierarchy, weights: Array, record: Array) -> Resolution:
+    def _farther(self, h: Hierarchy, settings: Array, record: Array) -> Resolution:
         """Go on where guesses ended: from an x within the constraints, or a backend's."""
         hard, x = record[h.m:2 * h.m] == np.inf, h.reference.copy()
         if hard.any():
@@ -143,11 +150,10 @@ class Weighted(Resolver):
             if inside.status is not Status.SOLVED:
                 return Resolution(x, inside.status, int(record[-1]))
         if self.backend != OWN:
-            return self._asked(h, weights, record, hard, x)
-        while (code := weighted_steps(h.A, h.lower, h.upper, h.sizes, weights, h.reference, x,
-                                      record, self._settings, WORKSPACE.array)) == TOO_SMALL:
-            WORKSPACE.double()
-        return Resolution(x, Status(code), int(record[-1]), record)
+            return self._asked(h, settings, record, hard, x)
+        answer = np.array([x, h.reference])
+        code = run(weighted_steps, h.A, h.lower, h.upper, h.sizes, answer, record, settings)
+        return Resolution(answer[0].copy(), Status(code), int(record[-1]), record)
 
     def _within(self, h: Hierarchy, hard: NDArray[np.bool_]) -> Resolution:
         """Return the x within the constraints nearest to the reference; INACCURATE if none is."""
@@ -160,7 +166,7 @@ class Weighted(Resolver):
             status = Status.INACCURATE
         return Resolution(x, status)
 
-    def _asked(self, h: Hierarchy, weights: Array, record: Array, hard: NDArray[np.bool_],
+    def _asked(self, h: Hierarchy, settings: Array, record: Array, hard: NDArray[np.bool_],
                inside: Array) -> Resolution:
         """Ask the backend which rows act, and show that they do."""
         w, equal = np.where(hard, 1.0, record[h.m:2 * h.m]), h.lower == h.upper
@@ -172,8 +178,7 @@ class Weighted(Resolver):
         asked = h.reference + d[:h.n]
         record[:h.m] = _acting(h, hard, asked)
         x, made = h.reference.copy(), record[-1]
-        code = weighted(h.A, h.lower, h.upper, h.sizes, weights, x, record, self._settings,
-                        WORKSPACE.array)
+        code = run(weighted, h.A, h.lower, h.upper, h.sizes, x, record, settings)
         record[-1] += made
         if code != UNPROVED:
             return Resolution(x, Status(code), int(record[-1]), record)

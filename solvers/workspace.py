@@ -7,10 +7,13 @@ made larger when a kernel says that it is TOO_SMALL; what is left in it from bef
 from __future__ import annotations
 
 import threading
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
 from hierarchy.problem import Array
+from solvers.status import TOO_SMALL
 
 
 class _Workspace(threading.local):
@@ -25,3 +28,12 @@ class _Workspace(threading.local):
 
 
 WORKSPACE = _Workspace()
+
+
+def run(kernel: Callable[..., int], *arguments: Any) -> int:
+    """Call a kernel with the work space behind its arguments, with more while that is too small."""
+    code = kernel(*arguments, WORKSPACE.array)
+    while code == TOO_SMALL:
+        WORKSPACE.double()
+        code = kernel(*arguments, WORKSPACE.array)
+    return code

@@ -9,7 +9,8 @@ import numpy as np
 
 from hierarchy.adapters.pink import hierarchy
 from hierarchy.problem import Array
-from solvers.resolver import Resolver, Status, make
+from solvers.resolver import Resolver, make
+from solvers.status import Status
 
 _ALWAYS = ("limits", "constraints")
 

@@ -7,73 +7,135 @@ mu I the others. Reflections of columns keep the error of each row in proportion
 the pivot order makes the QR do the same (Powell, Reid 1969; Barlow, Handy 1988; Cox, Higham 1998),
 so weights may differ by any ratio. Normal equations would square them.
 
-R (7, m) holds by row of A its norm, its push, the rounding in that and whether there is a doubt;
-and by acting row, in the order of W, its number, what counts as zero, and what is missed. W
-(m + n + 5, n): acting rows, reflectors of Q, five vectors. settings: regularisation, damping,
-threshold, rank_tolerance, ...; see `weighted.py`.
+What acts, `Acting`, has entries by row of A; the factorisation, `Factors`, by acting row.
 """
 
 # mypy: disable-error-code="no-untyped-def"
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from hierarchy.compiled import compiled, inlined
-from solvers.kernels.block import variable_damping
-from solvers.kernels.rows import FREE, ROUNDING, ZERO, factor_level, reflect_rows
+from hierarchy.compiled import as_matrix, compiled, inlined
+from solvers.kernels.block import level_damping
+from solvers.kernels.rows import ROUNDING, ZERO, factor_level, reflect, reflect_back
+from solvers.kernels.space import (
+    Basis,
+    Block,
+    Rows,
+    View,
+    carve_basis,
+    carve_rows,
+    matrix,
+    vector,
+)
+from solvers.status import FREE, LOWER
 
-SCALE, PUSH, NOISE, DOUBT, ROW, NOTHING, MISS = range(7)  # rows of R
 EXACT, CLOSE = 1e-12, 1e-7  # shares left of a row behind others between which it is ill-posed
 
 
-@compiled
-def solve_acting(A, lower, upper, reference, x, active, weight, R, W, settings, work):
-    """Write x and the pushes; return whether rows are nearly parallel but not quite.
+class Problem(NamedTuple):
+    """Rows, their sides, and x_0: A (m, n), lower, upper (m,), reference (n,)."""
 
-    work: at least (m + n) (n + 1) numbers, of any content.
+    A: View
+    lower: View
+    upper: View
+    reference: View
+
+
+class Acting(NamedTuple):
+    """What each row does: (m,) each.
+
+    state: FREE, EQUAL, UPPER or LOWER. weight: infinite where hard. norm: of the row. push: how
+    strongly it would be left outward. noise: the rounding in that. doubt: 1 where it was let go on
+    trial.
     """
-    m, n = A.shape
-    zero, miss, row = R[NOTHING], R[MISS], R[ROW].view(np.int64)
-    V, X = m, m + n
-    beta, y = W[X + 1], W[X + 2]
-    hard = _gather(A, lower, upper, reference, active, weight, R, W, settings[3], ZERO, True)
-    end = _gather(A, lower, upper, reference, active, weight, R, W, settings[3], hard, False)
-    p = factor_level(W, row, zero, miss, beta, V, ZERO, hard, ZERO)
-    reflect_rows(W, beta, V, ZERO, p, hard, end)
+
+    state: View
+    weight: View
+    norm: View
+    push: View
+    noise: View
+    doubt: View
+
+
+class Factors(NamedTuple):
+    """The acting rows, first the hard ones, factored.
+
+    of_x (1, n), y (n,): the step and the same in Q. diagonal, force, size (n,): on the way.
+    of_block: work space.
+    """
+
+    rows: Rows
+    basis: Basis
+    of_x: View
+    y: View
+    diagonal: View
+    force: View
+    size: View
+    of_block: View
+
+
+@inlined
+def carve_factors(work, at, m, n):
+    """Return Factors for m rows of n unknowns, and where they end."""
+    rows, at = carve_rows(work, at, m, n)
+    basis, at = carve_basis(work, at, n, n)
+    of_x, at = matrix(work, at, 1, n)
+    y, at = vector(work, at, n)
+    diagonal, at = vector(work, at, n)
+    force, at = vector(work, at, n)
+    size, at = vector(work, at, n)
+    of_block, at = vector(work, at, (m + n) * (n + 1))
+    return Factors(rows, basis, of_x, y, diagonal, force, size, of_block), at
+
+
+@inlined
+def carve_acting(record, work, at, m):
+    """Return Acting, state and weight out of the record, and where the rest of it ends."""
+    norm, at = vector(work, at, m)
+    push, at = vector(work, at, m)
+    noise, at = vector(work, at, m)
+    doubt, at = vector(work, at, m)
+    return Acting(record[:m], record[m:2 * m], norm, push, noise, doubt), at
+
+
+@compiled
+def solve_acting(problem, x, acting, factors, settings, regularisation):
+    """Write x and the pushes; return whether rows are nearly parallel but not quite."""
+    rows, basis, of_x, y, _, _, _, _ = factors
+    hard = _gather(problem, acting, rows, settings.rank_tolerance, ZERO, True)
+    end = _gather(problem, acting, rows, settings.rank_tolerance, hard, False)
+    p = factor_level(rows, basis, ZERO, hard, ZERO)
+    reflect(basis, ZERO, p, rows.W, hard, end)
     for k in range(p):
-        y[k] = miss[k]
+        y[k] = rows.miss[k]
         for c in range(k):
-            y[k] -= W[k, c] * y[c]
-        y[k] /= W[k, k]
-    rank = factor_level(W, row, zero, miss, beta, V, hard, end, p)
-    close = False
-    for i in range(end):
-        norm = R[SCALE, row[i]] * (1.0 if i < hard else weight[row[i]])
-        own = i if i < hard else p + i - hard
-        left = _drop_rounding(W, i, own, zero[i], p if i < hard else rank)
-        close |= EXACT * norm < left < CLOSE * norm
+            y[k] -= rows.W[k, c] * y[c]
+        y[k] /= rows.W[k, k]
+    rank = factor_level(rows, basis, hard, end, p)
+    close = _clean(acting, rows, hard, end, p, rank)
     for i in range(hard, end):
         for c in range(p):
-            miss[i] -= W[i, c] * y[c]
-    mu = settings[0]
-    if settings[1] > 0.0 and rank > p:
-        mu = np.hypot(mu, variable_damping(W, hard, end, p, rank, settings[1], settings[2], work))
-    _least_squares(W, miss, y, hard, end, p, rank, mu, W[X + 3], work)
-    for c in range(n):
-        W[X, c] = y[c] if c < rank else 0.0
-    for k in range(rank - 1, -1, -1):
-        reflect_rows(W, beta, V, k, k + 1, X, X + 1)
-    for c in range(n):
-        x[c] = reference[c] + W[X, c]
-    _pushes(lower, upper, x, active, weight, R, W, hard, end, p, settings[0])
+            rows.miss[i] -= rows.W[i, c] * y[c]
+    at = Block(hard, end, p, rank)
+    _least_squares(factors, at, _mu(rows.W, at, settings, regularisation, factors.of_block))
+    for c in range(x.size):
+        of_x[0, c] = y[c] if c < rank else 0.0
+    reflect_back(basis, rank, of_x, ZERO, ZERO + 1)
+    for c in range(x.size):
+        x[c] = problem.reference[c] + of_x[0, c]
+    _push_of_hard(acting, factors, at, regularisation)
+    _push_of_soft(problem, x, acting, rows, at)
     return close
 
 
 @inlined
-def side_of(lower, upper, active, i):
+def side_of(problem, acting, i):
     """The side at which a row acts."""
-    return lower[i] if active[i] == -1.0 else upper[i]
+    return problem.lower[i] if acting.state[i] == LOWER else problem.upper[i]
 
 
 @inlined
@@ -86,54 +148,76 @@ def length_of(x):
 
 
 @compiled
-def _gather(A, lower, upper, reference, active, weight, R, W, rank_tolerance, at, hard):
+def _gather(problem, acting, rows, rank_tolerance, at, hard):
     """Write the acting rows that are hard, or soft, into W from row `at` on; return their end."""
-    row = R[ROW].view(np.int64)
-    for i in range(active.size):
-        if active[i] == FREE or (weight[i] == np.inf) != hard:
+    A, reference = problem.A, problem.reference
+    for i in range(acting.state.size):
+        if acting.state[i] == FREE or (acting.weight[i] == np.inf) != hard:
             continue
-        w, miss = 1.0 if hard else weight[i], side_of(lower, upper, active, i)
+        w, miss = 1.0 if hard else acting.weight[i], side_of(problem, acting, i)
         for c in range(reference.size):
-            W[at, c] = w * A[i, c]
+            rows.W[at, c] = w * A[i, c]
             miss -= A[i, c] * reference[c]
-        row[at], R[MISS, at] = i, w * miss
-        R[NOTHING, at] = (rank_tolerance * w * R[SCALE, i]) ** 2
+        rows.row[at], rows.miss[at] = i, w * miss
+        rows.zero[at] = (rank_tolerance * w * acting.norm[i]) ** 2
         at += 1
     return at
 
 
 @inlined
-def _drop_rounding(W, i, own, zero, rank):
-    """Set to zero what of row i, from its end, is nothing: of a heavy row it would be something.
+def _clean(acting, rows, hard, end, p, rank):
+    """Set to zero what of the rows is rounding; return whether any is nearly parallel to others."""
+    close = False
+    for i in range(end):
+        j = rows.row[i]
+        norm = acting.norm[j] * (1.0 if i < hard else acting.weight[j])
+        own = i if i < hard else p + i - hard
+        left = _drop_rounding(rows.W[i], own, rows.zero[i], p if i < hard else rank)
+        close |= EXACT * norm < left < CLOSE * norm
+    return close
+
+
+@inlined
+def _drop_rounding(w, own, zero, rank):
+    """Set to zero what of a row, from its end, is nothing: of a heavy row it would be something.
 
     own: its column where it got one. Returns what was left of it there, or when it got none.
     """
     square = 0.0
-    for c in range(rank, W.shape[1]):
-        square += W[i, c] * W[i, c]
+    for c in range(rank, w.size):
+        square += w[c] * w[c]
     for c in range(rank - 1, -1, -1):
-        more = square + W[i, c] * W[i, c]
+        more = square + w[c] * w[c]
         if more > zero:
-            return abs(W[i, c]) if c == own else np.sqrt(square)
+            return abs(w[c]) if c == own else np.sqrt(square)
         square = more
-        W[i, c] = 0.0
+        w[c] = 0.0
     return np.sqrt(square)
 
 
-@compiled
-def _least_squares(W, miss, y, i0, i1, k0, k1, mu, diagonal, work):
-    """Write into y[k0:k1] what minimises ||W y - miss||^2 + mu^2 ||y||^2, over rows i0:i1.
+@inlined
+def _mu(W, at, settings, regularisation, work):
+    """Return mu, with lambda where the soft rows are damped as one level."""
+    if settings.damping > 0.0 and at.k1 > at.k0:
+        return np.hypot(regularisation, level_damping(W, at, settings, work))
+    return regularisation
 
-    miss[i0:i1] goes out as what is still missed. It comes out of the reflections, so that what
-    little a heavy row misses is as exact as the rest.
+
+@compiled
+def _least_squares(factors, at, mu):
+    """Write into y what minimises ||W y - miss||^2 + mu^2 ||y||^2, over the block `at`.
+
+    miss goes out as what is still missed. It comes out of the reflections, so that what little a
+    heavy row misses is as exact as the rest.
     """
-    rows, q = i1 - i0, k1 - k0
+    (W, _, _, miss), y, diagonal = factors.rows, factors.y, factors.diagonal
+    rows, q = at.i1 - at.i0, at.k1 - at.k0
     height = rows + q
-    T = work[:height * (q + 1)].reshape((q + 1, height))  # a column lies in memory as a row
+    T = as_matrix(factors.of_block[:height * (q + 1)], q + 1, height)  # a column lies as a row
     b = T[q]
     for k in range(q + 1):
         for i in range(rows):
-            T[k, i] = miss[i0 + i] if k == q else W[i0 + i, k0 + k]
+            T[k, i] = miss[at.i0 + i] if k == q else W[at.i0 + i, at.k0 + k]
         for i in range(rows, height):
             T[k, i] = mu if i - rows == k else 0.0
     for k in range(q):
@@ -146,14 +230,14 @@ def _least_squares(W, miss, y, i0, i1, k0, k1, mu, diagonal, work):
     for k in range(q - 1, -1, -1):
         rest = b[k]
         for j in range(k + 1, q):
-            rest -= T[j, k] * y[k0 + j]
-        y[k0 + k] = rest / diagonal[k]
+            rest -= T[j, k] * y[at.k0 + j]
+        y[at.k0 + k] = rest / diagonal[k]
     for k in range(q):
         b[k] = 0.0
     for k in range(q - 1, -1, -1):
         _reflect(T[k, k:], b[k:], diagonal[k])
     for i in range(rows):
-        miss[i0 + i] = b[i]
+        miss[at.i0 + i] = b[i]
 
 
 @inlined
@@ -168,32 +252,35 @@ def _reflect(v, b, norm):
 
 
 @compiled
-def _pushes(lower, upper, x, active, weight, R, W, hard, end, p, mu):
-    """Write how strongly each acting row would be left outward; inward is negative.
+def _push_of_hard(acting, factors, at, mu):
+    """Write the multipliers of the hard rows; zero where one adds no column.
 
-    Of a soft row it is w_i times what it is violated by; of a hard row the multiplier, L^T times
-    which is the force of all the others on y[:p]; zero where a hard row adds no column.
+    L^T times them is the force of all the others on y[:p].
     """
-    row, miss = R[ROW].view(np.int64), R[MISS]
-    at = W.shape[0] - 3
-    y, force, size = W[at], W[at + 1], W[at + 2]
+    (W, row, _, miss), y, force, size = factors.rows, factors.y, factors.force, factors.size
+    hard, p = at.i0, at.k0
     for k in range(p, hard):
-        R[PUSH, row[k]] = R[NOISE, row[k]] = 0.0
+        acting.push[row[k]] = acting.noise[row[k]] = 0.0
     for k in range(p - 1, -1, -1):
         force[k] = -mu * mu * y[k]
         size[k] = abs(force[k])
-        for i in range(hard, end):
+        for i in range(hard, at.i1):
             force[k] += W[i, k] * miss[i]
             size[k] += abs(W[i, k] * miss[i])
         for j in range(k + 1, p):
             force[k] -= W[j, k] * force[j]
             size[k] += abs(W[j, k] * force[j])
         force[k] /= W[k, k]
-        R[PUSH, row[k]] = active[row[k]] * force[k]
-        R[NOISE, row[k]] = ROUNDING * size[k] / abs(W[k, k])
+        acting.push[row[k]] = acting.state[row[k]] * force[k]
+        acting.noise[row[k]] = ROUNDING * size[k] / abs(W[k, k])
+
+
+@compiled
+def _push_of_soft(problem, x, acting, rows, at):
+    """Write w_i times what each soft row is violated by; inward is negative."""
     length = length_of(x)
-    for i in range(hard, end):
-        j = row[i]
-        R[PUSH, j] = -active[j] * miss[i]
-        R[NOISE, j] = ROUNDING * weight[j] * (
-            R[SCALE, j] * length + abs(side_of(lower, upper, active, j)))
+    for i in range(at.i0, at.i1):
+        j = rows.row[i]
+        around = acting.norm[j] * length + abs(side_of(problem, acting, j))
+        acting.push[j] = -acting.state[j] * rows.miss[i]
+        acting.noise[j] = ROUNDING * acting.weight[j] * around

@@ -1,66 +1,59 @@
 """Loops over the problems of a batch, for one thread: which of them, and what each is solved by.
 
-All arrays have the problem as their first axis; x comes in as the reference. Without the lock of
-Python, so that other threads run their own part meanwhile. Each kernel returns False where `work`
-is too small, which depends on the shape alone and so shows at the first problem.
+All arrays have the problem as their first axis. A row of `answers` is x (n,), which comes in as the
+reference, the record of the solver, and its code. Without the lock of Python, so that other threads
+run their own part meanwhile. Each kernel returns TOO_SMALL where `work` is, which depends on the
+shape alone and so shows at the first problem.
 """
 
 # mypy: disable-error-code="no-untyped-def"
 
 from __future__ import annotations
 
-from hierarchy.compiled import unlocked
-from solvers.kernels.hcod import UNPROVED, hcod, hcod_equalities
-from solvers.kernels.rows import TOO_SMALL
-from solvers.kernels.saturation import saturation
-from solvers.kernels.stages import solve_by_stages
-from solvers.kernels.staircase import staircase
+from hierarchy.compiled import inlined, unlocked
+from solvers.kernels.bounds import solve_within_bounds
+from solvers.kernels.exact import solve_exactly
+from solvers.kernels.staircase import solve_by_staircase
+from solvers.status import SOLVED, TOO_SMALL
+
+
+@inlined
+def _parts(answers, p, n):
+    """Return x and the record of problem p."""
+    return answers[p, :n], answers[p, n:-1]
 
 
 @unlocked
-def batch_staircase(A, lower, upper, sizes, x, record, codes, settings, which, work):
-    """Solve the problems `which` by `staircase`; record is not used."""
+def batch_staircase(A, lower, upper, sizes, answers, settings, which, work):
+    """Solve the problems `which` by the staircase; the record is not used."""
     for p in which:
-        codes[p] = staircase(A[p], lower[p], upper[p], sizes, x[p], settings[0], settings[1],
-                             settings[2], work)
-        if codes[p] == TOO_SMALL:
-            return False
-    return True
-
-
-@unlocked
-def batch_saturation(A, lower, upper, sizes, x, record, codes, settings, which, work):
-    """Solve the problems `which` by `saturation`."""
-    for p in which:
-        codes[p] = saturation(A[p], lower[p], upper[p], sizes, x[p], record[p], settings[0],
-                              settings[1], settings[2], work)
-        if codes[p] == TOO_SMALL:
-            return False
-    return True
-
-
-@unlocked
-def batch_hcod(A, lower, upper, sizes, x, record, codes, settings, which, work):
-    """Solve the problems `which` by guesses, or by the staircase if all rows are equalities."""
-    for p in which:
-        code = UNPROVED
-        if lower.shape[1] == 0 or lower[p, 0] == upper[p, 0]:
-            code = hcod_equalities(A[p], lower[p], upper[p], sizes, x[p], record[p], settings,
-                                   work)
-        if code == UNPROVED:
-            code = hcod(A[p], lower[p], upper[p], sizes, x[p], record[p], settings, work)
-        codes[p] = code
+        x, _ = _parts(answers, p, A.shape[2])
+        code = solve_by_staircase(A[p], lower[p], upper[p], sizes, x, settings, work)
+        answers[p, -1] = code
         if code == TOO_SMALL:
-            return False
-    return True
+            return TOO_SMALL
+    return SOLVED
 
 
 @unlocked
-def batch_stages(A, lower, upper, sizes, x, record, codes, settings, which, work):
-    """Solve the problems `which` level by level."""
+def batch_bounds(A, lower, upper, sizes, answers, settings, which, work):
+    """Solve the problems `which` within their bounds."""
     for p in which:
-        codes[p] = solve_by_stages(A[p], lower[p], upper[p], sizes, x[p], record[p], settings,
-                                   work)
-        if codes[p] == TOO_SMALL:
-            return False
-    return True
+        x, record = _parts(answers, p, A.shape[2])
+        code = solve_within_bounds(A[p], lower[p], upper[p], sizes, x, record, settings, work)
+        answers[p, -1] = code
+        if code == TOO_SMALL:
+            return TOO_SMALL
+    return SOLVED
+
+
+@unlocked
+def batch_exact(A, lower, upper, sizes, answers, settings, which, work):
+    """Solve the problems `which` by the exact engine."""
+    for p in which:
+        x, record = _parts(answers, p, A.shape[2])
+        code = solve_exactly(A[p], lower[p], upper[p], sizes, x, record, settings, work)
+        answers[p, -1] = code
+        if code == TOO_SMALL:
+            return TOO_SMALL
+    return SOLVED

@@ -6,66 +6,67 @@ from __future__ import annotations
 
 import numpy as np
 
-from hierarchy.compiled import compiled
+from hierarchy.compiled import as_matrix, compiled, inlined
 
 SWEEPS = 40  # bound; Jacobi needs 6 to 10
 
 
 @compiled
-def solve_block(M, r, y, i0, i1, k0, k1, damping, threshold, work):
-    """Write into y[k0:k1] the step of one level with rows i0:i1 and columns k0:k1 of M.
+def solve_level(M, r, y, at, settings, work):
+    """Write into y the step of one level, whose rows and columns of M are the block `at`.
 
     The block is lower trapezoidal with a nonzero diagonal: its rows in pivot order, in the columns
-    that the level adds. r[i0:i1] is what its rows still miss. work: at least (m + n) (n + 1)
-    numbers, of any content.
+    that the level adds. r is what the rows still miss. work: at least (m + n) (n + 1) numbers, of
+    any content.
     """
     damped = 0.0
-    if damping > 0.0 and k1 > k0:
-        damped = variable_damping(M, i0, i1, k0, k1, damping, threshold, work)
-    solve_damped(M, r, y, i0, i1, k0, k1, damped, work)
+    if settings.damping > 0.0 and at.k1 > at.k0:
+        damped = level_damping(M, at, settings, work)
+    solve_damped_level(M, r, y, at, damped, work)
 
 
 @compiled
-def solve_damped(M, r, y, i0, i1, k0, k1, damped, work):
-    """Like `solve_block`, with lambda given."""
-    if damped == 0.0 and i1 - i0 == k1 - k0:
-        _substitute(M, r, y, i0, k0, k1)
-    elif k1 - k0 == 1:
-        _one_unknown(M, r, y, i0, i1, k0, damped)
-    elif k1 > k0:
-        _least_squares(M, r, y, i0, i1, k0, k1, damped, work)
+def solve_damped_level(M, r, y, at, damped, work):
+    """Like `solve_level`, with lambda given."""
+    rank = at.k1 - at.k0
+    if damped == 0.0 and at.i1 - at.i0 == rank:
+        _substitute(M, r, y, at)
+    elif rank == 1:
+        _one_unknown(M, r, y, at, damped)
+    elif rank > 0:
+        _least_squares(M, r, y, at, damped, work)
 
 
 @compiled
-def _substitute(M, r, y, i0, k0, k1):
-    """Write the solution of a square block into y[k0:k1]."""
-    for k in range(k0, k1):
-        i = i0 + k - k0
+def _substitute(M, r, y, at):
+    """Write the solution of a square block into y."""
+    for k in range(at.k0, at.k1):
+        i = at.i0 + k - at.k0
         rest = r[i]
-        for c in range(k0, k):
+        for c in range(at.k0, k):
             rest -= M[i, c] * y[c]
         y[k] = rest / M[i, k]
 
 
 @compiled
-def variable_damping(M, i0, i1, k0, k1, damping, threshold, work):
+def level_damping(M, at, settings, work):
     """Return lambda, with lambda^2 = (1 - (s / threshold)^2) damping^2 for s < threshold, else 0.
 
     s is the smallest singular value of the block, counted over its rows: 0 where rank < rows. It
     is computed only where the cheap bound s >= 1 / ||L^-1||_F does not already pass.
     """
-    if i1 - i0 > k1 - k0:
-        return damping
-    p = k1 - k0
-    L = work[:p * p].reshape((p, p))
-    if invert_triangle(M, L, i0, k0, p) * threshold * threshold <= 1.0:
+    p, threshold = at.k1 - at.k0, settings.threshold
+    if at.i1 - at.i0 > p:
+        return settings.damping
+    L = as_matrix(work[:p * p], p, p)
+    if invert_triangle(M, L, at.i0, at.k0, p) * threshold * threshold <= 1.0:
         return 0.0
     for i in range(p):
         for j in range(p):
-            L[i, j] = M[i0 + i, k0 + j] if i >= j else 0.0
-    orthogonalise_rows(L, work[:0].reshape((p, 0)))
+            L[i, j] = M[at.i0 + i, at.k0 + j] if i >= j else 0.0
+    orthogonalise_rows(L, as_matrix(work[:0], p, 0))
     ratio = smallest_square(L) / (threshold * threshold)
-    return damping * np.sqrt(1.0 - ratio) if ratio < 1.0 else 0.0
+    return settings.damping * np.sqrt(1.0 - ratio) if ratio < 1.0 else 0.0
 
 
 @compiled
@@ -128,56 +129,69 @@ def orthogonalise_rows(W, U):
                 t = 1.0 / (abs(zeta) + np.hypot(1.0, zeta))
                 t = t if zeta >= 0.0 else -t
                 cosine = 1.0 / np.sqrt(1.0 + t * t)
-                for V in (W, U):
-                    for k in range(V.shape[1]):
-                        above = V[i, k]
-                        V[i, k] = cosine * (above - t * V[j, k])
-                        V[j, k] = cosine * (t * above + V[j, k])
+                _rotate(W, i, j, cosine, t)
+                _rotate(U, i, j, cosine, t)
         if settled:
             return
 
 
 @compiled
-def _one_unknown(M, r, y, i0, i1, k, damped):
-    """Write the minimiser into y[k]."""
-    along, square = 0.0, damped * damped
-    for i in range(i0, i1):
+def _rotate(V, i, j, cosine, t):
+    """Rotate rows i and j of V by the angle of this cosine and tangent."""
+    for k in range(V.shape[1]):
+        above = V[i, k]
+        V[i, k] = cosine * (above - t * V[j, k])
+        V[j, k] = cosine * (t * above + V[j, k])
+
+
+@compiled
+def _one_unknown(M, r, y, at, damped):
+    """Write the minimiser into y."""
+    k, along, square = at.k0, 0.0, damped * damped
+    for i in range(at.i0, at.i1):
         along += M[i, k] * r[i]
         square += M[i, k] * M[i, k]
     y[k] = along / square
 
 
 @compiled
-def _least_squares(M, r, y, i0, i1, k0, k1, damped, work):
-    """Write the minimiser into y[k0:k1], by Householder reflections of [M r; lambda I 0]."""
-    rows, p = i1 - i0, k1 - k0
+def _least_squares(M, r, y, at, damped, work):
+    """Write the minimiser into y, by Householder reflections of [M r; lambda I 0]."""
+    p, rows = at.k1 - at.k0, at.i1 - at.i0
     height = rows + p if damped > 0.0 else rows
-    T = work[:height * (p + 1)].reshape((height, p + 1))
+    T = as_matrix(work[:height * (p + 1)], height, p + 1)
     for i in range(height):
         for k in range(p + 1):
             T[i, k] = 0.0
     for i in range(rows):
         for k in range(p):
-            T[i, k] = M[i0 + i, k0 + k]
-        T[i, p] = r[i0 + i]
+            T[i, k] = M[at.i0 + i, at.k0 + k]
+        T[i, p] = r[at.i0 + i]
     for k in range(height - rows):
         T[rows + k, k] = damped
     for k in range(p):
-        square = 0.0
-        for i in range(k, height):
-            square += T[i, k] * T[i, k]
-        norm = -np.sqrt(square) if T[k, k] > 0.0 else np.sqrt(square)
-        T[k, k] -= norm
-        for j in range(k + 1, p + 1):
-            s = 0.0
-            for i in range(k, height):
-                s += T[i, k] * T[i, j]
-            s /= norm * T[k, k]
-            for i in range(k, height):
-                T[i, j] += s * T[i, k]
-        T[k, k] = norm
+        _reflect_columns(T, k)
     for k in range(p - 1, -1, -1):
         rest = T[k, p]
         for j in range(k + 1, p):
-            rest -= T[k, j] * y[k0 + j]
-        y[k0 + k] = rest / T[k, k]
+            rest -= T[k, j] * y[at.k0 + j]
+        y[at.k0 + k] = rest / T[k, k]
+
+
+@inlined
+def _reflect_columns(T, k):
+    """Reflect column k of T onto unit vector k, and the columns behind it alike."""
+    height, columns = T.shape
+    square = 0.0
+    for i in range(k, height):
+        square += T[i, k] * T[i, k]
+    norm = -np.sqrt(square) if T[k, k] > 0.0 else np.sqrt(square)
+    T[k, k] -= norm
+    for j in range(k + 1, columns):
+        s = 0.0
+        for i in range(k, height):
+            s += T[i, k] * T[i, j]
+        s /= norm * T[k, k]
+        for i in range(k, height):
+            T[i, j] += s * T[i, k]
+    T[k, k] = norm

@@ -8,7 +8,7 @@ Rows of C and of the squares lie where a level was put first, its slot; a table 
 in order of priority, [slot, rows, rank with all above]. W has, for m <= V rows:
 
     rows 0 .. V - 1       the staircase, in order, each level in pivot order
-    the width after V     reflectors, see `reflect_rows`
+    the width after V     reflectors, see `Basis`
     four more             beta, y, x and the reference, in coordinates of Q
 """
 
@@ -16,18 +16,16 @@ in order of priority, [slot, rows, rank with all above]. W has, for m <= V rows:
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from hierarchy.compiled import compiled, inlined
-from solvers.kernels.block import solve_block
-from solvers.kernels.rows import (
-    NUMERICAL_FAILURE,
-    SOLVED,
-    ZERO,
-    factor_level,
-    finish,
-    reflect_rows,
-)
+from solvers.kernels.block import solve_level
+from solvers.kernels.rows import ZERO, factor_level, finish, reflect, reflect_back
+from solvers.kernels.space import Basis, Block, Rows, View, shared
+from solvers.kernels.staircase import subtract
+from solvers.status import NUMERICAL_FAILURE, SOLVED
 
 ROUNDED = 1e-14  # share of a row outside the basis that is its rounding, and no direction
 PASSES = 4       # bound; two are enough where the row is not rounding
@@ -66,18 +64,8 @@ def project_rows(A, first, last, r, Q, C, squares):
         squares[i] = dot(w, w)
         if not np.isfinite(squares[i]):
             continue
-        left = size = np.sqrt(squares[i])
-        for _ in range(PASSES):  # Gram-Schmidt, again where a row loses more than half of itself
-            before = left
-            for k in range(r):
-                q = Q[k]
-                s = dot(q, w)
-                coefficients[k] += s
-                for c in range(n):
-                    w[c] -= s * q[c]
-            left = np.sqrt(dot(w, w))
-            if left > 0.5 * before or left <= ROUNDED * size:
-                break
+        size = np.sqrt(squares[i])
+        left = _orthogonalise(w, Q, r, coefficients, size)
         if left > ROUNDED * size and r < n:
             coefficients[r] = left
             for c in range(n):
@@ -86,15 +74,58 @@ def project_rows(A, first, last, r, Q, C, squares):
     return r
 
 
+@inlined
+def _orthogonalise(w, Q, r, coefficients, size):
+    """Take the first r rows of Q out of w, of norm size; return what is left of it.
+
+    By Gram-Schmidt, again where the row loses more than half of itself.
+    """
+    left = size
+    for _ in range(PASSES):
+        before = left
+        for k in range(r):
+            q = Q[k]
+            s = dot(q, w)
+            coefficients[k] += s
+            for c in range(w.size):
+                w[c] -= s * q[c]
+        left = np.sqrt(dot(w, w))
+        if left > 0.5 * before or left <= ROUNDED * size:
+            break
+    return left
+
+
+class Factored(NamedTuple):
+    """The staircase of C.
+
+    rows, basis: as in `Staircase`. y (width,): the answer in the columns that the levels took. of_x
+    (2, width): x and the reference in coordinates of Q. rest: what follows in the work space.
+    """
+
+    rows: Rows
+    basis: Basis
+    y: View
+    of_x: View
+    rest: View
+
+
+@inlined
+def _opened(W, pivots, work):
+    """Return the parts of W, with zero and miss out of the work space."""
+    V, width = pivots.size, W.shape[1]
+    rows = Rows(W[:V], pivots, work[:V], work[V:2 * V])
+    basis = Basis(W[V:V + width], W[V + width])
+    return Factored(rows, basis, W[V + width + 1], W[V + width + 2:V + width + 4], work[2 * V:])
+
+
 @compiled
-def refactor(C, squares, table, kept, W, V, pivots, rank_tolerance, work):
+def refactor(C, squares, table, kept, W, pivots, rank_tolerance, work):
     """Bring the levels from `kept` on into the staircase, behind the kept ones; return a code.
 
     Writes ranks into the table, and into pivots (V,) which row of the stack each row of W is.
-    work: at least 2 V numbers.
+    work: as `factorization_work` says.
     """
-    width = W.shape[1]
-    beta, zero, unused = W[V + width], work[:V], work[V:2 * V]
+    rows, basis, _, _, _ = _opened(W, pivots, work)
     rank, first = ZERO, ZERO
     if kept > 0:
         rank = table[kept - 1, 2]
@@ -106,98 +137,102 @@ def refactor(C, squares, table, kept, W, V, pivots, rank_tolerance, work):
             square = squares[slot + i - first]
             if not np.isfinite(square):
                 return NUMERICAL_FAILURE
-            zero[i], pivots[i] = rank_tolerance * rank_tolerance * square, i
-            for c in range(width):
-                W[i, c] = C[slot + i - first, c]
-        reflect_rows(W, beta, V, ZERO, above, first, last)
-        rank = factor_level(W, pivots, zero, unused, beta, V, first, last, rank)
+            rows.zero[i], rows.row[i] = rank_tolerance * rank_tolerance * square, i
+            for c in range(W.shape[1]):
+                rows.W[i, c] = C[slot + i - first, c]
+        reflect(basis, ZERO, above, rows.W, first, last)
+        rank = factor_level(rows, basis, first, last, rank)
         table[level, 2] = rank
         first = last
     return SOLVED
 
 
 @inlined
-def substitute(b, table, W, V, pivots, y, damping, threshold, work):
-    """Write y (rank,) for targets b (m,) by block forward substitution, see `staircase`."""
-    miss, of_block = work[:V], work[V:]
+def _substitute(b, table, factored, settings):
+    """Write y (rank,) for targets b (m,) by block forward substitution; return the rank."""
+    rows, _, y, _, of_block = factored
     first = above = ZERO
     for level in range(table.shape[0]):
         last, rank = first + table[level, 1], table[level, 2]
         for i in range(first, last):
-            miss[i] = b[pivots[i]]
-            for c in range(above):
-                miss[i] -= W[i, c] * y[c]  # p_i - J_i x_{i-1}, in (13)
-        solve_block(W, miss, y, first, last, above, rank, damping, threshold, of_block)
+            rows.miss[i] = b[rows.row[i]]
+        subtract(rows, y, first, last, above)  # p_i - J_i x_{i-1}, in (13)
+        solve_level(rows.W, rows.miss, y, Block(first, last, above, rank), settings, of_block)
         first, above = last, rank
     return above
 
 
 @compiled
-def resolve(b, x, r, Q, table, W, V, pivots, damping, threshold, work):
+def resolve(b, x, Q, table, W, pivots, settings, work):
     """Solve for targets b (m,); x (n,) comes in as the reference and goes out as the answer.
 
     Returns SOLVED, NUMERICAL_FAILURE with x = 0, or -(i + 1) where target i is not finite, and
     -(m + 1 + c) where entry c of the reference is not. work: as `factorization_work` says.
     """
-    n, width = x.size, W.shape[1]
-    beta, y, u, u0 = W[V + width], W[V + width + 1], W[V + width + 2], W[V + width + 3]
     for i in range(b.size):
         if not np.isfinite(b[i]):
             return -(i + 1)
     zero_reference = True
-    for c in range(n):
+    for c in range(x.size):
         if not np.isfinite(x[c]):
             return -(b.size + 1 + c)
         zero_reference &= x[c] == 0.0
-    rank = substitute(b, table, W, V, pivots, y, damping, threshold, work)
-    for k in range(width):
+    factored = _opened(W, pivots, work)
+    u, u0 = factored.of_x[0], factored.of_x[1]
+    rank = _substitute(b, table, factored, shared(settings))
+    for k in range(u.size):
         u[k] = u0[k] = 0.0
     if not zero_reference:
-        for k in range(r):
-            u[k] = u0[k] = dot(Q[k], x)
-        reflect_rows(W, beta, V, ZERO, rank, V + width + 2, V + width + 3)  # of q0, see (14)
-        if r == n:  # nothing of the reference is outside the basis but rounding
-            for c in range(n):
-                x[c] = 0.0
-            for k in range(width):
-                u0[k] = 0.0
-    lift(W, V, y, rank, V + width + 2)
-    for k in range(r):
+        _project_reference(x, Q, factored, rank)
+    _lift(factored, rank)
+    for k in range(Q.shape[0]):
         s, q = u[k] - u0[k], Q[k]
-        for c in range(n):
+        for c in range(x.size):
             x[c] += s * q[c]
     return finish(x, SOLVED)
 
 
 @inlined
-def lift(W, V, y, rank, row):
-    """Turn row `row` of W, with y in its first columns, into coordinates of Q."""
-    width = W.shape[1]
+def _project_reference(x, Q, factored, rank):
+    """Write Q^T q0 (14) into u0, and reflected into u."""
+    u, u0 = factored.of_x[0], factored.of_x[1]
+    for k in range(Q.shape[0]):
+        u[k] = u0[k] = dot(Q[k], x)
+    reflect(factored.basis, ZERO, rank, factored.of_x, ZERO, ZERO + 1)
+    if Q.shape[0] == x.size:  # nothing of the reference is outside the basis but rounding
+        for c in range(x.size):
+            x[c] = 0.0
+        for k in range(u0.size):
+            u0[k] = 0.0
+
+
+@inlined
+def _lift(factored, rank):
+    """Turn x, with y in its first columns, into coordinates of Q."""
     for c in range(rank):
-        W[row, c] = y[c]
-    for k in range(rank - 1, -1, -1):
-        reflect_rows(W, W[V + width], V, k, k + 1, row, row + 1)
+        factored.of_x[0, c] = factored.y[c]
+    reflect_back(factored.basis, rank, factored.of_x, ZERO, ZERO + 1)
 
 
 @compiled
-def resolve_units(Z, table, W, V, pivots, damping, threshold, work):
+def resolve_units(Z, table, W, pivots, settings, work):
     """Write into row i of Z (m, width) the answer to target i alone being 1, in coordinates of Q.
 
     With it G = Q Z^T and F = J G = C Z^T. work: as `factorization_work` says.
     """
     m, width = Z.shape
-    y, unit = W[V + width + 1], work[:m]
+    unit, factored = work[:m], _opened(W, pivots, work[m:])
     for i in range(m):
         for k in range(m):
             unit[k] = 1.0 if k == i else 0.0
-        rank = substitute(unit, table, W, V, pivots, y, damping, threshold, work[m:])
+        rank = _substitute(unit, table, factored, shared(settings))
         for k in range(width):
-            W[V + width + 2, k] = 0.0
-        lift(W, V, y, rank, V + width + 2)
+            factored.of_x[0, k] = 0.0
+        _lift(factored, rank)
         for k in range(width):
-            Z[i, k] = W[V + width + 2, k]
+            Z[i, k] = factored.of_x[0, k]
 
 
 def factorization_work(rows: int, width: int) -> int:
     """Return how many numbers of work space the kernels here need."""
-    return 2 * rows + (rows + width) * (width + 1)
+    return 3 * rows + (rows + width) * (width + 1)

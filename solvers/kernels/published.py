@@ -9,135 +9,188 @@ is filled up with zero columns to a square matrix.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from hierarchy.compiled import compiled
+from hierarchy.compiled import as_matrix, compiled, inlined
 from solvers.kernels.block import invert_triangle, orthogonalise_rows, smallest_square
-from solvers.kernels.rows import (
-    SOLVED,
-    TOO_SMALL,
-    ZERO,
-    finish,
-    load_rows,
-    make_reflector,
-    reflect_rows,
+from solvers.kernels.rows import ZERO, finish, load_rows, make_reflector, reflect, reflect_back
+from solvers.kernels.space import (
+    Basis,
+    View,
+    carve_basis,
+    integers,
+    matrix,
+    shared,
+    vector,
 )
-from solvers.kernels.staircase import staircase, staircase_work
+from solvers.kernels.staircase import carve_staircase, solve_by_staircase
+from solvers.status import SOLVED, TOO_SMALL
 
 
-@compiled
-def published_work(m, n):
-    """Return how many numbers of work space a hierarchy of m rows needs."""
-    return m + n + 1 + max((2 * m + 1) * max(m, n) + 2 * m + 5 * m * m, staircase_work(m, n))
+class Matrices(NamedTuple):
+    """What F comes from and goes into; N = max(m, n).
 
-
-@compiled
-def published(A, lower, upper, sizes, x, damping, threshold, rank_tolerance, work):
-    """Solve (14) with F of (10); x (n,) comes in as the reference and goes out as the answer.
-
-    x is zero on failure. work: at least published_work(m, n), of any content. Returns
-    SOLVED, NUMERICAL_FAILURE, TOO_SMALL, or -(i + 1) where row i is an inequality.
+    R (m, N): R^T, the rows of J reflected. basis: the m reflectors of Q. F (m, m): F^T. T (m, m):
+    R^-1. zero (m,): squared norms at or below which a row is nothing. rest: for m + 3 m^2 numbers.
     """
+
+    R: View
+    basis: Basis
+    F: View
+    T: View
+    zero: View
+    rest: View
+
+
+@inlined
+def _carve(work, at, m, n):
+    """Return Matrices for m rows of n unknowns, and where they end."""
+    N = max(m, n)
+    R, at = matrix(work, at, m, N)
+    basis, at = carve_basis(work, at, m, N)
+    F, at = matrix(work, at, m, m)
+    T, at = matrix(work, at, m, m)
+    zero, at = vector(work, at, m)
+    rest, at = vector(work, at, m + 3 * m * m)
+    return Matrices(R, basis, F, T, zero, rest), at
+
+
+@compiled
+def solve_as_published(A, lower, upper, sizes, x, settings, work):
+    """Solve (14) with F of (10); arguments and results as those of `solve_by_staircase`."""
     m, n = A.shape
-    if work.size < published_work(m, n):
+    matrices, at = _carve(work, 0, m, n)
+    u, at = vector(work, at, m)
+    of_x, at = matrix(work, at, 1, max(m, n))
+    _, end = _carve_inverse(work, at, m, n)
+    if end > work.size:
         return TOO_SMALL
-    N, of_rows = max(m, n), m + n + 1
-    of_squares = of_rows + (2 * m + 1) * N
-    u, least, whole = work[:m], work[m:m + n], work[m + n:of_rows].view(np.int64)
-    W = work[of_rows:of_squares].reshape((2 * m + 1, N))  # rows of J, reflectors of Q, then x
-    F = work[of_squares:of_squares + m * m].reshape((m, m))
-    T = work[of_squares + m * m:of_squares + 2 * m * m].reshape((m, m))
-    beta = work[of_squares + 2 * m * m:of_squares + 2 * m * m + m]
-    code = priority_matrix(A, lower, upper, sizes, x, W, beta, F, T, damping, threshold,
-                           rank_tolerance, work[of_squares + 2 * m * m + m:])
+    settings = shared(settings)
+    code = _fill(A, lower, upper, sizes, x, matrices, settings)
     if code != SOLVED:
         return finish(x, code)
-    tolerance, square = _tolerance(A, rank_tolerance), 0.0
+    tolerance, square = _tolerance(A, settings.rank_tolerance), 0.0
     for i in range(m):
         u[i] = 0.0
         for k in range(n):
             u[i] -= A[i, k] * x[k]
         for k in range(i, m):
-            square += T[i, k] * T[i, k]
+            square += matrices.T[i, k] * matrices.T[i, k]
     for k in range(m):
         for i in range(m):
-            u[i] += F[k, i] * lower[k]  # F p - J q0, of (14); F here is its transpose
+            u[i] += matrices.F[k, i] * lower[k]  # F p - J q0, of (14); F here is its transpose
     if square * tolerance * tolerance < 1.0:  # sigma_min(R) >= 1 / ||R^-1||_F > tolerance
-        for c in range(N):
-            W[2 * m, c] = 0.0
-        for i in range(m):
-            for k in range(i):
-                u[i] -= W[i, k] * u[k]
-            u[i] /= W[i, i]
-            W[2 * m, i] = u[i]
-        for k in range(m - 1, -1, -1):
-            reflect_rows(W, beta, m, k, k + 1, 2 * m, 2 * m + 1)  # (11)
-        for c in range(n):
-            x[c] += W[2 * m, c]
+        _add_inverse(matrices, u, of_x, x)
         return finish(x, SOLVED)
+    return finish(x, _add_least(A, u, x, settings, work[at:]))
+
+
+@inlined
+def _add_inverse(matrices, u, of_x, x):
+    """Add J^# u = Q [R^-T u; 0] to x (11)."""
+    m = u.size
+    for c in range(of_x.shape[1]):
+        of_x[0, c] = 0.0
+    for i in range(m):
+        for k in range(i):
+            u[i] -= matrices.R[i, k] * u[k]
+        u[i] /= matrices.R[i, i]
+        of_x[0, i] = u[i]
+    reflect_back(matrices.basis, m, of_x, ZERO, ZERO + 1)
+    for c in range(x.size):
+        x[c] += of_x[0, c]
+
+
+@inlined
+def _carve_inverse(work, at, m, n):
+    """Return what `_add_least` needs, and where it ends."""
+    undamped, at = vector(work, at, 3)
+    least, at = vector(work, at, n)
+    whole, at = integers(work, at, 1)
+    _, end = carve_staircase(work, at, m, n)
+    return (undamped, least, whole, work[at:]), end
+
+
+@inlined
+def _add_least(A, u, x, settings, work):
+    """Add J^# u, at any rank, to x; return the code of the staircase that finds it."""
+    m, n = A.shape
+    (undamped, least, whole, rest), _ = _carve_inverse(work, 0, m, n)
+    undamped[0], undamped[1], undamped[2] = 0.0, settings.threshold, settings.rank_tolerance
     whole[0] = m
     for c in range(n):
         least[c] = 0.0
-    code = staircase(A, u, u, whole, least, 0.0, threshold, rank_tolerance,
-                     work[of_rows:])  # J^# at any rank
+    code = solve_by_staircase(A, u, u, whole, least, undamped, rest)
     for c in range(n):
         x[c] += least[c]
-    return finish(x, code)
+    return code
 
 
 @compiled
-def priority_matrix(A, lower, upper, sizes, x, W, beta, F, T, damping, threshold, rank_tolerance,
-                    work):
-    """Write R^T into W, its reflectors below and into beta, F^T into F and R^-1 into T; a code.
-
-    Shapes, with N = max(m, n): W (>= 2 m, N), beta (m,), F (m, m), T (m, m). work: at least
-    m + 3 m^2 numbers, of any content.
-    """
+def _fill(A, lower, upper, sizes, x, matrices, settings):
+    """Write R, its reflectors, F and T; return a code."""
     m, n = A.shape
-    code = load_rows(W, beta, A, lower, upper, x, rank_tolerance)
+    R, basis, F, T, zero, rest = matrices
+    code = load_rows(R, zero, A, lower, upper, x, settings.rank_tolerance)
     if code != SOLVED:
         return code
-    for i in range(m):
-        for c in range(n, W.shape[1]):
-            W[i, c] = 0.0
-    for k in range(m):  # (8)
-        square = 0.0
-        for c in range(k, W.shape[1]):
-            W[m + k, c] = 0.0
-            square += W[k, c] * W[k, c]
-        zero, beta[k] = beta[k], 0.0
-        if square <= zero:  # nothing is left of the row: rounding error must not choose for it
-            for c in range(k, W.shape[1]):
-                W[k, c] = 0.0
-        else:
-            make_reflector(W, beta, m, k, k, square)
-            reflect_rows(W, beta, m, k, k + 1, k, m)
-    invert_triangle(W, T, ZERO, ZERO, m)
+    _factor(R, basis, zero, n)  # (8)
+    invert_triangle(R, T, ZERO, ZERO, m)
     for i in range(m):
         for k in range(m):
-            F[i, k] = W[k, i] if k >= i else 0.0  # (9)
-    entries, of_block, tolerance = work[:m], work[m:], _tolerance(A, rank_tolerance)
+            F[i, k] = R[k, i] if k >= i else 0.0  # (9)
+    entries, of_pivot, tolerance = rest[:m], rest[m:], _tolerance(A, settings.rank_tolerance)
     first = ZERO
     for level in range(sizes.size):
         last = first + sizes[level]
-        D = of_block[:(last - first) * (last - first)].reshape((last - first, last - first))
-        _invert_pivot(F, T, first, last, damping, threshold, tolerance, D,
-                      of_block[D.size:])
-        for k in range(first, m):  # step 2
-            for j in range(last - first):
-                entries[j] = F[first + j, k]
-            for i in range(last - first):
-                F[first + i, k] = 0.0
-                for j in range(last - first):
-                    F[first + i, k] += D[i, j] * entries[j]
-        for i in range(first):  # step 3
-            for j in range(last - first):
-                entries[j] = F[i, first + j]
-            for j in range(last - first):
-                for k in range(first, m):
-                    F[i, k] -= entries[j] * F[first + j, k]
+        p = last - first
+        D = as_matrix(of_pivot[:p * p], p, p)
+        _invert_pivot(F, T, first, settings, tolerance, D, of_pivot[D.size:])
+        _eliminate(F, D, entries, first, last)
         first = last
     return SOLVED
+
+
+@inlined
+def _factor(R, basis, zero, n):
+    """Make the QR of J^T, of which R comes in as J and goes out as R^T (8)."""
+    m, N = R.shape
+    for i in range(m):
+        for c in range(n, N):
+            R[i, c] = 0.0
+    for k in range(m):
+        square = 0.0
+        for c in range(k, N):
+            basis.V[k, c] = 0.0
+            square += R[k, c] * R[k, c]
+        basis.beta[k] = 0.0
+        if square <= zero[k]:  # nothing is left of the row: rounding error must not choose for it
+            for c in range(k, N):
+                R[k, c] = 0.0
+        else:
+            make_reflector(basis, k, R[k], square)
+            reflect(basis, k, k + 1, R, k, m)
+
+
+@inlined
+def _eliminate(F, D, entries, first, last):
+    """Do steps 2 and 3 of the elimination for one level, D being the inverse of its pivot."""
+    p = last - first
+    for k in range(first, F.shape[1]):  # step 2
+        for j in range(p):
+            entries[j] = F[first + j, k]
+        for i in range(p):
+            F[first + i, k] = 0.0
+            for j in range(p):
+                F[first + i, k] += D[i, j] * entries[j]
+    for i in range(first):  # step 3
+        for j in range(p):
+            entries[j] = F[i, first + j]
+        for j in range(p):
+            for k in range(first, F.shape[1]):
+                F[i, k] -= entries[j] * F[first + j, k]
 
 
 @compiled
@@ -153,12 +206,13 @@ def _tolerance(A, rank_tolerance):
 
 
 @compiled
-def _invert_pivot(F, T, first, last, damping, threshold, tolerance, D, work):
+def _invert_pivot(F, T, first, settings, tolerance, D, work):
     """Write R_ii^# into D, damped where its smallest singular value is small.
 
     That is R^T (R R^T + lambda^2 I)^-1. work: twice the size of D, of any content.
     """
-    p, square = last - first, 0.0
+    damping, threshold = settings.damping, settings.threshold
+    p, square = D.shape[0], 0.0
     for i in range(p):
         for j in range(p):
             D[i, j] = T[first + i, first + j]
@@ -166,7 +220,7 @@ def _invert_pivot(F, T, first, last, damping, threshold, tolerance, D, work):
     enough = max(tolerance, threshold) if damping > 0.0 else tolerance
     if square * enough * enough < 1.0:
         return
-    S, U = work[:p * p].reshape((p, p)), work[p * p:2 * p * p].reshape((p, p))
+    S, U = as_matrix(work[:p * p], p, p), as_matrix(work[p * p:2 * p * p], p, p)
     for i in range(p):
         for j in range(p):
             U[i, j] = 1.0 if i == j else 0.0
@@ -183,3 +237,18 @@ def _invert_pivot(F, T, first, last, damping, threshold, tolerance, D, work):
             for i in range(p):
                 for j in range(p):
                     D[i, j] += S[k, i] * U[k, j] / (square + damped)
+
+
+@compiled
+def matrix_as_published(A, lower, upper, sizes, F, settings, work):
+    """Write F^T of (10) into F (m, m); return SOLVED, NUMERICAL_FAILURE or TOO_SMALL."""
+    m, n = A.shape
+    matrices, at = _carve(work, 0, m, n)
+    zero, at = vector(work, at, 0)
+    if at > work.size:
+        return TOO_SMALL
+    code = _fill(A, lower, upper, sizes, zero, matrices, shared(settings))
+    for i in range(m):
+        for k in range(m):
+            F[i, k] = matrices.F[i, k]
+    return code

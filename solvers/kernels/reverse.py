@@ -13,66 +13,70 @@ finds it at any rank, and no pseudoinverse is formed.
 
 from __future__ import annotations
 
-import numpy as np
-
-from hierarchy.compiled import compiled
-from solvers.kernels.rows import NUMERICAL_FAILURE, SOLVED, TOO_SMALL, finish
-from solvers.kernels.staircase import staircase, staircase_work
-
-
-@compiled
-def reverse_work(m, n, levels):
-    """Return how many numbers of work space a hierarchy needs."""
-    return staircase_work(m, n) + m + 2 * n + levels
+from hierarchy.compiled import compiled, inlined
+from solvers.kernels.rows import finish
+from solvers.kernels.space import integers, vector
+from solvers.kernels.staircase import carve_staircase, solve_by_staircase
+from solvers.status import NUMERICAL_FAILURE, SOLVED, TOO_SMALL
 
 
 @compiled
-def reverse(A, lower, upper, sizes, x, in_order, damping, threshold, rank_tolerance, work):
+def reverse(A, lower, upper, sizes, x, settings, work):
     """Solve; x (n,) comes in as the reference and goes out as the answer, zero on failure.
 
-    in_order: the rows below are changed least level by level, the upper ones first, in place of
-    all alike. work: at least reverse_work(m, n, levels), of any content. Returns SOLVED,
-    NUMERICAL_FAILURE, TOO_SMALL, or -(i + 1) where row i is an inequality.
+    settings: damping, threshold, rank_tolerance, and whether the rows below are changed least level
+    by level, the upper ones first, in place of all alike. Else as `solve_by_staircase`.
     """
     m, n = A.shape
-    levels = sizes.size
-    if work.size < reverse_work(m, n, levels):
+    asked, at = vector(work, 0, m)
+    d, at = vector(work, at, n)
+    reference, at = vector(work, at, n)
+    parts, at = integers(work, at, sizes.size)
+    _, end = carve_staircase(work, at, m, n)
+    if end > work.size:
         return TOO_SMALL
-    asked, d, reference = work[:m], work[m:m + n], work[m + n:m + 2 * n]
-    at = m + 2 * n
-    parts = work[at:at + levels].view(np.int64)
-    of_staircase = work[at + levels:]
     for i in range(m):
         if lower[i] != upper[i]:
             return finish(x, -(i + 1) if lower[i] < upper[i] else NUMERICAL_FAILURE)
         asked[i] = 0.0
     for c in range(n):
-        reference[c] = x[c]
-        x[c] = 0.0
-    for k in range(levels):
-        parts[k] = sizes[k]
-
+        reference[c], x[c] = x[c], 0.0
     first = m
-    for k in range(levels - 1, -1, -1):
+    for k in range(sizes.size - 1, -1, -1):
         last, first = first, first - sizes[k]
-        for i in range(first, last):
-            asked[i] = lower[i]
-            for c in range(n):
-                asked[i] -= A[i, c] * x[c]  # b_k - J_k x_{k+1}
-        two = parts[k:] if in_order else parts[k:k + 2]
-        if not in_order and k + 1 < levels:
-            two[1] = m - last
         for c in range(n):
             d[c] = 0.0 if k > 0 else reference[c]  # nothing sees what J_RA of all levels leaves
-        code = staircase(A[first:], asked[first:], asked[first:], two, d, damping, threshold,
-                         rank_tolerance, of_staircase)
+        _ask(A, lower, x, asked, first, last)
+        two = parts[k:_end_of_parts(sizes, parts, k, m - last, settings[3] > 0.0)]
+        code = solve_by_staircase(A[first:], asked[first:], asked[first:], two, d, settings,
+                                  work[at:])
         if code != SOLVED:
             return finish(x, code)
         for c in range(n):
             x[c] += d[c]
         for i in range(first, last):
             asked[i] = 0.0
-    if levels == 0:
+    if sizes.size == 0:
         for c in range(n):
             x[c] = reference[c]
     return finish(x, SOLVED)
+
+
+@inlined
+def _ask(A, b, x, asked, first, last):
+    """Ask of a level what it misses, b_k - J_k x_{k+1}."""
+    for i in range(first, last):
+        asked[i] = b[i]
+        for c in range(x.size):
+            asked[i] -= A[i, c] * x[c]
+
+
+@inlined
+def _end_of_parts(sizes, parts, k, below, in_order):
+    """Write the rows of level k, and of each below it or of all as one; return where they end."""
+    levels = sizes.size
+    parts[k] = sizes[k]
+    if in_order or k + 1 == levels:
+        return levels
+    parts[k + 1] = below
+    return k + 2

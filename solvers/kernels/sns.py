@@ -17,38 +17,114 @@ No projector is formed here: saturated joints and the task have columns of Q, se
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from hierarchy.compiled import compiled, inlined
-from solvers.kernels.block import solve_block
+from solvers.kernels.block import solve_level
 from solvers.kernels.held import (
     NO_JOINT,
     SLACK,
-    enter,
+    Held,
+    carve_box,
+    carve_held,
     hold,
     hold_again,
-    leave,
-    places,
+    side_of_box,
     to_reference,
 )
-from solvers.kernels.rows import (
-    NUMERICAL_FAILURE,
-    SOLVED,
-    TOO_SMALL,
-    ZERO,
-    factor_level,
-    finish,
-    load_rows,
+from solvers.kernels.rows import ZERO, factor_level, finish, load_rows, reflect, reflect_back
+from solvers.kernels.space import (
+    Basis,
+    Block,
+    Rows,
+    Settings,
+    View,
+    carve_basis,
+    carve_rows,
+    matrix,
+    shared,
+    vector,
 )
-from solvers.kernels.staircase import staircase
+from solvers.kernels.staircase import carve_staircase, solve_by_staircase
+from solvers.status import CONTRADICTION, NUMERICAL_FAILURE, SOLVED, TOO_SMALL
 
-CONTRADICTION = 9  # no value of solvers.Status: two bounds of one unknown exclude each other
+
+class Options(NamedTuple):
+    """The settings that all resolvers share, and two.
+
+    release: whether saturated joints are released. of_miss: whether s scales what a task misses,
+    in place of b.
+    """
+
+    shared: Settings
+    release: View
+    of_miss: View
 
 
-@compiled
-def sns_work(m, n):
-    """Return how many numbers of work space a hierarchy needs, m rows without the bounds."""
-    return (2 * m + 3 * n + 9) * n + 5 * m + n + (m + n) * (n + 1) + 3 * n
+class Tasks(NamedTuple):
+    """Rows of all levels below the bounds."""
+
+    J: View
+    lower: View
+    upper: View
+    sizes: View
+
+
+class Task(NamedTuple):
+    """The rows of one task: J (p, n), b (p,); zero (p,): squared norms that are nothing."""
+
+    J: View
+    b: View
+    zero: View
+
+
+class Columns(NamedTuple):
+    """Where columns of Q end: of the tasks above, of the saturated joints, of the task."""
+
+    above: View
+    joints: View
+    task: View
+
+
+class Space(NamedTuple):
+    """What is written on the way.
+
+    held: saturated joints, and Q. kept: the reflectors of the tasks alone. rows: the task's rows,
+    factored. seen (m, n): the same in Q, not factored. now (m,): J_k x_{k-1}. zero (m,): of all
+    tasks. line (2, n): a and c of x_k(s) = s a + c. y_a (n,): a in Q. trial (1, n), best (n,):
+    steps. of_block: work space of `solve_level`.
+    """
+
+    held: Held
+    kept: Basis
+    rows: Rows
+    seen: View
+    now: View
+    zero: View
+    line: View
+    y_a: View
+    trial: View
+    best: View
+    of_block: View
+
+
+@inlined
+def _carve(work, at, m, n):
+    """Return Space for m rows of n joints, and where it ends."""
+    held, at = carve_held(work, at, n)
+    kept, at = carve_basis(work, at, n, n)
+    rows, at = carve_rows(work, at, m, n)
+    seen, at = matrix(work, at, m, n)
+    now, at = vector(work, at, m)
+    zero, at = vector(work, at, m)
+    line, at = matrix(work, at, 2, n)
+    y_a, at = vector(work, at, n)
+    trial, at = matrix(work, at, 1, n)
+    best, at = vector(work, at, n)
+    of_block, at = vector(work, at, (m + n) * (n + 1))
+    return Space(held, kept, rows, seen, now, zero, line, y_a, trial, best, of_block), at
 
 
 @compiled
@@ -57,18 +133,18 @@ def sns(A, lower, upper, sizes, x, record, settings, work):
 
     record (n + L + 1,) goes out as: +1, -1, 2 where x is at its upper, lower, only bound, else 0;
     the scaling of each level; the saturated sets tried. settings: damping, threshold,
-    rank_tolerance, whether saturated joints are released, and whether s scales what a task misses
-    in place of b. work: at least sns_work(m, n), of any content. Returns SOLVED, NUMERICAL_FAILURE,
-    TOO_SMALL, CONTRADICTION with the row at the end of the record, or -(i + 1) where row i is an
-    inequality that is not handled.
+    rank_tolerance, and the rest of `Options`. work: of any content. Returns SOLVED,
+    NUMERICAL_FAILURE, TOO_SMALL, CONTRADICTION with the row at the end of the record, or -(i + 1)
+    where row i is an inequality that is not handled.
     """
-    n = A.shape[1]
+    m, n = A.shape
     bounds = _bounds_above(lower, upper, sizes)
-    J, b, b_up, tasks = A[bounds:], lower[bounds:], upper[bounds:], sizes[min(bounds, 1):]
-    size = sns_work(b.size, n)
-    if work.size < size:
+    tasks = Tasks(A[bounds:], lower[bounds:], upper[bounds:], sizes[min(bounds, 1):])
+    box, at = carve_box(work, 0, n)
+    _, of_equalities = carve_staircase(work, at, m - bounds, n)
+    _, of_tasks = _carve(work, at, m - bounds, n)
+    if max(of_equalities, of_tasks) > work.size:
         return TOO_SMALL
-    box = work[size - 3 * n:size].reshape((3, n))  # lower and upper side, and the reference
     for i in range(record.size):
         record[i] = 1.0 if i >= n else 0.0
     code = _read_box(A, lower, upper, bounds, box, record)
@@ -77,19 +153,25 @@ def sns(A, lower, upper, sizes, x, record, settings, work):
     if code != SOLVED:
         return finish(x, code)
     for c in range(n):
-        box[2, c] = x[c]
+        box.reference[c] = x[c]
     if bounds == 0:
-        code = staircase(J, b, b_up, tasks, x, settings[0], settings[1], settings[2], work)
+        code = solve_by_staircase(A, lower, upper, sizes, x, settings, work[at:])
     else:
-        code = _saturate(J, b, b_up, tasks, x, box, record[n + 1:], settings, work)
+        code = _saturate(tasks, x, box, record[n + 1:], settings, work[at:])
     if code != SOLVED:
         return code - bounds if code < 0 else finish(x, code)
-    for c in range(n):
-        if _touches(x[c], box[1, c]):
-            x[c], record[c] = box[1, c], 2.0 if box[0, c] == box[1, c] else 1.0
-        elif _touches(x[c], box[0, c]):
-            x[c], record[c] = box[0, c], -1.0
+    _record_bounds(x, box, record)
     return finish(x, SOLVED)
+
+
+@inlined
+def _record_bounds(x, box, record):
+    """Put x on the bounds that it touches, and write which."""
+    for c in range(x.size):
+        if _touches(x[c], box.up[c]):
+            x[c], record[c] = box.up[c], 2.0 if box.low[c] == box.up[c] else 1.0
+        elif _touches(x[c], box.low[c]):
+            x[c], record[c] = box.low[c], -1.0
 
 
 @inlined
@@ -110,10 +192,9 @@ def _bounds_above(lower, upper, sizes):
 
 @inlined
 def _read_box(A, lower, upper, bounds, box, record):
-    """Write the sides of the box into box[:2]; returns as `sns`."""
-    n = A.shape[1]
-    for c in range(n):
-        box[0, c], box[1, c] = -np.inf, np.inf
+    """Write the sides of the box; returns as `sns`."""
+    for c in range(A.shape[1]):
+        box.low[c], box.up[c] = -np.inf, np.inf
     refused = bounds  # the first inequality, where an equality beside it does not fit
     for i in range(bounds - 1, -1, -1):
         refused = i if lower[i] < upper[i] else refused
@@ -122,7 +203,7 @@ def _read_box(A, lower, upper, bounds, box, record):
         if not low <= up or low == np.inf or up == -np.inf:
             return NUMERICAL_FAILURE
         at, entries = 0, 0
-        for c in range(n):
+        for c in range(A.shape[1]):
             if not np.isfinite(A[i, c]):
                 return NUMERICAL_FAILURE
             if A[i, c] != 0.0:
@@ -130,157 +211,175 @@ def _read_box(A, lower, upper, bounds, box, record):
         if entries != 1:
             return -((i if low < up else refused) + 1)
         low, up = low / A[i, at], up / A[i, at]
-        box[0, at] = max(min(low, up), box[0, at])
-        box[1, at] = min(max(low, up), box[1, at])
-        if box[0, at] > box[1, at]:
-            if box[0, at] - box[1, at] > SLACK * (1.0 + abs(box[0, at])):
+        box.low[at] = max(min(low, up), box.low[at])
+        box.up[at] = min(max(low, up), box.up[at])
+        if box.low[at] > box.up[at]:
+            if box.low[at] - box.up[at] > SLACK * (1.0 + abs(box.low[at])):
                 record[record.size - 1] = i
                 return CONTRADICTION
-            box[0, at] = box[1, at]
+            box.low[at] = box.up[at]
     return SOLVED
 
 
 @compiled
-def _saturate(J, b, b_up, sizes, x, box, record, settings, work):
+def _saturate(tasks, x, box, record, settings, work):
     """Solve level after level inside the box, then go to the reference; see `sns`."""
-    m, n = J.shape
-    rows = 2 * m + 3 * n + 9
-    W, at = work[:rows * n].reshape((rows, n)), rows * n
-    of_rows, at = work[at:at + 4 * m].reshape((4, m)), at + 4 * m
-    row, joint = work[at:at + m].view(np.int64), work[at + m:at + m + n].view(np.int64)
-    of_block = work[at + m + n:]
-    code = load_rows(W, of_rows[0], J, b, b_up, box[2], settings[2])
+    m, n = tasks.J.shape
+    space, _ = _carve(work, 0, m, n)
+    options = Options(shared(settings), settings[3] > 0.0, settings[4] > 0.0)
+    code = load_rows(space.rows.W, space.zero, tasks.J, tasks.lower, tasks.upper, box.reference,
+                     options.shared.rank_tolerance)
     if code != SOLVED:
         return code
     for c in range(n):
-        x[c] = min(max(0.0, box[0, c]), box[1, c])  # x_0, which the paper takes to be zero
+        x[c] = min(max(0.0, box.low[c]), box.up[c])  # x_0, which the paper takes to be zero
     first = above = tried = ZERO
-    for k in range(sizes.size):
-        last = first + sizes[k]
-        record[k], above, sets = _level(J, b, x, box, W, of_rows, row, joint, first, last, above,
-                                        settings, of_block)
+    for k in range(tasks.sizes.size):
+        last = first + tasks.sizes[k]
+        task = Task(tasks.J[first:last], tasks.lower[first:last], space.zero[first:last])
+        record[k], above, sets = _level(task, x, box, space, above, options)
         first, tried = last, tried + sets
-    record[sizes.size] = tried + to_reference(m, x, box, W, joint, above, settings[3] > 0.0)
+    steps = to_reference(space.held, box, x, space.line, above, options.release)
+    record[tasks.sizes.size] = tried + steps
     return SOLVED
 
 
-@compiled
-def _level(J, b, x, box, W, of_rows, row, joint, first, last, above, settings, of_block):
-    """Move x by one task: rows first .. last - 1 of J, behind columns 0 .. above - 1 of Q.
+@inlined
+def _level(task, x, box, space, above, options):
+    """Move x by one task, behind columns 0 .. above - 1 of Q.
 
     Returns its scaling, the columns of Q with those of the task alone, and the sets tried.
     """
-    m, n = J.shape
-    V, S, E, U, X = places(m, n)
-    a, c, y_a, y, best, trial = W[X], W[X + 1], W[X + 2], W[X + 3], W[X + 4], W[X + 8]
-    beta, held = W[X + 5], W[X + 6]
-    zero, miss, now = of_rows[1], of_rows[2], of_rows[3]
-    for j in range(n):
-        held[j] = 0.0
-    for i in range(first, last):
-        now[i] = 0.0
-        for j in range(n):
-            now[i] += J[i, j] * x[j]
-    _see(J, W, beta, S, U, first, last, above)
+    held, tolerance = space.held, options.shared.rank_tolerance
+    seen = space.seen[:task.b.size]
+    _begin(task, x, space)
+    _see(task, held.basis, seen, above)
     rank, taken, largest, sets = above, ZERO, -1.0, 0
-    release = settings[3] > 0.0
-    while sets < 2 * n + 2:  # the basic form saturates n joints at most
+    while sets < 2 * x.size + 2:  # the basic form saturates n joints at most
         sets += 1
         begin = above + taken
-        for i in range(first, last):
-            row[i], zero[i] = i, of_rows[0, i]
-            for j in range(n):
-                W[i, j] = W[S + i, j]
-        end = factor_level(W, row, zero, miss, beta, U, first, last, begin)
+        end = _factor(task, space, begin)  # J_k Pbar_k
         if sets == 1:
             rank = end
-            _copy_reflectors(W, U, V, above, rank)
-            for k in range(above, rank):
-                W[X + 7, k] = beta[k]
+            _copy_reflectors(held.basis, space.kept, above, rank)
         elif end - begin < rank - above:  # rank(J_k Pbar_k) < rank(J_k P_{k-1})
             break
-        _line(b, x, W, beta, U, X, row, miss, now, first, last, above, begin, end, settings,
-              of_block)
-        s, critical = _scaling(a, c, box, held)
-        if s >= max(largest, 0.0):
-            for k in range(n):
-                trial[k] = 0.0
-                if above <= k < end:
-                    trial[k] = y[k] + s * y_a[k] if k >= begin else y[k]
-            leave(W, beta, U, end, X + 8, X + 9)
-            if _fits(x, trial, box):
-                largest = s
-                for k in range(n):
-                    best[k] = trial[k]
-        at = s if s >= 0.0 else 1.0
-        if release and _release(W, E, y, y_a, at, joint, held, first, above, begin, end):
-            _see(J, W, beta, S, U, first, last, above)
-            taken = hold_again(W, m, x, box, beta, y, held, joint, above, taken, first, last,
-                               settings[2])
+        at = Columns(above, begin, end)
+        _write_line(task, x, space, at, options)
+        s, critical = _scaling(space.line[0], space.line[1], box, held.side)
+        if s >= max(largest, 0.0) and _improves(x, box, space, at, s):
+            largest = s
+        if options.release and _release(space, at, s if s >= 0.0 else 1.0):
+            _see(task, held.basis, seen, above)
+            taken = hold_again(held, seen, x, box, above, taken, tolerance)
             continue
         if s == 1.0 or critical == NO_JOINT:
             break
-        held[critical] = 1.0 if a[critical] + c[critical] > box[1, critical] else -1.0
-        side = box[1, critical] if held[critical] > 0.0 else box[0, critical]
-        taken = hold(W, m, beta, y, held, joint, critical, side - x[critical], above, taken, first,
-                     last, settings[2])
+        taken = _hold_critical(critical, x, box, space, seen, at, tolerance)
         if above + taken == begin:  # tasks above and saturated joints hold it already
             break
-    _copy_reflectors(W, V, U, above, rank)
-    for k in range(above, rank):
-        beta[k] = W[X + 7, k]
+    _copy_reflectors(space.kept, held.basis, above, rank)
     if largest >= 0.0:
-        for j in range(n):
-            x[j] = min(max(x[j] + best[j], box[0, j]), box[1, j])
+        for j in range(x.size):
+            x[j] = min(max(x[j] + space.best[j], box.low[j]), box.up[j])
     return max(largest, 0.0), rank, sets
 
 
+@inlined
+def _begin(task, x, space):
+    """Begin with no joint saturated, W_k = I; write what the task has now."""
+    for j in range(x.size):
+        space.held.side[j] = 0.0
+    for i in range(task.b.size):
+        space.now[i] = 0.0
+        for j in range(x.size):
+            space.now[i] += task.J[i, j] * x[j]
+
+
 @compiled
-def _line(b, x, W, beta, U, X, row, miss, now, first, last, above, begin, end, settings, of_block):
-    """Write a, c with x_k(s) = s a + c and the steps y_a, y in Q behind them into W[X:X + 4].
+def _see(task, basis, seen, above):
+    """Write the task's rows as seen in the columns of the tasks above."""
+    for i in range(task.b.size):
+        for j in range(seen.shape[1]):
+            seen[i, j] = task.J[i, j]
+    reflect(basis, ZERO, above, seen, ZERO, task.b.size)
 
-    Columns above .. begin - 1 of y, those of the saturated joints, come in.
+
+@inlined
+def _factor(task, space, begin):
+    """Factor the rows seen behind the first `begin` columns of Q; return where theirs end."""
+    rows = space.rows
+    for i in range(task.b.size):
+        rows.row[i], rows.zero[i] = i, task.zero[i]
+        for j in range(rows.W.shape[1]):
+            rows.W[i, j] = space.seen[i, j]
+    return factor_level(rows, space.held.basis, ZERO, task.b.size, begin)
+
+
+@inlined
+def _hold_critical(j, x, box, space, seen, at, least):
+    """Saturate the critical joint; return how many joints are saturated then."""
+    held, a, c = space.held, space.line[0], space.line[1]
+    held.side[j] = 1.0 if a[j] + c[j] > box.up[j] else -1.0
+    way = side_of_box(box, held, j) - x[j]
+    return hold(held, seen, j, way, at.above, at.joints - at.above, least)
+
+
+@compiled
+def _write_line(task, x, space, at, options):
+    """Write a and c with x_k(s) = s a + c, and the steps behind them, y_a and y in Q.
+
+    y comes in with the columns of the saturated joints.
     """
-    a, c, y_a, y = W[X], W[X + 1], W[X + 2], W[X + 3]
-    of_miss = settings[4] > 0.0
-    for i in range(first, last):
-        miss[i] = b[row[i]] - (now[row[i]] if of_miss else 0.0)
-    solve_block(W, miss, y_a, first, last, begin, end, settings[0], settings[1], of_block)
-    for i in range(first, last):
-        miss[i] = 0.0 if of_miss else -now[row[i]]
-        for k in range(above, begin):
-            miss[i] -= W[i, k] * y[k]
-    solve_block(W, miss, y, first, last, begin, end, settings[0], settings[1], of_block)
-    for k in range(a.size):
-        a[k] = y_a[k] if begin <= k < end else 0.0
-        c[k] = y[k] if above <= k < end else 0.0
-    leave(W, beta, U, end, X, X + 2)
-    for j in range(a.size):
-        c[j] += x[j]
+    rows, now, y, y_a, of_miss = space.rows, space.now, space.held.y, space.y_a, options.of_miss
+    size, line = task.b.size, space.line
+    block = Block(ZERO, size, at.joints, at.task)
+    for i in range(size):
+        rows.miss[i] = task.b[rows.row[i]] - (now[rows.row[i]] if of_miss else 0.0)
+    solve_level(rows.W, rows.miss, y_a, block, options.shared, space.of_block)
+    for i in range(size):
+        rows.miss[i] = 0.0 if of_miss else -now[rows.row[i]]
+        for k in range(at.above, at.joints):
+            rows.miss[i] -= rows.W[i, k] * y[k]
+    solve_level(rows.W, rows.miss, y, block, options.shared, space.of_block)
+    for k in range(x.size):
+        line[0, k] = y_a[k] if at.joints <= k < at.task else 0.0
+        line[1, k] = y[k] if at.above <= k < at.task else 0.0
+    reflect_back(space.held.basis, at.task, line, ZERO, ZERO + 2)
+    for j in range(x.size):
+        line[1, j] += x[j]
 
 
 @inlined
-def _see(J, W, beta, S, U, first, last, above):
-    """Write the task's rows, as seen in the columns of the tasks above, into W[S:]."""
-    for i in range(first, last):
-        for j in range(J.shape[1]):
-            W[S + i, j] = J[i, j]
-    enter(W, beta, U, above, S + first, S + last)
-
-
-@inlined
-def _copy_reflectors(W, source, target, k0, k1):
+def _copy_reflectors(source, target, k0, k1):
     """Copy reflectors k0 .. k1 - 1."""
     for k in range(k0, k1):
-        for j in range(k, W.shape[1]):
-            W[target + k, j] = W[source + k, j]
+        target.beta[k] = source.beta[k]
+        for j in range(k, source.V.shape[1]):
+            target.V[k, j] = source.V[k, j]
+
+
+@inlined
+def _improves(x, box, space, at, s):
+    """Write the step to x_k(s), and as the best if it is in the box; say whether it is."""
+    y, y_a, trial = space.held.y, space.y_a, space.trial
+    for k in range(x.size):
+        trial[0, k] = 0.0
+        if at.above <= k < at.task:
+            trial[0, k] = y[k] + s * y_a[k] if k >= at.joints else y[k]
+    reflect_back(space.held.basis, at.task, trial, ZERO, ZERO + 1)
+    inside = _fits(x, trial[0], box)
+    if inside:
+        for k in range(x.size):
+            space.best[k] = trial[0, k]
+    return inside
 
 
 @inlined
 def _fits(x, step, box):
     """Whether x + step is in the box, to what cancellation in a large step leaves of it."""
     for j in range(x.size):
-        low, up = box[0, j], box[1, j]
+        low, up = box.low[j], box.up[j]
         if x[j] + step[j] > up + 10.0 * SLACK * (1.0 + abs(up)):
             return False
         if x[j] + step[j] < low - 10.0 * SLACK * (1.0 + abs(low)):
@@ -289,7 +388,7 @@ def _fits(x, step, box):
 
 
 @compiled
-def _scaling(a, c, box, held):
+def _scaling(a, c, box, side):
     """The largest s <= 1 for which s a + c is in the box, or -1, and the most critical joint.
 
     A joint that is out at s = 1 is critical at the largest s at which it is still in; where all
@@ -299,10 +398,11 @@ def _scaling(a, c, box, held):
     for j in range(a.size):
         if not np.isfinite(a[j] + c[j]):
             return -1.0, NO_JOINT
-        if held[j] != 0.0:
+        if side[j] != 0.0:
             continue
-        low = box[0, j] - c[j] - SLACK * (1.0 + abs(box[0, j])) if box[0, j] > -np.inf else -np.inf
-        up = box[1, j] - c[j] + SLACK * (1.0 + abs(box[1, j])) if box[1, j] < np.inf else np.inf
+        low, up = box.low[j], box.up[j]
+        low = low - c[j] - SLACK * (1.0 + abs(low)) if low > -np.inf else low
+        up = up - c[j] + SLACK * (1.0 + abs(up)) if up < np.inf else up
         if a[j] != 0.0:
             s_min, s_max = min(low / a[j], up / a[j]), max(low / a[j], up / a[j])
         else:
@@ -319,26 +419,28 @@ def _scaling(a, c, box, held):
 
 
 @compiled
-def _release(W, E, y, y_a, s, joint, held, first, above, begin, end):
+def _release(space, at, s):
     """Release the saturated joints whose multiplier has the wrong sign; return whether any had.
 
     The multipliers are those of the least ||x_k - x_{k-1}|| with J_k x_k and the joints as they
     are: y + F^T nu + E^T mu = 0, where mu must push a joint against its bound.
     """
+    held, W, y_a = space.held, space.rows.W, space.y_a
+    E, y, above, begin = held.E, held.y, at.above, at.joints
     size = 0.0
-    for k in range(above, end):
+    for k in range(above, at.task):
         size = max(size, abs(y[k] + s * y_a[k]) if k >= begin else abs(y[k]))
-    for k in range(end - 1, above - 1, -1):  # nu, then mu, take the place of y_a
+    for k in range(at.task - 1, above - 1, -1):  # nu, then mu, take the place of y_a
         pull = -y[k] - s * y_a[k] if k >= begin else -y[k]
-        for i in range(max(k + 1, begin), end):
-            pull -= W[first + i - begin, k] * y_a[i]
+        for i in range(max(k + 1, begin), at.task):
+            pull -= W[i - begin, k] * y_a[i]
         for i in range(k + 1, begin):
-            pull -= W[E + i - above, k] * y_a[i]
-        y_a[k] = pull / (W[first + k - begin, k] if k >= begin else W[E + k - above, k])
+            pull -= E[i - above, k] * y_a[i]
+        y_a[k] = pull / (W[k - begin, k] if k >= begin else E[k - above, k])
     wrong = False
     for t in range(begin - above):
-        if y_a[above + t] * held[joint[t]] < -SLACK * size:
-            held[joint[t]] = 0.0
+        j = held.joint[t]
+        if y_a[above + t] * held.side[j] < -SLACK * size:
+            held.side[j] = 0.0
             wrong = True
     return wrong
-

@@ -10,70 +10,107 @@ recursion (5), (13) in other coordinates. The columns of Q that no level took ca
 
 from __future__ import annotations
 
-import numpy as np
+from typing import NamedTuple
 
-from hierarchy.compiled import compiled
-from solvers.kernels.block import solve_block
-from solvers.kernels.rows import (
-    SOLVED,
-    TOO_SMALL,
-    ZERO,
-    factor_level,
-    finish,
-    load_rows,
-    reflect_rows,
+from hierarchy.compiled import compiled, inlined
+from solvers.kernels.block import solve_level
+from solvers.kernels.rows import ZERO, factor_level, finish, load_rows, reflect, reflect_back
+from solvers.kernels.space import (
+    Basis,
+    Block,
+    Rows,
+    View,
+    carve_basis,
+    carve_rows,
+    matrix,
+    shared,
+    vector,
 )
+from solvers.status import SOLVED, TOO_SMALL
+
+
+class Staircase(NamedTuple):
+    """The rows in coordinates of Q.
+
+    basis: the reflectors of Q. rows: the rows of J Q. y (n,): the answer in the columns that the
+    levels took. of_x (1, n): x, to be reflected. of_block: work space of `solve_level`.
+    """
+
+    basis: Basis
+    rows: Rows
+    y: View
+    of_x: View
+    of_block: View
+
+
+@inlined
+def carve_staircase(work, at, m, n):
+    """Return a Staircase for m rows of n unknowns, and where it ends."""
+    basis, at = carve_basis(work, at, n, n)
+    rows, at = carve_rows(work, at, m, n)
+    y, at = vector(work, at, n)
+    of_x, at = matrix(work, at, 1, n)
+    of_block, at = vector(work, at, (m + n) * (n + 1))
+    return Staircase(basis, rows, y, of_x, of_block), at
 
 
 @compiled
-def staircase_work(m, n):
-    """Return how many numbers of work space a hierarchy of m rows needs."""
-    return (2 * m + 2 * n + 4) * n + 4 * m
-
-
-@compiled
-def staircase(A, lower, upper, sizes, x, damping, threshold, rank_tolerance, work):
+def solve_by_staircase(A, lower, upper, sizes, x, settings, work):
     """Solve; x (n,) comes in as the reference and goes out as the answer, zero on failure.
 
-    work: at least staircase_work(m, n), of any content. Returns SOLVED, NUMERICAL_FAILURE,
-    TOO_SMALL, or -(i + 1) where row i is an inequality.
+    settings: an array that begins with damping, threshold, rank_tolerance. work: of any content.
+    Returns SOLVED, NUMERICAL_FAILURE, TOO_SMALL, or -(i + 1) where row i is an inequality.
     """
     m, n = A.shape
-    if work.size < staircase_work(m, n):
+    (basis, rows, y, of_x, of_block), at = carve_staircase(work, 0, m, n)
+    if at > work.size:
         return TOO_SMALL
-    V, X, of_rows = m, m + n, (m + n + 3) * n
-    W = work[:of_rows].reshape((m + n + 3, n))  # rows of J, then of Q's reflectors, then x
-    beta, y = W[X + 1], W[X + 2]
-    zero, miss = work[of_rows:of_rows + m], work[of_rows + m:of_rows + 2 * m]
-    row = work[of_rows + 2 * m:of_rows + 3 * m].view(np.int64)  # the pivot order, not asked for
-    of_block = work[of_rows + 3 * m:]
-    code = load_rows(W, zero, A, lower, upper, x, rank_tolerance)
+    settings = shared(settings)
+    code = load_rows(rows.W, rows.zero, A, lower, upper, x, settings.rank_tolerance)
     if code != SOLVED:
         return finish(x, code)
-    for i in range(m):
-        miss[i] = lower[i]
 
     rank = first = ZERO
     for level in range(sizes.size):
         last, above = first + sizes[level], rank
-        reflect_rows(W, beta, V, ZERO, above, first, last)  # J_i Q: the level as seen from above
-        rank = factor_level(W, row, zero, miss, beta, V, first, last, rank)
-        for i in range(first, last):
-            for c in range(above):
-                miss[i] -= W[i, c] * y[c]  # p_i - J_i x_{i-1}, in (13)
-        solve_block(W, miss, y, first, last, above, rank, damping, threshold, of_block)
+        reflect(basis, ZERO, above, rows.W, first, last)  # J_i Q: the level as seen from above
+        _ask(rows, lower, first, last)
+        rank = factor_level(rows, basis, first, last, rank)
+        subtract(rows, y, first, last, above)  # p_i - J_i x_{i-1}, in (13)
+        solve_level(rows.W, rows.miss, y, Block(first, last, above, rank), settings, of_block)
         first = last
+    _to_unknowns(basis, y, rank, x, of_x)
+    return finish(x, SOLVED)
 
+
+@inlined
+def _ask(rows, b, first, last):
+    """Write the targets of a level into what it misses."""
+    for i in range(first, last):
+        rows.miss[i] = b[i]
+
+
+@inlined
+def subtract(rows, y, first, last, above):
+    """Take what y reaches in columns 0 .. above - 1 out of what a level misses."""
+    for i in range(first, last):
+        miss = rows.miss[i]
+        for c in range(above):
+            miss -= rows.W[i, c] * y[c]
+        rows.miss[i] = miss
+
+
+@inlined
+def _to_unknowns(basis, y, rank, x, of_x):
+    """Turn x, a reference, into Q [y; rest], the rest being that of the reference: (7) and (14)."""
     zero_reference = True
-    for c in range(n):
-        W[X, c] = x[c]
+    for c in range(x.size):
+        of_x[0, c] = x[c]
         zero_reference &= x[c] == 0.0
     if not zero_reference:
-        reflect_rows(W, beta, V, ZERO, rank, X, X + 1)  # Q^T q0, of which (14) keeps the rest
+        reflect(basis, ZERO, rank, of_x, ZERO, ZERO + 1)
     for c in range(rank):
-        W[X, c] = y[c]
-    for k in range(rank - 1, -1, -1):
-        reflect_rows(W, beta, V, k, k + 1, X, X + 1)  # x = Q [y; rest]: (7) and (14) at once
-    for c in range(n):
-        x[c] = W[X, c]
-    return finish(x, SOLVED)
+        of_x[0, c] = y[c]
+    reflect_back(basis, rank, of_x, ZERO, ZERO + 1)
+    for c in range(x.size):
+        x[c] = of_x[0, c]

@@ -15,198 +15,250 @@ can be told.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from hierarchy.compiled import compiled, inlined
-from solvers.kernels.acting import DOUBT, NOISE, PUSH, SCALE, length_of, side_of, solve_acting
-from solvers.kernels.rows import (
+from solvers.kernels.acting import (
+    Acting,
+    Factors,
+    Problem,
+    carve_acting,
+    carve_factors,
+    length_of,
+    side_of,
+    solve_acting,
+)
+from solvers.kernels.rows import ZERO, finish
+from solvers.kernels.space import Settings, View, shared, vector
+from solvers.status import (
     EQUAL,
     FREE,
     INACCURATE,
     ITERATION_LIMIT,
+    LOWER,
     NUMERICAL_FAILURE,
     SOLVED,
     TOO_SMALL,
-    ZERO,
-    finish,
+    UNPROVED,
+    UPPER,
 )
 
-UNPROVED = 7  # no value of solvers.Status
+OWN_SETTINGS = 8  # of the array of settings; the weights of the levels follow
+
+
+class Options(NamedTuple):
+    """The settings that all resolvers share, and those of `Weighted`."""
+
+    shared: Settings
+    regularisation: View
+    tolerance: View
+    hard_levels: View
+    guesses: View
+    max_iterations: View
+    weights: View
+
+
+class Space(NamedTuple):
+    """What is written on the way; count (1,) is the factorisations made, goal and trial (n,)."""
+
+    problem: Problem
+    acting: Acting
+    factors: Factors
+    options: Options
+    goal: View
+    trial: View
+    count: View
+
+
+@inlined
+def _carve(A, lower, upper, record, settings, work):
+    """Return Space, and where it ends in the work space."""
+    m, n = A.shape
+    options = Options(shared(settings), settings[3], settings[4], settings[5], settings[6],
+                      settings[7], settings[OWN_SETTINGS:])
+    acting, at = carve_acting(record, work, 0, m)
+    factors, at = carve_factors(work, at, m, n)
+    reference, at = vector(work, at, n)
+    goal, at = vector(work, at, n)
+    trial, at = vector(work, at, n)
+    problem = Problem(A, lower, upper, reference)
+    return Space(problem, acting, factors, options, goal, trial, record[2 * m:]), at
 
 
 @compiled
-def weighted_work(m, n):
-    """Return how many numbers of work space a hierarchy of m rows needs."""
-    return (m + n + 5) * n + 7 * m + 3 * n + (m + n) * (n + 1)
-
-
-@compiled
-def weighted(A, lower, upper, sizes, weights, x, record, settings, work):
+def weighted(A, lower, upper, sizes, x, record, settings, work):
     """Solve; x (n,) comes in as the reference and goes out as the answer, zero on failure.
 
-    weights (L,): of the levels. record (2 m + 1,): begins with zeros, or with what the rows did in
-    an earlier solve; goes out as what each row does (FREE, EQUAL, -1, +1), the weight of each row,
-    infinite where it is hard, and the factorisations made. settings: regularisation, damping,
-    threshold, rank_tolerance, tolerance, hard_levels, guesses, max_iterations, in one array because
-    each argument costs time. work: at least weighted_work(m, n), of any content. Returns SOLVED,
-    INACCURATE where an acting row is nearly parallel to others, NUMERICAL_FAILURE, TOO_SMALL, or
-    UNPROVED, where x is of no use.
+    record (2 m + 1,): begins with zeros, or with what the rows did in an earlier solve; goes out as
+    what each row does (FREE, EQUAL, UPPER, LOWER), the weight of each row, infinite where it is
+    hard, and the factorisations made. settings: those of `Options`, the weights last. work: of any
+    content. Returns SOLVED, INACCURATE where an acting row is nearly parallel to others,
+    NUMERICAL_FAILURE, TOO_SMALL, or UNPROVED, where x is of no use.
     """
-    m, n = A.shape
-    if work.size < weighted_work(m, n):
+    space, end = _carve(A, lower, upper, record, settings, work)
+    if end > work.size:
         return TOO_SMALL
-    active, weight, count = record[:m], record[m:2 * m], record[2 * m:]
-    W, R, reference, _, trial, of_block = _carved(m, n, work)
-    inequalities = _prepare(A, lower, upper, sizes, weights, x, active, weight, R, settings[5])
+    inequalities = _prepare(space, sizes, x)
     if inequalities < 0:
         return finish(x, NUMERICAL_FAILURE)
-    for c in range(n):
-        reference[c] = x[c]
-    count[0] = 0.0
-    while count[0] < settings[6]:
-        count[0] += 1.0
-        close = solve_acting(A, lower, upper, reference, x, active, weight, R, W, settings,
-                             of_block)
+    space.count[0] = 0.0
+    while space.count[0] < space.options.guesses:
+        close = _solve(space, x)
         if inequalities == 0:
             return finish(x, SOLVED)
-        if not _all_change(A, lower, upper, x, active, weight, R, settings[4]) and _no_doubt(
-                A, lower, upper, reference, trial, active, weight, R, W, count, settings, of_block):
+        if not _all_change(space, x) and _no_doubt(space):
             return INACCURATE if close and np.isfinite(length_of(x)) else finish(x, SOLVED)
     return UNPROVED
 
 
 @compiled
-def weighted_steps(A, lower, upper, sizes, weights, given, x, record, settings, work):
-    """Like `weighted`, step by step; x comes in as one within the hard rows, `given` (n,) is x_0.
+def weighted_steps(A, lower, upper, sizes, x, record, settings, work):
+    """Like `weighted`, step by step.
 
+    x (2, n) comes in as an x within the hard rows, which goes out as the answer, and the reference.
     Returns ITERATION_LIMIT in place of UNPROVED: x is the best that was found.
     """
-    m, n = A.shape
-    if work.size < weighted_work(m, n):
+    space, end = _carve(A, lower, upper, record, settings, work)
+    if end > work.size:
         return TOO_SMALL
-    active, weight, count = record[:m], record[m:2 * m], record[2 * m:]
-    W, R, reference, goal, trial, of_block = _carved(m, n, work)
-    _prepare(A, lower, upper, sizes, weights, given, active, weight, R, settings[5])
-    for c in range(n):
-        reference[c] = given[c]
-    for i in range(m):
-        if active[i] != EQUAL:
-            over, under = _beyond(A, lower, upper, x, i)
-            active[i] = FREE
-            if weight[i] < np.inf and max(over, under) > 0.0:
-                active[i] = 1.0 if over > 0.0 else -1.0
+    x, reference = x[0], x[1]
+    _prepare(space, sizes, reference)
+    _begin_at(space, x)
     freed = -1
-    for _ in range(np.int64(settings[7])):
-        count[0] += 1.0
-        close = solve_acting(A, lower, upper, reference, goal, active, weight, R, W, settings,
-                             of_block)
-        row, share = _first_event(A, lower, upper, x, goal, active, weight, R, settings[4])
-        for c in range(n):
-            x[c] = x[c] + share * (goal[c] - x[c]) if share < 1.0 else goal[c]
+    for _ in range(np.int64(space.options.max_iterations)):
+        close = _solve(space, space.goal)
+        row, share = _first_event(space, x)
+        for c in range(x.size):
+            x[c] = x[c] + share * (space.goal[c] - x[c]) if share < 1.0 else space.goal[c]
         if share < 1.0:
             if row == freed and share == 0.0:
-                R[DOUBT, row] = 1.0  # it was freed for what only rounding had it push
-            over, under = _beyond(A, lower, upper, goal, row)
-            active[row] = FREE if active[row] != FREE else (1.0 if over > under else -1.0)
+                space.acting.doubt[row] = 1.0  # it was freed for what only rounding had it push
+            _turn(space, row)
             freed = -1
             continue
-        freed = _pulls_most(active, R)
+        freed = _pulls_most(space.acting)
         if freed >= 0:
-            active[freed] = FREE
-        elif _no_doubt(A, lower, upper, reference, trial, active, weight, R, W, count, settings,
-                       of_block):
+            space.acting.state[freed] = FREE
+        elif _no_doubt(space):
             return INACCURATE if close and np.isfinite(length_of(x)) else finish(x, SOLVED)
     return finish(x, SOLVED) if not np.isfinite(length_of(x)) else ITERATION_LIMIT
 
 
-@inlined
-def _carved(m, n, work):
-    """Return W and R of `acting.py`, three vectors (n,), and the rest."""
-    at = (m + n + 5) * n
-    W = work[:at].reshape((m + n + 5, n))
-    R, at = work[at:at + 7 * m].reshape((7, m)), at + 7 * m
-    return (W, R, work[at:at + n], work[at + n:at + 2 * n], work[at + 2 * n:at + 3 * n],
-            work[at + 3 * n:])
+@compiled
+def _solve(space, x):
+    """Write x for the rows that act, and their pushes; return whether some are nearly parallel."""
+    space.count[0] += 1.0
+    return solve_acting(space.problem, x, space.acting, space.factors, space.options.shared,
+                        space.options.regularisation)
 
 
 @compiled
-def _prepare(A, lower, upper, sizes, weights, x, active, weight, R, hard_levels):
+def _prepare(space, sizes, x):
     """Check the data and start the record; return the number of inequality rows, -1 if bad."""
-    inequalities = first = ZERO
+    (A, lower, upper, reference), acting = space.problem, space.acting
+    hard_levels, inequalities, first = space.options.hard_levels, ZERO, ZERO
+    for c in range(x.size):
+        reference[c] = x[c]
     if not np.isfinite(length_of(x)):
         return -1
     for k in range(sizes.size):
         last, before = first + sizes[k], inequalities
         for i in range(first, last):
-            R[SCALE, i], R[DOUBT, i] = length_of(A[i]), 0.0
-            low, up = lower[i], upper[i]
-            if not np.isfinite(R[SCALE, i]) or not low <= up or low == np.inf or up == -np.inf:
+            acting.norm[i], acting.doubt[i] = length_of(A[i]), 0.0
+            low, up, guess = lower[i], upper[i], acting.state[i]
+            if not np.isfinite(acting.norm[i]) or not low <= up or low == np.inf or up == -np.inf:
                 return -1
             if low == up:
-                active[i] = EQUAL
+                acting.state[i] = EQUAL
                 continue
             inequalities += 1
-            known = (active[i] == 1 and up < np.inf) or (active[i] == -1 and low > -np.inf)
-            active[i] = active[i] if known else FREE
+            known = (guess == UPPER and up < np.inf) or (guess == LOWER and low > -np.inf)
+            acting.state[i] = guess if known else FREE
         hard = hard_levels > 0.0 and inequalities - before == sizes[k]
         if sizes[k] > 0:
             hard_levels = hard_levels - 1.0 if hard else 0.0
         for i in range(first, last):
-            weight[i] = np.inf if hard else weights[k]
+            acting.weight[i] = np.inf if hard else space.options.weights[k]
         first = last
     return inequalities
 
 
 @inlined
-def _beyond(A, lower, upper, x, i):
+def _begin_at(space, x):
+    """Let the soft rows act that are violated at x, and no hard one."""
+    acting = space.acting
+    for i in range(acting.state.size):
+        if acting.state[i] != EQUAL:
+            over, under = _beyond(space.problem, x, i)
+            acting.state[i] = FREE
+            if acting.weight[i] < np.inf and max(over, under) > 0.0:
+                acting.state[i] = UPPER if over > 0.0 else LOWER
+
+
+@inlined
+def _turn(space, row):
+    """Let a row act that did not, at the side that is beyond at the goal, or the other way."""
+    over, under = _beyond(space.problem, space.goal, row)
+    state = space.acting.state
+    state[row] = FREE if state[row] != FREE else (UPPER if over > under else LOWER)
+
+
+@inlined
+def _beyond(problem, x, i):
     """By how much row i is above its upper side, and below its lower."""
     value = 0.0
     for c in range(x.size):
-        value += A[i, c] * x[c]
-    return value - upper[i], lower[i] - value
+        value += problem.A[i, c] * x[c]
+    return value - problem.upper[i], problem.lower[i] - value
 
 
 @compiled
-def _all_change(A, lower, upper, x, active, weight, R, tolerance):
+def _all_change(space, x):
     """Let rows join that are violated, and leave that push inward; say whether any did.
 
     A hard row that acts and is missed all the same, because others contradict it, is a change too.
     """
+    problem, acting = space.problem, space.acting
     changed, length = False, length_of(x)
-    for i in range(active.size):
-        if active[i] == EQUAL:
+    for i in range(acting.state.size):
+        if acting.state[i] == EQUAL:
             continue
-        over, under = _beyond(A, lower, upper, x, i)
-        near = tolerance * (R[SCALE, i] * length + abs(upper[i] if over >= under else lower[i]))
+        over, under = _beyond(problem, x, i)
+        side = problem.upper[i] if over >= under else problem.lower[i]
+        near = space.options.tolerance * (acting.norm[i] * length + abs(side))
         outside = max(over, under) > near
-        if active[i] == FREE:
+        if acting.state[i] == FREE:
             if outside:
-                active[i] = 1.0 if over >= under else -1.0
+                acting.state[i] = UPPER if over >= under else LOWER
                 changed = True
-        elif R[PUSH, i] < -R[NOISE, i]:
-            active[i] = FREE
+        elif acting.push[i] < -acting.noise[i]:
+            acting.state[i] = FREE
             changed = True
-        elif weight[i] == np.inf:
+        elif acting.weight[i] == np.inf:
             changed |= outside
     return changed
 
 
 @compiled
-def _first_event(A, lower, upper, x, goal, active, weight, R, tolerance):
+def _first_event(space, x):
     """Return the row that first begins or ceases to act on the way from x to goal, and where.
 
     The share of the way is 1 where none does. Hard rows that act stay where they are.
     """
-    first, share, length = -1, 1.0, length_of(goal)
-    for i in range(active.size):
-        if active[i] == EQUAL or (active[i] != FREE and weight[i] == np.inf):
+    problem, acting = space.problem, space.acting
+    first, share, length = -1, 1.0, length_of(space.goal)
+    for i in range(acting.state.size):
+        state = acting.state[i]
+        if state == EQUAL or (state != FREE and acting.weight[i] == np.inf):
             continue
-        over, under = _beyond(A, lower, upper, goal, i)
-        up = over >= under if active[i] == FREE else active[i] > 0.0
-        new = over if up else under
-        near = tolerance * (R[SCALE, i] * length + abs(upper[i] if up else lower[i]))
-        if (active[i] == FREE and new > near) or (active[i] != FREE and new < -near):
-            over, under = _beyond(A, lower, upper, x, i)
+        over, under = _beyond(problem, space.goal, i)
+        up = over >= under if state == FREE else state > 0.0
+        new, side = over if up else under, problem.upper[i] if up else problem.lower[i]
+        near = space.options.tolerance * (acting.norm[i] * length + abs(side))
+        if (state == FREE and new > near) or (state != FREE and new < -near):
+            over, under = _beyond(problem, x, i)
             old = over if up else under
             at = old / (old - new) if old * new < 0.0 else 0.0
             if at < share:
@@ -215,36 +267,38 @@ def _first_event(A, lower, upper, x, goal, active, weight, R, tolerance):
 
 
 @compiled
-def _pulls_most(active, R):
+def _pulls_most(acting):
     """Return the acting row that pushes inward most beyond doubt, -1 for none."""
     most, row = 0.0, -1
-    for i in range(active.size):
-        if abs(active[i]) == 1.0 and R[DOUBT, i] == 0.0 and R[PUSH, i] < -R[NOISE, i]:
-            pull = -R[PUSH, i] / R[SCALE, i]
+    for i in range(acting.state.size):
+        certain = acting.doubt[i] == 0.0 and acting.push[i] < -acting.noise[i]
+        if abs(acting.state[i]) == 1.0 and certain:
+            pull = -acting.push[i] / acting.norm[i]
             if pull > most:
                 most, row = pull, i
     return row
 
 
 @compiled
-def _no_doubt(A, lower, upper, reference, trial, active, weight, R, W, count, settings, work):
+def _no_doubt(space):
     """Let each row go whose push may be rounding; say whether none of them moves inward.
 
     One that does is left free.
     """
-    m = active.size
-    for i in range(m):
-        if abs(active[i]) == 1.0 and abs(R[PUSH, i]) <= R[NOISE, i]:
-            R[DOUBT, i] = 1.0
-    for i in range(m):
-        if R[DOUBT, i] == 0.0 or abs(active[i]) != 1.0:
+    problem, acting, trial = space.problem, space.acting, space.trial
+    for i in range(acting.state.size):
+        if abs(acting.state[i]) == 1.0 and abs(acting.push[i]) <= acting.noise[i]:
+            acting.doubt[i] = 1.0
+    for i in range(acting.state.size):
+        if acting.doubt[i] == 0.0 or abs(acting.state[i]) != 1.0:
             continue
-        count[0] += 1.0
-        side, bound, active[i] = active[i], side_of(lower, upper, active, i), FREE
-        solve_acting(A, lower, upper, reference, trial, active, weight, R, W, settings, work)
-        over, under = _beyond(A, lower, upper, trial, i)
+        side, bound = acting.state[i], side_of(problem, acting, i)
+        acting.state[i] = FREE
+        _solve(space, trial)
+        over, under = _beyond(problem, trial, i)
         outside = over if side > 0.0 else under
-        if outside < -settings[4] * (R[SCALE, i] * length_of(trial) + abs(bound)):
+        around = acting.norm[i] * length_of(trial) + abs(bound)
+        if outside < -space.options.tolerance * around:
             return False
-        active[i] = side
+        acting.state[i] = side
     return True

@@ -1,0 +1,108 @@
+"""What kernels carve their work space into: views of one array, with names.
+
+    basis, at = carve_basis(work, 0, n, n)
+    rows, at = carve_rows(work, at, m, n)
+    if at > work.size:
+        return TOO_SMALL
+
+A carver counts on where the work space ends, and gives empty views from there: so what a kernel
+needs is what it carves, and nothing is carved before there is room for all of it. Made inside a
+kernel and handed to inlined helpers, such a tuple of views costs nothing.
+"""
+
+# mypy: disable-error-code="no-untyped-def"
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from hierarchy.compiled import as_matrix, inlined
+
+View = Any  # numpy to the reader, a type of its own to numba
+
+
+class Basis(NamedTuple):
+    """Reflectors I - beta[k] v v^T, one after the other: they make Q.
+
+    V (k, n): the v as rows, v of reflector k zero before column k. beta (k,).
+    """
+
+    V: View
+    beta: View
+
+
+class Rows(NamedTuple):
+    """Rows that are being factored, each level in pivot order.
+
+    W (m, n): the rows. row (m,) int64: their numbers in the problem. zero (m,): squared norms at or
+    below which what is left of a row is nothing. miss (m,): what the rows still miss.
+    """
+
+    W: View
+    row: View
+    zero: View
+    miss: View
+
+
+class Block(NamedTuple):
+    """One level's part of a staircase: rows i0 .. i1 - 1, and the columns k0 .. k1 - 1 it adds."""
+
+    i0: View
+    i1: View
+    k0: View
+    k1: View
+
+
+class Settings(NamedTuple):
+    """What all resolvers share, see `Resolver`; the first numbers of the array of settings."""
+
+    damping: View
+    threshold: View
+    rank_tolerance: View
+
+
+@inlined
+def shared(settings):
+    """Return the Settings at the beginning of an array of settings."""
+    return Settings(settings[0], settings[1], settings[2])
+
+
+@inlined
+def vector(work, at, size):
+    """Return the next `size` numbers, none if there are not so many, and where they end."""
+    end = at + size
+    return work[at:end if end <= work.size else at], end
+
+
+@inlined
+def integers(work, at, size):
+    """Like `vector`, as int64."""
+    numbers, end = vector(work, at, size)
+    return numbers.view(np.int64), end
+
+
+@inlined
+def matrix(work, at, rows, columns):
+    """Like `vector`, as (rows, columns); no rows if they do not fit."""
+    numbers, end = vector(work, at, rows * columns)
+    return as_matrix(numbers, rows if end <= work.size else 0, columns), end
+
+
+@inlined
+def carve_basis(work, at, k, n):
+    """Return a Basis of up to k reflectors of n unknowns, and where it ends."""
+    V, at = matrix(work, at, k, n)
+    beta, at = vector(work, at, k)
+    return Basis(V, beta), at
+
+
+@inlined
+def carve_rows(work, at, m, n):
+    """Return Rows for m rows of n unknowns, and where they end."""
+    W, at = matrix(work, at, m, n)
+    row, at = integers(work, at, m)
+    zero, at = vector(work, at, m)
+    miss, at = vector(work, at, m)
+    return Rows(W, row, zero, miss), at
