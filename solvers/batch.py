@@ -21,9 +21,9 @@ from numpy.typing import ArrayLike, NDArray
 from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array, Hierarchy
 from solvers.hcod import Hcod
-from solvers.kernels.batch import batch_bounds, batch_exact, batch_staircase
+from solvers.kernels.batch import batch_hcod, batch_saturation, batch_stages, batch_staircase
 from solvers.resolver import Resolver, make, refuse_inequality
-from solvers.status import INACCURATE, NO_LIMITS, NUMERICAL_FAILURE, Status
+from solvers.status import INACCURATE, NO_LIMITS, NUMERICAL_FAILURE, UNPROVED, Status
 from solvers.tpm import Tpm
 from solvers.workspace import run
 
@@ -145,7 +145,7 @@ def solve(batch: Batch, resolver: Resolver | None = None, threads: int | None = 
     if threads is not None and threads < 1:
         raise HierarchyError(f"threads = {threads}, expected at least 1")
     run = _Run(batch, resolver, cores() if threads is None else threads, memory)
-    return run.by_tpm() if isinstance(resolver, Tpm) else run.by_hcod()
+    return run.by_tpm() if isinstance(resolver, Tpm) else run.by_hcod(resolver)
 
 
 class _Run:
@@ -163,7 +163,7 @@ class _Run:
         self.answers = np.zeros((count, n + shape[1] + 1))
         self.x, self.record = self.answers[:, :n], self.answers[:, n:-1]
         self.codes = self.answers[:, -1]
-        self.settings = resolver._settings
+        self.settings = np.array([resolver.damping, resolver.threshold, resolver.rank_tolerance])
 
     def by_tpm(self) -> BatchResolution:
         """Resolve equalities by the staircase; with bounds, or a memory, by saturation."""
@@ -173,7 +173,7 @@ class _Run:
             return self._answer(np.ones(len(self.codes)), None)
         if self.resolver.damping == 0.0:
             self._remember()
-        self._call(batch_bounds, bounded)
+        self._call(batch_saturation, bounded)
         self._one_by_one(np.flatnonzero(self.codes == INACCURATE))
         unlimited = self.codes == NO_LIMITS
         self._call(batch_staircase, np.flatnonzero(unlimited))
@@ -183,10 +183,13 @@ class _Run:
         steps = np.maximum(self.record[:, -1], 1.0)
         return self._answer(steps, self.record.copy())
 
-    def by_hcod(self) -> BatchResolution:
-        """Resolve by the exact engine, and what is in doubt alone."""
+    def by_hcod(self, resolver: Hcod) -> BatchResolution:
+        """Resolve by guesses, what they do not prove by stages, and what is in doubt alone."""
+        self.settings = np.array([*self.settings, resolver.tolerance, resolver.guesses,
+                                  resolver.max_iterations])
         self._remember()
-        self._call(batch_exact, np.arange(len(self.batch)))
+        self._call(batch_hcod, np.arange(len(self.batch)))
+        self._call(batch_stages, np.flatnonzero(self.codes == UNPROVED))
         self._one_by_one(np.flatnonzero(self.codes == INACCURATE))
         steps = self.record[:, -3] + self.record[:, -2]
         return self._answer(steps, self.record.copy())

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any, ClassVar, final
 
 import numpy as np
@@ -12,15 +11,21 @@ from numpy.typing import NDArray
 from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array, Hierarchy
 from solvers.certificate import certify
-from solvers.kernels.bounds import solve_within_bounds
-from solvers.kernels.published import matrix_as_published, solve_as_published
-from solvers.kernels.staircase import solve_by_staircase
-from solvers.resolver import Handles, Resolution, Resolver, refuse_inequality, register
-from solvers.status import NO_LIMITS, NUMERICAL_FAILURE, SOLVED, Status
-from solvers.workspace import WORKSPACE, run
+from solvers.kernels.published import priority_matrix, published
+from solvers.kernels.rows import INACCURATE, SOLVED
+from solvers.kernels.saturation import NO_LIMITS, saturation
+from solvers.kernels.staircase import staircase
+from solvers.resolver import (
+    Handles,
+    Resolution,
+    Resolver,
+    Status,
+    refuse_inequality,
+    register,
+)
+from solvers.workspace import WORKSPACE
 
 FORMS = ("staircase", "published")
-_OF_THE_ENGINE = (1e-10, 3, 1000)  # tolerance, guesses, max_iterations, as those of `hcod`
 _SOLVED = Status.SOLVED
 
 
@@ -119,30 +124,27 @@ class Tpm(Resolver):
         if staircased and memory is not None:
             return self._within_bounds(h, memory)
         x = h.reference.copy()
-        kernel = solve_by_staircase if staircased else solve_as_published
-        code = kernel(h.A, h.lower, h.upper, h.sizes, x, self._settings, WORKSPACE.array)
+        kernel = staircase if staircased else published
+        code = kernel(h.A, h.lower, h.upper, h.sizes, x, self.damping, self.threshold,
+                      self.rank_tolerance, WORKSPACE.array)
         if code == 0:
             return Resolution(x)
         return (self._within_bounds(h, None) if code < 0 and staircased
                 else self._otherwise(h, x, code, memory))
 
-    @cached_property
-    def _settings(self) -> Array:
-        return np.array([self.damping, self.threshold, self.rank_tolerance, *_OF_THE_ENGINE])
-
     def _within_bounds(self, h: Hierarchy, memory: Any) -> Resolution:
         """Resolve h if its first level is bounds; otherwise refuse it, or forget the memory."""
         x = h.reference.copy()
         size = len(x) + len(h.sizes) + 1
-        known = memory is not None and len(memory) == size and self.damping == 0.0
-        record = memory.copy() if known else np.zeros(size)
-        code = run(solve_within_bounds, h.A, h.lower, h.upper, h.sizes, x, record, self._settings)
-        if code == NO_LIMITS:
-            return self.solve(h)
-        if code < 0 or code == NUMERICAL_FAILURE:
-            return self._otherwise(h, x, code)
-        sure = code == SOLVED or certify(h, x).certified
-        return SaturatedResolution(x, _SOLVED if sure else Status.INACCURATE, record)
+        fits = memory is not None and len(memory) == size and self.damping == 0.0
+        record = memory.copy() if fits else np.zeros(size)
+        code = saturation(h.A, h.lower, h.upper, h.sizes, x, record, self.damping, self.threshold,
+                          self.rank_tolerance, WORKSPACE.array)
+        if code == SOLVED or (code == INACCURATE and certify(h, x).certified):
+            return SaturatedResolution(x, _SOLVED, record)
+        if code == INACCURATE:
+            return SaturatedResolution(x, Status.INACCURATE, record)
+        return self.solve(h) if code == NO_LIMITS else self._otherwise(h, x, code, memory)
 
 
 @final
@@ -191,7 +193,9 @@ def _answer(resolver: Tpm, h: Hierarchy, b: Array, reference: Array) -> Array:
     return resolver.solve(Hierarchy(h.A, b, b, h.sizes, reference, h.names)).x
 
 
-def _published_matrix(h: Hierarchy, resolver: Tpm) -> Array:
-    F = np.empty((h.m, h.m))
-    run(matrix_as_published, h.A, h.lower, h.upper, h.sizes, F, resolver._settings)
+def _published_matrix(h: Hierarchy, r: Tpm) -> Array:
+    W, beta = np.empty((2 * h.m, max(h.m, h.n))), np.empty(h.m)
+    F, T = np.empty((h.m, h.m)), np.empty((h.m, h.m))
+    priority_matrix(h.A, h.lower, h.upper, h.sizes, h.reference, W, beta, F, T, r.damping,
+                    r.threshold, r.rank_tolerance, np.empty(h.m + 3 * h.m * h.m))
     return F.T.copy()  # (10)

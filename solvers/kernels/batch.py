@@ -11,10 +11,11 @@ shape alone and so shows at the first problem.
 from __future__ import annotations
 
 from hierarchy.compiled import inlined, unlocked
-from solvers.kernels.bounds import solve_within_bounds
-from solvers.kernels.exact import solve_exactly
+from solvers.kernels.hcod import hcod, hcod_equalities
+from solvers.kernels.saturation import saturation
+from solvers.kernels.stages import solve_by_stages
 from solvers.kernels.staircase import solve_by_staircase
-from solvers.status import SOLVED, TOO_SMALL
+from solvers.status import SOLVED, TOO_SMALL, UNPROVED
 
 
 @inlined
@@ -36,11 +37,12 @@ def batch_staircase(A, lower, upper, sizes, answers, settings, which, work):
 
 
 @unlocked
-def batch_bounds(A, lower, upper, sizes, answers, settings, which, work):
-    """Solve the problems `which` within their bounds."""
+def batch_saturation(A, lower, upper, sizes, answers, settings, which, work):
+    """Solve the problems `which` by `saturation`."""
     for p in which:
         x, record = _parts(answers, p, A.shape[2])
-        code = solve_within_bounds(A[p], lower[p], upper[p], sizes, x, record, settings, work)
+        code = saturation(A[p], lower[p], upper[p], sizes, x, record, settings[0], settings[1],
+                          settings[2], work)
         answers[p, -1] = code
         if code == TOO_SMALL:
             return TOO_SMALL
@@ -48,11 +50,26 @@ def batch_bounds(A, lower, upper, sizes, answers, settings, which, work):
 
 
 @unlocked
-def batch_exact(A, lower, upper, sizes, answers, settings, which, work):
-    """Solve the problems `which` by the exact engine."""
+def batch_hcod(A, lower, upper, sizes, answers, settings, which, work):
+    """Solve the problems `which` by guesses, or by the staircase if all rows are equalities."""
+    for p in which:
+        (x, record), code = _parts(answers, p, A.shape[2]), UNPROVED
+        if lower.shape[1] == 0 or lower[p, 0] == upper[p, 0]:
+            code = hcod_equalities(A[p], lower[p], upper[p], sizes, x, record, settings, work)
+        if code == UNPROVED:
+            code = hcod(A[p], lower[p], upper[p], sizes, x, record, settings, work)
+        answers[p, -1] = code
+        if code == TOO_SMALL:
+            return TOO_SMALL
+    return SOLVED
+
+
+@unlocked
+def batch_stages(A, lower, upper, sizes, answers, settings, which, work):
+    """Solve the problems `which` level by level."""
     for p in which:
         x, record = _parts(answers, p, A.shape[2])
-        code = solve_exactly(A[p], lower[p], upper[p], sizes, x, record, settings, work)
+        code = solve_by_stages(A[p], lower[p], upper[p], sizes, x, record, settings, work)
         answers[p, -1] = code
         if code == TOO_SMALL:
             return TOO_SMALL

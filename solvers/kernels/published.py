@@ -18,6 +18,7 @@ from solvers.kernels.block import invert_triangle, orthogonalise_rows, smallest_
 from solvers.kernels.rows import ZERO, finish, load_rows, make_reflector, reflect, reflect_back
 from solvers.kernels.space import (
     Basis,
+    Settings,
     View,
     carve_basis,
     integers,
@@ -252,3 +253,21 @@ def matrix_as_published(A, lower, upper, sizes, F, settings, work):
         for k in range(m):
             F[i, k] = matrices.F[i, k]
     return code
+
+
+@compiled
+def published(A, lower, upper, sizes, x, damping, threshold, rank_tolerance, work):
+    """Like `solve_as_published`."""  # for tpm.py until it is replaced
+    if work.size < 3:
+        return TOO_SMALL
+    work[0], work[1], work[2] = damping, threshold, rank_tolerance
+    return solve_as_published(A, lower, upper, sizes, x, work[:3], work[3:])
+
+
+@compiled
+def priority_matrix(A, lower, upper, sizes, x, W, beta, F, T, damping, threshold, rank_tolerance,
+                    work):
+    """Write F^T into F."""  # for tpm.py until it is replaced
+    m = A.shape[0]
+    matrices = Matrices(W[:m], Basis(W[m:2 * m], beta), F, T, T.reshape(m * m)[:m], work)
+    return _fill(A, lower, upper, sizes, x, matrices, Settings(damping, threshold, rank_tolerance))

@@ -114,3 +114,18 @@ def _to_unknowns(basis, y, rank, x, of_x):
     reflect_back(basis, rank, of_x, ZERO, ZERO + 1)
     for c in range(x.size):
         x[c] = of_x[0, c]
+
+
+@compiled
+def staircase_work(m, n):  # for hcod.py until it is replaced
+    """Return how many numbers of work space `staircase` needs."""
+    return 3 + (2 * m + 2 * n + 4) * n + 4 * m
+
+
+@compiled
+def staircase(A, lower, upper, sizes, x, damping, threshold, rank_tolerance, work):
+    """Like `solve_by_staircase`."""  # for hcod.py, tpm.py until they are replaced
+    if work.size < 3:
+        return TOO_SMALL
+    work[0], work[1], work[2] = damping, threshold, rank_tolerance
+    return solve_by_staircase(A, lower, upper, sizes, x, work[:3], work[3:])
