@@ -45,8 +45,10 @@ def read(name):
 
 
 def cases(names, late):
-    awaited = pytest.mark.xfail(reason="awaits the new kernels")
-    return [pytest.param(name, resolver, marks=[awaited] * ((name, resolver) in late),
+    why = {"hqp": "hqp loses rows of 1e-7 of the largest entry of their level"}
+    awaited = {resolver: pytest.mark.xfail(reason=why.get(resolver, "awaits the new kernels"))
+               for resolver in RESOLVERS}
+    return [pytest.param(name, resolver, marks=[awaited[resolver]] * ((name, resolver) in late),
                          id=f"{name}-{resolver}") for name in names for resolver in RESOLVERS]
 
 
