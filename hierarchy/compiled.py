@@ -17,7 +17,8 @@ from typing import Any
 
 import numba
 import numpy as np
-from numba.core import event, types
+from numba.core import cgutils, event, types
+from numba.core.registry import CPUDispatcher
 from numba.extending import intrinsic
 from numba.np import arrayobj
 
@@ -45,9 +46,21 @@ def unlocked(function: Kernel) -> Kernel:
 def inlined(function: Kernel) -> Kernel:
     """Compile `function` into the kernels that call it: for what an inner loop calls.
 
-    A call between compiled functions costs some 2 ns for each array handed over.
+    A call between compiled functions costs some 2 ns for each array handed over. Python cannot
+    call it: the code for that takes longer to compile than most of these functions.
     """
-    return _compiled(function, inline=True)
+    kernel = _compiled(function, inline=True)
+    if not numba.config.DISABLE_JIT:
+        kernel.__class__ = _OnlyInlined
+    return kernel
+
+
+class _OnlyInlined(CPUDispatcher):  # type: ignore[misc]
+    """A kernel without an entry for Python, where a call would end the process."""
+
+    def __call__(self, *arguments: Any) -> Any:
+        raise TypeError(f"{self.py_func.__name__} is compiled into other kernels; "
+                        "Python calls what is `compiled`")
 
 
 def _as_matrix(context: Any, numbers: Any, rows: Any, columns: Any) -> Any:
@@ -71,19 +84,43 @@ def _as_matrix(context: Any, numbers: Any, rows: Any, columns: Any) -> Any:
     return kind(numbers, types.intp, types.intp), write
 
 
+def _as_integers(context: Any, numbers: Any) -> Any:
+    """Return the view of contiguous numbers as int64; `view` is a kernel of its own to compile."""
+    kind = types.Array(types.int64, 1, "C")
+
+    def write(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        flat = arrayobj.make_array(numbers)(context, builder, arguments[0])
+        view = arrayobj.make_array(kind)(context, builder)
+        data = builder.bitcast(flat.data, view.data.type)
+        shape, strides = (cgutils.unpack_tuple(builder, part, 1)
+                          for part in (flat.shape, flat.strides))
+        arrayobj.populate_array(view, data=data, shape=shape, strides=strides,
+                                itemsize=flat.itemsize, meminfo=flat.meminfo, parent=flat.parent)
+        if context.enable_nrt:
+            context.nrt.incref(builder, kind, view._getvalue())
+        return view._getvalue()
+
+    return kind(numbers), write
+
+
 if numba.config.DISABLE_JIT:
     def as_matrix(numbers: Any, rows: int, columns: int) -> Any:
         """See `_as_matrix`."""
         return numbers.reshape((rows, columns))
+
+    def as_integers(numbers: Any) -> Any:
+        """See `_as_integers`."""
+        return numbers.view(np.int64)
 else:
-    as_matrix = intrinsic(_as_matrix)
+    as_matrix, as_integers = intrinsic(_as_matrix), intrinsic(_as_integers)
 
 
 def _compiled(function: Kernel, inline: bool = False, nogil: bool = False) -> Kernel:
     files, constants = _files_behind(function), _constants_behind(function)
     folder = cache_folder() / _digest((__file__, *sorted(files)), tuple(sorted(constants)))
     allocates = _allocates(function)
-    kernel: Kernel = _jit_into(folder, function, forceinline=inline, nogil=nogil, _nrt=allocates)
+    kernel: Kernel = _jit_into(folder, function, forceinline=inline, nogil=nogil, _nrt=allocates,
+                               no_cpython_wrapper=inline, no_cfunc_wrapper=True)
     if not isinstance(kernel, type(function)):
         kernel.source_files = files  # type: ignore[attr-defined]
         kernel.constants = constants  # type: ignore[attr-defined]

@@ -322,19 +322,30 @@ def doctor(as_json: AsJson = False) -> int:
 def bench(what: Annotated[str | None, typer.Argument(
         metavar="|".join(BENCHMARKS), help="Only this. Default: all but peers.",
         autocompletion=lambda incomplete: [b for b in BENCHMARKS if b.startswith(incomplete)]),
-        ] = None, out: Out = None) -> None:
+        ] = None,
+        fresh: Annotated[int | None, typer.Option(
+            metavar="SEED", help="Resolvers: time new problems too, from this seed on.")] = None,
+        count: Annotated[int, typer.Option(
+            min=1, metavar="N", help="New problems of each family.")] = 200,
+        out: Out = None) -> None:
     """Time resolvers, control tick, start, others' packages; judge errors and strictness."""
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy is loaded: one core is timed
     from importlib import import_module
 
-    from hierarchy.errors import UnknownNameError
+    from hierarchy.errors import HierarchyError, UnknownNameError
     from scenarios.folders import claim, next_free
 
     if what is not None and what not in BENCHMARKS:
         raise UnknownNameError("benchmark", what, BENCHMARKS)
+    if fresh is not None and what not in (None, "resolvers"):
+        raise HierarchyError(f"--fresh is for the benchmark of resolvers, not {what}")
     folder = claim(out if out is not None else next_free(Path("runs") / "bench"))
     for wanted in [what] if what is not None else [b for b in BENCHMARKS if b not in _ASKED_FOR]:
-        import_module(f"scenarios.bench.{wanted.replace('-', '_')}").run(folder)
+        module = import_module(f"scenarios.bench.{wanted.replace('-', '_')}")
+        if wanted == "resolvers":
+            module.run(folder, seed=fresh, count=count)
+        else:
+            module.run(folder)
     print(f"\nNumbers: {shown(folder)}")
 
 

@@ -8,6 +8,7 @@ from typing import Any, ClassVar, final
 from hierarchy.problem import Hierarchy
 from solvers.kernels.staircase import solve_by_staircase
 from solvers.resolver import Resolution, Resolver, register
+from solvers.status import INACCURATE, SOLVED
 from solvers.workspace import WORKSPACE
 
 
@@ -33,4 +34,4 @@ class Augmented(Resolver):
         x, whole = h.reference.copy(), h.offsets[-1:]  # one level of m rows
         code = solve_by_staircase(h.A, h.lower, h.upper, whole, x, self._settings,
                                   WORKSPACE.array)
-        return self._otherwise(h, x, code) if code else Resolution(x)
+        return Resolution(x) if code in (SOLVED, INACCURATE) else self._otherwise(h, x, code)

@@ -20,10 +20,16 @@ from numpy.typing import ArrayLike, NDArray
 
 from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array, Hierarchy
+from solvers.certificate import certify
 from solvers.hcod import Hcod
-from solvers.kernels.batch import batch_hcod, batch_saturation, batch_stages, batch_staircase
+from solvers.kernels.batch import (
+    batch_exact,
+    batch_saturation,
+    batch_staircase,
+    batch_without_bounds,
+)
 from solvers.resolver import Resolver, make, refuse_inequality
-from solvers.status import INACCURATE, NO_LIMITS, NUMERICAL_FAILURE, UNPROVED, Status
+from solvers.status import INACCURATE, NO_LIMITS, NUMERICAL_FAILURE, SOLVED, UNPROVED, Status
 from solvers.tpm import Tpm
 from solvers.workspace import run
 
@@ -145,7 +151,7 @@ def solve(batch: Batch, resolver: Resolver | None = None, threads: int | None = 
     if threads is not None and threads < 1:
         raise HierarchyError(f"threads = {threads}, expected at least 1")
     run = _Run(batch, resolver, cores() if threads is None else threads, memory)
-    return run.by_tpm() if isinstance(resolver, Tpm) else run.by_hcod(resolver)
+    return run.by_tpm() if isinstance(resolver, Tpm) else run.by_hcod()
 
 
 class _Run:
@@ -154,75 +160,72 @@ class _Run:
     def __init__(self, batch: Batch, resolver: Tpm | Hcod, threads: int, memory: Any) -> None:
         self.batch, self.resolver, self.threads = batch, resolver, threads
         count, rows, n = batch.A.shape
-        shape = (count, 3 * rows + 3 if isinstance(resolver, Hcod) else n + len(batch.sizes) + 1)
+        bounds = 0 if isinstance(resolver, Hcod) else n + len(batch.sizes)
+        shape = (count, bounds + 3 * rows + 3)
         before = None if memory is None else _numbers("memory", memory)
         self.before = before if before is not None and before.shape == shape else None
         self.warm: NDArray[np.bool_] = np.zeros(count, dtype=bool)
         if self.before is not None:
             self.warm |= (self.before != 0.0).any(axis=1)
-        self.answers = np.zeros((count, n + shape[1] + 1))
-        self.x, self.record = self.answers[:, :n], self.answers[:, n:-1]
-        self.codes = self.answers[:, -1]
-        self.settings = np.array([resolver.damping, resolver.threshold, resolver.rank_tolerance])
+        self.x, self.codes = np.zeros((count, n)), np.zeros(count, dtype=np.int64)
+        self.record = np.zeros(shape)
+        if self.before is not None and resolver.damping == 0.0:
+            self.record[:] = self.before
+        self.settings = resolver._settings
 
     def by_tpm(self) -> BatchResolution:
-        """Resolve equalities by the staircase; with bounds, or a memory, by saturation."""
-        self._call(batch_staircase, np.flatnonzero(~self.warm))
+        """Resolve equalities by the staircase; with bounds, or a memory, by the exact engine."""
+        self._refer(np.arange(len(self.codes)))
+        self._call(batch_staircase, np.flatnonzero(~self.warm), self.x, self.codes, self.settings)
         bounded = np.flatnonzero(self.warm | (self.codes < 0))
         if bounded.size == 0:
+            self._judge()
             return self._answer(np.ones(len(self.codes)), None)
-        if self.resolver.damping == 0.0:
-            self._remember()
-        self._call(batch_saturation, bounded)
-        self._one_by_one(np.flatnonzero(self.codes == INACCURATE))
+        self._refer(bounded)
+        self._call(batch_without_bounds, bounded, self.x, self.codes, self.record, self.settings)
+        self._call(batch_exact, np.flatnonzero(self.codes == UNPROVED), self.x, self.codes,
+                   self.record, self.settings)
         unlimited = self.codes == NO_LIMITS
-        self._call(batch_staircase, np.flatnonzero(unlimited))
+        named = ~unlimited & (self.codes >= 0) & (self.codes != NUMERICAL_FAILURE)
+        self._call(batch_saturation, bounded[named[bounded]], self.x, self.record)
+        self._call(batch_staircase, np.flatnonzero(unlimited), self.x, self.codes, self.settings)
+        self._judge()
         for p in np.flatnonzero(self.codes < 0)[:1]:
             refuse_inequality(self.resolver, self.batch[p], -int(self.codes[p]) - 1)
         self.record[unlimited | (self.codes == NUMERICAL_FAILURE)] = 0.0
-        steps = np.maximum(self.record[:, -1], 1.0)
-        return self._answer(steps, self.record.copy())
+        steps = np.maximum(self.record[:, -3] + self.record[:, -2], 1.0)
+        return self._answer(steps, self.record)
 
-    def by_hcod(self, resolver: Hcod) -> BatchResolution:
-        """Resolve by guesses, what they do not prove by stages, and what is in doubt alone."""
-        self.settings = np.array([*self.settings, resolver.tolerance, resolver.guesses,
-                                  resolver.max_iterations])
-        self._remember()
-        self._call(batch_hcod, np.arange(len(self.batch)))
-        self._call(batch_stages, np.flatnonzero(self.codes == UNPROVED))
-        self._one_by_one(np.flatnonzero(self.codes == INACCURATE))
-        steps = self.record[:, -3] + self.record[:, -2]
-        return self._answer(steps, self.record.copy())
+    def by_hcod(self) -> BatchResolution:
+        """Resolve by the exact engine, and what is in doubt alone."""
+        everything = np.arange(len(self.batch))
+        self._refer(everything)
+        self._call(batch_exact, everything, self.x, self.codes, self.record, self.settings)
+        self._judge()
+        return self._answer(self.record[:, -3] + self.record[:, -2], self.record)
 
-    def _remember(self) -> None:
-        if self.before is not None:
-            self.record[:] = self.before
+    def _refer(self, which: Indices) -> None:
+        self.x[which] = self.batch.reference[which]
 
     def _answer(self, steps: Array, memory: Array | None) -> BatchResolution:
-        return BatchResolution(self.x.copy(), self.codes.astype(np.int64), steps.astype(np.int64),
-                               memory)
+        return BatchResolution(self.x, self.codes, steps.astype(np.int64), memory)
 
-    def _call(self, kernel: Callable[..., int], which: Indices) -> None:
+    def _call(self, kernel: Callable[..., int], which: Indices, *arguments: Any) -> None:
         """Run a kernel over the problems `which`, in parts on several threads if there are many."""
-        self.x[which] = self.batch.reference[which]
-        threads = min(self.threads, len(which) * self.batch.A[:1].size // ENOUGH)
+        b = self.batch
+        call = partial(run, kernel, (b.A, b.lower, b.upper, b.sizes), *arguments)
+        threads = min(self.threads, len(which) * b.A[:1].size // ENOUGH)
         if threads < 2:
-            self._call_part(kernel, which)
+            call(which)
             return
         parts = np.array_split(which, PARTS * threads)
         with ThreadPoolExecutor(threads) as pool:
-            list(pool.map(partial(self._call_part, kernel), parts))
+            list(pool.map(call, parts))
 
-    def _call_part(self, kernel: Callable[..., int], which: Indices) -> None:
-        b = self.batch
-        run(kernel, b.A, b.lower, b.upper, b.sizes, self.answers, self.settings, which)
-
-    def _one_by_one(self, which: Indices) -> None:
-        """Resolve anew, by the resolver itself, which asks `certify`."""
-        for p in which:
-            before = self.before[p] if self.before is not None and self.warm[p] else None
-            res = self.resolver.solve(self.batch[p], before)
-            self.x[p], self.codes[p], self.record[p] = res.x, res.status, res.memory
+    def _judge(self) -> None:
+        """Let `certify` decide about the answers that are in doubt."""
+        for p in np.flatnonzero(self.codes == INACCURATE).tolist():
+            self.codes[p] = SOLVED if certify(self.batch[p], self.x[p]).certified else INACCURATE
 
 
 def cores() -> int:

@@ -20,9 +20,10 @@ test, with the rows of all levels above and x - reference for t, tells whether x
 
 There are two limits to what double precision can tell. Rows that agree up to an angle of `parallel`
 count as dependent: a direction that only their difference can see is free, and levels below may use
-it. From a quarter of that angle to four times it, x may be right in either reading. And a row
-smaller than 1e-13 of the largest row of its level is dust: rounding in the large row could have
-made it. An x that meets it is accepted, and so is one that ignores it.
+it. What they span is then known up to that angle. From a quarter of `parallel` to four times it, x
+may be right in either reading. And a row smaller than 1e-13 of the largest row of its level is
+dust: rounding in the large row could have made it. An x that meets it is accepted, and so is one
+that ignores it.
 
 The least change is a non-negative least-squares problem in coordinates in which large rows come
 first, so that rounding in rows of norm 1000 does not hide a row of norm 0.001.
@@ -47,6 +48,7 @@ PARALLEL = 1e-8
 _EITHER = 4.0       # up to this factor from `parallel`, rows may count as dependent or not
 _DUST = 1e-13       # norm of a row of a level relative to the largest: smaller ones are not judged
 _SMALLEST = 1e-30   # norm of a row of a level relative to the largest: smaller ones count as this
+_CLEAR = 0.1        # pivot, relative: smaller ones do not add to what parallel rows leave unknown
 _UNSEEN = 1e4       # weight of what no row of a level can see, relative to what they see least
 _LARGEST = 1e150    # of a length: its square is finite
 _SMALL = 1e-15      # relative: steps and pivots below it are rounding
@@ -152,7 +154,7 @@ def _judged(levels: list[_Rows], gap: Array, reach: float, tolerance: float, par
             break
         stationarity[k] = _residual(cone, level, tolerance * reach) / reach
         cone.add(level)
-    return stationarity, _projected(cone.Z.T @ gap, cone) / reach
+    return stationarity, _projected(gap, cone) / reach
 
 
 @final
@@ -208,12 +210,13 @@ class _NormalCone:
         self.rows = np.empty((0, n))   # coordinates in Z of rows on a side, unit again
         self._kept = np.empty((0, n))  # the same rows as they are given
         self.thinnest = 1.0  # smallest pivot that was not taken for zero: rounding grows by it
+        self.angle = 0.0  # largest that was: the span is known up to it
 
     def add(self, level: _Rows) -> None:
         """Take in a level: rows in the span, rows on their upper or lower side."""
         if level.fixed.any():
-            self.Z, pivot = _complement(self.Z, level.unit[level.fixed], self.parallel)
-            self.thinnest = min(self.thinnest, pivot)
+            self.Z, pivot, angle = _complement(self.Z, level.unit[level.fixed], self.parallel)
+            self.thinnest, self.angle = min(self.thinnest, pivot), max(self.angle, angle)
         if level.upper.any() or level.lower.any():
             self._kept = np.vstack([self._kept, level.unit[level.upper], -level.unit[level.lower]])
         seen = self._kept @ self.Z
@@ -224,14 +227,15 @@ class _NormalCone:
         self.thinnest = min(self.thinnest, float(left[seen_at_all].min(initial=1.0)))
 
 
-def _complement(Z: Array, rows: Array, parallel: float) -> tuple[Array, float]:
-    """Basis of what unit rows leave of Z (n, p), and the smallest pivot not taken for zero."""
+def _complement(Z: Array, rows: Array, parallel: float) -> tuple[Array, float, float]:
+    """Basis of what unit rows leave of Z (n, p), the smallest pivot taken, the largest left out."""
     from scipy.linalg import qr  # type: ignore[import-untyped]
 
     q, r, _ = qr((rows @ Z).T, pivoting=True, check_finite=False)
     pivots = np.abs(np.diagonal(r))
     rank = int(np.count_nonzero(pivots > parallel))
-    return Z @ q[:, rank:], float(pivots[:rank].min(initial=1.0))
+    return (Z @ q[:, rank:], float(pivots[:rank].min(initial=1.0)),
+            float(pivots[rank:].max(initial=0.0)))
 
 
 def _residual(cone: _NormalCone, level: _Rows, enough: float) -> float:
@@ -259,22 +263,30 @@ def _residual(cone: _NormalCone, level: _Rows, enough: float) -> float:
     f = np.concatenate([view.Q.T @ t, none, -np.maximum(own_t, 0.0)])
     size = np.concatenate([np.abs(view.Q).T @ np.abs(t), none, np.zeros(len(own_t))])
     found = _balanced(np.vstack([C, held]), np.vstack([terms, held]), f, size,
-                      min(cone.thinnest, view.thinnest), 1e-3 * enough)
+                      _unknown(min(cone.thinnest, view.thinnest), max(cone.angle, view.angle)),
+                      1e-3 * enough)
     return min(found, all_of_it)
 
 
 def _projected(gap: Array, cone: _NormalCone) -> float:
-    """Length of the projection of -gap on the polar cone."""
-    C, size = cone.rows.T, np.full(len(gap), norm(gap))
-    return _balanced(C, np.ones_like(C), gap, size, cone.thinnest, 0.0)
+    """Length of the projection of -gap (n,) on the polar cone, in the coordinates of Z."""
+    C, f = cone.rows.T, cone.Z.T @ gap
+    size = norm(f if cone.angle == 0.0 else gap)
+    return _balanced(C, np.ones_like(C), f, np.full(len(f), size),
+                     _unknown(cone.thinnest, cone.angle), 0.0)
 
 
-def _balanced(C: Array, terms: Array, f: Array, size: Array, thinnest: float, enough: float
+def _unknown(thinnest: float, angle: float) -> float:
+    """Share of a term that rounding may have made, or rows that count as parallel."""
+    return _ROUNDING / thinnest + 2.0 * angle / max(thinnest, _CLEAR)
+
+
+def _balanced(C: Array, terms: Array, f: Array, size: Array, unknown: float, enough: float
               ) -> float:
-    """Least |C z + f| for z >= 0, without what rounding can make of terms of these sizes."""
+    """Least |C z + f| for z >= 0, without the share that is unknown of terms of these sizes."""
     z = _non_negative(C, -f, enough)
     left = C @ z + f
-    noise = _ROUNDING * (size + terms @ z) / thinnest
+    noise = unknown * (size + terms @ z)
     return _length(left[np.abs(left) > noise])
 
 
@@ -293,6 +305,7 @@ class _View:
     directions: Array
     rest: Array
     thinnest: float
+    angle: float
     parallel: float
 
     @property
@@ -305,13 +318,13 @@ class _View:
         """Factorise rows P (m, p), parts of unit rows, that stand for rows of these sizes."""
         from scipy.linalg import qr
 
-        V, T, thinnest, rank = _graded(P, size, parallel)
+        V, T, thinnest, angle, rank = _graded(P, size, parallel)
         by_size = np.argsort(-size, kind="stable")
         q, R, order = qr((T[:rank] * size**2).T[by_size], mode="economic", pivoting=True,
                          check_finite=False)
         Q = np.empty_like(q)
         Q[by_size] = q
-        return _View(Q, R, order, V[:, :rank], V[:, rank:], thinnest, parallel)
+        return _View(Q, R, order, V[:, :rank], V[:, rank:], thinnest, angle, parallel)
 
     def weighted(self, rows: Array) -> tuple[Array, Array]:
         """Return what rows (k, p) do to a balance, as columns (p, k), in lengths of the level.
@@ -326,15 +339,16 @@ class _View:
         outside[norm(outside, axis=1) <= self.parallel * length] = 0.0
         if not self.rank:
             return np.asarray(outside.T), np.tile(length, (outside.shape[1], 1))
-        inside = solve_triangular(self.R, (rows @ self.directions)[:, self.order].T, trans="T",
-                                  check_finite=False)
+        seen = rows @ self.directions
+        seen[np.abs(seen) <= _ROUNDING * length[:, None]] = 0.0
+        inside = solve_triangular(self.R, seen[:, self.order].T, trans="T", check_finite=False)
         weight = _UNSEEN / float(np.abs(np.diagonal(self.R)).min())
         return (np.vstack([inside, weight * outside.T]),
                 np.vstack([np.abs(inside), np.tile(weight * length, (outside.shape[1], 1))]))
 
 
-def _graded(P: Array, size: Array, parallel: float) -> tuple[Array, Array, float, int]:
-    """Orthonormal basis V (p, p), T = V^T P^T, its thinnest pivot, and the rank of T.
+def _graded(P: Array, size: Array, parallel: float) -> tuple[Array, Array, float, float, int]:
+    """Orthonormal basis V (p, p), T = V^T P^T, its thinnest pivot, what it left out, its rank.
 
     Pivots are chosen by the size of what is left of a row. A row that has no more than `parallel`
     of itself left is not a pivot, and nothing is left of it.
@@ -352,9 +366,11 @@ def _graded(P: Array, size: Array, parallel: float) -> tuple[Array, Array, float
         candidate[chosen[order[int(np.argmax(lost))]]] = False
     T = V.T @ P.T
     left = np.sqrt(np.cumsum(T[::-1]**2, axis=0)[::-1])
-    T[left <= 0.5 * parallel] = 0.0  # half: what is left of a pivot stays, after rounding too
-    T[len(pivots):] = 0.0
-    return V, T, float(pivots.min(initial=1.0)), len(pivots)
+    out = left <= 0.5 * parallel  # half: what is left of a pivot stays, after rounding too
+    out[len(pivots):] = True
+    angle = float(np.minimum(np.abs(T)[out].max(initial=0.0), parallel))
+    T[out] = 0.0
+    return V, T, float(pivots.min(initial=1.0)), angle, len(pivots)
 
 
 def _non_negative(C: Array, b: Array, enough: float) -> Array:
@@ -370,19 +386,20 @@ def _non_negative(C: Array, b: Array, enough: float) -> Array:
     heavy = np.argsort(-np.abs(C).max(axis=1), kind="stable")  # for rows of different weight
     D, target = C[:, usable][heavy], b[heavy] / largest
     unit = D / peak[usable]
-    unit = unit / np.sqrt(np.einsum("ij,ij->j", unit, unit))
     y, left, free = _begun(D, target)
-    refused = np.zeros(len(y), dtype=bool)
+    refused, tried = np.zeros(len(y), dtype=bool), {free.tobytes()}
     for _ in range(3 * len(y) + 3):
-        slope = np.where(free | refused, 0.0, unit.T @ left)
+        slope, terms = unit.T @ left, np.abs(unit).T @ np.abs(left)
+        slope = np.where(free | refused | (terms == 0.0), 0.0, slope / np.where(terms, terms, 1.0))
         best = int(np.argmax(slope))
-        if norm(left) * largest <= enough or slope[best] <= _SMALL * norm(left):
+        if norm(left) * largest <= enough or slope[best] <= _SMALL:
             break
         moved = _freed(D, target, y, free, best)
-        if moved is None:
+        if moved is None or moved[2].tobytes() in tried:  # rounding chose it
             refused[best] = True
         else:
             y, left, free = moved
+            tried.add(free.tobytes())
             refused[:] = False
     z[usable] = y * largest
     return z
@@ -421,16 +438,25 @@ def _freed(D: Array, b: Array, y: Array, free: Mask, new: int) -> tuple[Array, A
 
 
 def _least_squares(D: Array, b: Array, free: Mask) -> tuple[Array, Array]:
-    """Least squares of the free columns, and what it leaves; QR with pivoting, heavy rows first."""
-    from scipy.linalg import qr, solve_triangular
+    """Least squares of the free columns, and what it leaves; QR with pivoting, heavy rows first.
 
-    q, r, order = qr(D[:, free], mode="economic", pivoting=True, check_finite=False)
-    inside, s = q.T @ b, np.zeros(D.shape[1])
-    pivots = np.abs(np.diagonal(r)) > _SMALL * norm(r, axis=0)[:min(r.shape)]
+    What is left comes out of the reflections, not as a difference, so the little that a heavy row
+    leaves is as exact as the rest (Cox, Higham 1998).
+    """
+    from scipy.linalg import lapack, qr, solve_triangular
+
+    (raw, tau), r, order = qr(D[:, free], mode="raw", pivoting=True, check_finite=False)
+    depth = min(r.shape)
+    raw = raw[:, :depth]
+    inside, s = lapack.dormqr("L", "T", raw, tau, b[:, None], 64)[0][:, 0], np.zeros(D.shape[1])
+    rounding = _SMALL * np.minimum(norm(r, axis=0)[:depth],  # of each column, and each row
+                                   np.abs(D[:, free]).max(axis=1)[:depth])
+    pivots = np.abs(np.diagonal(r)) > rounding
     rank = len(pivots) if pivots.all() else int(np.argmin(pivots))
     solved = solve_triangular(r[:rank, :rank], inside[:rank], check_finite=False)
     s[np.flatnonzero(free)[order[:rank]]] = solved
-    return s, b - q[:, :rank] @ inside[:rank]
+    inside[:rank] = 0.0
+    return s, lapack.dormqr("L", "N", raw, tau, inside[:, None], 64)[0][:, 0]
 
 
 def _length(v: Array) -> float:

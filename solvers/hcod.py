@@ -1,10 +1,9 @@
-"""Exact lexicographic least squares with inequalities at every level: our own active-set solver."""
+"""The exact engine: lexicographic least squares with inequalities at every level."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import chain
 from typing import Any, ClassVar, final
 
 import numpy as np
@@ -13,10 +12,11 @@ from numpy.typing import NDArray
 from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array, Hierarchy
 from solvers.certificate import certify
-from solvers.kernels.hcod import UNPROVED, hcod, hcod_equalities
-from solvers.kernels.rows import TOO_SMALL
-from solvers.kernels.stages import solve_by_stages
-from solvers.resolver import Handles, Resolution, Resolver, Status, register
+from solvers.kernels.guess import solve_by_guesses
+from solvers.kernels.levels import solve_by_levels
+from solvers.kernels.staircase import solve_equalities
+from solvers.resolver import Handles, Resolution, Resolver, register
+from solvers.status import EQUAL, NO_LIMITS, TOO_SMALL, UNPROVED, Status
 from solvers.workspace import WORKSPACE
 
 
@@ -41,7 +41,7 @@ class ActiveSetResolution(Resolution):
 
     @property
     def iterations(self) -> int:  # type: ignore[override]
-        """Active sets guessed and steps by stages."""
+        """Active sets guessed, and steps by levels."""
         return int(self.memory[-3] + self.memory[-2])
 
     @property
@@ -74,28 +74,20 @@ class ActiveSetResolution(Resolution):
 @register
 @dataclass(frozen=True, kw_only=True)
 class Hcod(Resolver):
-    """Active set, exact at any rank, equalities and two-sided inequalities at every level.
+    """Active set on a hierarchical factorisation, exact at any rank, inequalities at every level.
 
-    Guesses the active set, solves it by the staircase of `tpm`, and proves the answer by its
-    multipliers; where `guesses` do not lead there, a primal active set goes level by level. On
-    equalities alone it is `tpm`, to the last digit, damped or not. With inequalities, damping makes
-    it go level by level: a level minimises ||what it misses||^2 + lambda^2 ||its own step||^2
-    inside the rows above, lambda being the largest of the active sets met on the way.
+    It is not the decomposition of Escande, Mansard and Wieber; docs/hcod.md says how it differs.
 
-    Where nearly parallel rows, or rows of very different scale, leave a doubt about the active set,
-    `certify` judges; an answer that it does not accept has Status.INACCURATE. (Not with damping
-    on, which is for such rows and makes another problem of it.)
+    Equalities alone are resolved by the staircase of `tpm`, to the last digit. With the memory of
+    the tick before, its active set is solved and proved by its multipliers; where that fails within
+    `guesses`, and without a memory, a primal active set goes level by level. With damping and
+    inequalities a level minimises ||what it misses||^2 + lambda^2 ||its own step||^2 inside the
+    rows above. Where a row that acts is nearly parallel to others, `certify` judges; an answer that
+    it does not accept has Status.INACCURATE. (Not with damping on.)
 
-    tolerance : of violations and multipliers, relative to the size of the terms they are made of.
+    tolerance : of violations, relative to the size of the terms they are made of.
     guesses : active sets tried before going level by level; at least 1.
-    max_iterations : steps by levels, then Status.ITERATION_LIMIT: x keeps the levels above the
-        one that was being worked on.
-
-    The memory is the active set; with that of the tick before most solves need one guess. The
-    answer does not depend on it beyond rounding. Sources: Escande, Mansard, Wieber, "Hierarchical
-    quadratic programming" (2014); Dimitrov, Sherikov, Wieber, "Efficient resolution of potentially
-    conflicting linear constraints in robotics" (2015); Hintermueller, Ito, Kunisch, "The
-    primal-dual active set strategy as a semismooth Newton method" (2002).
+    max_iterations : steps by levels, then Status.ITERATION_LIMIT: x keeps the levels above.
     """
 
     name: ClassVar[str] = "hcod"
@@ -121,43 +113,33 @@ class Hcod(Resolver):
         """Resolve h, beginning with the active set of an earlier resolution if one is given."""
         x = h.reference.copy()
         size = 3 * len(h.lower) + 3
-        fits = memory is not None and len(memory) == size
-        record = memory.copy() if fits else np.zeros(size)
-        problem = (h.A, h.lower, h.upper, h.sizes, x, record, self._settings, WORKSPACE.array)
-        equal = len(h.lower) == 0 or h.lower.item(0) == h.upper.item(0)
-        code = hcod_equalities(*problem) if equal else UNPROVED
-        if code == UNPROVED:
-            code = hcod(*problem)
-        if code == 0:
+        known = memory is not None and len(memory) == size and self.damping == 0.0
+        record = memory.copy() if known else np.zeros(size)
+        code = solve_exactly(h, x, record, self._settings, known)
+        if code == 0 or (code == _INACCURATE and certify(h, x).certified):
             return ActiveSetResolution(x, _SOLVED, record)
-        if code == TOO_SMALL:
-            WORKSPACE.double()
-            return self.solve(h, memory)
-        if code != UNPROVED:
-            return ActiveSetResolution(x, Status(code), record)
-        resolution = self._by_stages(h, record)
-        return (self._without_doubt(h, resolution) if resolution.status is Status.INACCURATE
-                else resolution)
-
-    def _by_stages(self, h: Hierarchy, record: Array, share: float = 1.0) -> ActiveSetResolution:
-        """Go level by level, with a share of the tolerance."""
-        x, settings = h.reference.copy(), self._settings.copy()
-        settings[3] *= share
-        problem = (h.A, h.lower, h.upper, h.sizes, x, record, settings)
-        while (code := solve_by_stages(*problem, WORKSPACE.array)) == TOO_SMALL:
-            WORKSPACE.double()
         return ActiveSetResolution(x, Status(code), record)
 
-    def _without_doubt(self, h: Hierarchy, first: ActiveSetResolution) -> ActiveSetResolution:
-        """Let `certify` judge a doubtful answer, and others found with finer tolerances."""
-        finer = (self._by_stages(h, first.memory.copy(), share) for share in _FINER)
-        for answer in chain([first], finer):
-            if answer.status in (Status.SOLVED, Status.INACCURATE) and certify(
-                    h, answer.x).certified:
-                answer.status = Status.SOLVED
-                return answer
-        return first
+
+def solve_exactly(h: Hierarchy, x: Array, record: Array, settings: Array, known: bool) -> int:
+    """Call the kernels one after the other until one has an answer; return its code.
+
+    Equalities go to the staircase, a known active set to guesses, all else to levels. x (n,) comes
+    in as the reference and goes out as the answer; record (3 m + 3,), settings: see
+    `solve_by_guesses`. A kernel calls no other, which would compile it again.
+    """
+    work, code = WORKSPACE.array, UNPROVED
+    if not known or record[0] == EQUAL:
+        code = solve_equalities(h.A, h.lower, h.upper, h.sizes, x, record, settings, work)
+    if code == UNPROVED and known:
+        code = solve_by_guesses(h.A, h.lower, h.upper, h.sizes, x, record, settings, work)
+    if code == UNPROVED:
+        code = solve_by_levels(h.A, h.lower, h.upper, h.sizes, x, record, settings, work)
+    if code == TOO_SMALL:
+        WORKSPACE.double()
+    if code in (TOO_SMALL, NO_LIMITS):
+        return solve_exactly(h, x, record, settings, known and code == TOO_SMALL)
+    return code
 
 
-_SOLVED = Status.SOLVED
-_FINER = (1e-2, 1e-3)  # shares of the tolerance that a doubtful answer is tried again with
+_SOLVED, _INACCURATE = Status.SOLVED, Status.INACCURATE

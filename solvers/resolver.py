@@ -72,7 +72,7 @@ class Resolver(ABC):
 
     damping: float = 0.0
     threshold: float = 0.1
-    rank_tolerance: float = 1e-9
+    rank_tolerance: float = 1e-8
 
     name: ClassVar[str]
     handles: ClassVar[Handles] = "equalities"

@@ -7,50 +7,17 @@ from functools import cached_property
 from typing import Any, ClassVar, final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array, Hierarchy
 from solvers.kernels.sns import sns
 from solvers.resolver import Handles, Resolution, Resolver, register
+from solvers.saturation import SaturatedResolution
 from solvers.status import CONTRADICTION, TOO_SMALL, Status
 from solvers.workspace import WORKSPACE
 
 FORMS = ("basic", "optimal")
 SCALES = ("target", "miss")
-
-
-@final
-class SaturatedResolution(Resolution):
-    """A resolution that says which unknowns are at their bounds, and what was scaled.
-
-    Attributes beside those of `Resolution`; n unknowns, L levels
-    ----------
-    saturated : (n,) int8, +1 for x at its upper bound, -1 at its lower one, 2 where both are one.
-    scaling : (L,) s of each level, in 0 .. 1, and 1 for the bounds. 0 also where no s was found:
-        then the level adds nothing to x.
-    """
-
-    __slots__ = ("_record",)
-    memory: None
-
-    def __init__(self, x: Array, status: Status, record: Array) -> None:
-        self.x, self.status, self._record, self.memory = x, status, record, None
-
-    @property
-    def iterations(self) -> int:  # type: ignore[override]
-        """Sets of saturated joints tried, and steps to the reference."""
-        return int(self._record[-1])
-
-    @property
-    def saturated(self) -> NDArray[np.int8]:
-        """Which unknowns are at a bound: (n,)."""
-        return self._record[:len(self.x)].astype(np.int8)
-
-    @property
-    def scaling(self) -> Array:
-        """The share of each level that is carried out: (L,)."""
-        return self._record[len(self.x):-1].copy()
 
 
 @final
@@ -129,7 +96,7 @@ class Sns(Resolver):
             _refuse_contradiction(h, int(record[-1]))
         if code < 0 or code == TOO_SMALL:
             return self._otherwise(h, x, code)
-        return SaturatedResolution(x, Status(code), record)
+        return SaturatedResolution(x, Status(code), int(record[-1]), record, len(h.sizes))
 
 
 def _refuse_contradiction(h: Hierarchy, row: int) -> None:

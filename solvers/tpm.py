@@ -3,66 +3,26 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, ClassVar, final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array, Hierarchy
 from solvers.certificate import certify
-from solvers.kernels.published import priority_matrix, published
-from solvers.kernels.rows import INACCURATE, SOLVED
-from solvers.kernels.saturation import NO_LIMITS, saturation
-from solvers.kernels.staircase import staircase
-from solvers.resolver import (
-    Handles,
-    Resolution,
-    Resolver,
-    Status,
-    refuse_inequality,
-    register,
-)
-from solvers.workspace import WORKSPACE
+from solvers.hcod import solve_exactly
+from solvers.kernels.bounds import name_saturation, solve_without_bounds
+from solvers.kernels.published import matrix_as_published, solve_as_published
+from solvers.kernels.staircase import solve_by_staircase
+from solvers.resolver import Handles, Resolution, Resolver, refuse_inequality, register
+from solvers.saturation import SaturatedResolution
+from solvers.status import INACCURATE, NO_LIMITS, NUMERICAL_FAILURE, SOLVED, UNPROVED, Status
+from solvers.workspace import WORKSPACE, run
 
 FORMS = ("staircase", "published")
+_OF_THE_ENGINE = (1e-10, 3, 1000)  # tolerance, guesses, max_iterations, as those of `hcod`
 _SOLVED = Status.SOLVED
-
-
-@final
-class SaturatedResolution(Resolution):
-    """A resolution that says which joints are at a bound, and how much of each level is left.
-
-    Attributes beside those of `Resolution`; n joints, L levels
-    ----------
-    saturated : (n,) int8, +1 for a joint held at its upper bound, -1 at its lower one, 2 where both
-        are one, 0 for a free joint.
-    scaling : (L,) how much of its target each level gets, 1 - |A_k x - b_k| / |b_k| and not below
-        zero: 1 exactly where the level is met. For the bounds 1, or 0 where rows on one joint
-        exclude each other.
-    """
-
-    __slots__ = ()
-
-    def __init__(self, x: Array, status: Status, memory: Array) -> None:
-        self.x, self.status, self.memory = x, status, memory
-
-    @property
-    def iterations(self) -> int:  # type: ignore[override]
-        """Levels resolved with a set of saturated joints: 1 where the first set was right."""
-        return int(self.memory[-1])
-
-    @property
-    def saturated(self) -> NDArray[np.int8]:
-        """Which bound each joint is held at: (n,)."""
-        part: Array = self.memory[:len(self.x)]
-        return part.astype(np.int8)
-
-    @property
-    def scaling(self) -> Array:
-        """How much of its target each level gets: (L,)."""
-        part: Array = self.memory[len(self.x):-1].copy()
-        return part
 
 
 @final
@@ -75,18 +35,16 @@ class Tpm(Resolver):
     `recursive`, to rounding.
 
     Limits, in this form: the first level may be bounds on single unknowns (joints), in any number
-    of rows with one entry each. Joints that saturate leave the stack's columns, and come back where
-    that serves the first level they hold back; the resolution is a `SaturatedResolution`. Unless
-    the data are not finite, x keeps the bounds to rounding, and no level gives up anything for one
-    below it. Of bounds on one joint that exclude each other the point of least violation is taken,
-    as a norm. With damping off, SOLVED is the exact lexicographic answer, that of `hcod`, and does
-    not depend on `memory` beyond rounding. Status.INACCURATE: the set of saturated joints did not
-    settle, or rows are nearly parallel behind those above, and `certify` does not accept x; a
-    level, or the way to the reference, may then be worse than it could be.
-    With damping on, a level that it acts on is damped on the columns left; which joints saturate
-    then follows the same rule but has no optimum to meet, so one that comes back for a level and
-    saturates again stays, and `memory` is not used. Where no bound is in the way, x is that without
-    bounds to the last digit.
+    of rows with one entry each. Where x without bounds is within them it is the answer, to the last
+    digit; otherwise the engine of `hcod` resolves, and the resolution is a `SaturatedResolution`:
+    `scaling` is 1 - |A_k x - b_k| / |b_k| and not below zero, 1 exactly where a level is met, and
+    `iterations` counts the sets of saturated joints tried, and steps by levels. Unless the data are
+    not finite, x keeps the bounds to rounding, and no level gives up anything for one below it. Of
+    bounds on one joint that exclude each other the point of least violation is taken, as a norm.
+    With damping off, SOLVED is the exact lexicographic answer, and does not depend on `memory`
+    beyond rounding. Status.INACCURATE: rows are nearly parallel behind those above, and `certify`
+    does not accept x; a level, or the way to the reference, may then be worse than it could be.
+    Damping is that of `hcod`; `memory` is then not used.
 
     form = "published": plain QR and Gauss-Jordan elimination with pivot blocks R_ii, as printed.
     It departs from the strict answer where a level above the last loses rank and no freedom is left
@@ -124,27 +82,37 @@ class Tpm(Resolver):
         if staircased and memory is not None:
             return self._within_bounds(h, memory)
         x = h.reference.copy()
-        kernel = staircase if staircased else published
-        code = kernel(h.A, h.lower, h.upper, h.sizes, x, self.damping, self.threshold,
-                      self.rank_tolerance, WORKSPACE.array)
-        if code == 0:
+        kernel = solve_by_staircase if staircased else solve_as_published
+        code = kernel(h.A, h.lower, h.upper, h.sizes, x, self._settings, WORKSPACE.array)
+        if code == SOLVED or (code == INACCURATE and certify(h, x).certified):
             return Resolution(x)
         return (self._within_bounds(h, None) if code < 0 and staircased
                 else self._otherwise(h, x, code, memory))
 
+    @cached_property
+    def _settings(self) -> Array:
+        return np.array([self.damping, self.threshold, self.rank_tolerance, *_OF_THE_ENGINE])
+
     def _within_bounds(self, h: Hierarchy, memory: Any) -> Resolution:
         """Resolve h if its first level is bounds; otherwise refuse it, or forget the memory."""
         x = h.reference.copy()
-        size = len(x) + len(h.sizes) + 1
-        fits = memory is not None and len(memory) == size and self.damping == 0.0
-        record = memory.copy() if fits else np.zeros(size)
-        code = saturation(h.A, h.lower, h.upper, h.sizes, x, record, self.damping, self.threshold,
-                          self.rank_tolerance, WORKSPACE.array)
-        if code == SOLVED or (code == INACCURATE and certify(h, x).certified):
-            return SaturatedResolution(x, _SOLVED, record)
-        if code == INACCURATE:
-            return SaturatedResolution(x, Status.INACCURATE, record)
-        return self.solve(h) if code == NO_LIMITS else self._otherwise(h, x, code, memory)
+        first = len(x) + len(h.sizes)
+        size = first + 3 * len(h.lower) + 3
+        known = memory is not None and len(memory) == size and self.damping == 0.0
+        record = memory.copy() if known else np.zeros(size)
+        code = run(solve_without_bounds, h.A, h.lower, h.upper, h.sizes, x, record, self._settings)
+        if code == UNPROVED:
+            inner = record[first:]
+            known = bool(inner[-3] + inner[-2] > 0.0)
+            code = solve_exactly(h, x, inner, self._settings, known)
+        if code == NO_LIMITS:
+            return self.solve(h)
+        if code < 0 or code == NUMERICAL_FAILURE:
+            return self._otherwise(h, x, code)
+        name_saturation(h.A, h.lower, h.upper, h.sizes, x, record, WORKSPACE.array)
+        sure = code == SOLVED or certify(h, x).certified
+        return SaturatedResolution(x, _SOLVED if sure else Status.INACCURATE,
+                                   int(record[-3] + record[-2]), record, len(h.sizes), record)
 
 
 @final
@@ -193,9 +161,7 @@ def _answer(resolver: Tpm, h: Hierarchy, b: Array, reference: Array) -> Array:
     return resolver.solve(Hierarchy(h.A, b, b, h.sizes, reference, h.names)).x
 
 
-def _published_matrix(h: Hierarchy, r: Tpm) -> Array:
-    W, beta = np.empty((2 * h.m, max(h.m, h.n))), np.empty(h.m)
-    F, T = np.empty((h.m, h.m)), np.empty((h.m, h.m))
-    priority_matrix(h.A, h.lower, h.upper, h.sizes, h.reference, W, beta, F, T, r.damping,
-                    r.threshold, r.rank_tolerance, np.empty(h.m + 3 * h.m * h.m))
+def _published_matrix(h: Hierarchy, resolver: Tpm) -> Array:
+    F = np.empty((h.m, h.m))
+    run(matrix_as_published, h.A, h.lower, h.upper, h.sizes, F, resolver._settings)
     return F.T.copy()  # (10)

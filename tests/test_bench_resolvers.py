@@ -8,7 +8,7 @@ import pytest
 
 from hierarchy import HierarchyError
 from scenarios.bench import candidates, cascade, families, machine, resolvers
-from scenarios.bench.families import family, well_posed_levels
+from scenarios.bench.families import family
 from solvers import Status, backends
 
 
@@ -95,9 +95,24 @@ def test_its_flag_is_read_before_its_answer():
     assert not res.x.any()
 
 
-def test_nearly_parallel_rows_make_the_levels_below_them_ill_posed():
-    assert {well_posed_levels(p.h, p.x) for p in family("INEQ7")} == {5}
-    assert {well_posed_levels(p.h, p.x) for p in family("DEGEN7")} <= {2, 3}
+def test_fresh_problems_are_timed_and_reported_apart(few, capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    rows = resolvers.run(seconds=0.0, families=("EQ7", "INEQ7"), seed=10_000_000, count=4)
+    assert {(row["family"], row["origin"], row["problems"]) for row in rows} == {
+        (name, origin, count) for name in ("EQ7", "INEQ7")
+        for origin, count in (("known", 3), ("fresh", 4))}
+    assert all(row["wrong"] == 0 for row in rows if row["resolver"] in ("hcod", "hcod warm"))
+    out = capsys.readouterr().out
+    assert "INEQ7, fresh" in out
+    assert out.index("known INEQ7") < out.index("fresh INEQ7")
+    assert max(map(len, out.splitlines())) <= 80
+
+
+def test_fresh_problems_are_not_the_stored_ones_and_some_have_norms():
+    made = families.fresh("INEQ7", 10_000_000, 4, checked=2)
+    assert [problem.known for problem in made] == [True, True, False, False]
+    stored = [problem.h.upper for problem in family("INEQ7")]
+    assert not any(np.array_equal(one.h.upper, old) for one in made for old in stored)
 
 
 def test_timing_on_one_core_gives_the_others_back():

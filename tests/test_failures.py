@@ -28,27 +28,16 @@ RIGHT = {
 }
 UNKNOWN = ["hcod_nested_2004163_shift"]  # near-ties of 1e-9: any answer that says it is not sure
 RESOLVERS = ("hcod", "tpm", "hqp")
-NOT_YET = {  # wrong, though called solved, until the kernels judge rows by their own norm
-    ("hcod_SOLVED_wrong_2x2_integer", "hcod"), ("hcod_pinch_avoid_box_task", "hcod"),
-    ("hcod_wrong_min_2003814_order", "hcod"), ("hcod_wrong_min_2007743_order", "hcod"),
-    ("hcod_wrong_min_2011075_base", "hcod"), ("hcod_wrong_min_2011075_order", "hcod"),
-    ("hcod_wrong_min_2019756_order", "hcod"), ("hcod_nested_2004163_shift", "hcod"),
-    ("tpm_wrong_min_3000097", "tpm"), ("tpm_wrong_min_3000542", "tpm"),
-    ("tpm_wrong_min_3009328", "tpm"), ("hcod_wrong_min_2007743_order", "hqp")}
-UNSOLVED = {  # right x or not, the status is not SOLVED yet
-    ("hcod_iterlimit_min_11197", "hcod"), ("hcod_iterlimit_min_11480", "hcod"),
-    ("hcod_n60_2006232_zeros", "hcod")}
+WRONG = {("hcod_wrong_min_2007743_order", "hqp")}  # a level is divided by its largest entry
 
 
 def read(name):
     return problems.load(FOLDER / f"{name}.npz")
 
 
-def cases(names, late):
-    why = {"hqp": "hqp loses rows of 1e-7 of the largest entry of their level"}
-    awaited = {resolver: pytest.mark.xfail(reason=why.get(resolver, "awaits the new kernels"))
-               for resolver in RESOLVERS}
-    return [pytest.param(name, resolver, marks=[awaited[resolver]] * ((name, resolver) in late),
+def cases(names):
+    small = pytest.mark.xfail(reason="hqp loses rows of 1e-7 of the largest entry of their level")
+    return [pytest.param(name, resolver, marks=[small] * ((name, resolver) in WRONG),
                          id=f"{name}-{resolver}") for name in names for resolver in RESOLVERS]
 
 
@@ -60,7 +49,7 @@ def solved(name, resolver):
         pytest.skip(str(refusal))
 
 
-@pytest.mark.parametrize(("name", "resolver"), cases([*RIGHT, *UNKNOWN], NOT_YET))
+@pytest.mark.parametrize(("name", "resolver"), cases([*RIGHT, *UNKNOWN]))
 def test_what_is_called_solved_is_certified(name, resolver):
     res = solved(name, resolver)
     assert np.isfinite(res.x).all()
@@ -68,7 +57,7 @@ def test_what_is_called_solved_is_certified(name, resolver):
     assert res.status is not Status.SOLVED or verdict.certified, str(verdict)
 
 
-@pytest.mark.parametrize(("name", "resolver"), cases(RIGHT, NOT_YET | UNSOLVED))
+@pytest.mark.parametrize(("name", "resolver"), cases(RIGHT))
 def test_the_violations_are_the_right_ones(name, resolver):
     res = solved(name, resolver)
     assert res.status is Status.SOLVED

@@ -84,19 +84,20 @@ def test_equalities_alone_are_the_staircase_to_the_last_digit(name, damping):
 
 @pytest.mark.parametrize("guesses", [1, 3, 30])
 def test_guessing_and_going_level_by_level_give_one_answer(guesses):
-    resolver = make("hcod", guesses=guesses)
+    resolver, rng = make("hcod", guesses=guesses), np.random.default_rng(1)
     for h, _, _ in family("INEQ7"):
-        np.testing.assert_allclose(resolver.solve(h).x, by_stages(h).x, atol=1e-9)
+        memory = HCOD.solve(moved(h, rng, 0.3)).memory
+        np.testing.assert_allclose(resolver.solve(h, memory).x, by_levels(h).x, atol=1e-9)
 
 
-def by_stages(h):
-    """hcod without a guess."""
-    return HCOD._by_stages(h, np.zeros(3 * h.m + 3))
+def by_levels(h):
+    """hcod without a guess: it has no memory to guess from."""
+    return HCOD.solve(h)
 
 
 def test_both_ways_know_the_same_rows_and_multipliers():
     for h, _, _ in family("INEQ7"):
-        a, b = HCOD.solve(h, HCOD.solve(h).memory), by_stages(h)
+        a, b = HCOD.solve(h, HCOD.solve(h).memory), by_levels(h)
         np.testing.assert_array_equal(a.holds_back, b.holds_back)
         np.testing.assert_allclose(a.multipliers, b.multipliers, atol=1e-6)
 
@@ -160,7 +161,7 @@ def test_a_zero_row_that_cannot_be_met_disturbs_nobody():
     res = HCOD.solve(h)
     assert res.status is Status.SOLVED
     np.testing.assert_allclose(res.x, [2, 2])
-    np.testing.assert_allclose(h.violations(res.x), [1, 0], atol=1e-15)
+    np.testing.assert_allclose(h.violations(res.x), [1, 0], atol=4e-15)
 
 
 def test_inequalities_stay_violated_where_they_must():

@@ -28,11 +28,7 @@ def test_generated_problems_are_solved_and_certified(name, part):
     assert found.counts[stress.CERTIFIED] >= 0.999 * each, "the rest says that it is not sure"
 
 
-AWAITED = {"opposed", "nearly_parallel", "shifted"}  # wrong until the new kernels
-
-
-@pytest.mark.parametrize("kind", [pytest.param(kind, marks=[pytest.mark.xfail(
-    reason="awaits the new kernels")] * (kind in AWAITED)) for kind in problems.KINDS])
+@pytest.mark.parametrize("kind", problems.KINDS)
 def test_structured_problems_end_certified_or_with_a_status(kind):
     found = stress.tally("hcod", range(FIRST, FIRST + min(COUNT, 200)), kind)
     assert not found.failing

@@ -15,7 +15,7 @@ from math import inf
 
 import numpy as np
 
-from hierarchy.compiled import inlined
+from hierarchy.compiled import compiled, inlined
 from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array
 
@@ -65,13 +65,13 @@ class Barrier:
         return np.array(astuple(self))
 
 
-@inlined
+@compiled
 def least_rate(h, settings):
     """The dh/dt [m/s] to ask for at least, at velocity level; settings of `Barrier.packed`."""
     return min(-settings[1] * h, settings[3])
 
 
-@inlined
+@compiled
 def least_acceleration(h, rate_of_h, bend, settings):
     """The d2h/dt2 - bend [m/s^2] to ask for at least; settings of `Barrier.packed`.
 

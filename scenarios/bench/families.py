@@ -1,4 +1,4 @@
-"""The reference problems: lexicographic least squares with certified answers."""
+"""The reference problems, stored with certified answers, and fresh ones of the same make."""
 
 from __future__ import annotations
 
@@ -9,21 +9,29 @@ import numpy as np
 
 from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array, Hierarchy
+from solvers import Resolver, Status, certify, make
+from solvers.problems import family as make_problem
 
 EQUALITIES = ("EQ7", "EQ7over", "EQ7sing", "EQ30L8", "EQ30L10")
 INEQUALITIES = ("INEQ7", "HUM38", "DEGEN7")
 FAMILIES = EQUALITIES + INEQUALITIES
 DATA = Path(__file__).parents[2] / "tests" / "data" / "hlsp"
+CHECKED = 5      # fresh problems of a family whose violations hqp gives
 _MISSING = 1e9  # the data's sign for a missing side
 
 
 @dataclass(frozen=True)
 class Problem:
-    """A reference hierarchy with its certified answer x (n,) and violations, norms (L,)."""
+    """A hierarchy with its certified answer x (n,) and violations, norms (L,); NaN if unknown."""
 
     h: Hierarchy
     x: Array
     norms: Array
+
+    @property
+    def known(self) -> bool:
+        """Whether there is a certified answer."""
+        return not bool(np.isnan(self.norms).any())
 
 
 def family(name: str, folder: Path = DATA) -> list[Problem]:
@@ -51,19 +59,21 @@ def _problem(data: dict[str, Array], p: int) -> Problem:
     return Problem(Hierarchy.from_levels(levels), data["x"][p], data["norms"][p])
 
 
-def well_posed_levels(h: Hierarchy, x: Array, parallel: tuple[float, float] = (1e-12, 1e-7)
-                      ) -> int:
-    """Return for how many levels, from the top, the violations are well-posed, x being the answer.
+def fresh(name: str, seed: int, count: int, checked: int = CHECKED) -> list[Problem]:
+    """Make problems of a family that nothing was tuned on, from seeds `seed`, `seed` + 1, ...
 
-    Two rows at an angle between `parallel`, both equalities or violated, fix a direction that they
-    hardly tell from rounding: what lies below the level of the second is anybody's.
+    checked : for so many of them, the first, hqp gives norms; only where its answer is certified.
     """
-    fixed = (h.lower == h.upper) | (np.abs(h.slacks(x)) > 1e-9)
-    level = np.repeat(np.arange(len(h.sizes)), h.sizes)
-    size = np.linalg.norm(h.A, axis=1)
-    rows = np.flatnonzero(fixed & (size > 0.0))
-    U = h.A[rows] / size[rows, None]
-    sine = np.minimum(*(np.linalg.norm(U[:, None] - sign * U[None], axis=2) for sign in (1, -1)))
-    close = (sine > parallel[0]) & (sine < parallel[1])
-    pairs = np.maximum(level[rows][:, None], level[rows][None])[close]
-    return int(pairs.min()) + 1 if pairs.size else len(h.sizes)
+    made, hqp = [make_problem(name, seed + i) for i in range(count)], make("hqp")
+    return [_answered(hqp, h) if i < checked else _unanswered(h) for i, h in enumerate(made)]
+
+
+def _answered(hqp: Resolver, h: Hierarchy) -> Problem:
+    res = hqp.solve(h)
+    if res.status is not Status.SOLVED or not certify(h, res.x).certified:
+        return _unanswered(h)
+    return Problem(h, res.x, h.violations(res.x))
+
+
+def _unanswered(h: Hierarchy) -> Problem:
+    return Problem(h, np.full(h.n, np.nan), np.full(len(h.sizes), np.nan))

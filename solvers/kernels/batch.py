@@ -1,76 +1,78 @@
 """Loops over the problems of a batch, for one thread: which of them, and what each is solved by.
 
-All arrays have the problem as their first axis. A row of `answers` is x (n,), which comes in as the
-reference, the record of the solver, and its code. Without the lock of Python, so that other threads
-run their own part meanwhile. Each kernel returns TOO_SMALL where `work` is, which depends on the
-shape alone and so shows at the first problem.
+problems: A (B, m, n), lower, upper (B, m), sizes (L,). All else has the problem as its first axis
+too: x (B, n), which comes in as the reference, the records of the solver, the codes. Without the
+lock of Python, so that other threads run their own part meanwhile. Each kernel returns TOO_SMALL
+where `work` is, before it has solved anything.
 """
 
 # mypy: disable-error-code="no-untyped-def"
 
 from __future__ import annotations
 
-from hierarchy.compiled import inlined, unlocked
-from solvers.kernels.hcod import hcod, hcod_equalities
-from solvers.kernels.saturation import saturation
-from solvers.kernels.stages import solve_by_stages
-from solvers.kernels.staircase import solve_by_staircase
-from solvers.status import SOLVED, TOO_SMALL, UNPROVED
-
-
-@inlined
-def _parts(answers, p, n):
-    """Return x and the record of problem p."""
-    return answers[p, :n], answers[p, n:-1]
+from hierarchy.compiled import unlocked
+from solvers.kernels.bounds import name_saturation, solve_without_bounds
+from solvers.kernels.guess import solve_by_guesses
+from solvers.kernels.levels import solve_by_levels
+from solvers.kernels.staircase import solve_by_staircase, solve_equalities
+from solvers.kernels.tableau import carve
+from solvers.status import EQUAL, NO_LIMITS, SOLVED, TOO_SMALL, UNPROVED
 
 
 @unlocked
-def batch_staircase(A, lower, upper, sizes, answers, settings, which, work):
-    """Solve the problems `which` by the staircase; the record is not used."""
+def batch_staircase(problems, x, codes, settings, which, work):
+    """Solve the problems `which` by the staircase."""
+    A, lower, upper, sizes = problems
     for p in which:
-        x, _ = _parts(answers, p, A.shape[2])
-        code = solve_by_staircase(A[p], lower[p], upper[p], sizes, x, settings, work)
-        answers[p, -1] = code
-        if code == TOO_SMALL:
+        codes[p] = solve_by_staircase(A[p], lower[p], upper[p], sizes, x[p], settings, work)
+        if codes[p] == TOO_SMALL:
             return TOO_SMALL
     return SOLVED
 
 
 @unlocked
-def batch_saturation(A, lower, upper, sizes, answers, settings, which, work):
-    """Solve the problems `which` by `saturation`."""
+def batch_without_bounds(problems, x, codes, records, settings, which, work):
+    """Solve the problems `which` as if they had no bounds."""
+    A, lower, upper, sizes = problems
     for p in which:
-        x, record = _parts(answers, p, A.shape[2])
-        code = saturation(A[p], lower[p], upper[p], sizes, x, record, settings[0], settings[1],
-                          settings[2], work)
-        answers[p, -1] = code
-        if code == TOO_SMALL:
+        codes[p] = solve_without_bounds(A[p], lower[p], upper[p], sizes, x[p], records[p],
+                                        settings, work)
+        if codes[p] == TOO_SMALL:
             return TOO_SMALL
     return SOLVED
 
 
 @unlocked
-def batch_hcod(A, lower, upper, sizes, answers, settings, which, work):
-    """Solve the problems `which` by guesses, or by the staircase if all rows are equalities."""
+def batch_saturation(problems, x, records, which, work):
+    """Say of the problems `which` what their bounds do."""
+    A, lower, upper, sizes = problems
     for p in which:
-        (x, record), code = _parts(answers, p, A.shape[2]), UNPROVED
-        if lower.shape[1] == 0 or lower[p, 0] == upper[p, 0]:
-            code = hcod_equalities(A[p], lower[p], upper[p], sizes, x, record, settings, work)
+        name_saturation(A[p], lower[p], upper[p], sizes, x[p], records[p], work)
+    return SOLVED
+
+
+@unlocked
+def batch_exact(problems, x, codes, records, settings, which, work):
+    """Solve the problems `which` as `solvers.hcod.solve_exactly` does.
+
+    The record of the exact engine is the last part of each of the records.
+    """
+    A, lower, upper, sizes = problems
+    begin = records.shape[1] - 3 * A.shape[1] - 3
+    for p in which:
+        _, enough = carve(A[p], sizes, x[p], settings, work)
+        if not enough:
+            return TOO_SMALL
+        record, code = records[p, begin:], UNPROVED
+        guesses, steps = record[record.size - 3], record[record.size - 2]
+        known = guesses + steps > 0.0 and settings[0] == 0.0
+        if not known or record[0] == EQUAL:
+            code = solve_equalities(A[p], lower[p], upper[p], sizes, x[p], record, settings, work)
+        if code == UNPROVED and known:
+            code = solve_by_guesses(A[p], lower[p], upper[p], sizes, x[p], record, settings, work)
+        if code == NO_LIMITS:
+            code = solve_equalities(A[p], lower[p], upper[p], sizes, x[p], record, settings, work)
         if code == UNPROVED:
-            code = hcod(A[p], lower[p], upper[p], sizes, x, record, settings, work)
-        answers[p, -1] = code
-        if code == TOO_SMALL:
-            return TOO_SMALL
-    return SOLVED
-
-
-@unlocked
-def batch_stages(A, lower, upper, sizes, answers, settings, which, work):
-    """Solve the problems `which` level by level."""
-    for p in which:
-        x, record = _parts(answers, p, A.shape[2])
-        code = solve_by_stages(A[p], lower[p], upper[p], sizes, x, record, settings, work)
-        answers[p, -1] = code
-        if code == TOO_SMALL:
-            return TOO_SMALL
+            code = solve_by_levels(A[p], lower[p], upper[p], sizes, x[p], record, settings, work)
+        codes[p] = code
     return SOLVED

@@ -7,7 +7,6 @@ from __future__ import annotations
 import numpy as np
 
 from hierarchy.compiled import as_matrix, compiled, inlined
-from solvers.kernels.space import Block, Settings
 
 SWEEPS = 40  # bound; Jacobi needs 6 to 10
 
@@ -196,21 +195,3 @@ def _reflect_columns(T, k):
         for i in range(k, height):
             T[i, j] += s * T[i, k]
     T[k, k] = norm
-
-
-@compiled
-def solve_block(M, r, y, i0, i1, k0, k1, damping, threshold, work):  # for hcod.py, saturation.py
-    """Write into y[k0:k1] what `solve_level` does."""
-    solve_level(M, r, y, Block(i0, i1, k0, k1), Settings(damping, threshold, 0.0), work)
-
-
-@compiled
-def solve_damped(M, r, y, i0, i1, k0, k1, damped, work):  # for stages.py until it is replaced
-    """Write into y[k0:k1] what `solve_damped_level` does."""
-    solve_damped_level(M, r, y, Block(i0, i1, k0, k1), damped, work)
-
-
-@compiled
-def variable_damping(M, i0, i1, k0, k1, damping, threshold, work):  # for stages.py
-    """Return what `level_damping` does."""
-    return level_damping(M, Block(i0, i1, k0, k1), Settings(damping, threshold, 0.0), work)

@@ -13,19 +13,15 @@ from typing import NamedTuple
 import numpy as np
 
 from hierarchy.compiled import compiled, inlined
-from solvers.kernels.exact import all_equal, solve_exactly
-from solvers.kernels.levels import end_of_levels
-from solvers.kernels.rows import ZERO, finish
+from solvers.kernels.rows import ZERO, all_equal, finish
 from solvers.kernels.space import View, vector
 from solvers.kernels.staircase import solve_by_staircase
 from solvers.status import (
-    EQUAL,
-    FREE,
-    INACCURATE,
     NO_LIMITS,
     NUMERICAL_FAILURE,
     SOLVED,
     TOO_SMALL,
+    UNPROVED,
 )
 
 MET = 1e-10  # of the terms of a row, up to which it is met
@@ -33,67 +29,95 @@ NONE, CONFLICT = 0.0, 2.0  # beside -1 and 1: what an unknown that is at no boun
 
 
 class Box(NamedTuple):
-    """Bounds of each unknown and the x it had at first (n,); rows of the first level with rows, its
-    index.
-    """
+    """Bounds of each unknown (n,); the rows of the first level with rows, and its index."""
 
     low: View
     high: View
-    reference: View
     end: View
     top: View
 
 
 @compiled
-def solve_within_bounds(A, lower, upper, sizes, x, record, settings, work):
-    """Solve; x (n,) comes in as the reference and goes out as the answer, zero on failure.
+def solve_without_bounds(A, lower, upper, sizes, x, record, settings, work):
+    """Solve as if there were no bounds; SOLVED if x is within them, otherwise UNPROVED.
 
-    record (n + L + 1,): comes in with the saturation to begin with, or zeros; goes out as what each
-    unknown does (-1 or +1: at its lower or upper bound, 2: both, 0: free), the scaling of each
-    level, and the steps taken. settings: those of `Hcod`. Returns a Status as `solve_exactly`,
+    x (n,) comes in as the reference, and goes out as that where bounds are in the way. record
+    (n + L + 3 m + 3,): comes in as that of an earlier solve, or zeros; goes out as
+    `name_saturation` says, for which the second part is the record of the exact engine. Where a
+    saturation is known nothing is tried. settings: those of `Hcod`. Or returns NUMERICAL_FAILURE,
     TOO_SMALL, NO_LIMITS, or -(i + 1) where row i is an inequality that is no bound.
     """
-    m, n = A.shape
-    sides, at = vector(work, 0, 3 * n)
-    inner, at = vector(work, at, 3 * m + 3)
-    if at > work.size or end_of_levels(A, lower, upper, sizes, x, work[at:]) > work.size - at:
+    n, known = x.size, False
+    sides, at = vector(work, ZERO, 3 * n)
+    if at > work.size:
         return TOO_SMALL
     if all_equal(lower, upper):
         return NO_LIMITS
-    top = ZERO
-    while sizes[top] == 0:
-        top += 1
-    box = Box(sides[:n], sides[n:2 * n], sides[2 * n:], sizes[top], top)
+    box = _first_level(sizes, sides, n)
     code = _refused(A, lower, upper, box.end)
     if code != SOLVED:
         return code if code < 0 else finish(x, code)
-    _intersect(A, lower, upper, box, x)
-    known = False
     for c in range(n):
-        known |= record[c] != NONE and settings[0] == 0.0
-    code = _try_without(A, lower, upper, sizes, x, box, settings, work[at:])
-    if code == INACCURATE or known:
-        _activate(A, lower, upper, box, record, inner, known)
-        for c in range(n):
-            x[c] = box.reference[c]
-        code = solve_exactly(A, lower, upper, sizes, x, inner, settings, work[at:])
-        _put_on_bounds(A, lower, upper, box, inner, x, record)
-    else:
-        for c in range(n):
-            record[c] = CONFLICT if box.low[c] == box.high[c] else NONE
-        inner[3 * m], inner[3 * m + 1] = 1.0, 0.0
+        known |= abs(record[c]) == 1.0 and settings[0] == 0.0
+        sides[2 * n + c] = x[c]
+    if known:
+        return UNPROVED
+    _intersect(A, lower, upper, box)
+    end = box.end
+    code = solve_by_staircase(A[end:], lower[end:], upper[end:], sizes[box.top + 1:], x, settings,
+                              work[at:])
+    if code == TOO_SMALL:
+        return code
+    for i in range(n + sizes.size, record.size):
+        record[i] = 0.0
+    within = code == SOLVED
+    for c in range(n):
+        within &= box.low[c] <= x[c] <= box.high[c]
+    for c in range(n):
+        x[c] = x[c] if within else sides[2 * n + c]
+    record[record.size - 3] = 1.0 if within else 0.0
+    return SOLVED if within else UNPROVED
+
+
+@compiled
+def name_saturation(A, lower, upper, sizes, x, record, work):
+    """Take the rounding out of x where it is at a bound, and write the record's first part.
+
+    What each unknown does (-1 or +1: at its lower or upper bound, 2: both, 0: free), and the
+    scaling of each level. The second part is the record of the exact engine.
+    """
+    n = x.size
+    inner = record[n + sizes.size:]
+    box = _first_level(sizes, work, n)
+    _intersect(A, lower, upper, box)
+    for c in range(n):
+        record[c] = CONFLICT if box.low[c] >= box.high[c] else NONE
+        if box.low[c] <= box.high[c]:
+            x[c] = min(max(x[c], box.low[c]), box.high[c])
+    for i in range(box.end):
+        c = _unknown(A, i)
+        if record[c] == NONE and abs(inner[i]) == 1.0:
+            record[c] = inner[i] if A[i, c] > 0.0 else -inner[i]
+            x[c] = box.high[c] if record[c] > 0.0 else box.low[c]
     _scale(A, upper, sizes, box, x, record)
-    record[n + sizes.size] = inner[3 * m] + inner[3 * m + 1]
-    return code
+
+
+@inlined
+def _first_level(sizes, sides, n):
+    """Return a Box for the first level that has rows, without sides."""
+    top = ZERO
+    while sizes[top] == 0:
+        top += 1
+    return Box(sides[:n], sides[n:2 * n], sizes[top], top)
 
 
 @inlined
 def _refused(A, lower, upper, end):
     """SOLVED, NUMERICAL_FAILURE at bad data, or -(i + 1) where row i is an inequality no bound.
 
-    In place of an equality with several entries among bounds the first bound is refused.
+    With an equality of several entries among them, the bounds are none, and the first is refused.
     """
-    sane, refused, bound = True, ZERO, ZERO
+    sane, mixed, refused, bound = True, False, ZERO, ZERO
     for i in range(lower.size):
         entries, square = 0, 0.0
         for c in range(A.shape[1]):
@@ -101,22 +125,25 @@ def _refused(A, lower, upper, end):
             square += A[i, c] * A[i, c]
         sane &= np.isfinite(square) and lower[i] <= upper[i]
         sane &= lower[i] < np.inf and upper[i] > -np.inf
-        if i < end and bound == 0 and lower[i] < upper[i]:
+        mixed |= i < end and entries != 1
+        if lower[i] == upper[i]:
+            continue
+        if i < end and entries == 1 and bound == 0:
             bound = -(ZERO + i + 1)
-        if refused == 0 and ((i < end and entries != 1) or (i >= end and lower[i] < upper[i])):
+        elif refused == 0 and (i >= end or entries != 1):
             refused = -(ZERO + i + 1)
     if not sane:
         return ZERO + NUMERICAL_FAILURE
-    if refused < 0 and lower[-refused - 1] == upper[-refused - 1] and bound < 0:
+    if refused == 0 and mixed:
         refused = bound
     return refused if refused < 0 else ZERO + SOLVED
 
 
 @inlined
-def _intersect(A, lower, upper, box, x):
+def _intersect(A, lower, upper, box):
     """Write the bounds of each unknown, low above high where its rows exclude each other."""
-    for c in range(x.size):
-        box.low[c], box.high[c], box.reference[c] = -np.inf, np.inf, x[c]
+    for c in range(box.low.size):
+        box.low[c], box.high[c] = -np.inf, np.inf
     for i in range(box.end):
         c = _unknown(A, i)
         one, other = lower[i] / A[i, c], upper[i] / A[i, c]
@@ -131,51 +158,6 @@ def _unknown(A, i):
     while A[i, c] == 0.0:
         c += 1
     return c
-
-
-@inlined
-def _try_without(A, lower, upper, sizes, x, box, settings, work):
-    """Solve without the bounds; INACCURATE, which nothing else here is, if x is not within them."""
-    end = box.end
-    code = solve_by_staircase(A[end:], lower[end:], upper[end:], sizes[box.top + 1:], x, settings,
-                              work)
-    for c in range(x.size):
-        if code == SOLVED and not box.low[c] <= x[c] <= box.high[c]:
-            code = INACCURATE
-    return code
-
-
-@inlined
-def _activate(A, lower, upper, box, record, inner, known):
-    """Write the first working set: the bounds that unknowns are said to be at."""
-    for i in range(inner.size):
-        inner[i] = 0.0
-    if not known:
-        return
-    inner[inner.size - 3] = 1.0
-    for i in range(lower.size):
-        inner[i] = EQUAL if lower[i] == upper[i] else FREE
-    for i in range(box.end):
-        c = _unknown(A, i)
-        side = record[c] if A[i, c] > 0.0 else -record[c]
-        bound = box.high[c] if record[c] > 0.0 else box.low[c]
-        row = upper[i] if side > 0.0 else lower[i]
-        if abs(record[c]) == 1.0 and lower[i] < upper[i] and row / A[i, c] == bound:
-            inner[i] = side
-
-
-@inlined
-def _put_on_bounds(A, lower, upper, box, inner, x, record):
-    """Take the rounding out of x where it is at a bound, and say which those are."""
-    for c in range(x.size):
-        record[c] = CONFLICT if box.low[c] >= box.high[c] else NONE
-        if box.low[c] <= box.high[c]:
-            x[c] = min(max(x[c], box.low[c]), box.high[c])
-    for i in range(box.end):
-        c = _unknown(A, i)
-        if record[c] == NONE and abs(inner[i]) == 1.0:
-            record[c] = inner[i] if A[i, c] > 0.0 else -inner[i]
-            x[c] = box.high[c] if record[c] > 0.0 else box.low[c]
 
 
 @inlined

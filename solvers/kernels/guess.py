@@ -18,92 +18,80 @@ the basis, and their columns take no further part.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from hierarchy.compiled import compiled, inlined
 from solvers.kernels.level import (
     Part,
-    Pull,
     balance,
+    has_dust,
     pull_of_rows,
     smallest_share,
     solve_part,
+    weigh_rows,
 )
-from solvers.kernels.rows import ZERO, finish
-from solvers.kernels.space import View, integers, matrix, vector
+from solvers.kernels.rows import ZERO, all_equal, finish
 from solvers.kernels.tableau import (
+    ACTING,
+    ACTIVE,
     BASE,
+    BEGIN,
+    COLUMN,
+    ENTRY,
+    EXTENT,
     FIRST,
+    FORCE,
+    GOAL,
+    GUESSES,
+    HOLDS,
+    LEVELS,
+    LIST,
+    MULTIPLIER,
+    NORM,
+    ORDER,
+    OVER,
+    OWNER,
+    PULL,
+    PULLED,
+    RANKS,
+    REFERENCE,
     REMOVED,
-    Problem,
-    Record,
-    Tableau,
+    REST,
+    ROUNDING,
+    SCALE,
+    SHARE,
+    SIZE,
+    STEP,
+    UNIT,
+    VALUE,
+    WORST,
+    Z,
+    around,
     asks_for_x,
-    carve_problem,
-    carve_tableau,
+    carve,
     factor,
-    length_of,
-    look_at_rows,
+    has_outgrown,
+    keep,
+    load,
+    measure,
+    missed_side,
     open_tableau,
-    parts_of,
+    side_of,
     value_of,
+    with_tableau,
 )
-from solvers.kernels.tolerances import DOUBTFUL, EPSILON
-from solvers.status import EQUAL, FREE, NUMERICAL_FAILURE, SOLVED, TOO_SMALL, UNPROVED
+from solvers.kernels.tolerances import CANCELLED, DOUBTFUL
+from solvers.status import (
+    EQUAL,
+    FREE,
+    NO_LIMITS,
+    NUMERICAL_FAILURE,
+    SOLVED,
+    TOO_SMALL,
+    UNPROVED,
+)
 
 RIGHT, WRONG, UNCLEAR = range(3)  # of a guess
-SIZE = 0
-
-
-class Guess(NamedTuple):
-    """One guess, solved.
-
-    rows (m,): the acting rows, level by level, each level in pivot order; what they miss before
-    their level is solved, and have too much after (m,). first, rank (L + 1,): where a level begins
-    in rows and in the basis. owner (n,): the row of a basis vector, -1 for none. z (n,): x in the
-    basis, the goal of the level that asks for x, the reference (n,), its pull.
-    """
-
-    rows: View
-    rest: View
-    w: View
-    first: View
-    rank: View
-    owner: View
-    z: View
-    x: View
-    goal: View
-    reference: View
-    scratch: View
-    pull: Pull
-
-
-class Solve(NamedTuple):
-    """All of it. number (1,): the size of the numbers met."""
-
-    problem: Problem
-    T: Tableau
-    record: Record
-    guess: Guess
-    number: View
-    tolerance: View
-    rank_tolerance: View
-    room: View
-
-
-@inlined
-def carve_guess(work, at, m, n, levels, x):
-    """Return a Guess at x and where it ends."""
-    rows, at = integers(work, at, m)
-    of_rows, at = matrix(work, at, 2, m)
-    of_levels, at = integers(work, at, 2 * levels + 2)
-    owner, at = integers(work, at, n)
-    of, at = matrix(work, at, 8, n)
-    pull = Pull(of[4], of[5], of[6], of[7])
-    return Guess(rows, of_rows[0], of_rows[1], of_levels[:levels + 1], of_levels[levels + 1:],
-                 owner, of[0], x, of[1], of[2], of[3], pull), at
 
 
 @compiled
@@ -114,51 +102,32 @@ def solve_by_guesses(A, lower, upper, sizes, x, record, settings, work):
     goes out as: what each row does; the level that each row holds back (its own if it stays
     violated, L for the reference, -1 for none); its multiplier there; guesses tried; steps by
     levels; the level that was not finished. settings: those of `Hcod`, in one array because each
-    argument costs time. work: of any content. Returns SOLVED, NUMERICAL_FAILURE, TOO_SMALL, or
-    UNPROVED where `solve_by_levels` must be called.
+    argument costs time. work: of any content. Returns SOLVED, NUMERICAL_FAILURE, TOO_SMALL,
+    NO_LIMITS where all rows are equalities, or UNPROVED where `solve_by_levels` must be called.
     """
-    m, n = A.shape
-    problem, at = carve_problem(A, lower, upper, sizes, work, ZERO)
-    guess, at = carve_guess(work, at, m, n, sizes.size, x)
-    number, at = vector(work, at, 1)
-    if at > work.size:
+    s, enough = carve(A, sizes, x, settings, work)
+    if not enough:
         return TOO_SMALL
-    parts = parts_of(record, m)
-    parts.counts[0], parts.counts[1], parts.counts[2] = 0.0, 0.0, -1.0
-    general = look_at_rows(problem, parts, x)
+    if all_equal(lower, upper):
+        return NO_LIMITS
+    general = load(s, lower, upper, sizes, record)
     if general < 0:
         return finish(x, NUMERICAL_FAILURE)
-    T, at = carve_tableau(work, at, m, n, general)
-    room, at = vector(work, at, (m + 1) * (n + 2))
-    if at > work.size:
-        return TOO_SMALL
-    s = Solve(problem, T, parts, guess, number, settings[3], settings[2], room)
-    for c in range(n):
-        guess.reference[c] = x[c]
+    s = with_tableau(s, general)
     verdict = WRONG
-    while verdict == WRONG and parts.counts[0] < settings[4]:
-        parts.counts[0] += 1.0
+    while verdict == WRONG and s.scalar[GUESSES] < s.settings.guesses:
+        s.scalar[GUESSES] += 1.0
         _remove_bounds(s)
-        open_tableau(problem, parts.active, T, True)
+        open_tableau(s, ACTING)
         whole = _solve(s)
+        _write_x(s)
         verdict = _prove(s, whole)
+    keep(s, record)
     if verdict == RIGHT:
         return finish(x, SOLVED)
-    for c in range(n):
-        x[c] = guess.reference[c]
+    for c in range(x.size):
+        x[c] = s.number[REFERENCE, c]
     return UNPROVED
-
-
-@inlined
-def _side(s, i):
-    """The side at which row i acts."""
-    return s.problem.upper[i] if s.record.active[i] > 0.0 else s.problem.lower[i]
-
-
-@inlined
-def _around(s, i, side):
-    """What a tolerance for row i at a side is taken of; see `tolerances.py`."""
-    return s.problem.norm[i] * s.number[SIZE] + abs(side)
 
 
 @inlined
@@ -167,11 +136,10 @@ def _remove_bounds(s):
 
     None are if other rows of that level act.
     """
-    sizes, active, unit, order = s.problem.sizes, s.record.active, s.problem.unit, s.T.order
-    seen, n, level = s.guess.scratch, s.T.order.size, 0
-    while level < sizes.size - 1 and sizes[level] == 0:
-        level += 1
-    end = sizes[level] if sizes.size > 0 else ZERO
+    active, unit, order = s.number[ACTIVE], s.index[UNIT], s.index[ORDER]
+    seen, n, end = s.number[STEP], s.x.size, ZERO
+    for k in range(s.count[LEVELS]):
+        end += s.index[EXTENT, k] if end == 0 else 0
     for c in range(n):
         seen[c] = 0.0
     removed = ZERO
@@ -181,67 +149,64 @@ def _remove_bounds(s):
                 removed = ZERO
                 break
             seen[unit[i]] = 1.0
-            order[removed], s.guess.owner[removed] = unit[i], i
-            s.guess.z[removed] = _side(s, i) / s.problem.entry[i]
+            order[removed], s.index[OWNER, removed] = unit[i], i
+            s.number[Z, removed] = side_of(s.number, i) / s.number[ENTRY, i]
             removed += 1
     at = removed
     for c in range(n):
         if removed == 0 or seen[c] == 0.0:
             order[at] = c
             at += 1
-    s.T.at[REMOVED] = removed
+    s.count[REMOVED] = removed
 
 
 @inlined
 def _solve(s):
-    """Solve the acting rows as equalities, write x; return the level that asks for x, or -1."""
-    guess, rank, rows, removed = s.guess, ZERO, ZERO, s.T.at[REMOVED]
-    levels, n, first, whole = s.problem.sizes.size, s.T.M.shape[0], ZERO, -1
-    s.number[SIZE] = 0.0
+    """Solve the acting rows as equalities; return the level that asks for x, or -1."""
+    rank, rows, removed = ZERO, ZERO, s.count[REMOVED]
+    levels, n, first, whole = s.count[LEVELS], s.x.size, ZERO, -1
+    s.scalar[SIZE] = 0.0
     for k in range(levels):
-        guess.first[k], guess.rank[k] = rows, rank
-        last = first + s.problem.sizes[k]
+        s.index[BEGIN, k], s.index[RANKS, k] = rows, rank
+        last = first + s.index[EXTENT, k]
         if rows == 0 and removed > 0 and last > first:  # bounds, which are met
             for t in range(removed):
-                guess.rows[t], guess.w[t] = guess.owner[t], 0.0
+                s.index[LIST, t], s.number[OVER, t] = s.index[OWNER, t], 0.0
             rows = rank = removed
-        elif whole < 0 and asks_for_x(s.problem, s.record.active, first, last, guess.goal,
-                                      guess.scratch):
-            guess.rows[rows] = first
+        elif whole < 0 and asks_for_x(s, first, last):
+            s.index[LIST, rows] = first
             rows += 1
-            _take_all(s, guess.goal, rank)
+            _take_all(s, s.number[GOAL], rank)
             whole, rank = k, ZERO + n
         else:
             rows = _list(s, first, last, rows, rank)
-            rank = _solve_level(s, guess.first[k], rows, rank)
+            rank = _solve_level(s, s.index[BEGIN, k], rows, rank)
         first = last
-    guess.first[levels], guess.rank[levels] = rows, rank
-    _take_all(s, guess.reference, rank)
-    _write_x(s)
+    s.index[BEGIN, levels], s.index[RANKS, levels] = rows, rank
+    _take_all(s, s.number[REFERENCE], rank)
     return whole
 
 
 @inlined
 def _take_all(s, goal, rank):
     """Give all basis vectors that are left what they have of the goal."""
-    base, removed, n = s.T.at[BASE], s.T.at[REMOVED], s.T.M.shape[0]
+    base, removed, n = s.count[BASE], s.count[REMOVED], s.M.shape[0]
     for t in range(rank, n):
         value = 0.0
         for c in range(removed, n):
-            value += s.T.M[t, base + c - removed] * goal[s.T.order[c]]
-        s.guess.z[t], s.guess.owner[t] = value, -1
+            value += s.M[t, base + c - removed] * goal[s.index[ORDER, c]]
+        s.number[Z, t], s.index[OWNER, t] = value, -1
 
 
 @inlined
 def _list(s, first, last, rows, rank):
     """Append the acting rows of a level and what they miss; return the end of the list."""
-    guess, M = s.guess, s.T.M
     for i in range(first, last):
-        if s.record.active[i] != FREE:
-            value, column, entry = _side(s, i), s.T.column[i], s.problem.entry[i]
+        if s.number[ACTIVE, i] != FREE:
+            value, column, entry = side_of(s.number, i), s.index[COLUMN, i], s.number[ENTRY, i]
             for t in range(rank):
-                value -= entry * M[t, column] * guess.z[t]
-            guess.rows[rows], guess.rest[i] = i, value
+                value -= entry * s.M[t, column] * s.number[Z, t]
+            s.index[LIST, rows], s.number[VALUE, i] = i, value
             rows += 1
     return rows
 
@@ -249,34 +214,33 @@ def _list(s, first, last, rows, rank):
 @inlined
 def _solve_level(s, q0, q1, begin):
     """Give rows q0 .. q1 - 1 basis vectors and solve them there; return the rank of all so far."""
-    guess, rest = s.guess, s.room
-    rank = factor(s.problem, s.T, guess.rows, q0, q1, begin, ZERO, s.rank_tolerance)
+    rank = factor(s, q0, q1, begin, ZERO)
     for q in range(q0, q1):
-        i = guess.rows[q]
-        rest[q] = guess.rest[i]
-        s.T.at[FIRST] += s.record.active[i] == EQUAL and s.problem.unit[i] < 0
-    size = solve_part(s.problem, s.T, guess.rows, Part(q0, q1, begin, rank), rest,
-                      guess.z[begin:], guess.w, s.room[q1:])
-    s.number[SIZE] = max(s.number[SIZE], size)
+        i = s.index[LIST, q]
+        s.number[REST, q] = s.number[VALUE, i]
+        s.count[FIRST] += s.number[ACTIVE, i] == EQUAL and s.index[UNIT, i] < 0
+    size = solve_part(s, Part(q0, q1, begin, rank))
+    s.scalar[SIZE] = max(s.scalar[SIZE], size)
     for t in range(rank):
-        guess.owner[begin + t] = guess.rows[q0 + t]
+        s.index[OWNER, begin + t] = s.index[LIST, q0 + t]
     return begin + rank
 
 
 @inlined
 def _write_x(s):
     """Write x = Q z."""
-    z, x, order, scratch = s.guess.z, s.guess.x, s.T.order, s.guess.scratch
-    base, removed, n, size = s.T.at[BASE], s.T.at[REMOVED], s.T.M.shape[0], s.number[SIZE]
+    z, x, order, scratch = s.number[Z], s.x, s.index[ORDER], s.number[STEP]
+    base, removed, n, size = s.count[BASE], s.count[REMOVED], s.M.shape[0], s.scalar[SIZE]
     for c in range(n):
         scratch[c] = 0.0
     for t in range(removed, n):
         for c in range(n - removed):
-            scratch[c] += z[t] * s.T.M[t, base + c]
+            scratch[c] += z[t] * s.M[t, base + c]
     for t in range(n):
         size = max(size, abs(z[t]))
         x[order[t]] = z[t] if t < removed else scratch[t - removed]
-    s.number[SIZE] = max(size, length_of(x))
+    s.scalar[SIZE] = size
+    measure(s)
 
 
 @inlined
@@ -285,18 +249,18 @@ def _prove(s, whole):
 
     A guess in which a row is hardly independent of others is unclear.
     """
-    guess, levels = s.guess, s.problem.sizes.size
+    levels = s.count[LEVELS]
     verdict = _add_violated(s)
-    if smallest_share(s.problem, s.T, guess.owner, ZERO, guess.rank[levels]) < DOUBTFUL:
+    if has_outgrown(s) or smallest_share(s, ZERO, s.index[RANKS, levels]) < DOUBTFUL:
         return UNCLEAR
     for k in range(levels + 1):
-        above = guess.rank[k]
+        above = s.index[RANKS, k]
         at_goal = k in (whole, levels)
         if at_goal:
-            goal = guess.goal if k == whole else guess.reference
-            weight = s.problem.entry[guess.rows[guess.first[k]]] ** 2 if k == whole else 1.0
+            goal = s.number[GOAL if k == whole else REFERENCE]
+            weight = s.number[ENTRY, s.index[LIST, s.index[BEGIN, k]]] ** 2 if k == whole else 1.0
             missed = above > 0 and _pull_of_goal(s, goal, weight, above)
-        elif guess.first[k + 1] - guess.first[k] == guess.rank[k + 1] - above:
+        elif s.index[BEGIN, k + 1] - s.index[BEGIN, k] == s.index[RANKS, k + 1] - above:
             continue
         else:
             missed, said = _pull_of_level(s, k, above)
@@ -311,36 +275,34 @@ def _prove(s, whole):
 @inlined
 def _add_violated(s):
     """Let the rows that x violates act; say whether there are none."""
-    verdict, x = RIGHT, s.guess.x
-    for i in range(s.problem.unit.size):
-        s.record.held[i], s.record.multiplier[i] = -1.0, 0.0
-        if s.record.active[i] == FREE:
-            value = value_of(s.problem, x, i)
-            low, up = s.problem.lower[i], s.problem.upper[i]
-            if value > up + s.tolerance * _around(s, i, up):
-                s.record.active[i], verdict = 1.0, WRONG
-            elif value < low - s.tolerance * _around(s, i, low):
-                s.record.active[i], verdict = -1.0, WRONG
+    verdict, number = RIGHT, s.number
+    for i in range(s.A.shape[0]):
+        number[HOLDS, i], number[MULTIPLIER, i] = -1.0, 0.0
+        if number[ACTIVE, i] == FREE:
+            value = value_of(s, s.x, i)
+            side = missed_side(number, i, value, s.scalar[SCALE], s.settings.tolerance)
+            if side != 0.0:
+                number[ACTIVE, i], verdict = side, WRONG
     return verdict
 
 
 @inlined
 def _pull_of_goal(s, goal, weight, above):
     """Write the pull of the way to a goal on the basis vectors above it; False if x is there."""
-    guess, order, removed = s.guess, s.T.order, s.T.at[REMOVED]
-    n, base, gap, square = order.size, s.T.at[BASE], 0.0, 0.0
+    order, removed = s.index[ORDER], s.count[REMOVED]
+    n, base, gap, square = s.x.size, s.count[BASE], 0.0, 0.0
     for c in range(n):
-        gap += (guess.x[c] - goal[c]) ** 2
+        gap += (s.x[c] - goal[c]) ** 2
         square += goal[c] ** 2
-    if np.sqrt(gap) <= s.tolerance * max(s.number[SIZE], np.sqrt(square)):
+    if np.sqrt(gap) <= s.settings.tolerance * max(s.scalar[SCALE], np.sqrt(square)):
         return False
+    s.scalar[ROUNDING] = CANCELLED * weight * max(s.scalar[SIZE], np.sqrt(square))
     for t in range(above):
         value = goal[order[t]] if t < removed else 0.0
         if t >= removed:
             for c in range(removed, n):
-                value += s.T.M[t, base + c - removed] * goal[order[c]]
-        guess.pull.g[t] = weight * (guess.z[t] - value)
-        guess.pull.terms[t] = weight * (abs(guess.z[t]) + abs(value))
+                value += s.M[t, base + c - removed] * goal[order[c]]
+        s.number[PULL, t] = weight * (s.number[Z, t] - value)
     return True
 
 
@@ -350,47 +312,42 @@ def _pull_of_level(s, k, above):
 
     Its own rows that are inside their side rest from now on.
     """
-    guess, active, verdict, worst = s.guess, s.record.active, RIGHT, 0.0
-    for q in range(guess.first[k], guess.first[k + 1]):
-        i = guess.rows[q]
-        around = _around(s, i, _side(s, i))
-        if abs(guess.w[q]) <= EPSILON * around:
-            guess.w[q] = 0.0
-        else:
-            worst = max(worst, abs(guess.w[q]) / around)
-    if worst <= s.rank_tolerance:
-        return False, UNCLEAR if worst > s.tolerance else RIGHT
-    for q in range(guess.first[k], guess.first[k + 1]):
-        i = guess.rows[q]
-        push = active[i] * guess.w[q]
+    active, over, verdict = s.number[ACTIVE], s.number[OVER], RIGHT
+    part = Part(s.index[BEGIN, k], s.index[BEGIN, k + 1], above, ZERO)
+    weigh_rows(s, part)
+    worst = s.scalar[WORST]
+    if worst < DOUBTFUL:
+        return False, UNCLEAR if worst > s.settings.tolerance else RIGHT
+    if has_dust(s, part):
+        return False, UNCLEAR
+    for q in range(part.q0, part.q1):
+        i = s.index[LIST, q]
+        push = active[i] * over[q]
+        scale = around(s.number[NORM, i], side_of(s.number, i), s.scalar[SCALE])
         if active[i] != EQUAL and push < 0.0:
             active[i], verdict = FREE, WRONG
-        elif active[i] != EQUAL and push > s.tolerance * _around(s, i, _side(s, i)):
-            s.record.held[i], s.record.multiplier[i] = k, guess.w[q]
+        elif active[i] != EQUAL and push > s.settings.tolerance * scale:
+            s.number[HOLDS, i], s.number[MULTIPLIER, i] = k, over[q]
     for t in range(above):
-        guess.pull.g[t] = guess.pull.terms[t] = 0.0
-    part = Part(guess.first[k], guess.first[k + 1], above, ZERO)
-    pull_of_rows(s.problem, s.T, guess.rows, part, guess.w, guess.pull, ZERO, above)
+        s.number[PULL, t] = 0.0
+    pull_of_rows(s, part, ZERO, above)
     return True, verdict
 
 
 @inlined
 def _check_forces(s, k, above, whole):
     """Give the rows above level k their multipliers in it; those that pull rest from now on."""
-    guess, pull, active, held = s.guess, s.guess.pull, s.record.active, s.record.held
-    small, verdict = 0.0, RIGHT
-    if not whole:
-        for q in range(guess.first[k], guess.first[k + 1]):
-            small += s.rank_tolerance * abs(guess.w[q]) * s.problem.norm[guess.rows[q]]
-    balance(s.problem, s.T, guess.owner, pull, ZERO, above, s.T.at[REMOVED])
+    active, held = s.number[ACTIVE], s.number[HOLDS]
+    verdict, small = RIGHT, 0.0 if whole else s.settings.rank_tolerance * s.scalar[PULLED]
+    balance(s, ZERO, above, s.count[REMOVED])
     for t in range(above):
-        i, force = guess.owner[t], pull.force[t]
+        i, force = s.index[OWNER, t], s.number[FORCE, t]
         if i < 0 or force == 0.0 or active[i] == EQUAL or active[i] == FREE or held[i] >= 0.0:
             continue
-        if pull.share[t] <= small:
+        if s.number[SHARE, t] <= small:
             verdict = UNCLEAR
         elif active[i] * force > 0.0:
-            held[i], s.record.multiplier[i] = k, force
+            held[i], s.number[MULTIPLIER, i] = k, force
         else:
             active[i], verdict = FREE, max(verdict, WRONG)
     return verdict

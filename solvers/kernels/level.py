@@ -13,15 +13,37 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hierarchy.compiled import compiled, inlined
+from hierarchy.compiled import as_matrix, compiled, inlined
 from solvers.kernels.block import level_damping
-from solvers.kernels.space import Block, View
-from solvers.kernels.tableau import left_of
-from solvers.kernels.tolerances import CANCELLED
+from solvers.kernels.rows import ZERO
+from solvers.kernels.space import Block, Settings, View
+from solvers.kernels.tableau import (
+    COLUMN,
+    ENTRY,
+    FORCE,
+    LIST,
+    NORM,
+    OVER,
+    OWNER,
+    PULL,
+    PULLED,
+    REST,
+    ROUNDING,
+    SCALE,
+    SHARE,
+    SIZE,
+    STEP,
+    WORST,
+    Z,
+    around,
+    left_of,
+    side_of,
+)
+from solvers.kernels.tolerances import CANCELLED, DUST, EPSILON, SAME
 
 
 class Part(NamedTuple):
-    """A level's part: rows q0 .. q1 - 1 of a list, and `rank` basis vectors from `begin` on."""
+    """A level's part: rows q0 .. q1 - 1 of the list, and `rank` basis vectors from `begin` on."""
 
     q0: View
     q1: View
@@ -29,74 +51,61 @@ class Part(NamedTuple):
     rank: View
 
 
-class Pull(NamedTuple):
-    """A level's pull on the basis vectors above it, and the forces that balance it.
+@inlined
+def solve_part(s, part):
+    """Write the step of a level that is not damped into Z, and what its rows have too much after.
 
-    g (n,): the pull; terms (n,): the absolute sum of its terms; force (n,): of the row that owns
-    the basis vector; share (n,): what it balances.
+    Rows that are independent are met. Returns the size of the numbers met.
     """
-
-    g: View
-    terms: View
-    force: View
-    share: View
+    begin, rank, size, y = part.begin, part.rank, 0.0, s.number[Z, part.begin:]
+    if part.q1 - part.q0 > rank:
+        return least_squares_part(s, part, 0.0)
+    for t in range(rank):
+        i, left = s.index[LIST, part.q0 + t], s.number[REST, part.q0 + t]
+        column, entry = s.index[COLUMN, i], s.number[ENTRY, i]
+        diagonal = entry * s.M[begin + t, column]
+        size = max(size, abs(left / diagonal))
+        for c in range(t):
+            left -= entry * s.M[begin + c, column] * y[c]
+        y[t] = left / diagonal
+        s.number[OVER, part.q0 + t] = 0.0
+    return size
 
 
 @inlined
-def solve_part(problem, T, rows, part, rest, y, w, room):
-    """Write the step y of a level that is not damped, and w, what its rows have too much after it.
-
-    rest: what the rows of the list miss before. Rows that are independent are met, w is zero.
-    Returns the size of the numbers met.
-    """
-    begin, rank, size = part.begin, part.rank, 0.0
-    for q in range(part.q0, part.q1):
-        w[q] = 0.0
-    if part.q1 - part.q0 == rank:
-        for t in range(rank):
-            i, left = rows[part.q0 + t], rest[part.q0 + t]
-            column, entry = T.column[i], problem.entry[i]
-            diagonal = entry * T.M[begin + t, column]
-            size = max(size, abs(left / diagonal))
-            for c in range(t):
-                left -= entry * T.M[begin + c, column] * y[c]
-            y[t] = left / diagonal
-        return size
-    return least_squares_part(problem, T, rows, part, rest, y, w, room, 0.0)
-
-
-@inlined
-def least_squares_part(problem, T, rows, part, rest, y, w, room, damped):
-    """Like `solve_part`, with a damping, whose own targets come in as y."""
-    s, rank = part.q1 - part.q0, part.rank
-    height = s + rank if damped > 0.0 else s
-    L, size = room[:height * (rank + 1)].reshape((rank + 1, height)), 0.0
-    for q in range(s):
-        i = rows[part.q0 + q]
-        column, entry = T.column[i], problem.entry[i]
-        for c in range(rank):
-            L[c, q] = entry * T.M[part.begin + c, column] if c <= q else 0.0
-        L[rank, q] = rest[part.q0 + q]
+def least_squares_part(s, part, damped):
+    """Like `solve_part`, with a damping, whose own targets come in as Z."""
+    rows, rank, size, least = part.q1 - part.q0, part.rank, 0.0, s.settings.rank_tolerance
+    height = rows + rank if damped > 0.0 else rows
+    L, y = as_matrix(s.room[:height * (rank + 1)], rank + 1, height), s.number[Z, part.begin:]
+    for q in range(rows):
+        i, rest = s.index[LIST, part.q0 + q], s.number[REST, part.q0 + q]
+        column, entry = s.index[COLUMN, i], s.number[ENTRY, i]
+        seen = left_of(s, i, part.begin, part.begin + rank) > (least * s.number[NORM, i]) ** 2
+        for c in range(rank):  # what a row in the span of those above has of the level is rounding
+            L[c, q] = entry * s.M[part.begin + c, column] if c <= q and seen else 0.0
+        L[rank, q] = rest
         if q < rank:
-            size = max(size, abs(rest[part.q0 + q] / L[q, q]))
-    for q in range(s, height):
+            size = max(size, abs(rest / L[q, q]))
+    for q in range(rows, height):
         for c in range(rank):
-            L[c, q] = damped if q - s == c else 0.0
-        L[rank, q] = damped * y[q - s]
-    least_squares(L, y, room[L.size:], height, rank)
-    for q in range(s):
-        w[part.q0 + q] = -L[rank, q]
+            L[c, q] = damped if q - rows == c else 0.0
+        L[rank, q] = damped * y[q - rows]
+    least_squares(L, y, s.room[L.size:])
+    for q in range(rows):
+        s.number[OVER, part.q0 + q] = -L[rank, q]
     return size
 
 
 @compiled
-def least_squares(T, y, diagonal, s, r):
+def least_squares(T, y, diagonal):
     """Write into y[:r] what minimises |T y - b|, for T (r + 1, s) by columns with b the last.
 
     b goes out as what is still missed. It comes out of the reflections, not as a difference, so
     the little that a heavy row misses is as exact as the rest (Cox, Higham 1998). The rows come in
     pivot order, the heaviest first. diagonal (r,) is scratch.
     """
+    r = T.shape[0] - 1
     b = T[r]
     for k in range(r):
         v = T[k, k:]
@@ -131,82 +140,124 @@ def _reflect(v, b, norm):
 
 
 @inlined
-def damping_of(problem, T, rows, part, settings, room):
+def damping_of(s, part):
     """Return lambda of a level, see `Resolver`."""
-    s, rank = part.q1 - part.q0, part.rank
-    L = room[:s * rank].reshape((s, rank))
-    for q in range(s):
-        i = rows[part.q0 + q]
+    rows, rank = part.q1 - part.q0, part.rank
+    L = as_matrix(s.room[:rows * rank], rows, rank)
+    for q in range(rows):
+        i = s.index[LIST, part.q0 + q]
+        column, entry = s.index[COLUMN, i], s.number[ENTRY, i]
         for c in range(rank):
-            L[q, c] = problem.entry[i] * T.M[part.begin + c, T.column[i]] if c <= q else 0.0
-    zero = 0 * s
-    return level_damping(L, Block(zero, s, zero, rank), settings, room[s * rank:])
+            L[q, c] = entry * s.M[part.begin + c, column] if c <= q else 0.0
+    shared = Settings(s.settings.damping, s.settings.threshold, s.settings.rank_tolerance)
+    return level_damping(L, Block(ZERO, rows, ZERO, rank), shared, s.room[rows * rank:])
 
 
 @inlined
-def pull_of_rows(problem, T, rows, part, w, pull, begin, end):
-    """Add w times the rows of a level, in the basis vectors begin .. end - 1, to its pull."""
+def weigh_rows(s, part):
+    """Write by how much rows of a level miss their sides at most, and what they pull with in all.
+
+    If that is rounding in all rows, none misses anything; in one of them alone it may be what
+    balances a light row. Of the pull, too, rounding is the share that it is of a miss.
+    """
+    worst = pulled = 0.0
+    missed = False
     for q in range(part.q0, part.q1):
-        push, column = w[q] * problem.entry[rows[q]], T.column[rows[q]]
+        i, over = s.index[LIST, q], abs(s.number[OVER, q])
+        norm, side = s.number[NORM, i], side_of(s.number, i)
+        missed |= over > EPSILON * around(norm, side, s.scalar[SIZE])
+        pulled += norm * over
+        if over > 0.0:
+            worst = max(worst, over / around(norm, side, s.scalar[SCALE]))
+    if not missed:
+        worst = pulled = 0.0
+        for q in range(part.q0, part.q1):
+            s.number[OVER, q] = 0.0
+    s.scalar[WORST], s.scalar[PULLED] = worst, pulled
+    rounding = EPSILON * s.scalar[SIZE]
+    s.scalar[ROUNDING] = pulled * max(
+        CANCELLED, rounding / max(worst * s.scalar[SCALE], rounding)) if pulled > 0.0 else 0.0
+
+
+@inlined
+def has_dust(s, part):
+    """Whether a row of a level is so small beside another that it may be the rounding of that."""
+    least, most = np.inf, 0.0
+    for q in range(part.q0, part.q1):
+        norm = s.number[NORM, s.index[LIST, q]]
+        least, most = min(least, norm), max(most, norm)
+    return least < DUST * most
+
+
+@inlined
+def pull_of_rows(s, part, begin, end):
+    """Add what the rows of a level have too much, times the rows, to its pull.
+
+    In the basis vectors begin .. end - 1.
+    """
+    pull = s.number[PULL]
+    for q in range(part.q0, part.q1):
+        i = s.index[LIST, q]
+        push, column = s.number[OVER, q] * s.number[ENTRY, i], s.index[COLUMN, i]
         if push != 0.0:
             for t in range(begin, end):
-                term = push * T.M[t, column]
-                pull.g[t] += term
-                pull.terms[t] += abs(term)
+                pull[t] += push * s.M[t, column]
 
 
 @inlined
-def balance(problem, T, owner, pull, begin, end, removed):
+def balance(s, begin, end, removed):
     """Write the forces of the rows that own the basis vectors begin .. end - 1.
 
-    owner (n,): the row of a basis vector, -1 for none. The first `removed` vectors are unknowns
-    that were removed: their rows pull on nothing else. A force that its terms cancel to is zero.
+    The first `removed` vectors are unknowns that were removed: their rows pull on nothing else.
+    What of a pull may be rounding alone is none: every entry of a row is rounded to its norm.
     """
+    pull, force, share = s.number[PULL], s.number[FORCE], s.number[SHARE]
+    rounding = s.scalar[ROUNDING]
     for t in range(end - 1, begin - 1, -1):
-        pull.force[t], pull.share[t] = 0.0, abs(pull.g[t])
-        i = owner[t]
-        if i < 0 or pull.share[t] <= CANCELLED * pull.terms[t]:
+        force[t], share[t] = 0.0, abs(pull[t])
+        i = s.index[OWNER, t]
+        if i < 0 or share[t] <= rounding:
             continue
-        column, entry = T.column[i], problem.entry[i]
-        pull.force[t] = -pull.g[t] / (entry * T.M[t, column])
+        column, entry = s.index[COLUMN, i], s.number[ENTRY, i]
+        force[t] = -pull[t] / (entry * s.M[t, column])
         if t >= removed:
+            rounding += CANCELLED * abs(force[t]) * s.number[NORM, i]
             for c in range(begin, t):
-                term = pull.force[t] * entry * T.M[c, column]
-                pull.g[c] += term
-                pull.terms[c] += abs(term)
+                pull[c] += force[t] * entry * s.M[c, column]
 
 
 @inlined
-def nearly_parallel(problem, T, rows, part, above, v, rank_tolerance):
+def nearly_parallel(s, part, above):
     """Whether a row of a level depends on its others but for a share below rank_tolerance.
 
-    The basis vectors above .. part.begin - 1 belong to rows that are only held. v (n,) is scratch.
+    The basis vectors above .. part.begin - 1 belong to rows that are only held.
     """
-    M, h, n = T.M, part.begin - above, T.M.shape[0]
+    M, h, n, v = s.M, part.begin - above, s.x.size, s.number[STEP]
+    least = s.settings.rank_tolerance
     for q in range(part.q0 + part.rank, part.q1):
-        i = rows[q]
-        square, norm = 0.0, problem.norm[i]
+        i = s.index[LIST, q]
+        square, norm = 0.0, s.number[NORM, i]
         for t in range(above, n):
-            v[t - above] = M[t, T.column[i]] * problem.entry[i]
+            v[t - above] = M[t, s.index[COLUMN, i]] * s.number[ENTRY, i]
         for c in range(part.rank - 1, -1, -1):
-            j = rows[part.q0 + c]
-            share = v[h + c] / M[part.begin + c, T.column[j]]
-            if abs(share / problem.entry[j]) * problem.norm[j] > rank_tolerance * norm:
+            j = s.index[LIST, part.q0 + c]
+            share = v[h + c] / M[part.begin + c, s.index[COLUMN, j]]
+            if abs(share / s.number[ENTRY, j]) * s.number[NORM, j] > least * norm:
                 for t in range(h + c + 1):
-                    v[t] -= share * M[above + t, T.column[j]]
+                    v[t] -= share * M[above + t, s.index[COLUMN, j]]
         for t in range(n - above):
             square += v[t] * v[t]
-        if (CANCELLED * norm) ** 2 < square <= (rank_tolerance * norm) ** 2:
+        if (SAME * norm) ** 2 < square <= (least * norm) ** 2:
             return True
     return False
 
 
 @inlined
-def smallest_share(problem, T, owner, begin, end):
+def smallest_share(s, begin, end):
     """Return the least that is left of a row in its own basis vector, as a share of its norm."""
     least = 1.0
     for t in range(begin, end):
-        i = owner[t]
+        i = s.index[OWNER, t]
         if i >= 0:
-            least = min(least, np.sqrt(left_of(problem, T, i, t, t + 1)) / problem.norm[i])
+            least = min(least, np.sqrt(left_of(s, i, t, t + 1)) / s.number[NORM, i])
     return least

@@ -20,48 +20,87 @@ held at their side, to the `soft` rows of the level, and to nothing.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from hierarchy.compiled import compiled, inlined
 from solvers.kernels.level import (
     Part,
-    Pull,
     balance,
     damping_of,
+    has_dust,
     least_squares_part,
     nearly_parallel,
     pull_of_rows,
     smallest_share,
     solve_part,
+    weigh_rows,
 )
 from solvers.kernels.rows import ZERO, finish
-from solvers.kernels.space import View, integers, matrix, vector
 from solvers.kernels.tableau import (
+    ACTIVE,
+    ALL,
     BASE,
+    COLUMN,
+    DAMPED,
+    ENTRY,
+    EXTENT,
     FIRST,
+    FORCE,
+    GOAL,
+    GUESSES,
+    HOLDS,
+    LEVELS,
+    LIST,
+    LOW,
+    LOWER,
+    MULTIPLIER,
+    NORM,
+    OVER,
+    OWNER,
+    PULL,
+    PULLED,
+    REFERENCE,
     REMOVED,
-    Problem,
-    Record,
-    Tableau,
+    REST,
+    ROUNDING,
+    SCALE,
+    SHARE,
+    SIZE,
+    SPEED,
+    START,
+    STATE,
+    STEP,
+    STEPS,
+    UNFINISHED,
+    UNIT,
+    UP,
+    UPPER,
+    VALUE,
+    WEIGHT,
+    WORST,
+    Z,
+    around,
     asks_for_x,
-    carve_problem,
-    carve_tableau,
+    carve,
     factor,
     fold,
+    has_outgrown,
+    keep,
     left_of,
-    length_of,
-    look_at_rows,
+    load,
+    measure,
+    missed_side,
     open_tableau,
-    parts_of,
     reflect,
+    side_of,
     value_of,
+    with_tableau,
 )
 from solvers.kernels.tolerances import (
     BLAND_AFTER,
+    CANCELLED,
     DOUBTFUL,
-    EPSILON,
+    FLOOR,
     NO_STEP,
     PATIENCE,
     RELAXATION,
@@ -84,198 +123,92 @@ WATCHED, HELD, SOFT, FIXED, PARALLEL = range(1, 6)
 # Entries of `count`: basis vectors of the fixed, hard and soft rows, soft rows, equalities of the
 # level that have columns; steps of no length, steps at a level's optimum, sides moved apart, times
 # that was done; whether the level is missed, whether an answer is doubtful.
-FIX, HARD, RANK, ROWS, EQUALITIES, STILL, TRIES, APART, TIMES, MISSED, DOUBT = range(11)
-SIZE, DAMPED, WEIGHT = range(3)  # entries of `number`
+FIX, HARD, RANK, ROWS, EQUALITIES, STILL, TRIES, APART, TIMES, MISSED, DOUBT = range(4, 15)
 GOLDEN = 0.6180339887498949
-
-
-class Exact(NamedTuple):
-    """The settings of `Hcod`, in the order of its array."""
-
-    damping: View
-    threshold: View
-    rank_tolerance: View
-    tolerance: View
-    guesses: View
-    max_iterations: View
-
-
-class Working(NamedTuple):
-    """The working set: state (m,) of each row, owner (n,) of each basis vector that is held, soft
-    (m,) rows in pivot order, low and up (m,) the sides as they are now, counts and numbers.
-    """
-
-    state: View
-    owner: View
-    soft: View
-    low: View
-    up: View
-    count: View
-    number: View
-
-
-class Point(NamedTuple):
-    """Where the solve is: x, the x that the level began with and its goal, the step p in x and y in
-    basis vectors (n,); value of each row, how fast it changes, what it has too much, what it misses
-    (m,); the level's pull.
-    """
-
-    x: View
-    start: View
-    goal: View
-    p: View
-    y: View
-    value: View
-    along: View
-    w: View
-    rest: View
-    pull: Pull
-
-
-class Solve(NamedTuple):
-    """All of it."""
-
-    problem: Problem
-    T: Tableau
-    record: Record
-    working: Working
-    point: Point
-    settings: Exact
-    room: View
-
-
-@inlined
-def carve_working(work, at, m, n):
-    """Return a Working and where it ends."""
-    state, at = integers(work, at, m)
-    owner, at = integers(work, at, n)
-    soft, at = integers(work, at, m)
-    sides, at = matrix(work, at, 2, m)
-    count, at = integers(work, at, 11)
-    number, at = vector(work, at, 3)
-    return Working(state, owner, soft, sides[0], sides[1], count, number), at
-
-
-@inlined
-def carve_pull(work, at, n):
-    """Return a Pull and where it ends."""
-    of, at = matrix(work, at, 4, n)
-    return Pull(of[0], of[1], of[2], of[3]), at
-
-
-@inlined
-def carve_point(work, at, m, n, x):
-    """Return a Point at x and where it ends."""
-    of, at = matrix(work, at, 4, n)
-    of_rows, at = matrix(work, at, 4, m)
-    pull, at = carve_pull(work, at, n)
-    return Point(x, of[0], of[1], of[2], of[3], of_rows[0], of_rows[1], of_rows[2], of_rows[3],
-                 pull), at
-
-
-@inlined
-def end_of_levels(A, lower, upper, sizes, x, work):
-    """Return where the work space of `solve_by_levels` ends, at most."""
-    m, n = A.shape
-    _, at = carve_problem(A, lower, upper, sizes, work, ZERO)
-    _, at = carve_working(work, at, m, n)
-    _, at = carve_point(work, at, m, n, x)
-    _, at = carve_tableau(work, at, m, n, m)
-    return at + n + _room(m, n)
-
-
-@inlined
-def _room(m, n):
-    """Numbers that a least squares problem and its damping need."""
-    return (m + n) * (2 * n + 2)
 
 
 @compiled
 def solve_by_levels(A, lower, upper, sizes, x, record, settings, work):
     """Solve; x (n,) comes in as the reference and goes out as the answer, zero on failure.
 
-    record (3 m + 3,) and settings: as for `solve_by_guesses`; the record is only written. Where the
-    iterations end early, x keeps all levels above the unfinished one, which is as good as it got.
-    Returns SOLVED, ITERATION_LIMIT, NUMERICAL_FAILURE, TOO_SMALL, or INACCURATE where a row that
-    acts is nearly parallel to others.
+    record (3 m + 3,) and settings: as for `solve_by_guesses`; of the record only the guesses are
+    read. Where the iterations end early, x keeps all levels above the unfinished one, which is as
+    good as it got. Returns SOLVED, ITERATION_LIMIT, NUMERICAL_FAILURE, TOO_SMALL, or INACCURATE
+    where a row that acts is nearly parallel to others.
     """
-    m, n = A.shape
-    problem, at = carve_problem(A, lower, upper, sizes, work, ZERO)
-    working, at = carve_working(work, at, m, n)
-    point, at = carve_point(work, at, m, n, x)
-    reference, at = vector(work, at, n)
-    if at > work.size:
+    s, enough = carve(A, sizes, x, settings, work)
+    if not enough:
         return TOO_SMALL
-    parts = parts_of(record, m)
-    general = look_at_rows(problem, parts, x)
+    general = load(s, lower, upper, sizes, record)
     if general < 0:
         return finish(x, NUMERICAL_FAILURE)
-    T, at = carve_tableau(work, at, m, n, general)
-    room, at = vector(work, at, _room(m, n))
-    if at > work.size:
-        return TOO_SMALL
-    s = Solve(problem, T, parts, working, point, Exact(settings[0], settings[1], settings[2],
-              settings[3], settings[4], settings[5]), room)
-    _open(s, reference)
-    first = ZERO
+    s = with_tableau(s, general)
+    _open(s, record)
+    first, code = ZERO, SOLVED
     for k in range(sizes.size + 1):
-        last = first + sizes[k] if k < sizes.size else first
-        whole = _wants_whole(s, k, first, last, reference)
-        if _begin(s, k, first, last, whole):
-            while parts.counts[1] < s.settings.max_iterations:
-                parts.counts[1] += 1.0
-                _step(s, whole)
-                entering = _advance(s, last)
-                leaving = _worst(s, whole) if entering < 0 else -1
-                if entering >= 0:
-                    _enter(s, entering, first, last)
-                elif leaving >= 0:
-                    _leave(s, leaving, last)
-                elif working.count[APART] == 1:
-                    _put_back(s, last)
-                else:
-                    break
+        last = first + s.index[EXTENT, k] if k < sizes.size else first
+        whole = _wants_whole(s, k, first, last)
+        solved = not _begin(s, k, first, last, whole)
+        while not solved and s.scalar[STEPS] < s.settings.max_iterations:
+            s.scalar[STEPS] += 1.0
+            part = _factor(s, whole)
+            if whole:
+                _head_for_goal(s, part)
             else:
-                parts.counts[2] = k
-                code = finish(x, SOLVED)
-                return ITERATION_LIMIT if code == SOLVED else code
-            _settle(s, k, whole)
+                _damp(s, part)
+                _meet_rows(s, part)
+            entering, leaving = _advance(s, part, last), -1
+            if entering < 0:
+                _pull(s, part, whole)
+                balance(s, s.count[FIX], part.begin, ZERO)
+                _forgive(s, part, whole)
+                leaving = _worst(s)
+            if entering >= 0:
+                _enter(s, entering, first, last)
+            elif leaving >= 0:
+                _leave(s, leaving, last)
+            elif s.count[APART] == 1:
+                _put_back(s, last)
+            else:
+                solved = True
+                _settle(s, k, whole)
+                _order(s, whole)
         first = last
-    code = finish(x, SOLVED)
-    doubtful = working.count[DOUBT] == 1 and s.settings.damping == 0.0
-    return INACCURATE if doubtful and code == SOLVED else code
+        if not solved:
+            code, s.scalar[UNFINISHED] = ITERATION_LIMIT, k
+            break
+    keep(s, record)
+    doubt = s.count[DOUBT] == 1 or has_outgrown(s)
+    if code == SOLVED and doubt and s.settings.damping == 0.0:
+        code = INACCURATE
+    return code if finish(x, SOLVED) == SOLVED else NUMERICAL_FAILURE
 
 
 @inlined
-def _open(s, reference):
+def _open(s, record):
     """Begin at x = 0 with no row in the working set."""
-    for i in range(s.working.state.size):
-        s.working.state[i], s.point.value[i] = 0, 0.0
-        s.working.low[i], s.working.up[i] = s.problem.lower[i], s.problem.upper[i]
-        if s.record.active[i] != EQUAL:
-            s.record.active[i] = FREE
-    for c in range(reference.size):
-        reference[c], s.point.x[c] = s.point.x[c], 0.0
-        s.T.order[c] = c
-    for c in range(s.working.count.size):
-        s.working.count[c] = 0
-    s.working.number[SIZE] = 0.0
-    s.T.at[REMOVED] = 0
-    open_tableau(s.problem, s.record.active, s.T, False)
-    s.record.counts[1], s.record.counts[2] = 0.0, -1.0
+    for i in range(s.A.shape[0]):
+        s.index[STATE, i], s.number[VALUE, i] = 0, 0.0
+        if s.number[ACTIVE, i] != EQUAL:
+            s.number[ACTIVE, i] = FREE
+    for c in range(s.x.size):
+        s.x[c] = 0.0
+    for c in range(REMOVED, s.count.size):
+        s.count[c] = 0
+    s.scalar[GUESSES] = record[record.size - 3]
+    open_tableau(s, ALL)
 
 
 @inlined
-def _wants_whole(s, k, first, last, reference):
+def _wants_whole(s, k, first, last):
     """Whether a level asks for x as a whole: the reference, or one that is like it."""
-    if k < s.problem.sizes.size:
-        whole = s.settings.damping == 0.0 and asks_for_x(
-            s.problem, s.record.active, first, last, s.point.goal, s.point.p)
-        s.working.number[WEIGHT] = s.problem.entry[first] ** 2 if whole else 1.0
+    if k < s.count[LEVELS]:
+        whole = s.settings.damping == 0.0 and asks_for_x(s, first, last)
+        s.scalar[WEIGHT] = s.number[ENTRY, first] ** 2 if whole else 1.0
         return whole
-    for c in range(reference.size):
-        s.point.goal[c] = reference[c]
-    s.working.number[WEIGHT] = 1.0
+    for c in range(s.x.size):
+        s.number[GOAL, c] = s.number[REFERENCE, c]
+    s.scalar[WEIGHT] = 1.0
     return True
 
 
@@ -285,201 +218,196 @@ def _begin(s, k, first, last, whole):
 
     A row of which nothing is left behind the fixed ones is settled.
     """
-    count, number, state, value = s.working.count, s.working.number, s.working.state, s.point.value
-    number[SIZE] = max(number[SIZE], length_of(s.point.x))
-    number[DAMPED] = 0.0
+    count, number, n = s.count, s.number, s.x.size
+    measure(s)
+    s.scalar[DAMPED] = 0.0
     for c in (RANK, ROWS, EQUALITIES, STILL, TRIES, TIMES):
         count[c] = 0
-    n = s.point.x.size
     least = s.settings.rank_tolerance
     for i in range(first, last):
-        value[i] = value_of(s.problem, s.point.x, i)
-        if s.record.active[i] != EQUAL:
-            s.record.active[i] = _missed_side(s, i, s.settings.tolerance)
-        elif s.problem.unit[i] < 0:
+        number[VALUE, i] = value = value_of(s, s.x, i)
+        if number[ACTIVE, i] != EQUAL:
+            number[ACTIVE, i] = missed_side(number, i, value, s.scalar[SCALE], s.settings.tolerance)
+        elif s.index[UNIT, i] < 0:
             count[EQUALITIES] += 1
-        state[i] = WATCHED if s.record.active[i] == FREE else FIXED
-        if state[i] == WATCHED or whole:
+        s.index[STATE, i] = WATCHED if number[ACTIVE, i] == FREE else FIXED
+        if s.index[STATE, i] == WATCHED or whole:
             continue
-        if left_of(s.problem, s.T, i, count[FIX], n) > (least * s.problem.norm[i]) ** 2:
-            state[i] = SOFT
-            s.working.soft[count[ROWS]] = i
+        if left_of(s, i, count[FIX], n) > (least * number[NORM, i]) ** 2:
+            s.index[STATE, i] = SOFT
+            s.index[LIST, count[ROWS]] = i
             count[ROWS] += 1
-        elif s.record.active[i] != EQUAL:
-            s.record.held[i], s.record.multiplier[i] = k, value[i] - _side(s, i)
+        elif number[ACTIVE, i] != EQUAL:
+            number[HOLDS, i], number[MULTIPLIER, i] = k, value - side_of(number, i)
     for c in range(n):
-        s.point.start[c] = s.point.x[c]
+        number[START, c] = s.x[c]
     _watch_parallel(s, first)
     if count[ROWS] == 0 and not whole:
-        s.T.at[FIRST] += count[EQUALITIES]
+        count[FIRST] += count[EQUALITIES]
     return count[ROWS] > 0 or (whole and count[FIX] < n)
-
-
-@inlined
-def _side(s, i):
-    """The side at which row i acts."""
-    return s.working.up[i] if s.record.active[i] > 0.0 else s.working.low[i]
-
-
-@inlined
-def _around(s, i, side):
-    """What a tolerance for row i at a side is taken of; see `tolerances.py`."""
-    return s.problem.norm[i] * s.working.number[SIZE] + abs(side)
-
-
-@inlined
-def _missed_side(s, i, tolerance):
-    """+1 where row i is above its upper side, -1 where it is below its lower, 0 within."""
-    low, up, value = s.working.low[i], s.working.up[i], s.point.value[i]
-    if value > up + tolerance * _around(s, i, up):
-        return 1.0
-    return -1.0 if value < low - tolerance * _around(s, i, low) else 0.0
 
 
 @inlined
 def _watch_parallel(s, last):
     """Watch the rows again that held rows kept in place, as those are no more the same."""
     for i in range(last):
-        if s.working.state[i] == PARALLEL:
-            s.working.state[i] = WATCHED
-            s.point.value[i] = value_of(s.problem, s.point.x, i)
+        if s.index[STATE, i] == PARALLEL:
+            s.index[STATE, i] = WATCHED
+            s.number[VALUE, i] = value_of(s, s.x, i)
 
 
 @inlined
-def _step(s, whole):
-    """Write the step to the best point that the held rows leave: y in basis vectors, p in x."""
-    M, base, p, y = s.T.M, s.T.at[BASE], s.point.p, s.point.y
-    n, begin = M.shape[0], s.working.count[FIX] + s.working.count[HARD]
+def _factor(s, whole):
+    """Give the soft rows basis vectors behind those of the held; return the part of the level.
+
+    A level that asks for x as a whole takes all that are left.
+    """
+    begin, rows = s.count[FIX] + s.count[HARD], s.count[ROWS]
     if whole:
-        for c in range(n):
-            p[c] = s.point.goal[c] - s.point.x[c]
-        for t in range(begin, n):
-            total = 0.0
-            for c in range(n):
-                total += M[t, base + c] * p[c]
-            y[t - begin] = total
-        rank = n - begin
-    else:
-        rank = _step_of_rows(s, begin)
-    size = s.working.number[SIZE]
-    for c in range(n):
-        p[c] = 0.0
-    for t in range(rank):
-        size = max(size, abs(y[t]))
-        for c in range(n):
-            p[c] += y[t] * M[begin + t, base + c]
-    s.working.number[SIZE] = size
-
-
-@inlined
-def _step_of_rows(s, begin):
-    """Write the step of the soft rows in their basis vectors; return their rank."""
-    count, number, point, soft = s.working.count, s.working.number, s.point, s.working.soft
-    rows = count[ROWS]
-    rank = factor(s.problem, s.T, soft, ZERO, rows, begin, count[RANK], s.settings.rank_tolerance)
-    count[RANK] = rank
+        return Part(ZERO, ZERO, begin, s.x.size - begin)
+    s.count[RANK] = factor(s, ZERO, rows, begin, s.count[RANK])
     for q in range(rows):
-        i = soft[q]
-        point.value[i] = value_of(s.problem, point.x, i)
-        point.rest[q] = _side(s, i) - point.value[i]
-    part = Part(ZERO, rows, begin, rank)
-    if s.settings.damping > 0.0 and rank > 0 and not _is_box(s, begin):
-        damped = damping_of(s.problem, s.T, soft, part, s.settings, s.room)
-        number[DAMPED] = max(number[DAMPED], damped)
-    if number[DAMPED] == 0.0:
-        size = solve_part(s.problem, s.T, soft, part, point.rest, point.y, point.w, s.room)
-    else:
-        for t in range(rank):
-            point.y[t] = -_gone(s, begin + t)
-        size = least_squares_part(s.problem, s.T, soft, part, point.rest, point.y, point.w, s.room,
-                                  number[DAMPED])
-    number[SIZE] = max(number[SIZE], size)
-    return rank
+        i = s.index[LIST, q]
+        s.number[VALUE, i] = value_of(s, s.x, i)
+        s.number[REST, q] = side_of(s.number, i) - s.number[VALUE, i]
+    return Part(ZERO, rows, begin, s.count[RANK])
 
 
 @inlined
-def _is_box(s, begin):
-    """Whether nothing but bounds act so far, which are not damped."""
-    box = begin == 0
-    for q in range(s.working.count[ROWS]):
-        box &= s.problem.unit[s.working.soft[q]] >= 0
-    return box
+def _head_for_goal(s, part):
+    """Write the step towards the goal, in basis vectors."""
+    goal, x, base = s.number[GOAL], s.x, s.count[BASE]
+    for t in range(part.begin, x.size):
+        total = 0.0
+        for c in range(x.size):
+            total += s.M[t, base + c] * (goal[c] - x[c])
+        s.number[Z, t] = total
+
+
+@inlined
+def _damp(s, part):
+    """Write the damping of a level: the largest of its steps. Bounds are not damped."""
+    if s.settings.damping == 0.0 or part.rank == 0:
+        return
+    box = part.begin == 0
+    for q in range(part.q1):
+        box &= s.index[UNIT, s.index[LIST, q]] >= 0
+    if not box:
+        s.scalar[DAMPED] = max(s.scalar[DAMPED], damping_of(s, part))
+
+
+@inlined
+def _meet_rows(s, part):
+    """Write the step of the soft rows, in basis vectors."""
+    if s.scalar[DAMPED] == 0.0:
+        size = solve_part(s, part)
+    else:
+        for t in range(part.begin, part.begin + part.rank):
+            s.number[Z, t] = -_gone(s, t)
+        size = least_squares_part(s, part, s.scalar[DAMPED])
+    s.scalar[SIZE] = max(s.scalar[SIZE], size)
 
 
 @inlined
 def _gone(s, t):
     """How far x has gone along basis vector t since the level began."""
     total = 0.0
-    for c in range(s.point.x.size):
-        total += s.T.M[t, s.T.at[BASE] + c] * (s.point.x[c] - s.point.start[c])
+    for c in range(s.x.size):
+        total += s.M[t, s.count[BASE] + c] * (s.x[c] - s.number[START, c])
     return total
 
 
 @inlined
-def _advance(s, last):
+def _advance(s, part, last):
     """Move along the step to the first watched row in the way; return it, or -1 if there is none.
 
     Of those that are reached at once Bland's rule takes the first.
     """
-    x, p, value, along, state = s.point.x, s.point.p, s.point.value, s.point.along, s.working.state
-    number, count, tolerance = s.working.number, s.working.count, s.settings.tolerance
-    size = 0.0
-    for c in range(x.size):
-        size += (x[c] + p[c]) ** 2
-    number[SIZE] = max(number[SIZE], np.sqrt(size))
+    x, p, value, speed = s.x, s.number[STEP], s.number[VALUE], s.number[SPEED]
+    count, tolerance = s.count, s.settings.tolerance
+    _write_step(s, part)
     bland = count[STILL] > BLAND_AFTER
     entering, side, length = -1, 0.0, 1.0
     for i in range(last):
-        if state[i] != WATCHED:
+        if s.index[STATE, i] != WATCHED:
             continue
-        along[i] = speed = value_of(s.problem, p, i)
-        bound = s.working.up[i] if speed > 0.0 else s.working.low[i]
-        over = value[i] + speed - bound
-        over = over if speed > 0.0 else -over
-        if speed == 0.0 or over <= tolerance * _around(s, i, bound) or not np.isfinite(bound):
+        speed[i] = v = value_of(s, p, i)
+        bound = s.number[UP, i] if v > 0.0 else s.number[LOW, i]
+        over = value[i] + v - bound if v > 0.0 else bound - value[i] - v
+        least = tolerance * around(s.number[NORM, i], bound, s.scalar[SCALE])
+        if v == 0.0 or over <= least or not np.isfinite(bound):
             continue
-        t = max((bound - value[i]) / speed, 0.0)
+        t = max((bound - value[i]) / v, 0.0)
         if t < length and not (bland and entering >= 0 and t >= length - NO_STEP):
-            entering, side, length = i, (1.0 if speed > 0.0 else -1.0), t
+            entering, side, length = i, (1.0 if v > 0.0 else -1.0), t
     for c in range(x.size):
         x[c] += length * p[c]
     for i in range(last):
-        if state[i] == WATCHED:
-            value[i] += length * along[i]
+        if s.index[STATE, i] == WATCHED:
+            value[i] += length * speed[i]
     count[STILL] = count[STILL] + 1 if length < NO_STEP else 0
     if entering >= 0:
-        s.record.active[entering] = side
+        s.number[ACTIVE, entering] = side
     return entering
+
+
+@inlined
+def _write_step(s, part):
+    """Write the step in x from that in basis vectors."""
+    x, p, z, size, square = s.x, s.number[STEP], s.number[Z], s.scalar[SIZE], 0.0
+    for c in range(x.size):
+        p[c] = 0.0
+    for t in range(part.begin, part.begin + part.rank):
+        size = max(size, abs(z[t]))
+        for c in range(x.size):
+            p[c] += z[t] * s.M[t, s.count[BASE] + c]
+    for c in range(x.size):
+        square += (x[c] + p[c]) ** 2
+    s.scalar[SIZE] = max(size, np.sqrt(square))
+    s.scalar[SCALE] = max(s.scalar[SCALE], np.sqrt(square), FLOOR * s.scalar[SIZE])
 
 
 @inlined
 def _enter(s, i, first, last):
     """Take row i into the working set: as a soft row of the level, or as one that is held."""
-    count = s.working.count
+    count = s.count
     if count[STILL] > STALLED and count[APART] == 0 and count[TIMES] < RELAXATIONS:
         _move_apart(s, last)
     if i >= first:
-        s.working.state[i] = SOFT
-        s.working.soft[count[ROWS]] = i
+        s.index[STATE, i] = SOFT
+        s.index[LIST, count[ROWS]] = i
         count[ROWS] += 1
         return
-    M, n, begin = s.T.M, s.T.M.shape[0], count[FIX] + count[HARD]
-    least, column, lo = s.settings.rank_tolerance * s.problem.norm[i], s.T.column[i], s.T.at[FIRST]
-    if left_of(s.problem, s.T, i, begin, n) <= least * least:
-        s.working.state[i], s.record.active[i] = PARALLEL, FREE
+    M, n, begin = s.M, s.x.size, count[FIX] + count[HARD]
+    column, lo = s.index[COLUMN, i], count[FIRST]
+    if left_of(s, i, begin, n) <= (s.settings.rank_tolerance * s.number[NORM, i]) ** 2:
+        s.index[STATE, i], s.number[ACTIVE, i] = PARALLEL, FREE
         return
     free = min(begin + count[RANK], n - 1)
-    reflect(M, free, n, column, lo, s.T.total)
+    reflect(M, free, n, column, lo, s.room)
     for t in range(free - 1, begin - 1, -1):
         fold(M, t, column, lo)
-    s.working.owner[begin], s.working.state[i] = i, HELD
+    s.index[OWNER, begin], s.index[STATE, i] = i, HELD
     count[HARD] += 1
     count[RANK] = min(count[RANK], n - begin - 1)
     for q in range(count[RANK]):  # pivot again from where a row lost its own basis vector
-        j, t = s.working.soft[q], begin + 1 + q
-        if left_of(s.problem, s.T, j, t, t + 1) <= (WEAK * s.problem.norm[j]) ** 2:
+        j, t = s.index[LIST, q], begin + 1 + q
+        if left_of(s, j, t, t + 1) <= (WEAK * s.number[NORM, j]) ** 2:
             count[RANK] = q
             break
+
+
+@inlined
+def _move_apart(s, last):
+    """Move the sides of the inequalities outward, each by another little, so that no two tie."""
+    count, low, up = s.count, s.number[LOW], s.number[UP]
+    count[APART], count[STILL] = 1, 0
+    count[TIMES] += 1
+    for i in range(last):
+        if s.number[ACTIVE, i] != EQUAL and s.index[STATE, i] != FIXED:
+            share = RELAXATION * (1.0 + (GOLDEN * (i + count[TIMES])) % 1.0)
+            up[i] += share * around(s.number[NORM, i], up[i], s.scalar[SCALE])
+            low[i] -= share * around(s.number[NORM, i], low[i], s.scalar[SCALE])
 
 
 @inlined
@@ -488,38 +416,39 @@ def _leave(s, i, last):
 
     A soft row that is now beyond its other side stays, for that side.
     """
-    state, was = s.working.state, s.record.active[i]
-    s.point.value[i] = value_of(s.problem, s.point.x, i)
-    if state[i] == SOFT:
-        s.record.active[i] = _missed_side(s, i, s.settings.tolerance)
-        if s.record.active[i] == -was:
+    was, value = s.number[ACTIVE, i], value_of(s, s.x, i)
+    s.number[VALUE, i] = value
+    if s.index[STATE, i] == SOFT:
+        side = missed_side(s.number, i, value, s.scalar[SCALE], s.settings.tolerance)
+        s.number[ACTIVE, i] = side
+        if side == -was:
             return
-        _drop_soft(s, i)
+        _drop(s, i)
     else:
         _release(s, i)
-    s.record.active[i], state[i] = FREE, WATCHED
+    s.number[ACTIVE, i], s.index[STATE, i] = FREE, WATCHED
     _watch_parallel(s, last)
 
 
 @inlined
 def _release(s, i):
     """Let go of the held row i: its basis vector goes to the soft rows."""
-    count, owner, place = s.working.count, s.working.owner, s.working.count[FIX]
+    count, owner, place = s.count, s.index[OWNER], s.count[FIX]
     while owner[place] != i:
         place += 1
     count[HARD] -= 1
     end = count[FIX] + count[HARD]
     for t in range(place, end):
         owner[t] = owner[t + 1]
-        fold(s.T.M, t, s.T.column[owner[t]], s.T.at[FIRST])
+        fold(s.M, t, s.index[COLUMN, owner[t]], count[FIRST])
     for q in range(count[RANK]):
-        fold(s.T.M, end + q, s.T.column[s.working.soft[q]], s.T.at[FIRST])
+        fold(s.M, end + q, s.index[COLUMN, s.index[LIST, q]], count[FIRST])
 
 
 @inlined
-def _drop_soft(s, i):
+def _drop(s, i):
     """Take row i out of the soft rows."""
-    count, soft, place = s.working.count, s.working.soft, 0
+    count, soft, place = s.count, s.index[LIST], 0
     while soft[place] != i:
         place += 1
     count[ROWS] -= 1
@@ -531,191 +460,179 @@ def _drop_soft(s, i):
     count[RANK] -= 1
     begin = count[FIX] + count[HARD]
     for q in range(place, count[RANK]):
-        fold(s.T.M, begin + q, s.T.column[soft[q]], s.T.at[FIRST])
-
-
-@inlined
-def _move_apart(s, last):
-    """Move the sides of the inequalities outward, each by another little, so that no two tie."""
-    count, low, up = s.working.count, s.working.low, s.working.up
-    count[APART], count[STILL] = 1, 0
-    count[TIMES] += 1
-    for i in range(last):
-        if s.record.active[i] != EQUAL and s.working.state[i] != FIXED:
-            share = RELAXATION * (1.0 + (GOLDEN * (i + count[TIMES])) % 1.0)
-            up[i] += share * _around(s, i, up[i])
-            low[i] -= share * _around(s, i, low[i])
+        fold(s.M, begin + q, s.index[COLUMN, soft[q]], count[FIRST])
 
 
 @inlined
 def _put_back(s, last):
     """Put the sides back where they were, and the held rows on them."""
-    count, x, M = s.working.count, s.point.x, s.T.M
+    count, x, M, number = s.count, s.x, s.M, s.number
     count[APART] = count[STILL] = 0
     for i in range(last):
-        s.working.low[i], s.working.up[i] = s.problem.lower[i], s.problem.upper[i]
+        number[LOW, i], number[UP, i] = number[LOWER, i], number[UPPER, i]
     for t in range(count[FIX], count[FIX] + count[HARD]):
-        i = s.working.owner[t]
-        step = (_side(s, i) - value_of(s.problem, x, i)) / (
-            s.problem.entry[i] * M[t, s.T.column[i]])
+        i = s.index[OWNER, t]
+        step = (side_of(number, i) - value_of(s, x, i)) / (
+            number[ENTRY, i] * M[t, s.index[COLUMN, i]])
         for c in range(x.size):
-            x[c] += step * M[t, s.T.at[BASE] + c]
+            x[c] += step * M[t, count[BASE] + c]
     for i in range(last):
-        if s.working.state[i] == WATCHED:
-            s.point.value[i] = value_of(s.problem, x, i)
-            if _missed_side(s, i, 10.0 * s.settings.tolerance) != 0.0:
+        if s.index[STATE, i] == WATCHED:
+            number[VALUE, i] = value = value_of(s, x, i)
+            if missed_side(number, i, value, s.scalar[SCALE], 10.0 * s.settings.tolerance) != 0.0:
                 count[DOUBT] = 1
 
 
 @inlined
-def _worst(s, whole):
+def _pull(s, part, whole):
+    """Write the pull of the level on the held rows, none where it misses nothing."""
+    fixed, damped = s.count[FIX], s.scalar[DAMPED]
+    measure(s)
+    s.count[TRIES] += 1
+    s.count[MISSED] = _misses_goal(s) if whole else _misses_rows(s, part)
+    for t in range(fixed, part.begin):
+        s.number[PULL, t] = 0.0
+        if s.count[MISSED] == 1 and whole:
+            for c in range(s.x.size):
+                s.number[PULL, t] += s.scalar[WEIGHT] * s.M[t, s.count[BASE] + c] * (
+                    s.x[c] - s.number[GOAL, c])
+        elif s.count[MISSED] == 1 and damped > 0.0:
+            s.number[PULL, t] = damped * damped * _gone(s, t)
+    if s.count[MISSED] == 1 and not whole:
+        pull_of_rows(s, part, fixed, part.begin)
+
+
+@inlined
+def _misses_goal(s):
+    """Whether x is not at the goal, as 0 or 1."""
+    gap = square = 0.0
+    for c in range(s.x.size):
+        gap += (s.x[c] - s.number[GOAL, c]) ** 2
+        square += s.number[GOAL, c] ** 2
+    size, scale = max(s.scalar[SIZE], np.sqrt(square)), max(s.scalar[SCALE], np.sqrt(square))
+    s.scalar[ROUNDING] = CANCELLED * s.scalar[WEIGHT] * size
+    return 0 if np.sqrt(gap) <= s.settings.tolerance * scale else 1
+
+
+@inlined
+def _misses_rows(s, part):
+    """Whether a soft row misses its side by more than rounding, as 0 or 1."""
+    weigh_rows(s, part)
+    s.scalar[ROUNDING] += CANCELLED * s.scalar[DAMPED] ** 2 * s.scalar[SIZE]
+    return 0 if s.scalar[WORST] <= s.settings.tolerance else 1
+
+
+@inlined
+def _forgive(s, part, whole):
+    """Let forces be none that rows of the level have only because they are not quite parallel.
+
+    Where rows are parallel but for less than rank_tolerance, they count as parallel, and what they
+    miss by, or pull with, for that reason alone is none.
+    """
+    count, force, share = s.count, s.number[FORCE], s.number[SHARE]
+    fixed, least = count[FIX], s.settings.rank_tolerance
+    if whole or count[MISSED] == 0:
+        return
+    small = least * s.scalar[PULLED]
+    unclear = s.scalar[WORST] <= least
+    for t in range(fixed, part.begin):
+        unclear |= force[t] != 0.0 and share[t] <= small
+    patient = count[TRIES] <= PATIENCE * (count[HARD] + count[ROWS] + 1)
+    if not unclear or (patient and not nearly_parallel(s, part, fixed)):
+        return
+    count[DOUBT] = 1 if not patient else count[DOUBT]
+    for t in range(fixed, part.begin):
+        if share[t] <= small:
+            force[t] = 0.0
+    count[MISSED] = 1 if s.scalar[WORST] > least else 0
+
+
+@inlined
+def _worst(s):
     """Return the row that holds x back the wrong way most, or the first by Bland; -1 if none."""
-    count, owner, soft = s.working.count, s.working.owner, s.working.soft
-    fixed, hard = count[FIX], count[HARD]
-    s.working.number[SIZE] = max(s.working.number[SIZE], length_of(s.point.x))
-    count[TRIES] += 1
-    for t in range(fixed, fixed + hard):
-        s.point.pull.force[t] = 0.0
-    if whole:
-        count[MISSED] = _force_of_whole(s)
-    else:
-        count[MISSED] = _force_of_rows(s)
+    count, fixed, hard = s.count, s.count[FIX], s.count[HARD]
     bland = count[STILL] > BLAND_AFTER
     least, leaving = 0.0, -1
-    if count[MISSED] == 1:
-        for q in range(hard + count[ROWS]):
-            i = owner[fixed + q] if q < hard else soft[q - hard]
-            force = s.point.pull.force[fixed + q] if q < hard else s.point.w[q - hard]
-            push = s.record.active[i] * force * s.problem.norm[i]
-            if s.record.active[i] == EQUAL or push >= 0.0:
-                continue
-            if bland and (leaving < 0 or i < leaving):
-                leaving = i
-            elif not bland and push < least:
-                least, leaving = push, i
+    if count[MISSED] == 0:
+        return leaving
+    for q in range(hard + count[ROWS]):
+        i = s.index[OWNER, fixed + q] if q < hard else s.index[LIST, q - hard]
+        force = s.number[FORCE, fixed + q] if q < hard else s.number[OVER, q - hard]
+        push = s.number[ACTIVE, i] * force * s.number[NORM, i]
+        if s.number[ACTIVE, i] == EQUAL or push >= (0.0 if q < hard else -s.scalar[ROUNDING]):
+            continue
+        if bland and (leaving < 0 or i < leaving):
+            leaving = i
+        elif not bland and push < least:
+            least, leaving = push, i
     return leaving
 
 
 @inlined
-def _force_of_whole(s):
-    """Write the forces of the held rows against the way to the goal; 0 if x is there."""
-    x, goal, pull, count = s.point.x, s.point.goal, s.point.pull, s.working.count
-    base, end, weight = s.T.at[BASE], count[FIX] + count[HARD], s.working.number[WEIGHT]
-    gap = square = 0.0
-    for c in range(x.size):
-        gap += (x[c] - goal[c]) ** 2
-        square += goal[c] ** 2
-    size = max(s.working.number[SIZE], np.sqrt(square))
-    if np.sqrt(gap) <= s.settings.tolerance * size:
-        return 0
-    for t in range(count[FIX], end):
-        g = terms = 0.0
-        for c in range(x.size):
-            term = s.T.M[t, base + c] * (x[c] - goal[c])
-            g += term
-            terms += abs(term)
-        pull.g[t], pull.terms[t] = weight * g, weight * terms
-    balance(s.problem, s.T, s.working.owner, pull, count[FIX], end, ZERO)
-    return 1
-
-
-@inlined
-def _force_of_rows(s):
-    """Write the forces of the held rows against the level's; 0 if it misses nothing.
-
-    Where rows of the level are parallel but for less than rank_tolerance, they count as parallel,
-    and what they miss by, or pull with, for that reason alone is none.
-    """
-    count, pull, w, soft = s.working.count, s.point.pull, s.point.w, s.working.soft
-    fixed, end = count[FIX], count[FIX] + count[HARD]
-    worst = pulled = 0.0
-    for q in range(count[ROWS]):
-        around = _around(s, soft[q], _side(s, soft[q]))
-        if abs(w[q]) <= EPSILON * around:
-            w[q] = 0.0
-        else:
-            worst = max(worst, abs(w[q]) / around)
-        pulled += s.problem.norm[soft[q]] * abs(w[q])
-    if worst <= s.settings.tolerance:
-        return 0
-    for t in range(fixed, end):
-        damped = s.working.number[DAMPED]
-        pull.g[t] = damped * damped * _gone(s, t) if damped > 0.0 else 0.0
-        pull.terms[t] = abs(pull.g[t])
-    part = Part(ZERO, count[ROWS], end, count[RANK])
-    pull_of_rows(s.problem, s.T, soft, part, w, pull, fixed, end)
-    balance(s.problem, s.T, s.working.owner, pull, fixed, end, ZERO)
-    small = s.settings.rank_tolerance * pulled
-    unclear = worst <= s.settings.rank_tolerance
-    for t in range(fixed, end):
-        unclear |= pull.force[t] != 0.0 and pull.share[t] <= small
-    if not unclear or (count[TRIES] <= PATIENCE * (count[HARD] + count[ROWS] + 1)
-                       and not nearly_parallel(s.problem, s.T, soft, part, fixed, s.point.p,
-                                               s.settings.rank_tolerance)):
-        return 1
-    for t in range(fixed, end):
-        if pull.share[t] <= small:
-            pull.force[t] = 0.0
-    return 1 if worst > s.settings.rank_tolerance else 0
-
-
-@inlined
 def _settle(s, k, whole):
-    """Make the rows that a level decided equalities for good; its other rows stay held."""
-    count, state, record, owner = s.working.count, s.working.state, s.record, s.working.owner
-    fixed, end, n = count[FIX], count[FIX] + count[HARD], s.T.M.shape[0]
-    least = smallest_share(s.problem, s.T, owner, fixed, end)
+    """Make the rows that a level decided equalities for good; its other rows stay held.
+
+    So do those of which that is not clear: a row that the level needs where it is cannot leave
+    while the rows of the level keep their values.
+    """
+    count, number, state, owner = s.count, s.number, s.index[STATE], s.index[OWNER]
+    fixed, end, unclear = count[FIX], count[FIX] + count[HARD], s.settings.rank_tolerance
+    least, missed = smallest_share(s, fixed, end), s.scalar[WORST] > unclear
     for t in range(fixed, end):
-        i, force = owner[t], s.point.pull.force[t]
-        if record.active[i] * force > 0.0:
-            state[i], record.held[i], record.multiplier[i] = FIXED, k, force
+        i, force = owner[t], number[FORCE, t]
+        share = number[SHARE, t] / s.scalar[PULLED] if missed and not whole else 1.0
+        clear = whole or (missed and share > unclear)
+        count[DOUBT] |= clear and share < DOUBTFUL
+        if clear and number[ACTIVE, i] * force > 0.0:
+            state[i], number[HOLDS, i], number[MULTIPLIER, i] = FIXED, k, force
     for q in range(count[ROWS]):
-        i = s.working.soft[q]
-        around = s.settings.tolerance * _around(s, i, _side(s, i))
+        i, over = s.index[LIST, q], number[OVER, q]
+        scale = around(number[NORM, i], side_of(number, i), s.scalar[SCALE])
         state[i] = FIXED
         if q < count[RANK]:
-            left = left_of(s.problem, s.T, i, end + q, end + q + 1)
-            least = min(least, np.sqrt(left) / s.problem.norm[i])
-        if record.active[i] == EQUAL:
+            left = left_of(s, i, end + q, end + q + 1)
+            least = min(least, np.sqrt(left) / number[NORM, i])
+        if number[ACTIVE, i] == EQUAL:
             continue
-        if count[MISSED] == 1 and record.active[i] * s.point.w[q] > around:
-            record.held[i], record.multiplier[i] = k, s.point.w[q]
+        if count[MISSED] == 1 and number[ACTIVE, i] * over > unclear * scale:
+            number[HOLDS, i], number[MULTIPLIER, i] = k, over
         else:
             state[i] = HELD
-    if least < DOUBTFUL:
+    slight = not whole and count[MISSED] == 1 and 0.25 * unclear < s.scalar[WORST] < DOUBTFUL
+    if least < DOUBTFUL or slight or (missed and has_dust(s, Part(ZERO, count[ROWS], end, ZERO))):
         count[DOUBT] = 1
-    _order(s, n if whole else end + count[RANK])
-    s.T.at[FIRST] += count[EQUALITIES]
 
 
 @inlined
-def _order(s, end):
-    """Give the basis vectors up to `end` to the rows that are fixed first, then to those held."""
-    count, owner, soft, state = s.working.count, s.working.owner, s.working.soft, s.working.state
-    fixed, hard, rows, held = count[FIX], count[HARD], count[ROWS], s.point.along
+def _order(s, whole):
+    """Give the level's basis vectors to the rows that are fixed first, then to those held."""
+    count, owner, soft, state = s.count, s.index[OWNER], s.index[LIST], s.index[STATE]
+    fixed, hard, rows, held = count[FIX], count[HARD], count[ROWS], s.number[SPEED]
+    end = s.x.size if whole else fixed + hard + count[RANK]
     at, least, open_rows = fixed, s.settings.rank_tolerance, 0
-    for q in range(hard + rows):
+    for q in range(0 if whole else hard + rows):  # x as a whole is settled: no row is open
         i = owner[fixed + q] if q < hard else soft[q - hard]
         if state[i] == HELD:
             held[open_rows] = i
             open_rows += 1
-    count[FIX], count[HARD] = end, 0
-    if open_rows == 0:
-        return
-    for q in range(hard + rows):
+    for q in range(hard + rows if open_rows > 0 else 0):
         i = owner[fixed + q] if q < hard else soft[q - hard]
-        if state[i] == FIXED and left_of(s.problem, s.T, i, at, end) > (
-                least * s.problem.norm[i]) ** 2:
-            reflect(s.T.M, at, end, s.T.column[i], s.T.at[FIRST], s.T.total)
+        left = left_of(s, i, at, end)
+        if state[i] == FIXED and left > (least * s.number[NORM, i]) ** 2:
+            count[DOUBT] |= left < (DOUBTFUL * s.number[NORM, i]) ** 2
+            reflect(s.M, at, end, s.index[COLUMN, i], count[FIRST], s.room)
             at += 1
-    count[FIX] = at
+    count[FIX] = at if open_rows > 0 else end
     for q in range(open_rows):
         i = np.int64(held[q])
-        if left_of(s.problem, s.T, i, at, end) > (least * s.problem.norm[i]) ** 2:
-            reflect(s.T.M, at, end, s.T.column[i], s.T.at[FIRST], s.T.total)
+        left = left_of(s, i, at, end)
+        if left > (least * s.number[NORM, i]) ** 2:
+            count[DOUBT] |= left < (DOUBTFUL * s.number[NORM, i]) ** 2
+            reflect(s.M, at, end, s.index[COLUMN, i], count[FIRST], s.room)
             owner[at] = i
             at += 1
         else:
-            state[i], s.record.active[i] = WATCHED, FREE
-            s.point.value[i] = value_of(s.problem, s.point.x, i)
-    count[HARD] = at - count[FIX]
+            state[i], s.number[ACTIVE, i] = WATCHED, FREE
+            s.number[VALUE, i] = value_of(s, s.x, i)
+    count[HARD] = at - count[FIX] if open_rows > 0 else 0
+    count[FIRST] += count[EQUALITIES]

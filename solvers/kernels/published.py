@@ -18,7 +18,6 @@ from solvers.kernels.block import invert_triangle, orthogonalise_rows, smallest_
 from solvers.kernels.rows import ZERO, finish, load_rows, make_reflector, reflect, reflect_back
 from solvers.kernels.space import (
     Basis,
-    Settings,
     View,
     carve_basis,
     integers,
@@ -26,7 +25,7 @@ from solvers.kernels.space import (
     shared,
     vector,
 )
-from solvers.kernels.staircase import carve_staircase, solve_by_staircase
+from solvers.kernels.staircase import carve_staircase, climb
 from solvers.status import SOLVED, TOO_SMALL
 
 
@@ -123,7 +122,7 @@ def _add_least(A, u, x, settings, work):
     whole[0] = m
     for c in range(n):
         least[c] = 0.0
-    code = solve_by_staircase(A, u, u, whole, least, undamped, rest)
+    code, _ = climb(A, u, u, whole, least, undamped, rest)
     for c in range(n):
         x[c] += least[c]
     return code
@@ -253,21 +252,3 @@ def matrix_as_published(A, lower, upper, sizes, F, settings, work):
         for k in range(m):
             F[i, k] = matrices.F[i, k]
     return code
-
-
-@compiled
-def published(A, lower, upper, sizes, x, damping, threshold, rank_tolerance, work):
-    """Like `solve_as_published`."""  # for tpm.py until it is replaced
-    if work.size < 3:
-        return TOO_SMALL
-    work[0], work[1], work[2] = damping, threshold, rank_tolerance
-    return solve_as_published(A, lower, upper, sizes, x, work[:3], work[3:])
-
-
-@compiled
-def priority_matrix(A, lower, upper, sizes, x, W, beta, F, T, damping, threshold, rank_tolerance,
-                    work):
-    """Write F^T into F."""  # for tpm.py until it is replaced
-    m = A.shape[0]
-    matrices = Matrices(W[:m], Basis(W[m:2 * m], beta), F, T, T.reshape(m * m)[:m], work)
-    return _fill(A, lower, upper, sizes, x, matrices, Settings(damping, threshold, rank_tolerance))

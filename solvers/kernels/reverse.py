@@ -16,7 +16,7 @@ from __future__ import annotations
 from hierarchy.compiled import compiled, inlined
 from solvers.kernels.rows import finish
 from solvers.kernels.space import integers, vector
-from solvers.kernels.staircase import carve_staircase, solve_by_staircase
+from solvers.kernels.staircase import carve_staircase, climb
 from solvers.status import NUMERICAL_FAILURE, SOLVED, TOO_SMALL
 
 
@@ -48,8 +48,7 @@ def reverse(A, lower, upper, sizes, x, settings, work):
             d[c] = 0.0 if k > 0 else reference[c]  # nothing sees what J_RA of all levels leaves
         _ask(A, lower, x, asked, first, last)
         two = parts[k:_end_of_parts(sizes, parts, k, m - last, settings[3] > 0.0)]
-        code = solve_by_staircase(A[first:], asked[first:], asked[first:], two, d, settings,
-                                  work[at:])
+        code, _ = climb(A[first:], asked[first:], asked[first:], two, d, settings, work[at:])
         if code != SOLVED:
             return finish(x, code)
         for c in range(n):

@@ -13,23 +13,10 @@ from __future__ import annotations
 import numpy as np
 
 from hierarchy.compiled import compiled, inlined
-
-# for hcod.py, stages.py, saturation.py and their resolvers until they are replaced
-from solvers.status import EQUAL as EQUAL
-from solvers.status import FREE as FREE
-from solvers.status import INACCURATE as INACCURATE
-from solvers.status import ITERATION_LIMIT as ITERATION_LIMIT
-from solvers.status import NUMERICAL_FAILURE as NUMERICAL_FAILURE
-from solvers.status import SOLVED as SOLVED
-from solvers.status import TOO_SMALL as TOO_SMALL
+from solvers.status import NUMERICAL_FAILURE, SOLVED
 
 ZERO = np.int64(0)
-# A multiplier is known to ROUNDING times the size of the rows that it balances: where rows of very
-# different scale conflict, that is more than DOUBT times what they really pull.
-ROUNDING, DOUBT = 1e-13, 1e-6
-SLIGHT = 1e-6  # share of its terms by which a level may be missed and yet be attainable
-GROWTH = 1e3  # of x over the distance of the farthest acting row from zero; more is worth a doubt
-NEARLY_PARALLEL = 1e-5  # what is left of a row behind others, as a share; less is worth a doubt
+ROUNDING = 1e-13  # of the terms of a sum, up to which it is rounding
 
 
 @compiled
@@ -63,31 +50,13 @@ def all_finite(x):
     return finite
 
 
-@compiled
-def prepare(A, lower, upper, x, active, held, multiplier, scale):
-    """Check the data and start the record; return the number of inequality rows, -1 if bad."""
-    m, n = A.shape
-    inequalities = 0
-    for c in range(n):
-        if not np.isfinite(x[c]):
-            return -1
-    for i in range(m):
-        square = 0.0
-        for c in range(n):
-            square += A[i, c] * A[i, c]
-        scale[i] = np.sqrt(square)
-        held[i], multiplier[i] = -1.0, 0.0
-        low, up = lower[i], upper[i]
-        if not np.isfinite(square) or not low <= up or low == np.inf or up == -np.inf:
-            return -1
-        if low == up:
-            active[i] = EQUAL
-            continue
-        inequalities += 1
-        guess = active[i]
-        known = (guess == 1 and up < np.inf) or (guess == -1 and low > -np.inf)
-        active[i] = guess if known else FREE
-    return inequalities
+@inlined
+def all_equal(lower, upper):
+    """Whether all rows are equalities."""
+    equal = True
+    for i in range(lower.size):
+        equal &= lower[i] == upper[i]
+    return equal
 
 
 @inlined
@@ -202,24 +171,6 @@ def factor_level(rows, basis, begin, end, rank):
         reflect(basis, rank, rank + 1, W, i, end)
         rank += 1
     return rank
-
-
-@compiled
-def grown(lower, upper, active, scale, x, reference):
-    """Whether x is far longer than the rows that act, or the reference, ask for."""
-    size = square = 0.0
-    for c in range(x.size):
-        size += x[c] * x[c]
-        square += reference[c] * reference[c]
-    if size <= GROWTH * GROWTH * square:
-        return False
-    size = np.sqrt(size)
-    for i in range(active.size):
-        if active[i] != FREE:
-            bound = upper[i] if active[i] > 0 else lower[i]
-            if scale[i] * size <= GROWTH * abs(bound):
-                return False
-    return size > 0.0
 
 
 @compiled

@@ -47,7 +47,7 @@ from solvers.kernels.space import (
     shared,
     vector,
 )
-from solvers.kernels.staircase import carve_staircase, solve_by_staircase
+from solvers.kernels.staircase import carve_staircase, climb
 from solvers.status import CONTRADICTION, NUMERICAL_FAILURE, SOLVED, TOO_SMALL
 
 
@@ -155,7 +155,7 @@ def sns(A, lower, upper, sizes, x, record, settings, work):
     for c in range(n):
         box.reference[c] = x[c]
     if bounds == 0:
-        code = solve_by_staircase(A, lower, upper, sizes, x, settings, work[at:])
+        code, _ = climb(A, lower, upper, sizes, x, settings, work[at:])
     else:
         code = _saturate(tasks, x, box, record[n + 1:], settings, work[at:])
     if code != SOLVED:

@@ -16,9 +16,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-import numpy as np
-
-from hierarchy.compiled import as_matrix, inlined
+from hierarchy.compiled import as_integers, as_matrix, inlined
 
 View = Any  # numpy to the reader, a type of its own to numba
 
@@ -80,7 +78,7 @@ def vector(work, at, size):
 def integers(work, at, size):
     """Like `vector`, as int64."""
     numbers, end = vector(work, at, size)
-    return numbers.view(np.int64), end
+    return as_integers(numbers), end
 
 
 @inlined

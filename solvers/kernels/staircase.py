@@ -12,9 +12,19 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import numpy as np
+
 from hierarchy.compiled import compiled, inlined
 from solvers.kernels.block import solve_level
-from solvers.kernels.rows import ZERO, factor_level, finish, load_rows, reflect, reflect_back
+from solvers.kernels.rows import (
+    ZERO,
+    all_equal,
+    factor_level,
+    finish,
+    load_rows,
+    reflect,
+    reflect_back,
+)
 from solvers.kernels.space import (
     Basis,
     Block,
@@ -26,7 +36,8 @@ from solvers.kernels.space import (
     shared,
     vector,
 )
-from solvers.status import SOLVED, TOO_SMALL
+from solvers.kernels.tolerances import DOUBTFUL
+from solvers.status import EQUAL, INACCURATE, SOLVED, TOO_SMALL, UNPROVED
 
 
 class Staircase(NamedTuple):
@@ -59,28 +70,67 @@ def solve_by_staircase(A, lower, upper, sizes, x, settings, work):
     """Solve; x (n,) comes in as the reference and goes out as the answer, zero on failure.
 
     settings: an array that begins with damping, threshold, rank_tolerance. work: of any content.
-    Returns SOLVED, NUMERICAL_FAILURE, TOO_SMALL, or -(i + 1) where row i is an inequality.
+    Returns SOLVED, NUMERICAL_FAILURE, TOO_SMALL, -(i + 1) where row i is an inequality, or
+    INACCURATE where a row is nearly parallel to others and nothing is damped.
+    """
+    code, least = climb(A, lower, upper, sizes, x, settings, work)
+    if code == SOLVED and least < DOUBTFUL and settings[0] == 0.0:
+        return ZERO + INACCURATE
+    return code
+
+
+@compiled
+def climb(A, lower, upper, sizes, x, settings, work):
+    """Solve like `solve_by_staircase`, without a doubt; return that code, and the least pivot.
+
+    A pivot is what was left of a row when it was taken, as a share of its norm.
     """
     m, n = A.shape
     (basis, rows, y, of_x, of_block), at = carve_staircase(work, 0, m, n)
     if at > work.size:
-        return TOO_SMALL
+        return ZERO + TOO_SMALL, 0.0
     settings = shared(settings)
     code = load_rows(rows.W, rows.zero, A, lower, upper, x, settings.rank_tolerance)
     if code != SOLVED:
-        return finish(x, code)
+        return finish(x, code), 0.0
 
-    rank = first = ZERO
+    rank, first, least = ZERO, ZERO, np.inf
     for level in range(sizes.size):
         last, above = first + sizes[level], rank
         reflect(basis, ZERO, above, rows.W, first, last)  # J_i Q: the level as seen from above
         _ask(rows, lower, first, last)
         rank = factor_level(rows, basis, first, last, rank)
+        least = _smallest_pivot(rows, first, above, rank, least)
         subtract(rows, y, first, last, above)  # p_i - J_i x_{i-1}, in (13)
         solve_level(rows.W, rows.miss, y, Block(first, last, above, rank), settings, of_block)
         first = last
     _to_unknowns(basis, y, rank, x, of_x)
-    return finish(x, SOLVED)
+    return finish(x, SOLVED), np.sqrt(least) * settings.rank_tolerance
+
+
+@inlined
+def _smallest_pivot(rows, first, above, rank, least):
+    """Return the least square of a pivot, over that at which a row counts as zero."""
+    for k in range(above, rank):
+        i = first + k - above
+        square, zero = rows.W[i, k] * rows.W[i, k], rows.zero[i]
+        least = min(least, square / zero) if zero > 0.0 else least
+    return least
+
+
+@compiled
+def solve_equalities(A, lower, upper, sizes, x, record, settings, work):
+    """Like `solve_by_staircase`, with the record of `solve_by_guesses`.
+
+    Returns UNPROVED where a row is an inequality, and then nothing was done.
+    """
+    if not all_equal(lower, upper):
+        return UNPROVED
+    code, m = solve_by_staircase(A, lower, upper, sizes, x, settings, work), lower.size
+    for i in range(m):
+        record[i], record[m + i], record[2 * m + i] = EQUAL, -1.0, 0.0
+    record[3 * m], record[3 * m + 1], record[3 * m + 2] = 1.0, 0.0, -1.0
+    return code
 
 
 @inlined
@@ -114,18 +164,3 @@ def _to_unknowns(basis, y, rank, x, of_x):
     reflect_back(basis, rank, of_x, ZERO, ZERO + 1)
     for c in range(x.size):
         x[c] = of_x[0, c]
-
-
-@compiled
-def staircase_work(m, n):  # for hcod.py until it is replaced
-    """Return how many numbers of work space `staircase` needs."""
-    return 3 + (2 * m + 2 * n + 4) * n + 4 * m
-
-
-@compiled
-def staircase(A, lower, upper, sizes, x, damping, threshold, rank_tolerance, work):
-    """Like `solve_by_staircase`."""  # for hcod.py, tpm.py until they are replaced
-    if work.size < 3:
-        return TOO_SMALL
-    work[0], work[1], work[2] = damping, threshold, rank_tolerance
-    return solve_by_staircase(A, lower, upper, sizes, x, work[:3], work[3:])

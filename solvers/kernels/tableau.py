@@ -18,135 +18,166 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hierarchy.compiled import compiled, inlined
+from hierarchy.compiled import as_matrix, compiled, inlined
+from solvers.kernels.rows import ZERO
 from solvers.kernels.space import View, integers, matrix, vector
+from solvers.kernels.tolerances import FLOOR, OUTGROWN
 from solvers.status import EQUAL, FREE
 
-FIRST, BASE, REMOVED = range(3)  # entries of `at`
+# Rows of `number`. Of each row of A: its norm, its only entry (1 where there are more), its sides,
+# those as they are moved, its value and how fast that changes, what it misses before its level and
+# has too much after (these two in the order of the list), and the record, see
+# `ActiveSetResolution`. Of each unknown or basis vector: the x that the level began with, its goal,
+# the reference, the step in x, x or its step in the basis, the level's pull, the force that
+# balances it, and what of the pull that is.
+(NORM, ENTRY, LOWER, UPPER, LOW, UP, VALUE, SPEED, REST, OVER, ACTIVE, HOLDS, MULTIPLIER,
+ START, GOAL, REFERENCE, STEP, Z, PULL, FORCE, SHARE) = range(21)
+# Rows of `index`. Of each row of A: its unknown (-1 for more than one entry), its column of M, its
+# state; the list of rows that act, each level in pivot order. Of each basis vector: the row that
+# owns it, -1 for none; the unknown it was at first. Of each level: how many rows it has, where it
+# begins in the list, and in the basis.
+UNIT, COLUMN, STATE, LIST, OWNER, ORDER, EXTENT, BEGIN, RANKS = range(9)
+# In `count`: levels; first column of M still in use; that of the unknowns that are left; unknowns
+# removed, as they were put on a bound before all else. The others are those of `levels.py`.
+LEVELS, FIRST, BASE, REMOVED = range(4)
+COUNTS = 15
+# In `scalar`: the largest number met, what tolerances are taken of; a level's damping and weight;
+# the most that a row of it misses, the sum of what they pull with, what of that may be rounding;
+# guesses, steps, the level that was not finished.
+(SIZE, SCALE, DAMPED, WEIGHT, WORST, PULLED, ROUNDING,
+ GUESSES, STEPS, UNFINISHED) = range(10)
+
+ALL, ACTING = np.int64(0), np.int64(1)  # the rows that a tableau is for
 
 
-class Problem(NamedTuple):
-    """The data, and what is known of each row.
+class Exact(NamedTuple):
+    """The settings of `Hcod`, in the order of its array."""
 
-    A (m, n), lower, upper (m,), sizes (L,). norm (m,): of each row. unit (m,): the unknown of a row
-    with a single entry, -1 for others. entry (m,): that entry, 1 for others.
+    damping: View
+    threshold: View
+    rank_tolerance: View
+    tolerance: View
+    guesses: View
+    max_iterations: View
+
+
+class Solve(NamedTuple):
+    """All that a solve works with: few arrays, whose rows have names, as each costs the compiler.
+
+    A (m, n), x (n,). number, index (.., w), w the largest of m, n, L + 1, and count, scalar: see
+    above. M (n, g + n). room: scratch.
     """
 
     A: View
-    lower: View
-    upper: View
-    sizes: View
-    norm: View
-    unit: View
-    entry: View
-
-
-class Record(NamedTuple):
-    """What a solve leaves for the next: parts of one array, see `ActiveSetResolution`."""
-
-    active: View
-    held: View
-    multiplier: View
-    counts: View
-
-
-class Tableau(NamedTuple):
-    """M and where things are in it.
-
-    column (m,): of each row of A. order (n,): the unknown that each basis vector was at first.
-    at (3,): the first column still in use; that of the unknowns that are left; how many unknowns
-    were removed, because they were put on a bound before all else. total (g + n,): scratch.
-    """
-
+    x: View
+    number: View
+    index: View
+    count: View
+    scalar: View
     M: View
-    column: View
-    order: View
-    at: View
-    total: View
+    room: View
+    settings: Exact
 
 
 @inlined
-def carve_problem(A, lower, upper, sizes, work, at):
-    """Return a Problem, whose rows are not looked at yet, and where it ends."""
-    norm, at = vector(work, at, A.shape[0])
-    entry, at = vector(work, at, A.shape[0])
-    unit, at = integers(work, at, A.shape[0])
-    return Problem(A, lower, upper, sizes, norm, unit, entry), at
+def carve(A, sizes, x, settings, work):
+    """Return a Solve without data whose M has no columns yet, and whether there is room for all.
+
+    That is M, a least squares problem of all rows, and its damping.
+    """
+    m, n = A.shape
+    w = max(m, n, sizes.size + 1)
+    number, at = matrix(work, ZERO, 21, w)
+    numbers, at = integers(work, at, 9 * w)
+    count, at = integers(work, at, COUNTS)
+    scalar, at = vector(work, at, 10)
+    enough = at + n * (m + n) + (m + n) * (2 * n + 2) <= work.size
+    room = work[at if enough else work.size:]
+    exact = Exact(settings[0], settings[1], settings[2], settings[3], settings[4], settings[5])
+    index = as_matrix(numbers, 9 if numbers.size > 0 else 0, w)
+    return Solve(A, x, number, index, count, scalar,
+                 as_matrix(room[:0], n, 0), room, exact), enough
 
 
 @inlined
-def parts_of(record, m):
-    """Return a Record of views."""
-    return Record(record[:m], record[m:2 * m], record[2 * m:3 * m], record[3 * m:])
-
-
-@inlined
-def carve_tableau(work, at, m, n, general):
-    """Return a Tableau for `general` rows with more than one entry, and where it ends."""
-    M, at = matrix(work, at, n, general + n)
-    column, at = integers(work, at, m)
-    order, at = integers(work, at, n)
-    places, at = integers(work, at, 3)
-    total, at = vector(work, at, general + n)
-    return Tableau(M, column, order, places, total), at
+def with_tableau(s, general):
+    """Return the Solve with an M for `general` rows of more than one entry."""
+    n = s.x.size
+    M, at = matrix(s.room, ZERO, n, general + n)
+    return Solve(s.A, s.x, s.number, s.index, s.count, s.scalar, M, s.room[at:], s.settings)
 
 
 @compiled
-def look_at_rows(problem, record, x):
-    """Check all data, begin the record; return how many rows have several entries, -1 if bad.
+def load(s, lower, upper, sizes, record):
+    """Check all data and copy them; return how many rows have several entries, -1 if bad.
 
     An active inequality whose side is missing is set free.
     """
-    general, sane = 0, True
-    for c in range(x.size):
-        sane &= np.isfinite(x[c])
-    for i in range(problem.norm.size):
-        a, square, entries, only = problem.A[i], 0.0, 0, -1
+    number, general, sane = s.number, ZERO, True
+    s.count[LEVELS] = sizes.size
+    for k in range(sizes.size):
+        s.index[EXTENT, k] = sizes[k]
+    for c in range(s.x.size):
+        sane &= np.isfinite(s.x[c])
+        number[REFERENCE, c], s.index[ORDER, c] = s.x[c], c
+    for i in range(lower.size):
+        a, square, entries, only = s.A[i], 0.0, 0, -1
         for c in range(a.size):
             square += a[c] * a[c]
-            entries += 1 if a[c] != 0.0 else 0
-        if entries == 1:
-            only = 0
-            while a[only] == 0.0:
-                only += 1
-        else:
-            general += 1
-        problem.norm[i], problem.unit[i] = np.sqrt(square), only
-        problem.entry[i] = a[only] if only >= 0 else 1.0
-        low, up = problem.lower[i], problem.upper[i]
+            if a[c] != 0.0:
+                entries, only = entries + 1, c
+        only = only if entries == 1 else -1
+        general += only < 0
+        low, up, act = lower[i], upper[i], record[i]
         sane &= np.isfinite(square) and low <= up and low < np.inf and up > -np.inf
-        act = record.active[i]
+        number[NORM, i], s.index[UNIT, i] = np.sqrt(square), only
+        number[ENTRY, i] = a[only] if only >= 0 else 1.0
+        number[LOWER, i] = number[LOW, i] = low
+        number[UPPER, i] = number[UP, i] = up
         if low == up:
-            record.active[i] = EQUAL
+            act = EQUAL
         elif not ((act == 1.0 and up < np.inf) or (act == -1.0 and low > -np.inf)):
-            record.active[i] = FREE
-        record.held[i], record.multiplier[i] = -1.0, 0.0
+            act = FREE
+        number[ACTIVE, i], number[HOLDS, i], number[MULTIPLIER, i] = act, -1.0, 0.0
+    s.scalar[SIZE] = s.scalar[SCALE] = s.scalar[GUESSES] = s.scalar[STEPS] = 0.0
+    s.scalar[UNFINISHED] = -1.0
     return general if sane else -1
 
 
 @inlined
-def open_tableau(problem, active, T, only_active):
+def keep(s, record):
+    """Write the record."""
+    m = s.A.shape[0]
+    for i in range(m):
+        record[i], record[m + i] = s.number[ACTIVE, i], s.number[HOLDS, i]
+        record[2 * m + i] = s.number[MULTIPLIER, i]
+    record[3 * m], record[3 * m + 1] = s.scalar[GUESSES], s.scalar[STEPS]
+    record[3 * m + 2] = s.scalar[UNFINISHED]
+
+
+@compiled
+def open_tableau(s, rows):
     """Write M for Q = I: removed unknowns, equalities, inequalities, the unknowns that are left.
 
-    So what is settled lies before what is not, and is left out of all that follows. Where only the
-    active rows are wanted, the others have columns that are left out from the beginning.
+    So what is settled lies before what is not, and is left out of all that follows. If only the
+    ACTING rows are wanted, the others have columns that are left out from the beginning.
     """
-    M, order, removed = T.M, T.order, T.at[REMOVED]
-    n, at = order.size, T.at[REMOVED]
-    if only_active:
-        for i in range(problem.unit.size):
-            at += problem.unit[i] < 0 and active[i] == FREE
-    T.at[FIRST] = at
+    M, active, unit, order = s.M, s.number[ACTIVE], s.index[UNIT], s.index[ORDER]
+    m, n, removed = s.A.shape[0], s.x.size, s.count[REMOVED]
+    at = removed
+    for i in range(m):
+        at += rows == ACTING and unit[i] < 0 and active[i] == FREE
+    s.count[FIRST] = at
     for equal in (True, False):
-        for i in range(problem.unit.size):
-            if problem.unit[i] < 0 and (active[i] == EQUAL) == equal and not (
-                    only_active and active[i] == FREE):
-                T.column[i] = at
-                a = problem.A[i]
+        for i in range(m):
+            if unit[i] < 0 and (active[i] == EQUAL) == equal and not (
+                    rows == ACTING and active[i] == FREE):
+                s.index[COLUMN, i] = at
+                a = s.A[i]
                 for t in range(n):
                     M[t, at] = a[order[t]]
                 at += 1
-    T.at[BASE] = at
+    s.count[BASE] = at
     for t in range(n):
         for c in range(removed):
             M[t, c] = 0.0
@@ -154,10 +185,10 @@ def open_tableau(problem, active, T, only_active):
             M[t, c] = 0.0
         column = t if t < removed else at + t - removed
         M[t, column] = 1.0
-        T.total[order[t]] = column
-    for i in range(problem.unit.size):
-        if problem.unit[i] >= 0:
-            T.column[i] = np.int64(T.total[problem.unit[i]])
+        s.room[order[t]] = column
+    for i in range(m):
+        if unit[i] >= 0:
+            s.index[COLUMN, i] = np.int64(s.room[unit[i]])
 
 
 @compiled
@@ -210,46 +241,67 @@ def fold(M, k, column, first):
 
 
 @inlined
-def left_of(problem, T, i, begin, end):
+def left_of(s, i, begin, end):
     """Squared norm of row i in the basis vectors begin .. end - 1."""
-    square, column = 0.0, T.column[i]
+    square, column, entry = 0.0, s.index[COLUMN, i], s.number[ENTRY, i]
     for t in range(begin, end):
-        square += T.M[t, column] * T.M[t, column]
-    return square * problem.entry[i] * problem.entry[i]
+        square += s.M[t, column] * s.M[t, column]
+    return square * entry * entry
 
 
 @inlined
-def factor(problem, T, rows, q0, q1, begin, rank, rank_tolerance):
-    """Give rows q0 .. q1 - 1 of a list basis vectors from `begin` on, the largest first.
+def factor(s, q0, q1, begin, rank):
+    """Give rows q0 .. q1 - 1 of the list basis vectors from `begin` on, the largest first.
 
     The first `rank` of them have theirs. The list is brought into pivot order; returns the rank.
     """
-    n = T.M.shape[0]
+    n, rows = s.x.size, s.index[LIST]
     while q0 + rank < q1 and begin + rank < n:
         largest, best = 0.0, -1
         for q in range(q0 + rank, q1):
-            least = rank_tolerance * problem.norm[rows[q]]
-            square = left_of(problem, T, rows[q], begin + rank, n)
+            least = s.settings.rank_tolerance * s.number[NORM, rows[q]]
+            square = left_of(s, rows[q], begin + rank, n)
             if square > largest and square > least * least:
                 largest, best = square, q
         if best < 0:
             break
         q = q0 + rank
         rows[q], rows[best] = rows[best], rows[q]
-        reflect(T.M, begin + rank, n, T.column[rows[q]], T.at[FIRST], T.total)
+        reflect(s.M, begin + rank, n, s.index[COLUMN, rows[q]], s.count[FIRST], s.room)
         rank += 1
     return rank
 
 
 @inlined
-def value_of(problem, x, i):
+def value_of(s, x, i):
     """Row i of A times x."""
-    if problem.unit[i] >= 0:
-        return problem.entry[i] * x[problem.unit[i]]
-    total, a = 0.0, problem.A[i]
-    for c in range(x.size):
+    if s.index[UNIT, i] >= 0:
+        return s.number[ENTRY, i] * x[s.index[UNIT, i]]
+    total, a = 0.0, s.A[i]
+    for c in range(a.size):
         total += a[c] * x[c]
     return total
+
+
+@inlined
+def side_of(number, i):
+    """The side at which row i acts."""
+    return number[UP, i] if number[ACTIVE, i] > 0.0 else number[LOW, i]
+
+
+@inlined
+def around(norm, side, scale):
+    """What a tolerance for a row at a side is taken of; see `tolerances.py`."""
+    return norm * scale + abs(side)
+
+
+@inlined
+def missed_side(number, i, value, scale, tolerance):
+    """+1 where row i is above its upper side, -1 where it is below its lower, 0 within."""
+    low, up, norm = number[LOW, i], number[UP, i], number[NORM, i]
+    if value > up + tolerance * around(norm, up, scale):
+        return 1.0
+    return -1.0 if value < low - tolerance * around(norm, low, scale) else 0.0
 
 
 @inlined
@@ -262,22 +314,35 @@ def length_of(x):
 
 
 @inlined
-def asks_for_x(problem, active, first, last, goal, seen):
+def measure(s):
+    """Write what tolerances are taken of: the length of x, but not less than rounding may be."""
+    length = length_of(s.x)
+    s.scalar[SIZE] = max(s.scalar[SIZE], length)
+    s.scalar[SCALE] = max(length, FLOOR * s.scalar[SIZE])
+
+
+@inlined
+def has_outgrown(s):
+    """Whether x is so small beside the numbers it came from that its tolerances say little."""
+    return s.scalar[SIZE] > OUTGROWN * (1.0 + length_of(s.x))
+
+
+@inlined
+def asks_for_x(s, first, last):
     """Whether rows first .. last - 1 ask each unknown for one value, all with one weight.
 
-    Such a level is the way to a reference of its own, which is written into goal (n,). seen (n,) is
-    scratch.
+    Such a level is the way to a reference of its own, which is written into the goal.
     """
-    n = goal.size
+    n, seen = s.x.size, s.number[STEP]
     if last - first != n:
         return False
     for c in range(n):
         seen[c] = 0.0
-    weight = abs(problem.entry[first])
+    weight = abs(s.number[ENTRY, first])
     for i in range(first, last):
-        c = problem.unit[i]
-        if c < 0 or active[i] != EQUAL or abs(problem.entry[i]) != weight or seen[c] != 0.0:
+        c, entry = s.index[UNIT, i], s.number[ENTRY, i]
+        if c < 0 or s.number[ACTIVE, i] != EQUAL or abs(entry) != weight or seen[c] != 0.0:
             return False
         seen[c] = 1.0
-        goal[c] = problem.lower[i] / problem.entry[i]
+        s.number[GOAL, c] = s.number[LOWER, i] / entry
     return True
