@@ -82,8 +82,8 @@ class Hcod(Resolver):
     the tick before, its active set is solved and proved by its multipliers; where that fails within
     `guesses`, and without a memory, a primal active set goes level by level. With damping and
     inequalities a level minimises ||what it misses||^2 + lambda^2 ||its own step||^2 inside the
-    rows above. Where a row that acts is nearly parallel to others, `certify` judges; an answer that
-    it does not accept has Status.INACCURATE. (Not with damping on.)
+    rows above. Where rounding leaves a doubt (docs/hcod.md says when), `certify` judges; an answer
+    that it does not accept has Status.INACCURATE. (Not with damping on.)
 
     tolerance : of violations, relative to the size of the terms they are made of.
     guesses : active sets tried before going level by level; at least 1.

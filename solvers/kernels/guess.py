@@ -68,26 +68,22 @@ from solvers.kernels.tableau import (
     Z,
     around,
     asks_for_x,
-    carve,
     factor,
     has_outgrown,
     keep,
-    load,
     measure,
     missed_side,
     open_tableau,
+    prepare,
     side_of,
     value_of,
-    with_tableau,
 )
 from solvers.kernels.tolerances import CANCELLED, DOUBTFUL
 from solvers.status import (
     EQUAL,
     FREE,
     NO_LIMITS,
-    NUMERICAL_FAILURE,
     SOLVED,
-    TOO_SMALL,
     UNPROVED,
 )
 
@@ -105,15 +101,11 @@ def solve_by_guesses(A, lower, upper, sizes, x, record, settings, work):
     argument costs time. work: of any content. Returns SOLVED, NUMERICAL_FAILURE, TOO_SMALL,
     NO_LIMITS where all rows are equalities, or UNPROVED where `solve_by_levels` must be called.
     """
-    s, enough = carve(A, sizes, x, settings, work)
-    if not enough:
-        return TOO_SMALL
     if all_equal(lower, upper):
         return NO_LIMITS
-    general = load(s, lower, upper, sizes, record)
-    if general < 0:
-        return finish(x, NUMERICAL_FAILURE)
-    s = with_tableau(s, general)
+    s, code = prepare(A, lower, upper, sizes, x, record, settings, work)
+    if code != SOLVED:
+        return code
     verdict = WRONG
     while verdict == WRONG and s.scalar[GUESSES] < s.settings.guesses:
         s.scalar[GUESSES] += 1.0

@@ -81,20 +81,18 @@ from solvers.kernels.tableau import (
     Z,
     around,
     asks_for_x,
-    carve,
     factor,
     fold,
     has_outgrown,
     keep,
     left_of,
-    load,
     measure,
     missed_side,
     open_tableau,
+    prepare,
     reflect,
     side_of,
     value_of,
-    with_tableau,
 )
 from solvers.kernels.tolerances import (
     BLAND_AFTER,
@@ -115,7 +113,6 @@ from solvers.status import (
     ITERATION_LIMIT,
     NUMERICAL_FAILURE,
     SOLVED,
-    TOO_SMALL,
 )
 
 # State of a row, 0 while its level is still to come. PARALLEL: the held rows keep it in place.
@@ -134,35 +131,22 @@ def solve_by_levels(A, lower, upper, sizes, x, record, settings, work):
     record (3 m + 3,) and settings: as for `solve_by_guesses`; of the record only the guesses are
     read. Where the iterations end early, x keeps all levels above the unfinished one, which is as
     good as it got. Returns SOLVED, ITERATION_LIMIT, NUMERICAL_FAILURE, TOO_SMALL, or INACCURATE
-    where a row that acts is nearly parallel to others.
+    where rounding leaves a doubt.
     """
-    s, enough = carve(A, sizes, x, settings, work)
-    if not enough:
-        return TOO_SMALL
-    general = load(s, lower, upper, sizes, record)
-    if general < 0:
-        return finish(x, NUMERICAL_FAILURE)
-    s = with_tableau(s, general)
+    s, code = prepare(A, lower, upper, sizes, x, record, settings, work)
+    if code != SOLVED:
+        return code
     _open(s, record)
-    first, code = ZERO, SOLVED
+    first = ZERO
     for k in range(sizes.size + 1):
         last = first + s.index[EXTENT, k] if k < sizes.size else first
         whole = _wants_whole(s, k, first, last)
         solved = not _begin(s, k, first, last, whole)
         while not solved and s.scalar[STEPS] < s.settings.max_iterations:
             s.scalar[STEPS] += 1.0
-            part = _factor(s, whole)
-            if whole:
-                _head_for_goal(s, part)
-            else:
-                _damp(s, part)
-                _meet_rows(s, part)
-            entering, leaving = _advance(s, part, last), -1
-            if entering < 0:
-                _pull(s, part, whole)
-                balance(s, s.count[FIX], part.begin, ZERO)
-                _forgive(s, part, whole)
-                leaving = _worst(s)
+            part = _aim(s, whole)
+            entering = _advance(s, part, last)
+            leaving = -1 if entering >= 0 else _held_wrongly(s, part, whole)
             if entering >= 0:
                 _enter(s, entering, first, last)
             elif leaving >= 0:
@@ -178,10 +162,16 @@ def solve_by_levels(A, lower, upper, sizes, x, record, settings, work):
             code, s.scalar[UNFINISHED] = ITERATION_LIMIT, k
             break
     keep(s, record)
+    return _verdict(s, code)
+
+
+@inlined
+def _verdict(s, code):
+    """Return how the solve ended; with x = 0 if x is not finite."""
     doubt = s.count[DOUBT] == 1 or has_outgrown(s)
     if code == SOLVED and doubt and s.settings.damping == 0.0:
-        code = INACCURATE
-    return code if finish(x, SOLVED) == SOLVED else NUMERICAL_FAILURE
+        code = ZERO + INACCURATE
+    return code if finish(s.x, SOLVED) == SOLVED else ZERO + NUMERICAL_FAILURE
 
 
 @inlined
@@ -254,6 +244,27 @@ def _watch_parallel(s, last):
         if s.index[STATE, i] == PARALLEL:
             s.index[STATE, i] = WATCHED
             s.number[VALUE, i] = value_of(s, s.x, i)
+
+
+@inlined
+def _aim(s, whole):
+    """Write the step of a level from where x is, in basis vectors; return the level's part."""
+    part = _factor(s, whole)
+    if whole:
+        _head_for_goal(s, part)
+    else:
+        _damp(s, part)
+        _meet_rows(s, part)
+    return part
+
+
+@inlined
+def _held_wrongly(s, part, whole):
+    """Give the held rows their forces; return the row that pulls the wrong way, or -1."""
+    _pull(s, part, whole)
+    balance(s, s.count[FIX], part.begin, ZERO)
+    _forgive(s, part, whole)
+    return _worst(s)
 
 
 @inlined

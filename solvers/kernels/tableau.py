@@ -19,10 +19,10 @@ from typing import NamedTuple
 import numpy as np
 
 from hierarchy.compiled import as_matrix, compiled, inlined
-from solvers.kernels.rows import ZERO
+from solvers.kernels.rows import ZERO, finish
 from solvers.kernels.space import View, integers, matrix, vector
 from solvers.kernels.tolerances import FLOOR, OUTGROWN
-from solvers.status import EQUAL, FREE
+from solvers.status import EQUAL, FREE, NUMERICAL_FAILURE, SOLVED, TOO_SMALL
 
 # Rows of `number`. Of each row of A: its norm, its only entry (1 where there are more), its sides,
 # those as they are moved, its value and how fast that changes, what it misses before its level and
@@ -77,6 +77,18 @@ class Solve(NamedTuple):
     M: View
     room: View
     settings: Exact
+
+
+@inlined
+def prepare(A, lower, upper, sizes, x, record, settings, work):
+    """Return a Solve that has all data, and SOLVED, TOO_SMALL or, with x = 0, NUMERICAL_FAILURE."""
+    s, enough = carve(A, sizes, x, settings, work)
+    if not enough:
+        return s, ZERO + TOO_SMALL
+    general = load(s, lower, upper, sizes, record)
+    if general < 0:
+        return s, ZERO + finish(x, NUMERICAL_FAILURE)
+    return with_tableau(s, general), ZERO + SOLVED
 
 
 @inlined
