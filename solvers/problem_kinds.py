@@ -43,6 +43,28 @@ def structured(seed: int, kinds: Sequence[str] = (), equalities_only: bool = Fal
     return Hierarchy.from_levels(levels, reference)
 
 
+def bounded(h: Hierarchy, seed: int) -> Hierarchy:
+    """Return a hierarchy of equalities inside a box, which goes first: the same one every time.
+
+    The box lies around the x that meets the first level best. Sides may be at it, at both sides of
+    it, beyond it or missing; rows are turned round, repeated, and of any norm.
+    """
+    rng = np.random.default_rng([seed, 2])
+    end = int(h.offsets[1]) if len(h.sizes) else 0
+    middle = np.linalg.lstsq(h.A[:end], h.lower[:end], rcond=1e-6)[0] if end else h.reference
+    half = float(np.abs(middle).max()) or 1.0
+    rows = rng.integers(0, h.n, int(rng.integers(1, h.n + 3)))
+    share = rng.choice([0.0, 0.0, 0.5, 1.0, -0.2, np.inf], (2, len(rows)))
+    share[1] = np.maximum(share[1], -share[0])
+    lower, upper = middle[rows] - half * share[0], middle[rows] + half * share[1]
+    size = rng.choice([1.0, 1.0, -1.0, 1e-3, 1e3, -0.7], len(rows))
+    sides = np.sort(np.array([lower, upper]) * size, axis=0)
+    levels = [(h.A[i:j], h.lower[i:j], h.upper[i:j])
+              for i, j in zip(h.offsets[:-1].tolist(), h.offsets[1:].tolist(), strict=True)]
+    return Hierarchy.from_levels([(np.eye(h.n)[rows] * size[:, None], *sides), *levels],
+                                 h.reference)
+
+
 def _singular_arm(rng: Random, digits: int = 12) -> Levels:
     """Velocity box, position, orientation and posture of an arm at multiples of 90 degrees."""
     n = int(rng.integers(2, 9))

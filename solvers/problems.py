@@ -27,6 +27,7 @@ from hierarchy.problem import Array, Hierarchy
 from solvers.problem_families import FAMILIES as FAMILIES
 from solvers.problem_families import family as family
 from solvers.problem_kinds import KINDS as KINDS
+from solvers.problem_kinds import bounded as bounded
 from solvers.problem_kinds import structured as structured
 
 if TYPE_CHECKING:

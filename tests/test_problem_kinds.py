@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from hierarchy import Hierarchy, HierarchyError
-from solvers.problems import KINDS, structured
+from solvers.problems import KINDS, bounded, structured
 
 SEEDS = range(40)
 every_kind = pytest.mark.parametrize("kind", KINDS)
@@ -30,6 +30,20 @@ def test_every_problem_is_valid_and_the_same_for_a_seed(kind):
 @every_kind
 def test_equalities_alone_can_be_asked_for(kind):
     assert all(structured(seed, (kind,), equalities_only=True).is_equality for seed in SEEDS)
+
+
+def test_a_box_goes_first_and_is_often_in_the_way():
+    within = []
+    for seed in SEEDS:
+        h = structured(seed, ("integers",), equalities_only=True)
+        box = bounded(h, seed)
+        rows = box.A[:box.sizes[0]]
+        assert np.array_equal(box.A[box.sizes[0]:], h.A)
+        assert (np.count_nonzero(rows, axis=1) == 1).all()
+        assert np.array_equal(box.A, bounded(h, seed).A)
+        asked = np.linalg.lstsq(h.A, h.lower, rcond=None)[0]
+        within.append(bool((box.slacks(asked)[:box.sizes[0]] == 0.0).all()))
+    assert 0 < sum(within) < len(within)
 
 
 def test_all_kinds_are_drawn_unless_some_are_named():

@@ -105,11 +105,17 @@ def recipe_for(resolver: Resolver) -> problems.Recipe:
 
 
 def problem(resolver: Resolver, kind: str, seed: int) -> Hierarchy:
-    """Return the problem of a kind and a seed that the resolver can be asked for."""
+    """Return the problem of a kind and a seed that the resolver can be asked for.
+
+    Two of three are inside a box where it resolves bounds.
+    """
     recipe = recipe_for(resolver)
     if kind == RECIPE:
-        return problems.generate(seed, recipe)
-    return problems.structured(seed, (kind,), recipe.equalities_only)
+        h = problems.generate(seed, recipe)
+    else:
+        h = problems.structured(seed, (kind,), recipe.equalities_only)
+    inside = resolver.handles == "bounds" and resolver.strict and seed % 3 > 0
+    return problems.bounded(h, seed) if inside else h
 
 
 def tally(name: str, seeds: range, kind: str = RECIPE) -> Tally:
