@@ -445,6 +445,8 @@ def _least_squares(D: Array, b: Array, free: Mask) -> tuple[Array, Array]:
     """
     from scipy.linalg import lapack, qr, solve_triangular
 
+    if not free.any():
+        return np.zeros(D.shape[1]), b.copy()
     (raw, tau), r, order = qr(D[:, free], mode="raw", pivoting=True, check_finite=False)
     depth = min(r.shape)
     raw = raw[:, :depth]

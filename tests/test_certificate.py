@@ -327,3 +327,10 @@ def test_answers_to_structured_problems_are_certified_and_others_are_not(kind):
     for h, x in right:
         step = OFF * (1.0 + np.linalg.norm(x)) * r.normal(size=h.n)
         assert not certify(h, x + step).certified
+
+
+def test_least_squares_of_no_columns_leave_everything():
+    b = np.array([1.0, -2.0])
+    y, left = certificate._least_squares(np.eye(2), b, np.zeros(2, dtype=bool))
+    assert (y == 0.0).all()
+    assert np.array_equal(left, b)
