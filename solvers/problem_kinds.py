@@ -59,10 +59,8 @@ def bounded(h: Hierarchy, seed: int) -> Hierarchy:
     lower, upper = middle[rows] - half * share[0], middle[rows] + half * share[1]
     size = rng.choice([1.0, 1.0, -1.0, 1e-3, 1e3, -0.7], len(rows))
     sides = np.sort(np.array([lower, upper]) * size, axis=0)
-    levels = [(h.A[i:j], h.lower[i:j], h.upper[i:j])
-              for i, j in zip(h.offsets[:-1].tolist(), h.offsets[1:].tolist(), strict=True)]
-    return Hierarchy.from_levels([(np.eye(h.n)[rows] * size[:, None], *sides), *levels],
-                                 h.reference)
+    box = np.eye(h.n)[rows] * size[:, None], sides[0], sides[1]
+    return Hierarchy.from_levels([box, *h.levels()], h.reference)
 
 
 def _singular_arm(rng: Random, digits: int = 12) -> Levels:

@@ -11,7 +11,7 @@ import numpy as np
 from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array, Hierarchy
 from solvers.certificate import certify
-from solvers.hcod import solve_exactly
+from solvers.hcod import Hcod, solve_exactly
 from solvers.kernels.bounds import name_saturation, solve_without_bounds
 from solvers.kernels.published import matrix_as_published, solve_as_published
 from solvers.kernels.staircase import solve_by_staircase
@@ -21,7 +21,7 @@ from solvers.status import INACCURATE, NO_LIMITS, NUMERICAL_FAILURE, SOLVED, UNP
 from solvers.workspace import WORKSPACE, run
 
 FORMS = ("staircase", "published")
-_OF_THE_ENGINE = (1e-10, 3, 1000)  # tolerance, guesses, max_iterations, as those of `hcod`
+_OF_THE_ENGINE = Hcod.tolerance, Hcod.guesses, Hcod.max_iterations
 _SOLVED = Status.SOLVED
 
 

@@ -234,3 +234,11 @@ def test_damping_and_active_inequalities_always_end():
             res = resolver.solve(h)
             assert res.status is Status.SOLVED
             assert h.violations(res.x)[0] < 1e-9
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_level_missed_where_every_number_met_is_zero():
+    h = Hierarchy.from_levels([([[2.0], [1.0], [1.0]], [0.0, 1.0, -1.0]), ([[1.0]], [-9.0], [9.0])])
+    res = make("hcod").solve(h)
+    assert res.status is Status.SOLVED
+    assert certify(h, res.x).certified

@@ -3,6 +3,7 @@
 import ast
 import gc
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -285,7 +286,11 @@ EXAMPLES = Path(__file__).parents[1] / "examples"
 def test_the_example_of_a_loop_runs():
     ran = subprocess.run([sys.executable, EXAMPLES / "loop.py", "--duration", "0.1"], check=True,
                          capture_output=True, text=True)
-    assert "all ticks were run" in ran.stdout
+    # On a loaded machine the watchdog may end the loop: no test asks how late a tick is.
+    end = r"(all ticks were run|the watchdog fired in tick \d+)"
+    told = rf"^\d+ ticks of 2 ms, \d+ overruns, \d+ skipped; {end}$"
+    assert re.search(told, ran.stdout, re.MULTILINE), ran.stdout
+    assert re.search(r"^the hand is \S+ mm from its path$", ran.stdout, re.MULTILINE), ran.stdout
 
 
 def test_the_node_for_ros_is_python_and_says_that_no_more_was_checked():

@@ -24,7 +24,7 @@ SPECS = ("tpm", "tpm:form=staircase", "recursive", "augmented")
 PARTS = ("kinematics", "rows", "resolve", "act and record")
 _WARM_UP = 2000    # ticks before any is counted
 _BLOCK = 500       # ticks of one candidate before the next has its turn
-_LEAD_IN = 5       # ticks at the begin of a block that do not count: the caches were others'
+_LEAD_IN = 5       # ticks at the start of a block that do not count: the caches were others'
 _AGREE = 1e-7      # [rad/s^2] between compiled and plain commands
 
 

@@ -26,7 +26,7 @@ class Sensed(Protocol):
 class Apart:
     """A plant whose q and v are what `sensed` makes of the true ones, once each period.
 
-    The truth at the begin of each period is recorded as `true_q`, `true_v`.
+    The truth at the start of each period is recorded as `true_q`, `true_v`.
     """
 
     def __init__(self, plant: Plant, sensed: Sensed) -> None:

@@ -174,9 +174,9 @@ def weigh_rows(s, part):
         for q in range(part.q0, part.q1):
             s.number[OVER, q] = 0.0
     s.scalar[WORST], s.scalar[PULLED] = worst, pulled
-    rounding = EPSILON * s.scalar[SIZE]
-    s.scalar[ROUNDING] = pulled * max(
-        CANCELLED, rounding / max(worst * s.scalar[SCALE], rounding)) if pulled > 0.0 else 0.0
+    length = worst * s.scalar[SCALE]
+    share = min(EPSILON * s.scalar[SIZE] / length, 1.0) if length > 0.0 else 0.0
+    s.scalar[ROUNDING] = pulled * max(CANCELLED, share)
 
 
 @inlined

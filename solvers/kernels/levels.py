@@ -103,6 +103,7 @@ from solvers.kernels.tolerances import (
     PATIENCE,
     RELAXATION,
     RELAXATIONS,
+    SLIGHT,
     STALLED,
     WEAK,
 )
@@ -609,7 +610,7 @@ def _settle(s, k, whole):
             number[HOLDS, i], number[MULTIPLIER, i] = k, over
         else:
             state[i] = HELD
-    slight = not whole and count[MISSED] == 1 and 0.25 * unclear < s.scalar[WORST] < DOUBTFUL
+    slight = not whole and count[MISSED] == 1 and SLIGHT * unclear < s.scalar[WORST] < DOUBTFUL
     if least < DOUBTFUL or slight or (missed and has_dust(s, Part(ZERO, count[ROWS], end, ZERO))):
         count[DOUBT] = 1
 

@@ -15,6 +15,7 @@ SAME = 1e-12        # of a row, below which what others leave of it is rounding
 WEAK = 1e-4         # of a row in its own basis vector, below which its level is pivoted again
 DOUBTFUL = 1e-6     # of a row behind the others, or missed, below which an answer is worth a doubt
 DUST = 1e-12        # norm of a row, as a share of the largest of its level; below, worth a doubt
+SLIGHT = 0.25       # of rank_tolerance: a level missed by less is met, no doubt
 NO_STEP = 1e-12     # of a step, below which it has no length
 
 STALLED = 5         # steps of no length in a row, after which the sides are moved apart
