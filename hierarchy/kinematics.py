@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hierarchy.compiled import compiled, inlined
+from hierarchy.jit import compiled, inlined
 
 
 @inlined

@@ -32,8 +32,8 @@ from math import sqrt
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hierarchy.compiled import compiled, inlined
 from hierarchy.errors import HierarchyError
+from hierarchy.jit import compiled, inlined
 from hierarchy.problem import Array
 from hierarchy.task import Level
 

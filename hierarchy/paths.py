@@ -11,9 +11,8 @@ from math import cos, inf, sin
 
 import numpy as np
 
-from hierarchy.binding import bind
-from hierarchy.compiled import compiled
 from hierarchy.errors import HierarchyError
+from hierarchy.jit import bind, compiled
 from hierarchy.problem import Array
 
 Vector = Sequence[float]

@@ -17,15 +17,15 @@ from numpy.typing import ArrayLike, NDArray
 from hierarchy.avoidance.control_points import ControlPoint
 from hierarchy.avoidance.measurement import Measurement
 from hierarchy.avoidance.self_collision import Capsule
-from hierarchy.compiled import compiled
 from hierarchy.errors import RobotError, UnknownNameError
-from hierarchy.models.files import read_file
-from hierarchy.models.found import Found, is_floating
-from hierarchy.models.names import file_of, in_package
-from hierarchy.models.points import points_along_chain
-from hierarchy.models.tables import from_table
+from hierarchy.jit import compiled
 from hierarchy.problem import Array
 from hierarchy.robots import TABLES
+from hierarchy.robots.files import read_file
+from hierarchy.robots.found import Found, is_floating
+from hierarchy.robots.from_table import from_table
+from hierarchy.robots.names import file_of, in_package
+from hierarchy.robots.points import points_along_chain
 from hierarchy.robots.table import Base, Table
 
 ROBOTS = TABLES
@@ -121,7 +121,7 @@ class Robot:
         """Read a URDF (.urdf) or MJCF (.xml, .mjcf) file; RobotError if it cannot be read.
 
         `end_effector` names a frame; without it one is proposed, see
-        `hierarchy.models.points`. `base` None is that of the file: fixed, or
+        `hierarchy.robots.points`. `base` None is that of the file: fixed, or
         floating for an MJCF with a free joint. Capsules are proposed from the collision
         geometry, unless `shapes` is False, and control points along the chain to the end effector.
         `locked` joints are held at an angle [rad] or a way [m] and are no joints any more.

@@ -6,8 +6,8 @@ import numpy as np
 
 from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array, Hierarchy
-from solvers.hcod import ActiveSetResolution
 from solvers.resolver import Resolution
+from solvers.resolvers.hcod import ActiveSetResolution
 
 _MATTERS = 1e-6  # share of a level's pull below which a level above is not worth naming
 

@@ -11,7 +11,7 @@ import numpy as np
 from scenarios.config.avoidance import ObstacleSection
 from scenarios.config.robot import RobotSection
 from scenarios.config.sensor import SensorSection
-from scenarios.recording import Recording
+from scenarios.loop.recording import Recording
 
 LABELS = {"tpm": "tpm published", "tpm:form=staircase": "tpm"}
 

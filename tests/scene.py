@@ -14,7 +14,7 @@ from hierarchy.tasks import (
     Position,
     Posture,
 )
-from scenarios.sensors import ExactDistances
+from scenarios.cell.sensors import ExactDistances
 
 ROBOT = Robot.named("kuka_lwr")
 FRAME = ROBOT.frame("end_effector")

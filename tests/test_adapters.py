@@ -7,13 +7,13 @@ import pytest
 import qpsolvers
 
 from hierarchy import Hierarchy, HierarchyError, Robot, Stack
-from hierarchy.adapters.displacements import limit_level
-from hierarchy.adapters.pink import PinkTask
-from hierarchy.adapters.pink import hierarchy as pink_hierarchy
 from hierarchy.tasks import Position
 from solvers import make
-from solvers.adapters.pink import solve_ik
-from solvers.programs import level_problem
+from solvers.adapters.displacements import limit_level
+from solvers.adapters.for_pink import solve_ik
+from solvers.adapters.from_pink import PinkTask
+from solvers.adapters.from_pink import hierarchy as pink_hierarchy
+from solvers.qp.programs import level_problem
 
 DT = 0.01
 Q = np.array([0.1, 0.5, -0.2, -1.0, 0.3, 0.8, 0.0])
@@ -294,7 +294,7 @@ def arm():
 def test_a_jacobian_of_mujoco_is_the_difference_of_its_frames(arm, name, kind):
     import mujoco
 
-    from hierarchy.adapters import mujoco as adapter
+    from solvers.adapters import from_mujoco as adapter
 
     model, data = arm
     J, step = adapter.jacobian(model, data, name, kind), 1e-6
@@ -312,7 +312,7 @@ def test_a_jacobian_of_mujoco_is_the_difference_of_its_frames(arm, name, kind):
 def test_levels_out_of_mujoco_move_the_tip_within_the_ranges(arm):
     import mujoco
 
-    from hierarchy.adapters import mujoco as adapter
+    from solvers.adapters import from_mujoco as adapter
 
     model, data = arm
     start, turn = adapter.frame(model, data, "tip", "site")
@@ -332,7 +332,7 @@ def test_levels_out_of_mujoco_move_the_tip_within_the_ranges(arm):
 def test_an_orientation_level_turns_a_frame_to_its_target(arm):
     import mujoco
 
-    from hierarchy.adapters import mujoco as adapter
+    from solvers.adapters import from_mujoco as adapter
 
     model, data = arm
     data.qpos[:] = POSE + np.array([0.4, 0.0, 0.0, 0.3])
@@ -349,7 +349,7 @@ def test_an_orientation_level_turns_a_frame_to_its_target(arm):
 
 
 def test_a_joint_beyond_its_range_comes_back_no_faster_than_allowed(arm):
-    from hierarchy.adapters import mujoco as adapter
+    from solvers.adapters import from_mujoco as adapter
 
     model, data = arm
     data.qpos[:] = [2.5, 1.99, 0.0, -2.001]
@@ -359,7 +359,7 @@ def test_a_joint_beyond_its_range_comes_back_no_faster_than_allowed(arm):
 
 
 def test_mistakes_with_mujoco_name_what_is_wrong(arm):
-    from hierarchy.adapters import mujoco as adapter
+    from solvers.adapters import from_mujoco as adapter
 
     model, data = arm
     with pytest.raises(HierarchyError, match="unknown site 'tipp'; did you mean 'tip'"):
@@ -383,7 +383,7 @@ def mink_tasks(model, configuration):
 
 def test_one_level_of_mink_is_what_mink_finds_without_its_damping(arm):
     mink = pytest.importorskip("mink")
-    from hierarchy.adapters.mink import hierarchy
+    from solvers.adapters.from_mink import hierarchy
 
     model, _ = arm
     configuration = mink.Configuration(model, q=POSE)
@@ -398,7 +398,7 @@ def test_one_level_of_mink_is_what_mink_finds_without_its_damping(arm):
 
 def test_levels_of_mink_are_strict(arm):
     mink = pytest.importorskip("mink")
-    from hierarchy.adapters.mink import hierarchy
+    from solvers.adapters.from_mink import hierarchy
 
     model, _ = arm
     configuration = mink.Configuration(model, q=POSE)
@@ -413,7 +413,7 @@ def test_levels_of_mink_are_strict(arm):
 
 def test_a_task_of_mink_that_is_no_row_is_refused_by_name(arm):
     mink = pytest.importorskip("mink")
-    from hierarchy.adapters.mink import hierarchy
+    from solvers.adapters.from_mink import hierarchy
 
     configuration = mink.Configuration(arm[0], q=POSE)
     with pytest.raises(HierarchyError, match="KineticEnergyRegularizationTask: not a task with"):

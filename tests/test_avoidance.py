@@ -7,7 +7,7 @@ from hierarchy.avoidance import Measurement, Obstacle, Obstacles, Repulsion, Sur
 from hierarchy.avoidance.obstacles import distance_to_obstacle
 from hierarchy.errors import UnknownNameError
 from hierarchy.paths import Ellipse, Still, Waypoints
-from scenarios.sensors import ExactDistances
+from scenarios.cell.sensors import ExactDistances
 
 TURN = np.array([[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]])
 SHAPES = {

@@ -250,7 +250,7 @@ def test_jax_fails_alone_and_refuses_as_the_kernel_does():
 
 def jax_backend():
     pytest.importorskip("jax")
-    from solvers import batch_jax
+    from solvers.batch import on_jax as batch_jax
 
     return batch_jax
 

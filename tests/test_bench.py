@@ -3,10 +3,10 @@ import csv
 import numpy as np
 
 from scenarios.bench.plain import PlainTick
-from scenarios.build import build
+from scenarios.cell.build import build
 from scenarios.config import load
-from scenarios.control.controller import Controller
-from scenarios.simulate import simulate
+from scenarios.loop.controller import Controller
+from scenarios.loop.simulation import simulate
 
 
 def test_the_plain_numpy_tick_commands_what_the_compiled_one_does():

@@ -9,7 +9,8 @@ import pytest
 from hierarchy import HierarchyError
 from scenarios.bench import candidates, cascade, families, machine, resolvers
 from scenarios.bench.families import family
-from solvers import Status, backends
+from solvers import Status
+from solvers.qp import backends
 
 
 @pytest.fixture

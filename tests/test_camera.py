@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from hierarchy import HierarchyError, Robot
-from hierarchy.avoidance import Capsule, Obstacle, Obstacles, link_capsules
+from hierarchy.avoidance import Capsule, Obstacle, Obstacles
 from hierarchy.avoidance.obstacles import distance_to_obstacle
-from hierarchy.robots import TABLES
-from scenarios.sensors.camera import DepthCamera, Pinhole, looking_at
-from scenarios.sensors.errors import DepthErrors
+from hierarchy.robots import TABLES, link_capsules
+from scenarios.cell.sensors.camera import DepthCamera, Pinhole, looking_at
+from scenarios.cell.sensors.errors import DepthErrors
 
 ROBOT = Robot.named("kuka_lwr")
 STATE = ROBOT.state([0.9, -0.9, 0.9, 1.2, 1.0, 1.8, 0.0])

@@ -8,7 +8,7 @@ import pytest
 from hand_made import recording
 
 from scenarios import compare
-from scenarios.cli import run_command
+from scenarios.cli.main import run_command
 
 SHORT = ["--duration", "0.02"]
 
@@ -215,14 +215,14 @@ def test_one_run_that_breaks_does_not_lose_the_others(tmp_path, monkeypatch, cap
 
 INTERRUPTED_AT_TICK_500 = """
 import contextlib, os, signal
-import scenarios.progress
+import scenarios.cli.progress
 
 @contextlib.contextmanager
 def bar():
     yield lambda label, done, total: done == 500 and os.kill(os.getpid(), signal.SIGINT)
 
-scenarios.progress.bar = bar
-from scenarios.cli import main
+scenarios.cli.progress.bar = bar
+from scenarios.cli.main import main
 main()
 """
 
@@ -242,7 +242,7 @@ def test_ctrl_c_in_the_middle_of_a_run_saves_every_tick_so_far_whole(tmp_path):
 
 
 def test_help_needs_none_of_the_heavy_packages():
-    code = ("import sys; from scenarios.cli import run_command; run_command(['--help']); "
+    code = ("import sys; from scenarios.cli.main import run_command; run_command(['--help']); "
             "print({'numpy', 'numba', 'pinocchio', 'pydantic', 'matplotlib'} & set(sys.modules))")
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.endswith("set()\n")
@@ -294,7 +294,7 @@ def test_the_list_fits_80_columns(capsys):
 def completed(words):
     """What bash would offer for the last of the words of a command line."""
     done = subprocess.run(
-        [sys.executable, "-c", "from scenarios.cli import app; app(prog_name='hierarchy')"],
+        [sys.executable, "-c", "from scenarios.cli.main import app; app(prog_name='hierarchy')"],
         capture_output=True, text=True, check=False,
         env={**os.environ, "_HIERARCHY_COMPLETE": "complete_bash", "COMP_WORDS": " ".join(words),
              "COMP_CWORD": str(len(words) - 1)})

@@ -5,10 +5,10 @@ import pytest
 
 from hierarchy.avoidance import Obstacle, Obstacles
 from hierarchy.paths import Ellipse, Shifted, Waypoints
-from scenarios.build import build
+from scenarios.cell.build import build
 from scenarios.config import ScenarioError, load
-from scenarios.control.controller import Controller
-from scenarios.control.recorder import Recorder
+from scenarios.loop.controller import Controller
+from scenarios.loop.recorder import Recorder
 
 ELLIPSE = Ellipse((0.0, 0.6, 0.0), (0.2, 0.0, 0.2), (0.0, 0.1, 0.0))
 WAY = Waypoints((0.0, 1.0), ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0)))

@@ -13,7 +13,7 @@ from hierarchy import Hierarchy, HierarchyError
 from scenarios.bench import families
 from scenarios.bench.families import EQUALITIES
 from solvers import Status, certify, make, names
-from solvers.backends import BACKENDS
+from solvers.qp.backends import BACKENDS
 
 HQP = [make("hqp", backend=name, form=form)
        for name in BACKENDS for form in ("null-space", "slack")]

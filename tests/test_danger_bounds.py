@@ -9,8 +9,8 @@ from hierarchy.avoidance import Obstacle, Obstacles
 from hierarchy.paths import Still
 from hierarchy.tasks import JointDamping, JointLimits, Position
 from hierarchy.tasks.danger_bounds import DangerBounds
-from scenarios.plants import KinematicArm
-from scenarios.sensors import ExactDistances
+from scenarios.cell.plants import KinematicArm
+from scenarios.cell.sensors import ExactDistances
 from solvers import Status, make
 
 PERIOD, REACH, SHAPE = 1e-3, 0.5, 6.0

@@ -6,18 +6,18 @@ import numpy as np
 import pytest
 
 from hierarchy import HierarchyError, Robot
-from hierarchy.avoidance import ControlPoint, Obstacle, Obstacles, Repulsion, link_capsules
-from hierarchy.robots import TABLES
+from hierarchy.avoidance import ControlPoint, Obstacle, Obstacles, Repulsion
+from hierarchy.robots import TABLES, link_capsules
 from scenarios import load, simulate
-from scenarios.build import build
+from scenarios.cell.build import build
+from scenarios.cell.sensors import DepthSensor
+from scenarios.cell.sensors.camera import DepthCamera, Pinhole, looking_at
+from scenarios.cell.sensors.depth_space import DepthSpace, ObstacleImage
+from scenarios.cell.sensors.errors import DepthErrors
+from scenarios.cell.sensors.exact import ExactDistances
+from scenarios.cell.sensors.frames import RecordedFrames, write
 from scenarios.config import ScenarioError
-from scenarios.figures.depth import depth_figure
-from scenarios.sensors import DepthSensor
-from scenarios.sensors.camera import DepthCamera, Pinhole, looking_at
-from scenarios.sensors.depth_space import DepthSpace, ObstacleImage
-from scenarios.sensors.errors import DepthErrors
-from scenarios.sensors.exact import ExactDistances
-from scenarios.sensors.frames import RecordedFrames, write
+from scenarios.draw.figures.depth import depth_figure
 
 ROBOT = Robot.named("kuka_lwr")
 CAPSULES = link_capsules(TABLES["kuka_lwr"], foot=0.31)

@@ -17,7 +17,7 @@ import scenarios
 import solvers
 from hierarchy.tasks import TASKS
 from scenarios.config import shipped
-from scenarios.gallery import main as draw_gallery
+from scenarios.report.gallery import main as draw_gallery
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
@@ -146,7 +146,7 @@ def test_every_scenario_is_in_the_gallery_with_a_picture(name):
     picture = DOCS / "images" / "gallery" / f"{name}.png"
     section = f"\n## {name}\n\n![{name}](images/gallery/{name}.png)\n"
     shown = picture.exists() and text.count(section) == 1
-    assert shown, (f"run `python -m scenarios.gallery {name}` and give it a section in "
+    assert shown, (f"run `python -m scenarios.report.gallery {name}` and give it a section in "
                    "docs/gallery.md, as the others have it")
     assert picture.stat().st_size < LARGEST
 

@@ -4,8 +4,8 @@ from importlib.metadata import requires
 
 import pytest
 
-from scenarios import doctor
-from scenarios.cli import run_command
+from scenarios.cli import doctor
+from scenarios.cli.main import run_command
 
 
 def test_the_doctor_finds_all_well_here(capsys):

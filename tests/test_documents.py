@@ -11,7 +11,7 @@ import typer
 
 from hierarchy.robots import TABLES
 from hierarchy.tasks import TASKS
-from scenarios.cli import app, run_command
+from scenarios.cli.main import app, run_command
 from scenarios.config import load
 from scenarios.sweep.config import load_sweep
 from solvers.resolver import _REGISTRY
@@ -134,7 +134,7 @@ def is_name(text):
 def test_the_tutorial_can_be_followed_from_top_to_bottom(tmp_path, monkeypatch):
     """Files get the name in their first line, commands are run (but for figures), Python goes on.
     """
-    monkeypatch.setattr("scenarios.figures.letter.write_all", lambda recording, folder: None)
+    monkeypatch.setattr("scenarios.draw.figures.letter.write_all", lambda recording, folder: None)
     names, followed = {"__name__": "document"}, set()
     for language, text in BLOCK.findall(TEXTS[FOLLOWED]):
         followed.add(language)

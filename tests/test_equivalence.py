@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from scenarios.config import load
-from scenarios.control.controller import Controller
-from scenarios.simulate import simulate
+from scenarios.loop.controller import Controller
+from scenarios.loop.simulation import simulate
 from solvers import Status, certify, make, names
-from solvers.backends import BACKENDS
+from solvers.qp.backends import BACKENDS
 
 STRICT = [make(name) for name in names() if name != "hqp" and make(name).strict]
 BACKENDS_AND_FORMS = [make("hqp", backend=backend, form=form)

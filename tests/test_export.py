@@ -10,11 +10,12 @@ import pytest
 
 from hierarchy import HierarchyError, Robot
 from scenarios import load, simulate
-from scenarios.cli import run_command
+from scenarios.cli.main import run_command
+from scenarios.draw.run_folder import save
 from scenarios.export import export, foxglove
 from scenarios.export.columns import CONSTANTS, columns, joint_names, joint_units
-from scenarios.folders import OutputError
-from scenarios.recording import Event, save
+from scenarios.files import OutputError
+from scenarios.loop.recording import Event
 
 FORMATS = ("csv", "parquet", "mcap")
 

@@ -14,7 +14,7 @@ from hierarchy import HierarchyError
 from scenarios.bench import edits
 from solvers import Status, certify, make
 from solvers.factorization import Factorization
-from solvers.tpm import task_priority_matrix
+from solvers.resolvers.tpm import task_priority_matrix
 
 TPM = make("tpm")
 KINDS = ("generic", "combination of rows above", "row repeated inside", "zero row", "one direction",

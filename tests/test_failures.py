@@ -7,7 +7,7 @@ import pytest
 
 from hierarchy import HierarchyError
 from solvers import Status, certify, make, problems
-from solvers.backends import BACKENDS, installed
+from solvers.qp.backends import BACKENDS, installed
 
 FOLDER = Path(__file__).parent / "data" / "regressions" / "structured"
 SQRT2, SQRT5 = 2.0**0.5, 5.0**0.5

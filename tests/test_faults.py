@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 
 from hierarchy import HierarchyError
-from scenarios.build import build
-from scenarios.cli import run_command
+from scenarios.cell.build import build
+from scenarios.cli.main import run_command
 from scenarios.config import load
-from scenarios.control.faults import Faults
-from scenarios.metrics import measure
-from scenarios.recording import load_run, save
-from scenarios.simulate import simulate
+from scenarios.draw.run_folder import save
+from scenarios.loop.faults import Faults
+from scenarios.loop.recording import load_run
+from scenarios.loop.simulation import simulate
+from scenarios.measure.metrics import measure
 from solvers import Status
 
 AT, LASTS, END = 50, 60, 200  # ticks of 1 ms

@@ -15,15 +15,16 @@ from matplotlib.patches import Patch
 
 import solvers
 from hierarchy import HierarchyError
-from scenarios.cli import run_command
+from scenarios.cli.figures import redraw
+from scenarios.cli.main import run_command
 from scenarios.config import load
-from scenarios.figures import drawing, letter, palette, panels
-from scenarios.figures.picture import picture
-from scenarios.figures.redraw import redraw
-from scenarios.figures.timeline import timeline
-from scenarios.recording import Event, save
+from scenarios.draw.figures import drawing, letter, palette, panels
+from scenarios.draw.figures.picture import picture
+from scenarios.draw.figures.timeline import timeline
+from scenarios.draw.run_folder import save
+from scenarios.loop.recording import Event
+from scenarios.loop.simulation import simulate
 from scenarios.report.figures import computing_time, overlay, side_by_side
-from scenarios.simulate import simulate
 
 
 def beside(panel, recordings):
@@ -249,7 +250,7 @@ def test_figures_for_a_paper_are_vectors_one_column_wide_with_their_fonts_inside
 
 def test_figures_for_a_paper_are_the_same_bytes_in_another_process(run_folder, paper, tmp_path):
     subprocess.run([sys.executable, "-c", "import sys\n"
-                    "from scenarios.figures.redraw import redraw\n"
+                    "from scenarios.cli.figures import redraw\n"
                     "redraw(sys.argv[1], 'paper', sys.argv[2])", run_folder, tmp_path / "there"],
                    check=True, env={**os.environ, "PYTHONHASHSEED": "5"})
     for file in paper:

@@ -5,8 +5,8 @@ import pytest
 
 from hierarchy import HierarchyError
 from scenarios import load, simulate
-from scenarios.build import build
-from scenarios.metrics import measure
+from scenarios.cell.build import build
+from scenarios.measure.metrics import measure
 
 SHORT = "control.duration=1.5"
 

@@ -9,7 +9,8 @@ from rank_cases import family, generic
 
 from hierarchy import Hierarchy, HierarchyError
 from hierarchy.errors import UnknownNameError
-from solvers import Status, backends, certify, make, problems, programs
+from solvers import Status, certify, make, problems
+from solvers.qp import backends, programs
 
 BACKENDS = [make("hqp", backend=name, form=form)
             for name in backends.BACKENDS for form in ("null-space", "slack")]
@@ -198,7 +199,7 @@ LIMITS_BELOW = Hierarchy.from_levels([([[1.0, 0.0]], [2.0]), (np.eye(2), [-1.0, 
                                                  (True, Status.INACCURATE)])
 def test_an_answer_that_cannot_be_shown_right_leaves_the_levels_above(vouched, status, monkeypatch):
     monkeypatch.setattr(programs.Program, "solve", lambda *_: (np.full(9, 0.1), vouched))
-    monkeypatch.setattr("solvers.hqp.refined", lambda *_: None)
+    monkeypatch.setattr("solvers.resolvers.hqp.refined", lambda *_: None)
     res = make("hqp").solve(LIMITS_BELOW)
     assert res.status is status
     assert_close(make("hqp"), res.x, [2.0, 0.0])

@@ -8,11 +8,11 @@ from hierarchy.errors import HierarchyError
 from hierarchy.paths import Ellipse, Still
 from hierarchy.tasks import CentreOfMass, Pointing, Pose, Position
 from scenarios import load, simulate
-from scenarios.build import build
-from scenarios.compare import compare
+from scenarios.cell.build import build
 from scenarios.config import Scenario, ScenarioError
-from scenarios.figures.picture import picture
-from scenarios.metrics import measure
+from scenarios.draw.figures.picture import picture
+from scenarios.measure.metrics import measure
+from scenarios.report.comparing import compare
 
 ROBOTS = {name: Robot.named(name) for name in ("humanoid", "dual_arm")}
 PATH = Ellipse((0.1, 0.2, 0.8), (0.1, 0.0, 0.1), (0.0, 0.1, 0.0), rate=1.3)

@@ -9,8 +9,8 @@ from scene import PATH, ROBOT, state_at, states
 from test_robot import LIMIT, URDF
 
 from hierarchy import HierarchyError, Robot, Stack, State
-from hierarchy.compiled import compiled
 from hierarchy.errors import RobotError
+from hierarchy.jit import compiled
 from hierarchy.limits import Limits, write_box
 from hierarchy.tasks import JointLimits, Position, TorqueLimits
 from solvers import Status, make

@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 from hand_made import recording
 
-from scenarios.metrics import as_plain_data, measure
+from scenarios.measure.metrics import as_plain_data, measure
 
 
 def value(name, **signals):

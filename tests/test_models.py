@@ -10,12 +10,13 @@ import pytest
 from hierarchy import HierarchyError, Robot
 from hierarchy.avoidance.self_collision import pairs_of_tree
 from hierarchy.errors import RobotError, UnknownNameError
-from hierarchy.models.shapes import bounding_capsule
+from hierarchy.robots.shapes import bounding_capsule
 from hierarchy.tasks import DangerBounds, JointLimits, Posture, TorqueLimits
-from scenarios.cli import run_command
+from scenarios.cell.avoidance import separable_pairs
+from scenarios.cell.robot import make_robot
+from scenarios.cli.main import run_command
+from scenarios.cli.robot_check import look_at, paste
 from scenarios.config.robot import RobotSection
-from scenarios.making import make_robot, separable_pairs
-from scenarios.robot_check import look_at, paste
 
 ARM = """<robot name="arm">
   <link name="base"><collision><geometry><box size="0.2 0.2 0.1"/></geometry></collision></link>
@@ -350,7 +351,7 @@ def test_check_takes_changes_of_the_robot(arm):
 
 @pytest.mark.parametrize("package", ["example_robot_data", "robot_descriptions"])
 def test_a_package_that_is_missing_is_named_with_its_extra(package, monkeypatch):
-    import hierarchy.models.names as names
+    import hierarchy.robots.names as names
 
     def absent(name):
         raise names.PackageNotFoundError(name)

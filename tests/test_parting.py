@@ -7,11 +7,13 @@ import numpy as np
 from hand_made import HandMadeScenario, recording
 
 from scenarios import compare
-from scenarios.compare import Comparison, Run, default_resolvers
-from scenarios.parting import partings
+from scenarios.config.resolvers import default_resolvers
+from scenarios.measure.comparison import Comparison
+from scenarios.measure.partings import partings
+from scenarios.measure.runs import Run
+from scenarios.measure.verdict import verdict
 from scenarios.report.page import page
-from scenarios.report.verdict import verdict
-from solvers import backends
+from solvers.qp import backends
 
 
 def run_of(spec, q=None, fault=None, **changed):

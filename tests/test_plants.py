@@ -9,14 +9,15 @@ from hierarchy import HierarchyError, Robot
 from hierarchy.avoidance import Obstacle, Obstacles
 from hierarchy.paths import Waypoints
 from scenarios import load, simulate
-from scenarios.build import build
-from scenarios.cli import run_command
+from scenarios.cell.build import build
+from scenarios.cell.plants import Apart, JointSensor, KinematicArm, PhysicsArm
+from scenarios.cli.main import run_command
 from scenarios.config import ScenarioError
 from scenarios.config.plant import JointsSection, MeasurementSection, ServoSection
-from scenarios.control.controller import Controller
-from scenarios.metrics import measure
-from scenarios.plants import Apart, JointSensor, KinematicArm, PhysicsArm
-from scenarios.recording import load_run, save
+from scenarios.draw.run_folder import save
+from scenarios.loop.controller import Controller
+from scenarios.loop.recording import load_run
+from scenarios.measure.metrics import measure
 
 ROBOT = Robot.named("kuka_lwr")
 START = np.array([0.923, -0.854, 0.903, 1.195, 0.971, 1.796, 0.0])

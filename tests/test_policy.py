@@ -7,8 +7,8 @@ from hierarchy import HierarchyError, Robot
 from hierarchy.tasks import JointLimits
 from scenarios.config import load
 from scenarios.config.control import PolicySection
-from scenarios.control.controller import Controller
-from scenarios.control.policy import Policy
+from scenarios.loop.controller import Controller
+from scenarios.loop.policy import Policy
 from solvers import Resolution, Status
 
 PERIOD = 0.001

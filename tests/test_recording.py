@@ -7,8 +7,9 @@ from hand_made import HandMadeScenario, recording
 
 from hierarchy.errors import HierarchyError
 from scenarios import config
-from scenarios.folders import OutputError, claim, next_free, whole
-from scenarios.recording import load_run, save
+from scenarios.draw.run_folder import save
+from scenarios.files import OutputError, claim, next_free, whole
+from scenarios.loop.recording import load_run
 
 
 @pytest.fixture

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from scenarios.config import load
-from scenarios.control.controller import Controller
-from scenarios.simulate import simulate
+from scenarios.loop.controller import Controller
+from scenarios.loop.simulation import simulate
 
 DATA = Path(__file__).parent / "data" / "ellipse"
 

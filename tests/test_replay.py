@@ -10,9 +10,9 @@ from headless import chromium
 
 from hierarchy import HierarchyError
 from scenarios import load, save, simulate
-from scenarios.cli import run_command
-from scenarios.replay import html
-from scenarios.replay.data import packed, unpacked
+from scenarios.cli.main import run_command
+from scenarios.draw.replay import html
+from scenarios.draw.replay.data import packed, unpacked
 from scenarios.scene import scene
 
 VOID = {"meta", "input", "br", "link", "img"}

@@ -12,15 +12,16 @@ import pytest
 from hand_made import LABELS, HandMadeScenario, recording
 from headless import chromium
 
-from scenarios.compare import Comparison, Run, table
 from scenarios.config import load
-from scenarios.recording import Event
+from scenarios.loop.recording import Event
+from scenarios.loop.simulation import simulate
+from scenarios.measure.comparison import Comparison
+from scenarios.measure.motions import motions
+from scenarios.measure.runs import Run, table
+from scenarios.measure.verdict import verdict
 from scenarios.report import page
 from scenarios.report.commands import run_command
 from scenarios.report.embedded import replay
-from scenarios.report.motions import motions
-from scenarios.report.verdict import verdict
-from scenarios.simulate import simulate
 
 SOFTLY = {"contact_depth": np.zeros(5), "contact_force": np.zeros(5)}
 

@@ -10,11 +10,10 @@ import numpy as np
 import pytest
 
 from hierarchy import Robot
-from hierarchy.avoidance import link_capsules
-from hierarchy.robots import TABLES
+from hierarchy.robots import TABLES, link_capsules
 from scenarios import load, simulate
-from scenarios.build import build
-from scenarios.plants import PhysicsArm
+from scenarios.cell.build import build
+from scenarios.cell.plants import PhysicsArm
 
 ROBOT = Robot.named("kuka_lwr")
 HOME = [1.1657, -0.9476, 0.5844, 1.4408, 1.1464, 1.7695, 0.0]  # rad, where the scenarios start

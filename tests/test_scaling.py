@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from scenarios.bench import scaling, scaling_figure, scaling_timed
-from scenarios.build import build
+from scenarios.cell.build import build
 from scenarios.config import load
-from scenarios.simulate import simulate
+from scenarios.loop.simulation import simulate
 
 
 @pytest.fixture(scope="module")

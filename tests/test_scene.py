@@ -3,12 +3,11 @@ import pytest
 from hand_made import recording as hand_made
 
 from hierarchy import HierarchyError, Robot, State
-from hierarchy.avoidance import link_capsules
-from hierarchy.robots import TABLES
+from hierarchy.robots import TABLES, link_capsules
 from scenarios import load, simulate
 from scenarios.config.robot import RobotSection
-from scenarios.control.controller import Controller
-from scenarios.control.fate import Fate
+from scenarios.loop.controller import Controller
+from scenarios.loop.fate import Fate
 from scenarios.scene import capsules, ends, scene, stage
 from scenarios.scene.levels import judge
 

@@ -5,12 +5,12 @@ import pytest
 from scene import ROBOT, states
 
 from hierarchy import HierarchyError, Stack, State, Task
-from hierarchy.avoidance import Barrier, Capsule, link_capsules, pairs_of_chain
+from hierarchy.avoidance import Barrier, Capsule, pairs_of_chain
 from hierarchy.avoidance.self_collision import measure_capsules, pack_capsules
-from hierarchy.robots import TABLES
+from hierarchy.robots import TABLES, link_capsules
 from hierarchy.tasks import Posture
 from hierarchy.tasks.self_separation import SelfSeparation, _write
-from scenarios.plants import KinematicArm
+from scenarios.cell.plants import KinematicArm
 from solvers import Status, make
 
 LEVELS = ["velocity", "acceleration"]

@@ -8,8 +8,8 @@ from hierarchy.avoidance.barrier import least_acceleration, least_rate
 from hierarchy.paths import Ellipse, Still
 from hierarchy.tasks import JointDamping, Position, Separation
 from hierarchy.tasks.separation import _write
-from scenarios.plants import KinematicArm
-from scenarios.sensors import ExactDistances
+from scenarios.cell.plants import KinematicArm
+from scenarios.cell.sensors import ExactDistances
 from solvers import Status, make
 
 TURN = np.array([[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]])

@@ -3,11 +3,11 @@ import signal
 import numpy as np
 import pytest
 
-import scenarios.simulate
+import scenarios.loop.simulation
 from hierarchy import HierarchyError
 from scenarios.config import ScenarioError, load
-from scenarios.control.controller import Controller
-from scenarios.simulate import simulate
+from scenarios.loop.controller import Controller
+from scenarios.loop.simulation import simulate
 from solvers import Resolution, Status
 
 SHORT = ["control.duration=3.0"]
@@ -204,7 +204,7 @@ def test_a_run_whose_state_is_lost_ends_with_a_fault(monkeypatch):
         self.v[2] = np.inf
         self.a[:] = np.inf
 
-    monkeypatch.setattr(scenarios.plants.KinematicArm, "act", broken)
+    monkeypatch.setattr(scenarios.cell.plants.KinematicArm, "act", broken)
     run = simulate(load("ellipse", SHORT))
     assert run.fault == "the state is not finite from tick 0 on (t = 0.000 s)"
     assert run.ticks == 1
@@ -214,7 +214,7 @@ def test_a_run_that_diverges_ends_with_a_fault(monkeypatch):
     def broken(self, command):
         self.v[2] = 1.5e3 if self.v[2] else 1.0
 
-    monkeypatch.setattr(scenarios.plants.KinematicArm, "act", broken)
+    monkeypatch.setattr(scenarios.cell.plants.KinematicArm, "act", broken)
     run = simulate(load("ellipse", SHORT))
     assert run.fault == ("the motion has diverged: joint 2 moves at 1.5e+03 rad/s, more than 1000, "
                          "from tick 2 on (t = 0.002 s)")

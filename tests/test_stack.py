@@ -5,8 +5,7 @@ import pytest
 from scene import FRAME, PATH, ROBOT, SENSOR, TASKS, state_at, states
 
 from hierarchy import HierarchyError, Stack, Task
-from hierarchy.binding import bind
-from hierarchy.compiled import compiled
+from hierarchy.jit import bind, compiled
 from hierarchy.tasks import JointDamping, Position
 
 Q, V = states(1)[0]

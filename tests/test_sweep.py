@@ -14,8 +14,9 @@ import pyarrow.parquet as parquet
 import pytest
 
 from hierarchy import HierarchyError
-from scenarios import load, metrics, simulate
-from scenarios.cli import run_command
+from scenarios import load, simulate
+from scenarios.cli.main import run_command
+from scenarios.measure import metrics
 from scenarios.sweep import load_sweep, sweep
 from scenarios.sweep.config import SweepError, shipped_sweeps
 from scenarios.sweep.engine import carry_out, connected
@@ -261,7 +262,7 @@ def test_a_run_that_kills_its_workers_is_a_row_and_those_beside_it_are_made(tmp_
 
 def test_a_sweep_that_is_killed_goes_on_where_it_stopped(tmp_path):
     path, out = write(tmp_path, samples="20", duration="0.5"), tmp_path / "out"
-    command = [sys.executable, "-m", "scenarios.cli", "sweep", str(path), "--out", str(out),
+    command = [sys.executable, "-m", "scenarios.cli.main", "sweep", str(path), "--out", str(out),
                "--workers", "2"]
     with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE) as client:
         while not Store(out).parts:
@@ -378,7 +379,7 @@ def test_the_interval_of_a_share_is_wilsons(met, of, low, high):
 
 
 def test_help_names_the_sweep_and_needs_nothing_of_it():
-    code = ("import sys; from scenarios.cli import run_command; run_command(['--help']); "
+    code = ("import sys; from scenarios.cli.main import run_command; run_command(['--help']); "
             "print({'distributed', 'dask', 'pyarrow', 'pydantic'} & set(sys.modules))")
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert "sweep" in done.stdout

@@ -7,7 +7,7 @@ from rank_cases import CASES, build, family, generic, random_levels, rng
 
 from hierarchy import Hierarchy, HierarchyError
 from solvers import Status, make
-from solvers.tpm import FORMS, task_priority_matrix
+from solvers.resolvers.tpm import FORMS, task_priority_matrix
 
 every_case = pytest.mark.parametrize("case", CASES, ids=lambda c: c.__name__)
 every_form = pytest.mark.parametrize("form", FORMS)

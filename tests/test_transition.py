@@ -8,8 +8,8 @@ import scene
 from hierarchy import Hierarchy, HierarchyError, Stack
 from hierarchy.tasks import JointLimits, Position
 from scenarios.config import load
-from scenarios.control.transition import Blend, Key
-from scenarios.simulate import simulate
+from scenarios.loop.simulation import simulate
+from scenarios.loop.transition import Blend, Key
 from solvers import Resolution, Status, make
 
 A, B, C = Key(("position",)), Key(("position", "pointing")), Key(("pointing", "position"))

@@ -6,9 +6,9 @@ import pytest
 
 from hierarchy import HierarchyError
 from scenarios import load, save, simulate
-from scenarios.cli import run_command
-from scenarios.replay.frames import Frames
-from scenarios.replay.video import write_video
+from scenarios.cli.main import run_command
+from scenarios.draw.replay.frames import Frames
+from scenarios.draw.replay.video import write_video
 from scenarios.scene import scene
 
 

@@ -10,19 +10,20 @@ from headless import chromium
 from hierarchy.avoidance import Obstacle
 from hierarchy.avoidance.obstacles import distance_to_obstacle
 from hierarchy.errors import HierarchyError
-from scenarios.cli import run_command
+from scenarios.cli.main import run_command
 from scenarios.config import load
-from scenarios.control.controller import Controller
-from scenarios.control.recorder import Recorder
-from scenarios.recording import load_run, save
+from scenarios.draw.run_folder import save
+from scenarios.draw.viewer.curves import Lately
+from scenarios.draw.viewer.live import Live
+from scenarios.draw.viewer.moment import Became, Watched, of_scene
+from scenarios.draw.viewer.playback import Playback, Requests
+from scenarios.draw.viewer.stack_list import stack_html
+from scenarios.loop.controller import Controller
+from scenarios.loop.recorder import Recorder
+from scenarios.loop.recording import load_run
+from scenarios.loop.simulation import simulate, tick
 from scenarios.scene import scene
 from scenarios.scene.levels import Fate
-from scenarios.simulate import simulate, tick
-from scenarios.viewer.curves import Lately
-from scenarios.viewer.live import Live
-from scenarios.viewer.moment import Became, Watched, of_scene
-from scenarios.viewer.playback import Playback, Requests
-from scenarios.viewer.stack_list import stack_html
 
 LIMITED = load("ellipse-limits", ["control.duration=0.6"])
 
@@ -40,7 +41,7 @@ def recording():
 @pytest.fixture
 def server():
     pytest.importorskip("viser", reason="needs the extra view")
-    from scenarios.viewer.server import open_server
+    from scenarios.draw.viewer.server import open_server
 
     opened = open_server(0, "test")
     yield opened
@@ -129,7 +130,7 @@ def test_the_list_says_what_is_active_given_up_saturated_and_out_of_the_stack(re
 ], ids=lambda obstacle: obstacle.shape)
 def test_an_area_is_drawn_at_its_distance_from_the_obstacle(obstacle):
     pytest.importorskip("trimesh", reason="comes with the extra view")
-    from scenarios.viewer.meshes import obstacle_mesh
+    from scenarios.draw.viewer.meshes import obstacle_mesh
 
     vertices, faces = obstacle_mesh(obstacle, 0.05)
     away = np.empty(3)
@@ -221,7 +222,7 @@ def test_what_cannot_be_is_refused_and_the_run_goes_on(spoil, recording):
 
 
 def test_a_restart_keeps_the_settings_and_puts_obstacles_back(tmp_path, monkeypatch):
-    monkeypatch.setattr("scenarios.figures.letter.write_all", lambda *_: None)
+    monkeypatch.setattr("scenarios.draw.figures.letter.write_all", lambda *_: None)
     live = Live(LIMITED)
     live.change({"pointing.alpha_d": 20.0})
     live.drag(1, (0.0, 0.1, 0.0))
@@ -261,7 +262,7 @@ def test_curves_of_what_was_before_stay_when_the_cone_is_another():
 
 
 def test_a_page_plays_and_scrubs_runs_of_different_length(server, recording):
-    from scenarios.viewer.view import View, labelled
+    from scenarios.draw.viewer.view import View, labelled
 
     longer = simulate(LIMITED.with_resolver("hcod").with_changes({"control.duration": 0.8}))
     runs = labelled(["a", "b"], [recording, longer])
@@ -280,13 +281,13 @@ def test_a_page_plays_and_scrubs_runs_of_different_length(server, recording):
 
 
 def test_runs_of_the_same_resolver_are_told_apart_by_their_folders(recording):
-    from scenarios.viewer.view import labelled
+    from scenarios.draw.viewer.view import labelled
 
     assert list(labelled(["a", "b"], [recording, recording])) == ["tpm in a", "tpm in b"]
 
 
 def test_a_live_page_does_what_is_asked_for_and_says_what_it_refuses(server):
-    from scenarios.viewer.live_page import LivePage
+    from scenarios.draw.viewer.live_page import LivePage
 
     page = LivePage(server, Live(LIMITED))
     higher = page._middle + np.array([0.0, 0.02, 0.0])
@@ -313,7 +314,7 @@ def test_a_live_page_does_what_is_asked_for_and_says_what_it_refuses(server):
 
 
 def test_a_live_page_at_its_end_begins_anew_when_it_is_played(server):
-    from scenarios.viewer.live_page import LivePage
+    from scenarios.draw.viewer.live_page import LivePage
 
     page = LivePage(server, Live(load("ellipse", ["control.duration=0.05"])))
     page.step(0.06)
@@ -325,7 +326,7 @@ def test_a_live_page_at_its_end_begins_anew_when_it_is_played(server):
 
 
 def test_a_missing_extra_is_named(monkeypatch):
-    from scenarios.viewer.server import open_server
+    from scenarios.draw.viewer.server import open_server
 
     monkeypatch.setitem(sys.modules, "viser", None)
     with pytest.raises(HierarchyError, match=r"pip install 'task-hierarchy\[view\]'"):
@@ -334,14 +335,14 @@ def test_a_missing_extra_is_named(monkeypatch):
 
 def test_a_live_run_is_kept_at_ctrl_c(tmp_path, monkeypatch, capsys):
     pytest.importorskip("viser", reason="needs the extra view")
-    from scenarios.viewer.live_page import LivePage
+    from scenarios.draw.viewer.live_page import LivePage
 
     def interrupted(page, seconds):
         ticks(page.live, 20)
         raise KeyboardInterrupt
 
     monkeypatch.setattr(LivePage, "step", interrupted)
-    monkeypatch.setattr("scenarios.figures.letter.write_all", lambda *_: None)
+    monkeypatch.setattr("scenarios.draw.figures.letter.write_all", lambda *_: None)
     line = ["run", "ellipse", "--live", "--no-browser", "--port", "0", "--out"]
     assert run_command([*line, str(tmp_path / "a")]) == 1
     assert load_run(tmp_path / "a").ticks == 21
@@ -365,7 +366,7 @@ def test_the_page_is_served_to_this_machine_alone(server):
 
 
 def test_a_port_that_is_taken_is_told(server):
-    from scenarios.viewer.server import open_server
+    from scenarios.draw.viewer.server import open_server
 
     with pytest.raises(HierarchyError, match=r"--port \d+ cannot be used"):
         open_server(server.get_port(), "second")
@@ -414,8 +415,8 @@ def patient(monkeypatch):
 
 @pytest.mark.usefixtures("patient")
 def test_in_a_browser_play_moves_the_arm(server, recording):
-    from scenarios.viewer.server import address
-    from scenarios.viewer.view import View
+    from scenarios.draw.viewer.server import address
+    from scenarios.draw.viewer.view import View
 
     view = View(server, {"tpm": recording})
     with chromium() as browser:
@@ -432,8 +433,8 @@ def test_in_a_browser_play_moves_the_arm(server, recording):
 
 @pytest.mark.usefixtures("patient")
 def test_in_a_browser_the_resolver_is_switched_in_mid_motion(server):
-    from scenarios.viewer.live_page import LivePage
-    from scenarios.viewer.server import address
+    from scenarios.draw.viewer.live_page import LivePage
+    from scenarios.draw.viewer.server import address
 
     page = LivePage(server, Live(load("ellipse-limits", ["control.duration=60.0"])))
     with chromium() as browser:
@@ -453,7 +454,7 @@ def test_in_a_browser_the_resolver_is_switched_in_mid_motion(server):
 
 def test_a_run_is_shown_by_its_folder(tmp_path, recording, monkeypatch, capsys):
     pytest.importorskip("viser", reason="needs the extra view")
-    from scenarios.viewer.view import View
+    from scenarios.draw.viewer.view import View
 
     def interrupt(view):
         raise KeyboardInterrupt

@@ -10,8 +10,8 @@ from rank_cases import CASES, build, family, generic, more_rows_than_joints
 
 from hierarchy import Hierarchy, HierarchyError
 from solvers import Status, certify, make, problems
-from solvers.backends import BACKENDS
-from solvers.weighted import lexicographic_weights
+from solvers.qp.backends import BACKENDS
+from solvers.resolvers.weighted import lexicographic_weights
 from solvers.workspace import WORKSPACE
 
 EXACT = 1e-9

@@ -23,7 +23,7 @@ def _sections():
     os.environ["COLUMNS"] = "90"
     import typer
 
-    from scenarios.cli import app
+    from scenarios.cli.main import app
 
     for name, command in typer.main.get_command(app).commands.items():
         context = command.make_context(f"hierarchy {name}", [], resilient_parsing=True)

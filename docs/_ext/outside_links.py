@@ -1,6 +1,7 @@
 """Links from a document to the source tree, which is not part of the site.
 
-On a code host `[plants](../scenarios/plants)` leads there. In the site it is the text and the path.
+On a code host `[plants](../scenarios/cell/plants)` leads there. In the site it is the text and
+the path.
 """
 
 import re

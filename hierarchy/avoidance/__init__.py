@@ -6,8 +6,8 @@ from hierarchy.avoidance.measurement import Measurement, SurveillanceAreas, meas
 from hierarchy.avoidance.obstacles import Obstacle, Obstacles
 from hierarchy.avoidance.pairs import Pairs, measure_pairs
 from hierarchy.avoidance.repulsion import Repulsion
-from hierarchy.avoidance.self_collision import Capsule, link_capsules, pairs_of_chain
+from hierarchy.avoidance.self_collision import Capsule, pairs_of_chain
 
 __all__ = ["Barrier", "Capsule", "ControlPoint", "Measurement", "Obstacle", "Obstacles", "Pairs",
-           "Repulsion", "SurveillanceAreas", "link_capsules", "measure_exactly", "measure_pairs",
+           "Repulsion", "SurveillanceAreas", "measure_exactly", "measure_pairs",
            "pairs_of_chain"]

@@ -15,8 +15,8 @@ from math import inf
 
 import numpy as np
 
-from hierarchy.compiled import compiled, inlined
 from hierarchy.errors import HierarchyError
+from hierarchy.jit import compiled, inlined
 from hierarchy.problem import Array
 
 _ROUNDING = 1e-13  # [m] an entry of a row below this is rounding

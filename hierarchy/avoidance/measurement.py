@@ -14,9 +14,8 @@ from numpy.typing import NDArray
 from hierarchy.avoidance.obstacles import distance_to_obstacle
 from hierarchy.avoidance.pairs import Pairs
 from hierarchy.avoidance.repulsion import repulsion
-from hierarchy.binding import bind
-from hierarchy.compiled import compiled
 from hierarchy.errors import HierarchyError
+from hierarchy.jit import bind, compiled
 from hierarchy.kinematics import point_at
 from hierarchy.problem import Array
 

@@ -11,8 +11,8 @@ from math import inf, sqrt
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hierarchy.compiled import compiled
 from hierarchy.errors import HierarchyError, UnknownNameError
+from hierarchy.jit import compiled
 from hierarchy.paths import Path
 from hierarchy.problem import Array
 

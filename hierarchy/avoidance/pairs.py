@@ -9,7 +9,7 @@ from math import inf
 import numpy as np
 
 from hierarchy.avoidance.obstacles import Obstacles, distance_to_obstacle, turning_off_obstacle
-from hierarchy.compiled import compiled
+from hierarchy.jit import compiled
 from hierarchy.problem import Array
 
 # Columns of the table.

@@ -9,8 +9,8 @@ from math import exp
 
 import numpy as np
 
-from hierarchy.compiled import compiled
 from hierarchy.errors import HierarchyError
+from hierarchy.jit import compiled
 from hierarchy.problem import Array
 
 

@@ -1,5 +1,9 @@
-"""Robots given as tables of numbers; `hierarchy.robot` turns one into a model."""
+"""Where robots come from: our tables, URDF and MJCF files, packages of such files.
 
+Beside `hierarchy.robot` only the readers here call pinocchio; `Found` is what they give it.
+"""
+
+from hierarchy.robots.capsules import link_capsules
 from hierarchy.robots.dual_arm import DUAL_ARM
 from hierarchy.robots.humanoid import HUMANOID
 from hierarchy.robots.kuka_lwr import KUKA_LWR
@@ -8,4 +12,4 @@ from hierarchy.robots.table import DHTable, Link, Table, TreeFrame, TreeJoint, T
 TABLES: dict[str, Table] = {table.name: table for table in (KUKA_LWR, DUAL_ARM, HUMANOID)}
 
 __all__ = ["DUAL_ARM", "HUMANOID", "KUKA_LWR", "TABLES", "DHTable", "Link", "Table", "TreeFrame",
-           "TreeJoint", "TreeTable"]
+           "TreeJoint", "TreeTable", "link_capsules"]

@@ -13,9 +13,8 @@ from numpy.typing import NDArray
 
 from hierarchy.avoidance.control_points import ControlPoint, pack_points
 from hierarchy.avoidance.measurement import Measurement
-from hierarchy.binding import bind
-from hierarchy.compiled import compiled
 from hierarchy.errors import HierarchyError
+from hierarchy.jit import bind, compiled
 from hierarchy.kinematics import (
     add_row,
     drift_of_point,

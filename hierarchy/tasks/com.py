@@ -10,9 +10,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from hierarchy.binding import bind
-from hierarchy.compiled import compiled, inlined
 from hierarchy.errors import HierarchyError
+from hierarchy.jit import bind, compiled, inlined
 from hierarchy.kinematics import (
     drift_of_point,
     place,

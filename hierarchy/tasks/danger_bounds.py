@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from hierarchy.avoidance.control_points import ControlPoint, pack_points
 from hierarchy.avoidance.measurement import Measurement
 from hierarchy.avoidance.repulsion import Repulsion, repulsion
-from hierarchy.compiled import compiled
 from hierarchy.errors import HierarchyError
+from hierarchy.jit import compiled
 from hierarchy.kinematics import point_at
 from hierarchy.limits import clipped
 from hierarchy.problem import Array

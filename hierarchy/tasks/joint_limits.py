@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hierarchy.compiled import compiled
 from hierarchy.errors import HierarchyError
+from hierarchy.jit import compiled
 from hierarchy.limits import Limits, write_box
 from hierarchy.problem import Array
 from hierarchy.robot import Robot, State

@@ -10,9 +10,8 @@ from math import cos
 
 import numpy as np
 
-from hierarchy.binding import bind
-from hierarchy.compiled import compiled, inlined
 from hierarchy.errors import HierarchyError
+from hierarchy.jit import bind, compiled, inlined
 from hierarchy.kinematics import axis_at, subtract_over_period, velocity_of_point
 from hierarchy.problem import Array
 from hierarchy.robot import Frame, State

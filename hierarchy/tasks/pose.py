@@ -11,8 +11,7 @@ from math import atan2, sqrt
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hierarchy.binding import bind
-from hierarchy.compiled import compiled
+from hierarchy.jit import bind, compiled
 from hierarchy.kinematics import (
     drift_of_point,
     point_at,

@@ -9,8 +9,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from hierarchy.binding import bind
-from hierarchy.compiled import compiled
+from hierarchy.jit import bind, compiled
 from hierarchy.kinematics import (
     drift_of_point,
     point_at,

@@ -10,9 +10,8 @@ from typing import Literal
 
 import numpy as np
 
-from hierarchy.binding import bind
-from hierarchy.compiled import compiled
 from hierarchy.errors import HierarchyError
+from hierarchy.jit import bind, compiled
 from hierarchy.kinematics import write_equality
 from hierarchy.problem import Array
 from hierarchy.robot import State

@@ -27,8 +27,8 @@ from hierarchy.avoidance.self_collision import (
     pairs_of_chain,
     turned,
 )
-from hierarchy.compiled import compiled
 from hierarchy.errors import HierarchyError
+from hierarchy.jit import compiled
 from hierarchy.kinematics import (
     add_row,
     drift_of_point,

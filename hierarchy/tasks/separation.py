@@ -18,8 +18,8 @@ from hierarchy.avoidance.barrier import (
 )
 from hierarchy.avoidance.control_points import ControlPoint, pack_points
 from hierarchy.avoidance.pairs import Pairs
-from hierarchy.compiled import compiled
 from hierarchy.errors import HierarchyError
+from hierarchy.jit import compiled
 from hierarchy.kinematics import (
     add_row,
     drift_of_point,

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from hierarchy.compiled import compiled
 from hierarchy.errors import HierarchyError
+from hierarchy.jit import compiled
 from hierarchy.problem import Array
 from hierarchy.robot import Robot, State
 from hierarchy.task import Level, Task

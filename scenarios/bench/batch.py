@@ -122,7 +122,7 @@ def _ways(batch: Batch, resolver: Resolver) -> Iterable[Timed]:
         yield Timed(f"{threads} thread" + "s" * (threads > 1), _call(batch, resolver, threads),
                     len(batch))
     if resolver.name == "tpm" and find_spec("jax") is not None:
-        from solvers import batch_jax
+        from solvers.batch import on_jax as batch_jax
 
         yield Timed("jax", lambda: batch_jax.solve(batch, resolver), len(batch))
 

@@ -16,11 +16,11 @@ from rich.table import Table
 from hierarchy.problem import Array
 from scenarios.bench.machine import one_core
 from scenarios.bench.rows import write_rows
-from scenarios.build import Cell, build
+from scenarios.cell.build import Cell, build
+from scenarios.cell.sensors import DepthSensor
+from scenarios.cell.sensors.camera import DepthCamera
+from scenarios.cell.sensors.depth_space import ObstacleImage
 from scenarios.config import Scenario, load
-from scenarios.sensors import DepthSensor
-from scenarios.sensors.camera import DepthCamera
-from scenarios.sensors.depth_space import ObstacleImage
 
 _WARM_UP, _TIMES = 20, 300
 _TURN = 0.3  # [rad] by which joints are moved between two calls

@@ -10,7 +10,7 @@ import numpy as np
 
 from hierarchy.problem import Array, Hierarchy
 from solvers import Resolution, Resolver, Status, make, names
-from solvers.backends import BACKENDS, installed
+from solvers.qp.backends import BACKENDS, installed
 
 NUMPY, DAQP = "plain numpy", "DAQP by hand"
 _MOVED = 0.01       # relative change of the targets between a warm start's tick and the one before

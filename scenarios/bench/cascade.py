@@ -9,8 +9,8 @@ from rich.table import Table
 
 from scenarios.bench.families import FAMILIES, family
 from solvers import Status, make
-from solvers.backends import BACKENDS, installed
-from solvers.hqp import FORMS, Memory
+from solvers.qp.backends import BACKENDS, installed
+from solvers.resolvers.hqp import FORMS, Memory
 
 
 def run(families: tuple[str, ...] = FAMILIES) -> list[dict[str, Any]]:

@@ -181,7 +181,7 @@ def main() -> int:
                         help="new or empty folder; default: a new one in runs/")
     parser.add_argument("--seconds", type=float, default=SECONDS, help="for all times together")
     given = parser.parse_args()
-    from scenarios.folders import claim, next_free
+    from scenarios.files import claim, next_free
 
     folder = claim(given.out if given.out is not None else next_free(Path("runs") / "edits"))
     run(folder, given.seconds)

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from scenarios.bench.candidates import DAQP, NUMPY
-from scenarios.figures import drawing
+from scenarios.draw.figures import drawing
 
 _LEAST, _MOST = 1e-16, 1e-4  # residuals drawn; what is beyond stands at the edge
 _MARKS = "osD^v<P"  # variants of a resolver share its colour

@@ -46,7 +46,7 @@ def run(out: Path | None = None, arms: int = ARMS, checked: int = CHECKED,
     if out is not None:
         from scenarios.bench.growth_figure import time_over_size
         from scenarios.bench.rows import write_rows
-        from scenarios.figures.drawing import write
+        from scenarios.draw.figures.drawing import write
 
         write_rows(errors, out / "errors.csv")
         write_rows(times, out / "growth.csv")
@@ -67,7 +67,7 @@ def main() -> int:
     parser.add_argument("--seconds", type=float, default=SECONDS, help="for all times together")
     given = parser.parse_args()
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy is loaded: one core is timed
-    from scenarios.folders import claim, next_free
+    from scenarios.files import claim, next_free
 
     folder = claim(given.out if given.out is not None else next_free(Path("runs") / "first-paper"))
     run(folder, given.arms, given.checked, given.seconds)

@@ -13,8 +13,8 @@ from matplotlib.ticker import NullLocator, ScalarFormatter
 
 from scenarios.bench.candidates import NUMPY
 from scenarios.bench.growth import LEVEL_LESS, ROWS, exponents
-from scenarios.figures import drawing
-from scenarios.figures.drawing import INK, Array
+from scenarios.draw.figures import drawing
+from scenarios.draw.figures.drawing import INK, Array
 
 _PANELS = {"tasks": ("number of tasks $l$", "l"), "joints": ("number of joints $n$", "n")}
 _NUMPY = "#8a8f98"   # as in the benchmark of resolvers

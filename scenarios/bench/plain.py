@@ -13,7 +13,7 @@ from hierarchy.allocation import allocate
 from hierarchy.avoidance import ControlPoint
 from hierarchy.problem import Array
 from hierarchy.robot import Frame
-from scenarios.build import Cell
+from scenarios.cell.build import Cell
 from scenarios.config import Scenario
 
 

@@ -221,7 +221,7 @@ def _digits(value: float | None) -> str:
 
 def _write(rows: list[dict[str, Any]], out: Path) -> None:
     from scenarios.bench.figure import time_against_accuracy
-    from scenarios.figures.drawing import write
+    from scenarios.draw.figures.drawing import write
 
     write_rows(rows, out / "resolvers.csv")
     (out / "machine.json").write_text(json.dumps(machine(), indent=2) + "\n")

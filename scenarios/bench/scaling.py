@@ -18,14 +18,14 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from rich.console import Console
 
-Size = tuple[int, int, int]  # joints, tasks, rows of each
+    from scenarios.bench.scaling_timed import Size
+
 SIZES: dict[str, tuple[Size, ...]] = {
     "tasks": tuple((70, count, 3) for count in (1, 2, 3, 4, 5, 7, 10, 14, 20)),
     "rows": tuple((100, 5, each) for each in (1, 2, 3, 4, 6, 9, 14, 20)),
     "joints": tuple((n, 5, 3) for n in (6, 7, 10, 15, 20, 30, 45, 70, 100, 150, 200, 300))}
 PAIRS = ((8, 3), (8, 8), (16, 8), (16, 16), (32, 16), (32, 32), (64, 32), (64, 64), (64, 128),
          (64, 256))          # (control points, obstacles)
-PARTS = ("kinematics", "sensing and rows", "resolve", "whole tick")
 SECONDS = 90.0
 _TICKS = 1500            # of the run whose states are used
 _WIDTH = 100             # characters of a table
@@ -44,7 +44,7 @@ def run(out: Path | None = None, seconds: float = SECONDS,
     from scenarios.bench.machine import one_core
     from scenarios.bench.scaling_timed import Ticks, solves_of
     from scenarios.config import load
-    from scenarios.simulate import simulate
+    from scenarios.loop.simulation import simulate
 
     solves = [solve for figure, some in (SIZES if sizes is None else sizes).items()
               for solve in solves_of(figure, some)]
@@ -75,6 +75,8 @@ def _print(console: Console, figure: str, rows: Sequence[dict[str, Any]]) -> Non
     from rich.table import Table
 
     from scenarios.bench.growth import exponents
+    from scenarios.bench.scaling_figure import fixed
+    from scenarios.bench.scaling_timed import PARTS
 
     sizes = list(dict.fromkeys(row[figure] for row in rows))
     of = {(row["resolver"], row[figure]): row["median_us"] for row in rows}
@@ -96,16 +98,6 @@ def _print(console: Console, figure: str, rows: Sequence[dict[str, Any]]) -> Non
     console.print("")
 
 
-def fixed(figure: str, rows: Sequence[dict[str, Any]]) -> str:
-    """Return what does not vary in a figure, as words."""
-    row = rows[0]
-    each = row["rows"] // row["tasks"]
-    return {"tasks": f"{row['joints']} joints, tasks of {each} rows",
-            "rows": f"{row['joints']} joints, {row['tasks']} tasks",
-            "joints": f"{row['tasks']} tasks of {each} rows",
-            "pairs": f"a tick, {row['joints']} joints, hcod"}[figure]
-
-
 def _digits(value: float) -> str:
     return f"{value:.0f}" if value >= 10.0 else f"{value:.1f}"
 
@@ -114,7 +106,7 @@ def _write(rows: Sequence[dict[str, Any]], out: Path) -> None:
     from scenarios.bench.machine import machine
     from scenarios.bench.rows import write_rows
     from scenarios.bench.scaling_figure import time_over_sizes
-    from scenarios.figures.drawing import write
+    from scenarios.draw.figures.drawing import write
 
     write_rows(rows, out / "scaling.csv")
     (out / "machine.json").write_text(json.dumps(machine(), indent=2) + "\n")
@@ -130,7 +122,7 @@ def main() -> int:
     parser.add_argument("--seconds", type=float, default=SECONDS, help="for all times together")
     given = parser.parse_args()
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy is loaded: one core is timed
-    from scenarios.folders import claim, next_free
+    from scenarios.files import claim, next_free
 
     folder = claim(given.out if given.out is not None else next_free(Path("runs") / "scaling"))
     run(folder, given.seconds)

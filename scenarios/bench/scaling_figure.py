@@ -11,8 +11,8 @@ from matplotlib.figure import Figure
 from scenarios.bench.candidates import NUMPY
 from scenarios.bench.growth import LEVEL_LESS
 from scenarios.bench.growth_figure import draw_band, name_lines, scale_axes
-from scenarios.bench.scaling import PARTS, fixed
-from scenarios.figures import drawing
+from scenarios.bench.scaling_timed import PARTS
+from scenarios.draw.figures import drawing
 
 _PANELS = {"tasks": ("number of tasks $l$", "l"), "rows": ("number of rows $m$", "m"),
            "joints": ("number of joints $n$", "n"),
@@ -51,3 +51,13 @@ def time_over_sizes(rows: Sequence[dict[str, Any]]) -> Figure:
         for ax in axes[::2]:
             ax.set_ylabel("time [µs]: median, band to the 95th percentile", fontsize=8.0)
     return fig
+
+
+def fixed(figure: str, rows: Sequence[dict[str, Any]]) -> str:
+    """Return what does not vary in a figure, as words."""
+    row = rows[0]
+    each = row["rows"] // row["tasks"]
+    return {"tasks": f"{row['joints']} joints, tasks of {each} rows",
+            "rows": f"{row['joints']} joints, {row['tasks']} tasks",
+            "joints": f"{row['tasks']} tasks of {each} rows",
+            "pairs": f"a tick, {row['joints']} joints, hcod"}[figure]

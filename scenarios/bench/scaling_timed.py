@@ -11,10 +11,12 @@ import numpy as np
 from hierarchy.problem import Array, Hierarchy
 from scenarios.bench.accuracy import entrants
 from scenarios.bench.growth import LEVEL_LESS, Timed
-from scenarios.bench.scaling import PARTS, Size
 from scenarios.config import Scenario, load
-from scenarios.control.controller import Controller
+from scenarios.loop.controller import Controller
 from solvers import Status
+
+Size = tuple[int, int, int]  # joints, tasks, rows of each
+PARTS = ("kinematics", "sensing and rows", "resolve", "whole tick")
 
 _BLOCK = 25          # ticks of one candidate in its turn
 _ROOM = (0.7, 0.06)  # [m] half width of the box of obstacles; least distance to the path

@@ -43,9 +43,9 @@ from solvers import make
 h = Hierarchy.from_levels([(np.eye(3)[:1], [1.0]), (np.eye(3)[1:], [1.0, 2.0])])
 make("tpm").solve(h)"""
 _TICK = """\
-from scenarios.build import build
+from scenarios.cell.build import build
 from scenarios.config import load
-from scenarios.control.controller import Controller
+from scenarios.loop.controller import Controller
 controller = Controller(load("ellipse"))
 plant = controller.cell.plant
 controller.command(0.0, plant.q, plant.v)"""
@@ -116,7 +116,7 @@ def beginnings() -> list[Cost]:
     timed = [("python, nothing done", ["-c", "pass"], None),
              ("import scenarios", ["-c", "import scenarios"], None),
              ("import hierarchy, solvers", ["-c", "import hierarchy, solvers"], None),
-             ("hierarchy --help", ["-m", "scenarios.cli", "--help"], 0.5),
+             ("hierarchy --help", ["-m", "scenarios.cli.main", "--help"], 0.5),
              ("first solve, kernels cached", ["-c", _SOLVE], 1.0),
              ("first tick of ellipse, cached", ["-c", _TICK], None)]
     return [_least(what, arguments, most) for what, arguments, most in timed]
@@ -152,7 +152,7 @@ def own_seconds(events: Sequence[Sequence[Any]]) -> dict[str, float]:
 
 def memory(folder: Path) -> list[Cost]:
     """Return the most memory [MB] that processes hold at once."""
-    command = ["-m", "scenarios.cli", "run", "ellipse", "--duration", "2", "--out",
+    command = ["-m", "scenarios.cli.main", "run", "ellipse", "--duration", "2", "--out",
                str(folder / "run")]
     costs = [Cost("hierarchy run ellipse --duration 2", _run(command).memory, "MB", 300.0)]
     if find_spec("distributed") is not None:

@@ -4,10 +4,10 @@
 
 The problems are of `solvers.problems`: the recipe ("recipe"), and every structured kind by its
 name. Exit code 1 if the resolver raised, gave a number that is not finite, called solved what
-`certify` rejects, or ended its process. A problem that fails is shrunk while it still fails in the
-same way, and kept as a file that `solvers.problems.load` reads. With NUMBA_BOUNDSCHECK=1 (and a
-NUMBA_CACHE_DIR of its own) a kernel that reads or writes outside its arrays raises where it would
-corrupt memory.
+`certify` rejects, or ended its process, or if `certify` raised. A problem that fails is shrunk
+while it still fails in the same way, and kept as a file that `solvers.problems.load` reads. With
+NUMBA_BOUNDSCHECK=1 (and a NUMBA_CACHE_DIR of its own) a kernel that reads or writes outside its
+arrays raises where it would corrupt memory.
 """
 
 from __future__ import annotations
@@ -32,7 +32,8 @@ from solvers import Resolver, Status, certify, make, problems
 
 CERTIFIED = "certified"
 RAISED, NOT_FINITE, WRONG = "raised", "not finite", "solved, not certified"
-FAILURES = (RAISED, NOT_FINITE, WRONG)
+UNJUDGED = "solved, the certificate raised"
+FAILURES = (RAISED, NOT_FINITE, WRONG, UNJUDGED)
 CRASHED = "not judged, a process died"
 _CHUNK = 500  # seeds a process takes at a time
 _KEPT = 20    # failing problems that are shrunk and written, at most
@@ -96,7 +97,10 @@ def _solved(resolver: Resolver, h: Hierarchy) -> tuple[str, int]:
         return NOT_FINITE, res.iterations
     if res.status is not Status.SOLVED:
         return res.status.name, res.iterations
-    return CERTIFIED if certify(h, res.x).certified else WRONG, res.iterations
+    try:
+        return CERTIFIED if certify(h, res.x).certified else WRONG, res.iterations
+    except Exception:  # a fault of the certificate, which must not end the run
+        return UNJUDGED, res.iterations
 
 
 def recipe_for(resolver: Resolver) -> problems.Recipe:

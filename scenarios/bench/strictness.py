@@ -23,7 +23,7 @@ from hierarchy.kinematics import write_point_jacobian
 from hierarchy.problem import Array
 from scenarios.bench.rows import write_rows
 from solvers import Resolution, Resolver, Status, make, names
-from solvers.backends import BACKENDS, installed
+from solvers.qp.backends import BACKENDS, installed
 from solvers.resolver import Handles
 
 AIM = 1e-9                       # [m] of the end effector a tick
@@ -226,7 +226,7 @@ def _listed(parts: list[str]) -> str:
 
 def main() -> None:
     """Run from the command line; the numbers go to a new folder in runs/."""
-    from scenarios.folders import next_free
+    from scenarios.files import next_free
 
     folder = next_free(Path("runs") / "strictness")
     run(folder)

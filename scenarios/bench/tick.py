@@ -13,12 +13,12 @@ from rich.table import Table
 from hierarchy.problem import Array
 from scenarios.bench.plain import PlainTick
 from scenarios.bench.rows import write_rows
-from scenarios.build import build
+from scenarios.cell.build import build
 from scenarios.config import load
-from scenarios.control.controller import Controller
-from scenarios.control.recorder import Recorder
-from scenarios.recording import Recording
-from scenarios.simulate import simulate
+from scenarios.loop.controller import Controller
+from scenarios.loop.recorder import Recorder
+from scenarios.loop.recording import Recording
+from scenarios.loop.simulation import simulate
 
 SPECS = ("tpm", "tpm:form=staircase", "recursive", "augmented")
 PARTS = ("kinematics", "rows", "resolve", "act and record")

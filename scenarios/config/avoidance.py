@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal, Self
 
+import numpy as np
 from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
 
 from scenarios.config.sections import (
@@ -14,6 +15,7 @@ from scenarios.config.sections import (
     Vector3,
     WaypointsSection,
 )
+from scenarios.config.variation import moved
 
 
 class RepulsionSection(Section):
@@ -69,6 +71,18 @@ class VariationSection(Section):
     timing: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.1
 
 
+def _varied(obstacle: ObstacleSection, variation: VariationSection,
+            number: int) -> ObstacleSection:
+    """Return the obstacle with its waypoints moved, each obstacle by chance of its own."""
+    path = obstacle.path
+    if not isinstance(path, WaypointsSection):
+        return obstacle
+    times, points = moved(np.array(path.times), np.array(path.points), variation.spread,
+                          variation.timing, np.random.default_rng((variation.seed, number)))
+    waypoints = {"times": tuple(times.tolist()), "points": tuple(map(tuple, points.tolist()))}
+    return obstacle.model_copy(update={"path": path.model_copy(update=waypoints)})
+
+
 class _Avoiding(Section):
     obstacles: Obstacles
     variation: VariationSection | None = None
@@ -76,9 +90,10 @@ class _Avoiding(Section):
     @property
     def placed(self) -> Obstacles:
         """The obstacles on the paths that `variation` leads them."""
-        from scenarios.variation import varied
-
-        return self.obstacles if self.variation is None else varied(self.obstacles, self.variation)
+        if self.variation is None:
+            return self.obstacles
+        return tuple(_varied(obstacle, self.variation, number)
+                     for number, obstacle in enumerate(self.obstacles))
 
     @model_validator(mode="after")
     def _varies_something(self) -> Self:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from hierarchy.errors import UnknownNameError
-from hierarchy.models.names import in_package
+from hierarchy.robots.names import in_package
 from scenarios.config.changes import change, parse_changes
 from scenarios.config.errors import ScenarioError
 from scenarios.config.scenario import Scenario

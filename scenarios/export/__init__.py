@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from hierarchy.errors import HierarchyError, UnknownNameError
-from scenarios.folders import OutputError
+from scenarios.files import OutputError
 
 if TYPE_CHECKING:
-    from scenarios.recording import Recording
+    from scenarios.loop.recording import Recording
 
 # Each a module of this package with write(recording, path); what it needs, and the extra with it.
 FORMATS: dict[str, tuple[str, str]] = {"csv": ("csv", ""), "parquet": ("pyarrow", "export"),

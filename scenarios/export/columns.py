@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hierarchy import Robot
-from scenarios.making import make_robot
+from scenarios.cell.robot import make_robot
 
 if TYPE_CHECKING:
-    from scenarios.recording import Recording
+    from scenarios.loop.recording import Recording
 
 CONSTANTS = ("joint_lower", "joint_upper", "velocity_limit")
 _METRES = ("ee_position", "desired_position", "position_error", "true_ee_position",

@@ -12,7 +12,7 @@ from scenarios.export import new_file
 from scenarios.export.columns import columns
 
 if TYPE_CHECKING:
-    from scenarios.recording import Recording
+    from scenarios.loop.recording import Recording
 
 
 def write(recording: Recording, path: Path) -> list[Path]:

@@ -8,7 +8,7 @@ from scenarios.export.columns import joint_names
 from scenarios.scene import stage
 
 if TYPE_CHECKING:
-    from scenarios.recording import Recording
+    from scenarios.loop.recording import Recording
 
 Panel = dict[str, Any]
 

@@ -17,7 +17,7 @@ from scenarios.export.schemas import FOXGLOVE, INTEGER, NUMBER, TEXT, TRUTH, a_l
 from scenarios.scene import scene
 
 if TYPE_CHECKING:
-    from scenarios.recording import Recording
+    from scenarios.loop.recording import Recording
 
 FRAMES_A_SECOND = 30.0  # of what is drawn; numbers are there of every tick
 _WARNING = 3            # Foxglove's level of a log message

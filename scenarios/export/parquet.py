@@ -6,13 +6,13 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from scenarios.cell.robot import make_robot
 from scenarios.export import new_file
 from scenarios.export.columns import CONSTANTS, Column, columns, joint_names
 from scenarios.export.numbers import plain
-from scenarios.making import make_robot
 
 if TYPE_CHECKING:
-    from scenarios.recording import Recording
+    from scenarios.loop.recording import Recording
 
 
 def write(recording: Recording, path: Path) -> list[Path]:

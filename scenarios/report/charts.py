@@ -6,17 +6,17 @@ from collections.abc import Mapping, Sequence
 from html import escape
 from typing import TYPE_CHECKING
 
-from scenarios.figures import drawing, panels
-from scenarios.figures.palette import Look, task_colours
-from scenarios.figures.timeline import tasks, timeline
+from scenarios.draw.figures import drawing, panels
+from scenarios.draw.figures.palette import Look, task_colours
+from scenarios.draw.figures.timeline import tasks, timeline
+from scenarios.measure.motions import ALIKE, Motion, motions
+from scenarios.measure.verdict import listed
 from scenarios.report import figures
-from scenarios.report.motions import ALIKE, Motion, motions
 from scenarios.report.parts import chip, joints, legend, picture, section, squares
-from scenarios.report.verdict import listed
 
 if TYPE_CHECKING:
-    from scenarios.compare import Run
-    from scenarios.recording import Recording
+    from scenarios.loop.recording import Recording
+    from scenarios.measure.runs import Run
 
 
 def same_motion(found: Sequence[Motion]) -> str:

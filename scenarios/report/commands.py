@@ -9,11 +9,12 @@ from pathlib import PurePath
 from typing import TYPE_CHECKING, Any
 
 from hierarchy.errors import HierarchyError
-from scenarios.report.motions import motions
+from scenarios.measure.motions import motions
 
 if TYPE_CHECKING:
-    from scenarios.compare import Comparison, Run
     from scenarios.config import Scenario
+    from scenarios.measure.comparison import Comparison
+    from scenarios.measure.runs import Run
 
 
 def run_command(run: Run, folder: str) -> str:

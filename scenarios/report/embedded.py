@@ -7,12 +7,12 @@ from html import escape
 from typing import TYPE_CHECKING
 
 from hierarchy.errors import HierarchyError
-from scenarios.report.motions import Motion
+from scenarios.measure.motions import Motion
+from scenarios.measure.verdict import in_words, listed
 from scenarios.report.parts import section
-from scenarios.report.verdict import in_words, listed
 
 if TYPE_CHECKING:
-    from scenarios.recording import Recording
+    from scenarios.loop.recording import Recording
 
 MOST = 4  # motions in one replay
 _FASTEST, _SLOWEST = 30.0, 5.0  # [Hz] of the pictures kept
@@ -36,7 +36,7 @@ def replay(name: str, found: Sequence[Motion], most_bytes: int) -> str:
 
 
 def _document(name: str, shown: Sequence[Motion], most_bytes: int) -> tuple[str, float]:
-    from scenarios.replay import html
+    from scenarios.draw.replay import html
 
     recordings: dict[str, Recording] = {one.label: one.recording for one in shown}
     document, rate = html(recordings, name, rate=_FASTEST, embedded=True), _FASTEST

@@ -10,13 +10,13 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from scenarios.figures import drawing
-from scenarios.figures.drawing import ALERT, INK, Array
-from scenarios.figures.palette import Look
-from scenarios.figures.panels import Draw, Panel
+from scenarios.draw.figures import drawing
+from scenarios.draw.figures.drawing import ALERT, INK, Array
+from scenarios.draw.figures.palette import Look
+from scenarios.draw.figures.panels import Draw, Panel
 
 if TYPE_CHECKING:
-    from scenarios.recording import Recording
+    from scenarios.loop.recording import Recording
 
 
 def side_by_side(panel: Panel, recordings: Mapping[str, Recording], looks: Mapping[str, Look]

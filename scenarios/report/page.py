@@ -9,19 +9,20 @@ from importlib.resources import files
 from string import Template
 from typing import TYPE_CHECKING
 
-from scenarios.figures import drawing
-from scenarios.figures.palette import Look, looks
-from scenarios.figures.picture import picture
-from scenarios.folders import slug
+from scenarios.draw.figures import drawing
+from scenarios.draw.figures.palette import Look, looks
+from scenarios.draw.figures.picture import picture
+from scenarios.files import slug
+from scenarios.measure.motions import Motion, motions
+from scenarios.measure.verdict import in_words, verdict
 from scenarios.report import charts, tables
 from scenarios.report.commands import commands
 from scenarios.report.embedded import replay
-from scenarios.report.motions import Motion, motions
 from scenarios.report.parts import legend, plain_table, section, unbroken
-from scenarios.report.verdict import in_words, verdict
 
 if TYPE_CHECKING:
-    from scenarios.compare import Comparison, Run
+    from scenarios.measure.comparison import Comparison
+    from scenarios.measure.runs import Run
 
 _REPLAY_BYTES, _REPLAYS_BYTES = 3_000_000, 8_000_000  # of one replay, and of all on a page
 

@@ -8,8 +8,8 @@ from html import escape
 
 from matplotlib.figure import Figure
 
-from scenarios.figures import drawing
-from scenarios.figures.palette import Look
+from scenarios.draw.figures import drawing
+from scenarios.draw.figures.palette import Look
 
 
 def chip(look: Look) -> str:

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from scenarios.figures.palette import Look
-from scenarios.parting import BOUND, partings
+from scenarios.draw.figures.palette import Look
+from scenarios.measure.partings import BOUND, partings
 from scenarios.report.parts import chip, folded, plain_table, section
 
 if TYPE_CHECKING:
-    from scenarios.compare import Row, Run
+    from scenarios.measure.runs import Row, Run
 
 # What most readers ask; the rest is folded away.
 _FIRST = ("position_error_median_settled", "position_error_max_settled", "cone_violation_max",
@@ -26,7 +26,7 @@ _FIRST = ("position_error_median_settled", "position_error_max_settled", "cone_v
 
 def numbers(runs: Sequence[Run], looks: Mapping[str, Look]) -> str:
     """Return what was measured, best of each row marked; the less asked for is folded away."""
-    from scenarios.compare import table
+    from scenarios.measure.runs import table
 
     rows = table(runs, details=False)
     first = [row for row in rows if _is_first(row.name)]

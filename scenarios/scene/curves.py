@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hierarchy.problem import Array
-from scenarios.control import listed
-from scenarios.metrics import pointing_angle
+from scenarios.loop import listed
+from scenarios.measure.metrics import pointing_angle
 
 if TYPE_CHECKING:
-    from scenarios.recording import Recording
+    from scenarios.loop.recording import Recording
 
 _ERRORS = {"m": "positions", "deg": "directions", "rad": "postures"}
 _SYMBOLS = {r"$\epsilon_1$": "ε₁", r"$\epsilon_2$": "ε₂", r"$\epsilon_{ee}$": "ε_ee",

@@ -14,17 +14,18 @@ from hierarchy import HierarchyError, Robot, State
 from hierarchy.avoidance import Capsule, ControlPoint, Obstacles
 from hierarchy.problem import Array
 from hierarchy.robots import DHTable
-from scenarios.build import make_obstacles, make_robot, sensed_points
-from scenarios.control import listed
-from scenarios.control.fate import Fate
+from scenarios.cell.obstacles import make_obstacles
+from scenarios.cell.robot import make_robot, sensed_points
+from scenarios.cell.sensors import ExactDistances
+from scenarios.loop import listed
+from scenarios.loop.fate import Fate
 from scenarios.scene.curves import Areas, Series, marks_of, series
 from scenarios.scene.levels import Levels, judge, order_names
 from scenarios.scene.links import capsules, ends, lowest
-from scenarios.sensors import ExactDistances
 
 if TYPE_CHECKING:
     from scenarios.config import Scenario
-    from scenarios.recording import Recording
+    from scenarios.loop.recording import Recording
 
 SEPARATION = "separation"  # the task that keeps all points off all obstacles
 

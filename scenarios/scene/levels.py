@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 
 from hierarchy.avoidance import Measurement
 from hierarchy.problem import Array, Hierarchy
-from scenarios.build import Cell, build
+from scenarios.cell.build import Cell, build
 from scenarios.config import Scenario
 from scenarios.config.plant import PlantSection
-from scenarios.control.fate import Fate, judged
+from scenarios.loop.fate import Fate, judged
 
 if TYPE_CHECKING:
-    from scenarios.recording import Recording
+    from scenarios.loop.recording import Recording
 
 _SAME = 1e-9  # [m] of distances that are those recorded
 

@@ -8,8 +8,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from scenarios.figures import drawing
-from scenarios.metrics import Metric
+from scenarios.draw.figures import drawing
+from scenarios.measure.metrics import Metric
 from scenarios.sweep.results import Results
 
 Array = NDArray[np.float64]

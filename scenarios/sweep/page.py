@@ -13,10 +13,10 @@ from string import Template
 
 import numpy as np
 
-from scenarios.figures import drawing
-from scenarios.figures.palette import looks
-from scenarios.folders import slug
-from scenarios.metrics import Metric
+from scenarios.draw.figures import drawing
+from scenarios.draw.figures.palette import looks
+from scenarios.files import slug
+from scenarios.measure.metrics import Metric
 from scenarios.report.parts import chip
 from scenarios.sweep import figures
 from scenarios.sweep.planning import Plan, Planned

@@ -63,7 +63,7 @@ def plan(sweep: Sweep) -> Plan:
 
 
 def _loaded(sweep: Sweep) -> tuple[Scenario, ...]:
-    from scenarios.build import build
+    from scenarios.cell.build import build
 
     lasting = {} if sweep.duration is None else {"control.duration": sweep.duration}
     scenarios = tuple(load(name, lasting) for name in sweep.scenarios)

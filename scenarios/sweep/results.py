@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scenarios.metrics import Metric
+from scenarios.measure.metrics import Metric
 from scenarios.sweep.planning import Plan, Planned
 from scenarios.sweep.store import Store, metrics_of
 

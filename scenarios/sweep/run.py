@@ -12,12 +12,12 @@ from functools import cache
 from pathlib import Path
 from time import perf_counter
 
-from scenarios.metrics import Metric
+from scenarios.measure.metrics import Metric
 
 # What only asks for runs or shows them; a change to it does not change what is measured.
-_NOT_IN_A_RUN = ("bench/", "report/", "sweep/", "library/", "figures/", "scene/", "viewer/",
-                 "replay/", "export/", "cli.py", "terminal.py", "completion.py", "doctor.py",
-                 "compare.py", "parting.py", "gallery.py", "progress.py", "folders.py")
+_NOT_IN_A_RUN = ("bench/", "cli/", "draw/", "export/", "library/", "report/", "scene/", "sweep/",
+                 "files.py", *(f"measure/{name}.py" for name in (
+                     "comparison", "motions", "partings", "runs", "verdict")))
 _PLACE = ("system", "processor")  # of versions(): on which machine, not with what
 _ONE_AT_A_TIME = threading.Lock()  # the kernels' work arrays belong to the process
 
@@ -64,7 +64,7 @@ def digest() -> str:
     That is the source of what takes part in a run, kernels included, and the versions of what it
     uses.
     """
-    from scenarios.recording import versions
+    from scenarios.loop.recording import versions
 
     root = Path(__file__).parents[2]
     files = (path for package in ("hierarchy", "solvers", "scenarios")
@@ -81,7 +81,7 @@ def run(text: str, resolver: str, key: str) -> Outcome:
     """Run a scenario under a resolver and measure it; whatever breaks becomes its `error`."""
     from scenarios import simulate
     from scenarios.config import Scenario
-    from scenarios.metrics import measure
+    from scenarios.measure.metrics import measure
 
     begun = perf_counter()
     try:

@@ -15,7 +15,7 @@ import pyarrow as pa
 import pyarrow.parquet as parquet
 
 from hierarchy.errors import HierarchyError
-from scenarios.metrics import Metric
+from scenarios.measure.metrics import Metric
 from scenarios.sweep.run import Outcome
 
 _FIXED = (("key", pa.string()), ("ticks", pa.int64()), ("fault", pa.string()),
@@ -103,7 +103,7 @@ def write_table(table: pa.Table, path: Path) -> None:
 
 def write_text(text: str, path: Path) -> None:
     """Write a file so that a reader finds the old one or the new one; raises FullError."""
-    from scenarios.folders import write_text as write
+    from scenarios.files import write_text as write
 
     with _named(path):
         write(path, text)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from scenarios.config import Scenario
-from scenarios.recording import versions
+from scenarios.loop.recording import versions
 from scenarios.sweep.config import find, load_sweep
 from scenarios.sweep.engine import carry_out, connected
 from scenarios.sweep.page import Page, name_of

@@ -1,1 +1,1 @@
-"""Our resolvers called in the way of other packages; each file is called after one."""
+"""Problems from and for other packages: pink, mink and MuJoCo."""

@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hierarchy.compiled import as_matrix, compiled, inlined
+from hierarchy.jit import as_matrix, compiled, inlined
 from solvers.kernels.block import level_damping
 from solvers.kernels.rows import ROUNDING, ZERO, factor_level, reflect, reflect_back
 from solvers.kernels.space import (

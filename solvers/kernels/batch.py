@@ -10,7 +10,7 @@ where `work` is, before it has solved anything.
 
 from __future__ import annotations
 
-from hierarchy.compiled import unlocked
+from hierarchy.jit import unlocked
 from solvers.kernels.bounds import name_saturation, solve_without_bounds
 from solvers.kernels.guess import solve_by_guesses
 from solvers.kernels.levels import solve_by_levels
@@ -53,7 +53,7 @@ def batch_saturation(problems, x, records, which, work):
 
 @unlocked
 def batch_exact(problems, x, codes, records, settings, which, work):
-    """Solve the problems `which` as `solvers.hcod.solve_exactly` does.
+    """Solve the problems `which` as `solvers.resolvers.hcod.solve_exactly` does.
 
     The record of the exact engine is the last part of each of the records.
     """

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hierarchy.compiled import as_matrix, compiled, inlined
+from hierarchy.jit import as_matrix, compiled, inlined
 
 SWEEPS = 40  # bound; Jacobi needs 6 to 10
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hierarchy.compiled import compiled, inlined
+from hierarchy.jit import compiled, inlined
 from solvers.kernels.rows import ZERO, all_equal, finish
 from solvers.kernels.space import View, vector
 from solvers.kernels.staircase import solve_by_staircase

@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hierarchy.compiled import compiled, inlined
+from hierarchy.jit import compiled, inlined
 from solvers.kernels.block import solve_level
 from solvers.kernels.rows import ZERO, factor_level, finish, reflect, reflect_back
 from solvers.kernels.space import Basis, Block, Rows, View, shared

@@ -20,7 +20,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hierarchy.compiled import compiled, inlined
+from hierarchy.jit import compiled, inlined
 from solvers.kernels.level import (
     Part,
     balance,

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from hierarchy.compiled import compiled, inlined
+from hierarchy.jit import compiled, inlined
 from solvers.kernels.rows import ROUNDING, ZERO, make_reflector, reflect, reflect_back
 from solvers.kernels.space import Basis, View, carve_basis, integers, matrix, vector
 

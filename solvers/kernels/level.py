@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hierarchy.compiled import as_matrix, compiled, inlined
+from hierarchy.jit import as_matrix, compiled, inlined
 from solvers.kernels.block import level_damping
 from solvers.kernels.rows import ZERO
 from solvers.kernels.space import Block, Settings, View

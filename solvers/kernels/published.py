@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hierarchy.compiled import as_matrix, compiled, inlined
+from hierarchy.jit import as_matrix, compiled, inlined
 from solvers.kernels.block import invert_triangle, orthogonalise_rows, smallest_square
 from solvers.kernels.rows import ZERO, finish, load_rows, make_reflector, reflect, reflect_back
 from solvers.kernels.space import (

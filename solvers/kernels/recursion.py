@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hierarchy.compiled import compiled, inlined
+from hierarchy.jit import compiled, inlined
 from solvers.kernels.block import solve_level
 from solvers.kernels.rows import ZERO, finish, largest_row, load_rows, swap, swap_rows
 from solvers.kernels.space import Block, View, matrix, shared, vector

@@ -13,7 +13,7 @@ finds it at any rank, and no pseudoinverse is formed.
 
 from __future__ import annotations
 
-from hierarchy.compiled import compiled, inlined
+from hierarchy.jit import compiled, inlined
 from solvers.kernels.rows import finish
 from solvers.kernels.space import integers, vector
 from solvers.kernels.staircase import carve_staircase, climb

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hierarchy.compiled import compiled, inlined
+from hierarchy.jit import compiled, inlined
 from solvers.status import NUMERICAL_FAILURE, SOLVED
 
 ZERO = np.int64(0)

@@ -21,7 +21,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hierarchy.compiled import compiled, inlined
+from hierarchy.jit import compiled, inlined
 from solvers.kernels.block import solve_level
 from solvers.kernels.held import (
     NO_JOINT,

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from hierarchy.compiled import as_integers, as_matrix, inlined
+from hierarchy.jit import as_integers, as_matrix, inlined
 
 View = Any  # numpy to the reader, a type of its own to numba
 

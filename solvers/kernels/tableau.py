@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hierarchy.compiled import as_matrix, compiled, inlined
+from hierarchy.jit import as_matrix, compiled, inlined
 from solvers.kernels.rows import ZERO, finish
 from solvers.kernels.space import View, integers, matrix, vector
 from solvers.kernels.tolerances import FLOOR, OUTGROWN

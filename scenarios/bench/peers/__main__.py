@@ -21,7 +21,7 @@ def main() -> int:
         print("usage: python -m scenarios.bench.peers [--install]", file=sys.stderr)
         return 2
     from scenarios.bench.peers import run
-    from scenarios.folders import next_free
+    from scenarios.files import next_free
 
     folder = next_free(Path("runs") / "peers")
     run(folder)

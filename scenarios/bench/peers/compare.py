@@ -220,7 +220,7 @@ def _power(value: float | None) -> str:
 
 def _write(rows: list[dict[str, Any]], missing: dict[str, str], out: Path) -> None:
     from scenarios.bench.peers.figure import bars
-    from scenarios.figures.drawing import write
+    from scenarios.draw.figures.drawing import write
 
     out.mkdir(parents=True, exist_ok=True)
     (out / "missing.json").write_text(json.dumps(missing, indent=2) + "\n")

@@ -13,7 +13,7 @@ from matplotlib.patches import Patch
 
 from scenarios.bench.candidates import DAQP
 from scenarios.bench.figure import OWN
-from scenarios.figures import drawing
+from scenarios.draw.figures import drawing
 
 _PEERS = {"pink": "#ee99aa", "mink": "#994455", "placo": "#6699cc", "tsid": "#997700"}
 _STRICT = 1e-9  # [m a tick], as `hierarchy bench strictness` has it

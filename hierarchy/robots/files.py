@@ -1,0 +1,177 @@
+"""Models and shapes out of URDF and MJCF files; a mesh that is missing is said, not fatal."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from types import MappingProxyType
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+import pinocchio as pin
+
+from hierarchy.errors import RobotError, UnknownNameError
+from hierarchy.robots.found import Found, is_floating, neutral_within_limits
+from hierarchy.robots.points import proposed_end_effector
+from hierarchy.robots.shapes import capsules_of
+from hierarchy.robots.table import Base
+
+SUFFIXES = (".urdf", ".xml", ".mjcf")
+Element = ElementTree.Element
+
+
+def read_file(path: str | Path, base: Base | None = None, shapes: bool = True,
+              locked: Mapping[str, float] = MappingProxyType({})) -> Found:
+    """Read a robot from a URDF (.urdf) or MJCF (.xml, .mjcf) file.
+
+    `base` None takes what the file has: fixed for a URDF, floating for an MJCF whose first body
+    has a free joint. Without `shapes` no collision geometry is looked for. `locked` joints are held
+    at an angle [rad] or a way [m]. Raises RobotError for a file that cannot be read.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise RobotError(f"robot file {str(path)!r} does not exist")
+    if path.suffix not in SUFFIXES:
+        raise RobotError(f"robot file {str(path)!r}: expected .urdf, .xml or .mjcf")
+    urdf = path.suffix == ".urdf"
+    try:
+        model = _urdf_model(path, base) if urdf else _mjcf_model(path, base)
+    except Exception as error:  # the parsers raise many kinds; all mean the file is bad
+        raise RobotError(f"robot file {str(path)!r} cannot be read: {_in_one_line(error)}"
+                         ) from error
+    model = _without(model, locked, str(path))
+    found = Found(model, proposed_end_effector(model),
+                  rest=neutral_within_limits(model, pin.neutral(model)))
+    if not shapes:
+        return found
+    geometries, missing = _geometry(path, model, _urdf_shapes if urdf else _mjcf_shapes)
+    capsules, left_out = capsules_of(geometries)
+    return replace(found, capsules=_held_by(model, capsules), missing=(*missing, *left_out))
+
+
+def _without(model: Any, locked: Mapping[str, float], file: str) -> Any:
+    """Return the model without the joints that are locked."""
+    if not locked:
+        return model
+    q, indices = np.array(pin.neutral(model)), []
+    for name, value in locked.items():
+        if name not in list(model.names)[1:]:
+            raise UnknownNameError("joint", name, list(model.names)[1:])
+        joint = model.joints[model.getJointId(name)]
+        if joint.nq != 1:
+            raise RobotError(f"robot file {file!r}: joint {name!r} has {joint.nq} coordinates and "
+                             "cannot be locked")
+        q[joint.idx_q] = value
+        indices.append(int(joint.id))
+    return pin.buildReducedModel(model, indices, q)
+
+
+def _urdf_model(path: Path, base: Base | None) -> Any:
+    root = (pin.JointModelFreeFlyer(),) if base == "floating" else ()
+    return pin.buildModelFromUrdf(str(path), *root)
+
+
+def _mjcf_model(path: Path, base: Base | None) -> Any:
+    model = pin.buildModelFromMJCF(str(path))
+    if base == "floating" and not is_floating(model):
+        return pin.buildModelFromMJCF(str(path), pin.JointModelFreeFlyer())
+    if base == "fixed" and is_floating(model):
+        return pin.buildReducedModel(model, [1], pin.neutral(model))
+    return model
+
+
+Shapes = Callable[[Path, Any, bool], tuple[Any, list[str]]]
+
+
+def _geometry(path: Path, model: Any, read: Shapes) -> tuple[Any, list[str]]:
+    """Return collision geometries; without any mesh, or none at all, where the file fails."""
+    said: list[str] = []
+    for meshes in (True, False):
+        try:
+            geometries, missing = read(path, model, meshes)
+        except Exception as error:  # coal and assimp raise many kinds
+            what = "meshes" if meshes else "collision geometry"
+            said.append(f"the {what} cannot be read: {_in_one_line(error)}")
+        else:
+            return geometries, said + missing
+    return (), said
+
+
+def _in_one_line(error: Exception) -> str:
+    lines = [line.strip() for line in str(error).splitlines()]
+    of_use = [line.removeprefix("message:").strip() for line in lines
+              if line and not line.startswith(("From file", "in function", "at line"))]
+    return " ".join(of_use).strip()[:200] or type(error).__name__
+
+
+def _urdf_shapes(path: Path, model: Any, meshes: bool) -> tuple[Any, list[str]]:
+    """Read the text with each mesh's path made absolute, and without those that are not there."""
+    root, missing = ElementTree.parse(path).getroot(), []
+    for link in root.iter("link"):
+        for collision in link.findall("collision"):
+            mesh = collision.find("geometry/mesh")
+            if mesh is None:
+                continue
+            name = mesh.get("filename", "")
+            file = _mesh_file(name, path)
+            if meshes and file is not None:
+                mesh.set("filename", str(file))
+                continue
+            link.remove(collision)
+            if file is None:
+                missing.append(f"mesh {name!r} of link {link.get('name')!r} is not there")
+    text = ElementTree.tostring(root, encoding="unicode")
+    geometry = pin.buildGeomFromUrdfString(model, text, pin.GeometryType.COLLISION)
+    return geometry.geometryObjects, missing
+
+
+def _mesh_file(name: str, path: Path) -> Path | None:
+    """Return the file of a mesh that a URDF names, or None where there is none.
+
+    "package://NAME/..." is looked for in the folders above the URDF: one called NAME, or one that
+    has it in it.
+    """
+    if not name.startswith("package://"):
+        file = path.parent / name.removeprefix("file://")
+        return file.resolve() if file.is_file() else None
+    package, _, rest = name.removeprefix("package://").partition("/")
+    for folder in path.resolve().parents:
+        for at in (folder / package / rest, folder / rest if folder.name == package else folder):
+            if at.is_file():
+                return at
+    return None
+
+
+def _mjcf_shapes(path: Path, model: Any, meshes: bool) -> tuple[Any, list[str]]:
+    """Read a copy whose mesh folder is absolute, and without the meshes that are not there."""
+    root, missing = ElementTree.parse(path).getroot(), []
+    compiler = root.find("compiler")
+    if compiler is None:
+        compiler = ElementTree.SubElement(root, "compiler")
+    folder = (path.parent / (compiler.get("meshdir") or compiler.get("assetdir") or "")).resolve()
+    compiler.set("meshdir", str(folder))
+    absent = set()
+    for mesh in root.iter("mesh"):
+        file = mesh.get("file")
+        if file is not None and not (folder / file).is_file():
+            absent.add(mesh.get("name") or Path(file).stem)
+            missing.append(f"mesh {file!r} is not there")
+    for parent in list(root.iter()):
+        for geom in parent.findall("geom"):
+            name = geom.get("mesh")
+            if name is not None and (name in absent or not meshes):
+                parent.remove(geom)
+    with TemporaryDirectory() as copies:
+        copy = Path(copies) / path.name
+        copy.write_text(ElementTree.tostring(root, encoding="unicode"), encoding="utf-8")
+        geometry = pin.buildGeomFromMJCF(model, str(copy), pin.GeometryType.COLLISION)
+    return geometry.geometryObjects, missing
+
+
+def _held_by(model: Any, capsules: tuple[Any, ...]) -> tuple[Any, ...]:
+    """Leave out what belongs to no joint of the model, or has no size."""
+    return tuple(c for c in capsules if 0 <= c.joint < model.njoints
+                 and (c.radius > 0.0 or not np.array_equal(c.start, c.end)))

@@ -1,0 +1,133 @@
+"""Models of robots that are given as tables."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from hierarchy.avoidance.control_points import ControlPoint
+from hierarchy.avoidance.self_collision import Vector
+from hierarchy.problem import Array
+from hierarchy.robots.capsules import link_capsules
+from hierarchy.robots.found import Found
+from hierarchy.robots.table import Base, DHTable, Link, Table, TreeTable
+
+END_EFFECTOR = "end_effector"
+ROOT = "root_joint"
+
+
+def from_table(table: Table, base: Base | None = None) -> Found:
+    """Make the model of a table; `base` goes before the table's own."""
+    if isinstance(table, DHTable):
+        return _from_chain(table, base or "fixed")
+    return _from_tree(table, base or table.base)
+
+
+def _from_chain(table: DHTable, base: Base) -> Found:
+    model = _empty(table.name, base)
+    first = joint = model.njoints - 1
+    placement = pin.SE3.Identity()
+    for i, d in enumerate(table.d):
+        limit = np.deg2rad([table.range[i]])
+        joint = model.addJoint(joint, pin.JointModelRZ(), placement, f"joint_{i + 1}",
+                               np.array([table.effort[i]]), np.array([table.velocity[i]]),
+                               -limit, limit)
+        placement = pin.SE3(_rotation_about_x(table.alpha[i]), np.array([table.a[i], 0.0, d]))
+        model.appendBodyToJoint(joint, _rod(table, i), pin.SE3.Identity())
+        model.addJointFrame(joint, -1)
+    model.addFrame(pin.Frame(END_EFFECTOR, joint, placement, pin.FrameType.OP_FRAME))
+    return Found(model, END_EFFECTOR, link_capsules(table, base=first),
+                 _points(model, table.control_points))
+
+
+def _from_tree(table: TreeTable, base: Base) -> Found:
+    model = _empty(table.name, base)
+    root = model.njoints - 1
+    for joint in table.joints:
+        lower, upper = np.deg2rad(joint.range)
+        index = model.addJoint(
+            _index(model, joint.parent, root), _REVOLUTE[joint.axis](),
+            pin.SE3(np.eye(3), np.array(joint.at)), joint.name, np.array([joint.effort]),
+            np.array([joint.velocity]), np.array([lower]), np.array([upper]))
+        model.addJointFrame(index, -1)
+    links = [*((joint.name, joint.link) for joint in table.joints), *table.links]
+    for name, link in links:
+        model.appendBodyToJoint(_index(model, name, root), _capsule_inertia(link),
+                                pin.SE3.Identity())
+    for frame in table.frames:
+        placement = pin.SE3(_axes_with_z(frame.z_axis), np.array(frame.offset))
+        model.addFrame(pin.Frame(frame.name, _index(model, frame.joint, root), placement,
+                                 pin.FrameType.OP_FRAME))
+    return Found(model, table.end_effector, link_capsules(table, base=root),
+                 _points(model, table.control_points), _rest(model, table, base))
+
+
+def _empty(name: str, base: Base) -> Any:
+    model = pin.Model()
+    model.name = name
+    if base == "floating":
+        joint = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), ROOT)
+        model.addJointFrame(joint, -1)
+    return model
+
+
+def _rest(model: Any, table: TreeTable, base: Base) -> Array:
+    q = np.array(pin.neutral(model))
+    if base == "floating":
+        q[2] = table.base_height
+    q[model.nq - len(table.joints):] = np.deg2rad([joint.rest for joint in table.joints])
+    return q
+
+
+def _points(model: Any, points: tuple[tuple[str, Vector], ...]) -> tuple[ControlPoint, ...]:
+    return tuple(ControlPoint(f"{joint} {list(offset)}", int(model.getJointId(joint)),
+                              np.array(offset, dtype=float)) for joint, offset in points)
+
+
+def _index(model: Any, name: str, root: int) -> int:
+    return int(model.getJointId(name)) if name else root
+
+
+_REVOLUTE = {"x": pin.JointModelRX, "y": pin.JointModelRY, "z": pin.JointModelRZ}
+
+
+def _capsule_inertia(link: Link) -> Any:
+    """Inertia of a uniform cylinder of the capsule's whole length about its own centre."""
+    if link.mass == 0.0:
+        return pin.Inertia.Zero()
+    start, end = np.array(link.start), np.array(link.end)
+    way = end - start
+    length = float(np.linalg.norm(way))
+    across = link.mass * (3 * link.radius**2 + (length + 2 * link.radius) ** 2) / 12
+    along = link.mass * link.radius**2 / 2
+    axis = way / length if length > 0.0 else np.array([0.0, 0.0, 1.0])
+    inertia = across * np.eye(3) + (along - across) * np.outer(axis, axis)
+    return pin.Inertia(link.mass, (start + end) / 2, inertia)
+
+
+def _axes_with_z(z_axis: Vector) -> Array:
+    """Return a rotation (3, 3) whose third column is `z_axis`; the identity for z itself."""
+    z = np.array(z_axis) / np.linalg.norm(z_axis)
+    if z[2] > 1.0 - 1e-12:
+        return np.eye(3)
+    y = np.array([0.0, 1.0, 0.0]) if abs(z[1]) < 0.9 else np.array([0.0, 0.0, 1.0])
+    x = np.cross(y, z)
+    x /= np.linalg.norm(x)
+    return np.column_stack([x, np.cross(z, x), z])
+
+
+def _rod(table: DHTable, i: int) -> Any:
+    """Inertia of a uniform cylinder from the joint to the next origin."""
+    length = max(float(np.hypot(table.a[i], table.d[i])), 2 * table.radius)
+    across = table.mass[i] * (3 * table.radius**2 + length**2) / 12
+    along = table.mass[i] * table.radius**2 / 2
+    centre = np.array([table.a[i], 0.0, table.d[i]]) / 2
+    return pin.Inertia(table.mass[i], centre, np.diag([across, across, along]))
+
+
+def _rotation_about_x(degrees: float) -> Array:
+    """Exact for multiples of 90 degrees."""
+    c, s = np.round([np.cos(np.deg2rad(degrees)), np.sin(np.deg2rad(degrees))], 15)
+    return np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])

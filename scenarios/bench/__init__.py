@@ -1,0 +1,1 @@
+"""What is timed and compared: resolvers, the control tick, starts, packages of others."""

@@ -1,0 +1,1 @@
+"""What a scenario file describes, put together: robot, tasks, sensor and plant."""

@@ -1,0 +1,71 @@
+"""From the section [avoidance] to its tasks, its areas and its laws of repulsion."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hierarchy import Robot, Task
+from hierarchy.avoidance import Barrier, Repulsion, SurveillanceAreas
+from hierarchy.avoidance.self_collision import measure_capsules, pack_capsules, pairs_of_tree
+from hierarchy.tasks import Avoidance, Separation
+from hierarchy.tasks.self_separation import SelfSeparation
+from scenarios.cell.published import PublishedAvoidance
+from scenarios.cell.robot import sensed_points
+from scenarios.config import Scenario, ScenarioError
+from scenarios.config.avoidance import AvoidanceSection, RepulsionSection, SeparationSection
+
+
+def areas_of(scenario: Scenario) -> SurveillanceAreas | None:
+    """Return the areas of Algorithm 1, or None where it has no part."""
+    section = scenario.avoidance
+    if not isinstance(section, AvoidanceSection):
+        return None
+    return SurveillanceAreas(section.near, section.far, section.end_effector)
+
+
+def repulsion_of(section: RepulsionSection) -> Repulsion:
+    """Return the law of repulsion that a section describes."""
+    return Repulsion(section.maximum, section.reach, section.shape, section.scale)
+
+
+def avoidance_tasks(scenario: Scenario, robot: Robot) -> list[Task]:
+    """Return the tasks that keep the robot off obstacles and off itself."""
+    section = scenario.avoidance
+    if section is None:
+        return []
+    if isinstance(section, SeparationSection):
+        return _separation(section, robot, scenario.sensor.kind == "exact")
+    kind = PublishedAvoidance if section.jacobian == "published" else Avoidance
+    return [kind(robot.control_points, section.dimension)]
+
+
+def _separation(section: SeparationSection, robot: Robot, exact: bool) -> list[Task]:
+    tasks: list[Task] = []
+    if section.obstacles or not exact:
+        barrier = Barrier(section.distance, section.rate, section.influence, section.recovery,
+                          section.limit)
+        tasks.append(Separation(sensed_points(robot), barrier,
+                                len(section.obstacles) if exact else None))
+    if section.self_collision is not None:
+        pairs = separable_pairs(robot)
+        if not pairs:
+            raise ScenarioError(f"avoidance.self_collision: robot {robot.name!r} has no capsules "
+                                "that could be kept apart; list them in robot.capsules")
+        barrier = Barrier(section.self_collision, section.rate, section.influence,
+                          section.recovery, section.limit)
+        tasks.append(SelfSeparation(robot.capsules, barrier, pairs))
+    return tasks
+
+
+def separable_pairs(robot: Robot) -> list[tuple[int, int]]:
+    """Return the pairs of capsules that can be kept apart, as indices.
+
+    Neighbours of the tree share a joint and are none. Of capsules proposed for a file, which may
+    stand out, no pair counts that overlaps in the robot's own posture.
+    """
+    pairs = pairs_of_tree(robot.capsules, robot.parents)
+    if robot.table is not None or not pairs:
+        return pairs
+    distances = measure_capsules(robot.state(robot.rest).placements,
+                                 *pack_capsules(robot.capsules), np.array(pairs))[:, 0]
+    return [pair for pair, distance in zip(pairs, distances, strict=True) if distance > 0.0]

@@ -1,0 +1,89 @@
+"""From a scenario file to the parts of its control loop."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from hierarchy import Robot, Stack, State, Task
+from hierarchy.avoidance import Obstacles, SurveillanceAreas
+from hierarchy.problem import Array
+from hierarchy.tasks import JointLimits, Pointing, Position
+from scenarios.cell.avoidance import areas_of, avoidance_tasks
+from scenarios.cell.order import Order, order_of
+from scenarios.cell.plant import plant_of
+from scenarios.cell.plants import Plant
+from scenarios.cell.robot import make_robot, start_of
+from scenarios.cell.sensor import sensor_of
+from scenarios.cell.sensors import Sensor
+from scenarios.cell.tasks import (
+    limits_of,
+    listed_tasks,
+    pointing_of,
+    position_of,
+    posture_of,
+    reference_of,
+)
+from scenarios.config import Scenario
+
+
+@dataclass(frozen=True)
+class Cell:
+    """A robot with its start, its tasks and what it senses: everything the loop needs.
+
+    `start` is q (nq,) and v (n,). `order` says which tasks are in the stack, from the measurement
+    and the cone error. `position`, `pointing`, `limits` are the tasks of that name or None,
+    `listed` those of `[[tasks]]`; `areas` are those of Algorithm 1.
+    """
+
+    scenario: Scenario
+    robot: Robot
+    start: tuple[Array, Array]
+    state: State
+    plant: Plant
+    stack: Stack
+    sensor: Sensor | None
+    areas: SurveillanceAreas | None
+    position: Position | None
+    pointing: Pointing | None
+    limits: JointLimits | None
+    order: Order
+    listed: tuple[Task, ...] = ()
+
+
+def build(scenario: Scenario, kept: Cell | None = None) -> Cell:
+    """Make the parts; raises HierarchyError where the scenario does not fit its robot.
+
+    With `kept`, the cell of a scenario that differs in its tasks' settings or its resolver, its
+    robot, start, state, plant and obstacles go on, and its sensor where the settings of that are
+    the same.
+    """
+    control = scenario.control
+    robot = kept.robot if kept else make_robot(scenario.robot)
+    sensor = _kept_sensor(scenario, kept) if kept else sensor_of(scenario, robot)
+    if kept:
+        start, state, plant = kept.start, kept.state, kept.plant
+    else:
+        start = start_of(robot, scenario.start)
+        differences = control.jacobian_derivative == "difference"
+        state = State(robot, control.period if differences else None)
+        if sensor is not None:
+            sensor.check_start(robot.state(*start))
+        plant = plant_of(scenario, robot, start, sensor.obstacles if sensor else Obstacles())
+    areas = areas_of(scenario)
+    limits, first = limits_of(scenario, robot)
+    position, pointing = position_of(scenario, robot), pointing_of(scenario, robot)
+    listed = listed_tasks(scenario.tasks, robot.state(*start))
+    last = posture_of(scenario, robot, "task")
+    tasks = [*first, *avoidance_tasks(scenario, robot),
+             *(task for task in (position, pointing, *listed, last) if task)]
+    return Cell(scenario, robot, start, state, plant,
+                Stack(tasks, control.level, reference_of(scenario, robot)), sensor, areas,
+                position, pointing, limits, order_of(scenario, areas, first, tasks), tuple(listed))
+
+
+def _kept_sensor(scenario: Scenario, kept: Cell) -> Sensor | None:
+    same = (scenario.avoidance, scenario.sensor, scenario.limits) == (
+        kept.scenario.avoidance, kept.scenario.sensor, kept.scenario.limits)
+    if same or kept.sensor is None:
+        return kept.sensor
+    return sensor_of(scenario, kept.robot, kept.sensor.obstacles)

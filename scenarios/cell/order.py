@@ -1,0 +1,83 @@
+"""Which tasks are in the stack in one tick, and in which order."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from functools import cache
+from itertools import product
+from math import inf, nan
+from typing import Protocol, final
+
+from hierarchy import Task
+from hierarchy.allocation import POINTING, POSITION, Allocation, allocate
+from hierarchy.avoidance import Measurement, SurveillanceAreas
+from scenarios.config import Scenario
+
+
+class Order(Protocol):
+    """Which tasks are in the stack in one tick, and in which order."""
+
+    @property
+    def possible(self) -> Iterable[tuple[str, ...]]:
+        """Every order that may come up."""
+
+    def __call__(self, seen: Measurement | None, cone_error: float) -> Allocation:
+        """Return the order at the distances measured and cos(alpha_d) - cos(alpha)."""
+
+
+@final
+class Hierarchical:
+    """All tasks at all times: the resolver decides what acts."""
+
+    def __init__(self, names: Sequence[str]) -> None:
+        self._allocation = Allocation(tuple(names), repulsion=False)
+        self.possible = [self._allocation.order]
+
+    def __call__(self, seen: Measurement | None, cone_error: float) -> Allocation:
+        """Return the order; measurement and cone error do not matter."""
+        return self._allocation
+
+
+@final
+class Switched:
+    """Algorithm 1, behind the tasks called `first`; without `areas` the cone alone is switched.
+
+    With `always_point` the cone is an equality, in the stack at all times.
+    """
+
+    def __init__(self, areas: SurveillanceAreas | None, always_point: bool,
+                 first: Sequence[str] = (), position: bool = True) -> None:
+        self._areas, self._always_point = areas, always_point
+        self._first, self._position = tuple(first), position
+        self._behind_first = cache(self._put_behind)
+        distances = (inf,) if areas is None else (areas.near, areas.far, inf)
+        self.possible = {self._choose(body, end, cone).order for body, end, cone in product(
+            distances, (0.0, inf), (1.0, nan))}
+
+    def __call__(self, seen: Measurement | None, cone_error: float) -> Allocation:
+        """Return the order at the distances measured and cos(alpha_d) - cos(alpha)."""
+        if seen is None:
+            return self._choose(inf, inf, cone_error)
+        return self._choose(seen.minimal_distance, seen.end_effector_distance, cone_error)
+
+    def _choose(self, body: float, end: float, cone_error: float) -> Allocation:
+        if self._areas is None:
+            point = cone_error > 0.0 or self._always_point
+            chosen = Allocation((POSITION,) * self._position + (POINTING,) * point,
+                                repulsion=False)
+        else:
+            chosen = allocate(body, end, cone_error, self._areas, self._always_point)
+        return self._behind_first(chosen) if self._first else chosen
+
+    def _put_behind(self, chosen: Allocation) -> Allocation:
+        return Allocation((*self._first, *chosen.order), chosen.repulsion)
+
+
+def order_of(scenario: Scenario, areas: SurveillanceAreas | None, first: Sequence[Task],
+             tasks: Sequence[Task]) -> Order:
+    """Return the order of a scenario's tasks; those of `first` are above all others always."""
+    if scenario.control.stack == "hierarchical":
+        return Hierarchical([task.name for task in tasks])
+    always_point = bool(scenario.pointing and scenario.pointing.kind == "equality")
+    return Switched(areas, always_point, [task.name for task in first],
+                    scenario.position is not None)

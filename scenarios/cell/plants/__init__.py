@@ -1,0 +1,8 @@
+"""What the commands move."""
+
+from scenarios.cell.plants.kinematic import KinematicArm
+from scenarios.cell.plants.measured import Apart, Commanded, JointSensor
+from scenarios.cell.plants.physics import PhysicsArm
+from scenarios.cell.plants.plant import Plant
+
+__all__ = ["Apart", "Commanded", "JointSensor", "KinematicArm", "PhysicsArm", "Plant"]

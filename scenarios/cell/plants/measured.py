@@ -1,0 +1,104 @@
+"""What a controller is told of a plant, kept apart from what is so."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Mapping
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hierarchy.problem import Array
+from scenarios.cell.plants.plant import Driven, Plant
+from scenarios.config import ScenarioError
+from scenarios.config.plant import MeasurementSection
+
+_WHOLE = 1e-6  # of a period: a delay this near to a whole number of periods is one
+
+
+class Sensed(Protocol):
+    """Turns the true state into what the controller is told of it."""
+
+    def __call__(self, q: Array, v: Array) -> tuple[Array, Array]: ...  # noqa: D102
+
+
+class Apart:
+    """A plant whose q and v are what `sensed` makes of the true ones, once each period.
+
+    The truth at the start of each period is recorded as `true_q`, `true_v`.
+    """
+
+    def __init__(self, plant: Plant, sensed: Sensed) -> None:
+        self._plant, self._sensed = plant, sensed
+        self._true_q, self._true_v = plant.q.copy(), plant.v.copy()
+        self.extra: Mapping[str, NDArray[Any]] = {
+            "true_q": self._true_q, "true_v": self._true_v, **plant.extra}
+        self.q, self.v = sensed(plant.q, plant.v)
+
+    @property
+    def a(self) -> Array:
+        """The acceleration (n,) [rad/s^2] that the last command meant."""
+        return self._plant.a
+
+    def act(self, command: Array) -> None:
+        """Apply a command (n,) for one period, then measure."""
+        plant = self._plant
+        self._true_q[:], self._true_v[:] = plant.q, plant.v
+        plant.act(command)
+        self.q, self.v = self._sensed(plant.q, plant.v)
+
+
+class Commanded:
+    """Tells the controller what its own commands add up to, and nothing of the real joints."""
+
+    def __init__(self, plant: Driven) -> None:
+        self._plant = plant
+
+    def __call__(self, q: Array, v: Array) -> tuple[Array, Array]:
+        """Return the reference in place of q (n,), v (n,)."""
+        return self._plant.reference_q.copy(), self._plant.reference_v.copy()
+
+
+class JointSensor:
+    """Joint sensors with noise, steps and delay, read every `period` [s]; seeded.
+
+    A position gets its noise, then goes to the nearest step. With velocity = "differenced" the
+    velocity is the backward difference of these positions, passed through a low-pass of first
+    order, and at first the true one. All is told `delay` later, and up to then as at the start.
+    Raises ScenarioError where the delay is no whole number of periods.
+    """
+
+    def __init__(self, section: MeasurementSection, period: float) -> None:
+        behind = section.delay / period
+        if abs(behind - round(behind)) > _WHOLE:
+            raise ScenarioError(f"plant.measurement.delay = {section.delay:g} s is not a whole "
+                                f"number of periods of {period:g} s")
+        self._section, self._period = section, period
+        self._random = np.random.default_rng(section.seed)
+        self._behind: deque[tuple[Array, Array]] = deque(maxlen=round(behind) + 1)
+        self._last: tuple[Array, Array] | None = None  # position and filtered velocity
+
+    def __call__(self, q: Array, v: Array) -> tuple[Array, Array]:
+        """Return what is told now (n,), (n,) when the joints are at q (n,), v (n,)."""
+        position = self._position(q)
+        velocity = (self._differenced(position, v) if self._section.velocity == "differenced"
+                    else v + self._noise(self._section.velocity_noise, len(v)))
+        self._last = position, velocity
+        self._behind.append((position, velocity))
+        return self._behind[0]
+
+    def _position(self, q: Array) -> Array:
+        noisy = q + self._noise(self._section.position_noise, len(q))
+        step = self._section.quantisation
+        return noisy if step == 0.0 else np.round(noisy / step) * step
+
+    def _noise(self, deviation: float, n: int) -> Array:
+        return deviation * self._random.standard_normal(n)
+
+    def _differenced(self, position: Array, v: Array) -> Array:
+        if self._last is None:
+            return v.copy()
+        before, velocity = self._last
+        share = self._period / (self._period + self._section.filter_time)
+        return velocity + share * ((position - before) / self._period - velocity)

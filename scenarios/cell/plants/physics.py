@@ -1,0 +1,163 @@
+"""An arm in MuJoCo under position servos, sent joint positions as an arm is through KUKA's FRI."""
+
+# mypy: disable-error-code="no-untyped-def"
+
+from __future__ import annotations
+
+from math import ceil
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hierarchy import Robot
+from hierarchy.avoidance import Obstacles
+from hierarchy.jit import compiled
+from hierarchy.problem import Array
+from hierarchy.robots import TABLES, DHTable
+from hierarchy.task import Level
+from scenarios.cell.plants.mjcf import each, scene
+from scenarios.config import ScenarioError
+from scenarios.config.plant import JointsSection, ServoSection
+
+_ROUNDING = 1e-9  # of a number of steps
+_ARMS = [name for name, table in TABLES.items() if isinstance(table, DHTable)]
+
+
+class PhysicsArm:
+    """Adds commands up to a reference, which the servos of a simulated arm follow.
+
+    `q`, `v` (n,) are the true joint state, `a` (n,) the acceleration that the last command meant,
+    `reference_q`, `reference_v` (n,) the servos' reference at the end of the period [rad, s].
+    `extra`: `contacts`, how many points of arm and obstacles touched at once in the last period at
+    most, `contact_depth` [m] and `contact_force` [N], the largest normal one. Obstacles are where
+    `obstacles` has them at each step; a point has no body, so nothing touches it.
+
+    Raises ScenarioError where mujoco is not installed, and for a robot that is not a table.
+    """
+
+    def __init__(self, robot: Robot, q: Array, v: Array, period: float, level: Level,
+                 obstacles: Obstacles | None = None, servo: ServoSection | None = None,
+                 joints: JointsSection | None = None) -> None:
+        mujoco = _mujoco()
+        servo, joints = servo or ServoSection(), joints or JointsSection()
+        if not isinstance(robot.table, DHTable):
+            raise ScenarioError(f'plant.kind = "mujoco": robot {robot.name!r} is not one of '
+                                f"{', '.join(_ARMS)}, the arms given as tables")
+        self._steps = ceil(period * servo.rate - _ROUNDING)
+        self._period, self._acceleration = period, level == "acceleration"
+        self.stiffness, self.damping = _gains(robot, q, servo, joints)
+        self._obstacles = obstacles or Obstacles()
+        self.model = mujoco.MjModel.from_xml_string(
+            scene(robot, robot.capsules, self._obstacles.obstacles, joints,
+                  servo, (self.stiffness, self.damping), period / self._steps))
+        self.data = mujoco.MjData(self.model)
+        self._step, self._force_of = mujoco.mj_step, mujoco.mj_contactForce
+        self._lower, self._upper = robot.lower, robot.upper
+        self._lead, self._feedforward = servo.lead, float(servo.feedforward)
+        self._placed = self._bodies(mujoco)
+        self._start(mujoco, q, v)
+
+    def _start(self, mujoco: Any, q: Array, v: Array) -> None:
+        self.data.qpos[:], self.data.qvel[:] = q, v
+        # A joint that starts beyond its limit has its stop there, and is not flung back.
+        self.model.jnt_range[:] = np.column_stack([np.minimum(self.model.jnt_range[:, 0], q),
+                                                   np.maximum(self.model.jnt_range[:, 1], q)])
+        self.q, self.v, self.a = q.copy(), v.copy(), np.zeros(len(v))
+        self.reference_q, self.reference_v = q.copy(), v.copy()
+        self._time, self._wrench = 0.0, np.zeros(6)
+        self._references = np.zeros((self._steps, 2 * len(v)))
+        self._contacts = np.zeros((), dtype=np.int16)
+        self._depth, self._force = np.zeros(()), np.zeros(())
+        self.extra: dict[str, NDArray[Any]] = {
+            "contacts": self._contacts, "contact_depth": self._depth,
+            "contact_force": self._force}
+        self._place(0.0)
+        mujoco.mj_forward(self.model, self.data)
+
+    def act(self, command: Array) -> None:
+        """Apply a command (n,) for one period."""
+        _follow(command, self._period, self._acceleration, self._lower, self._upper, self._lead,
+                self._feedforward, self.q, self.reference_q, self.reference_v, self.a,
+                self._references)
+        self._contacts[...], self._depth[...], self._force[...] = 0, 0.0, 0.0
+        dt = self._period / self._steps
+        for i, reference in enumerate(self._references):
+            self._place(self._time + i * dt)
+            self.data.ctrl[:] = reference
+            self._step(self.model, self.data)
+            if self.data.ncon:
+                self._look_at_contacts()
+        self._time += self._period
+        self.q[:], self.v[:] = self.data.qpos, self.data.qvel
+
+    def _bodies(self, mujoco: Any) -> list[tuple[int, int]]:
+        """Index of each obstacle that has a body, and of its place among the bodies put there."""
+        found = []
+        for h in range(len(self._obstacles)):
+            body = mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_BODY, f"obstacle {h + 1}")
+            if body >= 0:
+                found.append((h, int(self.model.body_mocapid[body])))
+        return found
+
+    def _place(self, t: float) -> None:
+        """Put the obstacles where they are at time t [s]."""
+        self._obstacles.at(t)
+        for h, placed in self._placed:
+            self.data.mocap_pos[placed] = self._obstacles.centres[h]
+
+    def _look_at_contacts(self) -> None:
+        """Note the contacts of one step; each is between the arm and an obstacle."""
+        contacts = self.data.contact
+        self._contacts[...] = max(int(self._contacts), len(contacts))
+        self._depth[...] = max(float(self._depth), -float(contacts.dist.min()))
+        for i in range(len(contacts)):
+            self._force_of(self.model, self.data, i, self._wrench)
+            self._force[...] = max(float(self._force), float(self._wrench[0]))
+
+
+def _mujoco() -> Any:
+    try:
+        import mujoco
+    except ImportError as error:
+        raise ScenarioError('plant.kind = "mujoco" needs MuJoCo, which is not installed: '
+                            "pip install 'task-hierarchy[sim]'") from error
+    return mujoco
+
+
+def _gains(robot: Robot, q: Array, servo: ServoSection,
+           joints: JointsSection) -> tuple[Array, Array]:
+    """Stiffness (n,) [N m/rad] and damping (n,) [N m s/rad] of critically damped servos."""
+    bandwidth = each(servo.bandwidth, robot.n, "plant.servo.bandwidth")
+    inertia = np.diag(robot.state(q).mass_matrix()) + each(
+        joints.armature, robot.n, "plant.joints.armature")
+    return inertia * bandwidth**2, 2.0 * inertia * bandwidth
+
+
+@compiled
+def _follow(x, T, acceleration, lower, upper, lead, feedforward, q, reference_q, reference_v, a,
+            references):
+    """Move the reference by one command, and interpolate it: `references` (steps, 2 n)."""
+    n, steps = len(q), references.shape[0]
+    for i in range(n):
+        rate = reference_v[i]
+        if acceleration:
+            a[i] = x[i]
+            after = rate + x[i] * T
+            step = rate * T + x[i] * T * T / 2
+        else:
+            a[i] = (x[i] - rate) / T
+            after = x[i]
+            step = x[i] * T
+        asked = reference_q[i] + step
+        # A reference beyond a limit, where the arm started, may come back at its own pace.
+        low, up = min(lower[i], reference_q[i]), max(upper[i], reference_q[i])
+        allowed = min(max(asked, q[i] - lead, low), q[i] + lead, up)
+        if allowed != asked:  # the reference is held, and its rate is what it still does
+            step = allowed - reference_q[i]
+            after = step / T
+        for k in range(steps):
+            references[k, i] = reference_q[i] + step * (k + 1) / steps
+            references[k, n + i] = feedforward * step / T
+        reference_q[i] += step
+        reference_v[i] = after

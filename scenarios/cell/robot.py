@@ -1,0 +1,83 @@
+"""From the sections [robot] and [start] to a robot and where it starts."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hierarchy import HierarchyError, Robot, Stack, State
+from hierarchy.avoidance import Capsule, ControlPoint
+from hierarchy.paths import Still
+from hierarchy.problem import Array
+from hierarchy.tasks import Position
+from scenarios.config import ScenarioError
+from scenarios.config.robot import RobotSection, StartSection
+from solvers import make
+
+_REACHED = 1e-6      # [m]
+_REACH_STEPS = 500   # damped Newton steps; a reachable point takes some ten
+_LONGEST_STEP = 0.3  # [rad] of any joint
+
+
+def make_robot(section: RobotSection) -> Robot:
+    """Make the robot of a scenario, with the points and the capsules the scenario asks for."""
+    robot = Robot.load(section.model, section.end_effector, section.base, section.locked)
+    if section.control_points is not None:
+        robot.control_points = tuple(
+            robot.control_point(point.joint, point.offset) if point.joint is not None
+            else robot.control_point_of_frame(str(point.frame), point.offset)
+            for point in section.control_points)
+    if section.capsules is not None:
+        base = 1 if robot.base == "floating" else 0
+        robot.capsules = tuple(
+            Capsule(f"{capsule.joint or 'base'} {i}",
+                    base if capsule.joint is None else robot.joint(capsule.joint),
+                    capsule.start, capsule.end, capsule.radius)
+            for i, capsule in enumerate(section.capsules, 1))
+    return robot
+
+
+def sensed_points(robot: Robot) -> tuple[ControlPoint, ...]:
+    """Return what a sensor measures: the control points, and the end effector as the last."""
+    end = robot.frame(robot.end_effector)
+    return (*robot.control_points, ControlPoint(end.name, end.joint, end.offset))
+
+
+def start_of(robot: Robot, section: StartSection) -> tuple[Array, Array]:
+    """Return q (nq,) and v (n,) of a robot's start, with the end effector where it is asked to be.
+
+    Raises ScenarioError where the section does not fit the robot, or the point is out of reach.
+    """
+    state = _state(robot, section)
+    q, v = state.q.copy(), state.v.copy()
+    if section.end_effector is not None:
+        q = _reach(robot, q, np.array(section.end_effector))
+    return q, v
+
+
+def _state(robot: Robot, section: StartSection) -> State:
+    q = robot.rest.copy() if section.q is None else np.array(section.q)
+    try:
+        if q.shape == (robot.nq,):
+            for name, value in section.joints.items():
+                q[robot.coordinate(name)] = value
+        return robot.state(q, section.v)
+    except HierarchyError as error:
+        raise ScenarioError(f"start: {error}") from error
+
+
+def _reach(robot: Robot, q: Array, point: Array) -> Array:
+    """Bring the end effector to a point [m] from q, or raise a ScenarioError."""
+    frame, resolver = robot.frame(robot.end_effector), make("tpm", damping=0.05)
+    stack = Stack([Position(frame, Still(point.tolist()), gain=1.0)], "velocity")
+    nearest = np.inf
+    for _ in range(_REACH_STEPS):
+        state = robot.state(q)
+        distance = float(np.linalg.norm(state.position(frame) - point))
+        nearest = min(nearest, distance)
+        if distance < _REACHED:
+            return q
+        step = resolver.solve(stack.hierarchy(state)).x
+        step = step * min(1.0, _LONGEST_STEP / max(float(np.abs(step).max()), 1e-12))
+        q = robot.integrate(q, step)
+    raise ScenarioError(f"start.end_effector {point.tolist()} m cannot be reached: robot "
+                        f"{robot.name!r} came no nearer than {nearest:.3g} m")

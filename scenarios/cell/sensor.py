@@ -1,0 +1,111 @@
+"""From [sensor] and [avoidance] to what measures distances."""
+
+from __future__ import annotations
+
+from math import inf
+from typing import NamedTuple
+
+import numpy as np
+
+from hierarchy import HierarchyError, Robot
+from hierarchy.avoidance import Capsule, Obstacles, Repulsion
+from scenarios.cell.avoidance import repulsion_of
+from scenarios.cell.obstacles import make_obstacles
+from scenarios.cell.sensors import ExactDistances, Sensor
+from scenarios.cell.sensors.camera import DepthCamera, Pinhole, looking_at
+from scenarios.cell.sensors.depth_sensor import DepthSensor, Source
+from scenarios.cell.sensors.depth_space import DepthSpace
+from scenarios.cell.sensors.errors import DepthErrors
+from scenarios.cell.sensors.frames import RecordedFrames
+from scenarios.config import Scenario, ScenarioError
+from scenarios.config.avoidance import SeparationSection
+from scenarios.config.sensor import SensorSection
+
+
+class _Asked(NamedTuple):
+    """What is asked of a sensor: obstacles within `region` [m]; mean directions, by which laws."""
+
+    region: float
+    mean: bool = False
+    body: Repulsion | None = None
+    tip: Repulsion | None = None
+
+
+def sensor_of(scenario: Scenario, robot: Robot,
+              obstacles: Obstacles | None = None) -> Sensor | None:
+    """Return what measures distances to the obstacles, None without [avoidance].
+
+    `obstacles` are those of the scenario unless others are given. Raises ScenarioError where the
+    robot has no control points, or [sensor] does not fit it.
+    """
+    section = scenario.avoidance
+    if section is None:
+        return None
+    if not robot.control_points:
+        raise ScenarioError(f"[avoidance]: robot {robot.name!r} has no control points; list them "
+                            "in robot.control_points")
+    if obstacles is None:
+        obstacles = make_obstacles(section.placed)
+    if isinstance(section, SeparationSection):
+        exact = ExactDistances(robot, obstacles, pairs=True)
+        return _seen_by(scenario, robot, exact, _Asked(section.influence))
+    asked = _Asked(max(section.far, section.end_effector), section.direction == "mean",
+                   repulsion_of(section.body), repulsion_of(section.tip))
+    exact = ExactDistances(robot, obstacles, asked.body, asked.tip,
+                           section.far if asked.mean else 0.0)
+    return _seen_by(scenario, robot, exact, asked)
+
+
+def _seen_by(scenario: Scenario, robot: Robot, exact: ExactDistances, asked: _Asked) -> Sensor:
+    """Return the sensor that the scenario asks for, in place of an exact one."""
+    if scenario.sensor.kind == "exact":
+        return exact
+    danger = scenario.limits.danger_reach if scenario.limits else None
+    try:
+        return _depth_sensor(scenario.sensor, robot, exact,
+                             asked._replace(region=max(asked.region, danger or 0.0)))
+    except HierarchyError as error:
+        raise ScenarioError(f"sensor: {error}") from error
+
+
+def _depth_sensor(section: SensorSection, robot: Robot, exact: ExactDistances,
+                  asked: _Asked) -> DepthSensor:
+    """Make the sensor of a section for what `exact` would measure."""
+    capsules = _capsules(robot, section.foot)
+    source: Source
+    checked: ExactDistances | None = None
+    if section.kind == "camera":
+        source, checked = _camera(section, exact, capsules), exact
+    else:
+        source = RecordedFrames(section.folder or "", robot, section.latency)
+    space = DepthSpace(source.pinhole, exact.points, capsules, section.region or asked.region,
+                       section.margin, inf if section.thin is None else section.thin,
+                       section.support, section.band, asked.mean, asked.body, asked.tip,
+                       exact.measurement.pairs is not None)
+    return DepthSensor(source, space, section.stale_after, section.least_readings, checked)
+
+
+def _camera(section: SensorSection, exact: ExactDistances,
+                capsules: tuple[Capsule, ...]) -> DepthCamera:
+    """Make the simulated camera of a section."""
+    rotation = (looking_at(section.position, section.look_at) if section.rotation is None
+                else np.array(section.rotation))
+    pinhole = Pinhole(section.width, section.height, section.fx, section.fy, section.cx,
+                      section.cy, section.position, rotation)
+    errors = DepthErrors.none(section.near, section.far) if section.ideal else DepthErrors(
+        section.noise_floor, section.noise_growth, section.noise_from, section.rounding,
+        section.step, section.near, section.far, section.missing, section.missing_at_edges,
+        section.outliers, section.outlier_size)
+    return DepthCamera(pinhole, exact.obstacles, capsules, errors, section.rate, section.jitter,
+                       section.latency, section.seed, section.point_radius,
+                       section.backdrop or inf)
+
+
+def _capsules(robot: Robot, foot: float) -> tuple[Capsule, ...]:
+    if not robot.capsules:
+        raise HierarchyError(f"robot {robot.name!r} has no capsules, by which it is taken out of "
+                             "the image")
+    if foot == 0.0 or robot.base == "floating":
+        return robot.capsules
+    column = Capsule("foot", 0, (0.0, 0.0, -foot), (0.0, 0.0, 0.0), robot.capsules[0].radius)
+    return (column, *robot.capsules)

@@ -1,0 +1,8 @@
+"""Where distances come from: known geometry, or depth images."""
+
+from scenarios.cell.sensors.depth_sensor import DepthSensor
+from scenarios.cell.sensors.exact import ExactDistances
+
+Sensor = ExactDistances | DepthSensor
+
+__all__ = ["DepthSensor", "ExactDistances", "Sensor"]

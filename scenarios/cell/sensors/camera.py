@@ -1,0 +1,142 @@
+"""A simulated depth camera: what it sees of obstacles and robot, and when."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import floor, inf
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from hierarchy import HierarchyError, State
+from hierarchy.avoidance import Capsule, Obstacles
+from hierarchy.avoidance.self_collision import pack_capsules
+from hierarchy.problem import Array
+from scenarios.cell.sensors.errors import DepthErrors, Image, expose
+from scenarios.cell.sensors.rendering import draw_scene
+
+_ROUNDING = 1e-9   # [s] of times that are compared
+_SKEW = 1e-6       # by how much a rotation may fail to be one
+
+
+@dataclass(frozen=True)
+class Pinhole:
+    """Intrinsics and pose of a camera.
+
+    width, height [px]; fx, fy [px]; cx, cy [px], the middle of the image if None. A pixel u, v has
+    its centre there. position (3,) [m]; rotation (3, 3), whose columns are the camera's axes in
+    the world: x to the right of the image, y down, z along the optical axis.
+    """
+
+    width: int = 640
+    height: int = 480
+    fx: float = 525.0
+    fy: float = 525.0
+    cx: float | None = None
+    cy: float | None = None
+    position: ArrayLike = (0.0, 0.0, 0.0)
+    rotation: ArrayLike = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
+
+    def __post_init__(self) -> None:
+        for name in ("width", "height", "fx", "fy"):
+            if not 0 < getattr(self, name) < inf:
+                raise HierarchyError(f"camera: {name} = {getattr(self, name)} px must be positive")
+        for name, size in (("cx", self.width), ("cy", self.height)):
+            if getattr(self, name) is None:
+                object.__setattr__(self, name, (size - 1) / 2)
+        R = np.asarray(self.rotation, dtype=float)
+        if R.shape != (3, 3) or not np.abs(R @ R.T - np.eye(3)).max() < _SKEW or (
+                np.linalg.det(R) < 0.0):
+            raise HierarchyError(f"camera: rotation {R.tolist()} is none")
+        if not np.isfinite(np.asarray(self.position, dtype=float)).all():
+            raise HierarchyError(f"camera: position {self.position} is not finite")
+
+    def packed(self) -> Array:
+        """What kernels take (16,): fx, fy, cx, cy, position, rotation row by row."""
+        return np.array([self.fx, self.fy, self.cx, self.cy,
+                         *np.asarray(self.position, dtype=float),
+                         *np.asarray(self.rotation, dtype=float).ravel()])
+
+    def project(self, points: ArrayLike) -> Array:
+        """Return u, v [px] and depth [m] (..., 3) of world points (..., 3) [m]."""
+        seen = (np.asarray(points, dtype=float) - np.asarray(self.position)) @ np.asarray(
+            self.rotation, dtype=float)
+        depth = seen[..., 2]
+        return np.stack([self.fx * seen[..., 0] / depth + self.cx,
+                         self.fy * seen[..., 1] / depth + self.cy, depth], axis=-1)
+
+    def deproject(self, pixels: ArrayLike) -> Array:
+        """Return the world points (..., 3) [m] of u, v [px] and depth [m] (..., 3)."""
+        u, v, depth = np.moveaxis(np.asarray(pixels, dtype=float), -1, 0)
+        seen = np.stack([(u - self.cx) / self.fx * depth, (v - self.cy) / self.fy * depth, depth],
+                        axis=-1)
+        return np.asarray(seen @ np.asarray(self.rotation, dtype=float).T
+                          + np.asarray(self.position))
+
+
+def looking_at(position: ArrayLike, target: ArrayLike) -> Array:
+    """Rotation (3, 3) of a camera at `position` [m] that has `target` [m] in the middle, upright.
+
+    Upright is with the world's z up in the image; looking straight up or down, with its y up.
+    """
+    forward = np.subtract(target, position).astype(float)
+    length = float(np.linalg.norm(forward))
+    if length == 0.0:
+        raise HierarchyError(f"camera: position and look_at are both {list(np.ravel(target))} m")
+    forward /= length
+    upright = np.abs(forward[2]) < 1.0 - _SKEW
+    right = np.cross(forward, (0.0, 0.0, 1.0) if upright else (0.0, 1.0, 0.0))
+    right /= np.linalg.norm(right)
+    return np.column_stack([right, np.cross(forward, right), forward])
+
+
+class DepthCamera:
+    """Takes depth images (h, w) [m] of obstacles and of a robot made of capsules; 0 is no reading.
+
+    Points among the obstacles are seen as balls of `point_radius` [m]; a wall stands across the
+    optical axis at depth `backdrop` [m], infinite for none. Frame i is taken at i / `rate` [Hz]
+    plus up to `jitter` [s], and is there `latency` [s] later. The errors of frame i follow from
+    `seed` and i alone. `scene` has the true depths of the last frame, infinite where nothing is.
+    """
+
+    def __init__(self, pinhole: Pinhole, obstacles: Obstacles, capsules: tuple[Capsule, ...],
+                 errors: DepthErrors | None = None, rate: float = 30.0, jitter: float = 0.0,
+                 latency: float = 0.0, seed: int = 0, point_radius: float = 0.02,
+                 backdrop: float = inf) -> None:
+        if not 0.0 <= jitter < 1.0 / rate:
+            raise HierarchyError(f"camera: jitter = {jitter} s must be below 1 / rate = "
+                                 f"{1.0 / rate:.3g} s")
+        self.pinhole, self.obstacles, self.latency = pinhole, obstacles, latency
+        self.errors = DepthErrors() if errors is None else errors
+        self._rate, self._jitter, self._seed = rate, jitter, seed
+        self._eye, self._packed = pinhole.packed(), self.errors.packed()
+        self._joints, self._capsules = pack_capsules(capsules)
+        self._point_radius, self._backdrop = point_radius, backdrop
+        size = (pinhole.height, pinhole.width)
+        self.scene, self._reading = np.zeros(size, np.float32), np.zeros(size, np.float32)
+        self._normal, self._uniform = np.zeros(size, np.float32), np.ones(size, np.float32)
+
+    def time(self, frame: int) -> float:
+        """When a frame is taken [s]."""
+        wait = self._jitter * self._rng(frame, 1).random() if self._jitter else 0.0
+        return frame / self._rate + wait
+
+    def newest(self, t: float) -> int:
+        """Number of the last frame taken by time t [s], -1 before the first."""
+        frame = floor((t + _ROUNDING) * self._rate)
+        return frame - (frame >= 0 and self.time(frame) > t + _ROUNDING)
+
+    def image(self, frame: int, state: State) -> tuple[Image, Array]:
+        """Take a frame at a state: the image, valid until the next, and the robot's placements."""
+        draw_scene(self.scene, self._eye, self._backdrop, self.obstacles.at(state.t),
+                   self._point_radius, state.placements, self._joints, self._capsules)
+        rng = self._rng(frame, 0)
+        if self.errors.random:
+            rng.standard_normal(out=self._normal, dtype=np.float32)
+            rng.random(out=self._uniform, dtype=np.float32)
+        expose(self.scene, self._normal, self._uniform, self._packed, self._reading)
+        self.errors.add_outliers(rng, self._reading)
+        return self._reading, state.placements
+
+    def _rng(self, frame: int, use: int) -> np.random.Generator:
+        return np.random.default_rng((self._seed, frame, use))

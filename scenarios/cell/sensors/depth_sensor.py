@@ -1,0 +1,117 @@
+"""The depth camera in the control loop: frames that come now and then, late or not at all."""
+
+from __future__ import annotations
+
+from collections import deque
+from math import inf
+from time import perf_counter
+from typing import Protocol
+
+from hierarchy import State
+from hierarchy.avoidance import ControlPoint, Measurement, Obstacles
+from hierarchy.problem import Array
+from scenarios.cell.sensors.camera import Pinhole
+from scenarios.cell.sensors.depth_space import DepthSpace, ObstacleImage
+from scenarios.cell.sensors.errors import Image
+from scenarios.cell.sensors.exact import ExactDistances
+
+_ROUNDING = 1e-9  # [s] of times that are compared
+
+
+class Source(Protocol):
+    """Where depth images come from: `DepthCamera` or `RecordedFrames`."""
+
+    pinhole: Pinhole
+    obstacles: Obstacles
+    latency: float
+
+    def newest(self, t: float) -> int:
+        """Number of the last frame taken by time t [s], -1 before the first."""
+
+    def image(self, frame: int, state: State) -> tuple[Image, Array]:
+        """The image (h, w) [m] of a frame and the robot's placements when it was taken."""
+
+
+class DepthSensor:
+    """Measures control points and end effector in the last depth image that has come.
+
+    A frame is taken in the first tick at or after its time, with the robot as it is then, and is
+    used from `source.latency` [s] after that until the next has come; meanwhile the points move on
+    with the robot. A frame that has a reading in less than `least_readings` of its pixels is as
+    good as none.
+
+    `measurement.stamp` is the time [s] at which the image in use was taken, -inf before the first;
+    `measurement.blind` is set while that is more than `stale_after` [s] ago: the camera has
+    stopped, is late or sees nothing. Distances are then those of the last image, infinite without
+    any, and the controller treats the tick as stale. While `stopped` no frames are taken, while
+    `covered` they have no readings: what faults do. `outside` [s] is how long the source took to
+    make the image in the last measurement: work of a real camera, not of the control loop.
+    """
+
+    def __init__(self, source: Source, space: DepthSpace, stale_after: float = 0.2,
+                 least_readings: float = 0.1, exact: ExactDistances | None = None) -> None:
+        self.source, self.space, self.stale_after = source, space, stale_after
+        self.least_readings = least_readings
+        self.points: tuple[ControlPoint, ...] = space.points
+        self.measurement, self.obstacles = space.measurement, source.obstacles
+        self.reading: Image | None = None
+        self.stopped = self.covered = False
+        self.outside = 0.0
+        self._exact = exact
+        self._nothing = self._current = ObstacleImage(space.pinhole)
+        self._spare: list[ObstacleImage] = []
+        self._coming: deque[tuple[float, ObstacleImage]] = deque()
+        self._frame, self._now = -1, -inf
+        self._forget()
+
+    def measure(self, state: State) -> Measurement:
+        """Measure at a state and hang the measurement on it; valid until the next call."""
+        t, seen = state.t, self.measurement
+        self.outside = 0.0
+        if t < self._now:
+            self._forget()
+        self._now = t
+        frame = self.source.newest(t)
+        if frame > self._frame:
+            self._frame = frame
+            self._take(frame, state)
+        while self._coming and t - self._coming[0][0] >= self.source.latency - _ROUNDING:
+            self._keep(self._current)
+            seen.stamp, self._current = self._coming.popleft()
+        seen.blind = t - seen.stamp > self.stale_after + _ROUNDING
+        self.space.measure(self._current, state.placements)
+        state.measurement = seen
+        return seen
+
+    def check_start(self, state: State) -> None:
+        """Raise a HierarchyError if an obstacle of a simulated scene touches a point."""
+        if self._exact is not None:
+            self._exact.check_start(state)
+
+    def _take(self, frame: int, state: State) -> None:
+        if self.stopped:
+            return
+        begin = perf_counter()
+        self.reading, placements = self.source.image(frame, state)
+        self.outside = perf_counter() - begin
+        if self.covered:
+            self.reading[:] = 0.0
+        image = self._spare.pop() if self._spare else ObstacleImage(self.space.pinhole)
+        read = self.space.find_obstacles(self.reading, placements, image)
+        if read < self.least_readings or read == 0.0:
+            self._keep(image)
+        else:
+            self._coming.append((state.t, image))
+
+    def _keep(self, image: ObstacleImage) -> None:
+        if image is not self._nothing:
+            self._spare.append(image)
+
+    def _forget(self) -> None:
+        """Begin anew: no frame has been taken."""
+        self._keep(self._current)
+        for _, image in self._coming:
+            self._keep(image)
+        self._coming.clear()
+        self._current, self._frame, self._now = self._nothing, -1, -inf
+        self.measurement.stamp, self.measurement.blind = -inf, True

@@ -1,0 +1,156 @@
+"""Kernels of the depth space: which pixels are obstacles, and how far each point is from them.
+
+`eye` (16,) is `Pinhole.packed`. In an obstacle image (h, w) a pixel is a depth [m] or 0; its
+`tiles`, squares of TILE pixels, are the smallest depth in them, infinite where there is none.
+Source: Flacco, Kroeger, De Luca, Khatib, "A depth space approach to human-robot collision
+avoidance", ICRA 2012 (the letter's [8]); equation numbers are those of the letter.
+"""
+
+# mypy: disable-error-code="no-untyped-def"
+
+from __future__ import annotations
+
+from math import sqrt
+
+import numpy as np
+
+from hierarchy.avoidance.repulsion import repulsion
+from hierarchy.jit import compiled
+from hierarchy.kinematics import place
+from scenarios.cell.sensors.rendering import in_camera, pixels_of_ball
+
+TILE = 16  # pixels to a side
+
+
+@compiled
+def farthest(placements, joints, offsets, eye):
+    """Return the depth [m] of the point that is farthest from the camera's plane."""
+    most = 0.0
+    for k in range(len(joints)):
+        x, y, z = place(placements[joints[k]], offsets[k, 0], offsets[k, 1], offsets[k, 2])
+        most = max(most, in_camera(eye, x, y, z)[2])
+    return most
+
+
+@compiled
+def find_obstacles(reading, robot, support, band, beyond, depth, tiles):
+    """Write the obstacle image of a reading into depth (h, w) and tiles; return how much was read.
+
+    robot (h, w) is the depth at which the robot begins, margin included, infinite beside it;
+    it is used up. A pixel there or behind is no obstacle, nor is one with which less than `support`
+    pixels of the 3 x 3 around it, itself included, agree within `band` [m], nor one farther than
+    `beyond` [m]. The share of pixels with a reading is returned.
+    """
+    height, width = reading.shape
+    read = 0
+    for v in range(height):
+        for u in range(width):
+            z = reading[v, u]
+            if not (0.0 < z < np.inf):
+                robot[v, u] = 0.0
+                continue
+            read += 1
+            robot[v, u] = z if z < robot[v, u] and z <= beyond else 0.0
+    tiles[:, :] = np.inf
+    for v in range(height):
+        for u in range(width):
+            z = robot[v, u]
+            if z > 0.0 and support > 1 and not _supported(robot, v, u, support, band):
+                z = np.float32(0.0)
+            depth[v, u] = z
+            if z > 0.0 and z < tiles[v // TILE, u // TILE]:
+                tiles[v // TILE, u // TILE] = z
+    return read / (height * width)
+
+
+@compiled
+def _supported(depth, v, u, support, band):
+    agree = 0
+    for j in range(max(v - 1, 0), min(v + 2, depth.shape[0])):
+        for i in range(max(u - 1, 0), min(u + 2, depth.shape[1])):
+            if depth[j, i] > 0.0 and abs(depth[j, i] - depth[v, u]) <= band:
+                agree += 1
+                if agree >= support:
+                    return True
+    return False
+
+
+@compiled
+def measure_pixels(placements, joints, offsets, eye, depth, tiles, region, thin, mean, laws,
+                   points, distance, direction, magnitude, nearest, pairs):
+    """Fill the arrays of a Measurement, and pairs (P, 1, 14), from an obstacle image.
+
+    joints (P,), offsets (P, 3) of the control points, the end effector last; see `DepthSpace` for
+    region, thin and mean; laws (2, 4) of `repulsion.laws`. Returns the active control point.
+    """
+    count = len(joints)
+    active, D_minimal = -1, np.inf
+    for k in range(count):
+        x, y, z = place(placements[joints[k]], offsets[k, 0], offsets[k, 1], offsets[k, 2])
+        points[k, 0], points[k, 1], points[k, 2] = x, y, z
+        pair = pairs[k, 0]
+        D_min = _nearest(eye, depth, tiles, region, thin, mean, x, y, z, direction[k], pair,
+                         nearest, k)
+        distance[k] = pair[0] = D_min
+        law = 1 if k == count - 1 else 0
+        magnitude[k] = repulsion(D_min, laws[law, 0], laws[law, 1], laws[law, 2],
+                                 laws[law, 3]) if D_min < np.inf else 0.0  # (23)
+        if k < count - 1 and D_min < D_minimal:  # (31)
+            D_minimal, active = D_min, k
+    return active
+
+
+@compiled
+def _nearest(eye, depth, tiles, region, thin, mean, x, y, z, direction, pair, nearest, k):
+    """Return the distance of a point, infinite beyond the region; directions into two arrays."""
+    height, width = depth.shape
+    cx, cy, cz = in_camera(eye, x, y, z)
+    u0, u1 = pixels_of_ball(eye[0], eye[2], width, cx, cz, region)
+    v0, v1 = pixels_of_ball(eye[1], eye[3], height, cy, cz, region)
+    per_x, per_y, reach = 1.0 / eye[0], 1.0 / eye[1], region * region
+    DD, at = reach, -1
+    nx = ny = nz = sx = sy = sz = 0.0
+    for tv in range(v0 // TILE, (v1 + TILE - 1) // TILE):
+        for tu in range(u0 // TILE, (u1 + TILE - 1) // TILE):
+            if tiles[tv, tu] >= cz + region:
+                continue
+            for v in range(max(v0, tv * TILE), min(v1, tv * TILE + TILE)):
+                ry = (v - eye[3]) * per_y
+                for u in range(max(u0, tu * TILE), min(u1, tu * TILE + TILE)):
+                    d = float(depth[v, u])
+                    if d == 0.0:
+                        continue
+                    if d < cz:  # it shadows what is behind it
+                        d = min(d + thin, cz)
+                    ox, oy, oz = cx - (u - eye[2]) * per_x * d, cy - ry * d, cz - d
+                    oo = ox * ox + oy * oy + oz * oz
+                    if oo >= reach:
+                        continue
+                    if oo < DD:  # (22)
+                        DD, at, nx, ny, nz = oo, v * width + u, ox, oy, oz
+                    if oo > 0.0:  # (25); the factor 1/h is lost in (26)
+                        per = 1.0 / sqrt(oo)
+                        sx, sy, sz = sx + per * ox, sy + per * oy, sz + per * oz
+    nearest[k] = at
+    if at < 0:
+        direction[0] = direction[1] = direction[2] = 0.0
+        pair[1] = pair[2] = pair[3] = 0.0
+        return np.inf
+    D = sqrt(DD)
+    norm = sqrt(sx * sx + sy * sy + sz * sz)
+    if D < cz * max(per_x, per_y):  # in the shadow of a pixel, where its centre says nothing
+        nx, ny, nz = (sx, sy, sz) if norm > 1e-6 else (1.0, 0.0, 0.0)
+    _turn_unit_back(eye, nx, ny, nz, pair[1:4])
+    if mean and norm > 1e-6:
+        _turn_unit_back(eye, sx, sy, sz, direction)  # (26)
+    else:
+        direction[0], direction[1], direction[2] = pair[1], pair[2], pair[3]
+    return D
+
+
+@compiled
+def _turn_unit_back(eye, x, y, z, out):
+    """Write the unit vector along x, y, z of the camera's frame into out (3,), in the world's."""
+    length = sqrt(x * x + y * y + z * z)
+    for i in range(3):
+        out[i] = (eye[7 + 3 * i] * x + eye[8 + 3 * i] * y + eye[9 + 3 * i] * z) / length

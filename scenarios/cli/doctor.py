@@ -1,0 +1,166 @@
+"""What `hierarchy doctor` looks at: versions, kernels, backends, and whether it all works."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from importlib.metadata import PackageNotFoundError, requires, version
+from pathlib import Path
+from time import perf_counter
+from typing import final
+
+_PACKAGE = "task-hierarchy"
+_PROBLEMS = 20      # generated ones that each resolver solves
+_MET = 1e-6         # by how much answers of strict resolvers may differ, relative to 1 + |x|
+
+
+@final
+@dataclass(frozen=True)
+class Finding:
+    """One thing looked at; `well` is None where there is no right or wrong, `remedy` what to do."""
+
+    part: str
+    what: str
+    found: str
+    well: bool | None = None
+    remedy: str = ""
+
+
+def doctor_command(as_json: bool) -> int:
+    """Print what was found and return the exit code: 0 if all is well, 1 if something is not."""
+    from scenarios.cli.terminal import print_json
+
+    found = list(examine())
+    ill = [one for one in found if one.well is False]
+    if as_json:
+        print_json({"well": not ill, "findings": [asdict(one) for one in found]})
+        return int(bool(ill))
+    part = ""
+    width = max(len(one.what) for one in found)
+    for one in found:
+        if one.part != part:
+            part = one.part
+            print(part)
+        mark = {True: "ok  ", False: "BAD ", None: "    "}[one.well]
+        print(f"  {mark}{one.what:{width}}  {one.found}" + f"; {one.remedy}" * bool(one.remedy))
+    print("\nAll is well." if not ill else f"\nNot well: {', '.join(one.what for one in ill)}.")
+    return int(bool(ill))
+
+
+def examine() -> Iterator[Finding]:
+    """Look at everything, one thing after the other."""
+    yield from _versions()
+    yield from _extras()
+    yield from _backends()
+    yield from _kernels()
+    yield from _tests()
+
+
+def _versions() -> Iterator[Finding]:
+    yield Finding("versions", "python", sys.version.split()[0], sys.version_info >= (3, 11))
+    yield Finding("versions", _PACKAGE, version(_PACKAGE))
+    for package, extra in _required():
+        if extra is None:
+            there = _version(package)
+            yield Finding("versions", package, there or "missing", there is not None,
+                          "" if there else f"pip install {package}")
+
+
+def _extras() -> Iterator[Finding]:
+    extras: dict[str, list[str]] = {}
+    for package, extra in _required():
+        if extra not in (None, "dev") and not package.startswith(_PACKAGE):
+            extras.setdefault(str(extra), []).append(package)
+    for extra, packages in extras.items():
+        missing = [package for package in packages if _version(package) is None]
+        there = ", ".join(f"{package} {_version(package)}" for package in packages
+                          if package not in missing)
+        yield Finding("extras, none of them needed", extra, there or "not installed", None,
+                      f"pip install '{_PACKAGE}[{extra}]'" if missing else "")
+
+
+def _backends() -> Iterator[Finding]:
+    from solvers.qp.backends import BACKENDS, installed
+
+    for name in BACKENDS:
+        yield Finding("backends of hqp", name, "found" if installed(name) else "not installed")
+
+
+def _kernels() -> Iterator[Finding]:
+    import numba
+
+    from hierarchy.jit import cache_folder
+
+    part, folder = "compiled kernels", cache_folder()
+    jit = not numba.config.DISABLE_JIT
+    yield Finding(part, "compiling", "on" if jit else "off: NUMBA_DISABLE_JIT is set", jit)
+    files = [path for path in folder.rglob("*") if path.is_file()] if folder.is_dir() else []
+    size = sum(path.stat().st_size for path in files) / 1e6
+    can = os.access(next(path for path in (folder, *folder.parents) if path.exists()), os.W_OK)
+    yield Finding(part, "cache", f"{_home(folder)}, {size:.0f} MB", can,
+                  "" if can else "it cannot be written; set NUMBA_CACHE_DIR to a folder that can")
+
+
+def _tests() -> Iterator[Finding]:
+    for what, test in (("resolvers agree", _resolvers_agree), ("a short run", _short_run)):
+        begun = perf_counter()
+        try:
+            said, well = test()
+        except Exception as error:  # what is broken here may break anything
+            said, well = f"{type(error).__name__}: {error}", False
+        yield Finding("self-test", what, f"{said} ({perf_counter() - begun:.1f} s)", well)
+
+
+def _resolvers_agree() -> tuple[str, bool]:
+    """Solve small well-posed stacks by every strict resolver, and certify the answers of one."""
+    import numpy as np
+
+    from hierarchy import Hierarchy
+    from solvers import certify, make
+
+    rng, worst, certified = np.random.default_rng(0), 0.0, 0
+    strict = [make(name) for name in ("tpm", "recursive", "hcod")]
+    for _ in range(_PROBLEMS):
+        h = Hierarchy.from_levels([(rng.normal(size=(3, 7)), rng.normal(size=3))
+                                   for _ in range(3)])
+        x = [resolver.solve(h).x for resolver in strict]
+        worst = max(worst, *(float(np.abs(x[0] - one).max() / (1 + np.abs(x[0]).max()))
+                             for one in x[1:]))
+        certified += certify(h, x[0]).certified
+    return (f"{', '.join(str(one.label) for one in strict)} to {worst:.0e}; {certified} of "
+            f"{_PROBLEMS} answers certified", worst < _MET and certified == _PROBLEMS)
+
+
+def _short_run() -> tuple[str, bool]:
+    """Simulate the beginning of the letter's task."""
+    import numpy as np
+
+    from scenarios import load, simulate
+
+    run = simulate(load("ellipse", ["control.duration=0.2"]))
+    median = float(np.median(run["time_tick"]) * 1e6)
+    return f"{run.ticks} ticks of ellipse, {median:.0f} us each", run.fault is None
+
+
+def _required() -> Iterator[tuple[str, str | None]]:
+    """Give every package that this one may use, and the extra that it belongs to."""
+    from packaging.requirements import Requirement
+
+    for line in requires(_PACKAGE) or ():
+        one = Requirement(line)
+        extra = str(one.marker).rpartition('extra == "')[2].rstrip('"') if one.marker else None
+        yield one.name, extra
+
+
+def _version(package: str) -> str | None:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return None
+
+
+def _home(path: Path) -> str:
+    home = Path.home()
+    return f"~/{path.relative_to(home)}" if path.is_relative_to(home) else str(path)

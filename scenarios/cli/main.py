@@ -1,0 +1,385 @@
+"""The command `hierarchy`.
+
+Nothing heavy is imported before it is needed, so that `--help` and completion answer at once. With
+`--json` a command prints one JSON object on standard output, and nothing else there. Exit codes:
+0 done, 1 a run ended in a fault that is reported, 2 the command line or a file is wrong.
+"""
+
+from __future__ import annotations
+
+import os
+import shlex
+import sys
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from scenarios.cli import completion
+from scenarios.cli.terminal import (
+    first_line,
+    print_json,
+    print_list,
+    print_table,
+    shown,
+    troubles,
+    verdict,
+)
+
+if TYPE_CHECKING:
+    from scenarios.config import Scenario
+    from scenarios.measure.runs import Run
+
+app = typer.Typer(help="Prioritized robot tasks: many ways of resolving them, compared.",
+                  rich_markup_mode=None, pretty_exceptions_enable=False)
+
+Changes = Annotated[list[str] | None, typer.Option(
+    "--set", metavar="KEY=VALUE",
+    help="Change the scenario: a dotted key and a TOML value. May be repeated.")]
+Duration = Annotated[float | None, typer.Option(
+    "--duration", metavar="SECONDS", help="Run for so long instead of the scenario's duration.")]
+Out = Annotated[Path | None, typer.Option(
+    "--out", metavar="FOLDER", help="Where to write; new or empty. Default: a new one in runs/.")]
+AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object, and nothing else.")]
+PORT = 8080
+Port = Annotated[int, typer.Option("--port", metavar="N", min=0, max=65535,
+                                   help="Where the page is on 127.0.0.1; 0 for any free port.")]
+Browser = Annotated[bool, typer.Option("--browser/--no-browser",
+                                       help="Open the page, or only say where it is.")]
+
+# What can be measured: names of modules of scenarios.bench, written with hyphens.
+BENCHMARKS = ("resolvers", "tick", "first-paper", "strictness", "start", "peers")
+_ASKED_FOR = ("peers",)  # minutes, and packages of others
+
+
+def main() -> None:
+    """Run the command line and exit with its code; see the module's text."""
+    sys.exit(run_command(sys.argv[1:]))
+
+
+def run_command(arguments: list[str]) -> int:
+    """Run one command line and return its exit code; mistakes become one line on stderr."""
+    try:
+        return int(app(arguments or ["--help"], prog_name="hierarchy", standalone_mode=False) or 0)
+    except typer.TyperException as error:
+        return _wrong(error.format_message())
+    except (KeyboardInterrupt, typer.Abort):
+        print("hierarchy: interrupted", file=sys.stderr)
+        return 1
+    except Exception as error:
+        from hierarchy.errors import HierarchyError
+
+        if isinstance(error, HierarchyError):
+            return _wrong(str(error))
+        raise
+
+
+@app.command("list")
+def list_(as_json: AsJson = False) -> None:
+    """List the scenarios, sweeps, resolvers, tasks and robots there are."""
+    import solvers
+    from hierarchy.robot import ROBOTS
+    from hierarchy.robots.table import in_words
+    from hierarchy.tasks import TASKS
+    from scenarios.config import load, shipped
+    from scenarios.sweep.config import load_sweep, shipped_sweeps
+
+    entries = {"scenarios": {name: load(name).title for name in shipped()},
+               "sweeps": {name: load_sweep(name).title for name in shipped_sweeps()},
+               "resolvers": {name: first_line(solvers.make(name)) for name in solvers.names()},
+               "tasks": {name: first_line(task) for name, task in TASKS.items()},
+               "robots": {name: in_words(table) for name, table in ROBOTS.items()}}
+    if as_json:
+        return print_json(entries)
+    for what, named in entries.items():
+        print_list(what, named)
+
+
+@app.command()
+def run(scenario: Annotated[str, typer.Argument(
+            help="Name of a scenario, or a scenario file.", autocompletion=completion.scenarios)],
+        resolver: Annotated[str | None, typer.Option(
+            "--resolver", metavar="SPEC", autocompletion=completion.resolvers,
+            help="Another resolver: name, or name:setting=value:setting=value.")] = None,
+        changes: Changes = None, duration: Duration = None, out: Out = None,
+        certify: Annotated[bool, typer.Option(
+            "--certify", help="Certify the answer of every tick, outside the times measured.")
+            ] = False, as_json: AsJson = False,
+        live: Annotated[bool, typer.Option(
+            "--live", help="Show it in the browser while it runs, and change it by hand; needs "
+                           "the extra `view`.")] = False,
+        speed: Annotated[float, typer.Option(
+            "--speed", metavar="X", min=0.01, max=100.0,
+            help="With --live: seconds of the run a second.")] = 1.0,
+        port: Port = PORT, browser: Browser = True) -> int:
+    """Run one scenario, measure it, keep the run in a folder."""
+    if live and (certify or as_json):
+        raise typer.BadParameter("goes with neither --certify nor --json", param_hint="--live")
+    chosen = _load(scenario, changes, duration)
+    if resolver is not None:
+        chosen = chosen.with_resolver(resolver)
+    from scenarios.files import claim, next_free
+
+    name = f"{chosen.name}-{chosen.control.resolver}"
+    folder = claim(out if out is not None else next_free(Path("runs") / name))
+    if live:
+        from scenarios.cli.view import live_command
+
+        return live_command(chosen, folder, port, speed, browser)
+    from scenarios.cli.progress import bar
+    from scenarios.draw.run_folder import save
+    from scenarios.loop.simulation import simulate
+
+    with bar() as told:
+        label = str(chosen.make_resolver().label)
+        recording = simulate(chosen, progress=partial(told, label) if told else None,
+                             certified=certify)
+    save(recording, folder)
+    if as_json:
+        from scenarios.measure.metrics import as_plain_data
+
+        print_json({"scenario": chosen.name, "resolver": chosen.control.resolver,
+                    "folder": shown(folder), **as_plain_data(recording)})
+        return _fault(recording.fault)
+    print_table([_run_of(chosen, recording)])
+    if certify:
+        print(f"\n{verdict(recording, chosen.make_resolver().damping)}")
+    for line in troubles(recording):
+        print(line)
+    print(f"\n{recording.ticks} ticks in {shown(folder)}")
+    return _fault(recording.fault)
+
+
+@app.command()
+def compare(scenarios: Annotated[list[str], typer.Argument(
+                help="Names of scenarios, or scenario files.",
+                autocompletion=completion.scenarios)],
+            resolvers: Annotated[str | None, typer.Option(
+                "--resolvers", metavar="SPEC,SPEC,...", autocompletion=completion.resolvers,
+                help="Resolvers: name, or name:setting=value. Default: all that suit.")] = None,
+            changes: Changes = None, duration: Duration = None, out: Out = None,
+            as_json: AsJson = False) -> int:
+    """Run scenarios under several resolvers; write a report."""
+    from scenarios.cli.progress import bar
+    from scenarios.config.resolvers import default_resolvers
+    from scenarios.files import next_free
+    from scenarios.report.comparing import compare as run_all
+
+    chosen = [_load(name, changes, duration) for name in scenarios]
+    specs = None if resolvers is None else _split(resolvers)
+    missing: dict[str, str] = {}
+    for scenario in chosen if specs is None else ():
+        missing |= default_resolvers(scenario.asks)[1]
+    for spec, remedy in missing.items():
+        print(f"left out: {spec} is not installed; {remedy}",
+              file=sys.stderr if as_json else sys.stdout)
+    folder = out if out is not None else next_free(Path("runs") / f"compare-{chosen[0].name}")
+    command = shlex.join(["hierarchy", *sys.argv[1:]])
+    with bar() as told:
+        comparison = run_all(chosen, specs, out=folder, progress=told, command=command)
+    if as_json:
+        print_json({"report": shown(folder / "index.html"), **comparison.as_plain_data()})
+    else:
+        for runs in comparison.groups().values():
+            print_table(runs)
+        print("", *comparison.refused, sep="\n" if comparison.refused else "")
+        print(f"\nReport: {shown(folder / 'index.html')}")
+    return max([_fault(f"{run.label}: {run.fault}") for run in comparison.faults], default=0)
+
+
+@app.command()
+def sweep(file: Annotated[str, typer.Argument(help="Name of a sweep, or a sweep file.",
+                                              autocompletion=completion.sweeps)],
+          out: Annotated[Path | None, typer.Option(
+              "--out", metavar="FOLDER",
+              help="Where to write, or to go on. Default: runs/sweep-NAME.")] = None,
+          workers: Annotated[int | None, typer.Option(
+              "--workers", metavar="N", min=1,
+              help="Processes on this machine. Default: one for each processor.")] = None,
+          scheduler: Annotated[str | None, typer.Option(
+              "--scheduler", metavar="ADDRESS",
+              help="Use the workers of this Dask scheduler instead.")] = None,
+          as_json: AsJson = False) -> int:
+    """Run scenarios under resolvers with sampled parameters; go on where that stopped."""
+    from scenarios.cli.sweep import sweep_command
+
+    return sweep_command(file, out, workers, scheduler, as_json)
+
+
+@app.command()
+def view(folders: Annotated[list[Path], typer.Argument(
+             metavar="RUN...", help="Folders that `hierarchy run` or `compare` wrote.")],
+         side_by_side: Annotated[bool, typer.Option(
+             "--side-by-side/--overlay", help="How several runs are placed.")] = True,
+         port: Port = PORT, browser: Browser = True) -> int:
+    """Show finished runs in the browser, in space and as curves; needs the extra `view`."""
+    from scenarios.cli.view import view_command
+
+    return view_command(folders, port, side_by_side, browser)
+
+
+@app.command()
+def export(folder: Annotated[Path, typer.Argument(
+               metavar="RUN", help="Folder that `hierarchy run` wrote.")],
+           format: Annotated[str | None, typer.Option(
+               "--format", metavar="FORMAT", help="csv, parquet or mcap. Default: that of --out's "
+               "suffix, or csv.")] = None,
+           out: Annotated[Path | None, typer.Option(
+               "--out", metavar="FILE", help="A new file. Default: run.FORMAT in RUN.")] = None,
+           as_json: AsJson = False) -> None:
+    """Write a run as a file that other programs open; Parquet and MCAP need the extra `export`."""
+    from scenarios.cli.export import export_command
+
+    files = [shown(path) for path in export_command(folder, format, out)]
+    if as_json:
+        return print_json({"files": files})
+    print(*files, sep="\n")
+
+
+@app.command()
+def replay(folders: Annotated[list[Path], typer.Argument(
+               metavar="RUN...", help="Folders that `hierarchy run` or `compare` wrote.")],
+           out: Annotated[Path | None, typer.Option(
+               "--out", metavar="FILE",
+               help="HTML file to write. Default: RUN/replay.html.")] = None,
+           video: Annotated[Path | None, typer.Option(
+               "--video", metavar="FILE", help="Video of one run to write, by ffmpeg.")] = None,
+           rate: Annotated[float, typer.Option(
+               "--rate", metavar="HZ", help="Frames a second.")] = 30.0) -> int:
+    """Write finished runs as one HTML file that plays without a server, or one as a video."""
+    from scenarios.cli.replay import replay_command
+
+    return replay_command(folders, out, video, rate)
+
+
+@app.command()
+def figures(folder: Annotated[Path, typer.Argument(
+                metavar="RUN", help="Folder that `hierarchy run` or `compare` wrote.")],
+            style: Annotated[str, typer.Option(
+                "--style", metavar="STYLE",
+                help="screen: SVG and PNG. paper: PDF, one column of a journal wide.")] = "screen",
+            out: Annotated[Path | None, typer.Option(
+                "--out", metavar="FOLDER",
+                help="Where to write; new or empty. Default: the run's own folder.")] = None,
+            as_json: AsJson = False) -> None:
+    """Draw a run's figures anew, for the screen or for a paper."""
+    from scenarios.cli.figures import redraw
+
+    files = [shown(file) for file in redraw(folder, style, out)]
+    if as_json:
+        return print_json({"files": files})
+    print(*files, sep="\n")
+
+
+@app.command()
+def check(file: Annotated[str, typer.Argument(help="A scenario, or a robot: file or name.",
+                                              autocompletion=completion.scenarios)],
+          changes: Changes = None, as_json: AsJson = False) -> None:
+    """Read a scenario file, or a robot's, and say what was understood."""
+    from scenarios.cli import robot_check
+
+    if robot_check.is_robot(file):
+        found = robot_check.look_at(file, changes or [])
+        return print_json(robot_check.as_plain_data(*found)) if as_json else print(
+            robot_check.say(*found))
+    scenario = _load(file, changes, None)
+    if as_json:
+        return print_json(scenario.model_dump(mode="json"))
+    ticks = round(scenario.control.duration / scenario.control.period)
+    print(f"{scenario.name}: {scenario.title}")
+    print(f"  robot     {scenario.robot.model}")
+    print(f"  control   {scenario.control.level} level, {ticks} ticks of "
+          f"{1e3 * scenario.control.period:g} ms")
+    print(f"  plant     {scenario.plant.kind}")
+    print(f"  resolver  {scenario.make_resolver()!r}")
+    if scenario.pointing is not None:
+        print(f"  pointing  {scenario.pointing.kind}, cone of {scenario.pointing.alpha_d:g} deg")
+    if scenario.avoidance is not None:
+        asked = scenario.avoidance
+        body, tip = (" and ".join(f"{distance:g}" for distance in thresholds.values())
+                     for thresholds in (asked.thresholds, asked.tip_thresholds))
+        print(f"  avoidance {asked.kind}, {len(asked.obstacles)} obstacles; within {body} m of the "
+              f"body, {tip} m of the end effector")
+    if scenario.limits is not None:
+        print(f"  limits    positions and velocities of the robot, "
+              f"{scenario.limits.acceleration} rad/s^2, "
+              f"{'in the stack' if scenario.limits_in_stack else 'as a guard outside the stack'}")
+    for i, task in enumerate(scenario.tasks, 1):
+        print(f"  task {i:<4} {task.title}" + (f", {task.kind}" if task.name else ""))
+    print("The file is right.")
+
+
+@app.command()
+def doctor(as_json: AsJson = False) -> int:
+    """Say what is installed and found, and solve a few problems to see that it works."""
+    from scenarios.cli.doctor import doctor_command
+
+    return doctor_command(as_json)
+
+
+@app.command()
+def bench(what: Annotated[str | None, typer.Argument(
+        metavar="|".join(BENCHMARKS), help="Only this. Default: all but peers.",
+        autocompletion=lambda incomplete: [b for b in BENCHMARKS if b.startswith(incomplete)]),
+        ] = None,
+        fresh: Annotated[int | None, typer.Option(
+            metavar="SEED", help="Resolvers: time new problems too, from this seed on.")] = None,
+        count: Annotated[int, typer.Option(
+            min=1, metavar="N", help="New problems of each family.")] = 200,
+        out: Out = None) -> None:
+    """Time resolvers, control tick, start, others' packages; judge errors and strictness."""
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy is loaded: one core is timed
+    from importlib import import_module
+
+    from hierarchy.errors import HierarchyError, UnknownNameError
+    from scenarios.files import claim, next_free
+
+    if what is not None and what not in BENCHMARKS:
+        raise UnknownNameError("benchmark", what, BENCHMARKS)
+    if fresh is not None and what not in (None, "resolvers"):
+        raise HierarchyError(f"--fresh is for the benchmark of resolvers, not {what}")
+    folder = claim(out if out is not None else next_free(Path("runs") / "bench"))
+    for wanted in [what] if what is not None else [b for b in BENCHMARKS if b not in _ASKED_FOR]:
+        module = import_module(f"scenarios.bench.{wanted.replace('-', '_')}")
+        if wanted == "resolvers":
+            module.run(folder, seed=fresh, count=count)
+        else:
+            module.run(folder)
+    print(f"\nNumbers: {shown(folder)}")
+
+
+def _load(name: str, changes: list[str] | None, duration: float | None) -> Scenario:
+    from scenarios.config import load
+
+    lengthened = [] if duration is None else [f"control.duration={duration!r}"]
+    return load(name, [*(changes or []), *lengthened])
+
+
+def _split(specs: str) -> list[str]:
+    named = [spec.strip() for spec in specs.split(",") if spec.strip()]
+    if not named:
+        raise typer.BadParameter("names no resolver", param_hint="--resolvers")
+    return named
+
+
+def _run_of(scenario: Scenario, recording: Any) -> Run:
+    from scenarios.measure.runs import Run
+
+    return Run(scenario, scenario.control.resolver, str(scenario.make_resolver().label), recording)
+
+
+def _fault(fault: str | None) -> int:
+    if fault is None:
+        return 0
+    print(f"hierarchy: fault: {fault}", file=sys.stderr)
+    return 1
+
+
+def _wrong(text: str) -> int:
+    print(f"hierarchy: error: {text}", file=sys.stderr)
+    return 2
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,177 @@
+"""`hierarchy check ROBOT`: what was found in a robot's file, and the section to go on with."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import isfinite
+from typing import Any
+
+import numpy as np
+from pydantic import ValidationError
+
+from hierarchy import Robot
+from hierarchy.robots import TABLES
+from hierarchy.robots.names import file_of, in_package
+from scenarios.config import ScenarioError, shipped
+from scenarios.config.changes import changed
+from scenarios.config.robot import RobotSection
+
+_FRAMES = 12   # named before "and so on"
+_ROUND = 4     # decimals of proposed places [m]
+
+
+def is_robot(text: str) -> bool:
+    """Whether the command line names a robot; what is a scenario's name too is a scenario."""
+    of_file = in_package(text) or text.endswith((".urdf", ".xml", ".mjcf"))
+    return of_file or (text in TABLES and text not in shipped())
+
+
+def look_at(model: str, changes: Sequence[str] = ()) -> tuple[RobotSection, Robot]:
+    """Make the robot of a model and of changes "robot.key=value"; HierarchyError if it fails."""
+    from scenarios.cell.robot import make_robot
+
+    data = changed({"robot": {"model": model}}, changes)
+    if unknown := [key for key in data if key != "robot"]:
+        raise ScenarioError(f"--set {unknown[0]}: only keys of robot can be set for a robot")
+    try:
+        section = RobotSection.model_validate(data["robot"])
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(map(str, first["loc"]))
+        raise ScenarioError(f"robot.{where}: {first['msg']}, got {first['input']!r}") from error
+    return section, make_robot(section)
+
+
+def as_plain_data(section: RobotSection, robot: Robot) -> dict[str, Any]:
+    """Return what was found, for a JSON file; limits that there are none of are None."""
+    return {
+        "model": section.model, "base": robot.base, "velocities": robot.n, "positions": robot.nq,
+        "mass_kg": float(robot.masses.sum()), "joints": _joints(robot),
+        "frames": [name for name in robot.frame_names
+                   if name not in ("universe", *robot.joint_names)],
+        "end_effector": robot.end_effector,
+        "capsules": [{"joint": _carrier(robot, c.joint), "start": _rounded(c.start),
+                      "end": _rounded(c.end), "radius": round(c.radius, _ROUND)}
+                     for c in robot.capsules],
+        "control_points": [{"joint": _carrier(robot, p.joint), "offset": _rounded(p.offset)}
+                           for p in robot.control_points],
+        "missing": list(_missing(robot))}
+
+
+def say(section: RobotSection, robot: Robot) -> str:
+    """Return what was found as text, with a [robot] section to paste."""
+    found = as_plain_data(section, robot)
+    of_table = robot.table is not None
+    listed = "as its table has them" if of_table else "proposed"
+    capsules = ("none" if not robot.capsules else f"{len(robot.capsules)}, "
+                + ("as listed" if section.capsules is not None or of_table
+                   else "proposed from the collision geometry"))
+    points = "as listed" if section.control_points is not None else listed
+    end = "as given" if section.end_effector else listed.replace("them", "it")
+    lines = [f"{robot.name}: {_source(section.model)}",
+             f"  base            {robot.base}, {robot.n} velocities, {robot.nq} positions",
+             f"  mass            {found['mass_kg']:.3g} kg, of what moves",
+             f"  joints          {len(found['joints'])} with a motor",
+             *_joint_table(found["joints"]),
+             f"  frames          {_some(found['frames'])}",
+             f"  end effector    {robot.end_effector}, {end}; "
+             f"{_moved_by(robot)} joints move it",
+             f"  capsules        {capsules}",
+             f"  control points  {len(robot.control_points)}, {points}"]
+    lines += [f"  missing         {sentence}" for sentence in found["missing"]]
+    return "\n".join([*lines, "", "For a scenario file:", "", paste(section, robot)])
+
+
+def paste(section: RobotSection, robot: Robot) -> str:
+    """Return the [robot] section that gives this robot, all that was proposed written out."""
+    lines = ["[robot]", f"model = {_quoted(section.model)}", f"base = {_quoted(robot.base)}",
+             f"end_effector = {_quoted(robot.end_effector)}"]
+    if section.locked:
+        locked = ", ".join(f"{_quoted(name)} = {value}" for name, value in section.locked.items())
+        lines.append(f"locked = {{ {locked} }}")
+    if robot.table is not None:
+        return "\n".join(lines)
+    found = as_plain_data(section, robot)
+    for key in ("control_points", "capsules"):
+        rows = ["    { " + ", ".join(f"{k} = {_quoted(v) if isinstance(v, str) else v}"
+                                     for k, v in row.items() if v is not None) + " },"
+                for row in found[key]]
+        lines += [f"{key} = [", *rows, "]"] if rows else []
+    return "\n".join(lines)
+
+
+def _source(model: str) -> str:
+    return f"{model} ({file_of(model)})" if in_package(model) else (
+        "a table of this package" if model in TABLES else model)
+
+
+def _joints(robot: Robot) -> list[dict[str, Any]]:
+    """Joints with a motor: names, kinds and limits."""
+    lower, upper = robot.position_limits()
+    names = robot.velocity_names
+    return [{"name": names[i], "lower": _or_none(lower[i]), "upper": _or_none(upper[i]),
+             "velocity": _or_none(robot.velocity_limit[i]),
+             "effort": _or_none(robot.effort_limit[i])} for i in range(robot.actuated, robot.n)]
+
+
+def _joint_table(joints: list[dict[str, Any]]) -> list[str]:
+    if not joints:
+        return []
+    width = max(len(joint["name"]) for joint in joints)
+    rows = [("", "lower", "upper", "velocity", "effort"), *(
+        (joint["name"], *(_shown(joint[key]) for key in ("lower", "upper", "velocity", "effort")))
+        for joint in joints)]
+    return [f"    {name:{width}}  " + "  ".join(f"{cell:>8}" for cell in cells)
+            for name, *cells in rows]
+
+
+def _missing(robot: Robot) -> list[str]:
+    joints = _joints(robot)
+    kinds = {"position limits": [j["name"] for j in joints if j["lower"] is None
+                                 and j["upper"] is None],
+             "velocity limits": [j["name"] for j in joints if j["velocity"] is None],
+             "effort limits": [j["name"] for j in joints if j["effort"] is None],
+             "room between its position limits": [
+                 j["name"] for j in joints if j["lower"] is not None
+                 and j["lower"] == j["upper"]]}
+    said = [f"{kind} of {_some(names)}" for kind, names in kinds.items() if names]
+    if not robot.masses.any():
+        said.append("masses: neither centre of mass nor torque limits can be used")
+    if not robot.capsules:
+        said.append("capsules: no self-collision, and pictures show lines; list robot.capsules")
+    if not robot.control_points:
+        said.append("control points: no avoidance; list robot.control_points")
+    return [*robot.missing, *said]
+
+
+def _moved_by(robot: Robot) -> int:
+    joint, count = robot.frame(robot.end_effector).joint, 0
+    while joint > (1 if robot.base == "floating" else 0):
+        joint, count = robot.parents[joint], count + 1
+    return count
+
+
+def _carrier(robot: Robot, joint: int) -> str | None:
+    """The joint's name as a section has it; None for the base."""
+    return robot.joint_names[joint - 1] if joint > (1 if robot.base == "floating" else 0) else None
+
+
+def _rounded(place: Any) -> list[float]:
+    return [float(value) + 0.0 for value in np.round(place, _ROUND)]
+
+
+def _some(names: Sequence[str]) -> str:
+    more = f" and {len(names) - _FRAMES} more" if len(names) > _FRAMES else ""
+    return ", ".join(names[:_FRAMES]) + more
+
+
+def _or_none(value: float) -> float | None:
+    return float(value) if isfinite(value) else None
+
+
+def _shown(value: float | None) -> str:
+    return "none" if value is None else f"{value:.4g}"
+
+
+def _quoted(text: str) -> str:
+    return '"' + text.replace("\\", "\\\\").replace('"', '\\"') + '"'

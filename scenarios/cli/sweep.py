@@ -1,0 +1,52 @@
+"""What `hierarchy sweep` does and prints."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from pathlib import Path
+from time import perf_counter
+
+from scenarios.cli.progress import bar
+from scenarios.cli.terminal import print_json
+from scenarios.sweep.config import load_sweep
+from scenarios.sweep.engine import EngineError
+from scenarios.sweep.store import FullError
+from scenarios.sweep.terminal import show
+from scenarios.sweep.whole import sweep
+
+
+def sweep_command(file: str, out: Path | None, workers: int | None, scheduler: str | None,
+                  as_json: bool = False) -> int:
+    """Make a sweep, print what came of it, and return the exit code.
+
+    That is 0 if every run has a row, 1 if the sweep could not go on or no run reached its end.
+    """
+    folder = out if out is not None else Path("runs") / f"sweep-{load_sweep(file).name}"
+    command = shlex.join(["hierarchy", *sys.argv[1:]])
+    begun = perf_counter()
+    try:
+        with bar("runs") as told:
+            done = sweep(file, folder, workers, scheduler, progress=told, command=command)
+    except (FullError, EngineError) as error:
+        print(f"hierarchy: fault: {error}", file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        print("hierarchy: interrupted; the same command goes on from here", file=sys.stderr)
+        return 1
+    if as_json:
+        print_json({"folder": str(folder), "report": str(folder / "index.html"),
+                    "table": str(folder / "runs.parquet"), "runs": len(done.plan.runs),
+                    "made_now": done.made, "did_not_reach_their_end": done.failed,
+                    "refused": list(done.plan.refused)})
+        return int(done.failed == len(done.plan.runs))
+    for name, results in done.found.items():
+        show(name, results)
+    if done.plan.refused:
+        print("", *done.plan.refused, sep="\n")
+    runs = len(done.plan.runs)
+    kept = f", {runs - done.made} were there before" if done.made < runs else ""
+    print(f"\n{runs} runs{kept}; {done.failed} did not reach their end; "
+          f"{perf_counter() - begun:.0f} s")
+    print(f"Report: {folder / 'index.html'}")
+    return int(done.failed == runs)

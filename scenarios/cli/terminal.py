@@ -1,0 +1,116 @@
+"""What the command line prints: tables of metrics, lists, what was certified."""
+
+from __future__ import annotations
+
+import json
+import re
+from math import isfinite
+from pathlib import Path
+from textwrap import wrap
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from scenarios.measure.runs import Row, Run
+
+_WIDTH = 80   # columns of a terminal
+_BESIDE = 5   # runs that a table of so many holds
+
+
+def troubles(recording: Any) -> list[str]:
+    """Say of each kind of trouble what was done, how often, and when first."""
+    lines = [f"{kind}: {action} in {len(ticks)} ticks, first in tick {ticks[0]} "
+             f"(t = {recording['t'][ticks[0]]:.3f} s)"
+             for (kind, action), ticks in recording.troubles().items()]
+    return ["", *lines] if lines else []
+
+
+def verdict(recording: Any, damping: float) -> str:
+    """Say how many ticks were certified and which is the first that was not."""
+    certified = recording["certified"]
+    text = f"certified: {certified.sum()} of {recording.ticks} ticks"
+    if certified.all():
+        return text
+    first = int(certified.argmin())
+    text += f"; the first that is not is tick {first} (t = {recording['t'][first]:.3f} s)"
+    if damping > 0.0:
+        text += (f"\n(damping = {damping:g}: near a singularity the answer is meant to differ from "
+                 "the undamped one, which is what is certified)")
+    return text
+
+
+def print_json(data: Any) -> None:
+    """Print plain data as one JSON object; a number that is not finite is null."""
+    print(json.dumps(_finite(data), indent=2, allow_nan=False))
+
+
+def _finite(data: Any) -> Any:
+    if isinstance(data, dict):
+        return {key: _finite(value) for key, value in data.items()}
+    if isinstance(data, list | tuple):
+        return [_finite(value) for value in data]
+    return None if isinstance(data, float) and not isfinite(data) else data
+
+
+def print_table(runs: list[Run]) -> None:
+    """Print the metrics of runs side by side, and where resolvers part that should agree."""
+    from rich.console import Console
+
+    from scenarios.measure.partings import partings
+    from scenarios.measure.runs import table
+
+    console = Console(markup=False, highlight=False)
+    titles = dict.fromkeys(one.scenario.title or one.scenario.name for one in runs)
+    print("", *titles, sep="\n")
+    rows = table(runs, details=False)
+    beside = -(-len(runs) // -(-len(runs) // _BESIDE))  # so that tables are about equally wide
+    for first in range(0, len(runs), beside):
+        print()
+        console.print(_table(runs, rows, range(first, min(first + beside, len(runs)))))
+    said = [str(one) for one in partings(runs)]
+    if said:
+        console.print("", *said, sep="\n")
+
+
+def _table(runs: list[Run], rows: list[Row], chosen: range) -> Table:
+    """Lay metrics of the chosen runs out for a terminal, best of all in bold with a star."""
+    from rich.table import Table
+    from rich.text import Text
+
+    laid_out = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False)
+    laid_out.add_column("", overflow="fold")
+    for i in chosen:
+        head = re.sub(r"(?<=[^ :-])[ :-]", _broken, runs[i].label)
+        laid_out.add_column(Text(head), justify="right", no_wrap=True)
+    for row in rows:
+        cells = [Text(row.cells[i] + ("*" if i in row.best else " "),
+                      "bold" if i in row.best else "") for i in chosen]
+        laid_out.add_row(Text(f"{row.label} [{row.unit}]" if row.unit else row.label), *cells)
+    return laid_out
+
+
+def _broken(separator: re.Match[str]) -> str:
+    """Break a column's head after a colon or hyphen, or instead of a space."""
+    return f"{separator[0].strip()}\n"
+
+
+def print_list(what: str, entries: dict[str, str]) -> None:
+    """Print names with what they are, in 80 columns."""
+    print(f"{what}:")
+    width = max((len(name) for name in entries), default=0)
+    for name, text in entries.items():
+        lines = wrap(text, _WIDTH - width - 4) or [""]
+        print(f"  {name:{width}}  {lines[0]}".rstrip())
+        print(*(f"{'':{width + 4}}{line}\n" for line in lines[1:]), sep="", end="")
+
+
+def first_line(thing: Any) -> str:
+    """Return the first line of the docstring of a class or an instance."""
+    return (thing.__doc__ or "").strip().partition("\n")[0]
+
+
+def shown(path: Path) -> str:
+    """Return a path as the user would write it from here."""
+    path = path.resolve()
+    return str(path.relative_to(Path.cwd()) if path.is_relative_to(Path.cwd()) else path)

@@ -1,0 +1,84 @@
+"""What `hierarchy view` and `hierarchy run --live` do."""
+
+from __future__ import annotations
+
+import itertools
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from scenarios.config import Scenario
+    from scenarios.draw.viewer.live_page import LivePage
+
+
+def view_command(folders: Sequence[Path], port: int, side_by_side: bool, browser: bool) -> int:
+    """Show finished runs until Ctrl-C, and return the exit code 0."""
+    from scenarios.draw.viewer.server import announce, close, open_server
+    from scenarios.draw.viewer.view import View, labelled
+    from scenarios.loop.recording import load_run
+
+    runs = labelled(folders, [load_run(folder) for folder in folders])
+    server = open_server(port, "hierarchy view")
+    try:
+        view = View(server, runs, side_by_side)
+        announce(server, browser)
+        view.serve()
+    except KeyboardInterrupt:
+        print()
+    finally:
+        close(server)
+    return 0
+
+
+def live_command(scenario: Scenario, folder: Path, port: int, speed: float, browser: bool) -> int:
+    """Run a scenario while it is watched, keep the run, and return 1 if it came to no end.
+
+    The run is kept when it ends or at Ctrl-C, in `folder` or, after a restart, beside it; one that
+    is restarted before its end is not kept.
+    """
+    from scenarios.draw.viewer.live import Live
+    from scenarios.draw.viewer.live_page import LivePage
+    from scenarios.draw.viewer.server import announce, close, open_server
+
+    live = Live(scenario)
+    server = open_server(port, f"hierarchy run {scenario.name} --live")
+    page = LivePage(server, live, speed)
+    try:
+        announce(server, browser)
+        _serve(page, folder)
+    except KeyboardInterrupt:
+        print()
+        if not live.over:
+            _keep(page, folder)
+    finally:
+        close(server)
+    return 1 if live.recording().fault else 0
+
+
+def _serve(page: LivePage, folder: Path) -> None:
+    """Let the run go on until Ctrl-C, and keep it whenever it ends."""
+    from scenarios.draw.viewer.live_page import FRAMES
+
+    last, kept = time.monotonic(), None
+    while True:
+        time.sleep(1.0 / FRAMES)
+        now = time.monotonic()
+        page.step(now - last)
+        last = now
+        if page.live.over and kept is not page.live.recorder:
+            kept = page.live.recorder
+            _keep(page, folder)
+
+
+def _keep(page: LivePage, folder: Path) -> None:
+    """Write the run's folder, or where there is one from before the next that is free beside it."""
+    beside = (folder.with_name(f"{folder.name}-{i}") for i in itertools.count(2))
+    free = next(path for path in itertools.chain([folder], beside)
+                if not path.exists() or not any(path.iterdir()))
+    recording = page.live.save(free)
+    print(f"{recording.ticks} ticks in {free}", flush=True)
+    if recording.fault:
+        print(f"hierarchy: fault: {recording.fault}", file=sys.stderr)

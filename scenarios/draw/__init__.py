@@ -1,0 +1,1 @@
+"""Drawings of runs: figures, the replay of one file, the viewer in a browser."""

@@ -1,0 +1,199 @@
+"""How every figure looks: colours, thinning of long curves, projection, SVG for a page."""
+
+from __future__ import annotations
+
+import io
+import itertools
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass
+from typing import Any
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from scenarios.draw.figures.palette import looks
+
+Array = NDArray[np.float64]
+
+# Text, axes and desired curves. In an inline SVG it becomes the page's own text colour.
+INK = "#0b0c0d"
+ALERT = "#d33a2c"
+
+# Tol's bright scheme, for the joints of one robot.
+JOINTS = ("#4477aa", "#ee6677", "#228833", "#ccbb44", "#66ccee", "#aa3377", "#999999", "#dd7733")
+
+_SCREEN: dict[Any, Any] = {
+    "font.size": 9.0, "axes.titlesize": 9.0, "axes.titlelocation": "left", "legend.frameon": False,
+    "axes.edgecolor": INK, "axes.labelcolor": INK, "text.color": INK, "xtick.color": INK,
+    "ytick.color": INK, "grid.color": INK, "grid.alpha": 0.12, "grid.linewidth": 0.6,
+    "axes.grid": True, "axes.linewidth": 0.6, "lines.linewidth": 1.0, "axes.facecolor": "none",
+    "axes.spines.top": False, "axes.spines.right": False, "xtick.major.width": 0.6,
+    "ytick.major.width": 0.6, "svg.fonttype": "none", "figure.dpi": 72.0}
+# Lines that are told apart in grey, one for each of JOINTS.
+_IN_GREY = ("-", "--", ":", "-.", (0, (5, 1, 1, 1, 1, 1)), (0, (8, 2)), (0, (3, 1)), (0, (1, 3)))
+_PAPER = {**_SCREEN, "font.family": "STIXGeneral", "mathtext.fontset": "stix", "font.size": 8.0,
+          "axes.titlesize": 8.0, "pdf.fonttype": 42}
+
+
+@dataclass(frozen=True)
+class Style:
+    """How figures are drawn: matplotlib's settings, and what those cannot say.
+
+    width [in] that every figure has, or None for each its own; titled, whether figures say of which
+    run they are; formats of the files; lines, those of the joints in turn.
+    """
+
+    settings: Mapping[Any, Any]
+    width: float | None
+    titled: bool
+    formats: tuple[str, ...]
+    lines: tuple[Any, ...] = ("-",)
+
+
+SCREEN = Style(_SCREEN, None, True, ("svg", "png"))
+# One column of IEEE's journals, and its usual size of letters in figures.
+PAPER = Style(_PAPER, 3.5, False, ("pdf",), _IN_GREY)
+STYLES = {"screen": SCREEN, "paper": PAPER}
+_LEAST_HEIGHT = 0.75  # of a figure made narrower, relative to its own: letters keep their size
+_present: ContextVar[Style] = ContextVar("style", default=SCREEN)
+
+
+@contextmanager
+def styled(style: Style) -> Iterator[None]:
+    """Draw and write all figures in a style, as a context."""
+    token = _present.set(style)
+    try:
+        with matplotlib.rc_context(dict(style.settings)):
+            yield
+    finally:
+        _present.reset(token)
+
+
+def present() -> Style:
+    """Return the style in which figures are drawn now."""
+    return _present.get()
+
+
+def colours(labels: Iterable[str]) -> dict[str, str]:
+    """Return the colour of each label; variants of a resolver share its, see `palette.looks`."""
+    return {label: look.colour for label, look in looks(labels).items()}
+
+
+def joint_colour(joint: int) -> str:
+    """Return the colour of a joint, numbered from 0."""
+    return JOINTS[joint % len(JOINTS)]
+
+
+def joint_line(joint: int) -> dict[str, Any]:
+    """Return colour and line of a joint's curve, numbered from 0, as matplotlib names them."""
+    lines = present().lines
+    return {"color": joint_colour(joint), "linestyle": lines[joint % len(lines)]}
+
+
+def style() -> dict[Any, Any]:
+    """Return matplotlib's settings of the present style, to be used as a context."""
+    return dict(present().settings)
+
+
+def figure(rows: int = 1, width: float = 3.3, height: float = 2.1,
+           heights: Sequence[float] | None = None) -> tuple[Figure, list[Axes]]:
+    """Return a figure of `rows` axes one under the other, in inches, in the present style."""
+    if (fixed := present().width) is not None:
+        width, height = fixed, height * min(max(fixed / width, _LEAST_HEIGHT), 1.0)
+    with matplotlib.rc_context(style()):
+        fig = Figure(figsize=(width, height), layout="constrained")
+        axes = fig.subplots(rows, 1, sharex=True, squeeze=False, height_ratios=heights)[:, 0]
+    return fig, list(axes)
+
+
+def envelope(y: Array, buckets: int = 350) -> NDArray[np.int64]:
+    """Return the indices that keep the shape of a long curve: each bucket's extremes and ends.
+
+    y is (T,); every smallest and largest value, and so every peak, stays. NaN is left out.
+    """
+    if len(y) <= 3 * buckets:
+        return np.arange(len(y))
+    edges = np.linspace(0, len(y), buckets + 1).astype(int)
+    kept = {0, len(y) - 1}
+    for first, last in itertools.pairwise(edges):
+        part = y[first:last]
+        if np.isnan(part).all():
+            kept.add(first)
+        else:
+            kept.update((first + int(np.nanargmin(part)), first + int(np.nanargmax(part))))
+    return np.array(sorted(kept))
+
+
+def curve(ax: Axes, t: Array, y: Array, **style: Any) -> None:
+    """Plot y over t, thinned."""
+    kept = envelope(y)
+    ax.plot(t[kept], y[kept], **style)
+
+
+def spans(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """Return (first, last + 1) of every run of True in mask (T,)."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], mask, [False])).astype(np.int8)))
+    return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
+
+
+def project(points: Array, azimuth: float = 150.0, elevation: float = 30.0) -> Array:
+    """Return the orthographic picture (..., 2) of points (..., 3); angles in degrees."""
+    a, e = np.radians([azimuth, elevation])
+    right = np.array([-np.sin(a), np.cos(a), 0.0])
+    up = np.array([-np.sin(e) * np.cos(a), -np.sin(e) * np.sin(a), np.cos(e)])
+    return np.asarray(points @ np.column_stack([right, up]))
+
+
+def shared_limits(ranges: Sequence[tuple[float, float]], factor: float = 4.0
+                  ) -> tuple[float, float]:
+    """Return limits that fit every range, but for those that would flatten all the others.
+
+    A range more than `factor` times as wide as the median one is left to be cut.
+    """
+    widths = np.array([high - low for low, high in ranges])
+    usual = factor * np.median(widths)
+    kept = [r for r, width in zip(ranges, widths, strict=True) if width <= usual]
+    low, high = min(low for low, _ in kept), max(high for _, high in kept)
+    margin = 0.04 * (high - low) or 1.0
+    return low - margin, high + margin
+
+
+def svg(fig: Figure, title: str) -> str:
+    """Return a figure as an inline `<svg>` that scales, follows the page's theme and is named."""
+    text = io.StringIO()
+    with matplotlib.rc_context({**style(), "svg.hashsalt": title}):
+        fig.savefig(text, format="svg", transparent=True, metadata={"Date": None})
+    body = text.getvalue()[text.getvalue().index("<svg"):]
+    body = re.sub(r"<metadata>.*?</metadata>", "", body, flags=re.DOTALL)
+    body = re.sub(r' id="[a-zA-Z0-9]+_\d+"', "", body)
+    body = re.sub(r"<!--.*?-->\s*|\s*\n\s*", lambda m: "" if m[0][0] == "<" else " ", body)
+    body = re.sub(r' d="[^"]*"', _rounded, body)
+    body = body.replace(INK, "currentColor").replace("'DejaVu Sans'", "inherit")
+    head = f'<svg role="img" aria-label="{_escape(title)}" viewBox="'
+    return re.sub(r'<svg [^>]*?viewBox="', lambda _: head, body, count=1)
+
+
+def write(fig: Figure, stem: str) -> None:
+    """Write a figure as stem.svg, stem.png or stem.pdf, on white, as the present style says.
+
+    The same figure is the same bytes: no file has a date.
+    """
+    undated = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
+    with matplotlib.rc_context({**style(), "svg.hashsalt": "task-hierarchy"}):
+        for kind in present().formats:
+            fig.savefig(f"{stem}.{kind}", facecolor="white", dpi=160, metadata=undated.get(kind))
+
+
+def _rounded(path: re.Match[str]) -> str:
+    """Round a path's coordinates to a tenth of a point, which no eye can see."""
+    return re.sub(r"(\.\d)\d+", r"\1", path[0])
+
+
+def _escape(text: str) -> str:
+    return text.replace("&", "&amp;").replace('"', "&quot;").replace("<", "&lt;")

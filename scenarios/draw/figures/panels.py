@@ -1,0 +1,161 @@
+"""The panels of the letter's figures: one quantity of a run over time each."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from scenarios.draw.figures import drawing
+from scenarios.draw.figures.drawing import ALERT, INK, Array
+from scenarios.loop.listed import errors
+
+if TYPE_CHECKING:
+    from scenarios.loop.recording import Recording
+
+Draw = Callable[[Axes, "Recording", str], None]
+
+
+@dataclass(frozen=True)
+class Panel:
+    """One quantity of a run over time: what it is, the signal it needs, how it is drawn.
+
+    A `signal` that ends in "_" stands for all that begin with it.
+    """
+
+    name: str
+    title: str
+    unit: str
+    signal: str
+    draw: Draw
+    explains: str = ""
+
+    def fits(self, recording: Recording) -> bool:
+        """Whether the recording has what this panel draws."""
+        known = (any(name.startswith(self.signal) for name in recording.signals)
+                 if self.signal.endswith("_") else self.signal in recording)
+        return known and recording.ticks > 1
+
+
+def joint_velocities(ax: Axes, recording: Recording, colour: str) -> None:
+    """Draw figure 4: every joint's velocity [rad/s], and the limits where they come into view."""
+    for joint, velocity in enumerate(recording["v"].T):
+        drawing.curve(ax, recording["t"], velocity, **drawing.joint_line(joint), linewidth=0.8,
+                      label=f"joint {joint + 1}")
+
+
+def joint_accelerations(ax: Axes, recording: Recording, colour: str) -> None:
+    """Draw figure 9 (b): every joint's acceleration [rad/s^2]."""
+    for joint, acceleration in enumerate(recording["a"].T):
+        drawing.curve(ax, recording["t"], acceleration, **drawing.joint_line(joint), linewidth=0.6)
+
+
+def ee_distance(ax: Axes, recording: Recording, colour: str) -> None:
+    """Draw figure 5 (a): D_min of the end effector [m], with eps_ee; red while repelled."""
+    t, distance = recording["t"], recording["ee_distance"]
+    drawing.curve(ax, t, distance, color=colour)
+    if "repulsion_active" in recording:
+        _in_red(ax, t, distance, recording["repulsion_active"])
+    avoidance = recording.scenario.avoidance
+    for symbol, threshold in avoidance.tip_thresholds.items() if avoidance else ():
+        _threshold(ax, t, threshold, symbol)
+
+
+def active_point(ax: Axes, recording: Recording, colour: str) -> None:
+    """Draw figure 5 (b), above: the number of the control point whose avoidance is in the stack."""
+    t, active = recording["t"], recording["active_control_point"]
+    changes = np.concatenate(([0], np.flatnonzero(np.diff(active)) + 1, [len(active)]))
+    for first, last in itertools.pairwise(changes):
+        if active[first] > 0:
+            ax.plot([t[first], t[min(last, len(t) - 1)]], [active[first]] * 2, color=colour,
+                    linewidth=3.0, solid_capstyle="butt")
+    points = recording["control_point_distance"].shape[1] \
+        if "control_point_distance" in recording else max(int(active.max()), 1)
+    ax.set_ylim(0.3, points + 0.7)
+    ax.set_yticks(range(1, points + 1, 1 + points // 10))
+
+
+def body_distance(ax: Axes, recording: Recording, colour: str) -> None:
+    """Draw figure 5 (b), below: D_minimal of the body [m], with eps_1 and eps_2."""
+    t = recording["t"]
+    drawing.curve(ax, t, recording["minimal_distance"], color=colour)
+    avoidance = recording.scenario.avoidance
+    for symbol, distance in avoidance.thresholds.items() if avoidance else ():
+        _threshold(ax, t, distance, symbol)
+    ax.set_ylim(bottom=0.0)
+
+
+def pointing_error(ax: Axes, recording: Recording, colour: str) -> None:
+    """Draw figure 7: cos(alpha_d) - cos(alpha), in red while the task is in the stack."""
+    t, error = recording["t"], recording["pointing_error"]
+    drawing.curve(ax, t, error, color=colour)
+    if "pointing_active" in recording:
+        _in_red(ax, t, error, recording["pointing_active"])
+    ax.axhline(0.0, color=INK, linewidth=0.6, linestyle=(0, (4, 3)))
+
+
+def position_error(ax: Axes, recording: Recording, colour: str) -> None:
+    """Draw the distance of the end effector from its path [mm], on a logarithmic scale."""
+    error = 1e3 * np.linalg.norm(recording["position_error"], axis=1)
+    drawing.curve(ax, recording["t"], np.maximum(error, 1e-6), color=colour)
+    ax.set_yscale("log")
+
+
+def task_errors(ax: Axes, recording: Recording, colour: str) -> None:
+    """Draw the errors of the listed tasks that are lengths [mm], on a logarithmic scale."""
+    _listed(ax, recording, "m", 1e3)
+
+
+def task_angles(ax: Axes, recording: Recording, colour: str) -> None:
+    """Draw the errors of the listed tasks that are angles of a body [deg], logarithmic."""
+    _listed(ax, recording, "deg", 1.0)
+
+
+def _listed(ax: Axes, recording: Recording, unit: str, scale: float) -> None:
+    titles = [section.title for section in recording.scenario.tasks]
+    for section, of, error in errors(recording):
+        if of == unit:
+            drawing.curve(ax, recording["t"], np.maximum(scale * error, 1e-6),
+                          **drawing.joint_line(titles.index(section.title)), linewidth=0.9,
+                          label=section.title)
+    ax.set_yscale("log")
+
+
+PANELS = (
+    Panel("joint-velocities", "Joint velocities", "rad/s", "v", joint_velocities,
+          "Figure 4: continuous at acceleration level, with jumps at velocity level."),
+    Panel("joint-accelerations", "Joint accelerations", "rad/s²", "a", joint_accelerations,
+          "Figure 9 (b): jumps at every change of the stack, within the limits."),
+    Panel("position-error", "Distance from the path", "mm, logarithmic", "position_error",
+          position_error, "The start lies off the path on purpose."),
+    Panel("body-distance", "Body to the nearest obstacle", "m", "minimal_distance", body_distance,
+          "Figure 5 (b): below ε₂ a lowest-priority task pushes away, below ε₁ the first."),
+    Panel("active-point", "Control point being pushed away", "number", "active_control_point",
+          active_point, "Figure 5 (b): the control point nearest to an obstacle, while within ε₂."),
+    Panel("ee-distance", "End effector to the nearest obstacle", "m", "ee_distance", ee_distance,
+          "Figure 5 (a): below ε_ee, in red, the position task is pushed off its path."),
+    Panel("pointing-error", "Pointing error", "cos α_d − cos α", "pointing_error", pointing_error,
+          "Figure 7: above zero the axis is outside the cone; red while the task is in the stack."),
+)
+TASK_PANELS = (
+    Panel("task-errors", "Errors of the tasks, lengths", "mm, logarithmic", "task_error_",
+          task_errors, "Each task's own error, whatever its place in the stack."),
+    Panel("task-angles", "Errors of the tasks, angles", "°, logarithmic", "task_error_",
+          task_angles),
+)
+PANEL = {panel.name: panel for panel in (*PANELS, *TASK_PANELS)}
+
+
+def _in_red(ax: Axes, t: Array, y: Array, mask: Array) -> None:
+    if mask.any():
+        drawing.curve(ax, t, np.where(mask, y, np.nan), color=ALERT, linewidth=1.7)
+
+
+def _threshold(ax: Axes, t: Array, value: float, name: str) -> None:
+    ax.axhline(value, color=INK, linewidth=0.6, linestyle=(0, (4, 3)))
+    ax.annotate(name, (1.0, value), xycoords=("axes fraction", "data"), fontsize="small",
+                va="bottom", ha="right", color=INK)

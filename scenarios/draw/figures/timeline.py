@@ -1,0 +1,125 @@
+"""The stack over time: which task is in which place of it, and what happened meanwhile."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+from numpy.typing import NDArray
+
+from scenarios.draw.figures import drawing
+from scenarios.draw.figures.drawing import ALERT, INK
+from scenarios.draw.figures.palette import task_colours
+from scenarios.scene.levels import order_names
+
+if TYPE_CHECKING:
+    from scenarios.loop.recording import Recording
+
+_ON_BAND = "#101214"   # text on a band, in any theme: bands are light
+_LETTER = 0.016        # width of a letter, relative to the time axis, in a band's name
+_LEAST = 0.004         # width of a mark, relative to the time axis, so that one tick is seen
+_MOST_STRETCHES = 600  # of bands in a row; what is shorter than one such share may be passed over
+_GRAVE = ("stop", "brake", "contact", "no answer")
+
+Mask = NDArray[np.bool_]
+
+
+def timeline(recording: Recording, beside: Sequence[Recording] = ()) -> Figure:
+    """Return bands that show which task has which place of the stack, and a row for each event.
+
+    Place 1 is the first priority. Below are the ticks with contact, without an answer, and with
+    each kind of trouble and what was done; a fault is a line where the run ended. `beside` are the
+    runs that are shown together with this one, itself among them: it then has their rows, colours
+    and time axis, and no legend or title of its own.
+    """
+    alone, beside = not beside, beside or (recording,)
+    places = max(len(stack) for one in beside for stack in ((), *order_names(one)))
+    rows = list(dict.fromkeys(name for one in beside for name in happened(one)))
+    colours, end = task_colours(tasks(beside)), max(float(one["t"][-1]) for one in beside)
+    fig, (ax,) = drawing.figure(width=4.9, height=0.3 + 0.24 * (places + len(rows)) + 0.8 * alone)
+    for place in range(places):
+        for task, colour in colours.items():
+            _band(ax, recording, place, task, colour, end)
+    for name, mask in happened(recording).items():
+        _marks(ax, recording["t"], mask, places + rows.index(name),
+               ALERT if name.endswith(_GRAVE) else INK, end)
+    _frame(ax, [*(str(k + 1) for k in range(places)), *rows], float(recording["t"][0]), end)
+    if recording.fault:
+        _ended(ax, float(recording["t"][-1]), end)
+    if alone:
+        _explain(fig, ax, colours, recording.switches().size)
+    return fig
+
+
+def tasks(recordings: Iterable[Recording]) -> list[str]:
+    """Return all tasks that are in the stack in any order of any of the runs."""
+    return list(dict.fromkeys(task for recording in recordings for stack in order_names(recording)
+                              for task in stack))
+
+
+def happened(recording: Recording) -> dict[str, Mask]:
+    """Return what happened beside the changes of the stack: its name, and in which ticks (T,)."""
+    rows: dict[str, Mask] = {}
+    if "contacts" in recording and (touched := recording["contacts"] > 0).any():
+        rows["contact"] = touched
+    troubles = recording.troubles()
+    for (kind, action), ticks in troubles.items():
+        rows[f"{kind.replace('_', ' ')}: {action}"] = _at(ticks, recording.ticks)
+    if "status" in recording and not troubles and (failed := recording["status"] != 0).any():
+        rows["no answer"] = failed
+    return rows
+
+
+def _at(ticks: list[int], count: int) -> Mask:
+    mask = np.zeros(count, dtype=bool)
+    mask[[tick for tick in ticks if tick < count]] = True
+    return mask
+
+
+def _band(ax: Axes, recording: Recording, place: int, task: str, colour: str, end: float) -> None:
+    t, stacks = recording["t"], order_names(recording)
+    held = np.array([len(stack) > place and stack[place] == task for stack in stacks])
+    every = max(1, len(t) // _MOST_STRETCHES) if recording.switches().size > _MOST_STRETCHES else 1
+    sampled = np.append(t[::every], t[-1])
+    spans = [(sampled[a], sampled[b]) for a, b in drawing.spans(held[recording["order"][::every]])]
+    ax.broken_barh([(a, b - a) for a, b in spans], (place - 0.42, 0.84), color=colour, linewidth=0)
+    longest = max(spans, key=lambda span: span[1] - span[0], default=None)
+    if longest is not None and longest[1] - longest[0] > _LETTER * len(task) * (end - t[0]):
+        ax.text(sum(longest) / 2, place, task, color=_ON_BAND, fontsize="small", ha="center",
+                va="center_baseline")
+
+
+def _marks(ax: Axes, t: NDArray[np.float64], mask: Mask, row: int, colour: str, end: float) -> None:
+    least = _LEAST * (end - t[0])
+    spans = [(t[a], max(t[b - 1] - t[a], least)) for a, b in drawing.spans(mask)]
+    ax.broken_barh(spans, (row - 0.3, 0.6), color=colour, linewidth=0)
+
+
+def _frame(ax: Axes, names: list[str], start: float, end: float) -> None:
+    ax.set_yticks(range(len(names)), names)
+    ax.set_ylim(len(names) - 0.5, -0.5)
+    ax.set_xlim(start, end if end > start else start + 1.0)
+    ax.tick_params(axis="y", length=0)
+    ax.grid(False, axis="y")
+    ax.set_axisbelow(True)
+    ax.spines["left"].set_visible(False)
+
+
+def _explain(fig: Figure, ax: Axes, colours: Mapping[str, str], changes: int) -> None:
+    fig.legend(handles=[Patch(color=colour, label=task) for task, colour in colours.items()],
+               loc="outside lower center", ncols=4, fontsize="small", handlelength=1.0)
+    ax.set_title(f"Place in the stack, {changes} change{'' if changes == 1 else 's'}", loc="left")
+    ax.set_xlabel("time [s]")
+
+
+def _ended(ax: Axes, t: float, end: float) -> None:
+    """Mark where a fault ended the run."""
+    ax.axvline(t, color=ALERT, linewidth=1.4)
+    inside = t > 0.5 * end
+    ax.annotate("fault", (t, 1.0), (-2 if inside else 2, 1), xycoords=("data", "axes fraction"),
+                textcoords="offset points", ha="right" if inside else "left", va="bottom",
+                color=ALERT, fontsize="small", annotation_clip=False)

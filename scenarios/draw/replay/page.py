@@ -1,0 +1,57 @@
+"""The replay as one HTML document: template, style, script and data."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from functools import cache
+from html import escape
+from importlib.resources import files
+from string import Template
+from typing import TYPE_CHECKING, Any
+
+from hierarchy.errors import HierarchyError
+from scenarios.draw.figures.palette import looks
+from scenarios.draw.replay.data import fates, run_data
+from scenarios.scene import scene
+
+if TYPE_CHECKING:
+    from scenarios.loop.recording import Recording
+
+_SCRIPTS = ("data.js", "space.js", "painter.js", "sketch.js", "stage.js", "curves.js",
+            "stack.js", "player.js")
+
+
+def html(recordings: Mapping[str, Recording], title: str, *, rate: float = 30.0,
+         embedded: bool = False) -> str:
+    """Return a replay of runs by their labels, as a document that refers to nothing outside itself.
+
+    `rate` [Hz] is that of the frames kept. With `embedded` it has no heading, fills its frame and
+    leaves the wheel to the page around it. Raises HierarchyError where there is nothing to show.
+    """
+    from scenarios.draw.figures.drawing import JOINTS
+
+    if not recordings:
+        raise HierarchyError("a replay needs at least one run")
+    look = looks(recordings)
+    runs = [run_data(scene(recording, rate), {"label": label, **look[label]._asdict(),
+                                              **_about(recording)})
+            for label, recording in recordings.items()]
+    data = {"runs": runs, "fates": fates(), "joints": JOINTS, "embedded": embedded}
+    return Template(_resource("replay.html")).substitute(
+        title=escape(title), style=_resource("replay.css"),
+        script="\n".join(_resource(name) for name in _SCRIPTS),
+        kind="embedded" if embedded else "whole",
+        data=json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c"))
+
+
+def _about(recording: Recording) -> dict[str, Any]:
+    scenario = recording.scenario
+    limits = getattr(scenario, "limits", None)
+    return {"scenario": scenario.name, "title": scenario.title, "fault": recording.fault,
+            "level": scenario.control.level, "limited": limits is not None}
+
+
+@cache
+def _resource(name: str) -> str:
+    return files("scenarios.draw.replay").joinpath(name).read_text(encoding="utf-8")

@@ -1,0 +1,50 @@
+"""The last seconds of a live run as curves."""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import Any
+
+import numpy as np
+
+from hierarchy.problem import Array
+from scenarios.draw.viewer.moment import Watched
+from scenarios.loop.controller import Controller
+from scenarios.loop.recording import Recording
+from scenarios.scene import Series, series
+
+
+class Lately:
+    """Keeps the last `length` moments that it is shown; `curves` are those of a recording."""
+
+    def __init__(self, length: int) -> None:
+        self._kept: deque[dict[str, Any]] = deque(maxlen=length)
+
+    def clear(self) -> None:
+        """Forget all."""
+        self._kept.clear()
+
+    def add(self, watched: Watched) -> None:
+        """Note what a controller did in its last tick, after a look at the moment."""
+        controller, cell = watched.controller, watched.controller.cell
+        now: dict[str, Any] = {"t": cell.state.t, "v": cell.state.v.copy()}
+        now |= {name: rows[0] for name, rows in watched.listed.items()}
+        if cell.position is not None:
+            now["position_error"] = (cell.position.target[0]
+                                     - cell.state.position(cell.position.frame))
+        if cell.pointing is not None:
+            # without alpha_d, which may be another one when this is drawn
+            now["pointing_error"] = controller.cone_error - cell.pointing.cos_alpha_d
+        if cell.sensor is not None:
+            seen = cell.sensor.measurement
+            now |= {"minimal_distance": seen.minimal_distance,
+                    "ee_distance": seen.end_effector_distance}
+        self._kept.append(now)
+
+    def curves(self, controller: Controller) -> tuple[Array, tuple[Series, ...]]:
+        """Return the times (F,) [s] and the curves of what is kept."""
+        signals = {name: np.array([now[name] for now in self._kept]) for name in self._kept[-1]}
+        if controller.cell.pointing is not None:
+            signals["pointing_error"] += controller.cell.pointing.cos_alpha_d
+        recording = Recording(signals, (), controller.cell.scenario)
+        return signals["t"], tuple(series(recording, np.arange(len(self._kept))))

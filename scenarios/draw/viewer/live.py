@@ -1,0 +1,152 @@
+"""A run that is changed by hand while it goes on; nothing here knows of a page."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from hierarchy.errors import HierarchyError
+from hierarchy.problem import Array
+from scenarios.cell.build import build
+from scenarios.config import Scenario, ScenarioError
+from scenarios.draw.run_folder import save
+from scenarios.loop.controller import Controller
+from scenarios.loop.recorder import Recorder
+from scenarios.loop.recording import Recording
+from scenarios.loop.simulation import tick
+
+_HAND = 1.0     # [m/s] at most, of an obstacle that is dragged
+_FARTHEST = 5.0  # [m] that anything may be dragged
+
+
+class Live:
+    """One run, tick by tick, by the thread that calls it.
+
+    `scenario` is as the settings are now, `begun` as they were at the first tick. A change takes
+    effect with the next tick: other tasks or another resolver, the same plant where it is. What
+    cannot be is refused with a HierarchyError, and leaves everything as it was. `over` after the
+    last tick, or after one with a `fault`.
+    """
+
+    def __init__(self, scenario: Scenario) -> None:
+        if scenario.faults:
+            raise ScenarioError(f"scenario {scenario.name!r}: a live run injects no [[faults]]")
+        rehearsal = Controller(scenario)
+        rehearsal.rehearse()
+        Recorder(rehearsal, 1).write()
+        self.scenario = self._first = scenario
+        self.restart()
+
+    def restart(self) -> None:
+        """Begin anew, with the settings as they are; obstacles go to where they belong."""
+        control = self.scenario.control
+        self.begun, self.over = self.scenario, False
+        self.fault: str | None = None
+        self.controller = Controller(self.scenario)
+        self.ticks = max(1, round(control.duration / control.period))
+        self.recorder = Recorder(self.controller, self.ticks)
+        self.changes: list[dict[str, Any]] = []
+        sensor = self.controller.cell.sensor
+        self.obstacles = sensor.obstacles if sensor else None
+        offset = np.zeros((0, 3)) if self.obstacles is None else self.obstacles.offset
+        self._wanted, self._changed = offset.copy(), np.zeros(self.ticks, dtype=np.bool_)
+        self._offsets = np.zeros((self.ticks, *offset.shape))
+
+    @property
+    def t(self) -> float:
+        """Time [s] of the next tick."""
+        return self.recorder.ticks * self.scenario.control.period
+
+    def tick(self) -> None:
+        """Make the next tick, if there is one."""
+        if self.over:
+            return
+        k = self.recorder.ticks
+        self._drag_on()
+        broken = tick(self.controller, self.recorder, self.t)
+        self._changed[k] = self.scenario != self.begun or self._offsets[k].any()
+        policy = self.controller.policy
+        if broken:
+            self.fault = f"{broken} from tick {k} on"
+        elif policy.stopped:
+            self.fault = policy.fault
+        self.over = self.fault is not None or k + 1 == self.ticks
+
+    def change(self, changes: Mapping[str, Any]) -> None:
+        """Give dotted keys of the scenario other values."""
+        self._take_over(self.scenario.with_changes(changes))
+        self.changes += [{"t": self.t, "key": key, "value": value}
+                         for key, value in changes.items()]
+
+    def switch(self, spec: str) -> None:
+        """Go on with another resolver, "name" or "name:setting=value"."""
+        control = self._first.with_resolver(spec).control  # not with what an earlier spec set
+        scenario = self.scenario.with_changes({"control.resolver": control.resolver,
+                                               "control.options": control.options})
+        resolver = scenario.make_resolver()
+        if not resolver.can_resolve(scenario.asks):
+            raise ScenarioError(f"{spec} cannot resolve the {scenario.asks} of this stack")
+        self._take_over(scenario)
+        self.changes.append({"t": self.t, "key": "control.resolver", "value": spec})
+
+    def drag(self, h: int, offset: ArrayLike) -> None:
+        """Move obstacle h to `offset` (3,) [m] from its place or path, no faster than a hand."""
+        wanted = np.asarray(offset, dtype=float)
+        if not 0 <= h < len(self._wanted):
+            raise ScenarioError(f"there is no obstacle {h + 1}, only {len(self._wanted)}")
+        if wanted.shape != (3,) or not np.linalg.norm(wanted) <= _FARTHEST:
+            raise ScenarioError(f"obstacle {h + 1}: an offset of {wanted.tolist()} m is not three "
+                                f"numbers within {_FARTHEST:g} m")
+        self._wanted[h] = wanted
+
+    def recording(self) -> Recording:
+        """Return what was recorded so far, with what was dragged and whether it was changed."""
+        ticks = self.recorder.ticks
+        fault = self.fault if self.over else f"interrupted at tick {ticks}"
+        recording = self.recorder.finish(self.begun, fault)
+        if self._changed[:ticks].any():
+            recording.signals["changed"] = self._changed[:ticks]
+            recording.signals["obstacle_offset"] = self._offsets[:ticks]
+        return recording
+
+    def save(self, folder: Path) -> Recording:
+        """Write the run's folder as `hierarchy run` does, and `changes.json` if there were any."""
+        recording = self.recording()
+        save(recording, folder)
+        if self.changes:
+            (folder / "changes.json").write_text(json.dumps(self.changes, indent=1) + "\n",
+                                                 encoding="utf-8")
+        return recording
+
+    def _take_over(self, scenario: Scenario) -> None:
+        """Go on under another scenario of the same robot and plant."""
+        before = self.controller.cell
+        measurement, commanded = before.state.measurement, before.state.commanded
+        try:
+            controller = Controller(scenario, build(scenario, before))
+        except HierarchyError:
+            before.state.measurement, before.state.commanded = measurement, commanded
+            raise
+        self.scenario, self.controller = scenario, controller
+        self.recorder.follow(controller)
+
+    def _drag_on(self) -> None:
+        """Bring obstacles a tick nearer to where they are dragged."""
+        if self.obstacles is None:
+            return
+        step = _HAND * self.scenario.control.period
+        for h in np.flatnonzero((self._wanted != self.obstacles.offset).any(axis=1)).tolist():
+            self.obstacles.shift(h, _toward(self.obstacles.offset[h], self._wanted[h], step))
+        self._offsets[self.recorder.ticks] = self.obstacles.offset
+
+
+def _toward(here: Array, there: Array, step: float) -> Array:
+    """Return the point (3,) at most `step` [m] from here on the way to there."""
+    way = there - here
+    length = float(np.linalg.norm(way))
+    return there if length <= step else here + way * (step / length)

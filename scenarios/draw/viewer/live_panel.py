@@ -1,0 +1,83 @@
+"""What a live run has to press, turn and drag, and its list and curves."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from hierarchy.errors import HierarchyError
+from scenarios.config import Scenario
+from scenarios.draw.figures.drawing import INK
+from scenarios.draw.viewer.handles import Handles
+from scenarios.draw.viewer.knobs import knobs
+from scenarios.draw.viewer.playback import PlayButton, Requests, add_speed
+from scenarios.draw.viewer.plots import Plots
+from scenarios.draw.viewer.server import lay_out
+
+
+class LivePanel:
+    """The panels of a live run; all that is done on them goes into `requests`.
+
+    Asks for ("toggle", None), ("restart", None), ("speed", x), ("resolver", label), ("handles",
+    shown), (dotted key, value), and what `Handles` does. `choice`, `sliders` by key: the inputs.
+    """
+
+    def __init__(self, server: Any, requests: Requests, scenario: Scenario, labels: Sequence[str],
+                 curves: Any, speed: float, obstacles: int) -> None:
+        gui = server.gui
+        with lay_out(server):
+            self._plots = Plots(gui, {"run": curves}, {"run": INK}, rolling=True)
+        self._button = PlayButton(gui, requests)
+        requests.when_pressed(gui.add_button("Restart", icon="player-skip-back", color="gray"),
+                              "restart")
+        add_speed(gui, requests, speed)
+        self.choice = gui.add_dropdown("Resolver", list(labels), initial_value=labels[0])
+        requests.when_changed(self.choice, "resolver")
+        gui.add_markdown("**Stack**, most important first")
+        self._stack = gui.add_html("")
+        with gui.add_folder("Settings"):
+            shown = gui.add_checkbox("Handles to drag", initial_value=True)
+            requests.when_changed(shown, "handles")
+            self.sliders = {knob.key: gui.add_slider(
+                knob.label, 0.0, max(knob.high, value), knob.step, value, hint=knob.key)
+                for knob, value in knobs(scenario)}
+        for key, slider in self.sliders.items():
+            requests.when_changed(slider, key)
+        self.handles = Handles(server, requests, obstacles, scenario.position is not None)
+
+    def show(self, playing: bool, stack: str) -> None:
+        """Show whether it plays, and the stack's list."""
+        self._button.show(playing)
+        if stack != self._stack.content:
+            self._stack.content = stack
+
+    def roll(self, curves: Any) -> None:
+        """Show the curves of the last seconds."""
+        self._plots.roll({"run": curves})
+
+    def set_to(self, scenario: Scenario, label: str) -> None:
+        """Put every input to what is so."""
+        self.choice.value = label
+        for knob, value in knobs(scenario):
+            self.sliders[knob.key].value = value
+
+
+def resolvers(scenario: Scenario) -> dict[str, str]:
+    """Return specs of the resolvers that can resolve a scenario's stack, by their labels.
+
+    The scenario's own is the first.
+    """
+    from scenarios.config.resolvers import default_resolvers
+    from solvers import names
+
+    own = scenario.control.resolver
+    found: dict[str, str] = {}
+    for spec in (own, *default_resolvers(scenario.asks)[0], *names()):
+        try:
+            other = scenario if spec == own else scenario.with_resolver(spec)
+            resolver = other.make_resolver()
+        except HierarchyError:
+            continue
+        if resolver.can_resolve(other.asks):
+            found.setdefault(str(resolver.label), spec)
+    return found

@@ -1,0 +1,155 @@
+"""What is drawn at one moment: of a recording's frame, or of a controller that is at work."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hierarchy import State
+from hierarchy.allocation import AVOIDANCE
+from hierarchy.avoidance import Obstacles
+from hierarchy.problem import Array
+from scenarios.cell.sensors import ExactDistances
+from scenarios.loop import listed
+from scenarios.loop.fate import Fate, Judged, judged
+from scenarios.scene import SEPARATION, Scene
+
+if TYPE_CHECKING:
+    from scenarios.loop.controller import Controller
+
+
+class Became(NamedTuple):
+    """What became of a task, and the Euclidean norm of its violation in the unit of its rows."""
+
+    fate: Fate
+    violation: float
+
+
+@dataclass(frozen=True)
+class Moment:
+    """What there is to draw at time t [s]; metres, arrays as in `scenarios.scene.Scene`.
+
+    placements (J + 1, 12); points (P, 3), the end effector last; nearest (3,) the obstacle's point
+    to link with point `linked`, or None; active, the point that the stack keeps away, or -1;
+    centres (H, 3); axis (3,); desired (3,) or None; angle [rad] between the axis and that of the
+    cone, or None. `order` names the tasks in the stack, most important first, `became` has each of
+    them; saturated (n,) says which side -1 or 1 of its limits each joint is at. `moved` has the
+    point that each listed task moves and where it is wanted, if it says so.
+    """
+
+    t: float
+    placements: Array
+    points: Array
+    nearest: Array | None
+    linked: int
+    active: int
+    centres: Array
+    axis: Array
+    desired: Array | None
+    order: tuple[str, ...]
+    became: Mapping[str, Became]
+    saturated: NDArray[np.int8]
+    moved: tuple[tuple[Array, Array | None], ...] = ()
+
+    @property
+    def goals(self) -> list[Array]:
+        """Where points are wanted now: (3,) [m] each."""
+        wanted = [self.desired, *(goal for _, goal in self.moved)]
+        return [goal for goal in wanted if goal is not None]
+
+    @property
+    def tips(self) -> list[Array]:
+        """What leaves a trace: the end effector, or the points that listed tasks move, (3,) [m]."""
+        return [place for place, _ in self.moved] or [self.points[-1]]
+
+
+def of_scene(scene: Scene, f: int) -> Moment:
+    """Return frame f of a recorded run."""
+    linked = int(scene.linked[f])
+    order = scene.orders[scene.order[f]]
+    levels, columns = scene.levels, [scene.levels.names.index(name) for name in order]
+    return Moment(
+        float(scene.t[f]), scene.placements[f], scene.points[f],
+        _where_finite(scene.nearest[f, linked]), linked, int(scene.active[f]), scene.centres[f],
+        scene.axis[f], None if scene.desired is None else scene.desired[f], order,
+        {name: Became(Fate(levels.fate[f, column]), float(levels.violation[f, column]))
+         for name, column in zip(order, columns, strict=True)}, levels.saturated[f],
+        tuple((path.actual[f], None if path.wanted is None else path.wanted[f])
+              for path in scene.paths))
+
+
+class Watched:
+    """A controller that is at work, looked at between two ticks.
+
+    Distances are measured once more, from known geometry and at the true joints, also where the
+    controller sees a camera's. After `moment`, `listed` has the signals of listed tasks, one row
+    each, see scenarios.loop.listed.
+    """
+
+    def __init__(self, controller: Controller) -> None:
+        self.controller, self.listed = controller, dict[str, Array]()
+        cell = controller.cell
+        self._state, self._at_rest = State(cell.robot), np.zeros(cell.robot.n)
+        obstacles = cell.sensor.obstacles if cell.sensor else Obstacles()
+        self._exact = ExactDistances(cell.robot, obstacles)
+        self._tip = cell.robot.frame(cell.robot.end_effector)
+
+    def moment(self) -> Moment:
+        """Return what there is to draw after the last tick, as it was at its begin."""
+        controller, cell, seen = self.controller, self.controller.cell, self._exact.measurement
+        q = cell.plant.extra.get("true_q", cell.state.q)
+        self._state.move(cell.state.t, np.asarray(q), self._at_rest)
+        self._exact.measure(self._state)
+        order = controller.allocation.order
+        found = self._judged()
+        became = {name: Became(*one) for name, *one in zip(
+            order, found.fate, found.violation.tolist(), strict=True)}
+        active, linked = self._active(became), int(np.argmin(seen.distance))
+        linked = active if active >= 0 else linked
+        D = seen.distance[linked]
+        nearest = seen.points[linked] - D * seen.direction[linked] if D < np.inf else None
+        return Moment(
+            cell.state.t, self._state.placements.copy(), seen.points.copy(), nearest, linked,
+            active, self._exact.obstacles.centres.copy(), self._state.rotation(self._tip)[:, 2],
+            cell.position.target[0].copy() if cell.position else None, order, became,
+            found.saturated, tuple(self._moved()))
+
+    def _active(self, became: Mapping[str, Became]) -> int:
+        """The point that is kept away, as `scenarios.scene.Scene` has it."""
+        cell = self.controller.cell
+        if cell.sensor is None:
+            return -1
+        if SEPARATION in became:
+            idle = became[SEPARATION].fate is Fate.FREE
+            return -1 if idle else int(self._exact.measurement.distance.argmin())
+        return cell.sensor.measurement.active if AVOIDANCE in became else -1
+
+    def _moved(self) -> Iterator[tuple[Array, Array | None]]:
+        state, cell = self._state, self.controller.cell
+        if not cell.listed:
+            return
+        self.listed = listed.signals(cell.robot, cell.listed, np.array([state.t]),
+                                     state.q[None], state.v[None])
+        for section in cell.scenario.tasks:
+            here = self.listed.get(listed.position_of(section.title))
+            if here is not None:
+                error = self.listed[listed.error_of(section.title)]
+                at_a_point = section.kind in ("position", "pose")
+                yield here[0], here[0] + error[0, :3] if at_a_point else None
+
+    def _judged(self) -> Judged:
+        controller = self.controller
+        if not controller.answered:
+            levels = len(controller.allocation.order)
+            return Judged([Fate.UNKNOWN] * levels, np.full(levels, np.nan),
+                          np.zeros(len(controller.sent), np.int8))
+        return judged(controller.cell, controller.hierarchy, controller.sent,
+                      controller.resolver.accuracy)
+
+
+def _where_finite(point: Array) -> Array | None:
+    return point if np.isfinite(point).all() else None

@@ -1,0 +1,166 @@
+"""One tick of control: from a measured joint state to a command."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from math import inf, nan
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from hierarchy.allocation import Allocation
+from hierarchy.jit import bind
+from hierarchy.problem import Array, Hierarchy
+from scenarios.cell.build import Cell, build
+from scenarios.config import Scenario
+from scenarios.loop.policy import Policy, smallest
+from scenarios.loop.transition import Blend
+from solvers import Resolution, Resolver, Status
+
+_REHEARSALS = 20
+_ROUNDING = 1e-9  # [s] of times that are compared
+
+
+class Controller:
+    """Sense, allocate, stack, resolve; then the policy says what is sent.
+
+    After `command`: `sent`; `allocation` and `cone_error` of the tick, its `hierarchy` (until the
+    next command) and `resolution`, and `stamps`, the clock [s] at its begin, after kinematics,
+    after rows (sensing and allocation included) and after resolving; what a simulated camera takes
+    for its image is taken out. A tick whose measurement is of
+    no use is not `answered`, and leaves allocation and hierarchy as they were. `policy` has the
+    events of the tick, `blend` the weight of the present stack, or is None.
+    """
+
+    hierarchy: Hierarchy
+
+    def __init__(self, scenario: Scenario, cell: Cell | None = None,
+                 resolver: Resolver | None = None,
+                 clock: Callable[[], float] = perf_counter) -> None:
+        self.cell = cell = build(scenario) if cell is None else cell
+        self.resolver = scenario.make_resolver() if resolver is None else resolver
+        control = scenario.control
+        self.level, self.clock = control.level, clock
+        clamp = partial(cell.limits.clamp, cell.state, control.level) if cell.limits else None
+        self.policy = Policy(control.policy, control.level, control.period, clamp)
+        self.blend = Blend(control.transition_time) if control.transition == "blend" else None
+        self.cone_error = nan
+        self._measure_cone = cell.pointing.follow_cone_error(cell.state) if cell.pointing else None
+        if cell.sensor is not None:
+            self._nearest = bind(smallest, cell.sensor.measurement.distance)
+        self.allocation = Allocation((), repulsion=False)
+        self.resolution = self._unanswered = Resolution(np.zeros(cell.robot.n),
+                                                        Status.NUMERICAL_FAILURE, 0)
+        self.stamps = (0.0, 0.0, 0.0, 0.0)
+        self._memory: Any = None
+        self._outside = 0.0
+        self._deadline = control.policy.deadline or inf
+        self._stale_after, self._measured_at = control.policy.stale_after, -inf
+        # What a first tick without a measurement goes on from.
+        cell.state.move(0.0, cell.plant.q, cell.plant.v)
+        self.sent = cell.plant.v.copy() if self.level == "velocity" else np.zeros(cell.robot.n)
+        cell.state.commanded = self.sent if self.level == "velocity" else None
+        if cell.sensor is not None:
+            cell.state.measurement = cell.sensor.measurement
+        for order in cell.order.possible:
+            if set(order) <= set(cell.stack.names):
+                cell.stack.prepare(cell.state, order)
+
+    @property
+    def answered(self) -> bool:
+        """Whether the resolver was asked in the last tick."""
+        return self.resolution is not self._unanswered
+
+    def command(self, t: float, q: Array, v: Array, measured_at: float | None = None) -> Array:
+        """Return the velocity or acceleration (n,) to send at time t [s], joints at q and v.
+
+        `measured_at` [s] is the time of q and v, None for t. The command is finite whatever was
+        measured; `control.policy` says what it is in a tick with trouble.
+        """
+        clock, state = self.clock, self.cell.state
+        troubles: list[str] = []
+        begin = clock()
+        if measured_at is not None or not state.move(t, q, v):
+            self._move(t, q, v, measured_at, troubles)
+        moved = clock()
+        self._sense(troubles)
+        if self._outside > 0.0:
+            begin, moved = begin + self._outside, moved + self._outside
+        x = self._answer(troubles)
+        resolved = clock()
+        self.stamps = (begin, moved, self._written, resolved)
+        if resolved - begin > self._deadline:
+            troubles.append("overrun")
+        self.sent = sent = self.policy.choose(t, troubles, x, state.v)
+        if self.level == "velocity":
+            state.commanded = sent
+        return sent
+
+    def rehearse(self) -> None:
+        """Call every kernel of the loop once, so that none is loaded while ticks are timed.
+
+        Spoils the controller's state; make another for the run.
+        """
+        plant, tasks = self.cell.plant, self.cell.stack.names
+        self.command(0.0, plant.q, plant.v)
+        for _ in range(_REHEARSALS):
+            self.resolver.solve(self.cell.stack.hierarchy(self.cell.state, tasks), self._memory)
+        plant.act(np.zeros_like(plant.v))
+
+    def _move(self, t: float, q: Array, v: Array, measured_at: float | None,
+              troubles: list[str]) -> None:
+        """Go to what was measured if it is new and finite, else on from the last such state."""
+        state, stamp = self.cell.state, t if measured_at is None else measured_at
+        new = stamp > self._measured_at
+        if new and state.move(t, q, v):
+            self._measured_at = stamp
+            return
+        if new:
+            troubles.append("not_finite")
+        elif t - stamp > self._stale_after + _ROUNDING:
+            troubles.append("stale")
+        state.move(t, *self._carried_on(t - state.t))
+
+    def _carried_on(self, dt: float) -> tuple[Array, Array]:
+        """Return q (nq,), v (n,) after `dt` [s] under the command that was sent last."""
+        state, x = self.cell.state, self.sent
+        if self.level == "velocity":
+            return state.robot.integrate(state.q, x * dt), x
+        return state.robot.integrate(state.q, state.v * dt + x * (dt * dt / 2)), state.v + x * dt
+
+    def _sense(self, troubles: list[str]) -> None:
+        cell = self.cell
+        if self._measure_cone is not None:
+            self.cone_error = self._measure_cone()
+        if cell.sensor is not None:
+            seen = cell.sensor.measure(cell.state)
+            self._outside = cell.sensor.outside
+            if seen.blind and "stale" not in troubles:
+                troubles.append("stale")
+            nearest = self._nearest()
+            if not nearest > 0.0:
+                troubles.append("inside" if nearest <= 0.0 else "not_finite")
+
+    def _answer(self, troubles: list[str]) -> Array:
+        """Return the resolver's answer (n,), or zero where nothing usable was measured."""
+        if troubles and troubles != ["inside"]:
+            self.resolution, self._written = self._unanswered, self.clock()
+            return self.resolution.x
+        cell = self.cell
+        seen = None if cell.sensor is None else cell.sensor.measurement
+        self.allocation = allocation = cell.order(seen, self.cone_error)
+        order = allocation.order
+        self.hierarchy = hierarchy = cell.stack.hierarchy(cell.state, order)
+        self._written = self.clock()
+        if self.blend is None:
+            self.resolution = resolution = self.resolver.solve(hierarchy, self._memory)
+            x, self._memory = resolution.x, resolution.memory
+        else:
+            resolution, x = self.blend.resolve(self.resolver, cell.stack, cell.state, order,
+                                               hierarchy)
+            self.resolution = resolution
+        if resolution.status is not Status.SOLVED:
+            troubles.append(resolution.status.name.lower())
+        return x

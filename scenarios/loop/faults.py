@@ -1,0 +1,165 @@
+"""What goes wrong on purpose: faults put between plant, sensor, resolver and controller."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from time import perf_counter
+from typing import Any, ClassVar, final
+
+import numpy as np
+
+from hierarchy.avoidance import Measurement
+from hierarchy.problem import Array, Hierarchy
+from hierarchy.robot import Frame, Robot, State
+from scenarios.cell.build import build
+from scenarios.cell.sensors import DepthSensor, ExactDistances, Sensor
+from scenarios.config import Scenario, ScenarioError
+from scenarios.config.avoidance import ObstacleSection
+from scenarios.config.faults import FaultSection
+from scenarios.loop.controller import Controller
+from solvers import Resolution, Resolver, Status
+
+_AWAY = (1e3, 1e3, 1e3)  # [m] where an obstacle waits for its time
+
+
+@final
+class Faults:
+    """The faults of a scenario, and a `controller` that they happen to.
+
+    `measure` has to be called once before each command, in order of time. Raises ScenarioError
+    where a fault does not fit the robot.
+    """
+
+    def __init__(self, scenario: Scenario) -> None:
+        self._sections, self._now = scenario.faults, 0.0
+        self._half = scenario.control.period / 2
+        cell = build(_with_room_for_obstacles(scenario))
+        for i, fault in enumerate(scenario.faults):
+            _check(f"faults.{i}", fault, cell.robot)
+        if cell.sensor is not None:
+            cell = replace(cell, sensor=_FaultySensor(cell.sensor, self))
+        self._plant, self._robot, self._sensor = cell.plant, cell.robot, cell.sensor
+        self._last = cell.plant.q.copy(), cell.plant.v.copy(), 0.0
+        self._skipped, self._skipped_at = 0.0, -1.0
+        self._standing: set[int] = set()
+        resolver = _FaultyResolver(inner=scenario.make_resolver(), faults=self)
+        self.controller = Controller(scenario, cell, resolver, self.clock)
+
+    def measure(self, t: float) -> tuple[Array, Array, float]:
+        """Return q (nq,) and v (n,) as measured at time t [s], and when that was [s]."""
+        self._now = t
+        self._place_obstacles()
+        if not any(self.now("stale")):
+            q, v = self._plant.q.copy(), self._plant.v.copy()
+            base = self._robot.actuated
+            positions = self._robot.coordinates[base:] + 1
+            _spoil(q, [int(positions[fault.joint - 1]) if fault.joint else None
+                       for fault in self.now("nan_position")])
+            _spoil(v, [base + fault.joint if fault.joint else None
+                       for fault in self.now("nan_velocity")])
+            self._last = q, v, t
+        return self._last
+
+    def now(self, kind: str) -> Iterator[FaultSection]:
+        """Yield the faults of a kind that are under way."""
+        return (fault for fault in self._sections if fault.kind == kind and self._on(fault))
+
+    def clock(self) -> float:
+        """Return the time [s] by a clock that faults may advance."""
+        return perf_counter() + self._skipped
+
+    def overrun(self) -> None:
+        """Let the present tick take as long as the faults under way say."""
+        if self._skipped_at != self._now:  # once a tick
+            self._skipped_at = self._now
+            self._skipped += sum(fault.takes or 0.0 for fault in self.now("overrun"))
+
+    def _on(self, fault: FaultSection) -> bool:
+        return 0.0 <= self._now - fault.at + self._half < fault.duration
+
+    def _place_obstacles(self) -> None:
+        """Bring the obstacles of faults to where they belong at this time."""
+        spheres = [fault for fault in self._sections if fault.kind == "obstacle"]
+        for i, fault in enumerate(spheres, -len(spheres)):
+            if self._on(fault) == (i in self._standing):
+                continue
+            self._standing ^= {i}
+            assert self._sensor is not None
+            self._sensor.obstacles.centres[i] = (
+                _place(fault, self._robot, self._plant.q) if i in self._standing else _AWAY)
+
+
+class _FaultySensor(ExactDistances):
+    """Stands in for a sensor, with all that this one has."""
+
+    def __init__(self, sensor: Sensor, faults: Faults) -> None:
+        self.__dict__.update(sensor.__dict__)
+        self._inner, self._faults = sensor, faults
+
+    def measure(self, state: State) -> Measurement:
+        if any(self._faults.now("stale")):
+            return self.measurement
+        if isinstance(self._inner, DepthSensor):
+            self._inner.stopped = any(self._faults.now("no_frames"))
+            self._inner.covered = any(self._faults.now("dark_frames"))
+        seen = self._inner.measure(state)
+        self.outside = self._inner.outside
+        points = [fault.point for fault in self._faults.now("nan_distance")]
+        _spoil(seen.distance, points)
+        if seen.pairs is not None:
+            _spoil(seen.pairs.table, points)
+        return seen
+
+
+@final
+@dataclass(frozen=True, kw_only=True)
+class _FaultyResolver(Resolver):
+    """Stands in for a resolver; its answers may come late or under another status."""
+
+    name: ClassVar[str] = "faulty"
+    inner: Resolver
+    faults: Faults
+
+    def solve(self, h: Hierarchy, memory: Any = None) -> Resolution:
+        """Resolve h as the inner resolver does, but for the faults under way."""
+        resolution = self.inner.solve(h, memory)
+        self.faults.overrun()
+        for fault in self.faults.now("status"):
+            status = Status[str(fault.status).upper()]
+            x = np.zeros(h.n) if status is Status.NUMERICAL_FAILURE else resolution.x
+            return Resolution(x, status, resolution.iterations, resolution.memory)
+        return resolution
+
+
+def _with_room_for_obstacles(scenario: Scenario) -> Scenario:
+    """Return the scenario with one more obstacle, far away, for each that a fault will bring."""
+    radii = [fault.radius for fault in scenario.faults if fault.kind == "obstacle"]
+    if not radii or scenario.avoidance is None:
+        return scenario
+    waiting = (ObstacleSection(shape="sphere", centre=_AWAY, radius=radius) for radius in radii)
+    avoidance = scenario.avoidance.model_copy(
+        update={"obstacles": (*scenario.avoidance.obstacles, *waiting)})
+    return scenario.model_copy(update={"avoidance": avoidance})
+
+
+def _check(where: str, fault: FaultSection, robot: Robot) -> None:
+    joints, points = robot.n - robot.actuated, len(robot.control_points) + 1
+    for key, value, most in (("joint", fault.joint, joints), ("point", fault.point, points)):
+        if value is not None and value > most:
+            raise ScenarioError(f"{where}.{key} = {value}: robot {robot.name!r} has {most}")
+    if fault.place is not None:
+        robot.joint(fault.place.joint)
+
+
+def _place(fault: FaultSection, robot: Robot, q: Array) -> Array:
+    if fault.place is None:
+        return np.array(fault.centre)
+    frame = Frame("place", robot.joint(fault.place.joint), np.array(fault.place.offset), np.eye(3))
+    return robot.state(q).position(frame)
+
+
+def _spoil(values: Array, numbers: list[int | None]) -> None:
+    """Write NaN into entry `number` (1, 2, ...) along the first axis, or into all for None."""
+    for number in numbers:
+        values[slice(None) if number is None else number - 1] = np.nan

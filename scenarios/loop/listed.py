@@ -1,0 +1,73 @@
+"""What became of the tasks that a scenario lists: their errors, tick by tick."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hierarchy import Robot, State, Task
+from hierarchy.problem import Array
+from hierarchy.tasks import CentreOfMass, Pose, Position
+
+if TYPE_CHECKING:
+    from scenarios.config.sections import ListedTask
+    from scenarios.loop.recording import Recording
+
+
+def error_of(name: str) -> str:
+    """Name of the signal (T, m) that has the error of a listed task."""
+    return f"task_error_{name.replace(' ', '_')}"
+
+
+def position_of(name: str) -> str:
+    """Name of the signal (T, 3) [m] of where the point is that a listed task moves."""
+    return f"task_position_{name.replace(' ', '_')}"
+
+
+def signals(robot: Robot, tasks: Iterable[Task], t: Array, q: Array, v: Array) -> dict[str, Array]:
+    """Return error and position of listed tasks at t (T,) [s], q (T, nq), v (T, n).
+
+    Rows of a state that is not finite are NaN.
+    """
+    tasks, state = tuple(tasks), State(robot)
+    found = {error_of(task.name): np.full((len(t), task.dimension), np.nan) for task in tasks}
+    found |= {position_of(task.name): np.full((len(t), 3), np.nan)
+              for task in tasks if _position(task, state) is not None}
+    for k in range(len(t)):
+        if not state.move(t[k], q[k], v[k]):
+            continue
+        for task in tasks:
+            found[error_of(task.name)][k] = task.error(state)
+            if (position := _position(task, state)) is not None:
+                found[position_of(task.name)][k] = position
+    return found
+
+
+def _position(task: Task, state: State) -> Array | None:
+    if isinstance(task, Position | Pose):
+        return state.position(task.frame)
+    return task.position(state) if isinstance(task, CentreOfMass) else None
+
+
+def errors(recording: Recording) -> Iterator[tuple[ListedTask, str, Array]]:
+    """Yield of each listed task its section, a unit, and how large its error is: (T,).
+
+    A pose comes twice, [m] and [deg]; a pointing task in [deg], off its cone or outside it.
+    """
+    for section in recording.scenario.tasks:
+        if error_of(section.title) not in recording:
+            continue
+        error = recording[error_of(section.title)]
+        if section.kind == "pose":
+            yield section, "m", np.linalg.norm(error[:, :3], axis=1)
+            yield section, "deg", np.degrees(np.linalg.norm(error[:, 3:], axis=1))
+        elif section.kind == "pointing":
+            cosine = np.clip(np.cos(np.radians(section.alpha_d)) - error[:, 0], -1.0, 1.0)
+            beyond = np.degrees(np.arccos(cosine)) - section.alpha_d
+            yield section, "deg", np.maximum(beyond, 0.0 if section.rows == "inequality"
+                                             else -beyond)
+        else:
+            unit = "rad" if section.kind == "posture" else "m"
+            yield section, unit, np.linalg.norm(error, axis=1)

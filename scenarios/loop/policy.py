@@ -1,0 +1,125 @@
+"""What is sent in a tick with trouble, and the guard that every command passes."""
+
+# mypy: disable-error-code="no-untyped-def"
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import final
+
+import numpy as np
+
+from hierarchy.jit import compiled
+from hierarchy.problem import Array
+from hierarchy.task import Level
+from scenarios.config.control import PolicySection
+
+_ORDER = ("use", "hold", "brake", "stop")  # the last that a trouble of the tick asks for is done
+_BRAKE = 10.0    # [1/s] deceleration per velocity
+_AT_REST = 1e-9  # [rad/s]
+_UNCHANGED = 1e-9  # what a clamp may take off a command unmentioned, relative to 1 + |x|
+
+
+@final
+class Policy:
+    """Chooses the command of each tick.
+
+    `clamp` moves a command (n,) to the nearest that the robot's limits allow in this tick; None
+    for a robot without limits. After `choose`: `events` are the (kind, action) of the tick; `fault`
+    says why the run is to end, once a "stop" was asked for, and `stopped` that the robot is at rest
+    since then.
+    """
+
+    def __init__(self, section: PolicySection, level: Level, period: float,
+                 clamp: Callable[[Array], Array] | None = None) -> None:
+        self.events: Sequence[tuple[str, str]] = ()
+        self.fault: str | None = None
+        self.stopped = False
+        self._section, self._clamp, self._period = section, clamp, period
+        self._acceleration = level == "acceleration"
+        self._good: Array | None = None
+        self._held = 0
+
+    def choose(self, t: float, troubles: Sequence[str], x: Array, v: Array) -> Array:
+        """Return the command (n,) to send at time t [s].
+
+        `troubles` are the kinds of trouble of the tick, x (n,) the answer, v (n,) the joint
+        velocity as far as it is known. The command is finite and within the limits.
+        """
+        if troubles or self.fault is not None or not finite(x):
+            return self._otherwise(t, troubles, x, v)
+        self.events, self._held = (), 0
+        self._good = command = x if self._clamp is None else self._within_limits(x)
+        return command
+
+    def _otherwise(self, t: float, troubles: Sequence[str], x: Array, v: Array) -> Array:
+        if not finite(x):  # no resolver should
+            troubles, x = [*troubles, "numerical_failure"], np.zeros_like(v)
+        action = self._action(troubles)
+        self.events = [(kind, action) for kind in troubles]
+        if action == "use":
+            return self._within_limits(x)
+        if action == "hold" and self._good is not None:
+            self._held += 1
+            return self._within_limits(self._good)
+        if action == "stop" and self.fault is None:
+            self.fault = f"stopped by its policy at t = {t:.3f} s: {', '.join(troubles)}"
+        return self._slower(action, v)
+
+    def _action(self, troubles: Sequence[str]) -> str:
+        if self.fault is not None:
+            return "stop"
+        action = max((getattr(self._section, kind) for kind in troubles), key=_ORDER.index)
+        spent = self._good is None or self._held >= self._section.patience
+        return "brake" if action == "hold" and spent else action
+
+    def _slower(self, action: str, v: Array) -> Array:
+        """Return the command that brings v toward zero: to "stop" at once, else at `_BRAKE`."""
+        rate = 1.0 / self._period
+        if action == "brake":
+            rate = min(rate, _BRAKE)
+        command = -rate * v if self._acceleration else np.zeros_like(v)
+        if self._clamp is not None:
+            command = self._clamp(command)
+        if action == "stop":
+            after = v + command * self._period if self._acceleration else command
+            self.stopped = bool(np.abs(after).max() <= _AT_REST)
+        return command
+
+    def _within_limits(self, x: Array) -> Array:
+        """Return x as the limits allow it; a change is an event."""
+        if self._clamp is None:
+            return x
+        command = self._clamp(x)
+        if _differ(command, x):
+            self.events = [*self.events, ("beyond_limits", "clamp")]
+        return command
+
+
+@compiled
+def finite(values):
+    """Whether all entries of an array (n,) are finite."""
+    for i in range(len(values)):  # noqa: SIM110, numba has no generators here
+        if not np.isfinite(values[i]):
+            return False
+    return True
+
+
+@compiled
+def _differ(command, x):
+    """Whether a clamp took more off x (n,) than is left unmentioned."""
+    most = largest = 0.0
+    for i in range(len(x)):
+        most, largest = max(most, abs(command[i] - x[i])), max(largest, abs(x[i]))
+    return most > _UNCHANGED * (1.0 + largest)
+
+
+@compiled
+def smallest(values):
+    """Return the smallest entry of an array (n,), NaN if one is NaN, infinity if it is empty."""
+    least = np.inf
+    for i in range(len(values)):
+        if np.isnan(values[i]):
+            return np.nan
+        least = min(least, values[i])
+    return least

@@ -1,0 +1,179 @@
+"""Writes one row a tick while the loop runs; nothing is computed from it there."""
+
+# mypy: disable-error-code="no-untyped-def"
+
+from __future__ import annotations
+
+import numpy as np
+
+from hierarchy.allocation import AVOIDANCE
+from hierarchy.jit import bind, compiled
+from hierarchy.kinematics import point_at
+from hierarchy.problem import Array
+from hierarchy.robot import Frame, Robot, State
+from scenarios.config import Scenario
+from scenarios.loop import listed
+from scenarios.loop.controller import Controller
+from scenarios.loop.recording import Event, Recording
+
+FASTEST = 1e3  # [rad/s or m/s] of a joint; what moves faster has diverged
+_TIMES = ("time_kinematics", "time_rows", "time_resolve", "time_tick")
+
+
+class Recorder:
+    """Room for a whole run, filled row by row.
+
+    `ticks` is the number of rows written so far.
+    """
+
+    def __init__(self, controller: Controller, ticks: int) -> None:
+        self.ticks = 0
+        cell, robot = controller.cell, controller.cell.robot
+        distances = len(cell.sensor.measurement.distance) if cell.sensor else 0
+        self._orders: dict[tuple[str, ...], int] = {}
+        # One row: t, q, v, a, command, end effector, target, cone error, distances.
+        # All are written once here: the system maps memory when it is first touched.
+        self._log = np.full((ticks, 8 + robot.nq + 3 * robot.n + distances), np.nan)
+        self._choices = np.full((ticks, 5), -1, dtype=np.int16)
+        self._times, self._over = np.full((ticks, len(_TIMES)), np.nan), np.full(ticks, np.nan)
+        self._given = 1 + robot.nq + robot.n  # column of a
+        self._extra = {name: np.empty((ticks, *value.shape), value.dtype)
+                       for name, value in cell.plant.extra.items()}
+        self._weights = np.empty(ticks if controller.blend else 0)
+        self._events: list[Event] = []
+        self.follow(controller)
+
+    def follow(self, controller: Controller) -> None:
+        """Go on with this controller, of the same robot, plant and points that are measured."""
+        self._controller, self._cell = controller, controller.cell
+        cell, state = controller.cell, controller.cell.state
+        self._frame = cell.robot.frame(cell.robot.end_effector)
+        self._distance = cell.sensor.measurement.distance if cell.sensor else np.empty(0)
+        self._target = cell.position.target if cell.position else np.full((3, 3), np.nan)
+        self._write_rest = bind(
+            _write, self._log, self._choices, self._times, state.q, state.v, state.placements,
+            self._frame.joint, self._frame.offset, self._target, self._distance,
+            then=(*(0,) * 6, *(0.0,) * 6))
+        self._blend, self._policy = controller.blend, controller.policy
+
+    def write(self) -> bool:
+        """Record the tick whose command was just applied; False if its state is of no use.
+
+        That is not finite, or a joint faster than FASTEST.
+        """
+        controller, cell, k = self._controller, self._cell, self.ticks
+        order, repulsion = controller.allocation
+        index = self._orders.setdefault(order, len(self._orders))
+        active = cell.sensor.measurement.active + 1 if AVOIDANCE in order and cell.sensor else -1
+        resolution, plant = controller.resolution, cell.plant
+        finite = _write_given(self._log, k, self._given, plant.a, controller.sent)
+        finite &= self._write_rest(k, index, active, repulsion, resolution.status,
+                                   resolution.iterations, cell.state.t, controller.cone_error,
+                                   *controller.stamps)
+        if self._extra:
+            for name, value in plant.extra.items():
+                self._extra[name][k] = value
+        if self._blend is not None:
+            self._weights[k] = self._blend.weight
+        if self._policy.events:
+            self._events += [Event(k, *event) for event in self._policy.events]
+        self.ticks = k + 1
+        return bool(finite)
+
+    def stamp(self, clock: float) -> None:
+        """Note when the tick just written was over [s]."""
+        self._over[self.ticks - 1] = clock
+
+    def finish(self, scenario: Scenario, fault: str | None) -> Recording:
+        """Return what was recorded so far."""
+        robot, rows = self._cell.robot, slice(0, self.ticks)
+        n, log = robot.n, self._log[rows]
+        widths = [1, robot.nq, n, n, n, 3, 3, 1, max(len(self._distance) - 1, 0)]
+        ends = np.cumsum(widths)
+        t, q, v, a, command, actual, desired, cone, body = (
+            log[:, end - width:end].copy() for end, width in zip(ends, widths, strict=True))
+        order, active, repulsion, status, iterations = self._choices[rows].T.copy()
+        signals = {"t": t[:, 0], "q": q, "v": v, "a": a, "command": command,
+                   "ee_position": actual, "order": order, "status": status,
+                   "iterations": iterations}
+        orders = tuple(self._orders)
+        if self._cell.position is not None:
+            signals |= {"desired_position": desired, "position_error": desired - actual}
+        if self._cell.pointing is not None:
+            asked = np.array(["pointing" in names for names in orders])
+            signals |= {"pointing_error": cone[:, 0], "pointing_active": asked[order]}
+        if self._cell.listed:
+            signals |= listed.signals(robot, self._cell.listed, t[:, 0], q, v)
+        if self._blend is not None:
+            signals["transition"] = self._weights[rows].copy()
+        signals |= {name: values[rows].copy() for name, values in self._extra.items()}
+        if "true_q" in signals:
+            signals["true_ee_position"] = _positions(robot, self._frame, signals["true_q"])
+        if len(self._distance):
+            signals |= {"control_point_distance": body, "minimal_distance": body.min(axis=1),
+                        "ee_distance": log[:, -1].copy(), "active_control_point": active,
+                        "repulsion_active": repulsion.astype(bool)}
+        times = self._times[rows].copy()
+        times[:, 3] = self._over[rows] - times[:, 3]
+        signals |= dict(zip(_TIMES, times.T.copy(), strict=True))
+        signals |= {"joint_lower": robot.lower, "joint_upper": robot.upper,
+                    "velocity_limit": robot.velocity_limit}
+        return Recording(signals, tuple(" > ".join(names) for names in orders), scenario, fault,
+                         tuple(self._events))
+
+
+def _positions(robot: Robot, frame: Frame, q: Array) -> Array:
+    """Where a frame's origin is (T, 3) [m] at joint positions q (T, nq)."""
+    state, at_rest = State(robot), np.zeros(robot.n)
+    positions = np.full((len(q), 3), np.nan)
+    for k, row in enumerate(q):
+        if state.move(0.0, row, at_rest):
+            positions[k] = state.position(frame)
+    return positions
+
+
+@compiled
+def _write_given(log, k, first, a, command):
+    """Write the acceleration and the command of tick k; whether the former is finite."""
+    row, n, finite = log[k], len(a), True
+    for j in range(n):
+        row[first + j] = a[j]
+        row[first + n + j] = command[j]
+        finite &= np.isfinite(a[j])
+    return finite
+
+
+@compiled
+def _write(log, choices, times, q, v, placements, joint, offset, target, distance,
+           k, order, active, repulsion, status, iterations, t, cone_error,
+           begin, moved, written, resolved):
+    """Write the rest of tick k; whether q is finite, and v within FASTEST."""
+    row = log[k]
+    row[0] = t
+    i = 1
+    finite = True
+    for j in range(len(q)):
+        row[i + j] = q[j]
+        finite &= np.isfinite(q[j])
+    i += len(q)
+    for j in range(len(v)):
+        row[i + j] = v[j]
+        finite &= abs(v[j]) <= FASTEST
+    i += 3 * len(v)
+    for j in range(3):
+        row[i + j] = point_at(placements, joint, offset, j)
+        row[i + 3 + j] = target[0, j]
+    row[i + 6] = cone_error
+    i += 7
+    for j in range(len(distance)):
+        row[i + j] = distance[j]
+    choices[k, 0] = order
+    choices[k, 1] = active
+    choices[k, 2] = repulsion
+    choices[k, 3] = status
+    choices[k, 4] = min(iterations, 32767)
+    times[k, 0] = moved - begin
+    times[k, 1] = written - moved
+    times[k, 2] = resolved - written
+    times[k, 3] = begin
+    return finite

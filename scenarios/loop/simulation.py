@@ -1,0 +1,110 @@
+"""The control loop: a controller and a plant, tick after tick, recorded."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from hierarchy.problem import Array
+from scenarios.config import Scenario
+from scenarios.loop.audit import Audit, Certified, Judged, Strictness
+from scenarios.loop.controller import Controller
+from scenarios.loop.faults import Faults
+from scenarios.loop.recorder import FASTEST, Recorder
+from scenarios.loop.recording import Recording
+
+_REPORT_EVERY = 500  # ticks between two calls of `progress`
+
+
+def simulate(scenario: Scenario, progress: Callable[[int, int], None] | None = None,
+             certified: bool = False) -> Recording:
+    """Run a scenario from its start to its end.
+
+    `progress(done, total)` is called now and then. A run that is interrupted (Ctrl-C), that is
+    stopped by its policy, whose state stops being finite or whose joints pass `recorder.FASTEST`
+    ends early: the Recording has all ticks so far and says why in `fault`. With `certified`, every
+    answer is judged by `solvers.certify` after its tick was timed, and the Recording has the
+    verdicts as its signal `certified`; with `control.strictness` it has `moved_by_lower`, see
+    scenarios.loop.audit.Strictness; with a camera it has what became of each level, see `Judged`
+    there. Raises HierarchyError where the scenario does not fit its robot or resolver.
+    """
+    rehearsal = Controller(scenario)
+    rehearsal.rehearse()
+    Recorder(rehearsal, 1).write()
+    faults = Faults(scenario) if scenario.faults else None
+    controller = Controller(scenario) if faults is None else faults.controller
+    ticks = max(1, round(scenario.control.duration / scenario.control.period))
+    recorder = Recorder(controller, ticks)
+    audits = _audits(controller, scenario, ticks, certified)
+    try:
+        fault = _run(controller, recorder, scenario.control.period, ticks, progress or _silent,
+                     audits, faults)
+    except KeyboardInterrupt:
+        fault = f"interrupted at tick {recorder.ticks}"
+    recording = recorder.finish(scenario, fault)
+    for audit in audits:
+        recording.signals.update((name, values[:recording.ticks])
+                                 for name, values in audit.signals.items())
+    return recording
+
+
+def _audits(controller: Controller, scenario: Scenario, ticks: int, certified: bool
+            ) -> list[Audit]:
+    audits: list[Audit] = [Certified(ticks)] if certified else []
+    if scenario.control.strictness:
+        audits.append(Strictness(ticks, scenario))
+    if scenario.sensor.kind != "exact":  # rows cannot be written again without the images
+        audits.append(Judged(ticks, controller))
+    return audits
+
+
+def _run(controller: Controller, recorder: Recorder, period: float, ticks: int,
+         progress: Callable[[int, int], None], audits: list[Audit],
+         faults: Faults | None) -> str | None:
+    policy = controller.policy
+    for k in range(ticks):
+        if k % _REPORT_EVERY == 0:
+            progress(k, ticks)
+        broken = tick(controller, recorder, k * period, faults)
+        if broken:
+            return f"{broken} from tick {k} on (t = {k * period:.3f} s)"
+        if controller.answered:
+            for audit in audits:
+                audit.look(k, controller)
+        if policy.stopped:
+            return policy.fault
+    progress(ticks, ticks)
+    return policy.fault
+
+
+def tick(controller: Controller, recorder: Recorder, t: float,
+         faults: Faults | None = None) -> str | None:
+    """Command, act and record once, at time t [s]; say what is wrong with the state, or None."""
+    plant = controller.cell.plant
+    if faults is None:
+        plant.act(controller.command(t, plant.q, plant.v))
+    else:
+        plant.act(controller.command(t, *faults.measure(t)))
+    sound = recorder.write()
+    recorder.stamp(controller.clock())
+    if not sound or (controller.policy.events and not _finite(plant.q, plant.v)):
+        return _unsound(controller)
+    return None
+
+
+def _unsound(controller: Controller) -> str:
+    state = controller.cell.state
+    joint = int(np.abs(state.v).argmax())
+    if not FASTEST < abs(state.v[joint]) < np.inf:
+        return "the state is not finite"
+    return (f"the motion has diverged: joint {joint} moves at {state.v[joint]:.3g} rad/s, "
+            f"more than {FASTEST:g},")
+
+
+def _finite(*arrays: Array) -> bool:
+    return all(np.isfinite(array).all() for array in arrays)
+
+
+def _silent(done: int, total: int) -> None:
+    pass

@@ -1,0 +1,68 @@
+"""The same scenarios under several resolvers, laid side by side."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+from scenarios.measure import metrics
+from scenarios.measure.partings import Parting, partings
+from scenarios.measure.runs import Run
+from scenarios.measure.verdict import verdict
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Runs in the order asked for, scenario by scenario.
+
+    `refused` says of each resolver that cannot resolve a scenario why it was not run; `folder` is
+    where the runs' folders lie, as it was named, or None if they were not kept.
+    """
+
+    runs: tuple[Run, ...]
+    command: str
+    versions: dict[str, str]
+    refused: tuple[str, ...] = ()
+    folder: str | None = None
+
+    @property
+    def faults(self) -> list[Run]:
+        """The runs that did not reach their end."""
+        return [run for run in self.runs if run.fault]
+
+    def groups(self) -> dict[str, list[Run]]:
+        """Return the runs that stand side by side, with the name of each group.
+
+        Those are the runs of one scenario; or, with one resolver, the runs of all scenarios.
+        """
+        if len({run.spec for run in self.runs}) == 1:
+            return {self.runs[0].spec: list(self.runs)} if len(self.runs) > 1 else {
+                self.runs[0].scenario.name: list(self.runs)}
+        names = dict.fromkeys(run.scenario.name for run in self.runs)
+        return {name: [run for run in self.runs if run.scenario.name == name] for name in names}
+
+    def as_plain_data(self) -> dict[str, Any]:
+        """Return what `comparison.json` holds."""
+        return {"command": self.command, "versions": self.versions,
+                "verdicts": {name: verdict(runs) for name, runs in self.groups().items()},
+                "runs": [_plain(run) for run in self.runs], "refused": list(self.refused),
+                "partings": {name: [_plain_parting(one) for one in partings(runs)]
+                             for name, runs in self.groups().items()}}
+
+
+def _plain(run: Run) -> dict[str, Any]:
+    return {"scenario": run.scenario.name, "resolver": run.spec, "label": run.label,
+            "folder": run.folder, "fault": run.fault,
+            "settings": {name: _plain_value(value) for name, value in run.settings.items()},
+            "ticks": run.recording.ticks if run.recording else 0,
+            "metrics": {name: metrics.plain(metric) for name, metric in run.metrics.items()}}
+
+
+def _plain_parting(one: Parting) -> dict[str, Any]:
+    return {"label": one.label, "from": one.other, "bound_rad": one.bound, "tick": one.tick,
+            "largest_rad": one.largest if math.isfinite(one.largest) else None, "why": one.why}
+
+
+def _plain_value(value: Any) -> Any:
+    return value if isinstance(value, (bool, int, float, str, type(None))) else repr(value)

@@ -1,0 +1,263 @@
+"""What is measured on a recording; every number has a unit, a plain name and a direction."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from scenarios.loop.recording import Recording
+
+Array = NDArray[np.float64]
+_NOTHING = 1e-9  # errors of listed tasks below this are rounding and count as zero [m, deg, rad]
+
+# Display units by SI unit: how many of them make one, what it is called, decimals.
+_SHOWN = {"m": (1e3, "mm", 3), "s": (1e6, "µs", 2), "deg": (1.0, "°", 3), "share": (100.0, "%", 2),
+          "rad": (1.0, "rad", 3), "rad/s": (1.0, "rad/s", 3), "rad/s^2": (1.0, "rad/s²", 2),
+          "N": (1.0, "N", 1), "": (1.0, "", 0)}
+
+
+@dataclass(frozen=True)
+class Metric:
+    """One number about one run.
+
+    `value` is in the SI `unit` ("" for a count, "share" of 1, "deg"), and None when the run has
+    no such thing. `lower_is_better` is None where neither direction is. A `detail` is left out of
+    tables that must be short.
+    """
+
+    name: str
+    label: str
+    value: float | None
+    unit: str
+    lower_is_better: bool | None = True
+    group: str = ""
+    note: str = ""
+    detail: bool = False
+
+    @property
+    def shown_unit(self) -> str:
+        """The unit in which tables show the value."""
+        return _SHOWN[self.unit][1]
+
+    @property
+    def scale(self) -> float:
+        """How many of `shown_unit` make one SI unit."""
+        return _SHOWN[self.unit][0]
+
+    def shown(self) -> str:
+        """Return the value for a table: in `shown_unit`, without the unit."""
+        if self.value is None:
+            return "–"
+        scale, _, decimals = _SHOWN[self.unit]
+        value = self.value * scale
+        if value != 0.0 and (abs(value) < 0.5 * 10.0**-decimals or abs(value) >= 1e5):
+            return f"{value:.1e}"
+        return f"{value:.{decimals}f}"
+
+
+def measure(recording: Recording, settle: float = 2.0,
+            cone_tolerance_deg: float = 0.01) -> dict[str, Metric]:
+    """Return the metrics of a run by name, in the order in which tables show them.
+
+    Parameters
+    ----------
+    settle : [s] after which the start, which may lie off the path, no longer counts.
+    cone_tolerance_deg : [deg] beyond the cone that still counts as being on it.
+    """
+    if recording.ticks == 0:
+        return {}
+    found = (*_tracking(recording, settle), *_pointing(recording, cone_tolerance_deg),
+             *_listed(recording, settle), *_strictness(recording),
+             *_distances(recording), *_contacts(recording), *_motion(recording),
+             *_switching(recording), *_troubles(recording), *_time(recording))
+    return {metric.name: metric for metric in found}
+
+
+def as_plain_data(recording: Recording) -> dict[str, Any]:
+    """Return what `metrics.json` holds: ticks, fault, events, and each metric as `plain` has it."""
+    events = [{"kind": kind, "action": action, "ticks": len(ticks), "first_tick": ticks[0],
+               "first_time": float(recording["t"][ticks[0]])}
+              for (kind, action), ticks in recording.troubles().items()]
+    return {"ticks": recording.ticks, "fault": recording.fault, "events": events,
+            "metrics": {metric.name: plain(metric) for metric in measure(recording).values()}}
+
+
+def plain(metric: Metric) -> dict[str, Any]:
+    """Return a metric as plain data for a JSON file."""
+    note = {"note": metric.note} if metric.note else {}
+    return {"value": metric.value, "unit": metric.unit, "label": metric.label,
+            "lower_is_better": metric.lower_is_better, **note}
+
+
+def _tracking(recording: Recording, settle: float) -> Iterator[Metric]:
+    if "position_error" not in recording:
+        return
+    error = np.linalg.norm(recording["position_error"], axis=1)
+    after = error[recording["t"] - recording["t"][0] >= settle]
+    spans = (("", "Position error", error), ("_settled", f"Error after {settle:g} s", after))
+    for suffix, when, e in spans:
+        yield Metric(f"position_error_rms{suffix}", f"{when}, rms",
+                     _finite(np.sqrt(np.mean(e**2))) if e.size else None, "m", group="Tracking")
+        yield Metric(f"position_error_max{suffix}", f"{when}, max",
+                     _largest(e), "m", group="Tracking")
+    yield Metric("position_error_median_settled", f"Error after {settle:g} s, median",
+                 _finite(np.median(after)) if after.size else None, "m", group="Tracking")
+    if "true_ee_position" in recording:
+        true = np.linalg.norm(recording["desired_position"] - recording["true_ee_position"], axis=1)
+        yield Metric("true_position_error_rms", "True position error, rms",
+                     _finite(np.sqrt(np.mean(true**2))), "m", group="Tracking")
+        yield Metric("true_position_error_max", "True position error, max", _largest(true), "m",
+                     group="Tracking")
+
+
+def _pointing(recording: Recording, tolerance: float) -> Iterator[Metric]:
+    if "pointing_error" not in recording or recording.scenario.pointing is None:
+        return
+    half_angle = recording.scenario.pointing.alpha_d
+    beyond = pointing_angle(recording) - half_angle
+    yield Metric("cone_violation_max", "Beyond the cone, max",
+                 _finite(max(float(beyond.max()), 0.0)), "deg", group="Tracking",
+                 note=f"a cone of {half_angle:g}°")
+    yield Metric("cone_violation_share", "Time outside the cone",
+                 float(np.mean(beyond > tolerance)), "share", group="Tracking",
+                 note=f"outside by more than {tolerance:g}°")
+
+
+def _listed(recording: Recording, settle: float) -> Iterator[Metric]:
+    """Errors of the tasks of `[[tasks]]`, each under its name."""
+    if not recording.scenario.tasks:
+        return
+    from scenarios.loop.listed import errors
+
+    after = recording["t"] - recording["t"][0] >= settle
+    for section, unit, exact in errors(recording):
+        error = np.where(exact < _NOTHING, 0.0, exact)
+        turned = section.kind == "pose" and unit == "deg"
+        title = section.title[0].upper() + section.title[1:] + (", turned" if turned else "")
+        key = f"task_{section.title}{' turned' if turned else ''}".replace(" ", "_")
+        lower = None if section.kind == "posture" else True  # it gets what is left
+        yield Metric(f"{key}_rms", f"{title}: error, rms", _finite(np.sqrt(np.mean(error**2))),
+                     unit, lower, "Tracking")
+        yield Metric(f"{key}_max_settled", f"{title}: after {settle:g} s, max",
+                     _largest(error[after]), unit, lower, "Tracking")
+        yield Metric(f"{key}_end", f"{title}: at the end", _finite(error[-1]), unit, lower,
+                     "Tracking", detail=True)
+
+
+def pointing_angle(recording: Recording) -> Array:
+    """Return the angle between the pointing axis and the cone's axis: (T,) [deg]."""
+    assert recording.scenario.pointing is not None
+    cosine = np.cos(np.radians(recording.scenario.pointing.alpha_d)) - recording["pointing_error"]
+    return np.asarray(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))))
+
+
+def _strictness(recording: Recording) -> Iterator[Metric]:
+    if "moved_by_lower" in recording:
+        moved = recording["moved_by_lower"]
+        yield Metric("moved_by_lower_max", "Moved by lower tasks in a tick, max",
+                     _finite(np.nanmax(moved)) if np.isfinite(moved).any() else None, "m",
+                     group="Tracking", note="strict: not at all")
+
+
+def _distances(recording: Recording) -> Iterator[Metric]:
+    for name, signal, label in (("body_distance_min", "minimal_distance", "Body distance"),
+                                ("ee_distance_min", "ee_distance", "End effector distance")):
+        if signal in recording:
+            known = recording[signal][~np.isnan(recording[signal])]
+            yield Metric(name, f"{label}, min", _finite(known.min()) if known.size else None, "m",
+                         lower_is_better=False, group="Safety")
+
+
+def _contacts(recording: Recording) -> Iterator[Metric]:
+    if "contacts" in recording:
+        yield Metric("contact_ticks", "Contacts: ticks",
+                     float(np.count_nonzero(recording["contacts"])), "", group="Safety")
+        for key, unit in (("depth", "m"), ("force", "N")):
+            yield Metric(f"contact_{key}_max", f"Contact {key}, max",
+                         _largest(recording[f"contact_{key}"]), unit, group="Safety")
+
+
+def _true(recording: Recording, signal: str) -> Array:
+    """Return q or v as it was, where that is known apart from what was measured."""
+    return recording[f"true_{signal}" if f"true_{signal}" in recording else signal]
+
+
+def _motion(recording: Recording) -> Iterator[Metric]:
+    v, group = _true(recording, "v"), "Safety"
+    yield _joint_limit_excess(recording)
+    yield Metric("speed_max", "Joint speed, max", _largest(v), "rad/s", group=group)
+    yield Metric("velocity_step_max", "Joint speed step, max",
+                 _largest(np.diff(v, axis=0)), "rad/s", group=group)
+    yield Metric("acceleration_max", "Joint acceleration, max", _largest(recording["a"]),
+                 "rad/s^2", group=group)
+    yield Metric("acceleration_step_max", "Joint acceleration step, max",
+                 _largest(np.diff(recording["a"], axis=0)), "rad/s^2", group=group)
+
+
+def _joint_limit_excess(recording: Recording) -> Metric:
+    value, note = None, "the robot has no joint limits"
+    if "joint_lower" in recording and "joint_upper" in recording:
+        lower, upper, q = (recording["joint_lower"], recording["joint_upper"],
+                           _true(recording, "q"))
+        if np.isfinite(lower).any() or np.isfinite(upper).any():
+            excess = np.maximum(q - upper, lower - q).max(axis=0)
+            joint = int(np.argmax(excess))
+            value = _finite(max(float(excess[joint]), 0.0))
+            note = f"joint {joint + 1}" if excess[joint] > 0.0 else ""
+    return Metric("joint_limit_excess", "Beyond a joint limit, max", value, "rad",
+                  group="Safety", note=note)
+
+
+def _switching(recording: Recording) -> Iterator[Metric]:
+    yield Metric("stack_changes", "Changes of the stack", float(recording.switches().size), "",
+                 group="Switching")
+    if "active_control_point" in recording:
+        changes = np.count_nonzero(np.diff(recording["active_control_point"].astype(int)))
+        yield Metric("active_point_changes", "Changes of the active point",
+                     float(changes), "", group="Switching")
+
+
+_DONE = {"brake": "Ticks braked", "hold": "Ticks with the last command held",
+         "use": "Ticks with trouble, answer sent", "stop": "Ticks that stopped the run",
+         "clamp": "Ticks clamped to the limits"}
+
+
+def _troubles(recording: Recording) -> Iterator[Metric]:
+    for action, label in _DONE.items():
+        ticks = {event.tick for event in recording.events if event.action == action}
+        if ticks:
+            yield Metric(f"ticks_{action}", label, float(len(ticks)), "", group="Computing")
+
+
+def _time(recording: Recording) -> Iterator[Metric]:
+    if "status" in recording:
+        from solvers import Status
+        failed = np.count_nonzero(recording["status"] != int(Status.SOLVED))
+        yield Metric("ticks_not_solved", "Ticks not solved", float(failed), "", group="Computing")
+    if "time_tick" in recording:
+        late = np.count_nonzero(recording["time_tick"] > recording.scenario.control.period)
+        yield Metric("ticks_late", "Ticks longer than the period", float(late), "",
+                     group="Computing")
+    parts = (("time_tick", "Whole tick"), ("time_kinematics", "Kinematics"), ("time_rows", "Rows"),
+             ("time_resolve", "Resolve"))
+    levels = (("median", 50.0, "median"), ("p95", 95.0, "95 %"), ("p999", 99.9, "99.9 %"))
+    for signal, part in parts:
+        shared = signal in ("time_kinematics", "time_rows")  # the same code under any resolver
+        for key, percent, label in levels if signal in recording else ():
+            yield Metric(f"{signal}_{key}", f"{part}, {label}",
+                         _finite(np.percentile(recording[signal], percent)), "s",
+                         lower_is_better=None if shared else True, group="Computing",
+                         detail=shared and key != "median")
+
+
+def _largest(values: Array) -> float | None:
+    return _finite(np.abs(values).max()) if values.size else None
+
+
+def _finite(value: Any) -> float | None:
+    return float(value) if np.isfinite(value) else None

@@ -1,0 +1,98 @@
+"""Where runs that ought to be the same motion part, and why."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from scenarios.measure.runs import Run
+
+BOUND = 1e-6  # [rad] of any joint, or what the resolver declares as its accuracy where that is more
+
+
+@dataclass(frozen=True)
+class Parting:
+    """How one strict resolver's run stands to that of the first strict one.
+
+    tick : the first at which a joint is more than `bound` [rad] away, or None where none is.
+    largest : [rad] over all ticks that both runs have.
+    why : what was different up to that tick, as half a sentence; "" where tick is None.
+    """
+
+    label: str
+    other: str
+    bound: float
+    largest: float
+    tick: int | None = None
+    time: float = 0.0
+    why: str = ""
+
+    def __str__(self) -> str:
+        if self.largest == 0.0:
+            return f"{self.label} moves as {self.other} to the last bit"
+        if self.tick is None:
+            return f"{self.label} keeps within {self.largest:.1e} rad of {self.other} to the end"
+        return (f"{self.label} parts from {self.other} by more than {self.bound:.0e} rad at tick "
+                f"{self.tick} ({self.time:.2f} s), by {self.largest:.1e} rad at most: {self.why}")
+
+
+def partings(runs: Sequence[Run]) -> list[Parting]:
+    """Return one for each strict resolver after the first, where they ran the same scenario.
+
+    Only resolvers whose answer is the strict one at any rank ought to agree.
+    """
+    if len({run.scenario.name for run in runs}) != 1:
+        return []
+    strict = [run for run in runs if run.recording and run.recording.ticks
+              and run.scenario.make_resolver().strict]
+    return [_parting(run, strict[0]) for run in strict[1:]]
+
+
+def _parting(run: Run, other: Run) -> Parting:
+    assert run.recording is not None
+    assert other.recording is not None
+    ticks = min(run.recording.ticks, other.recording.ticks)
+    accuracy = float(run.scenario.make_resolver().accuracy)
+    bound = max(BOUND, accuracy)
+    apart = abs(run.recording["q"][:ticks] - other.recording["q"][:ticks]).max(axis=1)
+    beyond = np.flatnonzero(~(apart <= bound))
+    largest = float(np.nan_to_num(apart, nan=np.inf).max())
+    if not beyond.size:
+        return Parting(run.label, other.label, bound, largest)
+    tick = int(beyond[0])
+    return Parting(run.label, other.label, bound, largest, tick, float(run.recording["t"][tick]),
+                   _why(run, other, tick, accuracy))
+
+
+def _why(run: Run, other: Run, tick: int, accuracy: float) -> str:
+    for one in (run, other):
+        failed = np.flatnonzero(_signal(one, "status")[:tick + 1] != 0)
+        if failed.size:
+            return f"tick {failed[0]} of {one.label} was not solved"
+    if run.scenario.limits_in_stack != other.scenario.limits_in_stack:
+        return "the limits are in the stack of one, and a guard outside it for the other"
+    if run.scenario.asks == "bounds" and "bounds" in (
+            one.scenario.make_resolver().handles for one in (run, other)):
+        return ("while limits act they agree only undamped, and sns not then: it scales what it "
+                "cannot meet")
+    mine, theirs = (_orders(one)[:tick + 1] for one in (run, other))
+    switched = np.flatnonzero(mine != theirs)
+    if switched.size:
+        return (f"the stack is another one at tick {switched[0]}, where a switch came earlier or "
+                "later for errors below that bound")
+    return (f"no tick failed and the stacks are the same; the motion magnifies the errors of each "
+            f"tick (declared: {accuracy:.0e})")
+
+
+def _signal(run: Run, name: str) -> Any:
+    assert run.recording is not None
+    return run.recording[name]
+
+
+def _orders(run: Run) -> Any:
+    assert run.recording is not None
+    return np.array([*run.recording.orders, ""])[_signal(run, "order")]

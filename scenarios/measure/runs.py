@@ -1,0 +1,104 @@
+"""Runs of scenarios side by side: what was measured, in rows with the best values marked."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+from scenarios.files import slug
+from scenarios.measure import metrics
+from scenarios.measure.metrics import Metric
+
+if TYPE_CHECKING:
+    from scenarios.config import Scenario
+    from scenarios.loop.recording import Recording
+
+
+@dataclass(frozen=True)
+class Run:
+    """One scenario under one resolver, with what came of it.
+
+    `recording` is None when the run could not begin or broke; `error` then says why.
+    """
+
+    scenario: Scenario
+    spec: str
+    label: str
+    recording: Recording | None = None
+    error: str | None = None
+
+    @property
+    def fault(self) -> str | None:
+        """Why the run did not reach its end, or None when it did."""
+        return self.error or (self.recording.fault if self.recording else None)
+
+    @property
+    def folder(self) -> str:
+        """Where the run lies below the comparison's own folder."""
+        return f"{slug(self.scenario.name)}/{slug(self.spec)}"
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """The resolver's settings as they were used."""
+        resolver = self.scenario.make_resolver()
+        return {field.name: getattr(resolver, field.name) for field in dataclasses.fields(resolver)
+                } if dataclasses.is_dataclass(resolver) else {}
+
+    @cached_property
+    def metrics(self) -> dict[str, Metric]:
+        """What was measured on it, by name; empty without a recording."""
+        return metrics.measure(self.recording) if self.recording else {}
+
+
+@dataclass(frozen=True)
+class Row:
+    """One line of the table: a metric, its value for each run, and which of them are best."""
+
+    label: str
+    unit: str
+    group: str
+    cells: tuple[str, ...]
+    notes: tuple[str, ...]
+    best: frozenset[int]
+    name: str = ""
+
+
+def table(runs: Sequence[Run], details: bool = True) -> list[Row]:
+    """Return the rows that compare runs of one scenario, best values marked.
+
+    Only runs of one scenario that reached their end compete: other scenarios ask for other things,
+    and a shorter run's numbers cover less time. Values within one percent of the best are as good,
+    and where all are, none is marked.
+    """
+    one_scenario = len({run.scenario.name for run in runs}) == 1
+    competes = [one_scenario and run.fault is None for run in runs]
+    known = {name: metric for run in runs for name, metric in run.metrics.items()
+             if details or not metric.detail}
+    return [_row(metric, [run.metrics.get(name) for run in runs], competes)
+            for name, metric in known.items()]
+
+
+def _row(metric: Metric, found: Sequence[Metric | None], competes: Sequence[bool]) -> Row:
+    cells = tuple(m.shown() if m else "–" for m in found)
+    values = {i: m.value for i, m in enumerate(found)
+              if m and m.value is not None and competes[i]}
+    return Row(metric.label, metric.shown_unit, metric.group, cells,
+               tuple(m.note if m else "" for m in found), _best(values, metric.lower_is_better),
+               metric.name)
+
+
+def _best(values: Mapping[int, float], lower: bool | None, tie: float = 0.01,
+          rounding: float = 1e-12) -> frozenset[int]:
+    """Return which of the values are as good as the best; empty if all are.
+
+    That is within `tie`, relative, or within what rounding makes of nothing [SI units].
+    """
+    if lower is None or not values:
+        return frozenset()
+    winner = min(values.values()) if lower else max(values.values())
+    best = frozenset(i for i, value in values.items()
+                     if abs(value - winner) <= max(tie * max(abs(value), abs(winner)), rounding))
+    return best if len(best) < len(values) else frozenset()

@@ -1,0 +1,131 @@
+"""The same scenarios under several resolvers: run, written and reported."""
+
+from __future__ import annotations
+
+import dataclasses
+import shlex
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
+from functools import partial
+from pathlib import Path
+
+from hierarchy.errors import HierarchyError
+from scenarios.cell.build import build
+from scenarios.config import Scenario, load
+from scenarios.config.resolvers import default_resolvers
+from scenarios.draw.run_folder import save
+from scenarios.files import claim, write_json, write_text
+from scenarios.loop.recording import versions
+from scenarios.loop.simulation import simulate
+from scenarios.measure.comparison import Comparison
+from scenarios.measure.runs import Run
+
+Progress = Callable[[str, int, int], None]
+
+
+def compare(scenarios: Iterable[str | Scenario] | str, resolvers: Sequence[str] | None = None,
+            out: str | Path | None = None, progress: Progress | None = None,
+            command: str | None = None) -> Comparison:
+    """Run every scenario under every resolver, one after the other, and compare.
+
+    A resolver that cannot resolve a scenario's rows is not run on it, and the Comparison says so.
+
+    With `out`, each run's folder is out/<scenario>/<resolver>, the page is out/index.html and the
+    numbers are in out/comparison.json. A run that breaks or faults does not lose the others;
+    Ctrl-C keeps what was run so far.
+
+    Parameters
+    ----------
+    scenarios : names, paths or Scenario objects.
+    resolvers : specs `name` or `name:setting=value:setting=value`; by default those of
+        DEFAULT_RESOLVERS that suit the scenario and are installed.
+    progress : called as progress(label, ticks done, ticks in all).
+    command : the command line to print on the page; made up from the names if not given.
+
+    Raises
+    ------
+    HierarchyError : before anything is run: an unknown scenario, resolver or setting, a scenario
+        that does not fit its robot, resolvers of which none can resolve anything, or an output
+        folder that is in use.
+    """
+    planned, refused = _plan([scenarios] if isinstance(scenarios, str) else scenarios, resolvers)
+    folder = None if out is None else claim(out)
+    runs: list[Run] = []
+    for run in planned:
+        try:
+            runs.append(_carried_out(run, folder, progress))
+        except KeyboardInterrupt:
+            runs.append(dataclasses.replace(run, error="interrupted"))
+        if _interrupted(runs[-1]):
+            break
+    comparison = Comparison(tuple(runs), command or _command(planned, out), versions(),
+                            tuple(refused), None if out is None else str(out))
+    if folder is not None:
+        folder.mkdir(exist_ok=True)
+        _write(comparison, folder)
+    return comparison
+
+
+def _plan(scenarios: Iterable[str | Scenario],
+          resolvers: Sequence[str] | None) -> tuple[list[Run], list[str]]:
+    """Return the runs to be made, and why others are not."""
+    loaded = [load(s) if isinstance(s, (str, Path)) else s for s in scenarios]
+    for name, count in Counter(scenario.name for scenario in loaded).items():
+        if count > 1:
+            raise HierarchyError(f"{count} scenarios are called {name!r}; give each its own name")
+    runs, refused = [], []
+    for scenario in loaded:
+        build(scenario)
+        usual = default_resolvers(scenario.asks)[0] if resolvers is None else resolvers
+        for spec in dict.fromkeys(usual):
+            changed = scenario.with_resolver(spec)
+            resolver, asked = changed.make_resolver(), changed.asks
+            if resolver.can_resolve(asked):
+                runs.append(Run(changed, spec, str(resolver.label)))
+            else:
+                refused.append(f"{spec} is not run on {scenario.name}, which asks for {asked}: it "
+                               f"resolves {resolver.handles}")
+    if not runs:
+        raise HierarchyError("; ".join(refused) or "no resolver is named")
+    return [_distinct(run, runs) for run in runs], refused
+
+
+def _distinct(run: Run, runs: Sequence[Run]) -> Run:
+    """Return the run with a label that tells it from those beside it.
+
+    That is its resolver's label, or its spec where another resolver has the same one, or its
+    scenario's name where there is only one resolver.
+    """
+    if len(runs) > 1 and len({other.spec for other in runs}) == 1:
+        return dataclasses.replace(run, label=run.scenario.name)
+    same = {other.spec for other in runs if other.label == run.label}
+    return dataclasses.replace(run, label=run.spec) if len(same) > 1 else run
+
+
+def _carried_out(run: Run, folder: Path | None, progress: Progress | None) -> Run:
+    tell = partial(progress, f"{run.scenario.name} {run.spec}") if progress else None
+    try:
+        recording = simulate(run.scenario, progress=tell)
+    except Exception as error:  # one way's failure is a result, and must not lose the others'
+        return dataclasses.replace(run, error=f"{type(error).__name__}: {error}")
+    if folder is not None:
+        save(recording, folder / run.folder)
+    return dataclasses.replace(run, recording=recording)
+
+
+def _interrupted(run: Run) -> bool:
+    return bool(run.fault) and str(run.fault).startswith("interrupted")
+
+
+def _write(comparison: Comparison, folder: Path) -> None:
+    from scenarios.report import page
+
+    write_json(folder / "comparison.json", comparison.as_plain_data())
+    write_text(folder / "index.html", page(comparison))
+
+
+def _command(planned: Sequence[Run], out: str | Path | None) -> str:
+    names = dict.fromkeys(run.scenario.name for run in planned)
+    specs = ",".join(dict.fromkeys(run.spec for run in planned))
+    where = ["--out", str(out)] if out is not None else []
+    return shlex.join(["hierarchy", "compare", *names, "--resolvers", specs, *where])

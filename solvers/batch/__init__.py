@@ -1,0 +1,5 @@
+"""Many hierarchies of one shape at once, on all cores; on an accelerator in `on_jax`."""
+
+from solvers.batch.stacked import Batch, BatchResolution, cores, solve
+
+__all__ = ["Batch", "BatchResolution", "cores", "solve"]

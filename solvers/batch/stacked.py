@@ -1,0 +1,262 @@
+"""Many hierarchies of one shape, resolved in one call over all cores.
+
+    answer = solve(Batch(A, lower, upper, sizes), make("tpm"))
+
+For policies that learn, sampling, sweeps. Each problem gets what `resolver.solve` gives it alone,
+to the last bit; what is saved is the time around a solve, and one core does not wait for another.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from hierarchy.errors import HierarchyError
+from hierarchy.problem import Array, Hierarchy
+from solvers.certificate import certify
+from solvers.kernels.batch import (
+    batch_exact,
+    batch_saturation,
+    batch_staircase,
+    batch_without_bounds,
+)
+from solvers.resolver import Resolver, make, refuse_inequality
+from solvers.resolvers.hcod import Hcod
+from solvers.resolvers.tpm import Tpm
+from solvers.status import INACCURATE, NO_LIMITS, NUMERICAL_FAILURE, SOLVED, UNPROVED, Status
+from solvers.workspace import run
+
+Indices = NDArray[np.int64]
+ENOUGH = 2**15  # entries of A, half a millisecond or more, that are worth starting a thread for
+PARTS = 4       # for each thread, because some problems take longer than others
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Batch:
+    """B hierarchies of L levels, m rows and n unknowns, as stacked arrays.
+
+    Arrays of float64 without gaps are kept as they are, others copied. What is in them is not
+    checked, but in the end: data that are not finite, or lower > upper, give that one problem
+    Status.NUMERICAL_FAILURE.
+
+    Attributes
+    ----------
+    A : (B, m, n) the rows of all levels, one level under the other.
+    lower, upper : (B, m) their sides; an equality has lower == upper, a missing side is infinite.
+    sizes : (L,) rows of each level, the same for all problems.
+    reference : (B, n) the x preferred where nothing else decides; None for zero.
+
+    Raises
+    ------
+    HierarchyError : an array of another shape, or not of numbers; names the array.
+    """
+
+    A: Array
+    lower: Array
+    upper: Array
+    sizes: Indices
+    reference: Array = None  # type: ignore[assignment]  # zeros of the shape of A
+
+    def __post_init__(self) -> None:
+        A = _numbers("A", self.A)
+        if A.ndim != 3 or A.shape[2] == 0:
+            raise HierarchyError(f"A has shape {A.shape}, expected (problems, rows, unknowns)")
+        sides = A.shape[:2]
+        reference = (np.zeros(A.shape[::2]) if self.reference is None
+                     else _shaped("reference", self.reference, A.shape[::2]))
+        for name, array in (("A", A), ("lower", _shaped("lower", self.lower, sides)),
+                            ("upper", _shaped("upper", self.upper, sides)),
+                            ("sizes", _sizes(self.sizes, A.shape[1])), ("reference", reference)):
+            object.__setattr__(self, name, array)
+
+    @classmethod
+    def of(cls, hierarchies: Sequence[Hierarchy]) -> Batch:
+        """Stack hierarchies of one shape.
+
+        Raises
+        ------
+        HierarchyError : none at all, or one whose sizes or unknowns are not those of the first.
+        """
+        if not hierarchies:
+            raise HierarchyError("a batch of no hierarchies has no shape; give arrays")
+        first = hierarchies[0]
+        for p, h in enumerate(hierarchies):
+            if h.n != first.n or h.sizes.tolist() != first.sizes.tolist():
+                raise HierarchyError(f"problem {p} is {h}, where problem 0 is {first}")
+        stacked = (np.stack([getattr(h, name) for h in hierarchies])
+                   for name in ("A", "lower", "upper", "reference"))
+        A, lower, upper, reference = stacked
+        return cls(A, lower, upper, first.sizes, reference)
+
+    def __len__(self) -> int:
+        return len(self.A)
+
+    def __getitem__(self, p: int) -> Hierarchy:
+        """Return problem p as a hierarchy of its own, a view of these arrays."""
+        names = tuple(f"problem {p}, level {k + 1}" for k in range(len(self.sizes)))
+        return Hierarchy(self.A[p], self.lower[p], self.upper[p], self.sizes, self.reference[p],
+                         names)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class BatchResolution:
+    """What a batch gave.
+
+    Attributes
+    ----------
+    x : (B, n) the answers, always finite.
+    status : (B,) int, values of `Status`.
+    iterations : (B,) int, steps of the resolver's own kind.
+    memory : (B, ...) state for the next solve of the same shape, a row of zeros for none; None
+        where no problem has any.
+    """
+
+    x: Array
+    status: Indices
+    iterations: Indices
+    memory: Array | None
+
+    @property
+    def solved(self) -> NDArray[np.bool_]:
+        """Which problems are solved: (B,)."""
+        solved: NDArray[np.bool_] = self.status == Status.SOLVED
+        return solved
+
+
+def solve(batch: Batch, resolver: Resolver | None = None, threads: int | None = None,
+          memory: Any = None) -> BatchResolution:
+    """Resolve all problems of a batch by `tpm` (the default) or `hcod`, with their settings.
+
+    threads : at most so many at a time; None for as many as there are cores to run on.
+    memory : (B, ...) of an earlier resolution of this shape by this resolver, or None. Of another
+        shape it is forgotten.
+
+    Raises
+    ------
+    HierarchyError : another resolver; threads below 1; a row that the resolver cannot handle, by
+        problem, level and row.
+    """
+    resolver = make("tpm") if resolver is None else resolver
+    if not isinstance(resolver, (Tpm, Hcod)) or not resolver.strict:
+        raise HierarchyError(f"{resolver.label} resolves no batches; tpm and hcod do")
+    if threads is not None and threads < 1:
+        raise HierarchyError(f"threads = {threads}, expected at least 1")
+    run = _Run(batch, resolver, cores() if threads is None else threads, memory)
+    return run.by_tpm() if isinstance(resolver, Tpm) else run.by_hcod()
+
+
+class _Run:
+    """The arrays that the kernels write, and which problems go to which kernel."""
+
+    def __init__(self, batch: Batch, resolver: Tpm | Hcod, threads: int, memory: Any) -> None:
+        self.batch, self.resolver, self.threads = batch, resolver, threads
+        count, rows, n = batch.A.shape
+        bounds = 0 if isinstance(resolver, Hcod) else n + len(batch.sizes)
+        shape = (count, bounds + 3 * rows + 3)
+        before = None if memory is None else _numbers("memory", memory)
+        self.before = before if before is not None and before.shape == shape else None
+        self.warm: NDArray[np.bool_] = np.zeros(count, dtype=bool)
+        if self.before is not None:
+            self.warm |= (self.before != 0.0).any(axis=1)
+        self.x, self.codes = np.zeros((count, n)), np.zeros(count, dtype=np.int64)
+        self.record = np.zeros(shape)
+        if self.before is not None and resolver.damping == 0.0:
+            self.record[:] = self.before
+        self.settings = resolver._settings
+
+    def by_tpm(self) -> BatchResolution:
+        """Resolve equalities by the staircase; with bounds, or a memory, by the exact engine."""
+        self._refer(np.arange(len(self.codes)))
+        self._call(batch_staircase, np.flatnonzero(~self.warm), self.x, self.codes, self.settings)
+        bounded = np.flatnonzero(self.warm | (self.codes < 0))
+        if bounded.size == 0:
+            self._judge()
+            return self._answer(np.ones(len(self.codes)), None)
+        self._refer(bounded)
+        self._call(batch_without_bounds, bounded, self.x, self.codes, self.record, self.settings)
+        self._call(batch_exact, np.flatnonzero(self.codes == UNPROVED), self.x, self.codes,
+                   self.record, self.settings)
+        unlimited = self.codes == NO_LIMITS
+        named = ~unlimited & (self.codes >= 0) & (self.codes != NUMERICAL_FAILURE)
+        self._call(batch_saturation, bounded[named[bounded]], self.x, self.record)
+        self._call(batch_staircase, np.flatnonzero(unlimited), self.x, self.codes, self.settings)
+        self._judge()
+        for p in np.flatnonzero(self.codes < 0)[:1]:
+            refuse_inequality(self.resolver, self.batch[p], -int(self.codes[p]) - 1)
+        self.record[unlimited | (self.codes == NUMERICAL_FAILURE)] = 0.0
+        steps = np.maximum(self.record[:, -3] + self.record[:, -2], 1.0)
+        return self._answer(steps, self.record)
+
+    def by_hcod(self) -> BatchResolution:
+        """Resolve by the exact engine, and what is in doubt alone."""
+        everything = np.arange(len(self.batch))
+        self._refer(everything)
+        self._call(batch_exact, everything, self.x, self.codes, self.record, self.settings)
+        self._judge()
+        return self._answer(self.record[:, -3] + self.record[:, -2], self.record)
+
+    def _refer(self, which: Indices) -> None:
+        self.x[which] = self.batch.reference[which]
+
+    def _answer(self, steps: Array, memory: Array | None) -> BatchResolution:
+        return BatchResolution(self.x, self.codes, steps.astype(np.int64), memory)
+
+    def _call(self, kernel: Callable[..., int], which: Indices, *arguments: Any) -> None:
+        """Run a kernel over the problems `which`, in parts on several threads if there are many."""
+        b = self.batch
+        call = partial(run, kernel, (b.A, b.lower, b.upper, b.sizes), *arguments)
+        threads = min(self.threads, len(which) * b.A[:1].size // ENOUGH)
+        if threads < 2:
+            call(which)
+            return
+        parts = np.array_split(which, PARTS * threads)
+        with ThreadPoolExecutor(threads) as pool:
+            list(pool.map(call, parts))
+
+    def _judge(self) -> None:
+        """Let `certify` decide about the answers that are in doubt."""
+        for p in np.flatnonzero(self.codes == INACCURATE).tolist():
+            self.codes[p] = SOLVED if certify(self.batch[p], self.x[p]).certified else INACCURATE
+
+
+def cores() -> int:
+    """Return how many cores this process may run on."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def _numbers(name: str, value: ArrayLike) -> Array:
+    """Return an array of float64 that kernels may be handed: C-contiguous and writeable."""
+    try:
+        if np.iscomplexobj(value):
+            raise TypeError
+        return np.require(value, np.float64, ["C", "W", "A"])
+    except (TypeError, ValueError) as error:
+        raise HierarchyError(f"{name} is not an array of numbers") from error
+
+
+def _shaped(name: str, value: ArrayLike, shape: tuple[int, ...]) -> Array:
+    array = _numbers(name, value)
+    if array.shape != shape:
+        raise HierarchyError(f"{name} has shape {array.shape}, expected {shape}, that of A's "
+                             "problems and " + ("unknowns" if name == "reference" else "rows"))
+    return array
+
+
+def _sizes(value: ArrayLike, rows: int) -> Indices:
+    sizes = np.asarray(value)
+    if sizes.ndim != 1 or (sizes.size and sizes.dtype.kind not in "iu") or (sizes < 0).any():
+        raise HierarchyError(f"sizes is {value!r}, expected a whole number of rows for each level")
+    if sizes.sum() != rows:
+        raise HierarchyError(f"sizes sum to {sizes.sum()}, and A has {rows} rows a problem")
+    return np.require(sizes, np.int64, ["C", "W", "A"])

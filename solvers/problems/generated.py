@@ -1,0 +1,236 @@
+"""Hierarchies made at random, with all that makes them hard; for tests of resolvers, also yours.
+
+    for seed in range(1000):
+        h = generate(seed)
+        assert certify(h, make("hcod").solve(h).x).certified
+
+`family` gives fresh problems of the same make as the reference families, `structured` those of
+singular arms, tied boxes, contacts, nested levels and mixed units.
+
+All unit rows of a hierarchy are written around one point x*, so that sides can pass through the
+same vertex; then they are scaled. `strategy` gives the same problems to hypothesis.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, final
+
+import numpy as np
+from numpy.linalg import norm
+
+from hierarchy.errors import HierarchyError
+from hierarchy.problem import Array, Hierarchy
+
+if TYPE_CHECKING:
+    from hypothesis.strategies import SearchStrategy
+
+Random = np.random.Generator
+
+
+@final
+@dataclass(frozen=True, kw_only=True)
+class Recipe:
+    """What is in the problems. Ranges are (least, most); chances are of a level unless said.
+
+    joints, levels, rows : unknowns, levels, and rows of a level. Small ones are as frequent as
+        large ones: their logarithm is uniform.
+    equalities_only : whether all rows are equalities.
+    empty : chance of the least number of rows.
+    rank_lost : chance that rows depend on the others of their level, at a rank drawn.
+    linked : chance that directions are taken from the span of the levels above, as many as drawn.
+    simple_bounds : chance that rows are unit vectors.
+    conflicting : chance of a problem that targets and sides do not all admit x*; then each level
+        has it with the same chance.
+    ties : share of the inequalities with a side through x* exactly.
+    one_sided, sideless : share of the inequalities without one side, and without both.
+    zero_rows, duplicates, near_parallel : chance that one row is zero, is another of the hierarchy
+        again, or makes an `angles` [rad] with it. A duplicate may be turned round.
+    angles : of near-parallel rows. Those within a factor 1000 of a resolver's rank_tolerance (1e-9)
+        have no answer that double precision can tell.
+    scales : norms of the rows of a level.
+    spread : ratio of the largest to the smallest norm inside a level.
+    reference : chance of a problem that its reference is not zero.
+
+    Raises
+    ------
+    HierarchyError : a range that is empty or too low, or a chance outside 0..1.
+    """
+
+    joints: tuple[int, int] = (1, 60)
+    levels: tuple[int, int] = (1, 12)
+    rows: tuple[int, int] = (0, 40)
+    equalities_only: bool = False
+    empty: float = 0.03
+    rank_lost: float = 0.2
+    linked: float = 0.3
+    simple_bounds: float = 0.15
+    conflicting: float = 0.6
+    ties: float = 0.4
+    one_sided: float = 0.4
+    sideless: float = 0.02
+    zero_rows: float = 0.05
+    duplicates: float = 0.1
+    near_parallel: float = 0.03
+    angles: tuple[float, float] = (1e-6, 1e-1)
+    scales: tuple[float, float] = (1e-6, 1e6)
+    spread: float = 100.0
+    reference: float = 0.5
+
+    def __post_init__(self) -> None:
+        least = {"joints": 1, "levels": 1, "rows": 0, "angles": 0.0, "scales": 0.0}
+        for field in dataclasses.fields(self):
+            value = getattr(self, field.name)
+            if field.name in least:
+                right = least[field.name] <= value[0] <= value[1] < np.inf
+            elif field.name == "spread":
+                right = 1.0 <= value < np.inf
+            else:
+                right = 0.0 <= value <= 1.0
+            if not right:
+                raise HierarchyError(f"recipe: {field.name} = {value!r} is out of range")
+
+
+ANY = Recipe()
+
+
+def generate(seed: int, recipe: Recipe = ANY) -> Hierarchy:
+    """Return the hierarchy of a seed: the same one every time."""
+    rng = np.random.default_rng(seed)
+    n = _whole(rng, recipe.joints)
+    count = _whole(rng, recipe.levels)
+    rows = (max(recipe.rows[0], min(1, recipe.rows[1])), recipe.rows[1])
+    sizes = [recipe.rows[0] if _happens(rng, recipe.empty) else _whole(rng, rows)
+             for _ in range(count)]
+    return written(rng, n, sizes, recipe)
+
+
+def strategy(recipe: Recipe = ANY) -> SearchStrategy[Hierarchy]:
+    """Return a hypothesis strategy for hierarchies; it shrinks to few unknowns, levels and rows."""
+    from hypothesis import strategies as st
+
+    def build(n: int, sizes: list[int], seed: int) -> Hierarchy:
+        return written(np.random.default_rng(seed), n, sizes, recipe)
+
+    return st.builds(build, st.integers(*recipe.joints),
+                     st.lists(st.integers(*recipe.rows), min_size=recipe.levels[0],
+                              max_size=recipe.levels[1]),
+                     st.integers(0, 2**32 - 1))
+
+
+def written(rng: Random, n: int, sizes: Sequence[int], recipe: Recipe = ANY) -> Hierarchy:
+    """Return a hierarchy of n unknowns and levels of these sizes."""
+    through = rng.normal(size=n)
+    conflicts = recipe.conflicting * _happens(rng, recipe.conflicting)
+    above, levels = np.empty((0, n)), []
+    for size in sizes:
+        unit = _directions(rng, size, above, recipe)
+        _repeat_a_row(rng, unit, above, recipe)
+        if size and _happens(rng, recipe.zero_rows):
+            unit[rng.integers(size)] = 0.0
+        sides = _sides(rng, unit @ through, _happens(rng, conflicts), recipe)
+        scale = _scale(rng, size, recipe)
+        levels.append((unit * scale[:, None], *(scale * side for side in sides)))
+        above = np.vstack([above, unit])
+    reference = rng.normal(size=n) if _happens(rng, recipe.reference) else np.zeros(n)
+    return Hierarchy.from_levels(levels, reference)
+
+
+def save(h: Hierarchy, path: str | Path) -> None:
+    """Write a hierarchy as a small .npz file."""
+    np.savez_compressed(path, allow_pickle=False, A=h.A, lower=h.lower, upper=h.upper,
+                        sizes=h.sizes, reference=h.reference,
+                        names=np.array(h.names, dtype=np.str_))
+
+
+def load(path: str | Path) -> Hierarchy:
+    """Read the hierarchy that `save` wrote. The names may be missing from the file."""
+    with np.load(path, allow_pickle=False) as file:
+        sizes = file["sizes"]
+        names = (tuple(map(str, file["names"])) if "names" in file
+                 else tuple(f"level {k + 1}" for k in range(len(sizes))))
+        return Hierarchy(file["A"], file["lower"], file["upper"], sizes, file["reference"], names)
+
+
+def _directions(rng: Random, size: int, above: Array, recipe: Recipe) -> Array:
+    """Unit rows (size, n): simple bounds, or of a chosen rank and share in the levels above."""
+    n = above.shape[1]
+    if _happens(rng, recipe.simple_bounds):
+        order = np.resize(rng.permutation(n), size)
+        return np.asarray(np.eye(n)[order])
+    lost = size > 1 and _happens(rng, recipe.rank_lost)
+    rank = int(rng.integers(1, size)) if lost else size
+    basis = rng.normal(size=(rank, n))
+    if len(above) and rank and _happens(rng, recipe.linked):
+        taken = int(rng.integers(1, rank + 1))
+        chosen = above[rng.integers(len(above), size=min(taken + 2, 8))]
+        basis[:taken] = rng.normal(size=(taken, len(chosen))) @ chosen
+    rows = np.vstack([basis, rng.normal(size=(size - rank, rank)) @ basis])
+    length = norm(rows, axis=1, keepdims=True)
+    return np.asarray(rng.permutation(rows / np.where(length > 0.0, length, 1.0)))
+
+
+def _repeat_a_row(rng: Random, unit: Array, above: Array, recipe: Recipe) -> None:
+    """Make one row another of the hierarchy again, exactly or at an angle."""
+    size, n = unit.shape
+    choices = np.vstack([above, unit])
+    duplicate, parallel = (_happens(rng, recipe.duplicates), _happens(rng, recipe.near_parallel))
+    if not size or len(choices) < 2 or not (duplicate or parallel):
+        return
+    last, other = int(rng.integers(size)), int(rng.integers(len(choices)))
+    copied = choices[other] * rng.choice([1.0, -1.0])
+    if parallel and n > 1 and copied.any():
+        aside = rng.normal(size=n)
+        aside -= copied * (copied @ aside)
+        angle = _between(rng, recipe.angles)
+        copied = np.cos(angle) * copied + np.sin(angle) * aside / norm(aside)
+    unit[last] = copied
+
+
+def _sides(rng: Random, value: Array, conflict: bool, recipe: Recipe) -> tuple[Array, Array]:
+    """Sides (m_k,) around the value of the unit rows at x*, which they admit without conflict."""
+    m = len(value)
+    equal = np.full(m, recipe.equalities_only)
+    if not recipe.equalities_only:
+        equal |= rng.random(m) < rng.choice([0.0, 1.0, 0.3])
+    moved = value + conflict * rng.normal(size=m) * (rng.random(m) < 0.7)
+    lower = moved - rng.exponential(size=m)
+    upper = moved + rng.exponential(size=m)
+    tied = rng.random((2, m)) < recipe.ties / 2.0
+    lower, upper = np.where(tied[0], value, lower), np.where(tied[1], value, upper)
+    missing = rng.random(m)
+    alone = missing < recipe.one_sided
+    lower[alone & (missing < recipe.one_sided / 2.0)] = -np.inf
+    upper[alone & (missing >= recipe.one_sided / 2.0)] = np.inf
+    none = rng.random(m) < recipe.sideless
+    lower[none], upper[none] = -np.inf, np.inf
+    lower, upper = np.minimum(lower, upper), np.maximum(lower, upper)
+    return np.where(equal, moved, lower), np.where(equal, moved, upper)
+
+
+def _scale(rng: Random, size: int, recipe: Recipe) -> Array:
+    """Norms of the rows of a level: all one in half of the levels that allow it."""
+    low, high = recipe.scales
+    if _happens(rng, 0.5) and low <= 1.0 <= high:
+        return np.ones(size)
+    half = np.sqrt(recipe.spread)
+    middle = _between(rng, (low, high))
+    around = (1.0 / half, half)
+    return np.clip([middle * _between(rng, around) for _ in range(size)], low, high).reshape(size)
+
+
+def _happens(rng: Random, chance: float) -> bool:
+    return bool(rng.random() < chance)
+
+
+def _between(rng: Random, ends: tuple[float, float]) -> float:
+    """Uniform in the logarithm."""
+    return float(np.exp(rng.uniform(*np.log(np.maximum(ends, 1e-300)))))
+
+
+def _whole(rng: Random, ends: tuple[int, int]) -> int:
+    """Uniform in the logarithm, both ends included."""
+    return min(int(_between(rng, (ends[0] or 0.5, ends[1] + 1))), ends[1])

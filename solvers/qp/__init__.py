@@ -1,0 +1,1 @@
+"""Quadratic programs: the backends, what they are asked, and how their answers are refined."""

@@ -1,0 +1,10 @@
+"""The resolvers, one file each; importing this registers all of them by name."""
+
+from solvers.resolvers import augmented as augmented
+from solvers.resolvers import hcod as hcod
+from solvers.resolvers import hqp as hqp
+from solvers.resolvers import recursive as recursive
+from solvers.resolvers import reverse as reverse
+from solvers.resolvers import sns as sns
+from solvers.resolvers import tpm as tpm
+from solvers.resolvers import weighted as weighted
