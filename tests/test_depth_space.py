@@ -15,9 +15,10 @@ from scenarios.cell.sensors.camera import DepthCamera, Pinhole, looking_at
 from scenarios.cell.sensors.depth_space import DepthSpace, ObstacleImage
 from scenarios.cell.sensors.errors import DepthErrors
 from scenarios.cell.sensors.exact import ExactDistances
-from scenarios.cell.sensors.frames import RecordedFrames, write
+from scenarios.cell.sensors.frames import RecordedFrames
 from scenarios.config import ScenarioError
 from scenarios.draw.figures.depth import depth_figure
+from scenarios.loop import record_frames
 
 ROBOT = Robot.named("kuka_lwr")
 CAPSULES = link_capsules(TABLES["kuka_lwr"], foot=0.31)
@@ -450,7 +451,7 @@ def test_a_scenario_with_a_camera_survives_its_file(tmp_path):
 @pytest.fixture(scope="module")
 def written(tmp_path_factory):
     run = simulate(load("human", [*QUICK, "control.duration=0.3"]))
-    return write(tmp_path_factory.mktemp("frames") / "some", run, frames=6), run
+    return record_frames.write(tmp_path_factory.mktemp("frames") / "some", run, frames=6), run
 
 
 def test_frames_written_are_those_the_camera_took(written):
