@@ -103,7 +103,7 @@ def check(words):
     else:
         extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"][
             "optional-dependencies"]
-        for extra in re.findall(r"task-hierarchy\[([^\]]+)\]", " ".join(words)):
+        for extra in re.findall(r"(?:task-hierarchy|\.)\[([^\]]+)\]", " ".join(words)):
             assert set(extra.split(",")) <= set(extras), words
 
 
