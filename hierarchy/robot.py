@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -167,9 +167,16 @@ class Robot:
     @property
     def velocity_names(self) -> list[str]:
         """The joint of each velocity (n), by name, with a number where a joint has several."""
-        return [f"{name} {i + 1}" if joint.nv > 1 else name
-                for name, joint in zip(self.joint_names, list(self.model.joints)[1:], strict=True)
-                for i in range(joint.nv)]
+        return self._numbered([joint.nv for joint in self.model.joints[1:]])
+
+    @property
+    def coordinate_names(self) -> list[str]:
+        """The joint of each entry of q (nq), by name, with a number where a joint has several."""
+        return self._numbered([joint.nq for joint in self.model.joints[1:]])
+
+    def _numbered(self, sizes: Iterable[int]) -> list[str]:
+        return [f"{name} {i + 1}" if size > 1 else name
+                for name, size in zip(self.joint_names, sizes, strict=True) for i in range(size)]
 
     def joint(self, name: str) -> int:
         """Index of the joint called `name`, as used by frames and control points."""
@@ -247,18 +254,17 @@ class Robot:
         `differences` is the period [s] of backward differences, None for exact derivatives.
         """
         state = State(self, differences)
-        state.move(t, self._checked("q", q, self.nq),
-                   self._checked("v", np.zeros(self.n) if v is None else v, self.n))
+        state.move(t, self._checked("q", q, self.coordinate_names),
+                   self._checked("v", np.zeros(self.n) if v is None else v, self.velocity_names))
         return state
 
-    def _checked(self, what: str, value: ArrayLike, size: int) -> Array:
+    def _checked(self, what: str, value: ArrayLike, names: Sequence[str]) -> Array:
         vector = np.array(value, dtype=float)
-        if vector.shape != (size,):
+        if vector.shape != (len(names),):
             raise RobotError(f"robot {self.name!r}: {what} has shape {vector.shape}, "
-                             f"expected ({size},)")
+                             f"expected ({len(names)},)")
         for (i,) in np.argwhere(~np.isfinite(vector))[:1]:
-            raise RobotError(f"robot {self.name!r}: {what}[{i}] ({self.joint_names[i]}) is "
-                             f"{vector[i]}")
+            raise RobotError(f"robot {self.name!r}: {what}[{i}] ({names[i]}) is {vector[i]}")
         return vector
 
     def __repr__(self) -> str:

@@ -170,6 +170,26 @@ def test_a_bounding_capsule_holds_all_points(seed):
     assert off.max() == pytest.approx(radius, abs=1e-9)
 
 
+def test_points_all_over_a_capsule_have_that_capsule():
+    """Its caps reach beyond the segment: without them the one found is two radii too long."""
+    along, around = np.meshgrid(np.linspace(-np.pi / 2, np.pi / 2, 201),
+                                np.linspace(0.0, 2 * np.pi, 40, endpoint=False))
+    height = 0.1 * np.sin(along) + 0.25 * np.sign(along)
+    points = np.stack([0.1 * np.cos(along) * np.cos(around), 0.1 * np.cos(along) * np.sin(around),
+                       height], axis=-1).reshape(-1, 3)
+    start, end, radius = bounding_capsule(points)
+    assert radius == pytest.approx(0.1, abs=1e-9)
+    np.testing.assert_allclose(sorted([start[2], end[2]]), [-0.25, 0.25], atol=1e-3)
+
+
+def test_the_capsule_of_a_plate_lies_along_its_length():
+    """Across it the segment is shortest, but the caps hold many times the volume."""
+    corners = np.array(np.meshgrid((-2.0, 2.0), (-1.0, 1.0), (-0.1, 0.1))).reshape(3, -1).T
+    start, end, radius = bounding_capsule(corners)
+    assert radius == pytest.approx(np.hypot(1.0, 0.1))
+    assert abs(end[0] - start[0]) == pytest.approx(4.0)
+
+
 def test_a_start_beyond_the_limits_is_put_midway(arm):
     np.testing.assert_allclose(Robot.from_file(arm()).rest, [1.25, 1.25, 1.25])
 

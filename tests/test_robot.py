@@ -92,6 +92,19 @@ def test_a_bad_state_is_named(q, v, said):
     assert said in str(error.value)
 
 
+@pytest.mark.parametrize(("what", "entry", "name"), [
+    ("q", 0, "root_joint 1"), ("q", 6, "root_joint 7"), ("q", 7, "left_hip_yaw"),
+    ("q", 36, "neck_pitch"), ("v", 5, "root_joint 6"), ("v", 10, "left_ankle_pitch"),
+])
+def test_an_entry_of_a_floating_robot_is_named_by_its_own_joint(what, entry, name):
+    robot = Robot.named("humanoid")
+    given = {"q": robot.rest.copy(), "v": np.zeros(robot.n)}
+    given[what][entry] = np.nan
+    with pytest.raises(RobotError) as error:
+        robot.state(**given)
+    assert f"{what}[{entry}] ({name}) is nan" in str(error.value)
+
+
 def test_unknown_names_come_with_the_nearest_known():
     with pytest.raises(UnknownNameError, match="did you mean 'kuka_lwr'"):
         Robot.named("kuka_lvr")

@@ -3,6 +3,7 @@ import pytest
 from hand_made import recording as hand_made
 
 from hierarchy import HierarchyError, Robot, State
+from hierarchy.avoidance import Capsule
 from hierarchy.robots import TABLES, link_capsules
 from scenarios import load, simulate
 from scenarios.config.robot import RobotSection
@@ -10,6 +11,7 @@ from scenarios.loop.controller import Controller
 from scenarios.loop.fate import Fate
 from scenarios.scene import capsules, ends, scene, stage
 from scenarios.scene.levels import judge
+from scenarios.scene.links import lowest
 
 SHORT = ["control.duration=1.5"]
 NAMES = ("ellipse", "ellipse-velocity", "ellipse-published", "ellipse-limits", "ellipse-hqp")
@@ -183,6 +185,14 @@ def test_no_robot_at_rest_is_below_the_floor(name):
     low = ends(fixed.capsules[1:], fixed.robot.state(fixed.robot.rest).placements)[..., 2].min()
     assert low >= fixed.floor
     assert stage(load("humanoid")).floor == pytest.approx(0.0, abs=1e-6)  # it stands on it
+
+
+def test_the_floor_is_a_radius_below_the_lowest_end_of_a_link_and_not_above_the_base():
+    robot = Robot.named("kuka_lwr")
+    below = Capsule("below", 0, (0.0, 0.0, -0.5), (0.0, 0.0, 0.1), 0.04)
+    above = Capsule("above", 0, (0.0, 0.0, 0.3), (0.0, 0.0, 0.5), 0.04)
+    assert lowest(robot, [above, below]) == pytest.approx(-0.54)
+    assert lowest(robot, [above]) == 0.0
 
 
 def test_the_arm_given_as_a_table_has_its_own_capsules():

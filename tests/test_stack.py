@@ -59,6 +59,17 @@ def test_changing_the_stack_changes_the_hierarchy():
     assert s.hierarchy(state).sizes.tolist() == [1, 3, 1]
 
 
+def test_a_task_that_takes_the_place_of_one_removed_is_the_one_that_is_written():
+    s, state = Stack([TASKS["position"]]), state_at(Q, V)
+    before = s.hierarchy(state).lower.copy()
+    s.remove("position")
+    s.insert(Position(FRAME, PATH, stiffness=7.0))
+    after = s.hierarchy(state)
+    np.testing.assert_array_equal(
+        after.lower, Stack([Position(FRAME, PATH, stiffness=7.0)]).hierarchy(state).lower)
+    assert not np.array_equal(after.lower, before)
+
+
 def rows_of(h):
     return h.A.copy(), h.lower.copy(), h.upper.copy()
 
