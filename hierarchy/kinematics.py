@@ -9,9 +9,26 @@ dJ_v + dJ_w x p + J_w x dp/dt. `placements` rows are rotation (by columns) and t
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
+from numpy.typing import NDArray
 
 from hierarchy.jit import compiled, inlined
+from hierarchy.problem import Array
+
+
+class Kinematics(NamedTuple):
+    """The arrays of a State that kernels read, see there; `period` 0 for exact derivatives."""
+
+    v: Array
+    J: Array
+    dJ: Array  # noqa: N815
+    placements: Array
+    supports: NDArray[np.bool_]
+    previous_J: Array  # noqa: N815
+    previous_placements: Array
+    period: float
 
 
 @inlined
@@ -53,9 +70,9 @@ def write_point_jacobian(J, placements, supports, joint, offset, A, row):
 
 
 @compiled
-def write_point_jacobian_derivative(v, J, dJ, placements, supports, previous_J,
-                                    previous_placements, period, joint, offset, out):
+def write_point_jacobian_derivative(kinematics, joint, offset, out):
     """Write d/dt dp/dq of a point into out (3, n): exact, or by backward difference."""
+    v, J, dJ, placements, supports, previous_J, previous_placements, period = kinematics
     if period > 0.0:
         before = np.empty((3, out.shape[1]))
         write_point_jacobian(J, placements, supports, joint, offset, out, 0)
@@ -98,13 +115,13 @@ def velocity_of_point(J, supports, joint, v, x, y, z):
 
 
 @inlined
-def drift_of_point(v, J, dJ, placements, supports, previous_J, previous_placements, period,
-                   joint, ox, oy, oz):
+def drift_of_point(kinematics, joint, ox, oy, oz):
     """Velocity J_c v and drift dJ_c/dt v of the point at offset ox, oy, oz on a body.
 
     The drift is exact, or with a period that of the backward difference of J_c. The angular
     velocity of the body comes last.
     """
+    v, J, dJ, placements, supports, previous_J, previous_placements, period = kinematics
     x, y, z = place(placements[joint], ox, oy, oz)
     px, py, pz, wx, wy, wz = velocity_of_point(J, supports, joint, v, x, y, z)
     if period > 0.0:
@@ -118,8 +135,9 @@ def drift_of_point(v, J, dJ, placements, supports, previous_J, previous_placemen
 
 
 @inlined
-def add_row(J, supports, joint, x, y, z, rx, ry, rz, A, row):
-    """Add r^T J_c (n,) of the point of a body that is at x, y, z to A[row]."""
+def add_row(J, supports, joint, point, r, A, row):
+    """Add r^T J_c (n,) of the point of a body that is at `point` to A[row]."""
+    (x, y, z), (rx, ry, rz) = point, r
     mx, my, mz = y * rz - z * ry, z * rx - x * rz, x * ry - y * rx  # r . (w x p) = w . (p x r)
     for c in range(A.shape[1]):
         if supports[joint, c]:
@@ -133,6 +151,16 @@ def write_rotation_jacobian(J, supports, joint, A, row):
     for i in range(3):
         for c in range(A.shape[1]):
             A[row + i, c] = J[3 + i, c] if supports[joint, c] else 0.0
+
+
+@compiled
+def write_identity(A, row, count):
+    """Write the identity (count, count), right of zeros, into A[row : row + count]."""
+    base = A.shape[1] - count
+    for i in range(count):
+        for j in range(A.shape[1]):
+            A[row + i, j] = 0.0
+        A[row + i, base + i] = 1.0
 
 
 @compiled

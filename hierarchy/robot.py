@@ -19,6 +19,7 @@ from hierarchy.avoidance.measurement import Measurement
 from hierarchy.avoidance.self_collision import Capsule
 from hierarchy.errors import RobotError, UnknownNameError
 from hierarchy.jit import compiled
+from hierarchy.kinematics import Kinematics
 from hierarchy.problem import Array
 from hierarchy.robots import TABLES
 from hierarchy.robots.files import read_file
@@ -282,7 +283,8 @@ class State:
     With `period` > 0 [s] derivatives are backward differences against previous_J and
     previous_placements, those of the `move` before; with 0 they are exact. `measurement` holds
     what the sensor saw this tick, or None. `commanded` (n,) is the last command where commands are
-    velocities, which need not be v on a robot that lags; None for v.
+    velocities, which need not be v on a robot that lags; None for v. `kinematics` has all arrays
+    that kernels read.
     """
 
     def __init__(self, robot: Robot, differences: float | None = None) -> None:
@@ -302,10 +304,8 @@ class State:
         self.previous_J = self.J.copy(order="F")
         self.previous_placements = self.placements.copy()
         self._started = False
-        # What every task kernel takes first, in this order.
-        self.arrays: tuple[Any, ...] = (
-            self.v, self.J, self.dJ, self.placements, self.supports,
-            self.previous_J, self.previous_placements, self.period)
+        self.kinematics = Kinematics(self.v, self.J, self.dJ, self.placements, self.supports,
+                                     self.previous_J, self.previous_placements, self.period)
 
     @property
     def n(self) -> int:

@@ -119,8 +119,10 @@ class Stack:
         writers = [self[name].writer(state, self.level, h.A, h.lower, h.upper, int(row))
                    for name, row in zip(order, h.offsets, strict=False)]
         if self.reference is not None:
-            joints = h.reference[state.n - self.reference.dimension:]  # a floating base has none
-            writers.append(self.reference.reference_writer(state, self.level, joints))
+            m = self.reference.dimension
+            joints = h.reference[state.n - m:]  # a floating base has none
+            writers.append(self.reference.writer(state, self.level, np.empty((m, state.n)), joints,
+                                                 joints, 0))
         prepared = _Prepared(h, state, state.measurement, tuple(writers))
         self._prepared[order] = prepared
         return prepared

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from functools import partial
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from hierarchy.errors import HierarchyError
+from hierarchy.paths import Path
 from hierarchy.problem import Array, check_rows
 
 if TYPE_CHECKING:
@@ -81,64 +81,45 @@ class Task(ABC):
         return (self.desired_acceleration(state) + self.damping * rate
                 + self.stiffness * self.error(state))
 
-    def write(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-              row: int) -> None:
-        """Write this task's rows into A (m_all, n), lower, upper (m_all,) from `row` on.
-
-        This general form calls the methods above; tasks override it by a compiled kernel. Raises
-        HierarchyError, naming task and row, where a method returns the wrong shape or NaN.
-        """
-        rows = slice(row, row + self.dimension)
-        A[rows] = _shaped(self, "jacobian", self.jacobian(state), (self.dimension, state.n))
-        if level == "velocity":
-            b = self.reference_velocity(state)
-        else:
-            drift = _shaped(self, "jacobian_derivative", self.jacobian_derivative(state),
-                            (self.dimension, state.n)) @ state.v
-            b = self.reference_acceleration(state) - drift
-        lower[rows] = _shaped(self, "reference", b, (self.dimension,))
-        upper[rows] = lower[rows] if self.kind == "equality" else np.inf
-        check_rows(f"task {self.name!r}", A[rows], lower[rows], upper[rows])
-
     def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
                row: int) -> Callable[[], object]:
-        """Return what does `write` with these arguments, each time it is called.
+        """Return what writes this task's rows into A (m_all, n), lower, upper (m_all,).
 
-        A stack keeps it for as long as the state, and the measurement that the state carries, are
-        the same objects.
+        They are the rows from `row` on, as they are where the state is at each call. A stack keeps
+        the writer for as long as the state, and the measurement that the state carries, are the
+        same objects. This general form calls the methods above; tasks override it by a kernel bound
+        to its arrays. HierarchyError, naming task and row, where a method returns the wrong shape
+        or NaN, at the call.
         """
-        return partial(self.write, state, level, A, lower, upper, row)
-
-    def reference_writer(self, state: State, level: Level, out: Array) -> Callable[[], object]:
-        """Return what writes the value asked for (m,) into `out`, each time it is called."""
-        asked = (self.reference_acceleration if level == "acceleration"
-                 else self.reference_velocity)
+        rows = slice(row, row + self.dimension)
 
         def write() -> None:
-            out[:] = asked(state)
+            A[rows] = _shaped(self, "jacobian", self.jacobian(state), (self.dimension, state.n))
+            lower[rows] = _shaped(self, "reference", self._sides(state, level), (self.dimension,))
+            upper[rows] = lower[rows] if self.kind == "equality" else np.inf
+            check_rows(f"task {self.name!r}", A[rows], lower[rows], upper[rows])
 
         return write
 
+    def _sides(self, state: State, level: Level) -> Array:
+        """What J x is asked to be (m,), x the velocity or the acceleration."""
+        if level == "velocity":
+            return self.reference_velocity(state)
+        drift = _shaped(self, "jacobian_derivative", self.jacobian_derivative(state),
+                        (self.dimension, state.n)) @ state.v
+        return self.reference_acceleration(state) - drift
 
-class BoundTask(Task):
-    """A task whose rows are written by a kernel bound to all its arrays. Abstract."""
 
-    @abstractmethod
-    def bind_rows(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-                  row: int) -> Callable[[], object]:
-        """Return what writes the rows there, each time it is called; see `Task.writer`."""
+def along(path: Path, target: Array, state: State,
+          write_rows: Callable[[], object]) -> Callable[[], object]:
+    """Return what calls `write_rows` with `target` (3, 3) as `path` has it at the state's time."""
+    move_target = path.writer(target)
 
-    def write(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-              row: int) -> None:
-        """See `Task.write`; a single call takes long, for the kernel is bound first."""
-        self.bind_rows(state, level, A, lower, upper, row)()
+    def write() -> None:
+        move_target(state.t)
+        write_rows()
 
-    def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-               row: int) -> Callable[[], object]:
-        """See `Task.writer`; a subclass that overrides `write` is asked for that."""
-        of_rows = (state, level, A, lower, upper, row)
-        mine = type(self).write is BoundTask.write
-        return self.bind_rows(*of_rows) if mine else super().writer(*of_rows)
+    return write
 
 
 def _shaped(task: Task, what: str, value: Array, shape: tuple[int, ...]) -> Array:

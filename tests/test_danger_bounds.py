@@ -124,7 +124,7 @@ def test_the_rows_are_the_identity_with_the_box_as_sides(level):
     for q, v in STATES[:5]:
         state = state_at(q, v)
         A, low, up = np.full((9, 7), 5.0), np.full(9, 5.0), np.full(9, 5.0)
-        task().write(state, level, A, low, up, 1)
+        task().writer(state, level, A, low, up, 1)()
         np.testing.assert_array_equal(A[1:8], np.eye(7))
         np.testing.assert_array_equal([low[1:8], up[1:8]], task().box(state, level))
         assert (A[[0, 8]] == 5.0).all()

@@ -66,8 +66,8 @@ def test_compiled_rows_equal_those_of_the_plain_methods(name, task, level, diffe
     state.move(0.8, robot.integrate(q, 1e-3 * v), v)
     written, plain = [(np.zeros((task.dimension, robot.n)), np.zeros(task.dimension),
                        np.zeros(task.dimension)) for _ in range(2)]
-    task.write(state, level, *written, row=0)
-    Task.write(task, state, level, *plain, row=0)
+    task.writer(state, level, *written, row=0)()
+    Task.writer(task, state, level, *plain, row=0)()
     for a, b in zip(written, plain, strict=True):
         np.testing.assert_allclose(a, b, rtol=1e-10, atol=1e-10)
 

@@ -405,7 +405,7 @@ def test_the_rows_are_the_identity_and_the_box(level):
     for q, v in states(10):
         state = state_at(q, v)
         A, lower, upper = np.full((10, 7), 5.0), np.full(10, 5.0), np.full(10, 5.0)
-        task.write(state, level, A, lower, upper, 2)
+        task.writer(state, level, A, lower, upper, 2)()
         np.testing.assert_array_equal(A[2:9], np.eye(7))
         limits = Limits(ROBOT.lower + 0.02, ROBOT.upper - 0.02, ROBOT.velocity_limit,
                         np.full(7, 10.0), 1e-3)
@@ -517,7 +517,7 @@ def test_torque_rows_hold_exactly_where_inverse_dynamics_does():
     for q, v in states(200):
         state = state_at(q, v)
         A, lower, upper = np.full((9, 7), 5.0), np.full(9, 5.0), np.full(9, 5.0)
-        task.write(state, "acceleration", A, lower, upper, 1)
+        task.writer(state, "acceleration", A, lower, upper, 1)()
         a = rng.normal(0, 30, 7)
         torque = pin.rnea(ROBOT.model, data, q, v, a)
         np.testing.assert_allclose((A[1:8] @ a - lower[1:8]), torque + ROBOT.effort_limit / 2,

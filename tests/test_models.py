@@ -260,7 +260,7 @@ def test_joint_limits_leave_the_base_alone(arm):
     assert task.dimension == 3
     np.testing.assert_array_equal(task.jacobian(state), np.eye(9)[6:])
     A, lower, upper = np.full((3, 9), 7.0), np.zeros(3), np.zeros(3)
-    task.write(state, "acceleration", A, lower, upper, 0)
+    task.writer(state, "acceleration", A, lower, upper, 0)()
     np.testing.assert_array_equal(A, np.eye(9)[6:])
     x = np.array([np.nan, 1e6, 0, 0, 0, 0, 1e6, np.nan, 0.0])
     sent = task.clamp(state, "acceleration", x)

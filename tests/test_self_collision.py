@@ -163,8 +163,8 @@ def test_compiled_rows_equal_those_of_the_plain_methods(name, level, differences
         state.move(0.701, q + 1e-3 * v, v)
         written, plain = [(np.full((m + 2, 7), 5.0), np.full(m + 2, 5.0), np.full(m + 2, 5.0))
                           for _ in range(2)]
-        task.write(state, level, *written, row=1)
-        Task.write(task, state, level, *plain, row=1)
+        task.writer(state, level, *written, row=1)()
+        Task.writer(task, state, level, *plain, row=1)()
         for a, b in zip(written, plain, strict=True):
             np.testing.assert_allclose(a, b, rtol=1e-11, atol=1e-11)
             assert (a[[0, -1]] == 5.0).all(), "rows of others are left alone"
@@ -177,7 +177,7 @@ def test_parallel_links_give_finite_rows():
     for elbow in (0.0, np.pi):
         state = ROBOT.state([0.0, 0.3, 0.0, elbow, 0.0, 0.0, 0.0], np.ones(7))
         A, lower, upper = np.zeros((3, 7)), np.zeros(3), np.zeros(3)
-        TASKS["arm"].write(state, "acceleration", A, lower, upper, row=0)
+        TASKS["arm"].writer(state, "acceleration", A, lower, upper, row=0)()
         assert np.isfinite(A).all()
         assert np.isfinite(lower).all()
 

@@ -79,8 +79,8 @@ def test_compiled_rows_equal_those_of_the_plain_methods(name, level, differences
         state.move(0.8, q + 1e-3 * v, v)
         written, plain = [(np.full((8, 7), 5.0), np.full(8, 5.0), np.full(8, 5.0))
                           for _ in range(2)]
-        task.write(state, level, *written, row=1)
-        Task.write(task, state, level, *plain, row=1)
+        task.writer(state, level, *written, row=1)()
+        Task.writer(task, state, level, *plain, row=1)()
         for a, b in zip(written, plain, strict=True):
             np.testing.assert_allclose(a, b, rtol=1e-12, atol=1e-11)
             assert a[0].max() == 5.0
@@ -130,7 +130,7 @@ def test_the_cone_asks_for_one_side_and_its_surface_for_both():
     state = state_at(q, v)
     for name, upper in (("pointing", "equal"), ("cone", "infinite")):
         A, low, up = np.zeros((1, 7)), np.zeros(1), np.zeros(1)
-        TASKS[name].write(state, "acceleration", A, low, up, 0)
+        TASKS[name].writer(state, "acceleration", A, low, up, 0)()
         assert (up[0] == low[0]) == (upper == "equal")
         assert np.isinf(up[0]) == (upper == "infinite")
 
@@ -208,7 +208,7 @@ class Elbow(Task):
 def test_a_task_in_plain_numpy_needs_three_methods():
     q, v = STATES[10]
     A, low, up = np.zeros((1, 7)), np.zeros(1), np.zeros(1)
-    Elbow().write(ROBOT.state(q, v), "acceleration", A, low, up, 0)
+    Elbow().writer(ROBOT.state(q, v), "acceleration", A, low, up, 0)()
     assert low[0] == up[0] == pytest.approx(4 * (1 - q[3]) - 3 * v[3])
 
 
@@ -220,8 +220,8 @@ def test_a_task_in_plain_numpy_needs_three_methods():
 def test_a_wrong_task_is_named(method, value, said, monkeypatch):
     monkeypatch.setattr(Elbow, method, lambda self, state: value)
     with pytest.raises(HierarchyError) as error:
-        Elbow().write(ROBOT.state(*STATES[0]), "velocity", np.zeros((1, 7)), np.zeros(1),
-                      np.zeros(1), 0)
+        Elbow().writer(ROBOT.state(*STATES[0]), "velocity", np.zeros((1, 7)), np.zeros(1),
+                      np.zeros(1), 0)()
     assert said in str(error.value)
 
 

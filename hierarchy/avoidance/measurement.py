@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import inf, sqrt
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,6 +38,16 @@ class SurveillanceAreas:
                                  "not be negative")
 
 
+class Seen(NamedTuple):
+    """The arrays of a Measurement, as the kernels take them."""
+
+    points: Array
+    distance: Array
+    direction: Array
+    magnitude: Array
+    nearest: NDArray[np.int64]
+
+
 class Measurement:
     """Distances of K control points, and of the end effector as entry K, to the obstacles.
 
@@ -46,17 +57,19 @@ class Measurement:
     point of eq. (31), the first with the smallest distance (-1 if there is none). `pairs` has
     every point against every obstacle, or is None where nobody asked for it. `stamp` is the time
     [s] of what was seen, infinite for now; a sensor that has seen nothing new for too long to be
-    relied on is `blind`.
+    relied on is `blind`. All arrays together are `arrays`.
     """
 
-    __slots__ = ("active", "blind", "direction", "distance", "magnitude", "nearest", "pairs",
-                 "points", "stamp")
+    __slots__ = ("active", "arrays", "blind", "direction", "distance", "magnitude", "nearest",
+                 "pairs", "points", "stamp")
 
     def __init__(self, control_points: int) -> None:
         size = control_points + 1
         self.points, self.direction = np.zeros((size, 3)), np.zeros((size, 3))
         self.distance, self.magnitude = np.full(size, inf), np.zeros(size)
         self.nearest = np.full(size, -1, dtype=np.int64)
+        self.arrays = Seen(self.points, self.distance, self.direction, self.magnitude,
+                           self.nearest)
         self.active = -1
         self.pairs: Pairs | None = None
         self.stamp, self.blind = inf, False
@@ -89,8 +102,7 @@ def exact_measurer(measurement: Measurement, placements: Array, joints: NDArray[
     mean (25)-(26) over the obstacles nearer than that [m].
     """
     fill = bind(_measure, placements, joints, offsets, obstacles, laws, mean_within,
-                measurement.points, measurement.distance, measurement.direction,
-                measurement.magnitude, measurement.nearest)
+                measurement.arrays)
 
     def measure() -> None:
         measurement.active = fill()
@@ -99,8 +111,8 @@ def exact_measurer(measurement: Measurement, placements: Array, joints: NDArray[
 
 
 @compiled
-def _measure(placements, joints, offsets, obstacles, laws, mean_within,
-             points, distance, direction, magnitude, nearest):
+def _measure(placements, joints, offsets, obstacles, laws, mean_within, seen):
+    points, distance, direction, magnitude, nearest = seen
     count = len(joints)
     active, D_minimal = -1, np.inf
     for k in range(count):

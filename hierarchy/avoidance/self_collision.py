@@ -146,15 +146,18 @@ def nearest_shares(uu, uw, ww, ux, wx):
 
 
 @inlined
-def bend_of_nearest(length, rx, ry, rz, vx, vy, vz, ux, uy, uz, dux, duy, duz, s,
-                    wx, wy, wz, dwx, dwy, dwz, t):
+def bend_of_nearest(length, r, v, a_axis, b_axis):
     """What is left of the second derivative of the distance of two axes, beside r . acceleration.
 
     length [m] between the nearest points; r from b to a; v the velocity of the one relative to the
-    other, both fixed to their bodies; u, w the axes, du, dw their time derivatives. Where the
+    other, both fixed to their bodies; an axis is its vector (u, w), the time derivative of that and
+    the share (s, t) at which the nearest point lies. Where the
     nearest points are free to slide (0 < s < 1) the distance is the least over s and t, and its
     second derivative by a Schur complement: less than that of fixed points.
     """
+    (rx, ry, rz), (vx, vy, vz) = r, v
+    (ux, uy, uz), (dux, duy, duz), s = a_axis
+    (wx, wy, wz), (dwx, dwy, dwz), t = b_axis
     along = dot(rx, ry, rz, vx, vy, vz)
     bend = (dot(vx, vy, vz, vx, vy, vz) - along * along) / length
     H_ss = dot(ux, uy, uz, ux, uy, uz) / length

@@ -4,8 +4,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +15,7 @@ from hierarchy.avoidance.control_points import ControlPoint, pack_points
 from hierarchy.avoidance.measurement import Measurement
 from hierarchy.avoidance.repulsion import Repulsion, repulsion
 from hierarchy.errors import HierarchyError
-from hierarchy.jit import compiled
+from hierarchy.jit import bind, compiled
 from hierarchy.kinematics import point_at
 from hierarchy.limits import clipped
 from hierarchy.problem import Array
@@ -93,7 +94,7 @@ class DangerBounds(Task):
     def box(self, state: State, level: Level) -> tuple[Array, Array]:
         """Return the least and the greatest command (n,), (n,) at a state; never empty."""
         lower, upper = self.limits.box(state, level)
-        self._bring_in(state, level, lower, upper, 0)
+        self._bring_in(state, level, lower, upper, 0)()
         return lower, upper
 
     def error(self, state: State) -> Array:
@@ -108,18 +109,24 @@ class DangerBounds(Task):
         """Zero (n, n)."""
         return self.limits.jacobian_derivative(state)
 
-    def write(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-              row: int) -> None:
-        """See `Task.write`; the rows have two sides."""
-        self.limits.write(state, level, A, lower, upper, row)
-        self._bring_in(state, level, lower, upper, row)
+    def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
+               row: int) -> Callable[[], object]:
+        """See `Task.writer`; the rows have two sides."""
+        write_limits = self.limits.writer(state, level, A, lower, upper, row)
+        bring_in = self._bring_in(state, level, lower, upper, row)
 
-    def _bring_in(self, state: State, level: Level, lower: Array, upper: Array, row: int) -> None:
-        seen = self._seen(state)
-        _bring_in(state.v, state.J, state.placements, state.supports, self.joints, self.offsets,
-                  seen.distance, seen.direction, self.reach, self.shape, self.lever,
-                  self.limits.limits.packed[2], self.limits.period, level == "acceleration",
-                  lower, upper, row)
+        def write() -> None:
+            write_limits()
+            bring_in()
+
+        return write
+
+    def _bring_in(self, state: State, level: Level, lower: Array, upper: Array,
+                  row: int) -> Callable[[], object]:
+        asked = _Asked(self.joints, self.offsets, self.reach, self.shape, self.lever,
+                       self.limits.limits.packed[2], self.limits.period, level == "acceleration")
+        return bind(_bring_in, state.kinematics, asked, self._seen(state).arrays, lower, upper,
+                    row)
 
     def _seen(self, state: State) -> Measurement:
         seen = state.measurement
@@ -131,16 +138,28 @@ class DangerBounds(Task):
         return seen
 
 
+class _Asked(NamedTuple):
+    joints: NDArray[np.int64]
+    offsets: Array
+    reach: float
+    shape: float
+    lever: float
+    V: Array  # velocity limits
+    T: float  # period
+    acceleration: bool
+
+
 @compiled
-def _bring_in(v, J, placements, supports, joints, offsets, distance, direction, reach, shape,
-              lever, V, T, acceleration, lower, upper, row):
+def _bring_in(kinematics, asked, seen, lower, upper, row):
     """Bring in the sides of a box of n joints that begins at `row`."""
+    v, J, _, placements, supports, _, _, _ = kinematics
+    joints, offsets, reach, shape, lever, V, T, acceleration = asked
     n = len(v)
     danger = np.zeros((2, n))  # of moving backward, and forward
     contact = repulsion(0.0, 1.0, reach, shape, 2.0)
     for k in range(len(joints)):
-        joint, r = joints[k], direction[k]
-        f = min(repulsion(max(distance[k], 0.0), 1.0, reach, shape, 2.0) / contact, 1.0)
+        joint, r = joints[k], seen.direction[k]
+        f = min(repulsion(max(seen.distance[k], 0.0), 1.0, reach, shape, 2.0) / contact, 1.0)
         x = point_at(placements, joint, offsets[k], 0)
         y = point_at(placements, joint, offsets[k], 1)
         z = point_at(placements, joint, offsets[k], 2)

@@ -1,16 +1,16 @@
 """Limits of the joints' positions, velocities and accelerations, as one box of commands."""
 
-# mypy: disable-error-code="no-untyped-def"
-
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from hierarchy.errors import HierarchyError
-from hierarchy.jit import compiled
+from hierarchy.jit import bind
+from hierarchy.kinematics import write_identity
 from hierarchy.limits import Limits, write_box
 from hierarchy.problem import Array
 from hierarchy.robot import Robot, State
@@ -92,11 +92,18 @@ class JointLimits(Task):
         """Zero (n, n)."""
         return np.zeros((self.dimension, state.n))
 
-    def write(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-              row: int) -> None:
-        """See `Task.write`; the rows have two sides."""
-        _write(self._positions(state), self._rates(state, level), self.limits.packed, self.period,
-               level == "acceleration", A, lower, upper, row)
+    def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
+               row: int) -> Callable[[], object]:
+        """See `Task.writer`; the rows have two sides."""
+        write_rows, limits = bind(write_identity, A, row, self.dimension), self.limits.packed
+        acceleration = level == "acceleration"
+
+        def write() -> None:
+            write_rows()
+            write_box(self._positions(state), self._rates(state, level), limits, self.period,
+                      acceleration, lower, upper, row)
+
+        return write
 
     def _positions(self, state: State) -> Array:
         robot = self.robot
@@ -109,13 +116,3 @@ class JointLimits(Task):
         rates: Array = state.v if commanded is None else commanded
         first = self.robot.actuated
         return rates[first:] if first else rates
-
-
-@compiled
-def _write(q, v, limits, T, acceleration, A, lower, upper, row):
-    base = A.shape[1] - len(v)
-    for i in range(len(v)):
-        for j in range(A.shape[1]):
-            A[row + i, j] = 0.0
-        A[row + i, base + i] = 1.0
-    write_box(q, v, limits, T, acceleration, lower, upper, row)

@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from math import cos
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,11 +16,11 @@ from hierarchy.jit import bind, compiled, inlined
 from hierarchy.kinematics import axis_at, subtract_over_period, velocity_of_point
 from hierarchy.problem import Array
 from hierarchy.robot import Frame, State
-from hierarchy.task import BoundTask, Kind, Level
+from hierarchy.task import Kind, Level, Task
 
 
 @dataclass(frozen=True)
-class Pointing(BoundTask):
+class Pointing(Task):
     """Keep the z axis of `frame` at `half_angle` [rad] to `axis` (m = 1, p = z_d . z_e).
 
     kind = "equality": on the cone, cos(alpha) = cos(alpha_d), eq. (16). kind = "inequality": inside
@@ -80,15 +81,27 @@ class Pointing(BoundTask):
     def jacobian_derivative(self, state: State) -> Array:
         """Its time derivative (1, n) [1/s]."""
         dJ = np.empty((1, state.n))
-        _write_jacobian_derivative(*state.arrays, self.frame.joint, self.z_e, self.z_d, dJ)
+        _write_jacobian_derivative(state.kinematics, self.frame.joint, self.z_e, self.z_d, dJ)
         return dJ
 
-    def bind_rows(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-                  row: int) -> Callable[[], object]:
-        """See `BoundTask.bind_rows`."""
-        return bind(_write, *state.arrays, self.frame.joint, self.z_e, self.z_d, self.cos_alpha_d,
-                    self.stiffness, self.damping, self.gain, level == "acceleration",
-                    self.kind == "inequality", A, lower, upper, row)
+    def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
+               row: int) -> Callable[[], object]:
+        """See `Task.writer`."""
+        asked = _Asked(self.frame.joint, self.z_e, self.z_d, self.cos_alpha_d, self.stiffness,
+                       self.damping, self.gain, level == "acceleration", self.kind == "inequality")
+        return bind(_write, state.kinematics, asked, A, lower, upper, row)
+
+
+class _Asked(NamedTuple):
+    joint: int
+    z_e: Array
+    z_d: Array
+    cos_alpha_d: float
+    stiffness: float
+    damping: float
+    gain: float
+    acceleration: bool
+    inequality: bool
 
 
 @compiled
@@ -109,8 +122,8 @@ def _write_jacobian(J, placements, supports, joint, z_e, z_d, A, row):
 
 
 @compiled
-def _write_jacobian_derivative(v, J, dJ, placements, supports,
-                               previous_J, previous_placements, period, joint, z_e, z_d, out):
+def _write_jacobian_derivative(kinematics, joint, z_e, z_d, out):
+    v, J, dJ, placements, supports, previous_J, previous_placements, period = kinematics
     n = out.shape[1]
     if period > 0.0:
         before = np.empty((1, n))
@@ -135,9 +148,9 @@ def _write_jacobian_derivative(v, J, dJ, placements, supports,
 
 
 @inlined
-def _motion(v, J, dJ, placements, supports, previous_J, previous_placements, period, joint, z_e,
-            z_d):
+def _motion(kinematics, joint, z_e, z_d):
     """Rate J v and drift dJ/dt v of z_d . z_e; the drift exact, or of the backward difference."""
+    v, J, dJ, placements, supports, previous_J, previous_placements, period = kinematics
     x, y, z, wx, wy, wz, dx, dy, dz = _turning(v, J, placements, supports, joint, z_e)
     rate = z_d[0] * dx + z_d[1] * dy + z_d[2] * dz
     if period > 0.0:
@@ -160,14 +173,13 @@ def _turning(v, J, placements, supports, joint, z_e):
 
 
 @compiled
-def _write(v, J, dJ, placements, supports, previous_J, previous_placements,
-           period, joint, z_e, z_d, cos_alpha_d, stiffness, damping, gain, acceleration,
-           inequality, A, lower, upper, row):
-    _write_jacobian(J, placements, supports, joint, z_e, z_d, A, row)
+def _write(kinematics, asked, A, lower, upper, row):
+    joint, z_e, z_d, cos_alpha_d, stiffness, damping, gain, acceleration, inequality = asked
+    placements = kinematics.placements
+    _write_jacobian(kinematics.J, placements, kinematics.supports, joint, z_e, z_d, A, row)
     error = _cone_error(placements, joint, z_e, z_d, cos_alpha_d)
     if acceleration:
-        rate, drift = _motion(v, J, dJ, placements, supports, previous_J, previous_placements,
-                              period, joint, z_e, z_d)
+        rate, drift = _motion(kinematics, joint, z_e, z_d)
         b = stiffness * error - damping * rate - drift
     else:
         b = gain * error

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,7 +29,7 @@ from hierarchy.avoidance.self_collision import (
     turned,
 )
 from hierarchy.errors import HierarchyError
-from hierarchy.jit import compiled
+from hierarchy.jit import bind, compiled
 from hierarchy.kinematics import (
     add_row,
     drift_of_point,
@@ -114,14 +115,14 @@ class SelfSeparation(Task):
         """r^T (dJ_a/dt - dJ_b/dt) (m, n), directions and nearest points held."""
         def of_point(joint: int, offset: Array) -> Array:
             dJ = np.empty((3, state.n))
-            write_point_jacobian_derivative(*state.arrays, joint, offset, dJ)
+            write_point_jacobian_derivative(state.kinematics, joint, offset, dJ)
             return dJ
         return self._between(state, of_point)
 
     def bend(self, state: State) -> Array:
         """What d2d/dt2 has beside r^T (J_a - J_b) a + r^T (dJ_a/dt - dJ_b/dt) v: (m,) [m/s^2]."""
         return np.array([
-            _motion(*state.arrays, self.joints, self.table, i, j, *seen)[2]
+            _motion(state.kinematics, self.joints, self.table, i, j, tuple(seen))[2]
             for (i, j), seen in zip(self.indices, self._seen(state), strict=True)])
 
     def reference_velocity(self, state: State) -> Array:
@@ -135,11 +136,12 @@ class SelfSeparation(Task):
         return self._near(state, [least_acceleration(-e, rate, bend, self.settings)
                                   for e, rate, bend in terms])
 
-    def write(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-              row: int) -> None:
-        """See `Task.write`."""
-        _write(*state.arrays, self.joints, self.table, self.indices, self.settings,
-               level == "acceleration", A, lower, upper, row)
+    def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
+               row: int) -> Callable[[], object]:
+        """See `Task.writer`."""
+        asked = _Asked(self.joints, self.table, self.indices, self.settings,
+                       level == "acceleration")
+        return bind(_write, state.kinematics, asked, A, lower, upper, row)
 
     def _near(self, state: State, lower: Sequence[float]) -> Array:
         return np.where(self.distances(state) <= self.barrier.influence, lower, -np.inf)
@@ -157,27 +159,35 @@ class SelfSeparation(Task):
         return rows
 
 
+class _Asked(NamedTuple):
+    joints: NDArray[np.int64]
+    capsules: Array
+    pairs: NDArray[np.int64]
+    settings: Array
+    acceleration: bool
+
+
 @compiled
-def _write(v, J, dJ, placements, supports, previous_J, previous_placements, period,
-           joints, capsules, pairs, settings, acceleration, A, lower, upper, row):
+def _write(kinematics, asked, A, lower, upper, row):
+    joints, capsules, pairs, settings, acceleration = asked
+    J, placements, supports = kinematics.J, kinematics.placements, kinematics.supports
     for m in range(pairs.shape[0]):
         i, j = pairs[m, 0], pairs[m, 1]
         a, b = capsules[i], capsules[j]
         T_a, T_b = placements[joints[i]], placements[joints[j]]
-        D, rx, ry, rz, s, t = nearest_of_capsules(T_a, a, T_b, b)
+        seen = nearest_of_capsules(T_a, a, T_b, b)
+        D, rx, ry, rz, s, t = seen
         for c in range(A.shape[1]):
             A[row, c] = 0.0
-        x, y, z = place(T_a, a[0] + s * a[3], a[1] + s * a[4], a[2] + s * a[5])
-        add_row(J, supports, joints[i], x, y, z, rx, ry, rz, A, row)
-        x, y, z = place(T_b, b[0] + t * b[3], b[1] + t * b[4], b[2] + t * b[5])
-        add_row(J, supports, joints[j], x, y, z, -rx, -ry, -rz, A, row)
+        point = place(T_a, a[0] + s * a[3], a[1] + s * a[4], a[2] + s * a[5])
+        add_row(J, supports, joints[i], point, (rx, ry, rz), A, row)
+        point = place(T_b, b[0] + t * b[3], b[1] + t * b[4], b[2] + t * b[5])
+        add_row(J, supports, joints[j], point, (-rx, -ry, -rz), A, row)
         drop_rounding(A, row)
         lower[row], upper[row] = -np.inf, np.inf
         if D <= settings[2]:
             if acceleration:
-                rate, drift, bend = _motion(
-                    v, J, dJ, placements, supports, previous_J, previous_placements, period,
-                    joints, capsules, i, j, D, rx, ry, rz, s, t)
+                rate, drift, bend = _motion(kinematics, joints, capsules, i, j, seen)
                 lower[row] = least_acceleration(D - settings[0], rate, bend, settings) - drift
             else:
                 lower[row] = least_rate(D - settings[0], settings)
@@ -185,26 +195,23 @@ def _write(v, J, dJ, placements, supports, previous_J, previous_placements, peri
 
 
 @compiled
-def _motion(v, J, dJ, placements, supports, previous_J, previous_placements, period,
-            joints, capsules, i, j, D, rx, ry, rz, s, t):
+def _motion(kinematics, joints, capsules, i, j, seen):
     """dd/dt, r^T (dJ_a/dt - dJ_b/dt) v and bend of one pair."""
+    D, rx, ry, rz, s, t = seen
     a, b = capsules[i], capsules[j]
     ax, ay, az, fx, fy, fz, ox, oy, oz = drift_of_point(
-        v, J, dJ, placements, supports, previous_J, previous_placements, period, joints[i],
-        a[0] + s * a[3], a[1] + s * a[4], a[2] + s * a[5])
+        kinematics, joints[i], a[0] + s * a[3], a[1] + s * a[4], a[2] + s * a[5])
     bx, by, bz, gx, gy, gz, px, py, pz = drift_of_point(
-        v, J, dJ, placements, supports, previous_J, previous_placements, period, joints[j],
-        b[0] + t * b[3], b[1] + t * b[4], b[2] + t * b[5])
+        kinematics, joints[j], b[0] + t * b[3], b[1] + t * b[4], b[2] + t * b[5])
     vx, vy, vz = ax - bx, ay - by, az - bz
     rate = dot(rx, ry, rz, vx, vy, vz)
     drift = dot(rx, ry, rz, fx - gx, fy - gy, fz - gz)
     length = D + a[6] + b[6]
     if length < ON_AXIS:
         return rate, drift, 0.0
-    ux, uy, uz = turned(placements[joints[i]], a)
-    wx, wy, wz = turned(placements[joints[j]], b)
-    bend = bend_of_nearest(
-        length, rx, ry, rz, vx, vy, vz,
-        ux, uy, uz, oy * uz - oz * uy, oz * ux - ox * uz, ox * uy - oy * ux, s,
-        wx, wy, wz, py * wz - pz * wy, pz * wx - px * wz, px * wy - py * wx, t)
+    ux, uy, uz = turned(kinematics.placements[joints[i]], a)
+    wx, wy, wz = turned(kinematics.placements[joints[j]], b)
+    a_axis = (ux, uy, uz), (oy * uz - oz * uy, oz * ux - ox * uz, ox * uy - oy * ux), s
+    b_axis = (wx, wy, wz), (py * wz - pz * wy, pz * wx - px * wz, px * wy - py * wx), t
+    bend = bend_of_nearest(length, (rx, ry, rz), (vx, vy, vz), a_axis, b_axis)
     return rate, drift, bend

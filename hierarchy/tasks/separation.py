@@ -4,8 +4,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +20,7 @@ from hierarchy.avoidance.barrier import (
 from hierarchy.avoidance.control_points import ControlPoint, pack_points
 from hierarchy.avoidance.pairs import Pairs
 from hierarchy.errors import HierarchyError
-from hierarchy.jit import compiled
+from hierarchy.jit import bind, compiled
 from hierarchy.kinematics import (
     add_row,
     drift_of_point,
@@ -99,7 +100,8 @@ class Separation(Task):
         dJ = np.empty((3, state.n))
         A_dot = np.empty((self.dimension, state.n))
         for row, (k, pair) in enumerate(self._rows(state)):
-            write_point_jacobian_derivative(*state.arrays, int(self.joints[k]), self.offsets[k], dJ)
+            write_point_jacobian_derivative(state.kinematics, int(self.joints[k]),
+                                            self.offsets[k], dJ)
             A_dot[row] = pair[1:4] @ dJ
         return A_dot
 
@@ -135,11 +137,12 @@ class Separation(Task):
                  in zip(self.error(state), rates, self.bend(state), strict=True)]
         return self._near(state, self.desired_acceleration(state) + asked)
 
-    def write(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-              row: int) -> None:
-        """See `Task.write`."""
-        _write(*state.arrays, self.joints, self.offsets, self._seen(state).table, self.settings,
-               self.obstacles is None, level == "acceleration", A, lower, upper, row)
+    def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
+               row: int) -> Callable[[], object]:
+        """See `Task.writer`."""
+        asked = _Asked(self.joints, self.offsets, self.settings, self.obstacles is None,
+                       level == "acceleration")
+        return bind(_write, state.kinematics, asked, self._seen(state).table, A, lower, upper, row)
 
     def _near(self, state: State, lower: Array) -> Array:
         distances = self.barrier.distance - self.error(state)
@@ -168,16 +171,24 @@ class Separation(Task):
         return seen
 
 
+class _Asked(NamedTuple):
+    joints: NDArray[np.int64]
+    offsets: Array
+    settings: Array
+    nearest: bool  # of all obstacles only
+    acceleration: bool
+
+
 @compiled
-def _write(v, J, dJ, placements, supports, previous_J, previous_placements, period,
-           joints, offsets, pairs, settings, nearest, acceleration, A, lower, upper, row):
+def _write(kinematics, asked, pairs, A, lower, upper, row):
+    joints, offsets, settings, nearest, acceleration = asked
+    J, placements, supports = kinematics.J, kinematics.placements, kinematics.supports
     distance, influence = settings[0], settings[2]
     for k in range(joints.size):
         joint = joints[k]
-        x, y, z = place(placements[joint], offsets[k, 0], offsets[k, 1], offsets[k, 2])
+        point = place(placements[joint], offsets[k, 0], offsets[k, 1], offsets[k, 2])
         vx, vy, vz, ax, ay, az, _, _, _ = drift_of_point(
-            v, J, dJ, placements, supports, previous_J, previous_placements, period, joint,
-            offsets[k, 0], offsets[k, 1], offsets[k, 2])
+            kinematics, joint, offsets[k, 0], offsets[k, 1], offsets[k, 2])
         first, end = 0, pairs.shape[1]
         if nearest:
             for j in range(1, end):
@@ -189,7 +200,7 @@ def _write(v, J, dJ, placements, supports, previous_J, previous_placements, peri
             rx, ry, rz = pair[1], pair[2], pair[3]
             for c in range(A.shape[1]):
                 A[row, c] = 0.0
-            add_row(J, supports, joint, x, y, z, rx, ry, rz, A, row)
+            add_row(J, supports, joint, point, (rx, ry, rz), A, row)
             drop_rounding(A, row)
             lower[row], upper[row] = -np.inf, np.inf
             if pair[0] <= influence:

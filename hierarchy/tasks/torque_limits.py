@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -57,13 +58,14 @@ class TorqueLimits(Task):
         """Its time derivative (n, n) [kg m^2/s], which no row needs."""
         return state.mass_matrix_derivative()
 
-    def write(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-              row: int) -> None:
-        """See `Task.write`; HierarchyError at velocity level."""
+    def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
+               row: int) -> Callable[[], object]:
+        """See `Task.writer`; HierarchyError at velocity level."""
         if level != "acceleration":
             raise HierarchyError(f"task {self.name!r}: torque limits need the acceleration level, "
                                  f"not {level!r}")
-        _write(state.mass_matrix(), state.bias_effort(), self.limit, A, lower, upper, row)
+        return lambda: _write(state.mass_matrix(), state.bias_effort(), self.limit, A, lower, upper,
+                              row)
 
 
 @compiled
