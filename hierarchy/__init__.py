@@ -11,13 +11,14 @@ from hierarchy.errors import HierarchyError
 from hierarchy.problem import Hierarchy
 
 if TYPE_CHECKING:
-    from hierarchy.robot import Robot, State
+    from hierarchy.robot import Robot
     from hierarchy.stack import Stack
+    from hierarchy.state import State
     from hierarchy.task import Task
 
 __all__ = ["Hierarchy", "HierarchyError", "Robot", "Stack", "State", "Task"]
 
-_HOME = {"Robot": "robot", "Stack": "stack", "State": "robot", "Task": "task"}
+_HOME = {"Robot": "robot", "Stack": "stack", "State": "state", "Task": "task"}
 
 
 def __getattr__(name: str) -> Any:

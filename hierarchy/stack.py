@@ -10,7 +10,7 @@ import numpy as np
 from hierarchy.avoidance.measurement import Measurement
 from hierarchy.errors import HierarchyError, UnknownNameError
 from hierarchy.problem import Hierarchy
-from hierarchy.robot import State
+from hierarchy.state import State
 from hierarchy.task import Level, Task
 
 

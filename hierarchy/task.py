@@ -13,7 +13,7 @@ from hierarchy.paths import Path
 from hierarchy.problem import Array, check_rows
 
 if TYPE_CHECKING:
-    from hierarchy.robot import State
+    from hierarchy.state import State
 
 Level = Literal["velocity", "acceleration"]
 Kind = Literal["equality", "inequality"]

@@ -7,7 +7,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from hierarchy import HierarchyError, Robot
+from hierarchy import HierarchyError, Robot, State
 from hierarchy.avoidance.self_collision import pairs_of_tree
 from hierarchy.errors import RobotError, UnknownNameError
 from hierarchy.robots.shapes import bounding_capsule
@@ -203,7 +203,7 @@ def test_a_file_without_limits_has_infinite_ones(arm):
 
 def test_control_points_are_spread_evenly_over_the_chain(arm):
     robot = Robot.from_file(arm())
-    state, end = robot.state([0.7, 0.9, 0.6]), robot.frame("tool0")
+    state, end = State.at(robot, [0.7, 0.9, 0.6]), robot.frame("tool0")
     places = [state._placement(p.joint)[1] + state._placement(p.joint)[0] @ p.offset
               for p in robot.control_points]
     places = np.array([*places, state.position(end)])
@@ -238,16 +238,16 @@ def test_the_state_of_a_floating_base_has_exact_derivatives(arm):
     v, frame = rng.normal(size=robot.n), robot.frame("tool0")
 
     def position(step):
-        return robot.state(robot.integrate(q, step)).position(frame)
+        return State.at(robot, robot.integrate(q, step)).position(frame)
 
-    state = robot.state(q, v)
+    state = State.at(robot, q, v)
     columns = [(position(h * e) - position(-h * e)) / (2 * h) for e in np.eye(robot.n)]
     from hierarchy.paths import Still
     from hierarchy.tasks import Position
     task = Position(frame, Still((0.0, 0.0, 0.0)))
     J = task.jacobian(state)
     np.testing.assert_allclose(J, np.transpose(columns), atol=1e-8)
-    later, before = (robot.state(robot.integrate(q, s * h * v), v) for s in (1, -1))
+    later, before = (State.at(robot, robot.integrate(q, s * h * v), v) for s in (1, -1))
     np.testing.assert_allclose(
         task.jacobian_derivative(state),
         (task.jacobian(later) - task.jacobian(before)) / (2 * h), atol=1e-8)
@@ -256,7 +256,7 @@ def test_the_state_of_a_floating_base_has_exact_derivatives(arm):
 def test_joint_limits_leave_the_base_alone(arm):
     robot = Robot.from_file(arm(), base="floating")
     task = JointLimits(robot, 5.0, 0.01)
-    state = robot.state(robot.rest)
+    state = State.at(robot, robot.rest)
     assert task.dimension == 3
     np.testing.assert_array_equal(task.jacobian(state), np.eye(9)[6:])
     A, lower, upper = np.full((3, 9), 7.0), np.zeros(3), np.zeros(3)
@@ -277,7 +277,7 @@ def test_what_cannot_be_said_of_a_floating_base_is_refused(arm):
 
 def test_a_posture_is_that_of_the_joints_behind_a_floating_base(arm):
     robot = Robot.from_file(arm(), base="floating")
-    task, state = Posture((1.0, 1.0, 1.0)), robot.state(robot.rest)
+    task, state = Posture((1.0, 1.0, 1.0)), State.at(robot, robot.rest)
     np.testing.assert_allclose(task.error(state), [-0.25] * 3)
     np.testing.assert_array_equal(task.jacobian(state), np.eye(9)[6:])
     with pytest.raises(HierarchyError, match="2 targets for 3 joint positions"):
@@ -296,8 +296,8 @@ def test_locked_joints_are_no_joints(arm):
     assert robot.joint_names == ("shoulder", "turn")
     free = Robot.load(str(arm()))
     np.testing.assert_allclose(
-        robot.state([0.6, 0.7]).position(robot.frame("tool0")),
-        free.state([0.6, 0.8, 0.7]).position(free.frame("tool0")))
+        State.at(robot, [0.6, 0.7]).position(robot.frame("tool0")),
+        State.at(free, [0.6, 0.8, 0.7]).position(free.frame("tool0")))
     with pytest.raises(UnknownNameError, match="did you mean 'elbow'"):
         Robot.load(str(arm()), locked={"elbo": 0.0})
     with pytest.raises(RobotError, match="no joint can be locked"):

@@ -41,7 +41,7 @@ def test_more_frames_than_ticks_are_the_ticks(runs):
 def test_placements_and_links_are_those_of_the_kinematics(runs, ellipse):
     robot = Robot.named("kuka_lwr")
     for f in (0, 20, -1):
-        state = robot.state(runs["ellipse"]["q"][ellipse.ticks[f]])
+        state = State.at(robot, runs["ellipse"]["q"][ellipse.ticks[f]])
         assert np.array_equal(ellipse.placements[f], state.placements)
         chain = ellipse.links[f]
         assert np.allclose(chain[0, 1], 0.0)  # the foot ends at the base
@@ -182,7 +182,7 @@ def test_a_robot_without_capsules_is_drawn_as_sticks(tmp_path):
 def test_no_robot_at_rest_is_below_the_floor(name):
     section = load("ellipse").model_copy(update={"robot": RobotSection(model=name)})
     fixed = stage(section)
-    low = ends(fixed.capsules[1:], fixed.robot.state(fixed.robot.rest).placements)[..., 2].min()
+    low = ends(fixed.capsules[1:], State.at(fixed.robot, fixed.robot.rest).placements)[..., 2].min()
     assert low >= fixed.floor
     assert stage(load("humanoid")).floor == pytest.approx(0.0, abs=1e-6)  # it stands on it
 

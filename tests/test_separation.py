@@ -38,13 +38,13 @@ TASK = Separation(SENSOR.points, EVERYWHERE, len(SHAPES))
 
 
 def seen_at(q, v, t=0.7, differences=None):
-    state = ROBOT.state(q, v, t, differences)
+    state = State.at(ROBOT, q, v, t, differences)
     SENSOR.measure(state)
     return state
 
 
 def distances(q, t):
-    return SENSOR.measure(ROBOT.state(q, t=t)).pairs.distance.ravel().copy()
+    return SENSOR.measure(State.at(ROBOT, q, t=t)).pairs.distance.ravel().copy()
 
 
 def rows(count, n=7):
@@ -115,7 +115,7 @@ def test_compiled_rows_equal_those_of_the_plain_methods(level, differences, obst
     task = Separation(SENSOR.points, Barrier(0.05, influence=0.6), obstacles)
     m, sided = task.dimension, 0
     for q, v in STATES[:5]:
-        state = ROBOT.state(q, v, 0.7, differences)
+        state = State.at(ROBOT, q, v, 0.7, differences)
         state.move(0.701, q + 1e-3 * v, v)
         SENSOR.measure(state)
         written, plain = rows(m + 2), rows(m + 2)
@@ -189,7 +189,7 @@ def test_what_is_asked_inside_is_bounded_and_continuous():
 
 
 def test_a_point_on_an_obstacle_gives_finite_rows():
-    state = ROBOT.state(START, np.ones(7))
+    state = State.at(ROBOT, START, np.ones(7))
     state.measurement = Measurement(8)
     state.measurement.pairs = Pairs(9, 1)
     state.measurement.pairs.distance[:] = state.measurement.pairs.radius[:] = 0.0
@@ -224,7 +224,7 @@ def drive(level, period, obstacles, tasks, barrier, duration=2.0, start=START, d
     return [np.array(signal) for signal in zip(*log, strict=True)]
 
 
-HAND = ROBOT.state(START).position(FRAME)
+HAND = State.at(ROBOT, START).position(FRAME)
 
 
 def beside_the_hand(*offset):
@@ -297,7 +297,7 @@ def test_a_point_that_no_joint_moves_is_left_alone():
     obstacles = Obstacles([Obstacle("sphere", (0.0, 0.0, 0.13), (0.05,))])
     measurement = Measurement(0)
     measurement.pairs = Pairs(1, 1)
-    state = ROBOT.state(START)
+    state = State.at(ROBOT, START)
     position = state.placements[1, 9:] + 0.1 * state.placements[1, 3:6]
     away = position - obstacles.centres[0]
     measurement.pairs.distance[:] = np.linalg.norm(away) - 0.05
@@ -330,7 +330,7 @@ def test_bad_settings_are_named(make_task, said):
     (Pairs(9, 0), None, "9 points are measured against 0 obstacles, .* one at least"),
 ])
 def test_a_measurement_that_does_not_fit_is_named(pairs, obstacles, said):
-    state = ROBOT.state(START)
+    state = State.at(ROBOT, START)
     task = Separation(SENSOR.points, EVERYWHERE, obstacles)
     with pytest.raises(HierarchyError, match="measurement of pairs"):
         task.writer(state, "velocity", *rows(18), row=0)()
@@ -342,7 +342,7 @@ def test_a_measurement_that_does_not_fit_is_named(pairs, obstacles, said):
 
 def test_without_obstacles_there_are_no_rows():
     sensor = sensor_of([])
-    state = ROBOT.state(START)
+    state = State.at(ROBOT, START)
     sensor.measure(state)
     task = Separation(sensor.points, EVERYWHERE, 0)
     assert task.dimension == 0

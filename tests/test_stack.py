@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scene import FRAME, PATH, ROBOT, SENSOR, TASKS, state_at, states
 
-from hierarchy import HierarchyError, Stack, Task
+from hierarchy import HierarchyError, Stack, State, Task
 from hierarchy.jit import bind, compiled
 from hierarchy.tasks import JointDamping, Position
 
@@ -213,5 +213,5 @@ def test_bad_edits_are_named(edit, said):
 
 def test_an_empty_stack_is_an_error_and_an_empty_order_is_not():
     with pytest.raises(HierarchyError, match="stack is empty"):
-        Stack().hierarchy(ROBOT.state(Q))
+        Stack().hierarchy(State.at(ROBOT, Q))
     assert stack().hierarchy(state_at(Q, V), ()).m == 0

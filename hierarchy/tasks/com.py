@@ -23,7 +23,8 @@ from hierarchy.kinematics import (
 )
 from hierarchy.paths import Path
 from hierarchy.problem import Array
-from hierarchy.robot import Robot, State
+from hierarchy.robot import Robot
+from hierarchy.state import State
 from hierarchy.task import Level, Task, along
 
 

@@ -19,7 +19,7 @@ from hierarchy.jit import bind, compiled
 from hierarchy.kinematics import point_at
 from hierarchy.limits import clipped
 from hierarchy.problem import Array
-from hierarchy.robot import State
+from hierarchy.state import State
 from hierarchy.task import Level, Task
 from hierarchy.tasks.joint_limits import JointLimits
 

@@ -13,7 +13,8 @@ from hierarchy.jit import bind
 from hierarchy.kinematics import write_identity
 from hierarchy.limits import Limits, write_box
 from hierarchy.problem import Array
-from hierarchy.robot import Robot, State
+from hierarchy.robot import Robot
+from hierarchy.state import State
 from hierarchy.task import Level, Task
 
 

@@ -15,7 +15,8 @@ from hierarchy.errors import HierarchyError
 from hierarchy.jit import bind, compiled, inlined
 from hierarchy.kinematics import axis_at, subtract_over_period, velocity_of_point
 from hierarchy.problem import Array
-from hierarchy.robot import Frame, State
+from hierarchy.robot import Frame
+from hierarchy.state import State
 from hierarchy.task import Kind, Level, Task
 
 

@@ -21,7 +21,8 @@ from hierarchy.kinematics import (
 )
 from hierarchy.paths import Path
 from hierarchy.problem import Array
-from hierarchy.robot import Frame, State
+from hierarchy.robot import Frame
+from hierarchy.state import State
 from hierarchy.task import Level, Task, along
 
 

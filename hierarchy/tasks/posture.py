@@ -14,7 +14,7 @@ from hierarchy.errors import HierarchyError
 from hierarchy.jit import bind, compiled
 from hierarchy.kinematics import write_equality, write_identity
 from hierarchy.problem import Array
-from hierarchy.robot import State
+from hierarchy.state import State
 from hierarchy.task import Level, Task
 
 

@@ -12,7 +12,8 @@ import numpy as np
 from hierarchy.errors import HierarchyError
 from hierarchy.jit import compiled
 from hierarchy.problem import Array
-from hierarchy.robot import Robot, State
+from hierarchy.robot import Robot
+from hierarchy.state import State
 from hierarchy.task import Level, Task
 
 

@@ -10,7 +10,8 @@ from hierarchy.allocation import AVOIDANCE
 from hierarchy.jit import bind, compiled
 from hierarchy.kinematics import point_at
 from hierarchy.problem import Array
-from hierarchy.robot import Frame, Robot, State
+from hierarchy.robot import Frame, Robot
+from hierarchy.state import State
 from scenarios.config import Scenario
 from scenarios.loop import listed
 from scenarios.loop.controller import Controller

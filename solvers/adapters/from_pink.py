@@ -10,7 +10,7 @@ import numpy as np
 
 from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array, Hierarchy, check_rows
-from hierarchy.robot import State
+from hierarchy.state import State
 from hierarchy.task import Level, Task
 from solvers.adapters import displacements
 
