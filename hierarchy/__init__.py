@@ -1,4 +1,4 @@
-"""What is asked of a robot, in which order: tasks, stacks and the problem they make.
+"""Tasks of a robot in order of priority, and the problem that a stack of them makes.
 
 Names other than `Hierarchy` and `HierarchyError` are imported when first used, so that a program
 that has only arrays does not load pinocchio.

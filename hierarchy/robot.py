@@ -1,4 +1,4 @@
-"""Robot, around a model of pinocchio."""
+"""Robot: a model of pinocchio with limits, frames, control points and capsules."""
 
 from __future__ import annotations
 
@@ -38,10 +38,11 @@ class Frame:
 
 @dataclass(frozen=True)
 class Body:
-    """What joint `name` moves, and where that joint is on the body of joint `parent` (0: base).
+    """The body that joint `name` moves, and the place of that joint on its parent's body.
 
-    position (3,) [m] and rotation (3, 3) of the joint's frame in the parent's; mass [kg], centre
-    of mass (3,) [m] and inertia about it (3, 3) [kg m^2] in the joint's frame.
+    `parent` is the joint of the parent, 0 for the base;
+    position (3,) [m] and rotation (3, 3) are those of the joint's frame in the parent's; mass [kg],
+    centre of mass (3,) [m] and inertia about it (3, 3) [kg m^2] are in the joint's frame.
     """
 
     name: str
@@ -56,15 +57,15 @@ class Body:
 class Robot:
     """A robot: its model, base, limits, frames, control points and capsules of its links.
 
-    `n` is the number of velocities, `nq` that of positions (more than n where a joint is continuous
-    or the base floats). A floating `base` has the first six velocities, those of its own frame
-    [m/s, rad/s], and no limits; `actuated` is the first velocity that a motor moves: 6 or 0.
-    `lower`, `upper` (nq,) [rad or m], `velocity_limit` (n,) [rad/s or m/s] and `effort_limit` (n,)
-    [N m or N] are infinite where the model has none. `coordinates` (n,) says where in q the
-    position that belongs to a velocity is, or begins. `parents` (joints + 1) has the joint that
-    carries each, `masses` (joints + 1) [kg] and `centres` (joints + 1, 3) [m] the body that each
-    moves. `rest` (nq,) is where it starts unless told otherwise. `missing` are sentences on what
-    its file names and does not have; `table` is the table that it was made from, or None.
+    `n` is the number of velocities, `nq` that of positions (more than n if a joint is continuous or
+    the base floats). A floating `base` has the first six velocities, in its own frame [m/s, rad/s],
+    and no limits; `actuated` is the index of the first actuated velocity: 6 or 0. `lower`, `upper`
+    (nq,) [rad or m], `velocity_limit` (n,) [rad/s or m/s] and `effort_limit` (n,) [N m or N] are
+    infinite where the model has none. `coordinates` (n,) is the index in q of the (first) position
+    of each velocity. `parents` (joints + 1) has the joint that carries each joint, `masses`
+    (joints + 1) [kg] and `centres` (joints + 1, 3) [m] the body that each moves. `rest` (nq,) is
+    the default initial configuration. `missing` has sentences about files that are named but
+    missing; `table` is the table that the robot was made from, or None.
     """
 
     def __init__(self, model: Any, name: str, end_effector: str | None = None,
@@ -101,7 +102,7 @@ class Robot:
     def named(cls, name: str, base: Base | None = None) -> Robot:
         """Build a robot of `hierarchy.robot.ROBOTS`; an unknown name raises UnknownNameError.
 
-        `base` "fixed" or "floating" goes before that of its table.
+        `base` "fixed" or "floating" overrides that of its table.
         """
         if name not in TABLES:
             raise UnknownNameError("robot", name, TABLES)
@@ -115,11 +116,11 @@ class Robot:
                   locked: Mapping[str, float] | None = None) -> Robot:
         """Read a URDF (.urdf) or MJCF (.xml, .mjcf) file; RobotError if it cannot be read.
 
-        `end_effector` names a frame; without it one is proposed, see
-        `hierarchy.robots.points`. `base` None is that of the file: fixed, or
-        floating for an MJCF with a free joint. Capsules are proposed from the collision
-        geometry, unless `shapes` is False, and control points along the chain to the end effector.
-        `locked` joints are held at an angle [rad] or a way [m] and are no joints any more.
+        `end_effector` names a frame; without it one is proposed, see `hierarchy.robots.points`.
+        `base` None is that of the file: fixed, or floating for an MJCF with a free joint. Capsules
+        are proposed from the collision geometry, unless `shapes` is False, and control points along
+        the chain to the end effector. `locked` joints are fixed at a position [rad or m] and are
+        not joints of the robot.
         """
         found = read_file(path, base, shapes, locked or {})
         return cls._of(found, Path(path).stem, end_effector)
@@ -130,7 +131,7 @@ class Robot:
         """Make a robot by a name of `ROBOTS`, a file, or "package:name".
 
         Packages are example_robot_data and robot_descriptions (extra `robots`); the latter may
-        download. `locked` joints of a file are held at an angle [rad] or a way [m] and are no
+        download files. `locked` joints of a file are fixed at a position [rad or m] and are not
         joints of the robot. Raises RobotError and UnknownNameError.
         """
         if in_package(model):
@@ -140,7 +141,7 @@ class Robot:
         if model.endswith((".urdf", ".xml", ".mjcf")):
             return cls.from_file(model, end_effector, base, locked=locked)
         if locked:
-            raise RobotError(f"robot {model!r} is a table, of which no joint can be locked")
+            raise RobotError(f"robot {model!r} is a table; its joints cannot be locked")
         robot = cls.named(model, base)
         if end_effector is not None:
             robot.end_effector = robot.frame(end_effector).name
@@ -156,17 +157,17 @@ class Robot:
 
     @property
     def frame_names(self) -> list[str]:
-        """Names of all frames, those of joints and links too."""
+        """Names of all frames, including those of joints and links."""
         return [str(frame.name) for frame in self.model.frames]
 
     @property
     def velocity_names(self) -> list[str]:
-        """The joint of each velocity (n), by name, with a number where a joint has several."""
+        """The joint name of each velocity (n), numbered where a joint has several."""
         return self._numbered([joint.nv for joint in self.model.joints[1:]])
 
     @property
     def coordinate_names(self) -> list[str]:
-        """The joint of each entry of q (nq), by name, with a number where a joint has several."""
+        """The joint name of each entry of q (nq), numbered where a joint has several."""
         return self._numbered([joint.nq for joint in self.model.joints[1:]])
 
     def _numbered(self, sizes: Iterable[int]) -> list[str]:
@@ -180,7 +181,7 @@ class Robot:
         return self.joint_names.index(name) + 1
 
     def coordinate(self, name: str) -> int:
-        """Index in q of the position of the joint called `name`, which must have only one."""
+        """Index in q of the position of the joint called `name`; RobotError if it has several."""
         joint = self.model.joints[self.joint(name)]
         if joint.nq != 1:
             raise RobotError(f"robot {self.name!r}: joint {name!r} has {joint.nq} coordinates")
@@ -202,13 +203,13 @@ class Robot:
                             np.array(offset, dtype=float))
 
     def control_point_of_frame(self, frame: str, offset: ArrayLike) -> ControlPoint:
-        """Attach a point to what carries `frame`; offset (3,) [m] in axes of that."""
+        """Attach a point to the body that carries `frame`; offset (3,) [m] in that frame."""
         held = self.frame(frame)
         place = held.offset + held.rotation @ np.asarray(offset, dtype=float)
         return ControlPoint(f"{frame} {np.asarray(offset).tolist()}", held.joint, place)
 
     def bodies(self) -> tuple[Body, ...]:
-        """Return the robot's bodies in the order of its joints, for another engine to build."""
+        """Return the robot's bodies in the order of its joints, to build it in another engine."""
         return tuple(
             Body(name, int(self.model.parents[i]), placement.translation.copy(),
                  placement.rotation.copy(), float(inertia.mass), inertia.lever.copy(),
@@ -218,10 +219,10 @@ class Robot:
                     list(self.model.inertias)[1:], strict=True), 1))
 
     def position_limits(self) -> tuple[Array, Array]:
-        """Return lower and upper (n,), (n,) [rad or m], one for each velocity.
+        """Return lower and upper (n,), (n,) [rad or m], one per velocity.
 
-        Infinite for a continuous joint, whose coordinates are a cosine and a sine. RobotError for
-        another joint with more coordinates than velocities, if one of them has a limit.
+        They are infinite for a continuous joint, whose coordinates are a cosine and a sine. Raises
+        RobotError if another joint with more coordinates than velocities has a limit.
         """
         lower, upper = self.lower[self.coordinates], self.upper[self.coordinates]
         for name, joint in zip(self.joint_names, self.model.joints[1:], strict=True):
@@ -246,7 +247,7 @@ class Robot:
         return f"Robot({self.name!r}, n={self.n})"
 
 
-_UNIT = 1.01  # what pinocchio gives as the limit of a cosine, a sine or an entry of a quaternion
+_UNIT = 1.01  # limit in pinocchio of a cosine, a sine or an entry of a quaternion
 
 
 def _coordinates(model: Any) -> NDArray[np.int64]:
@@ -258,7 +259,7 @@ def _coordinates(model: Any) -> NDArray[np.int64]:
 
 
 def _finite_or_inf(lower: Array, upper: Array) -> tuple[Array, Array]:
-    """Limits as given; pinocchio's huge numbers for "none" become infinite."""
+    """Limits as given, with pinocchio's huge numbers for "none" replaced by infinity."""
     return (np.where(np.abs(lower) > 1e300, -np.inf, lower),
             np.where(np.abs(upper) > 1e300, np.inf, upper))
 

@@ -1,4 +1,4 @@
-"""State of a robot at one moment: everything that a task may read."""
+"""State of a robot at one time: everything that a task may read."""
 
 # mypy: disable-error-code="no-untyped-def"
 
@@ -26,13 +26,13 @@ class State:
     t [s], q (nq,), v (n,); J, dJ (6, n) world-frame spatial Jacobian of every joint and its time
     derivative, linear part at the world origin; placements (joints + 1, 12): rotation (column by
     column) and translation of each joint's frame; supports (joints + 1, n) whether a column moves
-    a body. J, dJ and placements are views of what `move` computed last.
+    a body. `kinematics` has all arrays that kernels read. J, dJ and placements are views of the
+    results of the last `move`.
 
     With `period` > 0 [s] derivatives are backward differences against previous_J and
-    previous_placements, those of the `move` before; with 0 they are exact. `measurement` holds
-    what the sensor saw this tick, or None. `commanded` (n,) is the last command where commands are
-    velocities, which need not be v on a robot that lags; None for v. `kinematics` has all arrays
-    that kernels read.
+    previous_placements, those of the previous `move`; with 0 they are exact. `measurement` is that
+    of this tick, or None. `commanded` (n,) is the last command if commands are velocities, which
+    differs from v on a robot that lags; None stands for v.
     """
 
     def __init__(self, robot: Robot, differences: float | None = None) -> None:
@@ -77,7 +77,7 @@ class State:
     def move(self, t: float, q: Array, v: Array) -> bool:
         """Go to time t [s] at q (nq,), v (n,): the one kinematics call of a tick.
 
-        Shapes are not checked. Where an entry is not finite, False is returned and nothing moves.
+        Shapes are not checked. Returns False and changes nothing if an entry is not finite.
         """
         if not _copy_if_finite(q, v, self.q, self.v):
             return False
@@ -85,7 +85,7 @@ class State:
             self._keep_kinematics()
         self.t = t
         self._compute()
-        if self.period > 0.0 and not self._started:  # no tick before: all differences are zero
+        if self.period > 0.0 and not self._started:  # no previous tick: differences are zero
             self._keep_kinematics()
         self._started = True
         return True
@@ -153,7 +153,7 @@ def _placements_view(data: Any, joints: int) -> Array:
         here = data.oMi[i]
         if not (np.shares_memory(view, here.translation)
                 and (view[i] == np.r_[here.rotation.T.ravel(), here.translation]).all()):
-            raise RobotError("this pinocchio stores placements in a layout that is not known")
+            raise RobotError("this version of pinocchio has an unknown layout of placements")
     return view
 
 

@@ -1,4 +1,4 @@
-"""Task: what is asked, as rows of Jacobian, drift and reference dynamics."""
+"""Task: rows of Jacobian, drift and reference dynamics."""
 
 from __future__ import annotations
 
@@ -20,24 +20,17 @@ Kind = Literal["equality", "inequality"]
 
 
 class Task(ABC):
-    """m rows asked of the joints: J v = dp/dt, or J a + dJ/dt v = d2p/dt2.
+    """m rows over the joints: J v = dp/dt, or J a + dJ/dt v = d2p/dt2. Abstract.
 
-    A task of one's own needs `dimension`, `error`, `jacobian` and `jacobian_derivative`; the rest
-    follows. The closed loop is, with the error e = p_d - p (equations (7), (12) and reference
-    [19] of the letter):
+    A new task needs `dimension` (m), `error`, `jacobian` and `jacobian_derivative`. The closed
+    loop is, with the error e = p_d - p (equations (7), (12) and reference [19] of the letter):
 
     - velocity level: dp/dt = dp_d/dt + gain e
     - acceleration level: d2p/dt2 = d2p_d/dt2 + damping (dp_d/dt - J v) + stiffness e
 
-    An equality asks for this value, an inequality for at least this value (rows that ask for at
-    most a value are written with the opposite sign).
-
-    Attributes
-    ----------
-    name : the task's name in stacks and messages.
-    dimension : number of rows m.
-    kind : "equality" or "inequality".
-    stiffness [1/s^2], damping [1/s], gain [1/s] : closed-loop gains.
+    With `kind` "equality" the rows require this value, with "inequality" at least this value (for
+    an upper bound, write rows of opposite sign). `name` is used in stacks and messages;
+    stiffness [1/s^2], damping [1/s] and gain [1/s] are the gains.
     """
 
     name: str
@@ -64,32 +57,32 @@ class Task(ABC):
         """Time derivative of the Jacobian at a state: (m, n)."""
 
     def desired_velocity(self, state: State) -> Array:
-        """Feedforward dp_d/dt: (m,), zero unless the task says otherwise."""
+        """Feedforward dp_d/dt: (m,), zero by default."""
         return np.zeros(self.dimension)
 
     def desired_acceleration(self, state: State) -> Array:
-        """Feedforward d2p_d/dt2: (m,), zero unless the task says otherwise."""
+        """Feedforward d2p_d/dt2: (m,), zero by default."""
         return np.zeros(self.dimension)
 
     def reference_velocity(self, state: State) -> Array:
-        """Task velocity asked for at velocity level: (m,)."""
+        """Reference of the task velocity at velocity level: (m,)."""
         return self.desired_velocity(state) + self.gain * self.error(state)
 
     def reference_acceleration(self, state: State) -> Array:
-        """Task acceleration asked for at acceleration level: (m,)."""
+        """Reference of the task acceleration at acceleration level: (m,)."""
         rate = self.desired_velocity(state) - self.jacobian(state) @ state.v
         return (self.desired_acceleration(state) + self.damping * rate
                 + self.stiffness * self.error(state))
 
     def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
                row: int) -> Callable[[], object]:
-        """Return what writes this task's rows into A (m_all, n), lower, upper (m_all,).
+        """Return a function that writes this task's rows into A (m_all, n), lower, upper (m_all,).
 
-        They are the rows from `row` on, as they are where the state is at each call. A stack keeps
-        the writer for as long as the state, and the measurement that the state carries, are the
-        same objects. This general form calls the methods above; tasks override it by a kernel bound
-        to its arrays. HierarchyError, naming task and row, where a method returns the wrong shape
-        or NaN, at the call.
+        Each call writes the rows from `row` on for the present values of the state. A stack keeps
+        the writer as long as the state, and the measurement that it carries, are the same objects.
+        This general form calls the methods above; tasks override it with a kernel bound to its
+        arrays. A call raises HierarchyError, naming task and row, if a method returns the wrong
+        shape or NaN.
         """
         rows = slice(row, row + self.dimension)
 
@@ -102,7 +95,7 @@ class Task(ABC):
         return write
 
     def _sides(self, state: State, level: Level) -> Array:
-        """What J x is asked to be (m,), x the velocity or the acceleration."""
+        """Required value of J x (m,), x being the velocity or the acceleration."""
         if level == "velocity":
             return self.reference_velocity(state)
         drift = _shaped(self, "jacobian_derivative", self.jacobian_derivative(state),
@@ -112,7 +105,7 @@ class Task(ABC):
 
 def along(path: Path, target: Array, state: State,
           write_rows: Callable[[], object]) -> Callable[[], object]:
-    """Return what calls `write_rows` with `target` (3, 3) as `path` has it at the state's time."""
+    """Return a function that updates `target` (3, 3) from `path`, then calls `write_rows`."""
     move_target = path.writer(target)
 
     def write() -> None:

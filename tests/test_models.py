@@ -300,7 +300,7 @@ def test_locked_joints_are_no_joints(arm):
         State.at(free, [0.6, 0.8, 0.7]).position(free.frame("tool0")))
     with pytest.raises(UnknownNameError, match="did you mean 'elbow'"):
         Robot.load(str(arm()), locked={"elbo": 0.0})
-    with pytest.raises(RobotError, match="no joint can be locked"):
+    with pytest.raises(RobotError, match="its joints cannot be locked"):
         Robot.load("kuka_lwr", locked={"joint_1": 0.0})
 
 

@@ -1,4 +1,4 @@
-"""Avoidance by a control point of the body: 3-D (28), or relaxed to one row (29)."""
+"""Obstacle avoidance by a control point of the body: 3-D (28), or relaxed to one row (29)."""
 
 # mypy: disable-error-code="no-untyped-def"
 
@@ -30,14 +30,15 @@ from hierarchy.task import Level, Task
 
 @dataclass(frozen=True)
 class Avoidance(Task):
-    """Push the active control point of the measurement away from what is near.
+    """Push the active control point of the measurement away from the nearest obstacle.
 
-    rows = 3: the point's acceleration is the repulsive vector, eqs. (27)-(28). rows = 1: its
-    component along the direction of repulsion is the magnitude, eq. (29). At velocity level the
-    vector is a velocity. With one row the derivative is that of (29), r^T dJ_c/dt: the direction
-    is held, because (29) projects an acceleration and does not differentiate a distance.
+    With rows = 3 the acceleration of the point equals the repulsive vector, eqs. (27)-(28). With
+    rows = 1 its component along the direction of repulsion equals the magnitude, eq. (29). At
+    velocity level the vector is a velocity. With one row the derivative is r^T dJ_c/dt, with the
+    direction held constant, because (29) projects an acceleration and does not differentiate a
+    distance.
 
-    `points` are the control points in the order of the measurement; the task works on
+    `points` are the control points in the order of the measurement; the task acts on
     `measurement.active`, or on the first point while that is -1.
     """
 
@@ -62,7 +63,7 @@ class Avoidance(Task):
         return self.rows
 
     def error(self, state: State) -> Array:
-        """The repulsion (rows,) [m/s^2 or m/s]: this task has no position to reach."""
+        """The repulsion (rows,) [m/s^2 or m/s]; this task has no target position."""
         seen, k = self._seen(state)
         r = seen.magnitude[k]
         return np.array([r]) if self.rows == 1 else np.asarray(r * seen.direction[k])
@@ -94,8 +95,8 @@ class Avoidance(Task):
                row: int) -> Callable[[], object]:
         """See `Task.writer`."""
         seen, k = self._seen(state)
-        asked = _Asked(self.joints, self.offsets, level == "acceleration", self.rows)
-        write_rows = bind(_write, state.kinematics, asked, seen.arrays, A, lower, upper, row,
+        parameters = _Parameters(self.joints, self.offsets, level == "acceleration", self.rows)
+        write_rows = bind(_write, state.kinematics, parameters, seen.arrays, A, lower, upper, row,
                           then=(k,))
         return lambda: write_rows(seen.active)
 
@@ -105,7 +106,7 @@ class Avoidance(Task):
         return state.measurement, max(state.measurement.active, 0)
 
 
-class _Asked(NamedTuple):
+class _Parameters(NamedTuple):
     joints: NDArray[np.int64]
     offsets: Array
     acceleration: bool
@@ -113,16 +114,16 @@ class _Asked(NamedTuple):
 
 
 @compiled
-def _write(kinematics, asked, seen, A, lower, upper, row, active):
+def _write(kinematics, parameters, seen, A, lower, upper, row, active):
     k = max(active, 0)
-    joint, offset = asked.joints[k], asked.offsets[k]
+    joint, offset = parameters.joints[k], parameters.offsets[k]
     r, magnitude = seen.direction[k], seen.magnitude[k]
     J, placements, supports = kinematics.J, kinematics.placements, kinematics.supports
     ax = ay = az = 0.0
-    if asked.acceleration:
+    if parameters.acceleration:
         _, _, _, ax, ay, az, _, _, _ = drift_of_point(kinematics, joint, offset[0], offset[1],
                                                       offset[2])
-    if asked.rows == 3:
+    if parameters.rows == 3:
         write_point_jacobian(J, placements, supports, joint, offset, A, row)
         write_equality(lower, upper, row, magnitude * r[0] - ax)  # (28)
         write_equality(lower, upper, row + 1, magnitude * r[1] - ay)

@@ -1,4 +1,4 @@
-"""The centre of mass of the whole robot along a path."""
+"""Task that moves the centre of mass of the whole robot along a path."""
 
 # mypy: disable-error-code="no-untyped-def"
 
@@ -30,11 +30,11 @@ from hierarchy.task import Level, Task, along
 
 @dataclass(frozen=True)
 class CentreOfMass(Task):
-    """Bring the robot's centre of mass along `path`, along some world axes only [m].
+    """Move the robot's centre of mass along `path` in the chosen world axes [m].
 
-    `axes` are of 0, 1, 2 for x, y, z, in this order (m = how many): (0, 1) leaves the height free,
-    which is what standing asks for. p = sum m_i p_i / sum m_i over the bodies that joints move.
-    Raises HierarchyError where the robot has no masses.
+    `axes` are some of 0, 1, 2 for x, y, z in increasing order, one row per axis: (0, 1) leaves the
+    height free, which is enough for standing. p = sum m_i p_i / sum m_i over the bodies that joints
+    move. Raises HierarchyError if the robot has no masses.
     """
 
     robot: Robot
@@ -44,7 +44,7 @@ class CentreOfMass(Task):
     damping: float = 20.0
     gain: float = 10.0
     name: str = "centre of mass"
-    shares: Array = field(init=False, repr=False, compare=False)  # of the mass, one a body
+    shares: Array = field(init=False, repr=False, compare=False)  # of the mass, one per body
 
     def __post_init__(self) -> None:
         axes = tuple(self.axes)
@@ -59,7 +59,7 @@ class CentreOfMass(Task):
 
     @property
     def dimension(self) -> int:
-        """One row an axis."""
+        """One row per axis."""
         return len(self.axes)
 
     def error(self, state: State) -> Array:
@@ -67,7 +67,7 @@ class CentreOfMass(Task):
         return np.asarray((self.path(state.t)[0] - self.position(state))[list(self.axes)])
 
     def position(self, state: State) -> Array:
-        """Where the centre of mass is in the world (3,) [m]."""
+        """World position of the centre of mass (3,) [m]."""
         R = state.placements[:, :9].reshape(-1, 3, 3)  # column by column
         points = state.placements[:, 9:] + np.einsum("jki,jk->ji", R, self.robot.centres)
         return np.asarray(self.shares @ points)
@@ -102,9 +102,9 @@ class CentreOfMass(Task):
                row: int) -> Callable[[], object]:
         """See `Task.writer`."""
         target = np.empty((3, 3))  # p_d, dp_d/dt, d2p_d/dt2
-        asked = _Asked(self.shares, self.robot.centres, self._axes(), target, self.stiffness,
-                       self.damping, self.gain, level == "acceleration")
-        write_rows = bind(_write, state.kinematics, asked, A, lower, upper, row)
+        parameters = _Parameters(self.shares, self.robot.centres, self._axes(), target,
+                                 self.stiffness, self.damping, self.gain, level == "acceleration")
+        write_rows = bind(_write, state.kinematics, parameters, A, lower, upper, row)
         return along(self.path, target, state, write_rows)
 
     def _of(self, J: Array, placements: Array, supports: NDArray[np.bool_]) -> Array:
@@ -117,7 +117,7 @@ class CentreOfMass(Task):
         return np.array(self.axes, dtype=np.int64)
 
 
-class _Asked(NamedTuple):
+class _Parameters(NamedTuple):
     shares: Array
     centres: Array
     axes: NDArray[np.int64]
@@ -130,7 +130,7 @@ class _Asked(NamedTuple):
 
 @compiled
 def _write_jacobian(J, placements, supports, shares, centres, axes, A, row):
-    """Column c is s J_v + J_w x m: s, m are mass and moment, as shares, of what joint c moves."""
+    """Column c is s J_v + J_w x m, with s and m the mass and moment (as shares) that c moves."""
     for c in range(A.shape[1]):
         s, mx, my, mz = _carried(placements, supports, shares, centres, c)
         for i in range(len(axes)):
@@ -157,8 +157,8 @@ def _carried(placements, supports, shares, centres, c):
 
 
 @compiled
-def _write(kinematics, asked, A, lower, upper, row):
-    shares, centres, axes, target, stiffness, damping, gain, acceleration = asked
+def _write(kinematics, parameters, A, lower, upper, row):
+    shares, centres, axes, target, stiffness, damping, gain, acceleration = parameters
     _write_jacobian(kinematics.J, kinematics.placements, kinematics.supports, shares, centres, axes,
                     A, row)
     p, drift = np.zeros(3), np.zeros(3)

@@ -1,4 +1,4 @@
-"""Relaxed pointing: an axis of a frame on, or inside, a cone (eqs. 16-21)."""
+"""Relaxed pointing: an axis of a frame on a cone, or inside it (eqs. 16-21)."""
 
 # mypy: disable-error-code="no-untyped-def"
 
@@ -22,11 +22,11 @@ from hierarchy.task import Kind, Level, Task
 
 @dataclass(frozen=True)
 class Pointing(Task):
-    """Keep the z axis of `frame` at `half_angle` [rad] to `axis` (m = 1, p = z_d . z_e).
+    """Keep the z axis of `frame` at the angle `half_angle` [rad] to `axis` (m = 1, p = z_d . z_e).
 
-    kind = "equality": on the cone, cos(alpha) = cos(alpha_d), eq. (16). kind = "inequality": inside
-    it, cos(alpha_d) <= cos(alpha), eq. (21), as one row with a lower side only. `axis` (3,) is
-    z_d, normalised here. Gains as in `Task`.
+    With kind = "equality" the axis lies on the cone, cos(alpha) = cos(alpha_d), eq. (16). With
+    kind = "inequality" it lies inside, cos(alpha_d) <= cos(alpha), eq. (21), as one row with a
+    lower bound only. `axis` (3,) is z_d, normalised here. Gains as in `Task`.
     """
 
     frame: Frame
@@ -68,7 +68,7 @@ class Pointing(Task):
                                  self.cos_alpha_d))
 
     def follow_cone_error(self, state: State) -> Callable[[], float]:
-        """Return what gives the error at a state that moves, for every tick of Algorithm 1."""
+        """Return a function that gives the error at a state as it moves, for Algorithm 1."""
         return bind(_cone_error, state.placements, self.frame.joint, self.z_e, self.z_d,
                     self.cos_alpha_d)
 
@@ -88,12 +88,13 @@ class Pointing(Task):
     def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
                row: int) -> Callable[[], object]:
         """See `Task.writer`."""
-        asked = _Asked(self.frame.joint, self.z_e, self.z_d, self.cos_alpha_d, self.stiffness,
-                       self.damping, self.gain, level == "acceleration", self.kind == "inequality")
-        return bind(_write, state.kinematics, asked, A, lower, upper, row)
+        parameters = _Parameters(self.frame.joint, self.z_e, self.z_d, self.cos_alpha_d,
+                                 self.stiffness, self.damping, self.gain, level == "acceleration",
+                                 self.kind == "inequality")
+        return bind(_write, state.kinematics, parameters, A, lower, upper, row)
 
 
-class _Asked(NamedTuple):
+class _Parameters(NamedTuple):
     joint: int
     z_e: Array
     z_d: Array
@@ -150,7 +151,7 @@ def _write_jacobian_derivative(kinematics, joint, z_e, z_d, out):
 
 @inlined
 def _motion(kinematics, joint, z_e, z_d):
-    """Rate J v and drift dJ/dt v of z_d . z_e; the drift exact, or of the backward difference."""
+    """Rate J v and drift dJ/dt v of z_d . z_e; the drift is exact or a backward difference."""
     v, J, dJ, placements, supports, previous_J, previous_placements, period = kinematics
     x, y, z, wx, wy, wz, dx, dy, dz = _turning(v, J, placements, supports, joint, z_e)
     rate = z_d[0] * dx + z_d[1] * dy + z_d[2] * dz
@@ -174,8 +175,8 @@ def _turning(v, J, placements, supports, joint, z_e):
 
 
 @compiled
-def _write(kinematics, asked, A, lower, upper, row):
-    joint, z_e, z_d, cos_alpha_d, stiffness, damping, gain, acceleration, inequality = asked
+def _write(kinematics, parameters, A, lower, upper, row):
+    joint, z_e, z_d, cos_alpha_d, stiffness, damping, gain, acceleration, inequality = parameters
     placements = kinematics.placements
     _write_jacobian(kinematics.J, placements, kinematics.supports, joint, z_e, z_d, A, row)
     error = _cone_error(placements, joint, z_e, z_d, cos_alpha_d)

@@ -1,4 +1,4 @@
-"""Position and orientation of a frame together (m = 6)."""
+"""Position and orientation of a frame (m = 6)."""
 
 # mypy: disable-error-code="no-untyped-def"
 
@@ -32,10 +32,10 @@ from hierarchy.task import Level, Task, along
 
 @dataclass(frozen=True)
 class Pose(Task):
-    """Bring `frame` along `path` with the fixed orientation `rotation` (m = 6) [m, rad].
+    """Move `frame` along `path` with the constant orientation `rotation` (3, 3) (m = 6) [m, rad].
 
     The orientation error is the rotation vector from the actual to the desired orientation, in
-    world axes; the rows below are those of the angular velocity. `rotation` (3, 3).
+    world axes; the last three rows are those of the angular velocity.
     """
 
     frame: Frame
@@ -52,7 +52,7 @@ class Pose(Task):
         return 6
 
     def error(self, state: State) -> Array:
-        """p_d - p [m], then the rotation vector of R_d R^T [rad]: (6,)."""
+        """p_d - p [m], followed by the rotation vector of R_d R^T [rad]: (6,)."""
         turn = np.asarray(self.rotation, dtype=float) @ state.rotation(self.frame).T
         return np.concatenate([self.path(state.t)[0] - state.position(self.frame),
                                rotation_vector(turn)])
@@ -92,14 +92,14 @@ class Pose(Task):
                row: int) -> Callable[[], object]:
         """See `Task.writer`."""
         target = np.empty((3, 3))  # p_d, dp_d/dt, d2p_d/dt2
-        asked = _Asked(self.frame.joint, self.frame.offset, self.frame.rotation, target,
-                       np.array(self.rotation, dtype=float), self.stiffness, self.damping,
-                       self.gain, level == "acceleration")
-        write_rows = bind(_write, state.kinematics, asked, A, lower, upper, row)
+        parameters = _Parameters(self.frame.joint, self.frame.offset, self.frame.rotation, target,
+                                 np.array(self.rotation, dtype=float), self.stiffness,
+                                 self.damping, self.gain, level == "acceleration")
+        write_rows = bind(_write, state.kinematics, parameters, A, lower, upper, row)
         return along(self.path, target, state, write_rows)
 
 
-class _Asked(NamedTuple):
+class _Parameters(NamedTuple):
     joint: int
     offset: Array
     rotation: Array  # of the frame in its body
@@ -148,8 +148,8 @@ def _turn(T, rotation, desired):
 
 
 @compiled
-def _write(kinematics, asked, A, lower, upper, row):
-    joint, offset, rotation, target, desired, stiffness, damping, gain, acceleration = asked
+def _write(kinematics, parameters, A, lower, upper, row):
+    joint, offset, rotation, target, desired, stiffness, damping, gain, acceleration = parameters
     J, placements, supports = kinematics.J, kinematics.placements, kinematics.supports
     write_point_jacobian(J, placements, supports, joint, offset, A, row)
     write_rotation_jacobian(J, supports, joint, A, row + 3)
@@ -173,7 +173,7 @@ def _write(kinematics, asked, A, lower, upper, row):
 
 @compiled
 def _turning(kinematics, joint):
-    """Drift (3,) of the angular velocity: exact, or that of the backward difference."""
+    """Drift (3,) of the angular velocity: exact or a backward difference."""
     v, J, dJ, _, supports, previous_J, _, period = kinematics
     if period > 0.0:
         _, _, _, x, y, z = velocity_of_point(J, supports, joint, v, 0.0, 0.0, 0.0)

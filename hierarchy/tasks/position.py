@@ -1,4 +1,4 @@
-"""Position of a frame along a path, with the end-effector repulsion of eq. (30)."""
+"""Position of a frame along a path, with the repulsion of the end effector of eq. (30)."""
 
 # mypy: disable-error-code="no-untyped-def"
 
@@ -28,11 +28,11 @@ from hierarchy.task import Level, Task, along
 
 @dataclass(frozen=True)
 class Position(Task):
-    """Bring the origin of `frame` along `path` (m = 3) [m].
+    """Move the origin of `frame` along `path` (m = 3) [m].
 
     stiffness [1/s^2] and damping [1/s] act at acceleration level, gain [1/s] at velocity level.
-    With `repulsion_within` > 0 [m], the repulsive vector (27) of the measurement's end effector
-    is added to the reference, eq. (30), while that distance is not exceeded (eps_ee).
+    With `repulsion_within` > 0 [m] (eps_ee), the repulsive vector (27) of the end effector is added
+    to the reference, eq. (30), while its distance to the obstacles is at most that.
     """
 
     frame: Frame
@@ -93,9 +93,10 @@ class Position(Task):
                row: int) -> Callable[[], object]:
         """See `Task.writer`."""
         seen, target = state.measurement, np.empty((3, 3))  # p_d, dp_d/dt, d2p_d/dt2
-        asked = _Asked(self.frame.joint, self.frame.offset, target, self.stiffness, self.damping,
-                       self.gain, level == "acceleration", self.repulsion_within)
-        write_rows = bind(_write, state.kinematics, asked,
+        parameters = _Parameters(self.frame.joint, self.frame.offset, target, self.stiffness,
+                                 self.damping, self.gain, level == "acceleration",
+                                 self.repulsion_within)
+        write_rows = bind(_write, state.kinematics, parameters,
                           _NOTHING_SEEN if seen is None else seen.arrays, A, lower, upper, row)
         return along(self.path, target, state, write_rows)
 
@@ -103,7 +104,7 @@ class Position(Task):
 _NOTHING_SEEN = Measurement(0).arrays
 
 
-class _Asked(NamedTuple):
+class _Parameters(NamedTuple):
     joint: int
     offset: Array
     target: Array
@@ -115,8 +116,8 @@ class _Asked(NamedTuple):
 
 
 @compiled
-def _write(kinematics, asked, seen, A, lower, upper, row):
-    joint, offset, target, stiffness, damping, gain, acceleration, repulsion_within = asked
+def _write(kinematics, parameters, seen, A, lower, upper, row):
+    joint, offset, target, stiffness, damping, gain, acceleration, repulsion_within = parameters
     write_point_jacobian(kinematics.J, kinematics.placements, kinematics.supports, joint, offset,
                          A, row)
     velocity = drift = (0.0, 0.0, 0.0)

@@ -1,4 +1,4 @@
-"""Tasks of the joints themselves: a posture to go to, and damping of the motion (eq. 15)."""
+"""Tasks of the joints themselves: a target posture, and damping of the motion (eq. 15)."""
 
 # mypy: disable-error-code="no-untyped-def"
 
@@ -19,13 +19,13 @@ from hierarchy.task import Level, Task
 
 
 class JointTask(Task):
-    """A task whose Jacobian is the identity: a last level, or the stack's null-space reference."""
+    """A task with the identity as Jacobian: a last level or the null-space reference of a stack."""
 
     joints: int
 
     @property
     def dimension(self) -> int:
-        """One row a joint."""
+        """One row per joint."""
         return self.joints
 
     def jacobian(self, state: State) -> Array:
@@ -39,9 +39,9 @@ class JointTask(Task):
 
 @dataclass(frozen=True)
 class Posture(JointTask):
-    """Bring every joint to `target` (n,) [rad or m]; gains as in `Task`.
+    """Move every joint to `target` (n,) [rad or m]; gains as in `Task`.
 
-    A floating base is no joint: the rows are those of the joints behind it.
+    A floating base does not count as a joint: the rows are those of the other joints.
     """
 
     target: tuple[float, ...]
@@ -60,7 +60,7 @@ class Posture(JointTask):
         return np.asarray(self.target - self._positions(state))
 
     def jacobian(self, state: State) -> Array:
-        """The identity (n, n), beside zeros for a floating base."""
+        """The identity (n, n), to the right of zeros for a floating base."""
         return np.eye(state.n)[state.n - self.joints:]
 
     def jacobian_derivative(self, state: State) -> Array:
@@ -83,13 +83,14 @@ class Posture(JointTask):
         target = np.array(self.target, dtype=float)
         for (i,) in np.argwhere(~np.isfinite(target))[:1]:
             raise HierarchyError(f"task {self.name!r}: target {i} is {target[i]}")
-        asked = _Asked(target, self.stiffness, self.damping, self.gain, level == "acceleration")
-        return bind(_write, positions, rates, asked, A, lower, upper, row)
+        parameters = _Parameters(target, self.stiffness, self.damping, self.gain,
+                                 level == "acceleration")
+        return bind(_write, positions, rates, parameters, A, lower, upper, row)
 
 
 @dataclass(frozen=True)
 class JointDamping(JointTask):
-    """Slow every joint down: a = -D v, eq. (15), D = k I or D = k M(q); v = 0 at velocity level.
+    """Damp every joint: a = -D v, eq. (15), with D = k I or D = k M(q); v = 0 at velocity level.
 
     `damping` is k, in [1/s] with weight = "identity" and in [1/(kg m^2 s)] with "mass".
     """
@@ -107,7 +108,7 @@ class JointDamping(JointTask):
             raise HierarchyError(f"task {self.name!r}: damping {self.damping} must not be negative")
 
     def error(self, state: State) -> Array:
-        """Zero (n,): there is no position to reach."""
+        """Zero (n,), because there is no target position."""
         return np.zeros(self.joints)
 
     def reference_acceleration(self, state: State) -> Array:
@@ -134,7 +135,7 @@ class JointDamping(JointTask):
         return write
 
 
-class _Asked(NamedTuple):
+class _Parameters(NamedTuple):
     target: Array
     stiffness: float
     damping: float
@@ -143,8 +144,8 @@ class _Asked(NamedTuple):
 
 
 @compiled
-def _write(q, v, asked, A, lower, upper, row):
-    target, stiffness, damping, gain, acceleration = asked
+def _write(q, v, parameters, A, lower, upper, row):
+    target, stiffness, damping, gain, acceleration = parameters
     write_identity(A, row, len(target))
     for i in range(len(target)):
         error = target[i] - q[i]

@@ -1,4 +1,17 @@
-"""Self-separation: links of the robot kept apart from each other by one-sided rows."""
+"""Self-separation: one-sided rows that keep links of the robot apart from each other.
+
+With d the distance of a pair, r its direction, and a, b the nearest points, taken as fixed to their
+bodies, a row is (see `Barrier` for the required dh/dt and d2h/dt2)
+
+    velocity level       r^T (J_a - J_b) v >= required dh/dt
+    acceleration level   r^T (J_a - J_b) a >= required d2h/dt2 - bend - r^T (dJ_a/dt - dJ_b/dt) v
+
+where bend is the rest of d2d/dt2: r turns and the nearest points slide along the axes. Unlike that
+of an obstacle it may be negative. Where two axes become parallel the nearest points jump, d has a
+kink, and bend falls without bound; `barrier.limit` then limits the row, and d may fall below
+`barrier.distance` by the motion of one period at velocity level, and by the braking distance with
+`limit` at acceleration level.
+"""
 
 # mypy: disable-error-code="no-untyped-def"
 
@@ -46,21 +59,11 @@ from hierarchy.task import Kind, Level, Task
 class SelfSeparation(Task):
     """Keep pairs of capsules of the robot at `barrier.distance` or more (m = pairs).
 
-    `pairs` are indices of `capsules`; None takes every pair of the chain but neighbours. No sensor
-    is needed. With d the distance of a pair, r its direction, a and b the nearest points, as if
-    fixed to their bodies, a row is, see `Barrier`,
+    `pairs` are indices of `capsules`; None takes every pair of the chain except neighbours. No
+    sensor is needed. See the module for the rows. Axes that cross (d is minus the two radii) have
+    no direction; the row then uses z.
 
-    - at velocity level r^T (J_a - J_b) v >= what is asked of dh/dt,
-    - at acceleration level r^T (J_a - J_b) a >= - r^T (dJ_a/dt - dJ_b/dt) v - bend + what is asked
-      of d2h/dt2.
-
-    bend is the rest of d2d/dt2, of the turning of r and of the nearest points that slide along the
-    axes; unlike that of an obstacle it may be negative. Where two axes pass through being parallel
-    the nearest points jump, d has a kink, and bend falls without bound: `barrier.limit` then limits
-    the row, and d may pass `barrier.distance` by what one period brings at velocity level, and by
-    the way of slowing down with `limit` at acceleration level.
-
-    Axes that cross (d = - the two radii) have no direction: the row then says "along z".
+    Raises HierarchyError if there is no pair or an index is out of range.
     """
 
     capsules: Sequence[Capsule]
@@ -92,15 +95,15 @@ class SelfSeparation(Task):
 
     @property
     def dimension(self) -> int:
-        """A row for each pair."""
+        """One row per pair."""
         return len(self.indices)
 
     def distances(self, state: State) -> Array:
-        """d (m,) [m], negative where capsules overlap."""
+        """Distances d (m,) [m], negative where capsules overlap."""
         return self._seen(state)[:, 0]
 
     def error(self, state: State) -> Array:
-        """distance - d (m,) [m], positive where two are too near."""
+        """distance - d (m,) [m], positive where two capsules are too close."""
         return self.barrier.distance - self.distances(state)
 
     def jacobian(self, state: State) -> Array:
@@ -112,7 +115,7 @@ class SelfSeparation(Task):
         return self._between(state, of_point)
 
     def jacobian_derivative(self, state: State) -> Array:
-        """r^T (dJ_a/dt - dJ_b/dt) (m, n), directions and nearest points held."""
+        """r^T (dJ_a/dt - dJ_b/dt) (m, n), with directions and nearest points held constant."""
         def of_point(joint: int, offset: Array) -> Array:
             dJ = np.empty((3, state.n))
             write_point_jacobian_derivative(state.kinematics, joint, offset, dJ)
@@ -120,7 +123,7 @@ class SelfSeparation(Task):
         return self._between(state, of_point)
 
     def bend(self, state: State) -> Array:
-        """What d2d/dt2 has beside r^T (J_a - J_b) a + r^T (dJ_a/dt - dJ_b/dt) v: (m,) [m/s^2]."""
+        """d2d/dt2 less r^T (J_a - J_b) a + r^T (dJ_a/dt - dJ_b/dt) v: (m,) [m/s^2]."""
         return np.array([
             _motion(state.kinematics, self.joints, self.table, i, j, tuple(seen))[2]
             for (i, j), seen in zip(self.indices, self._seen(state), strict=True)])
@@ -139,9 +142,9 @@ class SelfSeparation(Task):
     def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
                row: int) -> Callable[[], object]:
         """See `Task.writer`."""
-        asked = _Asked(self.joints, self.table, self.indices, self.settings,
-                       level == "acceleration")
-        return bind(_write, state.kinematics, asked, A, lower, upper, row)
+        parameters = _Parameters(self.joints, self.table, self.indices, self.settings,
+                                 level == "acceleration")
+        return bind(_write, state.kinematics, parameters, A, lower, upper, row)
 
     def _near(self, state: State, lower: Sequence[float]) -> Array:
         return np.where(self.distances(state) <= self.barrier.influence, lower, -np.inf)
@@ -159,7 +162,7 @@ class SelfSeparation(Task):
         return rows
 
 
-class _Asked(NamedTuple):
+class _Parameters(NamedTuple):
     joints: NDArray[np.int64]
     capsules: Array
     pairs: NDArray[np.int64]
@@ -168,8 +171,8 @@ class _Asked(NamedTuple):
 
 
 @compiled
-def _write(kinematics, asked, A, lower, upper, row):
-    joints, capsules, pairs, settings, acceleration = asked
+def _write(kinematics, parameters, A, lower, upper, row):
+    joints, capsules, pairs, settings, acceleration = parameters
     J, placements, supports = kinematics.J, kinematics.placements, kinematics.supports
     for m in range(pairs.shape[0]):
         i, j = pairs[m, 0], pairs[m, 1]
