@@ -12,7 +12,7 @@ import argparse
 
 import numpy as np
 
-from hierarchy import Robot, Stack
+from hierarchy import Robot, Stack, State
 from hierarchy.loop import Loop
 from hierarchy.paths import Ellipse
 from hierarchy.tasks import JointLimits, Position, Posture
@@ -47,7 +47,7 @@ class Control:
 
     def __init__(self, arm: Arm) -> None:
         self.arm, self.robot = arm, Robot.named("kuka_lwr")
-        self.state, self.resolver, self.memory = self.robot.state(START), make("hcod"), None
+        self.state, self.resolver, self.memory = State.at(self.robot, START), make("hcod"), None
         self.hand = self.robot.frame(self.robot.end_effector)
         centre = self.state.position(self.hand)
         self.path = Ellipse(tuple(centre), (0.0, 0.08, 0.0), (0.0, 0.0, 0.05), 2.0)

@@ -19,7 +19,7 @@ from rclpy.qos import qos_profile_sensor_data
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 
-from hierarchy import Robot, Stack
+from hierarchy import Robot, Stack, State
 from hierarchy.paths import Still
 from hierarchy.tasks import JointLimits, Position, Posture
 from solvers import Status, make
@@ -60,7 +60,7 @@ class TaskHierarchyNode(Node):
         self.q = np.array([known[name] for name in self.robot.joint_names])
         self.read_at = self.get_clock().now()
         if self.state is None:
-            self.state = self.robot.state(self.q)
+            self.state = State.at(self.robot, self.q)
             self.go_to(self.state.position(self.hand))
 
     def on_goal(self, message: PointStamped) -> None:

@@ -1,9 +1,32 @@
-"""What is asked of a robot, in which order: tasks, stacks and the problem they make."""
+"""Tasks of a robot in order of priority, and the problem that a stack of them makes.
+
+Names other than `Hierarchy` and `HierarchyError` are imported when first used, so that a program
+that has only arrays does not load pinocchio.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
 from hierarchy.errors import HierarchyError
 from hierarchy.problem import Hierarchy
-from hierarchy.robot import Robot, State
-from hierarchy.stack import Stack
-from hierarchy.task import Task
+
+if TYPE_CHECKING:
+    from hierarchy.robot import Robot
+    from hierarchy.stack import Stack
+    from hierarchy.state import State
+    from hierarchy.task import Task
 
 __all__ = ["Hierarchy", "HierarchyError", "Robot", "Stack", "State", "Task"]
+
+_HOME = {"Robot": "robot", "Stack": "stack", "State": "state", "Task": "task"}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = globals()[name] = getattr(import_module(f"hierarchy.{_HOME[name]}"), name)
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -1,4 +1,4 @@
-"""Algorithm 1 of the letter: from what is measured to the order of the stack."""
+"""Algorithm 1 of the letter: from measured distances to the order of the stack."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ def allocate(minimal_distance: float, end_effector_distance: float, cone_error: 
     ----------
     minimal_distance : D_minimal of the body's control points (31) [m], infinite if none.
     end_effector_distance : D_min of the end effector (22) [m], infinite if none.
-    cone_error : cos(alpha_d) - cos(alpha); the pointing task is asked for while it is positive,
+    cone_error : cos(alpha_d) - cos(alpha); the pointing task is in the stack while it is positive,
         and never when it is NaN (no pointing task).
     areas : the thresholds eps_1, eps_2, eps_ee.
     always_point : the pointing task is an equality (16), in the stack at all times.
 
-    Source: Algorithm 1. The published code differs at exact ties only: there avoidance goes first
-    also when both distances are equal, and the far area is open at eps_2.
+    Source: Algorithm 1. The published code differs only at exact ties: there avoidance is first
+    also if both distances are equal, and the far area excludes eps_2.
     """
     near = minimal_distance <= areas.near
     first = near and minimal_distance < end_effector_distance
@@ -46,7 +46,7 @@ def _order(first: bool, second: bool, point: bool, last: bool) -> tuple[str, ...
             *(AVOIDANCE,) * last)
 
 
-# One object for each case, so that the loop makes none.
+# One object per case, so that the loop creates none.
 _ALLOCATIONS = {(first, second, point, last, repulsion):
                 Allocation(_order(first, second, point, last), repulsion)
                 for first, second, point, last, repulsion in product((False, True), repeat=5)}

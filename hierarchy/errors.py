@@ -1,4 +1,4 @@
-"""The errors that a caller can make, each naming what was wrong and where."""
+"""Errors for a caller's mistakes; each names what was wrong and where."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ class HierarchyError(ValueError):
 
 
 class UnknownNameError(HierarchyError):
-    """A name that is not known, with the nearest one that is."""
+    """An unknown name, with the most similar known one."""
 
     def __init__(self, what: str, name: str, known: Iterable[str]) -> None:
         known = sorted(known)
@@ -21,4 +21,4 @@ class UnknownNameError(HierarchyError):
 
 
 class RobotError(HierarchyError):
-    """A robot model that cannot be read, or a state that does not fit it."""
+    """A robot model that cannot be read, or a state that does not fit the robot."""

@@ -1,4 +1,4 @@
-"""Compiled kinematics of points and axes fixed to a body, out of a State's arrays.
+"""Compiled kinematics of points and axes fixed to a body, from the arrays of a State.
 
 J is the world-frame spatial Jacobian of all joints (linear part at the world origin), so a point p
 on body j has the columns J_v + J_w x p of the joints that support j. Its time derivative is
@@ -9,9 +9,26 @@ dJ_v + dJ_w x p + J_w x dp/dt. `placements` rows are rotation (by columns) and t
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
+from numpy.typing import NDArray
 
 from hierarchy.jit import compiled, inlined
+from hierarchy.problem import Array
+
+
+class Kinematics(NamedTuple):
+    """The arrays of a State that kernels read; `period` is 0 for exact derivatives."""
+
+    v: Array
+    J: Array
+    dJ: Array  # noqa: N815
+    placements: Array
+    supports: NDArray[np.bool_]
+    previous_J: Array  # noqa: N815
+    previous_placements: Array
+    period: float
 
 
 @inlined
@@ -53,9 +70,9 @@ def write_point_jacobian(J, placements, supports, joint, offset, A, row):
 
 
 @compiled
-def write_point_jacobian_derivative(v, J, dJ, placements, supports, previous_J,
-                                    previous_placements, period, joint, offset, out):
-    """Write d/dt dp/dq of a point into out (3, n): exact, or by backward difference."""
+def write_point_jacobian_derivative(kinematics, joint, offset, out):
+    """Write d/dt dp/dq of a point into out (3, n), exact or as a backward difference."""
+    v, J, dJ, placements, supports, previous_J, previous_placements, period = kinematics
     if period > 0.0:
         before = np.empty((3, out.shape[1]))
         write_point_jacobian(J, placements, supports, joint, offset, out, 0)
@@ -84,7 +101,7 @@ def write_point_jacobian_derivative(v, J, dJ, placements, supports, previous_J,
 
 @inlined
 def velocity_of_point(J, supports, joint, v, x, y, z):
-    """Velocity of the material point that is at x, y, z, and the angular one of its body."""
+    """Velocity of the material point at x, y, z, and the angular velocity of its body."""
     px = py = pz = wx = wy = wz = 0.0
     for c in range(v.size):
         if supports[joint, c]:
@@ -98,13 +115,13 @@ def velocity_of_point(J, supports, joint, v, x, y, z):
 
 
 @inlined
-def drift_of_point(v, J, dJ, placements, supports, previous_J, previous_placements, period,
-                   joint, ox, oy, oz):
+def drift_of_point(kinematics, joint, ox, oy, oz):
     """Velocity J_c v and drift dJ_c/dt v of the point at offset ox, oy, oz on a body.
 
-    The drift is exact, or with a period that of the backward difference of J_c. The angular
+    The drift is exact, or with a period > 0 uses the backward difference of J_c. The angular
     velocity of the body comes last.
     """
+    v, J, dJ, placements, supports, previous_J, previous_placements, period = kinematics
     x, y, z = place(placements[joint], ox, oy, oz)
     px, py, pz, wx, wy, wz = velocity_of_point(J, supports, joint, v, x, y, z)
     if period > 0.0:
@@ -118,8 +135,9 @@ def drift_of_point(v, J, dJ, placements, supports, previous_J, previous_placemen
 
 
 @inlined
-def add_row(J, supports, joint, x, y, z, rx, ry, rz, A, row):
-    """Add r^T J_c (n,) of the point of a body that is at x, y, z to A[row]."""
+def add_row(J, supports, joint, point, r, A, row):
+    """Add r^T J_c (n,) of the material point at `point` of a body to A[row]."""
+    (x, y, z), (rx, ry, rz) = point, r
     mx, my, mz = y * rz - z * ry, z * rx - x * rz, x * ry - y * rx  # r . (w x p) = w . (p x r)
     for c in range(A.shape[1]):
         if supports[joint, c]:
@@ -133,6 +151,16 @@ def write_rotation_jacobian(J, supports, joint, A, row):
     for i in range(3):
         for c in range(A.shape[1]):
             A[row + i, c] = J[3 + i, c] if supports[joint, c] else 0.0
+
+
+@compiled
+def write_identity(A, row, count):
+    """Write zeros and, right of them, the identity (count, count) into A[row : row + count]."""
+    base = A.shape[1] - count
+    for i in range(count):
+        for j in range(A.shape[1]):
+            A[row + i, j] = 0.0
+        A[row + i, base + i] = 1.0
 
 
 @compiled

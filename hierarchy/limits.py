@@ -1,16 +1,16 @@
 """The box of commands, never empty, from which a joint can always stop before its limits.
 
-What "viable" means is after A. Del Prete, "Joint Position and Velocity Bounds in Discrete-Time
+"Viable" is used as in A. Del Prete, "Joint Position and Velocity Bounds in Discrete-Time
 Acceleration/Torque Control of Robot Manipulators", RA-L 2018; the formulas here are our own, for a
-joint that comes to rest at the end of a tick, which lets both levels share them. One joint, period
+joint that comes to rest at the end of a tick, so that both levels share them. One joint, period
 T [s], acceleration limit A [rad/s^2]:
 
-    S(w) = T (w + (w - A T) + (w - 2 A T) + ...), terms > 0     the way of a joint that has speed w
-                                                                and loses A T a tick
-    F(s) = the w with S(w) = s, F(-s) = -F(s)                   S and F are made of straight pieces
+    S(w) = T (w + (w - A T) + (w - 2 A T) + ...), terms > 0     distance that a joint of speed w
+                                                                travels if it loses A T per tick
+    F(s) = the w with S(w) = s, F(-s) = -F(s)                   S and F are piecewise linear
 
 A velocity x moves a joint from q to q + S(x) before it rests. At acceleration level the velocity
-goes from v to w in a straight line, and it rests at q + v T / 2 + S(w). So with
+changes linearly from v to w, and the joint rests at q + v T / 2 + S(w). So with
 
     r = q  (velocity level),   r = q + v T / 2  (acceleration level)                            (a)
 
@@ -18,8 +18,26 @@ the next velocity must lie in
 
     F(L - r) <= w <= F(U - r),   -V <= w <= V,   v - A T <= w <= v + A T                        (b)
 
-and a = (w - v) / T. If F(U - r) >= 0 nothing passes U between samples either: where v > 0 > w the
-joint turns back before it would have come to rest.
+and a = (w - v) / T. If F(U - r) >= 0, the joint does not exceed U between samples either: where
+v > 0 > w it reverses before it would have come to rest.
+
+What the box guarantees, for each joint by itself, with any command of the box in every tick, to
+rounding:
+
+- A state is viable if it is within `lower`, `upper` and `velocity` and can come to rest at the end
+  of a tick with `acceleration` before a position limit. From a viable state no limit is exceeded,
+  nor between ticks, and the next state is viable. The box is the largest for which that holds.
+- Acceleration level: a joint that can keep its position limit only by reversing within a tick (it
+  is up to A T^2 / 8 from viable) keeps it as well, unless that breaks another limit.
+- The acceleration limit holds from every initial state, always.
+- Faster than `velocity`: the speed falls by A T per tick until it is within the limit. A slower
+  joint never gets faster than `velocity`.
+- Too fast to stop: the joint brakes with the full A, as far as `velocity` and the other position
+  limit allow; it exceeds its limit by what v^2 / (2 A) and the ticks make unavoidable.
+- Beyond a position limit: outward speed is braked in the same manner; then the joint returns at
+  least as fast as a joint that accelerates and decelerates with A and comes to rest on the limit.
+  It is back after finitely many ticks, never further out than one tick before, and never faster
+  than `velocity`; within a distance `ROUNDING` of the limit counts as back.
 """
 
 # mypy: disable-error-code="no-untyped-def"
@@ -37,36 +55,18 @@ from hierarchy.jit import compiled, inlined
 from hierarchy.problem import Array
 from hierarchy.task import Level
 
-ROUNDING = 1e-12  # of a position, relative to 1 + its limit: nearer to a limit is on it
-_FAR = 1e100      # [rad] stands for an infinite way
+ROUNDING = 1e-12  # of a position, relative to 1 + its limit: closer to a limit counts as on it
+_FAR = 1e100      # [rad] stands for an infinite distance
 
 
 @dataclass(frozen=True)
 class Limits:
-    """Limits of n joints that get a command every `period` [s], and the box they leave it.
+    """Limits of n joints that get a command every `period` [s], and the box that they leave.
 
     `lower`, `upper` (n,) [rad or m] and `velocity` (n,) [rad/s or m/s] may be infinite,
-    `acceleration` (n,) [rad/s^2 or m/s^2] may not. Raises HierarchyError, naming joint and value,
-    where an entry is NaN, lower > upper, or a rate or the period is not positive.
-
-    The box is finite and never empty. Each joint by itself, with any command of the box in every
-    tick, to rounding:
-
-    - A state is viable if it is within `lower`, `upper` and `velocity` and can come to rest at
-      the end of a tick with `acceleration` before a position limit. From a viable state no limit
-      is exceeded, between ticks neither, and the next state is viable. The box is the largest
-      for which that holds.
-    - Acceleration level: a joint that can keep its position limit only by turning back within a
-      tick (it is up to A T^2 / 8 from viable) keeps it as well, unless that breaks another limit.
-    - The acceleration limit holds from every start, always.
-    - Faster than `velocity`: the speed falls by A T a tick until it is not. A slower joint never
-      gets faster than `velocity`.
-    - Too fast to stop: the full A brakes, as far as `velocity` and the other position limit let
-      it; the joint goes past its limit by what v^2 / (2 A) and the ticks make unavoidable.
-    - Beyond a position limit: speed outward is braked so; then the joint returns at least as fast
-      as a joint that speeds up and slows down with A and comes to rest on the limit. It is back
-      after finitely many ticks, never farther out than the tick before, and never faster than
-      `velocity`; within a distance `ROUNDING` of the limit counts as back.
+    `acceleration` (n,) [rad/s^2 or m/s^2] may not. The box is finite and never empty; see the
+    module for what it guarantees. Raises HierarchyError, naming joint and value, if an entry is
+    NaN, lower > upper, or a rate or the period is not positive.
     """
 
     lower: Array
@@ -74,7 +74,7 @@ class Limits:
     velocity: Array
     acceleration: Array
     period: float
-    packed: Array = field(init=False, repr=False, compare=False)  # (4, n), as the kernels take it
+    packed: Array = field(init=False, repr=False, compare=False)  # (4, n), for the kernels
 
     def __post_init__(self) -> None:
         rows = [np.asarray(side, dtype=float).ravel()
@@ -93,19 +93,19 @@ class Limits:
         object.__setattr__(self, "packed", np.array(rows))
 
     def box(self, q: Array, v: Array, level: Level) -> tuple[Array, Array]:
-        """Return the least and the greatest command (n,), (n,) at positions q and velocities v.
+        """Return the least and greatest command (n,), (n,) at positions q and velocities v.
 
-        Both (n,) and finite. The command is a velocity or an acceleration, by `level`.
+        Both are finite. The command is a velocity or an acceleration, depending on `level`.
         """
         lower, upper = np.empty(len(v)), np.empty(len(v))
         write_box(q, v, self.packed, self.period, level == "acceleration", lower, upper, 0)
         return lower, upper
 
     def clamp(self, q: Array, v: Array, level: Level, x: ArrayLike) -> Array:
-        """Return the command x (n,) with each entry moved to the nearest one of the box.
+        """Return the command x (n,) with each entry clamped to the box.
 
-        The last guard of a control loop: the answer is finite whatever x is. NaN becomes the
-        command of the box that comes nearest to a standstill.
+        This is the last safeguard of a control loop: the result is finite whatever x is. NaN
+        becomes the command in the box that comes nearest to a standstill.
         """
         command = np.array(x, dtype=float)
         clamp_into_box(q, v, self.packed, self.period, level == "acceleration", command)
@@ -134,7 +134,7 @@ def clamp_into_box(q, v, limits, T, acceleration, x):
                            acceleration)
         rest = -v[i] / T if acceleration else 0.0
         x[i] = clipped(rest if np.isnan(x[i]) else x[i], lower, upper)
-        if not np.isfinite(x[i]):  # nor is q or v
+        if not np.isfinite(x[i]):  # q or v is not finite either
             x[i] = 0.0
 
 
@@ -147,7 +147,7 @@ def box(q, v, L, U, V, A, T, acceleration):
     if not acceleration:
         return clipped(low, v - A * T, v + A * T), clipped(up, v - A * T, v + A * T)
     low, up = clipped((low - v) / T, -A, A), clipped((up - v) / T, -A, A)
-    # Where it cannot rest in time it turns back within the tick, at most v^2 / (2 |a|) from here.
+    # If it cannot rest in time, it reverses within the tick, at most v^2 / (2 |a|) from here.
     if v > 0.0 and r > U:
         return low, max(low, min(up, -v * v / (2 * max(U - q, ROUNDING * (1 + abs(U))))))
     if v < 0.0 and r < L:
@@ -157,14 +157,14 @@ def box(q, v, L, U, V, A, T, acceleration):
 
 @inlined
 def fastest(s, A, T):
-    """Return F(s), the velocity from which a joint that loses A T a tick rests after the way s."""
-    way = min(abs(s), _FAR)
-    k = np.floor((sqrt(1 + 8 * way / (A * T * T)) - 1) / 2)  # whole steps: S(k A T) <= s
-    w = k * A * T + (way - k * (k + 1) / 2 * A * T * T) / ((k + 1) * T)
+    """Return F(s), the velocity from which a joint that loses A T per tick rests after s."""
+    distance = min(abs(s), _FAR)
+    k = np.floor((sqrt(1 + 8 * distance / (A * T * T)) - 1) / 2)  # whole steps: S(k A T) <= s
+    w = k * A * T + (distance - k * (k + 1) / 2 * A * T * T) / ((k + 1) * T)
     return w if s >= 0 else -w
 
 
 @inlined
 def clipped(x, low, up):
-    """Return the value of low .. up nearest to x."""
+    """Return x clamped to low .. up."""
     return min(max(x, low), up)

@@ -19,14 +19,14 @@ Vector = Sequence[float]
 
 
 class Path(ABC):
-    """A point that moves in space."""
+    """A point that moves in space. Abstract."""
 
     @abstractmethod
     def write(self, t: float, out: Array) -> None:
         """Write position [m], velocity [m/s], acceleration [m/s^2] at t [s] as rows of (3, 3)."""
 
     def writer(self, out: Array) -> Callable[[float], object]:
-        """Return what does `write` into `out` (3, 3) for the time t [s] that it is given."""
+        """Return a function of t [s] that does `write` into `out` (3, 3)."""
         return lambda t: self.write(t, out)
 
     def __call__(self, t: float) -> Array:
@@ -38,7 +38,7 @@ class Path(ABC):
 
 @dataclass(frozen=True)
 class Still(Path):
-    """A point that stays where it is, `position` (3,) [m]."""
+    """A point at rest, `position` (3,) [m]."""
 
     position: Vector
 
@@ -80,7 +80,7 @@ class Ellipse(Path):
 
 @dataclass(frozen=True)
 class Waypoints(Path):
-    """Straight from point to point, at rest at each: quintic in time, velocity and acceleration 0.
+    """Straight lines between points, quintic in time, at rest at every point.
 
     `times` (N,) [s] increasing, `points` (N, 3) [m]; before the first and after the last it rests.
     """
@@ -107,15 +107,15 @@ class Waypoints(Path):
         span = self.times[i] - self.times[i - 1]
         s = (t - self.times[i - 1]) / span
         start = np.asarray(self.points[i - 1], dtype=float)
-        way = np.asarray(self.points[i], dtype=float) - start
-        out[0] = start + way * (s**3 * (10 - 15 * s + 6 * s * s))
-        out[1] = way * (30 * s * s * (1 - s) ** 2 / span)
-        out[2] = way * (60 * s * (1 - s) * (1 - 2 * s) / span**2)
+        step = np.asarray(self.points[i], dtype=float) - start
+        out[0] = start + step * (s**3 * (10 - 15 * s + 6 * s * s))
+        out[1] = step * (30 * s * s * (1 - s) ** 2 / span)
+        out[2] = step * (60 * s * (1 - s) * (1 - 2 * s) / span**2)
 
 
 @dataclass(frozen=True)
 class Shifted(Path):
-    """Another path, moved by `offset` (3,) [m]."""
+    """Another path, shifted by `offset` (3,) [m]."""
 
     path: Path
     offset: Vector

@@ -1,4 +1,4 @@
-"""The prioritized problem in its neutral form: packed rows, level sizes, a reference."""
+"""The prioritized problem in neutral form: packed rows, level sizes and a reference."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ class Hierarchy:
 
     Level k minimises the Euclidean norm of its violation without giving up any of the norms above
     it; among all such x the answer is the one nearest to `reference`. An equality row has
-    `lower == upper`, a missing side is infinite.
+    `lower == upper`; a missing bound is infinite.
 
     Attributes
     ----------
-    A : (m, n) the rows of all levels, one level under the other, C-contiguous.
-    lower, upper : (m,) the sides, in the unit of the rows.
+    A : (m, n) the rows of all levels, stacked from the top level down, C-contiguous.
+    lower, upper : (m,) the bounds, in the unit of the rows.
     sizes : (L,) rows of each level; zero is allowed.
     offsets : (L + 1,) first row of each level, and m.
-    reference : (n,) the x preferred where nothing else decides.
+    reference : (n,) the x preferred where the levels leave freedom.
     names : L level names, used in messages.
     """
 
@@ -34,7 +34,7 @@ class Hierarchy:
 
     def __init__(self, A: Array, lower: Array, upper: Array, sizes: NDArray[np.int64],
                  reference: Array, names: tuple[str, ...]) -> None:
-        """Wrap arrays as they are: no copy and no check. `from_levels` checks."""
+        """Wrap arrays without copying or checking them; `from_levels` checks."""
         self.A, self.lower, self.upper = A, lower, upper
         self.sizes, self.reference, self.names = sizes, reference, names
         self.offsets = np.concatenate(([0], np.cumsum(sizes))).astype(np.int64)
@@ -48,7 +48,7 @@ class Hierarchy:
         ----------
         levels : each `A (m_k, n)` with `b (m_k,)`, or with `lower (m_k,)` and `upper (m_k,)`.
         reference : (n,) or None for zero.
-        names : one name a level for messages, or None for "level 1", "level 2", ...
+        names : one name per level for messages, or None for "level 1", "level 2", ...
 
         Raises
         ------
@@ -74,7 +74,7 @@ class Hierarchy:
 
     @property
     def m(self) -> int:
-        """Number of rows of all levels together."""
+        """Total number of rows of all levels."""
         return int(self.A.shape[0])
 
     @property

@@ -1,12 +1,9 @@
-"""Robot and State, around pinocchio: everything a task may read."""
-
-# mypy: disable-error-code="no-untyped-def"
+"""Robot: a model of pinocchio with limits, frames, control points and capsules."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -15,10 +12,8 @@ import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from hierarchy.avoidance.control_points import ControlPoint
-from hierarchy.avoidance.measurement import Measurement
 from hierarchy.avoidance.self_collision import Capsule
 from hierarchy.errors import RobotError, UnknownNameError
-from hierarchy.jit import compiled
 from hierarchy.problem import Array
 from hierarchy.robots import TABLES
 from hierarchy.robots.files import read_file
@@ -43,10 +38,11 @@ class Frame:
 
 @dataclass(frozen=True)
 class Body:
-    """What joint `name` moves, and where that joint is on the body of joint `parent` (0: base).
+    """The body that joint `name` moves, and the place of that joint on its parent's body.
 
-    position (3,) [m] and rotation (3, 3) of the joint's frame in the parent's; mass [kg], centre
-    of mass (3,) [m] and inertia about it (3, 3) [kg m^2] in the joint's frame.
+    `parent` is the joint of the parent, 0 for the base;
+    position (3,) [m] and rotation (3, 3) are those of the joint's frame in the parent's; mass [kg],
+    centre of mass (3,) [m] and inertia about it (3, 3) [kg m^2] are in the joint's frame.
     """
 
     name: str
@@ -61,15 +57,15 @@ class Body:
 class Robot:
     """A robot: its model, base, limits, frames, control points and capsules of its links.
 
-    `n` is the number of velocities, `nq` that of positions (more than n where a joint is continuous
-    or the base floats). A floating `base` has the first six velocities, those of its own frame
-    [m/s, rad/s], and no limits; `actuated` is the first velocity that a motor moves: 6 or 0.
-    `lower`, `upper` (nq,) [rad or m], `velocity_limit` (n,) [rad/s or m/s] and `effort_limit` (n,)
-    [N m or N] are infinite where the model has none. `coordinates` (n,) says where in q the
-    position that belongs to a velocity is, or begins. `parents` (joints + 1) has the joint that
-    carries each, `masses` (joints + 1) [kg] and `centres` (joints + 1, 3) [m] the body that each
-    moves. `rest` (nq,) is where it starts unless told otherwise. `missing` are sentences on what
-    its file names and does not have; `table` is the table that it was made from, or None.
+    `n` is the number of velocities, `nq` that of positions (more than n if a joint is continuous or
+    the base floats). A floating `base` has the first six velocities, in its own frame [m/s, rad/s],
+    and no limits; `actuated` is the index of the first actuated velocity: 6 or 0. `lower`, `upper`
+    (nq,) [rad or m], `velocity_limit` (n,) [rad/s or m/s] and `effort_limit` (n,) [N m or N] are
+    infinite where the model has none. `coordinates` (n,) is the index in q of the (first) position
+    of each velocity. `parents` (joints + 1) has the joint that carries each joint, `masses`
+    (joints + 1) [kg] and `centres` (joints + 1, 3) [m] the body that each moves. `rest` (nq,) is
+    the default initial configuration. `missing` has sentences about files that are named but
+    missing; `table` is the table that the robot was made from, or None.
     """
 
     def __init__(self, model: Any, name: str, end_effector: str | None = None,
@@ -106,7 +102,7 @@ class Robot:
     def named(cls, name: str, base: Base | None = None) -> Robot:
         """Build a robot of `hierarchy.robot.ROBOTS`; an unknown name raises UnknownNameError.
 
-        `base` "fixed" or "floating" goes before that of its table.
+        `base` "fixed" or "floating" overrides that of its table.
         """
         if name not in TABLES:
             raise UnknownNameError("robot", name, TABLES)
@@ -120,11 +116,11 @@ class Robot:
                   locked: Mapping[str, float] | None = None) -> Robot:
         """Read a URDF (.urdf) or MJCF (.xml, .mjcf) file; RobotError if it cannot be read.
 
-        `end_effector` names a frame; without it one is proposed, see
-        `hierarchy.robots.points`. `base` None is that of the file: fixed, or
-        floating for an MJCF with a free joint. Capsules are proposed from the collision
-        geometry, unless `shapes` is False, and control points along the chain to the end effector.
-        `locked` joints are held at an angle [rad] or a way [m] and are no joints any more.
+        `end_effector` names a frame; without it one is proposed, see `hierarchy.robots.points`.
+        `base` None is that of the file: fixed, or floating for an MJCF with a free joint. Capsules
+        are proposed from the collision geometry, unless `shapes` is False, and control points along
+        the chain to the end effector. `locked` joints are fixed at a position [rad or m] and are
+        not joints of the robot.
         """
         found = read_file(path, base, shapes, locked or {})
         return cls._of(found, Path(path).stem, end_effector)
@@ -135,7 +131,7 @@ class Robot:
         """Make a robot by a name of `ROBOTS`, a file, or "package:name".
 
         Packages are example_robot_data and robot_descriptions (extra `robots`); the latter may
-        download. `locked` joints of a file are held at an angle [rad] or a way [m] and are no
+        download files. `locked` joints of a file are fixed at a position [rad or m] and are not
         joints of the robot. Raises RobotError and UnknownNameError.
         """
         if in_package(model):
@@ -145,7 +141,7 @@ class Robot:
         if model.endswith((".urdf", ".xml", ".mjcf")):
             return cls.from_file(model, end_effector, base, locked=locked)
         if locked:
-            raise RobotError(f"robot {model!r} is a table, of which no joint can be locked")
+            raise RobotError(f"robot {model!r} is a table; its joints cannot be locked")
         robot = cls.named(model, base)
         if end_effector is not None:
             robot.end_effector = robot.frame(end_effector).name
@@ -161,15 +157,22 @@ class Robot:
 
     @property
     def frame_names(self) -> list[str]:
-        """Names of all frames, those of joints and links too."""
+        """Names of all frames, including those of joints and links."""
         return [str(frame.name) for frame in self.model.frames]
 
     @property
     def velocity_names(self) -> list[str]:
-        """The joint of each velocity (n), by name, with a number where a joint has several."""
-        return [f"{name} {i + 1}" if joint.nv > 1 else name
-                for name, joint in zip(self.joint_names, list(self.model.joints)[1:], strict=True)
-                for i in range(joint.nv)]
+        """The joint name of each velocity (n), numbered where a joint has several."""
+        return self._numbered([joint.nv for joint in self.model.joints[1:]])
+
+    @property
+    def coordinate_names(self) -> list[str]:
+        """The joint name of each entry of q (nq), numbered where a joint has several."""
+        return self._numbered([joint.nq for joint in self.model.joints[1:]])
+
+    def _numbered(self, sizes: Iterable[int]) -> list[str]:
+        return [f"{name} {i + 1}" if size > 1 else name
+                for name, size in zip(self.joint_names, sizes, strict=True) for i in range(size)]
 
     def joint(self, name: str) -> int:
         """Index of the joint called `name`, as used by frames and control points."""
@@ -178,7 +181,7 @@ class Robot:
         return self.joint_names.index(name) + 1
 
     def coordinate(self, name: str) -> int:
-        """Index in q of the position of the joint called `name`, which must have only one."""
+        """Index in q of the position of the joint called `name`; RobotError if it has several."""
         joint = self.model.joints[self.joint(name)]
         if joint.nq != 1:
             raise RobotError(f"robot {self.name!r}: joint {name!r} has {joint.nq} coordinates")
@@ -200,13 +203,13 @@ class Robot:
                             np.array(offset, dtype=float))
 
     def control_point_of_frame(self, frame: str, offset: ArrayLike) -> ControlPoint:
-        """Attach a point to what carries `frame`; offset (3,) [m] in axes of that."""
+        """Attach a point to the body that carries `frame`; offset (3,) [m] in that frame."""
         held = self.frame(frame)
         place = held.offset + held.rotation @ np.asarray(offset, dtype=float)
         return ControlPoint(f"{frame} {np.asarray(offset).tolist()}", held.joint, place)
 
     def bodies(self) -> tuple[Body, ...]:
-        """Return the robot's bodies in the order of its joints, for another engine to build."""
+        """Return the robot's bodies in the order of its joints, to build it in another engine."""
         return tuple(
             Body(name, int(self.model.parents[i]), placement.translation.copy(),
                  placement.rotation.copy(), float(inertia.mass), inertia.lever.copy(),
@@ -216,10 +219,10 @@ class Robot:
                     list(self.model.inertias)[1:], strict=True), 1))
 
     def position_limits(self) -> tuple[Array, Array]:
-        """Return lower and upper (n,), (n,) [rad or m], one for each velocity.
+        """Return lower and upper (n,), (n,) [rad or m], one per velocity.
 
-        Infinite for a continuous joint, whose coordinates are a cosine and a sine. RobotError for
-        another joint with more coordinates than velocities, if one of them has a limit.
+        They are infinite for a continuous joint, whose coordinates are a cosine and a sine. Raises
+        RobotError if another joint with more coordinates than velocities has a limit.
         """
         lower, upper = self.lower[self.coordinates], self.upper[self.coordinates]
         for name, joint in zip(self.joint_names, self.model.joints[1:], strict=True):
@@ -240,166 +243,11 @@ class Robot:
             return q + step
         return np.asarray(pin.integrate(self.model, q, step))
 
-    def state(self, q: ArrayLike, v: ArrayLike | None = None, t: float = 0.0,
-              differences: float | None = None) -> State:
-        """Make a State at joint positions q (nq,) [rad or m] and velocities v (n,), zero if None.
-
-        `differences` is the period [s] of backward differences, None for exact derivatives.
-        """
-        state = State(self, differences)
-        state.move(t, self._checked("q", q, self.nq),
-                   self._checked("v", np.zeros(self.n) if v is None else v, self.n))
-        return state
-
-    def _checked(self, what: str, value: ArrayLike, size: int) -> Array:
-        vector = np.array(value, dtype=float)
-        if vector.shape != (size,):
-            raise RobotError(f"robot {self.name!r}: {what} has shape {vector.shape}, "
-                             f"expected ({size},)")
-        for (i,) in np.argwhere(~np.isfinite(vector))[:1]:
-            raise RobotError(f"robot {self.name!r}: {what}[{i}] ({self.joint_names[i]}) is "
-                             f"{vector[i]}")
-        return vector
-
     def __repr__(self) -> str:
         return f"Robot({self.name!r}, n={self.n})"
 
 
-class State:
-    """Time, joint state and kinematics of one tick: everything that a task may read.
-
-    t [s], q (nq,), v (n,); J, dJ (6, n) world-frame spatial Jacobian of every joint and its time
-    derivative, linear part at the world origin; placements (joints + 1, 12): rotation (column by
-    column) and translation of each joint's frame; supports (joints + 1, n) whether a column moves
-    a body. J, dJ and placements are views of what `move` computed last.
-
-    With `period` > 0 [s] derivatives are backward differences against previous_J and
-    previous_placements, those of the `move` before; with 0 they are exact. `measurement` holds
-    what the sensor saw this tick, or None. `commanded` (n,) is the last command where commands are
-    velocities, which need not be v on a robot that lags; None for v.
-    """
-
-    def __init__(self, robot: Robot, differences: float | None = None) -> None:
-        self.robot = robot
-        self.t = 0.0
-        self.q, self.v = pin.neutral(robot.model), np.zeros(robot.n)
-        self.measurement: Measurement | None = None
-        self.commanded: Array | None = None
-        self._model, self._data = robot.model, robot.model.createData()
-        self._compute = partial(pin.computeJointJacobiansTimeVariation, self._model, self._data,
-                                self.q, self.v)
-        self._compute()
-        self.J, self.dJ = self._data.J, self._data.dJ
-        self.placements = _placements_view(self._data, robot.model.njoints)
-        self.supports = _supports(robot.model)
-        self.period = differences or 0.0
-        self.previous_J = self.J.copy(order="F")
-        self.previous_placements = self.placements.copy()
-        self._started = False
-        # What every task kernel takes first, in this order.
-        self.arrays: tuple[Any, ...] = (
-            self.v, self.J, self.dJ, self.placements, self.supports,
-            self.previous_J, self.previous_placements, self.period)
-
-    @property
-    def n(self) -> int:
-        """Number of joint velocities."""
-        return self.robot.n
-
-    def move(self, t: float, q: Array, v: Array) -> bool:
-        """Go to time t [s] at q (nq,), v (n,): the one kinematics call of a tick.
-
-        Shapes are not checked. Where an entry is not finite, False is returned and nothing moves.
-        """
-        if not _copy_if_finite(q, v, self.q, self.v):
-            return False
-        if self.period > 0.0 and self._started:
-            self._keep_kinematics()
-        self.t = t
-        self._compute()
-        if self.period > 0.0 and not self._started:  # no tick before: all differences are zero
-            self._keep_kinematics()
-        self._started = True
-        return True
-
-    def _keep_kinematics(self) -> None:
-        _copy_kinematics(self.J, self.placements, self.previous_J, self.previous_placements)
-
-    def mass_matrix(self) -> Array:
-        """Joint-space inertia matrix M(q) (n, n) [kg m^2]."""
-        return np.ascontiguousarray(pin.crba(self._model, self._data, self.q))
-
-    def mass_matrix_derivative(self) -> Array:
-        """Time derivative of M(q) (n, n) [kg m^2/s]."""
-        C = pin.computeCoriolisMatrix(self._model, self._data, self.q, self.v)
-        return np.ascontiguousarray(C + C.T)
-
-    def bias_effort(self) -> Array:
-        """Joint efforts h(q, v) (n,) [N m or N] of gravity, Coriolis and centrifugal forces."""
-        return np.asarray(pin.nonLinearEffects(self._model, self._data, self.q, self.v))
-
-    def position(self, frame: Frame) -> Array:
-        """World position (3,) [m] of a frame's origin."""
-        rotation, translation = self._placement(frame.joint)
-        return translation + rotation @ frame.offset
-
-    def rotation(self, frame: Frame) -> Array:
-        """World orientation (3, 3) of a frame."""
-        return self._placement(frame.joint)[0] @ frame.rotation
-
-    def _placement(self, joint: int) -> tuple[Array, Array]:
-        row = self.placements[joint]
-        return row[:9].reshape(3, 3).T, row[9:]
-
-
-@compiled
-def _copy_if_finite(q, v, to_q, to_v):
-    for i in range(len(q)):
-        if not np.isfinite(q[i]):
-            return False
-    for i in range(len(v)):
-        if not np.isfinite(v[i]):
-            return False
-    for i in range(len(q)):
-        to_q[i] = q[i]
-    for i in range(len(v)):
-        to_v[i] = v[i]
-    return True
-
-
-@compiled
-def _copy_kinematics(J, placements, previous_J, previous_placements):
-    for c in range(J.shape[1]):
-        for i in range(6):
-            previous_J[i, c] = J[i, c]
-    for i in range(placements.shape[0]):
-        for k in range(12):
-            previous_placements[i, k] = placements[i, k]
-
-
-def _placements_view(data: Any, joints: int) -> Array:
-    """One (joints, 12) view over pinocchio's contiguous vector of placements."""
-    first = data.oMi[0].rotation
-    view = np.lib.stride_tricks.as_strided(first.T.reshape(-1), (joints, 12), (96, 8))
-    for i in range(joints):
-        here = data.oMi[i]
-        if not (np.shares_memory(view, here.translation)
-                and (view[i] == np.r_[here.rotation.T.ravel(), here.translation]).all()):
-            raise RobotError("this pinocchio stores placements in a layout that is not known")
-    return view
-
-
-def _supports(model: Any) -> NDArray[np.bool_]:
-    supports = np.zeros((model.njoints, model.nv), dtype=np.bool_)
-    for body in range(1, model.njoints):
-        for joint in model.supports[body].tolist():
-            if joint > 0:
-                first = model.joints[joint].idx_v
-                supports[body, first:first + model.joints[joint].nv] = True
-    return supports
-
-
-_UNIT = 1.01  # what pinocchio gives as the limit of a cosine, a sine or an entry of a quaternion
+_UNIT = 1.01  # limit in pinocchio of a cosine, a sine or an entry of a quaternion
 
 
 def _coordinates(model: Any) -> NDArray[np.int64]:
@@ -411,7 +259,7 @@ def _coordinates(model: Any) -> NDArray[np.int64]:
 
 
 def _finite_or_inf(lower: Array, upper: Array) -> tuple[Array, Array]:
-    """Limits as given; pinocchio's huge numbers for "none" become infinite."""
+    """Limits as given, with pinocchio's huge numbers for "none" replaced by infinity."""
     return (np.where(np.abs(lower) > 1e300, -np.inf, lower),
             np.where(np.abs(upper) > 1e300, np.inf, upper))
 

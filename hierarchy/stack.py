@@ -10,14 +10,14 @@ import numpy as np
 from hierarchy.avoidance.measurement import Measurement
 from hierarchy.errors import HierarchyError, UnknownNameError
 from hierarchy.problem import Hierarchy
-from hierarchy.robot import State
+from hierarchy.state import State
 from hierarchy.task import Level, Task
 
 
 class _Prepared(NamedTuple):
-    """The buffers of one order, and what writes into them while a state and its measurement stay.
+    """The buffers of one order and the writers of its tasks, for one state and its measurement.
 
-    Tasks bind their kernels to all these arrays once, so that a tick looks nothing up.
+    Tasks bind their kernels to these arrays once, so that a tick does no look-ups.
     """
 
     hierarchy: Hierarchy
@@ -32,7 +32,7 @@ class Stack:
     Parameters
     ----------
     tasks : the tasks; their names must differ.
-    level : "velocity" or "acceleration", what x of the hierarchy means.
+    level : "velocity" or "acceleration", the meaning of x in the hierarchy.
     reference : a joint task (posture, damping) whose value is the hierarchy's reference, the
         null-space term of eq. (14); None for zero.
     """
@@ -63,7 +63,7 @@ class Stack:
         return self._tasks[name]
 
     def insert(self, task: Task, index: int | None = None) -> None:
-        """Put a task at `index` of the order, 0 being the most important; None for the end."""
+        """Insert a task at `index` of the order, 0 being the most important; None for the end."""
         if task.name in self._tasks:
             raise HierarchyError(f"the stack already has a task {task.name!r}")
         position = len(self._order) if index is None else index
@@ -74,7 +74,7 @@ class Stack:
         self._order = (*self._order[:position], task.name, *self._order[position:])
 
     def remove(self, name: str) -> Task:
-        """Take a task out and return it; UnknownNameError if it is not there."""
+        """Remove a task and return it; UnknownNameError if it is not in the stack."""
         task = self[name]
         del self._tasks[name]
         self._order = tuple(other for other in self._order if other != name)
@@ -87,7 +87,7 @@ class Stack:
         self._order = tuple(place.get(name, name) for name in self._order)
 
     def reorder(self, order: Sequence[str]) -> None:
-        """Put all tasks in a new order; HierarchyError unless each is named once."""
+        """Set the order of all tasks; HierarchyError unless each is named once."""
         for name in order:
             self[name]
         if sorted(order) != sorted(self._order):
@@ -99,7 +99,7 @@ class Stack:
         """Write the tasks' rows at a state and return them as a Hierarchy.
 
         `order` names some or all of the tasks, most important first; None takes the stack's own.
-        The arrays are buffers of this stack: they hold until the same order is asked for again.
+        The arrays are buffers of this stack: the next call with the same order overwrites them.
         """
         order = self._order if order is None else order
         prepared = self._prepared.get(order)
@@ -111,16 +111,18 @@ class Stack:
         return prepared.hierarchy
 
     def prepare(self, state: State, order: tuple[str, ...]) -> _Prepared:
-        """Bind the tasks of an order to a state now, not in the first tick that asks for it."""
+        """Bind the tasks of an order to a state now rather than in the first tick that uses it."""
         if not self._tasks:
-            raise HierarchyError("the stack is empty: nothing is asked of the robot")
+            raise HierarchyError("the stack is empty: there are no tasks")
         known = self._prepared.get(order)
         h = self._buffers(order, state.n) if known is None else known.hierarchy
         writers = [self[name].writer(state, self.level, h.A, h.lower, h.upper, int(row))
                    for name, row in zip(order, h.offsets, strict=False)]
         if self.reference is not None:
-            joints = h.reference[state.n - self.reference.dimension:]  # a floating base has none
-            writers.append(self.reference.reference_writer(state, self.level, joints))
+            m = self.reference.dimension
+            joints = h.reference[state.n - m:]  # without those of a floating base
+            writers.append(self.reference.writer(state, self.level, np.empty((m, state.n)), joints,
+                                                 joints, 0))
         prepared = _Prepared(h, state, state.measurement, tuple(writers))
         self._prepared[order] = prepared
         return prepared

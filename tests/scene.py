@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from hierarchy import Robot
+from hierarchy import Robot, State
 from hierarchy.avoidance import Obstacle, Obstacles, Repulsion
 from hierarchy.paths import Ellipse
 from hierarchy.tasks import (
@@ -48,6 +48,6 @@ def states(count, seed=1):
 
 def state_at(q, v, t=0.7, differences=None):
     """A State that carries a measurement of its own moment."""
-    state = ROBOT.state(q, v, t, differences)
+    state = State.at(ROBOT, q, v, t, differences)
     SENSOR.measure(state)
     return state

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import qpsolvers
 
-from hierarchy import Hierarchy, HierarchyError, Robot, Stack
+from hierarchy import Hierarchy, HierarchyError, Robot, Stack, State
 from hierarchy.tasks import Position
 from solvers import make
 from solvers.adapters.displacements import limit_level
@@ -182,7 +182,7 @@ def test_tasks_of_pink_serve_in_a_stack_and_their_configuration_follows(robot, c
     hand, posture = frame_task(configuration), posture_task(Q + 0.3)
     stack = Stack([PinkTask(hand, configuration, DT), PinkTask(posture, configuration, DT, "rest")],
                   "velocity")
-    moved = robot.state(Q + 0.1)
+    moved = State.at(robot, Q + 0.1)
     h = stack.hierarchy(moved)
     np.testing.assert_array_equal(configuration.q, Q + 0.1)
     assert h.names == ("FrameTask of end_effector", "rest")
@@ -197,10 +197,10 @@ def test_a_task_of_pink_reaches_its_target_among_our_own(robot, configuration):
     hand = frame_task(configuration, shift=(0.1, 0.05, 0.0), turn=0.0, orientation=0.0)
     task = PinkTask(hand, configuration, DT)
     assert task.dimension == 3  # rows that cost nothing ask for nothing
-    stack, state = Stack([task], "velocity"), robot.state(Q)
+    stack, state = Stack([task], "velocity"), State.at(robot, Q)
     for _ in range(40):
         x = make("hcod").solve(stack.hierarchy(state)).x
-        state = robot.state(robot.integrate(state.q, DT * x))
+        state = State.at(robot, robot.integrate(state.q, DT * x))
     assert np.abs(task.error(state)).max() < 1e-6
 
 
@@ -211,7 +211,7 @@ def test_rows_of_a_frame_task_are_those_of_our_position_task(robot, configuratio
     hand = frame_task(configuration, shift=(shift, 2 * shift, 0.0), turn=0.0, orientation=0.0)
     goal = hand.transform_target_to_world.translation
     ours = Position(robot.frame("end_effector"), Still(goal.tolist()), gain=hand.gain / DT)
-    rows, theirs = (Stack([task], "velocity").hierarchy(robot.state(Q))
+    rows, theirs = (Stack([task], "velocity").hierarchy(State.at(robot, Q))
                     for task in (ours, PinkTask(hand, configuration, DT)))
     # pink's error is that of the target seen from the frame: in the frame's axes, and negative
     to_frame = -configuration.get_transform_frame_to_world("end_effector").rotation.T
@@ -225,17 +225,17 @@ def test_a_task_of_pink_refuses_another_robot_and_accelerations(robot, configura
 
     task = PinkTask(posture_task(Q), configuration, DT)
     with pytest.raises(HierarchyError, match="pink knows nothing of accelerations"):
-        Stack([task], "acceleration").hierarchy(robot.state(Q))
+        Stack([task], "acceleration").hierarchy(State.at(robot, Q))
     renamed = robot.model.copy()
     renamed.names[1] = "other"
     strange = pink.Configuration(renamed, renamed.createData(), Q)
     with pytest.raises(HierarchyError, match="has the joints other"):
-        Stack([PinkTask(posture_task(Q), strange, DT)], "velocity").hierarchy(robot.state(Q))
+        Stack([PinkTask(posture_task(Q), strange, DT)], "velocity").hierarchy(State.at(robot, Q))
 
 
 def test_costs_may_change_but_not_which_rows_cost_something(robot, configuration):
     hand = frame_task(configuration, orientation=0.0)
-    stack, state = Stack([PinkTask(hand, configuration, DT)], "velocity"), robot.state(Q)
+    stack, state = Stack([PinkTask(hand, configuration, DT)], "velocity"), State.at(robot, Q)
     before = stack.hierarchy(state).A.copy()
     hand.set_position_cost(2.0)
     np.testing.assert_allclose(stack.hierarchy(state).A, 2.0 * before)

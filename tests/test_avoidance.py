@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scene import BODY, OBSTACLES, ROBOT, TIP, states
 
-from hierarchy import HierarchyError
+from hierarchy import HierarchyError, State
 from hierarchy.avoidance import Measurement, Obstacle, Obstacles, Repulsion, SurveillanceAreas
 from hierarchy.avoidance.obstacles import distance_to_obstacle
 from hierarchy.errors import UnknownNameError
@@ -133,7 +133,7 @@ def test_areas_must_be_nested():
 def test_the_active_point_is_the_nearest_one_without_the_end_effector():
     sensor = ExactDistances(ROBOT, OBSTACLES, BODY, TIP)
     for q, v in states(30, seed=4):
-        state = ROBOT.state(q, v)
+        state = State.at(ROBOT, q, v)
         seen = sensor.measure(state)
         for k, point in enumerate(sensor.points):
             rotation, translation = state._placement(point.joint)
@@ -151,7 +151,7 @@ def test_the_active_point_is_the_nearest_one_without_the_end_effector():
 
 def at_origin_between(*centres, mean_within):
     """Measure the end effector of an arm whose end is put at the middle of two points."""
-    state = ROBOT.state(np.full(7, 0.4))
+    state = State.at(ROBOT, np.full(7, 0.4))
     middle = state.position(ROBOT.frame("end_effector"))
     obstacles = Obstacles([Obstacle("point", tuple(middle + c)) for c in np.array(centres)])
     return ExactDistances(ROBOT, obstacles, BODY, TIP, mean_within).measure(state)
@@ -168,7 +168,7 @@ def test_mean_direction_falls_back_to_the_nearest_where_the_unit_vectors_cancel(
 
 
 def test_without_obstacles_nothing_is_near():
-    seen = ExactDistances(ROBOT, Obstacles([]), BODY, TIP).measure(ROBOT.state(np.zeros(7)))
+    seen = ExactDistances(ROBOT, Obstacles([]), BODY, TIP).measure(State.at(ROBOT, np.zeros(7)))
     assert seen.active == -1
     assert seen.minimal_distance == seen.end_effector_distance == np.inf
     assert not seen.magnitude.any()
@@ -176,7 +176,7 @@ def test_without_obstacles_nothing_is_near():
 
 
 def test_an_obstacle_at_a_control_point_is_refused_at_the_start():
-    state = ROBOT.state(np.full(7, 0.4))
+    state = State.at(ROBOT, np.full(7, 0.4))
     rotation, translation = state._placement(ROBOT.control_points[4].joint)
     point = translation + rotation @ ROBOT.control_points[4].offset
     obstacles = Obstacles([Obstacle("point", (5, 5, 5)),

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from hierarchy import HierarchyError, Robot
+from hierarchy import HierarchyError, Robot, State
 from hierarchy.avoidance import Capsule, Obstacle, Obstacles
 from hierarchy.avoidance.obstacles import distance_to_obstacle
 from hierarchy.robots import TABLES, link_capsules
@@ -11,7 +11,7 @@ from scenarios.cell.sensors.camera import DepthCamera, Pinhole, looking_at
 from scenarios.cell.sensors.errors import DepthErrors
 
 ROBOT = Robot.named("kuka_lwr")
-STATE = ROBOT.state([0.9, -0.9, 0.9, 1.2, 1.0, 1.8, 0.0])
+STATE = State.at(ROBOT, [0.9, -0.9, 0.9, 1.2, 1.0, 1.8, 0.0])
 SMALL = {"width": 80, "height": 60, "fx": 70.0, "fy": 65.0}
 IDEAL = DepthErrors.none()
 TURNED = ((0.36, 0.48, -0.8), (-0.8, 0.6, 0.0), (0.48, 0.64, 0.6))
@@ -119,8 +119,8 @@ def test_obstacles_are_seen_where_they_are_at_the_time():
 
     path = Waypoints((0.0, 1.0), ((0.0, 0.0, 2.0), (0.0, 0.0, 3.0)))
     moving = camera(Obstacle("sphere", (0, 0, 0), (0.5,), path=path), pinhole=Pinhole(3, 3))
-    assert moving.image(0, ROBOT.state(np.zeros(7), t=0.0))[0][1, 1] == pytest.approx(1.5)
-    assert moving.image(1, ROBOT.state(np.zeros(7), t=1.0))[0][1, 1] == pytest.approx(2.5)
+    assert moving.image(0, State.at(ROBOT, np.zeros(7), t=0.0))[0][1, 1] == pytest.approx(1.5)
+    assert moving.image(1, State.at(ROBOT, np.zeros(7), t=1.0))[0][1, 1] == pytest.approx(2.5)
 
 
 def test_a_camera_looks_at_its_target_upright():

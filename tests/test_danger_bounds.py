@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scene import BODY, FRAME, ROBOT, SENSOR, TIP, state_at, states
 
-from hierarchy import HierarchyError, Stack
+from hierarchy import HierarchyError, Stack, State
 from hierarchy.avoidance import Obstacle, Obstacles
 from hierarchy.paths import Still
 from hierarchy.tasks import JointDamping, JointLimits, Position
@@ -114,7 +114,7 @@ def test_no_command_of_the_box_nears_a_point_faster_than_the_danger_lets_it():
 
 @levels
 def test_without_obstacles_the_box_is_that_of_the_limits(level):
-    state = ROBOT.state(*STATES[0])
+    state = State.at(ROBOT, *STATES[0])
     ExactDistances(ROBOT, Obstacles([]), BODY, TIP).measure(state)
     np.testing.assert_array_equal(task().box(state, level), LIMITS.box(state, level))
 
@@ -124,7 +124,7 @@ def test_the_rows_are_the_identity_with_the_box_as_sides(level):
     for q, v in STATES[:5]:
         state = state_at(q, v)
         A, low, up = np.full((9, 7), 5.0), np.full(9, 5.0), np.full(9, 5.0)
-        task().write(state, level, A, low, up, 1)
+        task().writer(state, level, A, low, up, 1)()
         np.testing.assert_array_equal(A[1:8], np.eye(7))
         np.testing.assert_array_equal([low[1:8], up[1:8]], task().box(state, level))
         assert (A[[0, 8]] == 5.0).all()
@@ -136,7 +136,7 @@ def test_the_rows_are_the_identity_with_the_box_as_sides(level):
 
 def test_a_joint_that_only_turns_about_the_point_is_free():
     q = np.array([0.3, 0.4, 0.0, 0.5, 0.2, 0.1, 0.6])
-    state = ROBOT.state(q)
+    state = State.at(ROBOT, q)
     axis = ROBOT.control_point("joint_1", (0.0, 0.0, 0.0))
     sensor = ExactDistances(ROBOT, Obstacles([Obstacle("point", (0.01, 0.01, 0.0))]), BODY, TIP)
     sensor.measure(state)
@@ -159,7 +159,7 @@ def test_what_it_cannot_do_without_is_named(monkeypatch):
     with pytest.raises(HierarchyError, match="needs at least one control point"):
         DangerBounds(LIMITS, ())
     with pytest.raises(HierarchyError, match="the state carries no measurement"):
-        task().box(ROBOT.state(np.zeros(7)), "velocity")
+        task().box(State.at(ROBOT, np.zeros(7)), "velocity")
     with pytest.raises(HierarchyError, match="18 control points, and distances of 9"):
         DangerBounds(LIMITS, SENSOR.points * 2).box(state_at(*STATES[0]), "velocity")
     monkeypatch.setattr(ROBOT, "velocity_limit", np.array([1.0, np.inf, 1, 1, 1, 1, 1]))
@@ -174,7 +174,7 @@ def closest(level, first, resolver, obstacles, goal, ticks=1500):
     """Go to a goal; return the least distance of all points and the least slack of the box."""
     sensor = ExactDistances(ROBOT, obstacles, BODY, TIP)
     stack = Stack([first, Position(FRAME, goal)], level, reference=JointDamping(7, 5.0))
-    plant, state = KinematicArm(ROBOT, START, np.zeros(7), PERIOD, level), ROBOT.state(START)
+    plant, state = KinematicArm(ROBOT, START, np.zeros(7), PERIOD, level), State.at(ROBOT, START)
     nearest, slack = np.inf, np.inf
     for tick in range(ticks):
         state.move(tick * PERIOD, plant.q, plant.v)
@@ -192,7 +192,7 @@ def closest(level, first, resolver, obstacles, goal, ticks=1500):
                          ids=str)
 def test_with_sns_the_arm_stops_before_an_obstacle_on_its_way(level, resolver):
     """The goal lies 0.3 m ahead, a ball of 5 cm half way to it."""
-    ahead = ROBOT.state(START).position(FRAME) + np.array([0.0, 0.0, 0.3])
+    ahead = State.at(ROBOT, START).position(FRAME) + np.array([0.0, 0.0, 0.3])
     obstacles = Obstacles([Obstacle("sphere", tuple(ahead - np.array([0.0, 0.0, 0.15])), (0.05,))])
     goal = Still(tuple(ahead))
     through, _ = closest(level, LIMITS, resolver, obstacles, goal)

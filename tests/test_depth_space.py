@@ -5,7 +5,7 @@ from math import inf
 import numpy as np
 import pytest
 
-from hierarchy import HierarchyError, Robot
+from hierarchy import HierarchyError, Robot, State
 from hierarchy.avoidance import ControlPoint, Obstacle, Obstacles, Repulsion
 from hierarchy.robots import TABLES, link_capsules
 from scenarios import load, simulate
@@ -22,7 +22,7 @@ from scenarios.loop import record_frames
 
 ROBOT = Robot.named("kuka_lwr")
 CAPSULES = link_capsules(TABLES["kuka_lwr"], foot=0.31)
-STATE = ROBOT.state([0.9, -0.9, 0.9, 1.2, 1.0, 1.8, 0.0])
+STATE = State.at(ROBOT, [0.9, -0.9, 0.9, 1.2, 1.0, 1.8, 0.0])
 BODY, TIP = Repulsion(3.0, 0.4, 4.0), Repulsion(12.0, 0.4, 6.0)
 FACING = Pinhole(101, 81, 100.0, 100.0)  # at the origin, z forward, its middle in pixel (50, 40)
 SIDE = Pinhole(320, 240, 262.0, 262.0, position=(0.3, 2.2, 0.8),
@@ -207,7 +207,7 @@ def test_the_arm_does_not_avoid_itself():
     space = DepthSpace(SIDE, ExactDistances(ROBOT, Obstacles()).points, CAPSULES, region=0.4)
     rng, obstacles = np.random.default_rng(8), ObstacleImage(SIDE)
     for i in range(60):
-        state = ROBOT.state(rng.uniform(0.9 * ROBOT.lower, 0.9 * ROBOT.upper))
+        state = State.at(ROBOT, rng.uniform(0.9 * ROBOT.lower, 0.9 * ROBOT.upper))
         space.find_obstacles(*camera.image(i, state), obstacles)
         assert (camera.scene < 3.9).mean() > 0.005
         assert np.isinf(space.measure(obstacles, state.placements).distance).all()
@@ -285,7 +285,7 @@ def sensor_of(source, stale_after=0.2, region=0.4, least_readings=0.1, **setting
     points = ExactDistances(ROBOT, Obstacles()).points
     space = DepthSpace(source.pinhole, points, CAPSULES, region, **settings)
     return (DepthSensor(source, space, stale_after, least_readings),
-            lambda t, q=STATE.q: ROBOT.state(q, t=t))
+            lambda t, q=STATE.q: State.at(ROBOT, q, t=t))
 
 
 def test_frames_are_used_from_their_latency_on_until_the_next():
@@ -407,7 +407,7 @@ def test_the_camera_tells_the_controller_what_exact_distances_would_nearly():
         obstacle = f"avoidance.obstacles=[{{shape='sphere', centre={ball}, radius=0.08}}]"
         camera, exact = (build(load("human", [obstacle, f"sensor={sensor}"])).sensor
                          for sensor in (f"{{{VIEW}, ideal=true}}", "{kind='exact'}"))
-        state = ROBOT.state([1.1657, -0.9476, 0.5844, 1.4408, 1.1464, 1.7695, 0.0])
+        state = State.at(ROBOT, [1.1657, -0.9476, 0.5844, 1.4408, 1.1464, 1.7695, 0.0])
         seen, known = camera.measure(state), exact.measure(state)
         near = known.distance < 0.4
         assert near.any()
@@ -462,7 +462,7 @@ def test_frames_written_are_those_the_camera_took(written):
     assert frames.pinhole.packed() == pytest.approx(camera.pinhole.packed())
     for i, t in enumerate(frames.times):
         k = int(np.argmin(np.abs(run["t"] - t)))
-        state = ROBOT.state(run["q"][k], t=t)
+        state = State.at(ROBOT, run["q"][k], t=t)
         taken, placements = frames.image(i, state)
         np.testing.assert_allclose(taken, camera.image(camera.newest(t), state)[0], atol=5.1e-4)
         np.testing.assert_allclose(placements, state.placements, atol=1e-12)
@@ -511,7 +511,7 @@ def test_the_figure_shows_points_and_distances_and_nothing_where_there_is_none()
 def test_the_shipped_frames_show_a_hand_that_comes_near():
     frames = RecordedFrames("hand", ROBOT)
     sensor, state_at = sensor_of(frames, least_readings=0.1)
-    distances = [sensor.measure(state_at(t, ROBOT.state(STATE.q).q)).distance.min()
+    distances = [sensor.measure(state_at(t, State.at(ROBOT, STATE.q).q)).distance.min()
                  for t in frames.times]
     assert len(frames.times) == 20
     assert frames.pinhole.width == 160

@@ -150,11 +150,11 @@ def test_the_tutorial_can_be_followed_from_top_to_bottom(tmp_path, monkeypatch):
 
 
 def test_the_task_of_the_guide_serves_in_a_stack():
-    from hierarchy import Robot, Stack
+    from hierarchy import Robot, Stack, State
     from solvers import make
 
     names = {"__name__": "document"}
     exec("\n".join(blocks("CONTRIBUTING.md", "python")), names)
-    state = Robot.named("kuka_lwr").state([0.1] * 7)
+    state = State.at(Robot.named("kuka_lwr"), [0.1] * 7)
     h = Stack([names["Elbow"](joint=3, angle=1.0)], "velocity").hierarchy(state)
     assert make("tpm").solve(h).x[3] == pytest.approx(2.0 * 0.9)

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hierarchy import HierarchyError, Robot
+from hierarchy import HierarchyError, Robot, State
 from scenarios import load, simulate
 from scenarios.cli.main import run_command
 from scenarios.draw.run_folder import save
@@ -169,7 +169,7 @@ def test_frames_are_where_the_robot_is(run, messages):
     for at, message in found["/tf"]:
         frames = {one["child_frame_id"]: one for one in message["transforms"]}
         tick = int(np.abs(run["t"] - at * 1e-9).argmin())
-        state = robot.state(run["q"][tick])
+        state = State.at(robot, run["q"][tick])
         placed = [*frames["end_effector"]["translation"].values()]
         np.testing.assert_allclose(placed, run["ee_position"][tick], atol=1e-9)
         np.testing.assert_allclose([*frames["desired"]["translation"].values()],

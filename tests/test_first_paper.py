@@ -8,7 +8,7 @@ import oracle
 import pytest
 import rank_cases
 
-from hierarchy import Hierarchy, Robot
+from hierarchy import Hierarchy, Robot, State
 from hierarchy.robots import KUKA_LWR, TABLES
 from scenarios.bench import accuracy, arms, exact, first_paper, growth, growth_figure
 from solvers import Resolution, Status, make, names
@@ -39,7 +39,7 @@ def test_the_jacobians_are_those_of_pinocchio(monkeypatch):
                         alpha=tuple(np.degrees(some.alpha[i])), range=(180.0,) * 6,
                         velocity=(1.0,) * 6, mass=(1.0,) * 6, control_points=())
         monkeypatch.setitem(TABLES, "some", table)
-        state = Robot.named("some").state(q[i])
+        state = State.at(Robot.named("some"), q[i])
         p = state.position(state.robot.frame("end_effector"))
         linear = state.J[:3] + np.cross(state.J[3:].T, p).T
         np.testing.assert_allclose(J, np.vstack([linear, state.J[3:]]), atol=1e-12)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from hierarchy import Robot, Stack, Task
+from hierarchy import Robot, Stack, State, Task
 from hierarchy.errors import HierarchyError
 from hierarchy.paths import Ellipse, Still
 from hierarchy.tasks import CentreOfMass, Pointing, Pose, Position
@@ -42,9 +42,9 @@ def test_jacobian_and_its_derivative_agree_with_central_differences(name, task):
     task = tasks(robot)[task]
     for q, v in some_states(robot):
         def moved(step, q=q, v=v):
-            return robot.state(robot.integrate(q, step), v, 0.7)
+            return State.at(robot, robot.integrate(q, step), v, 0.7)
 
-        state = robot.state(q, v, 0.7)
+        state = State.at(robot, q, v, 0.7)
         J = task.jacobian(state)
         if task.name != "pose":  # whose rows are the angular velocity, not the error's derivative
             columns = [(task.error(moved(-STEP * e)) - task.error(moved(STEP * e))) / (2 * STEP)
@@ -62,12 +62,12 @@ def test_compiled_rows_equal_those_of_the_plain_methods(name, task, level, diffe
     robot = ROBOTS[name]
     task = tasks(robot)[task]
     q, v = some_states(robot, 1)[0]
-    state = robot.state(q, v, 0.7, differences)
+    state = State.at(robot, q, v, 0.7, differences)
     state.move(0.8, robot.integrate(q, 1e-3 * v), v)
     written, plain = [(np.zeros((task.dimension, robot.n)), np.zeros(task.dimension),
                        np.zeros(task.dimension)) for _ in range(2)]
-    task.write(state, level, *written, row=0)
-    Task.write(task, state, level, *plain, row=0)
+    task.writer(state, level, *written, row=0)()
+    Task.writer(task, state, level, *plain, row=0)()
     for a, b in zip(written, plain, strict=True):
         np.testing.assert_allclose(a, b, rtol=1e-10, atol=1e-10)
 
@@ -77,7 +77,7 @@ def test_the_centre_of_mass_is_that_of_pinocchio():
     robot = ROBOTS["humanoid"]
     task = CentreOfMass(robot, Still((0.0, 0.0, 0.0)))
     for q, v in some_states(robot):
-        state, data = robot.state(q, v), robot.model.createData()
+        state, data = State.at(robot, q, v), robot.model.createData()
         np.testing.assert_allclose(task.position(state), pin.centerOfMass(robot.model, data, q),
                                    atol=1e-12)
         np.testing.assert_allclose(task.jacobian(state),
@@ -101,7 +101,7 @@ def test_a_robot_without_masses_has_no_centre_of_mass(tmp_path):
 
 def test_the_humanoid_stands_on_its_soles_with_its_weight_over_them():
     robot = ROBOTS["humanoid"]
-    state = robot.state(robot.rest)
+    state = State.at(robot, robot.rest)
     assert (robot.base, robot.n, robot.nq, robot.actuated) == ("floating", 36, 37, 6)
     feet = [state.position(robot.frame(f"{side}_foot")) for side in ("left", "right")]
     for foot, side in zip(feet, (1, -1), strict=True):
@@ -116,7 +116,7 @@ def test_the_humanoid_stands_on_its_soles_with_its_weight_over_them():
 @pytest.mark.parametrize("name", ROBOTS)
 def test_left_and_right_of_a_table_are_mirror_images(name):
     robot = ROBOTS[name]
-    state = robot.state(robot.rest)
+    state = State.at(robot, robot.rest)
     left, right = (state.position(robot.frame(f"{side}_hand")) for side in ("left", "right"))
     np.testing.assert_allclose(left, right * [1, -1, 1], atol=1e-12)
 
@@ -311,7 +311,7 @@ def test_a_posture_in_the_null_space_leaves_a_floating_base_alone():
     from hierarchy.tasks import Posture
     stack = Stack([Position(robot.frame("left_hand"), PATH)], "acceleration",
                   Posture((0.1,) * 30))
-    h = stack.hierarchy(robot.state(robot.rest))
+    h = stack.hierarchy(State.at(robot, robot.rest))
     np.testing.assert_array_equal(h.reference[:6], 0.0)
     np.testing.assert_allclose(h.reference[6:], 10.0 * (0.1 - robot.rest[7:]))
 

@@ -405,7 +405,7 @@ def test_the_rows_are_the_identity_and_the_box(level):
     for q, v in states(10):
         state = state_at(q, v)
         A, lower, upper = np.full((10, 7), 5.0), np.full(10, 5.0), np.full(10, 5.0)
-        task.write(state, level, A, lower, upper, 2)
+        task.writer(state, level, A, lower, upper, 2)()
         np.testing.assert_array_equal(A[2:9], np.eye(7))
         limits = Limits(ROBOT.lower + 0.02, ROBOT.upper - 0.02, ROBOT.velocity_limit,
                         np.full(7, 10.0), 1e-3)
@@ -444,10 +444,11 @@ def test_the_error_is_how_far_a_joint_is_from_its_range():
     task = JointLimits(ROBOT, 10.0, 1e-3, margin=0.1)
     q = np.zeros(7)
     q[0], q[3] = ROBOT.upper[0], ROBOT.lower[3] - 0.2
-    np.testing.assert_allclose(task.error(ROBOT.state(q)), [-0.1, 0, 0, 0.3, 0, 0, 0], atol=1e-15)
+    state = State.at(ROBOT, q)
+    np.testing.assert_allclose(task.error(state), [-0.1, 0, 0, 0.3, 0, 0, 0], atol=1e-15)
     assert (task.dimension, task.kind) == (7, "inequality")
-    np.testing.assert_array_equal(task.jacobian(ROBOT.state(q)), np.eye(7))
-    assert not task.jacobian_derivative(ROBOT.state(q)).any()
+    np.testing.assert_array_equal(task.jacobian(state), np.eye(7))
+    assert not task.jacobian_derivative(state).any()
 
 
 def model_of(*kinds):
@@ -469,7 +470,7 @@ def test_a_continuous_joint_has_no_position_limits_and_the_others_keep_theirs():
     np.testing.assert_array_equal(robot.coordinates, [0, 2, 3])
     np.testing.assert_array_equal(robot.position_limits(),
                                   [[-np.inf, -0.5, -np.inf], [np.inf, 0.7, 3.0]])
-    state = robot.state([1.0, 0.0, 0.7, 3.0])
+    state = State.at(robot, [1.0, 0.0, 0.7, 3.0])
     low, up = JointLimits(robot, 10.0, 1e-3).box(state, "acceleration")
     np.testing.assert_allclose(up, [10.0, 0.0, 0.0], atol=1e-9)
     np.testing.assert_allclose(low, -10.0)
@@ -517,7 +518,7 @@ def test_torque_rows_hold_exactly_where_inverse_dynamics_does():
     for q, v in states(200):
         state = state_at(q, v)
         A, lower, upper = np.full((9, 7), 5.0), np.full(9, 5.0), np.full(9, 5.0)
-        task.write(state, "acceleration", A, lower, upper, 1)
+        task.writer(state, "acceleration", A, lower, upper, 1)()
         a = rng.normal(0, 30, 7)
         torque = pin.rnea(ROBOT.model, data, q, v, a)
         np.testing.assert_allclose((A[1:8] @ a - lower[1:8]), torque + ROBOT.effort_limit / 2,
@@ -537,7 +538,7 @@ def test_the_other_methods_of_the_torque_task_say_the_same():
         error = task.error(state)
         assert (np.abs(bias + error) <= 0.2 * ROBOT.effort_limit + 1e-12).all()
         np.testing.assert_array_equal(task.jacobian(state), state.mass_matrix())
-        later, before = (ROBOT.state(q + h * v).mass_matrix() for h in (1e-6, -1e-6))
+        later, before = (State.at(ROBOT, q + h * v).mass_matrix() for h in (1e-6, -1e-6))
         np.testing.assert_allclose(task.jacobian_derivative(state), (later - before) / 2e-6,
                                    atol=1e-7)
     assert (task.dimension, task.kind) == (7, "inequality")
@@ -566,7 +567,8 @@ def test_effort_limits_are_those_of_the_file(tmp_path, limit, effort):
     path.write_text(URDF.format(kind="revolute", limit=limit))
     robot = Robot.from_file(path)
     assert robot.effort_limit == effort
-    h = Stack([TorqueLimits(robot), JointLimits(robot, 5.0, 0.01)]).hierarchy(robot.state([0.3]))
+    stack = Stack([TorqueLimits(robot), JointLimits(robot, 5.0, 0.01)])
+    h = stack.hierarchy(State.at(robot, [0.3]))
     res = make("hcod").solve(h)
     assert res.status is Status.SOLVED
     assert h.violations(res.x).max() <= 1e-9

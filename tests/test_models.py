@@ -7,7 +7,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from hierarchy import HierarchyError, Robot
+from hierarchy import HierarchyError, Robot, State
 from hierarchy.avoidance.self_collision import pairs_of_tree
 from hierarchy.errors import RobotError, UnknownNameError
 from hierarchy.robots.shapes import bounding_capsule
@@ -170,6 +170,26 @@ def test_a_bounding_capsule_holds_all_points(seed):
     assert off.max() == pytest.approx(radius, abs=1e-9)
 
 
+def test_points_all_over_a_capsule_have_that_capsule():
+    """Its caps reach beyond the segment: without them the one found is two radii too long."""
+    along, around = np.meshgrid(np.linspace(-np.pi / 2, np.pi / 2, 201),
+                                np.linspace(0.0, 2 * np.pi, 40, endpoint=False))
+    height = 0.1 * np.sin(along) + 0.25 * np.sign(along)
+    points = np.stack([0.1 * np.cos(along) * np.cos(around), 0.1 * np.cos(along) * np.sin(around),
+                       height], axis=-1).reshape(-1, 3)
+    start, end, radius = bounding_capsule(points)
+    assert radius == pytest.approx(0.1, abs=1e-9)
+    np.testing.assert_allclose(sorted([start[2], end[2]]), [-0.25, 0.25], atol=1e-3)
+
+
+def test_the_capsule_of_a_plate_lies_along_its_length():
+    """Across it the segment is shortest, but the caps hold many times the volume."""
+    corners = np.array(np.meshgrid((-2.0, 2.0), (-1.0, 1.0), (-0.1, 0.1))).reshape(3, -1).T
+    start, end, radius = bounding_capsule(corners)
+    assert radius == pytest.approx(np.hypot(1.0, 0.1))
+    assert abs(end[0] - start[0]) == pytest.approx(4.0)
+
+
 def test_a_start_beyond_the_limits_is_put_midway(arm):
     np.testing.assert_allclose(Robot.from_file(arm()).rest, [1.25, 1.25, 1.25])
 
@@ -183,7 +203,7 @@ def test_a_file_without_limits_has_infinite_ones(arm):
 
 def test_control_points_are_spread_evenly_over_the_chain(arm):
     robot = Robot.from_file(arm())
-    state, end = robot.state([0.7, 0.9, 0.6]), robot.frame("tool0")
+    state, end = State.at(robot, [0.7, 0.9, 0.6]), robot.frame("tool0")
     places = [state._placement(p.joint)[1] + state._placement(p.joint)[0] @ p.offset
               for p in robot.control_points]
     places = np.array([*places, state.position(end)])
@@ -218,16 +238,16 @@ def test_the_state_of_a_floating_base_has_exact_derivatives(arm):
     v, frame = rng.normal(size=robot.n), robot.frame("tool0")
 
     def position(step):
-        return robot.state(robot.integrate(q, step)).position(frame)
+        return State.at(robot, robot.integrate(q, step)).position(frame)
 
-    state = robot.state(q, v)
+    state = State.at(robot, q, v)
     columns = [(position(h * e) - position(-h * e)) / (2 * h) for e in np.eye(robot.n)]
     from hierarchy.paths import Still
     from hierarchy.tasks import Position
     task = Position(frame, Still((0.0, 0.0, 0.0)))
     J = task.jacobian(state)
     np.testing.assert_allclose(J, np.transpose(columns), atol=1e-8)
-    later, before = (robot.state(robot.integrate(q, s * h * v), v) for s in (1, -1))
+    later, before = (State.at(robot, robot.integrate(q, s * h * v), v) for s in (1, -1))
     np.testing.assert_allclose(
         task.jacobian_derivative(state),
         (task.jacobian(later) - task.jacobian(before)) / (2 * h), atol=1e-8)
@@ -236,11 +256,11 @@ def test_the_state_of_a_floating_base_has_exact_derivatives(arm):
 def test_joint_limits_leave_the_base_alone(arm):
     robot = Robot.from_file(arm(), base="floating")
     task = JointLimits(robot, 5.0, 0.01)
-    state = robot.state(robot.rest)
+    state = State.at(robot, robot.rest)
     assert task.dimension == 3
     np.testing.assert_array_equal(task.jacobian(state), np.eye(9)[6:])
     A, lower, upper = np.full((3, 9), 7.0), np.zeros(3), np.zeros(3)
-    task.write(state, "acceleration", A, lower, upper, 0)
+    task.writer(state, "acceleration", A, lower, upper, 0)()
     np.testing.assert_array_equal(A, np.eye(9)[6:])
     x = np.array([np.nan, 1e6, 0, 0, 0, 0, 1e6, np.nan, 0.0])
     sent = task.clamp(state, "acceleration", x)
@@ -257,7 +277,7 @@ def test_what_cannot_be_said_of_a_floating_base_is_refused(arm):
 
 def test_a_posture_is_that_of_the_joints_behind_a_floating_base(arm):
     robot = Robot.from_file(arm(), base="floating")
-    task, state = Posture((1.0, 1.0, 1.0)), robot.state(robot.rest)
+    task, state = Posture((1.0, 1.0, 1.0)), State.at(robot, robot.rest)
     np.testing.assert_allclose(task.error(state), [-0.25] * 3)
     np.testing.assert_array_equal(task.jacobian(state), np.eye(9)[6:])
     with pytest.raises(HierarchyError, match="2 targets for 3 joint positions"):
@@ -276,11 +296,11 @@ def test_locked_joints_are_no_joints(arm):
     assert robot.joint_names == ("shoulder", "turn")
     free = Robot.load(str(arm()))
     np.testing.assert_allclose(
-        robot.state([0.6, 0.7]).position(robot.frame("tool0")),
-        free.state([0.6, 0.8, 0.7]).position(free.frame("tool0")))
+        State.at(robot, [0.6, 0.7]).position(robot.frame("tool0")),
+        State.at(free, [0.6, 0.8, 0.7]).position(free.frame("tool0")))
     with pytest.raises(UnknownNameError, match="did you mean 'elbow'"):
         Robot.load(str(arm()), locked={"elbo": 0.0})
-    with pytest.raises(RobotError, match="no joint can be locked"):
+    with pytest.raises(RobotError, match="its joints cannot be locked"):
         Robot.load("kuka_lwr", locked={"joint_1": 0.0})
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hierarchy import Robot
+from hierarchy import Robot, State
 from hierarchy.errors import RobotError
 from scenarios.bench.peers import run
 from scenarios.bench.peers.compare import make_scenes
@@ -46,7 +46,7 @@ def test_the_arm_read_from_its_urdf_moves_and_weighs_as_ours(arm):
     rng = np.random.default_rng(0)
     for _ in range(50):
         q, v = rng.uniform(ours.lower, ours.upper), rng.uniform(-1.0, 1.0, ours.n)
-        a, b = ours.state(q, v), read.state(q, v)
+        a, b = State.at(ours, q, v), State.at(read, q, v)
         for of in ("J", "dJ"):
             np.testing.assert_allclose(getattr(b, of), getattr(a, of), rtol=0.0, atol=1e-12)
         end, same = ours.frame("end_effector"), read.frame("end_effector")

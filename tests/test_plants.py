@@ -5,7 +5,7 @@ import sys
 import numpy as np
 import pytest
 
-from hierarchy import HierarchyError, Robot
+from hierarchy import HierarchyError, Robot, State
 from hierarchy.avoidance import Obstacle, Obstacles
 from hierarchy.paths import Waypoints
 from scenarios import load, simulate
@@ -54,7 +54,7 @@ def test_inertia_gravity_and_coriolis_forces_are_those_of_the_robots_model(mujoc
         data.qpos[:], data.qvel[:] = q, v
         mujoco.mj_forward(model, data)
         M = np.array([inertia_times(mujoco, plant, e) for e in np.eye(7)])
-        state = ROBOT.state(q, v)
+        state = State.at(ROBOT, q, v)
         upper = np.triu(state.mass_matrix())
         np.testing.assert_allclose(M, upper + np.triu(upper, 1).T, rtol=0, atol=1e-9)
         np.testing.assert_allclose(data.qfrc_bias, state.bias_effort(), rtol=0, atol=1e-9)
@@ -79,7 +79,7 @@ def test_the_links_are_where_the_robot_has_them(mujoco):
     for q, v in states():
         plant.data.qpos[:] = q
         mujoco.mj_forward(plant.model, plant.data)
-        state = ROBOT.state(q, v)
+        state = State.at(ROBOT, q, v)
         for name in ROBOT.joint_names:
             body, joint = plant.data.body(f"body {name}"), ROBOT.joint(name)
             placed = state.placements[joint]
@@ -105,7 +105,7 @@ def test_an_arm_sags_by_the_share_of_gravity_that_is_not_compensated(mujoco):
     plant = arm(mujoco, servo={"gravity": 0.5}, joints={"friction": 0.0})
     for _ in range(400):
         plant.act(STILL)
-    expected = 0.5 * ROBOT.state(plant.q).bias_effort() / plant.stiffness
+    expected = 0.5 * State.at(ROBOT, plant.q).bias_effort() / plant.stiffness
     np.testing.assert_allclose(START - plant.q, expected, rtol=1e-3, atol=1e-6)
     assert np.abs(expected).max() > 1e-4
 
@@ -176,7 +176,7 @@ def sphere_at(centre, radius=0.05, path=None):
 
 def forearm(q=START):
     """The middle of the forearm, a capsule along the z axis of the frame of joint 5."""
-    placed = ROBOT.state(q).placements[5]
+    placed = State.at(ROBOT, q).placements[5]
     return placed[9:] + 0.195 * placed[6:9]
 
 
@@ -199,7 +199,7 @@ def test_an_obstacle_put_into_the_arm_is_touched(mujoco, shape):
 
 
 def test_the_depth_of_a_contact_is_how_far_shapes_overlap(mujoco):
-    side = ROBOT.state(START).placements[5][0:3]
+    side = State.at(ROBOT, START).placements[5][0:3]
     deep = 1e-3  # [m]
     centre = forearm() + (0.06 + 0.05 - deep) * side  # radii of arm and ball
     plant = arm(mujoco, obstacles=[sphere_at(centre)])
@@ -222,7 +222,7 @@ def test_the_links_do_not_touch_each_other(mujoco):
 
 
 def test_a_moving_obstacle_touches_when_it_arrives_and_pushes_the_arm(mujoco):
-    side = ROBOT.state(START).placements[5][0:3]
+    side = State.at(ROBOT, START).placements[5][0:3]
     path = Waypoints((0.0, 1.0), (tuple(forearm() + 0.3 * side), tuple(forearm() + 0.05 * side)))
     plant = arm(mujoco, obstacles=[sphere_at((0.0, 0.0, 0.0), path=path)])
     touched = []
@@ -237,11 +237,11 @@ def test_a_moving_obstacle_touches_when_it_arrives_and_pushes_the_arm(mujoco):
 
 
 def test_the_reference_of_an_arm_held_back_does_not_run_away(mujoco):
-    side = ROBOT.state(START).placements[5][0:3]
+    side = State.at(ROBOT, START).placements[5][0:3]
     # Joint 1 turns the arm about the vertical, with this sign toward the wall.
     sign = np.sign(np.cross([0.0, 0.0, 1.0], forearm()) @ side)
     wall = Obstacle("box", tuple(forearm() + 0.17 * side), (0.1, 0.1, 0.1),
-                    ROBOT.state(START).placements[5][:9].reshape(3, 3).T)
+                    State.at(ROBOT, START).placements[5][:9].reshape(3, 3).T)
     plant = arm(mujoco, obstacles=[wall], servo={"lead": 0.05})
     for _ in range(200):
         plant.act(0.5 * sign * np.eye(7)[0])
@@ -370,9 +370,9 @@ def test_the_end_effector_is_also_recorded_where_it_is(mujoco):
     run = simulate(load("ellipse", [*PHYSICS, *NOISY]))
     frame = ROBOT.frame("end_effector")
     for k in (0, 17, run.ticks - 1):
-        true = ROBOT.state(run["true_q"][k]).position(frame)
+        true = State.at(ROBOT, run["true_q"][k]).position(frame)
         np.testing.assert_allclose(run["true_ee_position"][k], true, rtol=0, atol=1e-15)
-        told = ROBOT.state(run["q"][k]).position(frame)
+        told = State.at(ROBOT, run["q"][k]).position(frame)
         np.testing.assert_allclose(run["ee_position"][k], told, rtol=0, atol=1e-15)
         assert np.linalg.norm(told - true) > 1e-6
 
@@ -409,7 +409,7 @@ def test_contacts_are_measured_in_a_run(mujoco, tmp_path):
         return simulate(load("ellipse", [
             *PHYSICS, f"avoidance.obstacles=[{{shape='sphere', radius=0.05, centre={centre}}}]"]))
 
-    side = ROBOT.state(START).placements[5][0:3]
+    side = State.at(ROBOT, START).placements[5][0:3]
     run = touching((forearm() + 0.105 * side).tolist())
     found = measure(run)
     assert found["contact_ticks"].value == np.count_nonzero(run["contacts"]) > 0

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from hierarchy import HierarchyError, Robot
+from hierarchy import HierarchyError, Robot, State
 from hierarchy.tasks import JointLimits
 from scenarios.config import load
 from scenarios.config.control import PolicySection
@@ -264,7 +264,7 @@ def test_whatever_is_asked_commands_stay_within_the_joint_limits(level):
     limits = JointLimits(robot, 5.0, PERIOD)
     rng = np.random.default_rng(3)
     q = rng.uniform(0.8 * robot.lower, 0.8 * robot.upper)
-    state, v = robot.state(q), np.zeros(7)
+    state, v = State.at(robot, q), np.zeros(7)
     p = Policy(PolicySection(stale="hold", inaccurate="use", patience=50), level, PERIOD,
                lambda x: limits.clamp(state, level, x))
     for k in range(2000):

@@ -4,6 +4,7 @@ import re
 import subprocess
 import sys
 import tomllib
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -75,11 +76,28 @@ def test_importing_the_package_costs_nothing():
     assert done.stdout == "False False\n"
 
 
-def test_what_the_package_says_it_exports_is_there():
-    import scenarios
+@pytest.mark.parametrize("statement", ["import hierarchy", "from hierarchy import Hierarchy",
+                                       "import solvers"])
+def test_a_program_with_arrays_only_does_not_load_pinocchio(statement):
+    code = f"import sys; {statement}; print('pinocchio' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "False\n"
 
-    assert set(scenarios.__all__) <= set(dir(scenarios))
-    for name in scenarios.__all__:
-        assert callable(getattr(scenarios, name))
+
+def test_a_hierarchy_is_resolved_without_pinocchio():
+    code = ("import sys; sys.modules['pinocchio'] = None\n"
+            "from hierarchy import Hierarchy; from solvers import make\n"
+            "h = Hierarchy.from_levels([([[1.0, 0.0]], [2.0])])\n"
+            "print(make('recursive').solve(h).x[0])")
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert float(done.stdout) == pytest.approx(2.0)
+
+
+@pytest.mark.parametrize("package", ["hierarchy", "solvers", "scenarios"])
+def test_what_a_package_says_it_exports_is_there(package):
+    module = import_module(package)
+    assert set(module.__all__) <= set(dir(module))
+    for name in module.__all__:
+        assert callable(getattr(module, name))
     with pytest.raises(AttributeError, match="no attribute 'nothing'"):
-        _ = scenarios.nothing
+        _ = module.nothing

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from hierarchy import HierarchyError, Robot
+from hierarchy import HierarchyError, Robot, State
 from hierarchy.errors import RobotError, UnknownNameError
 
 ROBOT = Robot.named("kuka_lwr")
@@ -38,19 +38,19 @@ def from_dh_table(q, joints=7):
 def test_kinematics_equal_the_table_multiplied_out():
     frame = ROBOT.frame("end_effector")
     for q in np.random.default_rng(0).uniform(-3, 3, (50, 7)):
-        state, T = ROBOT.state(q), from_dh_table(q)
+        state, T = State.at(ROBOT, q), from_dh_table(q)
         np.testing.assert_allclose(state.position(frame), T[:3, 3], atol=1e-14)
         np.testing.assert_allclose(state.rotation(frame), T[:3, :3], atol=1e-14)
 
 
 def test_the_start_of_the_letter_is_22_mm_off_the_path():
     q0 = [0.923, -0.854, 0.903, 1.195, 0.971, 1.796, 0.0]
-    p = ROBOT.state(q0).position(ROBOT.frame("end_effector"))
+    p = State.at(ROBOT, q0).position(ROBOT.frame("end_effector"))
     assert np.linalg.norm(p - [0.2, 0.6, 0.2]) == pytest.approx(0.022, abs=5e-4)
 
 
 def test_control_points_lie_on_the_upper_arm_and_the_forearm():
-    state = ROBOT.state(np.linspace(-1, 1, 7))
+    state = State.at(ROBOT, np.linspace(-1, 1, 7))
     elbow, wrist = from_dh_table(state.q, 3)[:3, 3], from_dh_table(state.q, 5)[:3, 3]
     for i, point in enumerate(ROBOT.control_points):
         rotation, translation = state._placement(point.joint)
@@ -67,16 +67,16 @@ def test_limits_are_those_of_the_arm():
 
 
 def test_the_mass_matrix_is_symmetric_and_positive():
-    M = ROBOT.state(np.ones(7)).mass_matrix()
+    M = State.at(ROBOT, np.ones(7)).mass_matrix()
     np.testing.assert_allclose(M, M.T)
     assert np.linalg.eigvalsh(M).min() > 0
 
 
 def test_a_state_is_moved_without_making_another():
-    state = ROBOT.state(np.zeros(7))
+    state = State.at(ROBOT, np.zeros(7))
     views = [state.J, state.dJ, state.placements]
     state.move(1.0, np.ones(7), np.ones(7))
-    fresh = ROBOT.state(np.ones(7), np.ones(7))
+    fresh = State.at(ROBOT, np.ones(7), np.ones(7))
     for view, name in zip(views, ("J", "dJ", "placements"), strict=True):
         np.testing.assert_array_equal(view, getattr(fresh, name))
 
@@ -88,8 +88,21 @@ def test_a_state_is_moved_without_making_another():
 ])
 def test_a_bad_state_is_named(q, v, said):
     with pytest.raises(RobotError) as error:
-        ROBOT.state(q, v)
+        State.at(ROBOT, q, v)
     assert said in str(error.value)
+
+
+@pytest.mark.parametrize(("what", "entry", "name"), [
+    ("q", 0, "root_joint 1"), ("q", 6, "root_joint 7"), ("q", 7, "left_hip_yaw"),
+    ("q", 36, "neck_pitch"), ("v", 5, "root_joint 6"), ("v", 10, "left_ankle_pitch"),
+])
+def test_an_entry_of_a_floating_robot_is_named_by_its_own_joint(what, entry, name):
+    robot = Robot.named("humanoid")
+    given = {"q": robot.rest.copy(), "v": np.zeros(robot.n)}
+    given[what][entry] = np.nan
+    with pytest.raises(RobotError) as error:
+        State.at(robot, **given)
+    assert f"{what}[{entry}] ({name}) is nan" in str(error.value)
 
 
 def test_unknown_names_come_with_the_nearest_known():
@@ -115,7 +128,7 @@ def test_a_urdf_file_is_read_with_its_limits_and_frames(pendulum):
     assert (robot.n, robot.name, robot.joint_names) == (1, "revolute", ("hinge",))
     assert (robot.lower[0], robot.upper[0], robot.velocity_limit[0]) == (-1, 2, 3)
     assert robot.end_effector == "hand"
-    p = robot.state([0.5]).position(robot.frame("hand"))
+    p = State.at(robot, [0.5]).position(robot.frame("hand"))
     np.testing.assert_allclose(p, [-np.sin(0.5), 0, -np.cos(0.5)])
 
 

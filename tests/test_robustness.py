@@ -9,7 +9,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from hierarchy import Robot
+from hierarchy import Robot, State
 from hierarchy.robots import TABLES, link_capsules
 from scenarios import load, simulate
 from scenarios.cell.build import build
@@ -82,7 +82,7 @@ def clearance(found, every=5):
     obstacles, least = build(found.scenario).sensor.obstacles, np.inf
     share = np.linspace(0.0, 1.0, 15)[:, None]
     for t, q in zip(found["t"][::every], true(found, "q")[::every], strict=True):
-        placements, table = ROBOT.state(q).placements, obstacles.at(t)
+        placements, table = State.at(ROBOT, q).placements, obstacles.at(t)
         for link in link_capsules(TABLES["kuka_lwr"]):
             T = placements[link.joint]
             axis = (1 - share) * link.start + share * np.array(link.end)

@@ -3,6 +3,7 @@ import pytest
 from hand_made import recording as hand_made
 
 from hierarchy import HierarchyError, Robot, State
+from hierarchy.avoidance import Capsule
 from hierarchy.robots import TABLES, link_capsules
 from scenarios import load, simulate
 from scenarios.config.robot import RobotSection
@@ -10,6 +11,7 @@ from scenarios.loop.controller import Controller
 from scenarios.loop.fate import Fate
 from scenarios.scene import capsules, ends, scene, stage
 from scenarios.scene.levels import judge
+from scenarios.scene.links import lowest
 
 SHORT = ["control.duration=1.5"]
 NAMES = ("ellipse", "ellipse-velocity", "ellipse-published", "ellipse-limits", "ellipse-hqp")
@@ -39,7 +41,7 @@ def test_more_frames_than_ticks_are_the_ticks(runs):
 def test_placements_and_links_are_those_of_the_kinematics(runs, ellipse):
     robot = Robot.named("kuka_lwr")
     for f in (0, 20, -1):
-        state = robot.state(runs["ellipse"]["q"][ellipse.ticks[f]])
+        state = State.at(robot, runs["ellipse"]["q"][ellipse.ticks[f]])
         assert np.array_equal(ellipse.placements[f], state.placements)
         chain = ellipse.links[f]
         assert np.allclose(chain[0, 1], 0.0)  # the foot ends at the base
@@ -180,9 +182,17 @@ def test_a_robot_without_capsules_is_drawn_as_sticks(tmp_path):
 def test_no_robot_at_rest_is_below_the_floor(name):
     section = load("ellipse").model_copy(update={"robot": RobotSection(model=name)})
     fixed = stage(section)
-    low = ends(fixed.capsules[1:], fixed.robot.state(fixed.robot.rest).placements)[..., 2].min()
+    low = ends(fixed.capsules[1:], State.at(fixed.robot, fixed.robot.rest).placements)[..., 2].min()
     assert low >= fixed.floor
     assert stage(load("humanoid")).floor == pytest.approx(0.0, abs=1e-6)  # it stands on it
+
+
+def test_the_floor_is_a_radius_below_the_lowest_end_of_a_link_and_not_above_the_base():
+    robot = Robot.named("kuka_lwr")
+    below = Capsule("below", 0, (0.0, 0.0, -0.5), (0.0, 0.0, 0.1), 0.04)
+    above = Capsule("above", 0, (0.0, 0.0, 0.3), (0.0, 0.0, 0.5), 0.04)
+    assert lowest(robot, [above, below]) == pytest.approx(-0.54)
+    assert lowest(robot, [above]) == 0.0
 
 
 def test_the_arm_given_as_a_table_has_its_own_capsules():

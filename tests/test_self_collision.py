@@ -112,7 +112,7 @@ def test_distances_agree_with_coal_through_pinocchio():
         for q, _ in STATES:
             pin.computeDistances(ROBOT.model, data, geometry, seen, q)
             coal_says = np.array([result.min_distance for result in seen.distanceResults])
-            ours = task.distances(ROBOT.state(q))
+            ours = task.distances(State.at(ROBOT, q))
             apart = ours > 0
             np.testing.assert_allclose(ours[apart], coal_says[apart], atol=2e-6)
             assert (coal_says[~apart] < 2e-6).all(), name
@@ -122,9 +122,9 @@ def test_distances_agree_with_coal_through_pinocchio():
 def test_rows_are_the_derivative_of_the_distances(name):
     task, h = TASKS[name], 1e-6
     for q, v in STATES:
-        columns = [(task.distances(ROBOT.state(q + h * e)) - task.distances(ROBOT.state(q - h * e)))
-                   / (2 * h) for e in np.eye(7)]
-        np.testing.assert_allclose(task.jacobian(ROBOT.state(q, v)), np.transpose(columns),
+        columns = [(task.distances(State.at(ROBOT, q + h * e))
+                    - task.distances(State.at(ROBOT, q - h * e))) / (2 * h) for e in np.eye(7)]
+        np.testing.assert_allclose(task.jacobian(State.at(ROBOT, q, v)), np.transpose(columns),
                                    atol=1e-7)
 
 
@@ -133,11 +133,11 @@ def test_rows_give_the_second_derivative_with_nearest_points_that_slide():
     for q, v in STATES:
         a, d, free = rng.normal(size=7), [], []
         for t in (-h, 0.0, h):
-            state = ROBOT.state(q + v * t + a * t * t / 2)
+            state = State.at(ROBOT, q + v * t + a * t * t / 2)
             d.append(task.distances(state))
             seen = measure_capsules(state.placements, task.joints, task.table, task.indices)
             free.append((seen[:, 4:] > 0) & (seen[:, 4:] < 1))
-        state = ROBOT.state(q, v)
+        state = State.at(ROBOT, q, v)
         bend = task.bend(state)
         second = task.jacobian(state) @ a + task.jacobian_derivative(state) @ v + bend
         same = (free[0] == free[2]).all(axis=1)  # no nearest point came to an end in between
@@ -159,12 +159,12 @@ def test_compiled_rows_equal_those_of_the_plain_methods(name, level, differences
     task = SelfSeparation(kind.capsules, Barrier(0.02, influence=0.4), kind.pairs)
     m, sided = task.dimension, 0
     for q, v in STATES[:8]:
-        state = ROBOT.state(q, v, 0.7, differences)
+        state = State.at(ROBOT, q, v, 0.7, differences)
         state.move(0.701, q + 1e-3 * v, v)
         written, plain = [(np.full((m + 2, 7), 5.0), np.full(m + 2, 5.0), np.full(m + 2, 5.0))
                           for _ in range(2)]
-        task.write(state, level, *written, row=1)
-        Task.write(task, state, level, *plain, row=1)
+        task.writer(state, level, *written, row=1)()
+        Task.writer(task, state, level, *plain, row=1)()
         for a, b in zip(written, plain, strict=True):
             np.testing.assert_allclose(a, b, rtol=1e-11, atol=1e-11)
             assert (a[[0, -1]] == 5.0).all(), "rows of others are left alone"
@@ -175,9 +175,9 @@ def test_compiled_rows_equal_those_of_the_plain_methods(name, level, differences
 def test_parallel_links_give_finite_rows():
     """Stretched out, then folded by half a turn: the axes of the arm lie on one line."""
     for elbow in (0.0, np.pi):
-        state = ROBOT.state([0.0, 0.3, 0.0, elbow, 0.0, 0.0, 0.0], np.ones(7))
+        state = State.at(ROBOT, [0.0, 0.3, 0.0, elbow, 0.0, 0.0, 0.0], np.ones(7))
         A, lower, upper = np.zeros((3, 7)), np.zeros(3), np.zeros(3)
-        TASKS["arm"].write(state, "acceleration", A, lower, upper, row=0)
+        TASKS["arm"].writer(state, "acceleration", A, lower, upper, row=0)()
         assert np.isfinite(A).all()
         assert np.isfinite(lower).all()
 
@@ -211,7 +211,7 @@ INTO_THE_FOOT = (0.3, 2.05, 0.1, -2.05, 0.2, 1.8, 0.0)
 @pytest.mark.parametrize("period", [1e-3, 4e-3, 1e-2])
 @pytest.mark.parametrize("differences", [False, True])
 def test_an_arm_driven_into_its_foot_stops_before(level, period, differences):
-    collides = TASKS["arm"].distances(ROBOT.state(INTO_THE_FOOT)).min()
+    collides = TASKS["arm"].distances(State.at(ROBOT, INTO_THE_FOOT)).min()
     assert collides < 0
     d, plant = drive(level, period, OPEN, INTO_THE_FOOT, Barrier(0.02), differences)
     assert d[0].min() > 0.1
@@ -227,7 +227,7 @@ def test_no_posture_near_that_one_brings_the_arm_into_itself(level):
         start = rng.uniform(ROBOT.lower, ROBOT.upper)
         goal = INTO_THE_FOOT + rng.uniform(-0.1, 0.1, 7)
         goal[0] = rng.uniform(-2, 2)
-        assert TASKS["arm"].distances(ROBOT.state(start)).min() > 0.03
+        assert TASKS["arm"].distances(State.at(ROBOT, start)).min() > 0.03
         d, _ = drive(level, 4e-3, start, tuple(goal), Barrier(0.02))
         assert d.min() > 0.02 - 1e-5
 
@@ -243,7 +243,7 @@ def test_a_start_in_contact_recovers(level):
 
 def test_a_distance_that_no_joint_changes_is_left_alone():
     """That of the elbow from the foot: asking for more of it must not move the arm at all."""
-    state = ROBOT.state(OPEN)
+    state = State.at(ROBOT, OPEN)
     task = SelfSeparation(ARM, Barrier(0.3, influence=0.5), ((0, 2),))
     assert task.distances(state)[0] == pytest.approx(0.28)
     for level in LEVELS:
@@ -259,7 +259,7 @@ def test_capsules_of_a_table_are_its_links():
     assert [c.name for c in link_capsules(TABLES["kuka_lwr"])] == ["link 3", "link 5", "link 7"]
     assert pairs_of_chain(ARM) == ((0, 2), (0, 3), (1, 3))
     for q, _ in STATES:  # each begins where the one before it ends
-        state = ROBOT.state(q)
+        state = State.at(ROBOT, q)
         ends = [[rotation @ point + at for point in (np.array(c.start), np.array(c.end))]
                 for c in ARM for rotation, at in [state._placement(c.joint)]]
         for (_, end), (start, _) in pairwise(ends):

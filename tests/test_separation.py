@@ -38,13 +38,13 @@ TASK = Separation(SENSOR.points, EVERYWHERE, len(SHAPES))
 
 
 def seen_at(q, v, t=0.7, differences=None):
-    state = ROBOT.state(q, v, t, differences)
+    state = State.at(ROBOT, q, v, t, differences)
     SENSOR.measure(state)
     return state
 
 
 def distances(q, t):
-    return SENSOR.measure(ROBOT.state(q, t=t)).pairs.distance.ravel().copy()
+    return SENSOR.measure(State.at(ROBOT, q, t=t)).pairs.distance.ravel().copy()
 
 
 def rows(count, n=7):
@@ -115,12 +115,12 @@ def test_compiled_rows_equal_those_of_the_plain_methods(level, differences, obst
     task = Separation(SENSOR.points, Barrier(0.05, influence=0.6), obstacles)
     m, sided = task.dimension, 0
     for q, v in STATES[:5]:
-        state = ROBOT.state(q, v, 0.7, differences)
+        state = State.at(ROBOT, q, v, 0.7, differences)
         state.move(0.701, q + 1e-3 * v, v)
         SENSOR.measure(state)
         written, plain = rows(m + 2), rows(m + 2)
-        task.write(state, level, *written, row=1)
-        Task.write(task, state, level, *plain, row=1)
+        task.writer(state, level, *written, row=1)()
+        Task.writer(task, state, level, *plain, row=1)()
         for a, b in zip(written, plain, strict=True):
             np.testing.assert_allclose(a, b, rtol=1e-12, atol=1e-11)
             assert (a[[0, -1]] == 5.0).all(), "rows of others are left alone"
@@ -133,8 +133,8 @@ def test_one_row_a_point_is_that_of_its_nearest_obstacle():
     for level in LEVELS:
         state = seen_at(*STATES[1])
         every, one = rows(54), rows(9)
-        TASK.write(state, level, *every, row=0)
-        nearest.write(state, level, *one, row=0)
+        TASK.writer(state, level, *every, row=0)()
+        nearest.writer(state, level, *one, row=0)()
         chosen = np.arange(9) * len(SHAPES) + state.measurement.nearest
         for a, b in zip(every, one, strict=True):
             np.testing.assert_array_equal(a[chosen], b)
@@ -150,7 +150,7 @@ def test_a_sensor_of_surfaces_fills_one_column():
     state.measurement = seen
     task = Separation(SENSOR.points, EVERYWHERE, 1)
     A, lower, upper = rows(9)
-    task.write(state, "acceleration", A, lower, upper, row=0)
+    task.writer(state, "acceleration", A, lower, upper, row=0)()
     assert np.isfinite(lower[:8]).all()
     assert lower[8] == -np.inf
     assert not A[8].any()
@@ -189,14 +189,14 @@ def test_what_is_asked_inside_is_bounded_and_continuous():
 
 
 def test_a_point_on_an_obstacle_gives_finite_rows():
-    state = ROBOT.state(START, np.ones(7))
+    state = State.at(ROBOT, START, np.ones(7))
     state.measurement = Measurement(8)
     state.measurement.pairs = Pairs(9, 1)
     state.measurement.pairs.distance[:] = state.measurement.pairs.radius[:] = 0.0
     state.measurement.pairs.direction[..., 2] = 1.0
     for level in LEVELS:
         A, lower, upper = rows(9)
-        Separation(SENSOR.points, Barrier(0.0), 1).write(state, level, A, lower, upper, row=0)
+        Separation(SENSOR.points, Barrier(0.0), 1).writer(state, level, A, lower, upper, row=0)()
         assert np.isfinite(A).all()
         assert np.isfinite(lower).all()
 
@@ -224,7 +224,7 @@ def drive(level, period, obstacles, tasks, barrier, duration=2.0, start=START, d
     return [np.array(signal) for signal in zip(*log, strict=True)]
 
 
-HAND = ROBOT.state(START).position(FRAME)
+HAND = State.at(ROBOT, START).position(FRAME)
 
 
 def beside_the_hand(*offset):
@@ -297,7 +297,7 @@ def test_a_point_that_no_joint_moves_is_left_alone():
     obstacles = Obstacles([Obstacle("sphere", (0.0, 0.0, 0.13), (0.05,))])
     measurement = Measurement(0)
     measurement.pairs = Pairs(1, 1)
-    state = ROBOT.state(START)
+    state = State.at(ROBOT, START)
     position = state.placements[1, 9:] + 0.1 * state.placements[1, 3:6]
     away = position - obstacles.centres[0]
     measurement.pairs.distance[:] = np.linalg.norm(away) - 0.05
@@ -330,20 +330,20 @@ def test_bad_settings_are_named(make_task, said):
     (Pairs(9, 0), None, "9 points are measured against 0 obstacles, .* one at least"),
 ])
 def test_a_measurement_that_does_not_fit_is_named(pairs, obstacles, said):
-    state = ROBOT.state(START)
+    state = State.at(ROBOT, START)
     task = Separation(SENSOR.points, EVERYWHERE, obstacles)
     with pytest.raises(HierarchyError, match="measurement of pairs"):
-        task.write(state, "velocity", *rows(18), row=0)
+        task.writer(state, "velocity", *rows(18), row=0)()
     state.measurement = Measurement(8)
     state.measurement.pairs = pairs
     with pytest.raises(HierarchyError, match=said):
-        task.write(state, "velocity", *rows(18), row=0)
+        task.writer(state, "velocity", *rows(18), row=0)()
 
 
 def test_without_obstacles_there_are_no_rows():
     sensor = sensor_of([])
-    state = ROBOT.state(START)
+    state = State.at(ROBOT, START)
     sensor.measure(state)
     task = Separation(sensor.points, EVERYWHERE, 0)
     assert task.dimension == 0
-    task.write(state, "velocity", *rows(0), row=0)
+    task.writer(state, "velocity", *rows(0), row=0)()

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scene import FRAME, PATH, ROBOT, SENSOR, TASKS, state_at, states
 
-from hierarchy import HierarchyError, Stack, Task
+from hierarchy import HierarchyError, Stack, State, Task
 from hierarchy.jit import bind, compiled
 from hierarchy.tasks import JointDamping, Position
 
@@ -59,6 +59,30 @@ def test_changing_the_stack_changes_the_hierarchy():
     assert s.hierarchy(state).sizes.tolist() == [1, 3, 1]
 
 
+def test_a_task_that_takes_the_place_of_one_removed_is_the_one_that_is_written():
+    s, state = Stack([TASKS["position"]]), state_at(Q, V)
+    before = s.hierarchy(state).lower.copy()
+    s.remove("position")
+    s.insert(Position(FRAME, PATH, stiffness=7.0))
+    after = s.hierarchy(state)
+    np.testing.assert_array_equal(
+        after.lower, Stack([Position(FRAME, PATH, stiffness=7.0)]).hierarchy(state).lower)
+    assert not np.array_equal(after.lower, before)
+
+
+@pytest.mark.parametrize("name", TASKS)
+def test_stacks_that_share_a_task_change_nothing_in_it(name):
+    """The target of a path stood in the task, where each stack overwrote that of the other."""
+    task = TASKS[name]
+    before = {key: value.copy() for key, value in vars(task).items()
+              if isinstance(value, np.ndarray)}
+    one, other = state_at(Q, V, 0.2), state_at(Q + 0.1, V, 0.9)
+    rows = [Stack([task]).hierarchy(state).lower.copy() for state in (one, other, one)]
+    np.testing.assert_array_equal(rows[0], rows[2])
+    for key, value in before.items():
+        np.testing.assert_array_equal(getattr(task, key), value)
+
+
 def rows_of(h):
     return h.A.copy(), h.lower.copy(), h.upper.copy()
 
@@ -108,10 +132,15 @@ class Elbow(Task):
 class Slower(Position):
     """A compiled task of the package, changed in plain numpy."""
 
-    def write(self, state, level, A, lower, upper, row):
-        super().write(state, level, A, lower, upper, row)
-        lower[row:row + 3] *= 0.5
-        upper[row:row + 3] *= 0.5
+    def writer(self, state, level, A, lower, upper, row):
+        write_whole = super().writer(state, level, A, lower, upper, row)
+
+        def write():
+            write_whole()
+            lower[row:row + 3] *= 0.5
+            upper[row:row + 3] *= 0.5
+
+        return write
 
 
 def test_tasks_in_plain_numpy_stand_beside_compiled_ones():
@@ -151,6 +180,20 @@ def test_the_reference_is_the_null_space_term():
     np.testing.assert_allclose(velocity.reference, TASKS["posture"].reference_velocity(state))
 
 
+@pytest.mark.parametrize("level", ["velocity", "acceleration"])
+@pytest.mark.parametrize("task", [JointDamping(7, 5.0), JointDamping(7, 2.0, "mass"),
+                                  TASKS["posture"]], ids=["identity", "mass", "posture"])
+def test_a_joint_task_is_the_same_as_a_level_and_as_the_reference(task, level):
+    state = state_at(Q, V)
+    h = Stack([task], level, reference=task).hierarchy(state)
+    expected = (task.reference_velocity(state) if level == "velocity"
+                else task.reference_acceleration(state))
+    np.testing.assert_allclose(h.reference, expected, rtol=1e-14)
+    np.testing.assert_array_equal(h.lower, h.reference)
+    np.testing.assert_array_equal(h.upper, h.reference)
+    np.testing.assert_array_equal(h.A, np.eye(7))
+
+
 @pytest.mark.parametrize(("edit", "said"), [
     (lambda s: s.remove("pose"), "unknown task 'pose'"),
     (lambda s: s.swap("position", "pointin"), "did you mean 'pointing'"),
@@ -160,6 +203,7 @@ def test_the_reference_is_the_null_space_term():
     (lambda s: s.reorder(["position", "position", "pointing"]), "each of"),
     (lambda s: s.hierarchy(state_at(Q, V), ("posture",)), "unknown task 'posture'"),
     (lambda s: Stack(level="torque"), "level"),
+    (lambda s: Stack([JointDamping(6)]).hierarchy(state_at(Q, V)), "6 joints, the robot has 7"),
 ])
 def test_bad_edits_are_named(edit, said):
     with pytest.raises(HierarchyError) as error:
@@ -169,5 +213,5 @@ def test_bad_edits_are_named(edit, said):
 
 def test_an_empty_stack_is_an_error_and_an_empty_order_is_not():
     with pytest.raises(HierarchyError, match="stack is empty"):
-        Stack().hierarchy(ROBOT.state(Q))
+        Stack().hierarchy(State.at(ROBOT, Q))
     assert stack().hierarchy(state_at(Q, V), ()).m == 0

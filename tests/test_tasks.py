@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scene import BODY, FRAME, PATH, ROBOT, SENSOR, TASKS, TIP, state_at, states
 
-from hierarchy import HierarchyError, Task
+from hierarchy import HierarchyError, State, Task
 from hierarchy.tasks import Avoidance, JointDamping, Pointing, Position, Posture
 from hierarchy.tasks.pose import rotation_vector
 
@@ -12,7 +12,7 @@ STATES = states(20)
 
 def moved(q, v, step, task_state):
     """The state a little later along v, with the measurement of `task_state`."""
-    state = ROBOT.state(q + step * v, v, task_state.t)
+    state = State.at(ROBOT, q + step * v, v, task_state.t)
     state.measurement = task_state.measurement
     return state
 
@@ -38,7 +38,7 @@ def test_avoidance_jacobian_is_that_of_the_active_control_point(rows):
         away = seen.direction[seen.active].copy()
 
         def position(q, point=point):
-            rotation, translation = ROBOT.state(q)._placement(point.joint)
+            rotation, translation = State.at(ROBOT, q)._placement(point.joint)
             return translation + rotation @ point.offset
 
         J = np.transpose([(position(q + STEP * e) - position(q - STEP * e)) / (2 * STEP)
@@ -79,8 +79,8 @@ def test_compiled_rows_equal_those_of_the_plain_methods(name, level, differences
         state.move(0.8, q + 1e-3 * v, v)
         written, plain = [(np.full((8, 7), 5.0), np.full(8, 5.0), np.full(8, 5.0))
                           for _ in range(2)]
-        task.write(state, level, *written, row=1)
-        Task.write(task, state, level, *plain, row=1)
+        task.writer(state, level, *written, row=1)()
+        Task.writer(task, state, level, *plain, row=1)()
         for a, b in zip(written, plain, strict=True):
             np.testing.assert_allclose(a, b, rtol=1e-12, atol=1e-11)
             assert a[0].max() == 5.0
@@ -95,9 +95,9 @@ def test_following_the_reference_acceleration_gives_the_second_derivative(differ
     a = np.arange(7.0) - 3
 
     def p(t):
-        return ROBOT.state(q + v * t + a * t * t / 2).position(FRAME)
+        return State.at(ROBOT, q + v * t + a * t * t / 2).position(FRAME)
 
-    state = ROBOT.state(q, v)
+    state = State.at(ROBOT, q, v)
     second = (p(h) - 2 * p(0) + p(-h)) / h**2
     np.testing.assert_allclose(
         task.jacobian(state) @ a + task.jacobian_derivative(state) @ v, second, atol=1e-6)
@@ -106,7 +106,7 @@ def test_following_the_reference_acceleration_gives_the_second_derivative(differ
 def test_position_reference_is_the_closed_loop_of_the_letter():
     task = Position(FRAME, PATH, stiffness=40.0, damping=20.0, gain=3.0)
     q, v = STATES[2]
-    state = ROBOT.state(q, v, 0.7)
+    state = State.at(ROBOT, q, v, 0.7)
     p, dp, ddp = PATH(0.7)
     error, rate = p - state.position(FRAME), dp - task.jacobian(state) @ v
     np.testing.assert_allclose(task.reference_acceleration(state), ddp + 20 * rate + 40 * error)
@@ -130,13 +130,13 @@ def test_the_cone_asks_for_one_side_and_its_surface_for_both():
     state = state_at(q, v)
     for name, upper in (("pointing", "equal"), ("cone", "infinite")):
         A, low, up = np.zeros((1, 7)), np.zeros(1), np.zeros(1)
-        TASKS[name].write(state, "acceleration", A, low, up, 0)
+        TASKS[name].writer(state, "acceleration", A, low, up, 0)()
         assert (up[0] == low[0]) == (upper == "equal")
         assert np.isinf(up[0]) == (upper == "infinite")
 
 
 def test_pointing_error_is_positive_outside_the_cone():
-    state = ROBOT.state(*STATES[5])
+    state = State.at(ROBOT, *STATES[5])
     axis = state.rotation(FRAME)[:, 2]
     across = np.cross(axis, [0.3, 0.5, 0.1])
     assert Pointing(FRAME, tuple(axis), 0.1).error(state)[0] < 0
@@ -155,7 +155,7 @@ def test_one_row_of_avoidance_is_the_projection_of_three():
 
 def test_damping_brakes_in_proportion_to_speed_or_momentum():
     q, v = STATES[7]
-    state = ROBOT.state(q, v)
+    state = State.at(ROBOT, q, v)
     np.testing.assert_allclose(JointDamping(7, 5.0).reference_acceleration(state), -5 * v)
     np.testing.assert_allclose(JointDamping(7, 2.0, "mass").reference_acceleration(state),
                                -2 * state.mass_matrix() @ v)
@@ -165,7 +165,7 @@ def test_damping_brakes_in_proportion_to_speed_or_momentum():
 def test_posture_pulls_toward_its_target():
     q, v = STATES[8]
     task = Posture((0.1,) * 7, stiffness=3.0, damping=2.0, gain=4.0)
-    state = ROBOT.state(q, v)
+    state = State.at(ROBOT, q, v)
     np.testing.assert_allclose(task.reference_acceleration(state), 3 * (0.1 - q) - 2 * v)
     np.testing.assert_allclose(task.reference_velocity(state), 4 * (0.1 - q))
 
@@ -184,9 +184,9 @@ def test_rotation_vector_inverts_rodrigues(angle):
 def test_pose_error_falls_when_its_velocity_is_followed():
     q, _ = STATES[9]
     task = TASKS["pose"]
-    error = task.error(ROBOT.state(q))
-    v = np.linalg.pinv(task.jacobian(ROBOT.state(q))) @ error
-    assert np.linalg.norm(task.error(ROBOT.state(q + 1e-3 * v))) < np.linalg.norm(error)
+    error = task.error(State.at(ROBOT, q))
+    v = np.linalg.pinv(task.jacobian(State.at(ROBOT, q))) @ error
+    assert np.linalg.norm(task.error(State.at(ROBOT, q + 1e-3 * v))) < np.linalg.norm(error)
 
 
 class Elbow(Task):
@@ -208,7 +208,7 @@ class Elbow(Task):
 def test_a_task_in_plain_numpy_needs_three_methods():
     q, v = STATES[10]
     A, low, up = np.zeros((1, 7)), np.zeros(1), np.zeros(1)
-    Elbow().write(ROBOT.state(q, v), "acceleration", A, low, up, 0)
+    Elbow().writer(State.at(ROBOT, q, v), "acceleration", A, low, up, 0)()
     assert low[0] == up[0] == pytest.approx(4 * (1 - q[3]) - 3 * v[3])
 
 
@@ -220,8 +220,8 @@ def test_a_task_in_plain_numpy_needs_three_methods():
 def test_a_wrong_task_is_named(method, value, said, monkeypatch):
     monkeypatch.setattr(Elbow, method, lambda self, state: value)
     with pytest.raises(HierarchyError) as error:
-        Elbow().write(ROBOT.state(*STATES[0]), "velocity", np.zeros((1, 7)), np.zeros(1),
-                      np.zeros(1), 0)
+        Elbow().writer(State.at(ROBOT, *STATES[0]), "velocity", np.zeros((1, 7)), np.zeros(1),
+                      np.zeros(1), 0)()
     assert said in str(error.value)
 
 
@@ -240,5 +240,5 @@ def test_bad_settings_of_tasks_are_named():
 
 def test_avoidance_without_a_measurement_is_an_error():
     with pytest.raises(HierarchyError, match="no measurement"):
-        TASKS["avoidance 1-D"].jacobian(ROBOT.state(*STATES[0]))
+        TASKS["avoidance 1-D"].jacobian(State.at(ROBOT, *STATES[0]))
     assert SENSOR.measurement is not None

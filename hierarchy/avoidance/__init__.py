@@ -1,4 +1,4 @@
-"""Where obstacles are, how far, and how strongly the robot should leave them (eqs. 22-27, 31)."""
+"""Obstacles, distances to them, and the repulsion from them (eqs. 22-27, 31)."""
 
 from hierarchy.avoidance.barrier import Barrier
 from hierarchy.avoidance.control_points import ControlPoint

@@ -1,7 +1,17 @@
-"""What a row that keeps h >= 0 asks for.
+"""Bound of a row that keeps h >= 0.
 
-h is a distance less the one to keep. The side is a control barrier: of first order at velocity
-level, dh/dt >= -rate h, of second order at acceleration level, (d/dt + rate)^2 h >= 0. Sources:
+h is a distance minus the distance to keep. The bound is a control barrier function: of first order
+at velocity level, dh/dt >= -rate h, of second order at acceleration level, (d/dt + rate)^2 h >= 0.
+
+At velocity level dh/dt >= min(-rate h, recovery). At acceleration level d2h/dt2 >=
+2 rate (min(-rate h / 2, recovery) - dh/dt), at most `limit`: critically damped, and inside the
+distance to keep the point leaves at `recovery` until h = -2 recovery / rate. From h >= 0 and
+dh/dt >= -rate h on, h remains non-negative as long as the rows are satisfied and `limit` is not
+active; after a faster approach h may become negative, and recovers. In a sampled loop h may cross
+zero by terms in the period.
+
+A bound appears when the distance falls to `influence`. It does not bind at once: there h is large,
+and an approach at up to rate h, at acceleration level up to half of that, may continue. Sources:
 Ames et al., "Control barrier functions: theory and applications" (2019); Nguyen and Sreenath,
 "Exponential control barrier functions" (2016).
 """
@@ -19,30 +29,20 @@ from hierarchy.errors import HierarchyError
 from hierarchy.jit import compiled, inlined
 from hierarchy.problem import Array
 
-_ROUNDING = 1e-13  # [m] an entry of a row below this is rounding
+_ROUNDING = 1e-13  # [m] entries of a row below this are rounding errors
 
 
 @dataclass(frozen=True)
 class Barrier:
-    """How h = d - distance is kept from becoming negative.
+    """Settings that keep h = d - distance from becoming negative; see the module.
 
-    distance : what to keep, d_min [m].
-    rate : how fast what is left of h may be used up [1/s]; times the period it should be well
-        below 1.
-    influence : beyond this distance [m] a row has no side.
-    recovery : the largest speed away from the obstacle that is asked for inside d_min [m/s].
-    limit : the largest acceleration away from it that is ever asked for [m/s^2].
+    distance : distance to keep, d_min [m].
+    rate : rate of the barrier [1/s]; its product with the period should be well below 1.
+    influence : distance [m] beyond which a row has no bound.
+    recovery : largest required speed away from the obstacle inside d_min [m/s].
+    limit : largest required acceleration away from the obstacle [m/s^2].
 
-    At velocity level dh/dt >= min(-rate h, recovery). At acceleration level d2h/dt2 >=
-    2 rate (min(-rate h / 2, recovery) - dh/dt), at most `limit`: critically damped, and inside
-    d_min it goes out at `recovery` until h = -2 recovery / rate. From h >= 0 and dh/dt >= -rate h
-    on h stays so as long as rows are met and `limit` does not act; after a faster approach
-    h may become negative, and recovers. In a sampled loop h may pass zero by terms in the period.
-
-    A side appears when d falls to `influence`. It does not bind at once: there h is large, and an
-    approach at up to rate h, at acceleration level up to half of that, may go on as it is.
-
-    Raises HierarchyError, naming the setting, where one is out of its range.
+    Raises HierarchyError, naming the setting, if one is out of range.
     """
 
     distance: float
@@ -61,19 +61,19 @@ class Barrier:
                                  f"distance to keep, {self.distance} m")
 
     def packed(self) -> Array:
-        """The settings as one array (5,), as the kernels take it."""
+        """The settings as one array (5,) for the kernels."""
         return np.array(astuple(self))
 
 
 @compiled
 def least_rate(h, settings):
-    """The dh/dt [m/s] to ask for at least, at velocity level; settings of `Barrier.packed`."""
+    """Least dh/dt [m/s] at velocity level; settings of `Barrier.packed`."""
     return min(-settings[1] * h, settings[3])
 
 
 @compiled
 def least_acceleration(h, rate_of_h, bend, settings):
-    """The d2h/dt2 - bend [m/s^2] to ask for at least; settings of `Barrier.packed`.
+    """Least d2h/dt2 - bend [m/s^2] at acceleration level; settings of `Barrier.packed`.
 
     bend is what the turning of the direction adds to d2h/dt2.
     """
@@ -83,7 +83,7 @@ def least_acceleration(h, rate_of_h, bend, settings):
 
 @inlined
 def drop_rounding(A, row):
-    """Make what is zero but for rounding zero: no joint moves the point along r at all."""
+    """Set entries to zero that differ from it by rounding: joints that do not move along r."""
     for c in range(A.shape[1]):
         if abs(A[row, c]) < _ROUNDING:
             A[row, c] = 0.0

@@ -1,4 +1,4 @@
-"""Points of the robot that are kept away from obstacles."""
+"""Control points: points of the robot that are kept away from obstacles."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the sensor tells the controller in one tick: distances, directions, magnitudes."""
+"""Measurements of one tick: distances, directions and magnitudes of repulsion."""
 
 # mypy: disable-error-code="no-untyped-def"
 
@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import inf, sqrt
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,33 +38,45 @@ class SurveillanceAreas:
                                  "not be negative")
 
 
+class Readings(NamedTuple):
+    """The arrays of a Measurement, for the kernels."""
+
+    points: Array
+    distance: Array
+    direction: Array
+    magnitude: Array
+    nearest: NDArray[np.int64]
+
+
 class Measurement:
     """Distances of K control points, and of the end effector as entry K, to the obstacles.
 
     points (K + 1, 3) [m]; distance (K + 1,) [m] to the nearest obstacle, eq. (22), infinite when
     there is none; direction (K + 1, 3) unit vector away from it; magnitude (K + 1,) of the
-    repulsion, eq. (23); nearest (K + 1,) index of that obstacle or -1. `active` is the control
-    point of eq. (31), the first with the smallest distance (-1 if there is none). `pairs` has
-    every point against every obstacle, or is None where nobody asked for it. `stamp` is the time
-    [s] of what was seen, infinite for now; a sensor that has seen nothing new for too long to be
-    relied on is `blind`.
+    repulsion, eq. (23); nearest (K + 1,) index of that obstacle or -1; `arrays` has all of these
+    for the kernels. `active` is the control point of eq. (31), the first with the smallest distance
+    (-1 if there is none). `pairs` has every point against every obstacle, or is None if it is not
+    measured; it remains the same object. `stamp` is the time [s] of the data, infinite for now. A
+    sensor is `blind` when its last new data are too old to be used.
     """
 
-    __slots__ = ("active", "blind", "direction", "distance", "magnitude", "nearest", "pairs",
-                 "points", "stamp")
+    __slots__ = ("active", "arrays", "blind", "direction", "distance", "magnitude", "nearest",
+                 "pairs", "points", "stamp")
 
     def __init__(self, control_points: int) -> None:
         size = control_points + 1
         self.points, self.direction = np.zeros((size, 3)), np.zeros((size, 3))
         self.distance, self.magnitude = np.full(size, inf), np.zeros(size)
         self.nearest = np.full(size, -1, dtype=np.int64)
+        self.arrays = Readings(self.points, self.distance, self.direction, self.magnitude,
+                           self.nearest)
         self.active = -1
         self.pairs: Pairs | None = None
         self.stamp, self.blind = inf, False
 
     @property
     def minimal_distance(self) -> float:
-        """D_minimal [m] of eq. (31): the smallest distance of a control point, without the end."""
+        """D_minimal [m] of eq. (31): the smallest distance of a control point of the body."""
         return float(self.distance.item(self.active)) if self.active >= 0 else inf
 
     @property
@@ -81,7 +94,7 @@ def measure_exactly(measurement: Measurement, placements: Array, joints: NDArray
 def exact_measurer(measurement: Measurement, placements: Array, joints: NDArray[np.int64],
                    offsets: Array, obstacles: Array, laws: Array,
                    mean_within: float) -> Callable[[], None]:
-    """Return what fills a Measurement from known geometry, each time it is called.
+    """Return a function that fills a Measurement from known geometry at each call.
 
     placements (joints + 1, 12) of a State; joints (K + 1,), offsets (K + 1, 3) of the control
     points and the end effector; obstacles (H, 16) a table of `Obstacles`; laws (2, 4) of
@@ -89,8 +102,7 @@ def exact_measurer(measurement: Measurement, placements: Array, joints: NDArray[
     mean (25)-(26) over the obstacles nearer than that [m].
     """
     fill = bind(_measure, placements, joints, offsets, obstacles, laws, mean_within,
-                measurement.points, measurement.distance, measurement.direction,
-                measurement.magnitude, measurement.nearest)
+                measurement.arrays)
 
     def measure() -> None:
         measurement.active = fill()
@@ -99,8 +111,8 @@ def exact_measurer(measurement: Measurement, placements: Array, joints: NDArray[
 
 
 @compiled
-def _measure(placements, joints, offsets, obstacles, laws, mean_within,
-             points, distance, direction, magnitude, nearest):
+def _measure(placements, joints, offsets, obstacles, laws, mean_within, seen):
+    points, distance, direction, magnitude, nearest = seen
     count = len(joints)
     active, D_minimal = -1, np.inf
     for k in range(count):
@@ -109,13 +121,13 @@ def _measure(placements, joints, offsets, obstacles, laws, mean_within,
             points[k, i] = point_at(placements, joint, offsets[k], i)
         D_min, at = np.inf, -1
         ax = ay = az = x = y = z = 0.0
-        away = direction[k]  # written anew for each obstacle
+        away = direction[k]  # overwritten for each obstacle
         for j in range(obstacles.shape[0]):
             D = distance_to_obstacle(obstacles[j], points[k, 0], points[k, 1], points[k, 2], away)
             if D < D_min:  # (22)
                 D_min, at = D, j
                 ax, ay, az = away[0], away[1], away[2]
-            if mean_within > 0.0 and D < mean_within:  # (25); the factor 1/h is lost in (26)
+            if mean_within > 0.0 and D < mean_within:  # (25); the factor 1/h cancels in (26)
                 x += away[0]
                 y += away[1]
                 z += away[2]
@@ -125,7 +137,7 @@ def _measure(placements, joints, offsets, obstacles, laws, mean_within,
             magnitude[k] = 0.0
             continue
         norm = sqrt(x * x + y * y + z * z)
-        if norm > 1e-6:  # else the unit vectors cancel, or the nearest is asked for
+        if norm > 1e-6:  # else the unit vectors cancel, or mean_within is 0
             direction[k, 0], direction[k, 1], direction[k, 2] = x / norm, y / norm, z / norm  # (26)
         law = 1 if k == count - 1 else 0
         magnitude[k] = repulsion(max(D_min, 0.0), laws[law, 0], laws[law, 1], laws[law, 2],

@@ -1,4 +1,4 @@
-"""Obstacles: points, spheres, capsules and boxes, still or moving on a path."""
+"""Obstacles: points, spheres, capsules and boxes, at rest or moving on a path."""
 
 # mypy: disable-error-code="no-untyped-def"
 
@@ -50,17 +50,17 @@ class Obstacle:
             raise HierarchyError(f"{self.name}: centre {list(self.centre)} is not finite")
 
     def packed(self) -> Array:
-        """The obstacle as one row (16,) of the kernels' table."""
+        """The obstacle as one row (16,) of the table for the kernels."""
         size = (*self.size, 0.0, 0.0, 0.0)[:3]
         return np.array([SHAPES[self.shape], *size, *self.centre,
                          *np.asarray(self.rotation, dtype=float).ravel()])
 
 
 class Obstacles:
-    """All obstacles of a scene as one table (H, 16) that follows time.
+    """All obstacles of a scene as one table (H, 16) that is updated with time.
 
     `motion` (H, 6) has the velocity [m/s] and acceleration [m/s^2] of each centre; `offset` (H, 3)
-    [m] is what `shift` moved each by.
+    [m] is the displacement of each by `shift`.
     """
 
     def __init__(self, obstacles: Sequence[Obstacle] = ()) -> None:
@@ -82,25 +82,25 @@ class Obstacles:
         return self.table
 
     def shift(self, h: int, offset: ArrayLike) -> None:
-        """Move obstacle h to `offset` (3,) [m] from where its centre or its path has it.
+        """Displace obstacle h by `offset` (3,) [m] from its centre or its path.
 
-        Its `motion` stays that of its path: a sensor does not know what moves it by hand.
+        Its `motion` remains that of its path: a sensor does not know about displacements by hand.
         """
         self.table[h, _CENTRE] += np.asarray(offset, dtype=float) - self.offset[h]
         self.offset[h] = offset
 
     @property
     def centres(self) -> Array:
-        """Where the obstacles' centres are now: (H, 3) [m], a view."""
+        """The current centres of the obstacles: (H, 3) [m], a view."""
         return self.table[:, _CENTRE]
 
 
 @compiled
 def distance_to_obstacle(obstacle, x, y, z, away):
-    """Signed distance of a point to one obstacle; `away` (3,) gets the unit vector off it.
+    """Signed distance of a point to one obstacle; writes the unit vector away from it to `away`.
 
-    Negative inside. Where the direction is undefined (on a point, at a centre or on an axis),
-    `away` is the obstacle's z axis.
+    The distance is negative inside. Where the direction is undefined (on a point, at a centre or
+    on an axis), `away` (3,) is the obstacle's z axis.
     """
     # Point in the obstacle's axes.
     ox, oy, oz = x - obstacle[4], y - obstacle[5], z - obstacle[6]
@@ -126,11 +126,11 @@ def distance_to_obstacle(obstacle, x, y, z, away):
 
 @compiled
 def turning_off_obstacle(obstacle, x, y, z, D, straight):
-    """Radius [m] about which the direction off an obstacle turns; infinite beside a flat face.
+    """Radius [m] about which the direction away from an obstacle turns; infinite at a flat face.
 
-    The second derivative of the distance D by the point is (I - r r^T - e e^T) / radius; e is
-    `straight` (3,), the axis of a capsule beside its side, that of a box's edge beside the edge,
-    and zero elsewhere.
+    The second derivative of the distance D with respect to the point is
+    (I - r r^T - e e^T) / radius; e is `straight` (3,): the axis of a capsule beside its cylinder,
+    the direction of an edge of a box beside that edge, and zero elsewhere.
     """
     straight[0] = straight[1] = straight[2] = 0.0
     shape = int(obstacle[0])
@@ -142,7 +142,7 @@ def turning_off_obstacle(obstacle, x, y, z, D, straight):
         _copy_axis(obstacle, 2 if abs(along) < obstacle[2] else -1, straight)
         return D + obstacle[1]
     beyond, axis = 0, -1
-    for i in range(3):  # beyond one face of three: flat; of two: an edge; of all: a corner
+    for i in range(3):  # outside one pair of faces: flat; two: an edge; three: a corner
         along = obstacle[7 + i] * ox + obstacle[10 + i] * oy + obstacle[13 + i] * oz
         if abs(along) > obstacle[1 + i]:
             beyond += 1
@@ -165,7 +165,7 @@ def _copy_axis(obstacle, axis, out):
 def _off_box(hx, hy, hz, px, py, pz):
     dx, dy, dz = abs(px) - hx, abs(py) - hy, abs(pz) - hz
     sx, sy, sz = (1.0 if px >= 0 else -1.0), (1.0 if py >= 0 else -1.0), (1.0 if pz >= 0 else -1.0)
-    if dx <= 0.0 and dy <= 0.0 and dz <= 0.0:  # inside: out through the nearest face
+    if dx <= 0.0 and dy <= 0.0 and dz <= 0.0:  # inside: leave through the nearest face
         if dx >= dy and dx >= dz:
             return dx, sx, 0.0, 0.0
         if dy >= dz:

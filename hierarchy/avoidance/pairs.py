@@ -1,4 +1,4 @@
-"""Every point against every obstacle: what rows that hold for all of them need."""
+"""Distances of every point to every obstacle, for tasks with one row per pair."""
 
 # mypy: disable-error-code="no-untyped-def"
 
@@ -20,14 +20,14 @@ _STRAIGHT, _RADIUS, _WIDTH = slice(10, 13), 13, 14
 class Pairs:
     """P points of the robot against H obstacles.
 
-    distance (P, H) [m], negative inside, infinite where nothing is seen; direction (P, H, 3) unit
-    vector away from the obstacle; velocity, acceleration (P, H, 3) of the obstacle, zero where
-    they are not known. radius (P, H) [m] and straight (P, H, 3) say how the direction turns where
-    the point moves across it: by the speed over the radius, but not along the unit vector
-    `straight`; an infinite radius, that of a flat face, is on the safe side where it is not known.
+    distance (P, H) [m], negative inside, infinite where nothing is measured; direction (P, H, 3)
+    unit vector away from the obstacle; velocity, acceleration (P, H, 3) of the obstacle, zero where
+    unknown. radius (P, H) [m] and straight (P, H, 3) describe how the direction turns when the
+    point moves across it: at the speed divided by the radius, but not along the unit vector
+    `straight`; where the radius is unknown, an infinite one (a flat face) is conservative.
 
-    All are views of `table` (P, H, 14), which kernels take. A sensor that sees surfaces and not
-    obstacles has H = 1: what is nearest to each point.
+    All are views of `table` (P, H, 14), which the kernels take. A sensor that measures surfaces and
+    not obstacles has H = 1: the nearest point of a surface.
     """
 
     __slots__ = ("acceleration", "direction", "distance", "radius", "straight", "table", "velocity")
@@ -42,7 +42,7 @@ class Pairs:
 
 
 def measure_pairs(pairs: Pairs, points: Array, obstacles: Obstacles) -> None:
-    """Fill Pairs from known geometry: points (P, 3) [m] against obstacles where they are now."""
+    """Fill Pairs from known geometry: points (P, 3) [m] against the current obstacles."""
     _measure(points, obstacles.table, obstacles.motion, pairs.table)
 
 

@@ -1,4 +1,4 @@
-"""Magnitude of the repulsive vector, eq. (23) in a form for which (24) holds."""
+"""Magnitude of the repulsive vector, eq. (23), in a form for which (24) holds."""
 
 # mypy: disable-error-code="no-untyped-def"
 
@@ -40,7 +40,7 @@ class Repulsion:
         return float(repulsion(distance, self.maximum, self.reach, self.shape, self.scale))
 
     def packed(self) -> tuple[float, float, float, float]:
-        """(maximum, reach, shape, scale), as the kernels take it."""
+        """(maximum, reach, shape, scale) for the kernels."""
         return self.maximum, self.reach, self.shape, self.scale
 
 

@@ -1,4 +1,4 @@
-"""Capsules fixed to the links of a robot, and how near two of them are."""
+"""Capsules fixed to the links of a robot, and the distances between them."""
 
 # mypy: disable-error-code="no-untyped-def"
 
@@ -24,10 +24,10 @@ ON_AXIS = 1e-12  # [m] axes that meet have no direction between them
 
 @dataclass(frozen=True)
 class Capsule:
-    """All within `radius` [m] of the segment from `start` to `end` (3,) [m].
+    """All points within `radius` [m] of the segment from `start` to `end` (3,) [m].
 
-    It is fixed to the body that `joint` (an index, 0 for what does not move) moves, in its frame.
-    A segment of length zero is a ball.
+    The segment is in the frame of the body that `joint` (an index, 0 for the fixed base) moves. A
+    segment of length zero makes a ball.
     """
 
     name: str
@@ -47,15 +47,15 @@ class Capsule:
 
 
 def pairs_of_chain(capsules: Sequence[Capsule]) -> tuple[tuple[int, int], ...]:
-    """Every pair (i, j) of a chain of capsules but neighbours, which share a joint."""
+    """Every pair (i, j) of a chain of capsules, except neighbours, which share a joint."""
     return tuple((i, j) for i, j in combinations(range(len(capsules)), 2) if j > i + 1)
 
 
 def pairs_of_tree(capsules: Sequence[Capsule], parents: Sequence[int]) -> list[tuple[int, int]]:
-    """Every pair (i, j) of capsules on a tree of joints, but those on one joint and neighbours.
+    """Every pair (i, j) of capsules on a tree of joints, except neighbours and those on one joint.
 
-    `parents` has the joint that carries each joint. Neighbours are a capsule and those on the
-    nearest joint below that has any, down to the base.
+    `parents` has the joint that carries each joint. Neighbours of a capsule are those on the
+    nearest joint toward the base that has any.
     """
     joints = {capsule.joint for capsule in capsules}
 
@@ -72,7 +72,7 @@ def pairs_of_tree(capsules: Sequence[Capsule], parents: Sequence[int]) -> list[t
 
 
 def pack_capsules(capsules: Sequence[Capsule]) -> tuple[NDArray[np.int64], Array]:
-    """Joints (K,), and start, start to end, radius (K, 7) [m] of capsules, for the kernels."""
+    """Joints (K,), and start, end - start, radius (K, 7) [m] of capsules, for the kernels."""
     joints = np.array([capsule.joint for capsule in capsules], dtype=np.int64)
     rows = [[*c.start, *np.subtract(c.end, c.start), c.radius] for c in capsules]
     return joints, np.array(rows, dtype=float).reshape(-1, 7)
@@ -80,11 +80,11 @@ def pack_capsules(capsules: Sequence[Capsule]) -> tuple[NDArray[np.int64], Array
 
 def measure_capsules(placements: Array, joints: NDArray[np.int64], capsules: Array,
                      pairs: NDArray[np.int64]) -> Array:
-    """How near the capsules of each pair are: (M, 6).
+    """Return distance, direction and nearest points of each pair of capsules: (M, 6).
 
-    A row is the distance [m], negative where they overlap; the unit direction from the second to
-    the first; and the shares of their axes, 0 at the start and 1 at the end, at which the nearest
-    points lie. placements as in a State; joints (K,), capsules (K, 7) packed; pairs (M, 2).
+    A row is the distance [m], negative where the capsules overlap; the unit vector from the second
+    to the first; and the positions of the nearest points on the two axes, 0 at the start and 1 at
+    the end. placements as in a State; joints (K,) and capsules (K, 7) packed; pairs (M, 2).
     """
     seen = np.empty((len(pairs), 6))
     _measure(placements, joints, capsules, pairs, seen)
@@ -103,7 +103,7 @@ def _measure(placements, joints, capsules, pairs, seen):
 
 @inlined
 def nearest_of_capsules(T_a, a, T_b, b):
-    """Distance, direction from b to a, and shares s, t of the axes; see `measure_capsules`."""
+    """Distance, direction from b to a, and positions s, t on the axes; see `measure_capsules`."""
     ux, uy, uz = turned(T_a, a)
     wx, wy, wz = turned(T_b, b)
     ax, ay, az = place(T_a, a[0], a[1], a[2])
@@ -122,10 +122,10 @@ def nearest_of_capsules(T_a, a, T_b, b):
 
 @inlined
 def nearest_shares(uu, uw, ww, ux, wx):
-    """The s, t in 0 .. 1 that make |x + s u - t w|^2 least, from the products of x, u and w.
+    """The s, t in 0 .. 1 that minimise |x + s u - t w|^2, from the products of x, u and w.
 
-    That is convex in s and t: its least value lies inside the square, or else on one of the four
-    edges. Of parallel axes side by side, which have many nearest points, one at an end is taken.
+    The function is convex in s and t: its minimum lies inside the square or on one of the four
+    edges. For parallel axes side by side, which have many nearest points, one at an end is taken.
     """
     determinant = uu * ww - uw * uw
     if determinant > _PARALLEL * uu * ww:
@@ -146,15 +146,18 @@ def nearest_shares(uu, uw, ww, ux, wx):
 
 
 @inlined
-def bend_of_nearest(length, rx, ry, rz, vx, vy, vz, ux, uy, uz, dux, duy, duz, s,
-                    wx, wy, wz, dwx, dwy, dwz, t):
-    """What is left of the second derivative of the distance of two axes, beside r . acceleration.
+def bend_of_nearest(length, r, v, a_axis, b_axis):
+    """Second derivative of the distance of two axes, less r . acceleration.
 
-    length [m] between the nearest points; r from b to a; v the velocity of the one relative to the
-    other, both fixed to their bodies; u, w the axes, du, dw their time derivatives. Where the
-    nearest points are free to slide (0 < s < 1) the distance is the least over s and t, and its
-    second derivative by a Schur complement: less than that of fixed points.
+    length [m] is the distance of the nearest points; r points from b to a; v is the velocity of a
+    relative to b, both taken as fixed to their bodies. An axis is its vector (u or w), the time
+    derivative of that vector, and the position (s or t) of the nearest point. Where the nearest
+    points can slide (0 < s < 1) the distance is the minimum over s and t, and its second derivative
+    follows from a Schur complement: less than that of fixed points.
     """
+    (rx, ry, rz), (vx, vy, vz) = r, v
+    (ux, uy, uz), (dux, duy, duz), s = a_axis
+    (wx, wy, wz), (dwx, dwy, dwz), t = b_axis
     along = dot(rx, ry, rz, vx, vy, vz)
     bend = (dot(vx, vy, vz, vx, vy, vz) - along * along) / length
     H_ss = dot(ux, uy, uz, ux, uy, uz) / length
@@ -182,7 +185,7 @@ def turned(T, capsule):
 
 @inlined
 def dot(ax, ay, az, bx, by, bz):
-    """Product of two vectors."""
+    """Scalar product of two vectors."""
     return ax * bx + ay * by + az * bz
 
 

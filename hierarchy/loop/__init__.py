@@ -1,8 +1,8 @@
-"""A loop for hardware of one's own: fixed period, overruns, watchdog, a log of every tick.
+"""A control loop for your hardware: fixed period, overruns, watchdog, and a log of every tick.
 
-No robot's interface is assumed: what to compute, how to send it and how to stop safely are the
-user's functions. This is Python on an ordinary operating system: the period is kept as well as the
-log says, and a stop by the robot's own controller is still needed.
+No robot interface is assumed: the user provides functions that compute the command, send it and
+stop safely. This is Python on an ordinary operating system: the log shows how well the period is
+kept, and the robot's own controller must be able to stop it.
 """
 
 from hierarchy.loop.fixed_period import Loop

@@ -1,4 +1,4 @@
-"""The loop itself: planned times, overruns, priority, and how it ends."""
+"""The loop: planned times, overruns, priority, and how it ends."""
 
 from __future__ import annotations
 
@@ -20,21 +20,19 @@ OVERRUNS = ("skip", "catch up", "stop")
 
 
 class Loop:
-    """Runs a function at a fixed period, by planned times that do not drift.
+    """Runs a function at a fixed period, at planned times that do not drift.
 
     period : [s].
-    overrun : what follows a tick that ends after the next was to begin. "skip" goes on with the
-        next planned time to come; "catch up" runs missed ticks at once, the last `behind` of them,
-        and skips the others; "stop" ends the loop.
-    watchdog : [s] without the end of a tick after which `safe_stop` is called from another thread,
-        and the loop ends; None for none.
-    spin : [s] before a planned time from which the clock is watched instead of sleeping: more
-        punctual, at the price of a core.
-    priority : of SCHED_FIFO (Linux), None to leave it. Where it is not permitted the log says so.
-    pause_gc : whether Python's garbage collector rests while the loop runs.
-    clock, sleep : others for tests.
-
-    `log` is that of the last run, also where it ended in an exception.
+    overrun : what to do if a tick ends after the planned start of the next. "skip" continues at the
+        next planned time; "catch up" runs the last `behind` missed ticks at once and skips the
+        others; "stop" ends the loop.
+    watchdog : time [s] without the end of a tick after which `safe_stop` is called from another
+        thread and the loop ends; None for no watchdog.
+    spin : time [s] before a planned time during which the loop polls the clock instead of sleeping:
+        more accurate, but it occupies a core.
+    priority : of SCHED_FIFO (Linux), None to leave it. If it is not permitted, the log says so.
+    pause_gc : whether Python's garbage collector is off while the loop runs.
+    clock, sleep : replacements for tests. `log` is that of the last run, even after an exception.
     """
 
     def __init__(self, period: float, *, overrun: Overrun = "skip", behind: int = 10,
@@ -57,12 +55,12 @@ class Loop:
             send: Callable[[Any], object] | None = None, record: int = 0) -> Log:
         """Call `send(step(t))` every period for `duration` [s], then `safe_stop()`.
 
-        t [s] is the planned time of the tick since the loop began. Without `send`, `step` sends by
-        itself. `record` is the size of the commands to keep in the log.
+        t [s] is the planned time of the tick since the start of the loop. Without `send`, `step`
+        sends the command itself. `record` is the size of the commands to keep in the log.
 
-        However the loop ends, `safe_stop` is called: once; a second time if the watchdog called it
-        and a command may have been sent since. An exception of any of the functions, and Ctrl-C,
-        goes on to the caller after that.
+        `safe_stop` is called however the loop ends: once, and a second time if the watchdog called
+        it and a command may have been sent since. An exception in any of the functions, or Ctrl-C,
+        then propagates to the caller.
         """
         _require(0.0 < duration < np.inf, f"duration {duration} s must be positive and finite")
         ticks = max(1, round(duration / self.period))
@@ -86,19 +84,19 @@ class Loop:
 
     def _run(self, step: Callable[[float], Any], safe_stop: Callable[[], object],
              send: Callable[[Any], object] | None, ticks: int, dog: Watchdog) -> str:
-        """Go through the ticks; return why it ended."""
+        """Run the ticks; return why the loop ended."""
         start, tick = self.clock(), 0
         while tick < ticks:
             planned = start + tick * self.period
             self._wait(planned)
-            begin = self.clock()
+            started = self.clock()
             command = step(tick * self.period)
             if send is not None:
                 if dog.fired:
                     return f"the watchdog fired in tick {tick}"
                 send(command)
             end = self.clock()
-            self.log.write(tick, begin - planned, end - begin, command)
+            self.log.write(tick, started - planned, end - started, command)
             if dog.fired:
                 _stop_again(dog, safe_stop)
                 return f"the watchdog fired in tick {tick}"
@@ -110,10 +108,10 @@ class Loop:
         return "all ticks were run"
 
     def _next(self, tick: int, late: float) -> int:
-        """Return the tick that follows one that ended `late` [s] after it was to begin."""
+        """Return the tick to run after one that ended `late` [s] after the start of the next."""
         if late <= 0.0:
             return tick + 1
-        missed = tick + 1 + int(late / self.period)  # the last whose time has passed
+        missed = tick + 1 + int(late / self.period)  # the last whose planned time has passed
         return missed + 1 if self.overrun == "skip" else max(tick + 1, missed + 1 - self.behind)
 
     def _wait(self, until: float) -> None:
@@ -124,7 +122,7 @@ class Loop:
 
 
 def _stop_again(dog: Watchdog, safe_stop: Callable[[], object]) -> None:
-    """Stop what a command may have set going after the watchdog stopped it."""
+    """Stop motion that a command may have started after the watchdog stopped the robot."""
     if dog.fired:
         dog.settle()
         safe_stop()
@@ -132,7 +130,7 @@ def _stop_again(dog: Watchdog, safe_stop: Callable[[], object]) -> None:
 
 @contextmanager
 def _quiet(pause_gc: bool, priority: int | None, notes: list[str]) -> Iterator[None]:
-    """Keep the garbage collector and other processes from the loop, as far as allowed."""
+    """Turn the garbage collector off and raise the priority, as far as permitted."""
     before = _raise_priority(priority, notes)
     collecting = pause_gc and gc.isenabled()
     if collecting:
@@ -150,7 +148,7 @@ def _quiet(pause_gc: bool, priority: int | None, notes: list[str]) -> Iterator[N
 
 
 def _raise_priority(priority: int | None, notes: list[str]) -> tuple[int, Any] | None:
-    """Take SCHED_FIFO and return what was before, or None with a note why not."""
+    """Set SCHED_FIFO and return the previous setting, or None with a note on why not."""
     if priority is None:
         return None
     try:

@@ -1,4 +1,4 @@
-"""What became of every tick of a loop."""
+"""Log of every tick of a loop."""
 
 from __future__ import annotations
 
@@ -13,11 +13,12 @@ PERCENTILES = {"median": 50.0, "p95": 95.0, "p99.9": 99.9, "max": 100.0}
 
 
 class Log:
-    """What became of each tick that was run; room for all is made before the loop begins.
+    """Times and commands of each tick that ran; memory is allocated before the loop starts.
 
-    tick (K,) its number by plan, which jumps where ticks were skipped; late (K,) [s] how long after
-    its planned time it began; duration (K,) [s] until its command was sent; command (K, n) if asked
-    for. `ended` says why the loop ended, `notes` what could not be done as asked.
+    tick (K,) is the planned number, which jumps where ticks were skipped; late (K,) [s] the delay
+    of the start after its planned time; duration (K,) [s] the time until the command was sent;
+    command (K, n) if recorded. `ended` says why the loop ended, `notes` which settings could not be
+    applied.
     """
 
     def __init__(self, period: float, ticks: int, width: int = 0) -> None:
@@ -28,7 +29,7 @@ class Log:
         self._command = np.full((ticks, width), np.nan)
 
     def write(self, tick: int, late: float, duration: float, command: Any) -> None:
-        """Note one tick."""
+        """Record one tick."""
         k = self.count
         self._tick[k], self._times[k] = tick, (late, duration)
         if self._command.shape[1]:
@@ -37,32 +38,32 @@ class Log:
 
     @property
     def tick(self) -> NDArray[np.int64]:
-        """Number of each tick by plan: (K,)."""
+        """Planned number of each tick: (K,)."""
         return self._tick[:self.count]
 
     @property
     def late(self) -> Array:
-        """How late each tick began: (K,) [s]."""
+        """Delay of the start of each tick: (K,) [s]."""
         return self._times[:self.count, 0]
 
     @property
     def duration(self) -> Array:
-        """How long each tick took: (K,) [s]."""
+        """Duration of each tick: (K,) [s]."""
         return self._times[:self.count, 1]
 
     @property
     def command(self) -> Array:
-        """What each tick sent: (K, n)."""
+        """Command of each tick: (K, n)."""
         return self._command[:self.count]
 
     @property
     def overruns(self) -> int:
-        """Number of ticks that ended after the next one was to begin."""
+        """Number of ticks that ended after the planned start of the next one."""
         return int(np.count_nonzero(self.late + self.duration > self.period))
 
     @property
     def skipped(self) -> int:
-        """Number of ticks that were left out, up to the last that was run."""
+        """Number of ticks that were skipped, up to the last that ran."""
         return int(self.tick[-1] + 1 - self.count) if self.count else 0
 
     def summary(self) -> dict[str, dict[str, float]]:
@@ -72,7 +73,7 @@ class Log:
                 for name, values in (("late", self.late), ("duration", self.duration))}
 
     def arrays(self) -> dict[str, NDArray[Any]]:
-        """Return the log by name, for `numpy.savez`."""
+        """Return the arrays of the log by name, for `numpy.savez`."""
         return {"tick": self.tick, "late": self.late, "duration": self.duration,
                 "command": self.command}
 

@@ -1,4 +1,4 @@
-"""A thread that stops a robot when the loop that moves it hangs."""
+"""A thread that stops a robot when its control loop hangs."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from threading import Event, Lock, Thread
 
 
 class Watchdog:
-    """Calls `stop` once if it is not fed for `limit` [s]; in a thread, while it is entered.
+    """Context manager that calls `stop` once, in a thread, if not fed for `limit` [s].
 
-    The thread is one of this process: it cannot act while compiled code holds the interpreter.
+    The thread belongs to this process: it cannot act while compiled code holds the interpreter.
     """
 
     def __init__(self, limit: float, stop: Callable[[], object],
@@ -22,11 +22,11 @@ class Watchdog:
         self._thread = Thread(target=self._watch, name="watchdog", daemon=True)
 
     def feed(self) -> None:
-        """Say that all is well now."""
+        """Reset the timer."""
         self._fed = self._clock()
 
     def check(self) -> bool:
-        """Call `stop` if it is time and was not done; return whether it was done."""
+        """Call `stop` if the limit has passed; return whether it has been called."""
         if not self.fired and self._clock() - self._fed > self.limit:
             self.fired = True
             try:
@@ -37,7 +37,7 @@ class Watchdog:
         return self.fired
 
     def settle(self) -> None:
-        """Wait until `stop` has returned, but no longer than the limit."""
+        """Wait until `stop` has returned, for at most the limit."""
         self._stopped.wait(self.limit)
 
     def __enter__(self) -> Watchdog:
@@ -55,13 +55,13 @@ class Watchdog:
 
 
 class Once:
-    """A function that is called the first time only, from whatever thread."""
+    """A function that runs only the first time it is called, from any thread."""
 
     def __init__(self, function: Callable[[], object]) -> None:
         self._function, self._lock, self._done = function, Lock(), False
 
     def __call__(self) -> None:
-        """Call it, unless that was done."""
+        """Call the function unless it has already been called."""
         with self._lock:
             first, self._done = not self._done, True
         if first:

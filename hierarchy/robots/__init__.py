@@ -1,6 +1,7 @@
-"""Where robots come from: our tables, URDF and MJCF files, packages of such files.
+"""Sources of robots: our tables, URDF and MJCF files, packages of such files.
 
-Beside `hierarchy.robot` only the readers here call pinocchio; `Found` is what they give it.
+Besides `hierarchy.robot` and `hierarchy.state` only the readers here call pinocchio; they return
+`Found`.
 """
 
 from hierarchy.robots.capsules import link_capsules

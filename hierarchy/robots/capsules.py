@@ -9,11 +9,11 @@ from hierarchy.robots.table import Table, TreeTable
 
 
 def link_capsules(table: Table, foot: float = 0.0, base: int | None = None) -> tuple[Capsule, ...]:
-    """Capsules of a robot given as a table: of an arm each link from its joint to the next.
+    """Capsules of a robot given as a table; for an arm, each link from its joint to the next.
 
-    Links of length zero are left out: their neighbours cover them. With `foot` > 0 [m] the first
-    capsule of an arm is the column from there below the base frame up to it. Each touches the next.
-    `base` is the index of the joint that the base moves with, None for that of the table's base.
+    Links of length zero are omitted because their neighbours cover them. With `foot` > 0 [m] the
+    first capsule of an arm is a column from that far below the base frame up to it. Each touches
+    the next. `base` is the index of the joint that moves the base, None for that of the table.
     """
     if isinstance(table, TreeTable):
         return _tree_capsules(table, int(table.base == "floating") if base is None else base)
@@ -35,6 +35,6 @@ def _tree_capsules(table: TreeTable, base: int) -> tuple[Capsule, ...]:
 
 
 def _numbered(names: Sequence[str], k: int) -> str:
-    """The k-th name, with a number from the second of its kind on."""
+    """The k-th name, numbered from its second occurrence on."""
     before = names[:k].count(names[k])
     return f"{names[k]} {before + 1}" if before else names[k]

@@ -1,8 +1,8 @@
-"""Two arms of seven joints on a torso that turns: 15 joints, of plausible numbers.
+"""Generic robot with two arms of seven joints on a rotating torso: 15 joints, plausible numbers.
 
 The torso's axis is z of the world at the origin; the shoulders are 0.25 m to its left (y) and
-right, 0.9 m up. Arms are 0.3 m and 0.3 m long, hands 0.1 m; they hang down at zero. Nothing of it
-is any robot in particular.
+right, 0.9 m up. Arms are 0.3 m and 0.3 m long, hands 0.1 m; they hang down at zero. It models no
+particular robot.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Models and shapes out of URDF and MJCF files; a mesh that is missing is said, not fatal."""
+"""Models and shapes from URDF and MJCF files; a missing mesh is reported and not an error."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ def read_file(path: str | Path, base: Base | None = None, shapes: bool = True,
               locked: Mapping[str, float] = MappingProxyType({})) -> Found:
     """Read a robot from a URDF (.urdf) or MJCF (.xml, .mjcf) file.
 
-    `base` None takes what the file has: fixed for a URDF, floating for an MJCF whose first body
-    has a free joint. Without `shapes` no collision geometry is looked for. `locked` joints are held
-    at an angle [rad] or a way [m]. Raises RobotError for a file that cannot be read.
+    `base` None takes that of the file: fixed for a URDF, floating for an MJCF whose first body has
+    a free joint. Without `shapes` no collision geometry is read. `locked` joints are fixed at a
+    position [rad or m]. Raises RobotError if the file cannot be read.
     """
     path = Path(path)
     if not path.is_file():
@@ -39,7 +39,7 @@ def read_file(path: str | Path, base: Base | None = None, shapes: bool = True,
     urdf = path.suffix == ".urdf"
     try:
         model = _urdf_model(path, base) if urdf else _mjcf_model(path, base)
-    except Exception as error:  # the parsers raise many kinds; all mean the file is bad
+    except Exception as error:  # the parsers raise many types; all mean an invalid file
         raise RobotError(f"robot file {str(path)!r} cannot be read: {_in_one_line(error)}"
                          ) from error
     model = _without(model, locked, str(path))
@@ -53,7 +53,7 @@ def read_file(path: str | Path, base: Base | None = None, shapes: bool = True,
 
 
 def _without(model: Any, locked: Mapping[str, float], file: str) -> Any:
-    """Return the model without the joints that are locked."""
+    """Return the model without the locked joints."""
     if not locked:
         return model
     q, indices = np.array(pin.neutral(model)), []
@@ -87,12 +87,12 @@ Shapes = Callable[[Path, Any, bool], tuple[Any, list[str]]]
 
 
 def _geometry(path: Path, model: Any, read: Shapes) -> tuple[Any, list[str]]:
-    """Return collision geometries; without any mesh, or none at all, where the file fails."""
+    """Return collision geometries; without meshes, or none at all, if they cannot be read."""
     said: list[str] = []
     for meshes in (True, False):
         try:
             geometries, missing = read(path, model, meshes)
-        except Exception as error:  # coal and assimp raise many kinds
+        except Exception as error:  # coal and assimp raise many types
             what = "meshes" if meshes else "collision geometry"
             said.append(f"the {what} cannot be read: {_in_one_line(error)}")
         else:
@@ -108,7 +108,7 @@ def _in_one_line(error: Exception) -> str:
 
 
 def _urdf_shapes(path: Path, model: Any, meshes: bool) -> tuple[Any, list[str]]:
-    """Read the text with each mesh's path made absolute, and without those that are not there."""
+    """Read a copy of the text with absolute mesh paths and without the missing meshes."""
     root, missing = ElementTree.parse(path).getroot(), []
     for link in root.iter("link"):
         for collision in link.findall("collision"):
@@ -129,10 +129,10 @@ def _urdf_shapes(path: Path, model: Any, meshes: bool) -> tuple[Any, list[str]]:
 
 
 def _mesh_file(name: str, path: Path) -> Path | None:
-    """Return the file of a mesh that a URDF names, or None where there is none.
+    """Return the file of a mesh that a URDF names, or None if it does not exist.
 
-    "package://NAME/..." is looked for in the folders above the URDF: one called NAME, or one that
-    has it in it.
+    "package://NAME/..." is searched for in the folders above the URDF: one called NAME, or one that
+    contains it.
     """
     if not name.startswith("package://"):
         file = path.parent / name.removeprefix("file://")
@@ -146,7 +146,7 @@ def _mesh_file(name: str, path: Path) -> Path | None:
 
 
 def _mjcf_shapes(path: Path, model: Any, meshes: bool) -> tuple[Any, list[str]]:
-    """Read a copy whose mesh folder is absolute, and without the meshes that are not there."""
+    """Read a copy with an absolute mesh folder and without the missing meshes."""
     root, missing = ElementTree.parse(path).getroot(), []
     compiler = root.find("compiler")
     if compiler is None:
@@ -172,6 +172,6 @@ def _mjcf_shapes(path: Path, model: Any, meshes: bool) -> tuple[Any, list[str]]:
 
 
 def _held_by(model: Any, capsules: tuple[Any, ...]) -> tuple[Any, ...]:
-    """Leave out what belongs to no joint of the model, or has no size."""
+    """Omit capsules that belong to no joint of the model or have no size."""
     return tuple(c for c in capsules if 0 <= c.joint < model.njoints
                  and (c.radius > 0.0 or not np.array_equal(c.start, c.end)))

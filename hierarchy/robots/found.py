@@ -1,4 +1,4 @@
-"""What is known of a robot before it is one."""
+"""What a reader of a file or a table finds about a robot."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from hierarchy.problem import Array
 
 @dataclass(frozen=True)
 class Found:
-    """A pinocchio model, its shape, and what could not be found.
+    """A pinocchio model, its shapes, and what is missing.
 
-    `end_effector` is a frame's name; `rest` (nq,) the configuration in which it starts, or None;
-    `missing` are sentences. `control_points` is None where they are to be proposed.
+    `end_effector` is a frame's name; `rest` (nq,) the default initial configuration, or None;
+    `missing` are sentences. `control_points` is None if they are to be proposed.
     """
 
     model: Any
@@ -34,7 +34,10 @@ def is_floating(model: Any) -> bool:
 
 
 def neutral_within_limits(model: Any, neutral: Array) -> Array:
-    """Return `neutral` (nq,) with each single coordinate that is beyond its limits put midway."""
+    """Return `neutral` (nq,) with each coordinate of one-coordinate joints moved inside its limits.
+
+    A coordinate outside finite limits goes to their middle, else to the nearer limit.
+    """
     q = np.array(neutral)
     for joint in model.joints[1:]:
         if joint.nq == joint.nv == 1:

@@ -19,7 +19,7 @@ ROOT = "root_joint"
 
 
 def from_table(table: Table, base: Base | None = None) -> Found:
-    """Make the model of a table; `base` goes before the table's own."""
+    """Make the model of a table; `base` overrides that of the table."""
     if isinstance(table, DHTable):
         return _from_chain(table, base or "fixed")
     return _from_tree(table, base or table.base)
@@ -98,11 +98,11 @@ def _capsule_inertia(link: Link) -> Any:
     if link.mass == 0.0:
         return pin.Inertia.Zero()
     start, end = np.array(link.start), np.array(link.end)
-    way = end - start
-    length = float(np.linalg.norm(way))
+    segment = end - start
+    length = float(np.linalg.norm(segment))
     across = link.mass * (3 * link.radius**2 + (length + 2 * link.radius) ** 2) / 12
     along = link.mass * link.radius**2 / 2
-    axis = way / length if length > 0.0 else np.array([0.0, 0.0, 1.0])
+    axis = segment / length if length > 0.0 else np.array([0.0, 0.0, 1.0])
     inertia = across * np.eye(3) + (along - across) * np.outer(axis, axis)
     return pin.Inertia(link.mass, (start + end) / 2, inertia)
 

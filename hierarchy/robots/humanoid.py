@@ -1,9 +1,9 @@
-"""A humanoid of the size of Romeo: 30 joints on a floating base, 1.45 m and 40 kg.
+"""Generic humanoid of the size of Romeo: 30 joints on a floating base, 1.45 m and 40 kg.
 
 Lengths and masses of the segments are shares of height and mass: Drillis and Contini's, as in
 D. A. Winter, Biomechanics and Motor Control of Human Movement. Radii, ranges, speeds and torques
-of the joints are plausible round numbers of no robot in particular. The base frame is between the
-hips, x forward, y left, z up; the soles are at z = 0 of the world in the upright posture.
+of the joints are plausible round numbers and model no particular robot. The base frame is between
+the hips, x forward, y left, z up; the soles are at z = 0 of the world in the upright posture.
 """
 
 from __future__ import annotations

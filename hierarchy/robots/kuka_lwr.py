@@ -19,7 +19,7 @@ def _letters_eight_points() -> tuple[tuple[str, tuple[float, float, float]], ...
     """Points 1-4 from the elbow back over half the upper arm, 5-8 from the wrist to the elbow.
 
     An upper-arm point lies on the axis of joint 3 and a forearm point on that of joint 5, which
-    do not move it: each is attached to the link before, whose y axis is that axis.
+    do not move it: each is attached to the previous link, whose y axis is that axis.
     """
     upper = [_UPPER_ARM - i / 4 * 0.2 for i in range(4)]
     fore = [_FOREARM - i / 4 * _FOREARM for i in range(4)]

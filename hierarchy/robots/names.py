@@ -1,4 +1,4 @@
-"""Robots by the name that a package of robot descriptions gives them."""
+"""Robots by their names in packages of robot descriptions."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ _REMEDY = "pip install 'task-hierarchy[robots]'"
 
 
 def in_package(model: str) -> bool:
-    """Whether `model` is "package:name" with a package known here."""
+    """Whether `model` is "package:name" with a known package."""
     return model.partition(":")[0] in PACKAGES and ":" in model
 
 
 def file_of(model: str) -> Path:
     """Return the URDF or MJCF file of "example_robot_data:NAME" or "robot_descriptions:NAME".
 
-    Raises RobotError where the package is not installed, or its file cannot be had, and
-    UnknownNameError for a name that it does not have.
+    Raises RobotError if the package is not installed or its file is not available, and
+    UnknownNameError for an unknown name.
     """
     package, _, name = model.partition(":")
     finder = {"example_robot_data": _in_example_robot_data,
@@ -32,7 +32,7 @@ def file_of(model: str) -> Path:
 
 
 def _in_example_robot_data(name: str) -> Path:
-    """Names are those of its URDF files, without the ending."""
+    """Names are those of its URDF files, without the suffix."""
     try:
         files = distribution("example-robot-data").files or []
     except PackageNotFoundError as error:

@@ -1,4 +1,4 @@
-"""What is proposed where a file does not say it: end effector and control points."""
+"""Proposals where a file does not say: end effector and control points."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ import numpy as np
 from hierarchy.avoidance.control_points import ControlPoint
 from hierarchy.problem import Array
 
-COUNT = 8            # control points that are proposed
-FIRST_MOVED_BY = 3   # the joint of the chain, counted from 1, from whose origin on they lie
+COUNT = 8            # number of proposed control points
+FIRST_MOVED_BY = 3   # they start at the origin of this joint of the chain, counted from 1
 _NAMED_SO = re.compile(r"(^|[_\W])(tcp|tool\d*|eef?|end_?effector|gripper|flange)($|[_\W])",
                        re.IGNORECASE)
 
 
 def proposed_end_effector(model: Any) -> str:
-    """Return the last frame whose name is usual for a tool's, or the last that most joints move.
+    """Return the last frame with a common name of a tool, or the last that most joints move.
 
-    Usual are tcp, tool, ee, eef, end_effector, gripper and flange, as a part between underscores;
-    a frame that no joint moves does not count, and a joint's own frame neither.
+    Common names are tcp, tool, ee, eef, end_effector, gripper and flange, between underscores;
+    frames that no joint moves do not count, nor do the frames of joints.
     """
     frames = list(model.frames)
     joints = set(model.names)
@@ -38,9 +38,9 @@ def points_along_chain(model: Any, end_effector: str, count: int = COUNT,
                        first: int = FIRST_MOVED_BY) -> tuple[ControlPoint, ...]:
     """Return points spread evenly over the chain that carries the end effector.
 
-    The chain is the line through the origins of its joints, from the joint number `first` of those
-    that carry it on (a floating base does not count) to the end effector, which itself is left
-    out: sensors measure it anyway. A point between two origins is fixed to the joint before it.
+    The chain is the line through the origins of its joints, from joint number `first` of those that
+    carry it (a floating base does not count) to the end effector, which is omitted because sensors
+    measure it anyway. A point between two origins is fixed to the joint before it.
     """
     frame = model.frames[model.getFrameId(end_effector)]
     chain = [joint for joint in model.supports[frame.parentJoint].tolist()
@@ -49,21 +49,21 @@ def points_along_chain(model: Any, end_effector: str, count: int = COUNT,
     ends = [np.array(_between(model, a, b)) for a, b in pairwise(chain)]
     ends.append(np.array(frame.placement.translation))
     lengths = np.array([np.linalg.norm(end) for end in ends])
-    begin = np.concatenate([[0.0], np.cumsum(lengths)])
-    if not chain or begin[-1] < 1e-3:
+    starts = np.concatenate([[0.0], np.cumsum(lengths)])
+    if not chain or starts[-1] < 1e-3:
         return ()
     points = []
     for k in range(1, count + 1):
-        at = k * begin[-1] / (count + 1)
-        i = min(int(np.searchsorted(begin, at, side="right")) - 1, len(chain) - 1)
-        offset = ends[i] * ((at - begin[i]) / lengths[i])
+        at = k * starts[-1] / (count + 1)
+        i = min(int(np.searchsorted(starts, at, side="right")) - 1, len(chain) - 1)
+        offset = ends[i] * ((at - starts[i]) / lengths[i])
         points.append(ControlPoint(f"{model.names[chain[i]]} {np.round(offset, 3).tolist()}",
                                    chain[i], offset))
     return tuple(points)
 
 
 def _between(model: Any, joint: int, below: int) -> Array:
-    """Origin of joint `below` in the frame of `joint`, with what is between at zero."""
+    """Origin of joint `below` in the frame of `joint`, with the joints between them at zero."""
     placement = model.jointPlacements[below]
     parent = model.parents[below]
     while parent != joint:

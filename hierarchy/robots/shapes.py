@@ -10,13 +10,13 @@ import numpy as np
 from hierarchy.avoidance.self_collision import Capsule, Vector
 from hierarchy.problem import Array
 
-_AROUND = 24  # points on the rim of a circle
+_AROUND = 24  # points on a circle
 _CORNERS: Array = np.array(list(product((-1.0, 1.0), repeat=3)))
-_MOST = 2000  # vertices of a mesh that are looked at first, to choose the axis
+_MOST = 2000  # vertices of a mesh that are used to choose the axis
 
 
 def capsules_of(geometries: Any) -> tuple[tuple[Capsule, ...], tuple[str, ...]]:
-    """Return a capsule around each collision geometry, and sentences on those that have none."""
+    """Return a capsule around each collision geometry, and sentences on those without one."""
     capsules, left_out = [], []
     for geometry in geometries:
         name, kind = str(geometry.name), type(geometry.geometry).__name__
@@ -66,8 +66,8 @@ def _points_of(shape: Any, kind: str) -> Array | None:
 def bounding_capsule(points: Array) -> tuple[Array, Array, float]:
     """Return start (3,), end (3,) and radius [m] of a capsule that contains points (N, 3).
 
-    Of the axes x, y, z and the three principal ones of the points, through the middle of their
-    extent, that whose capsule has the least volume. It is not the smallest of all capsules.
+    Its axis is the one of x, y, z and the three principal axes of the points, through the middle of
+    their extent, whose capsule has the least volume. It is not the smallest of all capsules.
     """
     few = points[::max(1, len(points) // _MOST)]
     centred = few - few.mean(axis=0)
@@ -94,7 +94,7 @@ def _around(points: Array, axis: Array) -> tuple[Array, Array, float]:
 
 
 def _across(axis: Array) -> Array:
-    """Two unit vectors (2, 3) at right angles to an axis."""
+    """Two unit vectors (2, 3) perpendicular to an axis and to each other."""
     other = np.eye(3)[int(np.argmin(np.abs(axis)))]
     first = np.cross(axis, other)
     first /= np.linalg.norm(first)

@@ -13,10 +13,10 @@ Base = Literal["fixed", "floating"]
 class DHTable:
     """Standard Denavit-Hartenberg parameters: T_i = Rz(q_i) Tz(d_i) Tx(a_i) Rx(alpha_i).
 
-    One entry a joint: a, d [m], alpha [deg]; position limits +-`range` [deg]; `velocity` [rad/s];
-    `effort` limits [N m]; `mass` [kg] of the link that the joint moves. Each link is taken as a
+    One entry per joint: a, d [m], alpha [deg]; position limits +-`range` [deg]; `velocity` [rad/s];
+    `effort` limits [N m]; `mass` [kg] of the link that the joint moves. Each link is a
     uniform rod of radius `radius` [m] between its joint and the next. `control_points` are (joint,
-    offset [m] along the joint's own z axis measured from its DH origin, ...): see `ControlPoint`.
+    offset (3,) [m] in the joint's frame).
     """
 
     name: str
@@ -33,10 +33,10 @@ class DHTable:
 
 @dataclass(frozen=True)
 class Link:
-    """What a joint moves: a uniform capsule of `mass` [kg] and `radius` [m] from `start` to `end`.
+    """The body that a joint moves: a uniform capsule of `mass` [kg] and `radius` [m].
 
-    Both (3,) [m] in the joint's frame. A link of mass 0 has no shape: its joint shares an origin
-    with the next one.
+    It goes from `start` to `end` (3,) [m] in the joint's frame. A link of radius 0 has no shape;
+    its joint shares an origin with the next one.
     """
 
     end: Vector = (0.0, 0.0, 0.0)
@@ -52,7 +52,7 @@ class TreeJoint:
     `parent` is a joint further up in the table, "" the base; `at` (3,) [m] is the joint's origin in
     the parent's frame, whose axes it has at angle zero; `axis` is "x", "y" or "z" of that frame.
     `range` (lower, upper) [deg], `velocity` [rad/s], `effort` [N m]; `rest` [deg] is the angle of
-    the posture in which the robot starts if nothing else is said.
+    the default initial configuration.
     """
 
     name: str
@@ -81,7 +81,7 @@ class TreeFrame:
 
 @dataclass(frozen=True)
 class TreeTable:
-    """A robot of revolute joints that branch; parents come before their children.
+    """A robot with a tree of revolute joints; parents come before their children.
 
     `base` "floating" gives it six more velocities, those of the base's own frame, which is at
     `base_height` [m] above the world's origin at the start. `links` are further shapes as (joint,
@@ -102,7 +102,7 @@ Table = DHTable | TreeTable
 
 
 def in_words(table: Table) -> str:
-    """Return what a table is, for a list of robots."""
+    """Describe a table in a list of robots."""
     if isinstance(table, DHTable):
         return f"an arm of {len(table.d)} joints"
     floating = ", on a floating base" if table.base == "floating" else ""

@@ -1,4 +1,4 @@
-"""Avoidance by a control point of the body: 3-D (28), or relaxed to one row (29)."""
+"""Obstacle avoidance by a control point of the body: 3-D (28), or relaxed to one row (29)."""
 
 # mypy: disable-error-code="no-untyped-def"
 
@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,20 +24,21 @@ from hierarchy.kinematics import (
     write_point_jacobian_derivative,
 )
 from hierarchy.problem import Array
-from hierarchy.robot import State
-from hierarchy.task import BoundTask, Level
+from hierarchy.state import State
+from hierarchy.task import Level, Task
 
 
 @dataclass(frozen=True)
-class Avoidance(BoundTask):
-    """Push the active control point of the measurement away from what is near.
+class Avoidance(Task):
+    """Push the active control point of the measurement away from the nearest obstacle.
 
-    rows = 3: the point's acceleration is the repulsive vector, eqs. (27)-(28). rows = 1: its
-    component along the direction of repulsion is the magnitude, eq. (29). At velocity level the
-    vector is a velocity. With one row the derivative is that of (29), r^T dJ_c/dt: the direction
-    is held, because (29) projects an acceleration and does not differentiate a distance.
+    With rows = 3 the acceleration of the point equals the repulsive vector, eqs. (27)-(28). With
+    rows = 1 its component along the direction of repulsion equals the magnitude, eq. (29). At
+    velocity level the vector is a velocity. With one row the derivative is r^T dJ_c/dt, with the
+    direction held constant, because (29) projects an acceleration and does not differentiate a
+    distance.
 
-    `points` are the control points in the order of the measurement; the task works on
+    `points` are the control points in the order of the measurement; the task acts on
     `measurement.active`, or on the first point while that is -1.
     """
 
@@ -62,7 +63,7 @@ class Avoidance(BoundTask):
         return self.rows
 
     def error(self, state: State) -> Array:
-        """The repulsion (rows,) [m/s^2 or m/s]: this task has no position to reach."""
+        """The repulsion (rows,) [m/s^2 or m/s]; this task has no target position."""
         seen, k = self._seen(state)
         r = seen.magnitude[k]
         return np.array([r]) if self.rows == 1 else np.asarray(r * seen.direction[k])
@@ -79,7 +80,7 @@ class Avoidance(BoundTask):
         """dJ_c/dt (3, n) of the active point, or r^T dJ_c/dt (1, n)."""
         seen, k = self._seen(state)
         dJ = np.empty((3, state.n))
-        write_point_jacobian_derivative(*state.arrays, int(self.joints[k]), self.offsets[k], dJ)
+        write_point_jacobian_derivative(state.kinematics, int(self.joints[k]), self.offsets[k], dJ)
         return dJ if self.rows == 3 else seen.direction[k][None] @ dJ
 
     def reference_velocity(self, state: State) -> Array:
@@ -90,12 +91,12 @@ class Avoidance(BoundTask):
         """The repulsion as an acceleration (rows,) [m/s^2], eqs. (28)-(29)."""
         return self.error(state)
 
-    def bind_rows(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-                  row: int) -> Callable[[], object]:
-        """See `BoundTask.bind_rows`."""
+    def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
+               row: int) -> Callable[[], object]:
+        """See `Task.writer`."""
         seen, k = self._seen(state)
-        write_rows = bind(_write, *state.arrays, self.joints, self.offsets, seen.direction,
-                          seen.magnitude, level == "acceleration", self.rows, A, lower, upper, row,
+        parameters = _Parameters(self.joints, self.offsets, level == "acceleration", self.rows)
+        write_rows = bind(_write, state.kinematics, parameters, seen.arrays, A, lower, upper, row,
                           then=(k,))
         return lambda: write_rows(seen.active)
 
@@ -105,26 +106,32 @@ class Avoidance(BoundTask):
         return state.measurement, max(state.measurement.active, 0)
 
 
+class _Parameters(NamedTuple):
+    joints: NDArray[np.int64]
+    offsets: Array
+    acceleration: bool
+    rows: int
+
+
 @compiled
-def _write(v, J, dJ, placements, supports, previous_J, previous_placements,
-           period, joints, offsets, direction, magnitude, acceleration, rows,
-           A, lower, upper, row, active):
+def _write(kinematics, parameters, seen, A, lower, upper, row, active):
     k = max(active, 0)
-    joint, offset, r = joints[k], offsets[k], direction[k]
+    joint, offset = parameters.joints[k], parameters.offsets[k]
+    r, magnitude = seen.direction[k], seen.magnitude[k]
+    J, placements, supports = kinematics.J, kinematics.placements, kinematics.supports
     ax = ay = az = 0.0
-    if acceleration:
-        _, _, _, ax, ay, az, _, _, _ = drift_of_point(
-            v, J, dJ, placements, supports, previous_J, previous_placements, period, joint,
-            offset[0], offset[1], offset[2])
-    if rows == 3:
+    if parameters.acceleration:
+        _, _, _, ax, ay, az, _, _, _ = drift_of_point(kinematics, joint, offset[0], offset[1],
+                                                      offset[2])
+    if parameters.rows == 3:
         write_point_jacobian(J, placements, supports, joint, offset, A, row)
-        write_equality(lower, upper, row, magnitude[k] * r[0] - ax)  # (28)
-        write_equality(lower, upper, row + 1, magnitude[k] * r[1] - ay)
-        write_equality(lower, upper, row + 2, magnitude[k] * r[2] - az)
+        write_equality(lower, upper, row, magnitude * r[0] - ax)  # (28)
+        write_equality(lower, upper, row + 1, magnitude * r[1] - ay)
+        write_equality(lower, upper, row + 2, magnitude * r[2] - az)
         return
-    x, y, z = place(placements[joint], offset[0], offset[1], offset[2])
+    point = place(placements[joint], offset[0], offset[1], offset[2])
     for c in range(A.shape[1]):
         A[row, c] = 0.0
-    add_row(J, supports, joint, x, y, z, r[0], r[1], r[2], A, row)
+    add_row(J, supports, joint, point, (r[0], r[1], r[2]), A, row)
     write_equality(lower, upper, row,
-                   magnitude[k] - (r[0] * ax + r[1] * ay + r[2] * az))  # (29)
+                   magnitude - (r[0] * ax + r[1] * ay + r[2] * az))  # (29)

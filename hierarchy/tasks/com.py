@@ -1,4 +1,4 @@
-"""The centre of mass of the whole robot along a path."""
+"""Task that moves the centre of mass of the whole robot along a path."""
 
 # mypy: disable-error-code="no-untyped-def"
 
@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,17 +23,18 @@ from hierarchy.kinematics import (
 )
 from hierarchy.paths import Path
 from hierarchy.problem import Array
-from hierarchy.robot import Robot, State
-from hierarchy.task import BoundTask, Level
+from hierarchy.robot import Robot
+from hierarchy.state import State
+from hierarchy.task import Level, Task, along
 
 
 @dataclass(frozen=True)
-class CentreOfMass(BoundTask):
-    """Bring the robot's centre of mass along `path`, along some world axes only [m].
+class CentreOfMass(Task):
+    """Move the robot's centre of mass along `path` in the chosen world axes [m].
 
-    `axes` are of 0, 1, 2 for x, y, z, in this order (m = how many): (0, 1) leaves the height free,
-    which is what standing asks for. p = sum m_i p_i / sum m_i over the bodies that joints move.
-    Raises HierarchyError where the robot has no masses.
+    `axes` are some of 0, 1, 2 for x, y, z in increasing order, one row per axis: (0, 1) leaves the
+    height free, which is enough for standing. p = sum m_i p_i / sum m_i over the bodies that joints
+    move. Raises HierarchyError if the robot has no masses.
     """
 
     robot: Robot
@@ -42,9 +44,7 @@ class CentreOfMass(BoundTask):
     damping: float = 20.0
     gain: float = 10.0
     name: str = "centre of mass"
-    target: Array = field(default_factory=lambda: np.zeros((3, 3)), init=False, repr=False,
-                          compare=False)  # p_d, dp_d/dt, d2p_d/dt2 at the last write
-    shares: Array = field(init=False, repr=False, compare=False)  # of the mass, one a body
+    shares: Array = field(init=False, repr=False, compare=False)  # of the mass, one per body
 
     def __post_init__(self) -> None:
         axes = tuple(self.axes)
@@ -59,7 +59,7 @@ class CentreOfMass(BoundTask):
 
     @property
     def dimension(self) -> int:
-        """One row an axis."""
+        """One row per axis."""
         return len(self.axes)
 
     def error(self, state: State) -> Array:
@@ -67,7 +67,7 @@ class CentreOfMass(BoundTask):
         return np.asarray((self.path(state.t)[0] - self.position(state))[list(self.axes)])
 
     def position(self, state: State) -> Array:
-        """Where the centre of mass is in the world (3,) [m]."""
+        """World position of the centre of mass (3,) [m]."""
         R = state.placements[:, :9].reshape(-1, 3, 3)  # column by column
         points = state.placements[:, 9:] + np.einsum("jki,jk->ji", R, self.robot.centres)
         return np.asarray(self.shares @ points)
@@ -86,7 +86,7 @@ class CentreOfMass(BoundTask):
         dJ, of_body = np.zeros((3, state.n)), np.empty((3, state.n))
         for joint, (share, centre) in enumerate(zip(self.shares, self.robot.centres, strict=True)):
             if share > 0.0:
-                write_point_jacobian_derivative(*state.arrays, joint, centre, of_body)
+                write_point_jacobian_derivative(state.kinematics, joint, centre, of_body)
                 dJ += share * of_body
         return np.asarray(dJ[list(self.axes)])
 
@@ -98,19 +98,14 @@ class CentreOfMass(BoundTask):
         """d2p_d/dt2 (m,) [m/s^2]."""
         return np.asarray(self.path(state.t)[2][list(self.axes)])
 
-    def bind_rows(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-                  row: int) -> Callable[[], object]:
-        """See `BoundTask.bind_rows`."""
-        write_rows = bind(_write, *state.arrays, self.shares, self.robot.centres, self._axes(),
-                          self.target, self.stiffness, self.damping, self.gain,
-                          level == "acceleration", A, lower, upper, row)
-        move_target = self.path.writer(self.target)
-
-        def write() -> None:
-            move_target(state.t)
-            write_rows()
-
-        return write
+    def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
+               row: int) -> Callable[[], object]:
+        """See `Task.writer`."""
+        target = np.empty((3, 3))  # p_d, dp_d/dt, d2p_d/dt2
+        parameters = _Parameters(self.shares, self.robot.centres, self._axes(), target,
+                                 self.stiffness, self.damping, self.gain, level == "acceleration")
+        write_rows = bind(_write, state.kinematics, parameters, A, lower, upper, row)
+        return along(self.path, target, state, write_rows)
 
     def _of(self, J: Array, placements: Array, supports: NDArray[np.bool_]) -> Array:
         out = np.empty((self.dimension, J.shape[1]))
@@ -122,9 +117,20 @@ class CentreOfMass(BoundTask):
         return np.array(self.axes, dtype=np.int64)
 
 
+class _Parameters(NamedTuple):
+    shares: Array
+    centres: Array
+    axes: NDArray[np.int64]
+    target: Array
+    stiffness: float
+    damping: float
+    gain: float
+    acceleration: bool
+
+
 @compiled
 def _write_jacobian(J, placements, supports, shares, centres, axes, A, row):
-    """Column c is s J_v + J_w x m: s, m are mass and moment, as shares, of what joint c moves."""
+    """Column c is s J_v + J_w x m, with s and m the mass and moment (as shares) that c moves."""
     for c in range(A.shape[1]):
         s, mx, my, mz = _carried(placements, supports, shares, centres, c)
         for i in range(len(axes)):
@@ -151,21 +157,20 @@ def _carried(placements, supports, shares, centres, c):
 
 
 @compiled
-def _write(v, J, dJ, placements, supports, previous_J, previous_placements, period, shares,
-           centres, axes, target, stiffness, damping, gain, acceleration, A, lower, upper, row):
-    _write_jacobian(J, placements, supports, shares, centres, axes, A, row)
+def _write(kinematics, parameters, A, lower, upper, row):
+    shares, centres, axes, target, stiffness, damping, gain, acceleration = parameters
+    _write_jacobian(kinematics.J, kinematics.placements, kinematics.supports, shares, centres, axes,
+                    A, row)
     p, drift = np.zeros(3), np.zeros(3)
     for joint in range(1, len(shares)):
         if shares[joint] > 0.0:
             cx, cy, cz = centres[joint, 0], centres[joint, 1], centres[joint, 2]
-            x, y, z = place(placements[joint], cx, cy, cz)
+            x, y, z = place(kinematics.placements[joint], cx, cy, cz)
             p[0] += shares[joint] * x
             p[1] += shares[joint] * y
             p[2] += shares[joint] * z
             if acceleration:
-                _, _, _, ax, ay, az, _, _, _ = drift_of_point(
-                    v, J, dJ, placements, supports, previous_J, previous_placements, period,
-                    joint, cx, cy, cz)
+                _, _, _, ax, ay, az, _, _, _ = drift_of_point(kinematics, joint, cx, cy, cz)
                 drift[0] += shares[joint] * ax
                 drift[1] += shares[joint] * ay
                 drift[2] += shares[joint] * az
@@ -174,6 +179,6 @@ def _write(v, J, dJ, placements, supports, previous_J, previous_placements, peri
         error = target[0, k] - p[k]
         b = target[1, k] + gain * error
         if acceleration:
-            rate = target[1, k] - row_times(A, row + i, v)
+            rate = target[1, k] - row_times(A, row + i, kinematics.v)
             b = target[2, k] + damping * rate + stiffness * error - drift[k]
         write_equality(lower, upper, row + i, b)

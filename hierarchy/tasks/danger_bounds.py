@@ -1,11 +1,35 @@
-"""Collision avoidance as bounds of the joints: what moves toward an obstacle is slowed down."""
+"""Collision avoidance by joint bounds: joints that move toward an obstacle slow down.
+
+A control point at distance D [m] from its nearest obstacle, r being the direction away from it, has
+the danger
+
+    f(D) = g(D) / g(0),  g(D) = 1 / (1 + exp((2 D / reach - 1) shape))
+
+which is 1 at contact and near 0 from `reach` on. For each joint with velocity limit V that supports
+the point, one bound is tightened: the next velocity w satisfies w <= V (1 - f) where the joint's
+column of r^T J_c is negative and w >= -V (1 - f) where it is positive; a column of at most `lever`
+[m] tightens neither. The greatest danger of all points counts. At acceleration level w = v + a T; a
+joint beyond such a bound brakes as hard as its limits allow until it is within it. Braking is never
+forbidden.
+
+Once the joints are within these bounds, a point approaches an obstacle at rest at most at (1 - f)
+times the sum of V |r^T J_c| over the joints, which is zero at contact. The task does not push away
+and does not retreat from an approaching obstacle. At acceleration level `reach` must leave room to
+brake. A bound jumps where a column changes sign, and f considers only the nearest obstacle of each
+point.
+
+Source: Flacco, Kroeger, De Luca, Khatib, "A depth space approach to human-robot collision
+avoidance", ICRA 2012, reference [10] of the letter; there f is g, which leaves exp(-shape) of the
+velocity at contact.
+"""
 
 # mypy: disable-error-code="no-untyped-def"
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,44 +38,31 @@ from hierarchy.avoidance.control_points import ControlPoint, pack_points
 from hierarchy.avoidance.measurement import Measurement
 from hierarchy.avoidance.repulsion import Repulsion, repulsion
 from hierarchy.errors import HierarchyError
-from hierarchy.jit import compiled
+from hierarchy.jit import bind, compiled
 from hierarchy.kinematics import point_at
 from hierarchy.limits import clipped
 from hierarchy.problem import Array
-from hierarchy.robot import State
+from hierarchy.state import State
 from hierarchy.task import Level, Task
 from hierarchy.tasks.joint_limits import JointLimits
 
 
 @dataclass(frozen=True)
 class DangerBounds(Task):
-    """Keep every joint within `limits`, and slow those that move a control point to an obstacle.
+    """Keep every joint within `limits` and slow those that move a control point to an obstacle.
 
-    n rows, those of `limits` with a box that is at most as large, and never empty. A control point
-    at distance D [m], r being the direction away from its nearest obstacle, is in danger
+    n rows, those of `limits`, with a box that is at most as large and never empty; see the module
+    for how danger tightens it.
 
-        f(D) = g(D) / g(0),  g(D) = 1 / (1 + exp((2 D / reach - 1) shape))
+    limits : the box without obstacles; every joint must have a velocity limit.
+    points : the control points in the order of the measurement; with those of the sensor, the end
+        effector is the last of them.
+    reach : distance [m] from which on the danger is near 0.
+    shape : steepness of the danger.
+    lever : column of r^T J_c [m] below which a joint is not slowed.
 
-    which is 1 at contact and near 0 from `reach` on. Of each joint with velocity limit V that
-    supports the point, one side is brought in: the next velocity w has w <= V (1 - f) where the
-    joint's column of r^T J_c is negative, w >= -V (1 - f) where it is positive, and both sides are
-    free where it is at most `lever` [m]. Of all points the greatest danger counts. At acceleration
-    level w = v + a T; a joint beyond such a bound brakes as hard as `limits` allow until it is not.
-    Braking is never forbidden.
-
-    So, once the joints are within these bounds, a point nears a resting obstacle at most at (1 - f)
-    times the sum of V |r^T J_c| over the joints, which is nothing at contact. Nothing is pushed
-    away: an obstacle that comes nearer is not fled from. At acceleration level `reach` must leave
-    way to brake. A bound jumps where a column changes its sign, and f sees only the nearest
-    obstacle of each point.
-
-    `points` are the control points in the order of the measurement; with those of the sensor, the
-    end effector is the last of them. Source: Flacco, Kroeger, De Luca, Khatib, "A depth space
-    approach to human-robot collision avoidance", ICRA 2012, reference [10] of the letter; there f
-    is g, which leaves exp(-shape) of the velocity at contact.
-
-    Raises HierarchyError where a joint has no velocity limit, there is no point, or a number makes
-    no sense.
+    Raises HierarchyError if a joint has no velocity limit, there is no point, or a number is out
+    of range.
     """
 
     limits: JointLimits
@@ -87,17 +98,17 @@ class DangerBounds(Task):
 
     @property
     def dimension(self) -> int:
-        """One row a joint."""
+        """One row per joint."""
         return self.limits.dimension
 
     def box(self, state: State, level: Level) -> tuple[Array, Array]:
-        """Return the least and the greatest command (n,), (n,) at a state; never empty."""
+        """Return the least and greatest command (n,), (n,) at a state; the box is never empty."""
         lower, upper = self.limits.box(state, level)
-        self._bring_in(state, level, lower, upper, 0)
+        self._tighten(state, level, lower, upper, 0)()
         return lower, upper
 
     def error(self, state: State) -> Array:
-        """How far each joint is from its range (n,) [rad or m], zero within."""
+        """Distance of each joint from its range (n,) [rad or m], zero inside it."""
         return self.limits.error(state)
 
     def jacobian(self, state: State) -> Array:
@@ -108,18 +119,25 @@ class DangerBounds(Task):
         """Zero (n, n)."""
         return self.limits.jacobian_derivative(state)
 
-    def write(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-              row: int) -> None:
-        """See `Task.write`; the rows have two sides."""
-        self.limits.write(state, level, A, lower, upper, row)
-        self._bring_in(state, level, lower, upper, row)
+    def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
+               row: int) -> Callable[[], object]:
+        """See `Task.writer`; the rows have two sides."""
+        write_limits = self.limits.writer(state, level, A, lower, upper, row)
+        tighten = self._tighten(state, level, lower, upper, row)
 
-    def _bring_in(self, state: State, level: Level, lower: Array, upper: Array, row: int) -> None:
-        seen = self._seen(state)
-        _bring_in(state.v, state.J, state.placements, state.supports, self.joints, self.offsets,
-                  seen.distance, seen.direction, self.reach, self.shape, self.lever,
-                  self.limits.limits.packed[2], self.limits.period, level == "acceleration",
-                  lower, upper, row)
+        def write() -> None:
+            write_limits()
+            tighten()
+
+        return write
+
+    def _tighten(self, state: State, level: Level, lower: Array, upper: Array,
+                 row: int) -> Callable[[], object]:
+        parameters = _Parameters(self.joints, self.offsets, self.reach, self.shape, self.lever,
+                                 self.limits.limits.packed[2], self.limits.period,
+                                 level == "acceleration")
+        return bind(_tighten, state.kinematics, parameters, self._seen(state).arrays, lower, upper,
+                    row)
 
     def _seen(self, state: State) -> Measurement:
         seen = state.measurement
@@ -131,16 +149,28 @@ class DangerBounds(Task):
         return seen
 
 
+class _Parameters(NamedTuple):
+    joints: NDArray[np.int64]
+    offsets: Array
+    reach: float
+    shape: float
+    lever: float
+    V: Array  # velocity limits
+    T: float  # period
+    acceleration: bool
+
+
 @compiled
-def _bring_in(v, J, placements, supports, joints, offsets, distance, direction, reach, shape,
-              lever, V, T, acceleration, lower, upper, row):
-    """Bring in the sides of a box of n joints that begins at `row`."""
+def _tighten(kinematics, parameters, seen, lower, upper, row):
+    """Tighten the bounds of a box of n joints that starts at `row`."""
+    v, J, _, placements, supports, _, _, _ = kinematics
+    joints, offsets, reach, shape, lever, V, T, acceleration = parameters
     n = len(v)
     danger = np.zeros((2, n))  # of moving backward, and forward
     contact = repulsion(0.0, 1.0, reach, shape, 2.0)
     for k in range(len(joints)):
-        joint, r = joints[k], direction[k]
-        f = min(repulsion(max(distance[k], 0.0), 1.0, reach, shape, 2.0) / contact, 1.0)
+        joint, r = joints[k], seen.direction[k]
+        f = min(repulsion(max(seen.distance[k], 0.0), 1.0, reach, shape, 2.0) / contact, 1.0)
         x = point_at(placements, joint, offsets[k], 0)
         y = point_at(placements, joint, offsets[k], 1)
         z = point_at(placements, joint, offsets[k], 2)

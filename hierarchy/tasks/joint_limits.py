@@ -1,19 +1,20 @@
-"""Limits of the joints' positions, velocities and accelerations, as one box of commands."""
-
-# mypy: disable-error-code="no-untyped-def"
+"""Limits of joint positions, velocities and accelerations as one box of commands."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from hierarchy.errors import HierarchyError
-from hierarchy.jit import compiled
+from hierarchy.jit import bind
+from hierarchy.kinematics import write_identity
 from hierarchy.limits import Limits, write_box
 from hierarchy.problem import Array
-from hierarchy.robot import Robot, State
+from hierarchy.robot import Robot
+from hierarchy.state import State
 from hierarchy.task import Level, Task
 
 
@@ -21,14 +22,15 @@ from hierarchy.task import Level, Task
 class JointLimits(Task):
     """Keep every joint within its limits and able to stop before them: lower <= x <= upper.
 
-    One row a joint that a motor moves, the identity, at both levels: n rows, n - 6 with a floating
-    base, which has no limits; below n stands for that number. Positions and velocities are limited
-    as `robot` says, `margin` [rad or m] is kept off each position limit, `acceleration` [rad/s^2 or
-    m/s^2] is one number or (n,), `period` [s] is that of the control loop. What is promised from
-    which start: see `hierarchy.limits.Limits`. A continuous joint has no position limits. At
-    velocity level the acceleration is that of the commands: a step from `State.commanded`.
+    One row of the identity per actuated joint, at both levels: n rows, or n - 6 with a floating
+    base, which has no limits; below, n stands for that number. Positions and velocities are limited
+    by the limits of `robot`, `margin` [rad or m] is kept from each position limit, `acceleration`
+    [rad/s^2 or m/s^2] is one number or (n,), `period` [s] is that of the control loop. For what is
+    guaranteed from which initial state see `hierarchy.limits`. A continuous joint has no position
+    limits. At velocity level the acceleration is that of the commands: a step from
+    `State.commanded`.
 
-    Raises HierarchyError where a limit makes no sense or the margin leaves no room.
+    Raises HierarchyError if a limit is invalid or the margin leaves no room.
     """
 
     robot: Robot
@@ -58,17 +60,17 @@ class JointLimits(Task):
 
     @property
     def dimension(self) -> int:
-        """One row a joint that a motor moves."""
+        """One row per actuated joint."""
         return self.robot.n - self.robot.actuated
 
     def box(self, state: State, level: Level) -> tuple[Array, Array]:
-        """Return the least and the greatest command (n,), (n,) at a state; never empty."""
+        """Return the least and greatest command (n,), (n,) at a state; the box is never empty."""
         return self.limits.box(self._positions(state), self._rates(state, level), level)
 
     def clamp(self, state: State, level: Level, x: ArrayLike) -> Array:
-        """Return the command x, of the base too, moved into the box; finite also where x is not.
+        """Return the command x, including the base, clamped to the box; finite even if x is not.
 
-        NaN becomes the command of the box that comes nearest to a standstill; of the base, zero.
+        NaN becomes the command in the box that comes nearest to a standstill; for the base, zero.
         """
         first, positions, rates = self.robot.actuated, self._positions(state), self._rates(
             state, level)
@@ -80,23 +82,30 @@ class JointLimits(Task):
         return command
 
     def error(self, state: State) -> Array:
-        """How far each joint is from its range (n,) [rad or m], zero within."""
+        """Distance of each joint from its range (n,) [rad or m], zero inside it."""
         q = self._positions(state)
         return np.asarray(np.clip(q, *self.limits.packed[:2]) - q)
 
     def jacobian(self, state: State) -> Array:
-        """The identity (n, n), beside zeros for the base."""
+        """The identity (n, n), to the right of zeros for the base."""
         return np.eye(state.n)[self.robot.actuated:]
 
     def jacobian_derivative(self, state: State) -> Array:
         """Zero (n, n)."""
         return np.zeros((self.dimension, state.n))
 
-    def write(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-              row: int) -> None:
-        """See `Task.write`; the rows have two sides."""
-        _write(self._positions(state), self._rates(state, level), self.limits.packed, self.period,
-               level == "acceleration", A, lower, upper, row)
+    def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
+               row: int) -> Callable[[], object]:
+        """See `Task.writer`; the rows have two sides."""
+        write_rows, limits = bind(write_identity, A, row, self.dimension), self.limits.packed
+        acceleration = level == "acceleration"
+
+        def write() -> None:
+            write_rows()
+            write_box(self._positions(state), self._rates(state, level), limits, self.period,
+                      acceleration, lower, upper, row)
+
+        return write
 
     def _positions(self, state: State) -> Array:
         robot = self.robot
@@ -104,18 +113,8 @@ class JointLimits(Task):
         return q if robot.nq == robot.n else q[robot.coordinates[robot.actuated:]]
 
     def _rates(self, state: State, level: Level) -> Array:
-        """The velocities (n,) from which the next ones are limited."""
+        """The velocities (n,) that limit the next ones."""
         commanded = state.commanded if level == "velocity" else None
         rates: Array = state.v if commanded is None else commanded
         first = self.robot.actuated
         return rates[first:] if first else rates
-
-
-@compiled
-def _write(q, v, limits, T, acceleration, A, lower, upper, row):
-    base = A.shape[1] - len(v)
-    for i in range(len(v)):
-        for j in range(A.shape[1]):
-            A[row + i, j] = 0.0
-        A[row + i, base + i] = 1.0
-    write_box(q, v, limits, T, acceleration, lower, upper, row)

@@ -1,4 +1,4 @@
-"""Relaxed pointing: an axis of a frame on, or inside, a cone (eqs. 16-21)."""
+"""Relaxed pointing: an axis of a frame on a cone, or inside it (eqs. 16-21)."""
 
 # mypy: disable-error-code="no-untyped-def"
 
@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from math import cos
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,17 +15,18 @@ from hierarchy.errors import HierarchyError
 from hierarchy.jit import bind, compiled, inlined
 from hierarchy.kinematics import axis_at, subtract_over_period, velocity_of_point
 from hierarchy.problem import Array
-from hierarchy.robot import Frame, State
-from hierarchy.task import BoundTask, Kind, Level
+from hierarchy.robot import Frame
+from hierarchy.state import State
+from hierarchy.task import Kind, Level, Task
 
 
 @dataclass(frozen=True)
-class Pointing(BoundTask):
-    """Keep the z axis of `frame` at `half_angle` [rad] to `axis` (m = 1, p = z_d . z_e).
+class Pointing(Task):
+    """Keep the z axis of `frame` at the angle `half_angle` [rad] to `axis` (m = 1, p = z_d . z_e).
 
-    kind = "equality": on the cone, cos(alpha) = cos(alpha_d), eq. (16). kind = "inequality": inside
-    it, cos(alpha_d) <= cos(alpha), eq. (21), as one row with a lower side only. `axis` (3,) is
-    z_d, normalised here. Gains as in `Task`.
+    With kind = "equality" the axis lies on the cone, cos(alpha) = cos(alpha_d), eq. (16). With
+    kind = "inequality" it lies inside, cos(alpha_d) <= cos(alpha), eq. (21), as one row with a
+    lower bound only. `axis` (3,) is z_d, normalised here. Gains as in `Task`.
     """
 
     frame: Frame
@@ -66,7 +68,7 @@ class Pointing(BoundTask):
                                  self.cos_alpha_d))
 
     def follow_cone_error(self, state: State) -> Callable[[], float]:
-        """Return what gives the error at a state that moves, for every tick of Algorithm 1."""
+        """Return a function that gives the error at a state as it moves, for Algorithm 1."""
         return bind(_cone_error, state.placements, self.frame.joint, self.z_e, self.z_d,
                     self.cos_alpha_d)
 
@@ -80,15 +82,28 @@ class Pointing(BoundTask):
     def jacobian_derivative(self, state: State) -> Array:
         """Its time derivative (1, n) [1/s]."""
         dJ = np.empty((1, state.n))
-        _write_jacobian_derivative(*state.arrays, self.frame.joint, self.z_e, self.z_d, dJ)
+        _write_jacobian_derivative(state.kinematics, self.frame.joint, self.z_e, self.z_d, dJ)
         return dJ
 
-    def bind_rows(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-                  row: int) -> Callable[[], object]:
-        """See `BoundTask.bind_rows`."""
-        return bind(_write, *state.arrays, self.frame.joint, self.z_e, self.z_d, self.cos_alpha_d,
-                    self.stiffness, self.damping, self.gain, level == "acceleration",
-                    self.kind == "inequality", A, lower, upper, row)
+    def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
+               row: int) -> Callable[[], object]:
+        """See `Task.writer`."""
+        parameters = _Parameters(self.frame.joint, self.z_e, self.z_d, self.cos_alpha_d,
+                                 self.stiffness, self.damping, self.gain, level == "acceleration",
+                                 self.kind == "inequality")
+        return bind(_write, state.kinematics, parameters, A, lower, upper, row)
+
+
+class _Parameters(NamedTuple):
+    joint: int
+    z_e: Array
+    z_d: Array
+    cos_alpha_d: float
+    stiffness: float
+    damping: float
+    gain: float
+    acceleration: bool
+    inequality: bool
 
 
 @compiled
@@ -109,8 +124,8 @@ def _write_jacobian(J, placements, supports, joint, z_e, z_d, A, row):
 
 
 @compiled
-def _write_jacobian_derivative(v, J, dJ, placements, supports,
-                               previous_J, previous_placements, period, joint, z_e, z_d, out):
+def _write_jacobian_derivative(kinematics, joint, z_e, z_d, out):
+    v, J, dJ, placements, supports, previous_J, previous_placements, period = kinematics
     n = out.shape[1]
     if period > 0.0:
         before = np.empty((1, n))
@@ -135,9 +150,9 @@ def _write_jacobian_derivative(v, J, dJ, placements, supports,
 
 
 @inlined
-def _motion(v, J, dJ, placements, supports, previous_J, previous_placements, period, joint, z_e,
-            z_d):
-    """Rate J v and drift dJ/dt v of z_d . z_e; the drift exact, or of the backward difference."""
+def _motion(kinematics, joint, z_e, z_d):
+    """Rate J v and drift dJ/dt v of z_d . z_e; the drift is exact or a backward difference."""
+    v, J, dJ, placements, supports, previous_J, previous_placements, period = kinematics
     x, y, z, wx, wy, wz, dx, dy, dz = _turning(v, J, placements, supports, joint, z_e)
     rate = z_d[0] * dx + z_d[1] * dy + z_d[2] * dz
     if period > 0.0:
@@ -160,14 +175,13 @@ def _turning(v, J, placements, supports, joint, z_e):
 
 
 @compiled
-def _write(v, J, dJ, placements, supports, previous_J, previous_placements,
-           period, joint, z_e, z_d, cos_alpha_d, stiffness, damping, gain, acceleration,
-           inequality, A, lower, upper, row):
-    _write_jacobian(J, placements, supports, joint, z_e, z_d, A, row)
+def _write(kinematics, parameters, A, lower, upper, row):
+    joint, z_e, z_d, cos_alpha_d, stiffness, damping, gain, acceleration, inequality = parameters
+    placements = kinematics.placements
+    _write_jacobian(kinematics.J, placements, kinematics.supports, joint, z_e, z_d, A, row)
     error = _cone_error(placements, joint, z_e, z_d, cos_alpha_d)
     if acceleration:
-        rate, drift = _motion(v, J, dJ, placements, supports, previous_J, previous_placements,
-                              period, joint, z_e, z_d)
+        rate, drift = _motion(kinematics, joint, z_e, z_d)
         b = stiffness * error - damping * rate - drift
     else:
         b = gain * error

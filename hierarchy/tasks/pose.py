@@ -1,12 +1,13 @@
-"""Position and orientation of a frame together (m = 6)."""
+"""Position and orientation of a frame (m = 6)."""
 
 # mypy: disable-error-code="no-untyped-def"
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from math import atan2, sqrt
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -24,16 +25,17 @@ from hierarchy.kinematics import (
 )
 from hierarchy.paths import Path
 from hierarchy.problem import Array
-from hierarchy.robot import Frame, State
-from hierarchy.task import BoundTask, Level
+from hierarchy.robot import Frame
+from hierarchy.state import State
+from hierarchy.task import Level, Task, along
 
 
 @dataclass(frozen=True)
-class Pose(BoundTask):
-    """Bring `frame` along `path` with the fixed orientation `rotation` (m = 6) [m, rad].
+class Pose(Task):
+    """Move `frame` along `path` with the constant orientation `rotation` (3, 3) (m = 6) [m, rad].
 
     The orientation error is the rotation vector from the actual to the desired orientation, in
-    world axes; the rows below are those of the angular velocity. `rotation` (3, 3).
+    world axes; the last three rows are those of the angular velocity.
     """
 
     frame: Frame
@@ -43,8 +45,6 @@ class Pose(BoundTask):
     damping: float = 20.0
     gain: float = 10.0
     name: str = "pose"
-    target: Array = field(default_factory=lambda: np.zeros((3, 3)), init=False, repr=False,
-                          compare=False)  # p_d, dp_d/dt, d2p_d/dt2 at the last write
 
     @property
     def dimension(self) -> int:
@@ -52,7 +52,7 @@ class Pose(BoundTask):
         return 6
 
     def error(self, state: State) -> Array:
-        """p_d - p [m], then the rotation vector of R_d R^T [rad]: (6,)."""
+        """p_d - p [m], followed by the rotation vector of R_d R^T [rad]: (6,)."""
         turn = np.asarray(self.rotation, dtype=float) @ state.rotation(self.frame).T
         return np.concatenate([self.path(state.t)[0] - state.position(self.frame),
                                rotation_vector(turn)])
@@ -68,8 +68,8 @@ class Pose(BoundTask):
     def jacobian_derivative(self, state: State) -> Array:
         """Its time derivative (6, n)."""
         dJ, angular = np.empty((6, state.n)), np.empty((3, state.n))
-        write_point_jacobian_derivative(*state.arrays, self.frame.joint, self.frame.offset, dJ[:3])
         joint, supports = self.frame.joint, state.supports
+        write_point_jacobian_derivative(state.kinematics, joint, self.frame.offset, dJ[:3])
         if state.period > 0.0:
             before = np.empty_like(angular)
             write_rotation_jacobian(state.J, supports, joint, angular, 0)
@@ -88,20 +88,27 @@ class Pose(BoundTask):
         """Acceleration of the path, no rotation: (6,)."""
         return np.concatenate([self.path(state.t)[2], np.zeros(3)])
 
-    def bind_rows(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-                  row: int) -> Callable[[], object]:
-        """See `BoundTask.bind_rows`."""
-        asked = np.array(self.rotation, dtype=float)
-        write_rows = bind(_write, *state.arrays, self.frame.joint, self.frame.offset,
-                          self.frame.rotation, asked, self.target, self.stiffness, self.damping,
-                          self.gain, level == "acceleration", A, lower, upper, row)
-        move_target = self.path.writer(self.target)
+    def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
+               row: int) -> Callable[[], object]:
+        """See `Task.writer`."""
+        target = np.empty((3, 3))  # p_d, dp_d/dt, d2p_d/dt2
+        parameters = _Parameters(self.frame.joint, self.frame.offset, self.frame.rotation, target,
+                                 np.array(self.rotation, dtype=float), self.stiffness,
+                                 self.damping, self.gain, level == "acceleration")
+        write_rows = bind(_write, state.kinematics, parameters, A, lower, upper, row)
+        return along(self.path, target, state, write_rows)
 
-        def write() -> None:
-            move_target(state.t)
-            write_rows()
 
-        return write
+class _Parameters(NamedTuple):
+    joint: int
+    offset: Array
+    rotation: Array  # of the frame in its body
+    target: Array
+    desired: Array  # rotation of the frame in the world
+    stiffness: float
+    damping: float
+    gain: float
+    acceleration: bool
 
 
 @compiled
@@ -126,7 +133,7 @@ def rotation_vector(R):
 
 
 @compiled
-def _turn(T, rotation, asked):
+def _turn(T, rotation, desired):
     """R_d R^T (3, 3) of a frame with `rotation` on the body whose placement is T (12,)."""
     R, turn = np.zeros((3, 3)), np.zeros((3, 3))
     for i in range(3):
@@ -136,25 +143,25 @@ def _turn(T, rotation, asked):
     for i in range(3):
         for j in range(3):
             for k in range(3):
-                turn[i, j] += asked[i, k] * R[j, k]
+                turn[i, j] += desired[i, k] * R[j, k]
     return turn
 
 
 @compiled
-def _write(v, J, dJ, placements, supports, previous_J, previous_placements, period, joint, offset,
-           rotation, asked, target, stiffness, damping, gain, acceleration, A, lower, upper, row):
+def _write(kinematics, parameters, A, lower, upper, row):
+    joint, offset, rotation, target, desired, stiffness, damping, gain, acceleration = parameters
+    J, placements, supports = kinematics.J, kinematics.placements, kinematics.supports
     write_point_jacobian(J, placements, supports, joint, offset, A, row)
     write_rotation_jacobian(J, supports, joint, A, row + 3)
     error, velocity, drift = np.empty(6), np.zeros(6), np.zeros(6)
     for i in range(3):
         error[i] = target[0, i] - point_at(placements, joint, offset, i)
-    error[3:] = rotation_vector(_turn(placements[joint], rotation, asked))
+    error[3:] = rotation_vector(_turn(placements[joint], rotation, desired))
     if acceleration:
         (velocity[0], velocity[1], velocity[2], drift[0], drift[1], drift[2], velocity[3],
          velocity[4], velocity[5]) = drift_of_point(
-            v, J, dJ, placements, supports, previous_J, previous_placements, period, joint,
-            offset[0], offset[1], offset[2])
-        drift[3:] = _turning(v, J, dJ, supports, previous_J, period, joint)
+            kinematics, joint, offset[0], offset[1], offset[2])
+        drift[3:] = _turning(kinematics, joint)
     for i in range(6):
         rate, feedforward = (target[1, i], target[2, i]) if i < 3 else (0.0, 0.0)
         if acceleration:
@@ -165,8 +172,9 @@ def _write(v, J, dJ, placements, supports, previous_J, previous_placements, peri
 
 
 @compiled
-def _turning(v, J, dJ, supports, previous_J, period, joint):
-    """Drift (3,) of the angular velocity: exact, or that of the backward difference."""
+def _turning(kinematics, joint):
+    """Drift (3,) of the angular velocity: exact or a backward difference."""
+    v, J, dJ, _, supports, previous_J, _, period = kinematics
     if period > 0.0:
         _, _, _, x, y, z = velocity_of_point(J, supports, joint, v, 0.0, 0.0, 0.0)
         _, _, _, bx, by, bz = velocity_of_point(previous_J, supports, joint, v, 0.0, 0.0, 0.0)

@@ -1,14 +1,16 @@
-"""Position of a frame along a path, with the end-effector repulsion of eq. (30)."""
+"""Position of a frame along a path, with the repulsion of the end effector of eq. (30)."""
 
 # mypy: disable-error-code="no-untyped-def"
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
+from hierarchy.avoidance.measurement import Measurement
 from hierarchy.jit import bind, compiled
 from hierarchy.kinematics import (
     drift_of_point,
@@ -19,17 +21,18 @@ from hierarchy.kinematics import (
 )
 from hierarchy.paths import Path
 from hierarchy.problem import Array
-from hierarchy.robot import Frame, State
-from hierarchy.task import BoundTask, Level
+from hierarchy.robot import Frame
+from hierarchy.state import State
+from hierarchy.task import Level, Task, along
 
 
 @dataclass(frozen=True)
-class Position(BoundTask):
-    """Bring the origin of `frame` along `path` (m = 3) [m].
+class Position(Task):
+    """Move the origin of `frame` along `path` (m = 3) [m].
 
     stiffness [1/s^2] and damping [1/s] act at acceleration level, gain [1/s] at velocity level.
-    With `repulsion_within` > 0 [m], the repulsive vector (27) of the measurement's end effector
-    is added to the reference, eq. (30), while that distance is not exceeded (eps_ee).
+    With `repulsion_within` > 0 [m] (eps_ee), the repulsive vector (27) of the end effector is added
+    to the reference, eq. (30), while its distance to the obstacles is at most that.
     """
 
     frame: Frame
@@ -39,8 +42,6 @@ class Position(BoundTask):
     gain: float = 10.0
     repulsion_within: float = -1.0
     name: str = "position"
-    target: Array = field(default_factory=lambda: np.zeros((3, 3)), init=False, repr=False,
-                          compare=False)  # p_d, dp_d/dt, d2p_d/dt2 at the last write
 
     @property
     def dimension(self) -> int:
@@ -62,7 +63,7 @@ class Position(BoundTask):
     def jacobian_derivative(self, state: State) -> Array:
         """Its time derivative (3, n) [m/s]."""
         dJ = np.empty((3, state.n))
-        write_point_jacobian_derivative(*state.arrays, self.frame.joint, self.frame.offset, dJ)
+        write_point_jacobian_derivative(state.kinematics, self.frame.joint, self.frame.offset, dJ)
         return dJ
 
     def desired_velocity(self, state: State) -> Array:
@@ -88,45 +89,50 @@ class Position(BoundTask):
             return np.zeros(3)
         return np.asarray(seen.magnitude[-1] * seen.direction[-1])
 
-    def bind_rows(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-                  row: int) -> Callable[[], object]:
-        """See `BoundTask.bind_rows`."""
-        seen = state.measurement
-        near = _NOTHING_SEEN if seen is None else (seen.distance, seen.magnitude, seen.direction)
-        write_rows = bind(_write, *state.arrays, self.frame.joint, self.frame.offset, self.target,
-                          self.stiffness, self.damping, self.gain, level == "acceleration", *near,
-                          self.repulsion_within, A, lower, upper, row)
-        move_target = self.path.writer(self.target)
-
-        def write() -> None:
-            move_target(state.t)
-            write_rows()
-
-        return write
+    def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
+               row: int) -> Callable[[], object]:
+        """See `Task.writer`."""
+        seen, target = state.measurement, np.empty((3, 3))  # p_d, dp_d/dt, d2p_d/dt2
+        parameters = _Parameters(self.frame.joint, self.frame.offset, target, self.stiffness,
+                                 self.damping, self.gain, level == "acceleration",
+                                 self.repulsion_within)
+        write_rows = bind(_write, state.kinematics, parameters,
+                          _NOTHING_SEEN if seen is None else seen.arrays, A, lower, upper, row)
+        return along(self.path, target, state, write_rows)
 
 
-_NOTHING_SEEN = (np.full(1, np.inf), np.zeros(1), np.zeros((1, 3)))
+_NOTHING_SEEN = Measurement(0).arrays
+
+
+class _Parameters(NamedTuple):
+    joint: int
+    offset: Array
+    target: Array
+    stiffness: float
+    damping: float
+    gain: float
+    acceleration: bool
+    repulsion_within: float
 
 
 @compiled
-def _write(v, J, dJ, placements, supports, previous_J, previous_placements,
-           period, joint, offset, target, stiffness, damping, gain, acceleration,
-           distance, magnitude, direction, repulsion_within, A, lower, upper, row):
-    write_point_jacobian(J, placements, supports, joint, offset, A, row)
+def _write(kinematics, parameters, seen, A, lower, upper, row):
+    joint, offset, target, stiffness, damping, gain, acceleration, repulsion_within = parameters
+    write_point_jacobian(kinematics.J, kinematics.placements, kinematics.supports, joint, offset,
+                         A, row)
     velocity = drift = (0.0, 0.0, 0.0)
     if acceleration:
-        vx, vy, vz, ax, ay, az, _, _, _ = drift_of_point(
-            v, J, dJ, placements, supports, previous_J, previous_placements, period, joint,
-            offset[0], offset[1], offset[2])
+        vx, vy, vz, ax, ay, az, _, _, _ = drift_of_point(kinematics, joint, offset[0], offset[1],
+                                                         offset[2])
         velocity, drift = (vx, vy, vz), (ax, ay, az)
-    last = len(distance) - 1
+    last = len(seen.distance) - 1
     for i in range(3):
-        error = target[0, i] - point_at(placements, joint, offset, i)
+        error = target[0, i] - point_at(kinematics.placements, joint, offset, i)
         if acceleration:
             rate = target[1, i] - velocity[i]
             b = target[2, i] + damping * rate + stiffness * error - drift[i]
         else:
             b = target[1, i] + gain * error
-        if distance[last] <= repulsion_within:
-            b += magnitude[last] * direction[last, i]  # (30)
+        if seen.distance[last] <= repulsion_within:
+            b += seen.magnitude[last] * seen.direction[last, i]  # (30)
         write_equality(lower, upper, row + i, b)

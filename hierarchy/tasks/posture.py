@@ -1,4 +1,4 @@
-"""Tasks of the joints themselves: a posture to go to, and damping of the motion (eq. 15)."""
+"""Tasks of the joints themselves: a target posture, and damping of the motion (eq. 15)."""
 
 # mypy: disable-error-code="no-untyped-def"
 
@@ -6,26 +6,26 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
 from hierarchy.errors import HierarchyError
 from hierarchy.jit import bind, compiled
-from hierarchy.kinematics import write_equality
+from hierarchy.kinematics import write_equality, write_identity
 from hierarchy.problem import Array
-from hierarchy.robot import State
-from hierarchy.task import BoundTask, Level, Task
+from hierarchy.state import State
+from hierarchy.task import Level, Task
 
 
 class JointTask(Task):
-    """A task whose Jacobian is the identity: a last level, or the stack's null-space reference."""
+    """A task with the identity as Jacobian: a last level or the null-space reference of a stack."""
 
     joints: int
 
     @property
     def dimension(self) -> int:
-        """One row a joint."""
+        """One row per joint."""
         return self.joints
 
     def jacobian(self, state: State) -> Array:
@@ -38,10 +38,10 @@ class JointTask(Task):
 
 
 @dataclass(frozen=True)
-class Posture(JointTask, BoundTask):
-    """Bring every joint to `target` (n,) [rad or m]; gains as in `Task`.
+class Posture(JointTask):
+    """Move every joint to `target` (n,) [rad or m]; gains as in `Task`.
 
-    A floating base is no joint: the rows are those of the joints behind it.
+    A floating base does not count as a joint: the rows are those of the other joints.
     """
 
     target: tuple[float, ...]
@@ -60,7 +60,7 @@ class Posture(JointTask, BoundTask):
         return np.asarray(self.target - self._positions(state))
 
     def jacobian(self, state: State) -> Array:
-        """The identity (n, n), beside zeros for a floating base."""
+        """The identity (n, n), to the right of zeros for a floating base."""
         return np.eye(state.n)[state.n - self.joints:]
 
     def jacobian_derivative(self, state: State) -> Array:
@@ -76,20 +76,21 @@ class Posture(JointTask, BoundTask):
                                  f"{joints} joint positions")
         return np.asarray(state.q[robot.nq - joints:])
 
-    def bind_rows(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-                  row: int) -> Callable[[], object]:
-        """See `BoundTask.bind_rows`."""
+    def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
+               row: int) -> Callable[[], object]:
+        """See `Task.writer`."""
         positions, rates = self._positions(state), state.v[state.n - self.joints:]
         target = np.array(self.target, dtype=float)
         for (i,) in np.argwhere(~np.isfinite(target))[:1]:
             raise HierarchyError(f"task {self.name!r}: target {i} is {target[i]}")
-        return bind(_write, positions, rates, target, self.stiffness, self.damping, self.gain,
-                    level == "acceleration", A, lower, upper, row)
+        parameters = _Parameters(target, self.stiffness, self.damping, self.gain,
+                                 level == "acceleration")
+        return bind(_write, positions, rates, parameters, A, lower, upper, row)
 
 
 @dataclass(frozen=True)
 class JointDamping(JointTask):
-    """Slow every joint down: a = -D v, eq. (15), D = k I or D = k M(q); v = 0 at velocity level.
+    """Damp every joint: a = -D v, eq. (15), with D = k I or D = k M(q); v = 0 at velocity level.
 
     `damping` is k, in [1/s] with weight = "identity" and in [1/(kg m^2 s)] with "mass".
     """
@@ -107,7 +108,7 @@ class JointDamping(JointTask):
             raise HierarchyError(f"task {self.name!r}: damping {self.damping} must not be negative")
 
     def error(self, state: State) -> Array:
-        """Zero (n,): there is no position to reach."""
+        """Zero (n,), because there is no target position."""
         return np.zeros(self.joints)
 
     def reference_acceleration(self, state: State) -> Array:
@@ -116,26 +117,44 @@ class JointDamping(JointTask):
             return np.asarray(-self.damping * (state.mass_matrix() @ state.v))
         return np.asarray(-self.damping * state.v)
 
-    def reference_writer(self, state: State, level: Level, out: Array) -> Callable[[], object]:
-        """See `Task.reference_writer`."""
-        if self.weight == "mass" or level == "velocity":
-            return super().reference_writer(state, level, out)
-        return bind(_brake, state.v, self.damping, out)
+    def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
+               row: int) -> Callable[[], object]:
+        """See `Task.writer`."""
+        if self.joints != state.n:
+            raise HierarchyError(f"task {self.name!r}: {self.joints} joints, the robot has "
+                                 f"{state.n} velocities")
+        if self.weight == "identity" or level == "velocity":
+            damping = self.damping if level == "acceleration" else 0.0
+            return bind(_brake, state.v, damping, A, lower, upper, row)
+        write_rows, rows = bind(write_identity, A, row, self.joints), slice(row, row + self.joints)
+
+        def write() -> None:
+            write_rows()
+            lower[rows] = upper[rows] = self.reference_acceleration(state)
+
+        return write
+
+
+class _Parameters(NamedTuple):
+    target: Array
+    stiffness: float
+    damping: float
+    gain: float
+    acceleration: bool
 
 
 @compiled
-def _write(q, v, target, stiffness, damping, gain, acceleration, A, lower, upper, row):
-    base = A.shape[1] - len(target)
+def _write(q, v, parameters, A, lower, upper, row):
+    target, stiffness, damping, gain, acceleration = parameters
+    write_identity(A, row, len(target))
     for i in range(len(target)):
-        for j in range(A.shape[1]):
-            A[row + i, j] = 0.0
-        A[row + i, base + i] = 1.0
         error = target[i] - q[i]
         b = stiffness * error - damping * v[i] if acceleration else gain * error
         write_equality(lower, upper, row + i, b)
 
 
 @compiled
-def _brake(v, damping, out):
-    for c in range(len(v)):
-        out[c] = -damping * v[c]
+def _brake(v, damping, A, lower, upper, row):
+    write_identity(A, row, len(v))
+    for i in range(len(v)):
+        write_equality(lower, upper, row + i, -damping * v[i])  # (15)

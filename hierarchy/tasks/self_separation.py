@@ -1,4 +1,17 @@
-"""Self-separation: links of the robot kept apart from each other by one-sided rows."""
+"""Self-separation: one-sided rows that keep links of the robot apart from each other.
+
+With d the distance of a pair, r its direction, and a, b the nearest points, taken as fixed to their
+bodies, a row is (see `Barrier` for the required dh/dt and d2h/dt2)
+
+    velocity level       r^T (J_a - J_b) v >= required dh/dt
+    acceleration level   r^T (J_a - J_b) a >= required d2h/dt2 - bend - r^T (dJ_a/dt - dJ_b/dt) v
+
+where bend is the rest of d2d/dt2: r turns and the nearest points slide along the axes. Unlike that
+of an obstacle it may be negative. Where two axes become parallel the nearest points jump, d has a
+kink, and bend falls without bound; `barrier.limit` then limits the row, and d may fall below
+`barrier.distance` by the motion of one period at velocity level, and by the braking distance with
+`limit` at acceleration level.
+"""
 
 # mypy: disable-error-code="no-untyped-def"
 
@@ -6,6 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,7 +42,7 @@ from hierarchy.avoidance.self_collision import (
     turned,
 )
 from hierarchy.errors import HierarchyError
-from hierarchy.jit import compiled
+from hierarchy.jit import bind, compiled
 from hierarchy.kinematics import (
     add_row,
     drift_of_point,
@@ -37,7 +51,7 @@ from hierarchy.kinematics import (
     write_point_jacobian_derivative,
 )
 from hierarchy.problem import Array
-from hierarchy.robot import State
+from hierarchy.state import State
 from hierarchy.task import Kind, Level, Task
 
 
@@ -45,21 +59,11 @@ from hierarchy.task import Kind, Level, Task
 class SelfSeparation(Task):
     """Keep pairs of capsules of the robot at `barrier.distance` or more (m = pairs).
 
-    `pairs` are indices of `capsules`; None takes every pair of the chain but neighbours. No sensor
-    is needed. With d the distance of a pair, r its direction, a and b the nearest points, as if
-    fixed to their bodies, a row is, see `Barrier`,
+    `pairs` are indices of `capsules`; None takes every pair of the chain except neighbours. No
+    sensor is needed. See the module for the rows. Axes that cross (d is minus the two radii) have
+    no direction; the row then uses z.
 
-    - at velocity level r^T (J_a - J_b) v >= what is asked of dh/dt,
-    - at acceleration level r^T (J_a - J_b) a >= - r^T (dJ_a/dt - dJ_b/dt) v - bend + what is asked
-      of d2h/dt2.
-
-    bend is the rest of d2d/dt2, of the turning of r and of the nearest points that slide along the
-    axes; unlike that of an obstacle it may be negative. Where two axes pass through being parallel
-    the nearest points jump, d has a kink, and bend falls without bound: `barrier.limit` then limits
-    the row, and d may pass `barrier.distance` by what one period brings at velocity level, and by
-    the way of slowing down with `limit` at acceleration level.
-
-    Axes that cross (d = - the two radii) have no direction: the row then says "along z".
+    Raises HierarchyError if there is no pair or an index is out of range.
     """
 
     capsules: Sequence[Capsule]
@@ -91,15 +95,15 @@ class SelfSeparation(Task):
 
     @property
     def dimension(self) -> int:
-        """A row for each pair."""
+        """One row per pair."""
         return len(self.indices)
 
     def distances(self, state: State) -> Array:
-        """d (m,) [m], negative where capsules overlap."""
+        """Distances d (m,) [m], negative where capsules overlap."""
         return self._seen(state)[:, 0]
 
     def error(self, state: State) -> Array:
-        """distance - d (m,) [m], positive where two are too near."""
+        """distance - d (m,) [m], positive where two capsules are too close."""
         return self.barrier.distance - self.distances(state)
 
     def jacobian(self, state: State) -> Array:
@@ -111,17 +115,17 @@ class SelfSeparation(Task):
         return self._between(state, of_point)
 
     def jacobian_derivative(self, state: State) -> Array:
-        """r^T (dJ_a/dt - dJ_b/dt) (m, n), directions and nearest points held."""
+        """r^T (dJ_a/dt - dJ_b/dt) (m, n), with directions and nearest points held constant."""
         def of_point(joint: int, offset: Array) -> Array:
             dJ = np.empty((3, state.n))
-            write_point_jacobian_derivative(*state.arrays, joint, offset, dJ)
+            write_point_jacobian_derivative(state.kinematics, joint, offset, dJ)
             return dJ
         return self._between(state, of_point)
 
     def bend(self, state: State) -> Array:
-        """What d2d/dt2 has beside r^T (J_a - J_b) a + r^T (dJ_a/dt - dJ_b/dt) v: (m,) [m/s^2]."""
+        """d2d/dt2 less r^T (J_a - J_b) a + r^T (dJ_a/dt - dJ_b/dt) v: (m,) [m/s^2]."""
         return np.array([
-            _motion(*state.arrays, self.joints, self.table, i, j, *seen)[2]
+            _motion(state.kinematics, self.joints, self.table, i, j, tuple(seen))[2]
             for (i, j), seen in zip(self.indices, self._seen(state), strict=True)])
 
     def reference_velocity(self, state: State) -> Array:
@@ -135,11 +139,12 @@ class SelfSeparation(Task):
         return self._near(state, [least_acceleration(-e, rate, bend, self.settings)
                                   for e, rate, bend in terms])
 
-    def write(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-              row: int) -> None:
-        """See `Task.write`."""
-        _write(*state.arrays, self.joints, self.table, self.indices, self.settings,
-               level == "acceleration", A, lower, upper, row)
+    def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
+               row: int) -> Callable[[], object]:
+        """See `Task.writer`."""
+        parameters = _Parameters(self.joints, self.table, self.indices, self.settings,
+                                 level == "acceleration")
+        return bind(_write, state.kinematics, parameters, A, lower, upper, row)
 
     def _near(self, state: State, lower: Sequence[float]) -> Array:
         return np.where(self.distances(state) <= self.barrier.influence, lower, -np.inf)
@@ -157,27 +162,35 @@ class SelfSeparation(Task):
         return rows
 
 
+class _Parameters(NamedTuple):
+    joints: NDArray[np.int64]
+    capsules: Array
+    pairs: NDArray[np.int64]
+    settings: Array
+    acceleration: bool
+
+
 @compiled
-def _write(v, J, dJ, placements, supports, previous_J, previous_placements, period,
-           joints, capsules, pairs, settings, acceleration, A, lower, upper, row):
+def _write(kinematics, parameters, A, lower, upper, row):
+    joints, capsules, pairs, settings, acceleration = parameters
+    J, placements, supports = kinematics.J, kinematics.placements, kinematics.supports
     for m in range(pairs.shape[0]):
         i, j = pairs[m, 0], pairs[m, 1]
         a, b = capsules[i], capsules[j]
         T_a, T_b = placements[joints[i]], placements[joints[j]]
-        D, rx, ry, rz, s, t = nearest_of_capsules(T_a, a, T_b, b)
+        seen = nearest_of_capsules(T_a, a, T_b, b)
+        D, rx, ry, rz, s, t = seen
         for c in range(A.shape[1]):
             A[row, c] = 0.0
-        x, y, z = place(T_a, a[0] + s * a[3], a[1] + s * a[4], a[2] + s * a[5])
-        add_row(J, supports, joints[i], x, y, z, rx, ry, rz, A, row)
-        x, y, z = place(T_b, b[0] + t * b[3], b[1] + t * b[4], b[2] + t * b[5])
-        add_row(J, supports, joints[j], x, y, z, -rx, -ry, -rz, A, row)
+        point = place(T_a, a[0] + s * a[3], a[1] + s * a[4], a[2] + s * a[5])
+        add_row(J, supports, joints[i], point, (rx, ry, rz), A, row)
+        point = place(T_b, b[0] + t * b[3], b[1] + t * b[4], b[2] + t * b[5])
+        add_row(J, supports, joints[j], point, (-rx, -ry, -rz), A, row)
         drop_rounding(A, row)
         lower[row], upper[row] = -np.inf, np.inf
         if D <= settings[2]:
             if acceleration:
-                rate, drift, bend = _motion(
-                    v, J, dJ, placements, supports, previous_J, previous_placements, period,
-                    joints, capsules, i, j, D, rx, ry, rz, s, t)
+                rate, drift, bend = _motion(kinematics, joints, capsules, i, j, seen)
                 lower[row] = least_acceleration(D - settings[0], rate, bend, settings) - drift
             else:
                 lower[row] = least_rate(D - settings[0], settings)
@@ -185,26 +198,23 @@ def _write(v, J, dJ, placements, supports, previous_J, previous_placements, peri
 
 
 @compiled
-def _motion(v, J, dJ, placements, supports, previous_J, previous_placements, period,
-            joints, capsules, i, j, D, rx, ry, rz, s, t):
+def _motion(kinematics, joints, capsules, i, j, seen):
     """dd/dt, r^T (dJ_a/dt - dJ_b/dt) v and bend of one pair."""
+    D, rx, ry, rz, s, t = seen
     a, b = capsules[i], capsules[j]
     ax, ay, az, fx, fy, fz, ox, oy, oz = drift_of_point(
-        v, J, dJ, placements, supports, previous_J, previous_placements, period, joints[i],
-        a[0] + s * a[3], a[1] + s * a[4], a[2] + s * a[5])
+        kinematics, joints[i], a[0] + s * a[3], a[1] + s * a[4], a[2] + s * a[5])
     bx, by, bz, gx, gy, gz, px, py, pz = drift_of_point(
-        v, J, dJ, placements, supports, previous_J, previous_placements, period, joints[j],
-        b[0] + t * b[3], b[1] + t * b[4], b[2] + t * b[5])
+        kinematics, joints[j], b[0] + t * b[3], b[1] + t * b[4], b[2] + t * b[5])
     vx, vy, vz = ax - bx, ay - by, az - bz
     rate = dot(rx, ry, rz, vx, vy, vz)
     drift = dot(rx, ry, rz, fx - gx, fy - gy, fz - gz)
     length = D + a[6] + b[6]
     if length < ON_AXIS:
         return rate, drift, 0.0
-    ux, uy, uz = turned(placements[joints[i]], a)
-    wx, wy, wz = turned(placements[joints[j]], b)
-    bend = bend_of_nearest(
-        length, rx, ry, rz, vx, vy, vz,
-        ux, uy, uz, oy * uz - oz * uy, oz * ux - ox * uz, ox * uy - oy * ux, s,
-        wx, wy, wz, py * wz - pz * wy, pz * wx - px * wz, px * wy - py * wx, t)
+    ux, uy, uz = turned(kinematics.placements[joints[i]], a)
+    wx, wy, wz = turned(kinematics.placements[joints[j]], b)
+    a_axis = (ux, uy, uz), (oy * uz - oz * uy, oz * ux - ox * uz, ox * uy - oy * ux), s
+    b_axis = (wx, wy, wz), (py * wz - pz * wy, pz * wx - px * wz, px * wy - py * wx), t
+    bend = bend_of_nearest(length, (rx, ry, rz), (vx, vy, vz), a_axis, b_axis)
     return rate, drift, bend

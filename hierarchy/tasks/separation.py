@@ -1,11 +1,26 @@
-"""Separation: all points kept from all obstacles by one-sided rows, whatever else is asked."""
+"""Separation: one-sided rows that keep all points away from all obstacles.
+
+With d the distance of a pair, r the direction and o the obstacle, a row is (see `Barrier` for the
+required dh/dt and d2h/dt2)
+
+    velocity level       r^T J_c v >= required dh/dt + r . v_o
+    acceleration level   r^T J_c a >= required d2h/dt2 + r . a_o - r^T dJ_c/dt v - bend
+
+where bend = |w|^2 / radius is what the turning of r adds to d2d/dt2, with w the relative velocity
+across r, and the radius and the axis without turning from `Pairs`. It is never negative for a
+convex obstacle that does not rotate, so a sensor that does not know the radius may omit it; but
+then a point that swings around an obstacle at a constant distance has a row that no acceleration
+can satisfy. The radius is taken as at least d_min. The derivative of J_c is exact or a backward
+difference, as in the state.
+"""
 
 # mypy: disable-error-code="no-untyped-def"
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +34,7 @@ from hierarchy.avoidance.barrier import (
 from hierarchy.avoidance.control_points import ControlPoint, pack_points
 from hierarchy.avoidance.pairs import Pairs
 from hierarchy.errors import HierarchyError
-from hierarchy.jit import compiled
+from hierarchy.jit import bind, compiled
 from hierarchy.kinematics import (
     add_row,
     drift_of_point,
@@ -28,32 +43,21 @@ from hierarchy.kinematics import (
     write_point_jacobian_derivative,
 )
 from hierarchy.problem import Array
-from hierarchy.robot import State
+from hierarchy.state import State
 from hierarchy.task import Kind, Level, Task
 
-_SHARPEST = 1e-3  # [m] least radius about which a direction is taken to turn
+_SHARPEST = 1e-3  # [m] smallest radius of turning that is used
 
 
 @dataclass(frozen=True)
 class Separation(Task):
     """Keep every point at `barrier.distance` or more from every obstacle (m = points x obstacles).
 
-    `points` are those of the sensor, in its order, the end effector last; `obstacles` is how many
-    the measurement has. With None there is one row a point, against what is nearest to it: fewer
-    rows, but where another obstacle becomes the nearest, nothing has slowed its approach before.
-
-    With d the distance of a pair, r the direction and o the obstacle, a row is, see `Barrier`,
-
-    - at velocity level r^T J_c v >= r . v_o + what is asked of dh/dt,
-    - at acceleration level r^T J_c a >= r . a_o - r^T dJ_c/dt v - bend + what is asked of d2h/dt2.
-
-    bend = |w|^2 / radius is what the turning of r adds to d2d/dt2, with w the relative velocity
-    across r, and radius and axis without turning from `Pairs`. It is never negative for a convex
-    obstacle that does not rotate, so a sensor that does not know the radius may leave it out; but
-    then a point that swings around an obstacle at a constant distance is asked for what no
-    acceleration can give. The radius is taken as d_min at least. The derivative of J_c
-    is exact or a backward difference, as the state has it. A pair beyond `barrier.influence` has a
-    row without sides, which does nothing.
+    `points` are those of the sensor in its order, the end effector last; `obstacles` is how many
+    the measurement has. With None there is one row per point, for the obstacle nearest to it: fewer
+    rows, but when another obstacle becomes the nearest, nothing has slowed its approach before. A
+    pair beyond `barrier.influence` has a row without bounds, which has no effect. See the module
+    for the rows.
     """
 
     points: Sequence[ControlPoint]
@@ -77,15 +81,15 @@ class Separation(Task):
 
     @property
     def dimension(self) -> int:
-        """A row for each pair, or for each point."""
+        """One row per pair, or per point."""
         return len(self.joints) * (1 if self.obstacles is None else self.obstacles)
 
     def error(self, state: State) -> Array:
-        """distance - d (m,) [m], positive where a point is too near."""
+        """distance - d (m,) [m], positive where a point is too close."""
         return np.array([self.barrier.distance - pair[0] for _, pair in self._rows(state)])
 
     def jacobian(self, state: State) -> Array:
-        """r^T J_c (m, n): the derivative of the distances to obstacles that stand still."""
+        """r^T J_c (m, n): the derivative of the distances to obstacles at rest."""
         J = np.empty((3, state.n))
         A = np.empty((self.dimension, state.n))
         for row, (k, pair) in enumerate(self._rows(state)):
@@ -95,11 +99,12 @@ class Separation(Task):
         return A
 
     def jacobian_derivative(self, state: State) -> Array:
-        """r^T dJ_c/dt (m, n), the direction held."""
+        """r^T dJ_c/dt (m, n), with the direction held constant."""
         dJ = np.empty((3, state.n))
         A_dot = np.empty((self.dimension, state.n))
         for row, (k, pair) in enumerate(self._rows(state)):
-            write_point_jacobian_derivative(*state.arrays, int(self.joints[k]), self.offsets[k], dJ)
+            write_point_jacobian_derivative(state.kinematics, int(self.joints[k]),
+                                            self.offsets[k], dJ)
             A_dot[row] = pair[1:4] @ dJ
         return A_dot
 
@@ -125,28 +130,30 @@ class Separation(Task):
 
     def reference_velocity(self, state: State) -> Array:
         """The least r^T J_c v (m,) [m/s], -inf beyond `influence`."""
-        asked = [least_rate(-e, self.settings) for e in self.error(state)]
-        return self._near(state, self.desired_velocity(state) + asked)
+        required = [least_rate(-e, self.settings) for e in self.error(state)]
+        return self._near(state, self.desired_velocity(state) + required)
 
     def reference_acceleration(self, state: State) -> Array:
         """The least r^T d2p/dt2 (m,) [m/s^2], -inf beyond `influence`."""
         rates = self.jacobian(state) @ state.v - self.desired_velocity(state)
-        asked = [least_acceleration(-e, rate, bend, self.settings) for e, rate, bend
-                 in zip(self.error(state), rates, self.bend(state), strict=True)]
-        return self._near(state, self.desired_acceleration(state) + asked)
+        required = [least_acceleration(-e, rate, bend, self.settings) for e, rate, bend
+                    in zip(self.error(state), rates, self.bend(state), strict=True)]
+        return self._near(state, self.desired_acceleration(state) + required)
 
-    def write(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-              row: int) -> None:
-        """See `Task.write`."""
-        _write(*state.arrays, self.joints, self.offsets, self._seen(state).table, self.settings,
-               self.obstacles is None, level == "acceleration", A, lower, upper, row)
+    def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
+               row: int) -> Callable[[], object]:
+        """See `Task.writer`."""
+        parameters = _Parameters(self.joints, self.offsets, self.settings, self.obstacles is None,
+                                 level == "acceleration")
+        return bind(_write, state.kinematics, parameters, self._seen(state).table, A, lower, upper,
+                    row)
 
     def _near(self, state: State, lower: Array) -> Array:
         distances = self.barrier.distance - self.error(state)
         return np.where(distances <= self.barrier.influence, lower, -np.inf)
 
     def _rows(self, state: State) -> list[tuple[int, Array]]:
-        """Point and pair (6,) of each row."""
+        """Point and pair (14,) of each row."""
         seen = self._seen(state)
         if self.obstacles is None:
             return [(k, pairs[int(np.argmin(pairs[:, 0]))]) for k, pairs in enumerate(seen.table)]
@@ -168,16 +175,24 @@ class Separation(Task):
         return seen
 
 
+class _Parameters(NamedTuple):
+    joints: NDArray[np.int64]
+    offsets: Array
+    settings: Array
+    nearest: bool  # one row per point
+    acceleration: bool
+
+
 @compiled
-def _write(v, J, dJ, placements, supports, previous_J, previous_placements, period,
-           joints, offsets, pairs, settings, nearest, acceleration, A, lower, upper, row):
+def _write(kinematics, parameters, pairs, A, lower, upper, row):
+    joints, offsets, settings, nearest, acceleration = parameters
+    J, placements, supports = kinematics.J, kinematics.placements, kinematics.supports
     distance, influence = settings[0], settings[2]
     for k in range(joints.size):
         joint = joints[k]
-        x, y, z = place(placements[joint], offsets[k, 0], offsets[k, 1], offsets[k, 2])
+        point = place(placements[joint], offsets[k, 0], offsets[k, 1], offsets[k, 2])
         vx, vy, vz, ax, ay, az, _, _, _ = drift_of_point(
-            v, J, dJ, placements, supports, previous_J, previous_placements, period, joint,
-            offsets[k, 0], offsets[k, 1], offsets[k, 2])
+            kinematics, joint, offsets[k, 0], offsets[k, 1], offsets[k, 2])
         first, end = 0, pairs.shape[1]
         if nearest:
             for j in range(1, end):
@@ -189,7 +204,7 @@ def _write(v, J, dJ, placements, supports, previous_J, previous_placements, peri
             rx, ry, rz = pair[1], pair[2], pair[3]
             for c in range(A.shape[1]):
                 A[row, c] = 0.0
-            add_row(J, supports, joint, x, y, z, rx, ry, rz, A, row)
+            add_row(J, supports, joint, point, (rx, ry, rz), A, row)
             drop_rounding(A, row)
             lower[row], upper[row] = -np.inf, np.inf
             if pair[0] <= influence:

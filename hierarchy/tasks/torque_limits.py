@@ -1,9 +1,10 @@
-"""Limits of the joints' torques, as rows over their accelerations."""
+"""Joint torque limits as rows over the joint accelerations."""
 
 # mypy: disable-error-code="no-untyped-def"
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -11,17 +12,18 @@ import numpy as np
 from hierarchy.errors import HierarchyError
 from hierarchy.jit import compiled
 from hierarchy.problem import Array
-from hierarchy.robot import Robot, State
+from hierarchy.robot import Robot
+from hierarchy.state import State
 from hierarchy.task import Level, Task
 
 
 @dataclass(frozen=True)
 class TorqueLimits(Task):
-    """Keep every joint's torque within its limits: -limit <= M(q) a + h(q, v) <= limit.
+    """Keep every joint torque within its limits: -limit <= M(q) a + h(q, v) <= limit.
 
     n rows, at acceleration level only. The limit is `fraction`, more than 0 and at most 1, of the
-    robot's `effort_limit` [N m or N]; rows of joints without one are infinite on both sides. The
-    torques are those of the robot's model: rigid bodies, no friction, nothing held in the hand.
+    robot's `effort_limit` [N m or N]; rows of joints without one have infinite bounds. The torques
+    are those of the robot's model: rigid bodies, no friction, no payload.
     """
 
     robot: Robot
@@ -41,29 +43,30 @@ class TorqueLimits(Task):
 
     @property
     def dimension(self) -> int:
-        """One row a joint."""
+        """One row per joint."""
         return self.robot.n
 
     def error(self, state: State) -> Array:
-        """How far the torque of constant velocity is from the limits (n,) [N m or N]."""
+        """Distance of the torque at constant velocity from the limits (n,) [N m or N]."""
         h = state.bias_effort()
         return np.asarray(np.clip(h, -self.limit, self.limit) - h)
 
     def jacobian(self, state: State) -> Array:
-        """Mass matrix M(q) (n, n) [kg m^2]: the rate of torque with acceleration."""
+        """Mass matrix M(q) (n, n) [kg m^2]."""
         return state.mass_matrix()
 
     def jacobian_derivative(self, state: State) -> Array:
-        """Its time derivative (n, n) [kg m^2/s], which no row needs."""
+        """Its time derivative (n, n) [kg m^2/s]; no row uses it."""
         return state.mass_matrix_derivative()
 
-    def write(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-              row: int) -> None:
-        """See `Task.write`; HierarchyError at velocity level."""
+    def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
+               row: int) -> Callable[[], object]:
+        """See `Task.writer`; HierarchyError at velocity level."""
         if level != "acceleration":
             raise HierarchyError(f"task {self.name!r}: torque limits need the acceleration level, "
                                  f"not {level!r}")
-        _write(state.mass_matrix(), state.bias_effort(), self.limit, A, lower, upper, row)
+        return lambda: _write(state.mass_matrix(), state.bias_effort(), self.limit, A, lower, upper,
+                              row)
 
 
 @compiled

@@ -159,7 +159,7 @@ class _Step:
         self.robot, self.period = Robot.named("kuka_lwr"), period
         self.frame, self.limit = self.robot.frame("end_effector"), self.robot.velocity_limit
         n = self.robot.n
-        self.state: State = self.robot.state(START)
+        self.state: State = State.at(self.robot, START)
         self.goal = self.state.position(self.frame) + STEP
         self.posture = np.add(START, POSTURE)
         self.A = np.vstack([np.eye(n), np.zeros((3, n)), np.eye(n)])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hierarchy import Robot, Task
+from hierarchy import Robot, State, Task
 from hierarchy.avoidance import Barrier, Repulsion, SurveillanceAreas
 from hierarchy.avoidance.self_collision import measure_capsules, pack_capsules, pairs_of_tree
 from hierarchy.tasks import Avoidance, Separation
@@ -66,6 +66,6 @@ def separable_pairs(robot: Robot) -> list[tuple[int, int]]:
     pairs = pairs_of_tree(robot.capsules, robot.parents)
     if robot.table is not None or not pairs:
         return pairs
-    distances = measure_capsules(robot.state(robot.rest).placements,
+    distances = measure_capsules(State.at(robot, robot.rest).placements,
                                  *pack_capsules(robot.capsules), np.array(pairs))[:, 0]
     return [pair for pair, distance in zip(pairs, distances, strict=True) if distance > 0.0]

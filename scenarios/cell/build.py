@@ -67,12 +67,12 @@ def build(scenario: Scenario, kept: Cell | None = None) -> Cell:
         differences = control.jacobian_derivative == "difference"
         state = State(robot, control.period if differences else None)
         if sensor is not None:
-            sensor.check_start(robot.state(*start))
+            sensor.check_start(State.at(robot, *start))
         plant = plant_of(scenario, robot, start, sensor.obstacles if sensor else Obstacles())
     areas = areas_of(scenario)
     limits, first = limits_of(scenario, robot)
     position, pointing = position_of(scenario, robot), pointing_of(scenario, robot)
-    listed = listed_tasks(scenario.tasks, robot.state(*start))
+    listed = listed_tasks(scenario.tasks, State.at(robot, *start))
     last = posture_of(scenario, robot, "task")
     tasks = [*first, *avoidance_tasks(scenario, robot),
              *(task for task in (position, pointing, *listed, last) if task)]

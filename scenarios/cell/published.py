@@ -9,6 +9,7 @@ other end of each link than the points do, and entry (2, 1) of the upper-arm Jac
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -63,10 +64,10 @@ class PublishedAvoidance(Avoidance):
         subtract_over_period(now, before, state.period)
         return now if self.rows == 3 else seen.direction[k][None] @ now
 
-    def write(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-              row: int) -> None:
-        """See `Task.write`."""
-        Task.write(self, state, level, A, lower, upper, row)
+    def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
+               row: int) -> Callable[[], object]:
+        """See `Task.writer`."""
+        return Task.writer(self, state, level, A, lower, upper, row)
 
 
 @compiled

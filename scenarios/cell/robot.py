@@ -60,7 +60,7 @@ def _state(robot: Robot, section: StartSection) -> State:
         if q.shape == (robot.nq,):
             for name, value in section.joints.items():
                 q[robot.coordinate(name)] = value
-        return robot.state(q, section.v)
+        return State.at(robot, q, section.v)
     except HierarchyError as error:
         raise ScenarioError(f"start: {error}") from error
 
@@ -71,7 +71,7 @@ def _reach(robot: Robot, q: Array, point: Array) -> Array:
     stack = Stack([Position(frame, Still(point.tolist()), gain=1.0)], "velocity")
     nearest = np.inf
     for _ in range(_REACH_STEPS):
-        state = robot.state(q)
+        state = State.at(robot, q)
         distance = float(np.linalg.norm(state.position(frame) - point))
         nearest = min(nearest, distance)
         if distance < _REACHED:

@@ -11,7 +11,8 @@ import numpy as np
 
 from hierarchy.avoidance import Measurement
 from hierarchy.problem import Array, Hierarchy
-from hierarchy.robot import Frame, Robot, State
+from hierarchy.robot import Frame, Robot
+from hierarchy.state import State
 from scenarios.cell.build import build
 from scenarios.cell.sensors import DepthSensor, ExactDistances, Sensor
 from scenarios.config import Scenario, ScenarioError
@@ -156,7 +157,7 @@ def _place(fault: FaultSection, robot: Robot, q: Array) -> Array:
     if fault.place is None:
         return np.array(fault.centre)
     frame = Frame("place", robot.joint(fault.place.joint), np.array(fault.place.offset), np.eye(3))
-    return robot.state(q).position(frame)
+    return State.at(robot, q).position(frame)
 
 
 def _spoil(values: Array, numbers: list[int | None]) -> None:

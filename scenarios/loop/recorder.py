@@ -10,7 +10,8 @@ from hierarchy.allocation import AVOIDANCE
 from hierarchy.jit import bind, compiled
 from hierarchy.kinematics import point_at
 from hierarchy.problem import Array
-from hierarchy.robot import Frame, Robot, State
+from hierarchy.robot import Frame, Robot
+from hierarchy.state import State
 from scenarios.config import Scenario
 from scenarios.loop import listed
 from scenarios.loop.controller import Controller
@@ -49,7 +50,8 @@ class Recorder:
         cell, state = controller.cell, controller.cell.state
         self._frame = cell.robot.frame(cell.robot.end_effector)
         self._distance = cell.sensor.measurement.distance if cell.sensor else np.empty(0)
-        self._target = cell.position.target if cell.position else np.full((3, 3), np.nan)
+        self._target = np.full((3, 3), np.nan)
+        self._move_target = cell.position.path.writer(self._target) if cell.position else None
         self._write_rest = bind(
             _write, self._log, self._choices, self._times, state.q, state.v, state.placements,
             self._frame.joint, self._frame.offset, self._target, self._distance,
@@ -66,6 +68,8 @@ class Recorder:
         index = self._orders.setdefault(order, len(self._orders))
         active = cell.sensor.measurement.active + 1 if AVOIDANCE in order and cell.sensor else -1
         resolution, plant = controller.resolution, cell.plant
+        if self._move_target is not None:
+            self._move_target(cell.state.t)
         finite = _write_given(self._log, k, self._given, plant.a, controller.sent)
         finite &= self._write_rest(k, index, active, repulsion, resolution.status,
                                    resolution.iterations, cell.state.t, controller.cone_error,

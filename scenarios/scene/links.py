@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from hierarchy import Robot
+from hierarchy import Robot, State
 from hierarchy.avoidance import Capsule
 from hierarchy.problem import Array
 
@@ -37,7 +37,7 @@ def _sticks(robot: Robot) -> tuple[Capsule, ...]:
 
 def lowest(robot: Robot, links: Sequence[Capsule]) -> float:
     """Height [m] of what is lowest of a robot at rest, or of its base."""
-    low = ends(links, robot.state(robot.rest).placements)[..., 2].min(axis=-1)
+    low = ends(links, State.at(robot, robot.rest).placements)[..., 2].min(axis=-1)
     return float((low - [link.radius for link in links]).min(initial=0.0))
 
 

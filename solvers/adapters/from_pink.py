@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array, Hierarchy, check_rows
-from hierarchy.robot import State
+from hierarchy.state import State
 from hierarchy.task import Level, Task
 from solvers.adapters import displacements
 
@@ -65,20 +65,27 @@ class PinkTask(Task):
         self._follow(state)
         return self._residual()[0]
 
-    def write(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-              row: int) -> None:
-        """See `Task.write`; asks pink once."""
+    def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
+               row: int) -> Callable[[], object]:
+        """See `Task.writer`; a call asks pink once."""
         if level == "acceleration":
             self.jacobian_derivative(state)
-        self._follow(state)
+        own = slice(row, row + self.rows)
+
+        def write() -> None:
+            self._follow(state)
+            A[own], r = self._rows()
+            lower[own] = upper[own] = self.gain * r
+            check_rows(f"task {self.name!r}", A[own], lower[own], upper[own])
+
+        return write
+
+    def _rows(self) -> tuple[Array, Array]:
         J, r = self._residual()
         if len(r) != self.rows:
             raise HierarchyError(f"task {self.name!r}: {len(r)} of its rows cost something, "
                                  f"{self.rows} did when it was made; make it anew")
-        own = slice(row, row + self.rows)
-        A[own], lower[own] = J, self.gain * r
-        upper[own] = lower[own]
-        check_rows(f"task {self.name!r}", A[own], lower[own], upper[own])
+        return J, r
 
     def jacobian_derivative(self, state: State) -> Array:
         """Raise HierarchyError: pink has none."""

@@ -14,7 +14,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from hierarchy import Robot
+from hierarchy import Robot, State
 from hierarchy.problem import Array
 from scenarios.bench import strictness
 from scenarios.bench.machine import machine
@@ -68,7 +68,7 @@ def make_scenes(folder: Path) -> dict[str, Scene]:
     file = folder / f"{robot.name}.urdf"
     file.write_text(urdf(robot))
     start = strictness.START
-    goal = robot.state(start).position(robot.frame(robot.end_effector)) + strictness.STEP
+    goal = State.at(robot, start).position(robot.frame(robot.end_effector)) + strictness.STEP
     ellipse = Scene(str(file), robot.end_effector, robot.joint_names, tuple(start),
                     tuple(robot.velocity_limit.tolist()),
                     tuple(np.add(start, strictness.POSTURE).tolist()), (0.0, 0.6, 0.0),
@@ -163,7 +163,7 @@ def judge(file: Path, scenes: dict[str, Scene]) -> dict[str, Any]:
 def _path_error(log: dict[str, Array], scene: Scene) -> float | None:
     """The largest distance [m] of the end effector from the path, once it is there."""
     robot = Robot.from_file(scene.file, scene.frame)
-    state, frame, still = robot.state(scene.start), robot.frame(scene.frame), np.zeros(robot.n)
+    state, frame, still = State.at(robot, scene.start), robot.frame(scene.frame), np.zeros(robot.n)
     errors = [0.0]
     for t, q in zip(log["t"], log["q"], strict=True):
         if t >= _SETTLED:
@@ -182,7 +182,7 @@ def _moved(log: dict[str, Array], scene: Scene) -> float | None:
     for q, v, other, failed in zip(log["step_q"], log["step_v"], log["step_other"],
                                    log["step_failed"], strict=True):
         if not failed:
-            moved.append(np.linalg.norm(task.jacobian(robot.state(q)) @ (v - other)))
+            moved.append(np.linalg.norm(task.jacobian(State.at(robot, q)) @ (v - other)))
     return float(max(moved)) * scene.period if moved else None
 
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from hierarchy import Robot, Stack
+from hierarchy import Robot, Stack, State
 from hierarchy.paths import Ellipse
 from hierarchy.tasks import JointLimits, Position, Posture
 from scenarios.bench.peers.scene import Array, RefusedError, Scene
@@ -30,7 +30,7 @@ class Ours:
                  Position(robot.frame(scene.frame), path, gain=scene.gain),
                  Posture(scene.posture, gain=scene.posture_gain)]
         self.stack = Stack(tasks if posture else tasks[:2], "velocity")
-        self.state = robot.state(scene.start)
+        self.state = State.at(robot, scene.start)
         self.resolver, self.memory, self.before = make(resolver, **settings), None, None
 
     def velocity(self, t: float, q: Array, v: Array, goal: Array, rate: Array) -> Array:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hierarchy import Robot
+from hierarchy import Robot, State
 from hierarchy.avoidance import Obstacles
 from hierarchy.jit import compiled
 from hierarchy.problem import Array
@@ -129,7 +129,7 @@ def _gains(robot: Robot, q: Array, servo: ServoSection,
            joints: JointsSection) -> tuple[Array, Array]:
     """Stiffness (n,) [N m/rad] and damping (n,) [N m s/rad] of critically damped servos."""
     bandwidth = each(servo.bandwidth, robot.n, "plant.servo.bandwidth")
-    inertia = np.diag(robot.state(q).mass_matrix()) + each(
+    inertia = np.diag(State.at(robot, q).mass_matrix()) + each(
         joints.armature, robot.n, "plant.joints.armature")
     return inertia * bandwidth**2, 2.0 * inertia * bandwidth
 

@@ -55,7 +55,7 @@ class RecordedFrames:
         if not frames or any(a >= b for a, b in zip(self.times, self.times[1:], strict=False)):
             raise HierarchyError(f"{self.folder / ABOUT}: needs frames, at increasing times")
         self._images = [_read_png(file, self.pinhole) for file in files]
-        self._placements = [robot.state(frame["q"]).placements.copy() if "q" in frame else None
+        self._placements = [State.at(robot, frame["q"]).placements.copy() if "q" in frame else None
                             for frame in frames]
         self._reading = np.zeros((self.pinhole.height, self.pinhole.width), np.float32)
 

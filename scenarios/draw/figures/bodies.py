@@ -11,6 +11,7 @@ from matplotlib.collections import PatchCollection
 from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 
+from hierarchy import State
 from scenarios.draw.figures import drawing
 from scenarios.draw.figures.drawing import INK, Array
 from scenarios.scene import capsules, ends
@@ -76,7 +77,7 @@ def _moved(recording: Recording) -> list[str]:
 def _body(ax: Axes, robot: Robot, q: Array, aside: Array) -> None:
     """Draw the capsules, those farther away first and lighter."""
     links = capsules(robot)
-    segments = ends(links, robot.state(q).placements)
+    segments = ends(links, State.at(robot, q).placements)
     depth = segments.mean(axis=1) @ _toward_camera()
     order = np.argsort(depth)
     shade = (depth - depth.min()) / max(float(np.ptp(depth)), 1e-9)
@@ -115,7 +116,7 @@ def _extent(robot: Robot, recording: Recording, ticks: Array) -> tuple[float, fl
     """Greatest width [m] of the bodies that are drawn, their lowest and their highest place."""
     links = capsules(robot)
     radii = np.array([[link.radius] for link in links])
-    flat = [_flat(ends(links, robot.state(recording["q"][k]).placements)) for k in ticks]
+    flat = [_flat(ends(links, State.at(robot, recording["q"][k]).placements)) for k in ticks]
     low = np.array([(body - radii[..., None]).min(axis=(0, 1)) for body in flat])
     high = np.array([(body + radii[..., None]).max(axis=(0, 1)) for body in flat])
     return float((high - low)[:, 0].max()), float(low[:, 1].min()), float(high[:, 1].max())

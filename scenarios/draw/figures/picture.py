@@ -115,12 +115,13 @@ def _exact(recording: Recording) -> bool:
 
 
 def _arms(ax: Axes, robot: Robot, recording: Recording) -> None:
+    from hierarchy import State
     from scenarios.scene import place
 
     nearest = _nearest(recording)
     others = np.linspace(0, recording.ticks - 1, _OTHER_POSES).astype(int)
     for k, alpha in (*((int(k), 0.16) for k in others), (nearest, 0.9)):
-        placements = robot.state(recording["q"][k]).placements
+        placements = State.at(robot, recording["q"][k]).placements
         tip = recording["ee_position"][k]
         chain = drawing.project(np.vstack([np.zeros(3), placements[1:, 9:], tip]))
         ax.plot(*chain.T, color=INK, alpha=alpha, linewidth=5.0 if k == nearest else 2.5,

@@ -30,7 +30,7 @@ class Lately:
         now: dict[str, Any] = {"t": cell.state.t, "v": cell.state.v.copy()}
         now |= {name: rows[0] for name, rows in watched.listed.items()}
         if cell.position is not None:
-            now["position_error"] = (cell.position.target[0]
+            now["position_error"] = (cell.position.path(cell.state.t)[0]
                                      - cell.state.position(cell.position.frame))
         if cell.pointing is not None:
             # without alpha_d, which may be another one when this is drawn

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hierarchy import State
 from hierarchy.problem import Array
 from scenarios.draw.figures.drawing import ALERT, INK
 from scenarios.draw.viewer.meshes import Mesh, cone_mesh, hull_of_balls, obstacle_mesh
@@ -210,7 +211,7 @@ def _segments(points: Array | tuple[()]) -> Segments:
 
 def _widths(stage: Stage) -> Array:
     """Radius [m] at which each of the stage's points can be seen, on whatever link it is."""
-    placements = stage.robot.state(stage.robot.rest).placements
+    placements = State.at(stage.robot, stage.robot.rest).placements
     points = place(placements, [point.joint for point in stage.points],
                    [point.offset for point in stage.points])
     radii = np.array([capsule.radius for capsule in stage.capsules])

@@ -115,7 +115,7 @@ class Watched:
         return Moment(
             cell.state.t, self._state.placements.copy(), seen.points.copy(), nearest, linked,
             active, self._exact.obstacles.centres.copy(), self._state.rotation(self._tip)[:, 2],
-            cell.position.target[0].copy() if cell.position else None, order, became,
+            cell.position.path(cell.state.t)[0] if cell.position else None, order, became,
             found.saturated, tuple(self._moved()))
 
     def _active(self, became: Mapping[str, Became]) -> int:

@@ -1,0 +1,177 @@
+"""State of a robot at one time: everything that a task may read."""
+
+# mypy: disable-error-code="no-untyped-def"
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import partial
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike, NDArray
+
+from hierarchy.avoidance.measurement import Measurement
+from hierarchy.errors import RobotError
+from hierarchy.jit import compiled
+from hierarchy.kinematics import Kinematics
+from hierarchy.problem import Array
+from hierarchy.robot import Frame, Robot
+
+
+class State:
+    """Time, joint state and kinematics of one tick: everything that a task may read.
+
+    t [s], q (nq,), v (n,); J, dJ (6, n) world-frame spatial Jacobian of every joint and its time
+    derivative, linear part at the world origin; placements (joints + 1, 12): rotation (column by
+    column) and translation of each joint's frame; supports (joints + 1, n) whether a column moves
+    a body. `kinematics` has all arrays that kernels read. J, dJ and placements are views of the
+    results of the last `move`.
+
+    With `period` > 0 [s] derivatives are backward differences against previous_J and
+    previous_placements, those of the previous `move`; with 0 they are exact. `measurement` is that
+    of this tick, or None. `commanded` (n,) is the last command if commands are velocities, which
+    differs from v on a robot that lags; None stands for v.
+    """
+
+    def __init__(self, robot: Robot, differences: float | None = None) -> None:
+        self.robot = robot
+        self.t = 0.0
+        self.q, self.v = pin.neutral(robot.model), np.zeros(robot.n)
+        self.measurement: Measurement | None = None
+        self.commanded: Array | None = None
+        self._model, self._data = robot.model, robot.model.createData()
+        self._compute = partial(pin.computeJointJacobiansTimeVariation, self._model, self._data,
+                                self.q, self.v)
+        self._compute()
+        self.J, self.dJ = self._data.J, self._data.dJ
+        self.placements = _placements_view(self._data, robot.model.njoints)
+        self.supports = _supports(robot.model)
+        self.period = differences or 0.0
+        self.previous_J = self.J.copy(order="F")
+        self.previous_placements = self.placements.copy()
+        self._started = False
+        self.kinematics = Kinematics(self.v, self.J, self.dJ, self.placements, self.supports,
+                                     self.previous_J, self.previous_placements, self.period)
+
+    @classmethod
+    def at(cls, robot: Robot, q: ArrayLike, v: ArrayLike | None = None, t: float = 0.0,
+           differences: float | None = None) -> State:
+        """Make a State at joint positions q (nq,) [rad or m] and velocities v (n,), zero if None.
+
+        `differences` is the period [s] of backward differences, None for exact derivatives.
+        RobotError where a shape is wrong or an entry is not finite.
+        """
+        state = cls(robot, differences)
+        state.move(t, _checked(robot, "q", q, robot.coordinate_names),
+                   _checked(robot, "v", np.zeros(robot.n) if v is None else v,
+                            robot.velocity_names))
+        return state
+
+    @property
+    def n(self) -> int:
+        """Number of joint velocities."""
+        return self.robot.n
+
+    def move(self, t: float, q: Array, v: Array) -> bool:
+        """Go to time t [s] at q (nq,), v (n,): the one kinematics call of a tick.
+
+        Shapes are not checked. Returns False and changes nothing if an entry is not finite.
+        """
+        if not _copy_if_finite(q, v, self.q, self.v):
+            return False
+        if self.period > 0.0 and self._started:
+            self._keep_kinematics()
+        self.t = t
+        self._compute()
+        if self.period > 0.0 and not self._started:  # no previous tick: differences are zero
+            self._keep_kinematics()
+        self._started = True
+        return True
+
+    def _keep_kinematics(self) -> None:
+        _copy_kinematics(self.J, self.placements, self.previous_J, self.previous_placements)
+
+    def mass_matrix(self) -> Array:
+        """Joint-space inertia matrix M(q) (n, n) [kg m^2]."""
+        return np.ascontiguousarray(pin.crba(self._model, self._data, self.q))
+
+    def mass_matrix_derivative(self) -> Array:
+        """Time derivative of M(q) (n, n) [kg m^2/s]."""
+        C = pin.computeCoriolisMatrix(self._model, self._data, self.q, self.v)
+        return np.ascontiguousarray(C + C.T)
+
+    def bias_effort(self) -> Array:
+        """Joint efforts h(q, v) (n,) [N m or N] of gravity, Coriolis and centrifugal forces."""
+        return np.asarray(pin.nonLinearEffects(self._model, self._data, self.q, self.v))
+
+    def position(self, frame: Frame) -> Array:
+        """World position (3,) [m] of a frame's origin."""
+        rotation, translation = self._placement(frame.joint)
+        return translation + rotation @ frame.offset
+
+    def rotation(self, frame: Frame) -> Array:
+        """World orientation (3, 3) of a frame."""
+        return self._placement(frame.joint)[0] @ frame.rotation
+
+    def _placement(self, joint: int) -> tuple[Array, Array]:
+        row = self.placements[joint]
+        return row[:9].reshape(3, 3).T, row[9:]
+
+
+@compiled
+def _copy_if_finite(q, v, to_q, to_v):
+    for i in range(len(q)):
+        if not np.isfinite(q[i]):
+            return False
+    for i in range(len(v)):
+        if not np.isfinite(v[i]):
+            return False
+    for i in range(len(q)):
+        to_q[i] = q[i]
+    for i in range(len(v)):
+        to_v[i] = v[i]
+    return True
+
+
+@compiled
+def _copy_kinematics(J, placements, previous_J, previous_placements):
+    for c in range(J.shape[1]):
+        for i in range(6):
+            previous_J[i, c] = J[i, c]
+    for i in range(placements.shape[0]):
+        for k in range(12):
+            previous_placements[i, k] = placements[i, k]
+
+
+def _placements_view(data: Any, joints: int) -> Array:
+    """One (joints, 12) view over pinocchio's contiguous vector of placements."""
+    first = data.oMi[0].rotation
+    view = np.lib.stride_tricks.as_strided(first.T.reshape(-1), (joints, 12), (96, 8))
+    for i in range(joints):
+        here = data.oMi[i]
+        if not (np.shares_memory(view, here.translation)
+                and (view[i] == np.r_[here.rotation.T.ravel(), here.translation]).all()):
+            raise RobotError("this version of pinocchio has an unknown layout of placements")
+    return view
+
+
+def _supports(model: Any) -> NDArray[np.bool_]:
+    supports = np.zeros((model.njoints, model.nv), dtype=np.bool_)
+    for body in range(1, model.njoints):
+        for joint in model.supports[body].tolist():
+            if joint > 0:
+                first = model.joints[joint].idx_v
+                supports[body, first:first + model.joints[joint].nv] = True
+    return supports
+
+
+def _checked(robot: Robot, what: str, value: ArrayLike, names: Sequence[str]) -> Array:
+    vector = np.array(value, dtype=float)
+    if vector.shape != (len(names),):
+        raise RobotError(f"robot {robot.name!r}: {what} has shape {vector.shape}, "
+                         f"expected ({len(names)},)")
+    for (i,) in np.argwhere(~np.isfinite(vector))[:1]:
+        raise RobotError(f"robot {robot.name!r}: {what}[{i}] ({names[i]}) is {vector[i]}")
+    return vector
