@@ -164,7 +164,7 @@ def test_an_inequality_is_refused_by_problem_level_and_row():
     ({"upper": np.ones(3)}, r"upper has shape \(3,\), expected \(4, 3\)"),
     ({"upper": "high"}, "upper is not an array of numbers"),
     ({"reference": np.ones((5, 4))}, r"reference has shape \(5, 4\), expected \(4, 5\)"),
-    ({"sizes": [2, 2]}, "sizes sum to 4, and A has 3 rows"),
+    ({"sizes": [2, 2]}, "sizes sum to 4, but A has 3 rows"),
     ({"sizes": [4, -1]}, "expected a whole number of rows"),
     ({"sizes": [1.5, 1.5]}, "expected a whole number of rows")])
 def test_a_wrong_array_is_named(wrong, says):
@@ -244,7 +244,7 @@ def test_jax_fails_alone_and_refuses_as_the_kernel_does():
     batch.upper[11, 4] += 1.0
     with pytest.raises(HierarchyError, match="problem 11, level 3, row 0: an inequality"):
         in_jax.solve(batch)
-    with pytest.raises(HierarchyError, match="hcod is not there in jax"):
+    with pytest.raises(HierarchyError, match="hcod is not available in jax"):
         in_jax.solve(batch, make("hcod"))
 
 

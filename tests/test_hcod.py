@@ -138,7 +138,7 @@ def test_explain_names_equalities_and_rows_that_disagree():
         [([[1.0, 0.0]], [1.0]), ([[1.0, 0.0]], [2.0]), (np.zeros((0, 2)), []),
          ([[0.0, 1.0], [0.0, 1.0]], [0.0, 1.0])], names=["hand", "elbow", "none", "wrist"])
     assert explain(h, HCOD.solve(h)).splitlines() == [
-        "hand is met.", "elbow is missed by 1: held back by hand.", "none asks for nothing.",
+        "hand is met.", "elbow is missed by 1: held back by hand.", "none has no rows.",
         "wrist is missed by 0.707: its own rows disagree."]
 
 
