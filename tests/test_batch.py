@@ -11,8 +11,7 @@ from hierarchy import Hierarchy, HierarchyError
 from scenarios.bench import batch as bench
 from scenarios.bench.candidates import moved
 from solvers import Status, make
-from solvers import batch as batches
-from solvers.batch import Batch, solve
+from solvers.batch import Batch, solve, stacked
 from solvers.problems import Recipe, generate, load
 
 SLOW = os.environ.get("NUMBA_DISABLE_JIT") == "1"
@@ -27,7 +26,7 @@ both = pytest.mark.parametrize("name", ["tpm", "hcod"])
 
 @pytest.fixture(autouse=True)
 def threads_for_small_batches(monkeypatch):
-    monkeypatch.setattr(batches, "ENOUGH", 1)
+    monkeypatch.setattr(stacked, "ENOUGH", 1)
 
 
 def problems_of(name, copies=COPIES):
@@ -200,6 +199,17 @@ def test_a_batch_may_be_empty_or_without_rows(name, shape):
     assert answer.x.shape == (count, 5)
     assert answer.solved.all()
     assert m or (answer.x == 1.0).all()
+
+
+def test_a_problem_that_fails_keeps_no_memory_and_the_others_keep_theirs():
+    hs = [bounded(seed, 0.3) for seed in range(3)]
+    cold = solve(Batch.of(hs), make("tpm"))
+    assert cold.memory.any(axis=1).all()
+    batch = Batch.of(hs)
+    batch.A[1, -1, 0] = np.nan
+    warm = solve(batch, make("tpm"), memory=cold.memory)
+    assert warm.status.tolist() == [Status.SOLVED, Status.NUMERICAL_FAILURE, Status.SOLVED]
+    assert warm.memory.any(axis=1).tolist() == [True, False, True]
 
 
 @both
