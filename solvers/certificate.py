@@ -1,10 +1,10 @@
-"""Is this x the answer of a hierarchy? Judged from the data alone, trusting no solver.
+"""Certificate: is this x the answer of a hierarchy? Uses the data alone, trusting no solver.
 
 Every row is judged by its own norm. Let t_i be the violation of row i at x divided by the norm of
-the row: a length in the space of x. Let F_(k-1) be all y at which every row of the levels above has
-the violation that it has at x: an equality and a violated row keep their value, the others stay
-inside their sides. F_(k-1) is convex, so x is optimal for level k exactly when the normal cone of
-F_(k-1) at x balances the gradient (Karush-Kuhn-Tucker), that is when
+the row: a length in the space of x. Let F_(k-1) be the set of all y at which every row of the
+levels above has the violation that it has at x: equalities and violated rows keep their value, the
+others stay within their sides. F_(k-1) is convex, so x is optimal for level k exactly when the
+normal cone of F_(k-1) at x balances the gradient (Karush-Kuhn-Tucker), that is when
 
     sum_i |a_i|^2 t_i u_i + sum_j y_j u_j + sum_l z_l c_l = 0,   y >= 0,  z >= 0,          (1)
 
@@ -12,20 +12,20 @@ modulo the span of the equalities and violated rows above. The u_i are the unit 
 that are equalities or violated, the u_j those that are on a side, and the c_l the unit rows above
 that are on a side, all pointing outwards.
 
-The residual of a level is the least change of t for which (1) holds: the Euclidean norm over the
-rows of the level, relative to 1 + |x|. So an x is accepted where it is exactly optimal once each
-side is moved by no more than `tolerance` (1 + |x|) in the direction of its row, whatever the norm
-of the row. A level may be improved, and x is rejected, where no such shift explains it. The same
-test, with the rows of all levels above and x - reference for t, tells whether x is the nearest.
+The residual of a level is the smallest change of t for which (1) holds: the Euclidean norm over the
+rows of the level, relative to 1 + |x|. So x is accepted if it is exactly optimal once each side is
+shifted by no more than `tolerance` (1 + |x|) along its row, whatever the norm of the row, and
+rejected if no such shift explains it. The same test, with the rows of all levels above and
+x - reference for t, decides whether x is the nearest.
 
-There are two limits to what double precision can tell. Rows that agree up to an angle of `parallel`
-count as dependent: a direction that only their difference can see is free, and levels below may use
-it. What they span is then known up to that angle. From a quarter of `parallel` to four times it, x
-may be right in either reading. And a row smaller than 1e-13 of the largest row of its level is
-dust: rounding in the large row could have made it. An x that meets it is accepted, and so is one
-that ignores it.
+Double precision sets two limits. First, rows that agree up to an angle of `parallel` count as
+dependent: a direction that only their difference can see is free, and lower levels may use it.
+Their span is then known only up to that angle, so x may be right under either reading, with angles
+from a quarter of `parallel` to four times it. Second, a row smaller than 1e-13 of the largest row
+of its level is dust, which rounding in the large row could have produced: an x that meets it is
+accepted, and so is one that ignores it.
 
-The least change is a non-negative least-squares problem in coordinates in which large rows come
+The smallest change is a non-negative least-squares problem in coordinates that put large rows
 first, so that rounding in rows of norm 1000 does not hide a row of norm 0.001.
 """
 
@@ -41,17 +41,17 @@ from numpy.typing import ArrayLike, NDArray
 from hierarchy.problem import Array, Hierarchy
 
 TOLERANCE = 1e-8
-"""Largest residual of an answer, and distance to a side, relative to 1 + |x|, up to which a row is
-on it."""
+"""Largest residual of an answer, and largest distance of a row that counts as on its side, relative
+to 1 + |x|."""
 PARALLEL = 1e-8
-"""Angle [rad] up to which a row counts as lying in the span of others."""
-_EITHER = 4.0       # up to this factor from `parallel`, rows may count as dependent or not
-_DUST = 1e-13       # norm of a row of a level relative to the largest: smaller ones are not judged
-_SMALLEST = 1e-30   # norm of a row of a level relative to the largest: smaller ones count as this
-_CLEAR = 0.1        # pivot, relative: smaller ones do not add to what parallel rows leave unknown
-_UNSEEN = 1e4       # weight of what no row of a level can see, relative to what they see least
-_LARGEST = 1e150    # of a length: its square is finite
-_SMALL = 1e-15      # relative: steps and pivots below it are rounding
+"""Angle [rad] up to which a row counts as dependent on others."""
+_EITHER = 4.0       # rows within this factor of `parallel` may count as dependent or not
+_DUST = 1e-13       # norm of a row relative to the largest of its level: smaller ones are dust
+_SMALLEST = 1e-30   # norm of a row relative to the largest of its level: lower bound
+_CLEAR = 0.1        # relative pivot: smaller ones do not add to the uncertainty of parallel rows
+_UNSEEN = 1e4       # weight of directions that no row of a level sees, relative to the weakest seen
+_LARGEST = 1e150    # length: its square stays finite
+_SMALL = 1e-15      # relative: smaller steps and pivots are rounding
 _ROUNDING = 64 * float(np.finfo(float).eps)
 
 Mask = NDArray[np.bool_]
@@ -60,17 +60,17 @@ Mask = NDArray[np.bool_]
 @final
 @dataclass(frozen=True)
 class Certificate:
-    """What was found at one x.
+    """The verdict on one x.
 
     Attributes
     ----------
     violations : (L,) Euclidean norm of each level's violation.
-    stationarity : (L,) how far the sides of each level would have to be moved for x to be optimal,
-        in units of length (violation divided by the norm of the row), relative to 1 + |x|.
-    nearest : length of the step towards the reference that no level would feel, relative to
+    stationarity : (L,) residual of each level: the smallest shift of its sides for which x is
+        optimal, as a length (violation divided by the norm of the row), relative to 1 + |x|.
+    nearest : length of the remaining step towards the reference that changes no level, relative to
         1 + |x|.
-    tolerance : what residuals were compared with.
-    names : of the levels.
+    tolerance : largest residual that is accepted.
+    names : names of the levels.
     """
 
     violations: Array
@@ -87,17 +87,17 @@ class Certificate:
 
     @property
     def optimal(self) -> bool:
-        """Whether every level is as small as the levels above allow."""
+        """Whether every level's violation is as small as the levels above allow."""
         return self.level is None
 
     @property
     def is_nearest(self) -> bool:
-        """Whether no step towards the reference is left."""
+        """Whether no step towards the reference remains."""
         return self.nearest <= self.tolerance
 
     @property
     def certified(self) -> bool:
-        """Whether x is the answer: optimal, and of all optimal x the nearest to the reference."""
+        """Whether x is the answer: the optimal x nearest to the reference."""
         return self.optimal and self.is_nearest
 
     def __str__(self) -> str:
@@ -114,14 +114,14 @@ class Certificate:
 
 def certify(h: Hierarchy, x: ArrayLike, tolerance: float = TOLERANCE,
             parallel: float = PARALLEL) -> Certificate:
-    """Judge whether x (n,) is the answer of h, level by level; see the module's text.
+    """Judge level by level whether x (n,) is the answer of h; see the module's docstring.
 
-    A row's side counts as reached when x is within `tolerance` (1 + |x|) of its hyperplane, and as
-    violated beyond. Within, the row may push to its own side only: exact where it is satisfied, and
-    where it is violated by so little, its own level holds it there. What rounding alone can leave
-    of a residual counts as zero. An x, or data, that is not finite, or whose lengths overflow when
-    they are squared, is never certified.
+    x counts as on a side within `tolerance` (1 + |x|) of its hyperplane, and the row as violated
+    beyond it. A row on a side can push only towards that side. Residuals that rounding alone
+    explains count as zero. An x or data that are not finite, or lengths whose squares overflow, are
+    never certified.
 
+    tolerance : largest residual, relative to 1 + |x|.
     parallel : angle [rad] up to which rows count as dependent.
 
     Raises
@@ -147,7 +147,7 @@ def certify(h: Hierarchy, x: ArrayLike, tolerance: float = TOLERANCE,
 
 def _judged(levels: list[_Rows], gap: Array, reach: float, tolerance: float, parallel: float
             ) -> tuple[Array, float]:
-    """Residual of each level, and of the distance to the reference, relative to reach."""
+    """Return the residuals of the levels and of the distance to the reference, over reach."""
     stationarity, cone = np.zeros(len(levels)), _NormalCone(len(gap), parallel)
     for k, level in enumerate(levels):
         if cone.Z.shape[1] == 0:
@@ -160,10 +160,11 @@ def _judged(levels: list[_Rows], gap: Array, reach: float, tolerance: float, par
 @final
 @dataclass(frozen=True)
 class _Rows:
-    """Unit rows, and where x stands: in lengths, so that every row is judged by its own norm.
+    """Unit rows and the position of x relative to them, as lengths.
 
     unit (m, n); size (m,) logarithm of the norm; t (m,) signed distance beyond a side; fixed,
-    upper, lower (m,): must keep its value, on its upper side, on its lower side; reach = 1 + |x|.
+    upper, lower (m,): the row must keep its value, is on its upper side, is on its lower side;
+    reach = 1 + |x|.
     """
 
     unit: Array
@@ -176,14 +177,14 @@ class _Rows:
 
     @staticmethod
     def of(h: Hierarchy, x: Array, tolerance: float) -> _Rows | None:
-        """Return the rows of all levels, or None where numbers are not finite or too large."""
+        """Return the rows of all levels, or None if a number is too large or not finite."""
         largest = np.abs(h.A).max(axis=1, initial=0.0)
         seen = largest > 0.0
         scale = np.where(seen, largest, 1.0)
         unit = h.A / scale[:, None]
         length = np.where(seen, np.sqrt(np.einsum("ij,ij->i", unit, unit)), 1.0)
         unit = unit / length[:, None]
-        low = np.where(seen, h.lower / scale / length, -np.inf)  # a zero row asks nothing of x
+        low = np.where(seen, h.lower / scale / length, -np.inf)  # a zero row does not constrain x
         up = np.where(seen, h.upper / scale / length, np.inf)
         value, reach = unit @ x, 1.0 + _length(x)
         t = np.maximum(value - up, 0.0) - np.maximum(low - value, 0.0)
@@ -202,18 +203,18 @@ class _Rows:
 
 
 class _NormalCone:
-    """Normal cone of F_k at x: Z (n, p), a basis of what the span leaves, and unit rows in it."""
+    """Normal cone of F_k at x: Z (n, p), a basis of the freedom left by the span, and unit rows."""
 
     def __init__(self, n: int, parallel: float) -> None:
         self.Z = np.eye(n)
         self.parallel = parallel
-        self.rows = np.empty((0, n))   # coordinates in Z of rows on a side, unit again
-        self._kept = np.empty((0, n))  # the same rows as they are given
-        self.thinnest = 1.0  # smallest pivot that was not taken for zero: rounding grows by it
-        self.angle = 0.0  # largest that was: the span is known up to it
+        self.rows = np.empty((0, n))   # coordinates in Z of rows on a side, normalised again
+        self._kept = np.empty((0, n))  # the same rows as given
+        self.thinnest = 1.0  # smallest nonzero pivot: amplifies rounding
+        self.angle = 0.0  # largest pivot taken for zero: error of the span
 
     def add(self, level: _Rows) -> None:
-        """Take in a level: rows in the span, rows on their upper or lower side."""
+        """Add a level: rows in the span, and rows on their upper or lower side."""
         if level.fixed.any():
             self.Z, pivot, angle = _complement(self.Z, level.unit[level.fixed], self.parallel)
             self.thinnest, self.angle = min(self.thinnest, pivot), max(self.angle, angle)
@@ -228,7 +229,10 @@ class _NormalCone:
 
 
 def _complement(Z: Array, rows: Array, parallel: float) -> tuple[Array, float, float]:
-    """Basis of what unit rows leave of Z (n, p), the smallest pivot taken, the largest left out."""
+    """Return a basis of the part of Z (n, p) outside the span of unit rows, and two pivots.
+
+    The pivots are the smallest that counts and the largest that counts as zero.
+    """
     from scipy.linalg import qr  # type: ignore[import-untyped]
 
     q, r, _ = qr((rows @ Z).T, pivoting=True, check_finite=False)
@@ -239,37 +243,46 @@ def _complement(Z: Array, rows: Array, parallel: float) -> tuple[Array, float, f
 
 
 def _residual(cone: _NormalCone, level: _Rows, enough: float) -> float:
-    """Least change of t that balances the gradient of a level: a length."""
-    all_of_it = _length(level.t)
-    if all_of_it <= enough:  # no violation at all would do
-        return all_of_it
+    """Return the least change of t that balances the gradient of a level: a length."""
+    whole = _length(level.t)
+    if whole <= enough:  # a change to no violation at all is small enough
+        return whole
     largest = level.size[level.fixed | level.upper | level.lower].max()
     size = np.exp(np.maximum(level.size - largest, np.log(_SMALLEST)))
-    Z, judged = cone.Z, level.fixed & (size > _DUST)
+    judged = level.fixed & (size > _DUST)
     dust = level.fixed & ~judged
     if not judged.any():  # here too: each row is on its side
         return float(np.abs(level.t[~dust]).max(initial=0.0))
-    if dust.any():
-        Z = _complement(Z, level.unit[dust], cone.parallel)[0]
+    Z = _complement(cone.Z, level.unit[dust], cone.parallel)[0] if dust.any() else cone.Z
+    return min(_least_change(cone, level, Z, size, judged, enough), whole)
+
+
+def _least_change(cone: _NormalCone, level: _Rows, Z: Array, size: Array, judged: Mask,
+                  enough: float) -> float:
+    """Return the residual of (1) in coordinates of Z (n, p), for the judged rows of a level."""
     view = _View.of(level.unit[judged] @ Z, size[judged], cone.parallel)
-    on = [(level.unit[level.upper], size[level.upper], level.t[level.upper]),
-          (-level.unit[level.lower], size[level.lower], -level.t[level.lower])]
-    own, own_size, own_t = (np.concatenate(part) for part in zip(*on, strict=True))
+    own, own_size, own_t = _on_sides(level, size)
     columns = [view.weighted(cone.rows @ (cone.Z.T @ Z)),
                view.weighted((own @ Z) * own_size[:, None]**2)]
     C, terms = (np.hstack(part) for part in zip(*columns, strict=True))
     held = np.eye(len(own_t), C.shape[1], len(cone.rows))
     none, t = np.zeros(len(C) - view.rank), level.t[judged]
     f = np.concatenate([view.Q.T @ t, none, -np.maximum(own_t, 0.0)])
-    size = np.concatenate([np.abs(view.Q).T @ np.abs(t), none, np.zeros(len(own_t))])
-    found = _balanced(np.vstack([C, held]), np.vstack([terms, held]), f, size,
-                      _unknown(min(cone.thinnest, view.thinnest), max(cone.angle, view.angle)),
-                      1e-3 * enough)
-    return min(found, all_of_it)
+    sizes = np.concatenate([np.abs(view.Q).T @ np.abs(t), none, np.zeros(len(own_t))])
+    unknown = _unknown(min(cone.thinnest, view.thinnest), max(cone.angle, view.angle))
+    return _balanced(np.vstack([C, held]), np.vstack([terms, held]), f, sizes, unknown,
+                     1e-3 * enough)
+
+
+def _on_sides(level: _Rows, size: Array) -> tuple[Array, Array, Array]:
+    """Return the outward unit rows of a level that are on a side, their sizes and distances t."""
+    up, low = level.upper, level.lower
+    return (np.concatenate([level.unit[up], -level.unit[low]]),
+            np.concatenate([size[up], size[low]]), np.concatenate([level.t[up], -level.t[low]]))
 
 
 def _projected(gap: Array, cone: _NormalCone) -> float:
-    """Length of the projection of -gap (n,) on the polar cone, in the coordinates of Z."""
+    """Return the length of the projection of -gap (n,) on the polar cone, in coordinates of Z."""
     C, f = cone.rows.T, cone.Z.T @ gap
     size = norm(f if cone.angle == 0.0 else gap)
     return _balanced(C, np.ones_like(C), f, np.full(len(f), size),
@@ -277,13 +290,13 @@ def _projected(gap: Array, cone: _NormalCone) -> float:
 
 
 def _unknown(thinnest: float, angle: float) -> float:
-    """Share of a term that rounding may have made, or rows that count as parallel."""
+    """Return the share of a term that rounding or rows counted as parallel may explain."""
     return _ROUNDING / thinnest + 2.0 * angle / max(thinnest, _CLEAR)
 
 
 def _balanced(C: Array, terms: Array, f: Array, size: Array, unknown: float, enough: float
               ) -> float:
-    """Least |C z + f| for z >= 0, without the share that is unknown of terms of these sizes."""
+    """Return the least |C z + f| for z >= 0, ignoring entries within the unknown share of terms."""
     z = _non_negative(C, -f, enough)
     left = C @ z + f
     noise = unknown * (size + terms @ z)
@@ -293,10 +306,11 @@ def _balanced(C: Array, terms: Array, f: Array, size: Array, unknown: float, eno
 @final
 @dataclass(frozen=True)
 class _View:
-    """What the rows of a level see of p coordinates, large rows first.
+    """The part of p coordinates that the rows of a level see, large rows first.
 
     Q (m, rank) : orthonormal; |Q^T t| is the least change of t without help from the cone.
-    directions (p, rank) and rest (p, p - rank) : bases of what the rows see, and of the rest.
+    directions (p, rank), rest (p, p - rank) : bases of the directions that the rows see, and of
+        the others.
     """
 
     Q: Array
@@ -315,7 +329,7 @@ class _View:
 
     @staticmethod
     def of(P: Array, size: Array, parallel: float) -> _View:
-        """Factorise rows P (m, p), parts of unit rows, that stand for rows of these sizes."""
+        """Factorise rows P (m, p), projections of unit rows that represent rows of these sizes."""
         from scipy.linalg import qr
 
         V, T, thinnest, angle, rank = _graded(P, size, parallel)
@@ -327,9 +341,9 @@ class _View:
         return _View(Q, R, order, V[:, :rank], V[:, rank:], thinnest, angle, parallel)
 
     def weighted(self, rows: Array) -> tuple[Array, Array]:
-        """Return what rows (k, p) do to a balance, as columns (p, k), in lengths of the level.
+        """Return the effect of rows (k, p) on a balance, as columns (p, k) in lengths of the level.
 
-        And the size of the terms that its entries were summed from: rounding is relative to them.
+        Also returns the size of the terms summed in each entry, to which rounding is relative.
         """
         from scipy.linalg import solve_triangular
 
@@ -348,10 +362,10 @@ class _View:
 
 
 def _graded(P: Array, size: Array, parallel: float) -> tuple[Array, Array, float, float, int]:
-    """Orthonormal basis V (p, p), T = V^T P^T, its thinnest pivot, what it left out, its rank.
+    """Return an orthonormal basis V (p, p), T = V^T P^T, its smallest pivot, its error, its rank.
 
-    Pivots are chosen by the size of what is left of a row. A row that has no more than `parallel`
-    of itself left is not a pivot, and nothing is left of it.
+    Pivots are chosen by the size of the remainder of a row. A row with a remainder of at most
+    `parallel` of itself is not a pivot, and its remainder counts as zero.
     """
     from scipy.linalg import qr
 
@@ -366,7 +380,7 @@ def _graded(P: Array, size: Array, parallel: float) -> tuple[Array, Array, float
         candidate[chosen[order[int(np.argmax(lost))]]] = False
     T = V.T @ P.T
     left = np.sqrt(np.cumsum(T[::-1]**2, axis=0)[::-1])
-    out = left <= 0.5 * parallel  # half: what is left of a pivot stays, after rounding too
+    out = left <= 0.5 * parallel  # half: the remainder of a pivot must survive rounding
     out[len(pivots):] = True
     angle = float(np.minimum(np.abs(T)[out].max(initial=0.0), parallel))
     T[out] = 0.0
@@ -376,37 +390,50 @@ def _graded(P: Array, size: Array, parallel: float) -> tuple[Array, Array, float
 def _non_negative(C: Array, b: Array, enough: float) -> Array:
     """Return z >= 0 that minimises |C z - b| (Lawson and Hanson 1974, ch. 23).
 
-    Ends early where |C z - b| <= enough, and in any case after three steps a column.
+    Stops early once |C z - b| <= enough, and in any case after three steps per column.
     """
     z, largest = np.zeros(C.shape[1]), float(np.abs(b).max(initial=0.0))
     peak = np.abs(C).max(axis=0, initial=0.0)
     usable = (peak > 0.0) & (peak < np.inf)
     if not usable.any() or largest == 0.0:
         return z
-    heavy = np.argsort(-np.abs(C).max(axis=1), kind="stable")  # for rows of different weight
+    heavy = np.argsort(-np.abs(C).max(axis=1), kind="stable")  # rows differ in weight
     D, target = C[:, usable][heavy], b[heavy] / largest
-    unit = D / peak[usable]
-    y, left, free = _begun(D, target)
+    z[usable] = largest * _active_set(D, target, D / peak[usable], enough, largest)
+    return z
+
+
+def _active_set(D: Array, b: Array, unit: Array, enough: float, scale: float) -> Array:
+    """Return y >= 0 that minimises |D y - b|, or reaches enough / scale; unit (D) picks columns."""
+    y, left, free = _first_guess(D, b)
     refused, tried = np.zeros(len(y), dtype=bool), {free.tobytes()}
     for _ in range(3 * len(y) + 3):
-        slope, terms = unit.T @ left, np.abs(unit).T @ np.abs(left)
-        slope = np.where(free | refused | (terms == 0.0), 0.0, slope / np.where(terms, terms, 1.0))
-        best = int(np.argmax(slope))
-        if norm(left) * largest <= enough or slope[best] <= _SMALL:
+        best, slope = _steepest(unit, left, free | refused)
+        if norm(left) * scale <= enough or slope <= _SMALL:
             break
-        moved = _freed(D, target, y, free, best)
-        if moved is None or moved[2].tobytes() in tried:  # rounding chose it
+        moved = _freed(D, b, y, free, best)
+        if moved is None or moved[2].tobytes() in tried:  # chosen by rounding
             refused[best] = True
         else:
             y, left, free = moved
             tried.add(free.tobytes())
             refused[:] = False
-    z[usable] = y * largest
-    return z
+    return y
 
 
-def _begun(D: Array, b: Array) -> tuple[Array, Array, Mask]:
-    """Least squares of all columns, then again without those that came out negative."""
+def _steepest(unit: Array, left: Array, excluded: Mask) -> tuple[int, float]:
+    """Return the column with the largest slope relative to its terms, and that slope."""
+    slope, terms = unit.T @ left, np.abs(unit).T @ np.abs(left)
+    slope = np.where(excluded | (terms == 0.0), 0.0, slope / np.where(terms, terms, 1.0))
+    best = int(np.argmax(slope))
+    return best, float(slope[best])
+
+
+def _first_guess(D: Array, b: Array) -> tuple[Array, Array, Mask]:
+    """Return the least squares of all columns, repeated without those that come out negative.
+
+    Returns y, the residual, and the mask of the free columns.
+    """
     free = np.ones(D.shape[1], dtype=bool)
     while free.any():
         y, left = _least_squares(D, b, free)
@@ -417,9 +444,9 @@ def _begun(D: Array, b: Array) -> tuple[Array, Array, Mask]:
 
 
 def _freed(D: Array, b: Array, y: Array, free: Mask, new: int) -> tuple[Array, Array, Mask] | None:
-    """Return the least squares y >= 0 after one more entry is freed, what it leaves, and the mask.
+    """Return the least squares y >= 0 after one more entry is freed, its residual, and the mask.
 
-    None where the new entry would become negative: rounding chose it.
+    None if the new entry would become negative, which means that rounding chose it.
     """
     free = free.copy()
     free[new] = True
@@ -438,10 +465,10 @@ def _freed(D: Array, b: Array, y: Array, free: Mask, new: int) -> tuple[Array, A
 
 
 def _least_squares(D: Array, b: Array, free: Mask) -> tuple[Array, Array]:
-    """Least squares of the free columns, and what it leaves; QR with pivoting, heavy rows first.
+    """Return the least squares of the free columns and its residual; QR with pivoting.
 
-    What is left comes out of the reflections, not as a difference, so the little that a heavy row
-    leaves is as exact as the rest (Cox, Higham 1998).
+    Heavy rows come first. The residual comes from the reflections, not from a difference, so the
+    small residual of a heavy row is as accurate as the rest (Cox, Higham 1998).
     """
     from scipy.linalg import lapack, qr, solve_triangular
 
@@ -451,7 +478,7 @@ def _least_squares(D: Array, b: Array, free: Mask) -> tuple[Array, Array]:
     depth = min(r.shape)
     raw = raw[:, :depth]
     inside, s = lapack.dormqr("L", "T", raw, tau, b[:, None], 64)[0][:, 0], np.zeros(D.shape[1])
-    rounding = _SMALL * np.minimum(norm(r, axis=0)[:depth],  # of each column, and each row
+    rounding = _SMALL * np.minimum(norm(r, axis=0)[:depth],  # of each column and row
                                    np.abs(D[:, free]).max(axis=1)[:depth])
     pivots = np.abs(np.diagonal(r)) > rounding
     rank = len(pivots) if pivots.all() else int(np.argmin(pivots))
@@ -462,6 +489,6 @@ def _least_squares(D: Array, b: Array, free: Mask) -> tuple[Array, Array]:
 
 
 def _length(v: Array) -> float:
-    """Euclidean norm, without overflow inside."""
+    """Return the Euclidean norm, computed without overflow."""
     largest = float(np.abs(v).max(initial=0.0))
     return largest * float(norm(v / largest)) if 0.0 < largest < np.inf else largest

@@ -8,40 +8,47 @@ from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array, Hierarchy
 from solvers.resolver import Resolution
 from solvers.resolvers.hcod import ActiveSetResolution
+from solvers.status import EQUAL
 
-_MATTERS = 1e-6  # share of a level's pull below which a level above is not worth naming
+_MATTERS = 1e-6  # smallest share of a level's pull for which a level above is named
 
 
 def explain(h: Hierarchy, resolution: Resolution, tolerance: float = 1e-9) -> str:
-    """Say of every level whether it is met, and if not what holds it back.
+    """Say whether each level is met and, if not, which rows hold it back.
 
-    One line a level, under its name in `h.names`. A level counts as met where its violation is at
-    most `tolerance` times the size of its terms. Raises a HierarchyError unless the resolution is
-    one of `hcod`, which alone knows what each row does.
+    Returns one line per level, under its name in `h.names`. A level counts as met if its violation
+    is at most `tolerance` times the size of its terms. Raises a HierarchyError unless the
+    resolution is from `hcod`, the only resolver that reports the state of each row.
     """
     if not isinstance(resolution, ActiveSetResolution):
-        raise HierarchyError("explain needs a resolution of hcod: others do not say which rows act")
+        raise HierarchyError("explain needs a resolution of hcod: other resolvers do not report "
+                             "which rows are active")
     lines = [_level(h, resolution, k, tolerance) for k in range(len(h.sizes))]
     if resolution.unfinished is not None:
-        lines.append(f"The iterations ended while {h.names[resolution.unfinished]!r} was worked "
-                     "on: it and what is below may still be improved.")
+        lines.append(f"The iteration limit was reached at {h.names[resolution.unfinished]!r}: it "
+                     "and the levels below may not be optimal.")
     return "\n".join(lines)
 
 
 def _level(h: Hierarchy, resolution: ActiveSetResolution, k: int, tolerance: float) -> str:
     rows = slice(h.offsets[k], h.offsets[k + 1])
     w = h.slacks(resolution.x)[rows]
+    if not len(w):
+        return f"{h.names[k]} has no rows."
     size = np.linalg.norm(h.A[rows]) * np.linalg.norm(resolution.x) + 1e-300
     missed = float(np.linalg.norm(w))
-    held_by = [_row(h, resolution, int(i)) for i in np.flatnonzero(resolution.holds_back == k)
-               if i < h.offsets[k]]
-    equalities = _equalities_in_the_way(h, resolution, k, w)
     if missed <= tolerance * size:
-        return f"{h.names[k]} is met." if len(w) else f"{h.names[k]} asks for nothing."
-    text = f"{h.names[k]} is missed by {missed:.3g}"
-    if held_by or equalities:
-        return f"{text}: held back by {_and([*held_by, *equalities])}."
-    return f"{text}: its own rows disagree."
+        return f"{h.names[k]} is met."
+    blocking = _inequalities(h, resolution, k) + _equalities(h, resolution, k, w)
+    if not blocking:
+        return f"{h.names[k]} is missed by {missed:.3g}: its own rows disagree."
+    return f"{h.names[k]} is missed by {missed:.3g}: held back by {_and(blocking)}."
+
+
+def _inequalities(h: Hierarchy, resolution: ActiveSetResolution, k: int) -> list[str]:
+    """Name the inequality rows above level k that hold it back."""
+    holding = np.flatnonzero(resolution.holds_back == k)
+    return [_row(h, resolution, int(i)) for i in holding if i < h.offsets[k]]
 
 
 def _row(h: Hierarchy, resolution: ActiveSetResolution, i: int) -> str:
@@ -52,9 +59,8 @@ def _row(h: Hierarchy, resolution: ActiveSetResolution, i: int) -> str:
     return f"{name} at its {'upper' if resolution.active[i] > 0 else 'lower'} side"
 
 
-def _equalities_in_the_way(h: Hierarchy, resolution: ActiveSetResolution, k: int,
-                           w: Array) -> list[str]:
-    """Names of the levels above whose equality rows carry a part of level k's pull."""
+def _equalities(h: Hierarchy, resolution: ActiveSetResolution, k: int, w: Array) -> list[str]:
+    """Name the levels above whose equality rows carry part of level k's pull."""
     first = h.offsets[k]
     acting = np.flatnonzero(resolution.active[:first] != 0)
     pull = h.A[first:h.offsets[k + 1]].T @ w
@@ -62,7 +68,7 @@ def _equalities_in_the_way(h: Hierarchy, resolution: ActiveSetResolution, k: int
         return []
     forces = np.linalg.lstsq(h.A[acting].T, -pull, rcond=1e-10)[0]
     shares = np.abs(forces) * np.linalg.norm(h.A[acting], axis=1) / np.linalg.norm(pull)
-    matters = (resolution.active[acting] == 2) & (shares > _MATTERS)
+    matters = (resolution.active[acting] == EQUAL) & (shares > _MATTERS)
     levels = np.searchsorted(h.offsets, acting[matters], side="right") - 1
     return [h.names[level] for level in np.unique(levels)]
 

@@ -1,4 +1,4 @@
-"""What every resolver is: a name, an immutable record of settings, a status that is the remedy."""
+"""The interface of every resolver: a name, frozen settings, `solve`, and the registry."""
 
 from __future__ import annotations
 
@@ -24,20 +24,20 @@ _RESOLVED: dict[str, str] = {
 
 
 class Resolution:
-    """What a solve gave.
+    """The result of a solve.
 
     Attributes
     ----------
     x : (n,) the answer, always finite.
     status : how the solve ended.
-    iterations : steps of the resolver's own kind; 1 for a direct one.
-    memory : state for the next solve, or None where the resolver keeps none.
+    iterations : number of iterations, counted in the resolver's own way; 1 for a direct resolver.
+    memory : warm start for the next solve, in the resolver's own layout; None if it keeps none.
     """
 
     __slots__ = ("iterations", "memory", "status", "x")
 
     def __init__(self, x: Array, status: Status = Status.SOLVED, iterations: int = 1,
-                 memory: Any = None) -> None:
+                 memory: Array | None = None) -> None:
         self.x = x
         self.status = status
         self.iterations = iterations
@@ -49,25 +49,20 @@ class Resolution:
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Resolver(ABC):
-    """A way to resolve a hierarchy, with its settings. Abstract.
+    """Abstract solver of a task hierarchy: an immutable record of its settings.
 
-    The settings that all resolvers share have one meaning in all of them. For a level with m_k
-    rows, let B be its rows as seen through the null space of the levels above, and r what they
-    still miss.
+    The settings below mean the same in every resolver; docs/theory/resolver-notes.md has the exact
+    definition of damping.
 
-    damping : lambda_max, 0 = off. With it on and s < threshold, where s is the smallest of the m_k
-        singular values of B (0 where the rows of B are dependent), the level minimises
-        ||B z - r||^2 + lambda^2 ||z||^2 with lambda^2 = (1 - (s / threshold)^2) lambda_max^2. The
-        null space handed to the levels below, and the null-space term of (14), stay undamped.
-    threshold : the s below which damping starts, in the unit of the rows.
-    rank_tolerance : a row counts as zero in the null space of what was taken before it when the
-        norm of what is left is at most rank_tolerance times the norm of the row as given. A row of
-        zeros is zero. So rows may have any scale, and a row parallel to an upper one up to this
-        angle adds nothing.
+    damping : lambda_max of the variable damping of a level near a singularity; 0 = off.
+    threshold : smallest singular value of a level below which damping starts, in the unit of the
+        rows.
+    rank_tolerance : a row counts as dependent on the rows above it when the norm of what is left
+        of it is at most rank_tolerance times its norm as given. The scale of a row does not matter.
 
     Raises
     ------
-    HierarchyError : a setting that is not a number, or out of its range.
+    HierarchyError : a setting is not a number or is out of range.
     """
 
     damping: float = 0.0
@@ -76,21 +71,21 @@ class Resolver(ABC):
 
     name: ClassVar[str]
     handles: ClassVar[Handles] = "equalities"
-    """Which rows with lower < upper are resolved: none; bounds on single unknowns in the first
-    level, which then has no other rows; or any. Others are refused."""
+    """Rows with lower < upper that the resolver accepts: none; bounds on single unknowns in a first
+    level that has no other rows; or any. It rejects all others."""
 
     def __post_init__(self) -> None:
         self._number("damping", 0.0, math.inf)
         self._number("threshold", 0.0, math.inf, open_below=True)
         self._number("rank_tolerance", 0.0, 1.0)
 
-    def can_resolve(self, asked: Handles) -> bool:
-        """Whether it takes the rows that somebody asks for."""
-        return _KINDS.index(asked) <= _KINDS.index(self.handles)
+    def can_resolve(self, required: Handles) -> bool:
+        """Whether the resolver accepts rows of the required kind."""
+        return _KINDS.index(required) <= _KINDS.index(self.handles)
 
     @property
     def label(self) -> str:
-        """Name with the settings that make a different method of it, for tables and figures."""
+        """Name for tables and figures, with the settings that change the method."""
         return self.name
 
     @property
@@ -100,21 +95,21 @@ class Resolver(ABC):
 
     @property
     def accuracy(self) -> float:
-        """Error of x to expect on a well-conditioned hierarchy, relative to 1 + |x|."""
+        """Expected error of x on a well-conditioned hierarchy, relative to 1 + |x|."""
         return 1e-9
 
     @cached_property
     def _settings(self) -> Array:
-        """The settings in one array, as kernels take them: `Settings` first."""
+        """The settings in one array, in the order of the kernels' `Settings`."""
         return np.array([self.damping, self.threshold, self.rank_tolerance])
 
     @abstractmethod
-    def solve(self, h: Hierarchy, memory: Any = None) -> Resolution:
-        """Resolve h, starting from the memory of an earlier resolution if given.
+    def solve(self, h: Hierarchy, memory: Array | None = None) -> Resolution:
+        """Resolve h, warm-started with the memory of an earlier resolution if there is one.
 
         Raises
         ------
-        HierarchyError : rows that this resolver cannot handle. A numerical outcome is a status.
+        HierarchyError : the resolver cannot handle a row. A numerical outcome is a status.
         """
 
     def _number(self, setting: str, low: float, high: float, open_below: bool = False) -> None:
@@ -123,14 +118,21 @@ class Resolver(ABC):
         if not number or not low <= value < high or (open_below and value == low):
             raise HierarchyError(f"{self.name}: {setting} = {value!r}, expected a number "
                                  f"{'>' if open_below else '>='} {low:g} and < {high:g}")
-        object.__setattr__(self, setting, float(value))
+        set_frozen(self, **{setting: float(value)})
+
+    def _whole_number(self, setting: str, least: int) -> None:
+        value = getattr(self, setting)
+        if not isinstance(value, int) or isinstance(value, bool) or not least <= value < 2**31:
+            raise HierarchyError(f"{self.name}: {setting} = {value!r}, expected a whole number >= "
+                                 f"{least}")
 
     def _one_of(self, setting: str, allowed: tuple[str, ...]) -> None:
         if getattr(self, setting) not in allowed:
             raise UnknownNameError(f"{setting} of {self.name}", getattr(self, setting), allowed)
 
-    def _otherwise(self, h: Hierarchy, x: Array, code: int, memory: Any = None) -> Resolution:
-        """What follows a kernel's code other than SOLVED: more room, a refused row, a failure."""
+    def _otherwise(self, h: Hierarchy, x: Array, code: int,
+                   memory: Array | None = None) -> Resolution:
+        """Handle a kernel's code other than SOLVED: a small work space, a bad row, a failure."""
         if code == TOO_SMALL:
             WORKSPACE.double()
             return self.solve(h, memory)
@@ -139,8 +141,14 @@ class Resolver(ABC):
         return Resolution(x, Status(code))
 
 
+def set_frozen(record: object, **values: object) -> None:
+    """Set fields of a frozen dataclass; only for its own `__post_init__`."""
+    for name, value in values.items():
+        object.__setattr__(record, name, value)
+
+
 def refuse_inequality(resolver: Resolver, h: Hierarchy, row: int) -> None:
-    """Raise the HierarchyError that names the level and the row (of the whole stack) refused."""
+    """Raise a HierarchyError that names the level and row of a row (counted over all levels)."""
     level = int((h.offsets[1:] <= row).sum())
     able = sorted(name for name, kind in _REGISTRY.items() if kind.handles == "inequalities")
     raise HierarchyError(
@@ -154,7 +162,7 @@ _Kind = TypeVar("_Kind", bound=Resolver)
 
 
 def register(kind: type[_Kind]) -> type[_Kind]:
-    """Make a resolver known by its name."""
+    """Register a class of resolvers under its name."""
     _REGISTRY[kind.name] = kind
     return kind
 
@@ -165,11 +173,11 @@ def names() -> tuple[str, ...]:
 
 
 def make(name: str, /, **settings: Any) -> Resolver:
-    """Return the resolver called `name` with these settings, the rest at their defaults.
+    """Return the resolver called `name` with these settings and defaults for the rest.
 
     Raises
     ------
-    HierarchyError : no such resolver or setting, with the nearest that exists; a bad value.
+    HierarchyError : no such resolver or setting (suggests the nearest), or an invalid value.
     """
     if name not in _REGISTRY:
         raise UnknownNameError("resolver", name, _REGISTRY)

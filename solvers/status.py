@@ -1,4 +1,4 @@
-"""How a solve ends and what a row does: one enum each, and the plain integers that kernels use."""
+"""Enums for the outcome of a solve and the state of a row, and their integers for kernels."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from enum import IntEnum
 
 
 class Status(IntEnum):
-    """How a solve ended. The text of a status is its remedy."""
+    """How a solve ended; the text of a status says what to do about it."""
 
     SOLVED = 0
     ITERATION_LIMIT = 1
@@ -16,7 +16,7 @@ class Status(IntEnum):
 
     @property
     def remedy(self) -> str:
-        """What to do about it, as a sentence."""
+        """What to do about it."""
         return _REMEDIES[self]
 
     def __str__(self) -> str:
@@ -25,34 +25,33 @@ class Status(IntEnum):
 
 _REMEDIES = {
     Status.SOLVED: "nothing to do",
-    Status.ITERATION_LIMIT: "raise max_iterations, or hand over the memory of the tick before; "
-                            "x keeps the levels that were finished",
-    Status.NUMERICAL_FAILURE: "x is zero; look for NaN or infinite entries in the rows, or for "
+    Status.ITERATION_LIMIT: "raise max_iterations, or pass the memory of the previous tick; "
+                            "x is optimal for the finished levels",
+    Status.NUMERICAL_FAILURE: "x is zero; check the rows for NaN or infinite entries, or for "
                               "entries so large that their squares overflow",
-    Status.BACKEND_FAILURE: "x keeps the levels that were finished; try another backend, or scale "
-                            "the rows to a similar norm",
-    Status.INACCURATE: "an answer was found but not shown to be right: rows that are nearly "
-                       "parallel, or of very different scale, leave a doubt; try another "
-                       "resolver or backend",
+    Status.BACKEND_FAILURE: "x is optimal for the finished levels; try another backend, or "
+                            "scale the rows to similar norms",
+    Status.INACCURATE: "an answer was found but could not be verified: some rows are nearly "
+                       "parallel or differ greatly in scale; try another resolver or backend",
 }
 
 
 class Code(IntEnum):
-    """What a kernel returns: a `Status`, or what its caller must do. -(i + 1) refuses row i."""
+    """Return code of a kernel: a `Status` or a request to its caller; -(i + 1) rejects row i."""
 
     SOLVED = 0
     ITERATION_LIMIT = 1
     NUMERICAL_FAILURE = 2
     BACKEND_FAILURE = 3
     INACCURATE = 4
-    UNPROVED = 7       # no set of active rows was shown to be right: another kernel goes on
-    TOO_SMALL = 8      # the work space is, and nothing was done
+    UNPROVED = 7       # no active set was verified: another kernel takes over
+    TOO_SMALL = 8      # the work space is too small; nothing was computed
     NO_LIMITS = 9      # all rows are equalities: the staircase solves them
-    CONTRADICTION = 10  # two bounds of one unknown exclude each other
+    CONTRADICTION = 10  # two bounds on one unknown contradict each other
 
 
 class Row(IntEnum):
-    """What a row does: it acts at its upper or lower side, as an equality, or not at all."""
+    """State of a row: active at its upper or lower side, an equality, or inactive."""
 
     FREE = 0
     UPPER = 1
@@ -60,7 +59,7 @@ class Row(IntEnum):
     EQUAL = 2
 
 
-# numba stores no enum member in an array of floats, so kernels use these.
+# numba cannot store enum members in an array of floats, so kernels use plain integers.
 (SOLVED, ITERATION_LIMIT, NUMERICAL_FAILURE, BACKEND_FAILURE, INACCURATE, UNPROVED, TOO_SMALL,
  NO_LIMITS, CONTRADICTION) = (int(code) for code in Code)
 FREE, UPPER, LOWER, EQUAL = (int(row) for row in Row)

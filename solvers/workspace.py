@@ -1,7 +1,7 @@
-"""Work space that kernels write their intermediate numbers into.
+"""Work space for the intermediate results of kernels.
 
-Kernels allocate nothing: that costs them more than many of their sums. Each thread has one array,
-made larger when a kernel says that it is TOO_SMALL; what is left in it from before never matters.
+Kernels allocate no memory, since an allocation costs more than many of their loops. Each thread has
+one array; it grows when a kernel returns TOO_SMALL. Its old contents never matter.
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ from solvers.status import TOO_SMALL
 
 
 class _Workspace(threading.local):
-    """One array for each thread."""
+    """One array per thread."""
 
     def __init__(self) -> None:
-        self.array: Array = np.empty(4096)  # 32 kB: a humanoid's stack fits
+        self.array: Array = np.empty(4096)  # 32 kB: enough for a humanoid's stack
 
     def double(self) -> None:
         """Make room for twice as many numbers."""
@@ -31,7 +31,10 @@ WORKSPACE = _Workspace()
 
 
 def run(kernel: Callable[..., int], *arguments: Any) -> int:
-    """Call a kernel with the work space behind its arguments, with more while that is too small."""
+    """Call a kernel with the work space as its last argument, growing it until it is large enough.
+
+    arguments : whatever the kernel takes before the work space.
+    """
     code = kernel(*arguments, WORKSPACE.array)
     while code == TOO_SMALL:
         WORKSPACE.double()

@@ -224,7 +224,7 @@ def test_a_task_of_pink_refuses_another_robot_and_accelerations(robot, configura
     import pink
 
     task = PinkTask(posture_task(Q), configuration, DT)
-    with pytest.raises(HierarchyError, match="pink knows nothing of accelerations"):
+    with pytest.raises(HierarchyError, match="pink does not support accelerations"):
         Stack([task], "acceleration").hierarchy(State.at(robot, Q))
     renamed = robot.model.copy()
     renamed.names[1] = "other"

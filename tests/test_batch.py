@@ -11,8 +11,7 @@ from hierarchy import Hierarchy, HierarchyError
 from scenarios.bench import batch as bench
 from scenarios.bench.candidates import moved
 from solvers import Status, make
-from solvers import batch as batches
-from solvers.batch import Batch, solve
+from solvers.batch import Batch, solve, stacked
 from solvers.problems import Recipe, generate, load
 
 SLOW = os.environ.get("NUMBA_DISABLE_JIT") == "1"
@@ -27,7 +26,7 @@ both = pytest.mark.parametrize("name", ["tpm", "hcod"])
 
 @pytest.fixture(autouse=True)
 def threads_for_small_batches(monkeypatch):
-    monkeypatch.setattr(batches, "ENOUGH", 1)
+    monkeypatch.setattr(stacked, "ENOUGH", 1)
 
 
 def problems_of(name, copies=COPIES):
@@ -164,7 +163,7 @@ def test_an_inequality_is_refused_by_problem_level_and_row():
     ({"upper": np.ones(3)}, r"upper has shape \(3,\), expected \(4, 3\)"),
     ({"upper": "high"}, "upper is not an array of numbers"),
     ({"reference": np.ones((5, 4))}, r"reference has shape \(5, 4\), expected \(4, 5\)"),
-    ({"sizes": [2, 2]}, "sizes sum to 4, and A has 3 rows"),
+    ({"sizes": [2, 2]}, "sizes sum to 4, but A has 3 rows"),
     ({"sizes": [4, -1]}, "expected a whole number of rows"),
     ({"sizes": [1.5, 1.5]}, "expected a whole number of rows")])
 def test_a_wrong_array_is_named(wrong, says):
@@ -200,6 +199,17 @@ def test_a_batch_may_be_empty_or_without_rows(name, shape):
     assert answer.x.shape == (count, 5)
     assert answer.solved.all()
     assert m or (answer.x == 1.0).all()
+
+
+def test_a_problem_that_fails_keeps_no_memory_and_the_others_keep_theirs():
+    hs = [bounded(seed, 0.3) for seed in range(3)]
+    cold = solve(Batch.of(hs), make("tpm"))
+    assert cold.memory.any(axis=1).all()
+    batch = Batch.of(hs)
+    batch.A[1, -1, 0] = np.nan
+    warm = solve(batch, make("tpm"), memory=cold.memory)
+    assert warm.status.tolist() == [Status.SOLVED, Status.NUMERICAL_FAILURE, Status.SOLVED]
+    assert warm.memory.any(axis=1).tolist() == [True, False, True]
 
 
 @both
@@ -244,7 +254,7 @@ def test_jax_fails_alone_and_refuses_as_the_kernel_does():
     batch.upper[11, 4] += 1.0
     with pytest.raises(HierarchyError, match="problem 11, level 3, row 0: an inequality"):
         in_jax.solve(batch)
-    with pytest.raises(HierarchyError, match="hcod is not there in jax"):
+    with pytest.raises(HierarchyError, match="hcod is not available in jax"):
         in_jax.solve(batch, make("hcod"))
 
 

@@ -138,8 +138,17 @@ def test_explain_names_equalities_and_rows_that_disagree():
         [([[1.0, 0.0]], [1.0]), ([[1.0, 0.0]], [2.0]), (np.zeros((0, 2)), []),
          ([[0.0, 1.0], [0.0, 1.0]], [0.0, 1.0])], names=["hand", "elbow", "none", "wrist"])
     assert explain(h, HCOD.solve(h)).splitlines() == [
-        "hand is met.", "elbow is missed by 1: held back by hand.", "none asks for nothing.",
+        "hand is met.", "elbow is missed by 1: held back by hand.", "none has no rows.",
         "wrist is missed by 0.707: its own rows disagree."]
+
+
+@pytest.mark.parametrize(("share", "blocking"), [
+    (1e-8, "elbow"), (1e-4, "hand and elbow")])
+def test_explain_leaves_out_a_level_that_carries_next_to_nothing(share, blocking):
+    h = Hierarchy.from_levels([([[1.0, 0.0]], [0.0]), ([[0.0, 1.0]], [0.0]),
+                               ([[share, 1.0]], [1.0])], names=["hand", "elbow", "wrist"])
+    assert explain(h, HCOD.solve(h)).splitlines()[2] == (
+        f"wrist is missed by 1: held back by {blocking}.")
 
 
 def test_explain_needs_to_know_the_active_set():

@@ -33,7 +33,7 @@ def test_an_answer_is_right_or_says_that_it_is_not(hqp, name):
     chosen = [problems[i] for i in HUMANOIDS] if name == "HUM38" else problems[:PROBLEMS]
     for h, x, norms in chosen:
         res = hqp.solve(h)
-        finished = len(norms) if res.status is Status.SOLVED else len(res.memory.steps)
+        finished = len(norms) if res.status is Status.SOLVED else len(res.memory)
         assert_close(hqp, h.violations(res.x)[:finished], norms[:finished])
         if res.status is Status.SOLVED:
             assert_close(hqp, res.x, x)

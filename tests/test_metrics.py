@@ -115,9 +115,19 @@ def test_a_number_that_is_not_finite_is_left_out_of_the_file_and_not_passed_off_
     assert data["ticks"] == 5
 
 
-def test_every_metric_says_unit_name_and_direction():
-    for metric in measure(recording()).values():
-        assert metric.label
-        assert metric.group
-        assert isinstance(metric.shown_unit, str)
-        assert metric.lower_is_better in (True, False, None)
+@pytest.mark.parametrize(("name", "unit", "scale", "lower_is_better"), [
+    ("position_error_rms", "mm", 1e3, True), ("cone_violation_max", "°", 1.0, True),
+    ("cone_violation_share", "%", 100.0, True), ("body_distance_min", "mm", 1e3, False),
+    ("ee_distance_min", "mm", 1e3, False), ("speed_max", "rad/s", 1.0, True),
+    ("acceleration_max", "rad/s²", 1.0, True), ("ticks_not_solved", "", 1.0, True),
+    ("time_resolve_median", "µs", 1e6, True), ("time_kinematics_median", "µs", 1e6, None)])
+def test_a_metric_says_its_unit_and_its_better_direction(name, unit, scale, lower_is_better):
+    metric = measure(recording())[name]
+    assert (metric.shown_unit, metric.scale) == (unit, scale)
+    assert metric.lower_is_better is lower_is_better
+
+
+def test_every_metric_has_a_label_and_a_group():
+    found = measure(recording())
+    assert len(found) > 15
+    assert all(metric.label and metric.group for metric in found.values())

@@ -1,13 +1,17 @@
 """The registry, the status, the resolution; what importing costs."""
 
+import ast
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from hierarchy import HierarchyError
 from solvers import Resolution, Status, make, names
+
+ROOT = Path(__file__).parents[1]
 
 
 def test_names_are_sorted_and_each_makes_its_resolver():
@@ -44,5 +48,44 @@ def test_importing_solvers_does_not_import_the_quadratic_programming_backends():
     code = ("import sys, solvers; "
             "print([m for m in ('qpsolvers', 'proxsuite', 'osqp') "
             "if m in sys.modules])")
-    out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert out.stdout.strip() == "[]"
+    assert output_of(code) == "[]"
+
+
+FIRST_SOLVE = """
+import sys
+for name in ("pinocchio", "matplotlib", "qpsolvers"):
+    sys.modules[name] = None
+from hierarchy import Hierarchy
+from solvers import certify, make
+h = Hierarchy.from_levels([([[1.0, 0.0, 0.0]], [1.0]), ([[1.0, 1.0, 0.0]], [3.0])])
+for name in ("tpm", "hcod", "recursive"):
+    x = make(name).solve(h).x
+    print(name, x.round(12).tolist(), certify(h, x).certified)
+"""
+
+
+def test_a_first_hierarchy_is_solved_without_pinocchio_matplotlib_and_qpsolvers():
+    assert output_of(FIRST_SOLVE).splitlines() == [
+        f"{name} [1.0, 2.0, 0.0] True" for name in ("tpm", "hcod", "recursive")]
+
+
+@pytest.mark.parametrize("file", sorted((ROOT / "solvers").rglob("*.py")), ids=lambda f: f.stem)
+def test_scipy_qpsolvers_and_pinocchio_are_imported_where_first_needed(file):
+    top = [node for node in ast.parse(file.read_text()).body
+           if isinstance(node, (ast.Import, ast.ImportFrom))]
+    names = {name for node in top for name in (
+        [alias.name for alias in node.names] if isinstance(node, ast.Import) else [node.module])}
+    assert {name.partition(".")[0] for name in names}.isdisjoint(
+        {"scipy", "qpsolvers", "pinocchio", "matplotlib"})
+
+
+def test_importing_backends_changes_no_environment_variable():
+    code = ("import os; before = dict(os.environ)\n"
+            "import solvers, solvers.qp.backends\n"
+            "print(sorted(set(os.environ) - set(before)))")
+    assert output_of(code) == "[]"
+
+
+def output_of(code):
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    return run.stdout.strip()

@@ -10,7 +10,7 @@ from rich.table import Table
 from scenarios.bench.families import FAMILIES, family
 from solvers import Status, make
 from solvers.qp.backends import BACKENDS, installed
-from solvers.resolvers.hqp import FORMS, Memory
+from solvers.resolvers.hqp import FORMS, CascadeResolution
 
 
 def run(families: tuple[str, ...] = FAMILIES) -> list[dict[str, Any]]:
@@ -30,9 +30,8 @@ def _row(name: str, backend: str, form: str) -> dict[str, Any]:
     solved, error, programs, corrected = 0, 0.0, 0, 0
     for problem in problems:
         res = hqp.solve(problem.h)
-        if isinstance(res.memory, Memory):
-            programs, corrected = (programs + res.memory.programs,
-                                   corrected + res.memory.corrected)
+        if isinstance(res, CascadeResolution):
+            programs, corrected = programs + res.iterations, corrected + res.corrected
         if res.status is Status.SOLVED:
             off = abs(problem.h.violations(res.x) - problem.norms)
             solved, error = solved + 1, max(error, float(off.max()))

@@ -1,1 +1,1 @@
-"""Problems from and for other packages: pink, mink and MuJoCo."""
+"""Adapters: problems from pink, mink and MuJoCo, and answers for pink."""

@@ -1,13 +1,13 @@
-"""What pink and mink share: tasks and limits of the step that is made in one period.
+"""Common parts of the pink and mink adapters: tasks and limits of the step made in one period.
 
-Both ask a task for J dq = -gain e and a limit for G dq <= h, with dq = x period. Here x is the
-velocity, and priorities are strict.
+Both packages define a task by J dq = -gain e and a limit by G dq <= h, with dq = x period. Here x
+is the velocity, and priorities are strict.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -15,15 +15,27 @@ from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array, Hierarchy
 
 Level = tuple[Array, ...]
+Limit = tuple[Array, Array]  # G (k, n), h (k,)
 
 
-def hierarchy(configuration: Any, n: int, period: float, limits: Sequence[tuple[Any, Any]],
-              constraints: Sequence[Any], tasks: Iterable[Any]) -> Hierarchy:
-    """Pack limits, then constraints, then the tasks, each a level unless it is empty.
+class Task(Protocol):
+    """The part of a task of pink or mink that a level needs; `cost` is optional."""
 
-    n unknowns [rad/s or m/s]; limits as pairs G (k, n), h (k,); an entry of `tasks` is a task or a
-    sequence of tasks, which share a level and are weighted against each other by their costs. As
-    constraints, tasks have no cost, as in pink and mink.
+    gain: float
+
+    def compute_error(self, configuration: Any) -> Array:
+        """Return e (k,)."""
+
+    def compute_jacobian(self, configuration: Any) -> Array:
+        """Return J (k, n)."""
+
+
+def hierarchy(configuration: object, n: int, period: float, limits: Sequence[Limit],
+              constraints: Sequence[Task], tasks: Iterable[Task | Sequence[Task]]) -> Hierarchy:
+    """Pack limits, constraints and tasks into levels, without the empty ones.
+
+    n unknowns [rad/s or m/s]; period [s]. An entry of `tasks` is a task, or a sequence of tasks
+    that share a level, weighted by their costs. Constraints have no cost, as in pink and mink.
     """
     if not 0.0 < period < np.inf:
         raise HierarchyError(f"period {period} s must be positive and finite")
@@ -34,23 +46,23 @@ def hierarchy(configuration: Any, n: int, period: float, limits: Sequence[tuple[
     kept = [name for name, level in levels.items() if len(level[0])]
     packed = [levels[name] for name in kept]
     for entry in tasks:
-        together = list(entry) if isinstance(entry, (list, tuple)) else [entry]
+        together = entry if isinstance(entry, Sequence) else [entry]
         packed.append(_packed([task_rows(task, configuration, period) for task in together], n))
         kept.append(" + ".join(map(label, together)))
     return Hierarchy.from_levels(packed, np.zeros(n), kept)
 
 
-def task_rows(task: Any, configuration: Any, period: float, weighted: bool = True
+def task_rows(task: Task, configuration: object, period: float, weighted: bool = True
               ) -> tuple[Array, Array]:
-    """Return the rows W J (k, n) and -gain W e / period (k,) of a task, as in `residual`."""
+    """Return the rows W J (k, n) and -gain W e / period (k,) of a task; see `residual`."""
     J, r = residual(task, configuration, weighted)
     return J, r * (float(task.gain) / period)
 
 
-def residual(task: Any, configuration: Any, weighted: bool = True) -> tuple[Array, Array]:
-    """Return W J (k, n) and -W e (k,) of a task, W the diagonal of its cost.
+def residual(task: Task, configuration: object, weighted: bool = True) -> tuple[Array, Array]:
+    """Return W J (k, n) and -W e (k,) of a task, W the diagonal matrix of its costs.
 
-    Rows of cost zero are left out. With `weighted` false all rows are there, as they are.
+    Rows with zero cost are left out. With `weighted` false, all rows are returned unweighted.
 
     Raises
     ------
@@ -62,8 +74,8 @@ def residual(task: Any, configuration: Any, weighted: bool = True) -> tuple[Arra
     damping = getattr(task, "lm_damping", 0.0)
     if damping:
         raise HierarchyError(f"{label(task)}: lm_damping = {damping:g} weighs the task against its "
-                             "own step, which a strict level does not; set it to 0 and damp the "
-                             "resolver instead")
+                             "own step, which a strict level cannot; set it to 0 and use the "
+                             "damping of the resolver")
     J = np.asarray(task.compute_jacobian(configuration), dtype=float)
     e = np.asarray(task.compute_error(configuration), dtype=float)
     cost = costs(task, len(e)) if weighted else np.ones(len(e))
@@ -71,8 +83,8 @@ def residual(task: Any, configuration: Any, weighted: bool = True) -> tuple[Arra
     return cost[asked, None] * J[asked], -cost[asked] * e[asked]
 
 
-def costs(task: Any, rows: int) -> Array:
-    """Return what each row of a task is multiplied by: (rows,); ones where it has no cost."""
+def costs(task: Task, rows: int) -> Array:
+    """Return the cost of each row of a task: (rows,); ones for a task without a cost."""
     given = getattr(task, "cost", None)
     cost = np.asarray(1.0 if given is None else given, dtype=float)
     if cost.shape not in ((), (1,), (rows,)):
@@ -80,11 +92,11 @@ def costs(task: Any, rows: int) -> Array:
     return np.array(np.broadcast_to(cost, rows))
 
 
-def limit_level(limits: Iterable[tuple[Any, Any]], n: int, period: float
-                ) -> tuple[Array, Array, Array]:
+def limit_level(limits: Iterable[Limit], n: int, period: float) -> tuple[Array, Array, Array]:
     """Pack rows G x <= h / period into one level A (k, n), lower (k,), upper (k,).
 
-    Rows on one joint become its box, unless they leave no value; infinite h is left out.
+    Rows on a single joint become bounds of that joint, unless they contradict each other. Rows
+    with infinite h are left out.
     """
     pairs = [(np.asarray(G, dtype=float), np.asarray(h, dtype=float)) for G, h in limits]
     G = np.vstack([np.empty((0, n)), *(G for G, _ in pairs)])
@@ -97,17 +109,26 @@ def limit_level(limits: Iterable[tuple[Any, Any]], n: int, period: float
     lower, upper = np.full(n, -np.inf), np.full(n, np.inf)
     np.minimum.at(upper, joint[up], side[up])
     np.maximum.at(lower, joint[~up], side[~up])
-    empty = lower > upper  # such a joint keeps a row for each side, one of which must be broken
+    bounds, rest = _bounds(lower, upper), G[~single]
+    return _stacked(bounds, (rest, np.full(len(rest), -np.inf), h[~single]))
+
+
+def _bounds(lower: Array, upper: Array) -> tuple[Array, Array, Array]:
+    """Return the rows of joint bounds; contradictory bounds become one row for each side."""
+    empty = lower > upper
     boxed = ~empty & ((lower != -np.inf) | (upper != np.inf))
-    none = np.full(np.count_nonzero(empty), np.inf)
-    identity, rest = np.eye(n), G[~single]
-    return (np.vstack([identity[boxed], identity[empty], identity[empty], rest]),
-            np.concatenate([lower[boxed], lower[empty], -none, np.full(len(rest), -np.inf)]),
-            np.concatenate([upper[boxed], none, upper[empty], h[~single]]))
+    none, identity = np.full(np.count_nonzero(empty), np.inf), np.eye(len(lower))
+    return _stacked((identity[boxed], lower[boxed], upper[boxed]),
+                    (identity[empty], lower[empty], none), (identity[empty], -none, upper[empty]))
 
 
-def label(task: Any) -> str:
-    """Name a task by its kind and its frame, for messages."""
+def _stacked(*levels: tuple[Array, Array, Array]) -> tuple[Array, Array, Array]:
+    A, lower, upper = zip(*levels, strict=True)
+    return np.vstack(A), np.concatenate(lower), np.concatenate(upper)
+
+
+def label(task: object) -> str:
+    """Return the class and frame of a task, for messages."""
     frame = getattr(task, "frame", None) or getattr(task, "frame_name", None)
     return f"{type(task).__name__}" + (f" of {frame}" if isinstance(frame, str) else "")
 

@@ -2,26 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from typing import Any
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
 
 from hierarchy.problem import Hierarchy
 from solvers.adapters import displacements
+from solvers.adapters.displacements import Task
+
+if TYPE_CHECKING:
+    from mink import Configuration, Limit
 
 
-def hierarchy(configuration: Any, tasks: Iterable[Any], dt: float,
-              limits: Iterable[Any] | None = None,
-              constraints: Iterable[Any] | None = None) -> Hierarchy:
-    """Return what `mink.build_ik` would weigh, as levels: limits, constraints, then the tasks.
+def hierarchy(configuration: Configuration, tasks: Iterable[Task | Sequence[Task]], dt: float,
+              limits: Iterable[Limit] | None = None,
+              constraints: Iterable[Task] | None = None) -> Hierarchy:
+    """Return the problem of `mink.build_ik` as levels: limits, constraints, then the tasks.
 
-    Unknown is the velocity (nv,). The order of `tasks` is their priority; an entry may be a list of
-    tasks, which share a level and are weighted by their costs. Without `limits` the joint ranges of
-    the model are taken, as in mink.
+    The unknown is the velocity (nv,); dt [s]. The order of `tasks` is their priority; an entry may
+    be a sequence of tasks that share a level, weighted by their costs. Without `limits` the joint
+    ranges of the model are used, as in mink.
 
     Raises
     ------
-    HierarchyError : lm_damping, or a task without error and Jacobian (the regularisation by kinetic
-        energy), which weigh against all else and have no place in a strict order.
+    HierarchyError : lm_damping, or a task without error and Jacobian (the kinetic-energy
+        regularisation): both are weights against all tasks, which a strict order has no place for.
     """
     if limits is None:
         from mink import ConfigurationLimit

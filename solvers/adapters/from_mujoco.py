@@ -1,13 +1,13 @@
-"""Levels at velocity level out of a MuJoCo model and its data (extra `sim`).
+"""Levels for velocity control from a MuJoCo model and its data (extra `sim`).
 
-Unknown is the velocity (nv,), in MuJoCo's order. The data must be up to date at its qpos:
-`mj_forward`, or `mj_kinematics` and `mj_comPos`. Each function returns a level for
+The unknown is the velocity (nv,), in MuJoCo's order. The data must be up to date for its qpos: call
+`mj_forward`, or `mj_kinematics` and `mj_comPos`. Each `_level` function returns a level for
 `Hierarchy.from_levels`: `(A, b)` or `(A, lower, upper)`.
 """
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,22 +15,25 @@ from numpy.typing import ArrayLike
 from hierarchy.errors import HierarchyError, UnknownNameError
 from hierarchy.problem import Array
 
+if TYPE_CHECKING:
+    from mujoco import MjData, MjModel
+
 KINDS = ("body", "site", "geom")
 
 
-def frame(model: Any, data: Any, name: str, kind: str = "body") -> tuple[Array, Array]:
-    """Return where a body, site or geom is: position (3,) [m] and rotation (3, 3), in the world."""
+def frame(model: MjModel, data: MjData, name: str, kind: str = "body") -> tuple[Array, Array]:
+    """Return the position (3,) [m] and rotation (3, 3) of a body, site or geom in the world."""
     which = _index(model, name, kind)
-    # The frame of a body; `xipos` would be its centre of mass.
+    # the frame of a body: `xipos` would be its centre of mass
     position, rotation = {"body": (data.xpos, data.xmat), "site": (data.site_xpos, data.site_xmat),
                           "geom": (data.geom_xpos, data.geom_xmat)}[kind]
     return np.array(position[which]), np.array(rotation[which]).reshape(3, 3)
 
 
-def jacobian(model: Any, data: Any, name: str, kind: str = "body") -> Array:
-    """Return the Jacobian (6, nv) of a frame: its origin's velocity, then its angular velocity.
+def jacobian(model: MjModel, data: MjData, name: str, kind: str = "body") -> Array:
+    """Return the Jacobian (6, nv) of a frame: velocity of its origin, then angular velocity.
 
-    Both in the world's axes.
+    Both are in world axes.
     """
     import mujoco
 
@@ -41,10 +44,10 @@ def jacobian(model: Any, data: Any, name: str, kind: str = "body") -> Array:
     return J
 
 
-def position_level(model: Any, data: Any, name: str, target: ArrayLike, gain: float,
+def position_level(model: MjModel, data: MjData, name: str, target: ArrayLike, gain: float,
                    kind: str = "body", velocity: ArrayLike = (0.0, 0.0, 0.0)
                    ) -> tuple[Array, Array]:
-    """Bring a frame's origin to `target` (3,) [m]: J x = velocity + gain (target - position).
+    """Move the origin of a frame to `target` (3,) [m]: J x = velocity + gain (target - position).
 
     gain [1/s]; `velocity` (3,) [m/s] of the target.
     """
@@ -53,37 +56,42 @@ def position_level(model: Any, data: Any, name: str, target: ArrayLike, gain: fl
             np.asarray(velocity, float) + gain * (_shaped("target", target, (3,)) - position))
 
 
-def orientation_level(model: Any, data: Any, name: str, target: ArrayLike, gain: float,
+def orientation_level(model: MjModel, data: MjData, name: str, target: ArrayLike, gain: float,
                       kind: str = "body") -> tuple[Array, Array]:
-    """Turn a frame to the rotation `target` (3, 3): angular velocity = gain times what is missing.
+    """Turn a frame to the rotation `target` (3, 3): angular velocity = gain times the error.
 
-    What is missing is the rotation vector [rad], in the world's axes; gain [1/s].
+    The error is the rotation vector [rad] to the target, in world axes; gain [1/s].
     """
     import mujoco
 
     _, rotation = frame(model, data, name, kind)
-    missing = _shaped("target", target, (3, 3)) @ rotation.T
+    error = _shaped("target", target, (3, 3)) @ rotation.T
     quaternion, vector = np.empty(4), np.empty(3)
-    mujoco.mju_mat2Quat(quaternion, missing.ravel())
+    mujoco.mju_mat2Quat(quaternion, error.ravel())
     mujoco.mju_quat2Vel(vector, quaternion, 1.0)
     return jacobian(model, data, name, kind)[3:], gain * vector
 
 
-def posture_level(model: Any, data: Any, target: ArrayLike, gain: float) -> tuple[Array, Array]:
-    """Bring all joints to `target` (nq,) [rad or m]: x = gain times the way there; gain [1/s]."""
+def posture_level(model: MjModel, data: MjData, target: ArrayLike, gain: float
+                  ) -> tuple[Array, Array]:
+    """Move all joints to `target` (nq,) [rad or m]: x = gain times the difference; gain [1/s]."""
     import mujoco
 
-    way = np.empty(model.nv)
-    mujoco.mj_differentiatePos(model, way, 1.0, data.qpos, _shaped("target", target, (model.nq,)))
-    return np.eye(model.nv), gain * way
+    difference = np.empty(model.nv)
+    mujoco.mj_differentiatePos(model, difference, 1.0, data.qpos,
+                               _shaped("target", target, (model.nq,)))
+    return np.eye(model.nv), gain * difference
 
 
-def limit_level(model: Any, data: Any, period: float, velocity: float | ArrayLike = np.inf
+def limit_level(model: MjModel, data: MjData, period: float, velocity: float | ArrayLike = np.inf
                 ) -> tuple[Array, Array, Array]:
-    """Keep hinges and slides in their ranges after the next `period` [s], and within `velocity`.
+    """Keep hinges and slides within their ranges after the next `period` [s], and `velocity`.
 
-    velocity [rad/s or m/s] is one number or (nv,). A joint out of its range is brought back as fast
-    as that allows. Ranges of ball joints are not limited; HierarchyError names one that has any.
+    velocity [rad/s or m/s] : one number or (nv,). A joint outside its range returns as fast as the
+        velocity allows.
+
+    Raises HierarchyError for a period or velocity that is not positive, and for a limited joint
+    that is neither a hinge nor a slide.
     """
     import mujoco
 
@@ -98,13 +106,13 @@ def limit_level(model: Any, data: Any, period: float, velocity: float | ArrayLik
             continue
         if model.jnt_type[joint] not in single:
             raise HierarchyError(f"limits: joint {model.joint(joint).name!r} is neither a hinge "
-                                 "nor a slide, its range cannot be a bound")
+                                 "nor a slide; its range cannot become a bound")
         i, q = model.jnt_dofadr[joint], data.qpos[model.jnt_qposadr[joint]]
         lower[i], upper[i] = np.clip((model.jnt_range[joint] - q) / period, lower[i], upper[i])
     return np.eye(model.nv), lower, upper
 
 
-def _index(model: Any, name: str, kind: str) -> int:
+def _index(model: MjModel, name: str, kind: str) -> int:
     import mujoco
 
     if kind not in KINDS:

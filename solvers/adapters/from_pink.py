@@ -1,10 +1,10 @@
-"""Tasks, limits and barriers of pink (pin-pink, extra `adapters`) as ours."""
+"""Tasks, limits and barriers of pink (pin-pink, extra `adapters`) in a stack or a hierarchy."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,37 +13,43 @@ from hierarchy.problem import Array, Hierarchy, check_rows
 from hierarchy.state import State
 from hierarchy.task import Level, Task
 from solvers.adapters import displacements
+from solvers.resolver import set_frozen
+
+if TYPE_CHECKING:
+    from pink import Configuration
+    from pink.barriers import Barrier
+    from pink.limits import Limit
 
 
 @dataclass(frozen=True)
 class PinkTask(Task):
-    """Any task of pink as an equality at velocity level: J v = -gain e / period.
+    """A task of pink as an equality at velocity level: J v = -gain e / period.
 
-    task : of pink, its target set; its rows are multiplied by its cost, those of cost zero are
-        left out, as they weigh nothing in pink either.
-    configuration : pink's, of the same joints as the stack's robot, such as
+    task : a task of pink with its target set; its rows are multiplied by its costs, and rows with
+        zero cost are left out.
+    configuration : a pink configuration with the joints of the stack's robot, such as
         `pink.Configuration(robot.model, robot.model.createData(), q)`. It follows the State; tasks
         may share it.
-    period : [s] in which pink's gain of 1 reaches the target.
+    period : time [s] in which a gain of 1 reaches the target in pink.
 
-    In the words of `Task`: p is pink's error times the costs, p_d zero. Raises HierarchyError for
+    In terms of `Task`: p is pink's error times the costs, p_d is zero. Raises HierarchyError for
     lm_damping, which has no meaning in a strict level, for another robot, and at acceleration
-    level, of which pink knows nothing.
+    level, which pink does not support.
     """
 
-    task: Any
-    configuration: Any
+    task: displacements.Task
+    configuration: Configuration
     period: float
     name: str = ""
     rows: int = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         if not self.name:
-            object.__setattr__(self, "name", displacements.label(self.task))
+            set_frozen(self, name=displacements.label(self.task))
         if not 0.0 < self.period < np.inf:
             raise HierarchyError(f"task {self.name!r}: period {self.period} s must be positive "
                                  "and finite")
-        object.__setattr__(self, "rows", len(self._residual()[1]))
+        set_frozen(self, rows=len(self._residual()[1]))
 
     @property
     def gain(self) -> float:  # type: ignore[override]
@@ -52,16 +58,16 @@ class PinkTask(Task):
 
     @property
     def dimension(self) -> int:
-        """Number of rows that cost something."""
+        """Number of rows with a nonzero cost."""
         return self.rows
 
     def error(self, state: State) -> Array:
-        """Minus pink's error, times the costs: (m,)."""
+        """Return minus pink's error, times the costs: (m,)."""
         self._follow(state)
         return self._residual()[1]
 
     def jacobian(self, state: State) -> Array:
-        """Pink's Jacobian, times the costs: (m, n)."""
+        """Return pink's Jacobian, times the costs: (m, n)."""
         self._follow(state)
         return self._residual()[0]
 
@@ -84,19 +90,19 @@ class PinkTask(Task):
         J, r = self._residual()
         if len(r) != self.rows:
             raise HierarchyError(f"task {self.name!r}: {len(r)} of its rows cost something, "
-                                 f"{self.rows} did when it was made; make it anew")
+                                 f"{self.rows} did when it was created; create it again")
         return J, r
 
     def jacobian_derivative(self, state: State) -> Array:
-        """Raise HierarchyError: pink has none."""
-        raise HierarchyError(f"task {self.name!r}: pink knows nothing of accelerations; put it "
-                             "into a stack of level 'velocity'")
+        """Raise a HierarchyError: pink does not provide it."""
+        raise HierarchyError(f"task {self.name!r}: pink does not support accelerations; use "
+                             "it in a stack of level 'velocity'")
 
     def _residual(self) -> tuple[Array, Array]:
         return displacements.residual(self.task, self.configuration)
 
     def _follow(self, state: State) -> None:
-        """Bring pink's configuration to where the state is, unless it is there."""
+        """Update pink's configuration to the joint angles of the state."""
         configuration, robot = self.configuration, state.robot
         theirs = tuple(configuration.model.names)[1:]
         if theirs != robot.joint_names or configuration.model.nq != robot.nq:
@@ -107,32 +113,36 @@ class PinkTask(Task):
             configuration.update(state.q)
 
 
-def hierarchy(configuration: Any, tasks: Iterable[Any], dt: float,
-              limits: Iterable[Any] | None = None, barriers: Iterable[Any] | None = None,
-              constraints: Iterable[Any] | None = None) -> Hierarchy:
-    """Return what `pink.build_ik` would weigh, as levels: limits, constraints, then the tasks.
+def hierarchy(configuration: Configuration,
+              tasks: Iterable[displacements.Task | Sequence[displacements.Task]], dt: float,
+              limits: Iterable[Limit] | None = None, barriers: Iterable[Barrier] | None = None,
+              constraints: Iterable[displacements.Task] | None = None) -> Hierarchy:
+    """Return the problem of `pink.build_ik` as levels: limits, constraints, then the tasks.
 
-    Unknown is the velocity (n,). The order of `tasks` is their priority; an entry may be a list of
-    tasks, which share a level and are weighted by their costs. Without `limits` those of the model
-    are taken, as in pink; barriers are rows of the same level.
+    The unknown is the velocity (n,); dt [s]. The order of `tasks` is their priority; an entry may
+    be a sequence of tasks that share a level, weighted by their costs. Without `limits` those of
+    the model are used, as in pink. Barriers are rows of the level of limits.
 
     Raises
     ------
-    HierarchyError : lm_damping, or a barrier's safe_displacement_gain, which are weights against
-        all else and have no place in a strict order.
+    HierarchyError : lm_damping, or a barrier's safe_displacement_gain: both are weights against all
+        tasks, which a strict order has no place for.
     """
-    model = configuration.model
-    if limits is None:
-        of_model = (model.configuration_limit, model.velocity_limit,
-                    getattr(model, "floating_base_velocity_limit", None))
-        limits = [limit for limit in of_model if limit is not None]
-    pairs = [limit.compute_qp_inequalities(configuration, dt) for limit in limits]
+    pairs = [limit.compute_qp_inequalities(configuration, dt)
+             for limit in (_limits_of_model(configuration) if limits is None else limits)]
     for barrier in barriers or ():
         if barrier.safe_displacement_gain:
             raise HierarchyError(f"{type(barrier).__name__}: safe_displacement_gain = "
                                  f"{barrier.safe_displacement_gain:g} weighs a displacement "
                                  "against the tasks; set it to 0")
         pairs.append(barrier.compute_qp_inequalities(configuration, dt))
-    return displacements.hierarchy(configuration, model.nv, dt,
+    return displacements.hierarchy(configuration, configuration.model.nv, dt,
                                    [pair for pair in pairs if pair is not None],
                                    list(constraints or ()), tasks)
+
+
+def _limits_of_model(configuration: Configuration) -> list[Limit]:
+    model = configuration.model
+    found = (model.configuration_limit, model.velocity_limit,
+             getattr(model, "floating_base_velocity_limit", None))
+    return [limit for limit in found if limit is not None]

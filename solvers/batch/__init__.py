@@ -1,4 +1,4 @@
-"""Many hierarchies of one shape at once, on all cores; on an accelerator in `on_jax`."""
+"""Many hierarchies of one shape at once, on all cores, or on an accelerator with `on_jax`."""
 
 from solvers.batch.stacked import Batch, BatchResolution, cores, solve
 

@@ -1,11 +1,11 @@
-"""The staircase of `tpm` in jax: large batches on whatever device jax has. Extra `jax`.
+"""The staircase of `tpm` in jax, for large batches on any device of jax (extra `jax`).
 
     answer = solve(Batch(A, lower, upper, sizes), make("tpm"))
 
-`staircase` is one problem as a pure function, for `jax.vmap` and `jax.jit` in programs of your own,
-with 64 bits enabled. Shapes must not depend on the data there. So each row has a slot: the
-direction that it adds behind the rows before it, the largest first, or zero where nothing is left.
-In y, the coordinates in these directions, each level is solved by least squares (5), (13).
+`staircase` resolves one problem as a pure function, for your own use of `jax.vmap` and `jax.jit`
+with 64 bits enabled. Shapes must not depend on the data, so each row has a slot: the direction that
+it adds to the rows before it (largest first), or zero if it adds none. Each level is a
+least-squares problem (5), (13) in y, the coordinates along these directions.
 """
 
 from __future__ import annotations
@@ -29,18 +29,18 @@ except ModuleNotFoundError as error:
 
 
 def solve(batch: Batch, resolver: Resolver | None = None) -> BatchResolution:
-    """Resolve all problems of a batch of equalities by `tpm` in its staircase form.
+    """Resolve all problems of a batch of equalities with the staircase form of `tpm`.
 
-    The answers are those of `solvers.batch.solve` to rounding, not to the last bit. Compiled once
-    for each shape and settings.
+    The answers agree with those of `solvers.batch.solve` up to rounding. Compiled once for each
+    shape and each combination of settings.
 
     Raises
     ------
-    HierarchyError : another resolver; an inequality, by problem, level and row.
+    HierarchyError : another resolver; an inequality (names problem, level and row).
     """
     resolver = make("tpm") if resolver is None else resolver
     if not isinstance(resolver, Tpm) or not resolver.strict:
-        raise HierarchyError(f"{resolver.label} is not there in jax; tpm is")
+        raise HierarchyError(f"{resolver.label} is not available in jax; tpm is")
     for p, row in np.argwhere(batch.lower < batch.upper)[:1]:
         refuse_inequality(make("tpm", form="published"), batch[p], int(row))
     with jax.enable_x64(True):
@@ -54,10 +54,10 @@ def solve(batch: Batch, resolver: Resolver | None = None) -> BatchResolution:
 def staircase(A: jax.Array, b: jax.Array, reference: jax.Array, sizes: tuple[int, ...],
               damping: float = 0.0, threshold: float = 0.1, rank_tolerance: float = 1e-9
               ) -> tuple[jax.Array, jax.Array]:
-    """Return the answer (n,) of one problem, and whether it is one; zero if not.
+    """Return the answer (n,) of one problem, zero if it failed, and whether it is solved.
 
-    A (m, n), b (m,), reference (n,); sizes, the rows of each level, and damping are fixed when
-    compiled, the settings mean what they mean in `Resolver`.
+    A (m, n), b (m,), reference (n,). The sizes of the levels and damping are fixed at compile time;
+    the settings are those of `Resolver`.
     """
     square = jnp.sum(A * A, axis=1)
     x, Q = jnp.zeros_like(reference), jnp.zeros_like(A[:0])
@@ -87,16 +87,16 @@ def _staircases(A: jax.Array, b: jax.Array, reference: jax.Array, sizes: tuple[i
 
 
 def _outside(rows: jax.Array, Q: jax.Array) -> jax.Array:
-    """Rows (k, n) outside the span of the slots Q; twice, for rows that lie almost inside."""
+    """Return rows (k, n) outside the span of the slots Q; projected twice for accuracy."""
     for _ in range(2):
         rows = rows - (rows @ Q.T) @ Q
     return rows
 
 
 def _factor(rows: jax.Array, zero: jax.Array) -> tuple[jax.Array, jax.Array]:
-    """Return L (k, k) and slots Q (k, n) with rows = L Q, the largest row left first.
+    """Return L (k, k) and slots Q (k, n) with rows = L Q, largest remaining row first.
 
-    zero (k,): squared norms at or below which what is left of a row is nothing.
+    zero (k,): squared norm at or below which the remainder of a row counts as zero.
     """
     columns, Q = [], jnp.zeros_like(rows[:0])
     left = rows
@@ -114,7 +114,7 @@ def _factor(rows: jax.Array, zero: jax.Array) -> tuple[jax.Array, jax.Array]:
 
 
 def _damping(L: jax.Array, Q: jax.Array, damping: float, threshold: float) -> jax.Array:
-    """Return lambda, from the smallest singular value of L; where rank < rows, all of it."""
+    """Return lambda from the smallest singular value of L; the full damping if rank < rows."""
     smallest = jnp.linalg.svd(L, compute_uv=False)[-1]
     full = jnp.any(Q != 0.0, axis=1).all()
     ratio = jnp.where(full, jnp.minimum(smallest / threshold, 1.0), 0.0)
@@ -122,9 +122,9 @@ def _damping(L: jax.Array, Q: jax.Array, damping: float, threshold: float) -> ja
 
 
 def _least_squares(L: jax.Array, r: jax.Array, lambda_: jax.Array | None) -> jax.Array:
-    """Return the y that minimises |L y - r|^2 + lambda^2 |y|^2, zero where L has no column.
+    """Return the y that minimises |L y - r|^2 + lambda^2 |y|^2, zero for empty columns of L.
 
-    Modified Gram-Schmidt of [L r], which is as accurate as reflections as long as r goes along.
+    Modified Gram-Schmidt of [L r]: as accurate as reflections if r is orthogonalised with L.
     """
     k = L.shape[1]
     T = jnp.concatenate([L, r[:, None]], axis=1)

@@ -2,8 +2,8 @@
 
     answer = solve(Batch(A, lower, upper, sizes), make("tpm"))
 
-For policies that learn, sampling, sweeps. Each problem gets what `resolver.solve` gives it alone,
-to the last bit; what is saved is the time around a solve, and one core does not wait for another.
+For learning, sampling and parameter sweeps. Each answer is that of `resolver.solve`, to the last
+bit; a batch saves the overhead around each solve and uses all cores.
 """
 
 from __future__ import annotations
@@ -27,15 +27,15 @@ from solvers.kernels.batch import (
     batch_staircase,
     batch_without_bounds,
 )
-from solvers.resolver import Resolver, make, refuse_inequality
+from solvers.resolver import Resolver, make, refuse_inequality, set_frozen
 from solvers.resolvers.hcod import Hcod
 from solvers.resolvers.tpm import Tpm
 from solvers.status import INACCURATE, NO_LIMITS, NUMERICAL_FAILURE, SOLVED, UNPROVED, Status
 from solvers.workspace import run
 
 Indices = NDArray[np.int64]
-ENOUGH = 2**15  # entries of A, half a millisecond or more, that are worth starting a thread for
-PARTS = 4       # for each thread, because some problems take longer than others
+ENOUGH = 2**15  # entries of A (at least 0.5 ms of work) that justify a thread
+PARTS = 4       # per thread, since some problems take longer than others
 
 
 @final
@@ -43,20 +43,17 @@ PARTS = 4       # for each thread, because some problems take longer than others
 class Batch:
     """B hierarchies of L levels, m rows and n unknowns, as stacked arrays.
 
-    Arrays of float64 without gaps are kept as they are, others copied. What is in them is not
-    checked, but in the end: data that are not finite, or lower > upper, give that one problem
-    Status.NUMERICAL_FAILURE.
+    Contiguous float64 arrays are used as they are, others are copied. Values are not checked here:
+    a problem with numbers that are not finite, or lower > upper, gets Status.NUMERICAL_FAILURE.
 
     Attributes
     ----------
-    A : (B, m, n) the rows of all levels, one level under the other.
+    A : (B, m, n) the rows of all levels, top level first.
     lower, upper : (B, m) their sides; an equality has lower == upper, a missing side is infinite.
     sizes : (L,) rows of each level, the same for all problems.
-    reference : (B, n) the x preferred where nothing else decides; None for zero.
+    reference : (B, n) as in `Hierarchy`; None for zero.
 
-    Raises
-    ------
-    HierarchyError : an array of another shape, or not of numbers; names the array.
+    Raises HierarchyError, naming the array, for a wrong shape or entries that are not numbers.
     """
 
     A: Array
@@ -72,10 +69,9 @@ class Batch:
         sides = A.shape[:2]
         reference = (np.zeros(A.shape[::2]) if self.reference is None
                      else _shaped("reference", self.reference, A.shape[::2]))
-        for name, array in (("A", A), ("lower", _shaped("lower", self.lower, sides)),
-                            ("upper", _shaped("upper", self.upper, sides)),
-                            ("sizes", _sizes(self.sizes, A.shape[1])), ("reference", reference)):
-            object.__setattr__(self, name, array)
+        set_frozen(self, A=A, lower=_shaped("lower", self.lower, sides),
+                   upper=_shaped("upper", self.upper, sides), sizes=_sizes(self.sizes, A.shape[1]),
+                   reference=reference)
 
     @classmethod
     def of(cls, hierarchies: Sequence[Hierarchy]) -> Batch:
@@ -83,10 +79,10 @@ class Batch:
 
         Raises
         ------
-        HierarchyError : none at all, or one whose sizes or unknowns are not those of the first.
+        HierarchyError : no hierarchies, or one with other sizes or unknowns than the first.
         """
         if not hierarchies:
-            raise HierarchyError("a batch of no hierarchies has no shape; give arrays")
+            raise HierarchyError("a batch of no hierarchies has no shape; pass arrays instead")
         first = hierarchies[0]
         for p, h in enumerate(hierarchies):
             if h.n != first.n or h.sizes.tolist() != first.sizes.tolist():
@@ -100,7 +96,7 @@ class Batch:
         return len(self.A)
 
     def __getitem__(self, p: int) -> Hierarchy:
-        """Return problem p as a hierarchy of its own, a view of these arrays."""
+        """Return problem p as a `Hierarchy`, a view of these arrays."""
         names = tuple(f"problem {p}, level {k + 1}" for k in range(len(self.sizes)))
         return Hierarchy(self.A[p], self.lower[p], self.upper[p], self.sizes, self.reference[p],
                          names)
@@ -109,15 +105,15 @@ class Batch:
 @final
 @dataclass(frozen=True, eq=False)
 class BatchResolution:
-    """What a batch gave.
+    """The result of a batch.
 
     Attributes
     ----------
     x : (B, n) the answers, always finite.
     status : (B,) int, values of `Status`.
-    iterations : (B,) int, steps of the resolver's own kind.
-    memory : (B, ...) state for the next solve of the same shape, a row of zeros for none; None
-        where no problem has any.
+    iterations : (B,) int, as in `Resolution`.
+    memory : (B, ...) warm start for the next solve of the same shape, zeros for a problem without
+        one; None if no problem has one.
     """
 
     x: Array
@@ -133,17 +129,17 @@ class BatchResolution:
 
 
 def solve(batch: Batch, resolver: Resolver | None = None, threads: int | None = None,
-          memory: Any = None) -> BatchResolution:
-    """Resolve all problems of a batch by `tpm` (the default) or `hcod`, with their settings.
+          memory: Array | None = None) -> BatchResolution:
+    """Resolve all problems of a batch with `tpm` (the default) or `hcod`.
 
-    threads : at most so many at a time; None for as many as there are cores to run on.
-    memory : (B, ...) of an earlier resolution of this shape by this resolver, or None. Of another
-        shape it is forgotten.
+    threads : most threads to use; None for the number of available cores.
+    memory : (B, ...) of an earlier resolution by this resolver, or None; ignored if its shape does
+        not match.
 
     Raises
     ------
-    HierarchyError : another resolver; threads below 1; a row that the resolver cannot handle, by
-        problem, level and row.
+    HierarchyError : another resolver; threads below 1; a row that the resolver cannot handle
+        (names problem, level and row).
     """
     resolver = make("tpm") if resolver is None else resolver
     if not isinstance(resolver, (Tpm, Hcod)) or not resolver.strict:
@@ -155,9 +151,10 @@ def solve(batch: Batch, resolver: Resolver | None = None, threads: int | None = 
 
 
 class _Run:
-    """The arrays that the kernels write, and which problems go to which kernel."""
+    """The arrays that the kernels write, and the choice of kernel for each problem."""
 
-    def __init__(self, batch: Batch, resolver: Tpm | Hcod, threads: int, memory: Any) -> None:
+    def __init__(self, batch: Batch, resolver: Tpm | Hcod, threads: int,
+                 memory: Array | None) -> None:
         self.batch, self.resolver, self.threads = batch, resolver, threads
         count, rows, n = batch.A.shape
         bounds = 0 if isinstance(resolver, Hcod) else n + len(batch.sizes)
@@ -174,21 +171,16 @@ class _Run:
         self.settings = resolver._settings
 
     def by_tpm(self) -> BatchResolution:
-        """Resolve equalities by the staircase; with bounds, or a memory, by the exact engine."""
-        self._refer(np.arange(len(self.codes)))
-        self._call(batch_staircase, np.flatnonzero(~self.warm), self.x, self.codes, self.settings)
-        bounded = np.flatnonzero(self.warm | (self.codes < 0))
-        if bounded.size == 0:
+        """Resolve equalities with the staircase, and bounds or a warm start with exact kernels."""
+        self._set_reference(np.arange(len(self.codes)))
+        self._staircase(~self.warm)
+        bounded = self.warm | (self.codes < 0)
+        if not bounded.any():
             self._judge()
             return self._answer(np.ones(len(self.codes)), None)
-        self._refer(bounded)
-        self._call(batch_without_bounds, bounded, self.x, self.codes, self.record, self.settings)
-        self._call(batch_exact, np.flatnonzero(self.codes == UNPROVED), self.x, self.codes,
-                   self.record, self.settings)
+        self._within_bounds(np.flatnonzero(bounded))
         unlimited = self.codes == NO_LIMITS
-        named = ~unlimited & (self.codes >= 0) & (self.codes != NUMERICAL_FAILURE)
-        self._call(batch_saturation, bounded[named[bounded]], self.x, self.record)
-        self._call(batch_staircase, np.flatnonzero(unlimited), self.x, self.codes, self.settings)
+        self._staircase(unlimited)
         self._judge()
         for p in np.flatnonzero(self.codes < 0)[:1]:
             refuse_inequality(self.resolver, self.batch[p], -int(self.codes[p]) - 1)
@@ -196,22 +188,35 @@ class _Run:
         steps = np.maximum(self.record[:, -3] + self.record[:, -2], 1.0)
         return self._answer(steps, self.record)
 
+    def _staircase(self, chosen: NDArray[np.bool_]) -> None:
+        self._call(batch_staircase, np.flatnonzero(chosen), self.x, self.codes, self.settings)
+
+    def _within_bounds(self, which: Indices) -> None:
+        """Resolve problems with bounds, and write their saturation into the records."""
+        self._set_reference(which)
+        self._call(batch_without_bounds, which, self.x, self.codes, self.record, self.settings)
+        self._call(batch_exact, np.flatnonzero(self.codes == UNPROVED), self.x, self.codes,
+                   self.record, self.settings)
+        answered = ((self.codes >= 0) & (self.codes != NO_LIMITS)
+                    & (self.codes != NUMERICAL_FAILURE))
+        self._call(batch_saturation, which[answered[which]], self.x, self.record)
+
     def by_hcod(self) -> BatchResolution:
-        """Resolve by the exact engine, and what is in doubt alone."""
+        """Resolve with the kernels of `hcod`; let `certify` judge answers in doubt."""
         everything = np.arange(len(self.batch))
-        self._refer(everything)
+        self._set_reference(everything)
         self._call(batch_exact, everything, self.x, self.codes, self.record, self.settings)
         self._judge()
         return self._answer(self.record[:, -3] + self.record[:, -2], self.record)
 
-    def _refer(self, which: Indices) -> None:
+    def _set_reference(self, which: Indices) -> None:
         self.x[which] = self.batch.reference[which]
 
     def _answer(self, steps: Array, memory: Array | None) -> BatchResolution:
         return BatchResolution(self.x, self.codes, steps.astype(np.int64), memory)
 
     def _call(self, kernel: Callable[..., int], which: Indices, *arguments: Any) -> None:
-        """Run a kernel over the problems `which`, in parts on several threads if there are many."""
+        """Run a kernel over the problems `which`, on several threads if there are many."""
         b = self.batch
         call = partial(run, kernel, (b.A, b.lower, b.upper, b.sizes), *arguments)
         threads = min(self.threads, len(which) * b.A[:1].size // ENOUGH)
@@ -223,20 +228,20 @@ class _Run:
             list(pool.map(call, parts))
 
     def _judge(self) -> None:
-        """Let `certify` decide about the answers that are in doubt."""
+        """Let `certify` judge the answers in doubt."""
         for p in np.flatnonzero(self.codes == INACCURATE).tolist():
             self.codes[p] = SOLVED if certify(self.batch[p], self.x[p]).certified else INACCURATE
 
 
 def cores() -> int:
-    """Return how many cores this process may run on."""
+    """Return the number of cores that this process may use."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
 
 
 def _numbers(name: str, value: ArrayLike) -> Array:
-    """Return an array of float64 that kernels may be handed: C-contiguous and writeable."""
+    """Return an array of float64 as kernels need it: C-contiguous and writeable."""
     try:
         if np.iscomplexobj(value):
             raise TypeError
@@ -248,7 +253,7 @@ def _numbers(name: str, value: ArrayLike) -> Array:
 def _shaped(name: str, value: ArrayLike, shape: tuple[int, ...]) -> Array:
     array = _numbers(name, value)
     if array.shape != shape:
-        raise HierarchyError(f"{name} has shape {array.shape}, expected {shape}, that of A's "
+        raise HierarchyError(f"{name} has shape {array.shape}, expected {shape} for A's "
                              "problems and " + ("unknowns" if name == "reference" else "rows"))
     return array
 
@@ -258,5 +263,5 @@ def _sizes(value: ArrayLike, rows: int) -> Indices:
     if sizes.ndim != 1 or (sizes.size and sizes.dtype.kind not in "iu") or (sizes < 0).any():
         raise HierarchyError(f"sizes is {value!r}, expected a whole number of rows for each level")
     if sizes.sum() != rows:
-        raise HierarchyError(f"sizes sum to {sizes.sum()}, and A has {rows} rows a problem")
+        raise HierarchyError(f"sizes sum to {sizes.sum()}, but A has {rows} rows per problem")
     return np.require(sizes, np.int64, ["C", "W", "A"])

@@ -1,4 +1,4 @@
-"""A hierarchy kept factorised while rows and levels join, leave and change."""
+"""A factorised hierarchy that follows edits of its levels without factoring all rows again."""
 
 from solvers.factorization.edited import Factorization
 

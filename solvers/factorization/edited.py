@@ -1,4 +1,4 @@
-"""A factored stack whose priorities change at a cost that does not grow with the joints."""
+"""A factored stack whose priorities change at a cost independent of the number of joints."""
 
 from __future__ import annotations
 
@@ -21,44 +21,29 @@ Targets = Array | Mapping[str, ArrayLike] | Sequence[ArrayLike]
 
 @final
 class Factorization:
-    """Levels of equalities J x = b, kept as J = C Q^T while their priorities change.
+    """Levels of equalities J x = b, factored as J = C Q^T while their priorities change.
 
-    Q (n, r) is an orthonormal basis of the space of all rows, C (m, r) their coefficients. A swap,
-    a reorder and a delete work on C alone, from the first level that changes on: their cost does
-    not depend on n. An insert projects its own rows on Q, O(n r) each. A solve is that of `tpm`,
-    O(m r), and one product with Q, O(n r); rank decisions and damping are those of its `settings`.
-    Work waits for the next solve, so several edits cost one.
+    Swap, reorder and delete work on C (m, r) alone, from the first changed level on, so their cost
+    does not depend on n; insert projects its rows on the basis Q (n, r). The next solve does the
+    work, so several edits cost one. It gives the x of `tpm` with the same settings. Costs and the
+    treatment of deleted rows: docs/factorization.md, docs/theory/resolver-notes.md.
 
-    What is deleted stays in the basis, which then is wider than the rows need. An insert that
-    leaves more than 2 m + 8 rows in it, or finds no room, factors all rows afresh, O(m n r).
-
-    Parameters
-    ----------
     levels : A_k (m_k, n) of each level, most important first.
-    names : a name a level; None for "level 1", "level 2", ...
+    names : one name per level; None for "level 1", "level 2", ...
     n : number of unknowns; None takes it from the first level.
-    settings : of `tpm` in its staircase form; None for its defaults.
+    settings : a `tpm` in its staircase form; None for its defaults.
 
-    Raises
-    ------
-    HierarchyError : a wrong shape, an entry that is not finite, a name that is there twice, no n,
-        or the published form; names level, row and value.
-
-    Source: the letter, (7)-(11), and its text on swap, insertion and deletion, corrected for ranks.
+    Raises HierarchyError, naming level, row and value, for a wrong shape, an entry that is not
+    finite, a repeated name, an unknown n, or the published form.
     """
 
     def __init__(self, levels: Sequence[ArrayLike], names: Sequence[str] | None = None,
                  n: int | None = None, settings: Tpm | None = None) -> None:
         self._settings = Tpm() if settings is None else settings
         if self._settings.form != "staircase":
-            raise HierarchyError("a factorization is of the staircase form of tpm, got form = "
+            raise HierarchyError("a factorization needs the staircase form of tpm, got form = "
                                  f"{self._settings.form!r}")
-        names = [f"level {k + 1}" for k in range(len(levels))] if names is None else list(names)
-        if len(names) != len(levels):
-            raise HierarchyError(f"{len(names)} names for {len(levels)} levels")
-        twice = [name for name in names if names.count(name) > 1]
-        if twice:
-            raise HierarchyError(f"{twice[0]}: two levels of this name")
+        names = _distinct(names, len(levels))
         if n is None and not levels:
             raise HierarchyError("no levels and no n: the number of unknowns is not known")
         self._n = int(np.shape(levels[0])[-1] if np.ndim(levels[0]) == 2 else 0) if n is None else n
@@ -68,10 +53,10 @@ class Factorization:
 
     @classmethod
     def of(cls, h: Hierarchy, settings: Tpm | None = None) -> Factorization:
-        """Factor the rows of a hierarchy; its targets and reference are left to `solve`."""
+        """Factor the rows of a hierarchy; pass its targets and reference to `solve`."""
         return cls([A for A, _, _ in h.levels()], h.names, h.n, settings)
 
-    # -- what is there ----------------------------------------------------------------------------
+    # -- properties -------------------------------------------------------------------------------
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -100,7 +85,7 @@ class Factorization:
 
     @property
     def basis(self) -> Array:
-        """Q (n, r): a copy. Deleted levels may still have a part in it."""
+        """Q (n, r): a copy. It may still span rows of deleted levels."""
         return self._data.basis.T.copy()
 
     @property
@@ -110,16 +95,16 @@ class Factorization:
 
     @property
     def ranks(self) -> tuple[int, ...]:
-        """What each level adds to the rank of those above it."""
+        """Rank that each level adds to the levels above it."""
         self.update()
         return tuple(np.diff(self._data.ranks, prepend=0).tolist())
 
     @property
     def F(self) -> Array:  # noqa: N802
-        """The Task Priority Matrix (m, m) in the present order: F = C Z^T, from C alone.
+        """The Task Priority Matrix (m, m) in the current order: F = C Z^T, from C alone.
 
-        Z (m, r) has the answers to targets that are 1, one at a time, in coordinates of Q.
-        Raises HierarchyError where the rows are so large that their squares overflow.
+        Row i of Z (m, r) is the answer to unit target i, in coordinates of Q. Raises HierarchyError
+        if the squares of the rows overflow.
         """
         return np.asarray(self.coefficients @ self._units().T)
 
@@ -131,7 +116,7 @@ class Factorization:
     # -- edits ------------------------------------------------------------------------------------
 
     def swap(self, i: Level, j: Level) -> None:
-        """Exchange the places of two levels, given by name or by place from 0."""
+        """Swap two levels, given by name or by index from 0."""
         i, j = self._place(i), self._place(j)
         levels = self._levels
         levels[i], levels[j] = levels[j], levels[i]
@@ -139,9 +124,9 @@ class Factorization:
             self._changed(min(i, j))
 
     def reorder(self, order: Sequence[Level]) -> None:
-        """Put all levels in a new order, named or by their places until now, from 0.
+        """Put all levels in a new order, given by name or by current index from 0.
 
-        Raises HierarchyError unless each is there once.
+        Raises HierarchyError unless each level occurs once.
         """
         places = [self._place(level) for level in order]
         if sorted(places) != list(range(len(self._levels))):
@@ -151,22 +136,22 @@ class Factorization:
         self._changed(next((k for k, place in enumerate(places) if k != place), len(places)))
 
     def delete(self, level: Level) -> None:
-        """Take a level out, by name or by place from 0."""
+        """Delete a level, given by name or by index from 0."""
         place = self._place(level)
         self._m -= self._levels.pop(place).rows
         self._changed(place)
 
     def insert(self, level: str, A: ArrayLike, at: int | None = None) -> None:
-        """Put a level with rows A (m_k, n) at a place, 0 being the most important; None for last.
+        """Insert a level with rows A (m_k, n) at an index, 0 the most important; None for last.
 
-        Raises HierarchyError: a name that is there already, a place outside 0 .. L, a wrong shape,
-        an entry that is not finite; the factorization is then as before.
+        Raises HierarchyError for a name already in use, an index outside 0 .. L, a wrong shape or
+        an entry that is not finite; the factorization is then unchanged.
         """
         place = len(self._levels) if at is None else at
         if any(held.name == level for held in self._levels):
-            raise HierarchyError(f"{level}: there is a level of this name")
+            raise HierarchyError(f"{level}: a level of this name exists")
         if not 0 <= place <= len(self._levels):
-            raise HierarchyError(f"{level}: place {at} is outside 0 .. {len(self._levels)}")
+            raise HierarchyError(f"{level}: index {at} is outside 0 .. {len(self._levels)}")
         block = self._checked(level, A)
         used = self._data.used + len(block)
         if used > len(self._data.J) or used > 2 * (self._m + len(block)) + FEWEST:
@@ -177,20 +162,20 @@ class Factorization:
         self._changed(place)
 
     def update(self) -> Status:
-        """Do now what the next solve would do first: refactor C from the first changed level on."""
+        """Refactor C from the first changed level on, now rather than at the next solve."""
         return self._data.refactor(self._levels)
 
     # -- answers ----------------------------------------------------------------------------------
 
     def solve(self, targets: Targets, reference: ArrayLike | None = None) -> Resolution:
-        """Return the x of `tpm` for these targets in the present order.
+        """Return the x of `tpm` for these targets in the current order.
+
+        If squares of the numbers overflow, x is zero with Status.NUMERICAL_FAILURE.
 
         Parameters
         ----------
-        targets : b (m,) in the present order; or b_k (m_k,) of each level by name, or in order.
+        targets : b (m,) in the current order; or b_k (m_k,) of each level by name, or in order.
         reference : (n,) or None for zero, the q0 of (14).
-
-        Status.NUMERICAL_FAILURE: numbers so large that their squares overflow; x is zero.
 
         Raises
         ------
@@ -205,12 +190,12 @@ class Factorization:
         return Resolution(x, Status(code))
 
     def hierarchy(self, targets: Targets, reference: ArrayLike | None = None) -> Hierarchy:
-        """Return the same problem in the present order, for `certify` or another resolver."""
+        """Return the problem in the current order, for `certify` or another resolver."""
         b = self._packed(targets)
         return Hierarchy(self.rows, b, b.copy(), np.array(self.sizes, dtype=np.int64),
                          self._reference(reference), self.names)
 
-    # -- inside -----------------------------------------------------------------------------------
+    # -- internals --------------------------------------------------------------------------------
 
     def _place(self, level: Level) -> int:
         if isinstance(level, str):
@@ -219,7 +204,7 @@ class Factorization:
                     return k
             raise UnknownNameError("level", level, self.names)
         if not 0 <= level < len(self._levels):
-            raise HierarchyError(f"place {level} is outside 0 .. {len(self._levels) - 1}")
+            raise HierarchyError(f"index {level} is outside 0 .. {len(self._levels) - 1}")
         return level
 
     def _changed(self, place: int) -> None:
@@ -229,7 +214,7 @@ class Factorization:
         return [i for _, slot, rows in self._levels for i in range(slot, slot + rows)]
 
     def _factor_afresh(self, blocks: list[tuple[str, Array]], more: int = 0) -> None:
-        """Factor levels given by name and rows, with room for as many rows again and `more`."""
+        """Factor levels given by name and rows, with room for twice these and `more` rows."""
         self._m = sum(len(block) for _, block in blocks)
         self._data = FactoredRows(self._n, max(2 * (self._m + more), FEWEST), self._settings)
         self._levels = self._data.append(blocks)
@@ -255,7 +240,7 @@ class Factorization:
         return x
 
     def _packed(self, targets: Targets) -> Array:
-        """b (m,) in the present order."""
+        """Return b (m,) in the current order."""
         if isinstance(targets, np.ndarray) and targets.ndim == 1:
             if targets.shape != (self._m,):
                 raise HierarchyError(f"targets have shape {targets.shape}, expected ({self._m},)")
@@ -264,12 +249,7 @@ class Factorization:
             targets = self._in_order(targets)
         if len(targets) != len(self._levels):
             raise HierarchyError(f"{len(targets)} targets for {len(self._levels)} levels")
-        parts = [_array(f"{level.name}: b", b)
-                 for level, b in zip(self._levels, targets, strict=True)]
-        for level, b in zip(self._levels, parts, strict=True):
-            if b.shape != (level.rows,):
-                raise HierarchyError(f"{level.name}: b has shape {b.shape}, expected "
-                                     f"({level.rows},)")
+        parts = map(_target, self._levels, targets)
         return np.concatenate([np.empty(0), *parts])
 
     def _in_order(self, targets: Mapping[str, ArrayLike]) -> list[ArrayLike]:
@@ -277,11 +257,11 @@ class Factorization:
             self._place(name)
         for name in self.names:
             if name not in targets:
-                raise HierarchyError(f"{name}: no target is given")
+                raise HierarchyError(f"{name}: no target given")
         return [targets[name] for name in self.names]
 
     def _refuse(self, b: Array, x: Array, i: int) -> None:
-        """Name the target, or behind all targets the entry of the reference, that is bad."""
+        """Raise a HierarchyError that names the invalid target or entry of the reference."""
         if i >= len(b):
             raise HierarchyError(f"reference, entry {i - len(b)}: {x[i - len(b)]} is not finite")
         row = i
@@ -289,6 +269,24 @@ class Factorization:
             if row < level.rows:
                 raise HierarchyError(f"{level.name}, row {row}: target is {b[i]}")
             row -= level.rows
+
+
+def _distinct(names: Sequence[str] | None, count: int) -> list[str]:
+    """Return one name per level, all different, or raise a HierarchyError."""
+    names = [f"level {k + 1}" for k in range(count)] if names is None else list(names)
+    if len(names) != count:
+        raise HierarchyError(f"{len(names)} names for {count} levels")
+    for name in names:
+        if names.count(name) > 1:
+            raise HierarchyError(f"{name}: two levels have this name")
+    return names
+
+
+def _target(level: Held, value: ArrayLike) -> Array:
+    b = _array(f"{level.name}: b", value)
+    if b.shape != (level.rows,):
+        raise HierarchyError(f"{level.name}: b has shape {b.shape}, expected ({level.rows},)")
+    return b
 
 
 def _array(what: str, value: ArrayLike) -> Array:

@@ -20,13 +20,13 @@ from solvers.kernels.factorization import (
 from solvers.resolvers.tpm import Tpm
 from solvers.status import Status
 
-FEWEST = 8   # rows that there is always room for
-_LEVELS = 16  # in the first table
-_ROUND = 4   # the width of a staircase is a multiple of this: fewer of them are laid out anew
+FEWEST = 8   # rows for which there is always room
+_LEVELS = 16  # capacity of the first table
+_ROUND = 4   # the width of a staircase is a multiple of this, to reallocate less often
 
 
 class Held(NamedTuple):
-    """A level whose rows are `slot` .. `slot + rows - 1` of the arrays."""
+    """A level that occupies rows `slot` .. `slot + rows - 1` of the arrays."""
 
     name: str
     slot: int
@@ -35,12 +35,13 @@ class Held(NamedTuple):
 
 @final
 class FactoredRows:
-    """Rows in slots, factored as C Q^T; and the staircase of some levels of them.
+    """Rows in slots, factored as C Q^T, and the staircase of their levels.
 
     Attributes
     ----------
-    J : (room, n) the rows as given, `used` of them. basis : (r, n) their directions.
-    kept : how many of the levels, from the top, the staircase has right.
+    J : (room, n) the rows as given; the first `used` are occupied.
+    basis : (r, n) their directions.
+    kept : number of levels, from the top, for which the staircase is up to date.
     """
 
     def __init__(self, n: int, room: int, settings: Tpm) -> None:
@@ -72,7 +73,7 @@ class FactoredRows:
         return self._table[:, 2]
 
     def append(self, blocks: Iterable[tuple[str, Array]]) -> list[Held]:
-        """Put levels into the next slots, and what their rows add into the basis."""
+        """Put levels into the next slots, and add their new directions to the basis."""
         held, slot = [], self.used
         for name, block in blocks:
             held.append(Held(name, slot, len(block)))
@@ -85,11 +86,11 @@ class FactoredRows:
         return held
 
     def rows(self, level: Held) -> Array:
-        """Rows of a level as given (m_k, n), a view."""
+        """Return the rows of a level as given (m_k, n), a view."""
         return self.J[level.slot:level.slot + level.rows]
 
     def refactor(self, levels: Sequence[Held]) -> Status:
-        """Bring the levels behind the kept ones into the staircase."""
+        """Add the levels below the kept ones to the staircase."""
         count = len(levels)
         if self.kept < count or self.status is not Status.SOLVED:
             self._list(levels, self.kept)
@@ -102,12 +103,12 @@ class FactoredRows:
         return self.status
 
     def resolve(self, b: Array, x: Array) -> int:
-        """Turn x (n,), a reference, into the answer for targets b (m,); a code of the kernel."""
+        """Replace the reference in x (n,) by the answer for targets b (m,); return a code."""
         return int(resolve(b, x, self.basis, self._table, self._W, self._pivots,
                            self._numbers, self._work))
 
     def units(self, m: int) -> Array:
-        """Answers to m targets that are 1, one at a time, in the basis: (m, r)."""
+        """Return the answers to the m unit targets, in coordinates of the basis: (m, r)."""
         Z = np.empty((m, self._width))
         resolve_units(Z, self._table, self._W, self._pivots, self._numbers, self._work)
         return Z[:, :self._r]
@@ -123,7 +124,7 @@ class FactoredRows:
             _, table[k, 0], table[k, 1] = levels[k]
 
     def _widen(self, width: int) -> None:
-        """Make room for a wider basis; what is factored has zeros in the new columns."""
+        """Make room for a wider basis; factored rows get zeros in the new columns."""
         old, before, room = self._W, self._width, len(self.J)
         self._W, self._width = np.zeros((room + width + EXTRA_ROWS, width)), width
         if before:

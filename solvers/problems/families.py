@@ -1,10 +1,10 @@
-"""Fresh problems of the same make as the reference families, a new one for every seed.
+"""Fresh problems like those of the reference families, a new one for every seed.
 
-The stored families have 50 problems each, and solvers have been tuned on them. These have the same
-sizes, ranks, row norms and sides, and the same kinds of ties, but no seed repeats a stored problem.
+The stored families have 50 problems each, and solvers have been tuned on them. These problems have
+the same sizes, ranks, row norms, sides and kinds of ties, but no seed repeats a stored problem.
 
-INEQ7 and HUM38 come in two strengths. An easy problem looks like the stored ones. A hard problem
-has more bounds that exclude zero and targets that lie farther out, so more rows are active at the
+INEQ7 and HUM38 have easy and hard problems. An easy problem looks like the stored ones. A hard
+problem has more bounds that exclude zero and more distant targets, so more rows are active at the
 answer. The share of hard problems is an argument.
 """
 
@@ -25,14 +25,14 @@ _PARALLEL = 1e-9  # angle [rad] of the nearly parallel rows of DEGEN7
 
 
 def family(name: str, seed: int, hard: float = HARD) -> Hierarchy:
-    """Return one fresh problem of a reference family: the same one for a seed every time.
+    """Return one fresh problem of a reference family, reproducible from its seed.
 
     name : one of FAMILIES.
     hard : chance that a problem of INEQ7 or HUM38 is hard; the other families ignore it.
 
     Raises
     ------
-    HierarchyError : the name is not one of FAMILIES, or hard is outside 0..1.
+    HierarchyError : a name not in FAMILIES, or `hard` outside 0..1.
     """
     if name not in _MAKERS:
         raise HierarchyError(f"no family of problems is called {name!r}; there are "
@@ -44,14 +44,14 @@ def family(name: str, seed: int, hard: float = HARD) -> Hierarchy:
 
 
 def _equalities(n: int, *sizes: int) -> Callable[[Random, float], list[Level]]:
-    """Rows and targets from the standard normal distribution."""
+    """Return a maker of rows and targets from the standard normal distribution."""
     def make(rng: Random, _: float) -> list[Level]:
         return [_equal(rng.normal(size=(size, n)), rng.normal(size=size)) for size in sizes]
     return make
 
 
 def _singular(rng: Random, _: float) -> list[Level]:
-    """Rows that repeat, or lie in the span of the rows above, with targets that conflict."""
+    """Repeated rows and rows in the span of the rows above, with conflicting targets."""
     n = 7
     first = rng.normal(size=(2, n))
     first = np.vstack([first, first[0]])
@@ -118,7 +118,7 @@ def _degenerate(rng: Random, _: float) -> list[Level]:
 
 def _box(rng: Random, n: int, half: tuple[float, float], ratio: tuple[float, float],
          share: float) -> tuple[Array, Array]:
-    """Sides of symmetric bounds; a share has one side moved to a ratio of the other one."""
+    """Return symmetric bounds; in a share of them one side is moved to a ratio of the other."""
     upper = np.asarray(rng.uniform(half[0], half[1], n))
     lower = -upper
     moved, above = rng.random(n) < share, rng.random(n) < 0.5
@@ -136,7 +136,7 @@ def _equal(A: Array, b: Array) -> Level:
 
 
 def _one_sided(rng: Random, A: Array, side: Array, last: int) -> Level:
-    """Rows A x >= side; each of the last ones turned round with an even chance."""
+    """Return rows A x >= side; each of the last ones is reversed with an even chance."""
     level = (A.copy(), side.copy(), np.full(len(A), np.inf))
     for i in range(len(A) - last, len(A)):
         if rng.random() < 0.5:

@@ -1,14 +1,14 @@
-"""Hierarchies made at random, with all that makes them hard; for tests of resolvers, also yours.
+"""Random hierarchies with every known difficulty, for tests of resolvers.
 
     for seed in range(1000):
         h = generate(seed)
         assert certify(h, make("hcod").solve(h).x).certified
 
-`family` gives fresh problems of the same make as the reference families, `structured` those of
+`family` generates fresh problems like those of the reference families; `structured` generates
 singular arms, tied boxes, contacts, nested levels and mixed units.
 
-All unit rows of a hierarchy are written around one point x*, so that sides can pass through the
-same vertex; then they are scaled. `strategy` gives the same problems to hypothesis.
+All rows of a hierarchy start as unit rows around one point x*, so that sides can pass through the
+same vertex; then they are scaled. `strategy` provides the same problems to hypothesis.
 """
 
 from __future__ import annotations
@@ -34,30 +34,16 @@ Random = np.random.Generator
 @final
 @dataclass(frozen=True, kw_only=True)
 class Recipe:
-    """What is in the problems. Ranges are (least, most); chances are of a level unless said.
+    """Distribution of generated problems: ranges are (least, most), chances are per level.
 
-    joints, levels, rows : unknowns, levels, and rows of a level. Small ones are as frequent as
-        large ones: their logarithm is uniform.
-    equalities_only : whether all rows are equalities.
-    empty : chance of the least number of rows.
-    rank_lost : chance that rows depend on the others of their level, at a rank drawn.
-    linked : chance that directions are taken from the span of the levels above, as many as drawn.
-    simple_bounds : chance that rows are unit vectors.
-    conflicting : chance of a problem that targets and sides do not all admit x*; then each level
-        has it with the same chance.
-    ties : share of the inequalities with a side through x* exactly.
-    one_sided, sideless : share of the inequalities without one side, and without both.
-    zero_rows, duplicates, near_parallel : chance that one row is zero, is another of the hierarchy
-        again, or makes an `angles` [rad] with it. A duplicate may be turned round.
-    angles : of near-parallel rows. Those within a factor 1000 of a resolver's rank_tolerance (1e-9)
-        have no answer that double precision can tell.
-    scales : norms of the rows of a level.
-    spread : ratio of the largest to the smallest norm inside a level.
-    reference : chance of a problem that its reference is not zero.
+    Sizes are log-uniform in joints, levels and rows, norms in scales; `spread` is the ratio of the
+    largest to the smallest norm in a level, `angles` [rad] those of `near_parallel` rows. Chances
+    of a structure: empty, rank_lost, linked (rows in the span of levels above), simple_bounds,
+    zero_rows, duplicates, near_parallel; of a whole problem: conflicting, reference. Shares of the
+    inequalities: ties (a side exactly at x*), one_sided, sideless. docs/theory/resolver-notes.md
+    defines each.
 
-    Raises
-    ------
-    HierarchyError : a range that is empty or too low, or a chance outside 0..1.
+    Raises HierarchyError for an empty range or a chance outside 0..1.
     """
 
     joints: tuple[int, int] = (1, 60)
@@ -85,12 +71,12 @@ class Recipe:
         for field in dataclasses.fields(self):
             value = getattr(self, field.name)
             if field.name in least:
-                right = least[field.name] <= value[0] <= value[1] < np.inf
+                valid = least[field.name] <= value[0] <= value[1] < np.inf
             elif field.name == "spread":
-                right = 1.0 <= value < np.inf
+                valid = 1.0 <= value < np.inf
             else:
-                right = 0.0 <= value <= 1.0
-            if not right:
+                valid = 0.0 <= value <= 1.0
+            if not valid:
                 raise HierarchyError(f"recipe: {field.name} = {value!r} is out of range")
 
 
@@ -98,7 +84,7 @@ ANY = Recipe()
 
 
 def generate(seed: int, recipe: Recipe = ANY) -> Hierarchy:
-    """Return the hierarchy of a seed: the same one every time."""
+    """Return the hierarchy of a seed, reproducibly."""
     rng = np.random.default_rng(seed)
     n = _whole(rng, recipe.joints)
     count = _whole(rng, recipe.levels)
@@ -109,7 +95,7 @@ def generate(seed: int, recipe: Recipe = ANY) -> Hierarchy:
 
 
 def strategy(recipe: Recipe = ANY) -> SearchStrategy[Hierarchy]:
-    """Return a hypothesis strategy for hierarchies; it shrinks to few unknowns, levels and rows."""
+    """Return a hypothesis strategy for hierarchies that shrinks unknowns, levels and rows."""
     from hypothesis import strategies as st
 
     def build(n: int, sizes: list[int], seed: int) -> Hierarchy:
@@ -122,7 +108,7 @@ def strategy(recipe: Recipe = ANY) -> SearchStrategy[Hierarchy]:
 
 
 def written(rng: Random, n: int, sizes: Sequence[int], recipe: Recipe = ANY) -> Hierarchy:
-    """Return a hierarchy of n unknowns and levels of these sizes."""
+    """Return a hierarchy with n unknowns and levels of these sizes."""
     through = rng.normal(size=n)
     conflicts = recipe.conflicting * _happens(rng, recipe.conflicting)
     above, levels = np.empty((0, n)), []
@@ -147,7 +133,7 @@ def save(h: Hierarchy, path: str | Path) -> None:
 
 
 def load(path: str | Path) -> Hierarchy:
-    """Read the hierarchy that `save` wrote. The names may be missing from the file."""
+    """Read a hierarchy written by `save`; names are optional in the file."""
     with np.load(path, allow_pickle=False) as file:
         sizes = file["sizes"]
         names = (tuple(map(str, file["names"])) if "names" in file
@@ -156,7 +142,7 @@ def load(path: str | Path) -> Hierarchy:
 
 
 def _directions(rng: Random, size: int, above: Array, recipe: Recipe) -> Array:
-    """Unit rows (size, n): simple bounds, or of a chosen rank and share in the levels above."""
+    """Return unit rows (size, n): simple bounds, or of a random rank and link to levels above."""
     n = above.shape[1]
     if _happens(rng, recipe.simple_bounds):
         order = np.resize(rng.permutation(n), size)
@@ -174,7 +160,7 @@ def _directions(rng: Random, size: int, above: Array, recipe: Recipe) -> Array:
 
 
 def _repeat_a_row(rng: Random, unit: Array, above: Array, recipe: Recipe) -> None:
-    """Make one row another of the hierarchy again, exactly or at an angle."""
+    """Replace one row by a copy of another row of the hierarchy, exact or at an angle."""
     size, n = unit.shape
     choices = np.vstack([above, unit])
     duplicate, parallel = (_happens(rng, recipe.duplicates), _happens(rng, recipe.near_parallel))
@@ -191,7 +177,7 @@ def _repeat_a_row(rng: Random, unit: Array, above: Array, recipe: Recipe) -> Non
 
 
 def _sides(rng: Random, value: Array, conflict: bool, recipe: Recipe) -> tuple[Array, Array]:
-    """Sides (m_k,) around the value of the unit rows at x*, which they admit without conflict."""
+    """Return sides (m_k,) around the value of unit rows at x*, feasible without a conflict."""
     m = len(value)
     equal = np.full(m, recipe.equalities_only)
     if not recipe.equalities_only:
@@ -212,7 +198,7 @@ def _sides(rng: Random, value: Array, conflict: bool, recipe: Recipe) -> tuple[A
 
 
 def _scale(rng: Random, size: int, recipe: Recipe) -> Array:
-    """Norms of the rows of a level: all one in half of the levels that allow it."""
+    """Return norms of the rows of a level: all one in half of the levels that allow it."""
     low, high = recipe.scales
     if _happens(rng, 0.5) and low <= 1.0 <= high:
         return np.ones(size)
@@ -227,10 +213,10 @@ def _happens(rng: Random, chance: float) -> bool:
 
 
 def _between(rng: Random, ends: tuple[float, float]) -> float:
-    """Uniform in the logarithm."""
+    """Return a log-uniform number."""
     return float(np.exp(rng.uniform(*np.log(np.maximum(ends, 1e-300)))))
 
 
 def _whole(rng: Random, ends: tuple[int, int]) -> int:
-    """Uniform in the logarithm, both ends included."""
+    """Return a log-uniform whole number, both ends included."""
     return min(int(_between(rng, (ends[0] or 0.5, ends[1] + 1))), ends[1])

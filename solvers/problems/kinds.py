@@ -1,8 +1,8 @@
-"""Structured hierarchies: what robots make of themselves, where solvers fail and noise does not.
+"""Structured hierarchies as robots produce them, on which solvers fail more often than on noise.
 
 Random numbers rarely tie, repeat or cancel. An arm at a multiple of 90 degrees, a velocity box at
-rest or a foot in a corner does all three at once. Each kind is one short function from a generator
-of random numbers to levels; `structured` draws one.
+rest or a foot in a corner does all three at once. Each kind is one short function from a random
+generator to levels; `structured` draws one kind.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ Levels = list[Level]
 
 
 def structured(seed: int, kinds: Sequence[str] = (), equalities_only: bool = False) -> Hierarchy:
-    """Return the structured hierarchy of a seed: the same one every time.
+    """Return the structured hierarchy of a seed, reproducibly.
 
-    kinds : names out of KINDS to draw from; all of them if empty.
-    equalities_only : whether each row keeps one side only, as an equality.
+    kinds : names from KINDS to draw from; all of them if empty.
+    equalities_only : whether each row keeps only one side, as an equality.
 
     Raises
     ------
-    HierarchyError : a name that is not one of KINDS.
+    HierarchyError : a name not in KINDS.
     """
     for kind in kinds:
         if kind not in _MAKERS:
@@ -44,10 +44,10 @@ def structured(seed: int, kinds: Sequence[str] = (), equalities_only: bool = Fal
 
 
 def bounded(h: Hierarchy, seed: int) -> Hierarchy:
-    """Return a hierarchy of equalities inside a box, which goes first: the same one every time.
+    """Return a hierarchy of equalities below a first level with a box, reproducibly.
 
-    The box lies around the x that meets the first level best. Sides may be at it, at both sides of
-    it, beyond it or missing; rows are turned round, repeated, and of any norm.
+    The box lies around the x that meets the first level best. That x may be on a side or beyond it,
+    and sides may coincide or be missing; rows are reversed, repeated and scaled.
     """
     rng = np.random.default_rng([seed, 2])
     end = int(h.offsets[1]) if len(h.sizes) else 0
@@ -75,9 +75,9 @@ def _singular_arm(rng: Random, digits: int = 12) -> Levels:
 
 
 def _dusty_arm(rng: Random) -> Levels:
-    """The same, with the rounding of cos and sin left in: rows of 1e-17 where there is no motion.
+    """A singular arm that keeps the rounding of cos and sin: rows of 1e-17 where nothing moves.
 
-    A row of dust with a target other than zero asks for an x of 1e17, strictly speaking.
+    Strictly, a row of dust with a nonzero target requires an x of 1e17.
     """
     return _singular_arm(rng, digits=30)
 
@@ -90,7 +90,7 @@ def _tied_box(rng: Random) -> Levels:
 
 
 def _opposed(rng: Random) -> Levels:
-    """Avoidance from two sides, more than the room between allows, with a box; in any order."""
+    """Avoidance from two sides with too little room in between, and a box; in any order."""
     n = int(rng.integers(1, 8))
     A = _rows(rng, int(rng.integers(1, 4)), n)
     room = rng.choice([-0.1, 0.0, 0.1, 0.5], len(A))
@@ -103,7 +103,7 @@ def _opposed(rng: Random) -> Levels:
 
 
 def _contacts(rng: Random) -> Levels:
-    """Forces of feet: unilateral, in a friction pyramid, bounded, and their sum; least forces."""
+    """Foot forces: unilateral, in a friction pyramid, bounded, balanced and minimal."""
     feet = int(rng.integers(1, 5))
     mu, n = float(rng.choice([0.0, 0.3, 0.5, 1.0])), 3 * feet
     pyramid = np.array([[1.0, 0, -mu], [-1.0, 0, -mu], [0, 1.0, -mu], [0, -1.0, -mu]])
@@ -122,7 +122,7 @@ def _contacts(rng: Random) -> Levels:
 
 
 def _nested(rng: Random) -> Levels:
-    """Levels that repeat upper ones: equal, a subset, or sums of rows, with other sides or not."""
+    """Levels that repeat upper ones: equal, a subset or sums, with the same or new sides."""
     n = int(rng.integers(1, 9))
     levels = [_sided(rng, _rows(rng, int(rng.integers(1, 5)), n))]
     for _ in range(int(rng.integers(1, 7))):
@@ -149,7 +149,7 @@ def _integers(rng: Random) -> Levels:
 
 
 def _chain(rng: Random) -> Levels:
-    """Bounds on differences of neighbours, ends that are held, and targets."""
+    """Bounds on the differences of neighbours, fixed ends, and targets."""
     n = int(rng.integers(2, 13))
     step = float(rng.choice([0.0, 0.5, 1.0]))
     A = np.eye(n)[:-1] - np.eye(n)[1:]
@@ -160,7 +160,7 @@ def _chain(rng: Random) -> Levels:
 
 
 def _signs(rng: Random) -> Levels:
-    """All sides 0, 1 or -1, rows of any direction."""
+    """All sides 0, 1 or -1, rows in any direction."""
     n = int(rng.integers(1, 10))
     return [_sided(rng, _rows(rng, size, n), wide=1)
             for size in rng.integers(1, 9, int(rng.integers(1, 6)))]
@@ -181,12 +181,12 @@ def _sixty_unknowns(rng: Random) -> Levels:
 
 
 def _fifteen_levels(rng: Random) -> Levels:
-    """Fifteen levels, most of which find no freedom left."""
+    """Fifteen levels, most of which have no freedom left."""
     return _around(rng, int(rng.integers(4, 12)), 15)
 
 
 def _near_ties(rng: Random) -> Levels:
-    """Rows repeated below with sides that differ by about 1e-9."""
+    """Rows repeated in lower levels with sides that differ by about 1e-9."""
     levels = _around(rng, int(rng.integers(2, 8)), int(rng.integers(1, 4)))
     for _ in range(int(rng.integers(1, 4))):
         A, lower, upper = _stacked(*levels)
@@ -197,7 +197,7 @@ def _near_ties(rng: Random) -> Levels:
 
 
 def _nearly_parallel(rng: Random) -> Levels:
-    """Rows repeated, in their level or below, at an angle of 1e-9 to 1e-6."""
+    """Rows repeated in their level or below, at an angle of 1e-9 to 1e-6 rad."""
     levels = _around(rng, int(rng.integers(2, 8)), int(rng.integers(2, 5)))
     for k, level in enumerate(levels):
         A, lower, upper = levels[int(rng.integers(k + 1))]
@@ -209,7 +209,7 @@ def _nearly_parallel(rng: Random) -> Levels:
 
 
 def _tiny_rows(rng: Random) -> Levels:
-    """Rows of norm 1e-14 below rows of norm 1: dust of a Jacobian that should be zero."""
+    """Rows of norm 1e-14 below rows of norm 1, as in a Jacobian that should be zero."""
     levels = _around(rng, int(rng.integers(2, 8)), int(rng.integers(2, 5)))
     for k in range(1, len(levels)):
         A, lower, upper = levels[k]
@@ -219,7 +219,7 @@ def _tiny_rows(rng: Random) -> Levels:
 
 
 def _shifted(rng: Random) -> Levels:
-    """A problem of another kind with all unknowns moved by the same vector."""
+    """A problem of another kind with all unknowns shifted by the same vector."""
     kind = str(rng.choice([name for name in _MAKERS if name != "shifted"]))
     levels = _MAKERS[kind](rng)
     by = rng.normal(size=levels[0][0].shape[1]) * 10.0**rng.integers(-12, 3)
@@ -228,7 +228,7 @@ def _shifted(rng: Random) -> Levels:
 
 
 def _jacobian(rng: Random, n: int, planar: bool) -> Array:
-    """Jacobian (6, n) of a chain of n joints, angles and twists multiples of 90 degrees."""
+    """Return the Jacobian (6, n) of a chain of n joints at multiples of 90 degrees."""
     turns = np.pi / 2.0 * rng.integers(0, 4, n)
     twists = np.zeros(n) if planar else np.pi / 2.0 * rng.integers(-1, 2, n)
     lengths, offsets = rng.choice([0.0, 0.3, 0.4], (2, n))
@@ -244,12 +244,12 @@ def _jacobian(rng: Random, n: int, planar: bool) -> Array:
 
 
 def _around(rng: Random, n: int, count: int) -> Levels:
-    """Levels of random rows with a few whole sides."""
+    """Return levels of random rows with small integer sides."""
     return [_sided(rng, _rows(rng, size, n)) for size in rng.integers(1, 5, count)]
 
 
 def _rows(rng: Random, size: int, n: int) -> Array:
-    """Unit rows (size, n): random, along an axis, or along a sum of axes."""
+    """Return unit rows (size, n): random, along an axis, or along a sum of axes."""
     rows = [rng.normal(size=n), np.eye(n)[rng.integers(n)], rng.integers(-1, 2, n).astype(float)]
     made = np.array([rows[rng.integers(3)] if i == 0 else
                      (rng.normal(size=n), np.eye(n)[rng.integers(n)])[rng.integers(2)]
@@ -263,7 +263,7 @@ def _few(rng: Random, size: int) -> Array:
 
 
 def _sided(rng: Random, A: Array, wide: int = 2) -> Level:
-    """Rows with whole sides: equalities, one side missing, or both there."""
+    """Return rows with integer sides: equalities, one-sided or two-sided."""
     sides = np.sort(rng.integers(-wide, wide + 1, (2, len(A))).astype(float), axis=0)
     kind = rng.integers(4, size=len(A))
     lower = np.where(kind == 2, -np.inf, sides[0])
@@ -271,7 +271,7 @@ def _sided(rng: Random, A: Array, wide: int = 2) -> Level:
 
 
 def _box_at_rest(rng: Random, n: int) -> Level:
-    """Bounds of joints, some of which stand at a limit and may move one way only, or not."""
+    """Return joint bounds; joints at a limit can move in one direction or not at all."""
     upper = rng.choice([0.0, 0.5, 1.0, 1.0], n)
     lower = -rng.choice([0.0, 0.5, 1.0, 1.0], n)
     return np.eye(n), lower, upper

@@ -1,1 +1,1 @@
-"""Quadratic programs: the backends, what they are asked, and how their answers are refined."""
+"""Quadratic programs: the backends, the program of a level, and the refinement of answers."""

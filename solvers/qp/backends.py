@@ -1,4 +1,4 @@
-"""The quadratic programming solvers that `hqp` calls through qpsolvers: how, and how good."""
+"""The quadratic programming solvers that `hqp` calls through qpsolvers, and their accuracy."""
 
 from __future__ import annotations
 
@@ -12,23 +12,20 @@ from typing import Any, final
 
 from hierarchy.errors import HierarchyError, UnknownNameError
 
-# OSQP looks for its MKL and CUDA builds on disk at every program, a fifth of its time, unless told.
-os.environ.setdefault("OSQP_ALGEBRA_BACKEND", "builtin")
-
 
 @final
 @dataclass(frozen=True)
 class Backend:
-    """A solver, how it is called, and the accuracy that is asked of it.
+    """A solver, how to call it, and its required accuracy.
 
-    name : as qpsolvers knows it.
-    module : what has to be importable; part of the package's dependencies, or of its extra `qp`.
-    accuracy : of x, relative to 1 + |x|. An answer that is not shown to be as good is not taken.
-    options : its tolerances, handed on by qpsolvers.
-    sparse : whether it wants sparse matrices.
-    regularisation : added to the diagonal of the Hessian, where that has to be definite.
-    starts : whether it begins from a given x.
-    core : whether it comes with the package; if not, with the extra.
+    name : its name in qpsolvers.
+    module : the module to import; from the package's dependencies or its extra `qp`.
+    accuracy : of x, relative to 1 + |x|; an answer that is not shown to reach it is not used.
+    options : its tolerances, passed on by qpsolvers.
+    sparse : whether it needs sparse matrices.
+    regularisation : added to the diagonal of the Hessian, for solvers that need a definite one.
+    starts : whether it accepts an initial guess.
+    core : whether it is installed with the package; otherwise with the extra.
     """
 
     name: str
@@ -63,8 +60,8 @@ def backend_of(name: str) -> Backend:
 
     Raises
     ------
-    UnknownNameError : there is none.
-    HierarchyError : it is not installed; names the extra that brings it.
+    UnknownNameError : no such backend.
+    HierarchyError : it is not installed; names the package or extra to install.
     """
     if name not in BACKENDS:
         raise UnknownNameError("backend of hqp", name, BACKENDS)
@@ -78,6 +75,8 @@ def backend_of(name: str) -> Backend:
 @cache
 def installed(name: str) -> bool:
     """Whether a backend can be imported."""
+    if name == "osqp":  # it otherwise looks for MKL and CUDA builds on disk at every program
+        os.environ.setdefault("OSQP_ALGEBRA_BACKEND", "builtin")
     try:
         import_module(BACKENDS[name].module)
     except ImportError:

@@ -1,10 +1,10 @@
-"""One level as a quadratic program, in the two forms of `hqp`; the call of a backend."""
+"""One level as a quadratic program, in the two forms of `hqp`, and the call of a backend."""
 
 from __future__ import annotations
 
 import warnings
 from dataclasses import dataclass
-from typing import Any, final
+from typing import TYPE_CHECKING, final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,11 +14,14 @@ from hierarchy.problem import Array, Hierarchy
 from solvers.qp.backends import Backend
 from solvers.qp.refinement import Rows, split
 
+if TYPE_CHECKING:
+    import qpsolvers
+
 
 @final
 @dataclass(frozen=True)
 class Program:
-    """min y^T P y / 2 + q^T y with lower <= A y <= upper and F y = f, begun from y = start."""
+    """min y^T P y / 2 + q^T y with lower <= A y <= upper and F y = f; initial guess `start`."""
 
     P: Array
     q: Array
@@ -30,25 +33,26 @@ class Program:
     start: Array | None = None
 
     def solve(self, backend: Backend) -> tuple[Array, bool]:
-        """Return the backend's y, and whether it vouches for it; zeros where it gave none."""
+        """Return the backend's y, zeros if it gave none, and whether the backend vouches for it."""
         import qpsolvers
 
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # backends warn of what their status says anyway
+            warnings.simplefilter("ignore")  # the backend's status says the same
             try:
                 solution = qpsolvers.solve_problem(
                     self.problem(backend.sparse, backend.regularisation), solver=backend.name,
                     initvals=self.start if backend.starts else None, **backend.options)
-            except Exception:  # backends raise whatever they like; all of it is their failure
+            except Exception:  # backends raise any exception; each is a failure
                 return np.zeros(len(self.q)), False
         if solution.x is None or not np.isfinite(solution.x).all():
             return np.zeros(len(self.q)), False
         return np.asarray(solution.x), bool(solution.found)
 
-    def problem(self, sparse: bool = False, regularisation: float = 0.0) -> Any:
+    def problem(self, sparse: bool = False, regularisation: float = 0.0) -> qpsolvers.Problem:
         """Return the `qpsolvers.Problem` P, q, G, h, F, f, with G y <= h for both sides.
 
-        sparse : whether its matrices are; regularisation is added to the diagonal of P.
+        sparse : whether the matrices are sparse.
+        regularisation : added to the diagonal of P.
         """
         import qpsolvers
         from scipy.sparse import csc_matrix  # type: ignore[import-untyped]
@@ -56,17 +60,18 @@ class Program:
         kind = csc_matrix if sparse else np.ascontiguousarray
         up, low = np.isfinite(self.upper), np.isfinite(self.lower)
         P = self.P + regularisation * np.eye(len(self.q))
-        rows: tuple[Any, Any] = (None, None)
+        rows: dict[str, object] = {}
         if len(self.A):
-            rows = (kind(np.vstack([self.A[up], -self.A[low]])),
-                    np.concatenate([self.upper[up], -self.lower[low]]))
-        fixed = (kind(self.F), self.f) if self.f.size else (None, None)
-        return qpsolvers.Problem(kind(P), self.q, *rows, *fixed)
+            rows["G"] = kind(np.vstack([self.A[up], -self.A[low]]))
+            rows["h"] = np.concatenate([self.upper[up], -self.lower[low]])
+        if self.f.size:
+            rows["A"], rows["b"] = kind(self.F), self.f
+        return qpsolvers.Problem(kind(P), self.q, **rows)
 
 
-def null_space_program(goal: Rows, limits: Rows, kept: Rows, lam: float,
-                        start: Array | None) -> Program:
-    """Unknowns: z, and w (k,) the signed violation of each limit."""
+def null_space_program(goal: Rows, limits: Rows, kept: Rows, lam: float, start: Array | None
+                       ) -> Program:
+    """Return the program with unknowns z and w (k,), the signed violation of each limit."""
     p, k = goal.A.shape[1], limits.lower.size
     P = np.eye(p + k)
     P[:p, :p] = goal.A.T @ goal.A + lam**2 * np.eye(p)
@@ -78,11 +83,13 @@ def null_space_program(goal: Rows, limits: Rows, kept: Rows, lam: float,
                    np.empty((0, p + k)), np.empty(0), begin)
 
 
-def slack_program(goal: Rows, limits: Rows, kept: Rows, F: Array, lam: float, last: bool,
-                   start: Array | None, f: Array | None = None) -> Program:
-    """Unknowns: the step d (n,), and w (k,) what each goal and limit is missed by; F d = f.
+def slack_program(goal: Rows, limits: Rows, kept: Rows, F: Array, lam: float, *,
+                  last: bool = False, start: Array | None = None, f: Array | None = None
+                  ) -> Program:
+    """Return the program with unknowns d (n,), the step, and w (k,), the miss of each row.
 
-    f is zero if None. The last program, where `goal` is d itself, is written without w.
+    f : F d = f; None for zero.
+    last : whether `goal` is d itself, which needs no w.
     """
     n, m, k = goal.A.shape[1], 0 if last else goal.lower.size, limits.lower.size
     P = np.eye(n + m + k)
@@ -104,27 +111,43 @@ def slack_program(goal: Rows, limits: Rows, kept: Rows, F: Array, lam: float, la
 
 def level_problem(h: Hierarchy, level: int, above: ArrayLike | None = None,
                   rank_tolerance: float = 1e-9, settled: float = 1e-7, sparse: bool = False
-                  ) -> Any:
-    """Return one level of a hierarchy as a `qpsolvers.Problem`, given what the levels above reach.
+                  ) -> qpsolvers.Problem:
+    """Return one level of a hierarchy as a `qpsolvers.Problem`, given an optimum of those above.
 
-    Its unknowns are x (n,), then w, what each row of the level is missed by: equalities first, then
-    inequalities. Minimised is ||w||^2 / 2. Rows above hold by constraints: equalities, and
-    inequalities that `above` breaks, at the value they have there; the others within their sides.
-    So `above` itself is always feasible. P is singular in x: not every backend takes that.
+    The unknowns are x (n,), then w, the miss of each row of the level: equalities first, then
+    inequalities. The objective is ||w||^2 / 2. Constraints hold the rows above: equalities, and
+    inequalities that `above` violates, at their value there; the others within their sides. So
+    `above` itself is always feasible. P is singular in x, which not every backend accepts.
 
     Parameters
     ----------
-    level : index of the level, 0 the most important; `len(h.sizes)` for the last step, which takes
+    level : index of the level, 0 the most important; `len(h.sizes)` for the last step, which finds
         the x nearest to `h.reference` and has no w.
     above : (n,) an optimum of the levels above, None for level 0.
     rank_tolerance : as in `Resolver`.
-    settled : a row that `above` breaks by more, relative to 1 + |A x|, keeps its value.
-    sparse : whether matrices are, which some backends ask for.
+    settled : a row that `above` violates by more, relative to 1 + |A x|, keeps its value.
+    sparse : whether the matrices are sparse, as some backends require.
 
     Raises
     ------
     HierarchyError : no such level; `above` missing, of a wrong shape or not finite.
     """
+    x = _checked(h, level, above)
+    m = int(h.offsets[level])
+    kept, F = _above(Rows(h.A[:m], h.lower[:m], h.upper[:m]), x, rank_tolerance, settled)
+    if level == len(h.sizes):
+        goal = Rows(np.eye(h.n), h.reference, h.reference)
+        last = slack_program(goal, Rows.none(h.n), kept, F, 0.0, last=True, f=F @ x)
+        return last.problem(sparse)
+    own = slice(m, int(h.offsets[level + 1]))
+    rows = Rows(h.A[own], h.lower[own], h.upper[own])
+    equal = rows.lower == rows.upper
+    program = slack_program(rows.where(equal), rows.where(~equal), kept, F, 0.0, f=F @ x)
+    return program.problem(sparse)
+
+
+def _checked(h: Hierarchy, level: int, above: ArrayLike | None) -> Array:
+    """Return `above` as an array (n,), or raise a HierarchyError."""
     if not 0 <= level <= len(h.sizes):
         raise HierarchyError(f"level {level}: the hierarchy has levels 0 to {len(h.sizes) - 1}, "
                              f"and {len(h.sizes)} for its reference")
@@ -132,19 +155,14 @@ def level_problem(h: Hierarchy, level: int, above: ArrayLike | None = None,
     if x.shape != (h.n,) or not np.isfinite(x).all():
         raise HierarchyError(f"level {level}: above must be the x ({h.n},) of the levels above, "
                              f"finite, got {above!r}")
-    m = int(h.offsets[level])
-    done, value = Rows(h.A[:m], h.lower[:m], h.upper[:m]), h.A[:m] @ x
-    fixed = (done.lower == done.upper) | (abs(done.excess(x)) > settled * (1.0 + abs(value)))
-    norms = np.linalg.norm(done.A[fixed], axis=1)
-    F = split(done.A[fixed], norms, rank_tolerance)[0].T
-    kept = done.where(~fixed)
-    kept = Rows(kept.A, np.minimum(kept.lower, value[~fixed]),
-                np.maximum(kept.upper, value[~fixed]))
-    if level == len(h.sizes):
-        goal = Rows(np.eye(h.n), h.reference, h.reference)
-        return slack_program(goal, Rows.none(h.n), kept, F, 0.0, True, None, F @ x).problem(sparse)
-    own = slice(m, int(h.offsets[level + 1]))
-    rows = Rows(h.A[own], h.lower[own], h.upper[own])
-    equal = rows.lower == rows.upper
-    return slack_program(rows.where(equal), rows.where(~equal), kept, F, 0.0, False, None,
-                         F @ x).problem(sparse)
+    return x
+
+
+def _above(rows: Rows, x: Array, rank_tolerance: float, settled: float) -> tuple[Rows, Array]:
+    """Return the rows above that remain inequalities, and a basis F of those that are fixed."""
+    value = rows.A @ x
+    fixed = (rows.lower == rows.upper) | (abs(rows.excess(x)) > settled * (1.0 + abs(value)))
+    F = split(rows.A[fixed], np.linalg.norm(rows.A[fixed], axis=1), rank_tolerance)[0].T
+    kept = rows.where(~fixed)
+    return Rows(kept.A, np.minimum(kept.lower, value[~fixed]),
+                np.maximum(kept.upper, value[~fixed])), F

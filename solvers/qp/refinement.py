@@ -1,9 +1,9 @@
-"""From a nearly right answer of a program with rows to the exact one, with proof."""
+"""From the approximate answer of a quadratic program to the exact one, verified."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import final
+from typing import NamedTuple, final
 
 import numpy as np
 from numpy.linalg import norm
@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from hierarchy.problem import Array
 
-REFINEMENTS = 25  # bound on the steps from a backend's active set to the exact one
-AT_ONCE = 10  # of them change all rows that are on the wrong side, the others one row at a time
+REFINEMENTS = 25  # most steps from a backend's active set to the exact one
+AT_ONCE = 10  # the first steps change all rows on the wrong side, later ones a single row
 EXACT = 1e-10  # relative tolerance of the optimality conditions
-LITTLE = 1e-3  # rows broken by less are thought to hold at a nearby minimiser
-LARGEST = 1e100  # of an entry: products of three are finite; nnls ends the process on infinite ones
+LITTLE = 1e-3  # rows violated by less are assumed to hold at a nearby minimiser
+LARGEST = 1e100  # entry: products of three stay finite; nnls kills the process on infinite numbers
 ACTIVE = 1e-6  # distance to its side, relative to 1 + |side|, at which a row is a candidate
 
 
@@ -29,7 +29,7 @@ class Rows:
     upper: Array
 
     def excess(self, z: Array) -> Array:
-        """How far A z is above `upper` (positive) or below `lower` (negative)."""
+        """Amount by which A z is above `upper` (positive) or below `lower` (negative)."""
         value: Array = self.A @ z
         return value - np.clip(value, self.lower, self.upper)
 
@@ -39,18 +39,18 @@ class Rows:
         return Rows(np.empty((0, n)), np.empty(0), np.empty(0))
 
     def from_(self, x: Array) -> Rows:
-        """Return the same rows on d, where the unknown is x + d."""
+        """Return the same rows for the unknown d of x + d."""
         value = self.A @ x
         return Rows(self.A, self.lower - value, self.upper - value)
 
     def seen(self, N: Array, rank_tolerance: float) -> Rows:
-        """Return the same rows on z, where the unknown is N z; zeros where N leaves only those."""
+        """Return the same rows for the unknown z of N z, with zeros for rows dependent on N."""
         A = self.A @ N
         A[norm(A, axis=1) <= rank_tolerance * norm(self.A, axis=1)] = 0.0
         return Rows(A, self.lower, self.upper)
 
     def normalised(self) -> Rows:
-        """Return the rows divided by their norms, without those of zeros."""
+        """Return the rows divided by their norms, without rows of zeros."""
         size = norm(self.A, axis=1)
         rows, size = self.where(size > 0.0), size[size > 0.0]
         return Rows(rows.A / size[:, None], rows.lower / size, rows.upper / size)
@@ -60,7 +60,7 @@ class Rows:
         return Rows(self.A[chosen], self.lower[chosen], self.upper[chosen])
 
     def and_(self, other: Rows) -> Rows:
-        """Return these rows and, below them, the others."""
+        """Return these rows with the other rows below them."""
         return Rows(np.vstack([self.A, other.A]), np.concatenate([self.lower, other.lower]),
                     np.concatenate([self.upper, other.upper]))
 
@@ -69,9 +69,9 @@ class Rows:
         return Rows(self.A, self.lower - slack, self.upper + slack)
 
     def sides(self, z: Array, near: float) -> Array:
-        """+1 where A z is near or above `upper`, -1 near or below `lower`, 0 elsewhere.
+        """Return +1 where A z is near or above `upper`, -1 near or below `lower`, else 0.
 
-        near : how near, relative to 1 + |side|.
+        near : distance that counts as near, relative to 1 + |side|.
         """
         value = self.A @ z
         up, low = np.isfinite(self.upper), np.isfinite(self.lower)
@@ -81,14 +81,14 @@ class Rows:
         return side
 
     def at(self, side: Array) -> Array:
-        """Value of `upper` where side > 0, of `lower` elsewhere."""
+        """Return `upper` where side > 0, `lower` elsewhere."""
         return np.where(side > 0, self.upper, self.lower)
 
 
 def split(M: Array, norms: Array, rank_tolerance: float) -> tuple[Array, Array]:
-    """Orthonormal bases of the row space (p, rank) of M (k, p) and of its null space (p, p - rank).
+    """Return orthonormal bases of M's (k, p) row space (p, rank) and null space (p, p - rank).
 
-    norms (k,) of the rows before any projection: M is measured against them.
+    norms : (k,) of the rows before any projection, relative to which M is judged.
     """
     scaled = M / np.where(norms > 0.0, norms, 1.0)[:, None]
     _, s, Vt = np.linalg.svd(scaled, full_matrices=True)
@@ -98,52 +98,83 @@ def split(M: Array, norms: Array, rank_tolerance: float) -> tuple[Array, Array]:
 
 def refined(z: Array, E: Array, e: Array, limits: Rows, kept: Rows, rank_tolerance: float
             ) -> tuple[Array, Array] | None:
-    """Move from a backend's z to the exact minimiser for its active set, corrected where needed.
+    """Move from a backend's z to the exact minimiser, repairing the active set where necessary.
 
-    Minimised is ||E z - e||^2 + ||excess of limits||^2 within the kept rows. Returns z, and +1,
-    -1 or 0 for each limit that is violated above, below, or not. The result has passed the
-    optimality conditions; None where no step did. Rows are of the order of one; what their singular
-    values fall short of `rank_tolerance` is not moved.
+    Minimises ||E z - e||^2 + ||excess of limits||^2 within the kept rows. Returns z, and +1, -1 or
+    0 for each limit that is violated above, below, or not. The result satisfies the optimality
+    conditions; None if no step did. Rows are of order one; directions with singular values up to
+    `rank_tolerance` do not move.
     """
+    program = _Refinement(E, e, limits, kept, rank_tolerance)
     active, excess = kept.sides(z, ACTIVE), limits.excess(z)
     broken = np.sign(excess) * (abs(excess) > ACTIVE)
     for step in range(REFINEMENTS):
-        on, out = active != 0, broken != 0
-        B, c = np.vstack([E, limits.A[out]]), np.concatenate([e, limits.at(broken)[out]])
-        G, g = kept.A[on], kept.at(active)[on]
-        step_on, free = _least(G, g - G @ z, rank_tolerance)
-        new = z + step_on
-        step_in, still = _least(B @ free, c - B @ new, rank_tolerance)
-        new = _moved_inside(new + free @ step_in, free @ still,
-                            kept.where(~on).and_(limits.where(~out)))
+        new = program.minimiser(z, active, broken)
         if not np.isfinite(new).all():
             return None
-        scale = EXACT * (1.0 + norm(new))
-        over, excess = kept.excess(new), limits.excess(new)
-        near = np.where(on, active, kept.sides(new, EXACT))
-        gradient = E.T @ (e - E @ new) - limits.A.T @ excess
-        multipliers, rest = _multipliers(near, kept.A, gradient)
-        next_broken = np.sign(excess) * (abs(excess) > scale)
-        if (abs(over) <= scale).all() and rest <= EXACT * (1.0 + norm(B.T @ c)):
-            return np.asarray(new), np.asarray(next_broken)
-        next_active = np.where(multipliers > 0.0, near, 0.0)
-        next_active = np.where(abs(over) > scale, np.sign(over), next_active)
+        optimal, next_active, next_broken = program.judged(new, active, broken)
+        if optimal:
+            return new, next_broken
         if (next_active == active).all() and (next_broken == broken).all():
             return None
-        if step >= AT_ONCE:  # all at once has cycled: only the first row that is to change
-            next_active = _first_change(active, next_active)
-            if (next_active != active).any():
-                next_broken = broken
-            else:
-                next_broken = _first_change(broken, next_broken)
+        if step >= AT_ONCE:  # changing all rows at once has cycled
+            next_active, next_broken = _one_change(active, broken, next_active, next_broken)
         active, broken = next_active, next_broken
     return None
 
 
-def _least(M: Array, r: Array, tolerance: float) -> tuple[Array, Array]:
-    """Return the shortest y that minimises ||M y - r||, and a basis of what does not change M y.
+class _Refinement(NamedTuple):
+    """The program of `refined`; active (kept,) and broken (limits,) are sides, see `Rows.sides`."""
 
-    Singular values up to `tolerance` are zero.
+    E: Array
+    e: Array
+    limits: Rows
+    kept: Rows
+    rank_tolerance: float
+
+    def minimiser(self, z: Array, active: Array, broken: Array) -> Array:
+        """Return the minimiser nearest to z that holds the active rows at their sides."""
+        on, out = active != 0, broken != 0
+        B, c = self._acting(broken)
+        G, g = self.kept.A[on], self.kept.at(active)[on]
+        step_on, free = _least(G, g - G @ z, self.rank_tolerance)
+        new = z + step_on
+        step_in, unseen = _least(B @ free, c - B @ new, self.rank_tolerance)
+        others = self.kept.where(~on).and_(self.limits.where(~out))
+        return _moved_inside(new + free @ step_in, free @ unseen, others)
+
+    def judged(self, z: Array, active: Array, broken: Array) -> tuple[bool, Array, Array]:
+        """Return whether z is optimal, and the sides that its rows and multipliers suggest."""
+        scale = EXACT * (1.0 + norm(z))
+        over, excess = self.kept.excess(z), self.limits.excess(z)
+        near = np.where(active != 0, active, self.kept.sides(z, EXACT))
+        gradient = self.E.T @ (self.e - self.E @ z) - self.limits.A.T @ excess
+        multipliers, rest = _multipliers(near, self.kept.A, gradient)
+        B, c = self._acting(broken)
+        next_active = np.where(multipliers > 0.0, near, 0.0)
+        next_active = np.where(abs(over) > scale, np.sign(over), next_active)
+        optimal = (abs(over) <= scale).all() and rest <= EXACT * (1.0 + norm(B.T @ c))
+        return bool(optimal), next_active, np.sign(excess) * (abs(excess) > scale)
+
+    def _acting(self, broken: Array) -> tuple[Array, Array]:
+        """Return B and c: the goal and the broken limits are ||B z - c||^2."""
+        out = broken != 0
+        return (np.vstack([self.E, self.limits.A[out]]),
+                np.concatenate([self.e, self.limits.at(broken)[out]]))
+
+
+def _one_change(active: Array, broken: Array, next_active: Array, next_broken: Array
+                ) -> tuple[Array, Array]:
+    """Return the sides with only the first row that is to change."""
+    if (next_active != active).any():
+        return _first_change(active, next_active), broken
+    return active, _first_change(broken, next_broken)
+
+
+def _least(M: Array, r: Array, tolerance: float) -> tuple[Array, Array]:
+    """Return the shortest y that minimises ||M y - r||, and a basis of the null space of M.
+
+    Singular values up to `tolerance` count as zero.
     """
     U, s, Vt = np.linalg.svd(M)
     rank = int((s > tolerance).sum())
@@ -151,10 +182,10 @@ def _least(M: Array, r: Array, tolerance: float) -> tuple[Array, Array]:
 
 
 def _moved_inside(z: Array, D: Array, rows: Rows) -> Array:
-    """Return the point z + D y nearest to z at which rows hold that it breaks by a little.
+    """Return the point z + D y nearest to z at which slightly violated rows hold.
 
     The least-distance problem of Lawson and Hanson (1974, ch. 23), by non-negative least squares.
-    Returns z where they hold, are broken by much, or cannot all hold.
+    Returns z if the rows hold, are violated by more than a little, or cannot all hold.
     """
     off = float(abs(rows.excess(z)).max(initial=0.0))
     if not EXACT < off < LITTLE or not D.shape[1]:
@@ -166,13 +197,13 @@ def _moved_inside(z: Array, D: Array, rows: Rows) -> Array:
     target = np.zeros(D.shape[1] + 1)
     target[-1] = 1.0
     u, rest = _non_negative(np.vstack([G.T, g]), target)
-    if not ACTIVE < rest < np.inf:  # 1 / rest is the length of y: they hold nowhere, or far away
+    if not ACTIVE < rest < np.inf:  # 1 / rest is the length of y: no point, or none nearby
         return z
     return np.asarray(z + D @ (G.T @ u) * (off / (1.0 - g @ u)))
 
 
 def _first_change(old: Array, new: Array) -> Array:
-    """Return `old` with the first entry in which `new` differs."""
+    """Return `old`, changed only in the first entry where `new` differs."""
     changed = old.copy()
     for i in np.flatnonzero(old != new)[:1]:
         changed[i] = new[i]
@@ -180,9 +211,9 @@ def _first_change(old: Array, new: Array) -> Array:
 
 
 def _multipliers(side: Array, A: Array, gradient: Array) -> tuple[Array, float]:
-    """Multipliers >= 0 of the rows with a side that balance a gradient best, and what they leave.
+    """Return multipliers >= 0 of the active rows that best balance a gradient, and the residual.
 
-    Rows may be dependent: any multipliers that leave nothing prove the minimum.
+    Rows may be dependent: any multipliers with a zero residual prove the minimum.
     """
     found, on = np.zeros(len(side)), side != 0
     if not on.any():
@@ -197,13 +228,13 @@ def below_largest(*arrays: Array) -> bool:
 
 
 def _non_negative(A: Array, b: Array) -> tuple[Array, float]:
-    """Return u >= 0 that minimises ||A u - b||, and that norm; infinite where none was found."""
+    """Return u >= 0 that minimises ||A u - b||, and that norm; infinite if none was found."""
     from scipy.optimize import nnls  # type: ignore[import-untyped]
 
     if not below_largest(A, b):
         return np.zeros(A.shape[1]), np.inf
     try:
         u, rest = nnls(A, b)
-    except RuntimeError:  # its bound on iterations
+    except RuntimeError:  # its iteration limit
         return np.zeros(A.shape[1]), np.inf
     return np.asarray(u), float(rest)

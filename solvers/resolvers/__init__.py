@@ -1,4 +1,4 @@
-"""The resolvers, one file each; importing this registers all of them by name."""
+"""The resolvers, one file each; importing this package registers all of them by name."""
 
 from solvers.resolvers import augmented as augmented
 from solvers.resolvers import hcod as hcod

@@ -1,11 +1,11 @@
-"""All levels as one, for comparison."""
+"""All levels merged into one, for comparison."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, ClassVar, final
+from typing import ClassVar, final
 
-from hierarchy.problem import Hierarchy
+from hierarchy.problem import Array, Hierarchy
 from solvers.kernels.staircase import solve_by_staircase
 from solvers.resolver import Resolution, Resolver, register
 from solvers.status import INACCURATE, SOLVED
@@ -16,21 +16,21 @@ from solvers.workspace import WORKSPACE
 @register
 @dataclass(frozen=True, kw_only=True)
 class Augmented(Resolver):
-    """The least-squares solution of the whole stack, eqs. (2) and (14): priorities play no role.
+    """The least-squares solution of the whole stack, eqs. (2) and (14), without priorities.
 
-    It is the strict answer only where all levels can be met together. With damping on, the whole
-    stack is damped as one level.
+    It equals the strict answer only where all levels can be met together. Damping treats the whole
+    stack as one level.
     """
 
     name: ClassVar[str] = "augmented"
 
     @property
     def strict(self) -> bool:
-        """No: a lower level may take from a higher one."""
+        """False: lower levels can disturb higher ones."""
         return False
 
-    def solve(self, h: Hierarchy, memory: Any = None) -> Resolution:
-        """Resolve h; direct, `memory` is not used."""
+    def solve(self, h: Hierarchy, memory: Array | None = None) -> Resolution:
+        """Resolve h; a direct method that ignores `memory`."""
         x, whole = h.reference.copy(), h.offsets[-1:]  # one level of m rows
         code = solve_by_staircase(h.A, h.lower, h.upper, whole, x, self._settings,
                                   WORKSPACE.array)

@@ -1,15 +1,14 @@
-"""The exact engine: lexicographic least squares with inequalities at every level."""
+"""The exact resolver: lexicographic least squares with inequalities at every level."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, ClassVar, final
+from typing import ClassVar, final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array, Hierarchy
 from solvers.certificate import certify
 from solvers.kernels.guess import solve_by_guesses
@@ -22,46 +21,48 @@ from solvers.workspace import WORKSPACE
 
 @final
 class ActiveSetResolution(Resolution):
-    """A resolution that says which rows act, and what each of them holds back.
+    """A resolution that reports the active rows and the level that each of them holds back.
 
-    Attributes beside those of `Resolution`; m rows, L levels
+    Attributes in addition to those of `Resolution`; m rows, L levels
     ----------
-    active : (m,) int8, 2 for an equality, +1 for a row at or above its upper side, -1 for one at
-        or below its lower side, 0 for one that does not matter.
+    active : (m,) int8, 2 for an equality, +1 for a row at or above its upper side, -1 for a row at
+        or below its lower side, 0 for an inactive row.
     holds_back : (m,) int16, the first level that this inequality row keeps from being met better:
-        its own where it stays violated, L for the way to the reference, -1 for none.
-    multipliers : (m,) of the rows in that level; the violation itself in the row's own level.
-    unfinished : the level at which the iterations ended, or None.
+        its own level where it stays violated, L for the distance to the reference, -1 for none.
+    multipliers : (m,) multiplier of each row in that level; in its own level, its violation.
+    unfinished : the level at which the iteration limit was reached, or None.
     """
 
     __slots__ = ()
+
+    memory: Array
 
     def __init__(self, x: Array, status: Status, memory: Array) -> None:
         self.x, self.status, self.memory = x, status, memory
 
     @property
     def iterations(self) -> int:  # type: ignore[override]
-        """Active sets guessed, and steps by levels."""
+        """Active sets tried, plus active-set steps level by level."""
         return int(self.memory[-3] + self.memory[-2])
 
     @property
     def active(self) -> NDArray[np.int8]:
-        """What each row does: (m,)."""
+        """State of each row: (m,)."""
         return self._part(0).astype(np.int8)
 
     @property
     def holds_back(self) -> NDArray[np.int16]:
-        """Which level each row holds back: (m,)."""
+        """Level that each row holds back: (m,)."""
         return self._part(1).astype(np.int16)
 
     @property
     def multipliers(self) -> Array:
-        """How strongly: (m,), in units of that level's violation over those of the row."""
+        """Multiplier of each row: (m,), in units of that level's violation per unit of the row."""
         return self._part(2).copy()
 
     @property
     def unfinished(self) -> int | None:
-        """The level that was being worked on when the iterations ended."""
+        """The level at which the iteration limit was reached."""
         return int(self.memory[-1]) if self.status is Status.ITERATION_LIMIT else None
 
     def _part(self, which: int) -> Array:
@@ -74,20 +75,18 @@ class ActiveSetResolution(Resolution):
 @register
 @dataclass(frozen=True, kw_only=True)
 class Hcod(Resolver):
-    """Active set on a hierarchical factorisation, exact at any rank, inequalities at every level.
+    """Active-set method on a hierarchical factorisation; exact at any rank, with inequalities.
 
-    It is not the decomposition of Escande, Mansard and Wieber; docs/hcod.md says how it differs.
+    Not the decomposition of Escande, Mansard and Wieber; docs/hcod.md says how it differs, and
+    docs/theory/resolver-notes.md describes the method, its damping and its checks.
 
-    Equalities alone are resolved by the staircase of `tpm`, to the last digit. With the memory of
-    the tick before, its active set is solved and proved by its multipliers; where that fails within
-    `guesses`, and without a memory, a primal active set goes level by level. With damping and
-    inequalities a level minimises ||what it misses||^2 + lambda^2 ||its own step||^2 inside the
-    rows above. Where rounding leaves a doubt (docs/hcod.md says when), `certify` judges; an answer
-    that it does not accept has Status.INACCURATE. (Not with damping on.)
+    Equalities alone give the answer of `tpm`, to the last digit. An answer in doubt after rounding
+    is checked by `certify` (without damping); one that fails the check has Status.INACCURATE.
 
-    tolerance : of violations, relative to the size of the terms they are made of.
-    guesses : active sets tried before going level by level; at least 1.
-    max_iterations : steps by levels, then Status.ITERATION_LIMIT: x keeps the levels above.
+    tolerance : of violations, relative to the size of the terms in them.
+    guesses : active sets tried from a memory before solving level by level; at least 1.
+    max_iterations : active-set steps, level by level, before Status.ITERATION_LIMIT; x is then
+        optimal for the finished levels.
     """
 
     name: ClassVar[str] = "hcod"
@@ -99,34 +98,41 @@ class Hcod(Resolver):
     def __post_init__(self) -> None:
         super().__post_init__()
         self._number("tolerance", 0.0, 1e-3, open_below=True)
-        for setting in ("guesses", "max_iterations"):
-            value = getattr(self, setting)
-            if not isinstance(value, int) or isinstance(value, bool) or not 1 <= value < 2**31:
-                raise HierarchyError(f"hcod: {setting} = {value!r}, expected a whole number >= 1")
+        self._whole_number("guesses", 1)
+        self._whole_number("max_iterations", 1)
 
     @cached_property
     def _settings(self) -> Array:
         return np.array([self.damping, self.threshold, self.rank_tolerance, self.tolerance,
                          self.guesses, self.max_iterations], dtype=float)
 
-    def solve(self, h: Hierarchy, memory: Any = None) -> ActiveSetResolution:
-        """Resolve h, beginning with the active set of an earlier resolution if one is given."""
+    def solve(self, h: Hierarchy, memory: Array | None = None) -> ActiveSetResolution:
+        """Resolve h, starting from the active set of an earlier resolution if given."""
         x = h.reference.copy()
         size = 3 * len(h.lower) + 3
-        known = memory is not None and len(memory) == size and self.damping == 0.0
-        record = memory.copy() if known else np.zeros(size)
+        record, known = warm_record(memory, size, self.damping == 0.0)
         code = solve_exactly(h, x, record, self._settings, known)
         if code == 0 or (code == _INACCURATE and certify(h, x).certified):
             return ActiveSetResolution(x, _SOLVED, record)
         return ActiveSetResolution(x, Status(code), record)
 
 
-def solve_exactly(h: Hierarchy, x: Array, record: Array, settings: Array, known: bool) -> int:
-    """Call the kernels one after the other until one has an answer; return its code.
+def warm_record(memory: Array | None, size: int, usable: bool) -> tuple[Array, bool]:
+    """Return a record (size,) for the kernels, and whether it continues a memory: else zeros.
 
-    Equalities go to the staircase, a known active set to guesses, all else to levels. x (n,) comes
-    in as the reference and goes out as the answer; record (3 m + 3,), settings: see
-    `solve_by_guesses`. A kernel calls no other, which would compile it again.
+    usable : whether the settings allow a warm start.
+    """
+    if memory is None or len(memory) != size or not usable:
+        return np.zeros(size), False
+    return memory.copy(), True
+
+
+def solve_exactly(h: Hierarchy, x: Array, record: Array, settings: Array, known: bool) -> int:
+    """Call the kernels in turn until one finds an answer; return its code.
+
+    The staircase takes equalities, `solve_by_guesses` a known active set, `solve_by_levels` the
+    rest. x (n,) is the reference on entry and the answer on return; record (3 m + 3,) and settings:
+    see `solve_by_guesses`. Entry kernels do not call each other: that would compile them twice.
     """
     work, code = WORKSPACE.array, UNPROVED
     if not known or record[0] == EQUAL:

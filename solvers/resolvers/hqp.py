@@ -1,12 +1,13 @@
-"""A cascade of quadratic programs, one a level, through any backend that qpsolvers knows."""
+"""A cascade of quadratic programs, one per level, through any backend of qpsolvers."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, final
+from typing import ClassVar, NamedTuple, final
 
 import numpy as np
 from numpy.linalg import norm
+from numpy.typing import NDArray
 
 from hierarchy.problem import Array, Hierarchy
 from solvers.qp.backends import Backend, backend_of
@@ -17,52 +18,40 @@ from solvers.status import Status
 
 FORMS = ("null-space", "slack")
 
-_SHARE = 0.01  # of the declared accuracy: what one level may be off by, since lower ones magnify it
-_WIDER = (1.0, 100.0)  # times `slack`: tried one after the other
+_SHARE = 0.01  # of the declared accuracy: allowed error of one level, which lower levels magnify
+_WIDER = (1.0, 100.0)  # multiples of `slack`, tried in turn
 
 
 @final
-@dataclass(frozen=True)
-class Memory:
-    """The step that every level took from the levels above it, each (n,), and the last one.
+class CascadeResolution(Resolution):
+    """A resolution that counts its programs; its memory (k, n) has the step of each of k levels.
 
-    `corrected` of the `programs` were not answered well enough to be taken as they were.
+    `iterations` counts the programs that were solved; `corrected` of them had an answer that was
+    not accurate enough to be used as it was.
     """
 
-    steps: tuple[Array, ...]
-    programs: int
-    corrected: int
+    __slots__ = ("corrected",)
+
+    def __init__(self, x: Array, status: Status, programs: int, corrected: int,
+                 memory: Array) -> None:
+        super().__init__(x, status, programs, memory)
+        self.corrected = corrected
 
 
 @final
 @register
 @dataclass(frozen=True, kw_only=True)
 class Hqp(Resolver):
-    """Quadratic programs from the top level down, equalities and inequalities.
+    """A cascade of quadratic programs from the top level down, with inequalities at every level.
 
-    What upper levels have settled is frozen by design so that no backend can find it infeasible.
-    Settled are equalities, and inequalities that had to be violated: they leave the program as
-    `form` says. The other inequalities above stay as rows, divided by their norms and moved out by
-    `slack`; those that nothing can move any more are dropped. A level is divided by its largest
-    entry.
-
-    No answer of a backend is taken on trust. Without inequalities, the gradient that it leaves
-    bounds its error; where the bound is within a hundredth of the backend's declared accuracy the
-    answer is taken as it is, and otherwise corrected by one exact least-squares step. With
-    inequalities, the active set is read off, resolved exactly, repaired where multipliers or rows
-    say so, and taken when it passes the optimality conditions to 1e-10, so that neither the slack
-    nor the backend's error leaves a trace below. Where that fails even from a program with 100
-    times the slack, the status is INACCURATE (BACKEND_FAILURE if the backend gave nothing it
-    vouched for), and x is that of the levels above, which hold.
-
-    A level of inequalities that already hold asks nothing of the backend, nor does the reference
-    where no inequality is left. `iterations` counts the programs that were solved. `memory` hands
-    the steps of an earlier resolution to backends that can begin from one.
+    What upper levels have settled leaves the programs, so that no backend can find it infeasible;
+    no answer of a backend is used unchecked. docs/theory/resolver-notes.md has the method and the
+    meaning of each status. The memory warm-starts backends that accept an initial guess.
 
     backend : proxqp, osqp, quadprog, daqp, piqp or clarabel.
-    form : "null-space", the program's unknowns are coordinates of what upper levels leave free;
-        "slack", they are x and a slack for each row, and an orthonormal basis of what is settled
-        is held by equality rows.
+    form : "null-space", the unknowns are coordinates of the freedom that upper levels leave;
+        "slack", they are x and a slack for each row, and equality rows hold an orthonormal basis of
+        what is settled.
     slack : relaxation of the inequalities above, relative to the norm of the row.
     """
 
@@ -81,36 +70,36 @@ class Hqp(Resolver):
 
     @property
     def label(self) -> str:
-        """`hqp`, the backend, and the form where it is not the usual one."""
+        """`hqp`, the backend, and the form if it is not the default."""
         form = " slack" if self.form == "slack" else ""
         return f"{self.name} {self.backend}{form}"
 
     @property
     def accuracy(self) -> float:
-        """Error of x to expect, relative to 1 + |x|: the backend's."""
+        """Expected error of x, relative to 1 + |x|: that of the backend."""
         return backend_of(self.backend).accuracy
 
-    def solve(self, h: Hierarchy, memory: Any = None) -> Resolution:
-        """Resolve h; a failed program ends it with the x of the levels that were finished.
+    def solve(self, h: Hierarchy, memory: Array | None = None) -> Resolution:
+        """Resolve h; a program that fails ends the cascade with the x of the finished levels.
 
-        NUMERICAL_FAILURE and x = 0 where numbers are not finite, or so large that products of a
-        few of them overflow: some backends end the process on those.
+        NUMERICAL_FAILURE and x = 0 for numbers that are not finite, or so large that products of a
+        few of them overflow: some backends kill the process on those.
         """
         if not _in_range(h):
             return Resolution(np.zeros(h.n), Status.NUMERICAL_FAILURE)
-        known = memory.steps if isinstance(memory, Memory) else ()
-        starts = known if len(known) == len(h.sizes) + 1 and known[0].shape == (h.n,) else ()
+        shape = len(h.sizes) + 1, h.n
+        starts = memory if memory is not None and np.shape(memory) == shape else None
         with np.errstate(all="ignore"):
             try:
                 return _Cascade(self, h, backend_of(self.backend), starts).run()
-            except np.linalg.LinAlgError:  # an SVD of numbers beyond what a float can square
+            except np.linalg.LinAlgError:  # an SVD of numbers whose squares overflow
                 return Resolution(np.zeros(h.n), Status.NUMERICAL_FAILURE)
 
 
 def _in_range(h: Hierarchy) -> bool:
-    """Whether the sides admit values, and all numbers are finite and below LARGEST.
+    """Whether each row admits a value, and all numbers are finite and below LARGEST.
 
-    Sides are taken relative to the largest entry of their level.
+    Sides are measured relative to the largest entry of their level.
     """
     sides = (h.lower <= h.upper) & (h.lower < np.inf) & (h.upper > -np.inf)
     if not sides.all() or not below_largest(h.A, h.reference):
@@ -125,25 +114,43 @@ def _in_range(h: Hierarchy) -> bool:
 
 
 class _StopError(Exception):
-    """A program without an answer that can be taken."""
+    """A program without a usable answer."""
 
     def __init__(self, status: Status) -> None:
         super().__init__(status.remedy)
         self.status = status
 
 
+class _Level(NamedTuple):
+    """Rows of a level divided by their largest entry `scale`, their norms (m,), and M = A N."""
+
+    rows: Rows
+    equal: NDArray[np.bool_]
+    scale: float
+    norms: Array
+    M: Array
+
+    @staticmethod
+    def of(A: Array, lower: Array, upper: Array, N: Array) -> _Level:
+        """Scale the rows of a level; N (n, p) is the basis of the remaining freedom."""
+        scale = float(abs(A).max())
+        rows = Rows(A / scale, lower / scale, upper / scale)
+        return _Level(rows, lower == upper, scale, norm(rows.A, axis=1), rows.A @ N)
+
+
 @dataclass
 class _Cascade:
     """One run of the cascade.
 
-    x so far; the basis N of the freedom left and F of what is settled, one orthonormal vector a
-    column of N, a row of F; the inequalities to keep.
+    x : (n,) the answer so far.
+    N, F : orthonormal bases of the remaining freedom (columns) and of what is settled (rows).
+    kept : inequalities of the levels above that must still hold.
     """
 
     settings: Hqp
     h: Hierarchy
     backend: Backend
-    starts: tuple[Array, ...]
+    starts: Array | None
     programs: int = 0
     corrected: int = 0
     steps: list[Array] = field(default_factory=list)
@@ -165,8 +172,8 @@ class _Cascade:
             self._step(self._nearest())
         except _StopError as stop:
             status = stop.status
-        memory = Memory(tuple(self.steps), self.programs, self.corrected)
-        return Resolution(self.x, status, self.programs, memory)
+        memory = np.array(self.steps).reshape(-1, self.h.n)
+        return CascadeResolution(self.x, status, self.programs, self.corrected, memory)
 
     def _step(self, z: Array) -> None:
         x = self.x + self.N @ z
@@ -176,48 +183,53 @@ class _Cascade:
         self.x = x
 
     def _level(self, A: Array, lower: Array, upper: Array) -> None:
-        """Move x to the minimum of a level; settle its equalities and what it must violate."""
+        """Move x to the minimum of a level, then settle its equalities and violated rows."""
         if not self.N.shape[1] or not A.any():
             self.steps.append(np.zeros(self.h.n))
             return
-        scale, equal = float(abs(A).max()), lower == upper
-        rows = Rows(A / scale, lower / scale, upper / scale)
-        norms, M = norm(rows.A, axis=1), rows.A @ self.N
-        goal = rows.where(equal).from_(self.x)
-        limits = rows.where(~equal).from_(self.x)
-        near = EXACT * (1.0 + norm(self.x))
-        own, free = self._split(M[equal], norms[equal])
-        broken = np.zeros(limits.lower.size)
-        if not equal.any() and (abs(limits.excess(np.zeros(self.h.n))) <= near).all():
-            z = np.zeros(self.N.shape[1])
-        else:
-            seen = own if equal.all() else self._split(M, norms)[0]
-            lam = self._variable_damping(scale * M, seen.shape[1]) / scale
-            z, broken = self._minimise(goal, limits, own, lam)
-        self._step(z)
-        fixed = equal.copy()
-        fixed[~equal] = broken != 0
-        if broken.any():
-            own, free = self._split(M[fixed], norms[fixed])
+        level = _Level.of(A, lower, upper, self.N)
+        own, free = self._split(level, level.equal)
+        fixed = level.equal.copy()
+        fixed[~level.equal] = self._advance(level, own) != 0
+        if (fixed != level.equal).any():
+            own, free = self._split(level, fixed)
         self.F = np.vstack([self.F, (self.N @ own).T])
         self.N = self.N @ free
-        self.kept = self.kept.and_(rows.where(~fixed).normalised())
+        self.kept = self.kept.and_(level.rows.where(~fixed).normalised())
+
+    def _advance(self, level: _Level, own: Array) -> Array:
+        """Step to the minimum of a level; return the side on which each inequality is violated."""
+        limits = level.rows.where(~level.equal).from_(self.x)
+        near = EXACT * (1.0 + norm(self.x))
+        if not level.equal.any() and (abs(limits.excess(np.zeros(self.h.n))) <= near).all():
+            self._step(np.zeros(self.N.shape[1]))
+            return np.zeros(limits.lower.size)
+        goal = level.rows.where(level.equal).from_(self.x)
+        z, broken = self._minimise(goal, limits, own, self._lambda(level, own))
+        self._step(z)
+        return broken
 
     def _seen(self, rows: Rows) -> Rows:
         return rows.seen(self.N, self.settings.rank_tolerance)
 
-    def _split(self, M: Array, norms: Array) -> tuple[Array, Array]:
-        return split(M, norms, self.settings.rank_tolerance)
+    def _split(self, level: _Level, chosen: NDArray[np.bool_]) -> tuple[Array, Array]:
+        return split(level.M[chosen], level.norms[chosen], self.settings.rank_tolerance)
 
-    def _variable_damping(self, M: Array, rank: int) -> float:
+    def _lambda(self, level: _Level, own: Array) -> float:
+        """Return the variable damping of a level, in its scaled rows."""
         s = self.settings
-        if not s.damping or not M.shape[0]:
+        if not s.damping:
             return 0.0
-        smallest = np.linalg.svd(M, compute_uv=False)[-1] if rank == M.shape[0] else 0.0
-        return float(s.damping * np.sqrt(max(0.0, 1.0 - (smallest / s.threshold) ** 2)))
+        everything = np.ones_like(level.equal)
+        seen = own if level.equal.all() else self._split(level, everything)[0]
+        M = level.scale * level.M
+        full = seen.shape[1] == len(M)
+        smallest = np.linalg.svd(M, compute_uv=False)[-1] if full else 0.0
+        lam = s.damping * np.sqrt(max(0.0, 1.0 - (smallest / s.threshold) ** 2))
+        return float(lam) / level.scale
 
     def _nearest(self) -> Array:
-        """Return the z that leads nearest to the reference."""
+        """Return the z whose x is nearest to the reference."""
         target = self.h.reference - self.x
         if not self.N.shape[1] or not self._movable().lower.size:
             return np.asarray(self.N.T @ target)
@@ -234,41 +246,50 @@ class _Cascade:
         """Minimise ||goal||^2 + ||excess of limits||^2 + lam^2 ||z||^2 within the kept rows.
 
         All rows are of the step N z; own is a basis of the z that the goal can see.
-        Returns z and, for each limit, the side on which it remains violated.
+        Returns z and the side on which each limit remains violated. Raises _StopError if no
+        answer could be verified.
         """
-        kept, N = self._movable(), self.N
-        p = N.shape[1]
-        if last:
-            E, e = np.eye(p), N.T @ goal.lower
-        elif lam:
-            E, e = np.vstack([goal.A @ N, lam * np.eye(p)]), np.pad(goal.lower, (0, p))
-        else:
-            E, e = goal.A @ N @ own @ own.T, goal.lower
-        vouched = False
+        kept, vouched = self._movable(), False
+        E, e = self._target(goal, own, lam, last)
         for wider in _WIDER:
             z, found = self._ask(goal, limits, kept.relaxed(wider * self.settings.slack), lam, last)
             vouched |= found
             if not kept.lower.size and not limits.lower.size:
                 return self._least_squares(z, E, e, own, lam), np.empty(0)
-            for start in (z, np.zeros(p)):  # zero keeps all of `kept`: x does
-                exact = refined(start, E, e, self._seen(limits), self._seen(kept),
-                                self.settings.rank_tolerance)
-                if exact is not None:
-                    off = norm(exact[0] - z) > self._allowed()
-                    self.corrected += bool(off)
-                    return exact
+            exact = self._exact(z, E, e, self._seen(limits), self._seen(kept))
+            if exact is not None:
+                return exact
         raise _StopError(Status.INACCURATE if vouched else Status.BACKEND_FAILURE)
+
+    def _target(self, goal: Rows, own: Array, lam: float, last: bool) -> tuple[Array, Array]:
+        """Return E and e: the goal and its damping are ||E z - e||^2."""
+        N, p = self.N, self.N.shape[1]
+        if last:
+            return np.eye(p), N.T @ goal.lower
+        if lam:
+            return np.vstack([goal.A @ N, lam * np.eye(p)]), np.pad(goal.lower, (0, p))
+        return goal.A @ N @ own @ own.T, goal.lower
+
+    def _exact(self, z: Array, E: Array, e: Array, limits: Rows, kept: Rows
+               ) -> tuple[Array, Array] | None:
+        """Refine the backend's z; if that fails, zero, where all kept rows hold because x does."""
+        for start in (z, np.zeros_like(z)):
+            exact = refined(start, E, e, limits, kept, self.settings.rank_tolerance)
+            if exact is not None:
+                self.corrected += bool(norm(exact[0] - z) > self._allowed())
+                return exact
+        return None
 
     def _allowed(self) -> float:
         return float(_SHARE * self.backend.accuracy * (1.0 + norm(self.x)))
 
     def _least_squares(self, z: Array, E: Array, e: Array, own: Array, lam: float) -> Array:
-        """Return z where it is shown to be near enough to the least squares, or the exact ones."""
+        """Return z if its gradient proves it accurate enough, else the exact least squares."""
         if lam:
             own, smallest = np.eye(len(z)), lam
         else:
             smallest = float(np.linalg.svd(E @ own, compute_uv=False).min(initial=np.inf))
-        z = own.T @ z  # what is outside of it the level cannot see
+        z = own.T @ z  # the level cannot see the rest
         if norm(own.T @ (E.T @ e) - own.T @ (E.T @ (E @ (own @ z)))) <= (
                 self._allowed() * smallest**2):
             return np.asarray(own @ z)
@@ -277,16 +298,16 @@ class _Cascade:
 
     def _ask(self, goal: Rows, limits: Rows, kept: Rows, lam: float, last: bool
              ) -> tuple[Array, bool]:
-        """Return z as the backend has it, and whether it vouches for it."""
-        start = self.starts[len(self.steps)] if self.starts else None
+        """Return the z of the backend, and whether the backend vouches for it."""
+        start = None if self.starts is None else self.starts[len(self.steps)]
         self.programs += 1
         if self.settings.form == "slack":
-            d, found = slack_program(goal, limits, kept, self.F, lam, last, start).solve(
-                self.backend)
+            program = slack_program(goal, limits, kept, self.F, lam, last=last, start=start)
+            d, found = program.solve(self.backend)
             return self.N.T @ d[:self.h.n], found
         if start is not None:
             start = self.N.T @ start
         program = null_space_program(self._seen(goal), self._seen(limits), self._seen(kept), lam,
-                                      start)
+                                     start)
         z, found = program.solve(self.backend)
         return z[:self.N.shape[1]], found

@@ -1,10 +1,10 @@
-"""Reverse priority: from the lowest level up."""
+"""Reverse priority: from the lowest level to the highest."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, ClassVar, final
+from typing import ClassVar, final
 
 import numpy as np
 
@@ -20,22 +20,19 @@ FORMS = ("published", "in-order")
 @register
 @dataclass(frozen=True, kw_only=True)
 class Reverse(Resolver):
-    """Each level corrects what the levels below it chose, and changes them as little as it can.
+    """Each level corrects the answer of the levels below it and disturbs them as little as it can.
 
-    form = "published": the reverse priority of Flacco and De Luca, "A reverse priority approach to
-    multi-task control of redundant robots" (IROS 2014). A correction weighs all levels below alike.
-    The first level is as in the strict answer always. So is x where all targets can be met
-    together, at any rank, and of two levels even where they cannot: where every level but the last
-    two corrects without touching those below. Elsewhere what it takes is spread over all of them
-    in the units of their rows, and levels from the second on may be missed by more than they must.
+    form = "published": the reverse priority of Flacco and De Luca (IROS 2014). A correction weighs
+        all levels below alike, so levels from the second on may be missed by more than necessary
+        where targets conflict. The first level is always that of the strict answer.
+    form = "in-order": a correction disturbs the levels below least in their own order. This gives
+        the strict answer.
 
-    form = "in-order": a correction changes the levels below least in their own order. That is the
-    strict answer always.
+    Damping applies to every correction and so differs from that of `tpm`; docs/theory/reverse.md
+    and docs/theory/resolver-notes.md have the details.
 
-    In both, targets are met from x = 0 and the reference enters at the end as in eq. (14), so that
-    it changes no row; with the reference as the lowest answer it would, where levels conflict. With
-    damping on, every correction is damped, around the x that it corrects, in its own rows and in
-    the rows below (as one level, in-order as several): not what damping is in `tpm`.
+    Source: Flacco, De Luca, "A reverse priority approach to multi-task control of redundant
+    robots", IROS 2014.
     """
 
     name: ClassVar[str] = "reverse"
@@ -47,7 +44,7 @@ class Reverse(Resolver):
 
     @property
     def strict(self) -> bool:
-        """Whether priorities are respected exactly at any rank: in the form in-order."""
+        """True for the in-order form, which respects priorities exactly at any rank."""
         return self.form == "in-order"
 
     @cached_property
@@ -59,8 +56,8 @@ class Reverse(Resolver):
         """`reverse`, or `reverse in-order`."""
         return f"{self.name} {self.form}" if self.strict else self.name
 
-    def solve(self, h: Hierarchy, memory: Any = None) -> Resolution:
-        """Resolve h; direct, `memory` is not used."""
+    def solve(self, h: Hierarchy, memory: Array | None = None) -> Resolution:
+        """Resolve h; a direct method that ignores `memory`."""
         x = h.reference.copy()
         code = reverse(h.A, h.lower, h.upper, h.sizes, x, self._settings, WORKSPACE.array)
         return self._otherwise(h, x, code) if code else Resolution(x)

@@ -1,8 +1,8 @@
-"""What a resolver of bounds says beside x: which unknowns are at a bound, what each level gets."""
+"""The resolution of a resolver with bounds: saturated unknowns and the scaling of each level."""
 
 from __future__ import annotations
 
-from typing import Any, final
+from typing import final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,20 +14,20 @@ from solvers.status import Status
 
 @final
 class SaturatedResolution(Resolution):
-    """A resolution within bounds; its record (n + L + ..) begins with saturation and scaling.
+    """A resolution within bounds; its record (n + L + ..) starts with saturation and scaling.
 
-    Attributes beside those of `Resolution`; n unknowns, L levels
+    Attributes in addition to those of `Resolution`; n unknowns, L levels
     ----------
-    saturated : (n,) int8, +1 for x at its upper bound, -1 at its lower one, 2 where both are one, 0
-        where it is free.
-    scaling : (L,) the share of its target that each level gets, in 0 .. 1, and 1 for bounds that do
-        not exclude each other. How it is reckoned, the resolver says.
+    saturated : (n,) int8, +1 for an unknown at its upper bound, -1 at its lower bound, 2 where the
+        two bounds are equal, 0 where it is free.
+    scaling : (L,) share of its target that each level reaches, 0 to 1; 1 for bounds that do not
+        contradict each other. Each resolver documents how it computes the share.
     """
 
     __slots__ = ("_levels", "_record")
 
     def __init__(self, x: Array, status: Status, iterations: int, record: Array, levels: int,
-                 memory: Any = None) -> None:
+                 memory: Array | None = None) -> None:
         super().__init__(x, status, iterations, memory)
         self._record, self._levels = record, levels
 
@@ -38,6 +38,6 @@ class SaturatedResolution(Resolution):
 
     @property
     def scaling(self) -> Array:
-        """What each level gets of its target: (L,)."""
+        """Share of its target that each level reaches: (L,)."""
         n = len(self.x)
         return self._record[n:n + self._levels].copy()

@@ -1,10 +1,10 @@
-"""Saturation in the null space: hard bounds on single unknowns, and tasks scaled to fit them."""
+"""Saturation in the null space: hard bounds on single unknowns, tasks scaled to fit."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, ClassVar, final
+from typing import ClassVar, final
 
 import numpy as np
 
@@ -26,44 +26,18 @@ SCALES = ("target", "miss")
 class Sns(Resolver):
     """Saturation in the null space, inside a box given by the rows of the first level.
 
-    The first level holds one- or two-sided bounds on single unknowns, or else nowhere is an
-    inequality; then this is `tpm`, to the last digit. Task after task, in the null space of those
-    above and beginning with all joints: while the answer leaves the box, the most critical joint is
-    set to its bound and the others make up for it. When that has cost the task its rank, the set of
-    saturated joints with the largest scaling s is taken.
+    The first level holds one- or two-sided bounds on single unknowns; without any inequality the
+    answer is that of `tpm`, to the last digit. x stays inside the box, and lower tasks do not
+    change the values of upper levels. The answer is not optimal: it depends on the sets of
+    saturated joints that were tried. Algorithm, departures and sources:
+    docs/theory/resolver-notes.md.
 
-    form = "basic": as published. Joints once saturated stay so for the task. The null-space term is
-    the last task: x goes along P reference, and where the box stops a joint, on without it.
+    form : "basic" keeps a saturated joint saturated for the task; "optimal" releases it where its
+        multiplier has the wrong sign, and ends at the x nearest to the reference.
+    scales : "target" scales the target of a task; "miss" scales what the tasks above leave to do.
 
-    form = "optimal": as published, a saturated joint is released where the multiplier of the least
-    ||x_k - x_{k-1}|| has the wrong sign, for at most 2 n + 2 sets a task. Not published: the last
-    task ends at the x in the box nearest to the reference among those that change no level.
-
-    scales = "target": as published, a scaled task reaches s b, the direction of b kept. At
-    acceleration level b has the drift in it, and s scales that too. Where tasks above that are
-    saturated already move along a task, there often is no s, and the task adds nothing.
-
-    scales = "miss": a scaled task makes up for the share s of what the tasks above leave it to
-    miss. There always is an s. For the first task the same as "target".
-
-    Always: x is in the box, and the values of upper levels stay as lower ones are added. Where no
-    joint is ever at a bound, x is that of `recursive`. Not optimal: s is the largest of the sets
-    tried, and the box may allow more; it is not the least violation, which `hcod` finds; and no
-    level looks at those below it.
-
-    Unlike the paper, a task that adds nothing still keeps its rows from the levels below, a task
-    may have dependent rows (its rank is that without saturation), x_0 is the point of the box
-    nearest to zero, and where a joint comes into the box only beyond s = 1 it is the critical one.
-
-    Damping is that of `recursive`, with saturated joints counted as levels above. Sources: Flacco,
-    De Luca, Khatib, "Motion control of redundant robots under joint constraints", ICRA 2012,
-    algorithms 1 (one task) and 2 (s); "Prioritized multi-task motion control of redundant robots
-    under hard joint constraints", IROS 2012; "Control of redundant robots under hard joint
-    constraints: saturation in the null space", T-RO 31(3), 2015.
-
-    Raises
-    ------
-    HierarchyError : another inequality, or bounds of one unknown that exclude each other.
+    Raises HierarchyError for any other inequality, and for bounds on one unknown that contradict
+    each other.
     """
 
     name: ClassVar[str] = "sns"
@@ -78,7 +52,7 @@ class Sns(Resolver):
 
     @property
     def label(self) -> str:
-        """`sns`, with what is not published as "basic" or as scaling."""
+        """`sns`, with the form and the scaling where they are not the defaults."""
         form = "" if self.form == "basic" else f" {self.form}"
         return self.name + form + ("" if self.scales == "target" else f" {self.scales}")
 
@@ -87,8 +61,8 @@ class Sns(Resolver):
         return np.array([self.damping, self.threshold, self.rank_tolerance,
                          self.form == "optimal", self.scales == "miss"], dtype=float)
 
-    def solve(self, h: Hierarchy, memory: Any = None) -> Resolution:
-        """Resolve h; `memory` is not used. Gives a `SaturatedResolution`."""
+    def solve(self, h: Hierarchy, memory: Array | None = None) -> Resolution:
+        """Resolve h and return a `SaturatedResolution`; `memory` is ignored."""
         x = h.reference.copy()
         record = np.empty(len(x) + len(h.sizes) + 1)
         code = sns(h.A, h.lower, h.upper, h.sizes, x, record, self._settings, WORKSPACE.array)
@@ -103,4 +77,5 @@ def _refuse_contradiction(h: Hierarchy, row: int) -> None:
     unknown = int(np.flatnonzero(h.A[row])[0])
     raise HierarchyError(
         f"{h.names[0]}, row {row}: {h.lower[row]:g} <= {h.A[row, unknown]:g} x[{unknown}] <= "
-        f"{h.upper[row]:g} leaves nothing of what the rows above it allow x[{unknown}]")
+        f"{h.upper[row]:g} leaves nothing of the range that the rows above allow for "
+        f"x[{unknown}]")

@@ -14,8 +14,15 @@ from solvers.certificate import certify
 from solvers.kernels.bounds import name_saturation, solve_without_bounds
 from solvers.kernels.published import matrix_as_published, solve_as_published
 from solvers.kernels.staircase import solve_by_staircase
-from solvers.resolver import Handles, Resolution, Resolver, refuse_inequality, register
-from solvers.resolvers.hcod import Hcod, solve_exactly
+from solvers.resolver import (
+    Handles,
+    Resolution,
+    Resolver,
+    refuse_inequality,
+    register,
+    set_frozen,
+)
+from solvers.resolvers.hcod import Hcod, solve_exactly, warm_record
 from solvers.resolvers.saturation import SaturatedResolution
 from solvers.status import INACCURATE, NO_LIMITS, NUMERICAL_FAILURE, SOLVED, UNPROVED, Status
 from solvers.workspace import WORKSPACE, run
@@ -31,26 +38,17 @@ _SOLVED = Status.SOLVED
 class Tpm(Resolver):
     """Task priority through a factorisation of J^T, eqs. (7)-(10), (12) and (14).
 
-    form = "staircase": exact at every rank and for m > n. With damping on, the same x as
-    `recursive`, to rounding.
+    form = "staircase": exact at every rank and for m > n; with damping, x is that of `recursive`,
+        up to rounding. The first level may hold bounds on single unknowns. If x without them leaves
+        the bounds, the method of `hcod` finds the exact answer, as a `SaturatedResolution` that
+        keeps the bounds to rounding; its `scaling` is max(0, 1 - |A_k x - b_k| / |b_k|), exactly 1
+        for a level that is met.
+    form = "published": plain QR and Gauss-Jordan elimination as printed. It departs from the strict
+        answer where a level above the last loses rank and no freedom remains. Equalities only; its
+        rank_tolerance is absolute for singular values, times the largest row norm of J.
 
-    Limits, in this form: the first level may be bounds on single unknowns (joints), in any number
-    of rows with one entry each. Where x without bounds is within them it is the answer, to the last
-    digit; otherwise the engine of `hcod` resolves, and the resolution is a `SaturatedResolution`:
-    `scaling` is 1 - |A_k x - b_k| / |b_k| and not below zero, 1 exactly where a level is met, and
-    `iterations` counts the sets of saturated joints tried, and steps by levels. Unless the data are
-    not finite, x keeps the bounds to rounding, and no level gives up anything for one below it. Of
-    bounds on one joint that exclude each other the point of least violation is taken, as a norm.
-    With damping off, SOLVED is the exact lexicographic answer, and does not depend on `memory`
-    beyond rounding. Status.INACCURATE: rows are nearly parallel behind those above, and `certify`
-    does not accept x; a level, or the way to the reference, may then be worse than it could be.
-    Damping is that of `hcod`; `memory` is then not used.
-
-    form = "published": plain QR and Gauss-Jordan elimination with pivot blocks R_ii, as printed.
-    It departs from the strict answer where a level above the last loses rank and no freedom is left
-    over. The pivots R_ii^# are damped by their own smallest singular value, J^# is not; while the
-    rows of J are independent that is again the x of `recursive`, to rounding. Its rank_tolerance is
-    absolute for singular values: times the largest row norm of J.
+    See docs/theory/tpm.md, docs/tpm-limits.md, and docs/theory/resolver-notes.md for damping,
+    memory and status.
     """
 
     name: ClassVar[str] = "tpm"
@@ -61,11 +59,11 @@ class Tpm(Resolver):
         super().__post_init__()
         self._one_of("form", FORMS)
         if self.form == "published":
-            object.__setattr__(self, "handles", "equalities")
+            set_frozen(self, handles="equalities")
 
     @property
     def strict(self) -> bool:
-        """Whether priorities are respected exactly at any rank: in the staircase form."""
+        """True for the staircase form, which respects priorities exactly at any rank."""
         return self.form == "staircase"
 
     @property
@@ -73,10 +71,11 @@ class Tpm(Resolver):
         """`tpm`, or `tpm published`."""
         return self.name if self.strict else f"{self.name} {self.form}"
 
-    def solve(self, h: Hierarchy, memory: Any = None) -> Resolution:
-        """Resolve h; with bounds, beginning at the saturation of an earlier resolution if given.
+    def solve(self, h: Hierarchy, memory: Array | None = None) -> Resolution:
+        """Resolve h, with bounds starting from the saturation of an earlier resolution if given.
 
-        Without bounds direct, and `memory` is not used. With them a `SaturatedResolution`.
+        Without bounds a direct method that ignores `memory`; with them it returns a
+        `SaturatedResolution`.
         """
         staircased = self.form == "staircase"
         if staircased and memory is not None:
@@ -93,13 +92,11 @@ class Tpm(Resolver):
     def _settings(self) -> Array:
         return np.array([self.damping, self.threshold, self.rank_tolerance, *_OF_THE_ENGINE])
 
-    def _within_bounds(self, h: Hierarchy, memory: Any) -> Resolution:
-        """Resolve h if its first level is bounds; otherwise refuse it, or forget the memory."""
+    def _within_bounds(self, h: Hierarchy, memory: Array | None) -> Resolution:
+        """Resolve h if its first level is bounds; otherwise reject it, or drop the memory."""
         x = h.reference.copy()
         first = len(x) + len(h.sizes)
-        size = first + 3 * len(h.lower) + 3
-        known = memory is not None and len(memory) == size and self.damping == 0.0
-        record = memory.copy() if known else np.zeros(size)
+        record, _ = warm_record(memory, first + 3 * len(h.lower) + 3, self.damping == 0.0)
         code = run(solve_without_bounds, h.A, h.lower, h.upper, h.sizes, x, record, self._settings)
         if code == UNPROVED:
             inner = record[first:]
@@ -110,21 +107,21 @@ class Tpm(Resolver):
         if code < 0 or code == NUMERICAL_FAILURE:
             return self._otherwise(h, x, code)
         name_saturation(h.A, h.lower, h.upper, h.sizes, x, record, WORKSPACE.array)
-        sure = code == SOLVED or certify(h, x).certified
-        return SaturatedResolution(x, _SOLVED if sure else Status.INACCURATE,
+        solved = code == SOLVED or certify(h, x).certified
+        return SaturatedResolution(x, _SOLVED if solved else Status.INACCURATE,
                                    int(record[-3] + record[-2]), record, len(h.sizes), record)
 
 
 @final
 @dataclass(frozen=True)
 class TaskPriorityMatrix:
-    """The matrix F of one hierarchy, and what each level puts into x.
+    """The matrix F of one hierarchy, and the contribution of each level to x.
 
     Attributes
     ----------
     F : (m, m) with x = J^# F b + null_space_term, eq. (7).
     G : (n, m) = J^# F.
-    contributions : (L, n) G times the targets of one level.
+    contributions : (L, n) G times the targets of each level.
     null_space_term : (n,) (I - J^# J) reference, eq. (14); x is the sum of all of these.
     """
 
@@ -135,16 +132,16 @@ class TaskPriorityMatrix:
 
 
 def task_priority_matrix(h: Hierarchy, **settings: Any) -> TaskPriorityMatrix:
-    """Return F of a hierarchy of equalities; the settings are those of `tpm`. Not for the loop.
+    """Return F of a hierarchy of equalities, with settings of `tpm`; too slow for a control loop.
 
-    In the staircase form F = J G. Where J has dependent rows, other F give the same G.
+    In the staircase form F = J G. Where J has dependent rows, other matrices F give the same G.
 
     Raises
     ------
-    HierarchyError : an inequality, a bad setting, or rows with entries that are not finite.
+    HierarchyError : an inequality, an invalid setting, or rows that are not finite.
     """
     resolver = Tpm(**settings)
-    if (h.lower < h.upper).any():  # as the published form does, which resolves no bounds
+    if (h.lower < h.upper).any():  # worded as for the published form, which takes no bounds
         refuse_inequality(Tpm(form="published"), h, int((h.lower < h.upper).argmax()))
     if resolver.solve(h).status is not Status.SOLVED:
         raise HierarchyError(f"no task priority matrix of {h}: {Status.NUMERICAL_FAILURE}")

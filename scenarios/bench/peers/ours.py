@@ -31,7 +31,9 @@ class Ours:
                  Posture(scene.posture, gain=scene.posture_gain)]
         self.stack = Stack(tasks if posture else tasks[:2], "velocity")
         self.state = State.at(robot, scene.start)
-        self.resolver, self.memory, self.before = make(resolver, **settings), None, None
+        self.resolver = make(resolver, **settings)
+        self.memory: Array | None = None
+        self.before: Array | None = None
 
     def velocity(self, t: float, q: Array, v: Array, goal: Array, rate: Array) -> Array:
         """See `Adapter`; goal and rate come out of our own path."""
