@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from html import escape
 from typing import TYPE_CHECKING
+
+from markupsafe import Markup
 
 from hierarchy.errors import HierarchyError
 from scenarios.measure.motions import Motion
 from scenarios.measure.verdict import in_words, listed
-from scenarios.report.parts import section
+from scenarios.report.rendering import render
 
 if TYPE_CHECKING:
     from scenarios.loop.recording import Recording
@@ -18,7 +19,7 @@ MOST = 4  # motions in one replay
 _FASTEST, _SLOWEST = 30.0, 5.0  # [Hz] of the pictures kept
 
 
-def replay(name: str, found: Sequence[Motion], most_bytes: int) -> str:
+def replay(name: str, found: Sequence[Motion], most_bytes: int) -> Markup:
     """Return the section with the replay of up to MOST motions.
 
     Where it would be larger than `most_bytes`, fewer pictures a second are kept.
@@ -27,12 +28,9 @@ def replay(name: str, found: Sequence[Motion], most_bytes: int) -> str:
     try:
         document, rate = _document(name, shown, most_bytes)
     except HierarchyError as error:
-        return section("Replay", f'<p class="quiet">There is none: {escape(str(error))}.</p>')
-    held = document.replace("&", "&amp;").replace("'", "&#39;")
-    return section("Replay", f"""<div class="stage">
-<iframe title="Replay of {escape(name)}" data-document='{held}'></iframe>
-<noscript><p>The replay is drawn by a script, which is switched off here.</p></noscript></div>""",
-                   _said(shown, found, rate))
+        return render("report/replay.html", problem=str(error), said="")
+    return render("report/replay.html", name=name, document=document, problem="",
+                  said=_said(shown, found, rate))
 
 
 def _document(name: str, shown: Sequence[Motion], most_bytes: int) -> tuple[str, float]:

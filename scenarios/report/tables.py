@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from html import escape
 from itertools import groupby
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from markupsafe import Markup
 
 from scenarios.draw.figures.palette import Look
 from scenarios.measure.partings import BOUND, partings
-from scenarios.report.parts import chip, folded, plain_table, section
+from scenarios.report.rendering import render
 
 if TYPE_CHECKING:
     from scenarios.measure.runs import Row, Run
+
+Cell = tuple[str, str, str]  # its kind, "" for none; a note; the text
 
 # What most readers ask; the rest is folded away.
 _FIRST = ("position_error_median_settled", "position_error_max_settled", "cone_violation_max",
@@ -24,15 +26,16 @@ _FIRST = ("position_error_median_settled", "position_error_max_settled", "cone_v
           "time_resolve_median", "time_resolve_p999", "time_tick_median")
 
 
-def numbers(runs: Sequence[Run], looks: Mapping[str, Look]) -> str:
+def numbers(runs: Sequence[Run], looks: Mapping[str, Look]) -> Markup:
     """Return what was measured, best of each row marked; the less asked for is folded away."""
     from scenarios.measure.runs import table
 
     rows = table(runs, details=False)
-    first = [row for row in rows if _is_first(row.name)]
     rest = [row for row in rows if not _is_first(row.name)]
-    more = folded(f"{len(rest)} more rows", _table(rest, runs, looks)) if rest else ""
-    return section("In numbers", _table(first, runs, looks) + more, _marks(runs)) if rows else ""
+    return render("report/numbers.html", heads=[(run.label, _stopped(run)) for run in runs],
+                  looks=looks, first=_grouped([row for row in rows if _is_first(row.name)], runs),
+                  rest=_grouped(rest, runs), count=len(rest),
+                  said=_marks(runs)) if rows else Markup()
 
 
 def _is_first(name: str) -> bool:
@@ -54,45 +57,34 @@ def _marks(runs: Sequence[Run]) -> str:
                               "is pushed around an obstacle on its path." if detour else "")
 
 
-def _table(rows: Sequence[Row], runs: Sequence[Run], looks: Mapping[str, Look]) -> str:
-    heads = "".join(f"<th>{chip(looks[run.label])}{escape(run.label)}{_stopped(run)}</th>"
-                    for run in runs)
+def _grouped(rows: Sequence[Row], runs: Sequence[Run]
+             ) -> list[tuple[str, list[tuple[Row, list[Cell]]]]]:
+    """Return rows with their cells, by group."""
     out = [run.fault is not None for run in runs]
-    body = []
-    for group, some in groupby(rows, key=lambda row: row.group):
-        body.append(f'<tr class="group"><th colspan="{len(runs) + 1}">{escape(group)}</th></tr>')
-        body += [_line(row, out) for row in some]
-    return (f'<div class="scroll"><table class="numbers"><thead><tr><th></th>{heads}</tr></thead>'
-            f"\n<tbody>{''.join(body)}</tbody></table></div>")
+    return [(group, [(row, _cells(row, out)) for row in some])
+            for group, some in groupby(rows, key=lambda row: row.group)]
+
+
+def _cells(row: Row, out: Sequence[bool]) -> list[Cell]:
+    return [("best" if i in row.best else "out" if out[i] else "", note, cell)
+            for i, (cell, note) in enumerate(zip(row.cells, row.notes, strict=True))]
 
 
 def _stopped(run: Run) -> str:
     if run.fault is None:
         return ""
     if run.recording is None or not run.recording.ticks:
-        return '<br><small class="alert">did not begin</small>'
-    return f'<br><small class="alert">stopped at {run.recording["t"][-1]:.2f} s</small>'
+        return "did not begin"
+    return f"stopped at {run.recording['t'][-1]:.2f} s"
 
 
-def _line(row: Row, out: Sequence[bool]) -> str:
-    unit = f" <small class='quiet'>[{escape(row.unit)}]</small>" if row.unit else ""
-    cells = []
-    for i, (cell, note) in enumerate(zip(row.cells, row.notes, strict=True)):
-        kind = "best" if i in row.best else "out" if out[i] else ""
-        title = f' title="{escape(note)}"' if note else ""
-        cells.append(f'<td class="{kind}"{title}>{escape(cell)}</td>')
-    return f"<tr><th>{escape(row.label)}{unit}</th>{''.join(cells)}</tr>"
+def events(runs: Sequence[Run]) -> list[tuple[str, tuple[str, str, str, str]]]:
+    """Return every kind of trouble of every run, contacts and faults.
 
-
-def events(runs: Sequence[Run], looks: Mapping[str, Look]) -> str:
-    """Return every kind of trouble of every run, contacts and faults, as a table or a sentence."""
-    rows = [(f"{chip(looks[run.label])}{escape(run.label)}" if i == 0 else "",
-             *map(escape, happened))
+    A run's label stands beside the first of its own only.
+    """
+    return [(run.label if i == 0 else "", happened)
             for run in runs for i, happened in enumerate(_happened(run))]
-    if not rows:
-        return ('<p class="quiet">No run had a tick without an answer, with bad measurements, with '
-                "a command that was changed, or with contact.</p>")
-    return plain_table(rows, ("run", "what", "what was done", "ticks", "first at"))
 
 
 def _happened(run: Run) -> list[tuple[str, str, str, str]]:
@@ -112,25 +104,17 @@ def _happened(run: Run) -> list[tuple[str, str, str, str]]:
     return found
 
 
-def parted(runs: Sequence[Run]) -> str:
+def parted(runs: Sequence[Run]) -> Markup:
     """Return where strict resolvers' runs part from each other, and why."""
-    said = "".join(f"<li>{escape(str(one))}.</li>" for one in partings(runs))
-    return section("Where they part", f"<ul>{said}</ul>",
-                   "Resolvers that are strict at every rank solve the same problem at every tick, "
-                   f"so their joints should follow the same path; the bound is {BOUND:.0e} rad, or "
-                   "the accuracy that a resolver declares where that is more.") if said else ""
+    found = [str(one) for one in partings(runs)]
+    return render("report/partings.html", partings=found, bound=BOUND) if found else Markup()
 
 
-def settings(runs: Sequence[Run]) -> str:
+def settings(runs: Sequence[Run]) -> Markup:
     """Return the resolvers' settings as used, and each scenario as run."""
-    rows = [(escape(run.label), f"<code>{escape(_in_text(run.settings))}</code>",
-             f'<a href="{escape(run.folder)}/">{escape(run.folder)}/</a>') for run in runs]
-    asked = {run.scenario.name: run for run in reversed(runs)}
-    files = "".join(folded(f"{name}.toml, as run by {run.spec}",
-                           f"<pre><code>{escape(run.scenario.to_toml())}</code></pre>")
-                    for name, run in reversed(asked.items()))
-    return section("Settings", plain_table(rows) + files, "As they were used, damping included; "
-                   "every run's folder has the whole scenario.")
+    first = {run.scenario.name: run for run in reversed(runs)}
+    return render("report/settings.html", rows=[(run, _in_text(run.settings)) for run in runs],
+                  scenarios=list(reversed(first.values())))
 
 
 def _in_text(named: Mapping[str, Any]) -> str:
