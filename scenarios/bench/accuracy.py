@@ -14,6 +14,7 @@ from hierarchy.problem import Array, Hierarchy
 from scenarios.bench.arms import near_singular, regular
 from scenarios.bench.candidates import NUMPY, plain_numpy
 from scenarios.bench.exact import damped, exact
+from scenarios.words import listed
 from solvers import Resolution, Resolver, Status, certify, make, names
 
 DAMPING, THRESHOLD = 0.05, 0.1  # the letter's code
@@ -113,7 +114,7 @@ def said(case: Case, rows: Sequence[dict[str, Any]]) -> str:
     tasks = [f"task_{k + 1}_max" for k in range(len(case.tasks))]
     worst = {row["resolver"]: max(row[key] for key in tasks) for row in rows}
     reached = {label: off for label, off in worst.items() if off <= REACHED}
-    parts = [f"all that the tasks can have is reached by {_listed(list(reached))}, "
+    parts = [f"all that the tasks can have is reached by {listed(list(reached))}, "
              f"{_between(reached)}"] if reached else []
     parts += [_missing(row, tasks) for row in rows if row["resolver"] not in reached]
     return f"Shows: {'; '.join(parts)}."
@@ -122,16 +123,16 @@ def said(case: Case, rows: Sequence[dict[str, Any]]) -> str:
 def _missing(row: Mapping[str, Any], tasks: Sequence[str]) -> str:
     errors = {f"task {k + 1}": row[key] for k, key in enumerate(tasks)}
     rest = [off for off in errors.values() if off <= REACHED]
-    off = _listed([f"{task} by up to {off:.1g}" for task, off in errors.items() if off > REACHED])
+    off = listed([f"{task} by up to {off:.1g}" for task, off in errors.items() if off > REACHED])
     return f"{row['resolver']} misses {off}{f', the rest by {max(rest):.0e}' if rest else ''}"
 
 
 def _damped_parties(rows: Sequence[dict[str, Any]]) -> str:
     same = {row["resolver"]: row["x_max"] for row in rows if row["x_max"] <= REACHED}
     other = {row["resolver"]: row["x_max"] for row in rows if row["resolver"] not in same}
-    parts = [f"the damped x of the reference is found by {_listed(list(same))}, {_between(same)}"
+    parts = [f"the damped x of the reference is found by {listed(list(same))}, {_between(same)}"
              ] if same else []
-    parts += [f"another x by {_listed(list(other))}, up to {max(other.values()):.1g} away"
+    parts += [f"another x by {listed(list(other))}, up to {max(other.values()):.1g} away"
               ] if other else []
     return "; ".join(parts)
 
@@ -141,10 +142,6 @@ def _between(errors: Mapping[str, float]) -> str:
     if best == worst:
         return f"to {errors[best]:.0e}"
     return f"to between {errors[best]:.0e} ({best}) and {errors[worst]:.0e} ({worst})"
-
-
-def _listed(parts: Sequence[str]) -> str:
-    return " and ".join(filter(None, [", ".join(parts[:-1]), parts[-1]]))
 
 
 def _reference(case: Case, h: Hierarchy) -> Array:

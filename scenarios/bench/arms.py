@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import final
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from hierarchy.problem import Array
 
@@ -37,9 +38,9 @@ class Arms:
         axes, origins = np.empty((count, n, 3)), np.empty((count, n, 3))
         for i in range(n):
             axes[:, i], origins[:, i] = R[:, :, 2], p
-            R = R @ _rotations(q[:, i], 2)
+            R = R @ Rotation.from_euler("z", q[:, i]).as_matrix()
             p = p + self.a[:, i, None] * R[:, :, 0] + self.d[:, i, None] * R[:, :, 2]
-            R = R @ _rotations(self.alpha[:, i], 0)
+            R = R @ Rotation.from_euler("x", self.alpha[:, i]).as_matrix()
         return np.concatenate([np.cross(axes, p[:, None] - origins), axes], axis=2).swapaxes(1, 2)
 
 
@@ -108,14 +109,3 @@ def _collect(some: Callable[[np.random.Generator], Array], count: int, seed: int
 
 def _singular_values(J: Array) -> Array:
     return np.asarray(np.linalg.svd(J, compute_uv=False))
-
-
-def _rotations(angle: Array, axis: int) -> Array:
-    """Rotations (N, 3, 3) about x (axis = 0) or z (axis = 2) by angle (N,) [rad]."""
-    R = np.zeros((len(angle), 3, 3))
-    i, j = (axis + 1) % 3, (axis + 2) % 3
-    R[:, axis, axis] = 1.0
-    R[:, i, i] = R[:, j, j] = np.cos(angle)
-    R[:, j, i] = np.sin(angle)
-    R[:, i, j] = -np.sin(angle)
-    return R

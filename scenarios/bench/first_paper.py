@@ -8,7 +8,6 @@ joints. `hierarchy bench first-paper`, or with options `python -m scenarios.benc
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import sys
 from pathlib import Path
@@ -47,10 +46,11 @@ def run(out: Path | None = None, arms: int = ARMS, checked: int = CHECKED,
         from scenarios.bench.growth_figure import time_over_size
         from scenarios.bench.rows import write_rows
         from scenarios.draw.figures.drawing import write
+        from scenarios.files import write_json
 
         write_rows(errors, out / "errors.csv")
         write_rows(times, out / "growth.csv")
-        (out / "machine.json").write_text(json.dumps(machine(), indent=2) + "\n")
+        write_json(out / "machine.json", machine())
         write(time_over_size(times), str(out / "growth"))
     return errors, times
 

@@ -6,7 +6,6 @@ same make, of seeds that nothing was tuned on, are timed and reported apart.
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass, field
 from pathlib import Path
 from time import perf_counter_ns
@@ -20,6 +19,7 @@ from scenarios.bench.candidates import DAQP, NUMPY, Call, Candidate, candidates
 from scenarios.bench.families import DATA, FAMILIES, Problem, family, fresh
 from scenarios.bench.machine import machine, one_core
 from scenarios.bench.rows import write_rows
+from scenarios.files import write_json
 from solvers import Status, certify
 
 RIGHT = 1e-6        # a level's violation off by more than this is wrong; tolerance of `certify`
@@ -224,6 +224,6 @@ def _write(rows: list[dict[str, Any]], out: Path) -> None:
     from scenarios.draw.figures.drawing import write
 
     write_rows(rows, out / "resolvers.csv")
-    (out / "machine.json").write_text(json.dumps(machine(), indent=2) + "\n")
+    write_json(out / "machine.json", machine())
     known = [row for row in rows if row["origin"] == KNOWN]
     write(time_against_accuracy(known), str(out / "time-accuracy"))

@@ -7,7 +7,6 @@ One solve over tasks, rows and joints, by everyone that keeps priorities; and a 
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import sys
 from collections.abc import Sequence
@@ -107,9 +106,10 @@ def _write(rows: Sequence[dict[str, Any]], out: Path) -> None:
     from scenarios.bench.rows import write_rows
     from scenarios.bench.scaling_figure import time_over_sizes
     from scenarios.draw.figures.drawing import write
+    from scenarios.files import write_json
 
     write_rows(rows, out / "scaling.csv")
-    (out / "machine.json").write_text(json.dumps(machine(), indent=2) + "\n")
+    write_json(out / "machine.json", machine())
     write(time_over_sizes(rows), str(out / "scaling"))
 
 

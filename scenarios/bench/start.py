@@ -20,6 +20,7 @@ from rich.console import Console
 from rich.table import Table
 
 from scenarios.bench.machine import machine
+from scenarios.files import write_json
 
 _REPEATED = 7        # times each short process is started; the least counts
 _KERNELS = 12        # slowest to compile, listed
@@ -102,9 +103,9 @@ def run(out: Path | None = None) -> list[Cost]:
     _print(costs, kernels)
     if out is not None:
         out.mkdir(parents=True, exist_ok=True)
-        (out / "start.json").write_text(json.dumps({
+        write_json(out / "start.json", {
             "costs": [{**asdict(cost), "verdict": cost.verdict} for cost in costs],
-            "compilation": kernels, "machine": machine()}, indent=2) + "\n")
+            "compilation": kernels, "machine": machine()})
     return costs
 
 

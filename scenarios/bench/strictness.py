@@ -22,6 +22,7 @@ from hierarchy import Hierarchy, Robot, State
 from hierarchy.kinematics import write_point_jacobian
 from hierarchy.problem import Array
 from scenarios.bench.rows import write_rows
+from scenarios.words import listed
 from solvers import Resolution, Resolver, Status, make, names
 from solvers.qp.backends import BACKENDS, installed
 from solvers.resolver import Handles
@@ -215,13 +216,9 @@ def said(found: list[Strictness]) -> str:
     """Return in a sentence who met the aim."""
     met = [one.label for one in found if one.met]
     missed = [f"{one.label} ({one.largest:.0e} m)" for one in found if not one.met]
-    parts = [f"{_listed(met)} move the end effector by less than {AIM:g} m a tick"] if met else []
-    parts += [f"not so {_listed(missed)}"] if missed else []
+    parts = [f"{listed(met)} move the end effector by less than {AIM:g} m a tick"] if met else []
+    parts += [f"not so {listed(missed)}"] if missed else []
     return f"Shows: {'; '.join(parts)}."
-
-
-def _listed(parts: list[str]) -> str:
-    return " and ".join(filter(None, [", ".join(parts[:-1]), parts[-1]]))
 
 
 def main() -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -13,6 +12,7 @@ from scenarios.config.changes import change, parse_changes
 from scenarios.config.errors import ScenarioError
 from scenarios.config.scenario import Scenario
 from scenarios.config.validation import validated
+from scenarios.files import read_toml
 
 LIBRARY = Path(__file__).parents[1] / "library"
 
@@ -54,7 +54,7 @@ def load(name_or_path: str | Path, changes: Sequence[str] | Mapping[str, Any] = 
 
 def _read_extended(path: Path, below: tuple[Path, ...] = ()) -> dict[str, Any]:
     """Read a file and, under it, the shipped scenario or the file that its `extends` names."""
-    data = _read(path)
+    data = read_toml(path, "scenario file", ScenarioError)
     base = data.pop("extends", None)
     if base is None:
         return data
@@ -74,16 +74,3 @@ def _laid_over(below: dict[str, Any], above: dict[str, Any]) -> dict[str, Any]:
         both = isinstance(value, dict) and isinstance(merged.get(key), dict)
         merged[key] = _laid_over(merged[key], value) if both else value
     return merged
-
-
-def _read(path: Path) -> dict[str, Any]:
-    try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError as error:
-        raise ScenarioError(f"scenario file {str(path)!r} does not exist") from error
-    except OSError as error:
-        raise ScenarioError(f"scenario file {str(path)!r}: {error.strerror}") from error
-    except UnicodeDecodeError as error:
-        raise ScenarioError(f"scenario file {str(path)!r} is not UTF-8 text") from error
-    except tomllib.TOMLDecodeError as error:  # its text says line and column
-        raise ScenarioError(f"scenario file {str(path)!r}: {error}") from error

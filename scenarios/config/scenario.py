@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import tomllib
 from collections import Counter
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Any, Self
@@ -161,6 +162,11 @@ class Scenario(Section):
         for key, value in changes.items():
             change(data, key, value)
         return validated(Scenario, data, f"scenario {self.name!r}")
+
+    @classmethod
+    def from_toml(cls, text: str) -> Self:
+        """Return the scenario that `to_toml` wrote; raises pydantic's ValidationError."""
+        return cls.model_validate(tomllib.loads(text))
 
     def to_toml(self) -> str:
         """Return the scenario as a file that `load` reads back."""

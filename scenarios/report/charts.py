@@ -11,10 +11,10 @@ from scenarios.draw.figures import drawing, panels
 from scenarios.draw.figures.palette import Look, task_colours
 from scenarios.draw.figures.timeline import tasks, timeline
 from scenarios.measure.motions import ALIKE, Motion, motions
-from scenarios.measure.verdict import listed
 from scenarios.report import figures
 from scenarios.report.rendering import drawn, render
 from scenarios.report.tables import events
+from scenarios.words import listed
 
 if TYPE_CHECKING:
     from scenarios.loop.recording import Recording

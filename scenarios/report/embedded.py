@@ -9,8 +9,8 @@ from markupsafe import Markup
 
 from hierarchy.errors import HierarchyError
 from scenarios.measure.motions import Motion
-from scenarios.measure.verdict import in_words, listed
 from scenarios.report.rendering import render
+from scenarios.words import in_words, listed
 
 if TYPE_CHECKING:
     from scenarios.loop.recording import Recording

@@ -11,11 +11,12 @@ from scenarios.draw.figures import drawing
 from scenarios.draw.figures.palette import Look, looks
 from scenarios.draw.figures.picture import picture
 from scenarios.measure.motions import Motion, motions
-from scenarios.measure.verdict import in_words, verdict
+from scenarios.measure.verdict import verdict
 from scenarios.report import charts, tables
 from scenarios.report.commands import commands
 from scenarios.report.embedded import replay
 from scenarios.report.rendering import drawn, render, resource
+from scenarios.words import in_words
 
 if TYPE_CHECKING:
     from scenarios.measure.comparison import Comparison
@@ -30,11 +31,11 @@ def page(comparison: Comparison) -> str:
     with drawing.styled(drawing.SCREEN):
         sections = [_group(comparison, name, runs) for name, runs in groups.items()]
     contents = {name: verdict(runs) for name, runs in groups.items()} if len(groups) > 1 else {}
-    return render("report/page.html", title=f"{', '.join(groups)}: a comparison",
-                  style=resource("report/style.css"), script=resource("report/page.js"),
-                  contents=contents, count=in_words(len(groups)).capitalize(), groups=sections,
-                  refused=comparison.refused, command=comparison.command,
-                  versions=comparison.versions)
+    return str(render("report/page.html", title=f"{', '.join(groups)}: a comparison",
+                      style=resource("report/style.css"), script=resource("report/page.js"),
+                      contents=contents, count=in_words(len(groups)).capitalize(),
+                      groups=sections, refused=comparison.refused, command=comparison.command,
+                      versions=comparison.versions))
 
 
 def _group(comparison: Comparison, name: str, runs: Sequence[Run]) -> Markup:

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 from scenarios.draw.figures import drawing
 from scenarios.files import slug
-from scenarios.measure.verdict import listed
+from scenarios.words import listed
 
 _NUMBER = re.compile(r"[0-9.]+e-[0-9]+")
 

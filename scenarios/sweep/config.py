@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from pathlib import Path
 from typing import Annotated, Any, Self
 
@@ -19,6 +18,7 @@ from pydantic import (
 )
 
 from hierarchy.errors import HierarchyError, UnknownNameError
+from scenarios.files import read_toml
 
 LIBRARY = Path(__file__).parents[1] / "library" / "sweeps"
 
@@ -200,7 +200,7 @@ def load_sweep(name_or_path: str | Path) -> Sweep:
     SweepError, naming the file and the key, and UnknownNameError for a name that is not shipped.
     """
     path = find(name_or_path)
-    data = _read(path)
+    data = read_toml(path, "sweep file", SweepError)
     try:
         sweep = Sweep.model_validate(data)
     except ValidationError as error:
@@ -209,17 +209,6 @@ def load_sweep(name_or_path: str | Path) -> Sweep:
     return sweep.model_copy(update={"scenarios": tuple(
         str(path.parent.resolve() / name) if name.endswith(".toml") else name
         for name in sweep.scenarios)})
-
-
-def _read(path: Path) -> dict[str, Any]:
-    try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError as error:
-        raise SweepError(f"sweep file {str(path)!r} does not exist") from error
-    except OSError as error:
-        raise SweepError(f"sweep file {str(path)!r}: {error.strerror}") from error
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise SweepError(f"sweep file {str(path)!r}: {error}") from error
 
 
 def _say(path: Path, error: Any) -> str:

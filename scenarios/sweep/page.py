@@ -16,12 +16,12 @@ from scenarios.config import Scenario
 from scenarios.draw.figures.palette import Look, looks
 from scenarios.files import slug
 from scenarios.measure.metrics import Metric
-from scenarios.measure.verdict import listed
 from scenarios.report.rendering import drawn, render, resource
 from scenarios.sweep import figures
 from scenarios.sweep.planning import Plan, Planned
 from scenarios.sweep.results import Failure, Results, Worst, summary
 from scenarios.sweep.verdict import verdict
+from scenarios.words import listed
 
 _FAILURES = 20  # reasons listed
 
@@ -61,10 +61,11 @@ class Page:
 
     def html(self) -> str:
         """Return the page; it refers to nothing but files beside it."""
-        return render("sweep/page.html", sweep=self.plan.sweep, refused=self.plan.refused,
-                      style=resource("report/style.css"), counted=self._counted(),
-                      scenarios=[self._shown(name, one) for name, one in self.found.items()],
-                      command=self.command, file=self.file, versions=self.versions)
+        return str(render(
+            "sweep/page.html", sweep=self.plan.sweep, refused=self.plan.refused,
+            style=resource("report/style.css"), counted=self._counted(),
+            scenarios=[self._shown(name, one) for name, one in self.found.items()],
+            command=self.command, file=self.file, versions=self.versions))
 
     def worst_runs(self) -> list[Planned]:
         """Return the runs that the page has a command for."""

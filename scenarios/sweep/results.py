@@ -142,14 +142,14 @@ class Results:
         return sorted(found.values(), key=lambda one: -one.count)
 
 
-def wilson(met: int, of: int, z: float = 1.96) -> tuple[float, float]:
-    """Return the interval of a share after Wilson (1927); z = 1.96 for 95 %."""
+def wilson(met: int, of: int) -> tuple[float, float]:
+    """Return the 95 % interval of a share after Wilson (1927); 0 to 1 where nothing is known."""
+    from scipy.stats import binomtest
+
     if of == 0:
         return 0.0, 1.0
-    share = met / of
-    middle = (share + z**2 / (2 * of)) / (1 + z**2 / of)
-    half = z / (1 + z**2 / of) * math.sqrt(share * (1 - share) / of + z**2 / (4 * of**2))
-    return max(0.0, middle - half), min(1.0, middle + half)
+    low, high = binomtest(met, of).proportion_ci(confidence_level=0.95, method="wilson")
+    return float(low), float(high)
 
 
 def valued(metric: Metric, value: float) -> Metric:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import json
 import threading
-import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -16,7 +15,7 @@ from scenarios.measure.metrics import Metric
 
 # What only asks for runs or shows them; a change to it does not change what is measured.
 _NOT_IN_A_RUN = ("bench/", "cli/", "draw/", "export/", "library/", "report/", "scene/", "sweep/",
-                 "files.py", *(f"measure/{name}.py" for name in (
+                 "files.py", "words.py", *(f"measure/{name}.py" for name in (
                      "comparison", "motions", "partings", "runs", "verdict")))
 _PLACE = ("system", "processor")  # of versions(): on which machine, not with what
 _ONE_AT_A_TIME = threading.Lock()  # the kernels' work arrays belong to the process
@@ -85,7 +84,7 @@ def run(text: str, resolver: str, key: str) -> Outcome:
 
     begun = perf_counter()
     try:
-        scenario = Scenario.model_validate(tomllib.loads(text)).with_resolver(resolver)
+        scenario = Scenario.from_toml(text).with_resolver(resolver)
         recording = simulate(scenario)
         measured = tuple(measure(recording).values())
     except Exception as error:  # a row like any other, and the reason is its content

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import fcntl
 import hashlib
-import os
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -15,6 +14,8 @@ import pyarrow as pa
 import pyarrow.parquet as parquet
 
 from hierarchy.errors import HierarchyError
+from scenarios import files
+from scenarios.files import written
 from scenarios.measure.metrics import Metric
 from scenarios.sweep.run import Outcome
 
@@ -43,7 +44,7 @@ class Store:
     @property
     def parts(self) -> list[Path]:
         """The files of the parts."""
-        return sorted((self.folder / "parts").glob("*.parquet"))
+        return sorted((self.folder / "parts").glob("[!.]*.parquet"))
 
     @contextmanager
     def opened(self) -> Iterator[None]:
@@ -90,23 +91,15 @@ class Store:
 
 
 def write_table(table: pa.Table, path: Path) -> None:
-    """Write a table so that a reader finds the old file or the new one; raises FullError."""
-    partial = path.with_name(f".{path.name}.{os.getpid()}")
-    with _named(path):
-        try:
-            parquet.write_table(table, partial)
-            _sync(partial)
-            partial.replace(path)
-        finally:
-            partial.unlink(missing_ok=True)
+    """Write a Parquet file, whole or not at all; raises FullError."""
+    with _named(path), written(path, synced=True) as partial:
+        parquet.write_table(table, partial)
 
 
 def write_text(text: str, path: Path) -> None:
-    """Write a file so that a reader finds the old one or the new one; raises FullError."""
-    from scenarios.files import write_text as write
-
+    """Write a text file, whole or not at all; raises FullError."""
     with _named(path):
-        write(path, text)
+        files.write_text(path, text)
 
 
 def metrics_of(table: pa.Table) -> dict[str, Metric]:
@@ -144,12 +137,6 @@ def _read(part: Path, columns: Sequence[str] | None = None) -> Any:
     except (OSError, pa.ArrowException) as error:
         raise StoreError(f"{part} cannot be read ({error}); remove it to have its runs run "
                          "again") from error
-
-
-def _sync(path: Path) -> None:
-    """Have the file on the disk before it takes its name: a part must survive a loss of power."""
-    with path.open("rb") as stream:
-        os.fsync(stream.fileno())
 
 
 @contextmanager

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import shlex
-import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -95,5 +94,5 @@ def _written(planned: Plan, store: Store, text: str, command: str) -> dict[str, 
 
 def _scenario_of(run: Planned) -> str:
     """Return the scenario of a run as a file, its resolver put in."""
-    return Scenario.model_validate(tomllib.loads(run.job.text)).with_resolver(
+    return Scenario.from_toml(run.job.text).with_resolver(
         run.job.resolver).to_toml()

@@ -10,7 +10,6 @@ image: file, time [s], and optionally q [rad or m], the robot's joints when it w
 
 from __future__ import annotations
 
-import tomllib
 from bisect import bisect_right
 from pathlib import Path
 from typing import Any
@@ -25,6 +24,7 @@ from hierarchy.problem import Array
 from scenarios.cell.sensors.camera import Pinhole
 from scenarios.cell.sensors.errors import Image
 from scenarios.config.reading import LIBRARY
+from scenarios.files import read_toml
 
 SHIPPED = LIBRARY / "frames"
 ABOUT = "frames.toml"
@@ -43,7 +43,7 @@ class RecordedFrames:
     def __init__(self, folder: str | Path, robot: Robot, latency: float = 0.0) -> None:
         self.folder, self.latency = _found(folder), latency
         self.obstacles = Obstacles()
-        about = _read(self.folder / ABOUT)
+        about = read_toml(self.folder / ABOUT, "file of frames", HierarchyError)
         self.pinhole, self._scale = _pinhole(about, self.folder), about.get("scale", 1e-3)
         frames = about.get("frame") or []
         try:
@@ -78,13 +78,6 @@ def _found(folder: str | Path) -> Path:
         raise HierarchyError(f"folder {str(folder)!r} has no {ABOUT}")
     raise UnknownNameError("folder of frames", str(folder),
                            sorted(path.name for path in SHIPPED.glob("*")))
-
-
-def _read(file: Path) -> dict[str, Any]:
-    try:
-        return tomllib.loads(file.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise HierarchyError(f"{file}: {error}") from error
 
 
 def _pinhole(about: dict[str, Any], folder: Path) -> Pinhole:
