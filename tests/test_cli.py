@@ -3,6 +3,8 @@ import json
 import os
 import subprocess
 import sys
+from importlib.metadata import version
+from pathlib import Path
 
 import pytest
 from hand_made import recording
@@ -306,6 +308,22 @@ def test_the_shell_completes_commands_scenarios_and_resolvers():
     assert completed(["hierarchy", "run", "human-h"]) == ["human-hqp"]
     assert completed(["hierarchy", "compare", "ellipse", "--resolvers", "tpm,hc"]) == ["tpm,hcod"]
     assert completed(["hierarchy", "sweep", "ell"]) == ["ellipse-starts"]
+
+
+def test_the_version_is_printed(capsys):
+    assert run_command(["--version"]) == 0
+    assert capsys.readouterr().out == f"hierarchy {version('task-hierarchy')}\n"
+
+
+def test_every_benchmark_is_a_command_and_listed(capsys):
+    import scenarios.bench
+
+    folder = Path(scenarios.bench.__file__).parent
+    runnable = {path.stem for path in folder.glob("*.py") if "\ndef run(" in path.read_text()}
+    assert run_command(["bench", "--help"]) == 0
+    listed = capsys.readouterr().out
+    for name in (*runnable, "peers"):
+        assert f"  {name.replace('_', '-')}  " in listed
 
 
 def test_a_benchmark_that_is_not_there_is_answered_with_the_nearest(capsys):

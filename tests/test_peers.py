@@ -117,7 +117,7 @@ def test_another_environment_sees_nothing_of_ours_but_what_it_needs(tmp_path):
 
 def test_a_package_that_is_not_there_is_missing_with_what_to_do():
     nobody = Package("nobody", "no_such_module", ("nobody==1",))
-    with pytest.raises(MissingError, match=r"not installed; python -m .*peers --install"):
+    with pytest.raises(MissingError, match=r"not installed; hierarchy bench peers --install"):
         python_of(nobody)
 
 

@@ -1,6 +1,6 @@
 """How many problems a second does a batch solve, on one core and on all of them?
 
-    python -m scenarios.bench.batch --out runs/batch
+    hierarchy bench batch --out runs/batch
 
 Problems of a reference family, each with its own targets and reference, by `solvers.batch` with one
 thread and with one for each core, by `resolver.solve` in a Python loop, and for `tpm` in jax where
@@ -10,8 +10,6 @@ processor, no GPU was at hand.
 
 from __future__ import annotations
 
-import argparse
-import sys
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from importlib.util import find_spec
@@ -146,19 +144,3 @@ def _print(console: Console, title: str, rows: Sequence[dict[str, Any]]) -> None
 
 def _write(rows: Sequence[dict[str, Any]], out: Path) -> None:
     write_rows(rows, out / "batch.csv")
-
-
-def main() -> int:
-    """Run from the command line."""
-    parser = argparse.ArgumentParser(prog="python -m scenarios.bench.batch",
-                                     description="Problems a second in batches.")
-    parser.add_argument("--count", type=int, action="append", help="problems; may be repeated")
-    parser.add_argument("--seconds", type=float, default=1.0, help="for each number of problems")
-    parser.add_argument("--out", type=Path, default=None, help="folder for batch.csv")
-    given = parser.parse_args()
-    run(given.out, given.count or COUNTS, given.seconds)
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -1,6 +1,6 @@
 """A resolver on a million generated problems, every answer certified.
 
-    python -m scenarios.bench.stress --count 1000000 --resolver hcod --kind all
+    hierarchy bench stress --count 1000000 --resolver hcod --kind all
 
 The problems are of `solvers.problems`: the recipe ("recipe"), and every structured kind by its
 name. Exit code 1 if the resolver raised, gave a number that is not finite, called solved what
@@ -12,10 +12,8 @@ arrays raises where it would corrupt memory.
 
 from __future__ import annotations
 
-import argparse
 import multiprocessing
 import os
-import sys
 from collections import Counter
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
@@ -232,23 +230,3 @@ def keep(name: str, seed: int, what: str, out: Path, kind: str = RECIPE) -> Path
     file = out / (f"{name}-{seed}.npz" if kind == RECIPE else f"{name}-{kind}-{seed}.npz")
     problems.save(smallest, file)
     return file
-
-
-def main() -> int:
-    """Run from the command line."""
-    parser = argparse.ArgumentParser(prog="python -m scenarios.bench.stress",
-                                     description="A resolver on generated problems, certified.")
-    parser.add_argument("--count", type=int, default=1_000_000, help="how many problems")
-    parser.add_argument("--resolver", default="hcod")
-    parser.add_argument("--first", type=int, default=0, help="first seed")
-    parser.add_argument("--processes", type=int, default=None, help="default: one a core")
-    parser.add_argument("--out", type=Path, default=Path("runs/stress"),
-                        help="folder for problems that fail")
-    parser.add_argument("--kind", default=ALL, choices=(ALL, *KINDS), help="default: all")
-    given = parser.parse_args()
-    found = run(given.count, given.resolver, given.first, given.processes, given.out, given.kind)
-    return 0 if found.passed else 1
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -219,16 +219,3 @@ def said(found: list[Strictness]) -> str:
     parts = [f"{listed(met)} move the end effector by less than {AIM:g} m a tick"] if met else []
     parts += [f"not so {listed(missed)}"] if missed else []
     return f"Shows: {'; '.join(parts)}."
-
-
-def main() -> None:
-    """Run from the command line; the numbers go to a new folder in runs/."""
-    from scenarios.files import next_free
-
-    folder = next_free(Path("runs") / "strictness")
-    run(folder)
-    print(f"\nNumbers: {folder}")
-
-
-if __name__ == "__main__":
-    main()

@@ -7,7 +7,6 @@ Nothing heavy is imported before it is needed, so that `--help` and completion a
 
 from __future__ import annotations
 
-import os
 import shlex
 import sys
 from functools import partial
@@ -17,6 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from scenarios.cli import completion
+from scenarios.cli.bench import bench
 from scenarios.cli.terminal import (
     first_line,
     print_json,
@@ -31,8 +31,8 @@ if TYPE_CHECKING:
     from scenarios.config import Scenario
     from scenarios.measure.runs import Run
 
-app = typer.Typer(help="Prioritized robot tasks: many ways of resolving them, compared.",
-                  rich_markup_mode=None, pretty_exceptions_enable=False)
+app = typer.Typer(rich_markup_mode=None, pretty_exceptions_enable=False)
+app.add_typer(bench, name="bench")
 
 Changes = Annotated[list[str] | None, typer.Option(
     "--set", metavar="KEY=VALUE",
@@ -47,11 +47,6 @@ Port = Annotated[int, typer.Option("--port", metavar="N", min=0, max=65535,
                                    help="Where the page is on 127.0.0.1; 0 for any free port.")]
 Browser = Annotated[bool, typer.Option("--browser/--no-browser",
                                        help="Open the page, or only say where it is.")]
-
-# What can be measured: names of modules of scenarios.bench, written with hyphens.
-BENCHMARKS = ("resolvers", "tick", "first-paper", "strictness", "start", "peers")
-_ASKED_FOR = ("peers",)  # minutes, and packages of others
-
 
 def main() -> None:
     """Run the command line and exit with its code; see the module's text."""
@@ -73,6 +68,21 @@ def run_command(arguments: list[str]) -> int:
         if isinstance(error, HierarchyError):
             return _wrong(str(error))
         raise
+
+
+def _print_version(asked: bool) -> None:
+    if asked:
+        from importlib.metadata import version
+
+        print(f"hierarchy {version('task-hierarchy')}")
+        raise typer.Exit
+
+
+@app.callback()
+def options(version: Annotated[bool, typer.Option(
+        "--version", is_eager=True, callback=_print_version,
+        help="Print the version and exit.")] = False) -> None:
+    """Resolve prioritized robot tasks in many ways, and compare the results."""
 
 
 @app.command("list")
@@ -316,37 +326,6 @@ def doctor(as_json: AsJson = False) -> int:
     from scenarios.cli.doctor import doctor_command
 
     return doctor_command(as_json)
-
-
-@app.command()
-def bench(what: Annotated[str | None, typer.Argument(
-        metavar="|".join(BENCHMARKS), help="Only this. Default: all but peers.",
-        autocompletion=lambda incomplete: [b for b in BENCHMARKS if b.startswith(incomplete)]),
-        ] = None,
-        fresh: Annotated[int | None, typer.Option(
-            metavar="SEED", help="Resolvers: time new problems too, from this seed on.")] = None,
-        count: Annotated[int, typer.Option(
-            min=1, metavar="N", help="New problems of each family.")] = 200,
-        out: Out = None) -> None:
-    """Time resolvers, control tick, start, others' packages; judge errors and strictness."""
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy is loaded: one core is timed
-    from importlib import import_module
-
-    from hierarchy.errors import HierarchyError, UnknownNameError
-    from scenarios.files import claim, next_free
-
-    if what is not None and what not in BENCHMARKS:
-        raise UnknownNameError("benchmark", what, BENCHMARKS)
-    if fresh is not None and what not in (None, "resolvers"):
-        raise HierarchyError(f"--fresh is for the benchmark of resolvers, not {what}")
-    folder = claim(out if out is not None else next_free(Path("runs") / "bench"))
-    for wanted in [what] if what is not None else [b for b in BENCHMARKS if b not in _ASKED_FOR]:
-        module = import_module(f"scenarios.bench.{wanted.replace('-', '_')}")
-        if wanted == "resolvers":
-            module.run(folder, seed=fresh, count=count)
-        else:
-            module.run(folder)
-    print(f"\nNumbers: {shown(folder)}")
 
 
 def _load(name: str, changes: list[str] | None, duration: float | None) -> Scenario:
