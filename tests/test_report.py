@@ -19,7 +19,7 @@ from scenarios.measure.comparison import Comparison
 from scenarios.measure.motions import motions
 from scenarios.measure.runs import Run, table
 from scenarios.measure.verdict import verdict
-from scenarios.report import page
+from scenarios.report import comparison_page as page
 from scenarios.report.commands import run_command
 from scenarios.report.embedded import replay
 

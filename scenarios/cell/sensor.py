@@ -79,9 +79,9 @@ def _depth_sensor(section: SensorSection, robot: Robot, exact: ExactDistances,
     else:
         source = RecordedFrames(section.folder or "", robot, section.latency)
     space = DepthSpace(source.pinhole, exact.points, capsules, section.region or asked.region,
-                       section.margin, inf if section.thin is None else section.thin,
-                       section.support, section.band, asked.mean, asked.body, asked.tip,
-                       exact.measurement.pairs is not None)
+                       margin=section.margin, thin=inf if section.thin is None else section.thin,
+                       support=section.support, band=section.band, mean=asked.mean,
+                       body=asked.body, tip=asked.tip, pairs=exact.measurement.pairs is not None)
     return DepthSensor(source, space, section.stale_after, section.least_readings, checked)
 
 
@@ -96,9 +96,9 @@ def _camera(section: SensorSection, exact: ExactDistances,
         section.noise_floor, section.noise_growth, section.noise_from, section.rounding,
         section.step, section.near, section.far, section.missing, section.missing_at_edges,
         section.outliers, section.outlier_size)
-    return DepthCamera(pinhole, exact.obstacles, capsules, errors, section.rate, section.jitter,
-                       section.latency, section.seed, section.point_radius,
-                       section.backdrop or inf)
+    return DepthCamera(pinhole, exact.obstacles, capsules, errors, rate=section.rate,
+                       jitter=section.jitter, latency=section.latency, seed=section.seed,
+                       point_radius=section.point_radius, backdrop=section.backdrop or inf)
 
 
 def _capsules(robot: Robot, foot: float) -> tuple[Capsule, ...]:

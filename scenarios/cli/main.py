@@ -18,13 +18,13 @@ import typer
 from scenarios.cli import completion
 from scenarios.cli.bench import bench
 from scenarios.cli.terminal import (
+    certified,
     first_line,
     print_json,
     print_list,
     print_table,
     shown,
     troubles,
-    verdict,
 )
 
 if TYPE_CHECKING:
@@ -154,7 +154,7 @@ def run(scenario: Annotated[str, typer.Argument(
         return _fault(recording.fault)
     print_table([_run_of(chosen, recording)])
     if certify:
-        print(f"\n{verdict(recording, chosen.make_resolver().damping)}")
+        print(f"\n{certified(recording, chosen.make_resolver().damping)}")
     for line in troubles(recording):
         print(line)
     print(f"\n{recording.ticks} ticks in {shown(folder)}")

@@ -11,8 +11,8 @@ from scenarios.cli.progress import bar
 from scenarios.cli.terminal import print_json
 from scenarios.sweep.config import load_sweep
 from scenarios.sweep.engine import EngineError
+from scenarios.sweep.printing import show
 from scenarios.sweep.store import FullError
-from scenarios.sweep.terminal import show
 from scenarios.sweep.whole import sweep
 
 

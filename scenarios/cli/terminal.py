@@ -26,13 +26,13 @@ def troubles(recording: Any) -> list[str]:
     return ["", *lines] if lines else []
 
 
-def verdict(recording: Any, damping: float) -> str:
+def certified(recording: Any, damping: float) -> str:
     """Say how many ticks were certified and which is the first that was not."""
-    certified = recording["certified"]
-    text = f"certified: {certified.sum()} of {recording.ticks} ticks"
-    if certified.all():
+    ticks = recording["certified"]
+    text = f"certified: {ticks.sum()} of {recording.ticks} ticks"
+    if ticks.all():
         return text
-    first = int(certified.argmin())
+    first = int(ticks.argmin())
     text += f"; the first that is not is tick {first} (t = {recording['t'][first]:.3f} s)"
     if damping > 0.0:
         text += (f"\n(damping = {damping:g}: near a singularity the answer is meant to differ from "

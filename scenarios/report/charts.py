@@ -12,8 +12,8 @@ from scenarios.draw.figures.palette import Look, task_colours
 from scenarios.draw.figures.timeline import tasks, timeline
 from scenarios.measure.motions import ALIKE, Motion, motions
 from scenarios.report import figures
-from scenarios.report.rendering import drawn, render
 from scenarios.report.tables import events
+from scenarios.report.templates import drawn, render
 from scenarios.words import listed
 
 if TYPE_CHECKING:

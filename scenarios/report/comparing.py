@@ -118,10 +118,10 @@ def _interrupted(run: Run) -> bool:
 
 
 def _write(comparison: Comparison, folder: Path) -> None:
-    from scenarios.report import page
+    from scenarios.report import comparison_page
 
     write_json(folder / "comparison.json", comparison.as_plain_data())
-    write_text(folder / "index.html", page(comparison))
+    write_text(folder / "index.html", comparison_page(comparison))
 
 
 def _command(planned: Sequence[Run], out: str | Path | None) -> str:

@@ -9,7 +9,7 @@ from markupsafe import Markup
 
 from hierarchy.errors import HierarchyError
 from scenarios.measure.motions import Motion
-from scenarios.report.rendering import render
+from scenarios.report.templates import render
 from scenarios.words import in_words, listed
 
 if TYPE_CHECKING:

@@ -15,7 +15,7 @@ from scenarios.measure.verdict import verdict
 from scenarios.report import charts, tables
 from scenarios.report.commands import commands
 from scenarios.report.embedded import replay
-from scenarios.report.rendering import drawn, render, resource
+from scenarios.report.templates import drawn, render, resource
 from scenarios.words import in_words
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 _REPLAY_BYTES, _REPLAYS_BYTES = 3_000_000, 8_000_000  # of one replay, and of all on a page
 
 
-def page(comparison: Comparison) -> str:
+def comparison_page(comparison: Comparison) -> str:
     """Return the page; it refers to nothing outside itself but the run folders beside it."""
     groups = comparison.groups()
     with drawing.styled(drawing.SCREEN):

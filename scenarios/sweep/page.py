@@ -16,11 +16,11 @@ from scenarios.config import Scenario
 from scenarios.draw.figures.palette import Look, looks
 from scenarios.files import slug
 from scenarios.measure.metrics import Metric
-from scenarios.report.rendering import drawn, render, resource
+from scenarios.report.templates import drawn, render, resource
 from scenarios.sweep import figures
 from scenarios.sweep.planning import Plan, Planned
 from scenarios.sweep.results import Failure, Results, Worst, summary
-from scenarios.sweep.verdict import verdict
+from scenarios.sweep.success import success
 from scenarios.words import listed
 
 _FAILURES = 20  # reasons listed
@@ -86,7 +86,7 @@ class Page:
         failures = results.failures()
         return Shown(
             scenario=next(one for one in self.plan.scenarios if one.name == name),
-            verdict=verdict(results),
+            verdict=success(results),
             shares=drawn(figures.shares(results), f"{results.runs[0].scenario}: shares of runs"),
             failures=[(one, self._again(one.run)) for one in failures[:_FAILURES]],
             more_failures=max(0, len(failures) - _FAILURES), spreads=_spreads(name, results),

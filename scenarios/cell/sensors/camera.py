@@ -100,7 +100,7 @@ class DepthCamera:
     """
 
     def __init__(self, pinhole: Pinhole, obstacles: Obstacles, capsules: tuple[Capsule, ...],
-                 errors: DepthErrors | None = None, rate: float = 30.0, jitter: float = 0.0,
+                 errors: DepthErrors | None = None, *, rate: float = 30.0, jitter: float = 0.0,
                  latency: float = 0.0, seed: int = 0, point_radius: float = 0.02,
                  backdrop: float = inf) -> None:
         if not 0.0 <= jitter < 1.0 / rate:

@@ -62,7 +62,7 @@ class DepthSpace:
     """
 
     def __init__(self, pinhole: Pinhole, points: Sequence[ControlPoint],
-                 capsules: Sequence[Capsule], region: float, margin: float = 0.05,
+                 capsules: Sequence[Capsule], region: float, *, margin: float = 0.05,
                  thin: float = inf, support: int = 3, band: float = 0.05, mean: bool = True,
                  body: Repulsion | None = None, tip: Repulsion | None = None,
                  pairs: bool = False) -> None:

@@ -10,7 +10,7 @@ from rich.table import Table
 from rich.text import Text
 
 from scenarios.sweep.results import Results, summary
-from scenarios.sweep.verdict import verdict
+from scenarios.sweep.success import success
 
 _BESIDE = 3  # resolvers that 80 columns hold
 
@@ -18,7 +18,7 @@ _BESIDE = 3  # resolvers that 80 columns hold
 def show(name: str, results: Results, console: Console | None = None) -> None:
     """Print for each resolver in how many runs each criterion was met, and median and worst."""
     console = console or Console(markup=False, highlight=False)
-    console.print(f"\n{name}: {verdict(results)}")
+    console.print(f"\n{name}: {success(results)}")
     beside = -(-len(results.labels) // -(-len(results.labels) // _BESIDE))
     for first in range(0, len(results.labels), beside):
         console.print()

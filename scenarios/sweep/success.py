@@ -10,7 +10,7 @@ _IN_WORDS = {"Reached the end": "reached the end", "Touched nothing": "touched n
              "Every tick solved": "had every tick solved"}
 
 
-def verdict(results: Results) -> str:
+def success(results: Results) -> str:
     """Return in how many runs each criterion was met, the same for all resolvers or one by one."""
     said: dict[str, list[str]] = {}
     for criterion in results.criteria()[:-1]:
