@@ -47,7 +47,7 @@ def test_certify_counts_the_ticks_whose_answer_is_right(capsys):
 def test_certify_names_the_first_tick_that_is_not_and_says_that_damping_is_on(capsys):
     assert run_command(["run", "ellipse", "--certify", "--duration", "0.05"]) == 0
     out = capsys.readouterr().out
-    assert "certified: 0 of 50 ticks; the first that is not is tick 0 (t = 0.000 s)\n" in out
+    assert "certified: 0 of 50 ticks; the first one not certified is tick 0 (t = 0.000 s)\n" in out
     assert "damping = 0.05: near a singularity" in out
 
 
@@ -132,7 +132,7 @@ def test_check_says_what_was_understood(tmp_path, capsys):
     (["run", "ellipse", "--duration", "-1"], "control.duration"),
     (["run", "ellipse", "--duration", "long"], "--duration"),
     (["run", "missing.toml"], "missing.toml"),
-    (["compare", "ellipse", "--resolvers", ","], "names no resolver"),
+    (["compare", "ellipse", "--resolvers", ","], "no resolver given"),
     (["compare", "ellipse", "--resolvers", "tpm,recursiv"], "did you mean 'recursive'"),
     (["check", "missing.toml"], "missing.toml"),
     (["rnu", "ellipse"], "rnu"),

@@ -1,4 +1,4 @@
-"""The command `hierarchy figures`: a run's figures anew, from its folder alone."""
+"""`hierarchy figures`: draw a run's figures again from its folder."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from scenarios.files import added_to, claim, named, whole
 def redraw(run: str | Path, style: str = "screen", out: str | Path | None = None) -> list[Path]:
     """Draw the figures of a run folder in a style, and return the files.
 
-    They take the place of those in the run folder, or go to `out`, which must be new or empty.
+    They replace those in the run folder, or go to `out`, which must be new or empty.
 
     Raises
     ------
-    HierarchyError : `run` is not a run folder or is damaged, `style` is none of drawing.STYLES, or
+    HierarchyError : `run` is not a run folder or is damaged, `style` is not in drawing.STYLES, or
         the folder cannot be written.
     """
     from hierarchy.errors import UnknownNameError

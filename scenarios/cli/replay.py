@@ -1,4 +1,4 @@
-"""`hierarchy replay`: finished runs as one HTML file, or as a video."""
+"""`hierarchy replay`: write finished runs as one HTML file, or one as a video."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from scenarios.loop.recording import load_run
 
 def replay_command(folders: Sequence[Path], out: Path | None, video: Path | None,
                    rate: float) -> int:
-    """Write what is asked for and say where it is; without either, FOLDER/replay.html."""
+    """Write the HTML file, the video, or both, and print their paths; by default replay.html."""
     recordings = labelled(folders, [load_run(folder) for folder in folders])
     if video is not None:
         if len(recordings) > 1:

@@ -1,4 +1,4 @@
-"""The drawn sections of the report: the stack over time, small multiples, overlays."""
+"""The report's sections with figures: stack over time, panels side by side, overlays."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ if TYPE_CHECKING:
 
 
 def same_motion(found: Sequence[Motion]) -> str:
-    """Say which runs are drawn once because they are the same motion; empty if none are."""
+    """Return which runs are drawn once because their motion is the same; "" if none."""
     said = [f"{listed(one.labels)} are the same motion "
             + (f"to {one.apart:.0e} rad" if one.apart else "to the last bit")
             for one in found if len(one.runs) > 1]
-    return f"Drawn once: {'; '.join(said)} (runs within {ALIKE:.0e} rad are)." if said else ""
+    return f"Drawn once: {'; '.join(said)} (within {ALIKE:.0e} rad)." if said else ""
 
 
 def stack(name: str, runs: Sequence[Run], looks: Mapping[str, Look]) -> Markup:
-    """Return the section with the stack over time, for each motion with its own events."""
+    """Return the section with the stack over time, one figure for each motion and its events."""
     found = motions(runs, also=_events)
     beside = [one.recording for one in found]
     colours = task_colours(tasks(beside))
@@ -55,7 +55,7 @@ def _changes(recording: Recording) -> str:
 
 
 def multiples(name: str, found: Sequence[Motion], looks: Mapping[str, Look]) -> Markup:
-    """Return a card for each quantity, with a small panel for each motion on equal axes."""
+    """Return a card for each quantity, with one panel per motion on equal axes."""
     recordings = {one.label: one.recording for one in found}
     cards = []
     for panel in (*panels.PANELS, *panels.TASK_PANELS):
@@ -70,7 +70,7 @@ def multiples(name: str, found: Sequence[Motion], looks: Mapping[str, Look]) -> 
 
 
 def _key(panel: str, recordings: Mapping[str, Recording]) -> dict[str, str]:
-    """Return what the colours of a panel's lines mean, if they mean the same in all runs."""
+    """Return the legend of a panel's colours, if they mean the same in all runs."""
     count = max(int(recording["v"].shape[1]) for recording in recordings.values())
     if panel == "joint-velocities" and count <= len(drawing.JOINTS):
         return {f"joint {j + 1}": drawing.joint_colour(j) for j in range(count)}
@@ -83,7 +83,7 @@ def _key(panel: str, recordings: Mapping[str, Recording]) -> dict[str, str]:
 
 def overlays(name: str, runs: Sequence[Run], found: Sequence[Motion],
              looks: Mapping[str, Look]) -> Markup:
-    """Return what is best seen over each other: path error, departures, computing time."""
+    """Return overlaid curves: path error, joint difference from the first run, computing time."""
     recordings = {run.label: run.recording for run in runs
                   if run.recording is not None and run.recording.ticks > 1}
     figs = []
@@ -92,7 +92,7 @@ def overlays(name: str, runs: Sequence[Run], found: Sequence[Motion],
         figs.append(("Distance from the path [mm]",
                      figures.overlay(panels.position_error, moved, looks)))
     if len({one.scenario.name for one in recordings.values()}) < len(recordings):
-        figs.append((f"How far the joints depart from those of {next(iter(recordings))} [rad]",
+        figs.append((f"Joint difference from {next(iter(recordings))} [rad]",
                      figures.departure(recordings, looks)))
     if all("time_tick" in one for one in recordings.values()):
         timed, marks = figures.computing_time(recordings, looks)

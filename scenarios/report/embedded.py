@@ -1,4 +1,4 @@
-"""The replay inside the report: in the page's own file, but not drawn before it is looked at."""
+"""The replay embedded in the report, drawn only once it scrolls into view."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ if TYPE_CHECKING:
     from scenarios.loop.recording import Recording
 
 MOST = 4  # motions in one replay
-_FASTEST, _SLOWEST = 30.0, 5.0  # [Hz] of the pictures kept
+_FASTEST, _SLOWEST = 30.0, 5.0  # [Hz] of the frames kept
 
 
 def replay(name: str, found: Sequence[Motion], most_bytes: int) -> Markup:
     """Return the section with the replay of up to MOST motions.
 
-    Where it would be larger than `most_bytes`, fewer pictures a second are kept.
+    The frame rate is lowered if the replay would exceed `most_bytes`.
     """
     shown = list(found[:MOST])
     try:
@@ -45,14 +45,14 @@ def _document(name: str, shown: Sequence[Motion], most_bytes: int) -> tuple[str,
 
 
 def _said(shown: Sequence[Motion], found: Sequence[Motion], rate: float) -> str:
-    """Say which runs are shown and which coincide with them."""
-    said = f"Shown: {listed([one.label for one in shown])}, {rate:g} pictures a second."
+    """Return which runs are shown and which move in the same way."""
+    said = f"Shown: {listed([one.label for one in shown])}, {rate:g} frames per second."
     for one in shown:
         if len(one.runs) > 1:
             moves = "moves" if len(one.runs) == 2 else "move"
-            said += f" {listed(one.labels[1:])} {moves} as {one.label} does."
+            said += f" {listed(one.labels[1:])} {moves} like {one.label}."
     left = found[len(shown):]
     if left:
-        said += (f" Not shown: {listed([label for one in left for label in one.labels])}; a replay "
-                 f"here has {in_words(MOST)} motions at most.")
+        said += (f" Not shown: {listed([label for one in left for label in one.labels])}; the "
+                 f"replay here shows at most {in_words(MOST)} motions.")
     return said

@@ -1,4 +1,4 @@
-"""A comparison as one self-contained HTML page: verdict, replay, numbers, figures, commands."""
+"""A comparison as one self-contained HTML page: summary, replay, metrics, figures, commands."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _REPLAY_BYTES, _REPLAYS_BYTES = 3_000_000, 8_000_000  # of one replay, and of al
 
 
 def comparison_page(comparison: Comparison) -> str:
-    """Return the page; it refers to nothing outside itself but the run folders beside it."""
+    """Return the page; it refers to no other files except the run folders beside it."""
     groups = comparison.groups()
     with drawing.styled(drawing.SCREEN):
         sections = [_group(comparison, name, runs) for name, runs in groups.items()]
@@ -39,7 +39,7 @@ def comparison_page(comparison: Comparison) -> str:
 
 
 def _group(comparison: Comparison, name: str, runs: Sequence[Run]) -> Markup:
-    """Return all about runs that stand side by side."""
+    """Return the article about the runs of one group."""
     found, look = motions(runs), looks(run.label for run in runs)
     room = min(_REPLAY_BYTES, _REPLAYS_BYTES // len(comparison.groups()))
     moved = {"replay": replay(name, found, room),
@@ -54,27 +54,27 @@ def _group(comparison: Comparison, name: str, runs: Sequence[Run]) -> Markup:
 
 
 def _about(name: str, runs: Sequence[Run]) -> dict[str, Any]:
-    """Return the title, and by scenario what it is; without its name where there is only one."""
+    """Return the title, and each scenario's description by name ("" if there is only one)."""
     asked = {run.scenario.name: run.scenario for run in runs}
     if len(asked) > 1:
         return {"title": f"{in_words(len(asked)).capitalize()} scenarios, resolved by {name}",
                 "about": {key: one.title for key, one in asked.items()}}
-    ways = "one way" if len(runs) == 1 else f"{in_words(len(runs))} ways"
-    return {"title": f"{runs[0].scenario.title or name}, resolved in {ways}",
+    by = "one resolver" if len(runs) == 1 else f"{in_words(len(runs))} resolvers"
+    return {"title": f"{runs[0].scenario.title or name}: {by}",
             "about": {"": runs[0].scenario.description}}
 
 
 def _picture(name: str, found: Sequence[Motion], look: Mapping[str, Look]) -> dict[str, Any]:
-    """Return the picture of the paths taken with its caption; both empty without a path."""
+    """Return the picture of the paths with its caption; both empty without a path."""
     moved = {one.label: one.recording for one in found if "ee_position" in one.recording}
     if not moved:
         return {"picture": "", "caption": ""}
     first = next(iter(moved.values()))
-    caption = f"Drawn is the robot of {next(iter(moved))}."
+    caption = f"The robot is shown for {next(iter(moved))}."
     if "desired_position" in first:
-        caption += " Dashed: the path asked for."
+        caption += " Dashed: the desired path."
     if first.scenario.avoidance is not None:
-        caption += (" Red: obstacles with ε₁ and ε₂ around them, and control points; in full where "
-                    "it is nearest to an obstacle.")
+        caption += (" Red: obstacles with ε₁ and ε₂ around them, and control points; the robot is "
+                    "solid at its closest approach to an obstacle.")
     fig = picture(moved, {label: look[label].colour for label in moved})
     return {"picture": drawn(fig, f"{name}: the paths taken"), "caption": caption}

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 Cell = tuple[str, str, str]  # its kind, "" for none; a note; the text
 
-# What most readers ask; the rest is folded away.
+# The most important metrics; the others are folded away.
 _FIRST = ("position_error_median_settled", "position_error_max_settled", "cone_violation_max",
           "moved_by_lower_max", "body_distance_min", "ee_distance_min", "contact_ticks",
           "joint_limit_excess", "speed_max", "velocity_step_max", "acceleration_max",
@@ -27,7 +27,7 @@ _FIRST = ("position_error_median_settled", "position_error_max_settled", "cone_v
 
 
 def numbers(runs: Sequence[Run], looks: Mapping[str, Look]) -> Markup:
-    """Return what was measured, best of each row marked; the less asked for is folded away."""
+    """Return the metrics with the best of each row marked; minor ones are folded away."""
     from scenarios.measure.runs import table
 
     rows = table(runs, details=False)
@@ -43,18 +43,19 @@ def _is_first(name: str) -> bool:
 
 
 def _marks(runs: Sequence[Run]) -> str:
-    """Say what the marks mean, and what the numbers contain that is not obvious."""
+    """Return what the marks mean and what to know about the numbers."""
     if all(run.fault for run in runs):
-        return "No run reached its end, so none is marked as best."
+        return "No run was completed, so none is marked as best."
     detour = any(run.recording and "repulsion_active" in run.recording
                  and run.recording["repulsion_active"].any() for run in runs)
-    marks = ("Best of each row in colour, with a dot; within 1 % is as good, and a row where all "
-             "are is unmarked." if len({run.scenario.name for run in runs}) == 1 else
-             "Different scenarios ask for different things, so none is marked as best.")
-    stopped = (" Runs that did not reach their end, in grey, take no part."
+    one = len({run.scenario.name for run in runs}) == 1
+    marks = ("The best value of each row is coloured and has a dot; values within 1 % count as "
+             "equal, and rows in which all are equal are unmarked." if one else
+             "The scenarios differ, so none is marked as best.")
+    stopped = (" Runs that stopped early are grey and not compared."
                if any(run.fault for run in runs) else "")
-    return marks + stopped + (" The position error contains the detour by which the end effector "
-                              "is pushed around an obstacle on its path." if detour else "")
+    return marks + stopped + (" The position error includes the detour of the end effector around "
+                              "obstacles on its path." if detour else "")
 
 
 def _grouped(rows: Sequence[Row], runs: Sequence[Run]
@@ -74,21 +75,21 @@ def _stopped(run: Run) -> str:
     if run.fault is None:
         return ""
     if run.recording is None or not run.recording.ticks:
-        return "did not begin"
+        return "did not start"
     return f"stopped at {run.recording['t'][-1]:.2f} s"
 
 
 def events(runs: Sequence[Run]) -> list[tuple[str, tuple[str, str, str, str]]]:
-    """Return every kind of trouble of every run, contacts and faults.
+    """Return the problems of every run: by kind, contacts and faults.
 
-    A run's label stands beside the first of its own only.
+    Only the first row of a run has its label.
     """
     return [(run.label if i == 0 else "", happened)
             for run in runs for i, happened in enumerate(_happened(run))]
 
 
 def _happened(run: Run) -> list[tuple[str, str, str, str]]:
-    """Return what, what was done, in how many ticks and when first."""
+    """Return the problem, the action taken, the number of ticks and the first time."""
     recording = run.recording
     found = []
     if recording is not None:
@@ -100,18 +101,18 @@ def _happened(run: Run) -> list[tuple[str, str, str, str]]:
             found.append(("contact", "–", str(touched.size), f"{t[touched[0]]:.3f} s"))
     if run.fault:
         ended = f"{recording['t'][-1]:.3f} s" if recording and recording.ticks else "the start"
-        found.append((f"fault: {run.fault}", "run ended", "–", ended))
+        found.append((f"fault: {run.fault}", "run stopped", "–", ended))
     return found
 
 
 def parted(runs: Sequence[Run]) -> Markup:
-    """Return where strict resolvers' runs part from each other, and why."""
+    """Return where the runs of strict resolvers diverge, and why."""
     found = [str(one) for one in partings(runs)]
     return render("report/partings.html", partings=found, bound=BOUND) if found else Markup()
 
 
 def settings(runs: Sequence[Run]) -> Markup:
-    """Return the resolvers' settings as used, and each scenario as run."""
+    """Return the resolvers' settings and the scenario files as used."""
     first = {run.scenario.name: run for run in reversed(runs)}
     return render("report/settings.html", rows=[(run, _in_text(run.settings)) for run in runs],
                   scenarios=list(reversed(first.values())))

@@ -1,4 +1,4 @@
-"""What a sweep comes to, as one HTML page: verdict, shares, spread, worst cases, failures."""
+"""The results of a sweep as one HTML page: success, distributions, worst cases, failures."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _FAILURES = 20  # reasons listed
 
 
 class Again(NamedTuple):
-    """How to make a run again: the file of its scenario, its sample's number, the command."""
+    """How to repeat a run: the file of its scenario, the sample's number, the command."""
 
     file: str
     sample: int
@@ -35,7 +35,7 @@ class Again(NamedTuple):
 
 
 class Shown(NamedTuple):
-    """What the page shows of one scenario."""
+    """The content of the page for one scenario."""
 
     scenario: Scenario
     verdict: str
@@ -50,7 +50,7 @@ class Shown(NamedTuple):
 
 @dataclass(frozen=True)
 class Page:
-    """All that a page is made of; `file` is the sweep's file, `folder` as the user named it."""
+    """The content of a page; `file` is the text of the sweep file, `folder` as the user gave it."""
 
     plan: Plan
     found: Mapping[str, Results]
@@ -60,7 +60,7 @@ class Page:
     versions: Mapping[str, str]
 
     def html(self) -> str:
-        """Return the page; it refers to nothing but files beside it."""
+        """Return the page; it refers only to files beside it."""
         return str(render(
             "sweep/page.html", sweep=self.plan.sweep, refused=self.plan.refused,
             style=resource("report/style.css"), counted=self._counted(),
@@ -68,17 +68,17 @@ class Page:
             command=self.command, file=self.file, versions=self.versions))
 
     def worst_runs(self) -> list[Planned]:
-        """Return the runs that the page has a command for."""
+        """Return the runs for which the page shows a command."""
         runs = {run.job.key: run for results in self.found.values()
                 for run in (*(worst.run for worst in results.worst()),
                             *(failure.run for failure in results.failures()[:_FAILURES]))}
         return list(runs.values())
 
     def _counted(self) -> str:
-        """Say how many runs, of how many samples, under which resolvers."""
+        """Return the numbers of runs and samples, and the resolvers."""
         runs = self.plan.runs
         labels = list(dict.fromkeys(run.label for run in runs))
-        under = (f", each under {listed(labels)}, so that all are judged on the same"
+        under = (f", each under {listed(labels)}"
                  if len(labels) > 1 else f" under {labels[0]}")
         return f"{_count(len(runs), 'run')}: {_count(self.plan.sweep.samples, 'sample')}{under}"
 
@@ -93,7 +93,7 @@ class Page:
             worst=self._worst(results), numbers=_numbers(results), looks=looks(results.labels))
 
     def _worst(self, results: Results) -> list[tuple[Planned, list[str], Again]]:
-        """Return each run that is worst by some measures, and these in words."""
+        """Return each run that is worst in some metrics, with those metrics as text."""
         measures: dict[str, list[str]] = {}
         runs: dict[str, Planned] = {}
         for one in results.worst():
@@ -138,7 +138,7 @@ def _in_full(worst: Worst) -> str:
 
 def _direction(metric: Metric) -> str:
     unit = f"[{metric.shown_unit}]" if metric.shown_unit else ""
-    better = {True: "less is better", False: "more is better", None: ""}[metric.lower_is_better]
+    better = {True: "lower is better", False: "higher is better", None: ""}[metric.lower_is_better]
     return " ".join(part for part in (unit, better) if part)
 
 

@@ -1,4 +1,4 @@
-"""What came of the runs of a sweep: parquet parts, each written whole or not at all."""
+"""Outcomes of a sweep's runs as Parquet files, each written whole or not at all."""
 
 from __future__ import annotations
 
@@ -24,19 +24,18 @@ _FIXED = (("key", pa.string()), ("ticks", pa.int64()), ("fault", pa.string()),
 
 
 class StoreError(HierarchyError):
-    """A folder of a sweep that is in use or no such folder, or a part that cannot be read."""
+    """A folder that is in use or not a sweep's, or a part that cannot be read."""
 
 
 class FullError(OSError):
-    """A file that could not be written, such as on a full disk; what was written before stays."""
+    """A file that cannot be written, such as on a full disk; files written before are kept."""
 
 
 @dataclass(frozen=True)
 class Store:
-    """The folder of a sweep: `parts/`, one file for each batch of runs, and what is made of them.
+    """The folder of a sweep: `parts/` with one file per batch of runs, and the results.
 
-    A column of a part is named after its metric, in SI units; the column's metadata say label and
-    unit.
+    Columns of a part are named after metrics, in SI units; their metadata have label and unit.
     """
 
     folder: Path
@@ -48,22 +47,22 @@ class Store:
 
     @contextmanager
     def opened(self) -> Iterator[None]:
-        """Keep the folder for this process alone, and make it if it is new.
+        """Lock the folder for this process; make it if it is new.
 
         Raises
         ------
-        StoreError : it holds something else, or another process writes into it.
+        StoreError : it has other content, or another process writes into it.
         FullError : it cannot be made.
         """
         if self.folder.exists() and not (self.folder.is_dir() and self._is_free()):
-            raise StoreError(f"output folder {self.folder} holds something that is no sweep; "
+            raise StoreError(f"output folder {self.folder} is not empty and is not a sweep's; "
                              "choose another, or remove it first")
         with _named(self.folder):
             (self.folder / "parts").mkdir(parents=True, exist_ok=True)
             lock = (self.folder / ".lock").open("w")
         with lock:
             try:
-                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)  # the kernel lets go of it
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)  # the system releases it
             except OSError:
                 raise StoreError(f"another sweep is writing into {self.folder}") from None
             for left in (self.folder / "parts").glob(".*"):
@@ -74,7 +73,7 @@ class Store:
         return (self.folder / "parts").is_dir() or not any(self.folder.iterdir())
 
     def keys(self) -> set[str]:
-        """Return the keys of all runs that are kept; raises StoreError for a damaged part."""
+        """Return the keys of all stored runs; raises StoreError for a damaged part."""
         return {key for part in self.parts for key in _read(part, ["key"])["key"].to_pylist()}
 
     def add(self, outcomes: Sequence[Outcome]) -> Path:
@@ -103,7 +102,7 @@ def write_text(text: str, path: Path) -> None:
 
 
 def metrics_of(table: pa.Table) -> dict[str, Metric]:
-    """Return the metrics that a table of parts has columns for, by name and without a value."""
+    """Return the metrics that a table has columns for, by name and without values."""
     found = {}
     for field in table.schema:
         if field.metadata and b"label" in field.metadata:
@@ -135,15 +134,15 @@ def _read(part: Path, columns: Sequence[str] | None = None) -> Any:
     try:
         return parquet.read_table(part, columns=columns, partitioning=None)
     except (OSError, pa.ArrowException) as error:
-        raise StoreError(f"{part} cannot be read ({error}); remove it to have its runs run "
-                         "again") from error
+        raise StoreError(f"{part} cannot be read ({error}); remove it to repeat "
+                         "its runs") from error
 
 
 @contextmanager
 def _named(path: Path) -> Iterator[None]:
-    """Make an OSError say which file it is about and that nothing written before is lost."""
+    """Turn an OSError into a FullError that names the file."""
     try:
         yield
     except OSError as error:
-        raise FullError(f"{path} cannot be written: {error.strerror or error}; what was written "
-                        "before it stays, and the same command goes on from there") from error
+        raise FullError(f"{path} cannot be written: {error.strerror or error}; finished runs are "
+                        "kept, and the same command continues from there") from error

@@ -1,4 +1,4 @@
-"""What a sweep shows, in a sentence made from its numbers."""
+"""The success rates of a sweep as a sentence."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ _IN_WORDS = {"Reached the end": "reached the end", "Touched nothing": "touched n
 
 
 def success(results: Results) -> str:
-    """Return in how many runs each criterion was met, the same for all resolvers or one by one."""
+    """Return in how many runs each criterion was met, for all resolvers together if equal."""
     said: dict[str, list[str]] = {}
     for criterion in results.criteria()[:-1]:
         said.setdefault(_who(results, criterion), []).append(_IN_WORDS[criterion.label])
