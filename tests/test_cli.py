@@ -121,7 +121,7 @@ def test_check_says_what_was_understood(tmp_path, capsys):
 
 
 @pytest.mark.parametrize(("arguments", "says"), [
-    (["compare", "ellipse", "ellipse"], "2 scenarios are called 'ellipse'"),
+    (["compare", "ellipse", "ellipse"], "2 scenarios are named 'ellipse'"),
     (["run", "elipse"], "did you mean 'ellipse'"),
     (["run", "ellipse", "--resolver", "recursiv"], "did you mean 'recursive'"),
     (["run", "ellipse", "--resolver", "tpm:dampign=0.1"], "dampign"),

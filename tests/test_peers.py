@@ -163,8 +163,8 @@ def test_everybody_is_judged_or_named_with_the_reason(tmp_path, capsys):
     with (tmp_path / "out" / "peers.csv").open() as file:
         assert [row["entrant"] for row in csv.DictReader(file)] == list(found)
     said = capsys.readouterr().out
-    assert "left out: nobody (not installed" in said
-    assert max(map(len, said.splitlines())) <= 80 or "left out" in said
+    assert "skipped: nobody (not installed" in said
+    assert max(map(len, said.splitlines())) <= 80 or "skipped" in said
 
 
 def test_a_velocity_beyond_its_limit_is_found(tmp_path):

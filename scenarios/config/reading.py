@@ -1,4 +1,4 @@
-"""How a scenario file is read: by name or path, over what it extends, with changes."""
+"""Read a scenario file by name or path, with the file it extends and with changes."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ LIBRARY = Path(__file__).parents[1] / "library"
 
 
 def shipped() -> tuple[str, ...]:
-    """Names of the scenarios that come with the package."""
+    """Return the names of the scenarios shipped with the package."""
     return tuple(sorted(path.stem for path in LIBRARY.glob("*.toml")))
 
 
 def load(name_or_path: str | Path, changes: Sequence[str] | Mapping[str, Any] = ()) -> Scenario:
     """Read a shipped scenario by name, or a scenario file by path, and apply changes to it.
 
-    A file may begin with `extends = "ellipse"` (a shipped name or a path beside it) and then gives
-    only what differs. `changes` are "dotted.key=value" texts with TOML values, or a mapping of
-    dotted keys. Raises ScenarioError, naming the file and the key, and UnknownNameError for a name
-    that is not shipped.
+    A file with `extends = "ellipse"` (a shipped name or a relative path) contains only the
+    differences. `changes` are "dotted.key=value" texts with TOML values, or a mapping of dotted
+    keys. Raises ScenarioError, naming the file and the key, and UnknownNameError for an unknown
+    name.
     """
     path = Path(name_or_path)
     if path.suffix != ".toml":
@@ -53,7 +53,7 @@ def load(name_or_path: str | Path, changes: Sequence[str] | Mapping[str, Any] = 
 
 
 def _read_extended(path: Path, below: tuple[Path, ...] = ()) -> dict[str, Any]:
-    """Read a file and, under it, the shipped scenario or the file that its `extends` names."""
+    """Read a file, merged over the scenario or file that its `extends` names."""
     data = read_toml(path, "scenario file", ScenarioError)
     base = data.pop("extends", None)
     if base is None:

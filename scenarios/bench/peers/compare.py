@@ -56,7 +56,7 @@ def run(out: Path | None = None, entrants: Sequence[Entrant] | None = None,
         rows, missing = _run_all(chosen, scenes, stage(folder / "staged"), folder, ticks, seconds)
     _print(console, rows)
     for label, reason in missing.items():
-        console.print(f"left out: {label} ({reason})")
+        console.print(f"skipped: {label} ({reason})")
     if out is not None:
         _write(rows, missing, out)
     return rows

@@ -3,7 +3,7 @@
 `frames.toml` has width, height, fx, fy, cx, cy [px], position [m], rotation (rows; its columns are
 the camera's axes in the world), scale [m] of one step of a pixel, and a table `[[frame]]` for each
 image: file, time [s], and optionally q [rad or m], the robot's joints when it was taken. A pixel of
-0 is no reading.
+0 means no reading.
 
 `scenarios.loop.record_frames` writes such a folder.
 """
@@ -33,11 +33,11 @@ INTRINSICS = ("width", "height", "fx", "fy", "cx", "cy", "position", "rotation")
 
 
 class RecordedFrames:
-    """Depth images from a folder, or a shipped one by name, in place of a camera.
+    """Depth images from a folder, or a shipped set by name, in place of a camera.
 
-    Image i counts as taken at its time and is there `latency` [s] later. Where the folder has no
-    joints for it, the robot is taken out as it is then. After the last image the camera has
-    stopped. Raises HierarchyError, naming file and key, where the folder cannot be used.
+    Image i is taken at its time and available `latency` [s] later. If the folder has no joints for
+    it, the robot is removed in its current state. After the last image there are no more frames.
+    Raises HierarchyError, naming file and key, if the folder is invalid.
     """
 
     def __init__(self, folder: str | Path, robot: Robot, latency: float = 0.0) -> None:
@@ -60,7 +60,7 @@ class RecordedFrames:
         self._reading = np.zeros((self.pinhole.height, self.pinhole.width), np.float32)
 
     def newest(self, t: float) -> int:
-        """Number of the last image taken by time t [s], -1 before the first."""
+        """Return the number of the last image taken by time t [s], -1 before the first."""
         return bisect_right(self.times, t + _ROUNDING) - 1
 
     def image(self, frame: int, state: State) -> tuple[Image, Array]:
@@ -97,5 +97,5 @@ def _read_png(file: Path, pinhole: Pinhole) -> NDArray[np.uint16]:
         raise HierarchyError(f"{file}: {error}") from error
     if values.shape != (pinhole.height, pinhole.width) or values.dtype.kind not in "ui":
         raise HierarchyError(f"{file}: an image {values.shape} of {values.dtype}, expected "
-                             f"{(pinhole.height, pinhole.width)} of whole numbers")
+                             f"{(pinhole.height, pinhole.width)} of integers")
     return values.astype(np.uint16)
