@@ -39,7 +39,7 @@ COUNT    ?= 1000000
 RESOLVER ?= hcod
 
 stress: $(INSTALLED)
-	@$(BIN)/python -m scenarios.bench.stress --count $(COUNT) --resolver $(RESOLVER)
+	@$(BIN)/hierarchy bench stress --count $(COUNT) --resolver $(RESOLVER)
 
 docs: $(INSTALLED)
 	@$(BIN)/python -m sphinx -E -W --keep-going -q -b html docs build/docs

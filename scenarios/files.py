@@ -1,4 +1,4 @@
-"""Output folders: refused before a run begins if they cannot take it, and written whole or not."""
+"""Files and folders: output is written whole or not at all, and a bad file is named."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import os
 import re
 import shutil
 import tempfile
+import tomllib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -30,15 +31,13 @@ def claim(folder: str | Path) -> Path:
     OutputError : it holds something, is no folder, or its parent cannot be written.
     """
     path = Path(folder).expanduser().resolve()
-    try:
+    with named(f"output folder {folder}"):
         path.parent.mkdir(parents=True, exist_ok=True)
         if path.exists() and any(path.iterdir()):
             raise OutputError(f"output folder {folder} exists and is not empty; "
                               "choose another, or remove it first")
         with tempfile.TemporaryFile(dir=path.parent):
             pass
-    except OSError as error:
-        raise OutputError(f"output folder {folder} cannot be written: {error.strerror}") from error
     return path
 
 
@@ -61,42 +60,88 @@ def whole(folder: str | Path) -> Iterator[Path]:
     try:
         yield partial
         partial.chmod(0o777 & ~_umask())
-        _rename(partial, path)
+        with named(path):
+            partial.rename(path)
     except BaseException:
         shutil.rmtree(partial, ignore_errors=True)
         raise
 
 
-def slug(text: str) -> str:
-    """Return a text as a name for a file or folder; different texts may have the same one."""
-    return re.sub(r"[^A-Za-z0-9._]+", "-", text).strip("-.") or "unnamed"
+@contextmanager
+def written(file: Path, *, synced: bool = False) -> Iterator[Path]:
+    """Give a temporary sibling of a file to write to; it takes the file's name only when whole.
 
-
-def write_text(path: Path, text: str) -> None:
-    """Write a file so that a reader finds the old one or the new one, never a part."""
-    write_bytes(path, text.encode("utf-8"))
-
-
-def write_bytes(path: Path, content: bytes) -> None:
-    """Write a file so that a reader finds the old one or the new one, never a part."""
-    partial = path.with_name(f".{path.name}.{os.getpid()}")
+    A reader finds the old file or the new one, never a part. With `synced` it is on the disk before
+    it takes its name, so that it survives a loss of power.
+    """
+    partial = file.with_name(f".{os.getpid()}-{file.name}")
     try:
-        partial.write_bytes(content)
-        partial.replace(path)
+        yield partial
+        if synced:
+            with partial.open("rb") as stream:
+                os.fsync(stream.fileno())
+        partial.replace(file)
     finally:
         partial.unlink(missing_ok=True)
 
 
+@contextmanager
+def added_to(folder: Path) -> Iterator[Path]:
+    """Give a temporary folder to write into; its files move into `folder` once all are there.
+
+    Files of the same names are replaced, others stay.
+    """
+    with tempfile.TemporaryDirectory(prefix=".adding.", dir=folder) as partial:
+        yield Path(partial)
+        for file in sorted(Path(partial).iterdir()):
+            file.replace(folder / file.name)
+
+
+@contextmanager
+def named(path: str | Path) -> Iterator[None]:
+    """Turn an OSError into an OutputError that says which path cannot be written."""
+    try:
+        yield
+    except OSError as error:
+        raise OutputError(f"{path} cannot be written: {error.strerror}") from error
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a text file in UTF-8, whole or not at all."""
+    write_bytes(path, text.encode("utf-8"))
+
+
+def write_bytes(path: Path, content: bytes) -> None:
+    """Write a file, whole or not at all."""
+    with written(path) as partial:
+        partial.write_bytes(content)
+
+
 def write_json(path: Path, data: Any) -> None:
-    """Write plain data as a JSON file; a number that is not finite raises ValueError."""
+    """Write plain data as a JSON file; raises ValueError for a number that is not finite."""
     write_text(path, json.dumps(data, indent=2, allow_nan=False) + "\n")
 
 
-def _rename(partial: Path, path: Path) -> None:
+def read_toml(path: Path, what: str, error: type[HierarchyError]) -> dict[str, Any]:
+    """Return the content of a TOML file; raises `error`, naming the file, if it cannot be read.
+
+    `what` is the kind of file in the message, such as "scenario file".
+    """
     try:
-        partial.rename(path)
-    except OSError as error:
-        raise OutputError(f"{path} cannot be written: {error.strerror}") from error
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError as cause:
+        raise error(f"{what} {str(path)!r} does not exist") from cause
+    except OSError as cause:
+        raise error(f"{what} {str(path)!r}: {cause.strerror}") from cause
+    except UnicodeDecodeError as cause:
+        raise error(f"{what} {str(path)!r} is not UTF-8 text") from cause
+    except tomllib.TOMLDecodeError as cause:  # its text gives line and column
+        raise error(f"{what} {str(path)!r}: {cause}") from cause
+
+
+def slug(text: str) -> str:
+    """Return a text as a name for a file or folder; different texts may have the same one."""
+    return re.sub(r"[^A-Za-z0-9._]+", "-", text).strip("-.") or "unnamed"
 
 
 def _umask() -> int:

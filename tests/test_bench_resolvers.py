@@ -3,11 +3,12 @@
 import csv
 import json
 
+import cascade
 import numpy as np
 import pytest
 
 from hierarchy import HierarchyError
-from scenarios.bench import candidates, cascade, families, machine, resolvers
+from scenarios.bench import candidates, families, machine, resolvers
 from scenarios.bench.families import family
 from solvers import Status
 from solvers.qp import backends

@@ -3,6 +3,8 @@ import json
 import os
 import subprocess
 import sys
+from importlib.metadata import version
+from pathlib import Path
 
 import pytest
 from hand_made import recording
@@ -45,7 +47,7 @@ def test_certify_counts_the_ticks_whose_answer_is_right(capsys):
 def test_certify_names_the_first_tick_that_is_not_and_says_that_damping_is_on(capsys):
     assert run_command(["run", "ellipse", "--certify", "--duration", "0.05"]) == 0
     out = capsys.readouterr().out
-    assert "certified: 0 of 50 ticks; the first that is not is tick 0 (t = 0.000 s)\n" in out
+    assert "certified: 0 of 50 ticks; the first one not certified is tick 0 (t = 0.000 s)\n" in out
     assert "damping = 0.05: near a singularity" in out
 
 
@@ -119,7 +121,7 @@ def test_check_says_what_was_understood(tmp_path, capsys):
 
 
 @pytest.mark.parametrize(("arguments", "says"), [
-    (["compare", "ellipse", "ellipse"], "2 scenarios are called 'ellipse'"),
+    (["compare", "ellipse", "ellipse"], "2 scenarios are named 'ellipse'"),
     (["run", "elipse"], "did you mean 'ellipse'"),
     (["run", "ellipse", "--resolver", "recursiv"], "did you mean 'recursive'"),
     (["run", "ellipse", "--resolver", "tpm:dampign=0.1"], "dampign"),
@@ -130,7 +132,7 @@ def test_check_says_what_was_understood(tmp_path, capsys):
     (["run", "ellipse", "--duration", "-1"], "control.duration"),
     (["run", "ellipse", "--duration", "long"], "--duration"),
     (["run", "missing.toml"], "missing.toml"),
-    (["compare", "ellipse", "--resolvers", ","], "names no resolver"),
+    (["compare", "ellipse", "--resolvers", ","], "no resolver given"),
     (["compare", "ellipse", "--resolvers", "tpm,recursiv"], "did you mean 'recursive'"),
     (["check", "missing.toml"], "missing.toml"),
     (["rnu", "ellipse"], "rnu"),
@@ -306,6 +308,22 @@ def test_the_shell_completes_commands_scenarios_and_resolvers():
     assert completed(["hierarchy", "run", "human-h"]) == ["human-hqp"]
     assert completed(["hierarchy", "compare", "ellipse", "--resolvers", "tpm,hc"]) == ["tpm,hcod"]
     assert completed(["hierarchy", "sweep", "ell"]) == ["ellipse-starts"]
+
+
+def test_the_version_is_printed(capsys):
+    assert run_command(["--version"]) == 0
+    assert capsys.readouterr().out == f"hierarchy {version('task-hierarchy')}\n"
+
+
+def test_every_benchmark_is_a_command_and_listed(capsys):
+    import scenarios.bench
+
+    folder = Path(scenarios.bench.__file__).parent
+    runnable = {path.stem for path in folder.glob("*.py") if "\ndef run(" in path.read_text()}
+    assert run_command(["bench", "--help"]) == 0
+    listed = capsys.readouterr().out
+    for name in (*runnable, "peers"):
+        assert f"  {name.replace('_', '-')}  " in listed
 
 
 def test_a_benchmark_that_is_not_there_is_answered_with_the_nearest(capsys):

@@ -11,7 +11,7 @@ from scenarios.cli.main import run_command
 def test_the_doctor_finds_all_well_here(capsys):
     assert run_command(["doctor"]) == 0
     out = capsys.readouterr().out
-    assert "All is well." in out
+    assert "No problems found." in out
     assert "20 of 20 answers certified" in out
     assert "200 ticks of ellipse" in out
 

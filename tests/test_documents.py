@@ -18,7 +18,7 @@ from solvers.resolver import _REGISTRY
 
 ROOT = Path(__file__).parents[1]
 BLOCK = re.compile(r"^```(\w*)\n(.*?)^```", re.DOTALL | re.MULTILINE)
-INLINE = re.compile(r"(?<!`)`((?:hierarchy|make|python -m) [^`]+)`(?!`)")
+INLINE = re.compile(r"(?<!`)`((?:hierarchy |make |python -m |python docs/)[^`]+)`(?!`)")
 TEXTS = {str(path.relative_to(ROOT)): path.read_text(encoding="utf-8")
          for path in [ROOT / "README.md", ROOT / "CONTRIBUTING.md",
                       *sorted(path for path in (ROOT / "docs").rglob("*.md")
@@ -41,7 +41,7 @@ def commands(name):
     lines = [line.strip().removeprefix("$ ") for line in shell.splitlines()]
     prose = [" ".join(text.split()) for text in INLINE.findall(BLOCK.sub("", TEXTS[name]))]
     return [re.split(r"\s{2,}| #", line)[0] for line in [*lines, *prose]
-            if re.match(r"(hierarchy|make|python -m|pip install) [a-z'\".-]", line)]
+            if re.match(r"((hierarchy|make|python -m|pip install) [a-z'\".-]|python docs/)", line)]
 
 
 def having(found):
@@ -99,7 +99,7 @@ def check(words):
         for target in (word for word in words[1:] if "=" not in word):
             assert f"\n{target}:" in (ROOT / "Makefile").read_text(), words
     elif first == "python":
-        assert importlib.util.find_spec(rest[0]), words
+        assert importlib.util.find_spec(rest[0]) if second == "-m" else (ROOT / second).is_file()
     else:
         extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"][
             "optional-dependencies"]
@@ -110,10 +110,13 @@ def check(words):
 def check_hierarchy(command, arguments):
     if command.startswith("-"):
         return
+    found = COMMANDS[command]
+    if command == "bench" and arguments and not arguments[0].startswith("-"):
+        found, arguments = found.commands[arguments[0]], arguments[1:]
     if all(word.startswith("-") for word in arguments):  # a command that is only mentioned
-        assert set(arguments) <= {opt for one in COMMANDS[command].params for opt in one.opts}
+        assert set(arguments) <= {opt for one in found.params for opt in one.opts}
         return
-    asked = COMMANDS[command].make_context(command, list(arguments)).params
+    asked = found.make_context(command, list(arguments)).params
     named = [*asked.get("scenarios", ()), asked.get("scenario"), asked.get("file")]
     specs = [asked.get("resolver"), *(asked.get("resolvers") or "").split(",")]
     for name in filter(is_name, named):

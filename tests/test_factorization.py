@@ -2,6 +2,7 @@
 
 import csv
 
+import edits
 import numpy as np
 import oracle
 import pytest
@@ -11,7 +12,6 @@ from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, 
 from rank_cases import CASES, build, random_levels
 
 from hierarchy import HierarchyError
-from scenarios.bench import edits
 from solvers import Status, certify, make
 from solvers.factorization import Factorization
 from solvers.resolvers.tpm import task_priority_matrix

@@ -124,8 +124,8 @@ def test_the_sentence_under_a_table_names_the_tasks_that_are_missed():
              "task_3_max": 1e-15}
             for name, worst in (("one", 1e-14), ("another", 0.5), ("third", 2e-15))]
     assert accuracy.said(accuracy.CASES[0], rows) == (
-        "Shows: all that the tasks can have is reached by one and third, to between 2e-15 (third) "
-        "and 1e-14 (one); another misses task 2 by up to 0.5, the rest by 1e-15.")
+        "Result: the smallest possible errors are reached by one and third, to between 2e-15 "
+        "(third) and 1e-14 (one); another misses task 2 by up to 0.5, the rest by 1e-15.")
 
 
 def test_a_resolver_that_never_answers_is_counted_and_reaches_nothing(capsys, monkeypatch):
@@ -137,14 +137,14 @@ def test_a_resolver_that_never_answers_is_counted_and_reaches_nothing(capsys, mo
     assert row["failed"] == 3
     assert row["certified"] == 0.0
     said = " ".join(capsys.readouterr().out.split())
-    assert "without an answer: silent 3" in said
-    assert "nobody answered" in said
+    assert "no answer: silent 3" in said
+    assert "no answers" in said
 
 
 def test_under_damping_it_names_who_finds_another_answer():
     rows = [{"resolver": "one", "x_max": 1e-12}, {"resolver": "another", "x_max": 0.25}]
     assert accuracy.said(accuracy.CASES[2], rows) == (
-        "Shows: the damped x of the reference is found by one, to 1e-12; another x by another, "
+        "Result: the damped reference x is found by one, to 1e-12; another x by another, "
         "up to 0.2 away.")
 
 

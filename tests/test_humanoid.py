@@ -276,7 +276,7 @@ def test_tasks_stand_behind_limits_position_and_pointing_in_their_order():
 
 
 @pytest.mark.parametrize(("entries", "control", "said"), [
-    ([HAND, HAND], {}, "2 tasks are called 'position'"),
+    ([HAND, HAND], {}, "2 tasks are named 'position'"),
     ([HAND], {"stack": "switched"}, "hierarchical"),
     ([{**HAND, "from_start": True}], {}, "from_start needs a path"),
     ([{**HAND, "frame": 3}], {}, "frame"),

@@ -12,7 +12,7 @@ from scenarios.measure.comparison import Comparison
 from scenarios.measure.partings import partings
 from scenarios.measure.runs import Run
 from scenarios.measure.verdict import verdict
-from scenarios.report.page import page
+from scenarios.report import comparison_page as page
 from solvers.qp import backends
 
 
@@ -83,7 +83,7 @@ def test_resolvers_that_are_not_strict_need_not_agree():
 def test_the_page_says_it():
     runs = (run_of("recursive"), run_of("hqp", away_from(3)))
     text = page(Comparison(runs, "hierarchy compare", {}))
-    assert "Where they part" in text
+    assert "Where strict resolvers diverge" in text
     assert "parts from recursive" in text
 
 

@@ -117,7 +117,7 @@ def test_another_environment_sees_nothing_of_ours_but_what_it_needs(tmp_path):
 
 def test_a_package_that_is_not_there_is_missing_with_what_to_do():
     nobody = Package("nobody", "no_such_module", ("nobody==1",))
-    with pytest.raises(MissingError, match=r"not installed; python -m .*peers --install"):
+    with pytest.raises(MissingError, match=r"not installed; hierarchy bench peers --install"):
         python_of(nobody)
 
 
@@ -163,8 +163,8 @@ def test_everybody_is_judged_or_named_with_the_reason(tmp_path, capsys):
     with (tmp_path / "out" / "peers.csv").open() as file:
         assert [row["entrant"] for row in csv.DictReader(file)] == list(found)
     said = capsys.readouterr().out
-    assert "left out: nobody (not installed" in said
-    assert max(len(line) for line in said.splitlines() if not line.startswith("left out")) <= 80
+    assert "skipped: nobody (not installed" in said
+    assert max(len(line) for line in said.splitlines() if not line.startswith("skipped")) <= 80
 
 
 def test_a_velocity_beyond_its_limit_is_found(tmp_path):

@@ -19,7 +19,7 @@ from scenarios.measure.comparison import Comparison
 from scenarios.measure.motions import motions
 from scenarios.measure.runs import Run, table
 from scenarios.measure.verdict import verdict
-from scenarios.report import page
+from scenarios.report import comparison_page as page
 from scenarios.report.commands import run_command
 from scenarios.report.embedded import replay
 
@@ -206,7 +206,7 @@ def test_the_page_shows_verdict_replay_table_stack_panels_commands_settings():
     text = page(comparison(made("tpm"), made("hqp")))
     places = [text.index(mark) for mark in (
         'class="verdict"', "<h2>Replay", "<h2>In numbers", "<h2>The stack over time",
-        "<h2>Side by side", "<h2>How to get this<", "<h2>Settings",
+        "<h2>Side by side", "<h2>How to reproduce this<", "<h2>Settings",
         "hierarchy compare hand-made</code>")]
     assert places == sorted(places)
 
@@ -244,7 +244,7 @@ def test_the_page_shows_every_event_in_words_and_in_the_stack_over_time():
 
 
 def test_a_page_without_events_says_that_there_were_none():
-    assert "No run had a tick without an answer" in page(comparison(made("tpm"), made("hqp")))
+    assert "No run had unsolved ticks" in page(comparison(made("tpm"), made("hqp")))
 
 
 def test_the_same_motion_with_other_events_has_a_stack_over_time_of_its_own():
@@ -299,7 +299,7 @@ def short_comparison(tmp_path_factory):
 def test_the_replay_is_in_the_page_and_says_who_moves_as_whom(short_comparison):
     text = short_comparison.read_text(encoding="utf-8")
     assert len(re.findall(r"<iframe [^>]*data-document='", text)) == 1
-    assert "recursive moves as tpm does" in text
+    assert "recursive moves like tpm" in text
     assert len(text) < 3_000_000
 
 
@@ -307,8 +307,8 @@ def test_a_replay_that_would_be_too_large_has_fewer_pictures():
     run = simulate(load("ellipse", ["control.duration=1.0"]))
     found = motions([Run(run.scenario, "tpm", "tpm", run)])
     small, large = (replay("ellipse", found, most) for most in (1, 10**7))
-    assert "5 pictures a second" in small
-    assert "30 pictures a second" in large
+    assert "5 frames per second" in small
+    assert "30 frames per second" in large
     assert len(small) < len(large)
 
 

@@ -4,8 +4,10 @@ import csv
 
 import numpy as np
 import pytest
+import scaling
+import scaling_figure
+import scaling_timed
 
-from scenarios.bench import scaling, scaling_figure, scaling_timed
 from scenarios.cell.build import build
 from scenarios.config import load
 from scenarios.loop.simulation import simulate

@@ -73,7 +73,7 @@ def keys_kept(folder):
     ("", {"sampels": "3"}, "did you mean 'samples'"),
     ("", {"samples": "0"}, "samples: "),
     ("", {"scenarios": '["elipse"]'}, "did you mean 'ellipse'"),
-    ("", {"scenarios": '["ellipse", "ellipse"]'}, "2 are called 'ellipse'"),
+    ("", {"scenarios": '["ellipse", "ellipse"]'}, "2 are named 'ellipse'"),
     ("", {"scenarios": '["there.toml"]'}, "there.toml"),
     ("", {"resolvers": '["tmp"]'}, "did you mean 'tpm'"),
     ("", {"resolvers": '["tpm:dampign=0.1"]'}, "dampign"),
@@ -194,7 +194,7 @@ def test_a_run_that_breaks_is_a_row_with_its_reason(tmp_path, cluster):
     assert len(found) == done.failed == 4  # 2 values, 2 resolvers
     assert all("q has shape" in row["error"] and row["ticks"] == 0 for row in found)
     page = (tmp_path / "out" / "index.html").read_text()
-    assert "did not reach their end" in page
+    assert "did not finish" in page
     assert found[0]["error"].partition(":")[0] in page
 
 
@@ -327,7 +327,7 @@ def test_a_folder_that_is_in_use_or_no_sweep_is_left_alone(tmp_path):
             tmp_path / "out").opened():
         pass
     (tmp_path / "thesis.tex").write_text("")
-    with pytest.raises(StoreError, match="no sweep"), Store(tmp_path).opened():
+    with pytest.raises(StoreError, match="not a sweep"), Store(tmp_path).opened():
         pass
 
 

@@ -4,11 +4,11 @@ import os
 
 import numpy as np
 import pytest
+import saturation
 from rank_cases import CASES, build, generic, random_levels, rng
 from scipy.optimize import lsq_linear
 
 from hierarchy import Hierarchy, HierarchyError
-from scenarios.bench import saturation
 from solvers import Status, certify, make
 from solvers.problems import Recipe, generate
 from solvers.workspace import WORKSPACE

@@ -1,4 +1,4 @@
-"""Error of every task and of x on random 6R arms: regular, near-singular, damped, in conflict."""
+"""Errors of tasks and of x on random 6R arms: regular, near-singular, damped, conflicting."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from hierarchy.problem import Array, Hierarchy
 from scenarios.bench.arms import near_singular, regular
 from scenarios.bench.candidates import NUMPY, plain_numpy
 from scenarios.bench.exact import damped, exact
+from scenarios.words import listed
 from solvers import Resolution, Resolver, Status, certify, make, names
 
 DAMPING, THRESHOLD = 0.05, 0.1  # the letter's code
@@ -32,8 +33,8 @@ class Case:
     """One kind of arm and of tasks.
 
     tasks : for each task, rows of the end effector's Jacobian: 0 to 2 position, 3 to 5 rotation. A
-        row that an upper task has too is asked for twice, with different targets.
-    jacobians : makes so many (N, 6, 6) from a seed.
+        row that an upper task has too conflicts with it, since the targets differ.
+    jacobians : returns Jacobians (N, 6, 6) for a count N and a seed.
     """
 
     name: str
@@ -45,19 +46,19 @@ class Case:
 
 CASES = (
     Case("regular", "Regular arms, three tasks of two rows", _REST, regular),
-    Case("near-singular", "Near a singularity, not damped", _REST, near_singular),
+    Case("near-singular", "Near a singularity, undamped", _REST, near_singular),
     Case("damped", f"Near a singularity, damped by {DAMPING:g} below {THRESHOLD:g}", _REST,
          near_singular, DAMPING),
-    Case("conflict", "Task 2 asks a row of task 1 for something else", _CROSSED, regular),
-    Case("crowded", "The same and a fourth task: eight rows, no joint left over", _FULL, regular),
+    Case("conflict", "Task 2 conflicts with a row of task 1", _CROSSED, regular),
+    Case("crowded", "The same with a fourth task: eight rows, no redundancy left", _FULL, regular),
 )
 
 
 def run(count: int, checked: int, seed: int = 0,
         cases: Iterable[Case] = CASES) -> list[dict[str, Any]]:
-    """Resolve `count` arms of every case with everybody; print a table a case, return its rows.
+    """Resolve `count` arms of every case with all resolvers; print tables, return the rows.
 
-    `checked` of the arms are also held against the exact x, and judged by `certify`.
+    `checked` of the arms are also compared with the exact x, and certified.
     """
     console = Console(highlight=False, markup=False)
     rows: list[dict[str, Any]] = []
@@ -74,23 +75,23 @@ def run(count: int, checked: int, seed: int = 0,
 
 
 def entrants(damping: float = 0.0) -> dict[str, Solve]:
-    """Return how each resolver solves, by label; plain numpy too where nothing is damped."""
+    """Return the solve function of each resolver by label, and plain numpy without damping."""
     solves: dict[str, Solve] = {} if damping else {NUMPY: plain_numpy}
     return {**solves, **{resolver.label: resolver.solve for resolver in resolvers(damping)}}
 
 
 def resolvers(damping: float = 0.0) -> list[Resolver]:
-    """Return every resolver there is, in each form that makes a difference to equalities."""
+    """Return every resolver, in each form that differs for equalities."""
     settings: dict[str, Any] = {"damping": damping, "threshold": THRESHOLD}
     usual = [make(name, **settings) for name in names()]
     return usual + [make(name, form=form, **settings) for name, form in _FORMS if name in names()]
 
 
 def hierarchies(case: Case, count: int, seed: int) -> tuple[list[Hierarchy], Array]:
-    """Return the problems of a case, and the least violation (count, L) each task can have.
+    """Return the problems of a case, and the smallest possible violation (count, L) of each task.
 
-    A row of a task above cannot be given up, and the other rows can all be met: so what is asked
-    of a row for the second time is missed by the difference of its targets.
+    Rows of upper tasks are always met, and all other rows can be met, so a repeated row is missed
+    by the difference of its targets.
     """
     order = [row for task in case.tasks for row in task]
     sizes = np.array([len(task) for task in case.tasks], dtype=np.int64)
@@ -104,34 +105,34 @@ def hierarchies(case: Case, count: int, seed: int) -> tuple[list[Hierarchy], Arr
 
 
 def said(case: Case, rows: Sequence[dict[str, Any]]) -> str:
-    """Return in a sentence which tasks who reaches; where all is damped, who finds the same x."""
+    """Return in a sentence which resolvers reach which tasks, or with damping the same x."""
     rows = [row for row in rows if not np.isnan(row["x_max"])]
     if not rows:
-        return "Shows: nobody answered."
+        return "Result: no answers."
     if case.damping:
-        return f"Shows: {_damped_parties(rows)}."
+        return f"Result: {_damped_parties(rows)}."
     tasks = [f"task_{k + 1}_max" for k in range(len(case.tasks))]
     worst = {row["resolver"]: max(row[key] for key in tasks) for row in rows}
     reached = {label: off for label, off in worst.items() if off <= REACHED}
-    parts = [f"all that the tasks can have is reached by {_listed(list(reached))}, "
+    parts = [f"the smallest possible errors are reached by {listed(list(reached))}, "
              f"{_between(reached)}"] if reached else []
     parts += [_missing(row, tasks) for row in rows if row["resolver"] not in reached]
-    return f"Shows: {'; '.join(parts)}."
+    return f"Result: {'; '.join(parts)}."
 
 
 def _missing(row: Mapping[str, Any], tasks: Sequence[str]) -> str:
     errors = {f"task {k + 1}": row[key] for k, key in enumerate(tasks)}
     rest = [off for off in errors.values() if off <= REACHED]
-    off = _listed([f"{task} by up to {off:.1g}" for task, off in errors.items() if off > REACHED])
+    off = listed([f"{task} by up to {off:.1g}" for task, off in errors.items() if off > REACHED])
     return f"{row['resolver']} misses {off}{f', the rest by {max(rest):.0e}' if rest else ''}"
 
 
 def _damped_parties(rows: Sequence[dict[str, Any]]) -> str:
     same = {row["resolver"]: row["x_max"] for row in rows if row["x_max"] <= REACHED}
     other = {row["resolver"]: row["x_max"] for row in rows if row["resolver"] not in same}
-    parts = [f"the damped x of the reference is found by {_listed(list(same))}, {_between(same)}"
+    parts = [f"the damped reference x is found by {listed(list(same))}, {_between(same)}"
              ] if same else []
-    parts += [f"another x by {_listed(list(other))}, up to {max(other.values()):.1g} away"
+    parts += [f"another x by {listed(list(other))}, up to {max(other.values()):.1g} away"
               ] if other else []
     return "; ".join(parts)
 
@@ -143,17 +144,13 @@ def _between(errors: Mapping[str, float]) -> str:
     return f"to between {errors[best]:.0e} ({best}) and {errors[worst]:.0e} ({worst})"
 
 
-def _listed(parts: Sequence[str]) -> str:
-    return " and ".join(filter(None, [", ".join(parts[:-1]), parts[-1]]))
-
-
 def _reference(case: Case, h: Hierarchy) -> Array:
     return damped(h, case.damping, THRESHOLD) if case.damping else exact(h)
 
 
 def _judged(solve: Solve, case: Case, problems: Sequence[Hierarchy], least: Array,
             answers: Sequence[Array]) -> dict[str, Any]:
-    """Solve every problem; return errors of the tasks, of x, and what was certified or failed."""
+    """Solve every problem; return errors of tasks and x, and the shares certified and failed."""
     answered = [solve(h) for h in problems]
     solved = np.array([res.status is Status.SOLVED for res in answered])
     errors = np.array([abs(h.violations(res.x) - lowest) for h, res, lowest in zip(
@@ -171,7 +168,7 @@ def _judged(solve: Solve, case: Case, problems: Sequence[Hierarchy], least: Arra
 
 
 def _summary(errors: Sequence[float] | Array) -> dict[str, float]:
-    if not len(errors):  # nobody answered
+    if not len(errors):  # no answers
         return dict.fromkeys(("mean", "median", "max"), float("nan"))
     return {"mean": float(np.mean(errors)), "median": float(np.median(errors)),
             "max": float(np.max(errors))}
@@ -192,5 +189,5 @@ def _print(console: Console, case: Case, rows: Sequence[dict[str, Any]]) -> None
     console.print(table)
     failed = {row["resolver"]: row["failed"] for row in rows if row["failed"]}
     if failed:
-        console.print("without an answer: " + ", ".join(
+        console.print("no answer: " + ", ".join(
             f"{label} {number}" for label, number in failed.items()))

@@ -1,4 +1,4 @@
-"""Random arms of six revolute joints, many at a time, and configurations close to a singularity."""
+"""Random arms of six revolute joints, in batches, and configurations near a singularity."""
 
 from __future__ import annotations
 
@@ -7,15 +7,16 @@ from dataclasses import dataclass
 from typing import final
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from hierarchy.problem import Array
 
-REGULAR = 0.05           # smallest singular value [m or 1] from which on a Jacobian is regular
-NEAREST = 1e-7           # the same [m or 1], below which it is too near to a singular one
+REGULAR = 0.05           # smallest singular value [m or 1] of a regular Jacobian
+NEAREST = 1e-7           # smallest singular value [m or 1] that is accepted near a singularity
 _LENGTH = 0.5            # [m] the longest a and d of a link
 _STEPS = (1e-6, 1e-2)    # [rad] from a singular configuration
 _BISECTIONS = 60
-_BATCHES = 1000          # bound on how often arms are drawn
+_BATCHES = 1000          # largest number of draws
 
 
 @final
@@ -37,9 +38,9 @@ class Arms:
         axes, origins = np.empty((count, n, 3)), np.empty((count, n, 3))
         for i in range(n):
             axes[:, i], origins[:, i] = R[:, :, 2], p
-            R = R @ _rotations(q[:, i], 2)
+            R = R @ Rotation.from_euler("z", q[:, i]).as_matrix()
             p = p + self.a[:, i, None] * R[:, :, 0] + self.d[:, i, None] * R[:, :, 2]
-            R = R @ _rotations(self.alpha[:, i], 0)
+            R = R @ Rotation.from_euler("x", self.alpha[:, i]).as_matrix()
         return np.concatenate([np.cross(axes, p[:, None] - origins), axes], axis=2).swapaxes(1, 2)
 
 
@@ -55,9 +56,9 @@ def regular(count: int, seed: int = 0) -> Array:
 def near_singular(count: int, seed: int = 0) -> Array:
     """Return Jacobians (count, 6, 6) between 1e-6 and 1e-2 rad away from a singular configuration.
 
-    Between two configurations whose determinants differ in sign there is a singular one; it is
-    found by bisection, and left by a step that is uniform in its logarithm. The smallest singular
-    value stays above NEAREST, the others above REGULAR.
+    Bisection finds a singular configuration between two whose determinants differ in sign; a step
+    of log-uniform length leads away from it. The smallest singular value stays above NEAREST, the
+    others above REGULAR.
     """
     def some(rng: np.random.Generator) -> Array:
         arms, low, high = draw(count, rng), _configurations(count, rng), _configurations(count, rng)
@@ -108,14 +109,3 @@ def _collect(some: Callable[[np.random.Generator], Array], count: int, seed: int
 
 def _singular_values(J: Array) -> Array:
     return np.asarray(np.linalg.svd(J, compute_uv=False))
-
-
-def _rotations(angle: Array, axis: int) -> Array:
-    """Rotations (N, 3, 3) about x (axis = 0) or z (axis = 2) by angle (N,) [rad]."""
-    R = np.zeros((len(angle), 3, 3))
-    i, j = (axis + 1) % 3, (axis + 2) % 3
-    R[:, axis, axis] = 1.0
-    R[:, i, i] = R[:, j, j] = np.cos(angle)
-    R[:, j, i] = np.sin(angle)
-    R[:, i, j] = -np.sin(angle)
-    return R

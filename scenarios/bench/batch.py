@@ -1,17 +1,13 @@
-"""How many problems a second does a batch solve, on one core and on all of them?
+"""How many problems per second does a batch solve, on one core and on all cores?
 
-    python -m scenarios.bench.batch --out runs/batch
-
-Problems of a reference family, each with its own targets and reference, by `solvers.batch` with one
-thread and with one for each core, by `resolver.solve` in a Python loop, and for `tpm` in jax where
-that is installed. jax runs on the device that it finds; the numbers in docs/batch.md are from a
-processor, no GPU was at hand.
+Problems of a reference family, each with its own targets and reference, are solved by
+`solvers.batch` with one thread and with one per core, by `resolver.solve` in a Python loop, and for
+`tpm` by jax if installed. jax runs on the device that it finds; the numbers in docs/batch.md are
+from a CPU.
 """
 
 from __future__ import annotations
 
-import argparse
-import sys
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from importlib.util import find_spec
@@ -32,18 +28,17 @@ from solvers.batch import Batch, cores, solve
 
 COUNTS = (100, 1000, 10_000, 100_000)
 ENTRIES = (("EQ7", "tpm"), ("EQ7", "hcod"), ("INEQ7", "hcod"))
-_LOOPED = 1000  # problems at most that are solved one by one
+_LOOPED = 1000  # problems solved one by one, at most
 
 NOTES = """\
-Millions of problems a second: by the fastest call, and per core, over the processor time that all \
-calls took. Both are chosen because other work on the machine does not count; medians are in the \
-CSV."""
+Millions of problems per second: from the fastest call, and per core from the processor time of \
+all calls. Both are insensitive to other load on the machine; medians are in the CSV."""
 
 
 @final
 @dataclass
 class Timed:
-    """One way to solve a batch: its call, and what its calls took [s]."""
+    """One method to solve a batch: its call and its times [s]."""
 
     way: str
     call: Callable[[], Any]
@@ -59,7 +54,7 @@ class Timed:
         self.wall.append(perf_counter() - start)
 
     def row(self, name: str, resolver: str, problems: int) -> dict[str, Any]:
-        """Return what is written down."""
+        """Return the row of the table."""
         best, median, p95 = np.percentile(self.wall, [0, 50, 95])
         return {"family": name, "resolver": resolver, "problems": problems, "way": self.way,
                 "calls": len(self.wall), "best_us": 1e6 * best / self.count,
@@ -70,14 +65,14 @@ class Timed:
 
 def run(out: Path | None = None, counts: Sequence[int] = COUNTS, seconds: float = 1.0,
         entries: Sequence[tuple[str, str]] = ENTRIES) -> list[dict[str, Any]]:
-    """Time every way on every family and number of problems; print, return and keep the rows.
+    """Time every method on every family and batch size; print, write and return the rows.
 
-    seconds : [s] for all ways together at one number of problems; at least three calls of each.
+    seconds : [s] for all methods together at one batch size; at least three calls of each.
     entries : (family, resolver).
 
     Raises
     ------
-    HierarchyError : a family that is not there.
+    HierarchyError : an unknown family.
     """
     console = Console(highlight=False, markup=False)
     console.print(f"Batches on {cores()} cores of {machine()['processor']}")
@@ -93,7 +88,7 @@ def run(out: Path | None = None, counts: Sequence[int] = COUNTS, seconds: float 
 
 
 def problems_like(name: str, count: int, seed: int = 0) -> Batch:
-    """Return so many problems of a family, each with targets moved by 1 % and a reference."""
+    """Return `count` problems of a family, with targets varied by 1 % and random references."""
     r = np.random.default_rng(seed)
     originals = [problem.h for problem in family(name)]
     return Batch.of([_like(originals[p % len(originals)], r) for p in range(count)])
@@ -132,7 +127,7 @@ def _call(batch: Batch, resolver: Resolver, threads: int) -> Callable[[], Any]:
 
 
 def _print(console: Console, title: str, rows: Sequence[dict[str, Any]]) -> None:
-    """Print a row for each number of problems, and of each way its rate and that of a core."""
+    """Print the rate of each method and its rate per core, one row per batch size."""
     ways = list(dict.fromkeys(row["way"] for row in rows))
     table = Table(title=title, box=None, title_justify="left", pad_edge=False)
     for head in ("problems", *(head for way in ways for head in (way, "per core"))):
@@ -146,19 +141,3 @@ def _print(console: Console, title: str, rows: Sequence[dict[str, Any]]) -> None
 
 def _write(rows: Sequence[dict[str, Any]], out: Path) -> None:
     write_rows(rows, out / "batch.csv")
-
-
-def main() -> int:
-    """Run from the command line."""
-    parser = argparse.ArgumentParser(prog="python -m scenarios.bench.batch",
-                                     description="Problems a second in batches.")
-    parser.add_argument("--count", type=int, action="append", help="problems; may be repeated")
-    parser.add_argument("--seconds", type=float, default=1.0, help="for each number of problems")
-    parser.add_argument("--out", type=Path, default=None, help="folder for batch.csv")
-    given = parser.parse_args()
-    run(given.out, given.count or COUNTS, given.seconds)
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -1,4 +1,4 @@
-"""Who is timed: the resolvers, plain numpy, and DAQP's hierarchical call made by hand."""
+"""The candidates: the resolvers, plain numpy, and DAQP's hierarchical call."""
 
 from __future__ import annotations
 

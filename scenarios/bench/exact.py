@@ -13,10 +13,10 @@ Row = list[Fraction]
 
 
 def exact(h: Hierarchy) -> Array:
-    """Return x (n,) of a hierarchy of equalities without rounding, but for the last step to floats.
+    """Return x (n,) of a hierarchy of equalities without rounding, except the conversion to floats.
 
-    The numbers of h are taken as the fractions they are, so there is no tolerance either: rows
-    that differ in their last digit are independent. For some ten unknowns; milliseconds.
+    The numbers of h are taken as exact fractions, so there is no tolerance: rows that differ in
+    their last digit are independent. For about ten unknowns; takes milliseconds.
     """
     settled: list[Row] = []  # [a, a x] of the rows above
     for A, b, _ in [*h.levels(), (np.eye(h.n), h.reference, h.reference)]:
@@ -31,8 +31,8 @@ def exact(h: Hierarchy) -> Array:
 def damped(h: Hierarchy, damping: float, threshold: float, smallest: float = 1e-9) -> Array:
     """Return x (n,) of a hierarchy of equalities with the damping of `Resolver`, from numpy's SVD.
 
-    Singular values of a level's rows, as seen through the null space of those above, count as zero
-    below `smallest`.
+    Singular values of a level's rows, projected into the null space of the levels above, count as
+    zero below `smallest`.
     """
     x, N = np.zeros(h.n), np.eye(h.n)
     for A, b, _ in h.levels():
@@ -47,7 +47,7 @@ def damped(h: Hierarchy, damping: float, threshold: float, smallest: float = 1e-
 
 
 def _solutions(rows: Sequence[Row], pivots: Sequence[int], n: int) -> tuple[Row, list[Row]]:
-    """Return one solution of reduced rows, and a basis of what they leave free."""
+    """Return one solution of reduced rows, and a basis of their null space."""
     x, free = [Fraction(0)] * n, []
     for row, pivot in zip(rows, pivots, strict=True):
         x[pivot] = row[n]
@@ -60,7 +60,7 @@ def _solutions(rows: Sequence[Row], pivots: Sequence[int], n: int) -> tuple[Row,
 
 
 def _least_squares(rows: Sequence[Row], x: Row, free: Sequence[Row]) -> Row:
-    """Move x along the free directions to where the rows [a, b] are missed least."""
+    """Move x in the null space to the least-squares solution of the rows [a, b]."""
     missing = [row[-1] - _dot(row[:-1], x) for row in rows]
     columns = [[_dot(row[:-1], v) for row in rows] for v in free]
     normal = [[*(_dot(u, w) for w in columns), _dot(u, missing)] for u in columns]
@@ -70,7 +70,7 @@ def _least_squares(rows: Sequence[Row], x: Row, free: Sequence[Row]) -> Row:
 
 
 def _reduced(rows: Sequence[Row]) -> tuple[list[Row], list[int]]:
-    """Return the reduced echelon form of equations [a, b] that have a solution, and its pivots."""
+    """Return the reduced echelon form of consistent equations [a, b], and its pivots."""
     left, done, pivots = [list(row) for row in rows], 0, []
     for c in range(len(rows[0]) - 1 if rows else 0):
         pivot = next((i for i in range(done, len(left)) if left[i][c]), None)

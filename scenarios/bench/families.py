@@ -1,4 +1,4 @@
-"""The reference problems, stored with certified answers, and fresh ones of the same make."""
+"""Reference problems with stored certified answers, and fresh problems of the same families."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ EQUALITIES = ("EQ7", "EQ7over", "EQ7sing", "EQ30L8", "EQ30L10")
 INEQUALITIES = ("INEQ7", "HUM38", "DEGEN7")
 FAMILIES = EQUALITIES + INEQUALITIES
 DATA = Path(__file__).parents[2] / "tests" / "data" / "hlsp"
-CHECKED = 5      # fresh problems of a family whose violations hqp gives
-_MISSING = 1e9  # the data's sign for a missing side
+CHECKED = 5      # fresh problems of a family with violations from hqp
+_MISSING = 1e9  # marks a missing side in the data
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class Problem:
 
     @property
     def known(self) -> bool:
-        """Whether there is a certified answer."""
+        """Whether a certified answer is known."""
         return not bool(np.isnan(self.norms).any())
 
 
@@ -39,7 +39,7 @@ def family(name: str, folder: Path = DATA) -> list[Problem]:
 
     Raises
     ------
-    HierarchyError : the family's file is not in the folder.
+    HierarchyError : the folder does not have the family's file.
     """
     file = Path(folder) / f"{name}.npz"
     if not file.is_file():
@@ -60,9 +60,9 @@ def _problem(data: dict[str, Array], p: int) -> Problem:
 
 
 def fresh(name: str, seed: int, count: int, checked: int = CHECKED) -> list[Problem]:
-    """Make problems of a family that nothing was tuned on, from seeds `seed`, `seed` + 1, ...
+    """Generate problems of a family with seeds `seed`, `seed` + 1, ..., not used for tuning.
 
-    checked : for so many of them, the first, hqp gives norms; only where its answer is certified.
+    checked : number of problems, the first ones, with norms from hqp if its answer is certified.
     """
     made, hqp = [make_problem(name, seed + i) for i in range(count)], make("hqp")
     return [_answered(hqp, h) if i < checked else _unanswered(h) for i, h in enumerate(made)]

@@ -1,4 +1,4 @@
-"""Time against accuracy of every candidate, a panel for each family."""
+"""Time against accuracy of every candidate, one panel per family."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 from scenarios.bench.candidates import DAQP, NUMPY
 from scenarios.draw.figures import drawing
 
-_LEAST, _MOST = 1e-16, 1e-4  # residuals drawn; what is beyond stands at the edge
+_LEAST, _MOST = 1e-16, 1e-4  # limits of residuals; values beyond are drawn at the edge
 _MARKS = "osD^v<P"  # variants of a resolver share its colour
 OWN = {NUMPY: "#8a8f98", DAQP: "#0b0c0d"}
 
@@ -21,9 +21,9 @@ OWN = {NUMPY: "#8a8f98", DAQP: "#0b0c0d"}
 def time_against_accuracy(rows: Sequence[dict[str, Any]]) -> Figure:
     """Return the figure: median time over the largest certified residual, both logarithmic.
 
-    Low and left is better. A filled mark is a cold start, an empty one a warm one. A faint one
-    said of some problem that it did not solve it; one with a cross called an answer solved that is
-    not certified, or not as the stored one.
+    Low and left is better. Filled marks are cold starts, empty ones warm starts. A faint mark: some
+    problems were reported as not solved. A cross: an answer reported as solved is not certified, or
+    differs from the stored one.
     """
     names = list(dict.fromkeys(row["family"] for row in rows))
     labels = list(dict.fromkeys(row["resolver"] for row in rows))
@@ -86,5 +86,5 @@ def _legend(style: dict[str, tuple[str, str]]) -> list[Line2D]:
     wrong = Line2D([], [], color=drawing.ALERT, marker="x", linestyle="", markersize=4.0,
                    label="a wrong answer")
     faint = Line2D([], [], color=drawing.INK, marker="o", linestyle="", markersize=5.5, alpha=0.4,
-                   label="some without answer")
+                   label="some not solved")
     return [*marks, empty, faint, wrong]

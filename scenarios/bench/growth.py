@@ -1,4 +1,4 @@
-"""How the time of a solve grows with the number of tasks, and with the number of joints."""
+"""Growth of the time of a solve with the numbers of tasks and joints."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from scenarios.bench.machine import one_core
 
 TASKS = tuple((30, count) for count in range(1, 11))              # (joints, tasks)
 JOINTS = tuple((n, 5) for n in (20, 30, 45, 70, 100, 150, 200, 300))
-ROWS = 3                # of every task
-FITTED = 3              # sizes at the upper end from which an exponent is read, at least
-LEVEL_LESS = ("augmented", "weighted")  # no priorities, so not timed
-_TURN = 1_000_000       # [ns] for which one is timed before the next has its turn
+ROWS = 3                # per task
+FITTED = 3              # smallest number of upper sizes for fitting an exponent
+LEVEL_LESS = ("augmented", "weighted")  # not timed: no priorities
+_TURN = 1_000_000       # [ns] of timing per turn
 _MOST = 20              # solves in a turn
 
 
@@ -48,7 +48,7 @@ class Timed:
                 break
 
     def row(self, figure: str) -> dict[str, Any]:
-        """Return what is written down."""
+        """Return the row of the table."""
         median, p95 = np.percentile(self.times, [50, 95]) / 1e3
         return {"figure": figure, "resolver": self.resolver, "joints": self.joints,
                 "tasks": self.tasks, "rows": ROWS * self.tasks, "solves": len(self.times),
@@ -57,9 +57,9 @@ class Timed:
 
 def run(seconds: float, tasks: Sequence[tuple[int, int]] = TASKS,
         joints: Sequence[tuple[int, int]] = JOINTS, seed: int = 0) -> list[dict[str, Any]]:
-    """Time everyone that keeps priorities, over tasks and over joints; print and return the rows.
+    """Time all resolvers with priorities over tasks and joints; print and return the rows.
 
-    All sizes and all candidates take turns, on one core, for `seconds` in all and at least once.
+    All sizes and candidates take turns on one core for `seconds` [s] in total, at least once each.
     """
     field = {"tasks": _field(tasks, seed), "joints": _field(joints, seed + 1)}
     everyone = [timed for some in field.values() for timed in some]
@@ -80,7 +80,7 @@ def run(seconds: float, tasks: Sequence[tuple[int, int]] = TASKS,
 
 
 def random_hierarchy(joints: int, tasks: int, seed: int) -> Hierarchy:
-    """Return `tasks` levels of three random rows on so many joints, of full rank almost surely."""
+    """Return `tasks` levels of three random rows, almost surely of full rank."""
     rng = np.random.default_rng(seed)
     return Hierarchy.from_levels([(rng.normal(size=(ROWS, joints)), rng.normal(size=ROWS))
                                   for _ in range(tasks)])
@@ -109,7 +109,7 @@ def _call(solve: Callable[[Hierarchy], Any], h: Hierarchy) -> Callable[[], Any]:
 
 
 def _print(console: Console, figure: str, rows: Sequence[dict[str, Any]]) -> None:
-    """Print a column a size and a sentence of what the table shows."""
+    """Print a table with one column per size, and a summary."""
     sizes = list(dict.fromkeys(row[figure] for row in rows))
     labels = list(dict.fromkeys(row["resolver"] for row in rows))
     medians = {(row["resolver"], row[figure]): row["median_us"] for row in rows}
@@ -129,15 +129,15 @@ def _print(console: Console, figure: str, rows: Sequence[dict[str, Any]]) -> Non
 
 
 def said(rows: Sequence[dict[str, Any]], figure: str) -> str:
-    """Return in a sentence who is fastest at the largest size, and how the others stand to it."""
+    """Return in a sentence which resolver is fastest at the largest size, and by how much."""
     largest = max(row[figure] for row in rows)
     times = {row["resolver"]: row["median_us"] for row in rows if row[figure] == largest}
     first, *rest = sorted(times, key=times.__getitem__)
     others = ", ".join(f"{label} {_digits(times[label] / times[first])}" for label in rest)
-    return (f"Shows: at {largest} {figure} {first} is fastest, {_digits(times[first])} us; times "
-            f"of the others over its own: {others}.")
+    return (f"Result: at {largest} {figure} {first} is fastest, {_digits(times[first])} us; times "
+            f"of the others relative to it: {others}.")
 
 
 def _digits(value: float) -> str:
-    """Return two digits, and all that stand before the point."""
+    """Return a number with two digits, or all digits before the decimal point."""
     return f"{value:.0f}" if value >= 10.0 else f"{value:.1f}"

@@ -19,7 +19,7 @@ from scenarios.draw.figures.drawing import INK, Array
 _PANELS = {"tasks": ("number of tasks $l$", "l"), "joints": ("number of joints $n$", "n")}
 _NUMPY = "#8a8f98"   # as in the benchmark of resolvers
 _APART = 0.058       # of two labels, as a share of the height of the axes
-_UNMARKED = (7, 9)   # sizes without a number: these would run into their neighbours'
+_UNMARKED = (7, 9)   # sizes without a label, which would overlap
 _MARKS = "osD^v<P>X"
 
 
@@ -78,7 +78,7 @@ def _title(figure: str, rows: Sequence[dict[str, Any]]) -> str:
 
 def name_lines(ax: Axes, figure: str, letter: str, rows: Sequence[dict[str, Any]],
                colours: dict[str, str]) -> None:
-    """Write each name and exponent beside the end of its line, none over another."""
+    """Write each name and exponent beside the end of its line without overlap."""
     powers = exponents(rows, figure)
     ends = {row["resolver"]: row for row in sorted(rows, key=lambda row: float(row[figure]))}
     order = sorted(ends, key=lambda label: float(ends[label]["median_us"]))
@@ -94,7 +94,7 @@ def name_lines(ax: Axes, figure: str, letter: str, rows: Sequence[dict[str, Any]
 
 
 def _spread(heights: Sequence[float]) -> Array:
-    """Return ascending heights that are _APART at least, and together as near as they can be."""
+    """Return the nearest ascending heights that are at least _APART."""
     steps = np.arange(len(heights)) * _APART
     below = np.asarray(heights) - steps  # to be made ascending: pool what is not
     pools: list[list[float]] = []

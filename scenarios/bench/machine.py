@@ -1,4 +1,4 @@
-"""On what was timed, and on one core only."""
+"""The machine of a benchmark, and pinning to one core."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _PACKAGES = ("numpy", "numba", "scipy", "qpsolvers", "proxsuite", "osqp", "quadp
 
 @contextmanager
 def one_core() -> Iterator[None]:
-    """Keep this process on one of its cores, where the system can; all of them afterwards."""
+    """Pin this process to one of its cores, if the system can, and restore them afterwards."""
     if not hasattr(os, "sched_setaffinity"):
         yield
         return
@@ -28,7 +28,7 @@ def one_core() -> Iterator[None]:
 
 
 def machine() -> dict[str, str]:
-    """Return processor, cores and versions by name; nothing that tells whose machine it is."""
+    """Return processor, cores and versions by name, without personal data."""
     found = {"processor": _processor(), "cores": str(os.cpu_count()),
              "system": f"{platform.system()} {platform.machine()}",
              "python": platform.python_version()}

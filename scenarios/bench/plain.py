@@ -1,7 +1,7 @@
-"""The tick of `ellipse` as one writes it with plain numpy calls: what the compiled tick replaces.
+"""The tick of `ellipse` in plain numpy, which the compiled tick replaces.
 
-Same kinematics call, same tasks, same order, same TPM (plain QR, damped pivots), so the command
-must come out equal; `hierarchy bench tick` checks that before it times anything.
+It has the same kinematics call, tasks, order and TPM (plain QR, damped pivots), so the commands
+must agree; `hierarchy bench tick` checks that before timing.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ from scenarios.config import Scenario
 
 
 class PlainTick:
-    """One tick after the other in numpy; `log` collects what a recording would."""
+    """Ticks in numpy; `log` collects the signals of a recording."""
 
     def __init__(self, scenario: Scenario, cell: Cell) -> None:
         if not (cell.sensor and cell.areas and cell.position and cell.pointing):
-            raise HierarchyError("the plain tick is that of `ellipse`, with all of its tasks")
+            raise HierarchyError("the plain tick needs all tasks of `ellipse`")
         self.cell, self.areas = cell, cell.areas
         self.position, self.pointing = cell.position, cell.pointing
         self.period = scenario.control.period

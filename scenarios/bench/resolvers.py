@@ -1,12 +1,11 @@
-"""Time of every resolver on the reference problems, with the verdict on its answers beside it.
+"""Time of every resolver on the reference problems, with a check of its answers.
 
-The 50 stored problems of a family are known: solvers have been tuned on them. Fresh problems of the
-same make, of seeds that nothing was tuned on, are timed and reported apart.
+Solvers have been tuned on the 50 stored problems of each family. Fresh problems of the same
+families, with seeds not used for tuning, are timed and reported separately.
 """
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass, field
 from pathlib import Path
 from time import perf_counter_ns
@@ -20,17 +19,18 @@ from scenarios.bench.candidates import DAQP, NUMPY, Call, Candidate, candidates
 from scenarios.bench.families import DATA, FAMILIES, Problem, family, fresh
 from scenarios.bench.machine import machine, one_core
 from scenarios.bench.rows import write_rows
+from scenarios.files import write_json
 from solvers import Status, certify
 
-RIGHT = 1e-6        # a level's violation off by more than this is wrong; tolerance of `certify`
-_TURN = 1_000_000   # [ns] for which a candidate solves a problem before the next has its turn
+RIGHT = 1e-6        # tolerance of a level's violation and of `certify`
+_TURN = 1_000_000   # [ns] per turn of a candidate
 _MOST = 20          # solves in a turn
-_FOR_P999 = 1000    # solves from which on a 99.9th percentile means something
+_FOR_P999 = 1000    # solves needed for a 99.9th percentile
 
 KNOWN, FRESH = "known", "fresh"
 COUNT = 200  # fresh problems of a family
 
-# Medians to reach, as a ratio to the median of DAQP on the same family in the same run.
+# Target medians relative to the median of DAQP on the same family in the same run.
 TARGETS = {("EQ7", "tpm"): 0.3, ("EQ30L8", "tpm"): 0.6, ("EQ30L10", "tpm"): 0.6,
            ("INEQ7", "hcod"): 1.0, ("INEQ7", "hcod warm"): 0.47,
            ("HUM38", "hcod"): 1.3, ("HUM38", "hcod warm"): 0.25}
@@ -38,22 +38,22 @@ DEGENERATE = 2.0  # median of hcod on DEGEN7, in its medians on INEQ7
 RARE = 20.0       # its 99.9th percentile there, in its own medians
 
 NOTES = f"""\
-Times are of one call from Python, in microseconds; iter: median, in each one's own unit. cert: \
-share certified to {RIGHT:g}, from the data alone. unso: ended with a status. wrong: called \
-solved, but a level's violation is off by more than {RIGHT:g} from the stored one. error: the \
-largest such difference of those called solved. /DAQP, /numpy: ratios of medians. warm: with the \
-memory of the same problem with its targets moved by up to 1 %.
-Known limits. DAQP's hierarchical mode minimises violations divided by the norms of the rows, \
-another problem where rows differ in norm and conflict, softened by a finite weight; rows of \
-zeros are infeasible to it; its arrays are made ready before the clock starts. augmented and \
-tpm published are not strict at every rank. Resolvers of equalities are not asked about \
-inequalities. Fresh problems have no stored answers: wrong and error compare with those that hqp \
-gives for the first few, where certified; for the others, wrong is what is not certified."""
+Times of one call from Python, in microseconds; iter: median iterations, each resolver's own. \
+cert: share certified to {RIGHT:g}, from the data alone. unso: not reported as solved. wrong: \
+reported as solved, but a level's violation differs by more than {RIGHT:g} from the stored one. \
+error: the largest such difference. /DAQP, /numpy: ratios of medians. warm: with the memory of the \
+same problem with targets changed by up to 1 %.
+Known limitations. DAQP's hierarchical mode minimizes violations divided by the norms of the rows, \
+a different problem if rows conflict and differ in norm, softened by a finite weight; it treats \
+zero rows as infeasible; its arrays are prepared before timing. augmented and tpm published are \
+not strict at every rank. Resolvers for equalities skip problems with inequalities. Fresh problems \
+have no stored answers: wrong and error compare with certified answers of hqp for the first few; \
+for the others, wrong means not certified."""
 
 
 @dataclass
 class _Timed:
-    """A candidate on one family: its calls, one a problem, its times and the verdicts."""
+    """A candidate on one family: one call per problem, times and checks."""
 
     candidate: Candidate
     calls: list[Call]
@@ -67,7 +67,7 @@ class _Timed:
     residual: float = 0.0
 
     def judge(self, i: int, problem: Problem) -> None:
-        """Solve once, untimed, and hold the answer against the data and the stored answer."""
+        """Solve once, untimed, and compare with the data and the stored answer."""
         res = self.candidate.read(self.calls[i]())
         self.iterations.append(res.iterations)
         if res.status is not Status.SOLVED:
@@ -98,17 +98,17 @@ class _Timed:
 def run(out: Path | None = None, seconds: float = 0.5, folder: Path = DATA,
         families: tuple[str, ...] = FAMILIES, seed: int | None = None, count: int = COUNT
         ) -> list[dict[str, Any]]:
-    """Time everyone on every family, on one core, and judge every answer.
+    """Time all candidates on every family on one core, and check every answer.
 
-    The candidates take turns problem by problem, so that the machine's noise hits all of them
-    alike; before that each has judged, and so rehearsed, every problem. Prints a table a family
-    and what was aimed at; writes resolvers.csv, machine.json and time-accuracy.svg and .png into
-    `out` if given; returns the rows of the table.
+    Candidates take turns problem by problem, so that noise of the machine affects all equally; the
+    untimed check of every problem before also warms up. Prints a table per family and the targets;
+    writes resolvers.csv, machine.json and time-accuracy.svg and .png into `out` if given; returns
+    the rows of the table.
 
-    seconds : [s] for a candidate and family, once it has solved every problem.
-    folder : where the families are.
-    seed : of the first fresh problem of each family; None for the stored problems alone.
-    count : fresh problems of each family.
+    seconds : [s] per candidate and family, after it has solved every problem.
+    folder : folder of the families.
+    seed : seed of the first fresh problem of each family; None for stored problems only.
+    count : number of fresh problems of each family.
 
     Raises
     ------
@@ -127,7 +127,7 @@ def run(out: Path | None = None, seconds: float = 0.5, folder: Path = DATA,
             _print_family(console, rows, name, origin)
     console.print(NOTES)
     for label, reason in missing.items():
-        console.print(f"left out: {label} ({reason})", markup=False)
+        console.print(f"skipped: {label} ({reason})", markup=False)
     for origin in (KNOWN, FRESH):
         _print_targets(console, rows, origin)
     if out is not None:
@@ -189,7 +189,7 @@ def _print_family(console: Console, rows: list[dict[str, Any]], name: str, origi
 
 
 def _print_targets(console: Console, rows: list[dict[str, Any]], origin: str) -> None:
-    """Print what was aimed at and whether it is met; nothing where a row is missing."""
+    """Print the targets and whether they are met; skip missing rows."""
     found = {(row["family"], row["resolver"]): row for row in rows if row["origin"] == origin}
     for (name, label), most in TARGETS.items():
         if (name, DAQP) in found and (name, label) in found:
@@ -209,11 +209,11 @@ def _print_target(console: Console, origin: str, row: dict[str, Any], base: floa
     verdict = "met" if ratio <= most and kept else (
         "not met" if kept else "not met: not all certified")
     console.print(f"{origin:5} {row['family']:7} {row['resolver']:9} {key[:-3]:6} {ratio:5.2f} x "
-                  f"{what}, aim {most:g}: {verdict}")
+                  f"{what}, target {most:g}: {verdict}")
 
 
 def _digits(value: float | None) -> str:
-    """Return three digits, and all that stand before the point."""
+    """Return a number with three digits, or all digits before the decimal point."""
     if value is None:
         return "–"
     return f"{value:.0f}" if value >= 100.0 else f"{value:.1f}" if value >= 10.0 else f"{value:.2f}"
@@ -224,6 +224,6 @@ def _write(rows: list[dict[str, Any]], out: Path) -> None:
     from scenarios.draw.figures.drawing import write
 
     write_rows(rows, out / "resolvers.csv")
-    (out / "machine.json").write_text(json.dumps(machine(), indent=2) + "\n")
+    write_json(out / "machine.json", machine())
     known = [row for row in rows if row["origin"] == KNOWN]
     write(time_against_accuracy(known), str(out / "time-accuracy"))

@@ -1,6 +1,6 @@
-"""What it costs to begin: imports, compilation, the first solve, and the memory of a run.
+"""Start-up costs: imports, compilation, the first solve, and the memory of a run.
 
-Each number is that of a fresh process. `hierarchy bench start`.
+Each number is measured in a new process.
 """
 
 from __future__ import annotations
@@ -20,13 +20,14 @@ from rich.console import Console
 from rich.table import Table
 
 from scenarios.bench.machine import machine
+from scenarios.files import write_json
 
-_REPEATED = 7        # times each short process is started; the least counts
+_REPEATED = 7        # repetitions of short processes; the minimum counts
 _KERNELS = 12        # slowest to compile, listed
-_MB = 1024.0 if sys.platform == "linux" else 1024.0**2  # of what the system counts memory in
+_MB = 1024.0 if sys.platform == "linux" else 1024.0**2  # units of ru_maxrss per MB
 
-# A process counts the memory of the one that started it as its own, if that held more: so a small
-# one starts it.
+# The peak memory of a process includes that of its parent before exec, so a small process starts
+# it.
 _LAUNCH = """\
 import json, os, sys, time
 began = time.perf_counter()
@@ -73,10 +74,10 @@ print(json.dumps(after))"""
 @final
 @dataclass(frozen=True)
 class Cost:
-    """One number and the most it may be; a ceiling of None is none.
+    """One number and its upper limit, None for no limit.
 
-    unit : "s" or "MB". processor : [s] of the processor's time in it, which the machine's other
-    work does not change; None where it is not measured.
+    unit : "s" or "MB". processor : processor time [s], which does not depend on other load; None if
+    it is not measured.
     """
 
     what: str
@@ -87,14 +88,14 @@ class Cost:
 
     @property
     def verdict(self) -> str:
-        """Whether the ceiling is kept."""
+        """"met" or "not met", "" without a limit."""
         if self.ceiling is None:
             return ""
         return "met" if self.value <= self.ceiling else "not met"
 
 
 def run(out: Path | None = None) -> list[Cost]:
-    """Measure everything; print a table, write start.json into the folder `out` if given."""
+    """Measure all costs; print a table, and write start.json into the folder `out` if given."""
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)
         compiled, kernels = first_compilation(folder / "cache")
@@ -102,18 +103,18 @@ def run(out: Path | None = None) -> list[Cost]:
     _print(costs, kernels)
     if out is not None:
         out.mkdir(parents=True, exist_ok=True)
-        (out / "start.json").write_text(json.dumps({
+        write_json(out / "start.json", {
             "costs": [{**asdict(cost), "verdict": cost.verdict} for cost in costs],
-            "compilation": kernels, "machine": machine()}, indent=2) + "\n")
+            "compilation": kernels, "machine": machine()})
     return costs
 
 
 def beginnings() -> list[Cost]:
-    """Whole processes, from their start to their end, with kernels compiled before.
+    """Time whole processes from start to end, with compiled kernels in the cache.
 
-    The least of several, since the machine's other work only adds to it.
+    Returns the minimum of several repetitions, since other load can only add to it.
     """
-    timed = [("python, nothing done", ["-c", "pass"], None),
+    timed = [("python -c pass", ["-c", "pass"], None),
              ("import scenarios", ["-c", "import scenarios"], None),
              ("import hierarchy, solvers", ["-c", "import hierarchy, solvers"], None),
              ("hierarchy --help", ["-m", "scenarios.cli.main", "--help"], 0.5),
@@ -123,7 +124,7 @@ def beginnings() -> list[Cost]:
 
 
 def first_compilation(cache: Path) -> tuple[list[Cost], dict[str, float]]:
-    """Run ten ticks of ellipse with no kernel cached; also the seconds that are each kernel's own.
+    """Run ten ticks of ellipse without cached kernels; also return each kernel's own seconds.
 
     Raises
     ------
@@ -131,14 +132,14 @@ def first_compilation(cache: Path) -> tuple[list[Cost], dict[str, float]]:
     """
     done = _run(["-c", _COMPILE], NUMBA_CACHE_DIR=str(cache))
     own = own_seconds(json.loads(done.said.splitlines()[-1]))
-    return [Cost("ellipse, first time ever", done.seconds, "s", None, done.processor),
-            Cost(f"of it compiling {len(own)} kernels", sum(own.values()), "s")], own
+    return [Cost("ellipse, empty cache", done.seconds, "s", None, done.processor),
+            Cost(f"compilation of {len(own)} kernels", sum(own.values()), "s")], own
 
 
 def own_seconds(events: Sequence[Sequence[Any]]) -> dict[str, float]:
-    """Return from (time, whether it begins, name) the seconds each name took, less those within."""
+    """Return the seconds of each name without nested ones, from events (time, is start, name)."""
     own: dict[str, float] = {}
-    within: list[tuple[float, float]] = []  # when each that is open began, seconds of those in it
+    within: list[tuple[float, float]] = []  # start of each open event, seconds of nested ones
     for at, begins, name in events:
         if begins:
             within.append((at, 0.0))
@@ -151,19 +152,19 @@ def own_seconds(events: Sequence[Sequence[Any]]) -> dict[str, float]:
 
 
 def memory(folder: Path) -> list[Cost]:
-    """Return the most memory [MB] that processes hold at once."""
+    """Return the peak memory [MB] of processes."""
     command = ["-m", "scenarios.cli.main", "run", "ellipse", "--duration", "2", "--out",
                str(folder / "run")]
     costs = [Cost("hierarchy run ellipse --duration 2", _run(command).memory, "MB", 300.0)]
     if find_spec("distributed") is not None:
         after = json.loads(_run(["-c", _WORKER]).said.splitlines()[-1])
         costs += [Cost("a worker of a sweep of 20 runs", max(after), "MB", 300.0),
-                  Cost("growth over the last 15 of them", after[-1] - after[4], "MB")]
+                  Cost("growth over the last 15 runs", after[-1] - after[4], "MB")]
     return costs
 
 
 def resident() -> float:
-    """Memory [MB] that this process holds; 0 where the system does not say."""
+    """Return the resident memory [MB] of this process; 0 if it is unknown."""
     file = Path("/proc/self/statm")
     if not file.is_file():
         return 0.0
@@ -173,7 +174,7 @@ def resident() -> float:
 @final
 @dataclass(frozen=True)
 class _Done:
-    """What a process printed, its seconds by clock and by processor, its most memory [MB]."""
+    """Output of a process, wall and processor seconds, peak memory [MB]."""
 
     said: str
     seconds: float
@@ -182,14 +183,14 @@ class _Done:
 
 
 def _least(what: str, arguments: list[str], most: float | None) -> Cost:
-    _run(arguments)  # so that files and kernels are in their caches
+    _run(arguments)  # fills the caches of files and kernels
     done = [_run(arguments) for _ in range(_REPEATED)]
     return Cost(what, min(one.seconds for one in done), "s", most,
                 min(one.processor for one in done))
 
 
 def _run(arguments: list[str], **environment: str) -> _Done:
-    """Run Python with arguments; RuntimeError, with what it said, if it fails."""
+    """Run Python with arguments; raises RuntimeError with its output if it fails."""
     with tempfile.TemporaryDirectory() as temporary:
         measured = Path(temporary) / "measured.json"
         done = subprocess.run([sys.executable, "-S", "-c", _LAUNCH, str(measured), sys.executable,
@@ -216,4 +217,4 @@ def _print(costs: Sequence[Cost], kernels: dict[str, float]) -> None:
     console.print(table)
     slowest = list(kernels.items())[:_KERNELS]
     listed = ", ".join(f"{name.removeprefix('solvers.kernels.')} {s:.1f}" for name, s in slowest)
-    console.print(f"\nSlowest to compile [s], without the kernels they call: {listed}.")
+    console.print(f"\nSlowest to compile [s], without called kernels: {listed}.")

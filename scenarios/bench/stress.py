@@ -1,21 +1,17 @@
 """A resolver on a million generated problems, every answer certified.
 
-    python -m scenarios.bench.stress --count 1000000 --resolver hcod --kind all
-
-The problems are of `solvers.problems`: the recipe ("recipe"), and every structured kind by its
-name. Exit code 1 if the resolver raised, gave a number that is not finite, called solved what
-`certify` rejects, or ended its process, or if `certify` raised. A problem that fails is shrunk
-while it still fails in the same way, and kept as a file that `solvers.problems.load` reads. With
-NUMBA_BOUNDSCHECK=1 (and a NUMBA_CACHE_DIR of its own) a kernel that reads or writes outside its
-arrays raises where it would corrupt memory.
+The problems come from `solvers.problems`: the recipe ("recipe") and every structured kind by name.
+A problem fails if the resolver raises, returns a number that is not finite, reports as solved what
+`certify` rejects, or kills its process, or if `certify` raises. A failing problem is reduced while
+it still fails in the same way, and saved as a file that `solvers.problems.load` reads. With
+NUMBA_BOUNDSCHECK=1 (and a separate NUMBA_CACHE_DIR) a kernel that accesses memory outside its
+arrays raises instead of corrupting memory.
 """
 
 from __future__ import annotations
 
-import argparse
 import multiprocessing
 import os
-import sys
 from collections import Counter
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
@@ -35,9 +31,9 @@ RAISED, NOT_FINITE, WRONG = "raised", "not finite", "solved, not certified"
 UNJUDGED = "solved, the certificate raised"
 FAILURES = (RAISED, NOT_FINITE, WRONG, UNJUDGED)
 CRASHED = "not judged, a process died"
-_CHUNK = 500  # seeds a process takes at a time
-_KEPT = 20    # failing problems that are shrunk and written, at most
-_TRIALS = 3000  # of one shrinking
+_CHUNK = 500  # seeds per task of a process
+_KEPT = 20    # failing problems reduced and saved, at most
+_TRIALS = 3000  # per reduction
 RECIPE, ALL = "recipe", "all"
 KINDS = (RECIPE, *problems.KINDS)
 
@@ -45,9 +41,9 @@ KINDS = (RECIPE, *problems.KINDS)
 @final
 @dataclass
 class Tally:
-    """How many problems ended how, the seeds of those that failed, and those not judged.
+    """Counts of outcomes, the seeds of failures, and the seeds not judged.
 
-    effort : how often the iterations were so many hundredths of the number of rows.
+    effort : histogram of iterations divided by rows, in hundredths.
     """
 
     counts: Counter[str] = field(default_factory=Counter)
@@ -57,11 +53,11 @@ class Tally:
 
     @property
     def passed(self) -> bool:
-        """Whether all were judged and none failed."""
+        """Whether all problems were judged and none failed."""
         return not self.failing and not self.lost
 
     def add(self, other: Tally) -> None:
-        """Take in the counts of another."""
+        """Add the counts of another tally."""
         self.counts.update(other.counts)
         self.failing += other.failing
         self.lost += other.lost
@@ -83,15 +79,15 @@ class Tally:
 
 
 def outcome(resolver: Resolver, h: Hierarchy) -> str:
-    """Return how a solve ended: certified, one of FAILURES, or the name of another Status."""
+    """Return the outcome of a solve: certified, one of FAILURES, or the name of another Status."""
     return _solved(resolver, h)[0]
 
 
 def _solved(resolver: Resolver, h: Hierarchy) -> tuple[str, int]:
-    """Return how a solve ended, and its iterations; zero where it raised."""
+    """Return the outcome of a solve and its iterations, zero if it raised."""
     try:
         res = resolver.solve(h)
-    except Exception:  # whatever it is, a solve must not raise it
+    except Exception:  # a solve must never raise
         return RAISED, 0
     if not np.isfinite(res.x).all():
         return NOT_FINITE, res.iterations
@@ -99,19 +95,19 @@ def _solved(resolver: Resolver, h: Hierarchy) -> tuple[str, int]:
         return res.status.name, res.iterations
     try:
         return CERTIFIED if certify(h, res.x).certified else WRONG, res.iterations
-    except Exception:  # a fault of the certificate, which must not end the run
+    except Exception:  # an error of the certificate must not end the run
         return UNJUDGED, res.iterations
 
 
 def recipe_for(resolver: Resolver) -> problems.Recipe:
-    """Return what the resolver can be asked for."""
+    """Return a recipe for problems that the resolver can handle."""
     return problems.Recipe(equalities_only=resolver.handles != "inequalities")
 
 
 def problem(resolver: Resolver, kind: str, seed: int) -> Hierarchy:
-    """Return the problem of a kind and a seed that the resolver can be asked for.
+    """Return the problem of a kind and a seed, restricted to what the resolver can handle.
 
-    Two of three are inside a box where it resolves bounds.
+    For a resolver of bounds, two of three problems have a box.
     """
     recipe = recipe_for(resolver)
     if kind == RECIPE:
@@ -136,7 +132,7 @@ def tally(name: str, seeds: range, kind: str = RECIPE) -> Tally:
 
 
 def shrunk(h: Hierarchy, fails: Callable[[Hierarchy], bool]) -> Hierarchy:
-    """Leave out levels, rows, columns and the reference, as long as `fails` holds."""
+    """Remove levels, rows, columns and the reference as long as `fails` holds."""
     left, changed = _TRIALS, True
     while changed and left:
         changed = False
@@ -169,11 +165,11 @@ def _smaller(h: Hierarchy) -> Iterator[Hierarchy]:
 
 def run(count: int, name: str, first: int = 0, processes: int | None = None,
         out: Path = Path("runs/stress"), kind: str = RECIPE) -> Tally:
-    """Judge a resolver on `count` problems from seed `first` on; print the counts and return them.
+    """Judge a resolver on `count` problems starting at seed `first`; print and return the counts.
 
-    processes : how many at once; None for one a core.
-    out : folder for failing problems, made when there is one.
-    kind : one of KINDS, or "all": then `count` problems are spread evenly over them.
+    processes : number of processes; None for one per core.
+    out : folder for failing problems, made if there is one.
+    kind : one of KINDS, or "all" to distribute the problems evenly over them.
     """
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # read by the processes when they start
     kinds = KINDS if kind == ALL else (kind,)
@@ -205,7 +201,7 @@ def _chunks(first: int, count: int) -> list[range]:
 
 
 def _print_kind(name: str, kind: str, found: Tally, out: Path) -> None:
-    """Print how the problems of one kind ended; keep those that failed."""
+    """Print the outcomes of one kind; save the failing problems."""
     print(f"{name}, {found.counts.total()} problems, {kind}: {found}")
     median, rare, most = found.iterations_per_row()
     print(f"  iterations / rows: median {median:.2f}, p99.9 {rare:.2f}, largest {most:.2f}")
@@ -216,7 +212,7 @@ def _print_kind(name: str, kind: str, found: Tally, out: Path) -> None:
 
 
 def _judged(part: Future[Tally], seeds: range) -> Tally:
-    """Return the tally of these seeds, or that they were lost with the process that had them."""
+    """Return the tally of these seeds, or mark them as lost if their process died."""
     try:
         return part.result()
     except BrokenProcessPool:
@@ -224,7 +220,7 @@ def _judged(part: Future[Tally], seeds: range) -> Tally:
 
 
 def keep(name: str, seed: int, what: str, out: Path, kind: str = RECIPE) -> Path:
-    """Shrink the problem of a seed while it ends the same way; write it and return the file."""
+    """Reduce the problem of a seed while its outcome is the same; save it and return the file."""
     resolver = make(name)
     smallest = shrunk(problem(resolver, kind, seed),
                       lambda smaller: outcome(resolver, smaller) == what)
@@ -232,23 +228,3 @@ def keep(name: str, seed: int, what: str, out: Path, kind: str = RECIPE) -> Path
     file = out / (f"{name}-{seed}.npz" if kind == RECIPE else f"{name}-{kind}-{seed}.npz")
     problems.save(smallest, file)
     return file
-
-
-def main() -> int:
-    """Run from the command line."""
-    parser = argparse.ArgumentParser(prog="python -m scenarios.bench.stress",
-                                     description="A resolver on generated problems, certified.")
-    parser.add_argument("--count", type=int, default=1_000_000, help="how many problems")
-    parser.add_argument("--resolver", default="hcod")
-    parser.add_argument("--first", type=int, default=0, help="first seed")
-    parser.add_argument("--processes", type=int, default=None, help="default: one a core")
-    parser.add_argument("--out", type=Path, default=Path("runs/stress"),
-                        help="folder for problems that fail")
-    parser.add_argument("--kind", default=ALL, choices=(ALL, *KINDS), help="default: all")
-    given = parser.parse_args()
-    found = run(given.count, given.resolver, given.first, given.processes, given.out, given.kind)
-    return 0 if found.passed else 1
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -1,9 +1,9 @@
-"""Does a lower task touch an upper one while velocity limits are active?
+"""Does a lower task disturb an upper one while velocity limits are active?
 
-A KUKA LWR has to make a step of its end effector that is too fast for its joints, and below it in
-priority to go to another posture. Every tick is resolved twice at the same state, with and without
-the posture: a strict resolver gives the end effector the same motion in both. A plain resolver
-whose answer is cut off at the limits is the yardstick of what is not strict.
+A KUKA LWR tracks a step of its end effector that is too fast for its joints, and with lower
+priority another posture. Every tick is resolved twice at the same state, with and without the
+posture: a strict resolver moves the end effector identically in both. A resolver whose answer is
+clipped at the limits shows what a lack of strictness looks like.
 `hierarchy bench strictness`, or `strictness(make("hcod"))`.
 """
 
@@ -22,14 +22,15 @@ from hierarchy import Hierarchy, Robot, State
 from hierarchy.kinematics import write_point_jacobian
 from hierarchy.problem import Array
 from scenarios.bench.rows import write_rows
+from scenarios.words import listed
 from solvers import Resolution, Resolver, Status, make, names
 from solvers.qp.backends import BACKENDS, installed
 from solvers.resolver import Handles
 
-AIM = 1e-9                       # [m] of the end effector a tick
-RATIOS = (10.0, 100.0, 1000.0)   # of weights, one level to the next
-_FORMS = {"sns": ("optimal",)}   # beside the usual one
-START = (0.923, -0.854, 0.903, 1.195, 0.971, 1.796, 0.0)   # [rad] where the letter's run begins
+AIM = 1e-9                       # [m per tick] of the end effector
+RATIOS = (10.0, 100.0, 1000.0)   # of weights of successive levels
+_FORMS = {"sns": ("optimal",)}   # besides the default
+START = (0.923, -0.854, 0.903, 1.195, 0.971, 1.796, 0.0)   # [rad] start of the letter's run
 STEP = (-0.3, 0.15, -0.25)      # [m]
 POSTURE = (1.2, 0.6, -1.0, -1.2, 1.0, -0.9, 1.0)           # [rad] from the start
 _GAIN, _POSTURE_GAIN = 20.0, 5.0  # [1/s]
@@ -39,18 +40,18 @@ _AT_LIMIT = 1e-9                 # [rad/s]
 @final
 @dataclass(frozen=True)
 class Strictness:
-    """What one resolver did.
+    """The result of one resolver.
 
     Attributes
     ----------
     label, strict : the resolver's name, and whether it claims to be strict.
-    ticks, limited : ticks simulated, and those with a joint at its velocity limit.
-    failed : ticks in which a solve, with or without the posture, ended with a status.
-    largest, final, total : [m] how far the posture moves the end effector in one tick at most, in
-        the last one, and in all of them added up. Ticks that failed are left out.
-    missed : [m] what the limits keep the end effector from in one tick, at most.
+    ticks, limited : simulated ticks, and those with a joint at its velocity limit.
+    failed : ticks in which a solve, with or without the posture, failed.
+    largest, final, total : [m] motion of the end effector due to the posture: the largest in one
+        tick, that of the last tick, and the sum. Failed ticks are excluded.
+    missed : [m] largest motion in one tick that the limits prevent.
     excess : [rad/s] largest joint velocity beyond its limit.
-    error, error_alone : [m] position error at the end, run with and without the posture.
+    error, error_alone : [m] final position error with and without the posture.
     """
 
     label: str
@@ -68,12 +69,12 @@ class Strictness:
 
     @property
     def met(self) -> bool:
-        """Whether the aim is met, with an answer in every tick."""
+        """Whether the motion is below AIM and every tick was solved."""
         return self.largest <= AIM and not self.failed
 
 
 def strictness(resolver: Resolver, duration: float = 2.0, period: float = 1e-3) -> Strictness:
-    """Run the step for `duration` [s], one tick each `period` [s], with one resolver.
+    """Run the step for `duration` [s], one tick every `period` [s], with one resolver.
 
     Raises
     ------
@@ -107,14 +108,14 @@ def strictness(resolver: Resolver, duration: float = 2.0, period: float = 1e-3) 
 @final
 @dataclass(frozen=True, kw_only=True)
 class CutOff(Resolver):
-    """`tpm` on all levels but the first, whose bounds then cut its answer off. Not strict."""
+    """`tpm` on all levels but the first, whose bounds clip its answer. Not strict."""
 
     name: ClassVar[str] = "tpm, cut off"
     handles: ClassVar[Handles] = "bounds"
 
     @property
     def strict(self) -> bool:
-        """No: what is cut off takes from every level."""
+        """Never: clipping affects every level."""
         return False
 
     def solve(self, h: Hierarchy, memory: Any = None) -> Resolution:
@@ -126,7 +127,7 @@ class CutOff(Resolver):
 
 
 def able() -> list[Resolver]:
-    """Return every resolver that handles bounds: each backend and ratio where it has such."""
+    """Return every resolver that handles bounds, with each backend and ratio."""
     found: list[Resolver] = []
     for name in names():
         if name == "hqp":
@@ -140,7 +141,7 @@ def able() -> list[Resolver]:
 
 def run(out: Path | None = None, resolvers: Iterable[Resolver] | None = None,
         duration: float = 2.0) -> list[Strictness]:
-    """Hold resolvers to it, or every able one; print the table and return what each did.
+    """Measure resolvers, by default all that handle bounds; print and return the results.
 
     Writes strictness.csv into the folder `out` if given.
     """
@@ -153,7 +154,7 @@ def run(out: Path | None = None, resolvers: Iterable[Resolver] | None = None,
 
 
 class _Step:
-    """The arm on its way: velocity limits, then the end effector's position, then the posture."""
+    """The arm with velocity limits, the end effector's position and the posture as levels."""
 
     def __init__(self, period: float) -> None:
         self.robot, self.period = Robot.named("kuka_lwr"), period
@@ -172,7 +173,7 @@ class _Step:
         return self.A[self.robot.n:self.robot.n + 3]
 
     def hierarchies(self) -> tuple[Hierarchy, Hierarchy]:
-        """Return the stack at the state as it is, and the same without the posture."""
+        """Return the stack at the current state with and without the posture."""
         n, state, frame = self.robot.n, self.state, self.frame
         write_point_jacobian(state.J, state.placements, state.supports, frame.joint, frame.offset,
                              self.A, n)
@@ -186,7 +187,7 @@ class _Step:
                 Hierarchy.from_levels(stack[:2], names=known[:2]))
 
     def move(self, v: Array) -> None:
-        """Go on by one period with joint velocities v."""
+        """Move by one period with joint velocities v."""
         state = self.state
         state.move(state.t + self.period, state.q + self.period * v, v)
 
@@ -197,41 +198,25 @@ class _Step:
 
 def _print(found: list[Strictness]) -> None:
     console = Console(highlight=False, markup=False)
-    console.print("How far the posture moves the end effector that has priority over it [m]")
+    console.print("Motion of the end effector due to the posture, which has lower priority [m]")
     table = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False)
     table.add_column("", no_wrap=True)
-    for head in ("a tick,\nat most", "last\ntick", "limits\ntake", "error\nat end",
-                 "without\nposture", "at\nlimit", "over\n[rad/s]", "fail", "aim"):
+    for head in ("max per\ntick", "last\ntick", "limits\nprevent", "final\nerror",
+                 "without\nposture", "at\nlimit", "over\n[rad/s]", "fail", "strict"):
         table.add_column(head, justify="right", no_wrap=True)
     for one in found:
         lengths = (one.largest, one.final, one.missed, one.error, one.error_alone)
         table.add_row(one.label, *(f"{value:.0e}" for value in lengths), str(one.limited),
-                      f"{one.excess:.0e}", str(one.failed), "met" if one.met else "no")
+                      f"{one.excess:.0e}", str(one.failed), "yes" if one.met else "no")
     console.print(table)
     console.print(said(found))
 
 
 def said(found: list[Strictness]) -> str:
-    """Return in a sentence who met the aim."""
+    """Return in a sentence which resolvers are strict."""
     met = [one.label for one in found if one.met]
     missed = [f"{one.label} ({one.largest:.0e} m)" for one in found if not one.met]
-    parts = [f"{_listed(met)} move the end effector by less than {AIM:g} m a tick"] if met else []
-    parts += [f"not so {_listed(missed)}"] if missed else []
-    return f"Shows: {'; '.join(parts)}."
-
-
-def _listed(parts: list[str]) -> str:
-    return " and ".join(filter(None, [", ".join(parts[:-1]), parts[-1]]))
-
-
-def main() -> None:
-    """Run from the command line; the numbers go to a new folder in runs/."""
-    from scenarios.files import next_free
-
-    folder = next_free(Path("runs") / "strictness")
-    run(folder)
-    print(f"\nNumbers: {folder}")
-
-
-if __name__ == "__main__":
-    main()
+    parts = [f"with {listed(met)} the posture moves the end effector by at most {AIM:g} m per "
+             "tick"] if met else []
+    parts += [f"not with {listed(missed)}"] if missed else []
+    return f"Result: {'; '.join(parts)}."

@@ -1,4 +1,4 @@
-"""Time of one whole tick of `ellipse`: sense, allocate, rows, resolve, integrate, record."""
+"""Time of a whole tick of `ellipse`: sense, allocate, rows, resolve, integrate, record."""
 
 from __future__ import annotations
 
@@ -22,21 +22,21 @@ from scenarios.loop.simulation import simulate
 
 SPECS = ("tpm", "tpm:form=staircase", "recursive", "augmented")
 PARTS = ("kinematics", "rows", "resolve", "act and record")
-_WARM_UP = 2000    # ticks before any is counted
-_BLOCK = 500       # ticks of one candidate before the next has its turn
-_LEAD_IN = 5       # ticks at the start of a block that do not count: the caches were others'
-_AGREE = 1e-7      # [rad/s^2] between compiled and plain commands
+_WARM_UP = 2000    # ticks before counting starts
+_BLOCK = 500       # ticks per turn of a candidate
+_LEAD_IN = 5       # ticks at the start of a block that do not count: cold caches
+_AGREE = 1e-7      # [rad/s^2] tolerance between compiled and plain commands
 
 
 def run(out: Path | None = None) -> list[dict[str, Any]]:
     """Time every tick of the letter's run under each resolver, and the plain numpy tick.
 
-    The candidates take turns in blocks of the same run, so that the machine's noise hits all of
-    them alike. Returns one row a candidate, times in microseconds; prints a table; writes
-    tick.csv into the folder `out` if given.
+    The candidates take turns in blocks of the same run, so that noise of the machine affects all
+    equally. Returns one row per candidate, times in microseconds; prints a table; writes tick.csv
+    into the folder `out` if given.
     """
     scenario = load("ellipse")
-    path = simulate(scenario)  # the states at which everybody is timed
+    path = simulate(scenario)  # the states at which all candidates are timed
     compiled = {spec: _Compiled(scenario.with_resolver(spec), path) for spec in SPECS}
     plain = _Plain(scenario, path)
     _check_same_command(compiled["tpm"], plain, path)
@@ -58,7 +58,7 @@ def run(out: Path | None = None) -> list[dict[str, Any]]:
 
 
 class _Compiled:
-    """The product's own tick: controller, plant and recorder as the loop calls them."""
+    """The compiled tick: controller, plant and recorder as the loop calls them."""
 
     def __init__(self, scenario: Any, path: Recording) -> None:
         self.controller = Controller(scenario)

@@ -1,4 +1,4 @@
-"""From the section [avoidance] to its tasks, its areas and its laws of repulsion."""
+"""Make tasks, surveillance areas and repulsion laws from [avoidance]."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from scenarios.config.avoidance import AvoidanceSection, RepulsionSection, Separ
 
 
 def areas_of(scenario: Scenario) -> SurveillanceAreas | None:
-    """Return the areas of Algorithm 1, or None where it has no part."""
+    """Return the areas of Algorithm 1, or None if it is not used."""
     section = scenario.avoidance
     if not isinstance(section, AvoidanceSection):
         return None
@@ -24,12 +24,12 @@ def areas_of(scenario: Scenario) -> SurveillanceAreas | None:
 
 
 def repulsion_of(section: RepulsionSection) -> Repulsion:
-    """Return the law of repulsion that a section describes."""
+    """Return the repulsion law of a section."""
     return Repulsion(section.maximum, section.reach, section.shape, section.scale)
 
 
 def avoidance_tasks(scenario: Scenario, robot: Robot) -> list[Task]:
-    """Return the tasks that keep the robot off obstacles and off itself."""
+    """Return the tasks that avoid obstacles and self-collision."""
     section = scenario.avoidance
     if section is None:
         return []
@@ -60,8 +60,8 @@ def _separation(section: SeparationSection, robot: Robot, exact: bool) -> list[T
 def separable_pairs(robot: Robot) -> list[tuple[int, int]]:
     """Return the pairs of capsules that can be kept apart, as indices.
 
-    Neighbours of the tree share a joint and are none. Of capsules proposed for a file, which may
-    stand out, no pair counts that overlaps in the robot's own posture.
+    Neighbours in the tree share a joint and are excluded. For capsules proposed from a file, pairs
+    that overlap in the robot's own posture are excluded too, since they may be too large.
     """
     pairs = pairs_of_tree(robot.capsules, robot.parents)
     if robot.table is not None or not pairs:

@@ -1,4 +1,4 @@
-"""From a scenario file to the parts of its control loop."""
+"""Build the parts of the control loop from a scenario."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ from scenarios.config import Scenario
 
 @dataclass(frozen=True)
 class Cell:
-    """A robot with its start, its tasks and what it senses: everything the loop needs.
+    """Everything the control loop needs: robot, start, tasks and sensor.
 
-    `start` is q (nq,) and v (n,). `order` says which tasks are in the stack, from the measurement
-    and the cone error. `position`, `pointing`, `limits` are the tasks of that name or None,
-    `listed` those of `[[tasks]]`; `areas` are those of Algorithm 1.
+    `start` is q (nq,) and v (n,). `order` selects the tasks in the stack from the measurement and
+    the cone error. `position`, `pointing`, `limits` are the tasks of these names or None, `listed`
+    those of `[[tasks]]`; `areas` are those of Algorithm 1.
     """
 
     scenario: Scenario
@@ -51,11 +51,10 @@ class Cell:
 
 
 def build(scenario: Scenario, kept: Cell | None = None) -> Cell:
-    """Make the parts; raises HierarchyError where the scenario does not fit its robot.
+    """Build the parts; raises HierarchyError if the scenario does not fit its robot.
 
-    With `kept`, the cell of a scenario that differs in its tasks' settings or its resolver, its
-    robot, start, state, plant and obstacles go on, and its sensor where the settings of that are
-    the same.
+    `kept` is the cell of a scenario that differs only in its resolver or task settings: its robot,
+    start, state, plant and obstacles are reused, and its sensor if the sensor settings are equal.
     """
     control = scenario.control
     robot = kept.robot if kept else make_robot(scenario.robot)

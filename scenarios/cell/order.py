@@ -1,4 +1,4 @@
-"""Which tasks are in the stack in one tick, and in which order."""
+"""The selection and order of the tasks in the stack of a tick."""
 
 from __future__ import annotations
 
@@ -15,34 +15,34 @@ from scenarios.config import Scenario
 
 
 class Order(Protocol):
-    """Which tasks are in the stack in one tick, and in which order."""
+    """The selection and order of the tasks in the stack of a tick."""
 
     @property
     def possible(self) -> Iterable[tuple[str, ...]]:
-        """Every order that may come up."""
+        """Every possible order."""
 
     def __call__(self, seen: Measurement | None, cone_error: float) -> Allocation:
-        """Return the order at the distances measured and cos(alpha_d) - cos(alpha)."""
+        """Return the order for measured distances and the cone error cos(alpha_d) - cos(alpha)."""
 
 
 @final
 class Hierarchical:
-    """All tasks at all times: the resolver decides what acts."""
+    """All tasks in every tick."""
 
     def __init__(self, names: Sequence[str]) -> None:
         self._allocation = Allocation(tuple(names), repulsion=False)
         self.possible = [self._allocation.order]
 
     def __call__(self, seen: Measurement | None, cone_error: float) -> Allocation:
-        """Return the order; measurement and cone error do not matter."""
+        """Return the order, regardless of measurement and cone error."""
         return self._allocation
 
 
 @final
 class Switched:
-    """Algorithm 1, behind the tasks called `first`; without `areas` the cone alone is switched.
+    """Algorithm 1, below the tasks named `first`; without `areas` only the cone is switched.
 
-    With `always_point` the cone is an equality, in the stack at all times.
+    With `always_point` the cone is an equality that is always in the stack.
     """
 
     def __init__(self, areas: SurveillanceAreas | None, always_point: bool,
@@ -55,7 +55,7 @@ class Switched:
             distances, (0.0, inf), (1.0, nan))}
 
     def __call__(self, seen: Measurement | None, cone_error: float) -> Allocation:
-        """Return the order at the distances measured and cos(alpha_d) - cos(alpha)."""
+        """Return the order for measured distances and the cone error cos(alpha_d) - cos(alpha)."""
         if seen is None:
             return self._choose(inf, inf, cone_error)
         return self._choose(seen.minimal_distance, seen.end_effector_distance, cone_error)
@@ -75,7 +75,7 @@ class Switched:
 
 def order_of(scenario: Scenario, areas: SurveillanceAreas | None, first: Sequence[Task],
              tasks: Sequence[Task]) -> Order:
-    """Return the order of a scenario's tasks; those of `first` are above all others always."""
+    """Return the order of a scenario's tasks; those of `first` are always at the top."""
     if scenario.control.stack == "hierarchical":
         return Hierarchical([task.name for task in tasks])
     always_point = bool(scenario.pointing and scenario.pointing.kind == "equality")

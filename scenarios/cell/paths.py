@@ -1,4 +1,4 @@
-"""From the keys of a path to the path."""
+"""Make a path from its section."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from scenarios.config.sections import EllipseSection, PathSection, WaypointsSect
 
 
 def make_path(section: PathSection) -> Path:
-    """Make the path that a section describes."""
+    """Return the path of a section."""
     if isinstance(section, EllipseSection):
         return Ellipse(section.centre, section.cosine, section.sine, section.rate)
     if isinstance(section, WaypointsSection):

@@ -1,4 +1,4 @@
-"""From the section [plant] to what the commands move."""
+"""Make the plant from [plant]."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ def plant_of(scenario: Scenario, robot: Robot, start: tuple[Array, Array],
              obstacles: Obstacles) -> Plant:
     """Return the plant of a robot that starts at q (nq,) and v (n,).
 
-    Raises ScenarioError where the robot has joints that cannot be measured as asked.
+    Raises ScenarioError if the requested measurement is not possible for the robot's joints.
     """
     section, control, (q, v) = scenario.plant, scenario.control, start
     if not section.measurement.ideal and robot.nq != robot.n:
         raise ScenarioError(f"plant.measurement: robot {robot.name!r} has joints with more "
-                            "coordinates than velocities, which have no noise, steps or delay")
+                            "coordinates than velocities, which support no noise, steps or delay")
     sensor = JointSensor(section.measurement, control.period)
     if section.kind == "mujoco":
         arm = PhysicsArm(robot, q, v, control.period, control.level, obstacles, section.servo,

@@ -2,7 +2,7 @@
 
 Found by central differences (see the reproduction notes): the control-point Jacobians run from the
 other end of each link than the points do, and entry (2, 1) of the upper-arm Jacobian reads
--l c1 c2 where -l c1 s2 is right. Only the KUKA LWR of the letter has these Jacobians.
+-l c1 c2 instead of -l c1 s2. Only the KUKA LWR of the letter has these Jacobians.
 """
 
 # mypy: disable-error-code="no-untyped-def"
@@ -26,16 +26,16 @@ _UPPER_ARM_POINTS = 4
 
 @dataclass(frozen=True)
 class PublishedAvoidance(Avoidance):
-    """Avoidance with the Jacobians of the published code: wrong on purpose.
+    """Avoidance with the erroneous Jacobians of the published code.
 
-    They are derivatives of nothing, so at acceleration level only their backward differences
+    They are not Jacobians of any function, so at acceleration level only backward differences
     exist: a state with exact derivatives raises a HierarchyError.
     """
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if len(self.points) != 8:
-            raise HierarchyError(f"avoidance.jacobian = 'published' is of the letter's eight "
+            raise HierarchyError(f"avoidance.jacobian = 'published' needs the letter's eight "
                                  f"control points, the robot has {len(self.points)}")
         # Each point's Jacobian is taken at the mirrored place on its link [m].
         from_shoulder = [(0.0, i / 4 * 0.2, 0.0) for i in range(_UPPER_ARM_POINTS)]

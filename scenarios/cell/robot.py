@@ -1,4 +1,4 @@
-"""From the sections [robot] and [start] to a robot and where it starts."""
+"""Make the robot and its start from [robot] and [start]."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from scenarios.config.robot import RobotSection, StartSection
 from solvers import make
 
 _REACHED = 1e-6      # [m]
-_REACH_STEPS = 500   # damped Newton steps; a reachable point takes some ten
+_REACH_STEPS = 500   # damped Newton steps; a reachable point takes about ten
 _LONGEST_STEP = 0.3  # [rad] of any joint
 
 
 def make_robot(section: RobotSection) -> Robot:
-    """Make the robot of a scenario, with the points and the capsules the scenario asks for."""
+    """Make the robot of a scenario, with the control points and capsules of the section."""
     robot = Robot.load(section.model, section.end_effector, section.base, section.locked)
     if section.control_points is not None:
         robot.control_points = tuple(
@@ -37,15 +37,15 @@ def make_robot(section: RobotSection) -> Robot:
 
 
 def sensed_points(robot: Robot) -> tuple[ControlPoint, ...]:
-    """Return what a sensor measures: the control points, and the end effector as the last."""
+    """Return the points that a sensor measures: control points, then the end effector."""
     end = robot.frame(robot.end_effector)
     return (*robot.control_points, ControlPoint(end.name, end.joint, end.offset))
 
 
 def start_of(robot: Robot, section: StartSection) -> tuple[Array, Array]:
-    """Return q (nq,) and v (n,) of a robot's start, with the end effector where it is asked to be.
+    """Return q (nq,) and v (n,) of the start, with the end effector at the requested point.
 
-    Raises ScenarioError where the section does not fit the robot, or the point is out of reach.
+    Raises ScenarioError if the section does not fit the robot, or the point is out of reach.
     """
     state = _state(robot, section)
     q, v = state.q.copy(), state.v.copy()
@@ -66,7 +66,7 @@ def _state(robot: Robot, section: StartSection) -> State:
 
 
 def _reach(robot: Robot, q: Array, point: Array) -> Array:
-    """Bring the end effector to a point [m] from q, or raise a ScenarioError."""
+    """Return a posture near q with the end effector at a point [m]; raises ScenarioError."""
     frame, resolver = robot.frame(robot.end_effector), make("tpm", damping=0.05)
     stack = Stack([Position(frame, Still(point.tolist()), gain=1.0)], "velocity")
     nearest = np.inf

@@ -1,7 +1,8 @@
-"""From [sensor] and [avoidance] to what measures distances."""
+"""Make the distance sensor from [sensor] and [avoidance]."""
 
 from __future__ import annotations
 
+from dataclasses import fields
 from math import inf
 from typing import NamedTuple
 
@@ -23,7 +24,7 @@ from scenarios.config.sensor import SensorSection
 
 
 class _Asked(NamedTuple):
-    """What is asked of a sensor: obstacles within `region` [m]; mean directions, by which laws."""
+    """What a sensor must provide: `region` [m], mean directions, repulsion laws."""
 
     region: float
     mean: bool = False
@@ -33,10 +34,10 @@ class _Asked(NamedTuple):
 
 def sensor_of(scenario: Scenario, robot: Robot,
               obstacles: Obstacles | None = None) -> Sensor | None:
-    """Return what measures distances to the obstacles, None without [avoidance].
+    """Return the sensor of distances to the obstacles, None without [avoidance].
 
-    `obstacles` are those of the scenario unless others are given. Raises ScenarioError where the
-    robot has no control points, or [sensor] does not fit it.
+    `obstacles` default to those of the scenario. Raises ScenarioError if the robot has no control
+    points, or [sensor] does not fit it.
     """
     section = scenario.avoidance
     if section is None:
@@ -57,7 +58,7 @@ def sensor_of(scenario: Scenario, robot: Robot,
 
 
 def _seen_by(scenario: Scenario, robot: Robot, exact: ExactDistances, asked: _Asked) -> Sensor:
-    """Return the sensor that the scenario asks for, in place of an exact one."""
+    """Return the sensor of the scenario's kind, given the exact one."""
     if scenario.sensor.kind == "exact":
         return exact
     danger = scenario.limits.danger_reach if scenario.limits else None
@@ -70,7 +71,7 @@ def _seen_by(scenario: Scenario, robot: Robot, exact: ExactDistances, asked: _As
 
 def _depth_sensor(section: SensorSection, robot: Robot, exact: ExactDistances,
                   asked: _Asked) -> DepthSensor:
-    """Make the sensor of a section for what `exact` would measure."""
+    """Make the depth sensor of a section for the points that `exact` measures."""
     capsules = _capsules(robot, section.foot)
     source: Source
     checked: ExactDistances | None = None
@@ -79,9 +80,9 @@ def _depth_sensor(section: SensorSection, robot: Robot, exact: ExactDistances,
     else:
         source = RecordedFrames(section.folder or "", robot, section.latency)
     space = DepthSpace(source.pinhole, exact.points, capsules, section.region or asked.region,
-                       section.margin, inf if section.thin is None else section.thin,
-                       section.support, section.band, asked.mean, asked.body, asked.tip,
-                       exact.measurement.pairs is not None)
+                       margin=section.margin, thin=inf if section.thin is None else section.thin,
+                       support=section.support, band=section.band, mean=asked.mean,
+                       body=asked.body, tip=asked.tip, pairs=exact.measurement.pairs is not None)
     return DepthSensor(source, space, section.stale_after, section.least_readings, checked)
 
 
@@ -93,18 +94,16 @@ def _camera(section: SensorSection, exact: ExactDistances,
     pinhole = Pinhole(section.width, section.height, section.fx, section.fy, section.cx,
                       section.cy, section.position, rotation)
     errors = DepthErrors.none(section.near, section.far) if section.ideal else DepthErrors(
-        section.noise_floor, section.noise_growth, section.noise_from, section.rounding,
-        section.step, section.near, section.far, section.missing, section.missing_at_edges,
-        section.outliers, section.outlier_size)
-    return DepthCamera(pinhole, exact.obstacles, capsules, errors, section.rate, section.jitter,
-                       section.latency, section.seed, section.point_radius,
-                       section.backdrop or inf)
+        **{field.name: getattr(section, field.name) for field in fields(DepthErrors)})
+    return DepthCamera(pinhole, exact.obstacles, capsules, errors, rate=section.rate,
+                       jitter=section.jitter, latency=section.latency, seed=section.seed,
+                       point_radius=section.point_radius, backdrop=section.backdrop or inf)
 
 
 def _capsules(robot: Robot, foot: float) -> tuple[Capsule, ...]:
     if not robot.capsules:
-        raise HierarchyError(f"robot {robot.name!r} has no capsules, by which it is taken out of "
-                             "the image")
+        raise HierarchyError(f"robot {robot.name!r} has no capsules, which are needed to remove "
+                             "it from the image")
     if foot == 0.0 or robot.base == "floating":
         return robot.capsules
     column = Capsule("foot", 0, (0.0, 0.0, -foot), (0.0, 0.0, 0.0), robot.capsules[0].radius)

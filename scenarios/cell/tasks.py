@@ -1,4 +1,4 @@
-"""From [position], [pointing], [posture], [limits], [damping] and [[tasks]] to tasks."""
+"""Make tasks from [position], [pointing], [posture], [limits], [damping] and [[tasks]]."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ from scenarios.config.sections import (
 
 
 def limits_of(scenario: Scenario, robot: Robot) -> tuple[JointLimits | None, list[Task]]:
-    """The joint limits, and the tasks that go first."""
+    """Return the joint limits, and the tasks at the top of the stack."""
     section = scenario.limits
     if section is None:
         return None, []
@@ -70,14 +70,14 @@ def pointing_of(scenario: Scenario, robot: Robot) -> Pointing | None:
     section = scenario.pointing
     if section is None:
         return None
-    # Algorithm 1 puts the cone's surface into the stack while it is violated: an equality.
+    # Algorithm 1 adds the cone's surface to the stack while it is violated: an equality.
     kind = section.kind if scenario.control.stack == "hierarchical" else "equality"
     return Pointing(robot.frame(robot.end_effector), section.axis, radians(section.alpha_d),
                     kind, section.stiffness, section.damping, section.gain)
 
 
 def posture_of(scenario: Scenario, robot: Robot, role: str) -> Posture | None:
-    """Return the task of [posture] if it has this role, "task" or "null-space", or None."""
+    """Return the task of [posture] if it has this role ("task" or "null-space"), or None."""
     section = scenario.posture
     if section is None or section.role != role:
         return None
@@ -89,14 +89,14 @@ def posture_of(scenario: Scenario, robot: Robot, role: str) -> Posture | None:
 
 
 def reference_of(scenario: Scenario, robot: Robot) -> Task | None:
-    """Return the task of the null space: [damping], or [posture] in that role; or None."""
+    """Return the null-space task: [damping], or [posture] in that role; or None."""
     if scenario.damping is not None:
         return JointDamping(robot.n, scenario.damping.value, scenario.damping.weight)
     return posture_of(scenario, robot, "null-space")
 
 
 def listed_tasks(sections: tuple[ListedTask, ...], start: State) -> list[Task]:
-    """Make the tasks of `[[tasks]]`; what they leave open is as at the start."""
+    """Make the tasks of `[[tasks]]`; values that they omit are those of the start."""
     tasks = []
     for section in sections:
         try:

@@ -1,1 +1,1 @@
-"""The command line, `hierarchy`: one module a command or group of them."""
+"""The command line, `hierarchy`: one module per command or group."""

@@ -1,4 +1,4 @@
-"""What the shell may complete: names, found without importing anything heavy."""
+"""Names that the shell completes, found without heavy imports."""
 
 from __future__ import annotations
 
@@ -8,17 +8,17 @@ _LIBRARY = Path(__file__).parents[1] / "library"
 
 
 def scenarios(incomplete: str) -> list[str]:
-    """Return the scenarios that begin so, or nothing: then the shell completes files."""
+    """Return the matching scenarios; if there are none, the shell completes files."""
     return _names(_LIBRARY, incomplete)
 
 
 def sweeps(incomplete: str) -> list[str]:
-    """Return the sweeps that begin so."""
+    """Return the matching sweeps."""
     return _names(_LIBRARY / "sweeps", incomplete)
 
 
 def resolvers(incomplete: str) -> list[str]:
-    """Return the resolvers that the last of a list "tpm,hcod,..." may be."""
+    """Return the completions of the last entry of a list "tpm,hcod,..."."""
     import solvers
 
     before, comma, last = incomplete.rpartition(",")

@@ -1,4 +1,4 @@
-"""What `hierarchy doctor` looks at: versions, kernels, backends, and whether it all works."""
+"""`hierarchy doctor`: check versions, backends and kernels, and run a self-test."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from time import perf_counter
 from typing import final
 
 _PACKAGE = "task-hierarchy"
-_PROBLEMS = 20      # generated ones that each resolver solves
-_MET = 1e-6         # by how much answers of strict resolvers may differ, relative to 1 + |x|
+_PROBLEMS = 20      # generated problems for the self-test
+_MET = 1e-6         # largest difference between strict resolvers, relative to 1 + |x|
 
 
 @final
 @dataclass(frozen=True)
 class Finding:
-    """One thing looked at; `well` is None where there is no right or wrong, `remedy` what to do."""
+    """The result of one check: `well` is None if it cannot fail, `remedy` says what to do."""
 
     part: str
     what: str
@@ -29,7 +29,7 @@ class Finding:
 
 
 def doctor_command(as_json: bool) -> int:
-    """Print what was found and return the exit code: 0 if all is well, 1 if something is not."""
+    """Print the findings and return the exit code: 0 without problems, otherwise 1."""
     from scenarios.cli.terminal import print_json
 
     found = list(examine())
@@ -45,12 +45,13 @@ def doctor_command(as_json: bool) -> int:
             print(part)
         mark = {True: "ok  ", False: "BAD ", None: "    "}[one.well]
         print(f"  {mark}{one.what:{width}}  {one.found}" + f"; {one.remedy}" * bool(one.remedy))
-    print("\nAll is well." if not ill else f"\nNot well: {', '.join(one.what for one in ill)}.")
+    problems = ", ".join(one.what for one in ill)
+    print(f"\nProblems: {problems}." if problems else "\nNo problems found.")
     return int(bool(ill))
 
 
 def examine() -> Iterator[Finding]:
-    """Look at everything, one thing after the other."""
+    """Run all checks."""
     yield from _versions()
     yield from _extras()
     yield from _backends()
@@ -77,7 +78,7 @@ def _extras() -> Iterator[Finding]:
         missing = [package for package in packages if _version(package) is None]
         there = ", ".join(f"{package} {_version(package)}" for package in packages
                           if package not in missing)
-        yield Finding("extras, none of them needed", extra, there or "not installed", None,
+        yield Finding("extras (optional)", extra, there or "not installed", None,
                       f"pip install '{_PACKAGE}[{extra}]'" if missing else "")
 
 
@@ -100,7 +101,7 @@ def _kernels() -> Iterator[Finding]:
     size = sum(path.stat().st_size for path in files) / 1e6
     can = os.access(next(path for path in (folder, *folder.parents) if path.exists()), os.W_OK)
     yield Finding(part, "cache", f"{_home(folder)}, {size:.0f} MB", can,
-                  "" if can else "it cannot be written; set NUMBA_CACHE_DIR to a folder that can")
+                  "" if can else "not writable; set NUMBA_CACHE_DIR to a writable folder")
 
 
 def _tests() -> Iterator[Finding]:
@@ -108,13 +109,13 @@ def _tests() -> Iterator[Finding]:
         begun = perf_counter()
         try:
             said, well = test()
-        except Exception as error:  # what is broken here may break anything
+        except Exception as error:  # a broken installation may raise anything
             said, well = f"{type(error).__name__}: {error}", False
         yield Finding("self-test", what, f"{said} ({perf_counter() - begun:.1f} s)", well)
 
 
 def _resolvers_agree() -> tuple[str, bool]:
-    """Solve small well-posed stacks by every strict resolver, and certify the answers of one."""
+    """Solve small well-posed stacks with three strict resolvers, and certify one's answers."""
     import numpy as np
 
     from hierarchy import Hierarchy
@@ -129,23 +130,23 @@ def _resolvers_agree() -> tuple[str, bool]:
         worst = max(worst, *(float(np.abs(x[0] - one).max() / (1 + np.abs(x[0]).max()))
                              for one in x[1:]))
         certified += certify(h, x[0]).certified
-    return (f"{', '.join(str(one.label) for one in strict)} to {worst:.0e}; {certified} of "
+    return (f"{', '.join(str(one.label) for one in strict)} agree to {worst:.0e}; {certified} of "
             f"{_PROBLEMS} answers certified", worst < _MET and certified == _PROBLEMS)
 
 
 def _short_run() -> tuple[str, bool]:
-    """Simulate the beginning of the letter's task."""
+    """Simulate the first 0.2 s of the letter's task."""
     import numpy as np
 
     from scenarios import load, simulate
 
     run = simulate(load("ellipse", ["control.duration=0.2"]))
     median = float(np.median(run["time_tick"]) * 1e6)
-    return f"{run.ticks} ticks of ellipse, {median:.0f} us each", run.fault is None
+    return f"{run.ticks} ticks of ellipse, median {median:.0f} us", run.fault is None
 
 
 def _required() -> Iterator[tuple[str, str | None]]:
-    """Give every package that this one may use, and the extra that it belongs to."""
+    """Yield every dependency, and the extra it belongs to (None for a required one)."""
     from packaging.requirements import Requirement
 
     for line in requires(_PACKAGE) or ():

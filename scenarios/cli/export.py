@@ -1,4 +1,4 @@
-"""`hierarchy export`: a run's folder as a file that other programs open."""
+"""`hierarchy export`: write a run in a format for other programs."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from scenarios.loop.recording import load_run
 
 
 def export_command(folder: Path, format: str | None, out: Path | None) -> list[Path]:
-    """Export a run and return what was written; see `export`.
+    """Export a run and return the files written; see `export`.
 
-    Without `out` it is run.FORMAT in the run's folder; without both, run.csv there.
+    `out` is run.FORMAT in the run's folder by default; the default format is CSV.
     """
     path = out if out is not None else folder / f"run.{format or 'csv'}"
     return export(load_run(folder), path, format)

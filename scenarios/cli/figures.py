@@ -1,22 +1,20 @@
-"""The command `hierarchy figures`: a run's figures anew, from its folder alone."""
+"""`hierarchy figures`: draw a run's figures again from its folder."""
 
 from __future__ import annotations
 
-import tempfile
-from collections.abc import Callable
 from pathlib import Path
 
-from scenarios.files import OutputError, claim, whole
+from scenarios.files import added_to, claim, named, whole
 
 
 def redraw(run: str | Path, style: str = "screen", out: str | Path | None = None) -> list[Path]:
     """Draw the figures of a run folder in a style, and return the files.
 
-    They take the place of those in the run folder, or go to `out`, which must be new or empty.
+    They replace those in the run folder, or go to `out`, which must be new or empty.
 
     Raises
     ------
-    HierarchyError : `run` is not a run folder or is damaged, `style` is none of drawing.STYLES, or
+    HierarchyError : `run` is not a run folder or is damaged, `style` is not in drawing.STYLES, or
         the folder cannot be written.
     """
     from hierarchy.errors import UnknownNameError
@@ -25,21 +23,10 @@ def redraw(run: str | Path, style: str = "screen", out: str | Path | None = None
 
     if style not in drawing.STYLES:
         raise UnknownNameError("style", style, drawing.STYLES)
-    folder = None if out is None else claim(out)
+    claimed = None if out is None else claim(out)
     recording = load_run(run)
-    with drawing.styled(drawing.STYLES[style]):
-        if folder is None:
-            return _into(Path(run), lambda partial: letter.write_all(recording, partial))
-        with whole(folder) as partial:
-            letter.write_all(recording, partial)
-        return sorted(folder.iterdir())
-
-
-def _into(folder: Path, write: Callable[[Path], None]) -> list[Path]:
-    """Move files one by one into a folder that has others, once all of them are written."""
-    try:
-        with tempfile.TemporaryDirectory(prefix=".figures.", dir=folder) as partial:
-            write(Path(partial))
-            return [file.replace(folder / file.name) for file in sorted(Path(partial).iterdir())]
-    except OSError as error:
-        raise OutputError(f"{folder} cannot be written: {error.strerror}") from error
+    writing = added_to(Path(run)) if claimed is None else whole(claimed)
+    with drawing.styled(drawing.STYLES[style]), named(claimed or run), writing as partial:
+        letter.write_all(recording, partial)
+        names = sorted(file.name for file in partial.iterdir())
+    return [(claimed or Path(run)) / name for name in names]

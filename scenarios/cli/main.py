@@ -1,13 +1,12 @@
 """The command `hierarchy`.
 
-Nothing heavy is imported before it is needed, so that `--help` and completion answer at once. With
-`--json` a command prints one JSON object on standard output, and nothing else there. Exit codes:
-0 done, 1 a run ended in a fault that is reported, 2 the command line or a file is wrong.
+Heavy imports happen only when needed, so that `--help` and completion are fast. With `--json` a
+command prints one JSON object on standard output and nothing else there. Exit codes: 0 done, 1 a
+run stopped with a reported fault, 2 the command line or a file is invalid.
 """
 
 from __future__ import annotations
 
-import os
 import shlex
 import sys
 from functools import partial
@@ -17,49 +16,45 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from scenarios.cli import completion
+from scenarios.cli.bench import bench
 from scenarios.cli.terminal import (
+    certified,
     first_line,
     print_json,
     print_list,
     print_table,
     shown,
     troubles,
-    verdict,
 )
 
 if TYPE_CHECKING:
     from scenarios.config import Scenario
     from scenarios.measure.runs import Run
 
-app = typer.Typer(help="Prioritized robot tasks: many ways of resolving them, compared.",
-                  rich_markup_mode=None, pretty_exceptions_enable=False)
+app = typer.Typer(rich_markup_mode=None, pretty_exceptions_enable=False)
+app.add_typer(bench, name="bench")
 
 Changes = Annotated[list[str] | None, typer.Option(
     "--set", metavar="KEY=VALUE",
-    help="Change the scenario: a dotted key and a TOML value. May be repeated.")]
+    help="Change a scenario value: dotted key and TOML value. May be repeated.")]
 Duration = Annotated[float | None, typer.Option(
-    "--duration", metavar="SECONDS", help="Run for so long instead of the scenario's duration.")]
+    "--duration", metavar="SECONDS", help="Duration of the run. Default: that of the scenario.")]
 Out = Annotated[Path | None, typer.Option(
-    "--out", metavar="FOLDER", help="Where to write; new or empty. Default: a new one in runs/.")]
-AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object, and nothing else.")]
+    "--out", metavar="FOLDER", help="Output folder, new or empty. Default: a new folder in runs/.")]
+AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
 PORT = 8080
 Port = Annotated[int, typer.Option("--port", metavar="N", min=0, max=65535,
-                                   help="Where the page is on 127.0.0.1; 0 for any free port.")]
+                                   help="Port of the page on 127.0.0.1; 0 for any free port.")]
 Browser = Annotated[bool, typer.Option("--browser/--no-browser",
-                                       help="Open the page, or only say where it is.")]
-
-# What can be measured: names of modules of scenarios.bench, written with hyphens.
-BENCHMARKS = ("resolvers", "tick", "first-paper", "strictness", "start", "peers")
-_ASKED_FOR = ("peers",)  # minutes, and packages of others
-
+                                       help="Open a browser, or only print the address.")]
 
 def main() -> None:
-    """Run the command line and exit with its code; see the module's text."""
+    """Run the command line and exit with its code."""
     sys.exit(run_command(sys.argv[1:]))
 
 
 def run_command(arguments: list[str]) -> int:
-    """Run one command line and return its exit code; mistakes become one line on stderr."""
+    """Run a command line and return its exit code; errors become one line on stderr."""
     try:
         return int(app(arguments or ["--help"], prog_name="hierarchy", standalone_mode=False) or 0)
     except typer.TyperException as error:
@@ -75,9 +70,24 @@ def run_command(arguments: list[str]) -> int:
         raise
 
 
+def _print_version(asked: bool) -> None:
+    if asked:
+        from importlib.metadata import version
+
+        print(f"hierarchy {version('task-hierarchy')}")
+        raise typer.Exit
+
+
+@app.callback()
+def options(version: Annotated[bool, typer.Option(
+        "--version", is_eager=True, callback=_print_version,
+        help="Print the version and exit.")] = False) -> None:
+    """Resolve prioritized robot tasks in many ways, and compare the results."""
+
+
 @app.command("list")
 def list_(as_json: AsJson = False) -> None:
-    """List the scenarios, sweeps, resolvers, tasks and robots there are."""
+    """List scenarios, sweeps, resolvers, tasks and robots."""
     import solvers
     from hierarchy.robot import ROBOTS
     from hierarchy.robots.table import in_words
@@ -101,21 +111,21 @@ def run(scenario: Annotated[str, typer.Argument(
             help="Name of a scenario, or a scenario file.", autocompletion=completion.scenarios)],
         resolver: Annotated[str | None, typer.Option(
             "--resolver", metavar="SPEC", autocompletion=completion.resolvers,
-            help="Another resolver: name, or name:setting=value:setting=value.")] = None,
+            help="Use another resolver: name, or name:setting=value:setting=value.")] = None,
         changes: Changes = None, duration: Duration = None, out: Out = None,
         certify: Annotated[bool, typer.Option(
-            "--certify", help="Certify the answer of every tick, outside the times measured.")
+            "--certify", help="Certify the answer of every tick; not part of the measured times.")
             ] = False, as_json: AsJson = False,
         live: Annotated[bool, typer.Option(
-            "--live", help="Show it in the browser while it runs, and change it by hand; needs "
-                           "the extra `view`.")] = False,
+            "--live", help="Show the run in the browser and change it interactively; needs the "
+                           "extra `view`.")] = False,
         speed: Annotated[float, typer.Option(
             "--speed", metavar="X", min=0.01, max=100.0,
-            help="With --live: seconds of the run a second.")] = 1.0,
+            help="With --live: real-time factor.")] = 1.0,
         port: Port = PORT, browser: Browser = True) -> int:
-    """Run one scenario, measure it, keep the run in a folder."""
+    """Run a scenario, measure it, and save the run."""
     if live and (certify or as_json):
-        raise typer.BadParameter("goes with neither --certify nor --json", param_hint="--live")
+        raise typer.BadParameter("cannot be combined with --certify or --json", param_hint="--live")
     chosen = _load(scenario, changes, duration)
     if resolver is not None:
         chosen = chosen.with_resolver(resolver)
@@ -144,7 +154,7 @@ def run(scenario: Annotated[str, typer.Argument(
         return _fault(recording.fault)
     print_table([_run_of(chosen, recording)])
     if certify:
-        print(f"\n{verdict(recording, chosen.make_resolver().damping)}")
+        print(f"\n{certified(recording, chosen.make_resolver().damping)}")
     for line in troubles(recording):
         print(line)
     print(f"\n{recording.ticks} ticks in {shown(folder)}")
@@ -157,10 +167,10 @@ def compare(scenarios: Annotated[list[str], typer.Argument(
                 autocompletion=completion.scenarios)],
             resolvers: Annotated[str | None, typer.Option(
                 "--resolvers", metavar="SPEC,SPEC,...", autocompletion=completion.resolvers,
-                help="Resolvers: name, or name:setting=value. Default: all that suit.")] = None,
+                help="Resolvers: name, or name:setting=value. Default: all suitable ones.")] = None,
             changes: Changes = None, duration: Duration = None, out: Out = None,
             as_json: AsJson = False) -> int:
-    """Run scenarios under several resolvers; write a report."""
+    """Run scenarios under several resolvers and report."""
     from scenarios.cli.progress import bar
     from scenarios.config.resolvers import default_resolvers
     from scenarios.files import next_free
@@ -172,7 +182,7 @@ def compare(scenarios: Annotated[list[str], typer.Argument(
     for scenario in chosen if specs is None else ():
         missing |= default_resolvers(scenario.asks)[1]
     for spec, remedy in missing.items():
-        print(f"left out: {spec} is not installed; {remedy}",
+        print(f"skipped: {spec} is not installed; {remedy}",
               file=sys.stderr if as_json else sys.stdout)
     folder = out if out is not None else next_free(Path("runs") / f"compare-{chosen[0].name}")
     command = shlex.join(["hierarchy", *sys.argv[1:]])
@@ -193,15 +203,18 @@ def sweep(file: Annotated[str, typer.Argument(help="Name of a sweep, or a sweep 
                                               autocompletion=completion.sweeps)],
           out: Annotated[Path | None, typer.Option(
               "--out", metavar="FOLDER",
-              help="Where to write, or to go on. Default: runs/sweep-NAME.")] = None,
+              help="Output folder, new or to be continued. Default: runs/sweep-NAME.")] = None,
           workers: Annotated[int | None, typer.Option(
               "--workers", metavar="N", min=1,
-              help="Processes on this machine. Default: one for each processor.")] = None,
+              help="Processes on this machine. Default: one per processor.")] = None,
           scheduler: Annotated[str | None, typer.Option(
               "--scheduler", metavar="ADDRESS",
               help="Use the workers of this Dask scheduler instead.")] = None,
           as_json: AsJson = False) -> int:
-    """Run scenarios under resolvers with sampled parameters; go on where that stopped."""
+    """Run scenarios with sampled parameters.
+
+    An interrupted sweep is continued by the same command.
+    """
     from scenarios.cli.sweep import sweep_command
 
     return sweep_command(file, out, workers, scheduler, as_json)
@@ -209,11 +222,14 @@ def sweep(file: Annotated[str, typer.Argument(help="Name of a sweep, or a sweep 
 
 @app.command()
 def view(folders: Annotated[list[Path], typer.Argument(
-             metavar="RUN...", help="Folders that `hierarchy run` or `compare` wrote.")],
+             metavar="RUN...", help="Run folders of `hierarchy run` or `compare`.")],
          side_by_side: Annotated[bool, typer.Option(
-             "--side-by-side/--overlay", help="How several runs are placed.")] = True,
+             "--side-by-side/--overlay", help="Placement of several runs.")] = True,
          port: Port = PORT, browser: Browser = True) -> int:
-    """Show finished runs in the browser, in space and as curves; needs the extra `view`."""
+    """Show finished runs in the browser.
+
+    In 3D and as curves; needs the extra `view`.
+    """
     from scenarios.cli.view import view_command
 
     return view_command(folders, port, side_by_side, browser)
@@ -221,14 +237,17 @@ def view(folders: Annotated[list[Path], typer.Argument(
 
 @app.command()
 def export(folder: Annotated[Path, typer.Argument(
-               metavar="RUN", help="Folder that `hierarchy run` wrote.")],
+               metavar="RUN", help="Run folder of `hierarchy run`.")],
            format: Annotated[str | None, typer.Option(
-               "--format", metavar="FORMAT", help="csv, parquet or mcap. Default: that of --out's "
-               "suffix, or csv.")] = None,
+               "--format", metavar="FORMAT", help="csv, parquet or mcap. Default: by the suffix of "
+               "--out, or csv.")] = None,
            out: Annotated[Path | None, typer.Option(
                "--out", metavar="FILE", help="A new file. Default: run.FORMAT in RUN.")] = None,
            as_json: AsJson = False) -> None:
-    """Write a run as a file that other programs open; Parquet and MCAP need the extra `export`."""
+    """Export a run as CSV, Parquet or MCAP.
+
+    Parquet and MCAP need the extra `export`.
+    """
     from scenarios.cli.export import export_command
 
     files = [shown(path) for path in export_command(folder, format, out)]
@@ -239,15 +258,18 @@ def export(folder: Annotated[Path, typer.Argument(
 
 @app.command()
 def replay(folders: Annotated[list[Path], typer.Argument(
-               metavar="RUN...", help="Folders that `hierarchy run` or `compare` wrote.")],
+               metavar="RUN...", help="Run folders of `hierarchy run` or `compare`.")],
            out: Annotated[Path | None, typer.Option(
                "--out", metavar="FILE",
                help="HTML file to write. Default: RUN/replay.html.")] = None,
            video: Annotated[Path | None, typer.Option(
-               "--video", metavar="FILE", help="Video of one run to write, by ffmpeg.")] = None,
+               "--video", metavar="FILE", help="Write a video of one run with ffmpeg.")] = None,
            rate: Annotated[float, typer.Option(
-               "--rate", metavar="HZ", help="Frames a second.")] = 30.0) -> int:
-    """Write finished runs as one HTML file that plays without a server, or one as a video."""
+               "--rate", metavar="HZ", help="Frames per second.")] = 30.0) -> int:
+    """Write runs as one HTML file, or one run as a video.
+
+    The HTML file plays without a server.
+    """
     from scenarios.cli.replay import replay_command
 
     return replay_command(folders, out, video, rate)
@@ -255,15 +277,15 @@ def replay(folders: Annotated[list[Path], typer.Argument(
 
 @app.command()
 def figures(folder: Annotated[Path, typer.Argument(
-                metavar="RUN", help="Folder that `hierarchy run` or `compare` wrote.")],
+                metavar="RUN", help="Run folder of `hierarchy run` or `compare`.")],
             style: Annotated[str, typer.Option(
                 "--style", metavar="STYLE",
                 help="screen: SVG and PNG. paper: PDF, one column of a journal wide.")] = "screen",
             out: Annotated[Path | None, typer.Option(
                 "--out", metavar="FOLDER",
-                help="Where to write; new or empty. Default: the run's own folder.")] = None,
+                help="Output folder, new or empty. Default: the run's folder.")] = None,
             as_json: AsJson = False) -> None:
-    """Draw a run's figures anew, for the screen or for a paper."""
+    """Draw a run's figures again, for screen or paper."""
     from scenarios.cli.figures import redraw
 
     files = [shown(file) for file in redraw(folder, style, out)]
@@ -273,10 +295,10 @@ def figures(folder: Annotated[Path, typer.Argument(
 
 
 @app.command()
-def check(file: Annotated[str, typer.Argument(help="A scenario, or a robot: file or name.",
+def check(file: Annotated[str, typer.Argument(help="A scenario or a robot: file or name.",
                                               autocompletion=completion.scenarios)],
           changes: Changes = None, as_json: AsJson = False) -> None:
-    """Read a scenario file, or a robot's, and say what was understood."""
+    """Validate a scenario or robot file and summarize it."""
     from scenarios.cli import robot_check
 
     if robot_check.is_robot(file):
@@ -307,46 +329,15 @@ def check(file: Annotated[str, typer.Argument(help="A scenario, or a robot: file
               f"{'in the stack' if scenario.limits_in_stack else 'as a guard outside the stack'}")
     for i, task in enumerate(scenario.tasks, 1):
         print(f"  task {i:<4} {task.title}" + (f", {task.kind}" if task.name else ""))
-    print("The file is right.")
+    print("Valid.")
 
 
 @app.command()
 def doctor(as_json: AsJson = False) -> int:
-    """Say what is installed and found, and solve a few problems to see that it works."""
+    """Check the installation and run a self-test."""
     from scenarios.cli.doctor import doctor_command
 
     return doctor_command(as_json)
-
-
-@app.command()
-def bench(what: Annotated[str | None, typer.Argument(
-        metavar="|".join(BENCHMARKS), help="Only this. Default: all but peers.",
-        autocompletion=lambda incomplete: [b for b in BENCHMARKS if b.startswith(incomplete)]),
-        ] = None,
-        fresh: Annotated[int | None, typer.Option(
-            metavar="SEED", help="Resolvers: time new problems too, from this seed on.")] = None,
-        count: Annotated[int, typer.Option(
-            min=1, metavar="N", help="New problems of each family.")] = 200,
-        out: Out = None) -> None:
-    """Time resolvers, control tick, start, others' packages; judge errors and strictness."""
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy is loaded: one core is timed
-    from importlib import import_module
-
-    from hierarchy.errors import HierarchyError, UnknownNameError
-    from scenarios.files import claim, next_free
-
-    if what is not None and what not in BENCHMARKS:
-        raise UnknownNameError("benchmark", what, BENCHMARKS)
-    if fresh is not None and what not in (None, "resolvers"):
-        raise HierarchyError(f"--fresh is for the benchmark of resolvers, not {what}")
-    folder = claim(out if out is not None else next_free(Path("runs") / "bench"))
-    for wanted in [what] if what is not None else [b for b in BENCHMARKS if b not in _ASKED_FOR]:
-        module = import_module(f"scenarios.bench.{wanted.replace('-', '_')}")
-        if wanted == "resolvers":
-            module.run(folder, seed=fresh, count=count)
-        else:
-            module.run(folder)
-    print(f"\nNumbers: {shown(folder)}")
 
 
 def _load(name: str, changes: list[str] | None, duration: float | None) -> Scenario:
@@ -359,7 +350,7 @@ def _load(name: str, changes: list[str] | None, duration: float | None) -> Scena
 def _split(specs: str) -> list[str]:
     named = [spec.strip() for spec in specs.split(",") if spec.strip()]
     if not named:
-        raise typer.BadParameter("names no resolver", param_hint="--resolvers")
+        raise typer.BadParameter("no resolver given", param_hint="--resolvers")
     return named
 
 

@@ -1,4 +1,4 @@
-"""A progress bar on standard error, where that is a terminal, and nothing where it is not."""
+"""A progress bar on standard error if that is a terminal, otherwise nothing."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from contextlib import contextmanager
 
 @contextmanager
 def bar(what: str = "ticks") -> Iterator[Callable[[str, int, int], None] | None]:
-    """Give a function to call as told(label, done, in all), or None off a terminal.
+    """Yield a function to call as told(label, done, total), or None if there is no terminal.
 
-    `what` is counted.
+    `what` is the unit of the count.
     """
     if not sys.stderr.isatty():
         yield None

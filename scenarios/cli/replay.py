@@ -1,4 +1,4 @@
-"""`hierarchy replay`: finished runs as one HTML file, or as a video."""
+"""`hierarchy replay`: write finished runs as one HTML file, or one as a video."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from pathlib import Path
 
 from hierarchy.errors import HierarchyError
 from scenarios.draw.viewer.view import labelled
-from scenarios.files import OutputError, write_text
+from scenarios.files import named, write_text
 from scenarios.loop.recording import load_run
 
 
 def replay_command(folders: Sequence[Path], out: Path | None, video: Path | None,
                    rate: float) -> int:
-    """Write what is asked for and say where it is; without either, FOLDER/replay.html."""
+    """Write the HTML file, the video, or both, and print their paths; by default replay.html."""
     recordings = labelled(folders, [load_run(folder) for folder in folders])
     if video is not None:
         if len(recordings) > 1:
@@ -33,11 +33,9 @@ def replay_command(folders: Sequence[Path], out: Path | None, video: Path | None
                                for one in recordings.values())
         target = out if out is not None else folders[0] / "replay.html"
         text = html(recordings, " · ".join(titles), rate=rate)
-        try:
+        with named(target):
             target.parent.mkdir(parents=True, exist_ok=True)
             write_text(target, text)
-        except OSError as error:
-            raise OutputError(f"{target} cannot be written: {error.strerror}") from error
         _say(target)
     return 0
 

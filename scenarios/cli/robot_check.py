@@ -1,4 +1,4 @@
-"""`hierarchy check ROBOT`: what was found in a robot's file, and the section to go on with."""
+"""`hierarchy check ROBOT`: summarize a robot's file and propose a [robot] section."""
 
 from __future__ import annotations
 
@@ -16,23 +16,23 @@ from scenarios.config import ScenarioError, shipped
 from scenarios.config.changes import changed
 from scenarios.config.robot import RobotSection
 
-_FRAMES = 12   # named before "and so on"
-_ROUND = 4     # decimals of proposed places [m]
+_FRAMES = 12   # names listed at most
+_ROUND = 4     # decimals of proposed positions [m]
 
 
 def is_robot(text: str) -> bool:
-    """Whether the command line names a robot; what is a scenario's name too is a scenario."""
+    """Whether the text names a robot; a name that is also a scenario's means the scenario."""
     of_file = in_package(text) or text.endswith((".urdf", ".xml", ".mjcf"))
     return of_file or (text in TABLES and text not in shipped())
 
 
 def look_at(model: str, changes: Sequence[str] = ()) -> tuple[RobotSection, Robot]:
-    """Make the robot of a model and of changes "robot.key=value"; HierarchyError if it fails."""
+    """Make the robot of a model with changes "robot.key=value"; raises HierarchyError."""
     from scenarios.cell.robot import make_robot
 
     data = changed({"robot": {"model": model}}, changes)
     if unknown := [key for key in data if key != "robot"]:
-        raise ScenarioError(f"--set {unknown[0]}: only keys of robot can be set for a robot")
+        raise ScenarioError(f"--set {unknown[0]}: only keys of [robot] can be set for a robot")
     try:
         section = RobotSection.model_validate(data["robot"])
     except ValidationError as error:
@@ -43,7 +43,7 @@ def look_at(model: str, changes: Sequence[str] = ()) -> tuple[RobotSection, Robo
 
 
 def as_plain_data(section: RobotSection, robot: Robot) -> dict[str, Any]:
-    """Return what was found, for a JSON file; limits that there are none of are None."""
+    """Return the summary as plain data for JSON; missing limits are None."""
     return {
         "model": section.model, "base": robot.base, "velocities": robot.n, "positions": robot.nq,
         "mass_kg": float(robot.masses.sum()), "joints": _joints(robot),
@@ -59,19 +59,19 @@ def as_plain_data(section: RobotSection, robot: Robot) -> dict[str, Any]:
 
 
 def say(section: RobotSection, robot: Robot) -> str:
-    """Return what was found as text, with a [robot] section to paste."""
+    """Return the summary as text, with a [robot] section to paste."""
     found = as_plain_data(section, robot)
     of_table = robot.table is not None
-    listed = "as its table has them" if of_table else "proposed"
+    listed = "from its table" if of_table else "proposed"
     capsules = ("none" if not robot.capsules else f"{len(robot.capsules)}, "
                 + ("as listed" if section.capsules is not None or of_table
                    else "proposed from the collision geometry"))
     points = "as listed" if section.control_points is not None else listed
-    end = "as given" if section.end_effector else listed.replace("them", "it")
+    end = "as given" if section.end_effector else listed
     lines = [f"{robot.name}: {_source(section.model)}",
              f"  base            {robot.base}, {robot.n} velocities, {robot.nq} positions",
-             f"  mass            {found['mass_kg']:.3g} kg, of what moves",
-             f"  joints          {len(found['joints'])} with a motor",
+             f"  mass            {found['mass_kg']:.3g} kg of moving links",
+             f"  joints          {len(found['joints'])} actuated",
              *_joint_table(found["joints"]),
              f"  frames          {_some(found['frames'])}",
              f"  end effector    {robot.end_effector}, {end}; "
@@ -83,7 +83,7 @@ def say(section: RobotSection, robot: Robot) -> str:
 
 
 def paste(section: RobotSection, robot: Robot) -> str:
-    """Return the [robot] section that gives this robot, all that was proposed written out."""
+    """Return the [robot] section for this robot, with all proposed values."""
     lines = ["[robot]", f"model = {_quoted(section.model)}", f"base = {_quoted(robot.base)}",
              f"end_effector = {_quoted(robot.end_effector)}"]
     if section.locked:
@@ -106,7 +106,7 @@ def _source(model: str) -> str:
 
 
 def _joints(robot: Robot) -> list[dict[str, Any]]:
-    """Joints with a motor: names, kinds and limits."""
+    """Return the names and limits of the actuated joints."""
     lower, upper = robot.position_limits()
     names = robot.velocity_names
     return [{"name": names[i], "lower": _or_none(lower[i]), "upper": _or_none(upper[i]),
@@ -131,14 +131,15 @@ def _missing(robot: Robot) -> list[str]:
                                  and j["upper"] is None],
              "velocity limits": [j["name"] for j in joints if j["velocity"] is None],
              "effort limits": [j["name"] for j in joints if j["effort"] is None],
-             "room between its position limits": [
+             "range between the position limits": [
                  j["name"] for j in joints if j["lower"] is not None
                  and j["lower"] == j["upper"]]}
     said = [f"{kind} of {_some(names)}" for kind, names in kinds.items() if names]
     if not robot.masses.any():
-        said.append("masses: neither centre of mass nor torque limits can be used")
+        said.append("masses: centre-of-mass tasks and torque limits are not possible")
     if not robot.capsules:
-        said.append("capsules: no self-collision, and pictures show lines; list robot.capsules")
+        said.append("capsules: no self-collision avoidance, and figures show lines; list "
+                    "robot.capsules")
     if not robot.control_points:
         said.append("control points: no avoidance; list robot.control_points")
     return [*robot.missing, *said]
@@ -152,7 +153,7 @@ def _moved_by(robot: Robot) -> int:
 
 
 def _carrier(robot: Robot, joint: int) -> str | None:
-    """The joint's name as a section has it; None for the base."""
+    """Return the joint's name as in a section; None for the base."""
     return robot.joint_names[joint - 1] if joint > (1 if robot.base == "floating" else 0) else None
 
 

@@ -1,4 +1,4 @@
-"""What `hierarchy sweep` does and prints."""
+"""`hierarchy sweep`: run a sweep and print its results."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from scenarios.cli.progress import bar
 from scenarios.cli.terminal import print_json
 from scenarios.sweep.config import load_sweep
 from scenarios.sweep.engine import EngineError
+from scenarios.sweep.printing import show
 from scenarios.sweep.store import FullError
-from scenarios.sweep.terminal import show
 from scenarios.sweep.whole import sweep
 
 
 def sweep_command(file: str, out: Path | None, workers: int | None, scheduler: str | None,
                   as_json: bool = False) -> int:
-    """Make a sweep, print what came of it, and return the exit code.
+    """Run a sweep, print its results, and return the exit code.
 
-    That is 0 if every run has a row, 1 if the sweep could not go on or no run reached its end.
+    The code is 0 if every run has a row, 1 if the sweep could not continue or no run finished.
     """
     folder = out if out is not None else Path("runs") / f"sweep-{load_sweep(file).name}"
     command = shlex.join(["hierarchy", *sys.argv[1:]])
@@ -32,7 +32,7 @@ def sweep_command(file: str, out: Path | None, workers: int | None, scheduler: s
         print(f"hierarchy: fault: {error}", file=sys.stderr)
         return 1
     except KeyboardInterrupt:
-        print("hierarchy: interrupted; the same command goes on from here", file=sys.stderr)
+        print("hierarchy: interrupted; the same command continues from here", file=sys.stderr)
         return 1
     if as_json:
         print_json({"folder": str(folder), "report": str(folder / "index.html"),
@@ -45,8 +45,8 @@ def sweep_command(file: str, out: Path | None, workers: int | None, scheduler: s
     if done.plan.refused:
         print("", *done.plan.refused, sep="\n")
     runs = len(done.plan.runs)
-    kept = f", {runs - done.made} were there before" if done.made < runs else ""
-    print(f"\n{runs} runs{kept}; {done.failed} did not reach their end; "
+    kept = f", {runs - done.made} of them from before" if done.made < runs else ""
+    print(f"\n{runs} runs{kept}; {done.failed} did not finish; "
           f"{perf_counter() - begun:.0f} s")
     print(f"Report: {folder / 'index.html'}")
     return int(done.failed == runs)

@@ -1,4 +1,4 @@
-"""What the command line prints: tables of metrics, lists, what was certified."""
+"""Output of the command line: tables of metrics, lists, certificates."""
 
 from __future__ import annotations
 
@@ -15,28 +15,28 @@ if TYPE_CHECKING:
     from scenarios.measure.runs import Row, Run
 
 _WIDTH = 80   # columns of a terminal
-_BESIDE = 5   # runs that a table of so many holds
+_BESIDE = 5   # runs in a table of that width
 
 
 def troubles(recording: Any) -> list[str]:
-    """Say of each kind of trouble what was done, how often, and when first."""
+    """Return one line per kind of problem: action, number of ticks and first tick."""
     lines = [f"{kind}: {action} in {len(ticks)} ticks, first in tick {ticks[0]} "
              f"(t = {recording['t'][ticks[0]]:.3f} s)"
              for (kind, action), ticks in recording.troubles().items()]
     return ["", *lines] if lines else []
 
 
-def verdict(recording: Any, damping: float) -> str:
-    """Say how many ticks were certified and which is the first that was not."""
-    certified = recording["certified"]
-    text = f"certified: {certified.sum()} of {recording.ticks} ticks"
-    if certified.all():
+def certified(recording: Any, damping: float) -> str:
+    """Return how many ticks were certified, and the first that was not."""
+    ticks = recording["certified"]
+    text = f"certified: {ticks.sum()} of {recording.ticks} ticks"
+    if ticks.all():
         return text
-    first = int(certified.argmin())
-    text += f"; the first that is not is tick {first} (t = {recording['t'][first]:.3f} s)"
+    first = int(ticks.argmin())
+    text += f"; the first one not certified is tick {first} (t = {recording['t'][first]:.3f} s)"
     if damping > 0.0:
-        text += (f"\n(damping = {damping:g}: near a singularity the answer is meant to differ from "
-                 "the undamped one, which is what is certified)")
+        text += (f"\n(damping = {damping:g}: near a singularity the answer differs on purpose from "
+                 "the undamped one that is certified)")
     return text
 
 
@@ -54,7 +54,7 @@ def _finite(data: Any) -> Any:
 
 
 def print_table(runs: list[Run]) -> None:
-    """Print the metrics of runs side by side, and where resolvers part that should agree."""
+    """Print the metrics of runs side by side, and where strict resolvers diverge."""
     from rich.console import Console
 
     from scenarios.measure.partings import partings
@@ -74,7 +74,7 @@ def print_table(runs: list[Run]) -> None:
 
 
 def _table(runs: list[Run], rows: list[Row], chosen: range) -> Table:
-    """Lay metrics of the chosen runs out for a terminal, best of all in bold with a star."""
+    """Return a table of metrics for the terminal, the best values bold with a star."""
     from rich.table import Table
     from rich.text import Text
 
@@ -91,12 +91,12 @@ def _table(runs: list[Run], rows: list[Row], chosen: range) -> Table:
 
 
 def _broken(separator: re.Match[str]) -> str:
-    """Break a column's head after a colon or hyphen, or instead of a space."""
+    """Break a column's heading after a colon or hyphen, or at a space."""
     return f"{separator[0].strip()}\n"
 
 
 def print_list(what: str, entries: dict[str, str]) -> None:
-    """Print names with what they are, in 80 columns."""
+    """Print names with descriptions in 80 columns."""
     print(f"{what}:")
     width = max((len(name) for name in entries), default=0)
     for name, text in entries.items():
@@ -111,6 +111,6 @@ def first_line(thing: Any) -> str:
 
 
 def shown(path: Path) -> str:
-    """Return a path as the user would write it from here."""
+    """Return a path relative to the current folder, if it is below it."""
     path = path.resolve()
     return str(path.relative_to(Path.cwd()) if path.is_relative_to(Path.cwd()) else path)

@@ -1,4 +1,4 @@
-"""What `hierarchy view` and `hierarchy run --live` do."""
+"""`hierarchy view` and `hierarchy run --live`."""
 
 from __future__ import annotations
 
@@ -34,10 +34,10 @@ def view_command(folders: Sequence[Path], port: int, side_by_side: bool, browser
 
 
 def live_command(scenario: Scenario, folder: Path, port: int, speed: float, browser: bool) -> int:
-    """Run a scenario while it is watched, keep the run, and return 1 if it came to no end.
+    """Run a scenario live in the browser, save the run, and return 1 if it stopped with a fault.
 
-    The run is kept when it ends or at Ctrl-C, in `folder` or, after a restart, beside it; one that
-    is restarted before its end is not kept.
+    The run is saved when it ends or at Ctrl-C, in `folder` or, after a restart, beside it. A run
+    that is restarted before its end is not saved.
     """
     from scenarios.draw.viewer.live import Live
     from scenarios.draw.viewer.live_page import LivePage
@@ -59,7 +59,7 @@ def live_command(scenario: Scenario, folder: Path, port: int, speed: float, brow
 
 
 def _serve(page: LivePage, folder: Path) -> None:
-    """Let the run go on until Ctrl-C, and keep it whenever it ends."""
+    """Continue the run until Ctrl-C, and save it whenever it ends."""
     from scenarios.draw.viewer.live_page import FRAMES
 
     last, kept = time.monotonic(), None
@@ -74,7 +74,7 @@ def _serve(page: LivePage, folder: Path) -> None:
 
 
 def _keep(page: LivePage, folder: Path) -> None:
-    """Write the run's folder, or where there is one from before the next that is free beside it."""
+    """Save the run in its folder, or in the next free one beside it."""
     beside = (folder.with_name(f"{folder.name}-{i}") for i in itertools.count(2))
     free = next(path for path in itertools.chain([folder], beside)
                 if not path.exists() or not any(path.iterdir()))

@@ -1,4 +1,4 @@
-"""The validated form of a scenario file, a file for each of its sections, and how it is read."""
+"""Reading and validating scenario files; one module per section."""
 
 from scenarios.config.errors import ScenarioError
 from scenarios.config.reading import load, shipped

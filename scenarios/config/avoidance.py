@@ -28,7 +28,7 @@ class RepulsionSection(Section):
 
 
 class ObstacleSection(Section):
-    """An obstacle: shape, centre [m], sizes [m], rotation rows, and a path if it moves."""
+    """An obstacle: shape, centre [m], sizes [m], rows of its rotation, and a path if it moves."""
 
     shape: Literal["point", "sphere", "capsule", "box"] = "point"
     centre: Vector3 | None = None
@@ -51,7 +51,7 @@ class ObstacleSection(Section):
 
 
 def _point_as_table(obstacle: Any) -> Any:
-    """[x, y, z] is short for a point obstacle."""
+    """Accept [x, y, z] as a point obstacle."""
     return {"centre": obstacle} if isinstance(obstacle, list | tuple) else obstacle
 
 
@@ -59,11 +59,11 @@ Obstacles = tuple[Annotated[ObstacleSection, BeforeValidator(_point_as_table)], 
 
 
 class VariationSection(Section):
-    """Obstacles on slightly other paths, which follow from `seed`.
+    """Random variation of obstacle paths, determined by `seed`.
 
-    Every waypoint is moved by up to `spread` [m] in any direction, points at which an obstacle
-    rests as one; every time but the first by up to the share `timing` of half the shorter span
-    beside it. Obstacles without waypoints stay as they are.
+    Every waypoint moves by up to `spread` [m] in any direction; consecutive equal waypoints, at
+    which an obstacle rests, move together. Every time except the first shifts by up to the share
+    `timing` of half the shorter adjacent interval. Obstacles without waypoints do not change.
     """
 
     seed: Annotated[int, Field(ge=0)]
@@ -73,7 +73,7 @@ class VariationSection(Section):
 
 def _varied(obstacle: ObstacleSection, variation: VariationSection,
             number: int) -> ObstacleSection:
-    """Return the obstacle with its waypoints moved, each obstacle by chance of its own."""
+    """Return the obstacle with its waypoints moved, each obstacle with its own random numbers."""
     path = obstacle.path
     if not isinstance(path, WaypointsSection):
         return obstacle
@@ -89,7 +89,7 @@ class _Avoiding(Section):
 
     @property
     def placed(self) -> Obstacles:
-        """The obstacles on the paths that `variation` leads them."""
+        """The obstacles, on varied paths if there is a `variation`."""
         if self.variation is None:
             return self.obstacles
         return tuple(_varied(obstacle, self.variation, number)
@@ -99,12 +99,12 @@ class _Avoiding(Section):
     def _varies_something(self) -> Self:
         if self.variation and not any(isinstance(obstacle.path, WaypointsSection)
                                       for obstacle in self.obstacles):
-            raise ValueError("variation needs an obstacle with a path of waypoints")
+            raise ValueError("variation needs an obstacle with waypoints")
         return self
 
 
 class AvoidanceSection(_Avoiding):
-    """Avoidance by the body and repulsion of the end effector, switched by Algorithm 1."""
+    """Avoidance for the body and repulsion of the end effector, switched by Algorithm 1."""
 
     kind: Literal["repulsion"] = "repulsion"
     dimension: Literal[1, 3] = 1
@@ -124,7 +124,7 @@ class AvoidanceSection(_Avoiding):
 
     @property
     def thresholds(self) -> dict[str, float]:
-        """Distances of the body [m] at which something changes, by symbol."""
+        """Distances of the body [m] at which avoidance changes, by symbol."""
         outer = {r"$\epsilon_2$": self.far} if self.far > self.near else {}
         return {r"$\epsilon_1$": self.near} | outer
 
@@ -135,12 +135,12 @@ class AvoidanceSection(_Avoiding):
 
 
 class SeparationSection(_Avoiding):
-    """All control points and the end effector kept off all obstacles, as one-sided rows.
+    """Keep all control points and the end effector away from all obstacles, as one-sided rows.
 
-    `distance` [m] that is kept; `rate` [1/s] at which it may be approached; obstacles beyond
-    `influence` [m] ask for nothing; one that is too near is left at up to `recovery` [m/s], with up
-    to `limit` [m/s^2]. `self_collision` is the distance [m] kept between links that are no
-    neighbours, None for any. See hierarchy.avoidance.Barrier.
+    `distance` [m] is the clearance and `rate` [1/s] limits the approach to it. Obstacles beyond
+    `influence` [m] have no effect. Below the clearance the robot retreats at up to `recovery` [m/s]
+    and `limit` [m/s^2]. `self_collision` [m] is the clearance between links that are not
+    neighbours, None for no self-collision avoidance. See hierarchy.avoidance.Barrier.
     """
 
     kind: Literal["separation"]
@@ -161,7 +161,7 @@ class SeparationSection(_Avoiding):
 
     @property
     def thresholds(self) -> dict[str, float]:
-        """Distances of the body [m] at which something changes, by symbol."""
+        """Distances of the body [m] at which avoidance changes, by symbol."""
         return {r"$d_{min}$": self.distance}
 
     @property

@@ -1,4 +1,4 @@
-"""Changes of a scenario as text: dotted keys and TOML values."""
+"""Changes to a scenario as text: dotted keys and TOML values."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from scenarios.config.errors import ScenarioError
 
 
 def changed(data: dict[str, Any], changes: Sequence[str]) -> dict[str, Any]:
-    """Apply "dotted.key=value" texts to `data`, which is changed, and return it."""
+    """Apply "dotted.key=value" texts to `data` in place, and return it."""
     for key, value in parse_changes(changes, what="--set").items():
         change(data, key, value)
     return data
 
 
 def parse_changes(changes: Sequence[str], what: str) -> dict[str, Any]:
-    """Return dotted keys and values of "key=value" texts; ScenarioError begins with `what`."""
+    """Return keys and values of "key=value" texts; a ScenarioError starts with `what`."""
     parsed = {}
     for change in changes:
         key, equals, text = change.partition("=")
@@ -32,12 +32,12 @@ def _value(text: str, what: str) -> Any:
         return tomllib.loads(f"value = {text}")["value"]
     except tomllib.TOMLDecodeError as error:
         if text and all(c.isalnum() or c in "_-./" for c in text):
-            return text  # a bare word: quotes are a nuisance on a command line
+            return text  # a bare word needs no quotes on a command line
         raise ScenarioError(f"{what}: {text!r} is not a TOML value") from error
 
 
 def change(data: dict[str, Any], dotted: str, value: Any) -> None:
-    """Put a value at a dotted key of `data`, which is changed."""
+    """Set the value at a dotted key of `data` in place."""
     *path, last = dotted.split(".")
     table = data
     for key in path:
@@ -48,7 +48,7 @@ def change(data: dict[str, Any], dotted: str, value: Any) -> None:
 
 
 def without_none(data: Any) -> Any:
-    """Return data without the keys whose value is None, which TOML cannot say."""
+    """Return data without keys whose value is None, which TOML does not have."""
     if isinstance(data, dict):
         return {key: without_none(value) for key, value in data.items() if value is not None}
     if isinstance(data, list):

@@ -13,18 +13,18 @@ BlindPolicy = Literal["brake", "hold", "stop"]
 
 
 class PolicySection(Section):
-    """What is sent in a tick with trouble, for each kind of it.
+    """The command sent in a tick with a problem, for each kind of problem.
 
-    "brake": toward rest. "hold": the last command of a tick without trouble, for at most
-    `patience` ticks in a row, then brake. "stop": to rest as fast as the limits allow, where the
-    run ends with a fault. "use": the answer, where there is one. In a tick with troubles of several
-    kinds the last of use, hold, brake, stop that one of them asks for is done.
+    "brake": decelerate to rest. "hold": repeat the last good command for at most `patience`
+    consecutive ticks, then brake. "stop": decelerate as fast as the limits allow and end the run
+    with a fault. "use": send the answer, if there is one. If a tick has several problems, the most
+    cautious action wins, in the order use, hold, brake, stop.
 
     The first four kinds are statuses of a resolver, see solvers.Status. not_finite: a measured
-    joint state is NaN or infinite, or a distance NaN. stale: no new measurement for more than
-    `stale_after` [s]; up to then the last one is carried on by the commands sent. overrun: the
-    command was not there `deadline` [s] after the tick began; None for no deadline. inside: a
-    point of the robot is on or inside an obstacle.
+    joint state is NaN or infinite, or a distance is NaN. stale: no new measurement for more than
+    `stale_after` [s]; before that, the last one is extrapolated from the commands sent. overrun:
+    the command is not ready `deadline` [s] after the start of the tick; None for no deadline.
+    inside: a point of the robot is on or inside an obstacle.
     """
 
     iteration_limit: AnswerPolicy = "brake"
@@ -41,22 +41,22 @@ class PolicySection(Section):
 
 
 class ControlSection(Section):
-    """How the tasks are resolved and how often.
+    """How the tasks are resolved, and how often.
 
-    `stack` = "switched": Algorithm 1 says which tasks are in the stack, and all are equalities.
-    "hierarchical": limits, avoidance, position and pointing are in it at all times, in this order,
-    inequalities as inequalities.
+    `stack` = "switched": Algorithm 1 selects the tasks in the stack, all as equalities.
+    "hierarchical": limits, avoidance, position and pointing are always in it, in this order, and
+    inequalities stay inequalities.
 
-    With `strictness` every tick is also resolved without what is below the position, outside the
-    times measured, to see whether that moves the end effector.
+    With `strictness` every tick is also resolved without the levels below the position, to measure
+    whether they move the end effector; this is not part of the measured times.
 
-    `options` are settings of the resolver. A table in it that bears a resolver's name, such as
-    `[control.options.tpm]`, holds for that resolver alone; so the resolver can be swapped by
-    changing its name, and nothing else. A plain setting goes before one from such a table.
+    `options` are settings of the resolver. A table in it with a resolver's name, such as
+    `[control.options.tpm]`, applies to that resolver only, so that changing `resolver` is enough to
+    swap it. Plain settings override those from such a table.
 
-    `transition` = "blend": where the order of the stack or the active control point changes, the
-    command passes over from the old stack's to the new one's within `transition_time` [s]; "none":
-    at once. A task that enters, such as an avoidance, has its full effect only after that time.
+    `transition` = "blend": when the order of the stack or the active control point changes, the
+    command moves from the old stack's to the new one's within `transition_time` [s], and a new
+    task has its full effect only after that time. "none": it changes at once.
     """
 
     level: Literal["velocity", "acceleration"] = "acceleration"
@@ -82,7 +82,7 @@ class ControlSection(Section):
         return self
 
     def settings(self) -> dict[str, Any]:
-        """Settings of the resolver: those of its own table, the plain ones laid over."""
+        """Return the resolver's settings: those of its table, overridden by plain ones."""
         from solvers import names
 
         own = self.options.get(self.resolver, {})

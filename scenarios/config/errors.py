@@ -1,4 +1,4 @@
-"""What is raised for a scenario that cannot be used."""
+"""The error of an invalid scenario."""
 
 from __future__ import annotations
 
@@ -6,4 +6,4 @@ from hierarchy.errors import HierarchyError
 
 
 class ScenarioError(HierarchyError):
-    """A scenario file, or a change to one, that cannot be used; names file and key."""
+    """An invalid scenario file or change; the message names the file and the key."""

@@ -1,4 +1,4 @@
-"""The keys of [[faults]]: trouble that is injected."""
+"""The keys of [[faults]]: injected faults."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from scenarios.config.sections import NotNegative, Positive, Section, Vector3
 
 
 class FaultSection(Section):
-    """Something that goes wrong on purpose from `at` [s] on, for `duration` [s].
+    """A fault injected at `at` [s] for `duration` [s].
 
-    nan_position, nan_velocity: what is measured of `joint` (1, 2, ...; of all without it) is NaN.
-    nan_distance: so is the distance of `point` (control points 1, 2, ..., then the end effector;
-    of all without it). stale: joints and distances stay as they were. status: the resolver says
-    `status` of its answer. overrun: the tick takes `takes` [s] more. obstacle: a sphere of `radius`
-    [m] stands at `centre` [m], or at `place` on the body as this was when the sphere appeared.
-    no_frames: the camera takes no images; dark_frames: they have no readings.
+    nan_position, nan_velocity: the measurement of `joint` (1, 2, ...; default all) is NaN.
+    nan_distance: the distance of `point` (control points 1, 2, ..., then the end effector; default
+    all) is NaN. stale: measured joints and distances are frozen. status: the resolver reports
+    `status`. overrun: the tick takes `takes` [s] longer. obstacle: a sphere of `radius` [m] appears
+    at `centre` [m], or where `place` on the body is at that time. no_frames: the camera takes no
+    images. dark_frames: its images have no readings.
     """
 
     kind: Literal["nan_position", "nan_velocity", "nan_distance", "stale", "status", "overrun",

@@ -1,4 +1,4 @@
-"""The keys of [plant]: what moves, and how it is measured."""
+"""The keys of [plant]: the simulated robot and its measurement."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from scenarios.config.sections import NotNegative, Positive, Section
 
 
 class MeasurementSection(Section):
-    """What the controller is told of the joints, for either plant; all zero: exactly what is so.
+    """Measurement of the joints, for either plant; with all values zero it is exact.
 
-    Normal noise of deviation `position_noise` [rad] and `velocity_noise` [rad/s], drawn from
-    `seed`; steps of the position `quantisation` [rad]; `delay` [s], whole periods. velocity =
-    "measured" is a sensor of its own, "differenced" the backward difference of measured positions
-    behind a low-pass of `filter_time` [s].
+    Normal noise with standard deviations `position_noise` [rad] and `velocity_noise` [rad/s],
+    determined by `seed`; position steps of `quantisation` [rad]; `delay` [s], a whole number of
+    periods. velocity = "measured" is a separate sensor, "differenced" the backward difference of
+    measured positions after a low-pass filter with time constant `filter_time` [s].
     """
 
     position_noise: NotNegative = 0.0
@@ -35,7 +35,7 @@ class MeasurementSection(Section):
 
     @property
     def ideal(self) -> bool:
-        """Whether nothing is changed by measuring."""
+        """Whether the measurement is exact."""
         return self.velocity == "measured" and not (
             self.position_noise or self.velocity_noise or self.quantisation or self.delay)
 
@@ -43,12 +43,12 @@ class MeasurementSection(Section):
 class ServoSection(Section):
     """The position servo of each joint of the physics plant.
 
-    torque = k (reference - q) + c (its rate - v) + `gravity` times what holds the arm, within the
-    effort limits. k = m `bandwidth`^2 and c = 2 m `bandwidth` [rad/s], where m is the inertia that
-    the joint has at the start, drive included. It runs at `rate` [Hz] (or a little faster, a whole
-    number of times a period) on references interpolated linearly. `feedforward` off leaves out the
-    rate of the reference. The reference leads its joint by at most `lead` [rad], so that an arm
-    that is held back does not run after.
+    torque = k (reference - q) + c (its rate - v) + `gravity` times the gravity torque, within the
+    effort limits. k = m `bandwidth`^2 and c = 2 m `bandwidth` [rad/s], where m is the inertia of
+    the joint at the start, including the drive. The servo runs at `rate` [Hz] (or slightly faster,
+    a whole number of times per period) on linearly interpolated references. Without `feedforward`
+    the rate of the reference is ignored. The reference leads its joint by at most `lead` [rad], so
+    that a blocked arm does not rush to catch up.
     """
 
     rate: Annotated[float, Field(ge=200.0, le=10000.0)] = 1000.0
@@ -59,10 +59,10 @@ class ServoSection(Section):
 
 
 class JointsSection(Section):
-    """Joints of the physics plant: one number for all, or one each. Plausible, not identified.
+    """Joints of the physics plant: one value for all or one each. Plausible, not identified.
 
-    friction [N m] is dry; damping [N m s/rad]; armature [kg m^2] is the inertia of motor and gear
-    as felt at the joint.
+    friction [N m] is dry friction; damping [N m s/rad]; armature [kg m^2] is the inertia of motor
+    and gear at the joint.
     """
 
     friction: NotNegative | tuple[NotNegative, ...] = 0.5
@@ -71,12 +71,12 @@ class JointsSection(Section):
 
 
 class PlantSection(Section):
-    """What the commands move: "kinematic" follows them exactly, "mujoco" is simulated physics.
+    """The simulated robot: "kinematic" follows commands exactly, "mujoco" simulates physics.
 
-    `servo` and `joints` are those of "mujoco". It adds the commands up to a joint position
-    reference. With feedback = "commanded" the controller is told that reference in place of what
-    `measurement` says: it then sees neither noise nor what the joints do, as where commands through
-    FRI are integrated blindly. Both are stable with the letter's gains.
+    `servo` and `joints` belong to "mujoco", which integrates the commands to a joint position
+    reference. With feedback = "commanded" the controller receives that reference instead of a
+    measurement: it sees neither noise nor the real joints, as when commands through FRI are
+    integrated blindly. Both are stable with the letter's gains.
     """
 
     kind: Literal["kinematic", "mujoco"] = "kinematic"

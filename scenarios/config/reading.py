@@ -1,8 +1,7 @@
-"""How a scenario file is read: by name or path, over what it extends, with changes."""
+"""Read a scenario file by name or path, with the file it extends and with changes."""
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -13,22 +12,23 @@ from scenarios.config.changes import change, parse_changes
 from scenarios.config.errors import ScenarioError
 from scenarios.config.scenario import Scenario
 from scenarios.config.validation import validated
+from scenarios.files import read_toml
 
 LIBRARY = Path(__file__).parents[1] / "library"
 
 
 def shipped() -> tuple[str, ...]:
-    """Names of the scenarios that come with the package."""
+    """Return the names of the scenarios shipped with the package."""
     return tuple(sorted(path.stem for path in LIBRARY.glob("*.toml")))
 
 
 def load(name_or_path: str | Path, changes: Sequence[str] | Mapping[str, Any] = ()) -> Scenario:
     """Read a shipped scenario by name, or a scenario file by path, and apply changes to it.
 
-    A file may begin with `extends = "ellipse"` (a shipped name or a path beside it) and then gives
-    only what differs. `changes` are "dotted.key=value" texts with TOML values, or a mapping of
-    dotted keys. Raises ScenarioError, naming the file and the key, and UnknownNameError for a name
-    that is not shipped.
+    A file with `extends = "ellipse"` (a shipped name or a relative path) contains only the
+    differences. `changes` are "dotted.key=value" texts with TOML values, or a mapping of dotted
+    keys. Raises ScenarioError, naming the file and the key, and UnknownNameError for an unknown
+    name.
     """
     path = Path(name_or_path)
     if path.suffix != ".toml":
@@ -53,8 +53,8 @@ def load(name_or_path: str | Path, changes: Sequence[str] | Mapping[str, Any] = 
 
 
 def _read_extended(path: Path, below: tuple[Path, ...] = ()) -> dict[str, Any]:
-    """Read a file and, under it, the shipped scenario or the file that its `extends` names."""
-    data = _read(path)
+    """Read a file, merged over the scenario or file that its `extends` names."""
+    data = read_toml(path, "scenario file", ScenarioError)
     base = data.pop("extends", None)
     if base is None:
         return data
@@ -74,16 +74,3 @@ def _laid_over(below: dict[str, Any], above: dict[str, Any]) -> dict[str, Any]:
         both = isinstance(value, dict) and isinstance(merged.get(key), dict)
         merged[key] = _laid_over(merged[key], value) if both else value
     return merged
-
-
-def _read(path: Path) -> dict[str, Any]:
-    try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError as error:
-        raise ScenarioError(f"scenario file {str(path)!r} does not exist") from error
-    except OSError as error:
-        raise ScenarioError(f"scenario file {str(path)!r}: {error.strerror}") from error
-    except UnicodeDecodeError as error:
-        raise ScenarioError(f"scenario file {str(path)!r} is not UTF-8 text") from error
-    except tomllib.TOMLDecodeError as error:  # its text says line and column
-        raise ScenarioError(f"scenario file {str(path)!r}: {error}") from error

@@ -1,12 +1,11 @@
-"""The resolvers that a scenario is compared under unless others are named."""
+"""The resolvers of a comparison by default."""
 
 from __future__ import annotations
 
 from solvers.qp.backends import BACKENDS, installed
 from solvers.resolver import Handles
 
-# By default every way that the letter compares, and ours; where rows are inequalities, the whole
-# field of those that take them.
+# The methods that the letter compares, and ours; for inequalities all resolvers that accept them.
 DEFAULT_RESOLVERS: dict[Handles, tuple[str, ...]] = {
     "equalities": ("tpm", "tpm:form=staircase", "recursive", "augmented", "hqp",
                    "hqp:backend=osqp", "hqp:backend=daqp", "hcod"),
@@ -15,7 +14,7 @@ DEFAULT_RESOLVERS: dict[Handles, tuple[str, ...]] = {
 
 
 def default_resolvers(asked: Handles = "equalities") -> tuple[tuple[str, ...], dict[str, str]]:
-    """Return those of DEFAULT_RESOLVERS that can run here, and of the others what brings them."""
+    """Return the installed ones of DEFAULT_RESOLVERS, and how to install the others."""
     wanted = {spec: spec.partition(":backend=")[2] for spec in DEFAULT_RESOLVERS[asked]}
     missing = {spec: "pip install 'task-hierarchy[qp]'" for spec, backend in wanted.items()
                if backend in BACKENDS and not installed(backend)}

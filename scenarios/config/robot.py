@@ -11,14 +11,14 @@ from scenarios.config.sections import Finite, NotNegative, Section, Vector3
 
 
 class ControlPointSection(Section):
-    """A point on the body that `joint` moves, `offset` [m] in that joint's frame."""
+    """A point on the body of `joint`, at `offset` [m] in the joint's frame."""
 
     joint: str
     offset: Vector3
 
 
 class RobotPointSection(Section):
-    """A point on the body of `joint`, or fixed to `frame`, `offset` [m] in axes of that."""
+    """A point on the body of `joint`, or fixed to `frame`, at `offset` [m] in that frame."""
 
     joint: str | None = None
     frame: str | None = None
@@ -32,7 +32,7 @@ class RobotPointSection(Section):
 
 
 class CapsuleSection(Section):
-    """All within `radius` [m] of the segment `start` to `end` [m], in the frame of `joint`.
+    """All points within `radius` [m] of the segment `start` to `end` [m], in the frame of `joint`.
 
     Without a joint it is fixed to the base.
     """
@@ -46,10 +46,10 @@ class CapsuleSection(Section):
 class RobotSection(Section):
     """Which robot: a name of `hierarchy list`, a URDF or MJCF file, or "package:name".
 
-    Packages are example_robot_data and robot_descriptions (extra `robots`). `base` None is that of
-    the model. What `end_effector`, `control_points` and `capsules` do not say is as the robot's
-    table says, or for a file as `hierarchy check FILE` proposes. `locked` joints of a file are held
-    at an angle [rad] or a way [m] and are no joints any more.
+    Packages are example_robot_data and robot_descriptions (extra `robots`). `base` defaults to that
+    of the model. `end_effector`, `control_points` and `capsules` default to the robot's table, or
+    for a file to the proposals of `hierarchy check FILE`. `locked` joints of a file are fixed at a
+    position [rad or m] and removed.
     """
 
     model: str
@@ -61,9 +61,10 @@ class RobotSection(Section):
 
 
 class StartSection(Section):
-    """Positions `q` [rad or m] and velocities `v`; `end_effector` [m] is reached from q first.
+    """The start: positions `q` [rad or m] and velocities `v`.
 
-    Without q the robot starts in its own posture. `joints` by name go before either.
+    `q` defaults to the robot's own posture, and `joints` override it by name. With `end_effector`
+    [m] the start is the posture, reached from q, that puts the end effector there.
     """
 
     q: tuple[Finite, ...] | None = None

@@ -1,8 +1,9 @@
-"""A whole scenario in its validated form."""
+"""A validated scenario."""
 
 from __future__ import annotations
 
 import dataclasses
+import tomllib
 from collections import Counter
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Any, Self
@@ -35,9 +36,9 @@ if TYPE_CHECKING:
 class Scenario(Section):
     """One scenario: a robot, a start, tasks, and how they are resolved.
 
-    Sections of tasks that are absent ask for nothing. `tasks` are further ones, in order of
-    priority behind limits, avoidance, position and pointing. `damping` and `posture` are the
-    null-space term of eq. (14), so only one of them may be given.
+    Absent sections add no task. `tasks` are further tasks in order of priority, below limits,
+    avoidance, position and pointing. `damping` and `posture` are both the null-space term of
+    eq. (14), so only one of them may be given.
     """
 
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$")]
@@ -75,7 +76,7 @@ class Scenario(Section):
         if self.avoidance and switched and not self.position:
             raise ValueError("[avoidance] needs [position]: Algorithm 1 orders one by the other")
         if self.limits and self.limits.danger_reach and not self.avoidance:
-            raise ValueError("limits.danger_reach needs [avoidance], whose obstacles it sees")
+            raise ValueError("limits.danger_reach needs the obstacles of [avoidance]")
         if self.limits and self.limits.place != "stack" and (
                 self.limits.torque or self.limits.danger_reach):
             raise ValueError('limits.torque and limits.danger_reach need limits.place = "stack"')
@@ -91,7 +92,7 @@ class Scenario(Section):
         names += [name for name in ("position", "pointing", "posture") if getattr(self, name)]
         for name, count in Counter(names).items():
             if count > 1:
-                raise ValueError(f"{count} tasks are called {name!r}; give each a name of its own")
+                raise ValueError(f"{count} tasks are named {name!r}; give each its own name")
         return self
 
     @model_validator(mode="after")
@@ -102,7 +103,7 @@ class Scenario(Section):
             raise ValueError(f"a fault of kind {blind!r} needs [avoidance]")
         kinds, sensor = {fault.kind for fault in self.faults}, self.sensor.kind
         if sensor != "exact" and not self.avoidance:
-            raise ValueError(f"sensor.kind = {sensor!r} needs [avoidance], which it serves")
+            raise ValueError(f"sensor.kind = {sensor!r} needs [avoidance]")
         if sensor == "exact" and kinds & {"no_frames", "dark_frames"}:
             raise ValueError("faults of frames need a sensor of kind \"camera\" or \"frames\"")
         if sensor == "frames" and "obstacle" in kinds:
@@ -111,19 +112,19 @@ class Scenario(Section):
 
     @property
     def is_experiment(self) -> bool:
-        """Whether it stands for the letter's section IV-B: physics, or distances seen."""
+        """Whether it belongs to the letter's section IV-B: physics, or sensed distances."""
         return self.plant.kind != "kinematic" or self.sensor.kind != "exact"
 
     @property
     def limits_in_stack(self) -> bool:
-        """Whether the joint limits are a level of the stack, under the resolver that it names."""
+        """Whether the joint limits are a level of the stack under its resolver."""
         if self.limits is None or self.limits.place == "guard":
             return False
         return self.limits.place == "stack" or self.make_resolver().handles != "equalities"
 
     @property
     def asks(self) -> Handles:
-        """Which kind of rows its stack has, under the resolver that it names."""
+        """The kind of rows that its stack has under its resolver."""
         inequalities = self.control.stack == "hierarchical" and (
             self.avoidance is not None or (self.pointing and self.pointing.kind == "inequality")
             or any(isinstance(task, ListedPointing) and task.rows == "inequality"
@@ -134,7 +135,7 @@ class Scenario(Section):
         return "bounds" if limits else "equalities"
 
     def make_resolver(self) -> Resolver:
-        """Make the resolver that `control.resolver` and `control.options` describe."""
+        """Make the resolver given by `control.resolver` and `control.options`."""
         from solvers import make
 
         return make(self.control.resolver, **self.control.settings())
@@ -143,7 +144,7 @@ class Scenario(Section):
         """Return this scenario under another resolver.
 
         `spec` is `name` or `name:setting=value:setting=value`. The scenario's settings are kept
-        where the named resolver has them; those of the spec go before them.
+        if the resolver has them; those of the spec override them.
         """
         from solvers import make
 
@@ -156,12 +157,17 @@ class Scenario(Section):
         return validated(Scenario, {**self.model_dump(), "control": control}, f"resolver {spec!r}")
 
     def with_changes(self, changes: Mapping[str, Any]) -> Scenario:
-        """Return this scenario with other values of dotted keys; ScenarioError as `load` does."""
+        """Return this scenario with other values at dotted keys; raises ScenarioError."""
         data = self.model_dump()
         for key, value in changes.items():
             change(data, key, value)
         return validated(Scenario, data, f"scenario {self.name!r}")
 
+    @classmethod
+    def from_toml(cls, text: str) -> Self:
+        """Return the scenario that `to_toml` wrote; raises pydantic's ValidationError."""
+        return cls.model_validate(tomllib.loads(text))
+
     def to_toml(self) -> str:
-        """Return the scenario as a file that `load` reads back."""
+        """Return the scenario as TOML text that `load` can read."""
         return tomli_w.dumps(without_none(self.model_dump(mode="json")))

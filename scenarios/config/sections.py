@@ -1,4 +1,4 @@
-"""What sections of a scenario file are made of: numbers, paths, and tasks of one's own order."""
+"""Common parts of sections: numbers, paths, and the tasks of `[[tasks]]`."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Rows3 = tuple[Vector3, Vector3, Vector3]
 
 
 class Section(BaseModel):
-    """A table of a scenario file: no key that is not known, nothing changed after it was read."""
+    """A table of a scenario file: unknown keys are rejected, and it is immutable."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=False)
 
@@ -37,7 +37,7 @@ class EllipseSection(Section):
 
 
 class WaypointsSection(Section):
-    """From point to point [m] at increasing times [s], at rest at each."""
+    """Points [m] at increasing times [s], at rest at each point."""
 
     kind: Literal["waypoints"]
     times: tuple[NotNegative, ...]
@@ -50,7 +50,7 @@ TaskName = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_ -]*$")]
 
 
 class _Listed(Section):
-    """A task of `[[tasks]]`; its name is its kind unless it is given."""
+    """A task of `[[tasks]]`; its name defaults to its kind."""
 
     name: TaskName | None = None
     stiffness: NotNegative = 40.0
@@ -64,9 +64,9 @@ class _Listed(Section):
 
 
 class _Along(_Listed):
-    """Along `path`, or without one at rest where it is at the start.
+    """Follow `path`, or stay at the initial position without one.
 
-    With `from_start` the path is counted from where the frame is at the start.
+    With `from_start` the path is relative to the initial position.
     """
 
     path: PathSection | None = None
@@ -87,7 +87,7 @@ class ListedPosition(_Along):
 
 
 class ListedPose(_Along):
-    """Origin and axes of `frame` (6 rows); `rotation` are rows, None for as at the start."""
+    """Origin and axes of `frame` (6 rows); `rotation` (rows) defaults to the initial one."""
 
     kind: Literal["pose"]
     frame: str
@@ -102,7 +102,7 @@ class ListedCentreOfMass(_Along):
 
 
 class ListedPointing(_Listed):
-    """The z axis of `frame` at `alpha_d` [deg] to `axis`, or with "inequality" at most so far."""
+    """The z axis of `frame` at `alpha_d` [deg] from `axis`, or with "inequality" at most that."""
 
     kind: Literal["pointing"]
     frame: str
@@ -115,7 +115,7 @@ class ListedPointing(_Listed):
 
 
 class ListedPosture(_Listed):
-    """All joints to `target` [rad or m], None for the start, except those in `joints` by name."""
+    """All joints to `target` [rad or m], by default the start; `joints` override it by name."""
 
     kind: Literal["posture"]
     target: tuple[Finite, ...] | None = None

@@ -12,28 +12,27 @@ Share = Annotated[float, Field(ge=0.0, le=1.0)]
 
 
 class SensorSection(Section):
-    """Where distances come from; settings that the kind does not use have no effect.
+    """The source of distances; settings that the kind does not use have no effect.
 
     "exact": known geometry. "camera": a simulated depth camera that sees obstacles and robot.
-    "frames": depth images from a `folder`, or a shipped one by name, that also says which camera
-    took them and when; see scenarios.cell.sensors.frames.
+    "frames": depth images from a `folder` or a shipped set, with their camera and times; see
+    scenarios.cell.sensors.frames.
 
-    Of both kinds with images, see scenarios.cell.sensors.depth_space: a frame is used from
-    `latency` [s] after it was taken. Without a new frame for more than `stale_after` [s] the camera
-    is blind and `control.policy.stale` acts; one with a reading in less than the share
-    `least_readings` of its pixels is none. The robot, made of capsules with a column of height
-    `foot` [m] below its base, is taken out with a `margin` [m]. Obstacles within `region` [m] of a
-    point are seen, None for the largest distance at which avoidance acts. `thin` [m] is how far
-    obstacles reach behind their surface, None for any distance. A pixel counts if `support` of the
-    nine around it agree within `band` [m].
+    Both image sources (scenarios.cell.sensors.depth_space): a frame is available `latency` [s]
+    after it was taken. Without a new frame for more than `stale_after` [s] the camera is blind and
+    `control.policy.stale` applies; frames with fewer valid pixels than the share `least_readings`
+    do not count. The robot's capsules, with a column of height `foot` [m] below the base, are
+    removed from the image with a `margin` [m]. Obstacles are seen within `region` [m] of a point,
+    by default the largest distance at which avoidance acts. Obstacles extend `thin` [m] behind
+    their surface, by default without bound. A pixel counts if `support` of the nine around it agree
+    within `band` [m].
 
-    Of the camera, see scenarios.cell.sensors.camera: image size, focal lengths and centre [px],
-    None for the middle; position [m]; a point [m] to look at, or a rotation, which goes before it:
-    rows, whose columns are the camera's axes right, down and forward in the world. `rate` [Hz],
-    `jitter`
-    [s] of the frames; `seed` of all chance. `ideal`: without the errors, which are those of
-    scenarios.cell.sensors.errors. `backdrop` [m] is the depth of a wall, 0 for none, which may
-    leave too few readings; `point_radius` [m] is that of the balls as which points are seen.
+    The camera (scenarios.cell.sensors.camera): image size, focal lengths and centre [px], by
+    default the middle; position [m]; a point [m] to look at, or a rotation, which takes precedence:
+    rows, whose columns are the camera's axes right, down and forward in the world. `rate` [Hz] and
+    `jitter` [s] of the frames; random `seed`; `ideal` for no errors (else those of
+    scenarios.cell.sensors.errors); `backdrop` [m], the depth of a wall, 0 for none, which may leave
+    too few readings; `point_radius` [m] of the balls that represent points.
     """
 
     kind: Literal["exact", "camera", "frames"] = "exact"

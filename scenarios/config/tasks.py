@@ -10,7 +10,7 @@ from scenarios.config.sections import Finite, NotNegative, PathSection, Positive
 
 
 class PositionSection(Section):
-    """End-effector position along a path, which is moved by `offset` [m]."""
+    """End-effector position along a path, shifted by `offset` [m]."""
 
     path: PathSection
     offset: Vector3 = (0.0, 0.0, 0.0)
@@ -33,15 +33,15 @@ class PointingSection(Section):
 class LimitsSection(Section):
     """The robot's joint limits, as the first level of the stack.
 
-    With `place` = "guard" they are not in the stack: each command is moved into them joint by
-    joint, whatever that does to the tasks. So they suit every resolver. "either": in the stack of a
-    resolver that takes bounds, a guard for one that does not.
+    With `place` = "guard" they are not in the stack: each command is clamped to them joint by
+    joint, regardless of the tasks, which works with every resolver. "either": in the stack if the
+    resolver handles bounds, otherwise a guard.
 
-    Positions and velocities are those of the robot; `acceleration` [rad/s^2] of every joint, or
-    one for each; `margin` [rad] is kept off the position limits; `torque` is the share of the
-    effort limits that may be used, at acceleration level, or None for any torque. With
-    `danger_reach` [m] joints that would move a control point toward an obstacle nearer than that
-    are slowed, see hierarchy.tasks.DangerBounds.
+    Position and velocity limits are those of the robot; `acceleration` [rad/s^2] is one value for
+    all joints or one each; `margin` [rad] shrinks the position limits; `torque` is the usable share
+    of the effort limits, at acceleration level, None for no torque limit. With `danger_reach` [m]
+    joints that would move a control point toward an obstacle nearer than that are slowed down, see
+    hierarchy.tasks.DangerBounds.
     """
 
     acceleration: Positive | tuple[Positive, ...]
@@ -59,7 +59,7 @@ class DampingSection(Section):
 
 
 class PostureSection(Section):
-    """Toward a posture [rad or m]: the null-space term, or with `role` = "task" the last level."""
+    """A posture [rad or m] as the null-space term, or with `role` = "task" as the last level."""
 
     target: tuple[Finite, ...]
     role: Literal["null-space", "task"] = "null-space"

@@ -1,4 +1,4 @@
-"""From plain data to a validated section, with errors that name the key and the value."""
+"""Validate plain data as a section; errors name the key and the value."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Kind = TypeVar("Kind", bound=Section)
 
 
 def validated(kind: type[Kind], data: dict[str, Any], what: str) -> Kind:
-    """Return data as a section of this kind; ScenarioError names the key, and the nearest known."""
+    """Return data as a section; raises ScenarioError with the key and the nearest known one."""
     try:
         return kind.model_validate(data)
     except ValidationError as error:
@@ -34,13 +34,13 @@ def _say(root: type[Section], what: str, error: Any) -> str:
 
 
 def _without_kinds(root: type[Section], loc: list[str]) -> list[str]:
-    """Leave out what pydantic puts into a place for the kind that was chosen there."""
+    """Drop the kinds of sections that pydantic inserts into the location of an error."""
     return [key for i, key in enumerate(loc)
             if i in (0, len(loc) - 1) or key not in _kinds_at(root, loc[:i])]
 
 
 def _keys_beside(root: type[Section], keys: list[str]) -> list[str]:
-    """Full names of the keys that may stand where the last of `keys` stands."""
+    """Return the full names of the keys allowed in place of the last of `keys`."""
     beside = _sections_at(root, keys[:-1])
     known = dict.fromkeys(key for section in beside for key in section.model_fields)
     return [".".join([*keys[:-1], key]) for key in known]
@@ -52,9 +52,9 @@ def _kinds_at(root: type[Section], path: list[str]) -> set[str]:
 
 
 def _sections_at(root: type[Section], path: list[str]) -> list[Any]:
-    """The sections that may stand at a path: more than one where a kind decides."""
+    """Return the sections allowed at a path: several if a kind selects one."""
     sections: list[Any] = [root]
-    for key in (key for key in path if not key.isdigit()):  # a place in a list is no key
+    for key in (key for key in path if not key.isdigit()):  # a list index is not a key
         fields = [section.model_fields[key] for section in sections if key in section.model_fields]
         sections = [found for field in fields for found in _sections_in(field.annotation)]
     return sections

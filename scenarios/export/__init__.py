@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib import import_module
@@ -10,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from hierarchy.errors import HierarchyError, UnknownNameError
-from scenarios.files import OutputError
+from scenarios.files import OutputError, named, written
 
 if TYPE_CHECKING:
     from scenarios.loop.recording import Recording
@@ -49,16 +48,11 @@ def export(recording: Recording, path: str | Path, format: str | None = None) ->
 @contextmanager
 def new_file(path: Path) -> Iterator[Path]:
     """Give a temporary name to write to; the file takes its own when all is there."""
-    partial = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
+    with named(path):
         if path.exists():
             raise OutputError(f"{path} exists; choose another name, or remove it first")
         path.parent.mkdir(parents=True, exist_ok=True)
-        partial.touch()
-    except OSError as error:
-        raise OutputError(f"{path} cannot be written: {error.strerror}") from error
-    try:
+    with written(path) as partial:
+        with named(path):
+            partial.touch()
         yield partial
-        partial.replace(path)
-    finally:
-        partial.unlink(missing_ok=True)

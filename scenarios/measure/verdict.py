@@ -8,11 +8,11 @@ from operator import itemgetter
 from typing import TYPE_CHECKING
 
 from scenarios.measure.motions import ALIKE, departure, motions
+from scenarios.words import in_words, listed
 
 if TYPE_CHECKING:
     from scenarios.measure.runs import Run
 
-_NUMBERS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten")
 TIE = 0.05  # within which, relative to the better one, two values are not told apart in words
 
 Clause = tuple[str, str]  # who, or "", and what is said
@@ -43,17 +43,6 @@ def _joined(clauses: Sequence[Clause]) -> str:
     said = [(who, listed([what for _, what in some]) if who else "; ".join(w for _, w in some))
             for who, some in ((who, list(some)) for who, some in groupby(clauses, itemgetter(0)))]
     return "; ".join(f"{who} {what}".strip() for who, what in said) + "."
-
-
-def in_words(count: int) -> str:
-    """Return a small number as a word."""
-    return _NUMBERS[count] if count < len(_NUMBERS) else str(count)
-
-
-def listed(names: Sequence[str]) -> str:
-    """Return names as they are listed in a sentence."""
-    *first, last = names
-    return f"{', '.join(first)} and {last}" if first else last
 
 
 def _completion(runs: Sequence[Run], finished: Sequence[Run]) -> str:

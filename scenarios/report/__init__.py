@@ -1,5 +1,5 @@
 """The page that shows a comparison: one HTML file that needs nothing else."""
 
-from scenarios.report.page import page
+from scenarios.report.page import comparison_page
 
-__all__ = ["page"]
+__all__ = ["comparison_page"]

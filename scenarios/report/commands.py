@@ -1,4 +1,4 @@
-"""The commands that make a comparison again, run by run."""
+"""The commands that repeat a comparison, run by run."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ if TYPE_CHECKING:
 
 
 def run_command(run: Run, folder: str) -> str:
-    """Return the command that makes a run again.
+    """Return the command that repeats a run.
 
-    By the scenario's name and what was changed in it, if that gives the same scenario; by the file
-    in the run's own folder if not.
+    It uses the scenario's name and the changed values if they give the same scenario, otherwise
+    the scenario file in the run's folder.
     """
     changes = _changes(run)
     if changes is None:
@@ -31,18 +31,18 @@ def run_command(run: Run, folder: str) -> str:
 
 
 def commands(comparison: Comparison, runs: Sequence[Run]) -> list[tuple[str, str]]:
-    """Return what each command is for, and the command, for runs that stand side by side."""
+    """Return the purpose and text of each command for the runs of one group."""
     folder = comparison.folder or ""
     kept = [run for run in runs if run.recording is not None]
-    found = [(f"{run.label}, run again", run_command(run, folder)) for run in runs]
+    found = [(f"Repeat {run.label}", run_command(run, folder)) for run in runs]
     if kept:
         first = str(PurePath(folder, kept[0].folder))
         every = [str(PurePath(folder, one.runs[0].folder)) for one in motions(kept)] or [first]
-        found += [("See a run in the browser, in three dimensions",
+        found += [("View a run in 3D in the browser",
                    _shell("hierarchy", "view", first)),
-                  ("The replay alone, as one file; each motion once",
+                  ("Write the replay as a single file, each motion once",
                    _shell("hierarchy", "replay", *every)),
-                  ("A run's figures for a paper, as PDF",
+                  ("Draw a run's figures for a paper, as PDF",
                    _shell("hierarchy", "figures", first, "--style", "paper"))]
     return found
 
@@ -52,7 +52,7 @@ def _shell(*words: str) -> str:
 
 
 def _changes(run: Run) -> list[str] | None:
-    """Return what to set in the shipped scenario to get the run's, or None if that cannot be."""
+    """Return the changes to the shipped scenario that give the run's; None if there are none."""
     from scenarios.config import Scenario, load, shipped
 
     scenario = run.scenario
@@ -72,7 +72,7 @@ def _plain(scenario: Scenario) -> dict[str, Any]:
 
 
 def _differences(asked: dict[str, Any], found: dict[str, Any], under: str = "") -> Iterator[str]:
-    """Yield KEY=VALUE of every value that another one took the place of."""
+    """Yield KEY=VALUE for every value that differs."""
     for key, value in found.items():
         if value == asked.get(key):
             continue
@@ -83,7 +83,7 @@ def _differences(asked: dict[str, Any], found: dict[str, Any], under: str = "") 
 
 
 def _toml(value: Any) -> str:
-    """Return a value as TOML; TypeError for what it cannot hold."""
+    """Return a value as TOML; raises TypeError if TOML cannot represent it."""
     if isinstance(value, dict):
         return "{" + ", ".join(f"{key} = {_toml(one)}" for key, one in value.items()
                                if one is not None) + "}"

@@ -1,4 +1,4 @@
-"""The same scenarios under several resolvers: run, written and reported."""
+"""Run scenarios under several resolvers, write the runs and report the comparison."""
 
 from __future__ import annotations
 
@@ -28,25 +28,24 @@ def compare(scenarios: Iterable[str | Scenario] | str, resolvers: Sequence[str] 
             command: str | None = None) -> Comparison:
     """Run every scenario under every resolver, one after the other, and compare.
 
-    A resolver that cannot resolve a scenario's rows is not run on it, and the Comparison says so.
+    A resolver that cannot resolve a scenario's rows is skipped, and the Comparison says so.
 
     With `out`, each run's folder is out/<scenario>/<resolver>, the page is out/index.html and the
-    numbers are in out/comparison.json. A run that breaks or faults does not lose the others;
-    Ctrl-C keeps what was run so far.
+    numbers are in out/comparison.json. A run that fails does not affect the others; Ctrl-C keeps
+    the runs made so far.
 
     Parameters
     ----------
     scenarios : names, paths or Scenario objects.
     resolvers : specs `name` or `name:setting=value:setting=value`; by default those of
-        DEFAULT_RESOLVERS that suit the scenario and are installed.
-    progress : called as progress(label, ticks done, ticks in all).
-    command : the command line to print on the page; made up from the names if not given.
+        DEFAULT_RESOLVERS that can resolve the scenario and are installed.
+    progress : called as progress(label, ticks done, total ticks).
+    command : the command line shown on the page; derived from the names by default.
 
     Raises
     ------
-    HierarchyError : before anything is run: an unknown scenario, resolver or setting, a scenario
-        that does not fit its robot, resolvers of which none can resolve anything, or an output
-        folder that is in use.
+    HierarchyError : before any run: an unknown scenario, resolver or setting, a scenario that does
+        not fit its robot, no resolver that can resolve any scenario, or an output folder in use.
     """
     planned, refused = _plan([scenarios] if isinstance(scenarios, str) else scenarios, resolvers)
     folder = None if out is None else claim(out)
@@ -68,11 +67,11 @@ def compare(scenarios: Iterable[str | Scenario] | str, resolvers: Sequence[str] 
 
 def _plan(scenarios: Iterable[str | Scenario],
           resolvers: Sequence[str] | None) -> tuple[list[Run], list[str]]:
-    """Return the runs to be made, and why others are not."""
+    """Return the planned runs, and why others are not possible."""
     loaded = [load(s) if isinstance(s, (str, Path)) else s for s in scenarios]
     for name, count in Counter(scenario.name for scenario in loaded).items():
         if count > 1:
-            raise HierarchyError(f"{count} scenarios are called {name!r}; give each its own name")
+            raise HierarchyError(f"{count} scenarios are named {name!r}; give each its own name")
     runs, refused = [], []
     for scenario in loaded:
         build(scenario)
@@ -86,15 +85,15 @@ def _plan(scenarios: Iterable[str | Scenario],
                 refused.append(f"{spec} is not run on {scenario.name}, which asks for {asked}: it "
                                f"resolves {resolver.handles}")
     if not runs:
-        raise HierarchyError("; ".join(refused) or "no resolver is named")
+        raise HierarchyError("; ".join(refused) or "no resolver was given")
     return [_distinct(run, runs) for run in runs], refused
 
 
 def _distinct(run: Run, runs: Sequence[Run]) -> Run:
-    """Return the run with a label that tells it from those beside it.
+    """Return the run with a unique label.
 
-    That is its resolver's label, or its spec where another resolver has the same one, or its
-    scenario's name where there is only one resolver.
+    This is its resolver's label, its spec if another resolver has the same label, or its
+    scenario's name if there is only one resolver.
     """
     if len(runs) > 1 and len({other.spec for other in runs}) == 1:
         return dataclasses.replace(run, label=run.scenario.name)
@@ -106,7 +105,7 @@ def _carried_out(run: Run, folder: Path | None, progress: Progress | None) -> Ru
     tell = partial(progress, f"{run.scenario.name} {run.spec}") if progress else None
     try:
         recording = simulate(run.scenario, progress=tell)
-    except Exception as error:  # one way's failure is a result, and must not lose the others'
+    except Exception as error:  # a failure is a result too, and must not affect the other runs
         return dataclasses.replace(run, error=f"{type(error).__name__}: {error}")
     if folder is not None:
         save(recording, folder / run.folder)
@@ -118,10 +117,10 @@ def _interrupted(run: Run) -> bool:
 
 
 def _write(comparison: Comparison, folder: Path) -> None:
-    from scenarios.report import page
+    from scenarios.report import comparison_page
 
     write_json(folder / "comparison.json", comparison.as_plain_data())
-    write_text(folder / "index.html", page(comparison))
+    write_text(folder / "index.html", comparison_page(comparison))
 
 
 def _command(planned: Sequence[Run], out: str | Path | None) -> str:

@@ -1,38 +1,36 @@
-"""The replay inside the report: in the page's own file, but not drawn before it is looked at."""
+"""The replay embedded in the report, drawn only once it scrolls into view."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from html import escape
 from typing import TYPE_CHECKING
+
+from markupsafe import Markup
 
 from hierarchy.errors import HierarchyError
 from scenarios.measure.motions import Motion
-from scenarios.measure.verdict import in_words, listed
-from scenarios.report.parts import section
+from scenarios.report.templates import render
+from scenarios.words import in_words, listed
 
 if TYPE_CHECKING:
     from scenarios.loop.recording import Recording
 
 MOST = 4  # motions in one replay
-_FASTEST, _SLOWEST = 30.0, 5.0  # [Hz] of the pictures kept
+_FASTEST, _SLOWEST = 30.0, 5.0  # [Hz] of the frames kept
 
 
-def replay(name: str, found: Sequence[Motion], most_bytes: int) -> str:
+def replay(name: str, found: Sequence[Motion], most_bytes: int) -> Markup:
     """Return the section with the replay of up to MOST motions.
 
-    Where it would be larger than `most_bytes`, fewer pictures a second are kept.
+    The frame rate is lowered if the replay would exceed `most_bytes`.
     """
     shown = list(found[:MOST])
     try:
         document, rate = _document(name, shown, most_bytes)
     except HierarchyError as error:
-        return section("Replay", f'<p class="quiet">There is none: {escape(str(error))}.</p>')
-    held = document.replace("&", "&amp;").replace("'", "&#39;")
-    return section("Replay", f"""<div class="stage">
-<iframe title="Replay of {escape(name)}" data-document='{held}'></iframe>
-<noscript><p>The replay is drawn by a script, which is switched off here.</p></noscript></div>""",
-                   _said(shown, found, rate))
+        return render("report/replay.html", problem=str(error), said="")
+    return render("report/replay.html", name=name, document=document, problem="",
+                  said=_said(shown, found, rate))
 
 
 def _document(name: str, shown: Sequence[Motion], most_bytes: int) -> tuple[str, float]:
@@ -47,14 +45,14 @@ def _document(name: str, shown: Sequence[Motion], most_bytes: int) -> tuple[str,
 
 
 def _said(shown: Sequence[Motion], found: Sequence[Motion], rate: float) -> str:
-    """Say which runs are shown and which coincide with them."""
-    said = f"Shown: {listed([one.label for one in shown])}, {rate:g} pictures a second."
+    """Return which runs are shown and which move in the same way."""
+    said = f"Shown: {listed([one.label for one in shown])}, {rate:g} frames per second."
     for one in shown:
         if len(one.runs) > 1:
             moves = "moves" if len(one.runs) == 2 else "move"
-            said += f" {listed(one.labels[1:])} {moves} as {one.label} does."
+            said += f" {listed(one.labels[1:])} {moves} like {one.label}."
     left = found[len(shown):]
     if left:
-        said += (f" Not shown: {listed([label for one in left for label in one.labels])}; a replay "
-                 f"here has {in_words(MOST)} motions at most.")
+        said += (f" Not shown: {listed([label for one in left for label in one.labels])}; the "
+                 f"replay here shows at most {in_words(MOST)} motions.")
     return said

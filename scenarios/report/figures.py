@@ -1,4 +1,4 @@
-"""The figures of the report: runs beside each other on equal axes, and laid over each other."""
+"""The figures of the report: runs side by side on equal axes, and overlaid."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ if TYPE_CHECKING:
 
 def side_by_side(panel: Panel, recordings: Mapping[str, Recording], looks: Mapping[str, Look]
                  ) -> dict[str, Figure]:
-    """Return one small figure of `panel` a run, by label, with the same limits for all.
+    """Return one small figure of `panel` per run, by label, all with the same limits.
 
-    A run whose values are far beyond the others' is cut, and its panel says where it goes.
+    Values far beyond those of the other runs are cut, and the panel states their range.
     """
     drawn = {}
     for label, recording in recordings.items():
@@ -50,12 +50,12 @@ def _share_limits(figures: Sequence[Figure], times: Sequence[Array]) -> None:
         ax.set_xlim(0.0, end)
         ax.xaxis.set_major_locator(MaxNLocator(4))
         if high - low > 1.1 * (limits[1] - limits[0]):
-            ax.text(0.98, 0.96, f"cut: reaches {low:.2g} to {high:.2g}", color=ALERT, fontsize=8,
+            ax.text(0.98, 0.96, f"cut: {low:.2g} to {high:.2g}", color=ALERT, fontsize=8,
                     ha="right", va="top", transform=ax.transAxes)
 
 
 def overlay(draw: Draw, recordings: Mapping[str, Recording], looks: Mapping[str, Look]) -> Figure:
-    """Return one figure with a curve a run, in its label's colour and dashes."""
+    """Return one figure with a curve per run, in the colour and dashes of its label."""
     fig, (ax,) = drawing.figure(width=4.9, height=2.7)
     for label, recording in recordings.items():
         before = len(ax.lines)
@@ -67,7 +67,7 @@ def overlay(draw: Draw, recordings: Mapping[str, Recording], looks: Mapping[str,
 
 
 def departure(recordings: Mapping[str, Recording], looks: Mapping[str, Look]) -> Figure:
-    """Return how far each run's joints depart from the first run's [rad], logarithmic."""
+    """Return the largest joint difference from the first run over time [rad], logarithmic."""
     fig, (ax,) = drawing.figure(width=4.9, height=2.7)
     first, *others = recordings
     reference = recordings[first]
@@ -83,10 +83,10 @@ def departure(recordings: Mapping[str, Recording], looks: Mapping[str, Look]) ->
 
 def computing_time(recordings: Mapping[str, Recording], looks: Mapping[str, Look]
                    ) -> tuple[Figure, str]:
-    """Return the times of a tick [us], a row for each run, and what the marks in it mean.
+    """Return the computing times of a tick [us], one row per run, and the meaning of the marks.
 
-    The medians of its parts as a bar, or, where some runs take much longer than others, one dot on
-    a logarithmic axis; with the whole tick's median and 99.9 %.
+    A bar shows the medians of its parts; if some runs take much longer than others, a dot on a
+    logarithmic axis. Marks show the median and the 99.9th percentile of the whole tick.
     """
     fig, (ax,) = drawing.figure(width=4.9, height=0.7 + 0.4 * len(recordings))
     wide = _wide(recordings)
@@ -101,7 +101,7 @@ def computing_time(recordings: Mapping[str, Recording], looks: Mapping[str, Look
     ax.set_yticks(range(len(recordings)), list(recordings))
     ax.set_ylim(len(recordings) - 0.5, -0.5)
     ax.grid(axis="y", visible=False)
-    ax.set_xlabel("µs a tick")
+    ax.set_xlabel("µs per tick")
     bars = "kinematics, rows, resolve (light to full), medians"
     return fig, f"{'dot: resolve, median' if wide else bars}; whole tick | median, × 99.9 %"
 
@@ -115,7 +115,7 @@ def _bar(ax: Axes, row: int, recording: Recording, colour: str) -> None:
 
 
 def _slowest(ax: Axes, recordings: Mapping[str, Recording], wide: bool) -> None:
-    """Mark what 99.9 % of the ticks keep to; far from all bars it is a number at the edge."""
+    """Mark the 99.9th percentile; far from all bars it is a number at the edge."""
     edge = ax.get_xlim()[1] * (100.0 if wide else 1.6)
     for row, recording in enumerate(recordings.values()):
         slow = _micro(recording, "time_tick", 99.9)
@@ -133,7 +133,7 @@ def _micro(recording: Recording, signal: str, percent: float) -> float:
 
 
 def _dashed(look: Look) -> Any:
-    """Return a look's dashes as matplotlib takes them."""
+    """Return the dashes of a look in matplotlib's form."""
     return (0, look.dash) if look.dash else "-"
 
 

@@ -1,6 +1,6 @@
 """A small picture and the main numbers of every shipped scenario, for docs/gallery.md.
 
-`python -m scenarios.report.gallery` runs all of them; names after it, only those.
+`python -m scenarios.report.gallery` runs all scenarios, `... gallery NAME NAME` only those.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ _OF_TASKS = "_max_settled"
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Run the scenarios named on the command line, or all, and write their pictures."""
+    """Run the given scenarios, by default all, and write their pictures."""
     parser = argparse.ArgumentParser(prog="python -m scenarios.report.gallery", description=__doc__)
     parser.add_argument("scenarios", nargs="*", default=shipped(), metavar="scenario")
     parser.add_argument("--out", type=Path, default=FOLDER, metavar="FOLDER")
@@ -48,7 +48,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def small_png(recording: Recording) -> bytes:
-    """Return the picture of a run as a PNG of few colours."""
+    """Return the picture of a run as a PNG with a reduced palette."""
     drawn, reduced = io.BytesIO(), io.BytesIO()
     with matplotlib.rc_context(drawing.style()):
         picture({recording.scenario.name: recording}).savefig(
@@ -59,7 +59,7 @@ def small_png(recording: Recording) -> bytes:
 
 
 def main_numbers(recording: Recording) -> list[str]:
-    """Return the numbers that tell most about a run, as texts with units."""
+    """Return the most important metrics of a run, as text with units."""
     return [f"{metric.label} {metric.shown()} {metric.shown_unit}".strip()
             for name, metric in measure(recording).items() if metric.value is not None
             and (name in _NUMBERS or (name.startswith("task_") and name.endswith(_OF_TASKS)))]

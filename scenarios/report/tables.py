@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from html import escape
 from itertools import groupby
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from markupsafe import Markup
 
 from scenarios.draw.figures.palette import Look
 from scenarios.measure.partings import BOUND, partings
-from scenarios.report.parts import chip, folded, plain_table, section
+from scenarios.report.templates import render
 
 if TYPE_CHECKING:
     from scenarios.measure.runs import Row, Run
 
-# What most readers ask; the rest is folded away.
+Cell = tuple[str, str, str]  # its kind, "" for none; a note; the text
+
+# The most important metrics; the others are folded away.
 _FIRST = ("position_error_median_settled", "position_error_max_settled", "cone_violation_max",
           "moved_by_lower_max", "body_distance_min", "ee_distance_min", "contact_ticks",
           "joint_limit_excess", "speed_max", "velocity_step_max", "acceleration_max",
@@ -24,15 +26,16 @@ _FIRST = ("position_error_median_settled", "position_error_max_settled", "cone_v
           "time_resolve_median", "time_resolve_p999", "time_tick_median")
 
 
-def numbers(runs: Sequence[Run], looks: Mapping[str, Look]) -> str:
-    """Return what was measured, best of each row marked; the less asked for is folded away."""
+def numbers(runs: Sequence[Run], looks: Mapping[str, Look]) -> Markup:
+    """Return the metrics with the best of each row marked; minor ones are folded away."""
     from scenarios.measure.runs import table
 
     rows = table(runs, details=False)
-    first = [row for row in rows if _is_first(row.name)]
     rest = [row for row in rows if not _is_first(row.name)]
-    more = folded(f"{len(rest)} more rows", _table(rest, runs, looks)) if rest else ""
-    return section("In numbers", _table(first, runs, looks) + more, _marks(runs)) if rows else ""
+    return render("report/numbers.html", heads=[(run.label, _stopped(run)) for run in runs],
+                  looks=looks, first=_grouped([row for row in rows if _is_first(row.name)], runs),
+                  rest=_grouped(rest, runs), count=len(rest),
+                  said=_marks(runs)) if rows else Markup()
 
 
 def _is_first(name: str) -> bool:
@@ -40,63 +43,53 @@ def _is_first(name: str) -> bool:
 
 
 def _marks(runs: Sequence[Run]) -> str:
-    """Say what the marks mean, and what the numbers contain that is not obvious."""
+    """Return what the marks mean and what to know about the numbers."""
     if all(run.fault for run in runs):
-        return "No run reached its end, so none is marked as best."
+        return "No run was completed, so none is marked as best."
     detour = any(run.recording and "repulsion_active" in run.recording
                  and run.recording["repulsion_active"].any() for run in runs)
-    marks = ("Best of each row in colour, with a dot; within 1 % is as good, and a row where all "
-             "are is unmarked." if len({run.scenario.name for run in runs}) == 1 else
-             "Different scenarios ask for different things, so none is marked as best.")
-    stopped = (" Runs that did not reach their end, in grey, take no part."
+    one = len({run.scenario.name for run in runs}) == 1
+    marks = ("The best value of each row is coloured and has a dot; values within 1 % count as "
+             "equal, and rows in which all are equal are unmarked." if one else
+             "The scenarios differ, so none is marked as best.")
+    stopped = (" Runs that stopped early are grey and not compared."
                if any(run.fault for run in runs) else "")
-    return marks + stopped + (" The position error contains the detour by which the end effector "
-                              "is pushed around an obstacle on its path." if detour else "")
+    return marks + stopped + (" The position error includes the detour of the end effector around "
+                              "obstacles on its path." if detour else "")
 
 
-def _table(rows: Sequence[Row], runs: Sequence[Run], looks: Mapping[str, Look]) -> str:
-    heads = "".join(f"<th>{chip(looks[run.label])}{escape(run.label)}{_stopped(run)}</th>"
-                    for run in runs)
+def _grouped(rows: Sequence[Row], runs: Sequence[Run]
+             ) -> list[tuple[str, list[tuple[Row, list[Cell]]]]]:
+    """Return rows with their cells, by group."""
     out = [run.fault is not None for run in runs]
-    body = []
-    for group, some in groupby(rows, key=lambda row: row.group):
-        body.append(f'<tr class="group"><th colspan="{len(runs) + 1}">{escape(group)}</th></tr>')
-        body += [_line(row, out) for row in some]
-    return (f'<div class="scroll"><table class="numbers"><thead><tr><th></th>{heads}</tr></thead>'
-            f"\n<tbody>{''.join(body)}</tbody></table></div>")
+    return [(group, [(row, _cells(row, out)) for row in some])
+            for group, some in groupby(rows, key=lambda row: row.group)]
+
+
+def _cells(row: Row, out: Sequence[bool]) -> list[Cell]:
+    return [("best" if i in row.best else "out" if out[i] else "", note, cell)
+            for i, (cell, note) in enumerate(zip(row.cells, row.notes, strict=True))]
 
 
 def _stopped(run: Run) -> str:
     if run.fault is None:
         return ""
     if run.recording is None or not run.recording.ticks:
-        return '<br><small class="alert">did not begin</small>'
-    return f'<br><small class="alert">stopped at {run.recording["t"][-1]:.2f} s</small>'
+        return "did not start"
+    return f"stopped at {run.recording['t'][-1]:.2f} s"
 
 
-def _line(row: Row, out: Sequence[bool]) -> str:
-    unit = f" <small class='quiet'>[{escape(row.unit)}]</small>" if row.unit else ""
-    cells = []
-    for i, (cell, note) in enumerate(zip(row.cells, row.notes, strict=True)):
-        kind = "best" if i in row.best else "out" if out[i] else ""
-        title = f' title="{escape(note)}"' if note else ""
-        cells.append(f'<td class="{kind}"{title}>{escape(cell)}</td>')
-    return f"<tr><th>{escape(row.label)}{unit}</th>{''.join(cells)}</tr>"
+def events(runs: Sequence[Run]) -> list[tuple[str, tuple[str, str, str, str]]]:
+    """Return the problems of every run: by kind, contacts and faults.
 
-
-def events(runs: Sequence[Run], looks: Mapping[str, Look]) -> str:
-    """Return every kind of trouble of every run, contacts and faults, as a table or a sentence."""
-    rows = [(f"{chip(looks[run.label])}{escape(run.label)}" if i == 0 else "",
-             *map(escape, happened))
+    Only the first row of a run has its label.
+    """
+    return [(run.label if i == 0 else "", happened)
             for run in runs for i, happened in enumerate(_happened(run))]
-    if not rows:
-        return ('<p class="quiet">No run had a tick without an answer, with bad measurements, with '
-                "a command that was changed, or with contact.</p>")
-    return plain_table(rows, ("run", "what", "what was done", "ticks", "first at"))
 
 
 def _happened(run: Run) -> list[tuple[str, str, str, str]]:
-    """Return what, what was done, in how many ticks and when first."""
+    """Return the problem, the action taken, the number of ticks and the first time."""
     recording = run.recording
     found = []
     if recording is not None:
@@ -108,29 +101,21 @@ def _happened(run: Run) -> list[tuple[str, str, str, str]]:
             found.append(("contact", "–", str(touched.size), f"{t[touched[0]]:.3f} s"))
     if run.fault:
         ended = f"{recording['t'][-1]:.3f} s" if recording and recording.ticks else "the start"
-        found.append((f"fault: {run.fault}", "run ended", "–", ended))
+        found.append((f"fault: {run.fault}", "run stopped", "–", ended))
     return found
 
 
-def parted(runs: Sequence[Run]) -> str:
-    """Return where strict resolvers' runs part from each other, and why."""
-    said = "".join(f"<li>{escape(str(one))}.</li>" for one in partings(runs))
-    return section("Where they part", f"<ul>{said}</ul>",
-                   "Resolvers that are strict at every rank solve the same problem at every tick, "
-                   f"so their joints should follow the same path; the bound is {BOUND:.0e} rad, or "
-                   "the accuracy that a resolver declares where that is more.") if said else ""
+def parted(runs: Sequence[Run]) -> Markup:
+    """Return where the runs of strict resolvers diverge, and why."""
+    found = [str(one) for one in partings(runs)]
+    return render("report/partings.html", partings=found, bound=BOUND) if found else Markup()
 
 
-def settings(runs: Sequence[Run]) -> str:
-    """Return the resolvers' settings as used, and each scenario as run."""
-    rows = [(escape(run.label), f"<code>{escape(_in_text(run.settings))}</code>",
-             f'<a href="{escape(run.folder)}/">{escape(run.folder)}/</a>') for run in runs]
-    asked = {run.scenario.name: run for run in reversed(runs)}
-    files = "".join(folded(f"{name}.toml, as run by {run.spec}",
-                           f"<pre><code>{escape(run.scenario.to_toml())}</code></pre>")
-                    for name, run in reversed(asked.items()))
-    return section("Settings", plain_table(rows) + files, "As they were used, damping included; "
-                   "every run's folder has the whole scenario.")
+def settings(runs: Sequence[Run]) -> Markup:
+    """Return the resolvers' settings and the scenario files as used."""
+    first = {run.scenario.name: run for run in reversed(runs)}
+    return render("report/settings.html", rows=[(run, _in_text(run.settings)) for run in runs],
+                  scenarios=list(reversed(first.values())))
 
 
 def _in_text(named: Mapping[str, Any]) -> str:

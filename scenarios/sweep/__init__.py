@@ -1,10 +1,10 @@
-"""Scenarios x resolvers x sampled parameters: many runs on all cores, kept as a table.
+"""Scenarios x resolvers x sampled parameters: many runs on all cores, stored as a table.
 
-`config` is the validated form of a sweep file, `sampling` draws from it, `planning` makes the runs
-and their keys, `run` is one of them, `store` keeps what came of them, `engine` hands them to Dask,
-`results` and `page` say what it comes to. `sweep` is the whole.
+`config` validates a sweep file, `sampling` draws its parameters, `planning` lists the runs and
+their keys, `run` makes one of them, `store` keeps the outcomes, `engine` passes runs to Dask,
+`results`, `page` and `printing` present the outcome. `whole.sweep` does all of this.
 
-Dask and pyarrow are the extra `sweep`.
+Dask and pyarrow come with the extra `sweep`.
 """
 
 from typing import Any

@@ -1,8 +1,7 @@
-"""The validated form of a sweep file: which scenarios, which resolvers, what is sampled."""
+"""The validated form of a sweep file: scenarios, resolvers and sampled parameters."""
 
 from __future__ import annotations
 
-import tomllib
 from pathlib import Path
 from typing import Annotated, Any, Self
 
@@ -19,6 +18,7 @@ from pydantic import (
 )
 
 from hierarchy.errors import HierarchyError, UnknownNameError
+from scenarios.files import read_toml
 
 LIBRARY = Path(__file__).parents[1] / "library" / "sweeps"
 
@@ -28,7 +28,7 @@ Value = bool | int | float | str | list[Any]
 
 
 class SweepError(HierarchyError):
-    """A sweep file that cannot be used; names file and key."""
+    """An invalid sweep file; the message names the file and the key."""
 
 
 class _Section(BaseModel):
@@ -36,7 +36,7 @@ class _Section(BaseModel):
 
 
 class Uniform(_Section):
-    """Any value between two, all alike."""
+    """A number from a uniform distribution."""
 
     uniform: tuple[Finite, Finite]
 
@@ -47,7 +47,7 @@ class Uniform(_Section):
         return self
 
     def draw(self, chance: np.random.Generator, own: Value | None) -> Value:
-        """Return a number between the two."""
+        """Return a number within the bounds."""
         return float(chance.uniform(*self.uniform))
 
     def __str__(self) -> str:
@@ -55,20 +55,20 @@ class Uniform(_Section):
 
 
 class Normal(_Section):
-    """Normal, with a mean and a deviation."""
+    """A number from a normal distribution, given by mean and standard deviation."""
 
     normal: tuple[Finite, NotNegative]
 
     def draw(self, chance: np.random.Generator, own: Value | None) -> Value:
-        """Return a number; any is possible."""
+        """Return a number; it is not bounded."""
         return float(chance.normal(*self.normal))
 
     def __str__(self) -> str:
-        return f"normal, mean {self.normal[0]:g}, deviation {self.normal[1]:g}"
+        return f"normal, mean {self.normal[0]:g}, standard deviation {self.normal[1]:g}"
 
 
 class Choice(_Section):
-    """One of some values of any kind, all alike."""
+    """One of several values of any type, each equally likely."""
 
     choice: Annotated[tuple[Any, ...], Field(min_length=1)]
 
@@ -82,15 +82,15 @@ class Choice(_Section):
 
 
 class Around(_Section):
-    """The scenario's own value, a number or an array, with something uniform added to each entry.
+    """The scenario's own value, a number or an array, plus a uniform offset in each entry.
 
-    `around` is the largest that is added, the same for all entries or one for each.
+    `around` is the largest offset, one for all entries or one for each.
     """
 
     around: NotNegative | tuple[NotNegative, ...]
 
     def draw(self, chance: np.random.Generator, own: Value | None) -> Value:
-        """Return the own value with offsets; raises ValueError where it has no numbers."""
+        """Return the own value with offsets; raises ValueError if it is not numeric."""
         try:
             centre = np.array(own, dtype=float)
             offset = np.broadcast_to(np.array(self.around), centre.shape)
@@ -98,7 +98,7 @@ class Around(_Section):
             raise ValueError(f"around = {self.around} does not fit the scenario's own value "
                              f"{own!r}") from None
         if not np.isfinite(centre).all():
-            raise ValueError(f"the scenario has no value of its own to be around, but {own!r}")
+            raise ValueError(f"the scenario's own value is {own!r}, not a number")
         value: Value = (centre + chance.uniform(-offset, offset)).tolist()
         return value
 
@@ -108,7 +108,7 @@ class Around(_Section):
 
 
 class Integers(_Section):
-    """A whole number from the first to the last, both included; for seeds."""
+    """An integer from the first to the last, both included; for seeds."""
 
     integers: tuple[int, int]
 
@@ -119,11 +119,11 @@ class Integers(_Section):
         return self
 
     def draw(self, chance: np.random.Generator, own: Value | None) -> Value:
-        """Return a whole number of the range."""
+        """Return an integer of the range."""
         return int(chance.integers(self.integers[0], self.integers[1], endpoint=True))
 
     def __str__(self) -> str:
-        return f"whole numbers from {self.integers[0]} to {self.integers[1]}"
+        return f"integers from {self.integers[0]} to {self.integers[1]}"
 
 
 _KINDS = ("uniform", "normal", "choice", "around", "integers")
@@ -144,7 +144,7 @@ Distribution = Annotated[
 
 
 def _flat(table: Any, above: str = "") -> Any:
-    """Bring nested tables, as TOML makes of keys with dots, back to one level."""
+    """Flatten nested tables, which TOML makes of dotted keys, to one level."""
     if not isinstance(table, dict):
         return table
     flat: dict[str, Any] = {}
@@ -157,12 +157,11 @@ def _flat(table: Any, above: str = "") -> Any:
 
 
 class Sweep(_Section):
-    """Every scenario, under every resolver, with every one of `samples` draws of the parameters.
+    """Every scenario under every resolver, with each of `samples` draws of the parameters.
 
-    `parameters` are dotted keys of a scenario, a number for a place in a list. What is drawn
-    depends on `seed`, the number of the sample and the key alone: more samples, scenarios,
-    resolvers or parameters leave those there were as they are. `duration` [s] goes before that of
-    the scenarios.
+    `parameters` are dotted keys of a scenario, with numbers as list indices. A drawn value depends
+    only on `seed`, the sample's number and the key: adding samples, scenarios, resolvers or
+    parameters does not change existing samples. `duration` [s] overrides that of the scenarios.
     """
 
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$")]
@@ -177,14 +176,14 @@ class Sweep(_Section):
 
 
 def shipped_sweeps() -> tuple[str, ...]:
-    """Names of the sweeps that come with the package."""
+    """Return the names of the sweeps shipped with the package."""
     return tuple(sorted(path.stem for path in LIBRARY.glob("*.toml")))
 
 
 def find(name_or_path: str | Path) -> Path:
-    """Return the file of a shipped sweep by name, or the path as given.
+    """Return the file of a shipped sweep by name, or the given path.
 
-    Raises UnknownNameError for a name that is not shipped.
+    Raises UnknownNameError for an unknown name.
     """
     if Path(name_or_path).suffix == ".toml":
         return Path(name_or_path)
@@ -196,11 +195,11 @@ def find(name_or_path: str | Path) -> Path:
 def load_sweep(name_or_path: str | Path) -> Sweep:
     """Read a shipped sweep by name or a sweep file by path.
 
-    Paths of scenario files in it are relative to it, and absolute in what is returned. Raises
-    SweepError, naming the file and the key, and UnknownNameError for a name that is not shipped.
+    Paths of scenario files in it are relative to the file, and absolute in the returned sweep.
+    Raises SweepError, naming the file and the key, and UnknownNameError for an unknown name.
     """
     path = find(name_or_path)
-    data = _read(path)
+    data = read_toml(path, "sweep file", SweepError)
     try:
         sweep = Sweep.model_validate(data)
     except ValidationError as error:
@@ -209,17 +208,6 @@ def load_sweep(name_or_path: str | Path) -> Sweep:
     return sweep.model_copy(update={"scenarios": tuple(
         str(path.parent.resolve() / name) if name.endswith(".toml") else name
         for name in sweep.scenarios)})
-
-
-def _read(path: Path) -> dict[str, Any]:
-    try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError as error:
-        raise SweepError(f"sweep file {str(path)!r} does not exist") from error
-    except OSError as error:
-        raise SweepError(f"sweep file {str(path)!r}: {error.strerror}") from error
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise SweepError(f"sweep file {str(path)!r}: {error}") from error
 
 
 def _say(path: Path, error: Any) -> str:
@@ -234,8 +222,8 @@ def _say(path: Path, error: Any) -> str:
 
 
 def _without_kind(loc: list[str]) -> list[str]:
-    """Leave out the kind that pydantic puts between a parameter and the key in its table.
+    """Drop the distribution's kind that pydantic inserts into the location of an error.
 
-    And what it puts after that: which form of the value it tried.
+    The form of the value that it tried is dropped too.
     """
     return loc[:2] + loc[3:4] if loc[0] == "parameters" and len(loc) > 3 else loc

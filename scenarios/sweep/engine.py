@@ -1,4 +1,4 @@
-"""Jobs handed to Dask: to processes of this machine, or to a cluster; a run does not know which."""
+"""Run jobs with Dask, in processes of this machine or on a cluster."""
 
 from __future__ import annotations
 
@@ -27,38 +27,38 @@ except ImportError as error:
     raise HierarchyError("a sweep needs dask.distributed and pyarrow: "
                          "pip install 'task-hierarchy[sweep]'") from error
 
-LARGEST_BATCH = 16     # runs; what is lost when everything is killed, for each worker
-_BATCHES_EACH = 4      # at least so many for each worker, so that the last ones end together
-_QUEUED_EACH = 3       # batches that the scheduler has at a time, for each worker
-_DEATHS = 1            # workers that may die of a batch; at one more it is taken apart
+LARGEST_BATCH = 16     # runs per worker that are lost if everything is killed
+_BATCHES_EACH = 4      # per worker at least, so that workers finish at about the same time
+_QUEUED_EACH = 3       # batches per worker that are submitted at a time
+_DEATHS = 1            # workers a batch may kill; after one more its jobs run one at a time
 _PATIENCE = 30.0       # [s] for a scheduler to answer and to have a worker
 
 Work = Callable[[Sequence[Job], str], list[Outcome]]
 
 
 class EngineError(RuntimeError):
-    """The runs cannot go on: the scheduler is lost, or a worker has another version."""
+    """The sweep cannot continue: the scheduler is lost, or a worker has another version."""
 
 
 class _LeaveInterrupts(WorkerPlugin):  # type: ignore[misc]
-    """Ctrl-C, which a terminal sends to all processes, is for the client to act on."""
+    """Ignores Ctrl-C in workers: the terminal sends it to all processes, the client handles it."""
 
     def setup(self, worker: Worker) -> None:
         signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def processors() -> int:
-    """Return how many processors this process may use."""
+    """Return the number of processors this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else (
         os.cpu_count() or 1)
 
 
 @contextmanager
 def connected(workers: int | None = None, scheduler: str | None = None) -> Iterator[Client]:
-    """Give a client of the Dask scheduler at an address, or of processes of this machine.
+    """Yield a client of the Dask scheduler at an address, or of local worker processes.
 
-    There are `workers` of these, by default one for each processor, of one thread each; they listen
-    on 127.0.0.1 only and end with this process.
+    There are `workers` local processes with one thread each, by default one per processor; they
+    listen on 127.0.0.1 only and end with this process.
 
     Raises
     ------
@@ -70,10 +70,10 @@ def connected(workers: int | None = None, scheduler: str | None = None) -> Itera
         return
     settings = {"distributed.scheduler.allowed-failures": _DEATHS,
                 "distributed.scheduler.worker-saturation": 1.0,
-                "distributed.worker.profile.enabled": False}  # its samples fill the memory
+                "distributed.worker.profile.enabled": False}  # its samples would fill the memory
     with dask.config.set(settings), LocalCluster(
             n_workers=workers or processors(), threads_per_worker=1, processes=True,
-            host="127.0.0.1", dashboard_address="127.0.0.1:0",  # any free port, and no dashboard:
+            host="127.0.0.1", dashboard_address="127.0.0.1:0",  # any free port and no dashboard
             scheduler_kwargs={"dashboard": False}, silence_logs=logging.CRITICAL) as cluster, \
             Client(cluster) as client:
         client.register_plugin(_LeaveInterrupts())
@@ -83,19 +83,19 @@ def connected(workers: int | None = None, scheduler: str | None = None) -> Itera
 def carry_out(jobs: Sequence[Job], client: Client, keep: Callable[[list[Outcome]], object],
               told: Callable[[int], object] = lambda count: None, batch: int | None = None,
               work: Work = run_batch) -> None:
-    """Have all jobs run, and hand what came of them to `keep`, batch by batch, as it comes.
+    """Run all jobs and pass their outcomes to `keep`, batch by batch, as they finish.
 
-    A job of which workers die has that as its outcome; those beside it do not.
+    A job that kills its workers gets that as its outcome; other jobs of its batch are repeated.
 
     Parameters
     ----------
-    told : called with the number of jobs done since the last call.
-    batch : how many jobs are handed out together; by default up to LARGEST_BATCH.
-    work : what runs a batch.
+    told : called with the number of jobs finished since the last call.
+    batch : number of jobs submitted together; by default up to LARGEST_BATCH.
+    work : the function that runs a batch.
 
     Raises
     ------
-    EngineError : the scheduler is lost, or a worker refuses.
+    EngineError : the scheduler is lost, or a worker has another version.
     """
     threads = max(1, _threads(client))
     size = batch or max(1, min(LARGEST_BATCH, len(jobs) // (_BATCHES_EACH * threads)))
@@ -107,7 +107,7 @@ def carry_out(jobs: Sequence[Job], client: Client, keep: Callable[[list[Outcome]
         else:
             keep(outcomes)
             told(len(outcomes))
-    # One at a time: what else a worker has when it dies is blamed as well.
+    # One at a time: when a worker dies, all jobs it holds are blamed.
     for (job,), outcomes in _results(client, work, [[job] for job in suspects], 0):
         keep(outcomes or [_deadly(job)])
         told(1)
@@ -115,9 +115,9 @@ def carry_out(jobs: Sequence[Job], client: Client, keep: Callable[[list[Outcome]
 
 def _results(client: Client, work: Work, batches: Sequence[Sequence[Job]], queued: int
              ) -> Iterator[tuple[Sequence[Job], list[Outcome] | None]]:
-    """Give each batch with what came of it as it is done, None where workers died of it.
+    """Yield each batch with its outcomes as it finishes, None if it killed its workers.
 
-    The scheduler has at most `queued` batches at a time for each worker, and one if that is 0.
+    At most `queued` batches per worker are submitted at a time, one in all if that is 0.
     """
     waiting = iter(batches)
     running: dict[str, Sequence[Job]] = {}
@@ -138,18 +138,18 @@ def _results(client: Client, work: Work, batches: Sequence[Sequence[Job]], queue
 
 
 def _outcomes(future: Future) -> list[Outcome] | None:
-    """Return what came of a batch, or None where workers died of it."""
+    """Return the outcomes of a batch, or None if it killed its workers."""
     if future.status == "finished":
         found: list[Outcome] = future.result()
         return found
     error = future.exception() if future.status == "error" else None
     if isinstance(error, KilledWorker):
         return None
-    raise EngineError(f"{error or 'the scheduler is lost'}; what is done is kept")
+    raise EngineError(f"{error or 'the scheduler is lost'}; finished runs are kept")
 
 
 def _deadly(job: Job) -> Outcome:
-    return Outcome(job.key, 0, None, "KilledWorker: every worker that began this run died of it",
+    return Outcome(job.key, 0, None, "KilledWorker: every worker that started this run died",
                    float("nan"), digest())
 
 

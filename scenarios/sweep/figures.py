@@ -1,4 +1,4 @@
-"""The figures of a sweep's page: shares with their intervals, and how each metric is spread."""
+"""The figures of a sweep's page: shares with intervals, and the distribution of each metric."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 
 
 def shares(results: Results) -> Figure:
-    """Draw for each criterion and resolver the share of runs, and its interval."""
+    """Draw the share of runs that meet each criterion under each resolver, with its interval."""
     criteria, labels = results.criteria(), results.labels
     rows = len(criteria) * (len(labels) + 1)
     fig, (ax,) = drawing.figure(width=5.4, height=0.5 + 0.2 * rows)
@@ -46,10 +46,10 @@ def shares(results: Results) -> Figure:
 
 
 def spread(results: Results, metric: Metric) -> Figure:
-    """Draw how a metric is spread over the samples, a row for each resolver.
+    """Draw the distribution of a metric over the samples, one row per resolver.
 
-    Box: the middle half, with the median; line: from 5 to 95 %; dots: least and largest. Few values
-    that are far from all others are off the picture, and an arrow says how many and how far.
+    Box: quartiles with the median; line: 5th to 95th percentile; dots: smallest and largest value.
+    Outliers beyond the axis are counted, and an arrow gives the extreme value.
     """
     known = {label: metric.scale * results.of(metric.name, label) for label in results.labels}
     known = {label: values for label, values in known.items() if values.size}
@@ -82,7 +82,7 @@ def _box(ax: Axes, y: float, values: Array, colour: str) -> None:
 
 
 def _beyond(ax: Axes, y: float, values: Array, edge: float, colour: str) -> None:
-    """Say at an edge how many values lie beyond it, and the farthest."""
+    """Write at an edge how many values lie beyond it, and the extreme one."""
     if not values.size:
         return
     right = values[0] > edge
@@ -94,9 +94,9 @@ def _beyond(ax: Axes, y: float, values: Array, edge: float, colour: str) -> None
 
 
 def _limits(rows: list[Array], reach: float = 2.0) -> tuple[float, float]:
-    """Return limits that hold the middle nine tenths of all rows and what is not far from them.
+    """Return limits that contain the middle 90 % of all rows and the values near them.
 
-    Far is more than `reach` times their width away.
+    Values up to `reach` times the width of that range away are near.
     """
     ends = [np.percentile(values, [5.0, 95.0]) for values in rows]
     low, high = min(end[0] for end in ends), max(end[1] for end in ends)

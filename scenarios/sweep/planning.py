@@ -1,4 +1,4 @@
-"""From a sweep to its runs, each with a key made of its content."""
+"""Turn a sweep into its runs, each with a key derived from its content."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from scenarios.sweep.sampling import changed, drawn
 
 @dataclass(frozen=True)
 class Planned:
-    """A run of a sweep: which scenario, under which resolver, with which sample's values."""
+    """A run of a sweep: scenario, resolver, sample and sampled values."""
 
     scenario: str
     label: str
@@ -26,10 +26,10 @@ class Planned:
 
 @dataclass(frozen=True)
 class Plan:
-    """All runs of a sweep, no two of them the same.
+    """All runs of a sweep, without duplicates.
 
-    `scenarios` are those named, unchanged; `refused` says of each resolver that cannot resolve a
-    scenario why it is not run on it.
+    `scenarios` are unchanged; `refused` has the reason for each resolver that cannot resolve a
+    scenario.
     """
 
     sweep: Sweep
@@ -44,7 +44,7 @@ def plan(sweep: Sweep) -> Plan:
     Raises
     ------
     HierarchyError : an unknown scenario, resolver or setting, a scenario that does not fit its
-        robot, a parameter that a scenario does not have, a sampled value that is not allowed.
+        robot, a parameter that a scenario does not have, an invalid sampled value.
     """
     scenarios = _loaded(sweep)
     labels, refused = _resolvers(scenarios, sweep.resolvers)
@@ -69,7 +69,7 @@ def _loaded(sweep: Sweep) -> tuple[Scenario, ...]:
     scenarios = tuple(load(name, lasting) for name in sweep.scenarios)
     for name, count in Counter(scenario.name for scenario in scenarios).items():
         if count > 1:
-            raise SweepError(f"sweep {sweep.name!r}: scenarios: {count} are called {name!r}; give "
+            raise SweepError(f"sweep {sweep.name!r}: scenarios: {count} are named {name!r}; give "
                              "each its own name")
     for scenario in scenarios:
         build(scenario)
@@ -78,7 +78,7 @@ def _loaded(sweep: Sweep) -> tuple[Scenario, ...]:
 
 def _resolvers(scenarios: Sequence[Scenario], specs: Sequence[str]
                ) -> tuple[dict[str, dict[str, str]], tuple[str, ...]]:
-    """Return the label of each spec that can be run, by scenario, and why others cannot."""
+    """Return the labels of the usable specs by scenario, and why others are not usable."""
     labels: dict[str, dict[str, str]] = {}
     refused = []
     for scenario in scenarios:

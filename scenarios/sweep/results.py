@@ -1,4 +1,4 @@
-"""What a sweep comes to: its runs as columns, shares of success, worst cases, failures."""
+"""Results of a sweep: runs as columns, success rates, worst cases, failures."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ from scenarios.measure.metrics import Metric
 from scenarios.sweep.planning import Plan, Planned
 from scenarios.sweep.store import Store, metrics_of
 
-_TOLERANCE = 1e-6  # [rad] beyond a joint limit that is still on it
+_TOLERANCE = 1e-6  # [rad] beyond a joint limit that still counts as within it
 
 
 @dataclass(frozen=True)
 class Share:
-    """In how many of how many runs something was so, with its 95 % interval after Wilson."""
+    """A share of runs, with its 95 % Wilson interval."""
 
     met: int
     of: int
 
     @property
     def interval(self) -> tuple[float, float]:
-        """The interval of the share, 0 to 1."""
+        """The 95 % interval of the share, between 0 and 1."""
         return wilson(self.met, self.of)
 
     def __str__(self) -> str:
@@ -38,7 +38,7 @@ class Share:
 
 @dataclass(frozen=True)
 class Criterion:
-    """Something that a run should do: its name, and for each run whether it did."""
+    """A success criterion: its name, and whether each run meets it."""
 
     label: str
     met: NDArray[np.bool_]
@@ -46,7 +46,7 @@ class Criterion:
 
 @dataclass(frozen=True)
 class Worst:
-    """The run with the worst value of a metric, and what the others made of the same sample."""
+    """The run with the worst value of a metric, and the values of the others on that sample."""
 
     metric: Metric
     run: Planned
@@ -55,7 +55,7 @@ class Worst:
 
 @dataclass(frozen=True)
 class Failure:
-    """A reason for which runs ended early or broke, its first run, and how many there are."""
+    """A reason why runs stopped early or failed, the first such run, and their number."""
 
     reason: str
     run: Planned
@@ -64,7 +64,7 @@ class Failure:
 
 @dataclass(frozen=True)
 class Results:
-    """The runs of one scenario of a sweep, in the order of its plan; values NaN where unknown."""
+    """The runs of one scenario in the order of the plan; unknown values are NaN."""
 
     runs: tuple[Planned, ...]
     reasons: tuple[str | None, ...]
@@ -73,7 +73,7 @@ class Results:
 
     @cached_property
     def labels(self) -> tuple[str, ...]:
-        """Labels of the resolvers, in the order asked for."""
+        """Labels of the resolvers in the requested order."""
         return tuple(dict.fromkeys(run.label for run in self.runs))
 
     @cached_property
@@ -87,13 +87,13 @@ class Results:
         return np.asarray(values[np.isfinite(values)])
 
     def share(self, criterion: Criterion, label: str) -> Share:
-        """Return in how many runs of a resolver a criterion was met."""
+        """Return the share of a resolver's runs that meet a criterion."""
         return Share(int((criterion.met & self._of[label]).sum()), int(self._of[label].sum()))
 
     def criteria(self, tolerance: float = _TOLERANCE) -> list[Criterion]:
-        """Return what can be judged; a run that broke met nothing.
+        """Return the criteria that can be judged; a failed run meets none.
 
-        `tolerance` [rad] beyond a joint limit still keeps it.
+        Up to `tolerance` [rad] beyond a joint limit counts as within it.
         """
         finished = np.array([reason is None for reason in self.reasons])
         found = [Criterion("Reached the end", finished)]
@@ -111,15 +111,15 @@ class Results:
         return [*found, Criterion("All of the above", np.all([one.met for one in found], axis=0))]
 
     def shown(self) -> list[Metric]:
-        """Return the metrics that are laid side by side: no computing times, which depend on load.
+        """Return the metrics to compare: those of any run, except computing times.
 
-        One that no run has is left out.
+        Computing times depend on the load of the machine.
         """
         return [metric for name, metric in self.metrics.items()
                 if metric.group != "Computing" and np.isfinite(self.values[name]).any()]
 
     def worst(self) -> list[Worst]:
-        """Return the worst run by each metric that has a direction and is not the same in all."""
+        """Return the worst run for each metric that has a direction and differs between runs."""
         found = []
         for metric in self.shown():
             values = self.values[metric.name]
@@ -132,7 +132,7 @@ class Results:
         return found
 
     def failures(self) -> list[Failure]:
-        """Return why runs failed; reasons under one resolver that differ in numbers are one."""
+        """Return why runs failed; reasons that differ only in numbers are merged by resolver."""
         found: dict[tuple[str, str], Failure] = {}
         for run, reason in zip(self.runs, self.reasons, strict=True):
             if reason is not None:
@@ -142,14 +142,14 @@ class Results:
         return sorted(found.values(), key=lambda one: -one.count)
 
 
-def wilson(met: int, of: int, z: float = 1.96) -> tuple[float, float]:
-    """Return the interval of a share after Wilson (1927); z = 1.96 for 95 %."""
+def wilson(met: int, of: int) -> tuple[float, float]:
+    """Return the 95 % interval of a share after Wilson (1927); 0 to 1 where nothing is known."""
+    from scipy.stats import binomtest
+
     if of == 0:
         return 0.0, 1.0
-    share = met / of
-    middle = (share + z**2 / (2 * of)) / (1 + z**2 / of)
-    half = z / (1 + z**2 / of) * math.sqrt(share * (1 - share) / of + z**2 / (4 * of**2))
-    return max(0.0, middle - half), min(1.0, middle + half)
+    low, high = binomtest(met, of).proportion_ci(confidence_level=0.95, method="wilson")
+    return float(low), float(high)
 
 
 def valued(metric: Metric, value: float) -> Metric:
@@ -158,7 +158,7 @@ def valued(metric: Metric, value: float) -> Metric:
 
 
 def summary(results: Results, metric: Metric, label: str) -> str:
-    """Return "median (worst)" of a metric under a resolver; the largest where none is worse."""
+    """Return "median (worst)" of a metric; the largest value if it has no direction."""
     values = results.of(metric.name, label)
     if not values.size:
         return "–"
@@ -167,9 +167,9 @@ def summary(results: Results, metric: Metric, label: str) -> str:
 
 
 def joined(plan: Plan, store: Store) -> Any:
-    """Return the table of all runs of a plan: what was asked, what was sampled, what came of it.
+    """Return the table of all runs of a plan: scenario, resolver, sampled values and outcome.
 
-    Raises KeyError where a run of the plan has not been made.
+    Raises KeyError if a run of the plan has not been made.
     """
     import pyarrow as pa
 
@@ -188,7 +188,7 @@ def joined(plan: Plan, store: Store) -> Any:
 
 
 def results(plan: Plan, table: Any) -> dict[str, Results]:
-    """Return what came of each scenario, from the table that `joined` gives."""
+    """Return the results of each scenario from the table that `joined` returns."""
     metrics = metrics_of(table)
     columns = {name: _floats(table[name]) for name in metrics}
     faults, errors = table["fault"].to_pylist(), table["error"].to_pylist()
@@ -209,6 +209,6 @@ def _floats(column: Any) -> NDArray[np.float64]:
 
 
 def _of_one_type(values: Sequence[Any]) -> list[Any]:
-    """Return values that one column can hold: as they are, or as text where types differ."""
+    """Return values of one type for a column: unchanged, or as text if types differ."""
     same = len({type(value) for value in values}) == 1
     return list(values) if same else [str(value) for value in values]

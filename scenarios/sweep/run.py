@@ -1,11 +1,10 @@
-"""One run of a sweep: from a scenario's text to what was measured, wherever it is computed."""
+"""One run of a sweep: from the text of a scenario to its metrics."""
 
 from __future__ import annotations
 
 import hashlib
 import json
 import threading
-import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -14,17 +13,17 @@ from time import perf_counter
 
 from scenarios.measure.metrics import Metric
 
-# What only asks for runs or shows them; a change to it does not change what is measured.
+# Code that only requests or shows runs: changing it does not change the measurements.
 _NOT_IN_A_RUN = ("bench/", "cli/", "draw/", "export/", "library/", "report/", "scene/", "sweep/",
-                 "files.py", *(f"measure/{name}.py" for name in (
+                 "files.py", "words.py", *(f"measure/{name}.py" for name in (
                      "comparison", "motions", "partings", "runs", "verdict")))
-_PLACE = ("system", "processor")  # of versions(): on which machine, not with what
-_ONE_AT_A_TIME = threading.Lock()  # the kernels' work arrays belong to the process
+_PLACE = ("system", "processor")  # entries of versions() that describe the machine
+_ONE_AT_A_TIME = threading.Lock()  # the kernels' work arrays are shared in a process
 
 
 @dataclass(frozen=True)
 class Job:
-    """A run to be made: the scenario's text, the resolver, and the key of both."""
+    """A planned run: the scenario's text, the resolver, and the key of both."""
 
     key: str
     text: str
@@ -33,9 +32,9 @@ class Job:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came of a run.
+    """The outcome of a run.
 
-    `fault` says why it ended early, `error` why there is nothing measured; None if neither is so.
+    `fault` is the reason why it stopped early, `error` why nothing was measured, otherwise None.
     `versions` is the `digest` of the code that made it.
     """
 
@@ -49,20 +48,19 @@ class Outcome:
 
 
 class OtherVersionsError(RuntimeError):
-    """A worker has other versions of this package, or of what it uses, than who asks."""
+    """A worker has other versions of this package or its dependencies than the client."""
 
 
 def key_of(text: str, resolver: str, versions: str) -> str:
-    """Return the key of a run: the same scenario, resolver and code have the same one."""
+    """Return the key of a run, which is the same for the same scenario, resolver and code."""
     return hashlib.sha256("\0".join((text, resolver, versions)).encode()).hexdigest()[:32]
 
 
 @cache
 def digest() -> str:
-    """Return a digest of all that a run's numbers depend on besides its scenario.
+    """Return a digest of everything besides the scenario that the numbers of a run depend on.
 
-    That is the source of what takes part in a run, kernels included, and the versions of what it
-    uses.
+    This is the source code used in a run, including kernels, and the versions of dependencies.
     """
     from scenarios.loop.recording import versions
 
@@ -78,17 +76,17 @@ def digest() -> str:
 
 
 def run(text: str, resolver: str, key: str) -> Outcome:
-    """Run a scenario under a resolver and measure it; whatever breaks becomes its `error`."""
+    """Run a scenario under a resolver and measure it; an exception becomes its `error`."""
     from scenarios import simulate
     from scenarios.config import Scenario
     from scenarios.measure.metrics import measure
 
     begun = perf_counter()
     try:
-        scenario = Scenario.model_validate(tomllib.loads(text)).with_resolver(resolver)
+        scenario = Scenario.from_toml(text).with_resolver(resolver)
         recording = simulate(scenario)
         measured = tuple(measure(recording).values())
-    except Exception as error:  # a row like any other, and the reason is its content
+    except Exception as error:  # the failed run is a row too, with the reason
         return Outcome(key, 0, None, f"{type(error).__name__}: {error}",
                        perf_counter() - begun, digest())
     return Outcome(key, recording.ticks, recording.fault, None, perf_counter() - begun, digest(),
@@ -98,7 +96,7 @@ def run(text: str, resolver: str, key: str) -> Outcome:
 def run_batch(jobs: Sequence[Job], versions: str) -> list[Outcome]:
     """Run jobs one after the other; raises OtherVersionsError unless this code is `versions`."""
     if digest() != versions:
-        raise OtherVersionsError("a worker has other versions of task-hierarchy, or of what it "
-                                 "uses, than this machine; install the same on both")
+        raise OtherVersionsError("a worker has other versions of task-hierarchy or its "
+                                 "dependencies than this machine; install the same on both")
     with _ONE_AT_A_TIME:
         return [run(job.text, job.resolver, job.key) for job in jobs]

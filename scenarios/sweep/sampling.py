@@ -1,4 +1,4 @@
-"""What is drawn for a sample, and a scenario with it put in."""
+"""Draw the parameters of a sample, and put them into a scenario."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from scenarios.sweep.config import Sweep, SweepError, Value
 def drawn(sweep: Sweep, index: int, scenario: Scenario) -> dict[str, Value]:
     """Return the values of sample `index` by dotted key, for one scenario.
 
-    They depend on the seed, the index and the key alone, and "around" on the scenario's own value.
+    They depend only on the seed, the index and the key, "around" also on the scenario's own value.
 
     Raises
     ------
-    SweepError : a key that the scenario does not have, or has no fitting value for.
+    SweepError : the scenario does not have a key, or has no suitable value there.
     """
     own = scenario.model_dump(mode="json")
     values = {}
@@ -36,9 +36,9 @@ def drawn(sweep: Sweep, index: int, scenario: Scenario) -> dict[str, Value]:
 
 
 def changed(scenario: Scenario, values: Mapping[str, Value], what: str) -> Scenario:
-    """Return the scenario with other values at dotted keys; raises SweepError where one is wrong.
+    """Return the scenario with other values at dotted keys; raises SweepError for invalid ones.
 
-    `what` begins the text of the error.
+    The error message starts with `what`.
     """
     data = scenario.model_dump(mode="json")
     for key, value in values.items():
@@ -56,13 +56,13 @@ def changed(scenario: Scenario, values: Mapping[str, Value], what: str) -> Scena
 
 
 def _chance(seed: int, index: int, key: str) -> np.random.Generator:
-    """Chance of its own for each parameter of each sample, the same on every machine."""
+    """Return a random generator for one parameter of one sample, the same on every machine."""
     words = np.frombuffer(hashlib.sha256(key.encode()).digest()[:16], dtype="<u4").tolist()
     return np.random.Generator(np.random.PCG64(np.random.SeedSequence([seed, index, *words])))
 
 
 def _place(data: Any, dotted: str) -> tuple[Any, Any]:
-    """Return the table or list in which a dotted key stands, and its key or index there."""
+    """Return the table or list that contains a dotted key, and the key or index in it."""
     *path, last = dotted.split(".")
     for i, key in enumerate(path):
         data = data[_within(data, key, ".".join(path[:i]))]
@@ -70,14 +70,14 @@ def _place(data: Any, dotted: str) -> tuple[Any, Any]:
 
 
 def _within(data: Any, key: str, above: str) -> Any:
-    """Return the key of a table or the index of a list; raises ValueError where it has none."""
+    """Return the key of a table or the index of a list; raises ValueError if it has none."""
     where = f"[{above}]" if above else "the file"
     if isinstance(data, list):
         if not (key.isdigit() and int(key) < len(data)):
-            raise ValueError(f"{where} has {len(data)} entries, counted from 0, and no {key!r}")
+            raise ValueError(f"{where} has {len(data)} entries, numbered from 0, and no {key!r}")
         return int(key)
     if not isinstance(data, dict):
-        raise ValueError(f"{where} is not there" if data is None else f"{where} is no table")
+        raise ValueError(f"{where} is missing" if data is None else f"{where} is not a table")
     if key not in data and above != "control.options":
         raise ValueError(f"{where} has no key {key!r}; it has {', '.join(data)}")
     return key

@@ -1,10 +1,9 @@
-"""What came of the runs of a sweep: parquet parts, each written whole or not at all."""
+"""Outcomes of a sweep's runs as Parquet files, each written whole or not at all."""
 
 from __future__ import annotations
 
 import fcntl
 import hashlib
-import os
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -15,6 +14,8 @@ import pyarrow as pa
 import pyarrow.parquet as parquet
 
 from hierarchy.errors import HierarchyError
+from scenarios import files
+from scenarios.files import written
 from scenarios.measure.metrics import Metric
 from scenarios.sweep.run import Outcome
 
@@ -23,19 +24,18 @@ _FIXED = (("key", pa.string()), ("ticks", pa.int64()), ("fault", pa.string()),
 
 
 class StoreError(HierarchyError):
-    """A folder of a sweep that is in use or no such folder, or a part that cannot be read."""
+    """A folder that is in use or not a sweep's, or a part that cannot be read."""
 
 
 class FullError(OSError):
-    """A file that could not be written, such as on a full disk; what was written before stays."""
+    """A file that cannot be written, such as on a full disk; files written before are kept."""
 
 
 @dataclass(frozen=True)
 class Store:
-    """The folder of a sweep: `parts/`, one file for each batch of runs, and what is made of them.
+    """The folder of a sweep: `parts/` with one file per batch of runs, and the results.
 
-    A column of a part is named after its metric, in SI units; the column's metadata say label and
-    unit.
+    Columns of a part are named after metrics, in SI units; their metadata have label and unit.
     """
 
     folder: Path
@@ -43,26 +43,26 @@ class Store:
     @property
     def parts(self) -> list[Path]:
         """The files of the parts."""
-        return sorted((self.folder / "parts").glob("*.parquet"))
+        return sorted((self.folder / "parts").glob("[!.]*.parquet"))
 
     @contextmanager
     def opened(self) -> Iterator[None]:
-        """Keep the folder for this process alone, and make it if it is new.
+        """Lock the folder for this process; make it if it is new.
 
         Raises
         ------
-        StoreError : it holds something else, or another process writes into it.
+        StoreError : it has other content, or another process writes into it.
         FullError : it cannot be made.
         """
         if self.folder.exists() and not (self.folder.is_dir() and self._is_free()):
-            raise StoreError(f"output folder {self.folder} holds something that is no sweep; "
+            raise StoreError(f"output folder {self.folder} is not empty and is not a sweep's; "
                              "choose another, or remove it first")
         with _named(self.folder):
             (self.folder / "parts").mkdir(parents=True, exist_ok=True)
             lock = (self.folder / ".lock").open("w")
         with lock:
             try:
-                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)  # the kernel lets go of it
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)  # the system releases it
             except OSError:
                 raise StoreError(f"another sweep is writing into {self.folder}") from None
             for left in (self.folder / "parts").glob(".*"):
@@ -73,7 +73,7 @@ class Store:
         return (self.folder / "parts").is_dir() or not any(self.folder.iterdir())
 
     def keys(self) -> set[str]:
-        """Return the keys of all runs that are kept; raises StoreError for a damaged part."""
+        """Return the keys of all stored runs; raises StoreError for a damaged part."""
         return {key for part in self.parts for key in _read(part, ["key"])["key"].to_pylist()}
 
     def add(self, outcomes: Sequence[Outcome]) -> Path:
@@ -90,27 +90,19 @@ class Store:
 
 
 def write_table(table: pa.Table, path: Path) -> None:
-    """Write a table so that a reader finds the old file or the new one; raises FullError."""
-    partial = path.with_name(f".{path.name}.{os.getpid()}")
-    with _named(path):
-        try:
-            parquet.write_table(table, partial)
-            _sync(partial)
-            partial.replace(path)
-        finally:
-            partial.unlink(missing_ok=True)
+    """Write a Parquet file, whole or not at all; raises FullError."""
+    with _named(path), written(path, synced=True) as partial:
+        parquet.write_table(table, partial)
 
 
 def write_text(text: str, path: Path) -> None:
-    """Write a file so that a reader finds the old one or the new one; raises FullError."""
-    from scenarios.files import write_text as write
-
+    """Write a text file, whole or not at all; raises FullError."""
     with _named(path):
-        write(path, text)
+        files.write_text(path, text)
 
 
 def metrics_of(table: pa.Table) -> dict[str, Metric]:
-    """Return the metrics that a table of parts has columns for, by name and without a value."""
+    """Return the metrics that a table has columns for, by name and without values."""
     found = {}
     for field in table.schema:
         if field.metadata and b"label" in field.metadata:
@@ -142,21 +134,15 @@ def _read(part: Path, columns: Sequence[str] | None = None) -> Any:
     try:
         return parquet.read_table(part, columns=columns, partitioning=None)
     except (OSError, pa.ArrowException) as error:
-        raise StoreError(f"{part} cannot be read ({error}); remove it to have its runs run "
-                         "again") from error
-
-
-def _sync(path: Path) -> None:
-    """Have the file on the disk before it takes its name: a part must survive a loss of power."""
-    with path.open("rb") as stream:
-        os.fsync(stream.fileno())
+        raise StoreError(f"{part} cannot be read ({error}); remove it to repeat "
+                         "its runs") from error
 
 
 @contextmanager
 def _named(path: Path) -> Iterator[None]:
-    """Make an OSError say which file it is about and that nothing written before is lost."""
+    """Turn an OSError into a FullError that names the file."""
     try:
         yield
     except OSError as error:
-        raise FullError(f"{path} cannot be written: {error.strerror or error}; what was written "
-                        "before it stays, and the same command goes on from there") from error
+        raise FullError(f"{path} cannot be written: {error.strerror or error}; finished runs are "
+                        "kept, and the same command continues from there") from error

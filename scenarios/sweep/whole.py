@@ -1,10 +1,9 @@
-"""A sweep from its file to its page."""
+"""Run a whole sweep, from its file to its page."""
 
 from __future__ import annotations
 
 import json
 import shlex
-import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,7 +22,7 @@ Progress = Callable[[str, int, int], None]
 
 @dataclass(frozen=True)
 class Finished:
-    """A sweep all of whose runs are kept; `made` of them were made by this call."""
+    """A finished sweep; this call made `made` of its runs."""
 
     plan: Plan
     found: Mapping[str, Results]
@@ -31,29 +30,29 @@ class Finished:
 
     @property
     def failed(self) -> int:
-        """How many runs did not reach their end."""
+        """Number of runs that did not finish."""
         return sum(reason is not None for one in self.found.values() for reason in one.reasons)
 
 
 def sweep(name_or_path: str | Path, out: str | Path, workers: int | None = None,
           scheduler: str | None = None, progress: Progress | None = None,
           command: str | None = None) -> Finished:
-    """Make the runs of a sweep that `out` does not have yet, and write what all come to.
+    """Make the runs of a sweep that `out` does not have yet, and write the results of all.
 
-    `out` holds `parts/` (the runs, written as they come), `runs.parquet` (all of them with what was
-    sampled), `index.html`, and the scenarios of worst and failed runs in `worst/`. Whatever stops a
-    sweep, the same call goes on from there. A run that fails is a row with its reason.
+    `out` holds `parts/` (the runs, written as they finish), `runs.parquet` (all runs with their
+    sampled values), `index.html`, and the scenarios of worst and failed runs in `worst/`. After an
+    interruption, the same call continues. A failed run is a row with its reason.
 
     Parameters
     ----------
-    workers : processes on this machine; by default one for each processor.
+    workers : processes on this machine; by default one per processor.
     scheduler : address of a Dask scheduler whose workers are used instead.
-    progress : called as progress(name, runs done, runs in all).
-    command : the command line to print on the page.
+    progress : called as progress(name, runs done, total runs).
+    command : the command line shown on the page.
 
     Raises
     ------
-    HierarchyError : before anything is run: a wrong file, key, value, resolver, folder or address.
+    HierarchyError : before any run: an invalid file, key, value, resolver, folder or address.
     FullError : a file cannot be written, such as on a full disk.
     EngineError : the scheduler is lost, or a worker has another version of the code.
     """
@@ -80,7 +79,7 @@ def sweep(name_or_path: str | Path, out: str | Path, workers: int | None = None,
 
 
 def _written(planned: Plan, store: Store, text: str, command: str) -> dict[str, Results]:
-    """Write what is made of the parts; returns the results by scenario."""
+    """Write the results of all parts, and return them by scenario."""
     table = joined(planned, store)
     found = results(planned, table)
     page = Page(planned, found, store.folder, command, text, versions())
@@ -94,6 +93,6 @@ def _written(planned: Plan, store: Store, text: str, command: str) -> dict[str, 
 
 
 def _scenario_of(run: Planned) -> str:
-    """Return the scenario of a run as a file, its resolver put in."""
-    return Scenario.model_validate(tomllib.loads(run.job.text)).with_resolver(
+    """Return the scenario of a run as TOML, with its resolver."""
+    return Scenario.from_toml(run.job.text).with_resolver(
         run.job.resolver).to_toml()

@@ -1,6 +1,6 @@
 """Ours beside the packages that can be had with pip: same arm, same path, same limits.
 
-`hierarchy bench peers`, after `python -m scenarios.bench.peers --install`. What is imported here is
+`hierarchy bench peers`, after `hierarchy bench peers --install`. What is imported here is
 little, since the same files also run inside the peers' own environments.
 """
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import tempfile
 from collections.abc import Sequence
@@ -24,6 +23,7 @@ from scenarios.bench.peers.process import Process, after_nan, stage
 from scenarios.bench.peers.scene import Scene, write_scenes
 from scenarios.bench.peers.urdf import urdf
 from scenarios.bench.rows import write_rows
+from scenarios.files import write_json
 
 TURN = 1000        # ticks before the next entrant has its turn
 REHEARSED = 50     # ticks at the beginning of a turn that do not count: caches are cold
@@ -56,7 +56,7 @@ def run(out: Path | None = None, entrants: Sequence[Entrant] | None = None,
         rows, missing = _run_all(chosen, scenes, stage(folder / "staged"), folder, ticks, seconds)
     _print(console, rows)
     for label, reason in missing.items():
-        console.print(f"left out: {label} ({reason})")
+        console.print(f"skipped: {label} ({reason})")
     if out is not None:
         _write(rows, missing, out)
     return rows
@@ -223,8 +223,8 @@ def _write(rows: list[dict[str, Any]], missing: dict[str, str], out: Path) -> No
     from scenarios.draw.figures.drawing import write
 
     out.mkdir(parents=True, exist_ok=True)
-    (out / "missing.json").write_text(json.dumps(missing, indent=2) + "\n")
-    (out / "machine.json").write_text(json.dumps(machine(), indent=2) + "\n")
+    write_json(out / "missing.json", missing)
+    write_json(out / "machine.json", machine())
     if rows:
         write_rows(rows, out / "peers.csv")
         write(bars(rows), str(out / "peers"))

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from scenarios.bench.peers.entrants import PACKAGES, Package
 
-INSTALL = "python -m scenarios.bench.peers --install"
+INSTALL = "hierarchy bench peers --install"
 _LIMIT = 1200.0  # [s] for one package
 _FAILED = "failed.txt"
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import warnings
 import xml.etree.ElementTree as ET
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from hierarchy.errors import RobotError
 from hierarchy.problem import Array
@@ -46,10 +48,9 @@ def urdf(robot: Robot) -> str:
 
 def roll_pitch_yaw(R: Array) -> Array:
     """Return the angles (3,) [rad] with R = Rz(yaw) Ry(pitch) Rx(roll), as URDF has them."""
-    pitch = np.arctan2(-R[2, 0], np.hypot(R[0, 0], R[1, 0]))
-    if np.hypot(R[0, 0], R[1, 0]) < 1e-12:  # yaw and roll turn about the same axis
-        return np.array([np.arctan2(-R[1, 2], R[1, 1]), pitch, 0.0])
-    return np.array([np.arctan2(R[2, 1], R[2, 2]), pitch, np.arctan2(R[1, 0], R[0, 0])])
+    with warnings.catch_warnings():  # of a pitch of 90 deg, where yaw is arbitrary and set to 0
+        warnings.simplefilter("ignore", UserWarning)
+        return np.asarray(Rotation.from_matrix(R).as_euler("xyz"))
 
 
 def _add_link(root: ET.Element, name: str, body: Body) -> None:

@@ -1,4 +1,4 @@
-"""What the commands move."""
+"""Plants: the simulated robots that commands move."""
 
 from scenarios.cell.plants.kinematic import KinematicArm
 from scenarios.cell.plants.measured import Apart, Commanded, JointSensor

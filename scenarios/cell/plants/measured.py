@@ -1,4 +1,4 @@
-"""What a controller is told of a plant, kept apart from what is so."""
+"""Measurement of a plant, separate from its true state."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ from scenarios.cell.plants.plant import Driven, Plant
 from scenarios.config import ScenarioError
 from scenarios.config.plant import MeasurementSection
 
-_WHOLE = 1e-6  # of a period: a delay this near to a whole number of periods is one
+_WHOLE = 1e-6  # of a period: tolerance of a delay in whole periods
 
 
 class Sensed(Protocol):
-    """Turns the true state into what the controller is told of it."""
+    """Turns the true state into the measured one."""
 
     def __call__(self, q: Array, v: Array) -> tuple[Array, Array]: ...  # noqa: D102
 
 
 class Apart:
-    """A plant whose q and v are what `sensed` makes of the true ones, once each period.
+    """A plant whose q and v are measured by `sensed`, once per period.
 
-    The truth at the start of each period is recorded as `true_q`, `true_v`.
+    The true state at the start of each period is recorded as `true_q`, `true_v`.
     """
 
     def __init__(self, plant: Plant, sensed: Sensed) -> None:
@@ -38,7 +38,7 @@ class Apart:
 
     @property
     def a(self) -> Array:
-        """The acceleration (n,) [rad/s^2] that the last command meant."""
+        """The acceleration (n,) [rad/s^2] of the last command."""
         return self._plant.a
 
     def act(self, command: Array) -> None:
@@ -50,7 +50,7 @@ class Apart:
 
 
 class Commanded:
-    """Tells the controller what its own commands add up to, and nothing of the real joints."""
+    """Returns the integral of the controller's own commands instead of the real joint state."""
 
     def __init__(self, plant: Driven) -> None:
         self._plant = plant
@@ -61,12 +61,12 @@ class Commanded:
 
 
 class JointSensor:
-    """Joint sensors with noise, steps and delay, read every `period` [s]; seeded.
+    """Joint sensors with noise, quantisation and delay, read every `period` [s]; seeded.
 
-    A position gets its noise, then goes to the nearest step. With velocity = "differenced" the
-    velocity is the backward difference of these positions, passed through a low-pass of first
-    order, and at first the true one. All is told `delay` later, and up to then as at the start.
-    Raises ScenarioError where the delay is no whole number of periods.
+    Noise is added to a position, then it is rounded to the nearest step. With velocity =
+    "differenced" the velocity is the backward difference of these positions after a first-order
+    low-pass filter; the first one is the true velocity. Values arrive `delay` later, until then
+    those of the start. Raises ScenarioError if the delay is not a whole number of periods.
     """
 
     def __init__(self, section: MeasurementSection, period: float) -> None:
@@ -80,7 +80,7 @@ class JointSensor:
         self._last: tuple[Array, Array] | None = None  # position and filtered velocity
 
     def __call__(self, q: Array, v: Array) -> tuple[Array, Array]:
-        """Return what is told now (n,), (n,) when the joints are at q (n,), v (n,)."""
+        """Return the measurement (n,), (n,) when the joints are at q (n,), v (n,)."""
         position = self._position(q)
         velocity = (self._differenced(position, v) if self._section.velocity == "differenced"
                     else v + self._noise(self._section.velocity_noise, len(v)))

@@ -1,4 +1,4 @@
-"""An arm and its obstacles as a scene for MuJoCo, as text in its format MJCF."""
+"""An arm and its obstacles as a MuJoCo scene in the format MJCF."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from scenarios.config import ScenarioError
 from scenarios.config.plant import JointsSection, ServoSection
 
 GRAVITY = 9.81     # [m/s^2], along -z of the world, as in the robot's own model
-_SOFTNESS = 0.02   # [s] in which a contact comes to rest: some mm at usual speeds
+_SOFTNESS = 0.02   # [s] time constant of a contact: a few mm of penetration at usual speeds
 _FRICTION = "0.5 0.005 0.0001"  # of a contact: sliding, turning [m], rolling [m]
 Element = ElementTree.Element
 
@@ -24,17 +24,17 @@ Element = ElementTree.Element
 def scene(robot: Robot, capsules: Sequence[Capsule], obstacles: Sequence[Obstacle],
           joints: JointsSection, servo: ServoSection, gains: tuple[Array, Array],
           timestep: float) -> str:
-    """Return the scene: bodies of the robot, their capsules, servos, obstacles that are placed.
+    """Return the scene: bodies of the robot, capsules, servos, and movable obstacles.
 
     gains : stiffness (n,) [N m/rad] and damping (n,) [N m s/rad] of the servos. Actuators are the
-    n joint positions, then the n joint velocities; an obstacle is body "obstacle 1" and so on, a
-    point has none. Raises ScenarioError where a joint is not one turn about its frame's z axis.
+    n joint positions, then the n joint velocities. Obstacles are bodies "obstacle 1" and so on;
+    points have no body. Raises ScenarioError unless all joints turn about their frames' z axes.
     """
     root = Element("mujoco", model=robot.name)
     ElementTree.SubElement(root, "compiler", angle="radian", inertiafromgeom="false")
     option = ElementTree.SubElement(root, "option", timestep=repr(timestep),
                                     gravity=f"0 0 {-GRAVITY}", integrator="implicitfast")
-    ElementTree.SubElement(option, "flag", autoreset="disable")  # a state that is lost stays lost
+    ElementTree.SubElement(option, "flag", autoreset="disable")  # a diverged state is not reset
     default = ElementTree.SubElement(root, "default")
     ElementTree.SubElement(default, "geom", solref=_text(_SOFTNESS, 1.0), friction=_FRICTION)
     world = ElementTree.SubElement(root, "worldbody")
@@ -45,7 +45,7 @@ def scene(robot: Robot, capsules: Sequence[Capsule], obstacles: Sequence[Obstacl
 
 
 def each(value: float | tuple[float, ...], n: int, name: str) -> Array:
-    """Return a setting (n,) given as one number for all joints or one for each."""
+    """Return a setting (n,) that is given as one value for all joints or one each."""
     values = np.full(n, value) if isinstance(value, float | int) else np.array(value)
     if len(values) != n:
         raise ScenarioError(f"{name} has {len(values)} entries, the robot has {n} joints")
@@ -91,7 +91,7 @@ def _body(parent: Element, body: Body, gravity: float) -> Element:
 
 
 def _obstacles(world: Element, obstacles: Sequence[Obstacle]) -> None:
-    """Obstacles touch the arm and not each other; they go where they are put."""
+    """Add the obstacles: they collide with the arm, not with each other."""
     for number, obstacle in enumerate(obstacles, 1):
         if obstacle.shape == "point":
             continue

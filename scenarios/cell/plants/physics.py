@@ -1,4 +1,4 @@
-"""An arm in MuJoCo under position servos, sent joint positions as an arm is through KUKA's FRI."""
+"""An arm in MuJoCo with position servos, commanded in joint positions as through KUKA's FRI."""
 
 # mypy: disable-error-code="no-untyped-def"
 
@@ -25,15 +25,15 @@ _ARMS = [name for name, table in TABLES.items() if isinstance(table, DHTable)]
 
 
 class PhysicsArm:
-    """Adds commands up to a reference, which the servos of a simulated arm follow.
+    """Integrates commands to a reference that the servos of a simulated arm follow.
 
-    `q`, `v` (n,) are the true joint state, `a` (n,) the acceleration that the last command meant,
+    `q`, `v` (n,) are the true joint state, `a` (n,) the acceleration of the last command,
     `reference_q`, `reference_v` (n,) the servos' reference at the end of the period [rad, s].
-    `extra`: `contacts`, how many points of arm and obstacles touched at once in the last period at
-    most, `contact_depth` [m] and `contact_force` [N], the largest normal one. Obstacles are where
-    `obstacles` has them at each step; a point has no body, so nothing touches it.
+    `extra`: `contacts`, the largest number of simultaneous contact points between arm and obstacles
+    in the last period, `contact_depth` [m] and `contact_force` [N], the largest normal force.
+    Obstacles follow `obstacles` at each step; points have no body and no contacts.
 
-    Raises ScenarioError where mujoco is not installed, and for a robot that is not a table.
+    Raises ScenarioError if mujoco is not installed, or the robot is not given as a table.
     """
 
     def __init__(self, robot: Robot, q: Array, v: Array, period: float, level: Level,
@@ -60,7 +60,7 @@ class PhysicsArm:
 
     def _start(self, mujoco: Any, q: Array, v: Array) -> None:
         self.data.qpos[:], self.data.qvel[:] = q, v
-        # A joint that starts beyond its limit has its stop there, and is not flung back.
+        # A joint that starts beyond its limit has its stop there and is not thrown back.
         self.model.jnt_range[:] = np.column_stack([np.minimum(self.model.jnt_range[:, 0], q),
                                                    np.maximum(self.model.jnt_range[:, 1], q)])
         self.q, self.v, self.a = q.copy(), v.copy(), np.zeros(len(v))
@@ -92,7 +92,7 @@ class PhysicsArm:
         self.q[:], self.v[:] = self.data.qpos, self.data.qvel
 
     def _bodies(self, mujoco: Any) -> list[tuple[int, int]]:
-        """Index of each obstacle that has a body, and of its place among the bodies put there."""
+        """Return the index of each obstacle with a body, and the index of its mocap body."""
         found = []
         for h in range(len(self._obstacles)):
             body = mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_BODY, f"obstacle {h + 1}")
@@ -101,13 +101,13 @@ class PhysicsArm:
         return found
 
     def _place(self, t: float) -> None:
-        """Put the obstacles where they are at time t [s]."""
+        """Move the obstacles to their positions at time t [s]."""
         self._obstacles.at(t)
         for h, placed in self._placed:
             self.data.mocap_pos[placed] = self._obstacles.centres[h]
 
     def _look_at_contacts(self) -> None:
-        """Note the contacts of one step; each is between the arm and an obstacle."""
+        """Record the contacts of one step; all are between the arm and an obstacle."""
         contacts = self.data.contact
         self._contacts[...] = max(int(self._contacts), len(contacts))
         self._depth[...] = max(float(self._depth), -float(contacts.dist.min()))

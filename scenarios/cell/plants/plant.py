@@ -1,4 +1,4 @@
-"""What every plant has."""
+"""The interface of a plant."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from hierarchy.problem import Array
 
 
 class Plant(Protocol):
-    """Something that commands move.
+    """A simulated robot that commands move.
 
-    `q` (nq,) [rad] and `v` (n,) [rad/s] are what the controller is told; `a` (n,) [rad/s^2] is the
-    acceleration that the last command meant. `extra` has by name what else is to be recorded of the
-    period that `act` went through last; its arrays stay the same objects.
+    `q` (nq,) [rad] and `v` (n,) [rad/s] are measured values; `a` (n,) [rad/s^2] is the acceleration
+    of the last command. `extra` has further signals of the last period to record, by name; its
+    arrays stay the same objects.
     """
 
     @property
@@ -35,7 +35,7 @@ class Plant(Protocol):
 
 
 class Driven(Plant, Protocol):
-    """A plant that follows its reference (nq,) [rad], (n,) [rad/s] as well as it can."""
+    """A plant whose servos follow a reference (nq,) [rad], (n,) [rad/s]."""
 
     @property
     def reference_q(self) -> Array: ...  # noqa: D102

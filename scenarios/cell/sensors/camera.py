@@ -1,4 +1,4 @@
-"""A simulated depth camera: what it sees of obstacles and robot, and when."""
+"""A simulated depth camera that sees obstacles and robot."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from scenarios.cell.sensors.errors import DepthErrors, Image, expose
 from scenarios.cell.sensors.rendering import draw_scene
 
 _ROUNDING = 1e-9   # [s] of times that are compared
-_SKEW = 1e-6       # by how much a rotation may fail to be one
+_SKEW = 1e-6       # tolerance of a rotation matrix
 
 
 @dataclass(frozen=True)
@@ -47,12 +47,12 @@ class Pinhole:
         R = np.asarray(self.rotation, dtype=float)
         if R.shape != (3, 3) or not np.abs(R @ R.T - np.eye(3)).max() < _SKEW or (
                 np.linalg.det(R) < 0.0):
-            raise HierarchyError(f"camera: rotation {R.tolist()} is none")
+            raise HierarchyError(f"camera: {R.tolist()} is not a rotation")
         if not np.isfinite(np.asarray(self.position, dtype=float)).all():
             raise HierarchyError(f"camera: position {self.position} is not finite")
 
     def packed(self) -> Array:
-        """What kernels take (16,): fx, fy, cx, cy, position, rotation row by row."""
+        """Return the array (16,) for kernels: fx, fy, cx, cy, position, rotation row by row."""
         return np.array([self.fx, self.fy, self.cx, self.cy,
                          *np.asarray(self.position, dtype=float),
                          *np.asarray(self.rotation, dtype=float).ravel()])
@@ -75,9 +75,10 @@ class Pinhole:
 
 
 def looking_at(position: ArrayLike, target: ArrayLike) -> Array:
-    """Rotation (3, 3) of a camera at `position` [m] that has `target` [m] in the middle, upright.
+    """Return the rotation (3, 3) of an upright camera at `position` [m] that faces `target` [m].
 
-    Upright is with the world's z up in the image; looking straight up or down, with its y up.
+    The world's z axis points up in the image, or its y axis if the camera looks straight up or
+    down.
     """
     forward = np.subtract(target, position).astype(float)
     length = float(np.linalg.norm(forward))
@@ -91,16 +92,16 @@ def looking_at(position: ArrayLike, target: ArrayLike) -> Array:
 
 
 class DepthCamera:
-    """Takes depth images (h, w) [m] of obstacles and of a robot made of capsules; 0 is no reading.
+    """Takes depth images (h, w) [m] of obstacles and a robot of capsules; 0 means no reading.
 
-    Points among the obstacles are seen as balls of `point_radius` [m]; a wall stands across the
-    optical axis at depth `backdrop` [m], infinite for none. Frame i is taken at i / `rate` [Hz]
-    plus up to `jitter` [s], and is there `latency` [s] later. The errors of frame i follow from
-    `seed` and i alone. `scene` has the true depths of the last frame, infinite where nothing is.
+    Point obstacles are seen as balls of `point_radius` [m]; a wall perpendicular to the optical
+    axis is at depth `backdrop` [m], infinite for none. Frame i is taken at i / `rate` [Hz] plus up
+    to `jitter` [s], and available `latency` [s] later. The errors of frame i depend only on `seed`
+    and i. `scene` has the true depths of the last frame, infinite where there is nothing.
     """
 
     def __init__(self, pinhole: Pinhole, obstacles: Obstacles, capsules: tuple[Capsule, ...],
-                 errors: DepthErrors | None = None, rate: float = 30.0, jitter: float = 0.0,
+                 errors: DepthErrors | None = None, *, rate: float = 30.0, jitter: float = 0.0,
                  latency: float = 0.0, seed: int = 0, point_radius: float = 0.02,
                  backdrop: float = inf) -> None:
         if not 0.0 <= jitter < 1.0 / rate:
@@ -117,12 +118,12 @@ class DepthCamera:
         self._normal, self._uniform = np.zeros(size, np.float32), np.ones(size, np.float32)
 
     def time(self, frame: int) -> float:
-        """When a frame is taken [s]."""
+        """Return the time at which a frame is taken [s]."""
         wait = self._jitter * self._rng(frame, 1).random() if self._jitter else 0.0
         return frame / self._rate + wait
 
     def newest(self, t: float) -> int:
-        """Number of the last frame taken by time t [s], -1 before the first."""
+        """Return the number of the last frame taken by time t [s], -1 before the first."""
         frame = floor((t + _ROUNDING) * self._rate)
         return frame - (frame >= 0 and self.time(frame) > t + _ROUNDING)
 

@@ -1,4 +1,4 @@
-"""The depth camera in the control loop: frames that come now and then, late or not at all."""
+"""The depth camera in the control loop: frames at intervals, late or missing."""
 
 from __future__ import annotations
 
@@ -19,33 +19,31 @@ _ROUNDING = 1e-9  # [s] of times that are compared
 
 
 class Source(Protocol):
-    """Where depth images come from: `DepthCamera` or `RecordedFrames`."""
+    """A source of depth images: `DepthCamera` or `RecordedFrames`."""
 
     pinhole: Pinhole
     obstacles: Obstacles
     latency: float
 
     def newest(self, t: float) -> int:
-        """Number of the last frame taken by time t [s], -1 before the first."""
+        """Return the number of the last frame taken by time t [s], -1 before the first."""
 
     def image(self, frame: int, state: State) -> tuple[Image, Array]:
-        """The image (h, w) [m] of a frame and the robot's placements when it was taken."""
+        """Return the image (h, w) [m] of a frame and the robot's placements when it was taken."""
 
 
 class DepthSensor:
-    """Measures control points and end effector in the last depth image that has come.
+    """Measures control points and end effector in the latest available depth image.
 
-    A frame is taken in the first tick at or after its time, with the robot as it is then, and is
-    used from `source.latency` [s] after that until the next has come; meanwhile the points move on
-    with the robot. A frame that has a reading in less than `least_readings` of its pixels is as
-    good as none.
+    A frame is taken in the first tick at or after its time, with the robot's current state, and is
+    used from `source.latency` [s] later until the next frame is available; meanwhile the points
+    move with the robot. Frames with fewer valid pixels than the share `least_readings` are ignored.
 
-    `measurement.stamp` is the time [s] at which the image in use was taken, -inf before the first;
-    `measurement.blind` is set while that is more than `stale_after` [s] ago: the camera has
-    stopped, is late or sees nothing. Distances are then those of the last image, infinite without
-    any, and the controller treats the tick as stale. While `stopped` no frames are taken, while
-    `covered` they have no readings: what faults do. `outside` [s] is how long the source took to
-    make the image in the last measurement: work of a real camera, not of the control loop.
+    `measurement.stamp` is the time [s] at which the current image was taken, -inf before the first;
+    `measurement.blind` is set if that is more than `stale_after` [s] ago, and the controller then
+    treats the tick as stale. Distances are those of the last image, infinite without one. Faults
+    set `stopped` (no frames are taken) and `covered` (frames have no readings). `outside` [s] is
+    the time the source took to make the image, which is not part of the control loop.
     """
 
     def __init__(self, source: Source, space: DepthSpace, stale_after: float = 0.2,
@@ -65,7 +63,7 @@ class DepthSensor:
         self._forget()
 
     def measure(self, state: State) -> Measurement:
-        """Measure at a state and hang the measurement on it; valid until the next call."""
+        """Measure at a state and attach the measurement to it; valid until the next call."""
         t, seen = state.t, self.measurement
         self.outside = 0.0
         if t < self._now:
@@ -108,7 +106,7 @@ class DepthSensor:
             self._spare.append(image)
 
     def _forget(self) -> None:
-        """Begin anew: no frame has been taken."""
+        """Reset: no frame has been taken."""
         self._keep(self._current)
         for _, image in self._coming:
             self._keep(image)

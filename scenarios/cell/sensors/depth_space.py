@@ -1,4 +1,4 @@
-"""Distances of control points to what a depth image shows, evaluated in the image itself."""
+"""Distances of control points to obstacles in a depth image, evaluated in image space."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _ON_ITS_WAY = 0.3  # [m]
 
 
 class ObstacleImage:
-    """Depths (h, w) [m] of the pixels that show an obstacle, 0 of all others."""
+    """Depths (h, w) [m] of the pixels that show an obstacle, 0 elsewhere."""
 
     __slots__ = ("depth", "tiles")
 
@@ -34,35 +34,23 @@ class ObstacleImage:
 
 
 class DepthSpace:
-    """Turns depth images into obstacle images, and measures points in those.
+    """Turns depth images into obstacle images, and measures distances of points in them.
 
-    `points` are the control points, the end effector last; `capsules` the robot, which is taken
-    out: a pixel that shows the robot made thicker by `margin` [m], or what is behind it, is no
-    obstacle. `region` [m] is rho, beyond which nothing is seen. An obstacle nearer to the camera
-    than a point hides what is behind it, which may be occupied: it counts at the depth of the
-    point. With `thin` [m] obstacles are known to reach no farther than that behind their surface,
-    along the optical axis.
-
-    With `support` > 1 a pixel counts only where so many of the 3 x 3 around it, itself included,
-    agree within `band` [m] in depth; single outliers then have no effect. A surface that shows in
-    fewer pixels is overlooked, and so is one so slanted that neighbours differ by more.
-
-    With `mean` the direction of a point is the mean (25)-(26) over all pixels in the region, else
-    that from the nearest pixel; where the nearest is that of the point itself, which lies in its
-    shadow, the mean is taken in any case. `body` and `tip` are the laws of repulsion.
-
-    The distance to a surface that is seen (inside the image and the camera's range, not hidden,
-    turned from the ray by less than some 70 deg, nor taken out as the robot or for lack of support)
-    is never overestimated by more than the error of its reading along its ray and one pixel, see
-    `overestimate`; a pixel without a reading costs one more. Hidden space is taken as occupied, so
-    underestimates have no such bound; that of the nearest of many noisy pixels is too small on
-    average. What is outside the image is not seen.
-
-    `measurement.nearest` is the nearest pixel v width + u, -1 for none.
+    points : control points, the end effector last.
+    capsules : the robot, enlarged by `margin` [m]; pixels that show it or anything behind it do not
+        count as obstacles.
+    region : rho [m], the largest distance that is measured.
+    thin : how far obstacles extend behind their surface along the optical axis [m]. Space hidden by
+        an obstacle counts as occupied up to that depth.
+    support, band : a pixel counts if `support` of the 3 x 3 around it agree within `band` [m] in
+        depth, which removes outliers, but also surfaces that are smaller or steeper.
+    mean : use the mean direction (25)-(26) over all pixels in the region, otherwise that of the
+        nearest pixel, except for a point in the shadow of its own pixel.
+    body, tip : repulsion laws. `measurement.nearest` is a pixel v width + u, -1 for none.
     """
 
     def __init__(self, pinhole: Pinhole, points: Sequence[ControlPoint],
-                 capsules: Sequence[Capsule], region: float, margin: float = 0.05,
+                 capsules: Sequence[Capsule], region: float, *, margin: float = 0.05,
                  thin: float = inf, support: int = 3, band: float = 0.05, mean: bool = True,
                  body: Repulsion | None = None, tip: Repulsion | None = None,
                  pairs: bool = False) -> None:
@@ -88,9 +76,8 @@ class DepthSpace:
     def find_obstacles(self, reading: Image, placements: Array, into: ObstacleImage) -> float:
         """Fill an obstacle image from a reading (h, w) [m] and the robot's placements then.
 
-        What is farther than any point of the robot can be interested in, also if it moves by
-        _ON_ITS_WAY until the next frame, is left out. Returns the share of the pixels that have a
-        reading: neither 0 nor NaN.
+        Pixels beyond the region of every point, even if the robot moves by _ON_ITS_WAY until the
+        next frame, are ignored. Returns the share of valid pixels, which are neither 0 nor NaN.
         """
         draw_robot(self._robot, self._eye, placements, self._links, self._capsules, self._margin)
         beyond = farthest(placements, self._joints, self._offsets, self._eye)
@@ -98,7 +85,7 @@ class DepthSpace:
                                     beyond + self.region + _ON_ITS_WAY, into.depth, into.tiles))
 
     def measure(self, obstacles: ObstacleImage, placements: Array) -> Measurement:
-        """Measure the points of the robot where it is now; valid until the next call."""
+        """Measure the points of the robot at its current placements; valid until the next call."""
         seen = self.measurement
         seen.active = measure_pixels(
             placements, self._joints, self._offsets, self._eye, obstacles.depth, obstacles.tiles,
@@ -107,7 +94,12 @@ class DepthSpace:
         return seen
 
     def overestimate(self, point: Array, error: float) -> float:
-        """The most [m] by which a distance to the surface at `point` (3,) [m] is overestimated.
+        """Return the largest overestimate [m] of the distance to a surface at `point` (3,) [m].
+
+        It holds for visible surfaces: inside the image and range, less than about 70 deg from
+        facing the camera, and not removed as robot or for lack of support. A missing pixel adds
+        one pixel. There is no bound on underestimates: hidden space counts as occupied, and the
+        nearest of many noisy pixels is too near on average.
 
         `error` [m] is that of its reading, see `DepthErrors.bound`.
         """

@@ -1,4 +1,4 @@
-"""What a depth camera gets wrong: noise, rounding, range, missing pixels, outliers."""
+"""Errors of a depth camera: noise, rounding, range, missing pixels, outliers."""
 
 # mypy: disable-error-code="no-untyped-def"
 
@@ -15,8 +15,8 @@ from hierarchy.jit import compiled
 from hierarchy.problem import Array
 
 Image = NDArray[np.float32]
-_WIDEST = 3.5  # noise beyond so many standard deviations is cut off, so that it has a bound
-_EDGE = 0.05   # [m] step of the depth between two pixels that makes an edge
+_WIDEST = 3.5  # [standard deviations] at which noise is clipped, so that it is bounded
+_EDGE = 0.05   # [m] depth difference between two pixels at an edge
 
 
 @dataclass(frozen=True)
@@ -24,16 +24,16 @@ class DepthErrors:
     """Errors of a depth reading z [m]; all zero but `near` and `far` for an ideal camera.
 
     noise_floor, noise_growth, noise_from : the standard deviation [m] is
-        floor + growth (z - from)^2, normal, cut off at 3.5 times that.
+        floor + growth (z - from)^2, normal, clipped at 3.5 times that.
     rounding, step : "step" rounds z to multiples of `step` [m]; "disparity" rounds 1 / z to
-        multiples of `step` [1/m], as a camera does that measures an angle; step 0 for none.
+        multiples of `step` [1/m], as a triangulating camera does; step 0 for none.
     near, far : readings outside [m] are missing.
     missing : the probability that a pixel has no reading; missing_at_edges that of one whose
         neighbour is 5 cm nearer or farther.
     outliers : the probability that a frame has a square of up to `outlier_size` pixels to each
-        side, at least one pixel, whose depth is random between `near` and what was there.
+        side, at least one pixel, whose depth is random between `near` and the true depth.
 
-    The numbers are like those of a Kinect. Raises HierarchyError where one is out of its range.
+    The defaults resemble a Kinect. Raises HierarchyError for values out of range.
     """
 
     noise_floor: float = 1.2e-3
@@ -63,11 +63,11 @@ class DepthErrors:
 
     @classmethod
     def none(cls, near: float = 0.0, far: float = np.inf) -> DepthErrors:
-        """An ideal camera's: readings between near and far [m] are right to the last digit."""
+        """Return the errors of an ideal camera: exact readings between near and far [m]."""
         return cls(0.0, 0.0, 0.0, "step", 0.0, near, far, 0.0, 0.0, 0.0, 0)
 
     def bound(self, depth: float) -> float:
-        """The most by which a reading at a depth [m] is wrong [m], if it is no outlier."""
+        """Return the largest error [m] of a reading at a depth [m] that is not an outlier."""
         noise = _WIDEST * (self.noise_floor + self.noise_growth * (depth - self.noise_from) ** 2)
         if self.rounding == "step":
             return noise + self.step / 2
@@ -75,18 +75,18 @@ class DepthErrors:
 
     @property
     def random(self) -> bool:
-        """Whether any reading is left to chance."""
+        """Whether readings have random errors."""
         return any((self.noise_floor, self.noise_growth, self.missing, self.missing_at_edges,
                     self.outliers))
 
     def packed(self) -> Array:
-        """What `expose` takes (9,)."""
+        """Return the array (9,) for `expose`."""
         return np.array([self.noise_floor, self.noise_growth, self.noise_from,
                          self.rounding == "disparity", self.step, self.near, self.far,
                          self.missing, self.missing_at_edges])
 
     def add_outliers(self, rng: np.random.Generator, reading: Image) -> None:
-        """Put this frame's outlier, if it has one, into a reading (h, w)."""
+        """Add this frame's outlier, if it has one, to a reading (h, w)."""
         if rng.random() >= self.outliers:
             return
         v, u = rng.integers(reading.shape[0]), rng.integers(reading.shape[1])

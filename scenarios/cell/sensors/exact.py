@@ -19,7 +19,7 @@ from hierarchy.avoidance.control_points import pack_points
 from hierarchy.avoidance.measurement import exact_measurer
 from hierarchy.avoidance.repulsion import laws
 
-_TOUCHING = 1e-9  # [m] a control point this near to an obstacle has no direction to leave it
+_TOUCHING = 1e-9  # [m] a control point this close to an obstacle has no direction away from it
 _NO_LAWS = np.array([[0.0, 1.0, 1.0, 1.0]] * 2)  # r_max = 0
 
 
@@ -27,13 +27,12 @@ class ExactDistances:
     """Measures a robot's control points and end effector against obstacles.
 
     `body` and `tip` are the magnitudes of the repulsion of the control points and of the end
-    effector; with `mean_within` > 0 [m] directions are the mean (25)-(26) over the obstacles
-    nearer than that, else those of the nearest obstacle. With `pairs`, every point is also
-    measured against every obstacle, which the task `Separation` needs. Without both laws nothing
-    is repelled.
+    effector; without both there is no repulsion. With `mean_within` > 0 [m] directions are the mean
+    (25)-(26) over the obstacles nearer than that, otherwise those of the nearest obstacle. With
+    `pairs`, every point is also measured against every obstacle, as `Separation` needs.
     """
 
-    outside = 0.0  # [s] of a measurement that the control loop would not spend
+    outside = 0.0  # [s] of a measurement that is not part of the control loop
 
     def __init__(self, robot: Robot, obstacles: Obstacles, body: Repulsion | None = None,
                  tip: Repulsion | None = None, mean_within: float = 0.0,
@@ -51,7 +50,7 @@ class ExactDistances:
             self.measurement.pairs = Pairs(len(self.points), len(obstacles))
 
     def measure(self, state: State) -> Measurement:
-        """Measure at a state and hang the measurement on it; valid until the next call."""
+        """Measure at a state and attach the measurement to it; valid until the next call."""
         if state is not self._followed:
             self._follow(state)
         self.obstacles.at(state.t)

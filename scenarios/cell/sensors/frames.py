@@ -3,14 +3,13 @@
 `frames.toml` has width, height, fx, fy, cx, cy [px], position [m], rotation (rows; its columns are
 the camera's axes in the world), scale [m] of one step of a pixel, and a table `[[frame]]` for each
 image: file, time [s], and optionally q [rad or m], the robot's joints when it was taken. A pixel of
-0 is no reading.
+0 means no reading.
 
 `scenarios.loop.record_frames` writes such a folder.
 """
 
 from __future__ import annotations
 
-import tomllib
 from bisect import bisect_right
 from pathlib import Path
 from typing import Any
@@ -25,6 +24,7 @@ from hierarchy.problem import Array
 from scenarios.cell.sensors.camera import Pinhole
 from scenarios.cell.sensors.errors import Image
 from scenarios.config.reading import LIBRARY
+from scenarios.files import read_toml
 
 SHIPPED = LIBRARY / "frames"
 ABOUT = "frames.toml"
@@ -33,17 +33,17 @@ INTRINSICS = ("width", "height", "fx", "fy", "cx", "cy", "position", "rotation")
 
 
 class RecordedFrames:
-    """Depth images from a folder, or a shipped one by name, in place of a camera.
+    """Depth images from a folder, or a shipped set by name, in place of a camera.
 
-    Image i counts as taken at its time and is there `latency` [s] later. Where the folder has no
-    joints for it, the robot is taken out as it is then. After the last image the camera has
-    stopped. Raises HierarchyError, naming file and key, where the folder cannot be used.
+    Image i is taken at its time and available `latency` [s] later. If the folder has no joints for
+    it, the robot is removed in its current state. After the last image there are no more frames.
+    Raises HierarchyError, naming file and key, if the folder is invalid.
     """
 
     def __init__(self, folder: str | Path, robot: Robot, latency: float = 0.0) -> None:
         self.folder, self.latency = _found(folder), latency
         self.obstacles = Obstacles()
-        about = _read(self.folder / ABOUT)
+        about = read_toml(self.folder / ABOUT, "file of frames", HierarchyError)
         self.pinhole, self._scale = _pinhole(about, self.folder), about.get("scale", 1e-3)
         frames = about.get("frame") or []
         try:
@@ -60,7 +60,7 @@ class RecordedFrames:
         self._reading = np.zeros((self.pinhole.height, self.pinhole.width), np.float32)
 
     def newest(self, t: float) -> int:
-        """Number of the last image taken by time t [s], -1 before the first."""
+        """Return the number of the last image taken by time t [s], -1 before the first."""
         return bisect_right(self.times, t + _ROUNDING) - 1
 
     def image(self, frame: int, state: State) -> tuple[Image, Array]:
@@ -80,13 +80,6 @@ def _found(folder: str | Path) -> Path:
                            sorted(path.name for path in SHIPPED.glob("*")))
 
 
-def _read(file: Path) -> dict[str, Any]:
-    try:
-        return tomllib.loads(file.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise HierarchyError(f"{file}: {error}") from error
-
-
 def _pinhole(about: dict[str, Any], folder: Path) -> Pinhole:
     for key in INTRINSICS:
         if key not in about and key not in ("cx", "cy"):
@@ -104,5 +97,5 @@ def _read_png(file: Path, pinhole: Pinhole) -> NDArray[np.uint16]:
         raise HierarchyError(f"{file}: {error}") from error
     if values.shape != (pinhole.height, pinhole.width) or values.dtype.kind not in "ui":
         raise HierarchyError(f"{file}: an image {values.shape} of {values.dtype}, expected "
-                             f"{(pinhole.height, pinhole.width)} of whole numbers")
+                             f"{(pinhole.height, pinhole.width)} of integers")
     return values.astype(np.uint16)

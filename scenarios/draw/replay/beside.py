@@ -13,12 +13,12 @@ from PIL import Image, ImageDraw, ImageFont
 from hierarchy.problem import Array
 from scenarios.draw.figures import drawing
 from scenarios.loop.fate import Fate
+from scenarios.loop.phrases import phrase
 from scenarios.scene import Scene, Series
 
 _INK, _QUIET = (26, 29, 33), (92, 101, 112)
-_ROWS = {Fate.MET: ((207, 230, 218), "met"), Fate.FREE: ((227, 231, 236), "not acting"),
-         Fate.MISSED: ((243, 201, 139), "gives up {:.3g}"),
-         Fate.UNKNOWN: ((227, 231, 236), "in the stack")}
+_ROWS = {Fate.MET: (207, 230, 218), Fate.FREE: (227, 231, 236), Fate.MISSED: (243, 201, 139),
+         Fate.UNKNOWN: (227, 231, 236)}
 
 
 class Beside:
@@ -47,10 +47,10 @@ class Beside:
              right: int) -> None:
         levels = self.scene.levels
         n = levels.names.index(task)
-        colour, says = _ROWS[Fate(int(levels.fate[f, n]))]
-        draw.rounded_rectangle((14, y, right + 2, y + 23), 5, colour)
+        fate = Fate(int(levels.fate[f, n]))
+        draw.rounded_rectangle((14, y, right + 2, y + 23), 5, _ROWS[fate])
         draw.text((22, y + 3), text, _INK, self._plain)
-        draw.text((right - 6, y + 3), says.format(levels.violation[f, n]), _INK, self._plain,
+        draw.text((right - 6, y + 3), phrase(fate, levels.violation[f, n]), _INK, self._plain,
                   anchor="ra")
 
 

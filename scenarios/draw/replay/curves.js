@@ -21,20 +21,20 @@ function sample(run) {
                      ...dashed(run)}));
 }
 
-const KEY = [["met", "met", "met-soft"], ["not acting", "free", "free"],
-  ["given up, in part or whole", "missed", "missed-soft"],
-  ["in the stack, not judged", "unknown", "unknown"]];
+const KEY = [["met", "met-soft"], ["free", "free"], ["missed", "missed-soft"],
+  ["unknown", "unknown"]];
 
 // What the colours of the lanes mean.
-function key(present) {
-  return element("span", {class: "key"}, ...KEY.filter(([, fate]) => present.has(fate))
-    .map(([text, , colour]) => element("span", {},
-      element("i", {style: `background: var(--${colour})`}), text)));
+function key(present, phrases) {
+  return element("span", {class: "key"}, ...KEY.filter(([fate]) => present.has(fate))
+    .map(([fate, colour]) => element("span", {},
+      element("i", {style: `background: var(--${colour})`}), phrases[fate])));
 }
 
 class Curves {
   constructor(place, runs, data, seek) {
-    Object.assign(this, {place, runs, seek, joints: data.joints, fates: data.fates});
+    Object.assign(this, {place, runs, seek, joints: data.joints, fates: data.fates,
+                         phrases: data.phrases});
     this.end = Math.max(...runs.map(run => run.end)) || 1;
     new ResizeObserver(() => { if (place.clientWidth !== this.width) this.lay_out(); })
       .observe(place);
@@ -84,7 +84,7 @@ class Curves {
   // What became of each task of a run: a lane a task, with its place in the order.
   lanes(run, several, first) {
     const children = [], title = element("figcaption", {},
-      element("b", {}, several ? `The stack: ${run.label}` : "The stack"), ...(first ? [key(this.present())] : []));
+      element("b", {}, several ? `The stack: ${run.label}` : "The stack"), ...(first ? [key(this.present(), this.phrases)] : []));
     run.tasks.forEach((task, n) => {
       const y = TOP + n * LANE;
       children.push(element("text", {x: this.left - 5, y: y + 10, "text-anchor": "end"}, task));

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenarios.loop.fate import Fate
+from scenarios.loop.phrases import PHRASES
 from scenarios.scene import Scene, Series
 
 _NOTHING = 65535  # stands for NaN and for infinite
@@ -80,6 +81,11 @@ def run_data(scene: Scene, about: dict[str, Any]) -> dict[str, Any]:
 def fates() -> dict[str, int]:
     """Return the values of `Fate` by name, for the page's script."""
     return {fate.name.lower(): int(fate) for fate in Fate}
+
+
+def phrases() -> dict[str, str]:
+    """Return the words for each `Fate` by name, for the page's script."""
+    return {fate.name.lower(): said for fate, said in PHRASES.items()}
 
 
 def _curve(series: Series) -> dict[str, Any]:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from hierarchy.errors import HierarchyError
 from scenarios.draw.figures.palette import looks
-from scenarios.draw.replay.data import fates, run_data
+from scenarios.draw.replay.data import fates, phrases, run_data
 from scenarios.scene import scene
 
 if TYPE_CHECKING:
@@ -37,7 +37,8 @@ def html(recordings: Mapping[str, Recording], title: str, *, rate: float = 30.0,
     runs = [run_data(scene(recording, rate), {"label": label, **look[label]._asdict(),
                                               **_about(recording)})
             for label, recording in recordings.items()]
-    data = {"runs": runs, "fates": fates(), "joints": JOINTS, "embedded": embedded}
+    data = {"runs": runs, "fates": fates(), "phrases": phrases(), "joints": JOINTS,
+            "embedded": embedded}
     return Template(_resource("replay.html")).substitute(
         title=escape(title), style=_resource("replay.css"),
         script="\n".join(_resource(name) for name in _SCRIPTS),

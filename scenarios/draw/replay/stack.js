@@ -1,10 +1,10 @@
-// The stack of each run as a live list: what is met, what does not act, what is given up.
+// The stack of each run as a live list: what is met, inactive, missed.
 
 const ROW = 26;  // px
-const SAYS = {met: "met", free: "not acting", unknown: "in the stack", absent: "not in the stack"};
 
 class StackList {
-  constructor(run, fates, several) {
+  constructor(run, {fates, phrases}, several) {
+    this.phrases = phrases;
     this.run = run;
     this.unknown = fates.unknown;
     this.fates = Object.fromEntries(Object.entries(fates).map(([name, value]) => [value, name]));
@@ -62,7 +62,8 @@ class StackList {
       row.className = fate;
       row.style.transform = `translateY(${at * ROW}px)`;
       rank.textContent = place < 0 ? "–" : `${place + 1}`;
-      said.textContent = fate === "missed" ? `gives up ${short(violations[n])}` : SAYS[fate];
+      said.textContent = fate === "missed" ?
+        `${this.phrases.missed} by ${short(violations[n])}` : this.phrases[fate];
       row.title = fate === "missed" ?
         "Norm of what its rows are missed by, in their own unit" : "";
     });

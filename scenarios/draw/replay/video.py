@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import shutil
 import subprocess
 import tempfile
@@ -11,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from hierarchy.errors import HierarchyError
-from scenarios.files import OutputError
+from scenarios.files import named, written
 
 if TYPE_CHECKING:
     from scenarios.draw.replay.frames import Frames
@@ -35,14 +34,8 @@ def write_video(recording: Recording, path: Path, *, rate: float = 30.0,
     label = str(recording.scenario.make_resolver().label)
     frames = Frames(scene(recording, rate), f"{recording.scenario.name}, {label}", colour(label))
     path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.with_name(f".{os.getpid()}-{path.name}")
-    try:
+    with named(path), written(path) as partial:
         _encode(program, frames, partial, rate, progress)
-        partial.replace(path)
-    except OSError as error:
-        raise OutputError(f"{path} cannot be written: {error.strerror}") from error
-    finally:
-        partial.unlink(missing_ok=True)
 
 
 def _encode(program: str, frames: Frames, path: Path, rate: float,

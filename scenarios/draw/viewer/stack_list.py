@@ -1,4 +1,4 @@
-"""The order of the stack as a list: what is active, saturated, given up."""
+"""The order of the stack as a list: what is met, missed, saturated."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 
 from scenarios.draw.viewer.moment import Became, Moment
 from scenarios.loop.fate import Fate
+from scenarios.loop.phrases import PHRASES, phrase
 
 _PILLS = {  # text colour, background
     Fate.MET: ("#0a6b4f", "#d9f2e8"), Fate.FREE: ("#5b6470", "#eceff2"),
@@ -23,7 +24,7 @@ def stack_html(label: str, colour: str, now: Moment, tasks: Iterable[str] = (),
     saturated = _saturated(now)
     rows = [_row(str(i), name, *_state(now.became[name]), colour)
             for i, name in enumerate(now.order, 1)]
-    absent = _row("", "", "not in the stack", Fate.ABSENT, colour)
+    absent = _row("", "", PHRASES[Fate.ABSENT], Fate.ABSENT, colour)
     rows += [absent.replace("<b></b>", f"<span style='color:#a3abb5'>{escape(name)}</span>")
              for name in tasks if name not in now.order]
     if saturated:
@@ -47,11 +48,7 @@ def _pill(text: str, colour: str, background: str) -> str:
 
 def _state(became: Became) -> tuple[str, Fate]:
     """Say what became of a task in the stack."""
-    fate = became.fate
-    if fate is Fate.MISSED:
-        return f"given up: off by {became.violation:.2g}", fate
-    said = {Fate.MET: "active, met", Fate.FREE: "holds nothing back"}
-    return said.get(fate, "in the stack"), fate
+    return phrase(became.fate, became.violation), became.fate
 
 
 def _saturated(now: Moment) -> str:

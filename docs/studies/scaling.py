@@ -1,4 +1,4 @@
-"""How times grow far beyond the letter's sizes: python -m scenarios.bench.scaling.
+"""How times grow far beyond the letter's sizes: python docs/studies/scaling.py.
 
 One solve over tasks, rows and joints, by everyone that keeps priorities; and a whole tick of
 `ellipse-hqp` over control points and obstacles, where `hcod` has a row for every pair of them.
@@ -7,7 +7,6 @@ One solve over tasks, rows and joints, by everyone that keeps priorities; and a 
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import sys
 from collections.abc import Sequence
@@ -17,8 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from rich.console import Console
-
-    from scenarios.bench.scaling_timed import Size
+    from scaling_timed import Size
 
 SIZES: dict[str, tuple[Size, ...]] = {
     "tasks": tuple((70, count, 3) for count in (1, 2, 3, 4, 5, 7, 10, 14, 20)),
@@ -40,9 +38,9 @@ def run(out: Path | None = None, seconds: float = SECONDS,
     folder `out` if given.
     """
     from rich.console import Console
+    from scaling_timed import Ticks, solves_of
 
     from scenarios.bench.machine import one_core
-    from scenarios.bench.scaling_timed import Ticks, solves_of
     from scenarios.config import load
     from scenarios.loop.simulation import simulate
 
@@ -73,10 +71,10 @@ def run(out: Path | None = None, seconds: float = SECONDS,
 
 def _print(console: Console, figure: str, rows: Sequence[dict[str, Any]]) -> None:
     from rich.table import Table
+    from scaling_figure import fixed
+    from scaling_timed import PARTS
 
     from scenarios.bench.growth import exponents
-    from scenarios.bench.scaling_figure import fixed
-    from scenarios.bench.scaling_timed import PARTS
 
     sizes = list(dict.fromkeys(row[figure] for row in rows))
     of = {(row["resolver"], row[figure]): row["median_us"] for row in rows}
@@ -103,19 +101,21 @@ def _digits(value: float) -> str:
 
 
 def _write(rows: Sequence[dict[str, Any]], out: Path) -> None:
+    from scaling_figure import time_over_sizes
+
     from scenarios.bench.machine import machine
     from scenarios.bench.rows import write_rows
-    from scenarios.bench.scaling_figure import time_over_sizes
     from scenarios.draw.figures.drawing import write
+    from scenarios.files import write_json
 
     write_rows(rows, out / "scaling.csv")
-    (out / "machine.json").write_text(json.dumps(machine(), indent=2) + "\n")
+    write_json(out / "machine.json", machine())
     write(time_over_sizes(rows), str(out / "scaling"))
 
 
 def main() -> int:
     """Run from the command line."""
-    parser = argparse.ArgumentParser(prog="python -m scenarios.bench.scaling",
+    parser = argparse.ArgumentParser(prog="python docs/studies/scaling.py",
                                      description="Times over tasks, rows, joints and pairs.")
     parser.add_argument("--out", type=Path, default=None,
                         help="new or empty folder; default: a new one in runs/")

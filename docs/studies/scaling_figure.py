@@ -7,11 +7,11 @@ from typing import Any
 
 import matplotlib
 from matplotlib.figure import Figure
+from scaling_timed import PARTS
 
 from scenarios.bench.candidates import NUMPY
 from scenarios.bench.growth import LEVEL_LESS
 from scenarios.bench.growth_figure import draw_band, name_lines, scale_axes
-from scenarios.bench.scaling_timed import PARTS
 from scenarios.draw.figures import drawing
 
 _PANELS = {"tasks": ("number of tasks $l$", "l"), "rows": ("number of rows $m$", "m"),

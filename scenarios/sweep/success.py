@@ -1,20 +1,21 @@
-"""What a sweep shows, in a sentence made from its numbers."""
+"""The success rates of a sweep as a sentence."""
 
 from __future__ import annotations
 
 from scenarios.sweep.results import Criterion, Results
+from scenarios.words import listed
 
 _IN_WORDS = {"Reached the end": "reached the end", "Touched nothing": "touched nothing",
              "Kept the joint limits": "kept the joint limits",
              "Every tick solved": "had every tick solved"}
 
 
-def verdict(results: Results) -> str:
-    """Return in how many runs each criterion was met, the same for all resolvers or one by one."""
+def success(results: Results) -> str:
+    """Return in how many runs each criterion was met, for all resolvers together if equal."""
     said: dict[str, list[str]] = {}
     for criterion in results.criteria()[:-1]:
         said.setdefault(_who(results, criterion), []).append(_IN_WORDS[criterion.label])
-    text = "; ".join(f"{who} {_and(did)}" for who, did in said.items())
+    text = "; ".join(f"{who} {listed(did)}" for who, did in said.items())
     return f"{text[0].upper()}{text[1:]}."
 
 
@@ -28,9 +29,4 @@ def _who(results: Results, criterion: Criterion) -> str:
     if len({(share.met, share.of) for share in shares.values()}) == 1:
         each = " under each resolver" if len(shares) > 1 else ""
         return f"{next(iter(shares.values()))} runs{each}"
-    return _and([f"{share} runs under {label}" for label, share in shares.items()])
-
-
-def _and(parts: list[str]) -> str:
-    *first, last = parts
-    return f"{', '.join(first)} and {last}" if first else last
+    return listed([f"{share} runs under {label}" for label, share in shares.items()])

@@ -1,4 +1,4 @@
-"""Time of a change of priorities over the number of joints: python -m scenarios.bench.edits.
+"""Time of a change of priorities over the number of joints: python docs/studies/edits.py.
 
 A `Factorization` is kept while levels are swapped, reordered, deleted and inserted; beside it what
 has to be done without one: `tpm` from the rows in their new order.
@@ -175,7 +175,7 @@ def said(rows: Sequence[dict[str, Any]]) -> str:
 
 def main() -> int:
     """Run from the command line."""
-    parser = argparse.ArgumentParser(prog="python -m scenarios.bench.edits",
+    parser = argparse.ArgumentParser(prog="python docs/studies/edits.py",
                                      description="Time of a change of priorities.")
     parser.add_argument("--out", type=Path, default=None,
                         help="new or empty folder; default: a new one in runs/")

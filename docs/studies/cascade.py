@@ -1,4 +1,4 @@
-"""How much each backend of `hqp` solves: python -m scenarios.bench.cascade."""
+"""How much each backend of `hqp` solves: python docs/studies/cascade.py."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A sweep's results as tables for a terminal of 80 columns."""
+"""Print a sweep's results as tables of at most 80 columns."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from rich.table import Table
 from rich.text import Text
 
 from scenarios.sweep.results import Results, summary
-from scenarios.sweep.verdict import verdict
+from scenarios.sweep.success import success
 
-_BESIDE = 3  # resolvers that 80 columns hold
+_BESIDE = 3  # resolvers that fit into 80 columns
 
 
 def show(name: str, results: Results, console: Console | None = None) -> None:
-    """Print for each resolver in how many runs each criterion was met, and median and worst."""
+    """Print success rates and the median and worst value of each metric, by resolver."""
     console = console or Console(markup=False, highlight=False)
-    console.print(f"\n{name}: {verdict(results)}")
+    console.print(f"\n{name}: {success(results)}")
     beside = -(-len(results.labels) // -(-len(results.labels) // _BESIDE))
     for first in range(0, len(results.labels), beside):
         console.print()

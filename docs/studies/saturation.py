@@ -1,6 +1,6 @@
 """How near do resolvers come to the exact answer inside joint limits, and in what time?
 
-    python -m scenarios.bench.saturation --count 1000
+    python docs/studies/saturation.py --count 1000
 
 Every resolver that takes bounds, on generated stacks behind a first level of bounds: mild ones,
 that few joints meet, and severe ones. The exact answer is that of `hcod`, kept only where `certify`
@@ -224,7 +224,7 @@ def _digits(value: float) -> str:
 
 def main() -> int:
     """Run from the command line."""
-    parser = argparse.ArgumentParser(prog="python -m scenarios.bench.saturation",
+    parser = argparse.ArgumentParser(prog="python docs/studies/saturation.py",
                                      description="Resolvers inside joint limits.")
     parser.add_argument("--count", type=int, default=1000, help="problems of a family")
     parser.add_argument("--resolver", action="append", help="a name; may be repeated")

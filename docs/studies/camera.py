@@ -1,4 +1,4 @@
-"""Time of a depth camera's parts at 640 x 480, on one core: `python -m scenarios.bench.camera`."""
+"""Time of a depth camera's parts at 640 x 480, on one core: `python docs/studies/camera.py`."""
 
 from __future__ import annotations
 

@@ -1,0 +1,200 @@
+"""`hierarchy bench`: every benchmark there is, one command each."""
+
+from __future__ import annotations
+
+import os
+from importlib import import_module
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from scenarios.cli.terminal import shown
+
+_USUAL = ("resolvers", "tick", "first_paper", "strictness", "start")  # modules of scenarios.bench
+
+Out = Annotated[Path | None, typer.Option(
+    "--out", metavar="FOLDER",
+    help="Output folder, new or empty. Default: a new folder in runs/.")]
+Seconds = Annotated[float, typer.Option("--seconds", min=0.0, metavar="S",
+                                        help="Time for all measurements together.")]
+
+
+class _Benchmarks(typer.core.TyperGroup):
+    """Suggests the nearest benchmark for an unknown name."""
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        if args and not args[0].startswith("-") and args[0] not in self.commands:
+            from hierarchy.errors import UnknownNameError
+
+            raise UnknownNameError("benchmark", args[0], list(self.commands))
+        return super().resolve_command(ctx, args)
+
+
+bench = typer.Typer(cls=_Benchmarks, invoke_without_command=True, rich_markup_mode=None)
+
+
+@bench.callback()
+def main(ctx: typer.Context, out: Out = None) -> None:
+    """Measure speed, accuracy and strictness.
+
+    Without a name: resolvers, tick, first-paper, strictness and start, one after the other.
+    """
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy is loaded: one core is timed
+    if ctx.invoked_subcommand is None:
+        folder = _claimed(out)
+        for name in _USUAL:
+            import_module(f"scenarios.bench.{name}").run(folder)
+        _say(folder)
+
+
+@bench.command()
+def resolvers(
+        fresh: Annotated[int | None, typer.Option(
+            "--fresh", metavar="SEED", help="Time new problems too, from this seed on.")] = None,
+        count: Annotated[int, typer.Option(
+            "--count", min=1, metavar="N", help="New problems of each family.")] = 200,
+        out: Out = None) -> None:
+    """Time every resolver on the reference problems."""
+    from scenarios.bench.resolvers import run
+
+    folder = _claimed(out)
+    run(folder, seed=fresh, count=count)
+    _say(folder)
+
+
+@bench.command()
+def tick(out: Out = None) -> None:
+    """Time one control tick, compiled and in plain numpy."""
+    from scenarios.bench.tick import run
+
+    folder = _claimed(out)
+    run(folder)
+    _say(folder)
+
+
+@bench.command()
+def start(out: Out = None) -> None:
+    """Measure start-up time, compilation and memory."""
+    from scenarios.bench.start import run
+
+    folder = _claimed(out)
+    run(folder)
+    _say(folder)
+
+
+@bench.command()
+def strictness(out: Out = None) -> None:
+    """Measure whether lower tasks disturb upper ones."""
+    from scenarios.bench.strictness import run
+
+    folder = _claimed(out)
+    run(folder)
+    _say(folder)
+
+
+Arms = Annotated[int, typer.Option("--arms", min=1, metavar="N", help="Arms of each case.")]
+Checked = Annotated[int, typer.Option("--checked", min=1, metavar="N",
+                                      help="Arms that are compared with exact answers.")]
+
+
+@bench.command()
+def accuracy(arms: Arms = 10_000, checked: Checked = 1_000, out: Out = None) -> None:
+    """Measure errors on random arms against exact answers."""
+    from scenarios.bench.first_paper import errors
+
+    folder = _claimed(out)
+    errors(folder, arms, checked)
+    _say(folder)
+
+
+@bench.command()
+def growth(seconds: Seconds = 60.0, out: Out = None) -> None:
+    """Time a solve over the number of tasks and joints."""
+    from scenarios.bench.first_paper import times
+
+    folder = _claimed(out)
+    times(folder, seconds)
+    _say(folder)
+
+
+@bench.command("first-paper")
+def first_paper(arms: Arms = 10_000, checked: Checked = 1_000, seconds: Seconds = 60.0,
+                out: Out = None) -> None:
+    """Repeat the first TPM paper: accuracy and growth."""
+    from scenarios.bench.first_paper import run
+
+    folder = _claimed(out)
+    run(folder, arms, checked, seconds)
+    _say(folder)
+
+
+@bench.command()
+def batch(count: Annotated[list[int] | None, typer.Option(
+              "--count", min=1, metavar="N", help="Problems in a batch. May be repeated.")] = None,
+          seconds: Seconds = 1.0, out: Out = None) -> None:
+    """Measure the problems per second of batch solves."""
+    from scenarios.bench.batch import COUNTS, run
+
+    folder = _claimed(out)
+    run(folder, count or COUNTS, seconds)
+    _say(folder)
+
+
+@bench.command()
+def peers(install: Annotated[bool, typer.Option(
+              "--install", help="Make an environment for each package, and measure nothing.")
+              ] = False, out: Out = None) -> int:
+    """Compare with pink, mink, placo and tsid.
+
+    Run it with --install once before.
+    """
+    if install:
+        from scenarios.bench.peers.environments import install as install_all
+
+        said = install_all()
+        for name, why in said.items():
+            print(f"{name}: {why or 'installed'}")
+        return int(any(said.values()))
+    from scenarios.bench.peers import run
+
+    folder = _claimed(out)
+    run(folder)
+    _say(folder)
+    return 0
+
+
+@bench.command()
+def stress(count: Annotated[int, typer.Option("--count", min=1, metavar="N",
+                                              help="Number of problems.")] = 1_000_000,
+           resolver: Annotated[str, typer.Option("--resolver", metavar="NAME",
+                                                 help="Resolver to test.")] = "hcod",
+           kind: Annotated[str, typer.Option("--kind", metavar="KIND",
+                                             help="Kind of problems.")] = "all",
+           first: Annotated[int, typer.Option("--first", min=0, metavar="SEED",
+                                              help="First seed.")] = 0,
+           processes: Annotated[int | None, typer.Option(
+               "--processes", min=1, metavar="N", help="Default: one for each core.")] = None,
+           out: Annotated[Path, typer.Option(
+               "--out", metavar="FOLDER", help="Where failing problems are kept.")
+               ] = Path("runs/stress")) -> int:
+    """Certify a resolver on generated problems.
+
+    Exit code 1 if an answer fails.
+    """
+    from hierarchy.errors import UnknownNameError
+    from scenarios.bench.stress import ALL, KINDS, run
+
+    if kind not in (ALL, *KINDS):
+        raise UnknownNameError("kind", kind, (ALL, *KINDS))
+    return int(not run(count, resolver, first, processes, out, kind).passed)
+
+
+def _claimed(out: Path | None) -> Path:
+    from scenarios.files import claim, next_free
+
+    return claim(out if out is not None else next_free(Path("runs") / "bench"))
+
+
+def _say(folder: Path) -> None:
+    print(f"\nNumbers: {shown(folder)}")

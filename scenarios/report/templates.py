@@ -1,0 +1,46 @@
+"""Jinja templates of the pages: every value is escaped unless it is markup already."""
+
+from __future__ import annotations
+
+import re
+from functools import cache
+from importlib.resources import files
+from typing import Any
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup, escape
+from matplotlib.figure import Figure
+
+from scenarios.draw.figures import drawing
+from scenarios.files import slug
+from scenarios.words import listed
+
+_NUMBER = re.compile(r"[0-9.]+e-[0-9]+")
+
+
+def render(template: str, **values: Any) -> Markup:
+    """Return a template, by its path in this package, filled in with values."""
+    return Markup(_environment().get_template(template).render(values))
+
+
+def resource(name: str) -> Markup:
+    """Return a style sheet or a script, by its path in this package, as it is."""
+    return Markup(files("scenarios").joinpath(name).read_text(encoding="utf-8"))
+
+
+def drawn(fig: Figure, title: str) -> Markup:
+    """Return a matplotlib figure as an inline SVG with a title."""
+    return Markup(drawing.svg(fig, title))
+
+
+def unbroken(text: str) -> Markup:
+    """Return text in which no line ends inside a number such as 4e-08."""
+    return Markup(_NUMBER.sub(r'<span class="number">\g<0></span>', str(escape(text))))
+
+
+@cache
+def _environment() -> Environment:
+    made = Environment(loader=PackageLoader("scenarios", "."), autoescape=True,
+                       undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    made.filters |= {"unbroken": unbroken, "listed": listed, "slug": slug}
+    return made
