@@ -35,7 +35,7 @@ class Candidate:
 
 
 def candidates() -> tuple[list[Candidate], dict[str, str]]:
-    """Return everyone who can be timed here, and by name why others cannot."""
+    """Return the available candidates, and why others are missing, by name."""
     missing = {f"hqp {name}": "pip install 'task-hierarchy[qp]'"
                for name in BACKENDS if not installed(name)}
     field = [Candidate(NUMPY, False, lambda h: lambda: plain_numpy(h))]
@@ -54,7 +54,7 @@ def candidates() -> tuple[list[Candidate], dict[str, str]]:
 
 
 def plain_numpy(h: Hierarchy) -> Resolution:
-    """Solve by the recursion (5), (6), (14) as one writes it with np.linalg.pinv."""
+    """Solve by the recursion (5), (6), (14) with np.linalg.pinv."""
     x, P = np.zeros(h.n), np.eye(h.n)
     for first, last in zip(h.offsets[:-1], h.offsets[1:], strict=True):
         J, b = h.A[first:last], h.lower[first:last]
@@ -65,13 +65,13 @@ def plain_numpy(h: Hierarchy) -> Resolution:
 
 
 def moved(h: Hierarchy, seed: int = 0) -> Hierarchy:
-    """Return h with the sides of every row changed by up to 1 %, both by the same factor."""
+    """Return h with both sides of every row scaled by one factor within 1 % of 1."""
     factor = 1.0 + _MOVED * np.random.default_rng(seed).uniform(-1.0, 1.0, h.m)
     return Hierarchy(h.A, h.lower * factor, h.upper * factor, h.sizes, h.reference, h.names)
 
 
 def _starts(resolver: Resolver) -> bool:
-    """Whether the resolver gains something from the memory of the tick before."""
+    """Whether the resolver benefits from the memory of the previous tick."""
     if resolver.name == "hqp":
         return BACKENDS[getattr(resolver, "backend", "")].starts
     h = Hierarchy.from_levels([(np.eye(2), [1.0, 2.0])])
@@ -91,7 +91,7 @@ def _warm(resolver: Resolver) -> Callable[[Hierarchy], Call]:
 
 
 def _daqp(h: Hierarchy) -> Call:
-    """Write h as DAQP wants it: leading rows of the identity as bounds, big numbers for no side."""
+    """Convert h for DAQP: leading identity rows as bounds, large numbers for missing sides."""
     import daqp
 
     n = h.n
@@ -104,6 +104,6 @@ def _daqp(h: Hierarchy) -> Call:
 
 def _read_daqp(answer: tuple[Array, float, int, dict[str, Any]]) -> Resolution:
     x, _, flag, info = answer
-    right = flag > 0 and np.isfinite(x).all()  # its x is uninitialised memory otherwise
+    right = flag > 0 and np.isfinite(x).all()  # otherwise its x is uninitialised
     return Resolution(np.array(x) if right else np.zeros(len(x)),
                       Status.SOLVED if right else Status.BACKEND_FAILURE, int(info["iterations"]))

@@ -1,7 +1,7 @@
-"""Ours beside the packages that can be had with pip: same arm, same path, same limits.
+"""Comparison with other packages from PyPI: same arm, same path, same limits.
 
-`hierarchy bench peers`, after `hierarchy bench peers --install`. What is imported here is
-little, since the same files also run inside the peers' own environments.
+`hierarchy bench peers`, after `hierarchy bench peers --install`. Imports are minimal, since these
+files also run in the environments of the other packages.
 """
 
 from __future__ import annotations

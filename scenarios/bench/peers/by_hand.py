@@ -1,4 +1,4 @@
-"""What one writes without a framework: pinocchio, numpy and DAQP's hierarchical call."""
+"""Inverse kinematics without a framework: pinocchio, numpy and DAQP's hierarchical call."""
 
 from __future__ import annotations
 

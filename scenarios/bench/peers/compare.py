@@ -1,4 +1,4 @@
-"""Times of a whole tick of inverse kinematics, with what each package then has solved."""
+"""Times of a whole tick of inverse kinematics, with the quality of each package's solution."""
 
 from __future__ import annotations
 
@@ -25,27 +25,27 @@ from scenarios.bench.peers.urdf import urdf
 from scenarios.bench.rows import write_rows
 from scenarios.files import write_json
 
-TURN = 1000        # ticks before the next entrant has its turn
-REHEARSED = 50     # ticks at the beginning of a turn that do not count: caches are cold
+TURN = 1000        # ticks per turn
+REHEARSED = 50     # ticks at the start of a turn that do not count: cold caches
 WARM_UP = 1000     # ticks before the first turn
-_SETTLED = 3.0     # [s] after which the start, off the path, is forgotten
+_SETTLED = 3.0     # [s] after which the start off the path has no influence
 _AT_LIMIT = 1e-6   # [rad/s]
 
 NOTES = """\
-Times in microseconds, one core, from Python. tick: kinematics, rows, solve. solve: its solve once \
-more, where it can be called alone. at limit: a tick with a joint at its velocity limit, median. \
-path: largest distance [m] from where the path was, after 3 s. moved: how far [m a tick] the \
-posture moves the end effector at most, in a step too fast for the joints. over: largest velocity \
-[rad/s] beyond a limit. fail: ticks without an answer, ellipse / step."""
+Times in microseconds, one core, from Python. tick: kinematics, rows, solve. solve: the solve \
+alone, if it can be called alone. at limit: median tick with a joint at its velocity limit. path: \
+largest distance [m] from the path after 3 s. moved: largest motion [m per tick] of the end \
+effector due to the posture, in a step too fast for the joints. over: largest velocity [rad/s] \
+beyond a limit. fail: ticks without a solution, ellipse / step."""
 
 
 def run(out: Path | None = None, entrants: Sequence[Entrant] | None = None,
         ticks: int = 20_000, seconds: float = 20.0) -> list[dict[str, Any]]:
-    """Run everybody on the same two scenes, judge them with our model; print, return the rows.
+    """Run all entrants on the same two scenes, judge them with our model; print, return the rows.
 
-    Each is in its own process, all on one core; they take turns of TURN ticks, so that the
-    machine's noise hits all alike, until each has `ticks` or took `seconds` [s]. Who is missing
-    is named with the reason. Writes peers.csv, missing.json, machine.json and a figure into `out`.
+    Each has its own process, all on one core; they take turns of TURN ticks, so that noise of the
+    machine affects all equally, until each has `ticks` or took `seconds` [s]. Missing entrants are
+    listed with the reason. Writes peers.csv, missing.json, machine.json and a figure into `out`.
     """
     console = Console(highlight=False, markup=False)
     chosen = ENTRANTS if entrants is None else entrants
@@ -63,7 +63,7 @@ def run(out: Path | None = None, entrants: Sequence[Entrant] | None = None,
 
 
 def make_scenes(folder: Path) -> dict[str, Scene]:
-    """Return the two scenes, `ellipse` and `step`, and write their arm into the folder."""
+    """Return the scenes `ellipse` and `step`, and write their arm into the folder."""
     robot = Robot.named("kuka_lwr")
     file = folder / f"{robot.name}.urdf"
     file.write_text(urdf(robot))
@@ -104,7 +104,7 @@ def _run_all(entrants: Sequence[Entrant], scenes: dict[str, Scene], staged: Path
 
 
 class _named:  # noqa: N801
-    """Where an entrant is missing, keep the reason and go on."""
+    """Record the reason of a missing entrant, and continue."""
 
     def __init__(self, missing: dict[str, str], entrant: Entrant) -> None:
         self.missing, self.label = missing, entrant.label
@@ -136,7 +136,7 @@ def _parts(whole: int, part: int) -> list[int]:
 
 
 def judge(file: Path, scenes: dict[str, Scene]) -> dict[str, Any]:
-    """Return the numbers of one entrant, from what it wrote and our own model of the arm."""
+    """Return the results of one entrant, from its log and our own model of the arm."""
     with np.load(file) as kept:
         log = {key: kept[key] for key in kept.files}
     limit = np.array(scenes["ellipse"].limit)
@@ -161,7 +161,7 @@ def judge(file: Path, scenes: dict[str, Scene]) -> dict[str, Any]:
 
 
 def _path_error(log: dict[str, Array], scene: Scene) -> float | None:
-    """The largest distance [m] of the end effector from the path, once it is there."""
+    """Return the largest distance [m] of the end effector from the path after settling."""
     robot = Robot.from_file(scene.file, scene.frame)
     state, frame, still = State.at(robot, scene.start), robot.frame(scene.frame), np.zeros(robot.n)
     errors = [0.0]
@@ -173,7 +173,7 @@ def _path_error(log: dict[str, Array], scene: Scene) -> float | None:
 
 
 def _moved(log: dict[str, Array], scene: Scene) -> float | None:
-    """The largest motion [m a tick] of the end effector that is the posture's."""
+    """Return the largest motion [m per tick] of the end effector due to the posture."""
     robot = Robot.from_file(scene.file, scene.frame)
     from hierarchy.paths import Still
     from hierarchy.tasks import Position
@@ -187,7 +187,7 @@ def _moved(log: dict[str, Array], scene: Scene) -> float | None:
 
 
 def _print(console: Console, rows: list[dict[str, Any]]) -> None:
-    times = Table(title="One tick of inverse kinematics of a KUKA LWR, and what it is worth",
+    times = Table(title="One tick of inverse kinematics of a KUKA LWR, and its quality",
                   title_justify="left", box=None, padding=(0, 1, 0, 0), pad_edge=False)
     times.add_column("", no_wrap=True)
     for head in ("tick\nmedian", "\np95", "\np99.9", "solve\nmedian", "at\nlimit", "path", "moved",

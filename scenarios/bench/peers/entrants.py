@@ -1,4 +1,4 @@
-"""Who is compared, and what each needs from PyPI."""
+"""The packages that are compared, and their requirements from PyPI."""
 
 from __future__ import annotations
 

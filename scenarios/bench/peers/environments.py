@@ -1,4 +1,4 @@
-"""An environment for each package that is compared, under the user's cache folder."""
+"""A virtual environment for each compared package, in the user's cache folder."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ _FAILED = "failed.txt"
 
 
 class MissingError(Exception):
-    """A package that cannot be run, and why."""
+    """A package that cannot be run; the message gives the reason."""
 
 
 def folder_of(package: Package) -> Path:
-    """Where the package's environment is, or would be."""
+    """Return the folder of the package's environment, which may not exist."""
     root = os.environ.get("XDG_CACHE_HOME", "~/.cache")
     return Path(root).expanduser() / "task-hierarchy" / "peers" / package.name
 
@@ -45,7 +45,7 @@ def python_of(package: Package) -> str:
 
 
 def install(packages: Iterable[Package] = PACKAGES) -> dict[str, str]:
-    """Make what environments are not there yet; return by name "" or why it did not work."""
+    """Make missing environments; return "" or the reason of a failure by name."""
     said = {}
     for package in packages:
         folder = folder_of(package)
@@ -65,7 +65,7 @@ def _make(package: Package, folder: Path) -> str:
 
 
 def _said(command: list[str]) -> str:
-    """Run a command and return "", or the last line it said if it failed."""
+    """Run a command and return "", or its last line of output if it failed."""
     try:
         done = subprocess.run(command, capture_output=True, text=True, timeout=_LIMIT, check=False)
     except (OSError, subprocess.TimeoutExpired) as error:

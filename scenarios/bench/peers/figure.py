@@ -1,4 +1,4 @@
-"""Bars of the times, with what each of them bought written beside them."""
+"""Bars of the times, with the quality of the solutions beside them."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from scenarios.bench.figure import OWN
 from scenarios.draw.figures import drawing
 
 _PEERS = {"pink": "#ee99aa", "mink": "#994455", "placo": "#6699cc", "tsid": "#997700"}
-_STRICT = 1e-9  # [m a tick], as `hierarchy bench strictness` has it
+_STRICT = 1e-9  # [m per tick], as in `hierarchy bench strictness`
 
 
 def bars(rows: Sequence[dict[str, Any]]) -> Figure:

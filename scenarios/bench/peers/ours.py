@@ -36,7 +36,7 @@ class Ours:
         self.before: Array | None = None
 
     def velocity(self, t: float, q: Array, v: Array, goal: Array, rate: Array) -> Array:
-        """See `Adapter`; goal and rate come out of our own path."""
+        """See `Adapter`; goal and rate come from our own path."""
         if not self.state.move(t, q, v):
             raise RefusedError("State.move is False")
         self.h = self.stack.hierarchy(self.state)
@@ -52,12 +52,12 @@ class Ours:
 
 
 class Bounds(Ours):
-    """With a resolver of bounds only."""
+    """With a resolver that handles only bounds."""
 
     rows = "bounds of joints, first"
 
 
 class Weighted(Ours):
-    """With weights in place of levels."""
+    """With weights instead of levels."""
 
     priorities = "weights"

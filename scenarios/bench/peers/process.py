@@ -1,4 +1,4 @@
-"""An entrant in its own process, spoken to a line at a time."""
+"""An entrant in its own process, controlled by lines of text."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from typing import Any, final
 from scenarios.bench.peers.entrants import Entrant
 from scenarios.bench.peers.environments import MissingError, python_of
 
-START_LIMIT = 120.0  # [s] to import a package and be ready; kernels are compiled in it
+START_LIMIT = 120.0  # [s] for imports, including compilation of kernels
 TURN_LIMIT = 300.0   # [s]
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 _HERE = Path(__file__).parent
 
 
 def stage(folder: Path) -> Path:
-    """Copy this package, and nothing else of ours, to where other environments can import it."""
+    """Copy only this package to a folder from which other environments can import it."""
     target = folder / "scenarios" / "bench" / "peers"
     shutil.copytree(_HERE, target, ignore=shutil.ignore_patterns("__pycache__"))
     return folder
@@ -46,7 +46,7 @@ class Process:
         self.about: dict[str, str] = self._answer(START_LIMIT)
 
     def turn(self, ticks: int, rehearsed: int) -> None:
-        """Have it run so many ticks, the first `rehearsed` of them not to be counted."""
+        """Run this number of ticks, the first `rehearsed` of which do not count."""
         assert self._process.stdin is not None
         try:
             self._process.stdin.write(json.dumps([ticks, rehearsed]) + "\n")
@@ -56,7 +56,7 @@ class Process:
         self.seconds += self._answer(TURN_LIMIT)
 
     def finish(self) -> Path:
-        """Have it run the step and write everything; return the file."""
+        """Run the step and write the results; return the file."""
         try:
             self._process.communicate(timeout=TURN_LIMIT)
         except subprocess.TimeoutExpired as error:
@@ -67,7 +67,7 @@ class Process:
         return self.result
 
     def stop(self) -> None:
-        """End it, whatever it does."""
+        """Kill the process."""
         self._process.kill()
         self._process.communicate()
 
@@ -90,7 +90,7 @@ class Process:
 
 
 def after_nan(entrant: Entrant, scenes: Path, staged: Path) -> str:
-    """Say what comes of a NaN, from a process of its own: some do not survive it."""
+    """Return the reaction to a NaN, tested in a separate process since some packages crash."""
     try:
         done = subprocess.run(_command(entrant, scenes, Path(os.devnull), "nan"), text=True,
                               capture_output=True, cwd=staged, env=_environment(entrant),
@@ -108,7 +108,7 @@ def _command(entrant: Entrant, scenes: Path, result: Path, core: str) -> list[st
 
 
 def _environment(entrant: Entrant) -> dict[str, str]:
-    """One thread each; another environment sees nothing of ours but what is staged."""
+    """One thread each; other environments see only the staged package."""
     one = {**os.environ, **dict.fromkeys(_THREADS, "1")}
     if python_of(entrant.package) != sys.executable:
         one.pop("PYTHONPATH", None)

@@ -1,4 +1,4 @@
-"""What everybody is asked, as plain numbers. Needs numpy only."""
+"""The problem for all entrants as plain numbers. Needs only numpy."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Vector = tuple[float, ...]
 
 
 class RefusedError(Exception):
-    """Raised by an adapter where its package says, not by an exception, that it has no answer."""
+    """Raised by an adapter whose package reports failure without an exception."""
 
 
 class Adapter(Protocol):
@@ -25,11 +25,11 @@ class Adapter(Protocol):
     """
 
     package: str
-    """What it is called on PyPI."""
+    """Its name on PyPI."""
     priorities: str
     """Whether its priorities are strict, in a few words."""
     rows: str
-    """Which inequality rows it takes, in a few words."""
+    """Which inequality rows it supports, in a few words."""
 
     def velocity(self, t: float, q: Array, v: Array, goal: Array, rate: Array) -> Array:
         """Return joint velocities (n,): one whole tick.
@@ -38,13 +38,13 @@ class Adapter(Protocol):
         and rate (3,) [m/s] of the path at t [s]. Any exception is a failure.
         """
 
-    # def resolve(self) -> object: once more what the last tick resolved, and nothing else; optional
+    # def resolve(self) -> object: solve the last tick's problem again, nothing else; optional
 
 
 @final
 @dataclass(frozen=True)
 class Scene:
-    """An arm, a path for its end effector, a posture of less importance, velocity limits.
+    """An arm, a path for its end effector, a posture of lower priority, velocity limits.
 
     file : the URDF; frame : its end effector; joints : their names.
     centre, cosine, sine (3,) [m], turning [rad/s] : the path, centre + cosine cos + sine sin.

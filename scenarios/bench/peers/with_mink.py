@@ -13,7 +13,7 @@ _SOLVER = "daqp"
 
 
 class Mink:
-    """What `mink.solve_ik` does, in its two halves; targets as in `with_pink`."""
+    """The two steps of `mink.solve_ik`; targets as in `with_pink`."""
 
     package = "mink"
     priorities = "weights"
@@ -65,7 +65,7 @@ class MinkHard(Mink):
 
 
 class _PositionTask(mink.FrameTask):  # type: ignore[misc]
-    """The position rows of a frame alone: as a constraint costs do not choose rows."""
+    """Only the position rows of a frame: costs do not select rows of a constraint."""
 
     def compute_error(self, configuration: mink.Configuration) -> Array:
         return np.asarray(super().compute_error(configuration)[:3])

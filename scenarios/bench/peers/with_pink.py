@@ -1,4 +1,4 @@
-"""pink: tasks weighted against each other in one quadratic program, or as its constraints."""
+"""pink: tasks weighted in one quadratic program, or as its constraints."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ _SOLVER = "daqp"
 
 
 class Pink:
-    """What `pink.solve_ik` does, in its two halves.
+    """The two steps of `pink.solve_ik`.
 
-    The end effector's target is where it shall be after one period, with the rotation it has: so
-    that what is asked is the scene's velocity, and nothing of the rotation.
+    The end effector's target is its position after one period with its current rotation, which
+    requests the scene's velocity and no rotation.
     """
 
     package = "pin-pink"
@@ -68,7 +68,7 @@ class PinkHard(Pink):
 
 
 class _PositionTask(FrameTask):  # type: ignore[misc]
-    """The position rows of a frame alone: as a constraint costs do not choose rows."""
+    """Only the position rows of a frame: costs do not select rows of a constraint."""
 
     def compute_error(self, configuration: Configuration) -> Array:
         return np.asarray(super().compute_error(configuration)[:3])

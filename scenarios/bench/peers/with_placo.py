@@ -9,12 +9,12 @@ import placo
 
 from scenarios.bench.peers.scene import Array, Scene
 
-_REGULARISED = 1e-12  # as pink and mink have it
-_BASE = 7             # coordinates of the base that cannot move
+_REGULARISED = 1e-12  # as in pink and mink
+_BASE = 7             # coordinates of the fixed base
 
 
 class Placo:
-    """A position task and a joints task; targets are where to be after one period."""
+    """A position task and a joints task; targets are those after one period."""
 
     package = "placo"
     priorities = "weights"

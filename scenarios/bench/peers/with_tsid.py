@@ -30,7 +30,7 @@ class Tsid:
         self.formulation.computeProblemData(0.0, np.array(scene.start), np.zeros(n))
         self.bounds = bounds = tsid.TaskJointBounds("bounds", self.robot, period)
         bounds.setVelocityBounds(-np.array(scene.limit), np.array(scene.limit))
-        self.formulation.addMotionTask(bounds, 1.0, 0, 0.0)  # keeps no reference
+        self.formulation.addMotionTask(bounds, 1.0, 0, 0.0)  # stores no reference
         self.position = tsid.TaskSE3Equality("position", self.robot, scene.frame)
         self.position.setKp(np.zeros(6))
         self.position.setKd(np.full(6, 1.0 / period))
@@ -44,7 +44,7 @@ class Tsid:
             self.formulation.addMotionTask(self.joints, 1.0, 1, 0.0)
         self.posture = np.array(scene.posture)
         self.wanted, self.rates = tsid.TrajectorySample(12, 6), tsid.TrajectorySample(n)
-        self.wanted.value(np.append(np.zeros(3), np.eye(3)))  # of no weight, but a pose
+        self.wanted.value(np.append(np.zeros(3), np.eye(3)))  # has no weight, but must be a pose
         self.solver = tsid.SolverHQuadProgFast("solver")
         self.sized = False
 

@@ -1,4 +1,4 @@
-"""Runs one entrant in its own process, turn by turn as told. Needs numpy and the entrant only.
+"""Run one entrant in its own process, turn by turn. Needs only numpy and the entrant.
 
     python -m scenarios.bench.peers.worker MODULE:CLASS OPTIONS SCENES RESULT CORE
 
@@ -29,7 +29,7 @@ Make = Callable[[Scene, bool], Any]
 
 
 class Ticks:
-    """Ticks of one scene, one after the other, with what they gave and how long they took."""
+    """Ticks of one scene, with their results and times."""
 
     def __init__(self, scene: Scene, make: Make, beside: bool = False) -> None:
         self.scene, self.period = scene, scene.period
@@ -42,7 +42,7 @@ class Ticks:
         self.why = ""
 
     def go(self, ticks: int, rehearsed: int) -> None:
-        """Go on by so many ticks, of which the first `rehearsed` do not count."""
+        """Run this number of ticks, of which the first `rehearsed` do not count."""
         for k in range(ticks):
             goal, rate = self.scene.target(self.t)
             begin = perf_counter_ns()
@@ -63,7 +63,7 @@ class Ticks:
             self.t, self.q, self.v = self.t + self.period, self.q + self.period * v, v
 
     def _velocity(self, adapter: Any, goal: Array, rate: Array) -> tuple[Array, bool]:
-        """Ask for a velocity; zero, and a failure, where there is none that is finite."""
+        """Return the velocity; zero and a failure if there is no finite one."""
         try:
             v = np.array(adapter.velocity(self.t, self.q, self.v, goal, rate))
         except Exception as error:
@@ -75,12 +75,12 @@ class Ticks:
         return np.zeros(len(self.q)), True
 
     def arrays(self, prefix: str) -> dict[str, Array]:
-        """Return what was logged as arrays, for a file."""
+        """Return the log as arrays for a file."""
         return {f"{prefix}{key}": np.array(values) for key, values in self.log.items()}
 
 
 def after_nan(scene: Scene, make: Make) -> str:
-    """Say what an adapter does with a NaN in joint 3, after a few ticks without."""
+    """Return the reaction of an adapter to a NaN in joint 3 after a few normal ticks."""
     ticks = Ticks(scene, make)
     ticks.go(_BEFORE_NAN, 0)
     q = ticks.q.copy()
@@ -95,10 +95,10 @@ def after_nan(scene: Scene, make: Make) -> str:
 
 
 def main() -> None:
-    """Run from the command line; see the module's text."""
+    """Run from the command line; see the docstring of the module."""
     named, options, scenes_file, result, core = sys.argv[1:]
     answers = os.fdopen(os.dup(1), "w")
-    os.dup2(2, 1)  # what a package prints is no answer
+    os.dup2(2, 1)  # output of a package must not mix with answers
     scenes = read_scenes(Path(scenes_file))
     module, _, name = named.partition(":")
     kind, settings = getattr(import_module(module), name), json.loads(options)
