@@ -1,4 +1,4 @@
-// The stack of each run as a live list: what is met, what does not act, what is given up.
+// The stack of each run as a live list: tasks that are met, do not act, or are given up.
 
 const ROW = 26;  // px
 const SAYS = {met: "met", free: "not acting", unknown: "in the stack", absent: "not in the stack"};
@@ -22,7 +22,7 @@ class StackList {
     this.card = element("article", {class: "card"}, head, this.list, ...this.joint_row(),
                         this.near, this.note);
     const judged = !run.fate.values.includes(this.unknown);
-    this.doubt = judged ? [] : ["Not judged where the rows cannot be written again, as after a change by hand."];
+    this.doubt = judged ? [] : ["Unknown where the rows cannot be reconstructed, for example after a change by hand."];
     this.note.hidden = judged && !run.fault;
     this.note.append(...this.doubt);
     this.frame = -1;
@@ -64,7 +64,7 @@ class StackList {
       rank.textContent = place < 0 ? "–" : `${place + 1}`;
       said.textContent = fate === "missed" ? `gives up ${short(violations[n])}` : SAYS[fate];
       row.title = fate === "missed" ?
-        "Norm of what its rows are missed by, in their own unit" : "";
+        "Norm of the violation of its rows, in their unit" : "";
     });
   }
 
