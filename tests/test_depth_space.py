@@ -18,7 +18,7 @@ from scenarios.cell.sensors.exact import ExactDistances
 from scenarios.cell.sensors.frames import RecordedFrames, write
 from scenarios.config import ScenarioError
 from scenarios.draw.figures.depth import depth_figure
-from scenarios.loop.camera import depth_view
+from scenarios.loop.depth_image import depth_view
 
 ROBOT = Robot.named("kuka_lwr")
 CAPSULES = link_capsules(TABLES["kuka_lwr"], foot=0.31)

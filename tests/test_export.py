@@ -100,6 +100,7 @@ def test_a_parquet_table_is_the_recording_with_units_and_scenario(run, tmp_path)
     assert metadata[b"scenario"].decode() == run.scenario.to_toml()
     assert json.loads(metadata[b"joints"]) == list(Robot.named("kuka_lwr").joint_names)
     assert json.loads(metadata[b"orders"]) == list(run.orders)
+    assert json.loads(metadata[b"tasks"]) == list(run.task_names)
     assert json.loads(metadata[b"limits"])["joint_upper"] == run["joint_upper"].tolist()
 
 

@@ -18,7 +18,8 @@ def write(recording: Recording, path: Path) -> list[Path]:
     """Write `path`: one column per number, of the type it was recorded in, with metadata `unit`.
 
     The table's metadata has `scenario` (TOML as run), `joints` (the name of each velocity),
-    `orders`, `limits` (JSON; null for a missing limit) and `fault`.
+    `orders`, `tasks` (those of the columns level_fate and level_violation), `limits` (JSON; null
+    for a missing limit) and `fault`.
     """
     import pyarrow as pa
     import pyarrow.parquet as pq
@@ -27,7 +28,8 @@ def write(recording: Recording, path: Path) -> list[Path]:
     limits = {name: plain(recording[name]) for name in CONSTANTS if name in recording}
     metadata = {"scenario": recording.scenario.to_toml(),
                 "joints": json.dumps(recording.facts.robot.velocity_names),
-                "orders": json.dumps(recording.orders), "limits": json.dumps(limits),
+                "orders": json.dumps(recording.orders),
+                "tasks": json.dumps(recording.task_names), "limits": json.dumps(limits),
                 "fault": recording.fault or ""}
     schema = pa.schema([_field(pa, column) for column in table], metadata)
     arrays = [pa.array(column.values.tolist() if column.values.dtype.kind == "U"

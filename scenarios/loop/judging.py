@@ -12,7 +12,7 @@ from hierarchy.avoidance import Measurement
 from hierarchy.jit import compiled
 from hierarchy.problem import Hierarchy
 from scenarios.cell.build import Cell
-from scenarios.loop.camera import depth_view
+from scenarios.loop.depth_image import depth_view
 from scenarios.loop.fate import Fates
 from scenarios.loop.recording import Recording
 
