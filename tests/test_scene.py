@@ -159,6 +159,14 @@ def test_frames_end_where_the_state_stops_being_finite():
     assert scene(hand_made(q=q, order=np.zeros(5, int)), rate=1.0).ticks.tolist() == [0, 1, 2]
 
 
+def test_levels_that_were_not_judged_are_unknown_where_they_are_in_the_stack():
+    levels = levels_at(hand_made(orders=("a", "a > b"), order=[0, 1, 1, 0, 0]), [0, 1, 4])
+    assert levels.names == ("a", "b")
+    assert levels.fate.tolist() == [[Fate.UNKNOWN, Fate.ABSENT], [Fate.UNKNOWN, Fate.UNKNOWN],
+                                    [Fate.UNKNOWN, Fate.ABSENT]]
+    assert levels_at(hand_made(orders=("",)), [0, 4]).fate.shape == (2, 0)  # nothing was stacked
+
+
 @pytest.mark.parametrize("rate", [0.0, -1.0, np.nan, np.inf])
 def test_a_rate_that_is_none_is_refused(ellipse, runs, rate):
     with pytest.raises(HierarchyError, match="rate"):

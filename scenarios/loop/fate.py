@@ -87,9 +87,9 @@ class Fates:
 
 def unknown(recording: Recording) -> NDArray[np.int8]:
     """Return UNKNOWN for each task of each tick's stack, ABSENT for others: (T, N)."""
-    present = [[name in order for name in recording.task_names]
-               for order in recording.order_names]
-    table = np.array(present, dtype=np.int8).reshape(-1, len(recording.task_names))
+    orders, names = recording.order_names, recording.task_names
+    table = np.array([[name in order for name in names] for order in orders],
+                     dtype=np.int8).reshape(len(orders), len(names))
     return np.asarray(Fate.UNKNOWN * table[recording["order"]], dtype=np.int8)
 
 
