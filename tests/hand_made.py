@@ -3,17 +3,38 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cache
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
+from hierarchy import Robot
 from scenarios.config.avoidance import ObstacleSection
 from scenarios.config.robot import RobotSection
 from scenarios.config.sensor import SensorSection
+from scenarios.loop.facts import Facts, ResolverFacts, RobotFacts, robot_facts
 from scenarios.loop.recording import Recording
 
 LABELS = {"tpm": "tpm published", "tpm:form=staircase": "tpm"}
+
+
+@dataclass(frozen=True)
+class HandMadeResolver:
+    """As much of a Resolver as the facts of a run have."""
+
+    name: str
+
+    @property
+    def label(self) -> str:
+        return LABELS.get(self.name, self.name)
+
+    @property
+    def strict(self) -> bool:
+        return self.name not in ("tpm", "augmented")
+
+    accuracy = 1e-9
+    handles = "equalities"
 
 
 @dataclass(frozen=True)
@@ -53,11 +74,21 @@ class HandMadeScenario:
         return "equalities"
 
     def make_resolver(self) -> Any:
-        return SimpleNamespace(label=LABELS.get(self.resolver, self.resolver), accuracy=1e-9,
-                               strict=self.resolver not in ("tpm", "augmented"))
+        return HandMadeResolver(self.resolver)
 
     def to_toml(self) -> str:
         return f'name = "{self.name}"\n'
+
+
+@cache
+def kuka() -> RobotFacts:
+    return robot_facts(Robot.named("kuka_lwr"), 0.31)
+
+
+def facts(spec: str) -> Facts:
+    resolver = HandMadeResolver(spec)
+    return Facts(kuka(), ResolverFacts(spec, resolver.label, resolver.strict, resolver.accuracy,
+                                       "equalities", {}), "equalities", False)
 
 
 def recording(scenario: Any = None, fault: str | None = None, orders: tuple[str, ...] = ("a", "b"),
@@ -79,4 +110,5 @@ def recording(scenario: Any = None, fault: str | None = None, orders: tuple[str,
         "time_tick": np.full(ticks, 4e-6), "joint_lower": np.full(joints, -2.0),
         "joint_upper": np.full(joints, 2.0), "velocity_limit": np.full(joints, np.inf)}
     signals |= {name: np.asarray(value) for name, value in changed.items()}
-    return Recording(signals, orders, scenario or HandMadeScenario(), fault)
+    scenario = scenario or HandMadeScenario()
+    return Recording(signals, orders, scenario, facts(getattr(scenario, "resolver", "tpm")), fault)

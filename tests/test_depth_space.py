@@ -19,6 +19,7 @@ from scenarios.cell.sensors.frames import RecordedFrames
 from scenarios.config import ScenarioError
 from scenarios.draw.figures.depth import depth_figure
 from scenarios.loop import record_frames
+from scenarios.loop.depth_image import depth_view
 
 ROBOT = Robot.named("kuka_lwr")
 CAPSULES = link_capsules(TABLES["kuka_lwr"], foot=0.31)
@@ -496,16 +497,16 @@ def test_frames_that_cannot_be_used_are_refused_by_name(written, tmp_path):
 
 def test_the_figure_shows_points_and_distances_and_nothing_where_there_is_none():
     ball = "avoidance.obstacles=[{shape='sphere', centre=[0.4, 0.75, 0.2], radius=0.08}]"
-    fig = depth_figure(simulate(load("human", [*QUICK, "control.duration=0.05", ball])), 0.04)
+    run = simulate(load("human", [*QUICK, "control.duration=0.05", ball]))
+    fig = depth_figure(depth_view(run, 0.04))
     labels = [text.get_text() for text in fig.axes[0].get_legend().get_texts()]
     assert [label.rpartition(" ")[2] for label in labels] == ["m", "m"]
     fig.canvas.draw()
     away = "avoidance.obstacles=[{shape='sphere', centre=[4.0, 0.75, 0.2], radius=0.08}]"
-    fig = depth_figure(simulate(load("human", [*QUICK, "control.duration=0.05", away])), 0.04)
+    fig = depth_figure(simulate(load("human", [*QUICK, "control.duration=0.05", away])).depth)
     assert fig.axes[0].get_legend() is None
     exact = simulate(load("human", ["sensor={kind='exact'}", "plant={}", "control.duration=0.05"]))
-    with pytest.raises(HierarchyError, match="no camera"):
-        depth_figure(exact, 0.0)
+    assert exact.depth is None
 
 
 def test_the_shipped_frames_show_a_hand_that_comes_near():

@@ -2,6 +2,7 @@
 
 import csv
 import importlib
+import itertools
 import json
 from dataclasses import replace
 
@@ -13,9 +14,11 @@ from scenarios import load, simulate
 from scenarios.cli.main import run_command
 from scenarios.draw.run_folder import save
 from scenarios.export import export, foxglove
-from scenarios.export.columns import CONSTANTS, columns, joint_names, joint_units
+from scenarios.export.columns import CONSTANTS, columns
 from scenarios.files import OutputError
 from scenarios.loop.recording import Event
+from scenarios.loop.tree import joint_units, tree_of
+from scenarios.scene import scene
 
 FORMATS = ("csv", "parquet", "mcap")
 
@@ -58,7 +61,7 @@ def test_every_signal_of_the_ticks_is_a_column(run):
 
 
 def test_units_follow_the_joints():
-    assert joint_units(Robot.named("kuka_lwr")) == (("rad",) * 7, ("rad",) * 7)
+    assert joint_units(tree_of(Robot.named("kuka_lwr"))) == (("rad",) * 7, ("rad",) * 7)
 
 
 def test_a_slide_is_measured_in_metres_and_a_wheel_by_cosine_and_sine(tmp_path):
@@ -68,16 +71,16 @@ def test_a_slide_is_measured_in_metres_and_a_wheel_by_cosine_and_sine(tmp_path):
       <joint name="wheel" type="continuous"><parent link="b"/><child link="c"/>
       <axis xyz="0 0 1"/></joint></robot>""")
     robot = Robot.from_file(tmp_path / "cart.urdf")
-    assert joint_units(robot) == (("m", "1", "1"), ("m", "rad"))
-    assert joint_names(robot) == ("slide", "wheel")
+    assert joint_units(tree_of(robot)) == (("m", "1", "1"), ("m", "rad"))
+    assert robot.velocity_names == ["slide", "wheel"]
 
 
 def test_a_floating_base_has_metres_first_and_numbered_velocities():
     robot = Robot.named("kuka_lwr", base="floating")
-    positions, steps = joint_units(robot)
+    positions, steps = joint_units(tree_of(robot))
     assert positions[:8] == ("m",) * 3 + ("1",) * 4 + ("rad",)
     assert steps[:7] == ("m",) * 3 + ("rad",) * 4
-    assert joint_names(robot)[5:7] == (f"{robot.joint_names[0]} 6", "joint_1")
+    assert robot.velocity_names[5:7] == [f"{robot.joint_names[0]} 6", "joint_1"]
 
 
 # --- Parquet ------------------------------------------------------------------------------------
@@ -97,6 +100,7 @@ def test_a_parquet_table_is_the_recording_with_units_and_scenario(run, tmp_path)
     assert metadata[b"scenario"].decode() == run.scenario.to_toml()
     assert json.loads(metadata[b"joints"]) == list(Robot.named("kuka_lwr").joint_names)
     assert json.loads(metadata[b"orders"]) == list(run.orders)
+    assert json.loads(metadata[b"tasks"]) == list(run.task_names)
     assert json.loads(metadata[b"limits"])["joint_upper"] == run["joint_upper"].tolist()
 
 
@@ -198,6 +202,19 @@ def test_the_arm_hangs_on_its_joints_and_obstacles_stand_in_the_world(run, messa
     np.testing.assert_allclose(centres, [o.centre for o in run.scenario.avoidance.placed])
     later = [one["id"] for _, update in messages[0]["/scene"][1:] for one in update["entities"]]
     assert set(later) <= {"nearest", "path taken 1"}  # what stays is sent once
+
+
+@pytest.mark.parametrize("every", [1, 2, 7, 30])
+def test_the_path_taken_is_whole_when_its_pieces_are_joined(run, every):
+    drawn = scene(run, rate=100.0)
+    assert len(drawn.t) == 16
+    pieces = [[list(point.values()) for point in entity["lines"][0]["points"]]
+              for _, update in foxglove.scene_updates(drawn, every)
+              for entity in update["entities"] if entity["id"].startswith("path taken")]
+    for before, after in itertools.pairwise(pieces):
+        assert after[0] == before[-1]
+    joined = [pieces[0][0], *(point for piece in pieces for point in piece[1:])]
+    np.testing.assert_array_equal(joined, drawn.traced)
 
 
 def test_what_has_several_indices_is_one_list(run, tmp_path):

@@ -1,6 +1,7 @@
 """Faults put into a run: every command is finite, the run says what happened, and goes on."""
 
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from scenarios.cell.build import build
 from scenarios.cli.main import run_command
 from scenarios.config import load
 from scenarios.draw.run_folder import save
-from scenarios.loop.faults import Faults
+from scenarios.loop.faults import Faults, FaultySensor
 from scenarios.loop.recording import load_run
 from scenarios.loop.simulation import simulate
 from scenarios.measure.metrics import measure
@@ -238,3 +239,33 @@ def test_a_fault_of_distances_needs_a_sensor(tmp_path):
                     '[[faults]]\nkind = "nan_distance"\nat = 0.1\nduration = 0.1\n')
     with pytest.raises(HierarchyError, match="'nan_distance' needs"):
         load(path)
+
+
+class Watched:
+    """A sensor that says what was asked of it."""
+
+    def __init__(self):
+        self.asked, self.outside = [], 0.0
+        self.measurement, self.obstacles = SimpleNamespace(pairs=None, distance=None), object()
+
+    def measure(self, state):
+        self.asked.append("measure")
+        self.outside = 0.5
+        return self.measurement
+
+    def check_start(self, state):
+        self.asked.append("check_start")
+
+
+def test_a_sensor_with_faults_hands_on_the_sensor_and_has_none_of_its_inside():
+    under_way, inner = [], Watched()
+    sensor = FaultySensor(inner, SimpleNamespace(now=lambda kind: iter(
+        [kind] if kind in under_way else [])))
+    sensor.check_start(None)
+    assert sensor.measure(None) is sensor.measurement is inner.measurement
+    assert (inner.asked, sensor.outside) == (["check_start", "measure"], 0.5)
+    assert sensor.obstacles is inner.obstacles
+    assert "asked" not in vars(sensor)
+    under_way.append("stale")
+    assert sensor.measure(None) is inner.measurement  # of the tick before: nothing is measured
+    assert (len(inner.asked), sensor.outside) == (2, 0.0)

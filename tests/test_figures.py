@@ -119,6 +119,14 @@ def test_a_variant_has_the_colour_of_its_resolver_and_a_line_of_its_own():
     assert len(set(looks.values())) == 5
 
 
+def test_only_a_plain_name_and_what_it_stands_for_are_solid():
+    for label in ("hqp", "hqp proxqp", "tpm"):
+        assert palette.dash(label) == palette.SOLID
+    dashes = [palette.dash(label) for label in ("hqp osqp", "hqp daqp", "tpm published", "hqp new")]
+    assert palette.SOLID not in dashes
+    assert dashes[0] != dashes[1]
+
+
 def test_a_label_and_the_spec_that_asks_for_it_have_one_colour():
     assert palette.colour("hqp:backend=osqp") == palette.colour("hqp osqp")
 

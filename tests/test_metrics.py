@@ -92,6 +92,10 @@ def test_ticks_that_were_not_solved_are_counted():
     assert value("ticks_not_solved", status=[solved, other, other, solved, solved]) == 2
 
 
+def test_a_tick_is_late_only_when_it_takes_longer_than_the_period():
+    assert value("ticks_late", time_tick=[0.5e-3, 1e-3, 1.1e-3, 2e-3, 0.9e-3]) == 2
+
+
 def test_a_scenario_without_a_task_has_no_metric_of_it():
     full = recording()
     for signal in ("pointing_error", "minimal_distance", "ee_distance", "position_error"):

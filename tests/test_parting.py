@@ -9,6 +9,7 @@ from hand_made import HandMadeScenario, recording
 from scenarios import compare
 from scenarios.config.resolvers import default_resolvers
 from scenarios.measure.comparison import Comparison
+from scenarios.measure.motions import motions
 from scenarios.measure.partings import partings
 from scenarios.measure.runs import Run
 from scenarios.measure.verdict import verdict
@@ -49,6 +50,13 @@ def test_the_verdict_tells_a_run_that_parted_late_from_another_motion():
     said = verdict([run_of("recursive"), run_of("hqp", away_from(3))])
     assert "alike" not in said
     assert "hqp stayed within 1e-03 rad of recursive" in said
+
+
+def test_runs_that_are_one_motion_are_as_far_apart_as_the_farthest_of_them():
+    (one,) = motions([run_of("recursive"), run_of("hqp", away_from(1, 5e-6)),
+                      run_of("hcod", away_from(1, 2e-6))])
+    assert one.labels == ("recursive", "hqp", "hcod")
+    assert one.apart == 5e-6
 
 
 def test_the_first_tick_beyond_the_bound_is_named():

@@ -141,6 +141,13 @@ def test_a_smooth_motion_is_followed_closely(mujoco):
     assert 1e-6 < apart < 2e-3
 
 
+def test_the_servos_are_at_the_reference_at_the_end_of_a_period(mujoco):
+    plant = arm(mujoco, level="acceleration")
+    for k in range(20):
+        plant.act(np.cos(k * PERIOD + np.arange(7)))
+        np.testing.assert_allclose(plant.data.ctrl[:7], plant.reference_q, rtol=0, atol=1e-14)
+
+
 def test_servos_stay_within_the_effort_limits(mujoco):
     plant, most = arm(mujoco, servo={"bandwidth": 300.0}), STILL
     for k in range(40):

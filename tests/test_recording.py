@@ -33,11 +33,15 @@ def test_a_run_without_a_fault_comes_back_without_one(tmp_path):
     assert load_run(save(recording(), tmp_path / "run", figures=False)).fault is None
 
 
+def test_a_switch_is_the_first_tick_of_the_new_order():
+    assert recording(order=[0, 1, 1, 0, 0]).switches().tolist() == [1, 3]
+
+
 def test_a_run_folder_holds_arrays_metrics_scenario_versions_and_figures(tmp_path):
     save(recording(), tmp_path / "run")
     names = {path.name for path in (tmp_path / "run").iterdir()}
-    assert {"run.npz", "metrics.json", "scenario.toml", "versions.json", "picture.svg",
-            "figure-4-joint-velocities.png", "figure-5-distances.svg"} <= names
+    assert {"run.npz", "facts.json", "metrics.json", "scenario.toml", "versions.json",
+            "picture.svg", "figure-4-joint-velocities.png", "figure-5-distances.svg"} <= names
     assert "hand-made" in (tmp_path / "run" / "scenario.toml").read_text()
     assert {"python", "numpy", "pin", "task-hierarchy"} <= json.loads(
         (tmp_path / "run" / "versions.json").read_text()).keys()

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hand_made import recording as hand_made
@@ -6,15 +8,23 @@ from hierarchy import HierarchyError, Robot, State
 from hierarchy.avoidance import Capsule
 from hierarchy.robots import TABLES, link_capsules
 from scenarios import load, simulate
+from scenarios.cell.build import build
+from scenarios.cell.robot import make_robot
 from scenarios.config.robot import RobotSection
 from scenarios.loop.controller import Controller
+from scenarios.loop.facts import robot_facts
 from scenarios.loop.fate import Fate
+from scenarios.loop.judging import judge
+from scenarios.loop.links import lowest
 from scenarios.scene import capsules, ends, scene, stage
-from scenarios.scene.levels import judge
-from scenarios.scene.links import lowest
+from scenarios.scene.levels import levels_at
 
 SHORT = ["control.duration=1.5"]
 NAMES = ("ellipse", "ellipse-velocity", "ellipse-published", "ellipse-limits", "ellipse-hqp")
+
+
+def stage_of(scenario):
+    return stage(robot_facts(make_robot(scenario.robot), scenario.sensor.foot), scenario)
 
 
 @pytest.fixture(scope="module")
@@ -42,7 +52,7 @@ def test_placements_and_links_are_those_of_the_kinematics(runs, ellipse):
     robot = Robot.named("kuka_lwr")
     for f in (0, 20, -1):
         state = State.at(robot, runs["ellipse"]["q"][ellipse.ticks[f]])
-        assert np.array_equal(ellipse.placements[f], state.placements)
+        assert np.allclose(ellipse.placements[f], state.placements, rtol=0.0, atol=1e-14)
         chain = ellipse.links[f]
         assert np.allclose(chain[0, 1], 0.0)  # the foot ends at the base
         assert np.allclose(chain[1:, 0], chain[:-1, 1], atol=1e-12)
@@ -94,7 +104,7 @@ def test_violations_are_those_of_the_hierarchy_that_was_resolved(name):
         seen.append(dict(zip(controller.hierarchy.names, controller.hierarchy.violations(x),
                              strict=True)))
         plant.act(x)
-    levels = judge(simulate(scenario), range(200))
+    levels = levels_at(simulate(scenario), range(200))
     assert levels.known.all()
     for found, fates, expected in zip(levels.violation, levels.fate, seen, strict=True):
         for task, violation, fate in zip(levels.names, found, fates, strict=True):
@@ -105,7 +115,7 @@ def test_violations_are_those_of_the_hierarchy_that_was_resolved(name):
 def test_only_a_task_that_is_missed_is_violated(runs):
     for name, fates in (("ellipse-hqp", {Fate.FREE, Fate.MET}),
                         ("ellipse-limits", {Fate.FREE, Fate.MET, Fate.MISSED})):
-        levels = judge(runs[name], range(0, 1500, 10))
+        levels = levels_at(runs[name], range(0, 1500, 10))
         assert fates <= set(levels.fate.ravel().tolist())
         assert (levels.violation[np.isin(levels.fate, (Fate.FREE, Fate.MET))] < 1e-6).all()
         assert (levels.violation[levels.fate == Fate.MISSED] > 1e-9).all()
@@ -114,7 +124,7 @@ def test_only_a_task_that_is_missed_is_violated(runs):
 def test_saturated_joints_have_the_command_of_a_side_of_their_limits():
     scenario = load("ellipse-hqp", ["control.duration=0.5", "limits.acceleration=2.0"])
     recording = simulate(scenario)
-    levels = judge(recording, range(recording.ticks))
+    levels = levels_at(recording, range(recording.ticks))
     assert (levels.saturated != 0).any()
     at = levels.saturated[1:] != 0
     assert np.abs(recording["command"][1:][~at]).max() < 2.0
@@ -122,12 +132,10 @@ def test_saturated_joints_have_the_command_of_a_side_of_their_limits():
 
 def test_distances_that_are_not_those_recorded_leave_levels_unknown(runs):
     recording = runs["ellipse"]
-    kept = recording["control_point_distance"]
-    recording.signals["control_point_distance"] = kept + 1e-3
-    try:
-        levels = judge(recording, [0, 700])
-    finally:
-        recording.signals["control_point_distance"] = kept
+    moved = recording["control_point_distance"] + 1e-3
+    other = replace(recording, signals=recording.signals | {"control_point_distance": moved})
+    judge(other, build(recording.scenario))
+    levels = levels_at(other, [0, 700])
     assert not levels.known.any()
     assert np.isnan(levels.violation).all()
 
@@ -151,6 +159,14 @@ def test_frames_end_where_the_state_stops_being_finite():
     q = np.zeros((5, 7))
     q[3:] = np.nan
     assert scene(hand_made(q=q, order=np.zeros(5, int)), rate=1.0).ticks.tolist() == [0, 1, 2]
+
+
+def test_levels_that_were_not_judged_are_unknown_where_they_are_in_the_stack():
+    levels = levels_at(hand_made(orders=("a", "a > b"), order=[0, 1, 1, 0, 0]), [0, 1, 4])
+    assert levels.names == ("a", "b")
+    assert levels.fate.tolist() == [[Fate.UNKNOWN, Fate.ABSENT], [Fate.UNKNOWN, Fate.UNKNOWN],
+                                    [Fate.UNKNOWN, Fate.ABSENT]]
+    assert levels_at(hand_made(orders=("",)), [0, 4]).fate.shape == (2, 0)  # nothing was stacked
 
 
 @pytest.mark.parametrize("rate", [0.0, -1.0, np.nan, np.inf])
@@ -180,11 +196,11 @@ def test_a_robot_without_capsules_is_drawn_as_sticks(tmp_path):
 
 @pytest.mark.parametrize("name", TABLES)
 def test_no_robot_at_rest_is_below_the_floor(name):
-    section = load("ellipse").model_copy(update={"robot": RobotSection(model=name)})
-    fixed = stage(section)
-    low = ends(fixed.capsules[1:], State.at(fixed.robot, fixed.robot.rest).placements)[..., 2].min()
+    scenario = load("ellipse").model_copy(update={"robot": RobotSection(model=name)})
+    fixed = stage_of(scenario)
+    low = ends(fixed.capsules[1:], fixed.robot.placements(fixed.robot.rest))[..., 2].min()
     assert low >= fixed.floor
-    assert stage(load("humanoid")).floor == pytest.approx(0.0, abs=1e-6)  # it stands on it
+    assert stage_of(load("humanoid")).floor == pytest.approx(0.0, abs=1e-6)  # it stands on it
 
 
 def test_the_floor_is_a_radius_below_the_lowest_end_of_a_link_and_not_above_the_base():
@@ -197,12 +213,12 @@ def test_the_floor_is_a_radius_below_the_lowest_end_of_a_link_and_not_above_the_
 
 def test_the_arm_given_as_a_table_has_its_own_capsules():
     assert capsules(Robot.named("kuka_lwr"), 0.31) == link_capsules(TABLES["kuka_lwr"], 0.31)
-    assert stage(load("ellipse")).floor == pytest.approx(-0.31)
+    assert stage_of(load("ellipse")).floor == pytest.approx(-0.31)
 
 
 def test_a_floating_base_has_no_limits_to_be_at():
     recording = simulate(load("humanoid-reach", ["control.duration=0.02"]))
-    levels = judge(recording, [0, 1, 2, 3])
+    levels = levels_at(recording, [0, 1, 2, 3])
     assert levels.saturated.shape == (4, recording["v"].shape[1])
     assert (levels.saturated[:, :6] == 0).all()
 
@@ -220,7 +236,7 @@ def test_listed_tasks_have_their_paths_and_errors():
 
 def test_the_limits_of_a_floating_robot_are_those_of_its_joints():
     recording = simulate(load("humanoid-reach", ["control.duration=1.8"]))
-    levels = judge(recording, range(340, 360))
+    levels = levels_at(recording, range(340, 360))
     assert levels.known.all()
     assert not levels.saturated[:, :6].any()
     assert levels.saturated.any()
@@ -233,7 +249,7 @@ def test_after_a_camera_levels_are_those_judged_in_the_run():
                               "sensor.width=160", "sensor.height=120", "sensor.fx=131.25",
                               "sensor.fy=131.25"])
     recording = simulate(scenario)
-    levels = judge(recording, range(recording.ticks))
+    levels = levels_at(recording, range(recording.ticks))
     assert levels.known[1:].all()
     given_up = levels.fate == Fate.MISSED
     assert given_up.any()

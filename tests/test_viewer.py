@@ -10,6 +10,7 @@ from headless import chromium
 from hierarchy.avoidance import Obstacle
 from hierarchy.avoidance.obstacles import distance_to_obstacle
 from hierarchy.errors import HierarchyError
+from scenarios.cell.build import build
 from scenarios.cli.main import run_command
 from scenarios.config import load
 from scenarios.draw.run_folder import save
@@ -19,6 +20,7 @@ from scenarios.draw.viewer.moment import Became, Watched, of_scene
 from scenarios.draw.viewer.playback import Playback, Requests
 from scenarios.draw.viewer.stack_list import stack_html
 from scenarios.loop.controller import Controller
+from scenarios.loop.judging import judge
 from scenarios.loop.recorder import Recorder
 from scenarios.loop.recording import load_run
 from scenarios.loop.simulation import simulate, tick
@@ -97,7 +99,9 @@ def test_a_controller_at_work_and_its_recording_show_the_same_moments():
     for k in range(600):
         tick(controller, recorder, k * 0.001)
         live[k] = watched.moment() if k % 20 == 0 else None
-    recorded = scene(recorder.finish(LIMITED, None), rate=50.0)
+    run = recorder.finish(LIMITED, None)
+    judge(run, build(LIMITED))
+    recorded = scene(run, rate=50.0)
     for f, k in enumerate(recorded.ticks.tolist()):
         if live.get(k) is None:
             continue
@@ -247,7 +251,7 @@ def test_a_live_run_takes_no_faults():
 
 def test_curves_of_what_was_before_stay_when_the_cone_is_another():
     live = Live(LIMITED)
-    watched, lately = Watched(live.controller), Lately(10)
+    watched, lately = Watched(live.controller), Lately(10, live.recorder.facts)
     ticks(live, 30)
     lately.add(watched)
     (angle,) = (one.value[0, 0] for one in lately.curves(live.controller)[1]

@@ -1,4 +1,4 @@
-"""The folder of one run: what was recorded, its metrics and its figures."""
+"""The folder of one run: its recording, metrics and figures."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from scenarios.measure import metrics
 
 
 def save(recording: Recording, folder: str | Path, figures: bool = True) -> Path:
-    """Write a run's folder, whole or not at all, and return its path.
+    """Write a run's folder, completely or not at all, and return its path.
 
-    It holds what `scenarios.loop.recording.write` writes, `metrics.json`, and the letter's figures
-    if `figures`. `folder` must be new or empty.
+    It has the files of `scenarios.loop.recording.write`, `metrics.json` and, with `figures`, the
+    letter's figures. `folder` must be new or empty.
     """
     with whole(folder) as partial:
         write(recording, partial)

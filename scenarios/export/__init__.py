@@ -1,4 +1,4 @@
-"""Recordings in formats that other programs open: CSV, Parquet, MCAP with a layout for Foxglove."""
+"""Export of recordings as CSV, Parquet, or MCAP with a layout for Foxglove."""
 
 from __future__ import annotations
 
@@ -14,22 +14,22 @@ from scenarios.files import OutputError, named, written
 if TYPE_CHECKING:
     from scenarios.loop.recording import Recording
 
-# Each a module of this package with write(recording, path); what it needs, and the extra with it.
+# Each is a module of this package with write(recording, path): its package, and the extra of it.
 FORMATS: dict[str, tuple[str, str]] = {"csv": ("csv", ""), "parquet": ("pyarrow", "export"),
                                        "mcap": ("mcap", "export")}
 
 
 def export(recording: Recording, path: str | Path, format: str | None = None) -> list[Path]:
-    """Write a recording to a file of `format`, by default that of its suffix; return what there is.
+    """Write a recording to a file of `format`, by default its suffix; return the files written.
 
-    With "mcap" a layout for Foxglove is written beside it, as `path`.layout.json. The same
+    With "mcap" a layout for Foxglove is written next to it, as `path`.layout.json. The same
     recording gives the same bytes.
 
     Raises
     ------
-    UnknownNameError : no such format, with the nearest that there is.
-    OutputError : the file exists, or cannot be written.
-    HierarchyError : a package is not installed; says which extra brings it.
+    UnknownNameError : the format does not exist; names the closest one.
+    OutputError : the file exists or cannot be written.
+    HierarchyError : a package is not installed; names the extra that installs it.
     """
     path = Path(path)
     name = path.suffix.removeprefix(".") if format is None else format
@@ -47,7 +47,7 @@ def export(recording: Recording, path: str | Path, format: str | None = None) ->
 
 @contextmanager
 def new_file(path: Path) -> Iterator[Path]:
-    """Give a temporary name to write to; the file takes its own when all is there."""
+    """Yield a temporary name to write to; the file is renamed once it is complete."""
     with named(path):
         if path.exists():
             raise OutputError(f"{path} exists; choose another name, or remove it first")

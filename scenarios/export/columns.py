@@ -1,4 +1,4 @@
-"""A recording as columns: one a number, with its unit, all as long as the run."""
+"""A recording as columns: one per number, with its unit, one row per tick."""
 
 from __future__ import annotations
 
@@ -8,9 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
-
-from hierarchy import Robot
-from scenarios.cell.robot import make_robot
 
 if TYPE_CHECKING:
     from scenarios.loop.recording import Recording
@@ -23,7 +20,7 @@ _METRES = ("ee_position", "desired_position", "position_error", "true_ee_positio
 
 @dataclass(frozen=True)
 class Column:
-    """One number or text a tick: its name, such as `q[0]`, its unit, "" for none, values (T,)."""
+    """One number or text per tick: name such as `q[0]`, unit or "", values (T,)."""
 
     name: str
     unit: str
@@ -36,7 +33,7 @@ class Column:
 
 
 def columns(recording: Recording) -> Iterator[Column]:
-    """Yield every signal of the ticks number by number, then the stack and the events as text."""
+    """Yield every per-tick signal number by number, then the stack and the events as text."""
     units = signal_units(recording)
     for name, signal in of_ticks(recording).items():
         shape = signal.shape[1:]
@@ -53,7 +50,7 @@ def columns(recording: Recording) -> Iterator[Column]:
 
 
 def of_ticks(recording: Recording) -> dict[str, NDArray[Any]]:
-    """Return the signals that have an entry for each tick."""
+    """Return the signals that have one entry per tick."""
     return {name: signal for name, signal in recording.signals.items() if name not in CONSTANTS}
 
 
@@ -64,8 +61,9 @@ def stacks(recording: Recording) -> NDArray[Any]:
 
 
 def signal_units(recording: Recording) -> dict[str, tuple[str, ...]]:
-    """Return the unit of each entry of the signals that have one; a single unit is that of all."""
-    positions, rates = joint_units(make_robot(recording.scenario.robot))
+    """Return the units of the entries of each signal with units; a single one holds for all."""
+    positions, rates = (recording.facts.robot.position_units,
+                        recording.facts.robot.velocity_units)
     velocities = tuple(f"{unit}/s" for unit in rates)
     accelerations = tuple(f"{unit}/s^2" for unit in rates)
     commands = (accelerations if recording.scenario.control.level == "acceleration"
@@ -74,27 +72,3 @@ def signal_units(recording: Recording) -> dict[str, tuple[str, ...]]:
             "true_v": velocities, "a": accelerations, "command": commands,
             "contact_force": ("N",), **dict.fromkeys(_METRES, ("m",)),
             **{name: ("s",) for name in recording.signals if name.startswith("time_")}}
-
-
-def joint_units(robot: Robot) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return the units of q (nq,) and of a small step (n,): "rad", "m", or "1" of a ratio."""
-    positions: list[str] = []
-    steps: list[str] = []
-    for joint in list(robot.model.joints)[1:]:
-        metres = _LENGTHS.get(joint.shortname().removeprefix("JointModel"), 0)
-        turns = "rad" if joint.nq == joint.nv else "1"
-        positions += ["m"] * metres + [turns] * (joint.nq - metres)
-        steps += ["m"] * metres + ["rad"] * (joint.nv - metres)
-    return tuple(positions), tuple(steps)
-
-
-def joint_names(robot: Robot) -> tuple[str, ...]:
-    """Return a name for each velocity (n,): that of its joint, numbered where it has several."""
-    return tuple(name if joint.nv == 1 else f"{name} {i + 1}"
-                 for name, joint in zip(robot.joint_names, list(robot.model.joints)[1:],
-                                        strict=True) for i in range(joint.nv))
-
-
-# How many of a joint's first coordinates are lengths, by pinocchio's name; of all others none is.
-_LENGTHS = {"PX": 1, "PY": 1, "PZ": 1, "PrismaticUnaligned": 1, "Planar": 2, "Translation": 3,
-            "FreeFlyer": 3}

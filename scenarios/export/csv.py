@@ -1,4 +1,4 @@
-"""A recording as comma-separated values: a line of names with units, then a line a tick."""
+"""A recording as comma-separated values: a header of names with units, then a line per tick."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ if TYPE_CHECKING:
 
 
 def write(recording: Recording, path: Path) -> list[Path]:
-    """Write `path`; every number has as many digits as it takes to read the same number back.
+    """Write `path`; every number has enough digits to be read back exactly.
 
-    Numbers that are not finite are nan, inf and -inf; truths are true and false.
+    Numbers that are not finite are nan, inf and -inf; booleans are true and false.
     """
     table = list(columns(recording))
     with new_file(path) as partial, partial.open("w", encoding="utf-8", newline="") as stream:

@@ -1,4 +1,4 @@
-"""What Foxglove's 3D panel draws of a run: frames of the joints, links, obstacles, paths."""
+"""A run for Foxglove's 3D panel: joint frames, links, obstacles and paths."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from hierarchy.avoidance import Capsule
 from hierarchy.avoidance.obstacles import Obstacle
@@ -17,22 +18,21 @@ Message = dict[str, Any]
 
 _ARM, _OBSTACLE, _TRACE, _ASKED = ((0.35, 0.42, 0.5, 1.0), (0.83, 0.23, 0.17, 0.9),
                                    (0.0, 0.45, 0.7, 1.0), (0.6, 0.6, 0.6, 1.0))
-_POINT = 0.01      # [m] radius at which an obstacle that is a point is drawn
+_POINT = 0.01      # [m] radius of a point obstacle as drawn
 _THICK = 2.0       # [px] of lines
 _STRIP, _LIST = 0, 2
 
 
 def transforms(scene: Scene, frame: int) -> Message:
-    """Return the placements of the joints, the end effector and the point asked for, in the world.
+    """Return the placements of the joints, the end effector and the desired point in the world.
 
-    The point has no rotation of its own: it is given that of the world.
+    The desired point has no rotation of its own and is given that of the world.
     """
     robot, t = scene.stage.robot, float(scene.t[frame])
-    rows = scene.placements[frame]
+    rows, tip = scene.placements[frame], scene.stage.points[-1]
     placed = [(name, rows[i, 9:], rows[i, :9].reshape(3, 3).T)
               for i, name in enumerate(robot.joint_names, 1)]
-    tip = robot.frame(robot.end_effector)
-    turned = rows[tip.joint, :9].reshape(3, 3).T @ tip.rotation
+    turned = rows[tip.joint, :9].reshape(3, 3).T @ np.array(robot.tool)
     placed.append(("end_effector", scene.points[frame, -1], turned))
     if scene.desired is not None:
         placed.append(("desired", scene.desired[frame], np.eye(3)))
@@ -43,10 +43,10 @@ def transforms(scene: Scene, frame: int) -> Message:
 
 
 def scene_updates(scene: Scene, every: int) -> Iterator[tuple[int, Message]]:
-    """Yield a frame and what is drawn anew from there: what moves, only where it has moved.
+    """Yield frames with the entities that change there; obstacles only if they have moved.
 
-    Links hang on the frames of their joints and are sent once. The path taken is sent in pieces
-    of `every` frames.
+    Links are attached to the frames of their joints and are sent once. The path taken is sent in
+    pieces of `every` frames.
     """
     for frame in range(len(scene.t)):
         t, entities = float(scene.t[frame]), []
@@ -72,7 +72,7 @@ def scene_updates(scene: Scene, every: int) -> Iterator[tuple[int, Message]]:
 
 
 def link(t: float, capsule: Capsule, joints: Sequence[str]) -> Message:
-    """A capsule, fixed to the frame of its joint: a cylinder and two balls."""
+    """Return a capsule fixed to the frame of its joint: a cylinder and two balls."""
     start, end = np.array(capsule.start), np.array(capsule.end)
     length, wide = float(np.linalg.norm(end - start)), 2.0 * capsule.radius
     cylinders = [] if length == 0.0 else [_cylinder((start + end) / 2, _z_to(end - start), wide,
@@ -82,7 +82,7 @@ def link(t: float, capsule: Capsule, joints: Sequence[str]) -> Message:
 
 
 def obstacle(t: float, number: int, body: Obstacle, centre: Array) -> Message:
-    """An obstacle where it is now."""
+    """Return an obstacle at its present place."""
     turned, parts = np.asarray(body.rotation, dtype=float), dict[str, list[Message]]()
     if body.shape == "box":
         parts["cubes"] = [_body(centre, 2.0 * np.array(body.size), _OBSTACLE, turned)]
@@ -99,7 +99,7 @@ def obstacle(t: float, number: int, body: Obstacle, centre: Array) -> Message:
 
 
 def line(t: float, name: str, points: Array, colour: tuple[float, ...]) -> Message:
-    """A line through points (P, 3) [m] of the world; those that are not finite are left out."""
+    """Return a line through points (P, 3) [m] in the world, without those that are not finite."""
     kept = points[np.isfinite(points).all(axis=1)]
     drawn = {"type": _STRIP, "pose": pose(np.zeros(3), np.eye(3)), "thickness": _THICK,
              "scale_invariant": True, "points": [xyz(point) for point in kept],
@@ -108,7 +108,7 @@ def line(t: float, name: str, points: Array, colour: tuple[float, ...]) -> Messa
 
 
 def entity(t: float, name: str, frame: str, **parts: list[Message]) -> Message:
-    """An entity that stays until another of its name comes."""
+    """Return an entity that stays until another one of its name arrives."""
     kinds = ("metadata", "arrows", "cubes", "spheres", "cylinders", "lines", "triangles", "texts",
              "models")
     return {"timestamp": time(t), "frame_id": frame, "id": name, "lifetime": time(0.0),
@@ -116,47 +116,37 @@ def entity(t: float, name: str, frame: str, **parts: list[Message]) -> Message:
 
 
 def time(t: float) -> Message:
-    """A time [s] in Foxglove's form."""
+    """Return a time [s] as Foxglove's message."""
     return dict(zip(("sec", "nsec"), divmod(nanoseconds(t), 10**9), strict=True))
 
 
 def nanoseconds(t: float) -> int:
-    """A time [s] in [ns]."""
+    """Return a time [s] in [ns]."""
     return round(t * 1e9)
 
 
 def pose(place: Array, rotation: Array) -> Message:
-    """A pose in Foxglove's form."""
+    """Return a pose as Foxglove's message."""
     return {"position": xyz(place), "orientation": xyzw(quaternion(rotation))}
 
 
 def xyz(vector: Array) -> Message:
-    """A vector in Foxglove's form."""
+    """Return a vector as Foxglove's message."""
     return dict(zip("xyz", np.asarray(vector, dtype=float).tolist(), strict=True))
 
 
 def xyzw(q: Array) -> Message:
-    """A quaternion in Foxglove's form."""
+    """Return a quaternion as Foxglove's message."""
     return dict(zip("xyzw", q.tolist(), strict=True))
 
 
 def quaternion(R: Array) -> Array:
-    """Return the unit quaternion (4,) x, y, z, w of a rotation (3, 3).
-
-    As the eigenvector of the greatest eigenvalue of Bar-Itzhack's matrix (2000), which is well
-    conditioned at every rotation.
-    """
-    K = np.array([
-        [R[0, 0] - R[1, 1] - R[2, 2], R[1, 0] + R[0, 1], R[2, 0] + R[0, 2], R[2, 1] - R[1, 2]],
-        [R[1, 0] + R[0, 1], R[1, 1] - R[0, 0] - R[2, 2], R[2, 1] + R[1, 2], R[0, 2] - R[2, 0]],
-        [R[2, 0] + R[0, 2], R[2, 1] + R[1, 2], R[2, 2] - R[0, 0] - R[1, 1], R[1, 0] - R[0, 1]],
-        [R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1], R[0, 0] + R[1, 1] + R[2, 2]]])
-    q = np.linalg.eigh(K)[1][:, -1]
-    return np.asarray(q if q[3] >= 0.0 else -q)
+    """Return the unit quaternion (4,) x, y, z, w >= 0 of a rotation (3, 3)."""
+    return np.asarray(Rotation.from_matrix(R).as_quat(canonical=True))
 
 
 def _z_to(direction: Array) -> Array:
-    """A rotation (3, 3) that takes the z axis to a direction (3,)."""
+    """Return a rotation (3, 3) that takes the z axis to a direction (3,)."""
     z = direction / np.linalg.norm(direction)
     x = np.cross(np.eye(3)[int(np.abs(z).argmin())], z)
     x /= np.linalg.norm(x)

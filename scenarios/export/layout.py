@@ -4,9 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from scenarios.export.columns import joint_names
-from scenarios.scene import stage
-
 if TYPE_CHECKING:
     from scenarios.loop.recording import Recording
 
@@ -14,12 +11,12 @@ Panel = dict[str, Any]
 
 
 def layout(recording: Recording) -> Panel:
-    """Return the layout: the arm in space at the left, curves, stack and events at the right."""
-    fixed = stage(recording.scenario)
+    """Return the layout: the 3D view on the left; curves, stack and events on the right."""
+    robot = recording.facts.robot
     panels: dict[str, Panel] = {
-        "3D!arm": _space(fixed.floor),
+        "3D!arm": _space(robot.floor),
         "Plot!speeds": _plot("Joint speeds", [
-            (f"/joints.v[{j}]", name) for j, name in enumerate(joint_names(fixed.robot))]),
+            (f"/joints.v[{j}]", name) for j, name in enumerate(robot.velocity_names)]),
         "StateTransitions!stack": {"paths": [{"value": "/stack.tasks", "label": "stack",
                                               "timestampMethod": "receiveTime"}]},
         "Log!events": {"searchTerms": [], "minLogLevel": 1, "topicToRender": "/events"}}
@@ -40,7 +37,7 @@ def layout(recording: Recording) -> Panel:
 
 
 def _column(names: list[str]) -> Any:
-    """Panels one under the other, of the same height."""
+    """Return panels one below the other, of equal height."""
     if len(names) == 1:
         return names[0]
     return {"direction": "column", "first": names[0], "second": _column(names[1:]),

@@ -1,4 +1,4 @@
-"""A recording as an MCAP file, and a layout of panels for it: every tick, and what to draw."""
+"""A recording as an MCAP file with every tick and a 3D scene, and a layout of panels for it."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from scenarios.scene import scene
 if TYPE_CHECKING:
     from scenarios.loop.recording import Recording
 
-FRAMES_A_SECOND = 30.0  # of what is drawn; numbers are there of every tick
+FRAMES_A_SECOND = 30.0  # of the 3D scene; signals have every tick
 _WARNING = 3            # Foxglove's level of a log message
 
 # The channels of the signals; all others go to "/other".
@@ -41,9 +41,9 @@ Entry = tuple[int, str, dict[str, Any]]  # [ns], topic, message
 def write(recording: Recording, path: Path) -> list[Path]:
     """Write `path` and `path`.layout.json, times counted from zero.
 
-    Every signal of every tick is there under its name in `Recording`, in the channels of `TOPICS`;
-    numbers that are not finite are null, and what has several indices is one list. `/stack` has
-    the tasks' names too, `/events` the trouble, `/tf` and `/scene` what to draw.
+    Every signal of every tick has its name in `Recording`, in the channels of `TOPICS`; numbers
+    that are not finite are null, and an array with several indices is one flat list. `/stack` also
+    has the names of the tasks, `/events` the trouble, `/tf` and `/scene` the 3D scene.
     """
     from mcap.writer import Writer
 
@@ -58,7 +58,7 @@ def write(recording: Recording, path: Path) -> list[Path]:
 
 
 def grouped(recording: Recording) -> dict[str, dict[str, NDArray[Any]]]:
-    """Return the signals of the ticks by channel and name, without time."""
+    """Return the per-tick signals by channel and name, without time."""
     signals = {name: signal for name, signal in of_ticks(recording).items() if name != "t"}
     home = {name: topic for topic, names in TOPICS.items() for name in names}
     groups: dict[str, dict[str, NDArray[Any]]] = {topic: {} for topic in (*TOPICS, "/other")}

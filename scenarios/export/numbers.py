@@ -1,4 +1,4 @@
-"""Arrays as JSON has them."""
+"""Arrays as JSON values."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 
 def plain(values: ArrayLike) -> Any:
-    """Return numbers as nested lists in which those that are not finite are None."""
+    """Return numbers as nested lists, with None for those that are not finite."""
     array = np.asarray(values)
     if array.dtype.kind != "f" or np.isfinite(array).all():
         return array.tolist()

@@ -1,4 +1,4 @@
-"""A recording as a Parquet table, units in the fields' metadata, the scenario in the table's."""
+"""A recording as a Parquet table with units in the fields' metadata."""
 
 from __future__ import annotations
 
@@ -6,9 +6,8 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from scenarios.cell.robot import make_robot
 from scenarios.export import new_file
-from scenarios.export.columns import CONSTANTS, Column, columns, joint_names
+from scenarios.export.columns import CONSTANTS, Column, columns
 from scenarios.export.numbers import plain
 
 if TYPE_CHECKING:
@@ -16,19 +15,21 @@ if TYPE_CHECKING:
 
 
 def write(recording: Recording, path: Path) -> list[Path]:
-    """Write `path`: a column a number, of the type it was recorded in, with metadata `unit`.
+    """Write `path`: one column per number, of the type it was recorded in, with metadata `unit`.
 
     The table's metadata has `scenario` (TOML as run), `joints` (the name of each velocity),
-    `orders`, `limits` (JSON; null for a limit that is not there) and `fault`.
+    `orders`, `tasks` (those of the columns level_fate and level_violation), `limits` (JSON; null
+    for a missing limit) and `fault`.
     """
     import pyarrow as pa
     import pyarrow.parquet as pq
 
     table = list(columns(recording))
     limits = {name: plain(recording[name]) for name in CONSTANTS if name in recording}
-    joints = joint_names(make_robot(recording.scenario.robot))
-    metadata = {"scenario": recording.scenario.to_toml(), "joints": json.dumps(joints),
-                "orders": json.dumps(recording.orders), "limits": json.dumps(limits),
+    metadata = {"scenario": recording.scenario.to_toml(),
+                "joints": json.dumps(recording.facts.robot.velocity_names),
+                "orders": json.dumps(recording.orders),
+                "tasks": json.dumps(recording.task_names), "limits": json.dumps(limits),
                 "fault": recording.fault or ""}
     schema = pa.schema([_field(pa, column) for column in table], metadata)
     arrays = [pa.array(column.values.tolist() if column.values.dtype.kind == "U"

@@ -1,8 +1,8 @@
 """JSON Schemas of the messages in an MCAP file.
 
-Foxglove knows what it can draw by the schema's name; the fields are those of its published message
-types, as far as they are used here. Its reader takes one type a field, so that a number that may be
-null is a number here.
+Foxglove recognizes what it can draw by the schema's name; the fields are those of its published
+message types, as far as they are used here. Its reader takes one type per field, so a number that
+may be null is declared as a number.
 """
 
 from __future__ import annotations

@@ -1,1 +1,1 @@
-"""One tick of control: what is asked, resolved, sent and written down; and what goes wrong."""
+"""The control loop: one tick, a whole run, its recording, and injected faults."""

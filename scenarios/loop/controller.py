@@ -24,14 +24,14 @@ _ROUNDING = 1e-9  # [s] of times that are compared
 
 
 class Controller:
-    """Sense, allocate, stack, resolve; then the policy says what is sent.
+    """Senses, allocates, stacks and solves; then the policy decides what is sent.
 
-    After `command`: `sent`; `allocation` and `cone_error` of the tick, its `hierarchy` (until the
-    next command) and `resolution`, and `stamps`, the clock [s] at its begin, after kinematics,
-    after rows (sensing and allocation included) and after resolving; what a simulated camera takes
-    for its image is taken out. A tick whose measurement is of
-    no use is not `answered`, and leaves allocation and hierarchy as they were. `policy` has the
-    events of the tick, `blend` the weight of the present stack, or is None.
+    After `command`: `sent`; the tick's `allocation`, `cone_error`, `hierarchy` (valid until the
+    next command) and `resolution`; and `stamps`, the clock [s] at the start of the tick, after
+    kinematics, after rows (including sensing and allocation) and after solving, without the time
+    that a simulated camera takes to render its image. A tick with an unusable measurement is not
+    `answered` and leaves allocation and hierarchy unchanged. `policy` has the events of the tick,
+    `blend` the weight of the present stack, or is None.
     """
 
     hierarchy: Hierarchy
@@ -58,7 +58,7 @@ class Controller:
         self._outside = 0.0
         self._deadline = control.policy.deadline or inf
         self._stale_after, self._measured_at = control.policy.stale_after, -inf
-        # What a first tick without a measurement goes on from.
+        # A first tick without a measurement continues from this state.
         cell.state.move(0.0, cell.plant.q, cell.plant.v)
         self.sent = cell.plant.v.copy() if self.level == "velocity" else np.zeros(cell.robot.n)
         cell.state.commanded = self.sent if self.level == "velocity" else None
@@ -70,14 +70,14 @@ class Controller:
 
     @property
     def answered(self) -> bool:
-        """Whether the resolver was asked in the last tick."""
+        """Whether the resolver was called in the last tick."""
         return self.resolution is not self._unanswered
 
     def command(self, t: float, q: Array, v: Array, measured_at: float | None = None) -> Array:
-        """Return the velocity or acceleration (n,) to send at time t [s], joints at q and v.
+        """Return the velocity or acceleration (n,) to send at time t [s] with the joints at q, v.
 
         `measured_at` [s] is the time of q and v, None for t. The command is finite whatever was
-        measured; `control.policy` says what it is in a tick with trouble.
+        measured; `control.policy` decides it in a tick with trouble.
         """
         clock, state = self.clock, self.cell.state
         troubles: list[str] = []
@@ -99,9 +99,9 @@ class Controller:
         return sent
 
     def rehearse(self) -> None:
-        """Call every kernel of the loop once, so that none is loaded while ticks are timed.
+        """Call every kernel of the loop once, so that none is loaded during timed ticks.
 
-        Spoils the controller's state; make another for the run.
+        This changes the controller's state; use another controller for the run.
         """
         plant, tasks = self.cell.plant, self.cell.stack.names
         self.command(0.0, plant.q, plant.v)
@@ -111,7 +111,7 @@ class Controller:
 
     def _move(self, t: float, q: Array, v: Array, measured_at: float | None,
               troubles: list[str]) -> None:
-        """Go to what was measured if it is new and finite, else on from the last such state."""
+        """Move to a new, finite measurement; otherwise extrapolate from the last one."""
         state, stamp = self.cell.state, t if measured_at is None else measured_at
         new = stamp > self._measured_at
         if new and state.move(t, q, v):
@@ -124,7 +124,7 @@ class Controller:
         state.move(t, *self._carried_on(t - state.t))
 
     def _carried_on(self, dt: float) -> tuple[Array, Array]:
-        """Return q (nq,), v (n,) after `dt` [s] under the command that was sent last."""
+        """Return q (nq,), v (n,) after `dt` [s] under the last command sent."""
         state, x = self.cell.state, self.sent
         if self.level == "velocity":
             return state.robot.integrate(state.q, x * dt), x
@@ -144,7 +144,7 @@ class Controller:
                 troubles.append("inside" if nearest <= 0.0 else "not_finite")
 
     def _answer(self, troubles: list[str]) -> Array:
-        """Return the resolver's answer (n,), or zero where nothing usable was measured."""
+        """Return the resolver's answer (n,), or zero if the measurement is unusable."""
         if troubles and troubles != ["inside"]:
             self.resolution, self._written = self._unanswered, self.clock()
             return self.resolution.x

@@ -1,4 +1,4 @@
-"""What goes wrong on purpose: faults put between plant, sensor, resolver and controller."""
+"""Injected faults, placed between plant, sensor, resolver and controller."""
 
 from __future__ import annotations
 
@@ -14,22 +14,22 @@ from hierarchy.problem import Array, Hierarchy
 from hierarchy.robot import Frame, Robot
 from hierarchy.state import State
 from scenarios.cell.build import build
-from scenarios.cell.sensors import DepthSensor, ExactDistances, Sensor
+from scenarios.cell.sensors import DepthSensor, Sensor
 from scenarios.config import Scenario, ScenarioError
 from scenarios.config.avoidance import ObstacleSection
 from scenarios.config.faults import FaultSection
 from scenarios.loop.controller import Controller
 from solvers import Resolution, Resolver, Status
 
-_AWAY = (1e3, 1e3, 1e3)  # [m] where an obstacle waits for its time
+_AWAY = (1e3, 1e3, 1e3)  # [m] where an obstacle is until its fault starts
 
 
 @final
 class Faults:
-    """The faults of a scenario, and a `controller` that they happen to.
+    """The faults of a scenario, and the `controller` that they affect.
 
-    `measure` has to be called once before each command, in order of time. Raises ScenarioError
-    where a fault does not fit the robot.
+    Call `measure` once before each command, in order of time. Raises ScenarioError where a fault
+    does not fit the robot.
     """
 
     def __init__(self, scenario: Scenario) -> None:
@@ -39,7 +39,7 @@ class Faults:
         for i, fault in enumerate(scenario.faults):
             _check(f"faults.{i}", fault, cell.robot)
         if cell.sensor is not None:
-            cell = replace(cell, sensor=_FaultySensor(cell.sensor, self))
+            cell = replace(cell, sensor=FaultySensor(cell.sensor, self))
         self._plant, self._robot, self._sensor = cell.plant, cell.robot, cell.sensor
         self._last = cell.plant.q.copy(), cell.plant.v.copy(), 0.0
         self._skipped, self._skipped_at = 0.0, -1.0
@@ -63,15 +63,15 @@ class Faults:
         return self._last
 
     def now(self, kind: str) -> Iterator[FaultSection]:
-        """Yield the faults of a kind that are under way."""
+        """Yield the active faults of a kind."""
         return (fault for fault in self._sections if fault.kind == kind and self._on(fault))
 
     def clock(self) -> float:
-        """Return the time [s] by a clock that faults may advance."""
+        """Return the time [s] of a clock that faults may advance."""
         return perf_counter() + self._skipped
 
     def overrun(self) -> None:
-        """Let the present tick take as long as the faults under way say."""
+        """Let the present tick take as long as the active faults say."""
         if self._skipped_at != self._now:  # once a tick
             self._skipped_at = self._now
             self._skipped += sum(fault.takes or 0.0 for fault in self.now("overrun"))
@@ -80,7 +80,7 @@ class Faults:
         return 0.0 <= self._now - fault.at + self._half < fault.duration
 
     def _place_obstacles(self) -> None:
-        """Bring the obstacles of faults to where they belong at this time."""
+        """Place the obstacles of faults for this time."""
         spheres = [fault for fault in self._sections if fault.kind == "obstacle"]
         for i, fault in enumerate(spheres, -len(spheres)):
             if self._on(fault) == (i in self._standing):
@@ -91,14 +91,20 @@ class Faults:
                 _place(fault, self._robot, self._plant.q) if i in self._standing else _AWAY)
 
 
-class _FaultySensor(ExactDistances):
-    """Stands in for a sensor, with all that this one has."""
+class FaultySensor:
+    """Wraps a sensor, sharing its measurement and obstacles."""
 
     def __init__(self, sensor: Sensor, faults: Faults) -> None:
-        self.__dict__.update(sensor.__dict__)
         self._inner, self._faults = sensor, faults
+        self.measurement, self.obstacles, self.outside = sensor.measurement, sensor.obstacles, 0.0
+
+    def check_start(self, state: State) -> None:
+        """Raise a HierarchyError if an obstacle touches a point at the start."""
+        self._inner.check_start(state)
 
     def measure(self, state: State) -> Measurement:
+        """Measure with the sensor and apply the active faults."""
+        self.outside = 0.0
         if any(self._faults.now("stale")):
             return self.measurement
         if isinstance(self._inner, DepthSensor):
@@ -116,14 +122,14 @@ class _FaultySensor(ExactDistances):
 @final
 @dataclass(frozen=True, kw_only=True)
 class _FaultyResolver(Resolver):
-    """Stands in for a resolver; its answers may come late or under another status."""
+    """Wraps a resolver; its answers may be late or have another status."""
 
     name: ClassVar[str] = "faulty"
     inner: Resolver
     faults: Faults
 
     def solve(self, h: Hierarchy, memory: Any = None) -> Resolution:
-        """Resolve h as the inner resolver does, but for the faults under way."""
+        """Solve h with the inner resolver and apply the active faults."""
         resolution = self.inner.solve(h, memory)
         self.faults.overrun()
         for fault in self.faults.now("status"):
@@ -134,7 +140,7 @@ class _FaultyResolver(Resolver):
 
 
 def _with_room_for_obstacles(scenario: Scenario) -> Scenario:
-    """Return the scenario with one more obstacle, far away, for each that a fault will bring."""
+    """Return the scenario with one distant obstacle added for each obstacle fault."""
     radii = [fault.radius for fault in scenario.faults if fault.kind == "obstacle"]
     if not radii or scenario.avoidance is None:
         return scenario

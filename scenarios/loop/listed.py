@@ -1,4 +1,4 @@
-"""What became of the tasks that a scenario lists: their errors, tick by tick."""
+"""The errors of the tasks that a scenario lists, tick by tick."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ if TYPE_CHECKING:
 
 
 def error_of(name: str) -> str:
-    """Name of the signal (T, m) that has the error of a listed task."""
+    """Name of the signal (T, m) with the error of a listed task."""
     return f"task_error_{name.replace(' ', '_')}"
 
 
 def position_of(name: str) -> str:
-    """Name of the signal (T, 3) [m] of where the point is that a listed task moves."""
+    """Name of the signal (T, 3) [m] with the position of the point that a listed task moves."""
     return f"task_position_{name.replace(' ', '_')}"
 
 
@@ -52,9 +52,9 @@ def _position(task: Task, state: State) -> Array | None:
 
 
 def errors(recording: Recording) -> Iterator[tuple[ListedTask, str, Array]]:
-    """Yield of each listed task its section, a unit, and how large its error is: (T,).
+    """Yield section, unit and size of the error (T,) of each listed task.
 
-    A pose comes twice, [m] and [deg]; a pointing task in [deg], off its cone or outside it.
+    A pose comes twice, in [m] and [deg]; a pointing task in [deg], off its cone or outside it.
     """
     for section in recording.scenario.tasks:
         if error_of(section.title) not in recording:

@@ -1,4 +1,4 @@
-"""What is sent in a tick with trouble, and the guard that every command passes."""
+"""What is sent in a tick with trouble, and the guard that every command passes through."""
 
 # mypy: disable-error-code="no-untyped-def"
 
@@ -14,20 +14,20 @@ from hierarchy.problem import Array
 from hierarchy.task import Level
 from scenarios.config.control import PolicySection
 
-_ORDER = ("use", "hold", "brake", "stop")  # the last that a trouble of the tick asks for is done
+_ORDER = ("use", "hold", "brake", "stop")  # the last of those requested in a tick is taken
 _BRAKE = 10.0    # [1/s] deceleration per velocity
 _AT_REST = 1e-9  # [rad/s]
-_UNCHANGED = 1e-9  # what a clamp may take off a command unmentioned, relative to 1 + |x|
+_UNCHANGED = 1e-9  # change by a clamp that is not reported, relative to 1 + |x|
 
 
 @final
 class Policy:
     """Chooses the command of each tick.
 
-    `clamp` moves a command (n,) to the nearest that the robot's limits allow in this tick; None
-    for a robot without limits. After `choose`: `events` are the (kind, action) of the tick; `fault`
-    says why the run is to end, once a "stop" was asked for, and `stopped` that the robot is at rest
-    since then.
+    `clamp` moves a command (n,) to the nearest one that the robot's limits allow in this tick; None
+    for a robot without limits. After `choose`: `events` are the (kind, action) pairs of the tick;
+    `fault` is the reason for ending the run, once a "stop" was requested, and `stopped` is whether
+    the robot has come to rest since then.
     """
 
     def __init__(self, section: PolicySection, level: Level, period: float,
@@ -44,7 +44,7 @@ class Policy:
         """Return the command (n,) to send at time t [s].
 
         `troubles` are the kinds of trouble of the tick, x (n,) the answer, v (n,) the joint
-        velocity as far as it is known. The command is finite and within the limits.
+        velocity as far as known. The command is finite and within the limits.
         """
         if troubles or self.fault is not None or not finite(x):
             return self._otherwise(t, troubles, x, v)
@@ -74,7 +74,7 @@ class Policy:
         return "brake" if action == "hold" and spent else action
 
     def _slower(self, action: str, v: Array) -> Array:
-        """Return the command that brings v toward zero: to "stop" at once, else at `_BRAKE`."""
+        """Return the command that brings v toward zero: at once for "stop", else at `_BRAKE`."""
         rate = 1.0 / self._period
         if action == "brake":
             rate = min(rate, _BRAKE)
@@ -87,7 +87,7 @@ class Policy:
         return command
 
     def _within_limits(self, x: Array) -> Array:
-        """Return x as the limits allow it; a change is an event."""
+        """Return x moved within the limits; a change is an event."""
         if self._clamp is None:
             return x
         command = self._clamp(x)
@@ -107,7 +107,7 @@ def finite(values):
 
 @compiled
 def _differ(command, x):
-    """Whether a clamp took more off x (n,) than is left unmentioned."""
+    """Whether a clamp changed x (n,) by enough to be reported."""
     most = largest = 0.0
     for i in range(len(x)):
         most, largest = max(most, abs(command[i] - x[i])), max(largest, abs(x[i]))
@@ -116,7 +116,7 @@ def _differ(command, x):
 
 @compiled
 def smallest(values):
-    """Return the smallest entry of an array (n,), NaN if one is NaN, infinity if it is empty."""
+    """Return the smallest entry of an array (n,): NaN if any is NaN, infinity if it is empty."""
     least = np.inf
     for i in range(len(values)):
         if np.isnan(values[i]):

@@ -1,4 +1,4 @@
-"""Write what the camera of a scenario sees as a folder of depth images.
+"""Write the depth images of a scenario's camera to a folder.
 
 python -m scenarios.loop.record_frames SCENARIO FOLDER [KEY=VALUE ...]
 """
@@ -25,9 +25,9 @@ _MILLIMETRE = 1e-3
 
 
 def write(folder: str | Path, recording: Recording, frames: int | None = None) -> Path:
-    """Write what the camera of a run saw, at most the first `frames` images, into a new folder.
+    """Write the camera images of a run, at most the first `frames`, to a new folder.
 
-    The run is one with sensor.kind = "camera". Depths are rounded to millimetres.
+    The run must have sensor.kind = "camera". Depths are rounded to millimetres.
     """
     from PIL import Image as Png
 
@@ -61,7 +61,7 @@ def _plain(value: Any) -> Any:
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Run the command of the module's text."""
+    """Run the command described in the module's docstring."""
     if len(arguments) < 2:
         print("python -m scenarios.loop.record_frames SCENARIO FOLDER [KEY=VALUE ...]",
               file=sys.stderr)

@@ -1,4 +1,4 @@
-"""Writes one row a tick while the loop runs; nothing is computed from it there."""
+"""Writes one row per tick while the loop runs; nothing is computed from it there."""
 
 # mypy: disable-error-code="no-untyped-def"
 
@@ -15,16 +15,17 @@ from hierarchy.state import State
 from scenarios.config import Scenario
 from scenarios.loop import listed
 from scenarios.loop.controller import Controller
+from scenarios.loop.facts import facts_of
 from scenarios.loop.recording import Event, Recording
 
-FASTEST = 1e3  # [rad/s or m/s] of a joint; what moves faster has diverged
+FASTEST = 1e3  # [rad/s or m/s] of a joint; a faster motion has diverged
 _TIMES = ("time_kinematics", "time_rows", "time_resolve", "time_tick")
 
 
 class Recorder:
-    """Room for a whole run, filled row by row.
+    """Memory for a whole run, filled row by row.
 
-    `ticks` is the number of rows written so far.
+    `ticks` is the number of rows written so far; `facts` are those of the first controller.
     """
 
     def __init__(self, controller: Controller, ticks: int) -> None:
@@ -33,7 +34,7 @@ class Recorder:
         distances = len(cell.sensor.measurement.distance) if cell.sensor else 0
         self._orders: dict[tuple[str, ...], int] = {}
         # One row: t, q, v, a, command, end effector, target, cone error, distances.
-        # All are written once here: the system maps memory when it is first touched.
+        # All rows are written once here: the system maps memory when it is first touched.
         self._log = np.full((ticks, 8 + robot.nq + 3 * robot.n + distances), np.nan)
         self._choices = np.full((ticks, 5), -1, dtype=np.int16)
         self._times, self._over = np.full((ticks, len(_TIMES)), np.nan), np.full(ticks, np.nan)
@@ -42,10 +43,11 @@ class Recorder:
                        for name, value in cell.plant.extra.items()}
         self._weights = np.empty(ticks if controller.blend else 0)
         self._events: list[Event] = []
+        self.facts = facts_of(cell.scenario, robot)
         self.follow(controller)
 
     def follow(self, controller: Controller) -> None:
-        """Go on with this controller, of the same robot, plant and points that are measured."""
+        """Continue with this controller, which has the same robot, plant and measured points."""
         self._controller, self._cell = controller, controller.cell
         cell, state = controller.cell, controller.cell.state
         self._frame = cell.robot.frame(cell.robot.end_effector)
@@ -59,9 +61,9 @@ class Recorder:
         self._blend, self._policy = controller.blend, controller.policy
 
     def write(self) -> bool:
-        """Record the tick whose command was just applied; False if its state is of no use.
+        """Record the tick whose command was just applied; return False if its state is invalid.
 
-        That is not finite, or a joint faster than FASTEST.
+        A state is invalid if it is not finite or a joint is faster than FASTEST.
         """
         controller, cell, k = self._controller, self._cell, self.ticks
         order, repulsion = controller.allocation
@@ -85,11 +87,11 @@ class Recorder:
         return bool(finite)
 
     def stamp(self, clock: float) -> None:
-        """Note when the tick just written was over [s]."""
+        """Note the clock [s] at the end of the tick just written."""
         self._over[self.ticks - 1] = clock
 
     def finish(self, scenario: Scenario, fault: str | None) -> Recording:
-        """Return what was recorded so far."""
+        """Return the run as recorded so far."""
         robot, rows = self._cell.robot, slice(0, self.ticks)
         n, log = robot.n, self._log[rows]
         widths = [1, robot.nq, n, n, n, 3, 3, 1, max(len(self._distance) - 1, 0)]
@@ -122,12 +124,12 @@ class Recorder:
         signals |= dict(zip(_TIMES, times.T.copy(), strict=True))
         signals |= {"joint_lower": robot.lower, "joint_upper": robot.upper,
                     "velocity_limit": robot.velocity_limit}
-        return Recording(signals, tuple(" > ".join(names) for names in orders), scenario, fault,
-                         tuple(self._events))
+        return Recording(signals, tuple(" > ".join(names) for names in orders), scenario,
+                         self.facts, fault, tuple(self._events))
 
 
 def _positions(robot: Robot, frame: Frame, q: Array) -> Array:
-    """Where a frame's origin is (T, 3) [m] at joint positions q (T, nq)."""
+    """Positions (T, 3) [m] of a frame's origin at joint positions q (T, nq)."""
     state, at_rest = State(robot), np.zeros(robot.n)
     positions = np.full((len(q), 3), np.nan)
     for k, row in enumerate(q):
@@ -138,7 +140,7 @@ def _positions(robot: Robot, frame: Frame, q: Array) -> Array:
 
 @compiled
 def _write_given(log, k, first, a, command):
-    """Write the acceleration and the command of tick k; whether the former is finite."""
+    """Write acceleration and command of tick k; return whether the acceleration is finite."""
     row, n, finite = log[k], len(a), True
     for j in range(n):
         row[first + j] = a[j]
@@ -151,7 +153,7 @@ def _write_given(log, k, first, a, command):
 def _write(log, choices, times, q, v, placements, joint, offset, target, distance,
            k, order, active, repulsion, status, iterations, t, cone_error,
            begin, moved, written, resolved):
-    """Write the rest of tick k; whether q is finite, and v within FASTEST."""
+    """Write the rest of tick k; return whether q is finite and v within FASTEST."""
     row = log[k]
     row[0] = t
     i = 1

@@ -1,7 +1,9 @@
-"""A finished run: arrays by name, time first, SI units, with the scenario that made it."""
+"""A finished run: arrays by name, time first, in SI units, and the facts to read them by."""
 
 from __future__ import annotations
 
+import dataclasses
+import json
 import os
 import platform
 import zipfile
@@ -12,16 +14,19 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import TypeAdapter
 
 from hierarchy.errors import HierarchyError
 from scenarios.files import write_json
+from scenarios.loop.depth_view import DepthView
+from scenarios.loop.facts import Facts
 
 if TYPE_CHECKING:
     from scenarios.config import Scenario
 
 
 class Event(NamedTuple):
-    """What kind of trouble a tick had, as in `scenarios.loop.policy`, and what was done."""
+    """The kind of trouble in a tick and the action taken; see `scenarios.loop.policy`."""
 
     tick: int
     kind: str
@@ -33,44 +38,52 @@ _EVENT = np.dtype([("tick", np.int64), ("kind", "U24"), ("action", "U8")])
 
 @dataclass(frozen=True)
 class Recording:
-    """What one run did, tick by tick.
+    """One run, tick by tick.
 
-    Row k of `q` and `v` is the state before the command of tick k, `a` is the acceleration that
-    this command meant, so row 0 is the start. T ticks, n joints, K control points.
+    Row k of `q` and `v` is the state before the command of tick k, so row 0 is the start; `a` is
+    the acceleration that this command means. T ticks, n joints, K control points, N tasks.
 
     Signals
     -------
     t (T,) [s] · q, v, a (T, n) [rad, rad/s, rad/s^2], q and v as the controller knew them
-    command (T, n) that was sent: a velocity or an acceleration, after `scenario.control.level`
-    true_q, true_v (T, n) the true state where measuring or physics keep it apart from q and v;
-    true_ee_position (T, 3) [m] after true_q
-    contacts (T,) points of arm and obstacles that touched at once in the period of tick k;
-    contact_depth (T,) [m], contact_force (T,) [N], of a plant with physics
+    command (T, n) as sent: a velocity or an acceleration, depending on `scenario.control.level`
+    true_q, true_v (T, n) the true state where measurement or physics make it differ from q and v;
+    true_ee_position (T, 3) [m] from true_q
+    contacts (T,) largest number of contacts between arm and obstacles at once in the period of
+    tick k; contact_depth (T,) [m], contact_force (T,) [N]; from a plant with physics
     ee_position, desired_position, position_error (T, 3) [m], error = desired - actual
     pointing_error (T,) cos(alpha_d) - cos(alpha), positive outside the cone
     pointing_active (T,) bool, whether the pointing task was in the stack
-    task_error_NAME (T, m) of each task of `[[tasks]]`, a space of its name being "_", as the task
-    defines it; task_position_NAME (T, 3) [m] of the point or centre of mass that it moves
+    task_error_NAME (T, m) of each task of `[[tasks]]`, as the task defines it, with "_" for a space
+    in its name; task_position_NAME (T, 3) [m] of the point or centre of mass that it moves
     control_point_distance (T, K) [m] to the nearest obstacle; minimal_distance (T,) [m], eq. (31)
-    active_control_point (T,) number 1..K of the point whose avoidance was in the stack, or -1
+    active_control_point (T,) number 1..K of the point whose avoidance is in the stack, or -1
     ee_distance (T,) [m]; repulsion_active (T,) bool, whether eq. (30) was in force
     order (T,) index into `orders`; status (T,) value of solvers.Status; iterations (T,)
     transition (T,) weight of the present stack's answer in the command, where stacks are blended
-    certified (T,) bool, whether x is the undamped answer, in a run that was certified
-    time_kinematics, time_rows, time_resolve, time_tick (T,) [s] of computing; where stacks are
-    blended, time_resolve has the rows of the former ones too; time_tick has the plant's step too
+    certified (T,) bool, whether x is the undamped answer, in a certified run
+    moved_by_lower (T,) [m], see `scenarios.loop.audit.Strictness`
+    level_fate (T, N) value of `scenarios.loop.fate.Fate` of each of the `task_names` under the
+    command that was sent; level_violation (T, N) Euclidean norm of the violation of its rows, in
+    their unit, NaN where the task is absent or its fate unknown; saturated (T, n) -1 or 1 where a
+    joint is at the lower or upper side of its limits' box of commands, else 0
+    time_kinematics, time_rows, time_resolve, time_tick (T,) [s] of computation; time_resolve
+    includes the rows of former stacks where stacks are blended, time_tick the plant's step
     joint_lower, joint_upper, velocity_limit (n,) of the robot, infinite where it has none
-    obstacle_offset (T, H, 3) [m] by which obstacles had been dragged off their places, changed (T,)
-    bool, whether that or a setting was other than the scenario says, in a live run
+    obstacle_offset (T, H, 3) [m] by which obstacles were dragged off their places, changed (T,)
+    bool, whether obstacles or settings differ from the scenario, in a live run
 
-    A signal that the scenario has no use for is absent. `events` are the ticks with trouble.
+    A signal that does not apply to the scenario is absent. `events` are the ticks with trouble,
+    `facts` describe robot and resolver, `depth` is an image of the camera, if there is one.
     """
 
     signals: dict[str, NDArray[Any]]
     orders: tuple[str, ...]
     scenario: Scenario
+    facts: Facts
     fault: str | None = None
     events: tuple[Event, ...] = ()
+    depth: DepthView | None = None
 
     def __getitem__(self, name: str) -> NDArray[Any]:
         return self.signals[name]
@@ -80,15 +93,25 @@ class Recording:
 
     @property
     def ticks(self) -> int:
-        """Number of ticks that were run."""
+        """Number of ticks."""
         return len(self.signals["t"])
 
+    @property
+    def order_names(self) -> tuple[tuple[str, ...], ...]:
+        """The tasks of each of the orders, most important first."""
+        return tuple(tuple(name for name in order.split(" > ") if name) for order in self.orders)
+
+    @property
+    def task_names(self) -> tuple[str, ...]:
+        """The tasks that were in the stack in any tick (N,)."""
+        return tuple(dict.fromkeys(name for order in self.order_names for name in order))
+
     def switches(self) -> NDArray[np.int64]:
-        """Ticks k at which the stack's order differs from that of tick k - 1."""
+        """Ticks k at which the order of the stack differs from that of tick k - 1."""
         return np.flatnonzero(np.diff(self.signals["order"])) + 1
 
     def troubles(self) -> dict[tuple[str, str], list[int]]:
-        """Ticks of each kind of trouble and what was done, in the order of their first."""
+        """Ticks of each kind of trouble and action, ordered by first occurrence."""
         found: dict[tuple[str, str], list[int]] = {}
         for tick, kind, action in self.events:
             found.setdefault((kind, action), []).append(tick)
@@ -96,12 +119,12 @@ class Recording:
 
 
 def write(recording: Recording, folder: Path) -> None:
-    """Write what a run consists of into a folder that exists.
+    """Write a run to an existing folder.
 
-    That is `run.npz` (the signals by name, with `orders`, `fault` and `events`), `timings.npz` (the
-    signals time_*), `scenario.toml` as it was run, and `versions.json`. Times are measured, all
-    else follows from the scenario: the same scenario and versions give a `run.npz` of the same
-    bytes.
+    The files are `run.npz` (the signals by name, `orders`, `fault` and `events`), `timings.npz`
+    (the signals time_*), `facts.json`, `depth.npz` if there is a camera image, `scenario.toml` as
+    run, and `versions.json`. Only times are measured: the same scenario and versions give the same
+    bytes of `run.npz`.
     """
     times = {name: signal for name, signal in recording.signals.items() if name.startswith("time_")}
     rest = {name: signal for name, signal in recording.signals.items() if name not in times}
@@ -110,16 +133,20 @@ def write(recording: Recording, folder: Path) -> None:
                         fault=np.array(recording.fault or ""),
                         events=np.array(list(recording.events), dtype=_EVENT))
     np.savez_compressed(folder / "timings.npz", allow_pickle=False, **times)
+    if recording.depth is not None:
+        np.savez_compressed(folder / "depth.npz", allow_pickle=False, **recording.depth.arrays())
+    write_json(folder / "facts.json", dataclasses.asdict(recording.facts))
     write_json(folder / "versions.json", versions())
     (folder / "scenario.toml").write_text(recording.scenario.to_toml(), encoding="utf-8")
 
 
 def load_run(folder: str | Path) -> Recording:
-    """Read the Recording that `write` wrote.
+    """Read the Recording that `write` wrote; nothing outside the folder is needed.
 
     Raises
     ------
-    HierarchyError : a file of the run is missing or damaged, named.
+    HierarchyError : a file of the run is missing or damaged, named, or the run was written by an
+        earlier version.
     """
     from scenarios.config import load
 
@@ -128,15 +155,16 @@ def load_run(folder: str | Path) -> Recording:
     if not (path / "run.npz").exists():
         raise HierarchyError(f"{path} is not a run folder: it has no run.npz")
     signals = _arrays(path / "run.npz")
-    for name in ("orders", "fault"):
+    if not (path / "facts.json").exists():
+        raise HierarchyError(f"{path} was written by an earlier version; run the scenario again")
+    for name in ("orders", "fault", "events"):
         if name not in signals:
             raise HierarchyError(f"{path / 'run.npz'} cannot be read: it has no {name!r}")
-    orders, fault = signals.pop("orders"), signals.pop("fault")
-    events = signals.pop("events", np.empty(0, _EVENT))
-    if (path / "timings.npz").exists():  # earlier versions wrote the times into run.npz
-        signals |= _arrays(path / "timings.npz")
-    return Recording(signals, tuple(map(str, orders)), scenario, str(fault) or None,
-                     tuple(Event(*event) for event in events.tolist()))
+    orders, fault, events = (signals.pop(name) for name in ("orders", "fault", "events"))
+    signals |= _arrays(path / "timings.npz")
+    return Recording(signals, tuple(map(str, orders)), scenario, _facts(path / "facts.json"),
+                     str(fault) or None, tuple(Event(*event) for event in events.tolist()),
+                     _depth(path / "depth.npz"))
 
 
 def _arrays(path: Path) -> dict[str, NDArray[Any]]:
@@ -147,8 +175,24 @@ def _arrays(path: Path) -> dict[str, NDArray[Any]]:
         raise HierarchyError(f"{path} cannot be read: {error}") from error
 
 
+def _facts(path: Path) -> Facts:
+    try:
+        return TypeAdapter(Facts).validate_python(json.loads(path.read_text(encoding="utf-8")))
+    except (OSError, ValueError) as error:
+        raise HierarchyError(f"{path} cannot be read: {error}") from error
+
+
+def _depth(path: Path) -> DepthView | None:
+    if not path.exists():
+        return None
+    try:
+        return DepthView.of_arrays(_arrays(path))
+    except KeyError as error:
+        raise HierarchyError(f"{path} cannot be read: it has no {error}") from error
+
+
 def versions() -> dict[str, str]:
-    """Return the versions and the processor that a run's numbers were made with."""
+    """Return the versions and the processor of this installation."""
     packages = ("task-hierarchy", "numpy", "numba", "pin", "qpsolvers", "proxsuite", "osqp",
                 "mujoco")
     return {"python": platform.python_version(), **{name: _version(name) for name in packages},

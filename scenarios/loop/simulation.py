@@ -1,4 +1,4 @@
-"""The control loop: a controller and a plant, tick after tick, recorded."""
+"""The simulation loop: a controller and a plant, recorded tick by tick."""
 
 from __future__ import annotations
 
@@ -8,9 +8,10 @@ import numpy as np
 
 from hierarchy.problem import Array
 from scenarios.config import Scenario
-from scenarios.loop.audit import Audit, Certified, Judged, Strictness
+from scenarios.loop.audit import Audit, Certified, Judging, Strictness
 from scenarios.loop.controller import Controller
 from scenarios.loop.faults import Faults
+from scenarios.loop.judging import completed
 from scenarios.loop.recorder import FASTEST, Recorder
 from scenarios.loop.recording import Recording
 
@@ -21,13 +22,14 @@ def simulate(scenario: Scenario, progress: Callable[[int, int], None] | None = N
              certified: bool = False) -> Recording:
     """Run a scenario from its start to its end.
 
-    `progress(done, total)` is called now and then. A run that is interrupted (Ctrl-C), that is
-    stopped by its policy, whose state stops being finite or whose joints pass `recorder.FASTEST`
-    ends early: the Recording has all ticks so far and says why in `fault`. With `certified`, every
-    answer is judged by `solvers.certify` after its tick was timed, and the Recording has the
-    verdicts as its signal `certified`; with `control.strictness` it has `moved_by_lower`, see
-    scenarios.loop.audit.Strictness; with a camera it has what became of each level, see `Judged`
-    there. Raises HierarchyError where the scenario does not fit its robot or resolver.
+    `progress(done, total)` is called every 500 ticks. A run ends early if it is interrupted
+    (Ctrl-C), if its policy stops it, if its state is no longer finite, or if a joint is faster than
+    `recorder.FASTEST`: the Recording then has all ticks so far and says why in `fault`. With
+    `certified`, `solvers.certify` judges every answer after its tick was timed, and the Recording
+    has the verdicts as its signal `certified`; with `control.strictness` it has `moved_by_lower`,
+    see scenarios.loop.audit.Strictness. What became of each level is judged after the last tick,
+    or, with a camera, after each tick. Raises HierarchyError where the scenario does not fit its
+    robot or resolver.
     """
     rehearsal = Controller(scenario)
     rehearsal.rehearse()
@@ -44,9 +46,8 @@ def simulate(scenario: Scenario, progress: Callable[[int, int], None] | None = N
         fault = f"interrupted at tick {recorder.ticks}"
     recording = recorder.finish(scenario, fault)
     for audit in audits:
-        recording.signals.update((name, values[:recording.ticks])
-                                 for name, values in audit.signals.items())
-    return recording
+        recording.signals.update(audit.signals(recording))
+    return completed(recording, rehearsal.cell)
 
 
 def _audits(controller: Controller, scenario: Scenario, ticks: int, certified: bool
@@ -55,7 +56,7 @@ def _audits(controller: Controller, scenario: Scenario, ticks: int, certified: b
     if scenario.control.strictness:
         audits.append(Strictness(ticks, scenario))
     if scenario.sensor.kind != "exact":  # rows cannot be written again without the images
-        audits.append(Judged(ticks, controller))
+        audits.append(Judging(ticks, controller.cell))
     return audits
 
 
@@ -80,7 +81,7 @@ def _run(controller: Controller, recorder: Recorder, period: float, ticks: int,
 
 def tick(controller: Controller, recorder: Recorder, t: float,
          faults: Faults | None = None) -> str | None:
-    """Command, act and record once, at time t [s]; say what is wrong with the state, or None."""
+    """Command, act and record once at time t [s]; return what is wrong with the state, or None."""
     plant = controller.cell.plant
     if faults is None:
         plant.act(controller.command(t, plant.q, plant.v))

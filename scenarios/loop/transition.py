@@ -1,11 +1,11 @@
-"""From one stack to the next without a jump: a convex combination of their answers.
+"""Transition from one stack to the next without a jump: a convex combination of their answers.
 
-Every row that all of the stacks share, at the same or a higher priority, is kept by each of their
-answers, so by a convex combination too, and so are bounds. Where one equality task enters or leaves
-it is the intermediate desired value approach of Lee, Mansard, Park, "Intermediate desired value
+Each answer keeps every row that all stacks share at the same or a higher priority, so a convex
+combination keeps it too; the same holds for bounds. Where one equality task enters or leaves, this
+is the intermediate desired value approach of Lee, Mansard, Park, "Intermediate desired value
 approach for task transition of robots in kinematic control" (T-RO 2012): the answer of the stack
-with the task, its target b replaced by h b + (1 - h) J x, with x the answer without it. Undamped
-answers are meant; damping is not linear in b.
+with the task, its target b replaced by h b + (1 - h) J x, where x is the answer without it. This
+holds for undamped answers; damping is not linear in b.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ from hierarchy.allocation import AVOIDANCE
 from hierarchy.problem import Array, Hierarchy
 from solvers import Resolution, Resolver, Status
 
-_NO_WEIGHT = 1e-6  # below this a stack is not worth a solve
+_NO_WEIGHT = 1e-6  # stacks with a smaller weight are not solved
 
 
 class Key(NamedTuple):
-    """What tells one stack from another: its order, and the active point if it avoids by one."""
+    """Identifies a stack: its order, and the active point if it has an avoidance task."""
 
     order: tuple[str, ...]
     active: int = -1
@@ -29,14 +29,14 @@ class Key(NamedTuple):
 
 @final
 class Blend:
-    """Weights of the stacks in force within the last `time` [s], and their answers together.
+    """Weights the stacks of the last `time` [s] and combines their answers.
 
-    The weight of a stack is what a kernel 6 s (1 - s), s the age over `time`, finds of it in the
-    past: after a single change the new stack's rises as the smoothstep s^2 (3 - 2 s), and changes
-    that come before the last is over add up. So weights have continuous derivatives, are not
-    negative and sum to one. The `most` heaviest stacks are solved; their weights, less the first
-    that is left out, are scaled to sum to one again, and so they are where a former stack has no
-    answer. `weight` is that of the present stack in the last answer.
+    The weight of a stack is the integral over its past of the kernel 6 s (1 - s), where s is the
+    age over `time`: after a single change the weight of the new stack rises as the smoothstep
+    s^2 (3 - 2 s), and overlapping changes add up. Weights have continuous derivatives, are not
+    negative and sum to one. The `most` heaviest stacks are solved; their weights, minus the first
+    one left out, are scaled to sum to one again, also where a former stack has no answer. `weight`
+    is that of the present stack in the last answer.
     """
 
     def __init__(self, time: float, most: int = 6) -> None:
@@ -47,9 +47,9 @@ class Blend:
 
     def resolve(self, resolver: Resolver, stack: Stack, state: State,
                 order: tuple[str, ...], hierarchy: Hierarchy) -> tuple[Resolution, Array]:
-        """Return what the present stack's solve gave, and the combined answer x (n,).
+        """Return the resolution of the present stack and the combined answer x (n,).
 
-        `hierarchy` has the rows of `order` at `state`, and has them afterwards.
+        `hierarchy` has the rows of `order` at `state`, before and after the call.
         """
         present = _key(state, order)
         shares = self._shares(present, state.t)
@@ -71,7 +71,7 @@ class Blend:
         return resolution, x
 
     def weights(self, t: float, present: Key) -> dict[Key, float]:
-        """Return the weight of each stack at time t [s], with `present` in force from now on."""
+        """Return the weight of each stack at time t [s], with `present` active from now on."""
         visits = self._visits
         if visits and t < visits[-1][1]:  # another run
             visits.clear()
@@ -86,11 +86,11 @@ class Blend:
         return found
 
     def _shares(self, present: Key, t: float) -> dict[Key, float]:
-        """Return the heaviest stacks with their weights, which need not sum to one."""
+        """Return the heaviest stacks and their weights, which need not sum to one."""
         if len(self._visits) == 1 and self._visits[0][0] == present:
             return {present: 1.0}
         ranked = sorted(self.weights(t, present).items(), key=lambda item: -item[1])
-        # Less the first weight left out, so that nothing jumps where two change places.
+        # Minus the first weight left out, so that nothing jumps when two stacks change places.
         least = ranked[self._most][1] if len(ranked) > self._most else 0.0
         return {key: weight - least for key, weight in ranked[:self._most]
                 if weight - least > _NO_WEIGHT}
@@ -107,7 +107,7 @@ def _key(state: State, order: tuple[str, ...]) -> Key:
 
 
 def _rows(stack: Stack, state: State, key: Key) -> Hierarchy:
-    """Write a former stack's rows at the present state, with the point that was active in it."""
+    """Write a former stack's rows at the present state, with its own active point."""
     seen = state.measurement
     if seen is None:
         return stack.hierarchy(state, key.order)

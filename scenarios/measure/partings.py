@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 if TYPE_CHECKING:
+    from scenarios.loop.facts import Facts
     from scenarios.measure.runs import Run
 
 BOUND = 1e-6  # [rad] of any joint, or what the resolver declares as its accuracy where that is more
@@ -48,7 +49,7 @@ def partings(runs: Sequence[Run]) -> list[Parting]:
     if len({run.scenario.name for run in runs}) != 1:
         return []
     strict = [run for run in runs if run.recording and run.recording.ticks
-              and run.scenario.make_resolver().strict]
+              and run.recording.facts.resolver.strict]
     return [_parting(run, strict[0]) for run in strict[1:]]
 
 
@@ -56,7 +57,7 @@ def _parting(run: Run, other: Run) -> Parting:
     assert run.recording is not None
     assert other.recording is not None
     ticks = min(run.recording.ticks, other.recording.ticks)
-    accuracy = float(run.scenario.make_resolver().accuracy)
+    accuracy = run.recording.facts.resolver.accuracy
     bound = max(BOUND, accuracy)
     apart = abs(run.recording["q"][:ticks] - other.recording["q"][:ticks]).max(axis=1)
     beyond = np.flatnonzero(~(apart <= bound))
@@ -73,19 +74,23 @@ def _why(run: Run, other: Run, tick: int, accuracy: float) -> str:
         failed = np.flatnonzero(_signal(one, "status")[:tick + 1] != 0)
         if failed.size:
             return f"tick {failed[0]} of {one.label} was not solved"
-    if run.scenario.limits_in_stack != other.scenario.limits_in_stack:
+    mine, theirs = _facts(run), _facts(other)
+    if mine.limits_in_stack != theirs.limits_in_stack:
         return "the limits are in the stack of one, and a guard outside it for the other"
-    if run.scenario.asks == "bounds" and "bounds" in (
-            one.scenario.make_resolver().handles for one in (run, other)):
+    if mine.asks == "bounds" and "bounds" in (mine.resolver.handles, theirs.resolver.handles):
         return ("while limits act they agree only undamped, and sns not then: it scales what it "
                 "cannot meet")
-    mine, theirs = (_orders(one)[:tick + 1] for one in (run, other))
-    switched = np.flatnonzero(mine != theirs)
+    switched = np.flatnonzero(_orders(run)[:tick + 1] != _orders(other)[:tick + 1])
     if switched.size:
         return (f"the stack is another one at tick {switched[0]}, where a switch came earlier or "
                 "later for errors below that bound")
     return (f"no tick failed and the stacks are the same; the motion magnifies the errors of each "
             f"tick (declared: {accuracy:.0e})")
+
+
+def _facts(run: Run) -> Facts:
+    assert run.recording is not None
+    return run.recording.facts
 
 
 def _signal(run: Run, name: str) -> Any:

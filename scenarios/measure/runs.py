@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -42,10 +41,11 @@ class Run:
 
     @property
     def settings(self) -> dict[str, Any]:
-        """The resolver's settings as they were used."""
-        resolver = self.scenario.make_resolver()
-        return {field.name: getattr(resolver, field.name) for field in dataclasses.fields(resolver)
-                } if dataclasses.is_dataclass(resolver) else {}
+        """The resolver's settings as they were used, also where the run broke."""
+        from scenarios.loop.facts import resolver_facts
+
+        facts = self.recording.facts.resolver if self.recording else resolver_facts(self.scenario)
+        return dict(facts.settings)
 
     @cached_property
     def metrics(self) -> dict[str, Metric]:

@@ -1,4 +1,4 @@
-"""Curves of a run over the frames that are shown of it."""
+"""Curves of a run, sampled at the frames that are shown."""
 
 from __future__ import annotations
 
@@ -25,10 +25,9 @@ Areas = tuple[tuple[str, float], ...]
 
 @dataclass(frozen=True)
 class Series:
-    """A quantity over the frames: value, and its extremes since the frame before, (F, C) each.
+    """A quantity over the frames: value and its extremes since the previous frame, (F, C) each.
 
-    A mark is a name and the value of a line to compare with. `logarithmic` says on which scale it
-    is best drawn.
+    A mark is the name and the value of a reference line. `logarithmic` is the scale to draw it on.
     """
 
     name: str
@@ -42,13 +41,13 @@ class Series:
 
 
 def marks_of(thresholds: dict[str, float]) -> Areas:
-    """Return thresholds by symbol as (symbol in plain text, value)."""
+    """Return thresholds by symbol as pairs (symbol in plain text, value)."""
     return tuple((_SYMBOLS.get(name, name.strip("$")), radius)
                  for name, radius in thresholds.items())
 
 
 def series(recording: Recording, ticks: NDArray[np.int64]) -> Iterator[Series]:
-    """Yield the curves that a recording has the signals for, at some ticks."""
+    """Yield the curves for which a recording has the signals, at some ticks."""
     scenario = recording.scenario
     if "position_error" in recording:
         error = 1e3 * np.linalg.norm(recording["position_error"], axis=1)
@@ -70,7 +69,7 @@ def series(recording: Recording, ticks: NDArray[np.int64]) -> Iterator[Series]:
 
 
 def _task_errors(recording: Recording, ticks: NDArray[np.int64]) -> Iterator[Series]:
-    """Errors of listed tasks, one series for each unit."""
+    """Yield the errors of listed tasks, one series per unit."""
     if not getattr(recording.scenario, "tasks", ()):
         return
     found: dict[str, dict[str, Array]] = {}
@@ -84,7 +83,7 @@ def _task_errors(recording: Recording, ticks: NDArray[np.int64]) -> Iterator[Ser
 def _sampled(name: str, unit: str, labels: tuple[str, ...], values: Array,
              ticks: NDArray[np.int64], marks: Areas = (), logarithmic: bool = False) -> Series:
     values = values.reshape(len(values), -1)
-    first = np.concatenate(([0], ticks[:-1] + 1))  # so no peak between two frames is lost
+    first = np.concatenate(([0], ticks[:-1] + 1))  # no peak between two frames is lost
     upto = values[:ticks[-1] + 1]
     return Series(name, unit, labels, values[ticks], np.fmin.reduceat(upto, first, axis=0),
                   np.fmax.reduceat(upto, first, axis=0), marks, logarithmic)

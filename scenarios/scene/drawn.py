@@ -1,4 +1,4 @@
-"""What there is to draw of a run: the arm, obstacles, paths, cone, stack and curves, as arrays."""
+"""What is drawn of a run: arm, obstacles, paths, cone, stack and curves, as arrays."""
 
 from __future__ import annotations
 
@@ -10,57 +10,66 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from hierarchy import HierarchyError, Robot, State
-from hierarchy.avoidance import Capsule, ControlPoint, Obstacles
+from hierarchy import HierarchyError
+from hierarchy.avoidance import Capsule, Measurement, Obstacles
+from hierarchy.avoidance.measurement import exact_measurer
 from hierarchy.problem import Array
-from hierarchy.robots import DHTable
 from scenarios.cell.obstacles import make_obstacles
-from scenarios.cell.robot import make_robot, sensed_points
-from scenarios.cell.sensors import ExactDistances
 from scenarios.loop import listed
+from scenarios.loop.facts import Point, RobotFacts
 from scenarios.loop.fate import Fate
+from scenarios.loop.links import ends
 from scenarios.scene.curves import Areas, Series, marks_of, series
-from scenarios.scene.levels import Levels, judge, order_names
-from scenarios.scene.links import capsules, ends, lowest
+from scenarios.scene.levels import Levels, levels_at
 
 if TYPE_CHECKING:
     from scenarios.config import Scenario
     from scenarios.loop.recording import Recording
 
-SEPARATION = "separation"  # the task that keeps all points off all obstacles
+SEPARATION = "separation"  # the task that keeps all points away from all obstacles
+_NO_LAWS = np.array([[0.0, 1.0, 1.0, 1.0]] * 2)  # no repulsion
 
 
 @dataclass(frozen=True)
 class Stage:
-    """What stays the same while a scenario runs.
+    """What does not change during a run.
 
-    capsules of the links, in the frames of their joints; points are the robot's control points and
-    then its end effector; areas and tip_areas are (symbol, radius [m]) around an obstacle at which
-    something changes for a control point and for the end effector; axis (3,) that the end
-    effector's z axis shall have, within half_angle [rad], or None; floor is its height [m].
+    robot: its tree, links, points and floor; areas and tip_areas: (symbol, radius [m]) of the
+    thresholds around an obstacle for control points and for the end effector; axis (3,) of the
+    cone of half_angle [rad] for the end effector's z axis, or None.
     """
 
-    robot: Robot
-    capsules: tuple[Capsule, ...]
-    points: tuple[ControlPoint, ...]
+    robot: RobotFacts
     obstacles: Obstacles
     areas: Areas
     tip_areas: Areas
     axis: Array | None
     half_angle: float
-    floor: float
+
+    @property
+    def capsules(self) -> tuple[Capsule, ...]:
+        """The links, in the frames of their joints."""
+        return self.robot.capsules
+
+    @property
+    def points(self) -> tuple[Point, ...]:
+        """The robot's control points, then its end effector."""
+        return self.robot.points
+
+    @property
+    def floor(self) -> float:
+        """Height of the floor [m]."""
+        return self.robot.floor
 
     @property
     def azimuth(self) -> float:
-        """Where to look from [rad]: a robot that branches is looked at from before, along -x."""
-        parents = self.robot.parents[1:]
-        chain = self.robot.base == "fixed" and parents == tuple(range(len(parents)))
-        return radians(135.0 if chain else 40.0)
+        """Direction [rad] of the view: a robot that branches is seen from the front, along -x."""
+        return radians(135.0 if self.robot.is_chain else 40.0)
 
 
 @dataclass(frozen=True)
 class Moved:
-    """Where the point was that a task moves (F, 3) [m], and where it was wanted, or None."""
+    """Actual and desired position (F, 3) [m] of the point that a task moves; wanted may be None."""
 
     task: str
     actual: Array
@@ -69,24 +78,24 @@ class Moved:
 
 @dataclass(frozen=True)
 class Scene:
-    """What is drawn of a run, in F frames; J joints, P points, H obstacles. Metres, seconds.
+    """What is drawn of a run in F frames; J joints, P points, H obstacles. Metres, seconds.
 
-    stage : what stays the same.
-    t (F,) and ticks (F,), the tick that each frame shows.
+    stage : what does not change.
+    t (F,) and ticks (F,) : time and tick of each frame.
     placements (F, J + 1, 12) : of the joints' frames, rotation column by column, then translation;
-        of the true joints where the recording knows them. `ends` turns them into the links.
+        of the true joints if recorded. `ends` turns them into the links.
     points (F, P, 3) : control points, then the end effector.
-    nearest (F, P, 3) : the point on an obstacle that is nearest to each, and distance (F, P) to it,
-        from the scenario's geometry, also where the controller saw a camera's; NaN and infinite
-        without obstacles.
+    nearest (F, P, 3), distance (F, P) : the nearest obstacle point to each and the distance to it,
+        from the scenario's geometry even if the controller used a camera; NaN and infinite without
+        obstacles.
     active (F,) : the point that the stack keeps away from an obstacle, or -1. Under the task
         `separation` it is the nearest point, in ticks in which one of its rows acts.
     centres (F, H, 3) : of the obstacles; shape, size and rotation are in `stage.obstacles`.
     axis (F, 3) : the end effector's z axis. desired (F, 3) : its path, or None.
     order (F,) : index into `orders`, whose entries name tasks, most important first.
-    paths : of what the scenario's listed tasks move.
-    levels : what became of each task, see scenarios.scene.levels.
-    series : curves. switches (S,) : when the order changed.
+    paths : of the points that the scenario's listed tasks move.
+    levels : the fate of each task; see scenarios.scene.levels.
+    series : curves. switches (S,) : times of changes of the order.
     """
 
     stage: Stage
@@ -109,7 +118,7 @@ class Scene:
 
     @property
     def traced(self) -> Array:
-        """Where the end effector was: (F, 3) [m]."""
+        """The path of the end effector: (F, 3) [m]."""
         return np.asarray(self.points[:, -1])
 
     @property
@@ -119,48 +128,44 @@ class Scene:
 
     @property
     def linked(self) -> NDArray[np.int64]:
-        """The point to link with its nearest obstacle, the active one or else the closest: (F,)."""
+        """The point linked with its nearest obstacle: the active one, else the closest, (F,)."""
         return np.where(self.active >= 0, self.active, self.distance.argmin(axis=1))
 
 
-def stage(scenario: Scenario) -> Stage:
-    """Return what there is to draw of a scenario before it runs."""
-    robot, avoidance, pointing = make_robot(scenario.robot), scenario.avoidance, scenario.pointing
-    foot = scenario.sensor.foot if isinstance(robot.table, DHTable) else 0.0
-    links = capsules(robot, foot)
+def stage(robot: RobotFacts, scenario: Scenario) -> Stage:
+    """Return what is drawn of a scenario before it runs."""
+    avoidance, pointing = scenario.avoidance, scenario.pointing
     axis = None if pointing is None else np.asarray(pointing.axis) / np.linalg.norm(pointing.axis)
-    return Stage(robot, links, sensed_points(robot),
-                 make_obstacles(avoidance.placed if avoidance else ()),
+    return Stage(robot, make_obstacles(avoidance.placed if avoidance else ()),
                  marks_of(avoidance.thresholds if avoidance else {}),
                  marks_of(avoidance.tip_thresholds if avoidance else {}),
-                 axis, radians(pointing.alpha_d) if pointing else 0.0,
-                 -foot if foot else lowest(robot, links))
+                 axis, radians(pointing.alpha_d) if pointing else 0.0)
 
 
 def scene(recording: Recording, rate: float = 30.0) -> Scene:
-    """Return what there is to draw of a run, in `rate` frames a second [Hz].
+    """Return what is drawn of a run at `rate` frames per second.
 
-    Raises HierarchyError if nothing was recorded, or `rate` is not positive.
+    Raises HierarchyError if nothing was recorded or `rate` is not positive and finite.
     """
     if not 0.0 < rate < np.inf:
         raise HierarchyError(f"rate = {rate} Hz must be positive and finite")
     ticks = _frames(recording, rate)
-    fixed, t = stage(recording.scenario), recording["t"][ticks]
+    fixed, t = stage(recording.facts.robot, recording.scenario), recording["t"][ticks]
     order = recording["order"].astype(np.int64)
     moved = _moved(fixed, recording, ticks)
-    levels = judge(recording, ticks)
+    levels = levels_at(recording, ticks)
     return Scene(fixed, t, ticks, **moved,
                  active=_active(recording, ticks, levels, moved["distance"]),
                  desired=recording["desired_position"][ticks]
                  if "desired_position" in recording else None,
-                 order=order[ticks], orders=order_names(recording),
+                 order=order[ticks], orders=recording.order_names,
                  paths=tuple(_paths(recording, ticks)), levels=levels,
                  series=tuple(series(recording, ticks)),
                  switches=recording["t"][recording.switches()])
 
 
 def _frames(recording: Recording, rate: float) -> NDArray[np.int64]:
-    """The ticks nearest to the frames' times, the first and the last tick among them."""
+    """Return the ticks nearest to the frames' times, including the first and the last tick."""
     finite = np.flatnonzero(np.isfinite(_joints(recording)).all(axis=1))
     if not finite.size:
         raise HierarchyError("the recording has no tick: there is nothing to draw")
@@ -177,22 +182,34 @@ def _joints(recording: Recording) -> Array:
 
 
 def _moved(fixed: Stage, recording: Recording, ticks: NDArray[np.int64]) -> dict[str, Array]:
-    """What follows from the joints at each tick."""
-    robot, q = fixed.robot, _joints(recording)
-    state, at_rest, sensor = State(robot), np.zeros(robot.n), ExactDistances(robot, fixed.obstacles)
-    seen, tip = sensor.measurement, robot.frame(robot.end_effector)
+    """Return what follows from the joints at each tick."""
+    placements = fixed.robot.placements(_joints(recording)[ticks])
+    tip = fixed.points[-1].joint
+    z = placements[:, tip, :9].reshape(-1, 3, 3).swapaxes(1, 2) @ np.array(fixed.robot.tool)[:, 2]
+    return {"placements": placements, "axis": z,
+            **_distances(fixed, recording, ticks, placements)}
+
+
+def _distances(fixed: Stage, recording: Recording, ticks: NDArray[np.int64],
+               placements: Array) -> dict[str, Array]:
+    """Return points, distances, nearest points and the obstacles' centres, frame by frame."""
+    seen, now = Measurement(len(fixed.points) - 1), np.empty(placements.shape[1:])
+    measure = exact_measurer(seen, now, np.array([point.joint for point in fixed.points]),
+                             np.array([point.offset for point in fixed.points]),
+                             fixed.obstacles.table, _NO_LAWS, 0.0)
     frames: dict[str, list[Array]] = {name: [] for name in (
-        "placements", "points", "nearest", "distance", "centres", "axis")}
+        "points", "nearest", "distance", "centres")}
     offsets = recording.signals.get("obstacle_offset", np.empty((recording.ticks, 0, 3)))
-    for k in ticks:
-        state.move(float(recording["t"][k]), q[k], at_rest)
+    for k, placed in zip(ticks.tolist(), placements, strict=True):
+        now[:] = placed
+        fixed.obstacles.at(float(recording["t"][k]))
         for h, offset in enumerate(offsets[k]):
             fixed.obstacles.shift(h, offset)
-        sensor.measure(state)
+        measure()
         away = np.where(np.isfinite(seen.distance), seen.distance, np.nan)[:, None]
-        now = (state.placements, seen.points, seen.points - away * seen.direction, seen.distance,
-               fixed.obstacles.centres, state.rotation(tip)[:, 2])
-        for kept, value in zip(frames.values(), now, strict=True):
+        for kept, value in zip(frames.values(), (
+                seen.points, seen.points - away * seen.direction, seen.distance,
+                fixed.obstacles.centres), strict=True):
             kept.append(value.copy())
     return {name: np.array(kept) for name, kept in frames.items()}
 

@@ -2,7 +2,6 @@
 
 from scenarios.cell.sensors.depth_sensor import DepthSensor
 from scenarios.cell.sensors.exact import ExactDistances
-
-Sensor = ExactDistances | DepthSensor
+from scenarios.cell.sensors.sensor import Sensor
 
 __all__ = ["DepthSensor", "ExactDistances", "Sensor"]

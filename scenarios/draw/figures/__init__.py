@@ -1,1 +1,1 @@
-"""Figures of runs: the letter's panels, the scene in space, the stack over time; one look."""
+"""Figures of runs in one style: the letter's panels, the scene in space, the stack over time."""

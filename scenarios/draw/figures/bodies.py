@@ -1,4 +1,4 @@
-"""The picture of a robot whose joints branch: its body at some times, side by side."""
+"""The picture of a robot that branches: its body at several times, side by side."""
 
 from __future__ import annotations
 
@@ -11,17 +11,16 @@ from matplotlib.collections import PatchCollection
 from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 
-from hierarchy import State
 from scenarios.draw.figures import drawing
 from scenarios.draw.figures.drawing import INK, Array
-from scenarios.scene import capsules, ends
+from scenarios.scene import ends
 
 if TYPE_CHECKING:
-    from hierarchy import Robot
+    from scenarios.loop.facts import RobotFacts
     from scenarios.loop.recording import Recording
 
 _POSES = 4
-_APART = 1.1    # of the bodies, in widths of the widest
+_APART = 1.1    # distance between bodies, in widths of the widest
 _WIDTH, _HEADROOM = 6.4, 0.5  # of the figure [in]
 _AZIMUTH, _ELEVATION = 40.0, 12.0  # [deg] of the camera: in front of a robot that looks along x
 _AROUND = np.linspace(0.0, np.pi, 13)  # of half a rim
@@ -29,19 +28,13 @@ _VERTICES = 400
 _LIGHT, _DARK = "#d5d9de", "#8d96a1"  # of links far away and near
 
 
-def branches(robot: Robot) -> bool:
-    """Whether the robot is more than one chain from a fixed base."""
-    return robot.base == "floating" or any(
-        parent != joint - 1 for joint, parent in enumerate(robot.parents) if joint > 0)
+def picture(recordings: Mapping[str, Recording], colours: Mapping[str, str]) -> Figure:
+    """Return the first run's body at several times, with the paths of every run's tasks.
 
-
-def picture(robot: Robot, recordings: Mapping[str, Recording],
-            colours: Mapping[str, str]) -> Figure:
-    """Return the first run's body at some times, and where every run's tasks went.
-
-    Paths asked for are dashed; those taken, up to the time of the body, have the run's colour.
+    Desired paths are dashed; actual paths, up to the time of the body, have the run's colour.
     """
     first = next(iter(recordings.values()))
+    robot = first.facts.robot
     ticks = np.linspace(0, first.ticks - 1, _POSES).astype(int)
     width, lowest, highest = _extent(robot, first, ticks)
     apart = _APART * width
@@ -74,10 +67,10 @@ def _moved(recording: Recording) -> list[str]:
             if name.startswith("task_position_")]
 
 
-def _body(ax: Axes, robot: Robot, q: Array, aside: Array) -> None:
-    """Draw the capsules, those farther away first and lighter."""
-    links = capsules(robot)
-    segments = ends(links, State.at(robot, q).placements)
+def _body(ax: Axes, robot: RobotFacts, q: Array, aside: Array) -> None:
+    """Draw the capsules, the farthest first and lightest."""
+    links = robot.capsules
+    segments = ends(links, robot.placements(q))
     depth = segments.mean(axis=1) @ _toward_camera()
     order = np.argsort(depth)
     shade = (depth - depth.min()) / max(float(np.ptp(depth)), 1e-9)
@@ -112,11 +105,11 @@ def _line(ax: Axes, path: Array, aside: Array, **style: object) -> None:
     ax.plot(*(aside + _flat(kept)).T, **style)  # type: ignore[arg-type]
 
 
-def _extent(robot: Robot, recording: Recording, ticks: Array) -> tuple[float, float, float]:
-    """Greatest width [m] of the bodies that are drawn, their lowest and their highest place."""
-    links = capsules(robot)
+def _extent(robot: RobotFacts, recording: Recording, ticks: Array) -> tuple[float, float, float]:
+    """Return the greatest width [m] of the drawn bodies, and their lowest and highest point."""
+    links = robot.capsules
     radii = np.array([[link.radius] for link in links])
-    flat = [_flat(ends(links, State.at(robot, recording["q"][k]).placements)) for k in ticks]
+    flat = [_flat(ends(links, robot.placements(q))) for q in recording["q"][ticks]]
     low = np.array([(body - radii[..., None]).min(axis=(0, 1)) for body in flat])
     high = np.array([(body + radii[..., None]).max(axis=(0, 1)) for body in flat])
     return float((high - low)[:, 0].max()), float(low[:, 1].min()), float(high[:, 1].max())

@@ -1,4 +1,4 @@
-"""How every figure looks: colours, thinning of long curves, projection, SVG for a page."""
+"""The style of all figures: colours, thinning of long curves, projection, SVG for a page."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from scenarios.draw.figures.palette import looks
 
 Array = NDArray[np.float64]
 
-# Text, axes and desired curves. In an inline SVG it becomes the page's own text colour.
+# Text, axes and desired curves. In an inline SVG it becomes the text colour of the page.
 INK = "#0b0c0d"
 ALERT = "#d33a2c"
 
@@ -35,7 +35,7 @@ _SCREEN: dict[Any, Any] = {
     "axes.grid": True, "axes.linewidth": 0.6, "lines.linewidth": 1.0, "axes.facecolor": "none",
     "axes.spines.top": False, "axes.spines.right": False, "xtick.major.width": 0.6,
     "ytick.major.width": 0.6, "svg.fonttype": "none", "figure.dpi": 72.0}
-# Lines that are told apart in grey, one for each of JOINTS.
+# Line styles that differ in grey, one for each of JOINTS.
 _IN_GREY = ("-", "--", ":", "-.", (0, (5, 1, 1, 1, 1, 1)), (0, (8, 2)), (0, (3, 1)), (0, (1, 3)))
 _PAPER = {**_SCREEN, "font.family": "STIXGeneral", "mathtext.fontset": "stix", "font.size": 8.0,
           "axes.titlesize": 8.0, "pdf.fonttype": 42}
@@ -43,10 +43,10 @@ _PAPER = {**_SCREEN, "font.family": "STIXGeneral", "mathtext.fontset": "stix", "
 
 @dataclass(frozen=True)
 class Style:
-    """How figures are drawn: matplotlib's settings, and what those cannot say.
+    """How figures are drawn: matplotlib's settings and a few more.
 
-    width [in] that every figure has, or None for each its own; titled, whether figures say of which
-    run they are; formats of the files; lines, those of the joints in turn.
+    width [in] of every figure, or None for its own; titled: whether figures name their run; formats
+    of the files; lines: line styles of the joints in turn.
     """
 
     settings: Mapping[Any, Any]
@@ -57,16 +57,16 @@ class Style:
 
 
 SCREEN = Style(_SCREEN, None, True, ("svg", "png"))
-# One column of IEEE's journals, and its usual size of letters in figures.
+# One column of an IEEE journal, with the usual font size of its figures.
 PAPER = Style(_PAPER, 3.5, False, ("pdf",), _IN_GREY)
 STYLES = {"screen": SCREEN, "paper": PAPER}
-_LEAST_HEIGHT = 0.75  # of a figure made narrower, relative to its own: letters keep their size
+_LEAST_HEIGHT = 0.75  # of a narrowed figure, relative to its own: the font size stays
 _present: ContextVar[Style] = ContextVar("style", default=SCREEN)
 
 
 @contextmanager
 def styled(style: Style) -> Iterator[None]:
-    """Draw and write all figures in a style, as a context."""
+    """Draw and write all figures in a style within the context."""
     token = _present.set(style)
     try:
         with matplotlib.rc_context(dict(style.settings)):
@@ -76,12 +76,12 @@ def styled(style: Style) -> Iterator[None]:
 
 
 def present() -> Style:
-    """Return the style in which figures are drawn now."""
+    """Return the present style."""
     return _present.get()
 
 
 def colours(labels: Iterable[str]) -> dict[str, str]:
-    """Return the colour of each label; variants of a resolver share its, see `palette.looks`."""
+    """Return the colour of each label; variants of a resolver share one, see `palette.looks`."""
     return {label: look.colour for label, look in looks(labels).items()}
 
 
@@ -91,19 +91,19 @@ def joint_colour(joint: int) -> str:
 
 
 def joint_line(joint: int) -> dict[str, Any]:
-    """Return colour and line of a joint's curve, numbered from 0, as matplotlib names them."""
+    """Return colour and line style of a joint, numbered from 0, as matplotlib keywords."""
     lines = present().lines
     return {"color": joint_colour(joint), "linestyle": lines[joint % len(lines)]}
 
 
 def style() -> dict[Any, Any]:
-    """Return matplotlib's settings of the present style, to be used as a context."""
+    """Return matplotlib's settings of the present style."""
     return dict(present().settings)
 
 
 def figure(rows: int = 1, width: float = 3.3, height: float = 2.1,
            heights: Sequence[float] | None = None) -> tuple[Figure, list[Axes]]:
-    """Return a figure of `rows` axes one under the other, in inches, in the present style."""
+    """Return a figure of `rows` axes one below the other, in the present style; sizes in inches."""
     if (fixed := present().width) is not None:
         width, height = fixed, height * min(max(fixed / width, _LEAST_HEIGHT), 1.0)
     with matplotlib.rc_context(style()):
@@ -113,9 +113,9 @@ def figure(rows: int = 1, width: float = 3.3, height: float = 2.1,
 
 
 def envelope(y: Array, buckets: int = 350) -> NDArray[np.int64]:
-    """Return the indices that keep the shape of a long curve: each bucket's extremes and ends.
+    """Return the indices that keep the shape of a long curve y (T,): extremes of each bucket.
 
-    y is (T,); every smallest and largest value, and so every peak, stays. NaN is left out.
+    Every bucket's smallest and largest value, and so every peak, is kept. NaN is left out.
     """
     if len(y) <= 3 * buckets:
         return np.arange(len(y))
@@ -152,9 +152,9 @@ def project(points: Array, azimuth: float = 150.0, elevation: float = 30.0) -> A
 
 def shared_limits(ranges: Sequence[tuple[float, float]], factor: float = 4.0
                   ) -> tuple[float, float]:
-    """Return limits that fit every range, but for those that would flatten all the others.
+    """Return limits that fit every range except those that would flatten all the others.
 
-    A range more than `factor` times as wide as the median one is left to be cut.
+    A range more than `factor` times as wide as the median one is cut.
     """
     widths = np.array([high - low for low, high in ranges])
     usual = factor * np.median(widths)
@@ -165,7 +165,7 @@ def shared_limits(ranges: Sequence[tuple[float, float]], factor: float = 4.0
 
 
 def svg(fig: Figure, title: str) -> str:
-    """Return a figure as an inline `<svg>` that scales, follows the page's theme and is named."""
+    """Return a figure as a scalable inline `<svg>` with a title, in the colours of the page."""
     text = io.StringIO()
     with matplotlib.rc_context({**style(), "svg.hashsalt": title}):
         fig.savefig(text, format="svg", transparent=True, metadata={"Date": None})
@@ -180,9 +180,9 @@ def svg(fig: Figure, title: str) -> str:
 
 
 def write(fig: Figure, stem: str) -> None:
-    """Write a figure as stem.svg, stem.png or stem.pdf, on white, as the present style says.
+    """Write a figure on white as stem.svg, stem.png or stem.pdf, following the present style.
 
-    The same figure is the same bytes: no file has a date.
+    The same figure gives the same bytes: no file has a date.
     """
     undated = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
     with matplotlib.rc_context({**style(), "svg.hashsalt": "task-hierarchy"}):
@@ -191,7 +191,7 @@ def write(fig: Figure, stem: str) -> None:
 
 
 def _rounded(path: re.Match[str]) -> str:
-    """Round a path's coordinates to a tenth of a point, which no eye can see."""
+    """Round a path's coordinates to a tenth of a point, which cannot be seen."""
     return re.sub(r"(\.\d)\d+", r"\1", path[0])
 
 

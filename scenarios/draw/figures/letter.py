@@ -1,4 +1,4 @@
-"""The letter's figures 4 to 7, 9 and 10 and a few more, each drawn from a recording alone."""
+"""The letter's figures 4 to 7, 9 and 10 and a few more, drawn from a recording."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class LetterFigure:
-    """A figure of the letter: its panels, one under the other."""
+    """A figure of the letter: its panels, one below the other."""
 
     name: str
     title: str
@@ -50,9 +50,9 @@ EXPERIMENT = (
 
 
 def write_all(recording: Recording, folder: Path) -> None:
-    """Write a run's figures into a folder: the letter's, its picture, its stack over time.
+    """Write a run's figures to a folder: the letter's, its picture, its stack over time.
 
-    As SVG and PNG, or as the present style says, see `drawing.styled`.
+    The present style gives the formats, by default SVG and PNG; see `drawing.styled`.
     """
     with drawing.styled(drawing.present()):
         for name, fig in _all(recording):
@@ -68,18 +68,16 @@ def _all(recording: Recording) -> Iterator[tuple[str, Figure]]:
         yield "picture", picture({label_of(recording): recording})
     if recording.ticks > 1:
         yield "stack", timeline(recording)
-    seen = recording.scenario.is_experiment and recording.scenario.sensor.kind == "camera"
-    if seen and np.isfinite(recording["ee_distance"]).any():
+    if recording.depth is not None and np.isfinite(recording.depth.distance[-1]):
         from scenarios.draw.figures.depth import depth_figure
 
-        nearest = float(recording["t"][int(np.argmin(recording["ee_distance"]))])
-        yield "figure-8-depth-image", depth_figure(recording, nearest)
+        yield "figure-8-depth-image", depth_figure(recording.depth)
     if "time_tick" in recording and recording.ticks > 1:
         yield "tick-times", tick_times(recording)
 
 
 def stacked(recording: Recording, panels: Sequence[Panel], title: str) -> Figure:
-    """Return panels of one run, one under the other, in the letter's proportions."""
+    """Return panels of one run, one below the other, in the letter's proportions."""
     fig, axes = drawing.figure(len(panels), width=6.4, height=0.8 + 1.7 * len(panels))
     label = label_of(recording)
     colour = drawing.colours([label])[label]
@@ -98,7 +96,7 @@ def stacked(recording: Recording, panels: Sequence[Panel], title: str) -> Figure
 
 
 def tick_times(recording: Recording) -> Figure:
-    """Return a histogram of the time of whole ticks [us], with the period of the loop."""
+    """Return a histogram of the tick times [us], with the period of the loop."""
     fig, (ax,) = drawing.figure(width=6.4, height=2.4)
     label = label_of(recording)
     times = 1e6 * recording["time_tick"]
@@ -118,5 +116,5 @@ def tick_times(recording: Recording) -> Figure:
 
 
 def label_of(recording: Recording) -> str:
-    """Return the label of the resolver that made a run, as "tpm published"."""
-    return str(recording.scenario.make_resolver().label)
+    """Return the label of a run's resolver, such as "tpm published"."""
+    return recording.facts.resolver.label

@@ -1,8 +1,8 @@
-"""One colour for each resolver and one line for each variant, wherever either is drawn.
+"""One colour per resolver and one line style per variant, wherever they are drawn.
 
-No two of COLOURS are less than 16 apart in CIELAB, also as seen with protanopia, deuteranopia or
+Any two of COLOURS are at least 16 apart in CIELAB, also as seen with protanopia, deuteranopia or
 tritanopia (simulated after Machado, Oliveira, Fernandes 2009), and each is legible on white and on
-near-black; tests/test_figures.py holds them to it.
+near-black; tests/test_figures.py checks this.
 """
 
 from __future__ import annotations
@@ -12,13 +12,13 @@ from typing import NamedTuple
 
 Dash = tuple[float, ...]
 
-# Okabe and Ito's, a brown and a violet.
+# Okabe and Ito's colours, a brown and a violet.
 COLOURS = {"tpm": "#0072b2", "recursive": "#e69f00", "augmented": "#cc79a7", "hqp": "#009e73",
            "hcod": "#d55e00", "sns": "#56b4e9", "weighted": "#884422", "reverse": "#8844ee"}
-# For what is no resolver of this package.
+# For labels that are no resolver of this package.
 SPARE = ("#7f8790", "#999933", "#aa0044", "#44aa99", "#cc6677", "#664466")
 
-# Tol's light scheme, for bands with dark letters on them: tasks of a stack.
+# Tol's light scheme, for bands with dark text: tasks of a stack.
 _TASKS = {"position": "#77aadd", "pointing": "#eedd88", "avoidance": "#ee8866",
           "separation": "#ffaabb", "joint limits": "#dddddd"}
 _MORE_TASKS = ("#44bb99", "#bbcc33", "#99ddff", "#aaaa00", "#c9a0dc")
@@ -26,14 +26,14 @@ _MORE_TASKS = ("#44bb99", "#bbcc33", "#99ddff", "#aaaa00", "#c9a0dc")
 SOLID: Dash = ()
 _DASHES: tuple[Dash, ...] = (SOLID, (4.0, 1.6), (1.0, 1.4), (6.0, 1.4, 1.0, 1.4),
                              (6.0, 1.4, 1.0, 1.4, 1.0, 1.4), (9.0, 2.0), (2.2, 1.2))
-_USUAL = ("", "proxqp")  # variants that a plain name stands for
+_USUAL = ("", "proxqp")  # variants that share the plain name's line
 _VARIANTS = {"published": _DASHES[1], "in-order": _DASHES[1], "optimal": _DASHES[1],
              "osqp": _DASHES[1], "daqp": _DASHES[2], "quadprog": _DASHES[3], "piqp": _DASHES[4],
              "clarabel": _DASHES[5], "slack": _DASHES[6]}
 
 
 class Look(NamedTuple):
-    """A colour as "#rrggbb", and lengths on and off in line widths; none is a solid line."""
+    """A colour as "#rrggbb", and dash lengths on and off in line widths; none is a solid line."""
 
     colour: str
     dash: Dash
@@ -45,16 +45,16 @@ def colour(label: str) -> str:
 
 
 def dash(label: str) -> Dash:
-    """Return the line of a resolver's label: solid, but for variants."""
+    """Return the dashes of a resolver's label: solid except for variants."""
     variant = label.partition(" ")[2]
     return SOLID if variant in _USUAL else _VARIANTS.get(variant, _DASHES[1])
 
 
 def looks(labels: Iterable[str]) -> dict[str, Look]:
-    """Return how to draw labels side by side, no two alike as far as dashes and colours reach.
+    """Return how to draw labels side by side, no two alike as long as dashes and colours last.
 
-    A resolver keeps its colour. Variants of it that would have the same line get another, and names
-    that are no resolver's get colours that are free.
+    A resolver keeps its colour. Variants of it that would have the same dashes get others, and
+    labels that are no resolver get unused colours.
     """
     labels = list(dict.fromkeys(labels))
     known = {_resolver(label) for label in labels} & set(COLOURS)
@@ -70,7 +70,7 @@ def looks(labels: Iterable[str]) -> dict[str, Look]:
 
 
 def task_colours(names: Iterable[str]) -> dict[str, str]:
-    """Return a light colour for each task: of its own, or the next of those that are left."""
+    """Return a light colour for each task: its own, or the next unused one."""
     names = list(dict.fromkeys(names))
     others = [name for name in names if name not in _TASKS]
     left = (*_MORE_TASKS, *(shade for name, shade in _TASKS.items() if name not in names))
@@ -78,5 +78,5 @@ def task_colours(names: Iterable[str]) -> dict[str, str]:
 
 
 def _resolver(label: str) -> str:
-    """Return the name that a label "tpm published" or a spec "tpm:form=published" begins with."""
+    """Return the resolver's name in a label "tpm published" or a spec "tpm:form=published"."""
     return label.partition(" ")[0].partition(":")[0]

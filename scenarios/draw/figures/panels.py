@@ -1,4 +1,4 @@
-"""The panels of the letter's figures: one quantity of a run over time each."""
+"""The panels of the letter's figures, each one quantity of a run over time."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ Draw = Callable[[Axes, "Recording", str], None]
 
 @dataclass(frozen=True)
 class Panel:
-    """One quantity of a run over time: what it is, the signal it needs, how it is drawn.
+    """One quantity of a run over time: its title, the signal it needs, how it is drawn.
 
-    A `signal` that ends in "_" stands for all that begin with it.
+    A `signal` that ends in "_" stands for all signals with that prefix.
     """
 
     name: str
@@ -35,14 +35,14 @@ class Panel:
     explains: str = ""
 
     def fits(self, recording: Recording) -> bool:
-        """Whether the recording has what this panel draws."""
+        """Whether the recording has the signals of this panel."""
         known = (any(name.startswith(self.signal) for name in recording.signals)
                  if self.signal.endswith("_") else self.signal in recording)
         return known and recording.ticks > 1
 
 
 def joint_velocities(ax: Axes, recording: Recording, colour: str) -> None:
-    """Draw figure 4: every joint's velocity [rad/s], and the limits where they come into view."""
+    """Draw figure 4: every joint's velocity [rad/s]."""
     for joint, velocity in enumerate(recording["v"].T):
         drawing.curve(ax, recording["t"], velocity, **drawing.joint_line(joint), linewidth=0.8,
                       label=f"joint {joint + 1}")
@@ -106,12 +106,12 @@ def position_error(ax: Axes, recording: Recording, colour: str) -> None:
 
 
 def task_errors(ax: Axes, recording: Recording, colour: str) -> None:
-    """Draw the errors of the listed tasks that are lengths [mm], on a logarithmic scale."""
+    """Draw the errors of listed tasks that are lengths [mm], on a logarithmic scale."""
     _listed(ax, recording, "m", 1e3)
 
 
 def task_angles(ax: Axes, recording: Recording, colour: str) -> None:
-    """Draw the errors of the listed tasks that are angles of a body [deg], logarithmic."""
+    """Draw the errors of listed tasks that are angles [deg], on a logarithmic scale."""
     _listed(ax, recording, "deg", 1.0)
 
 

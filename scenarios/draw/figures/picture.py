@@ -1,4 +1,4 @@
-"""The scene of a run in space: the arm, the path asked for, the path taken, the obstacles."""
+"""The scene of a run in space: the arm, its desired and actual path, the obstacles."""
 
 from __future__ import annotations
 
@@ -14,35 +14,33 @@ from scenarios.draw.figures import drawing
 from scenarios.draw.figures.drawing import ALERT, INK, Array
 
 if TYPE_CHECKING:
-    from hierarchy import Robot
     from hierarchy.avoidance import Obstacle, Obstacles
+    from scenarios.loop.facts import RobotFacts
     from scenarios.loop.recording import Recording
 
 _VERTICES = 1200
 _OTHER_POSES = 5
 _AREA_ALPHAS = (0.08, 0.18)  # of the outer and the inner area
 _BALLS = 24  # that a capsule is drawn with
-_NEAR = 1.0  # [m] from the end effector: what moves farther away is left out
+_NEAR = 1.0  # [m] from the end effector: moving obstacles farther away are left out
 
 
 def picture(recordings: Mapping[str, Recording], colours: Mapping[str, str] | None = None
             ) -> Figure:
     """Return the scene, after figure 3 of the letter.
 
-    The arm is that of the first run, in full where its body is nearest to an obstacle, with the
-    line to it and with its control points; every run's path has the colour of its label, or that
-    given for it. A robot that branches is drawn by `scenarios.draw.figures.bodies`.
+    The arm is that of the first run, drawn dark when its body is nearest to an obstacle, with its
+    control points and the line to that obstacle; every run's path has the colour given for its
+    label, or that of its resolver. `scenarios.draw.figures.bodies` draws robots that branch.
     """
-    from scenarios.cell.robot import make_robot
     from scenarios.draw.figures import bodies
 
     first = next(iter(recordings.values()))
-    robot = make_robot(first.scenario.robot)
-    if bodies.branches(robot):
-        return bodies.picture(robot, recordings, colours or drawing.colours(recordings))
+    if not first.facts.robot.is_chain:
+        return bodies.picture(recordings, colours or drawing.colours(recordings))
     fig, (ax,) = drawing.figure(width=4.9, height=3.9)
     _obstacles(ax, first)
-    _arms(ax, robot, first)
+    _arms(ax, first.facts.robot, first)
     chosen = drawing.colours(recordings) if colours is None else colours
     for label, colour in reversed(list(chosen.items())):
         _line(ax, recordings[label]["ee_position"], color=colour, linewidth=1.8)
@@ -59,7 +57,7 @@ def _line(ax: Axes, path: Array, **style: object) -> None:
 
 
 def _obstacles(ax: Axes, recording: Recording) -> None:
-    """Draw each obstacle that stands still with its areas, and those that move if they are near."""
+    """Draw static obstacles with their areas, and moving ones that are near."""
     avoidance = recording.scenario.avoidance
     if avoidance is None:
         return
@@ -93,7 +91,7 @@ def _obstacles_at(recording: Recording, tick: int) -> Obstacles:
 
 
 def _along(obstacle: Obstacle, centre: Array) -> Array:
-    """Return places (P, 3) [m] such that balls around them make up a capsule; or the centre."""
+    """Return centres (P, 3) [m] of balls that make up a capsule; of other shapes the centre."""
     if obstacle.shape != "capsule":
         return centre[None]
     axis = np.asarray(obstacle.rotation, dtype=float)[:, 2] * obstacle.size[1]
@@ -101,10 +99,10 @@ def _along(obstacle: Obstacle, centre: Array) -> Array:
 
 
 def _nearest(recording: Recording) -> int:
-    """Return the tick in which the body is nearest to an obstacle, the last without any.
+    """Return the tick in which the body is nearest to an obstacle, or the last tick.
 
-    Of distances seen by a camera it is that of the end effector, as in figure 8: the body's are
-    often those to what an obstacle hides.
+    With a camera the distance of the end effector counts, as in figure 8: those of the body often
+    belong to space that an obstacle hides.
     """
     seen = "minimal_distance" if _exact(recording) else "ee_distance"
     return int(np.argmin(recording[seen])) if seen in recording else recording.ticks - 1
@@ -114,21 +112,20 @@ def _exact(recording: Recording) -> bool:
     return recording.scenario.sensor.kind == "exact"
 
 
-def _arms(ax: Axes, robot: Robot, recording: Recording) -> None:
-    from hierarchy import State
+def _arms(ax: Axes, robot: RobotFacts, recording: Recording) -> None:
     from scenarios.scene import place
 
     nearest = _nearest(recording)
     others = np.linspace(0, recording.ticks - 1, _OTHER_POSES).astype(int)
     for k, alpha in (*((int(k), 0.16) for k in others), (nearest, 0.9)):
-        placements = State.at(robot, recording["q"][k]).placements
+        placements = robot.placements(recording["q"][k])
         tip = recording["ee_position"][k]
         chain = drawing.project(np.vstack([np.zeros(3), placements[1:, 9:], tip]))
         ax.plot(*chain.T, color=INK, alpha=alpha, linewidth=5.0 if k == nearest else 2.5,
                 solid_capstyle="round", solid_joinstyle="round")
         if k == nearest:
             ax.plot(*chain.T, "o", color=INK, markersize=6)
-            points = robot.control_points
+            points = robot.points[:-1]
             body = place(placements, [p.joint for p in points], [p.offset for p in points])
             if len(body):
                 ax.plot(*drawing.project(body).T, "o", color=ALERT, markersize=3)
@@ -136,7 +133,7 @@ def _arms(ax: Axes, robot: Robot, recording: Recording) -> None:
 
 
 def _shortest(ax: Axes, recording: Recording, k: int, body: Array) -> None:
-    """Link the control point that is nearest to an obstacle with it, as figure 3 does."""
+    """Draw a line between the nearest control point and its obstacle, as in figure 3."""
     ends = _obstacles_at(recording, k).centres
     if ends.size and "control_point_distance" in recording and _exact(recording):
         point = body[int(np.argmin(recording["control_point_distance"][k]))]

@@ -1,4 +1,4 @@
-"""The stack over time: which task is in which place of it, and what happened meanwhile."""
+"""The stack over time: the place of each task in it, and events."""
 
 from __future__ import annotations
 
@@ -14,30 +14,29 @@ from numpy.typing import NDArray
 from scenarios.draw.figures import drawing
 from scenarios.draw.figures.drawing import ALERT, INK
 from scenarios.draw.figures.palette import task_colours
-from scenarios.scene.levels import order_names
 
 if TYPE_CHECKING:
     from scenarios.loop.recording import Recording
 
 _ON_BAND = "#101214"   # text on a band, in any theme: bands are light
-_LETTER = 0.016        # width of a letter, relative to the time axis, in a band's name
-_LEAST = 0.004         # width of a mark, relative to the time axis, so that one tick is seen
-_MOST_STRETCHES = 600  # of bands in a row; what is shorter than one such share may be passed over
+_LETTER = 0.016        # width of a character, relative to the time axis, in a band's name
+_LEAST = 0.004         # least width of a mark, relative to the time axis
+_MOST_STRETCHES = 600  # of bands in a row; shorter ones may be skipped
 _GRAVE = ("stop", "brake", "contact", "no answer")
 
 Mask = NDArray[np.bool_]
 
 
 def timeline(recording: Recording, beside: Sequence[Recording] = ()) -> Figure:
-    """Return bands that show which task has which place of the stack, and a row for each event.
+    """Return bands that show the place of each task in the stack, and a row for each kind of event.
 
     Place 1 is the first priority. Below are the ticks with contact, without an answer, and with
-    each kind of trouble and what was done; a fault is a line where the run ended. `beside` are the
-    runs that are shown together with this one, itself among them: it then has their rows, colours
-    and time axis, and no legend or title of its own.
+    each kind of trouble and action; a fault is a line at the end of the run. `beside` are the runs
+    shown together with this one, including itself: the figure then has their rows, colours and time
+    axis, and no legend or title of its own.
     """
     alone, beside = not beside, beside or (recording,)
-    places = max(len(stack) for one in beside for stack in ((), *order_names(one)))
+    places = max(len(stack) for one in beside for stack in ((), *one.order_names))
     rows = list(dict.fromkeys(name for one in beside for name in happened(one)))
     colours, end = task_colours(tasks(beside)), max(float(one["t"][-1]) for one in beside)
     fig, (ax,) = drawing.figure(width=4.9, height=0.3 + 0.24 * (places + len(rows)) + 0.8 * alone)
@@ -56,13 +55,12 @@ def timeline(recording: Recording, beside: Sequence[Recording] = ()) -> Figure:
 
 
 def tasks(recordings: Iterable[Recording]) -> list[str]:
-    """Return all tasks that are in the stack in any order of any of the runs."""
-    return list(dict.fromkeys(task for recording in recordings for stack in order_names(recording)
-                              for task in stack))
+    """Return all tasks in the stack of any of the runs."""
+    return list(dict.fromkeys(task for recording in recordings for task in recording.task_names))
 
 
 def happened(recording: Recording) -> dict[str, Mask]:
-    """Return what happened beside the changes of the stack: its name, and in which ticks (T,)."""
+    """Return the events other than changes of the stack: name, and a mask of their ticks (T,)."""
     rows: dict[str, Mask] = {}
     if "contacts" in recording and (touched := recording["contacts"] > 0).any():
         rows["contact"] = touched
@@ -81,7 +79,7 @@ def _at(ticks: list[int], count: int) -> Mask:
 
 
 def _band(ax: Axes, recording: Recording, place: int, task: str, colour: str, end: float) -> None:
-    t, stacks = recording["t"], order_names(recording)
+    t, stacks = recording["t"], recording.order_names
     held = np.array([len(stack) > place and stack[place] == task for stack in stacks])
     every = max(1, len(t) // _MOST_STRETCHES) if recording.switches().size > _MOST_STRETCHES else 1
     sampled = np.append(t[::every], t[-1])

@@ -1,4 +1,4 @@
-"""A run to look at again: one HTML file that needs nothing else, or a video."""
+"""Replays of runs: one self-contained HTML file, or a video."""
 
 from scenarios.draw.replay.page import html
 

@@ -1,4 +1,4 @@
-"""What is beside the arm in a frame: the stack as a list, and curves under one cursor."""
+"""The right part of a video frame: the stack as a list, and curves with a cursor."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _ROWS = {Fate.MET: (207, 230, 218), Fate.FREE: (227, 231, 236), Fate.MISSED: (24
 
 
 class Beside:
-    """Draws the list and the cursor of a frame on curves that are drawn once; size in pixels."""
+    """Draws list and cursor of each frame onto curves that are drawn once; size in pixels."""
 
     def __init__(self, scene: Scene, label: str, colour: str, size: tuple[int, int]) -> None:
         self.scene, self.label = scene, label
@@ -30,7 +30,7 @@ class Beside:
         self._bold, self._plain = _font("DejaVuSans-Bold"), _font("DejaVuSans")
 
     def draw(self, f: int) -> Image.Image:
-        """Return what is beside frame f."""
+        """Return the right part of frame f."""
         scene, image = self.scene, self._curves.copy()
         draw, right = ImageDraw.Draw(image), image.width - 16
         draw.text((16, 10), self.label, _INK, self._bold)
@@ -61,12 +61,12 @@ def _saturated(scene: Scene, f: int) -> str:
 
 
 def _head(scene: Scene) -> int:
-    """Height [px] of what is above the curves."""
+    """Return the height [px] of the part above the curves."""
     return 62 + 26 * max((len(order) for order in scene.orders), default=0)
 
 
 def _curves(scene: Scene, colour: str, size: tuple[int, int]) -> tuple[Image.Image, Any]:
-    """The curves as an image, and a function of t [s] that says where the cursor is in it."""
+    """Return the curves as an image, and a function from t [s] to the cursor's place in it."""
     head, dots = _head(scene), 100.0
     with matplotlib.rc_context(drawing.style()):
         fig = Figure(figsize=(size[0] / dots, (size[1] - head) / dots), dpi=dots,

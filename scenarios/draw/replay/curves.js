@@ -1,7 +1,7 @@
-// Curves over time, and what became of each task, under one cursor that can be put anywhere.
+// Curves over time and the fate of each task, under one movable cursor.
 
 const RIGHT = 8, TOP = 5, BELOW = 15, HEIGHT = 104, LANE = 15;
-const DAMPED = 4;  // a range this many times the usual one would flatten the others: it is cut
+const DAMPED = 4;  // a range this many times the usual one is cut, as it would flatten the others
 
 function element(name, attributes = {}, ...children) {
   const made = name === "svg" || element.svg.has(name) ?
@@ -24,7 +24,7 @@ function sample(run) {
 const KEY = [["met", "met-soft"], ["free", "free"], ["missed", "missed-soft"],
   ["unknown", "unknown"]];
 
-// What the colours of the lanes mean.
+// The legend of the lanes' colours.
 function key(present, phrases) {
   return element("span", {class: "key"}, ...KEY.filter(([fate]) => present.has(fate))
     .map(([fate, colour]) => element("span", {},
@@ -81,7 +81,7 @@ class Curves {
       element("text", {x: this.x(t), y: height - 3, "text-anchor": "middle"}, `${t} s`)]);
   }
 
-  // What became of each task of a run: a lane a task, with its place in the order.
+  // The fate of each task of a run: one lane per task, with its place in the order.
   lanes(run, several, first) {
     const children = [], title = element("figcaption", {},
       element("b", {}, several ? `The stack: ${run.label}` : "The stack"), ...(first ? [key(this.present(), this.phrases)] : []));
@@ -100,7 +100,7 @@ class Curves {
     return this.figure(title, TOP + run.tasks.length * LANE + BELOW, children);
   }
 
-  // The fates that come up in the runs that are shown.
+  // The fates that occur in the visible runs.
   present() {
     const values = new Set(this.runs.filter(run => run.visible)
       .flatMap(run => [...new Set(run.fate.values)]));
@@ -146,7 +146,7 @@ class Curves {
     return this.figure(heading, HEIGHT, children);
   }
 
-  // One curve for each column; where runs are compared, the largest of all columns.
+  // One curve per column; when runs are compared, the largest of all columns.
   channels(run, one, several) {
     const {values, width, rows} = one.value, low = one.low.values, high = one.high.values;
     if (width === 1) return [{run, one, colour: run.colour, value: values, low, high}];
@@ -204,7 +204,7 @@ class Scale {
     const ranges = drawn.map(({low, high}) => [finite(low), finite(high)])
       .filter(([low]) => low.length).map(([low, high]) => [
         low.reduce((a, b) => Math.min(a, b)), high.reduce((a, b) => Math.max(a, b))]);
-    if (drawn[0].label) {  // of one run: nothing is cut
+    if (drawn[0].label) {  // of a single run: nothing is cut
       ranges.splice(0, ranges.length, [Math.min(...ranges.map(range => range[0])),
                                        Math.max(...ranges.map(range => range[1]))]);
     }

@@ -29,7 +29,7 @@ class Run {
     this.visible = true;
   }
 
-  // The frame at time t [s] or before, and the share of the way to the next.
+  // The last frame not after time t [s], and the fraction of the time to the next.
   at(t) {
     const times = this.t.values;
     let low = 0, high = this.frames - 1;
@@ -42,7 +42,7 @@ class Run {
     return {frame: low, share: Math.min(Math.max(share, 0), 1)};
   }
 
-  // A row of an array between two frames; an array with one row stands still.
+  // A row of an array, interpolated between two frames; an array with one row is constant.
   between(name, {frame, share}) {
     const {values, width, rows} = this[name];
     const first = Math.min(frame, rows - 1) * width;

@@ -1,4 +1,4 @@
-"""Scenes as the data of a replay: plain numbers, and arrays in base64."""
+"""Scenes as data of a replay: plain numbers, and arrays in base64."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from scenarios.loop.fate import Fate
 from scenarios.loop.phrases import PHRASES
 from scenarios.scene import Scene, Series
 
-_NOTHING = 65535  # stands for NaN and for infinite
+_NOTHING = 65535  # NaN or infinite
 _STEPS = 65534
 
 
 def packed(values: NDArray[Any], steps: bool = False) -> dict[str, Any]:
-    """Return an array as shape, kind and base64; `unpacked` reads it, as the page does.
+    """Return an array as shape, kind and base64; `unpacked` and the page read it.
 
-    Whole numbers go as int16 or, where they are small, int8; others as float32, or with `steps` as
-    65535 even steps from the smallest to the largest value.
+    Integers become int16 or, if they are small, int8; others float32 or, with `steps`, 65535 even
+    steps from the smallest to the largest value.
     """
     if steps:
         return _in_steps(values)
@@ -39,7 +39,7 @@ def _in_steps(values: NDArray[Any]) -> dict[str, Any]:
 
 
 def unpacked(array: dict[str, Any]) -> NDArray[Any]:
-    """Return what `packed` was given, to its precision; infinite as NaN where it has steps."""
+    """Return the array given to `packed`, to its precision; with steps, infinite becomes NaN."""
     kind = {"f4": "<f4", "i2": "<i2", "u2": "<u2", "i1": "|i1"}[array["kind"]]
     values = np.frombuffer(base64.b64decode(array["data"]), kind).reshape(array["shape"])
     if "step" not in array:
@@ -48,7 +48,7 @@ def unpacked(array: dict[str, Any]) -> NDArray[Any]:
 
 
 def run_data(scene: Scene, about: dict[str, Any]) -> dict[str, Any]:
-    """Return one run as what the page's script reads; `about` goes with it as it is."""
+    """Return one run as the page's script reads it; `about` is added unchanged."""
     fixed, levels, frames = scene.stage, scene.levels, np.arange(len(scene.t))
     still = bool((scene.centres == scene.centres[:1]).all())
     places = {"links": scene.links, "points": scene.points, "axis": scene.axis,

@@ -1,4 +1,4 @@
-"""The frames of a video: arm and surroundings, the stack, and curves under one cursor."""
+"""The frames of a video: arm and surroundings, the stack, and curves with a cursor."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ from scenarios.scene import Scene
 
 Frame = NDArray[np.uint8]
 
-SIZE = (1280, 720)  # [px], the picture in space as wide as high
-_FINER = 2          # pixels drawn for each one shown
-_ELEVATION = 0.4    # [rad] of the eye above what is looked at
+SIZE = (1280, 720)  # [px], the 3D picture being square
+_FINER = 2          # pixels drawn per pixel shown, in each direction
+_ELEVATION = 0.4    # [rad] of the camera
 _FIELD = 0.6        # [rad]
 _SKY, _INK, _QUIET, _LINE = (238, 241, 244), (26, 29, 33), (92, 101, 112), (200, 205, 211)
 _LINK, _JOINT, _ALERT = (219, 224, 230), (102, 112, 128), (211, 58, 44)
@@ -32,7 +32,7 @@ _DOT, _CELL, _CONE = 0.011, 0.25, 0.3  # [m]
 
 
 class Frames:
-    """Draws a scene frame by frame; `colour` "#rrggbb" is that of its path and curves."""
+    """Draws a scene frame by frame; `colour` "#rrggbb" is used for its path and curves."""
 
     def __init__(self, scene: Scene, label: str, colour: str,
                  size: tuple[int, int] = SIZE) -> None:
@@ -107,7 +107,7 @@ class Frames:
 
 
 def _camera(scene: Scene, size: int) -> Pinhole:
-    """A camera that has all of the scene in its picture of size x size [px]."""
+    """Return a camera with the whole scene in its image of size x size [px]."""
     links = scene.links.reshape(-1, 3)
     known = np.vstack([links, scene.points.reshape(-1, 3), scene.centres.reshape(-1, 3),
                        *(path.wanted for path in scene.paths if path.wanted is not None)])
@@ -121,7 +121,7 @@ def _camera(scene: Scene, size: int) -> Pinhole:
 
 
 def _standing(scene: Scene) -> tuple[list[Capsule], Array]:
-    """The links, the column of an arm ending on the floor, and the plate (0 or 1, 16) below it."""
+    """Return the links, any column ending on the floor, and the plate (0 or 1, 16) below it."""
     links, floor = list(scene.stage.capsules), scene.stage.floor
     if not links or links[0].name != _FOOT:
         return links, np.zeros((0, 16))
@@ -132,7 +132,7 @@ def _standing(scene: Scene) -> tuple[list[Capsule], Array]:
 
 
 def _grid(scene: Scene) -> list[Array]:
-    """Lines on the floor, cut into pieces that are hidden or not one by one."""
+    """Return lines on the floor, cut into pieces whose visibility is tested one by one."""
     links = scene.links.reshape(-1, 3)
     x, y = (np.round(links.mean(axis=0)[:2] / _CELL) * _CELL).tolist()
     along, z = np.linspace(-1.25, 1.25, 81), np.full(81, scene.stage.floor)
@@ -143,7 +143,7 @@ def _grid(scene: Scene) -> list[Array]:
 
 
 def _thicker(table: Array, radius: float) -> Array:
-    """Obstacles grown by a radius; points stay points, boxes keep their corners."""
+    """Return obstacles grown by a radius; points stay points, boxes keep sharp corners."""
     grown = table.copy()
     round_ones = (table[:, 0] == SHAPES["sphere"]) | (table[:, 0] == SHAPES["capsule"])
     grown[round_ones, 1] += radius
@@ -153,7 +153,7 @@ def _thicker(table: Array, radius: float) -> Array:
 
 def _polyline(draw: ImageDraw.ImageDraw, picture: Picture, points: Array, colour: Any,
               width: int) -> None:
-    """Draw what can be seen of a line."""
+    """Draw the visible part of a line."""
     if len(points) < 2:
         return
     seen = picture.is_seen((points[1:] + points[:-1]) / 2)

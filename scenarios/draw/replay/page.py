@@ -24,10 +24,11 @@ _SCRIPTS = ("data.js", "space.js", "painter.js", "sketch.js", "stage.js", "curve
 
 def html(recordings: Mapping[str, Recording], title: str, *, rate: float = 30.0,
          embedded: bool = False) -> str:
-    """Return a replay of runs by their labels, as a document that refers to nothing outside itself.
+    """Return a replay of runs, by label, as a self-contained document.
 
-    `rate` [Hz] is that of the frames kept. With `embedded` it has no heading, fills its frame and
-    leaves the wheel to the page around it. Raises HierarchyError where there is nothing to show.
+    `rate` is the frame rate in frames per second. With `embedded` the document has no heading,
+    fills its frame and leaves the mouse wheel to the surrounding page. Raises HierarchyError if
+    there is nothing to show.
     """
     from scenarios.draw.figures.drawing import JOINTS
 

@@ -14,7 +14,7 @@ void main() {
   if (kind > 2.5) p = vec3(p.xy - sun.xy * (p.z - ground) / sun.z, ground);
   gl_Position = view * vec4(p, 1.0);
 }`;
-// kind: 0 lit, 1 a bubble whose rim is seen, 2 flat, 3 shadow on the ground
+// kind: 0 lit, 1 a bubble with a visible rim, 2 flat, 3 shadow on the ground
 const SOLID_COLOUR = `
 precision highp float;
 uniform vec3 eye, sun;
@@ -64,7 +64,7 @@ const SUN = unit([0.25, 0.35, 0.9]);
 const LIT = 0, BUBBLE = 1, FLAT = 2, SHADOW = 3;
 const QUARTER = 14;  // steps of a quarter circle
 
-// Every octant of a sphere apart, so that moving them apart by `corner` rounds a box.
+// The octants of a sphere, separate, so that moving them apart by `corner` makes a rounded box.
 function rounded_box() {
   const vertices = [], indices = [], rows = [], columns = [];
   for (const s of [-1, 1]) for (let i = 0; i <= QUARTER; i++) {
@@ -105,7 +105,7 @@ function cone(half_angle) {
 
 class Painter {
   constructor(canvas) {
-    const gl = this.gl = canvas.getContext("webgl");  // as the stage has asked for it
+    const gl = this.gl = canvas.getContext("webgl");  // with the attributes that the stage requested
     this.canvas = canvas;
     this.solids = this.program(SOLID, SOLID_COLOUR, ["normal", "corner"]);
     this.lines = this.program(LINE, LINE_COLOUR, ["from", "to", "at"]);
@@ -153,7 +153,7 @@ class Painter {
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT | gl.STENCIL_BUFFER_BIT);
   }
 
-  // Draw into x, y, width, height [px] from below on, as the camera sees it.
+  // Draw the camera's view into x, y, width, height [px], y counted from below.
   look([x, y, width, height], camera, ground) {
     const gl = this.gl, aspect = width / height, view = camera.matrix(aspect);
     gl.viewport(x, y, width, height);
@@ -169,13 +169,13 @@ class Painter {
     gl.uniform1f(this.solids.uniforms.ground, ground + 0.001);
   }
 
-  // Draw solids {mesh, centre, axes, size, radius, colour} one after the other; of surfaces in one
-  // place the one with the smallest `behind` is seen.
+  // Draw solids {mesh, centre, axes, size, radius, colour} in turn; of coincident surfaces the one
+  // with the smallest `behind` is visible.
   draw(solids, kind, {depth = true, write = kind === LIT, behind = 0} = {}) {
     const gl = this.gl, {program, uniforms} = this.solids;
     gl.useProgram(program);
     this.state(depth, write, kind !== FLAT && kind !== SHADOW);
-    if (kind === SHADOW) {  // each pixel once, however many shadows fall on it
+    if (kind === SHADOW) {  // each pixel once, however many shadows cover it
       gl.enable(gl.STENCIL_TEST);
       gl.stencilFunc(gl.EQUAL, 0, 255);
       gl.stencilOp(gl.KEEP, gl.KEEP, gl.INCR);
@@ -217,7 +217,7 @@ class Painter {
     (cull ? gl.enable : gl.disable).call(gl, gl.CULL_FACE);
   }
 
-  // Pairs of points [[a, b], ...] as what `line` draws.
+  // Pairs of points [[a, b], ...] in the form that `line` draws.
   segments(pairs, keep = true) {
     const gl = this.gl, numbers = [];
     let along = 0;

@@ -1,9 +1,9 @@
-// Time, and everything that follows it.
+// Playback time, and everything that follows it.
 
 class Player {
   constructor(data) {
     this.runs = data.runs.map(one => new Run(one));
-    this.runs.forEach((run, i) => {  // of one colour: each paler than the one before
+    this.runs.forEach((run, i) => {  // of one colour: each paler than the previous one
       run.paler = 0.3 * this.runs.slice(0, i).filter(one => one.colour === run.colour).length;
     });
     this.end = Math.max(...this.runs.map(run => run.end));
@@ -117,7 +117,7 @@ class Player {
     this.redraw();
   }
 
-  // By whole frames of the run that has the most.
+  // By whole frames of the run that has the most frames.
   step(frames) {
     const run = this.runs.reduce((a, b) => b.end > a.end ? b : a), times = run.t.values;
     this.seek(times[Math.min(Math.max(run.at(this.t).frame + frames, 0), run.frames - 1)]);
@@ -192,7 +192,7 @@ class Player {
 
   name(pictures, ratio) {
     const {space, names, legend} = this.parts;
-    const above = legend.offsetParent === legend.parentElement ? 44 : 6;  // what the legend covers
+    const above = legend.offsetParent === legend.parentElement ? 44 : 6;  // height covered by the legend
     names.replaceChildren(...pictures.map(({run, area: [x, y, , h]}) => element("span", {
       style: `left: ${x / ratio + 10}px; border-left: 4px solid ${run.colour};` +
         `top: ${space.offsetTop + (space.height - y - h) / ratio + above}px`}, run.label)));

@@ -1,4 +1,4 @@
-// What the painter does, on a canvas without WebGL: whole solids, those far away first.
+// The painter for a canvas without WebGL: whole solids, the farthest first.
 
 class Sketch {
   constructor(canvas) {
@@ -27,13 +27,13 @@ class Sketch {
     this.pen.lineCap = "round";
   }
 
-  // Paint all that was drawn since `look`.
+  // Paint everything drawn since `look`.
   finish() {
     this.things.sort((a, b) => b.far - a.far).forEach(thing => thing.paint());
     this.pen.restore();
   }
 
-  // Place [px], depth, and how many pixels a metre has there.
+  // Place [px], depth, and pixels per metre there.
   project(p) {
     const v = this.view, row = r => v[r] * p[0] + v[4 + r] * p[1] + v[8 + r] * p[2] + v[12 + r];
     const depth = Math.max(row(3), 1e-3);
@@ -42,7 +42,7 @@ class Sketch {
             metre: this.height / 2 / Math.tan(FIELD / 2) / depth};
   }
 
-  // Things that are not hidden by others are painted after all that are.
+  // Objects that nothing can hide are painted last.
   later(depth, far, paint) { this.things.push({far: depth ? far : -far, paint}); }
 
   draw(solids, kind, {depth = true} = {}) {
@@ -89,7 +89,7 @@ class Sketch {
     pen.fill();
   }
 
-  // The faces of a box that are turned to the eye.
+  // The faces of a box that face the camera.
   box(solid) {
     const half = solid.size.map(s => s + solid.radius), [red, green, blue, alpha] = solid.colour;
     for (const i of [0, 1, 2]) for (const side of [-1, 1]) {

@@ -1,4 +1,4 @@
-"""A picture of solids without a graphics card: their depth by ray casting, then light on them."""
+"""Images of solids without a graphics card: depth by ray casting, then lighting."""
 
 # mypy: disable-error-code="no-untyped-def"
 
@@ -26,7 +26,7 @@ _AT_REST = np.zeros((1, 12))
 
 
 class Picture:
-    """An image (h, w, 3) of bytes, with the depth [m] of what is nearest in each of its pixels."""
+    """An image (h, w, 3) of bytes with the depth [m] of the nearest surface in each pixel."""
 
     def __init__(self, pinhole: Pinhole, ground: Colour) -> None:
         size = (pinhole.height, pinhole.width)
@@ -36,7 +36,7 @@ class Picture:
         self._layer = np.empty(size, np.float32)
 
     def draw_links(self, links: Sequence[Capsule], placements: Array, colour: Colour) -> None:
-        """Draw capsules on bodies whose placements (J + 1, 12) are those of a State."""
+        """Draw capsules on bodies with placements (J + 1, 12), as in a State."""
         draw_scene(self._layer, self.eye, inf, _NOTHING, 0.0, placements, *pack_capsules(links))
         self._light(colour)
 
@@ -46,14 +46,14 @@ class Picture:
         self._light(colour)
 
     def tint(self, table: Array, point_radius: float, colour: Colour, share: float) -> None:
-        """Lay a table of obstacles over the image like glass."""
+        """Draw a table of obstacles as transparent surfaces."""
         draw_scene(self._layer, self.eye, inf, table, point_radius, _AT_REST, *_NOBODY)
         seen = self._layer < self.depth
         mixed = (1.0 - share) * self.image[seen] + share * np.array(colour)
         self.image[seen] = mixed.astype(np.uint8)
 
     def is_seen(self, points: ArrayLike) -> NDArray[np.bool_]:
-        """Whether points (N, 3) [m] are in the picture and nothing is before them: (N,)."""
+        """Whether points (N, 3) [m] are in the image and not hidden: (N,)."""
         u, v, depth = self.pinhole.project(points).T
         height, width = self.depth.shape
         inside = (u >= 0) & (u < width - 0.5) & (v >= 0) & (v < height - 0.5) & (depth > 0)
@@ -66,7 +66,7 @@ class Picture:
 
 @compiled
 def _light(layer, depth, eye, sun, colour, image):
-    """Put what is nearer than all before into the image, lit from `sun`, with a little shine."""
+    """Draw pixels nearer than all before into the image, lit from `sun`, with a highlight."""
     height, width = layer.shape
     for v in range(height):
         for u in range(width):
@@ -91,7 +91,7 @@ def _light(layer, depth, eye, sun, colour, image):
 
 @compiled
 def _slope(before, here, after):
-    """Change of 1 / depth a pixel times depth, from the side that belongs to the same surface."""
+    """Return the change of 1 / depth per pixel, times depth, on the side of the same surface."""
     ahead, behind = (here - after) / after, (before - here) / before
     if not np.isfinite(after):
         ahead = np.inf

@@ -17,14 +17,14 @@ function multiply(A, B) {
   return C;
 }
 
-// Axes whose z is the direction given.
+// Axes with z along the given direction.
 function axes_along(direction) {
   const z = unit(direction);
   const x = unit(cross(Math.abs(z[2]) < 0.9 ? [0, 0, 1] : [1, 0, 0], z));
   return [...x, ...cross(z, x), ...z];
 }
 
-const FIELD = 0.6;  // rad, of view from top to bottom
+const FIELD = 0.6;  // rad, vertical field of view
 
 class Camera {
   constructor(low, high, azimuth) {

@@ -22,7 +22,7 @@ class StackList {
     this.card = element("article", {class: "card"}, head, this.list, ...this.joint_row(),
                         this.near, this.note);
     const judged = !run.fate.values.includes(this.unknown);
-    this.doubt = judged ? [] : ["Not judged where the rows cannot be written again, as after a change by hand."];
+    this.doubt = judged ? [] : ["Unknown where the rows cannot be reconstructed, for example after a change by hand."];
     this.note.hidden = judged && !run.fault;
     this.note.append(...this.doubt);
     this.frame = -1;
@@ -65,7 +65,7 @@ class StackList {
       said.textContent = fate === "missed" ?
         `${this.phrases.missed} by ${short(violations[n])}` : this.phrases[fate];
       row.title = fate === "missed" ?
-        "Norm of what its rows are missed by, in their own unit" : "";
+        "Norm of the violation of its rows, in their unit" : "";
     });
   }
 

@@ -1,4 +1,4 @@
-// What is drawn of the runs at one time: arms, obstacles, areas, paths, cone, link, floor.
+// Draws the runs at one time: arms, obstacles, areas, paths, cone, link, floor.
 
 const UPRIGHT = [1, 0, 0, 0, 1, 0, 0, 0, 1];
 const DOT = 0.011, CONE_LENGTH = 0.3, AXIS_LENGTH = 0.34, CELL = 0.25;  // m
@@ -11,12 +11,12 @@ function capsule(a, b, radius, colour) {
           size: [0, 0, length / 2], radius, colour};
 }
 
-// What an arm stands on.
+// The base of an arm.
 const plate = ([x, y, top], radius, floor, colour) => ({
   centre: [x, y, (floor + top) / 2], axes: UPRIGHT, colour, radius: 0.3 * radius,
   size: [0.95 * radius, 0.95 * radius, Math.max((top - floor) / 2 - 0.3 * radius, 0)]});
 
-// An obstacle, thicker by `more`; its rotation comes row by row.
+// An obstacle grown by `more`; its rotation is given row by row.
 function thing({shape, size, rotation: r}, centre, more, colour) {
   const axes = [r[0], r[3], r[6], r[1], r[4], r[7], r[2], r[5], r[8]];
   if (shape === "capsule") {
@@ -64,7 +64,7 @@ class Stage {
     this.grid = this.painter.segments(grid(this.camera, this.floor));
   }
 
-  // Draw the visible runs, beside each other or one over the other; returns where each is.
+  // Draw the visible runs side by side or overlaid; return the area of each.
   draw(t, beside) {
     const shown = this.runs.filter(run => run.visible), colours = palette();
     const areas = beside ? split(shown.length, this.canvas) :
@@ -156,7 +156,7 @@ class Stage {
   }
 }
 
-// The box around all that is drawn of the runs.
+// The bounding box of everything drawn.
 function bounds(runs) {
   const low = [Infinity, Infinity, Infinity], high = low.map(value => -value);
   const take = (values, k, more) => triple(values, k).forEach((value, i) => {
@@ -188,7 +188,7 @@ function grid(camera, floor) {
   return pairs;
 }
 
-// Areas [px from below on] of `count` pictures that leave them as square as they can be.
+// Areas [px, from below] of `count` pictures, as square as possible.
 function split(count, {width, height}) {
   let columns = 1;
   while (columns < count && width / columns > 1.3 * height / Math.ceil(count / columns)) columns++;

@@ -19,9 +19,9 @@ if TYPE_CHECKING:
 
 def write_video(recording: Recording, path: Path, *, rate: float = 30.0,
                 progress: Callable[[int, int], None] | None = None) -> None:
-    """Write a run as a video of `rate` frames a second [Hz], in the format that `path` ends with.
+    """Write a run as a video of `rate` frames per second, in the format of the suffix of `path`.
 
-    Raises HierarchyError where ffmpeg is missing or fails; then nothing is left behind.
+    Raises HierarchyError if ffmpeg is missing or fails, and then leaves no file.
     """
     program = shutil.which("ffmpeg")
     if program is None:
@@ -31,7 +31,7 @@ def write_video(recording: Recording, path: Path, *, rate: float = 30.0,
     from scenarios.draw.replay.frames import Frames
     from scenarios.scene import scene
 
-    label = str(recording.scenario.make_resolver().label)
+    label = recording.facts.resolver.label
     frames = Frames(scene(recording, rate), f"{recording.scenario.name}, {label}", colour(label))
     path.parent.mkdir(parents=True, exist_ok=True)
     with named(path), written(path) as partial:
@@ -55,7 +55,7 @@ def _encode(program: str, frames: Frames, path: Path, rate: float,
                     progress(done, len(frames))
             process.stdin.close()
         except BrokenPipeError:
-            pass  # it ended early, and says why
+            pass  # ffmpeg ended early and says why
         except BaseException:
             process.kill()
             raise

@@ -1,4 +1,4 @@
-"""The last seconds of a live run as curves."""
+"""Curves of the last seconds of a live run."""
 
 from __future__ import annotations
 
@@ -10,22 +10,24 @@ import numpy as np
 from hierarchy.problem import Array
 from scenarios.draw.viewer.moment import Watched
 from scenarios.loop.controller import Controller
+from scenarios.loop.facts import Facts
 from scenarios.loop.recording import Recording
 from scenarios.scene import Series, series
 
 
 class Lately:
-    """Keeps the last `length` moments that it is shown; `curves` are those of a recording."""
+    """Keeps the last `length` moments; `curves` are like those of a recording."""
 
-    def __init__(self, length: int) -> None:
+    def __init__(self, length: int, facts: Facts) -> None:
+        self._facts = facts
         self._kept: deque[dict[str, Any]] = deque(maxlen=length)
 
     def clear(self) -> None:
-        """Forget all."""
+        """Discard everything."""
         self._kept.clear()
 
     def add(self, watched: Watched) -> None:
-        """Note what a controller did in its last tick, after a look at the moment."""
+        """Add the last tick of a watched controller, after its `moment`."""
         controller, cell = watched.controller, watched.controller.cell
         now: dict[str, Any] = {"t": cell.state.t, "v": cell.state.v.copy()}
         now |= {name: rows[0] for name, rows in watched.listed.items()}
@@ -33,7 +35,7 @@ class Lately:
             now["position_error"] = (cell.position.path(cell.state.t)[0]
                                      - cell.state.position(cell.position.frame))
         if cell.pointing is not None:
-            # without alpha_d, which may be another one when this is drawn
+            # without alpha_d, which may have changed when this is drawn
             now["pointing_error"] = controller.cone_error - cell.pointing.cos_alpha_d
         if cell.sensor is not None:
             seen = cell.sensor.measurement
@@ -42,9 +44,9 @@ class Lately:
         self._kept.append(now)
 
     def curves(self, controller: Controller) -> tuple[Array, tuple[Series, ...]]:
-        """Return the times (F,) [s] and the curves of what is kept."""
+        """Return times (F,) [s] and curves."""
         signals = {name: np.array([now[name] for now in self._kept]) for name in self._kept[-1]}
         if controller.cell.pointing is not None:
             signals["pointing_error"] += controller.cell.pointing.cos_alpha_d
-        recording = Recording(signals, (), controller.cell.scenario)
+        recording = Recording(signals, (), controller.cell.scenario, self._facts)
         return signals["t"], tuple(series(recording, np.arange(len(self._kept))))

@@ -1,4 +1,4 @@
-"""What is dragged on the page: obstacles, and the path of the target."""
+"""Handles that are dragged on the page: obstacles and the path of the target."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ _SIZE = 0.13  # [m] of the arrows
 
 
 class Handles:
-    """Arrows at each obstacle and at the middle of the path, which ask to move them.
+    """Arrows at each obstacle and at the middle of the path, to move them.
 
-    Asks for ("obstacle h", place (3,) [m]) and ("path", place). A handle that nobody holds follows
-    what it belongs to.
+    They request ("obstacle h", place (3,) [m]) and ("path", place). A handle that is not held
+    follows its object.
     """
 
     def __init__(self, server: Any, requests: Requests, obstacles: int, path: bool) -> None:
@@ -25,13 +25,13 @@ class Handles:
         self._handles = {name: self._add(server, name) for name in names}
 
     def follow(self, name: str, place: Array) -> None:
-        """Bring a handle to its place (3,) [m], unless it is held."""
+        """Move a handle to its place (3,) [m], unless it is held."""
         handle = self._handles.get(name)
         if handle is not None and name not in self._held and (handle.position != place).any():
             handle.position = place
 
     def set_visible(self, visible: bool) -> None:
-        """Show or hide all."""
+        """Show or hide all handles."""
         for handle in self._handles.values():
             handle.visible = visible
 

@@ -1,4 +1,4 @@
-"""The settings that have a slider while a run is live."""
+"""The settings with a slider in a live run."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from scenarios.config import Scenario
 
 @dataclass(frozen=True)
 class Knob:
-    """A number of a scenario, by its dotted key, and the range of its slider."""
+    """A number in a scenario, by its dotted key, and the range of its slider."""
 
     key: str
     label: str
@@ -18,7 +18,7 @@ class Knob:
     step: float
 
     def value(self, scenario: Scenario) -> float | None:
-        """Return its value; None where the scenario has no such number."""
+        """Return its value, or None where the scenario has no such number."""
         found: object = scenario
         for name in self.key.split("."):
             found = getattr(found, name, None)
@@ -46,7 +46,7 @@ _VELOCITY = (
 
 
 def knobs(scenario: Scenario) -> Iterator[tuple[Knob, float]]:
-    """Yield the settings that act in a scenario, with their values."""
+    """Yield the settings that apply to a scenario, with their values."""
     gains = _ACCELERATION if scenario.control.level == "acceleration" else _VELOCITY
     for knob in (*_BOTH, *gains):
         value = knob.value(scenario)

@@ -1,4 +1,4 @@
-"""A run that is changed by hand while it goes on; nothing here knows of a page."""
+"""A run that is changed by hand while it goes on; nothing here depends on a page."""
 
 from __future__ import annotations
 
@@ -14,23 +14,24 @@ from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array
 from scenarios.cell.build import build
 from scenarios.config import Scenario, ScenarioError
+from scenarios.config.plant import PlantSection
 from scenarios.draw.run_folder import save
 from scenarios.loop.controller import Controller
+from scenarios.loop.judging import completed
 from scenarios.loop.recorder import Recorder
 from scenarios.loop.recording import Recording
 from scenarios.loop.simulation import tick
 
-_HAND = 1.0     # [m/s] at most, of an obstacle that is dragged
-_FARTHEST = 5.0  # [m] that anything may be dragged
+_HAND = 1.0     # [m/s] greatest speed of a dragged obstacle
+_FARTHEST = 5.0  # [m] greatest distance of dragging
 
 
 class Live:
-    """One run, tick by tick, by the thread that calls it.
+    """One run, tick by tick, in the thread that calls it.
 
-    `scenario` is as the settings are now, `begun` as they were at the first tick. A change takes
-    effect with the next tick: other tasks or another resolver, the same plant where it is. What
-    cannot be is refused with a HierarchyError, and leaves everything as it was. `over` after the
-    last tick, or after one with a `fault`.
+    `scenario` has the present settings, `begun` those of the first tick. A change of tasks or
+    resolver takes effect with the next tick, with the plant as it is. An invalid change raises a
+    HierarchyError and has no effect. `over` is set after the last tick or after one with a `fault`.
     """
 
     def __init__(self, scenario: Scenario) -> None:
@@ -43,7 +44,7 @@ class Live:
         self.restart()
 
     def restart(self) -> None:
-        """Begin anew, with the settings as they are; obstacles go to where they belong."""
+        """Start again with the present settings; obstacles return to their places."""
         control = self.scenario.control
         self.begun, self.over = self.scenario, False
         self.fault: str | None = None
@@ -63,7 +64,7 @@ class Live:
         return self.recorder.ticks * self.scenario.control.period
 
     def tick(self) -> None:
-        """Make the next tick, if there is one."""
+        """Run the next tick, if there is one."""
         if self.over:
             return
         k = self.recorder.ticks
@@ -78,14 +79,14 @@ class Live:
         self.over = self.fault is not None or k + 1 == self.ticks
 
     def change(self, changes: Mapping[str, Any]) -> None:
-        """Give dotted keys of the scenario other values."""
+        """Change the values of dotted keys of the scenario."""
         self._take_over(self.scenario.with_changes(changes))
         self.changes += [{"t": self.t, "key": key, "value": value}
                          for key, value in changes.items()]
 
     def switch(self, spec: str) -> None:
-        """Go on with another resolver, "name" or "name:setting=value"."""
-        control = self._first.with_resolver(spec).control  # not with what an earlier spec set
+        """Continue with another resolver, "name" or "name:setting=value"."""
+        control = self._first.with_resolver(spec).control  # without the settings of an earlier spec
         scenario = self.scenario.with_changes({"control.resolver": control.resolver,
                                                "control.options": control.options})
         resolver = scenario.make_resolver()
@@ -95,7 +96,7 @@ class Live:
         self.changes.append({"t": self.t, "key": "control.resolver", "value": spec})
 
     def drag(self, h: int, offset: ArrayLike) -> None:
-        """Move obstacle h to `offset` (3,) [m] from its place or path, no faster than a hand."""
+        """Move obstacle h to `offset` (3,) [m] from its place or path, at limited speed."""
         wanted = np.asarray(offset, dtype=float)
         if not 0 <= h < len(self._wanted):
             raise ScenarioError(f"there is no obstacle {h + 1}, only {len(self._wanted)}")
@@ -105,17 +106,17 @@ class Live:
         self._wanted[h] = wanted
 
     def recording(self) -> Recording:
-        """Return what was recorded so far, with what was dragged and whether it was changed."""
+        """Return the run so far, including dragged obstacles and whether anything was changed."""
         ticks = self.recorder.ticks
         fault = self.fault if self.over else f"interrupted at tick {ticks}"
         recording = self.recorder.finish(self.begun, fault)
         if self._changed[:ticks].any():
             recording.signals["changed"] = self._changed[:ticks]
             recording.signals["obstacle_offset"] = self._offsets[:ticks]
-        return recording
+        return completed(recording, build(self.begun.model_copy(update={"plant": PlantSection()})))
 
     def save(self, folder: Path) -> Recording:
-        """Write the run's folder as `hierarchy run` does, and `changes.json` if there were any."""
+        """Write the run's folder as `hierarchy run` does, and any changes to `changes.json`."""
         recording = self.recording()
         save(recording, folder)
         if self.changes:
@@ -124,7 +125,7 @@ class Live:
         return recording
 
     def _take_over(self, scenario: Scenario) -> None:
-        """Go on under another scenario of the same robot and plant."""
+        """Continue with another scenario of the same robot and plant."""
         before = self.controller.cell
         measurement, commanded = before.state.measurement, before.state.commanded
         try:
@@ -136,7 +137,7 @@ class Live:
         self.recorder.follow(controller)
 
     def _drag_on(self) -> None:
-        """Bring obstacles a tick nearer to where they are dragged."""
+        """Move dragged obstacles by one tick toward their targets."""
         if self.obstacles is None:
             return
         step = _HAND * self.scenario.control.period
@@ -146,7 +147,7 @@ class Live:
 
 
 def _toward(here: Array, there: Array, step: float) -> Array:
-    """Return the point (3,) at most `step` [m] from here on the way to there."""
+    """Return the point (3,) at most `step` [m] from `here` toward `there`."""
     way = there - here
     length = float(np.linalg.norm(way))
     return there if length <= step else here + way * (step / length)

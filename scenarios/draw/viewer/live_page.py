@@ -1,4 +1,4 @@
-"""A live run on a page: drawn while it goes on, and changed by what is done there."""
+"""A live run on a page, where it is drawn and changed."""
 
 from __future__ import annotations
 
@@ -20,24 +20,24 @@ from scenarios.draw.viewer.moment import Moment, Watched
 from scenarios.draw.viewer.playback import Requests
 from scenarios.draw.viewer.server import lay_floor, look_at_all
 from scenarios.draw.viewer.stack_list import stack_html
-from scenarios.scene import ends, stage
+from scenarios.scene import Stage, ends, stage
 
-FRAMES = 30.0   # drawn a second
-_CURVES = 4.0   # times a second that the curves are drawn anew
-_LATELY = 10.0  # [s] that the curves show
-_TRACE = 600    # frames that the trace is long, points that the path has
-_BUSY = 0.05    # [s] of ticks between two drawings, at most
-_HAND = 1.0     # [m/s] at most, of a path that is dragged
-_MARGIN = 0.12  # [m] about what there is at first, that the camera sees
-_NEAR = 1.0     # [m] from the base: obstacles that the camera sees at first
+FRAMES = 30.0   # frames per second
+_CURVES = 4.0   # updates of the curves per second
+_LATELY = 10.0  # [s] shown by the curves
+_TRACE = 600    # length of the trace in frames, points of the path
+_BUSY = 0.05    # [s] of ticks between two frames, at most
+_HAND = 1.0     # [m/s] greatest speed of a dragged path
+_MARGIN = 0.12  # [m] margin of the initial camera view
+_NEAR = 1.0     # [m] from the base: obstacles in the initial camera view
 
 
 class LivePage:
     """A live run drawn into a server.
 
-    `step` does what was asked for on the page, makes the ticks that are due, and draws; nothing
-    else touches the run. `requests` takes what is asked for; `list` is the stack's HTML, `refused`
-    says why the last request that could not be was refused.
+    `step` carries out requests, runs the ticks that are due, and draws; nothing else changes the
+    run. `requests` takes the page's requests; `list` is the stack's HTML; `refused` says why the
+    last invalid request was rejected.
     """
 
     def __init__(self, server: Any, live: Live, speed: float = 1.0) -> None:
@@ -47,8 +47,8 @@ class LivePage:
         self.specs = resolvers(live.scenario)
         self._colours = colours(self.specs)
         self._due, self._curves_at = 0.0, -np.inf
-        self._stage, self._watched = stage(live.scenario), Watched(live.controller)
-        self._lately = Lately(int(_LATELY * FRAMES))
+        self._stage, self._watched = self._stage_now(), Watched(live.controller)
+        self._lately = Lately(int(_LATELY * FRAMES), live.recorder.facts)
         self._trace: deque[tuple[list[Array], Rgb]] = deque(maxlen=_TRACE)
         self._middle, self._path_wanted = np.zeros(3), self._path_offset()
         lay_floor(server, self._stage.floor)
@@ -63,11 +63,11 @@ class LivePage:
 
     @property
     def label(self) -> str:
-        """The resolver's label as it is now."""
+        """The label of the present resolver."""
         return str(self.live.scenario.make_resolver().label)
 
     def step(self, seconds: float) -> None:
-        """Do what was asked for, then the ticks of so many seconds, and draw."""
+        """Carry out requests, run the ticks of so many seconds, and draw."""
         for what, value in self.requests.take():
             self._do(what, value)
         if self.playing and not self.live.over:
@@ -76,7 +76,7 @@ class LivePage:
         self.draw()
 
     def draw(self) -> None:
-        """Show the run as it is."""
+        """Draw the present state of the run."""
         now = self._watched.moment()
         tips, shades = zip(*self._trace, strict=True)
         with self.server.atomic():
@@ -90,7 +90,7 @@ class LivePage:
             self.panel.roll(self._lately.curves(self.live.controller))
 
     def _make_ticks(self, seconds: float) -> None:
-        """Catch up with the clock as far as there is time; what cannot be caught up is left."""
+        """Run the ticks that are due as far as time allows; drop the rest."""
         live, a_second = self.live, self.speed / self.live.scenario.control.period
         self._due = min(self._due + a_second * seconds, a_second * 2.0 / FRAMES + 1.0)
         end = time.perf_counter() + _BUSY
@@ -100,7 +100,7 @@ class LivePage:
         self._note()
 
     def _first_tick(self) -> None:
-        """There is something to show after a tick, not before."""
+        """Run one tick, before which there is nothing to show."""
         self.live.tick()
         self._note()
 
@@ -148,27 +148,30 @@ class LivePage:
             self.live.drag(h, place - (obstacles.centres[h] - obstacles.offset[h]))
 
     def _drag_path(self, seconds: float) -> None:
-        """Bring the path nearer to where it is dragged."""
+        """Move the path toward its dragged place."""
         here = self._path_offset()
         way = self._path_wanted - here
         length = float(np.linalg.norm(way))
         if length > 0.0:
             step = min(1.0, _HAND * seconds / length)
             self._do("position.offset", (here + step * way).tolist())
-            if (here == self._path_offset()).all():  # it was refused
+            if (here == self._path_offset()).all():  # the change was rejected
                 self._path_wanted = here
 
     def _follow(self) -> None:
-        """Draw what has changed with the scenario."""
+        """Draw the parts that have changed with the scenario."""
         self._watched = Watched(self.live.controller)
-        before, self._stage = self._stage, stage(self.live.scenario)
+        before, self._stage = self._stage, self._stage_now()
         if (before.areas, before.half_angle) != (self._stage.areas, self._stage.half_angle):
             self._model.set_stage(self._stage)
         self._model.paint(self._colour)
         self._model.set_paths(self._paths())
 
+    def _stage_now(self) -> Stage:
+        return stage(self.live.recorder.facts.robot, self.live.scenario)
+
     def _refuse(self, why: str) -> None:
-        """Say why something was not done, and put the inputs back to what is so."""
+        """Say why a request was rejected, and reset the inputs."""
         self.refused = why
         for client in self.server.get_clients().values():
             client.add_notification("Not changed", why, color="red", auto_close_seconds=6.0)
@@ -183,7 +186,7 @@ class LivePage:
         return np.array(position.offset) if position else np.zeros(3)
 
     def _paths(self) -> list[Array]:
-        """Desired paths (N, 3) [m]; the first, without its offset, is about `_middle`."""
+        """Return the desired paths (N, 3) [m]; update `_middle`, that of the first one."""
         cell = self.live.controller.cell
         times = np.linspace(0.0, self.live.scenario.control.duration, _TRACE)
         paths = [np.array([task.path(t)[0] for t in times])

@@ -1,4 +1,4 @@
-"""What a live run has to press, turn and drag, and its list and curves."""
+"""The controls of a live run, its stack list and its curves."""
 
 from __future__ import annotations
 
@@ -16,10 +16,11 @@ from scenarios.draw.viewer.server import lay_out
 
 
 class LivePanel:
-    """The panels of a live run; all that is done on them goes into `requests`.
+    """The panels of a live run; every input goes into `requests`.
 
-    Asks for ("toggle", None), ("restart", None), ("speed", x), ("resolver", label), ("handles",
-    shown), (dotted key, value), and what `Handles` does. `choice`, `sliders` by key: the inputs.
+    They request ("toggle", None), ("restart", None), ("speed", x), ("resolver", label), ("handles",
+    shown), (dotted key, value), and what `Handles` does. The inputs are `choice` and `sliders` by
+    key.
     """
 
     def __init__(self, server: Any, requests: Requests, scenario: Scenario, labels: Sequence[str],
@@ -46,7 +47,7 @@ class LivePanel:
         self.handles = Handles(server, requests, obstacles, scenario.position is not None)
 
     def show(self, playing: bool, stack: str) -> None:
-        """Show whether it plays, and the stack's list."""
+        """Show whether the run is playing, and the stack list."""
         self._button.show(playing)
         if stack != self._stack.content:
             self._stack.content = stack
@@ -56,16 +57,16 @@ class LivePanel:
         self._plots.roll({"run": curves})
 
     def set_to(self, scenario: Scenario, label: str) -> None:
-        """Put every input to what is so."""
+        """Set every input to the present values."""
         self.choice.value = label
         for knob, value in knobs(scenario):
             self.sliders[knob.key].value = value
 
 
 def resolvers(scenario: Scenario) -> dict[str, str]:
-    """Return specs of the resolvers that can resolve a scenario's stack, by their labels.
+    """Return the specs of resolvers that can resolve a scenario's stack, by label.
 
-    The scenario's own is the first.
+    The scenario's own resolver is the first.
     """
     from scenarios.config.resolvers import default_resolvers
     from solvers import names

@@ -1,4 +1,4 @@
-"""Triangles for what is drawn: hulls of balls, and the surface of a cone."""
+"""Triangle meshes: hulls of balls, and the surface of a cone."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from hierarchy.problem import Array
 
 Mesh = tuple[Array, NDArray[np.int64]]  # vertices (V, 3), triangles (F, 3) turned outward
 
-POINT = 0.016  # [m] radius at which an obstacle that is a point is drawn
-_FINE = 2      # times that the faces of an icosahedron are divided to make a ball
-_AROUND = 48   # edges of a cone's rim
+POINT = 0.016  # [m] radius of a point obstacle as drawn
+_FINE = 2      # subdivisions of an icosahedron for a ball
+_AROUND = 48   # edges of the rim of a cone
 _AT_CENTRE = np.zeros((1, 3))
 
 
 def hull_of_balls(centres: Any, radii: Sequence[float]) -> Mesh:
     """Return the convex hull of balls: centres (K, 3) [m] and as many radii [m], zero for a point.
 
-    One ball is a ball, two are a capsule, tapered if their radii differ, and eight may be a box.
+    Two balls make a capsule, tapered if their radii differ, and eight points a box.
     """
     from trimesh.convex import convex_hull
     from trimesh.creation import icosphere
@@ -35,7 +35,7 @@ def hull_of_balls(centres: Any, radii: Sequence[float]) -> Mesh:
 
 
 def obstacle_mesh(obstacle: Obstacle, beyond: float = 0.0) -> Mesh:
-    """Return the surface at a distance `beyond` [m] from an obstacle, about its centre and axes."""
+    """Return the surface at distance `beyond` [m] from an obstacle, in its own frame."""
     centres, radius = _core(obstacle)
     if beyond == 0.0 and obstacle.shape == "point":
         radius = POINT
@@ -43,7 +43,7 @@ def obstacle_mesh(obstacle: Obstacle, beyond: float = 0.0) -> Mesh:
 
 
 def cone_mesh(half_angle: float, length: float) -> Mesh:
-    """Return the surface of a cone about z, its apex at the origin and its sides `length` [m]."""
+    """Return a cone about z with its apex at the origin and sides of `length` [m]."""
     angle = np.linspace(0.0, 2.0 * np.pi, _AROUND, endpoint=False)
     rim = length * np.column_stack([np.sin(half_angle) * np.cos(angle),
                                     np.sin(half_angle) * np.sin(angle),
@@ -54,7 +54,7 @@ def cone_mesh(half_angle: float, length: float) -> Mesh:
 
 
 def _core(obstacle: Obstacle) -> tuple[Array, float]:
-    """Points (K, 3) and a radius [m]: all within it of their hull is the obstacle."""
+    """Return points (K, 3) and a radius [m]; the obstacle is their hull grown by the radius."""
     if obstacle.shape == "capsule":
         radius, half = obstacle.size
         return np.array([[0.0, 0.0, -half], [0.0, 0.0, half]]), radius

@@ -1,4 +1,4 @@
-"""One run in space: nodes that are made once and then moved from moment to moment."""
+"""One run in space: nodes that are created once and then moved."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hierarchy import State
 from hierarchy.problem import Array
 from scenarios.draw.figures.drawing import ALERT, INK
 from scenarios.draw.viewer.meshes import Mesh, cone_mesh, hull_of_balls, obstacle_mesh
@@ -18,12 +17,12 @@ from scenarios.scene import Stage, ends, place
 Rgb = tuple[int, int, int]
 Segments = NDArray[np.float32]  # (M, 2, 3) [m]
 
-_SLIM = 0.62            # of the capsules' radii: so points and paths on the arm can be seen
+_SLIM = 0.62            # of the capsules' radii, so that points and paths on the arm are visible
 _TIP = 0.012            # [m] radius at the end effector
 _DOT = 0.012            # [m] radius of a control point
 _AXIS = 0.3             # [m] length of the cone
-_BAND = 0.002           # [m] by which control points stand out of the links
-_ON_AXIS = 0.3          # of a link's radius: how far off its axis a point may be to be on it
+_BAND = 0.002           # [m] by which control points protrude from the links
+_ON_AXIS = 0.3          # of a link's radius: points this near to its axis are on it
 _AXIS_WIDTH = 0.003     # [m]
 _AREA_OPACITIES = (0.20, 0.08)  # of the inner and the outer area
 _PATH_VERTICES = 400
@@ -36,9 +35,9 @@ def rgb(colour: str) -> Rgb:
 
 
 class Model:
-    """A run drawn into a viser server under the name `name`, in the colour of its resolver.
+    """A run drawn into a viser server under `name`, in the colour of its resolver.
 
-    `place` puts it elsewhere, `fade` makes it see-through, `show` brings it to a moment.
+    `place` moves it, `fade` makes it transparent, `show` brings it to a moment.
     """
 
     def __init__(self, server: Any, name: str, stage: Stage, colour: str,
@@ -47,7 +46,7 @@ class Model:
         self._colour = rgb(colour)
         self._root = self._frame("")
         self._joints = [self._frame(f"/joint{j}")
-                        for j in range(len(stage.robot.joint_names) + 1)]
+                        for j in range(len(stage.robot.joints) + 1)]
         self._solid = [*self._links(), *self._control_points()]
         self._obstacles = [self._frame(f"/obstacle{h}") for h in range(len(stage.obstacles))]
         self._draw_obstacles()
@@ -65,7 +64,7 @@ class Model:
         self.set_paths(paths)
 
     def set_stage(self, stage: Stage) -> None:
-        """Draw areas and cone as they are now."""
+        """Draw the areas and the cone of another stage."""
         self._stage = stage
         for area in self._areas:
             area.remove()
@@ -78,11 +77,11 @@ class Model:
             wxyz=_turn_z_to(stage.axis), cast_shadow=False)
 
     def place(self, offset: Array) -> None:
-        """Move the whole of it by an offset (3,) [m]."""
+        """Move everything by an offset (3,) [m]."""
         self._root.position = offset
 
     def fade(self, opacity: float | None) -> None:
-        """Make the arm see-through, without areas about obstacles; None for solid, with them."""
+        """Make the arm transparent and hide areas; None for an opaque arm with areas."""
         for node in self._solid:
             node.opacity = opacity
         for area in self._areas:
@@ -96,7 +95,7 @@ class Model:
                 node.color = self._colour
 
     def set_paths(self, paths: Sequence[Array]) -> None:
-        """Draw the desired paths, (N, 3) [m] each; always as many."""
+        """Draw the desired paths, (N, 3) [m] each; their number must not change."""
         for i, path in enumerate(paths):
             if i == len(self._paths):
                 self._paths.append(self._lines(f"/path{i}", _segments(()), rgb(INK), 1.5))
@@ -104,9 +103,9 @@ class Model:
 
     def show(self, now: Moment, traces: Sequence[Array],
              colours: NDArray[Any] | None = None) -> None:
-        """Bring everything to a moment; traces (N, 3) [m] are where points were.
+        """Show a moment, with traces (N, 3) [m] of points.
 
-        `colours` (N, 3) of them, from 0 to 255; that of the run if None.
+        `colours` (N, 3) of the traces are from 0 to 255; None takes the colour of the run.
         """
         for frame, row in zip(self._joints, now.placements, strict=True):
             frame.wxyz, frame.position = _quaternion(row[:9].reshape(3, 3).T), row[9:]
@@ -147,7 +146,7 @@ class Model:
             self._cone.color = colour
 
     def _links(self) -> list[Any]:
-        """The arm: pale links, joints in the run's colour, a tool that tapers to its point."""
+        """Draw the arm: pale links, joints in the run's colour, a tapered tool."""
         drawn: list[Any] = []
         tool = self._stage.points[-1]
         for i, capsule in enumerate(self._stage.capsules):
@@ -162,18 +161,18 @@ class Model:
         return drawn
 
     def _control_points(self) -> list[Any]:
-        """Bands about links where points are on their axes, dots elsewhere."""
+        """Draw control points as bands where they are on a link's axis, else as dots."""
         return [self._ball(f"/joint{point.joint}/point{k}", radius, _DARK, position=point.offset)
                 for k, (point, radius) in enumerate(zip(self._stage.points[:-1],
                                                         _widths(self._stage), strict=False))]
 
     def _pointer(self) -> Any:
-        """The end effector's z axis."""
-        frame = self._stage.robot.frame(self._stage.robot.end_effector)
-        end = frame.offset + 0.85 * _AXIS * frame.rotation[:, 2]
+        """Draw the end effector's z axis."""
+        tip = self._stage.points[-1]
+        end = tip.offset + 0.85 * _AXIS * np.array(self._stage.robot.tool)[:, 2]
         return self._add_mesh(
-            f"/joint{frame.joint}/axis",
-            hull_of_balls((frame.offset, end), (_AXIS_WIDTH, _AXIS_WIDTH)), self._colour)
+            f"/joint{tip.joint}/axis",
+            hull_of_balls((tip.offset, end), (_AXIS_WIDTH, _AXIS_WIDTH)), self._colour)
 
     def _draw_obstacles(self) -> None:
         for h, obstacle in enumerate(self._stage.obstacles.obstacles):
@@ -202,7 +201,7 @@ class Model:
 
 
 def _segments(points: Array | tuple[()]) -> Segments:
-    """The line through points (N, 3), thinned, as segments (M, 2, 3)."""
+    """Return the line through points (N, 3), thinned, as segments (M, 2, 3)."""
     if len(points) < 2:
         return np.zeros((1, 2, 3), np.float32)
     kept = np.asarray(points)[_thinned(len(points))]
@@ -210,8 +209,8 @@ def _segments(points: Array | tuple[()]) -> Segments:
 
 
 def _widths(stage: Stage) -> Array:
-    """Radius [m] at which each of the stage's points can be seen, on whatever link it is."""
-    placements = State.at(stage.robot, stage.robot.rest).placements
+    """Return a radius [m] at which each of the stage's points is visible on its link."""
+    placements = stage.robot.placements(np.array(stage.robot.rest))
     points = place(placements, [point.joint for point in stage.points],
                    [point.offset for point in stage.points])
     radii = np.array([capsule.radius for capsule in stage.capsules])
@@ -228,12 +227,12 @@ def _thinned(count: int) -> NDArray[np.int64]:
 
 
 def _linear(colours: NDArray[Any]) -> NDArray[np.uint8]:
-    """Colours from 0 to 255 as the page takes those of vertices: linear, not sRGB."""
+    """Return colours from 0 to 255 in linear RGB, as the page expects for vertices."""
     return np.rint(255.0 * (colours / 255.0) ** 2.2).astype(np.uint8)
 
 
 def _turn_z_to(axis: Array) -> Array:
-    """Quaternion (4,), scalar first, that turns z to a unit vector (3,)."""
+    """Return the quaternion (4,), scalar first, that turns z to a unit vector (3,)."""
     if axis[2] < -1.0 + 1e-9:
         return np.array([0.0, 1.0, 0.0, 0.0])
     turn = np.array([1.0 + axis[2], -axis[1], axis[0], 0.0])
@@ -241,7 +240,7 @@ def _turn_z_to(axis: Array) -> Array:
 
 
 def _quaternion(rotation: Array) -> Array:
-    """Quaternion (4,), scalar first, of a rotation (3, 3)."""
+    """Return the quaternion (4,), scalar first, of a rotation (3, 3)."""
     from viser.transforms import SO3
 
     return np.asarray(SO3.from_matrix(rotation).wxyz)

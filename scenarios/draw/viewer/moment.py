@@ -1,4 +1,4 @@
-"""What is drawn at one moment: of a recording's frame, or of a controller that is at work."""
+"""What is drawn at one moment, of a recorded frame or of a running controller."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 class Became(NamedTuple):
-    """What became of a task, and the Euclidean norm of its violation in the unit of its rows."""
+    """The fate of a task, and the Euclidean norm of its violation in the unit of its rows."""
 
     fate: Fate
     violation: float
@@ -31,14 +31,14 @@ class Became(NamedTuple):
 
 @dataclass(frozen=True)
 class Moment:
-    """What there is to draw at time t [s]; metres, arrays as in `scenarios.scene.Scene`.
+    """What is drawn at time t [s]; metres, arrays as in `scenarios.scene.Scene`.
 
-    placements (J + 1, 12); points (P, 3), the end effector last; nearest (3,) the obstacle's point
-    to link with point `linked`, or None; active, the point that the stack keeps away, or -1;
-    centres (H, 3); axis (3,); desired (3,) or None; angle [rad] between the axis and that of the
-    cone, or None. `order` names the tasks in the stack, most important first, `became` has each of
-    them; saturated (n,) says which side -1 or 1 of its limits each joint is at. `moved` has the
-    point that each listed task moves and where it is wanted, if it says so.
+    placements (J + 1, 12); points (P, 3), the end effector last; nearest (3,), the obstacle's point
+    linked with point `linked`, or None; active, the point that the stack keeps away, or -1;
+    centres (H, 3); axis (3,); desired (3,) or None. `order` names the tasks in the stack, most
+    important first, `became` has the fate of each; saturated (n,) is the side, -1 or 1, of its
+    limits at which each joint is, else 0. `moved` has the point that each listed task moves and its
+    desired position or None.
     """
 
     t: float
@@ -57,13 +57,13 @@ class Moment:
 
     @property
     def goals(self) -> list[Array]:
-        """Where points are wanted now: (3,) [m] each."""
+        """The desired positions of points, (3,) [m] each."""
         wanted = [self.desired, *(goal for _, goal in self.moved)]
         return [goal for goal in wanted if goal is not None]
 
     @property
     def tips(self) -> list[Array]:
-        """What leaves a trace: the end effector, or the points that listed tasks move, (3,) [m]."""
+        """The points with a trace: those that listed tasks move, or the end effector, (3,) [m]."""
         return [place for place, _ in self.moved] or [self.points[-1]]
 
 
@@ -83,11 +83,11 @@ def of_scene(scene: Scene, f: int) -> Moment:
 
 
 class Watched:
-    """A controller that is at work, looked at between two ticks.
+    """A running controller, observed between two ticks.
 
-    Distances are measured once more, from known geometry and at the true joints, also where the
-    controller sees a camera's. After `moment`, `listed` has the signals of listed tasks, one row
-    each, see scenarios.loop.listed.
+    Distances are measured again from known geometry at the true joints, even if the controller uses
+    a camera. After `moment`, `listed` has the signals of listed tasks, one row each; see
+    scenarios.loop.listed.
     """
 
     def __init__(self, controller: Controller) -> None:
@@ -99,15 +99,15 @@ class Watched:
         self._tip = cell.robot.frame(cell.robot.end_effector)
 
     def moment(self) -> Moment:
-        """Return what there is to draw after the last tick, as it was at its begin."""
+        """Return what is drawn after the last tick: the state at its start."""
         controller, cell, seen = self.controller, self.controller.cell, self._exact.measurement
         q = cell.plant.extra.get("true_q", cell.state.q)
         self._state.move(cell.state.t, np.asarray(q), self._at_rest)
         self._exact.measure(self._state)
         order = controller.allocation.order
         found = self._judged()
-        became = {name: Became(*one) for name, *one in zip(
-            order, found.fate, found.violation.tolist(), strict=True)}
+        became = {name: Became(Fate(fate), violation) for name, fate, violation in zip(
+            order, found.fate.tolist(), found.violation.tolist(), strict=True)}
         active, linked = self._active(became), int(np.argmin(seen.distance))
         linked = active if active >= 0 else linked
         D = seen.distance[linked]
@@ -119,7 +119,7 @@ class Watched:
             found.saturated, tuple(self._moved()))
 
     def _active(self, became: Mapping[str, Became]) -> int:
-        """The point that is kept away, as `scenarios.scene.Scene` has it."""
+        """Return the point that is kept away, as `active` of `scenarios.scene.Scene`."""
         cell = self.controller.cell
         if cell.sensor is None:
             return -1
@@ -145,7 +145,7 @@ class Watched:
         controller = self.controller
         if not controller.answered:
             levels = len(controller.allocation.order)
-            return Judged([Fate.UNKNOWN] * levels, np.full(levels, np.nan),
+            return Judged(np.full(levels, Fate.UNKNOWN, np.int8), np.full(levels, np.nan),
                           np.zeros(len(controller.sent), np.int8))
         return judged(controller.cell, controller.hierarchy, controller.sent,
                       controller.resolver.accuracy)

@@ -1,4 +1,4 @@
-"""The curves of runs, one plot for each quantity: under one time cursor, or rolling on."""
+"""The curves of runs, one plot per quantity, with a time cursor or rolling."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from hierarchy.problem import Array
 from scenarios.draw.figures.drawing import ALERT, INK, JOINTS
 from scenarios.scene import Series
 
-_POINTS = 500   # of each curve
+_POINTS = 500   # per curve
 _HEIGHT = 118   # [px]
-_MARGIN = 0.06  # of the range of a plot, above and below
+_MARGIN = 0.06  # above and below, relative to the range of a plot
 _DASHED = [4, 4]
 _NO_DOTS = {"show": False}
 _FONT = "10px sans-serif"
 
-Curves = Mapping[str, tuple[Array, Sequence[Series]]]  # of each run: times (F,) [s] and series
+Curves = Mapping[str, tuple[Array, Sequence[Series]]]  # by run: times (F,) [s] and series
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class _Plot:
 
     @property
     def range(self) -> tuple[float, float]:
-        """The least and the greatest value, with a margin."""
+        """The smallest and the largest value, with a margin."""
         values = np.concatenate(self.data[1:])
         finite = values[np.isfinite(values)]
         low, high = (float(finite.min()), float(finite.max())) if finite.size else (0.0, 1.0)
@@ -43,7 +43,7 @@ class _Plot:
         return low - margin, high + margin
 
     def with_cursor(self, t: float) -> tuple[Array, ...]:
-        """The data with three points more at t [s], where one more curve goes up and down."""
+        """Return the data with three more points at t [s], and a curve that is the cursor."""
         low, high = self.range
         t = float(np.clip(t, self.times[0], self.times[-1]))
         k = int(np.searchsorted(self.times, t))
@@ -56,7 +56,7 @@ class _Plot:
 
 
 class Plots:
-    """One plot for each quantity, one under the other; those of several runs share them."""
+    """One plot per quantity, one below the other, shared by all runs."""
 
     def __init__(self, gui: Any, curves: Curves, colours: Mapping[str, str],
                  rolling: bool = False) -> None:
@@ -70,7 +70,7 @@ class Plots:
             handle.data = self._plots[title].with_cursor(t)
 
     def roll(self, curves: Curves) -> None:
-        """Draw other curves of the same quantities."""
+        """Replace the curves by others of the same quantities."""
         for plot in _plots(curves, self._colours):
             self._handles[plot.title].data = tuple(plot.data)
 
@@ -106,7 +106,7 @@ def _plots(curves: Curves, colours: Mapping[str, str]) -> Iterator[_Plot]:
 
 def _drawn(label: str, colours: Mapping[str, str], times: Array, t: Array,
            one: Series) -> list[tuple[str, str, Array]]:
-    """A run's curves in a plot: every joint of a single run, the largest of several runs'."""
+    """Return a run's curves in a plot: each joint of a single run, the largest of several runs."""
     finite = np.where(np.isfinite(one.value), one.value, np.nan)
     values = np.column_stack([np.interp(times, t, column, right=np.nan) for column in finite.T])
     if len(one.labels) == 1:
@@ -117,6 +117,6 @@ def _drawn(label: str, colours: Mapping[str, str], times: Array, t: Array,
 
 
 def _common(times: Sequence[Array]) -> Array:
-    """Times [s] for all runs, from the first begin to the last end."""
+    """Return times [s] for all runs, from the earliest start to the latest end."""
     first, last = min(t[0] for t in times), max(t[-1] for t in times)
     return np.linspace(first, max(last, first + 1e-6), _POINTS)

@@ -1,4 +1,4 @@
-"""The page's server, and how the page looks before anything is drawn."""
+"""The page's server, camera and layout."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array
 
 HOST = "127.0.0.1"
-_ELEVATION = 22.0  # [deg] from where the camera looks
+_ELEVATION = 22.0  # [deg] of the camera
 _FIELD_OF_VIEW = 38.0  # [deg]
-_ASPECT = 0.9  # width over height of what is left between the panels
-_ROOM = 1.06   # of the distance at which all points are just seen
-_WIDTH = 330  # [px] of the panels
+_ASPECT = 0.9  # width over height of the area between the panels
+_ROOM = 1.06   # relative to the distance at which all points are just visible
+_WIDTH = 330  # [px] width of the panels
 
 
 def open_server(port: int, label: str) -> Any:
-    """Return a viser server that listens on 127.0.0.1; port 0 takes a free one.
+    """Return a viser server that listens on 127.0.0.1; port 0 takes a free port.
 
-    Raises HierarchyError where viser is not installed, or the port is taken.
+    Raises HierarchyError if viser is not installed or the port is in use.
     """
     try:
         import viser
@@ -33,7 +33,7 @@ def open_server(port: int, label: str) -> Any:
         raise HierarchyError("the page in the browser needs viser, which is not installed: "
                              "pip install 'task-hierarchy[view]'") from error
     port = _free(port)
-    with redirect_stdout(io.StringIO()):  # it prints a table of its own
+    with redirect_stdout(io.StringIO()):  # viser prints a table
         server = viser.ViserServer(host=HOST, port=port, label=label, verbose=False)
     server.gui.configure_theme(show_logo=False, show_share_button=False, control_width="medium",
                                brand_color=(0, 114, 178))
@@ -47,24 +47,24 @@ def close(server: Any) -> None:
 
 
 def address(server: Any) -> str:
-    """Return where the page is."""
+    """Return the address of the page."""
     return f"http://{HOST}:{server.get_port()}"
 
 
 def announce(server: Any, browser: bool) -> None:
-    """Say where the page is, and open it in a browser if that is wanted."""
+    """Print the address of the page, and open it if `browser` is set."""
     print(f"Page: {address(server)}   (Ctrl-C ends)", flush=True)
     if browser:
         webbrowser.open(address(server))
 
 
 def right(azimuth: float) -> Array:
-    """The direction (3,) to the right of a camera that looks from an azimuth [rad], level."""
+    """Return the horizontal direction (3,) to the right of a camera at an azimuth [rad]."""
     return np.array([-sin(azimuth), cos(azimuth), 0.0])
 
 
 def look_at_all(server: Any, points: Array, azimuth: float) -> None:
-    """Place the camera, from an azimuth [rad], so that points (N, 3) [m] fill the view."""
+    """Place the camera at an azimuth [rad] so that points (N, 3) [m] fill the view."""
     e, half_field = radians(_ELEVATION), radians(_FIELD_OF_VIEW / 2)
     away = np.array([cos(e) * cos(azimuth), cos(e) * sin(azimuth), sin(e)])
     axes = np.array([right(azimuth), np.cross(away, right(azimuth)), away])
@@ -78,7 +78,7 @@ def look_at_all(server: Any, points: Array, azimuth: float) -> None:
 
 
 def lay_out(server: Any) -> Any:
-    """Dock the main panel to the right; return the one at the left, a context to fill."""
+    """Dock the main panel on the right; return the panel on the left, a context to fill."""
     main, left = server.gui.main_panel, server.gui.add_panel()
     main.dock_right()
     main.set_width(_WIDTH)
@@ -88,7 +88,7 @@ def lay_out(server: Any) -> Any:
 
 
 def lay_floor(server: Any, height: float) -> None:
-    """Draw a grid at a height [m], and lights that cast shadows on it."""
+    """Draw a grid at a height [m], with shadows."""
     server.scene.add_grid("/floor", 8.0, 8.0, cell_size=0.1, section_size=0.5,
                           cell_color=(226, 230, 235), section_color=(196, 203, 211),
                           plane_color=(247, 248, 250), plane_opacity=1.0, shadow_opacity=0.25,
@@ -98,7 +98,7 @@ def lay_floor(server: Any, height: float) -> None:
 
 
 def _free(port: int) -> int:
-    """Return the port if nothing listens there, or any that is free for 0."""
+    """Return the port if it is free, or any free port for 0."""
     with closing(socket.socket()) as probe:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:

@@ -1,4 +1,4 @@
-"""The order of the stack as a list: what is met, missed, saturated."""
+"""The stack as a list: which tasks are active, given up or absent, which joints saturated."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _SATURATED = ("#8a5300", "#fdeccb")
 
 def stack_html(label: str, colour: str, now: Moment, tasks: Iterable[str] = (),
                note: str = "") -> str:
-    """Return the list at a moment: the stack in its order, then the other `tasks`, greyed."""
+    """Return the list at a moment: the stack in its order, then the other `tasks` in grey."""
     saturated = _saturated(now)
     rows = [_row(str(i), name, *_state(now.became[name]), colour)
             for i, name in enumerate(now.order, 1)]
@@ -47,12 +47,12 @@ def _pill(text: str, colour: str, background: str) -> str:
 
 
 def _state(became: Became) -> tuple[str, Fate]:
-    """Say what became of a task in the stack."""
+    """Return the text and the fate of a task in the stack."""
     return phrase(became.fate, became.violation), became.fate
 
 
 def _saturated(now: Moment) -> str:
-    """Say which joints are at a bound of their limits."""
+    """Return the text about joints at a limit."""
     sides = {1: "upper", -1: "lower"}
     joints = [f"{j + 1} ({sides[int(now.saturated[j])]})" for j in np.flatnonzero(now.saturated)]
     return f"saturated: joint {', '.join(joints)}" if joints else ""

@@ -1,4 +1,4 @@
-"""Finished runs in the browser: all under one time cursor, beside each other or overlaid."""
+"""Finished runs in the browser under one time cursor, side by side or overlaid."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ from scenarios.draw.viewer.stack_list import stack_html
 from scenarios.loop.recording import Recording
 from scenarios.scene import Scene, scene
 
-FRAMES = 30.0  # a second
-_CURSORS = 8.0  # moves of the plots' cursor a second while it plays
+FRAMES = 30.0  # per second
+_CURSORS = 8.0  # moves of the plots' cursor per second during playback
 _SEE_THROUGH = 0.35
-_APART = 1.15   # of a run's width, from one to the next
-_POSES = 50     # of the arm that the camera sees
-_ABOVE = 0.08   # [m] of a run's label over all of it
+_APART = 1.15   # distance between runs, relative to a run's width
+_POSES = 50     # of the arm that the camera has in view
+_ABOVE = 0.08   # [m] height of a run's label above it
 _BESIDE, _OVERLAID = "side by side", "overlaid"
 
 
 class View:
-    """Runs drawn into a server. `step` lets time pass and does what was asked for on the page.
+    """Runs, by label, drawn into a server; `step` carries out requests and lets time pass.
 
-    runs : by their labels. Public for tests: `playback`, `lists` (the stacks' HTML by label).
+    Public for tests: `playback`, `lists` (the stacks' HTML by label).
     """
 
     def __init__(self, server: Any, runs: dict[str, Recording], side_by_side: bool = True) -> None:
@@ -63,14 +63,14 @@ class View:
             last = now
 
     def step(self, seconds: float) -> None:
-        """Do what was asked for, let so many seconds pass, draw."""
+        """Carry out requests, let so many seconds pass, and draw."""
         for what, value in self.requests.take():
             self._do(what, value)
         self.playback.advance(seconds)
         self.draw()
 
     def draw(self) -> None:
-        """Show all runs as they were at the time of the playback."""
+        """Show all runs at the time of the playback."""
         t = self.playback.t
         with self.server.atomic():
             for label, one in self.scenes.items():
@@ -92,7 +92,7 @@ class View:
             self.lists[label] = self._stacks[label].content = html
 
     def _move_cursor(self, t: float) -> None:
-        """Plots take the browser longer than the rest, so they follow less often."""
+        """Move the plots' cursor; plots are slow in the browser, so they follow less often."""
         due = time.monotonic() - self._cursor_at > 1.0 / _CURSORS
         if t != self._cursor and (due or not self.playback.playing):
             self._cursor, self._cursor_at = t, time.monotonic()
@@ -127,7 +127,7 @@ class View:
         self._stacks = {label: gui.add_html("") for label in self.scenes}
 
     def _name_runs(self) -> list[Any]:
-        """Labels above the runs, seen where there are several."""
+        """Add labels above the runs, visible if there are several."""
         names = []
         for i, (label, one) in enumerate(self.scenes.items()):
             points = _points(one)
@@ -137,7 +137,7 @@ class View:
         return names
 
     def _arrange(self, side_by_side: bool) -> None:
-        """Put the runs beside each other, or into one place with all but the first see-through."""
+        """Place the runs side by side, or in one place with all but the first transparent."""
         azimuth = next(iter(self.scenes.values())).stage.azimuth
         points = [_points(one) for one in self.scenes.values()]
         across = np.vstack(points) @ right(azimuth)
@@ -152,8 +152,8 @@ class View:
 
 
 def labelled(folders: Sequence[Path], recordings: Sequence[Recording]) -> dict[str, Recording]:
-    """Return recordings by their resolvers' labels; with the folder where two are the same."""
-    labels = [str(one.scenario.make_resolver().label) for one in recordings]
+    """Return recordings by their resolvers' labels; equal labels get the folder as well."""
+    labels = [one.facts.resolver.label for one in recordings]
     if len({one.scenario.name for one in recordings}) > 1:
         labels = [f"{label} {one.scenario.name}"
                   for label, one in zip(labels, recordings, strict=True)]
@@ -162,24 +162,24 @@ def labelled(folders: Sequence[Path], recordings: Sequence[Recording]) -> dict[s
 
 
 def _frame_at(one: Scene, t: float) -> int:
-    """The last frame that is not after time t [s]."""
+    """Return the last frame that is not after time t [s]."""
     return max(int(np.searchsorted(one.t, t + 1e-9, side="right")) - 1, 0)
 
 
 def _points(one: Scene) -> Array:
-    """Points (N, 3) [m] of arm and path, and of obstacles where they are at first."""
+    """Return points (N, 3) [m] of arm and path, and of the obstacles at the start."""
     links = one.links[:: max(len(one.t) // _POSES, 1)].reshape(-1, 3)
     return np.vstack([links, one.traced, one.centres[0] if one.centres.size else links[:0]])
 
 
 def _paths(one: Scene) -> list[Array]:
-    """What is wanted of points over the run: (N, 3) [m] each."""
+    """Return the desired paths of points, (N, 3) [m] each."""
     wanted = [one.desired, *(path.wanted for path in one.paths)]
     return [_once_around(path) for path in wanted if path is not None]
 
 
 def _once_around(path: Array) -> Array:
-    """The path until it comes back to its begin, if it does."""
+    """Return the path until it first returns to its start, if it does."""
     far = np.linalg.norm(path - path[0], axis=1)
     step = np.linalg.norm(np.diff(path, axis=0), axis=1).max(initial=0.0)
     left = int(np.argmax(far > 2.0 * step))

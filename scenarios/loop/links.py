@@ -1,4 +1,4 @@
-"""A robot's links as capsules, and where they are in the world."""
+"""A robot's links as capsules, and their positions in the world."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ _STICK = 0.08  # radius of a link without capsules, relative to the robot's long
 
 
 def capsules(robot: Robot, foot: float = 0.0) -> tuple[Capsule, ...]:
-    """Return a robot's links, sticks from joint to joint where it has no capsules.
+    """Return a robot's links: its capsules or, without any, sticks from joint to joint.
 
-    With `foot` > 0 [m] the first is the column from there below the base up to it.
+    With `foot` > 0 [m] the first is a column of that height below the base.
     """
     links = robot.capsules or _sticks(robot)
     if foot == 0.0 or robot.base == "floating" or not links:
@@ -36,7 +36,7 @@ def _sticks(robot: Robot) -> tuple[Capsule, ...]:
 
 
 def lowest(robot: Robot, links: Sequence[Capsule]) -> float:
-    """Height [m] of what is lowest of a robot at rest, or of its base."""
+    """Height [m] of the lowest point of a robot at rest, at most that of its base."""
     low = ends(links, State.at(robot, robot.rest).placements)[..., 2].min(axis=-1)
     return float((low - [link.radius for link in links]).min(initial=0.0))
 

@@ -1,0 +1,88 @@
+"""Completes a Recording after its last tick, so that readers need no robot."""
+
+# mypy: disable-error-code="no-untyped-def"
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from hierarchy.avoidance import Measurement
+from hierarchy.jit import compiled
+from hierarchy.problem import Hierarchy
+from scenarios.cell.build import Cell
+from scenarios.loop.depth_image import depth_view
+from scenarios.loop.fate import Fates
+from scenarios.loop.recording import Recording
+
+_SAME = 1e-9  # [m] of distances that are those recorded
+
+
+def completed(recording: Recording, cell: Cell) -> Recording:
+    """Return a run with the fates of its levels and, if it has a camera, a depth image.
+
+    `cell` is built from the run's scenario; its state is moved, its plant is not used.
+    """
+    if recording.scenario.sensor.kind == "exact":
+        judge(recording, cell)
+    return replace(recording, depth=depth_view(recording))
+
+
+def judge(recording: Recording, cell: Cell) -> None:
+    """Write the rows of every tick again and judge the command that was sent by them.
+
+    Adds the signals level_fate, level_violation and saturated. Levels are UNKNOWN in ticks whose
+    distances do not follow from the recorded joints, or whose settings were changed by hand.
+    """
+    orders, rows = recording.order_names, _Rows(recording, cell)
+    fates = Fates(recording.task_names, recording.ticks, cell.robot.n)
+    accuracy, commands = recording.facts.resolver.accuracy, recording["command"]
+    changed = recording.signals.get("changed", np.zeros(recording.ticks, bool))
+    for k, index in enumerate(recording["order"].tolist()):
+        order = orders[index]
+        h = rows.hierarchy(k, order) if order and not changed[k] else None
+        if h is not None:
+            fates.judge(k, cell, h, commands[k], accuracy)
+    recording.signals.update(fates.signals(recording))
+
+
+class _Rows:
+    """Moves a cell through the recorded ticks."""
+
+    def __init__(self, recording: Recording, cell: Cell) -> None:
+        self._cell, self._recording = cell, recording
+        self._t = recording["t"].tolist()
+        self._q, self._v, self._command = (recording[name] for name in ("q", "v", "command"))
+        self._velocity = recording.scenario.control.level == "velocity"
+        self._cone_error = cell.pointing.follow_cone_error(cell.state) if cell.pointing else None
+        if "ee_distance" in recording:
+            self._distance = np.column_stack([recording["control_point_distance"],
+                                              recording["ee_distance"]])
+
+    def hierarchy(self, k: int, order: tuple[str, ...]) -> Hierarchy | None:
+        """Return the rows of tick k, valid until the next; None if they differ from the run's."""
+        t, q, v, cell = self._t, self._q, self._v, self._cell
+        if cell.state.period > 0.0:  # differences are against the tick before
+            cell.state.move(t[max(k - 1, 0)], q[max(k - 1, 0)], v[max(k - 1, 0)])
+        if not cell.state.move(t[k], q[k], v[k]):
+            return None
+        if self._velocity:
+            cell.state.commanded = self._command[k - 1] if k else v[0]
+        cone = self._cone_error() if self._cone_error else float("nan")
+        seen = cell.sensor.measure(cell.state) if cell.sensor else None
+        if not self._is_as_recorded(k, seen) or cell.order(seen, cone).order != order:
+            return None
+        return cell.stack.hierarchy(cell.state, order)
+
+    def _is_as_recorded(self, k: int, seen: Measurement | None) -> bool:
+        return seen is None or bool(_alike(seen.distance, self._distance[k], _SAME))
+
+
+@compiled
+def _alike(values, others, within):
+    """Whether two arrays agree to `within`; infinite entries agree, NaN agrees with nothing."""
+    for i in range(len(values)):
+        if not (values[i] == others[i] or abs(values[i] - others[i]) <= within):
+            return False
+    return True

@@ -1,0 +1,167 @@
+"""The kinematic tree of a robot as plain numbers, from which its placements follow."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from hierarchy import HierarchyError, Robot
+from hierarchy.problem import Array
+
+Kind = Literal["turn", "wheel", "slide", "ball"]
+Vector = tuple[float, float, float]
+Matrix = tuple[Vector, Vector, Vector]
+
+_AXES = {"X": (1.0, 0.0, 0.0), "Y": (0.0, 1.0, 0.0), "Z": (0.0, 0.0, 1.0)}
+_UNALIGNED: dict[str, Kind] = {"RevoluteUnaligned": "turn", "RevoluteUnboundedUnaligned": "wheel",
+                               "PrismaticUnaligned": "slide"}
+_SLIDES: list[tuple[Kind, str]] = [("slide", "X"), ("slide", "Y"), ("slide", "Z")]
+# Pinocchio's joints by name: elementary motions in the order of their coordinates.
+_MOTIONS: dict[str, list[tuple[Kind, str]]] = {
+    **{f"R{axis}": [("turn", axis)] for axis in _AXES},
+    **{f"RUB{axis}": [("wheel", axis)] for axis in _AXES},
+    **{f"P{axis}": [("slide", axis)] for axis in _AXES},
+    "Translation": _SLIDES, "FreeFlyer": [*_SLIDES, ("ball", "Z")], "Spherical": [("ball", "Z")],
+    "Planar": [*_SLIDES[:2], ("wheel", "Z")],
+    "SphericalZYX": [("turn", "Z"), ("turn", "Y"), ("turn", "X")]}
+# Units of a motion's coordinates, and of a small step along it.
+_UNITS: dict[Kind, tuple[tuple[str, ...], tuple[str, ...]]] = {
+    "turn": (("rad",), ("rad",)), "wheel": (("1", "1"), ("rad",)), "slide": (("m",), ("m",)),
+    "ball": (("1",) * 4, ("rad",) * 3)}
+_STILL: Vector = (0.0, 0.0, 0.0)
+_UPRIGHT: Matrix = (_AXES["X"], _AXES["Y"], _AXES["Z"])
+
+
+@dataclass(frozen=True)
+class Motion:
+    """One elementary motion of a joint, behind a fixed placement.
+
+    kind : "turn" about `axis` by an angle [rad], "wheel" about it by a cosine and a sine, "slide"
+        along it [m], or "ball", by a unit quaternion x, y, z, w.
+    coordinate : index in q of its first coordinate.
+    position (3,) [m], rotation (3, 3) : of the placement before it.
+    """
+
+    kind: Kind
+    coordinate: int
+    axis: Vector
+    position: Vector = _STILL
+    rotation: Matrix = _UPRIGHT
+
+
+@dataclass(frozen=True)
+class Joint:
+    """A joint by name, the joint `parent` that carries it (0: the base), and its motions."""
+
+    name: str
+    parent: int
+    motions: tuple[Motion, ...]
+
+
+def tree_of(robot: Robot) -> tuple[Joint, ...]:
+    """Return the joints of a robot, each behind its parent.
+
+    Raises HierarchyError for a kind of joint that is not known here, such as a screw.
+    """
+    model = robot.model
+    return tuple(
+        Joint(name, parent, tuple(_motions(name, joint, placement)))
+        for name, parent, joint, placement in zip(
+            robot.joint_names, robot.parents[1:], list(model.joints)[1:],
+            list(model.jointPlacements)[1:], strict=True))
+
+
+def joint_units(joints: Sequence[Joint]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return the units of q (nq,) and of a small step (n,): "rad", "m", or "1" of a ratio."""
+    units = [_UNITS[motion.kind] for joint in joints for motion in joint.motions]
+    return (tuple(unit for positions, _ in units for unit in positions),
+            tuple(unit for _, steps in units for unit in steps))
+
+
+def _motions(name: str, joint: Any, placement: Any) -> Iterator[Motion]:
+    """Yield the motions of a joint of pinocchio; one made of several has them in turn."""
+    kind = joint.shortname().removeprefix("JointModel")
+    if kind == "Composite":
+        parts = joint.extract()
+        for i, (part, before) in enumerate(zip(parts.joints, parts.jointPlacements, strict=True)):
+            yield from _motions(name, part, placement * before if i == 0 else before)
+        return
+    if kind in _UNALIGNED:
+        motions = [(_UNALIGNED[kind], _axis_of(joint))]
+    elif kind in _MOTIONS:
+        motions = [(motion, _AXES[axis]) for motion, axis in _MOTIONS[kind]]
+    else:
+        raise HierarchyError(f"joint {name!r} is of the kind {kind}, which cannot be recorded")
+    coordinate = int(joint.idx_q)
+    before = _vector(placement.translation), _matrix(placement.rotation)
+    for motion, axis in motions:
+        yield Motion(motion, coordinate, axis, *before)
+        coordinate, before = coordinate + len(_UNITS[motion][0]), (_STILL, _UPRIGHT)
+
+
+def _axis_of(joint: Any) -> Vector:
+    """Axis of a joint with one velocity: the half of its motion subspace that is not zero."""
+    data = joint.createData()
+    joint.calc(data, np.zeros(joint.idx_q + joint.nq))
+    subspace = np.ravel(data.S)
+    return _vector(subspace[:3] + subspace[3:])
+
+
+def placements(joints: Sequence[Joint], q: ArrayLike) -> Array:
+    """Return the placements (..., J + 1, 12) of the joints' frames at positions q (..., nq).
+
+    Each is a rotation, column by column, then a translation [m], as in a State.
+    """
+    q = np.asarray(q, dtype=float)
+    rotation = np.broadcast_to(np.eye(3), (*q.shape[:-1], 3, 3))
+    placed = [(rotation, np.zeros((*q.shape[:-1], 3)))]
+    for joint in joints:
+        R, p = placed[joint.parent]
+        for motion in joint.motions:
+            R, p = R @ np.array(motion.rotation), p + R @ np.array(motion.position)
+            R, p = _moved(R, p, motion, q[..., motion.coordinate:])
+        placed.append((R, p))
+    return np.stack([np.concatenate([np.swapaxes(R, -1, -2).reshape(*q.shape[:-1], 9), p], axis=-1)
+                     for R, p in placed], axis=-2)
+
+
+def _moved(R: Array, p: Array, motion: Motion, q: Array) -> tuple[Array, Array]:
+    axis = np.array(motion.axis)
+    if motion.kind == "slide":
+        return R, p + (R @ axis) * q[..., :1]
+    if motion.kind == "ball":
+        return R @ _of_quaternion(q[..., :4]), p
+    cosine, sine = (q[..., 0], q[..., 1]) if motion.kind == "wheel" else (
+        np.cos(q[..., 0]), np.sin(q[..., 0]))
+    return R @ _about(axis, cosine, sine), p
+
+
+def _about(axis: Array, cosine: Array, sine: Array) -> Array:
+    """Rotations (..., 3, 3) about an axis, after Rodrigues."""
+    c, s = cosine[..., None, None], sine[..., None, None]
+    return np.asarray(c * np.eye(3) + (1.0 - c) * np.outer(axis, axis) + s * _cross(axis))
+
+
+def _of_quaternion(quaternion: Array) -> Array:
+    """Rotations (..., 3, 3) of unit quaternions (..., 4) x, y, z, w."""
+    K, w = _cross(quaternion[..., :3]), quaternion[..., 3, None, None]
+    return np.asarray(np.eye(3) + 2.0 * (w * K + K @ K))
+
+
+def _cross(v: Array) -> Array:
+    """The matrices (..., 3, 3) of the cross product with vectors (..., 3)."""
+    return np.asarray(np.cross(v[..., None, :], np.eye(3))).swapaxes(-1, -2)
+
+
+def _vector(values: Any) -> Vector:
+    x, y, z = (float(value) for value in values)
+    return x, y, z
+
+
+def _matrix(values: Any) -> Matrix:
+    x, y, z = (_vector(row) for row in values)
+    return x, y, z

@@ -1,0 +1,230 @@
+"""A run's folder is all that a reader needs: the robot's file is gone, and no cell is built."""
+
+import json
+import re
+import shutil
+from dataclasses import asdict
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from hierarchy import HierarchyError, Robot, State
+from hierarchy.robots import TABLES
+from scenarios import load, load_run, save, simulate
+from scenarios.cli.main import run_command
+from scenarios.draw.replay import html
+from scenarios.loop.tree import joint_units, placements, tree_of
+from scenarios.measure.metrics import as_plain_data
+from scenarios.scene import scene
+
+LINK = """<link name="{0}"><inertial><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1"
+  iyz="0" izz="1"/></inertial><collision><origin xyz="0 0 {1}"/><geometry><cylinder radius="0.04"
+  length="{2}"/></geometry></collision></link>"""
+JOINT = """<joint name="{0}" type="{1}"><parent link="{2}"/><child link="{3}"/>
+  <origin xyz="0 0 {4}" rpy="{5}"/><axis xyz="{6}"/>
+  <limit lower="-2.5" upper="2.5" effort="50" velocity="3"/></joint>"""
+ARM = '<robot name="arm">' + "".join([
+    LINK.format("base", 0.05, 0.1), LINK.format("one", 0.1, 0.2), LINK.format("two", 0.15, 0.3),
+    LINK.format("three", 0.15, 0.3), LINK.format("four", 0.05, 0.1), LINK.format("tip", 0, 0.02),
+    JOINT.format("turn", "revolute", "base", "one", 0.1, "0 0 0.2", "0 0 1"),
+    JOINT.format("shoulder", "revolute", "one", "two", 0.2, "0 0.4 0", "0 1 0"),
+    JOINT.format("elbow", "revolute", "two", "three", 0.3, "0 0.9 0", "0 0.8 0.6"),
+    JOINT.format("wrist", "continuous", "three", "four", 0.3, "0 0 0", "1 0 0"),
+    JOINT.format("end", "fixed", "four", "tip", 0.12, "0 0 0", "1 0 0")]) + "</robot>"
+SCENARIO = """
+name = "alone"
+[robot]
+model = "arm.urdf"
+end_effector = "tip"
+[control]
+level = "acceleration"
+period = 0.001
+duration = 0.3
+stack = "hierarchical"
+resolver = "hcod"
+[position]
+stiffness = 40.0
+damping = 20.0
+path = {kind = "ellipse", centre = [0.4, 0, 0.4], cosine = [0, 0.1, 0], sine = [0, 0, 0.1]}
+[avoidance]
+kind = "separation"
+distance = 0.02
+influence = 0.3
+rate = 5.0
+obstacles = [{shape = "sphere", radius = 0.05, path = {kind = "ellipse", centre = [0.3, 0.2, 0.5],
+             cosine = [0.1, 0.0, 0.0], sine = [0.0, 0.1, 0.0], rate = 2.0}}]
+[limits]
+acceleration = 30.0
+[damping]
+value = 5.0
+"""
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """A run's folder, the run, and the replay drawn of it while the robot's file was there."""
+    there = tmp_path_factory.mktemp("robot")
+    (there / "arm.urdf").write_text(ARM)
+    (there / "alone.toml").write_text(SCENARIO)
+    run = simulate(load(there / "alone.toml"))
+    assert run.fault is None
+    folder = save(run, tmp_path_factory.mktemp("runs") / "run")
+    before = html({"run": load_run(folder)}, "alone")
+    shutil.rmtree(there)
+    return folder, run, before
+
+
+@pytest.fixture(autouse=True)
+def no_way_back(request, monkeypatch):
+    """Whatever would make the robot, the cell or the resolver again fails."""
+    if "made" not in request.fixturenames:
+        return
+    request.getfixturevalue("made")
+
+    def broken(*_, **__):
+        raise AssertionError("a reader went back to the scenario's robot or resolver")
+
+    monkeypatch.setattr("hierarchy.Robot.load", broken)
+    monkeypatch.setattr("scenarios.config.Scenario.make_resolver", broken)
+    monkeypatch.setattr("scenarios.cell.sensors.camera.DepthCamera.__init__", broken)
+
+
+def test_what_is_loaded_is_what_was_run(made):
+    folder, run, _ = made
+    again = load_run(folder)
+    assert again.facts == run.facts
+    assert again.signals.keys() == run.signals.keys()
+    assert again.facts.resolver.label == "hcod"
+    assert again.facts.robot.joint_names == ("turn", "shoulder", "elbow", "wrist")
+
+
+def test_the_replay_is_the_same_without_the_robots_file(made):
+    folder, run, before = made
+    assert html({"run": load_run(folder)}, "alone") == before
+    assert html({"run": run}, "alone") == before
+
+
+def test_a_scene_has_arm_obstacle_and_every_level(made):
+    folder, run, _ = made
+    shown = scene(load_run(folder))
+    assert np.allclose(shown.traced, run["ee_position"][shown.ticks], atol=1e-12)
+    assert np.allclose(shown.distance[:, -1], run["ee_distance"][shown.ticks], atol=1e-12)
+    assert shown.levels.known.all()
+    assert shown.levels.names == ("joint limits", "separation", "position")
+
+
+def test_the_page_in_the_browser_shows_it(made):
+    pytest.importorskip("viser", reason="needs the extra view")
+    from scenarios.draw.viewer.server import close, open_server
+    from scenarios.draw.viewer.view import View, labelled
+
+    folder, _, _ = made
+    server = open_server(0, "test")
+    try:
+        view = View(server, labelled([folder], [load_run(folder)]))
+        view.step(0.1)
+        assert list(view.lists) == ["hcod"]
+        assert "position" in view.lists["hcod"]
+    finally:
+        close(server)
+
+
+def test_figures_metrics_and_tables_are_made_of_it(made, tmp_path):
+    folder, run, _ = made
+    assert run_command(["figures", str(folder), "--out", str(tmp_path / "figures")]) == 0
+    assert {"picture.svg", "stack.svg", "tick-times.png"} <= {
+        path.name for path in (tmp_path / "figures").iterdir()}
+    assert as_plain_data(load_run(folder)) == as_plain_data(run)
+
+
+@pytest.mark.parametrize("format", ["csv", "parquet", "mcap"])
+def test_every_export_is_made_of_it(made, format, tmp_path):
+    if format != "csv":
+        pytest.importorskip({"parquet": "pyarrow", "mcap": "mcap"}[format])
+    folder, _, _ = made
+    file = tmp_path / f"run.{format}"
+    assert run_command(["export", str(folder), "--format", format, "--out", str(file)]) == 0
+    assert file.stat().st_size > 0
+
+
+def test_a_continuous_joint_has_its_units(made):
+    folder, _, _ = made
+    robot = load_run(folder).facts.robot
+    assert robot.position_units == ("rad", "rad", "rad", "1", "1")
+    assert robot.velocity_units == ("rad",) * 4
+
+
+def test_a_run_of_an_earlier_version_is_refused(made, tmp_path):
+    folder, _, _ = made
+    shutil.copytree(folder, tmp_path / "old")
+    (tmp_path / "old" / "facts.json").unlink()
+    with pytest.raises(HierarchyError, match="written by an earlier version; run the scenario"):
+        load_run(tmp_path / "old")
+
+
+def test_facts_that_are_damaged_are_named(made, tmp_path):
+    folder, run, _ = made
+    shutil.copytree(folder, tmp_path / "bad")
+    facts = asdict(run.facts)
+    del facts["robot"]["joints"]
+    for text in ("{", json.dumps(facts)):
+        (tmp_path / "bad" / "facts.json").write_text(text)
+        with pytest.raises(HierarchyError, match=r"facts\.json cannot be read"):
+            load_run(tmp_path / "bad")
+
+
+def test_nothing_in_the_folder_but_the_scenario_names_the_robots_file(made):
+    folder, _, _ = made
+    for name in ("facts.json", "metrics.json", "versions.json"):
+        assert not re.search(r"\.urdf", (folder / name).read_text())
+
+
+# The kinematic tree.
+
+CART = """<robot name="cart"><link name="a"/><link name="b"/><link name="c"/><link name="d"/>
+<link name="e"/>
+<joint name="slide" type="prismatic"><parent link="a"/><child link="b"/>
+<origin xyz="0.1 0.2 0.3" rpy="0.1 0.2 0.3"/><axis xyz="1 1 0"/>
+<limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
+<joint name="wheel" type="continuous"><parent link="b"/><child link="c"/>
+<origin xyz="0.1 0.2 0.3" rpy="0.1 0.2 0.3"/><axis xyz="0 0.6 0.8"/></joint>
+<joint name="table" type="planar"><parent link="c"/><child link="d"/>
+<origin xyz="0.1 0 0.3" rpy="0.3 0 0.3"/><axis xyz="0 0 1"/></joint>
+<joint name="hinge" type="revolute"><parent link="b"/><child link="e"/><origin xyz="0 0.2 0.3"/>
+<axis xyz="0 -1 0"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>"""
+DOLL = """<mujoco><worldbody><body name="a" pos="0 0 1"><freejoint/><geom size="0.1"/>
+<body name="b" pos="0 0 0.3" euler="10 20 30"><joint name="h1" axis="1 0 0" pos="0 0 0.1"/>
+<joint name="h2" axis="0 1 0" pos="0 0.1 0.1"/><joint name="s" type="slide" axis="0 1 1"/>
+<geom size="0.1"/><body name="c" pos="0 0 0.3"><joint name="ball" type="ball" pos="0.1 0 0"/>
+<geom size="0.1"/></body></body></body></worldbody></mujoco>"""
+
+
+def robots(folder):
+    (folder / "cart.urdf").write_text(CART)
+    (folder / "doll.xml").write_text(DOLL)
+    yield from (Robot.named(name, base) for name in TABLES for base in ("fixed", "floating"))
+    yield from (Robot.from_file(folder / "cart.urdf", base=base) for base in ("fixed", "floating"))
+    yield Robot.from_file(folder / "doll.xml")
+
+
+def test_the_tree_places_every_joint_as_pinocchio_does(tmp_path):
+    for robot in robots(tmp_path):
+        pin.seed(0)
+        q = np.array([pin.randomConfiguration(robot.model, -np.ones(robot.nq), np.ones(robot.nq))
+                      for _ in range(5)])
+        expected = [State.at(robot, one).placements.copy() for one in q]
+        np.testing.assert_allclose(placements(tree_of(robot), q), expected, atol=1e-14)
+
+
+def test_the_units_of_a_tree_are_as_many_as_its_coordinates(tmp_path):
+    for robot in robots(tmp_path):
+        positions, steps = joint_units(tree_of(robot))
+        assert (len(positions), len(steps)) == (robot.nq, robot.n)
+
+
+def test_a_joint_that_cannot_be_recorded_is_named():
+    model = pin.Model()
+    model.addJoint(0, pin.JointModelHX(0.1), pin.SE3.Identity(), "screw")
+    with pytest.raises(HierarchyError, match="'screw' is of the kind HX"):
+        tree_of(Robot(model, "screw", end_effector="universe"))
