@@ -8,7 +8,7 @@ the primal-dual active set method (Hintermueller, Ito, Kunisch 2002) on a hierar
 
 An active inequality row of level j has a multiplier in every level k >= j, in
 A_k^T w_k + sum_i a_i lambda_i = 0, with w_k the miss of level k. Its first nonzero multiplier must
-point outward (Escande, Mansard, Wieber 2014). Rows that stay violated, and equalities, may have any.
+point outward (Escande, Mansard, Wieber 2014). Rows that stay violated and equalities may have any.
 
 All computations use coordinates z = Q^T x. Unknowns that the first level puts on a bound come first
 in the basis, and their columns are then skipped.

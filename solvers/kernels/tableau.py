@@ -34,8 +34,8 @@ from solvers.status import EQUAL, FREE, NUMERICAL_FAILURE, SOLVED, TOO_SMALL
  START, GOAL, REFERENCE, STEP, Z, PULL, FORCE, SHARE) = range(21)
 # Rows of `index`. Per row of A: its unknown (-1 for several entries), its column of M, its state;
 # the list of active rows, each level in pivot order. Per basis vector: the row that owns it, -1 for
-# none; the unknown it was initially. Per level: its number of rows, where it starts in the list, and
-# where in the basis.
+# none; the unknown it was initially. Per level: its number of rows, its start in the list, and in
+# the basis.
 UNIT, COLUMN, STATE, LIST, OWNER, ORDER, EXTENT, BEGIN, RANKS = range(9)
 # In `count`: levels; first column of M in use; first column of the remaining unknowns; removed
 # unknowns, which were put on a bound before all else. The others are those of `levels.py`.
