@@ -163,6 +163,23 @@ def test_no_answer_to_a_generated_problem_is_called_solved_without_being_right()
     assert solved >= 145
 
 
+@pytest.mark.parametrize("guesses", [1, 10])
+def test_a_row_whose_multiplier_drowns_in_rounding_is_released_on_trial(guesses):
+    h = problems.generate(33, problems.Recipe(joints=(1, 4), levels=(2, 4), rows=(1, 4),
+                                              scales=(0.1, 10.0), spread=3.0, ties=0.8))
+    weighted = make("weighted", ratio=1e6, guesses=guesses)
+    x = weighted.solve(h).x
+    assert gap(x, exactly(h, weighted, x, hard=1)) < EXACT
+
+
+@pytest.mark.parametrize("seed", [3, 4, 5])
+def test_a_row_released_by_rounding_alone_is_not_released_for_ever(seed):
+    res = make("weighted", ratio=1e8, guesses=1, max_iterations=200).solve(
+        problems.family("DEGEN7", seed))
+    assert res.status is not Status.ITERATION_LIMIT
+    assert res.iterations < 50
+
+
 # What it does to the priorities ------------------------------------------------------------------
 
 

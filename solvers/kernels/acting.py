@@ -1,13 +1,13 @@
-"""Weighted least squares with the rows that act as equalities, and what each of them pushes with.
+"""Weighted least squares with the active rows as equalities, and the multiplier of each of them.
 
-Minimised is sum_i (w_i e_i)^2 + mu^2 ||x - x_0||^2, e_i what soft row i is missed by, on the hard
-rows. In x = x_0 + Q y, with Q from an LQ factorisation of first the hard and then the weighted soft
-rows in pivot order, the hard rows give the first y by substitution, and a QR of the soft rows and
+Minimises sum_i (w_i e_i)^2 + mu^2 ||x - x_0||^2, e_i the miss of soft row i, on the hard rows. In
+x = x_0 + Q y, Q comes from an LQ factorisation of the hard rows, then the weighted soft rows, in
+pivot order; the hard rows give the first entries of y by substitution, a QR of the soft rows and
 mu I the others. Reflections of columns keep the error of each row in proportion to that row, and
 the pivot order makes the QR do the same (Powell, Reid 1969; Barlow, Handy 1988; Cox, Higham 1998),
 so weights may differ by any ratio. Normal equations would square them.
 
-What acts, `Acting`, has entries by row of A; the factorisation, `Factors`, by acting row.
+`Acting` has one entry per row of A; the factorisation, `Factors`, one per active row.
 """
 
 # mypy: disable-error-code="no-untyped-def"
@@ -33,7 +33,7 @@ from solvers.kernels.space import (
 )
 from solvers.status import FREE, LOWER
 
-EXACT, CLOSE = 1e-12, 1e-7  # shares left of a row behind others between which it is ill-posed
+EXACT, CLOSE = 1e-12, 1e-7  # remainder of a row, relative: ill-posed in between
 
 
 class Problem(NamedTuple):
@@ -46,11 +46,10 @@ class Problem(NamedTuple):
 
 
 class Acting(NamedTuple):
-    """What each row does: (m,) each.
+    """State of each row, (m,) each.
 
-    state: FREE, EQUAL, UPPER or LOWER. weight: infinite where hard. norm: of the row. push: how
-    strongly it would be left outward. noise: the rounding in that. doubt: 1 where it was let go on
-    trial.
+    state: FREE, EQUAL, UPPER or LOWER. weight: infinite for a hard row. norm: of the row. push: its
+    multiplier, outward positive. noise: the rounding in it. doubt: 1 if it was released on trial.
     """
 
     state: View
@@ -62,10 +61,10 @@ class Acting(NamedTuple):
 
 
 class Factors(NamedTuple):
-    """The acting rows, first the hard ones, factored.
+    """The factored active rows, hard rows first.
 
-    of_x (1, n), y (n,): the step and the same in Q. diagonal, force, size (n,): on the way.
-    of_block: work space.
+    of_x (1, n), y (n,): the step, and the step in coordinates of Q. diagonal, force, size (n,):
+    intermediate results. of_block: work space.
     """
 
     rows: Rows
@@ -94,7 +93,7 @@ def carve_factors(work, at, m, n):
 
 @inlined
 def carve_acting(record, work, at, m):
-    """Return Acting, state and weight out of the record, and where the rest of it ends."""
+    """Return Acting, with state and weight from the record, and where the rest of it ends."""
     norm, at = vector(work, at, m)
     push, at = vector(work, at, m)
     noise, at = vector(work, at, m)
@@ -104,7 +103,7 @@ def carve_acting(record, work, at, m):
 
 @compiled
 def solve_acting(problem, x, acting, factors, settings, regularisation):
-    """Write x and the pushes; return whether rows are nearly parallel but not quite."""
+    """Write x and the multipliers; return whether rows are nearly parallel."""
     rows, basis, of_x, y, _, _, _, _ = factors
     hard = _gather(problem, acting, rows, settings.rank_tolerance, ZERO, True)
     end = _gather(problem, acting, rows, settings.rank_tolerance, hard, False)
@@ -134,13 +133,13 @@ def solve_acting(problem, x, acting, factors, settings, regularisation):
 
 @inlined
 def side_of(problem, acting, i):
-    """The side at which a row acts."""
+    """Return the side at which a row is active."""
     return problem.lower[i] if acting.state[i] == LOWER else problem.upper[i]
 
 
 @inlined
 def length_of(x):
-    """Euclidean norm."""
+    """Return the Euclidean norm."""
     square = 0.0
     for c in range(x.size):
         square += x[c] * x[c]
@@ -149,7 +148,7 @@ def length_of(x):
 
 @compiled
 def _gather(problem, acting, rows, rank_tolerance, at, hard):
-    """Write the acting rows that are hard, or soft, into W from row `at` on; return their end."""
+    """Write the active hard, or soft, rows into W from row `at` on; return where they end."""
     A, reference = problem.A, problem.reference
     for i in range(acting.state.size):
         if acting.state[i] == FREE or (acting.weight[i] == np.inf) != hard:
@@ -166,7 +165,7 @@ def _gather(problem, acting, rows, rank_tolerance, at, hard):
 
 @inlined
 def _clean(acting, rows, hard, end, p, rank):
-    """Set to zero what of the rows is rounding; return whether any is nearly parallel to others."""
+    """Set entries that are rounding to zero; return whether a row is nearly parallel to others."""
     close = False
     for i in range(end):
         j = rows.row[i]
@@ -179,9 +178,9 @@ def _clean(acting, rows, hard, end, p, rank):
 
 @inlined
 def _drop_rounding(w, own, zero, rank):
-    """Set to zero what of a row, from its end, is nothing: of a heavy row it would be something.
+    """Set the negligible entries at the end of a row to zero: a large weight would amplify them.
 
-    own: its column where it got one. Returns what was left of it there, or when it got none.
+    own: its column, if it has one. Returns the remainder of the row there, or when it got none.
     """
     square = 0.0
     for c in range(rank, w.size):
@@ -197,7 +196,7 @@ def _drop_rounding(w, own, zero, rank):
 
 @inlined
 def _mu(W, at, settings, regularisation, work):
-    """Return mu, with lambda where the soft rows are damped as one level."""
+    """Return mu, combined with lambda if the soft rows are damped as one level."""
     if settings.damping > 0.0 and at.k1 > at.k0:
         return np.hypot(regularisation, level_damping(W, at, settings, work))
     return regularisation
@@ -205,15 +204,15 @@ def _mu(W, at, settings, regularisation, work):
 
 @compiled
 def _least_squares(factors, at, mu):
-    """Write into y what minimises ||W y - miss||^2 + mu^2 ||y||^2, over the block `at`.
+    """Write into y the minimiser of ||W y - miss||^2 + mu^2 ||y||^2, over the block `at`.
 
-    miss goes out as what is still missed. It comes out of the reflections, so that what little a
-    heavy row misses is as exact as the rest.
+    miss is the remaining residual on return. It comes from the reflections, so that the small
+    residual of a heavy row is as accurate as the rest.
     """
     (W, _, _, miss), y, diagonal = factors.rows, factors.y, factors.diagonal
     rows, q = at.i1 - at.i0, at.k1 - at.k0
     height = rows + q
-    T = as_matrix(factors.of_block[:height * (q + 1)], q + 1, height)  # a column lies as a row
+    T = as_matrix(factors.of_block[:height * (q + 1)], q + 1, height)  # a column is stored as a row
     b = T[q]
     for k in range(q + 1):
         for i in range(rows):
@@ -253,9 +252,9 @@ def _reflect(v, b, norm):
 
 @compiled
 def _push_of_hard(acting, factors, at, mu):
-    """Write the multipliers of the hard rows; zero where one adds no column.
+    """Write the multipliers of the hard rows; zero for a row that adds no column.
 
-    L^T times them is the force of all the others on y[:p].
+    L^T times them is the force of all other rows on y[:p].
     """
     (W, row, _, miss), y, force, size = factors.rows, factors.y, factors.force, factors.size
     hard, p = at.i0, at.k0
@@ -277,7 +276,7 @@ def _push_of_hard(acting, factors, at, mu):
 
 @compiled
 def _push_of_soft(problem, x, acting, rows, at):
-    """Write w_i times what each soft row is violated by; inward is negative."""
+    """Write w_i times the violation of each soft row; inward is negative."""
     length = length_of(x)
     for i in range(at.i0, at.i1):
         j = rows.row[i]

@@ -1,9 +1,9 @@
-"""Loops over the problems of a batch, for one thread: which of them, and what each is solved by.
+"""Loops over the problems of a batch, for one thread.
 
-problems: A (B, m, n), lower, upper (B, m), sizes (L,). All else has the problem as its first axis
-too: x (B, n), which comes in as the reference, the records of the solver, the codes. Without the
-lock of Python, so that other threads run their own part meanwhile. Each kernel returns TOO_SMALL
-where `work` is, before it has solved anything.
+problems: A (B, m, n), lower, upper (B, m), sizes (L,). The other arrays also have the problem as
+their first axis: x (B, n), the reference on entry, the records of the resolver, and the codes. The
+kernels release the GIL, so that other threads run their own part. Each kernel returns TOO_SMALL
+before it solves anything if `work` is too small.
 """
 
 # mypy: disable-error-code="no-untyped-def"
@@ -21,7 +21,7 @@ from solvers.status import EQUAL, NO_LIMITS, SOLVED, TOO_SMALL, UNPROVED
 
 @unlocked
 def batch_staircase(problems, x, codes, settings, which, work):
-    """Solve the problems `which` by the staircase."""
+    """Solve the problems `which` with the staircase."""
     A, lower, upper, sizes = problems
     for p in which:
         codes[p] = solve_by_staircase(A[p], lower[p], upper[p], sizes, x[p], settings, work)
@@ -44,7 +44,7 @@ def batch_without_bounds(problems, x, codes, records, settings, which, work):
 
 @unlocked
 def batch_saturation(problems, x, records, which, work):
-    """Say of the problems `which` what their bounds do."""
+    """Write the saturation and scaling of the problems `which`."""
     A, lower, upper, sizes = problems
     for p in which:
         name_saturation(A[p], lower[p], upper[p], sizes, x[p], records[p], work)
@@ -55,7 +55,7 @@ def batch_saturation(problems, x, records, which, work):
 def batch_exact(problems, x, codes, records, settings, which, work):
     """Solve the problems `which` as `solvers.resolvers.hcod.solve_exactly` does.
 
-    The record of the exact engine is the last part of each of the records.
+    The record of the exact resolver is the last part of each record.
     """
     A, lower, upper, sizes = problems
     begin = records.shape[1] - 3 * A.shape[1] - 3

@@ -1,4 +1,4 @@
-"""One level's own small problem: min ||M y - r||^2 + lambda^2 ||y||^2, lambda from the damping."""
+"""The small problem of one level: min ||M y - r||^2 + lambda^2 ||y||^2, lambda from damping."""
 
 # mypy: disable-error-code="no-untyped-def"
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from hierarchy.jit import as_matrix, compiled, inlined
 
-SWEEPS = 40  # bound; Jacobi needs 6 to 10
+SWEEPS = 40  # most sweeps; Jacobi needs 6 to 10
 
 
 @compiled
@@ -16,8 +16,8 @@ def solve_level(M, r, y, at, settings, work):
     """Write into y the step of one level, whose rows and columns of M are the block `at`.
 
     The block is lower trapezoidal with a nonzero diagonal: its rows in pivot order, in the columns
-    that the level adds. r is what the rows still miss. work: at least (m + n) (n + 1) numbers, of
-    any content.
+    that the level adds. r is the residual of the rows. work: at least (m + n) (n + 1) numbers, any
+    contents.
     """
     damped = 0.0
     if settings.damping > 0.0 and at.k1 > at.k0:
@@ -27,7 +27,7 @@ def solve_level(M, r, y, at, settings, work):
 
 @compiled
 def solve_damped_level(M, r, y, at, damped, work):
-    """Like `solve_level`, with lambda given."""
+    """Like `solve_level`, for a given lambda."""
     rank = at.k1 - at.k0
     if damped == 0.0 and at.i1 - at.i0 == rank:
         _substitute(M, r, y, at)
@@ -52,8 +52,8 @@ def _substitute(M, r, y, at):
 def level_damping(M, at, settings, work):
     """Return lambda, with lambda^2 = (1 - (s / threshold)^2) damping^2 for s < threshold, else 0.
 
-    s is the smallest singular value of the block, counted over its rows: 0 where rank < rows. It
-    is computed only where the cheap bound s >= 1 / ||L^-1||_F does not already pass.
+    s is the smallest singular value of the block, one per row: 0 where rank < rows. It is computed
+    only if the cheap bound s >= 1 / ||L^-1||_F is not above the threshold.
     """
     p, threshold = at.k1 - at.k0, settings.threshold
     if at.i1 - at.i0 > p:
@@ -96,7 +96,7 @@ def invert_triangle(M, T, i0, k0, p):
 
 @compiled
 def smallest_square(W):
-    """Smallest squared norm among the rows of W."""
+    """Return the smallest squared norm of the rows of W."""
     smallest = np.inf
     for i in range(W.shape[0]):
         square = 0.0
@@ -108,10 +108,10 @@ def smallest_square(W):
 
 @compiled
 def orthogonalise_rows(W, U):
-    """Rotate the rows of W, and those of U alike, until the rows of W are orthogonal (Hestenes).
+    """Rotate the rows of W and U until the rows of W are orthogonal (Hestenes).
 
-    The norms of the rows of W are then the singular values of the old W; where U was the identity,
-    the old W is U^T W.
+    The norms of the rows of W are then the singular values of the original W. If U was the
+    identity, the original W is U^T W.
     """
     for _ in range(SWEEPS):
         settled = True
@@ -180,7 +180,7 @@ def _least_squares(M, r, y, at, damped, work):
 
 @inlined
 def _reflect_columns(T, k):
-    """Reflect column k of T onto unit vector k, and the columns behind it alike."""
+    """Reflect column k of T onto unit vector k, and apply it to the columns after it."""
     height, columns = T.shape
     square = 0.0
     for i in range(k, height):

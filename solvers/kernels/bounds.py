@@ -1,7 +1,7 @@
-"""Bounds in a first level, equalities below: where no bound is in the way, the staircase alone.
+"""Bounds in a first level, equalities below: where no bound is active, the staircase alone.
 
-The exact engine does the rest: bounds cost nothing in its tableau. This file says which bounds an
-unknown has, and afterwards which of them it is at and how much of its target each level gets.
+The exact resolver does the rest; bounds cost nothing in its tableau. This file finds the bounds of
+each unknown and, after the solve, its saturation and the scaling of each level.
 """
 
 # mypy: disable-error-code="no-untyped-def"
@@ -24,8 +24,8 @@ from solvers.status import (
     UNPROVED,
 )
 
-MET = 1e-10  # of the terms of a row, up to which it is met
-NONE, CONFLICT = 0.0, 2.0  # beside -1 and 1: what an unknown that is at no bound does, and at both
+MET = 1e-10  # of the terms of a row: a row with a smaller miss is met
+NONE, CONFLICT = 0.0, 2.0  # besides -1 and 1: an unknown at no bound, or at both
 
 
 class Box(NamedTuple):
@@ -39,13 +39,12 @@ class Box(NamedTuple):
 
 @compiled
 def solve_without_bounds(A, lower, upper, sizes, x, record, settings, work):
-    """Solve as if there were no bounds; SOLVED if x is within them, otherwise UNPROVED.
+    """Solve as if there were no bounds; return SOLVED if x is within them, otherwise UNPROVED.
 
-    x (n,) comes in as the reference, and goes out as that where bounds are in the way. record
-    (n + L + 3 m + 3,): comes in as that of an earlier solve, or zeros; goes out as
-    `name_saturation` says, for which the second part is the record of the exact engine. Where a
-    saturation is known nothing is tried. settings: those of `Hcod`. Or returns NUMERICAL_FAILURE,
-    TOO_SMALL, NO_LIMITS, or -(i + 1) where row i is an inequality that is no bound.
+    x (n,) is the reference on entry and, if SOLVED, the answer on return. record
+    (n + L + 3 m + 3,) is that of an earlier solve, or zeros; for its layout see `name_saturation`.
+    With a known saturation nothing is tried. settings: those of `Hcod`. Other codes:
+    NUMERICAL_FAILURE, TOO_SMALL, NO_LIMITS, or -(i + 1) if row i is an inequality but not a bound.
     """
     n, known = x.size, False
     sides, at = vector(work, ZERO, 3 * n)
@@ -81,10 +80,10 @@ def solve_without_bounds(A, lower, upper, sizes, x, record, settings, work):
 
 @compiled
 def name_saturation(A, lower, upper, sizes, x, record, work):
-    """Take the rounding out of x where it is at a bound, and write the record's first part.
+    """Remove rounding from x where it is at a bound, and write the first part of the record.
 
-    What each unknown does (-1 or +1: at its lower or upper bound, 2: both, 0: free), and the
-    scaling of each level. The second part is the record of the exact engine.
+    That part has the state of each unknown (-1 or +1: at its lower or upper bound, 2: both, 0:
+    free) and the scaling of each level. The second part is the record of the exact resolver.
     """
     n = x.size
     inner = record[n + sizes.size:]
@@ -104,7 +103,7 @@ def name_saturation(A, lower, upper, sizes, x, record, work):
 
 @inlined
 def _first_level(sizes, sides, n):
-    """Return a Box for the first level that has rows, without sides."""
+    """Return a Box for the first level that has rows, its sides not yet written."""
     top = ZERO
     while sizes[top] == 0:
         top += 1
@@ -113,9 +112,10 @@ def _first_level(sizes, sides, n):
 
 @inlined
 def _refused(A, lower, upper, end):
-    """SOLVED, NUMERICAL_FAILURE at bad data, or -(i + 1) where row i is an inequality no bound.
+    """Return SOLVED, NUMERICAL_FAILURE for bad data, or -(i + 1) if row i must be rejected.
 
-    With an equality of several entries among them, the bounds are none, and the first is refused.
+    An inequality that is not a bound is rejected. If the first level also has an equality with
+    several entries, its bounds do not count as bounds, and the first of them is rejected.
     """
     sane, mixed, refused, bound = True, False, ZERO, ZERO
     for i in range(lower.size):
@@ -141,7 +141,7 @@ def _refused(A, lower, upper, end):
 
 @inlined
 def _intersect(A, lower, upper, box):
-    """Write the bounds of each unknown, low above high where its rows exclude each other."""
+    """Write the bounds of each unknown; low exceeds high where its rows contradict each other."""
     for c in range(box.low.size):
         box.low[c], box.high[c] = -np.inf, np.inf
     for i in range(box.end):
@@ -153,7 +153,7 @@ def _intersect(A, lower, upper, box):
 
 @inlined
 def _unknown(A, i):
-    """The unknown that a bound is on."""
+    """Return the unknown of a bound."""
     c = 0
     while A[i, c] == 0.0:
         c += 1
@@ -162,7 +162,7 @@ def _unknown(A, i):
 
 @inlined
 def _scale(A, b, sizes, box, x, record):
-    """Write how much of its target each level gets: 1 - |A_k x - b_k| / |b_k|, not below zero."""
+    """Write the scaling of each level: 1 - |A_k x - b_k| / |b_k|, not below zero."""
     begin, n = ZERO + box.end, x.size
     for k in range(sizes.size):
         record[n + k] = 1.0

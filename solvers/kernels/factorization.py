@@ -1,14 +1,14 @@
 """A stack of equality levels factored as J = C Q^T, and the staircase of C, kept between edits.
 
 Q (n, r) has orthonormal columns, C (m, r) the coefficients of the rows. Lengths and angles of rows
-of J are those of rows of C, so the staircase of C is that of J, in r numbers a row in place of n:
-new priorities need C alone, which is what "only F is recomputed" (below (11)) promises.
+of J are those of rows of C, so the staircase of C is that of J, with r numbers per row, not n: new
+priorities need C alone, as "only F is recomputed" (below (11)) promises.
 
-Rows of C and of the squares lie where a level was put first, its slot; a table says for each level,
-in order of priority, [slot, rows, rank with all above]. W has, for m <= V rows:
+Rows of C and of the squares stay in the slot where a level was first put; a table has for each
+level, in order of priority, [slot, rows, rank with all above]. W has, for m <= V rows:
 
     rows 0 .. V - 1       the staircase, in order, each level in pivot order
-    the width after V     reflectors, see `Basis`
+    the next `width`      reflectors, see `Basis`
     four more             beta, y, x and the reference, in coordinates of Q
 """
 
@@ -27,14 +27,14 @@ from solvers.kernels.space import Basis, Block, Rows, View, shared
 from solvers.kernels.staircase import subtract
 from solvers.status import NUMERICAL_FAILURE, SOLVED
 
-ROUNDED = 1e-14  # share of a row outside the basis that is its rounding, and no direction
-PASSES = 4       # bound; two are enough where the row is not rounding
-EXTRA_ROWS = 4   # of W, beside staircase and reflectors
+ROUNDED = 1e-14  # share of a row outside the basis: smaller ones are rounding, not a direction
+PASSES = 4       # most passes; two are enough unless the row is rounding
+EXTRA_ROWS = 4   # of W, in addition to staircase and reflectors
 
 
 @inlined
 def dot(u, v):
-    """Inner product in four sums, which do not wait for each other."""
+    """Return the inner product, in four sums that do not wait for each other."""
     a = b = c = d = 0.0
     fours = u.size - u.size % 4
     for i in range(0, fours, 4):
@@ -49,10 +49,10 @@ def dot(u, v):
 
 @compiled
 def project_rows(A, first, last, r, Q, C, squares):
-    """Write rows first .. last - 1 of A as C Q^T, adding to the basis what is outside; return r.
+    """Write rows first .. last - 1 of A as C Q^T, extending the basis where necessary; return r.
 
-    Q (r + the rows at least, and one more; n) has the basis as its first r rows. A row whose square
-    is not finite gets no coefficients. squares receives the squared norms.
+    Q (at least r + the rows + 1, n) has the basis in its first r rows. A row whose square is not
+    finite gets no coefficients. squares receives the squared norms.
     """
     n = A.shape[1]
     for i in range(first, last):
@@ -76,9 +76,9 @@ def project_rows(A, first, last, r, Q, C, squares):
 
 @inlined
 def _orthogonalise(w, Q, r, coefficients, size):
-    """Take the first r rows of Q out of w, of norm size; return what is left of it.
+    """Project the first r rows of Q out of w, of norm `size`; return the norm of the remainder.
 
-    By Gram-Schmidt, again where the row loses more than half of itself.
+    By Gram-Schmidt, repeated if the row loses more than half of itself.
     """
     left = size
     for _ in range(PASSES):
@@ -98,7 +98,7 @@ def _orthogonalise(w, Q, r, coefficients, size):
 class Factored(NamedTuple):
     """The staircase of C.
 
-    rows, basis: as in `Staircase`. y (width,): the answer in the columns that the levels took. of_x
+    rows, basis: as in `Staircase`. y (width,): the answer in the columns of the levels. of_x
     (2, width): x and the reference in coordinates of Q. rest: what follows in the work space.
     """
 
@@ -111,7 +111,7 @@ class Factored(NamedTuple):
 
 @inlined
 def _opened(W, pivots, work):
-    """Return the parts of W, with zero and miss out of the work space."""
+    """Return the parts of W, with zero and miss from the work space."""
     V, width = pivots.size, W.shape[1]
     rows = Rows(W[:V], pivots, work[:V], work[V:2 * V])
     basis = Basis(W[V:V + width], W[V + width])
@@ -120,10 +120,10 @@ def _opened(W, pivots, work):
 
 @compiled
 def refactor(C, squares, table, kept, W, pivots, rank_tolerance, work):
-    """Bring the levels from `kept` on into the staircase, behind the kept ones; return a code.
+    """Add the levels from `kept` on to the staircase, after the kept ones; return a code.
 
-    Writes ranks into the table, and into pivots (V,) which row of the stack each row of W is.
-    work: as `factorization_work` says.
+    Writes ranks into the table, and into pivots (V,) the row of the stack of each row of W.
+    work: see `factorization_work`.
     """
     rows, basis, _, _, _ = _opened(W, pivots, work)
     rank, first = ZERO, ZERO
@@ -164,10 +164,10 @@ def _substitute(b, table, factored, settings):
 
 @compiled
 def resolve(b, x, Q, table, W, pivots, settings, work):
-    """Solve for targets b (m,); x (n,) comes in as the reference and goes out as the answer.
+    """Solve for targets b (m,); x (n,) is the reference on entry and the answer on return.
 
-    Returns SOLVED, NUMERICAL_FAILURE with x = 0, or -(i + 1) where target i is not finite, and
-    -(m + 1 + c) where entry c of the reference is not. work: as `factorization_work` says.
+    Returns SOLVED, NUMERICAL_FAILURE with x = 0, -(i + 1) if target i is not finite, or
+    -(m + 1 + c) if entry c of the reference is not. work: see `factorization_work`.
     """
     for i in range(b.size):
         if not np.isfinite(b[i]):
@@ -194,12 +194,12 @@ def resolve(b, x, Q, table, W, pivots, settings, work):
 
 @inlined
 def _project_reference(x, Q, factored, rank):
-    """Write Q^T q0 (14) into u0, and reflected into u."""
+    """Write Q^T q0 (14) into u0, and its reflection into u."""
     u, u0 = factored.of_x[0], factored.of_x[1]
     for k in range(Q.shape[0]):
         u[k] = u0[k] = dot(Q[k], x)
     reflect(factored.basis, ZERO, rank, factored.of_x, ZERO, ZERO + 1)
-    if Q.shape[0] == x.size:  # nothing of the reference is outside the basis but rounding
+    if Q.shape[0] == x.size:  # only rounding of the reference is outside the basis
         for c in range(x.size):
             x[c] = 0.0
         for k in range(u0.size):
@@ -208,7 +208,7 @@ def _project_reference(x, Q, factored, rank):
 
 @inlined
 def _lift(factored, rank):
-    """Turn x, with y in its first columns, into coordinates of Q."""
+    """Transform x, with y in its first columns, to coordinates of Q."""
     for c in range(rank):
         factored.of_x[0, c] = factored.y[c]
     reflect_back(factored.basis, rank, factored.of_x, ZERO, ZERO + 1)
@@ -216,9 +216,9 @@ def _lift(factored, rank):
 
 @compiled
 def resolve_units(Z, table, W, pivots, settings, work):
-    """Write into row i of Z (m, width) the answer to target i alone being 1, in coordinates of Q.
+    """Write into row i of Z (m, width) the answer to unit target i, in coordinates of Q.
 
-    With it G = Q Z^T and F = J G = C Z^T. work: as `factorization_work` says.
+    Then G = Q Z^T and F = J G = C Z^T. work: see `factorization_work`.
     """
     m, width = Z.shape
     unit, factored = work[:m], _opened(W, pivots, work[m:])
@@ -234,5 +234,5 @@ def resolve_units(Z, table, W, pivots, settings, work):
 
 
 def factorization_work(rows: int, width: int) -> int:
-    """Return how many numbers of work space the kernels here need."""
+    """Return the size of the work space for the kernels of this file."""
     return 3 * rows + (rows + width) * (width + 1)

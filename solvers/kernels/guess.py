@@ -1,17 +1,17 @@
-"""Lexicographic least squares with two-sided rows: guess the working set, solve it, prove it.
+"""Lexicographic least squares with two-sided rows: guess the working set, solve it, verify it.
 
-Given which rows act, and at which side, one pass over the levels gives x and the multipliers of
-every level. If no other row is violated and no multiplier has the wrong sign, x is optimal, and
-that is the proof. Otherwise the violated rows join, those with a wrong sign leave, and the next
-guess is solved: the primal-dual active set method (Hintermueller, Ito, Kunisch 2002) on a
-hierarchy. It may cycle; `levels.py` always ends, and is called where this does not.
+Given the active rows and their sides, one pass over the levels gives x and the multipliers of every
+level. If no other row is violated and no multiplier has the wrong sign, this proves that x is
+optimal. Otherwise violated rows join, rows with a wrong sign leave, and the next guess is solved:
+the primal-dual active set method (Hintermueller, Ito, Kunisch 2002) on a hierarchy. It may cycle;
+`levels.py` always ends, and takes over if this does not.
 
-An inequality row of level j that acts has a multiplier in every level k >= j, in
-A_k^T w_k + sum_i a_i lambda_i = 0, w_k being what level k misses. The first that is not zero must
-push outward (Escande, Mansard, Wieber 2014). Rows that stay violated, and equalities, may have any.
+An active inequality row of level j has a multiplier in every level k >= j, in
+A_k^T w_k + sum_i a_i lambda_i = 0, with w_k the miss of level k. Its first nonzero multiplier must
+point outward (Escande, Mansard, Wieber 2014). Rows that stay violated and equalities may have any.
 
-All is done in coordinates z = Q^T x. Unknowns that the first level puts on a bound come first in
-the basis, and their columns take no further part.
+All computations use coordinates z = Q^T x. Unknowns that the first level puts on a bound come first
+in the basis, and their columns are then skipped.
 """
 
 # mypy: disable-error-code="no-untyped-def"
@@ -92,14 +92,14 @@ RIGHT, WRONG, UNCLEAR = range(3)  # of a guess
 
 @compiled
 def solve_by_guesses(A, lower, upper, sizes, x, record, settings, work):
-    """Solve; x (n,) comes in as the reference and goes out as the answer, zero on failure.
+    """Solve; x (n,) is the reference on entry and the answer on return, zero on failure.
 
-    record (3 m + 3,) comes in as that of an earlier solve, whose active set is the first guess. It
-    goes out as: what each row does; the level that each row holds back (its own if it stays
-    violated, L for the reference, -1 for none); its multiplier there; guesses tried; steps by
-    levels; the level that was not finished. settings: those of `Hcod`, in one array because each
-    argument costs time. work: of any content. Returns SOLVED, NUMERICAL_FAILURE, TOO_SMALL,
-    NO_LIMITS where all rows are equalities, or UNPROVED where `solve_by_levels` must be called.
+    record (3 m + 3,) is that of an earlier solve on entry; its active set is the first guess. On
+    return: the state of each row; the level that each row holds back (its own if it stays violated,
+    L for the reference, -1 for none); its multiplier there; guesses tried; steps by levels; the
+    unfinished level. settings: those of `Hcod`, in one array because each argument costs time.
+    work: any contents. Returns SOLVED, NUMERICAL_FAILURE, TOO_SMALL, NO_LIMITS if all rows are
+    equalities, or UNPROVED if `solve_by_levels` must be called.
     """
     if all_equal(lower, upper):
         return NO_LIMITS
@@ -124,9 +124,9 @@ def solve_by_guesses(A, lower, upper, sizes, x, record, settings, work):
 
 @inlined
 def _remove_bounds(s):
-    """Order the unknowns: those first that the first level with rows puts on a bound, each once.
+    """Order the unknowns: first those that the first level with rows puts on a bound, each once.
 
-    None are if other rows of that level act.
+    There are none of these if other rows of that level are active.
     """
     active, unit, order = s.number[ACTIVE], s.index[UNIT], s.index[ORDER]
     seen, n, end = s.number[STEP], s.x.size, ZERO
@@ -154,7 +154,7 @@ def _remove_bounds(s):
 
 @inlined
 def _solve(s):
-    """Solve the acting rows as equalities; return the level that asks for x, or -1."""
+    """Solve the active rows as equalities; return the level that sets all of x, or -1."""
     rank, rows, removed = ZERO, ZERO, s.count[REMOVED]
     levels, n, first, whole = s.count[LEVELS], s.x.size, ZERO, -1
     s.scalar[SIZE] = 0.0
@@ -181,7 +181,7 @@ def _solve(s):
 
 @inlined
 def _take_all(s, goal, rank):
-    """Give all basis vectors that are left what they have of the goal."""
+    """Write the coordinates of the goal in the remaining basis vectors."""
     base, removed, n = s.count[BASE], s.count[REMOVED], s.M.shape[0]
     for t in range(rank, n):
         value = 0.0
@@ -192,7 +192,7 @@ def _take_all(s, goal, rank):
 
 @inlined
 def _list(s, first, last, rows, rank):
-    """Append the acting rows of a level and what they miss; return the end of the list."""
+    """Append the active rows of a level and their residuals; return the end of the list."""
     for i in range(first, last):
         if s.number[ACTIVE, i] != FREE:
             value, column, entry = side_of(s.number, i), s.index[COLUMN, i], s.number[ENTRY, i]
@@ -237,9 +237,9 @@ def _write_x(s):
 
 @inlined
 def _prove(s, whole):
-    """Say whether a guess is right; if not, make the next: violated rows act, rows that pull rest.
+    """Judge a guess; if it is wrong, make the next: add violated rows, release those that pull.
 
-    A guess in which a row is hardly independent of others is unclear.
+    A guess in which a row is nearly dependent on others is unclear.
     """
     levels = s.count[LEVELS]
     verdict = _add_violated(s)
@@ -266,7 +266,7 @@ def _prove(s, whole):
 
 @inlined
 def _add_violated(s):
-    """Let the rows that x violates act; say whether there are none."""
+    """Activate the rows that x violates; return whether there are none."""
     verdict, number = RIGHT, s.number
     for i in range(s.A.shape[0]):
         number[HOLDS, i], number[MULTIPLIER, i] = -1.0, 0.0
@@ -280,7 +280,7 @@ def _add_violated(s):
 
 @inlined
 def _pull_of_goal(s, goal, weight, above):
-    """Write the pull of the way to a goal on the basis vectors above it; False if x is there."""
+    """Write the pull of the step to a goal on the basis vectors above; False if x is there."""
     order, removed = s.index[ORDER], s.count[REMOVED]
     n, base, gap, square = s.x.size, s.count[BASE], 0.0, 0.0
     for c in range(n):
@@ -300,9 +300,9 @@ def _pull_of_goal(s, goal, weight, above):
 
 @inlined
 def _pull_of_level(s, k, above):
-    """Write the pull of what a level misses; return whether it misses anything, and a verdict.
+    """Write the pull of the miss of a level; return whether it has a miss, and a verdict.
 
-    Its own rows that are inside their side rest from now on.
+    Its own rows that are inside their side are released.
     """
     active, over, verdict = s.number[ACTIVE], s.number[OVER], RIGHT
     part = Part(s.index[BEGIN, k], s.index[BEGIN, k + 1], above, ZERO)
@@ -328,7 +328,7 @@ def _pull_of_level(s, k, above):
 
 @inlined
 def _check_forces(s, k, above, whole):
-    """Give the rows above level k their multipliers in it; those that pull rest from now on."""
+    """Write the multipliers of the rows above level k in it; release those that pull."""
     active, held = s.number[ACTIVE], s.number[HOLDS]
     verdict, small = RIGHT, 0.0 if whole else s.settings.rank_tolerance * s.scalar[PULLED]
     balance(s, ZERO, above, s.count[REMOVED])

@@ -1,7 +1,7 @@
-"""Joints held at their bounds as columns of Q, and the way to the reference beside them.
+"""Joints held at their bounds as columns of Q, and the step to the reference next to them.
 
-Q has columns for the tasks above, then one for each held joint in the order of holding; what
-follows is free.
+Q has columns for the tasks above, then one for each held joint in the order of holding; the rest is
+free.
 """
 
 # mypy: disable-error-code="no-untyped-def"
@@ -14,12 +14,12 @@ from hierarchy.jit import compiled, inlined
 from solvers.kernels.rows import ROUNDING, ZERO, make_reflector, reflect, reflect_back
 from solvers.kernels.space import Basis, View, carve_basis, integers, matrix, vector
 
-SLACK = 1e-12  # by which a joint may pass a bound before it is put back, relative to 1 + |bound|
+SLACK = 1e-12  # relative to 1 + |bound|: a joint may exceed a bound by less
 NO_JOINT = -1
 
 
 class Box(NamedTuple):
-    """Sides of the box, and the reference: (n,) each."""
+    """Sides of the box and the reference, (n,) each."""
 
     low: View
     up: View
@@ -30,7 +30,7 @@ class Held(NamedTuple):
     """Held joints.
 
     basis: the reflectors of Q. E (n, n): unit vectors of the held joints, in coordinates of Q, in
-    the order of holding. joint (n,): their numbers. side (n,): +1, -1 for a joint held at its
+    the order of holding. joint (n,): their indices. side (n,): +1, -1 for a joint held at its
     upper, lower bound, else 0. y (n,): the step in each column of Q.
     """
 
@@ -63,16 +63,17 @@ def carve_held(work, at, n):
 
 @inlined
 def side_of_box(box, held, j):
-    """The bound that joint j is held at."""
+    """Return the bound at which joint j is held."""
     return box.up[j] if held.side[j] > 0.0 else box.low[j]
 
 
 @compiled
 def hold(held, seen, j, way, above, count, least):
-    """Give joint j, whose side is written, a column of Q, and its step there to y.
+    """Give joint j, whose side is written, a column of Q, and write its step there into y.
 
-    way is how far it has to go; seen, the rows of a task in coordinates of Q, go along. Returns
-    how many joints are held then: `count` where less than `least` of its unit vector is left.
+    way: its distance to the bound. seen: the rows of a task in coordinates of Q, reflected too.
+    Returns the number of held joints: still `count` if the remainder of its unit vector is at most
+    `least`.
     """
     k, e, basis = above + count, held.E[count], held.basis
     for i in range(e.size):
@@ -97,7 +98,7 @@ def hold(held, seen, j, way, above, count, least):
 
 @compiled
 def hold_again(held, seen, x, box, above, count, least):
-    """Give columns of Q to those of the first `count` joints that are still held; see `hold`."""
+    """Give columns of Q to the joints among the first `count` that remain held; see `hold`."""
     holding = ZERO
     for t in range(count):
         j = held.joint[t]
@@ -109,10 +110,10 @@ def hold_again(held, seen, x, box, above, count, least):
 
 @compiled
 def to_reference(held, box, x, ways, rank, release):
-    """Move x in the columns of Q that no task has, inside the box; return the steps.
+    """Move x inside the box, in the columns of Q that no task has; return the number of steps.
 
-    Without release: to x plus the reference as far as the bounds let it, joints that they stop
-    being held; with it: to the x nearest to the reference. ways (2, n): of any content.
+    Without release: to x plus the reference as far as the bounds allow, holding joints that reach
+    one. With release: to the x nearest to the reference. ways (2, n): any contents.
     """
     n = x.size
     d, target, no_rows = ways[0], ways[1], ways[:0]
@@ -138,7 +139,7 @@ def to_reference(held, box, x, ways, rank, release):
 
 @inlined
 def _free_way(held, x, target, ways, begin):
-    """Write the part of the way from x to the target in columns `begin` and on; the rest to y."""
+    """Write the step from x to the target in columns `begin` and on; the other columns to y."""
     d = ways[0]
     for j in range(x.size):
         d[j] = target[j] - x[j]
@@ -150,7 +151,7 @@ def _free_way(held, x, target, ways, begin):
 
 @inlined
 def _step(x, d, box, side):
-    """Move x along d as far as the box lets it, x + d at most; return the joint that stops it."""
+    """Move x along d as far as the box allows, at most x + d; return the joint that stops it."""
     size, share, stopped = 0.0, 1.0, NO_JOINT
     for j in range(x.size):
         size = max(size, abs(d[j]))
@@ -169,9 +170,9 @@ def _step(x, d, box, side):
 
 @inlined
 def _drop(held, rank, begin):
-    """Release the held joint that the way to the reference pulls inward most, if there is one.
+    """Release the held joint that the step to the reference pulls inward most, if there is one.
 
-    y[rank:begin] is that way in the columns of the held joints; it goes out as multipliers.
+    y[rank:begin] is that step in the columns of the held joints on entry, multipliers on return.
     """
     y, E = held.y, held.E
     size, worst, at = 0.0, 0.0, NO_JOINT

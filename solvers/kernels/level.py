@@ -1,7 +1,7 @@
-"""What one level does with its rows in an orthogonal tableau: its step, and who holds it back.
+"""One level in an orthogonal tableau: its step, and the rows that hold it back.
 
-With the rows of a level lower triangular in its basis vectors, y solves L y = rest where they are
-independent, and the least squares problem where they are not. The force lambda_t of each row above,
+With the rows of a level lower triangular in its basis vectors, y solves L y = rest if they are
+independent, and the least squares problem if they are not. The force lambda_t of each row above,
 by back substitution in sum_t lambda_t a_t = -A_k^T w_k, says whether that row holds the level back.
 """
 
@@ -53,9 +53,9 @@ class Part(NamedTuple):
 
 @inlined
 def solve_part(s, part):
-    """Write the step of a level that is not damped into Z, and what its rows have too much after.
+    """Write the step of an undamped level into Z, and the excess of its rows after the step.
 
-    Rows that are independent are met. Returns the size of the numbers met.
+    Independent rows are met. Returns the size of the largest numbers involved.
     """
     begin, rank, size, y = part.begin, part.rank, 0.0, s.number[Z, part.begin:]
     if part.q1 - part.q0 > rank:
@@ -74,7 +74,7 @@ def solve_part(s, part):
 
 @inlined
 def least_squares_part(s, part, damped):
-    """Like `solve_part`, with a damping, whose own targets come in as Z."""
+    """Like `solve_part`, with damping; the targets of the damping are Z on entry."""
     rows, rank, size, least = part.q1 - part.q0, part.rank, 0.0, s.settings.rank_tolerance
     height = rows + rank if damped > 0.0 else rows
     L, y = as_matrix(s.room[:height * (rank + 1)], rank + 1, height), s.number[Z, part.begin:]
@@ -82,7 +82,7 @@ def least_squares_part(s, part, damped):
         i, rest = s.index[LIST, part.q0 + q], s.number[REST, part.q0 + q]
         column, entry = s.index[COLUMN, i], s.number[ENTRY, i]
         seen = left_of(s, i, part.begin, part.begin + rank) > (least * s.number[NORM, i]) ** 2
-        for c in range(rank):  # what a row in the span of those above has of the level is rounding
+        for c in range(rank):  # entries of a row in the span of the rows above are rounding
             L[c, q] = entry * s.M[part.begin + c, column] if c <= q and seen else 0.0
         L[rank, q] = rest
         if q < rank:
@@ -99,11 +99,11 @@ def least_squares_part(s, part, damped):
 
 @compiled
 def least_squares(T, y, diagonal):
-    """Write into y[:r] what minimises |T y - b|, for T (r + 1, s) by columns with b the last.
+    """Write into y[:r] the minimiser of |T y - b|, for T (r + 1, s) by columns with b the last.
 
-    b goes out as what is still missed. It comes out of the reflections, not as a difference, so
-    the little that a heavy row misses is as exact as the rest (Cox, Higham 1998). The rows come in
-    pivot order, the heaviest first. diagonal (r,) is scratch.
+    b is the residual on return. It comes from the reflections, not from a difference, so the small
+    residual of a heavy row is as accurate as the rest (Cox, Higham 1998). The rows are in pivot
+    order, the heaviest first. diagonal (r,) is scratch.
     """
     r = T.shape[0] - 1
     b = T[r]
@@ -155,10 +155,10 @@ def damping_of(s, part):
 
 @inlined
 def weigh_rows(s, part):
-    """Write by how much rows of a level miss their sides at most, and what they pull with in all.
+    """Write the largest miss of the rows of a level, and the sum of their pulls.
 
-    If that is rounding in all rows, none misses anything; in one of them alone it may be what
-    balances a light row. Of the pull, too, rounding is the share that it is of a miss.
+    If the misses are rounding in all rows, they count as zero; in a single row the miss may be what
+    balances a light row. The share of rounding in a pull is that in the miss.
     """
     worst = pulled = 0.0
     missed = False
@@ -181,7 +181,7 @@ def weigh_rows(s, part):
 
 @inlined
 def has_dust(s, part):
-    """Whether a row of a level is so small beside another that it may be the rounding of that."""
+    """Whether a row of a level is so small that it may be the rounding of another."""
     least, most = np.inf, 0.0
     for q in range(part.q0, part.q1):
         norm = s.number[NORM, s.index[LIST, q]]
@@ -191,7 +191,7 @@ def has_dust(s, part):
 
 @inlined
 def pull_of_rows(s, part, begin, end):
-    """Add what the rows of a level have too much, times the rows, to its pull.
+    """Add the excess of the rows of a level, times the rows, to its pull.
 
     In the basis vectors begin .. end - 1.
     """
@@ -208,8 +208,8 @@ def pull_of_rows(s, part, begin, end):
 def balance(s, begin, end, removed):
     """Write the forces of the rows that own the basis vectors begin .. end - 1.
 
-    The first `removed` vectors are unknowns that were removed: their rows pull on nothing else.
-    What of a pull may be rounding alone is none: every entry of a row is rounded to its norm.
+    The first `removed` vectors are removed unknowns: their rows pull on nothing else. A pull that
+    may be rounding alone counts as zero: every entry of a row is rounded relative to its norm.
     """
     pull, force, share = s.number[PULL], s.number[FORCE], s.number[SHARE]
     rounding = s.scalar[ROUNDING]
@@ -228,7 +228,7 @@ def balance(s, begin, end, removed):
 
 @inlined
 def nearly_parallel(s, part, above):
-    """Whether a row of a level depends on its others but for a share below rank_tolerance.
+    """Whether a row of a level depends on its other rows, up to a share of rank_tolerance.
 
     The basis vectors above .. part.begin - 1 belong to rows that are only held.
     """
@@ -254,7 +254,7 @@ def nearly_parallel(s, part, above):
 
 @inlined
 def smallest_share(s, begin, end):
-    """Return the least that is left of a row in its own basis vector, as a share of its norm."""
+    """Return the smallest share of a row in its own basis vector, relative to its norm."""
     least = 1.0
     for t in range(begin, end):
         i = s.index[OWNER, t]

@@ -1,19 +1,19 @@
-"""Lexicographic least squares with two-sided rows, level after level, by a primal active set.
+"""Lexicographic least squares with two-sided rows, level by level, by a primal active set.
 
 Each level is one convex problem. Its own rows are soft: their violation is minimised. The
 inequality rows of the levels above are hard: x satisfies them and moves only as far as the next one
-allows, which is then held at its side. Where a level can do no more, a held row with a multiplier
-of the wrong sign is released; with none, the level is solved. The rows that hold it back are
-equalities for good, the others stay inequalities. The last level brings x to the reference. A
+allows, which is then held at its side. When a level cannot improve, a held row with a multiplier of
+the wrong sign is released; if there is none, the level is solved. The rows that hold it back become
+equalities permanently, the others stay inequalities. The last level moves x to the reference. A
 multiplier belongs to one level, so no sign is lexicographic.
 
-A step lowers what the level misses, so no working set comes back after one. Where steps of length
-zero follow each other, all sides are moved outward by amounts that differ, so that no two tie, and
-put back in the end; after that, the row of least index enters and leaves, which cannot cycle
-(Bland 1977; Chang, Cottle 1980).
+A step reduces the miss of the level, so no working set returns after one. If steps of zero length
+follow each other, all sides are moved outward by different amounts, so that no two tie, and moved
+back at the end; after that, the row of least index enters and leaves, which cannot cycle (Bland
+1977; Chang, Cottle 1980).
 
-The basis vectors of the tableau belong, in this order, to rows `fixed` for good, to `hard` rows
-held at their side, to the `soft` rows of the level, and to nothing.
+The basis vectors of the tableau belong, in this order, to rows that are permanently `fixed`, to
+`hard` rows held at their side, to the `soft` rows of the level, and to none.
 """
 
 # mypy: disable-error-code="no-untyped-def"
@@ -116,23 +116,23 @@ from solvers.status import (
     SOLVED,
 )
 
-# State of a row, 0 while its level is still to come. PARALLEL: the held rows keep it in place.
+# State of a row, 0 before its level. PARALLEL: the held rows keep it in place.
 WATCHED, HELD, SOFT, FIXED, PARALLEL = range(1, 6)
 # Entries of `count`: basis vectors of the fixed, hard and soft rows, soft rows, equalities of the
-# level that have columns; steps of no length, steps at a level's optimum, sides moved apart, times
-# that was done; whether the level is missed, whether an answer is doubtful.
+# level that have columns; steps of zero length, steps at a level's optimum, whether sides are moved
+# apart, how often that was done; whether the level is missed, whether the answer is in doubt.
 FIX, HARD, RANK, ROWS, EQUALITIES, STILL, TRIES, APART, TIMES, MISSED, DOUBT = range(4, 15)
 GOLDEN = 0.6180339887498949
 
 
 @compiled
 def solve_by_levels(A, lower, upper, sizes, x, record, settings, work):
-    """Solve; x (n,) comes in as the reference and goes out as the answer, zero on failure.
+    """Solve; x (n,) is the reference on entry and the answer on return, zero on failure.
 
-    record (3 m + 3,) and settings: as for `solve_by_guesses`; of the record only the guesses are
-    read. Where the iterations end early, x keeps all levels above the unfinished one, which is as
-    good as it got. Returns SOLVED, ITERATION_LIMIT, NUMERICAL_FAILURE, TOO_SMALL, or INACCURATE
-    where rounding leaves a doubt.
+    record (3 m + 3,) and settings: as for `solve_by_guesses`; only the number of guesses is read
+    from the record. At the iteration limit, x is optimal for all levels above the unfinished one,
+    and the best found for that one. Returns SOLVED, ITERATION_LIMIT, NUMERICAL_FAILURE, TOO_SMALL,
+    or INACCURATE if rounding leaves a doubt.
     """
     s, code = prepare(A, lower, upper, sizes, x, record, settings, work)
     if code != SOLVED:
@@ -168,7 +168,7 @@ def solve_by_levels(A, lower, upper, sizes, x, record, settings, work):
 
 @inlined
 def _verdict(s, code):
-    """Return how the solve ended; with x = 0 if x is not finite."""
+    """Return how the solve ended; x becomes zero if it is not finite."""
     doubt = s.count[DOUBT] == 1 or has_outgrown(s)
     if code == SOLVED and doubt and s.settings.damping == 0.0:
         code = ZERO + INACCURATE
@@ -177,7 +177,7 @@ def _verdict(s, code):
 
 @inlined
 def _open(s, record):
-    """Begin at x = 0 with no row in the working set."""
+    """Start at x = 0 with an empty working set."""
     for i in range(s.A.shape[0]):
         s.index[STATE, i], s.number[VALUE, i] = 0, 0.0
         if s.number[ACTIVE, i] != EQUAL:
@@ -192,7 +192,7 @@ def _open(s, record):
 
 @inlined
 def _wants_whole(s, k, first, last):
-    """Whether a level asks for x as a whole: the reference, or one that is like it."""
+    """Whether a level sets all of x: the reference, or a level equivalent to one."""
     if k < s.count[LEVELS]:
         whole = s.settings.damping == 0.0 and asks_for_x(s, first, last)
         s.scalar[WEIGHT] = s.number[ENTRY, first] ** 2 if whole else 1.0
@@ -205,9 +205,9 @@ def _wants_whole(s, k, first, last):
 
 @inlined
 def _begin(s, k, first, last, whole):
-    """List the rows that a level misses or must meet, and watch the others; False if it is done.
+    """List the rows that a level misses or must meet, watch the others; False if it is finished.
 
-    A row of which nothing is left behind the fixed ones is settled.
+    A row with no remainder outside the fixed rows is settled.
     """
     count, number, n = s.count, s.number, s.x.size
     measure(s)
@@ -240,7 +240,7 @@ def _begin(s, k, first, last, whole):
 
 @inlined
 def _watch_parallel(s, last):
-    """Watch the rows again that held rows kept in place, as those are no more the same."""
+    """Watch again the rows that held rows kept in place, because the held rows have changed."""
     for i in range(last):
         if s.index[STATE, i] == PARALLEL:
             s.index[STATE, i] = WATCHED
@@ -249,7 +249,7 @@ def _watch_parallel(s, last):
 
 @inlined
 def _aim(s, whole):
-    """Write the step of a level from where x is, in basis vectors; return the level's part."""
+    """Write the step of a level from the current x, in basis vectors; return the level's part."""
     part = _factor(s, whole)
     if whole:
         _head_for_goal(s, part)
@@ -261,7 +261,7 @@ def _aim(s, whole):
 
 @inlined
 def _held_wrongly(s, part, whole):
-    """Give the held rows their forces; return the row that pulls the wrong way, or -1."""
+    """Write the forces of the held rows; return a row whose force has the wrong sign, or -1."""
     _pull(s, part, whole)
     balance(s, s.count[FIX], part.begin, ZERO)
     _forgive(s, part, whole)
@@ -270,9 +270,9 @@ def _held_wrongly(s, part, whole):
 
 @inlined
 def _factor(s, whole):
-    """Give the soft rows basis vectors behind those of the held; return the part of the level.
+    """Give the soft rows basis vectors after those of the held rows; return the level's part.
 
-    A level that asks for x as a whole takes all that are left.
+    A level that sets all of x takes all that remain.
     """
     begin, rows = s.count[FIX] + s.count[HARD], s.count[ROWS]
     if whole:
@@ -298,7 +298,7 @@ def _head_for_goal(s, part):
 
 @inlined
 def _damp(s, part):
-    """Write the damping of a level: the largest of its steps. Bounds are not damped."""
+    """Write the damping of a level: the largest over its steps. Bounds are not damped."""
     if s.settings.damping == 0.0 or part.rank == 0:
         return
     box = part.begin == 0
@@ -322,7 +322,7 @@ def _meet_rows(s, part):
 
 @inlined
 def _gone(s, t):
-    """How far x has gone along basis vector t since the level began."""
+    """Return the distance that x has moved along basis vector t since the start of the level."""
     total = 0.0
     for c in range(s.x.size):
         total += s.M[t, s.count[BASE] + c] * (s.x[c] - s.number[START, c])
@@ -331,9 +331,9 @@ def _gone(s, t):
 
 @inlined
 def _advance(s, part, last):
-    """Move along the step to the first watched row in the way; return it, or -1 if there is none.
+    """Move along the step up to the first watched row; return it, or -1 if there is none.
 
-    Of those that are reached at once Bland's rule takes the first.
+    Of several rows reached at once Bland's rule takes the first.
     """
     x, p, value, speed = s.x, s.number[STEP], s.number[VALUE], s.number[SPEED]
     count, tolerance = s.count, s.settings.tolerance
@@ -365,7 +365,7 @@ def _advance(s, part, last):
 
 @inlined
 def _write_step(s, part):
-    """Write the step in x from that in basis vectors."""
+    """Write the step in x, given the step in basis vectors."""
     x, p, z, size, square = s.x, s.number[STEP], s.number[Z], s.scalar[SIZE], 0.0
     for c in range(x.size):
         p[c] = 0.0
@@ -381,7 +381,7 @@ def _write_step(s, part):
 
 @inlined
 def _enter(s, i, first, last):
-    """Take row i into the working set: as a soft row of the level, or as one that is held."""
+    """Add row i to the working set, as a soft row of the level or as a held row."""
     count = s.count
     if count[STILL] > STALLED and count[APART] == 0 and count[TIMES] < RELAXATIONS:
         _move_apart(s, last)
@@ -402,7 +402,7 @@ def _enter(s, i, first, last):
     s.index[OWNER, begin], s.index[STATE, i] = i, HELD
     count[HARD] += 1
     count[RANK] = min(count[RANK], n - begin - 1)
-    for q in range(count[RANK]):  # pivot again from where a row lost its own basis vector
+    for q in range(count[RANK]):  # pivot again from the first row that lost its basis vector
         j, t = s.index[LIST, q], begin + 1 + q
         if left_of(s, j, t, t + 1) <= (WEAK * s.number[NORM, j]) ** 2:
             count[RANK] = q
@@ -411,7 +411,7 @@ def _enter(s, i, first, last):
 
 @inlined
 def _move_apart(s, last):
-    """Move the sides of the inequalities outward, each by another little, so that no two tie."""
+    """Move the sides of the inequalities outward by small different amounts, to break ties."""
     count, low, up = s.count, s.number[LOW], s.number[UP]
     count[APART], count[STILL] = 1, 0
     count[TIMES] += 1
@@ -424,9 +424,9 @@ def _move_apart(s, last):
 
 @inlined
 def _leave(s, i, last):
-    """Take row i out of the working set, and watch it.
+    """Remove row i from the working set, and watch it.
 
-    A soft row that is now beyond its other side stays, for that side.
+    A soft row that is now beyond its other side stays, at that side.
     """
     was, value = s.number[ACTIVE, i], value_of(s, s.x, i)
     s.number[VALUE, i] = value
@@ -444,7 +444,7 @@ def _leave(s, i, last):
 
 @inlined
 def _release(s, i):
-    """Let go of the held row i: its basis vector goes to the soft rows."""
+    """Release the held row i: its basis vector goes to the soft rows."""
     count, owner, place = s.count, s.index[OWNER], s.count[FIX]
     while owner[place] != i:
         place += 1
@@ -459,7 +459,7 @@ def _release(s, i):
 
 @inlined
 def _drop(s, i):
-    """Take row i out of the soft rows."""
+    """Remove row i from the soft rows."""
     count, soft, place = s.count, s.index[LIST], 0
     while soft[place] != i:
         place += 1
@@ -477,7 +477,7 @@ def _drop(s, i):
 
 @inlined
 def _put_back(s, last):
-    """Put the sides back where they were, and the held rows on them."""
+    """Restore the original sides, and put the held rows on them."""
     count, x, M, number = s.count, s.x, s.M, s.number
     count[APART] = count[STILL] = 0
     for i in range(last):
@@ -497,7 +497,7 @@ def _put_back(s, last):
 
 @inlined
 def _pull(s, part, whole):
-    """Write the pull of the level on the held rows, none where it misses nothing."""
+    """Write the pull of the level on the held rows, zero if the level has no miss."""
     fixed, damped = s.count[FIX], s.scalar[DAMPED]
     measure(s)
     s.count[TRIES] += 1
@@ -536,10 +536,10 @@ def _misses_rows(s, part):
 
 @inlined
 def _forgive(s, part, whole):
-    """Let forces be none that rows of the level have only because they are not quite parallel.
+    """Set forces to zero that rows of the level have only because they are not quite parallel.
 
-    Where rows are parallel but for less than rank_tolerance, they count as parallel, and what they
-    miss by, or pull with, for that reason alone is none.
+    Rows that are parallel up to rank_tolerance count as parallel, and a miss or pull that they have
+    for that reason alone counts as zero.
     """
     count, force, share = s.count, s.number[FORCE], s.number[SHARE]
     fixed, least = count[FIX], s.settings.rank_tolerance
@@ -561,7 +561,7 @@ def _forgive(s, part, whole):
 
 @inlined
 def _worst(s):
-    """Return the row that holds x back the wrong way most, or the first by Bland; -1 if none."""
+    """Return the row whose force has the worst wrong sign, or the first by Bland; -1 if none."""
     count, fixed, hard = s.count, s.count[FIX], s.count[HARD]
     bland = count[STILL] > BLAND_AFTER
     least, leaving = 0.0, -1
@@ -582,10 +582,10 @@ def _worst(s):
 
 @inlined
 def _settle(s, k, whole):
-    """Make the rows that a level decided equalities for good; its other rows stay held.
+    """Turn the rows that a level decided into permanent equalities; its other rows stay held.
 
-    So do those of which that is not clear: a row that the level needs where it is cannot leave
-    while the rows of the level keep their values.
+    So do unclear rows: a row that the level needs at its side cannot leave while the rows of the
+    level keep their values.
     """
     count, number, state, owner = s.count, s.number, s.index[STATE], s.index[OWNER]
     fixed, end, unclear = count[FIX], count[FIX] + count[HARD], s.settings.rank_tolerance
@@ -617,12 +617,12 @@ def _settle(s, k, whole):
 
 @inlined
 def _order(s, whole):
-    """Give the level's basis vectors to the rows that are fixed first, then to those held."""
+    """Give the level's basis vectors to the fixed rows first, then to the held rows."""
     count, owner, soft, state = s.count, s.index[OWNER], s.index[LIST], s.index[STATE]
     fixed, hard, rows, held = count[FIX], count[HARD], count[ROWS], s.number[SPEED]
     end = s.x.size if whole else fixed + hard + count[RANK]
     at, least, open_rows = fixed, s.settings.rank_tolerance, 0
-    for q in range(0 if whole else hard + rows):  # x as a whole is settled: no row is open
+    for q in range(0 if whole else hard + rows):  # all of x is settled: no row is open
         i = owner[fixed + q] if q < hard else soft[q - hard]
         if state[i] == HELD:
             held[open_rows] = i

@@ -1,8 +1,8 @@
 """The task priority matrix as published: plain QR (8), Gauss-Jordan with pivot blocks (9)-(10).
 
-It is the recursion's answer only while no level above the last loses rank or freedom is left over:
-a level occupies as many columns of Q as it has rows, whether it can use them or not. For m > n, J
-is filled up with zero columns to a square matrix.
+It gives the answer of the recursion only while no level above the last loses rank, or freedom
+remains: a level occupies as many columns of Q as it has rows, whether it can use them or not. For
+m > n, zero columns extend J to a square matrix.
 """
 
 # mypy: disable-error-code="no-untyped-def"
@@ -30,10 +30,10 @@ from solvers.status import SOLVED, TOO_SMALL
 
 
 class Matrices(NamedTuple):
-    """What F comes from and goes into; N = max(m, n).
+    """The matrices from which F is computed, and F; N = max(m, n).
 
     R (m, N): R^T, the rows of J reflected. basis: the m reflectors of Q. F (m, m): F^T. T (m, m):
-    R^-1. zero (m,): squared norms at or below which a row is nothing. rest: for m + 3 m^2 numbers.
+    R^-1. zero (m,): squared norm at or below which a row is zero. rest: m + 3 m^2 numbers.
     """
 
     R: View
@@ -59,7 +59,7 @@ def _carve(work, at, m, n):
 
 @compiled
 def solve_as_published(A, lower, upper, sizes, x, settings, work):
-    """Solve (14) with F of (10); arguments and results as those of `solve_by_staircase`."""
+    """Solve (14) with F of (10); arguments and return codes as in `solve_by_staircase`."""
     m, n = A.shape
     matrices, at = _carve(work, 0, m, n)
     u, at = vector(work, at, m)
@@ -105,7 +105,7 @@ def _add_inverse(matrices, u, of_x, x):
 
 @inlined
 def _carve_inverse(work, at, m, n):
-    """Return what `_add_least` needs, and where it ends."""
+    """Return the work space of `_add_least`, and where it ends."""
     undamped, at = vector(work, at, 3)
     least, at = vector(work, at, n)
     whole, at = integers(work, at, 1)
@@ -155,7 +155,7 @@ def _fill(A, lower, upper, sizes, x, matrices, settings):
 
 @inlined
 def _factor(R, basis, zero, n):
-    """Make the QR of J^T, of which R comes in as J and goes out as R^T (8)."""
+    """Compute the QR of J^T; R is J on entry and R^T on return (8)."""
     m, N = R.shape
     for i in range(m):
         for c in range(n, N):
@@ -166,7 +166,7 @@ def _factor(R, basis, zero, n):
             basis.V[k, c] = 0.0
             square += R[k, c] * R[k, c]
         basis.beta[k] = 0.0
-        if square <= zero[k]:  # nothing is left of the row: rounding error must not choose for it
+        if square <= zero[k]:  # no remainder: rounding must not choose a direction
             for c in range(k, N):
                 R[k, c] = 0.0
         else:
@@ -176,7 +176,7 @@ def _factor(R, basis, zero, n):
 
 @inlined
 def _eliminate(F, D, entries, first, last):
-    """Do steps 2 and 3 of the elimination for one level, D being the inverse of its pivot."""
+    """Do steps 2 and 3 of the elimination for one level; D is the inverse of its pivot."""
     p = last - first
     for k in range(first, F.shape[1]):  # step 2
         for j in range(p):
@@ -195,7 +195,7 @@ def _eliminate(F, D, entries, first, last):
 
 @compiled
 def _tolerance(A, rank_tolerance):
-    """Absolute tolerance of singular values: rank_tolerance times the largest row norm."""
+    """Return the absolute tolerance of singular values: rank_tolerance times the largest norm."""
     largest = 0.0
     for i in range(A.shape[0]):
         square = 0.0
@@ -207,9 +207,9 @@ def _tolerance(A, rank_tolerance):
 
 @compiled
 def _invert_pivot(F, T, first, settings, tolerance, D, work):
-    """Write R_ii^# into D, damped where its smallest singular value is small.
+    """Write R_ii^# into D, damped if its smallest singular value is small.
 
-    That is R^T (R R^T + lambda^2 I)^-1. work: twice the size of D, of any content.
+    That is R^T (R R^T + lambda^2 I)^-1. work: twice the size of D, any contents.
     """
     damping, threshold = settings.damping, settings.threshold
     p, square = D.shape[0], 0.0

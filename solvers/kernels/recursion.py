@@ -18,13 +18,13 @@ from solvers.kernels.rows import ZERO, finish, largest_row, load_rows, swap, swa
 from solvers.kernels.space import Block, View, matrix, shared, vector
 from solvers.status import SOLVED, TOO_SMALL
 
-SHRUNK = 0.01  # squared norm that a row may lose by projection before it is projected once more
+SHRUNK = 0.01  # squared norm of a remainder: smaller ones are projected a second time
 
 
 class Projected(NamedTuple):
-    """Rows J_i P_{i-1} = C V, what they miss, and the projector.
+    """Rows J_i P_{i-1} = C V, their residuals, and the projector.
 
-    W (m, n): what is left of the rows. C (m, n), V (n, n), P (n, n). zero, miss (m,): see `Rows`.
+    W (m, n): the remainders of the rows. C (m, n), V (n, n), P (n, n). zero, miss (m,): see `Rows`.
     """
 
     W: View
@@ -49,9 +49,9 @@ def _carve(work, at, m, n):
 
 @compiled
 def recursion(A, lower, upper, sizes, x, settings, work):
-    """Solve; x (n,) comes in as the reference and goes out as the answer, zero on failure.
+    """Solve; x (n,) is the reference on entry and the answer on return, zero on failure.
 
-    Arguments and results as those of `solve_by_staircase`.
+    Arguments and return codes are those of `solve_by_staircase`.
     """
     m, n = A.shape
     rows, at = _carve(work, 0, m, n)
@@ -104,7 +104,7 @@ def _add(q, s, v):
 
 @inlined
 def _see(rows, A, b, q, first, last, above):
-    """Write what a level misses, p_i - J_i x_{i-1} in (13), and its rows J_i P_{i-1}."""
+    """Write the residual of a level, p_i - J_i x_{i-1} in (13), and its rows J_i P_{i-1}."""
     for i in range(first, last):
         miss = b[i]
         for c in range(q.size):
@@ -116,7 +116,7 @@ def _see(rows, A, b, q, first, last, above):
 
 @inlined
 def _decompose(rows, A, first, last, rank, rank_tolerance):
-    """Give a level's rows unit vectors of their own, largest first; return the rank."""
+    """Decompose the rows of a level into unit vectors, largest first; return the rank."""
     for i in range(first, last):
         pivot, square = largest_row(rows.W, rows.zero, i, last, ZERO)
         if pivot < 0 or rank == A.shape[1]:
@@ -145,9 +145,9 @@ def _project(w, a, P):
 
 @compiled
 def _take_direction(rows, i, last, k, again):
-    """Make row i of W unit vector V[k], and take it out of the level's rows and out of P.
+    """Normalise row i of W to V[k], and remove it from the level's rows and from P.
 
-    again: project it once more, so that V[k] stays in the range of P when little was left of it.
+    again: project it a second time, so that V[k] stays in the range of P if its remainder is small.
     """
     v = rows.V[k]
     if again:

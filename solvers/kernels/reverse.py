@@ -1,12 +1,12 @@
-"""Reverse priority: levels from the lowest up, each correcting the answer of those below it.
+"""Reverse priority: from the lowest level up, each level corrects the answer of those below.
 
 Level k corrects by T_k (J_k T_k)^# (b_k - J_k x_{k+1}), where T_k are the first m_k columns of the
 pseudoinverse of the reverse augmented Jacobian, the rows of the levels k, k + 1, ..., l. With
 J_RA = U S V^T and U_k the first m_k rows of U, T_k = V S^-1 U_k^T, so S V^T times the correction is
-U_k^# (b_k - J_k x_{k+1}): of all steps that bring level k as near as it can come, the one that
-changes the rows below least, || J_RA d ||, and of those the shortest. That is a strict hierarchy of
-two levels, the rows of k with what they miss, and all rows below with zero; so the staircase
-finds it at any rank, and no pseudoinverse is formed.
+U_k^# (b_k - J_k x_{k+1}): of all steps that bring level k as close as possible to its target, the
+one that changes the rows below least, || J_RA d ||, and of those the shortest. That is a strict
+hierarchy of two levels: the rows of k with their residual, and all rows below with zero. So the
+staircase finds it at any rank, and no pseudoinverse is formed.
 """
 
 # mypy: disable-error-code="no-untyped-def"
@@ -22,10 +22,10 @@ from solvers.status import NUMERICAL_FAILURE, SOLVED, TOO_SMALL
 
 @compiled
 def reverse(A, lower, upper, sizes, x, settings, work):
-    """Solve; x (n,) comes in as the reference and goes out as the answer, zero on failure.
+    """Solve; x (n,) is the reference on entry and the answer on return, zero on failure.
 
     settings: damping, threshold, rank_tolerance, and whether the rows below are changed least level
-    by level, the upper ones first, in place of all alike. Else as `solve_by_staircase`.
+    by level, upper ones first, rather than all alike. Otherwise like `solve_by_staircase`.
     """
     m, n = A.shape
     asked, at = vector(work, 0, m)
@@ -45,7 +45,7 @@ def reverse(A, lower, upper, sizes, x, settings, work):
     for k in range(sizes.size - 1, -1, -1):
         last, first = first, first - sizes[k]
         for c in range(n):
-            d[c] = 0.0 if k > 0 else reference[c]  # nothing sees what J_RA of all levels leaves
+            d[c] = 0.0 if k > 0 else reference[c]  # in the null space of all levels
         _ask(A, lower, x, asked, first, last)
         two = parts[k:_end_of_parts(sizes, parts, k, m - last, settings[3] > 0.0)]
         code, _ = climb(A[first:], asked[first:], asked[first:], two, d, settings, work[at:])
@@ -63,7 +63,7 @@ def reverse(A, lower, upper, sizes, x, settings, work):
 
 @inlined
 def _ask(A, b, x, asked, first, last):
-    """Ask of a level what it misses, b_k - J_k x_{k+1}."""
+    """Write the residual of a level, b_k - J_k x_{k+1}, as its target."""
     for i in range(first, last):
         asked[i] = b[i]
         for c in range(x.size):
@@ -72,7 +72,7 @@ def _ask(A, b, x, asked, first, last):
 
 @inlined
 def _end_of_parts(sizes, parts, k, below, in_order):
-    """Write the rows of level k, and of each below it or of all as one; return where they end."""
+    """Write the sizes of level k and of those below, each or as one; return where they end."""
     levels = sizes.size
     parts[k] = sizes[k]
     if in_order or k + 1 == levels:

@@ -1,9 +1,8 @@
-"""What kernels do to rows: check and copy them, reflect them, swap them.
+"""Operations on rows in kernels: check, copy, reflect, swap, factor.
 
-The inner loops run over views of whole rows, unit stride, so that the compiler may vectorise them
-without fastmath. numba does not inline across functions, so each function here does the work of a
-range of rows; and it compiles a function once more for a literal argument, so counters start from
-ZERO.
+The inner loops run over views of whole rows with unit stride, so that the compiler can vectorise
+them without fastmath. numba does not inline across functions, so each function here handles a range
+of rows. It also compiles a function again for a literal argument, so counters start from ZERO.
 """
 
 # mypy: disable-error-code="no-untyped-def"
@@ -16,15 +15,15 @@ from hierarchy.jit import compiled, inlined
 from solvers.status import NUMERICAL_FAILURE, SOLVED
 
 ZERO = np.int64(0)
-ROUNDING = 1e-13  # of the terms of a sum, up to which it is rounding
+ROUNDING = 1e-13  # of the terms of a sum: smaller sums are rounding
 
 
 @compiled
 def load_rows(W, zero, A, lower, upper, x, rank_tolerance):
-    """Copy A into the first rows of W, check all data, and say when a row counts as zero.
+    """Copy A into the first rows of W, check all data, and write when a row counts as zero.
 
-    zero (m,) receives the squared norm at or below which what is left of a row is nothing.
-    Returns SOLVED, NUMERICAL_FAILURE at an entry that is not finite, or -(i + 1) where row i is an
+    zero (m,) receives the squared norm at or below which the remainder of a row counts as zero.
+    Returns SOLVED, NUMERICAL_FAILURE for an entry that is not finite, or -(i + 1) if row i is an
     inequality.
     """
     m, n = A.shape
@@ -43,7 +42,7 @@ def load_rows(W, zero, A, lower, upper, x, rank_tolerance):
 
 @inlined
 def all_finite(x):
-    """Whether every entry is."""
+    """Whether every entry is finite."""
     finite = True
     for c in range(x.size):
         finite &= np.isfinite(x[c])
@@ -61,9 +60,9 @@ def all_equal(lower, upper):
 
 @inlined
 def largest_row(W, zero, i0, i1, c0):
-    """Row of i0 .. i1 - 1 with the largest norm from column c0 on, and that norm squared.
+    """Return the row of i0 .. i1 - 1 with the largest norm from column c0 on, and its square.
 
-    The row is -1 if all count as zero.
+    The row is -1 if all rows count as zero.
     """
     largest, pivot = 0.0, -1
     for i in range(i0, i1):
@@ -93,8 +92,7 @@ def swap_rows(W, i, j):
 def reflect(basis, k0, k1, W, i0, i1):
     """Apply reflectors k0 .. k1 - 1 of the basis to rows i0 .. i1 - 1 of W, in this order.
 
-    Three rows at a time: a sum is exact in its order alone, and three of them do not wait for
-    each other.
+    Three rows at a time: the order of each sum is fixed, but three sums do not wait for each other.
     """
     for k in range(k0, k1):
         v, beta, i = basis.V[k, k:], basis.beta[k], i0
@@ -115,7 +113,7 @@ def reflect(basis, k0, k1, W, i0, i1):
 
 @inlined
 def three_products(u, v, w, x):
-    """Inner products of u, v and w with x."""
+    """Return the inner products of u, v and w with x."""
     a = b = c = 0.0
     for j in range(x.size):
         a += u[j] * x[j]
@@ -133,14 +131,14 @@ def add_multiple(w, s, v):
 
 @inlined
 def reflect_back(basis, rank, W, i0, i1):
-    """Apply reflectors rank - 1 .. 0: rows i0 .. i1 - 1 of W, given in Q, are then in x."""
+    """Apply reflectors rank - 1 .. 0: from coordinates of Q to x, for rows i0 .. i1 - 1 of W."""
     for k in range(rank - 1, -1, -1):
         reflect(basis, k, k + 1, W, i0, i1)
 
 
 @inlined
 def make_reflector(basis, k, w, square):
-    """Make reflector k map the row w onto unit vector k; apply it to no row.
+    """Make reflector k, which maps the row w onto unit vector k, without applying it.
 
     square is the squared norm of w from column k on.
     """
@@ -153,9 +151,9 @@ def make_reflector(basis, k, w, square):
 
 @compiled
 def factor_level(rows, basis, begin, end, rank):
-    """Give the rows begin .. end - 1, already reflected, columns of their own; return the rank.
+    """Factor rows begin .. end - 1, already reflected, into columns of their own; return the rank.
 
-    The rows are brought into pivot order, and row, zero and miss with them.
+    The rows are put into pivot order, together with row, zero and miss.
     """
     W = rows.W
     for i in range(begin, end):
@@ -175,7 +173,7 @@ def factor_level(rows, basis, begin, end, rank):
 
 @compiled
 def finish(x, code):
-    """Return code if x is finite; otherwise, or if code is no success, make x zero and say so."""
+    """Return `code`, or NUMERICAL_FAILURE if x is not finite; x is zero unless SOLVED."""
     if code == SOLVED and not all_finite(x):
         code = NUMERICAL_FAILURE
     if code != SOLVED:

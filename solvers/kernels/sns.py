@@ -1,14 +1,14 @@
-"""Saturation in the null space: task after task, joints that would pass a bound taken out.
+"""Saturation in the null space: task by task, joints that would pass a bound are saturated.
 
 For task k (Flacco, De Luca, Khatib 2015) let x_{k-1} be the answer of the tasks above and P_{k-1}
-the projector into their null space. A diagonal W_k has ones for the joints that are not saturated,
-Pbar_k = (I - ((I - W_k) P_{k-1})^#) P_{k-1} is what tasks above and saturated joints leave, and
+the projector onto their null space. A diagonal W_k has ones for the joints that are not saturated,
+Pbar_k = (I - ((I - W_k) P_{k-1})^#) P_{k-1} is the freedom of the remaining joints, and
 
     x_k(s) = x' + (J_k Pbar_k)^# (s b_k - J_k x'),   x' = x_{k-1} + ((I - W_k) P_{k-1})^# x_N,
 
-x_N being the ways of the saturated joints to their bounds. So x_k(s) = s a + c. While x_k(1) leaves
-the box, the joint that leaves it at the smallest s, the most critical one, is saturated too; when
-J_k Pbar_k loses rank, the set with the largest s is the answer. Each task begins with W_k = I.
+x_N the steps of the saturated joints to their bounds. So x_k(s) = s a + c. While x_k(1) leaves the
+box, the joint that leaves it at the smallest s, the most critical one, is saturated too; when
+J_k Pbar_k loses rank, the set with the largest s is the answer. Each task starts with W_k = I.
 
 No projector is formed here: saturated joints and the task have columns of Q, see `held`.
 """
@@ -52,10 +52,10 @@ from solvers.status import CONTRADICTION, NUMERICAL_FAILURE, SOLVED, TOO_SMALL
 
 
 class Options(NamedTuple):
-    """The settings that all resolvers share, and two.
+    """The settings that all resolvers share, and two more.
 
-    release: whether saturated joints are released. of_miss: whether s scales what a task misses,
-    in place of b.
+    release: whether saturated joints are released. of_miss: whether s scales the residual of a
+    task instead of b.
     """
 
     shared: Settings
@@ -73,7 +73,7 @@ class Tasks(NamedTuple):
 
 
 class Task(NamedTuple):
-    """The rows of one task: J (p, n), b (p,); zero (p,): squared norms that are nothing."""
+    """The rows of one task: J (p, n), b (p,); zero (p,): squared norms that count as zero."""
 
     J: View
     b: View
@@ -81,7 +81,7 @@ class Task(NamedTuple):
 
 
 class Columns(NamedTuple):
-    """Where columns of Q end: of the tasks above, of the saturated joints, of the task."""
+    """Ends of the columns of Q: of the tasks above, the saturated joints, the task."""
 
     above: View
     joints: View
@@ -89,10 +89,10 @@ class Columns(NamedTuple):
 
 
 class Space(NamedTuple):
-    """What is written on the way.
+    """Intermediate results.
 
-    held: saturated joints, and Q. kept: the reflectors of the tasks alone. rows: the task's rows,
-    factored. seen (m, n): the same in Q, not factored. now (m,): J_k x_{k-1}. zero (m,): of all
+    held: saturated joints, and Q. kept: the reflectors of the tasks alone. rows: the factored rows
+    of the task. seen (m, n): the same in Q, not factored. now (m,): J_k x_{k-1}. zero (m,): of all
     tasks. line (2, n): a and c of x_k(s) = s a + c. y_a (n,): a in Q. trial (1, n), best (n,):
     steps. of_block: work space of `solve_level`.
     """
@@ -129,13 +129,13 @@ def _carve(work, at, m, n):
 
 @compiled
 def sns(A, lower, upper, sizes, x, record, settings, work):
-    """Solve; x (n,) comes in as the reference and goes out as the answer, zero on failure.
+    """Solve; x (n,) is the reference on entry and the answer on return, zero on failure.
 
-    record (n + L + 1,) goes out as: +1, -1, 2 where x is at its upper, lower, only bound, else 0;
-    the scaling of each level; the saturated sets tried. settings: damping, threshold,
-    rank_tolerance, and the rest of `Options`. work: of any content. Returns SOLVED,
+    record (n + L + 1,) on return: +1, -1, 2 where x is at its upper, lower, only bound, else 0; the
+    scaling of each level; the number of saturated sets tried. settings: damping, threshold,
+    rank_tolerance, and the rest of `Options`. work: any contents. Returns SOLVED,
     NUMERICAL_FAILURE, TOO_SMALL, CONTRADICTION with the row at the end of the record, or -(i + 1)
-    where row i is an inequality that is not handled.
+    if row i is an inequality that is not handled.
     """
     m, n = A.shape
     bounds = _bounds_above(lower, upper, sizes)
@@ -166,7 +166,7 @@ def sns(A, lower, upper, sizes, x, record, settings, work):
 
 @inlined
 def _record_bounds(x, box, record):
-    """Put x on the bounds that it touches, and write which."""
+    """Put x exactly on the bounds that it touches, and write which."""
     for c in range(x.size):
         if _touches(x[c], box.up[c]):
             x[c], record[c] = box.up[c], 2.0 if box.low[c] == box.up[c] else 1.0
@@ -176,13 +176,13 @@ def _record_bounds(x, box, record):
 
 @inlined
 def _touches(x, side):
-    """Whether x is at this side of the box, to rounding."""
+    """Whether x is at this side of the box, up to rounding."""
     return abs(side) < np.inf and abs(x - side) <= SLACK * (1.0 + abs(side))
 
 
 @inlined
 def _bounds_above(lower, upper, sizes):
-    """Rows of the first level if there is an inequality in it, else 0."""
+    """Return the number of rows of the first level if it has an inequality, else 0."""
     if sizes.size > 0:
         for i in range(sizes[0]):
             if lower[i] < upper[i]:
@@ -192,10 +192,10 @@ def _bounds_above(lower, upper, sizes):
 
 @inlined
 def _read_box(A, lower, upper, bounds, box, record):
-    """Write the sides of the box; returns as `sns`."""
+    """Write the sides of the box; return a code of `sns`."""
     for c in range(A.shape[1]):
         box.low[c], box.up[c] = -np.inf, np.inf
-    refused = bounds  # the first inequality, where an equality beside it does not fit
+    refused = bounds  # the first inequality, if an equality of the level is no bound
     for i in range(bounds - 1, -1, -1):
         refused = i if lower[i] < upper[i] else refused
     for i in range(bounds):
@@ -223,7 +223,7 @@ def _read_box(A, lower, upper, bounds, box, record):
 
 @compiled
 def _saturate(tasks, x, box, record, settings, work):
-    """Solve level after level inside the box, then go to the reference; see `sns`."""
+    """Solve level by level inside the box, then move to the reference; see `sns`."""
     m, n = tasks.J.shape
     space, _ = _carve(work, 0, m, n)
     options = Options(shared(settings), settings[3] > 0.0, settings[4] > 0.0)
@@ -232,7 +232,7 @@ def _saturate(tasks, x, box, record, settings, work):
     if code != SOLVED:
         return code
     for c in range(n):
-        x[c] = min(max(0.0, box.low[c]), box.up[c])  # x_0, which the paper takes to be zero
+        x[c] = min(max(0.0, box.low[c]), box.up[c])  # x_0, zero in the paper
     first = above = tried = ZERO
     for k in range(tasks.sizes.size):
         last = first + tasks.sizes[k]
@@ -246,16 +246,16 @@ def _saturate(tasks, x, box, record, settings, work):
 
 @inlined
 def _level(task, x, box, space, above, options):
-    """Move x by one task, behind columns 0 .. above - 1 of Q.
+    """Move x by one task, in the columns of Q from `above` on.
 
-    Returns its scaling, the columns of Q with those of the task alone, and the sets tried.
+    Returns its scaling, the columns of Q including those of the task alone, and the sets tried.
     """
     held, tolerance = space.held, options.shared.rank_tolerance
     seen = space.seen[:task.b.size]
     _begin(task, x, space)
     _see(task, held.basis, seen, above)
     rank, taken, largest, sets = above, ZERO, -1.0, 0
-    while sets < 2 * x.size + 2:  # the basic form saturates n joints at most
+    while sets < 2 * x.size + 2:  # the basic form saturates at most n joints
         sets += 1
         begin = above + taken
         end = _factor(task, space, begin)  # J_k Pbar_k
@@ -276,7 +276,7 @@ def _level(task, x, box, space, above, options):
         if s == 1.0 or critical == NO_JOINT:
             break
         taken = _hold_critical(critical, x, box, space, seen, at, tolerance)
-        if above + taken == begin:  # tasks above and saturated joints hold it already
+        if above + taken == begin:  # tasks above and saturated joints already hold it
             break
     _copy_reflectors(space.kept, held.basis, above, rank)
     if largest >= 0.0:
@@ -287,7 +287,7 @@ def _level(task, x, box, space, above, options):
 
 @inlined
 def _begin(task, x, space):
-    """Begin with no joint saturated, W_k = I; write what the task has now."""
+    """Start with no joint saturated, W_k = I; write the current value of the task."""
     for j in range(x.size):
         space.held.side[j] = 0.0
     for i in range(task.b.size):
@@ -298,7 +298,7 @@ def _begin(task, x, space):
 
 @compiled
 def _see(task, basis, seen, above):
-    """Write the task's rows as seen in the columns of the tasks above."""
+    """Write the rows of the task, reflected by the columns of the tasks above."""
     for i in range(task.b.size):
         for j in range(seen.shape[1]):
             seen[i, j] = task.J[i, j]
@@ -307,7 +307,7 @@ def _see(task, basis, seen, above):
 
 @inlined
 def _factor(task, space, begin):
-    """Factor the rows seen behind the first `begin` columns of Q; return where theirs end."""
+    """Factor the task's rows after the first `begin` columns of Q; return where theirs end."""
     rows = space.rows
     for i in range(task.b.size):
         rows.row[i], rows.zero[i] = i, task.zero[i]
@@ -318,7 +318,7 @@ def _factor(task, space, begin):
 
 @inlined
 def _hold_critical(j, x, box, space, seen, at, least):
-    """Saturate the critical joint; return how many joints are saturated then."""
+    """Saturate the critical joint; return the new number of saturated joints."""
     held, a, c = space.held, space.line[0], space.line[1]
     held.side[j] = 1.0 if a[j] + c[j] > box.up[j] else -1.0
     way = side_of_box(box, held, j) - x[j]
@@ -327,9 +327,9 @@ def _hold_critical(j, x, box, space, seen, at, least):
 
 @compiled
 def _write_line(task, x, space, at, options):
-    """Write a and c with x_k(s) = s a + c, and the steps behind them, y_a and y in Q.
+    """Write a and c with x_k(s) = s a + c, and their steps y_a and y in coordinates of Q.
 
-    y comes in with the columns of the saturated joints.
+    On entry y has the columns of the saturated joints.
     """
     rows, now, y, y_a, of_miss = space.rows, space.now, space.held.y, space.y_a, options.of_miss
     size, line = task.b.size, space.line
@@ -361,7 +361,7 @@ def _copy_reflectors(source, target, k0, k1):
 
 @inlined
 def _improves(x, box, space, at, s):
-    """Write the step to x_k(s), and as the best if it is in the box; say whether it is."""
+    """Write the step to x_k(s), also as the best if it is in the box; return whether it is."""
     y, y_a, trial = space.held.y, space.y_a, space.trial
     for k in range(x.size):
         trial[0, k] = 0.0
@@ -377,7 +377,7 @@ def _improves(x, box, space, at, s):
 
 @inlined
 def _fits(x, step, box):
-    """Whether x + step is in the box, to what cancellation in a large step leaves of it."""
+    """Whether x + step is in the box, up to cancellation in a large step."""
     for j in range(x.size):
         low, up = box.low[j], box.up[j]
         if x[j] + step[j] > up + 10.0 * SLACK * (1.0 + abs(up)):
@@ -389,10 +389,10 @@ def _fits(x, step, box):
 
 @compiled
 def _scaling(a, c, box, side):
-    """The largest s <= 1 for which s a + c is in the box, or -1, and the most critical joint.
+    """Return the largest s <= 1 with s a + c in the box, or -1, and the most critical joint.
 
-    A joint that is out at s = 1 is critical at the largest s at which it is still in; where all
-    such joints come in only beyond s = 1, the last of them to come in is.
+    A joint that is outside at s = 1 is critical at the largest s at which it is inside; if all such
+    joints enter only beyond s = 1, the last of them to enter is critical.
     """
     smallest, largest, critical, late = -np.inf, np.inf, NO_JOINT, NO_JOINT
     for j in range(a.size):
@@ -420,7 +420,7 @@ def _scaling(a, c, box, side):
 
 @compiled
 def _release(space, at, s):
-    """Release the saturated joints whose multiplier has the wrong sign; return whether any had.
+    """Release saturated joints whose multiplier has the wrong sign; return whether there were any.
 
     The multipliers are those of the least ||x_k - x_{k-1}|| with J_k x_k and the joints as they
     are: y + F^T nu + E^T mu = 0, where mu must push a joint against its bound.

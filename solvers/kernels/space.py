@@ -1,13 +1,13 @@
-"""What kernels carve their work space into: views of one array, with names.
+"""Named views of one array: how kernels divide their work space.
 
     basis, at = carve_basis(work, 0, n, n)
     rows, at = carve_rows(work, at, m, n)
     if at > work.size:
         return TOO_SMALL
 
-A carver counts on where the work space ends, and gives empty views from there: so what a kernel
-needs is what it carves, and nothing is carved before there is room for all of it. Made inside a
-kernel and handed to inlined helpers, such a tuple of views costs nothing.
+A carver keeps counting beyond the end of the work space but returns empty views there, so a kernel
+learns how much it needs before it uses any of it. Such a tuple of views, made inside a kernel and
+passed to inlined helpers, costs nothing.
 """
 
 # mypy: disable-error-code="no-untyped-def"
@@ -18,13 +18,13 @@ from typing import Any, NamedTuple
 
 from hierarchy.jit import as_integers, as_matrix, inlined
 
-View = Any  # numpy to the reader, a type of its own to numba
+View = Any  # an array to the reader; numba infers a type
 
 
 class Basis(NamedTuple):
-    """Reflectors I - beta[k] v v^T, one after the other: they make Q.
+    """Reflectors I - beta[k] v v^T whose product is Q.
 
-    V (k, n): the v as rows, v of reflector k zero before column k. beta (k,).
+    V (k, n): the vectors v as rows; v of reflector k is zero before column k. beta (k,).
     """
 
     V: View
@@ -32,10 +32,10 @@ class Basis(NamedTuple):
 
 
 class Rows(NamedTuple):
-    """Rows that are being factored, each level in pivot order.
+    """Rows during a factorisation, each level in pivot order.
 
-    W (m, n): the rows. row (m,) int64: their numbers in the problem. zero (m,): squared norms at or
-    below which what is left of a row is nothing. miss (m,): what the rows still miss.
+    W (m, n): the rows. row (m,) int64: their indices in the problem. zero (m,): squared norm at or
+    below which the remainder of a row counts as zero. miss (m,): the residual of each row.
     """
 
     W: View
@@ -54,7 +54,7 @@ class Block(NamedTuple):
 
 
 class Settings(NamedTuple):
-    """What all resolvers share, see `Resolver`; the first numbers of the array of settings."""
+    """The settings that all resolvers share, see `Resolver`; first in the array of settings."""
 
     damping: View
     threshold: View
@@ -63,13 +63,13 @@ class Settings(NamedTuple):
 
 @inlined
 def shared(settings):
-    """Return the Settings at the beginning of an array of settings."""
+    """Return the Settings at the start of an array of settings."""
     return Settings(settings[0], settings[1], settings[2])
 
 
 @inlined
 def vector(work, at, size):
-    """Return the next `size` numbers, none if there are not so many, and where they end."""
+    """Return the next `size` numbers, none if they do not fit, and where they end."""
     end = at + size
     return work[at:end if end <= work.size else at], end
 

@@ -1,9 +1,9 @@
 """The exact task priority solution at every rank, from a level-by-level QR of J^T.
 
 J^T = Q [R; O] (8), but with R an upper block staircase: a level takes as many columns of Q as it
-adds rank, so what an upper level cannot use stays free for the levels below. In y = Q^T x the
+adds rank, so columns that an upper level cannot use remain for the levels below. In y = Q^T x the
 levels are solved from the top by block forward substitution, least squares in each block: the
-recursion (5), (13) in other coordinates. The columns of Q that no level took carry (14).
+recursion (5), (13) in other coordinates. The columns of Q that no level takes carry (14).
 """
 
 # mypy: disable-error-code="no-untyped-def"
@@ -43,8 +43,8 @@ from solvers.status import EQUAL, INACCURATE, SOLVED, TOO_SMALL, UNPROVED
 class Staircase(NamedTuple):
     """The rows in coordinates of Q.
 
-    basis: the reflectors of Q. rows: the rows of J Q. y (n,): the answer in the columns that the
-    levels took. of_x (1, n): x, to be reflected. of_block: work space of `solve_level`.
+    basis: the reflectors of Q. rows: the rows of J Q. y (n,): the answer in the columns of the
+    levels. of_x (1, n): x, for reflections. of_block: work space of `solve_level`.
     """
 
     basis: Basis
@@ -67,11 +67,11 @@ def carve_staircase(work, at, m, n):
 
 @compiled
 def solve_by_staircase(A, lower, upper, sizes, x, settings, work):
-    """Solve; x (n,) comes in as the reference and goes out as the answer, zero on failure.
+    """Solve; x (n,) is the reference on entry and the answer on return, zero on failure.
 
-    settings: an array that begins with damping, threshold, rank_tolerance. work: of any content.
-    Returns SOLVED, NUMERICAL_FAILURE, TOO_SMALL, -(i + 1) where row i is an inequality, or
-    INACCURATE where a row is nearly parallel to others and nothing is damped.
+    settings: an array that starts with damping, threshold, rank_tolerance. work: any contents.
+    Returns SOLVED, NUMERICAL_FAILURE, TOO_SMALL, -(i + 1) if row i is an inequality, or INACCURATE
+    if a row is nearly parallel to others and damping is off.
     """
     code, least = climb(A, lower, upper, sizes, x, settings, work)
     if code == SOLVED and least < DOUBTFUL and settings[0] == 0.0:
@@ -81,9 +81,9 @@ def solve_by_staircase(A, lower, upper, sizes, x, settings, work):
 
 @compiled
 def climb(A, lower, upper, sizes, x, settings, work):
-    """Solve like `solve_by_staircase`, without a doubt; return that code, and the least pivot.
+    """Solve like `solve_by_staircase`, but never INACCURATE; return the code and the least pivot.
 
-    A pivot is what was left of a row when it was taken, as a share of its norm.
+    A pivot is the remainder of a row when its column was made, relative to its norm.
     """
     m, n = A.shape
     (basis, rows, y, of_x, of_block), at = carve_staircase(work, 0, m, n)
@@ -110,7 +110,7 @@ def climb(A, lower, upper, sizes, x, settings, work):
 
 @inlined
 def _smallest_pivot(rows, first, above, rank, least):
-    """Return the least square of a pivot, over that at which a row counts as zero."""
+    """Return the least squared pivot, relative to the square at which a row counts as zero."""
     for k in range(above, rank):
         i = first + k - above
         square, zero = rows.W[i, k] * rows.W[i, k], rows.zero[i]
@@ -122,7 +122,7 @@ def _smallest_pivot(rows, first, above, rank, least):
 def solve_equalities(A, lower, upper, sizes, x, record, settings, work):
     """Like `solve_by_staircase`, with the record of `solve_by_guesses`.
 
-    Returns UNPROVED where a row is an inequality, and then nothing was done.
+    Returns UNPROVED, with nothing done, if a row is an inequality.
     """
     if not all_equal(lower, upper):
         return UNPROVED
@@ -135,14 +135,14 @@ def solve_equalities(A, lower, upper, sizes, x, record, settings, work):
 
 @inlined
 def _ask(rows, b, first, last):
-    """Write the targets of a level into what it misses."""
+    """Write the targets of a level as its residual."""
     for i in range(first, last):
         rows.miss[i] = b[i]
 
 
 @inlined
 def subtract(rows, y, first, last, above):
-    """Take what y reaches in columns 0 .. above - 1 out of what a level misses."""
+    """Subtract the part that y reaches in columns 0 .. above - 1 from the residual of a level."""
     for i in range(first, last):
         miss = rows.miss[i]
         for c in range(above):
@@ -152,7 +152,7 @@ def subtract(rows, y, first, last, above):
 
 @inlined
 def _to_unknowns(basis, y, rank, x, of_x):
-    """Turn x, a reference, into Q [y; rest], the rest being that of the reference: (7) and (14)."""
+    """Replace the reference x by Q [y; rest], with the rest of the reference: (7) and (14)."""
     zero_reference = True
     for c in range(x.size):
         of_x[0, c] = x[c]

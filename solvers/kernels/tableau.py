@@ -1,9 +1,9 @@
-"""An orthogonal tableau: the rows of a hierarchy in a basis that turns with the working set.
+"""An orthogonal tableau: the rows of a hierarchy in a basis that follows the working set.
 
 The tableau is M = Q^T [A^T, I] (n, g + n), one row for each basis vector: the coordinates of the g
 rows of A with more than one entry, then the basis vector itself. A row of A with a single entry is
-a multiple of a column of the identity, so a bound costs nothing. Each row of A that acts gets a
-basis vector of its own and is zero beyond it: the acting rows are lower triangular.
+a multiple of a column of the identity, so a bound costs nothing. Each active row of A gets a basis
+vector of its own and is zero beyond it: the active rows are lower triangular.
 
 Adding and removing a row is a few plane rotations of adjacent rows of M (Gill, Golub, Murray,
 Saunders 1974), never a new factorisation. The columns of a row depend on that row alone, so rows of
@@ -24,30 +24,30 @@ from solvers.kernels.space import View, integers, matrix, vector
 from solvers.kernels.tolerances import FLOOR, OUTGROWN
 from solvers.status import EQUAL, FREE, NUMERICAL_FAILURE, SOLVED, TOO_SMALL
 
-# Rows of `number`. Of each row of A: its norm, its only entry (1 where there are more), its sides,
-# those as they are moved, its value and how fast that changes, what it misses before its level and
-# has too much after (these two in the order of the list), and the record, see
-# `ActiveSetResolution`. Of each unknown or basis vector: the x that the level began with, its goal,
-# the reference, the step in x, x or its step in the basis, the level's pull, the force that
-# balances it, and what of the pull that is.
+# Rows of `number`. Per row of A: its norm, its only entry (1 if there are more), its sides, the
+# sides as moved, its value and the rate of that, its residual before its level and its excess after
+# (these two in the order of the list), and the record, see `ActiveSetResolution`. Per unknown or
+# basis vector: the x at the start of the level, its goal, the reference, the step in x, x or its
+# step in the basis, the level's pull, the force that balances it, and the part of the pull that
+# it balances.
 (NORM, ENTRY, LOWER, UPPER, LOW, UP, VALUE, SPEED, REST, OVER, ACTIVE, HOLDS, MULTIPLIER,
  START, GOAL, REFERENCE, STEP, Z, PULL, FORCE, SHARE) = range(21)
-# Rows of `index`. Of each row of A: its unknown (-1 for more than one entry), its column of M, its
-# state; the list of rows that act, each level in pivot order. Of each basis vector: the row that
-# owns it, -1 for none; the unknown it was at first. Of each level: how many rows it has, where it
-# begins in the list, and in the basis.
+# Rows of `index`. Per row of A: its unknown (-1 for several entries), its column of M, its state;
+# the list of active rows, each level in pivot order. Per basis vector: the row that owns it, -1 for
+# none; the unknown it was initially. Per level: its number of rows, its start in the list, and in
+# the basis.
 UNIT, COLUMN, STATE, LIST, OWNER, ORDER, EXTENT, BEGIN, RANKS = range(9)
-# In `count`: levels; first column of M still in use; that of the unknowns that are left; unknowns
-# removed, as they were put on a bound before all else. The others are those of `levels.py`.
+# In `count`: levels; first column of M in use; first column of the remaining unknowns; removed
+# unknowns, which were put on a bound before all else. The others are those of `levels.py`.
 LEVELS, FIRST, BASE, REMOVED = range(4)
 COUNTS = 15
-# In `scalar`: the largest number met, what tolerances are taken of; a level's damping and weight;
-# the most that a row of it misses, the sum of what they pull with, what of that may be rounding;
-# guesses, steps, the level that was not finished.
+# In `scalar`: the largest number so far, the scale of tolerances; a level's damping and weight; the
+# largest miss of its rows, the sum of their pulls, the part of that which may be rounding; guesses,
+# steps, the unfinished level.
 (SIZE, SCALE, DAMPED, WEIGHT, WORST, PULLED, ROUNDING,
  GUESSES, STEPS, UNFINISHED) = range(10)
 
-ALL, ACTING = np.int64(0), np.int64(1)  # the rows that a tableau is for
+ALL, ACTING = np.int64(0), np.int64(1)  # the rows that a tableau holds
 
 
 class Exact(NamedTuple):
@@ -62,7 +62,7 @@ class Exact(NamedTuple):
 
 
 class Solve(NamedTuple):
-    """All that a solve works with: few arrays, whose rows have names, as each costs the compiler.
+    """The data of a solve: few arrays with named rows, since each array costs compile time.
 
     A (m, n), x (n,). number, index (.., w), w the largest of m, n, L + 1, and count, scalar: see
     above. M (n, g + n). room: scratch.
@@ -81,7 +81,7 @@ class Solve(NamedTuple):
 
 @inlined
 def prepare(A, lower, upper, sizes, x, record, settings, work):
-    """Return a Solve that has all data, and SOLVED, TOO_SMALL or, with x = 0, NUMERICAL_FAILURE."""
+    """Return a Solve with all data, and SOLVED, TOO_SMALL or, with x = 0, NUMERICAL_FAILURE."""
     s, enough = carve(A, sizes, x, settings, work)
     if not enough:
         return s, ZERO + TOO_SMALL
@@ -93,9 +93,9 @@ def prepare(A, lower, upper, sizes, x, record, settings, work):
 
 @inlined
 def carve(A, sizes, x, settings, work):
-    """Return a Solve without data whose M has no columns yet, and whether there is room for all.
+    """Return a Solve without data whose M has no columns yet, and whether everything fits.
 
-    That is M, a least squares problem of all rows, and its damping.
+    Everything is M, a least squares problem of all rows, and its damping.
     """
     m, n = A.shape
     w = max(m, n, sizes.size + 1)
@@ -113,7 +113,7 @@ def carve(A, sizes, x, settings, work):
 
 @inlined
 def with_tableau(s, general):
-    """Return the Solve with an M for `general` rows of more than one entry."""
+    """Return the Solve with an M for `general` rows with several entries."""
     n = s.x.size
     M, at = matrix(s.room, ZERO, n, general + n)
     return Solve(s.A, s.x, s.number, s.index, s.count, s.scalar, M, s.room[at:], s.settings)
@@ -121,9 +121,9 @@ def with_tableau(s, general):
 
 @compiled
 def load(s, lower, upper, sizes, record):
-    """Check all data and copy them; return how many rows have several entries, -1 if bad.
+    """Check and copy all data; return the number of rows with several entries, -1 if invalid.
 
-    An active inequality whose side is missing is set free.
+    An active inequality whose side is missing becomes free.
     """
     number, general, sane = s.number, ZERO, True
     s.count[LEVELS] = sizes.size
@@ -169,10 +169,10 @@ def keep(s, record):
 
 @compiled
 def open_tableau(s, rows):
-    """Write M for Q = I: removed unknowns, equalities, inequalities, the unknowns that are left.
+    """Write M for Q = I: removed unknowns, equalities, inequalities, the remaining unknowns.
 
-    So what is settled lies before what is not, and is left out of all that follows. If only the
-    ACTING rows are wanted, the others have columns that are left out from the beginning.
+    So settled columns come before the others and can be skipped from then on. If only the ACTING
+    rows are needed, the columns of the others are skipped from the start.
     """
     M, active, unit, order = s.M, s.number[ACTIVE], s.index[UNIT], s.index[ORDER]
     m, n, removed = s.A.shape[0], s.x.size, s.count[REMOVED]
@@ -207,7 +207,7 @@ def open_tableau(s, rows):
 def reflect(M, k, end, column, first, total):
     """Reflect rows k .. end - 1 of M so that `column` is zero below row k.
 
-    Columns from `first` on go along; total (g + n,) is scratch.
+    Columns from `first` on are reflected too; total (g + n,) is scratch.
     """
     square, alpha = 0.0, M[k, column]
     for t in range(k + 1, end):
@@ -254,7 +254,7 @@ def fold(M, k, column, first):
 
 @inlined
 def left_of(s, i, begin, end):
-    """Squared norm of row i in the basis vectors begin .. end - 1."""
+    """Return the squared norm of row i in the basis vectors begin .. end - 1."""
     square, column, entry = 0.0, s.index[COLUMN, i], s.number[ENTRY, i]
     for t in range(begin, end):
         square += s.M[t, column] * s.M[t, column]
@@ -263,9 +263,9 @@ def left_of(s, i, begin, end):
 
 @inlined
 def factor(s, q0, q1, begin, rank):
-    """Give rows q0 .. q1 - 1 of the list basis vectors from `begin` on, the largest first.
+    """Give rows q0 .. q1 - 1 of the list basis vectors from `begin` on, the largest row first.
 
-    The first `rank` of them have theirs. The list is brought into pivot order; returns the rank.
+    The first `rank` of them already have theirs. Puts the list into pivot order; returns the rank.
     """
     n, rows = s.x.size, s.index[LIST]
     while q0 + rank < q1 and begin + rank < n:
@@ -286,7 +286,7 @@ def factor(s, q0, q1, begin, rank):
 
 @inlined
 def value_of(s, x, i):
-    """Row i of A times x."""
+    """Return row i of A times x."""
     if s.index[UNIT, i] >= 0:
         return s.number[ENTRY, i] * x[s.index[UNIT, i]]
     total, a = 0.0, s.A[i]
@@ -297,19 +297,19 @@ def value_of(s, x, i):
 
 @inlined
 def side_of(number, i):
-    """The side at which row i acts."""
+    """Return the side at which row i is active."""
     return number[UP, i] if number[ACTIVE, i] > 0.0 else number[LOW, i]
 
 
 @inlined
 def around(norm, side, scale):
-    """What a tolerance for a row at a side is taken of; see `tolerances.py`."""
+    """Return the scale of tolerances for a row at a side; see `tolerances.py`."""
     return norm * scale + abs(side)
 
 
 @inlined
 def missed_side(number, i, value, scale, tolerance):
-    """+1 where row i is above its upper side, -1 where it is below its lower, 0 within."""
+    """Return +1 if row i is above its upper side, -1 if below its lower side, else 0."""
     low, up, norm = number[LOW, i], number[UP, i], number[NORM, i]
     if value > up + tolerance * around(norm, up, scale):
         return 1.0
@@ -318,7 +318,7 @@ def missed_side(number, i, value, scale, tolerance):
 
 @inlined
 def length_of(x):
-    """Euclidean norm."""
+    """Return the Euclidean norm."""
     square = 0.0
     for c in range(x.size):
         square += x[c] * x[c]
@@ -327,7 +327,7 @@ def length_of(x):
 
 @inlined
 def measure(s):
-    """Write what tolerances are taken of: the length of x, but not less than rounding may be."""
+    """Write the scale of tolerances: the length of x, but at least the size of rounding."""
     length = length_of(s.x)
     s.scalar[SIZE] = max(s.scalar[SIZE], length)
     s.scalar[SCALE] = max(length, FLOOR * s.scalar[SIZE])
@@ -335,15 +335,15 @@ def measure(s):
 
 @inlined
 def has_outgrown(s):
-    """Whether x is so small beside the numbers it came from that its tolerances say little."""
+    """Whether x is so small relative to its terms that its tolerances mean little."""
     return s.scalar[SIZE] > OUTGROWN * (1.0 + length_of(s.x))
 
 
 @inlined
 def asks_for_x(s, first, last):
-    """Whether rows first .. last - 1 ask each unknown for one value, all with one weight.
+    """Whether rows first .. last - 1 give each unknown one target, all with the same weight.
 
-    Such a level is the way to a reference of its own, which is written into the goal.
+    Such a level amounts to a reference of its own, which is written into the goal.
     """
     n, seen = s.x.size, s.number[STEP]
     if last - first != n:

@@ -1,25 +1,25 @@
-"""Every tolerance of the exact engine that is not a setting.
+"""Every tolerance of the exact resolver that is not a setting.
 
-All are relative. Of a row a with side b they are taken of |a| scale + |b|. `scale` is the length of
-x, but at least FLOOR of `size`: the largest of x, of the steps, and of the targets over their
-pivots met so far in the solve. So they have a floor from the data: where x is zero and all sides
-are zero, rounding still has the size of the numbers that cancelled.
+All are relative. For a row a with side b they are relative to |a| scale + |b|. `scale` is the
+length of x, but at least FLOOR times `size`: the largest of x, of the steps, and of the targets
+over their pivots so far in the solve. So they have a floor from the data: even where x and all
+sides are zero, rounding has the size of the numbers that cancelled.
 """
 
-FLOOR = 1e-3        # of the largest number met, which tolerances are taken of where x is less
-OUTGROWN = 1e4      # numbers met, as a multiple of 1 + |x|, beyond which an answer is worth a doubt
+FLOOR = 1e-3        # of the largest number so far: lower bound of `scale`
+OUTGROWN = 1e4      # largest number so far over 1 + |x|: larger ones leave the answer in doubt
 
-EPSILON = 2e-15     # what a row is missed by, below which that is rounding
-CANCELLED = 1e-14   # of the norms that a sum is made of, below which the sum is rounding
-SAME = 1e-12        # of a row, below which what others leave of it is rounding
-WEAK = 1e-4         # of a row in its own basis vector, below which its level is pivoted again
-DOUBTFUL = 1e-6     # of a row behind the others, or missed, below which an answer is worth a doubt
-DUST = 1e-12        # norm of a row, as a share of the largest of its level; below, worth a doubt
-SLIGHT = 0.25       # of rank_tolerance: a level missed by less is met, no doubt
-NO_STEP = 1e-12     # of a step, below which it has no length
+EPSILON = 2e-15     # miss of a row: smaller ones are rounding
+CANCELLED = 1e-14   # sum relative to the norms of its terms: smaller ones are rounding
+SAME = 1e-12        # remainder of a row outside the others: smaller ones are rounding
+WEAK = 1e-4         # share of a row in its own basis vector: smaller ones pivot the level again
+DOUBTFUL = 1e-6     # remainder or miss of a row: smaller ones leave the answer in doubt
+DUST = 1e-12        # norm of a row over the largest of its level: smaller ones leave a doubt
+SLIGHT = 0.25       # of rank_tolerance: a level with a smaller miss is met, without doubt
+NO_STEP = 1e-12     # length of a step: smaller ones count as zero
 
-STALLED = 5         # steps of no length in a row, after which the sides are moved apart
-RELAXATION = 1e-6   # by which they are moved, times 1 to 2
-RELAXATIONS = 3     # times a level may do so; after that, the rule of least index
-BLAND_AFTER = 30    # steps of no length in a row, after which the row of least index goes
-PATIENCE = 10       # steps for each row of a level, after which small multipliers count as none
+STALLED = 5         # consecutive steps of zero length before the sides are moved apart
+RELAXATION = 1e-6   # amount by which they are moved, times 1 to 2
+RELAXATIONS = 3     # most times per level; then the rule of least index applies
+BLAND_AFTER = 30    # consecutive steps of zero length before the row of least index leaves
+PATIENCE = 10       # steps per row of a level before small multipliers count as zero

@@ -1,14 +1,14 @@
-"""Weighted least squares within hard rows: which rows act.
+"""Weighted least squares within hard rows: the search for the active set.
 
-A set of acting rows is right when the rows outside of it hold and every one inside pushes outward.
-First sets are guessed: rows join and leave all at once (Hintermueller, Ito, Kunisch 2002); this
-mostly ends within a few guesses, and may cycle. Then x goes step by step from one that the hard
-rows allow: as far as the next row that begins or ceases to act, each better than the last (primal
-active set; Nocedal, Wright 2006, ch. 16.5).
+An active set is optimal if the rows outside it hold and every row in it has an outward multiplier.
+First, sets are guessed: rows join and leave all at once (Hintermueller, Ito, Kunisch 2002), which
+mostly ends within a few guesses but may cycle. Then x moves step by step from a point within the
+hard rows, each time up to the next row that becomes active or inactive, and improves with every
+step (primal active set; Nocedal, Wright 2006, ch. 16.5).
 
-A push is a product of squared weights, and a light one drowns in the rounding of heavy ones. Where
-its sign is in doubt the row is let go on trial: it was right if x then moves out, or nowhere that
-can be told.
+A multiplier is a product of squared weights, and that of a light row drowns in the rounding of
+heavy ones. If its sign is in doubt the row is released on trial: it belongs in the set if x then
+moves outward, or by nothing measurable.
 """
 
 # mypy: disable-error-code="no-untyped-def"
@@ -45,7 +45,7 @@ from solvers.status import (
     UPPER,
 )
 
-OWN_SETTINGS = 8  # of the array of settings; the weights of the levels follow
+OWN_SETTINGS = 8  # at the start of the array of settings; the weights of the levels follow
 
 
 class Options(NamedTuple):
@@ -61,7 +61,7 @@ class Options(NamedTuple):
 
 
 class Space(NamedTuple):
-    """What is written on the way; count (1,) is the factorisations made, goal and trial (n,)."""
+    """Intermediate results; count (1,) is the number of factorisations, goal and trial (n,)."""
 
     problem: Problem
     acting: Acting
@@ -89,13 +89,13 @@ def _carve(A, lower, upper, record, settings, work):
 
 @compiled
 def weighted(A, lower, upper, sizes, x, record, settings, work):
-    """Solve; x (n,) comes in as the reference and goes out as the answer, zero on failure.
+    """Solve; x (n,) is the reference on entry and the answer on return, zero on failure.
 
-    record (2 m + 1,): begins with zeros, or with what the rows did in an earlier solve; goes out as
-    what each row does (FREE, EQUAL, UPPER, LOWER), the weight of each row, infinite where it is
-    hard, and the factorisations made. settings: those of `Options`, the weights last. work: of any
-    content. Returns SOLVED, INACCURATE where an acting row is nearly parallel to others,
-    NUMERICAL_FAILURE, TOO_SMALL, or UNPROVED, where x is of no use.
+    record (2 m + 1,): on entry zeros, or the row states of an earlier solve first; on return the
+    state of each row (FREE, EQUAL, UPPER, LOWER), its weight, infinite for a hard row, and the
+    number of factorisations. settings: those of `Options`, the weights last. work: any contents.
+    Returns SOLVED, INACCURATE if an active row is nearly parallel to others, NUMERICAL_FAILURE,
+    TOO_SMALL, or UNPROVED, when x has no meaning.
     """
     space, end = _carve(A, lower, upper, record, settings, work)
     if end > work.size:
@@ -117,8 +117,8 @@ def weighted(A, lower, upper, sizes, x, record, settings, work):
 def weighted_steps(A, lower, upper, sizes, x, record, settings, work):
     """Like `weighted`, step by step.
 
-    x (2, n) comes in as an x within the hard rows, which goes out as the answer, and the reference.
-    Returns ITERATION_LIMIT in place of UNPROVED: x is the best that was found.
+    x (2, n): a point within the hard rows, which is the answer on return, and the reference.
+    Returns ITERATION_LIMIT in place of UNPROVED: x is then the best point found.
     """
     space, end = _carve(A, lower, upper, record, settings, work)
     if end > work.size:
@@ -134,7 +134,7 @@ def weighted_steps(A, lower, upper, sizes, x, record, settings, work):
             x[c] = x[c] + share * (space.goal[c] - x[c]) if share < 1.0 else space.goal[c]
         if share < 1.0:
             if row == freed and share == 0.0:
-                space.acting.doubt[row] = 1.0  # it was freed for what only rounding had it push
+                space.acting.doubt[row] = 1.0  # only the rounding of its multiplier released it
             _turn(space, row)
             freed = -1
             continue
@@ -148,7 +148,7 @@ def weighted_steps(A, lower, upper, sizes, x, record, settings, work):
 
 @compiled
 def _solve(space, x):
-    """Write x for the rows that act, and their pushes; return whether some are nearly parallel."""
+    """Write x and the multipliers of active rows; return whether some are nearly parallel."""
     space.count[0] += 1.0
     return solve_acting(space.problem, x, space.acting, space.factors, space.options.shared,
                         space.options.regularisation)
@@ -187,7 +187,7 @@ def _prepare(space, sizes, x):
 
 @inlined
 def _begin_at(space, x):
-    """Let the soft rows act that are violated at x, and no hard one."""
+    """Activate the soft rows that are violated at x, and no hard row."""
     acting = space.acting
     for i in range(acting.state.size):
         if acting.state[i] != EQUAL:
@@ -199,7 +199,7 @@ def _begin_at(space, x):
 
 @inlined
 def _turn(space, row):
-    """Let a row act that did not, at the side that is beyond at the goal, or the other way."""
+    """Toggle a row: activate it at the side that the goal violates, or release it."""
     over, under = _beyond(space.problem, space.goal, row)
     state = space.acting.state
     state[row] = FREE if state[row] != FREE else (UPPER if over > under else LOWER)
@@ -207,7 +207,7 @@ def _turn(space, row):
 
 @inlined
 def _beyond(problem, x, i):
-    """By how much row i is above its upper side, and below its lower."""
+    """Return the amounts by which row i is above its upper side and below its lower side."""
     value = 0.0
     for c in range(x.size):
         value += problem.A[i, c] * x[c]
@@ -216,9 +216,9 @@ def _beyond(problem, x, i):
 
 @compiled
 def _all_change(space, x):
-    """Let rows join that are violated, and leave that push inward; say whether any did.
+    """Add violated rows, release rows with an inward multiplier; return whether any changed.
 
-    A hard row that acts and is missed all the same, because others contradict it, is a change too.
+    An active hard row that is missed because others contradict it counts as a change too.
     """
     problem, acting = space.problem, space.acting
     changed, length = False, length_of(x)
@@ -243,9 +243,9 @@ def _all_change(space, x):
 
 @compiled
 def _first_event(space, x):
-    """Return the row that first begins or ceases to act on the way from x to goal, and where.
+    """Return the row that first becomes active or inactive on the step from x to goal, and where.
 
-    The share of the way is 1 where none does. Hard rows that act stay where they are.
+    The share of the step is 1 if there is none. Active hard rows stay active.
     """
     problem, acting = space.problem, space.acting
     first, share, length = -1, 1.0, length_of(space.goal)
@@ -268,7 +268,7 @@ def _first_event(space, x):
 
 @compiled
 def _pulls_most(acting):
-    """Return the acting row that pushes inward most beyond doubt, -1 for none."""
+    """Return the active row with the largest multiplier that is surely inward, -1 for none."""
     most, row = 0.0, -1
     for i in range(acting.state.size):
         certain = acting.doubt[i] == 0.0 and acting.push[i] < -acting.noise[i]
@@ -281,9 +281,9 @@ def _pulls_most(acting):
 
 @compiled
 def _no_doubt(space):
-    """Let each row go whose push may be rounding; say whether none of them moves inward.
+    """Release each row whose multiplier may be rounding; return whether none then moves inward.
 
-    One that does is left free.
+    A row that does remains free.
     """
     problem, acting, trial = space.problem, space.acting, space.trial
     for i in range(acting.state.size):
