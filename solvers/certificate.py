@@ -233,7 +233,7 @@ def _complement(Z: Array, rows: Array, parallel: float) -> tuple[Array, float, f
 
     The pivots are the smallest that counts and the largest that counts as zero.
     """
-    from scipy.linalg import qr  # type: ignore[import-untyped]
+    from scipy.linalg import qr
 
     q, r, _ = qr((rows @ Z).T, pivoting=True, check_finite=False)
     pivots = np.abs(np.diagonal(r))

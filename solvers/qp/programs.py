@@ -55,7 +55,7 @@ class Program:
         regularisation : added to the diagonal of P.
         """
         import qpsolvers
-        from scipy.sparse import csc_matrix  # type: ignore[import-untyped]
+        from scipy.sparse import csc_matrix
 
         kind = csc_matrix if sparse else np.ascontiguousarray
         up, low = np.isfinite(self.upper), np.isfinite(self.lower)

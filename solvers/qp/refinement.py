@@ -229,7 +229,7 @@ def below_largest(*arrays: Array) -> bool:
 
 def _non_negative(A: Array, b: Array) -> tuple[Array, float]:
     """Return u >= 0 that minimises ||A u - b||, and that norm; infinite if none was found."""
-    from scipy.optimize import nnls  # type: ignore[import-untyped]
+    from scipy.optimize import nnls
 
     if not below_largest(A, b):
         return np.zeros(A.shape[1]), np.inf
