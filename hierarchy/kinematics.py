@@ -31,6 +31,20 @@ class Kinematics(NamedTuple):
     period: float
 
 
+class Readings(NamedTuple):
+    """The arrays of a Measurement, for the kernels.
+
+    It is here because every kernel that reads it calls one of this file, so that the cache of
+    compiled kernels notices a change of its fields.
+    """
+
+    points: Array
+    distance: Array
+    direction: Array
+    magnitude: Array
+    nearest: NDArray[np.int64]
+
+
 @inlined
 def place(T, ox, oy, oz):
     """World position of an offset on the body whose placement is T (12,)."""

@@ -7,7 +7,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import inf, sqrt
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +16,7 @@ from hierarchy.avoidance.pairs import Pairs
 from hierarchy.avoidance.repulsion import repulsion
 from hierarchy.errors import HierarchyError
 from hierarchy.jit import bind, compiled
-from hierarchy.kinematics import point_at
+from hierarchy.kinematics import Readings, point_at
 from hierarchy.problem import Array
 
 
@@ -36,16 +35,6 @@ class SurveillanceAreas:
         if not 0.0 <= self.end_effector < inf:
             raise HierarchyError(f"surveillance area end_effector = {self.end_effector} m must "
                                  "not be negative")
-
-
-class Readings(NamedTuple):
-    """The arrays of a Measurement, for the kernels."""
-
-    points: Array
-    distance: Array
-    direction: Array
-    magnitude: Array
-    nearest: NDArray[np.int64]
 
 
 class Measurement:
