@@ -16,24 +16,21 @@ Kind = Literal["turn", "wheel", "slide", "ball"]
 Vector = tuple[float, float, float]
 Matrix = tuple[Vector, Vector, Vector]
 
-_AXES = {"X": (1.0, 0.0, 0.0), "Y": (0.0, 1.0, 0.0), "Z": (0.0, 0.0, 1.0)}
-_UNALIGNED: dict[str, Kind] = {"RevoluteUnaligned": "turn", "RevoluteUnboundedUnaligned": "wheel",
-                               "PrismaticUnaligned": "slide"}
-_SLIDES: list[tuple[Kind, str]] = [("slide", "X"), ("slide", "Y"), ("slide", "Z")]
-# Pinocchio's joints by name: elementary motions in the order of their coordinates.
-_MOTIONS: dict[str, list[tuple[Kind, str]]] = {
-    **{f"R{axis}": [("turn", axis)] for axis in _AXES},
-    **{f"RUB{axis}": [("wheel", axis)] for axis in _AXES},
-    **{f"P{axis}": [("slide", axis)] for axis in _AXES},
-    "Translation": _SLIDES, "FreeFlyer": [*_SLIDES, ("ball", "Z")], "Spherical": [("ball", "Z")],
-    "Planar": [*_SLIDES[:2], ("wheel", "Z")],
-    "SphericalZYX": [("turn", "Z"), ("turn", "Y"), ("turn", "X")]}
+_AXES: Matrix = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+_SLIDES: list[tuple[Kind, Vector]] = [("slide", axis) for axis in _AXES]
+# Pinocchio's joints by name, those about or along one axis without its name: elementary motions.
+_SINGLE: dict[str, Kind] = {
+    "R": "turn", "RevoluteUnaligned": "turn", "RUB": "wheel", "RevoluteUnboundedUnaligned": "wheel",
+    "P": "slide", "PrismaticUnaligned": "slide"}
+_SEVERAL: dict[str, list[tuple[Kind, Vector]]] = {
+    "Translation": _SLIDES, "FreeFlyer": [*_SLIDES, ("ball", _AXES[2])],
+    "Spherical": [("ball", _AXES[2])], "Planar": [*_SLIDES[:2], ("wheel", _AXES[2])],
+    "SphericalZYX": [("turn", _AXES[2]), ("turn", _AXES[1]), ("turn", _AXES[0])]}
 # Units of a motion's coordinates, and of a small step along it.
 _UNITS: dict[Kind, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "turn": (("rad",), ("rad",)), "wheel": (("1", "1"), ("rad",)), "slide": (("m",), ("m",)),
     "ball": (("1",) * 4, ("rad",) * 3)}
 _STILL: Vector = (0.0, 0.0, 0.0)
-_UPRIGHT: Matrix = (_AXES["X"], _AXES["Y"], _AXES["Z"])
 
 
 @dataclass(frozen=True)
@@ -50,7 +47,7 @@ class Motion:
     coordinate: int
     axis: Vector
     position: Vector = _STILL
-    rotation: Matrix = _UPRIGHT
+    rotation: Matrix = _AXES
 
 
 @dataclass(frozen=True)
@@ -90,17 +87,17 @@ def _motions(name: str, joint: Any, placement: Any) -> Iterator[Motion]:
         for i, (part, before) in enumerate(zip(parts.joints, parts.jointPlacements, strict=True)):
             yield from _motions(name, part, placement * before if i == 0 else before)
         return
-    if kind in _UNALIGNED:
-        motions = [(_UNALIGNED[kind], _axis_of(joint))]
-    elif kind in _MOTIONS:
-        motions = [(motion, _AXES[axis]) for motion, axis in _MOTIONS[kind]]
+    if kind in _SEVERAL:
+        motions = _SEVERAL[kind]
+    elif (single := _SINGLE.get(kind.rstrip("XYZ"))) is not None:
+        motions = [(single, _axis_of(joint))]
     else:
         raise HierarchyError(f"joint {name!r} is of the kind {kind}, which cannot be recorded")
     coordinate = int(joint.idx_q)
     before = _vector(placement.translation), _matrix(placement.rotation)
     for motion, axis in motions:
         yield Motion(motion, coordinate, axis, *before)
-        coordinate, before = coordinate + len(_UNITS[motion][0]), (_STILL, _UPRIGHT)
+        coordinate, before = coordinate + len(_UNITS[motion][0]), (_STILL, _AXES)
 
 
 def _axis_of(joint: Any) -> Vector:
