@@ -170,7 +170,8 @@ def test_an_output_folder_that_cannot_be_written_stops_the_run_before_it_begins(
 
 
 def simulation_is(stand_in, monkeypatch):
-    monkeypatch.setattr(importlib.import_module("scenarios.simulate"), "simulate", stand_in)
+    for module in ("scenarios.loop.simulation", "scenarios.report.comparing"):
+        monkeypatch.setattr(importlib.import_module(module), "simulate", stand_in)
 
 
 def must_not_run(*_, **__):
@@ -218,6 +219,8 @@ def test_one_run_that_breaks_does_not_lose_the_others(tmp_path, monkeypatch, cap
 INTERRUPTED_AT_TICK_500 = """
 import contextlib, os, signal
 import scenarios.cli.progress
+
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job ignores it
 
 @contextlib.contextmanager
 def bar():

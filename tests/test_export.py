@@ -127,7 +127,7 @@ def messages(run, tmp_path_factory):
 def test_an_mcap_file_has_every_signal_of_every_tick(run, messages):
     found, _, _ = messages
     read = {}
-    for topic in ("/joints", "/end_effector", "/distances", "/stack", "/times"):
+    for topic in ("/joints", "/end_effector", "/distances", "/stack", "/times", "/other"):
         assert [at for at, _ in found[topic]] == [round(t * 1e9) for t in run["t"]]
         for name in found[topic][0][1]:
             read[name] = [message[name] for _, message in found[topic]]

@@ -156,7 +156,11 @@ def test_an_interrupted_run_keeps_what_was_run():
         if done == 1000:
             signal.raise_signal(signal.SIGINT)
 
-    run = simulate(load("ellipse", SHORT), progress=interrupt)
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # it may be ignored here
+    try:
+        run = simulate(load("ellipse", SHORT), progress=interrupt)
+    finally:
+        signal.signal(signal.SIGINT, before)
     assert run.fault == "interrupted at tick 1000"
     assert run.ticks == len(run["q"]) == len(run["time_tick"]) == 1000
 

@@ -38,9 +38,9 @@ class Arms:
         axes, origins = np.empty((count, n, 3)), np.empty((count, n, 3))
         for i in range(n):
             axes[:, i], origins[:, i] = R[:, :, 2], p
-            R = R @ Rotation.from_euler("z", q[:, i]).as_matrix()
+            R = R @ Rotation.from_euler("z", q[:, i, None]).as_matrix()
             p = p + self.a[:, i, None] * R[:, :, 0] + self.d[:, i, None] * R[:, :, 2]
-            R = R @ Rotation.from_euler("x", self.alpha[:, i]).as_matrix()
+            R = R @ Rotation.from_euler("x", self.alpha[:, i, None]).as_matrix()
         return np.concatenate([np.cross(axes, p[:, None] - origins), axes], axis=2).swapaxes(1, 2)
 
 

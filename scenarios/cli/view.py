@@ -55,7 +55,7 @@ def live_command(scenario: Scenario, folder: Path, port: int, speed: float, brow
             _keep(page, folder)
     finally:
         close(server)
-    return 1 if live.recording().fault else 0
+    return 1 if live.ending else 0
 
 
 def _serve(page: LivePage, folder: Path) -> None:

@@ -105,11 +105,15 @@ class Live:
                                 f"numbers within {_FARTHEST:g} m")
         self._wanted[h] = wanted
 
+    @property
+    def ending(self) -> str | None:
+        """Why the run did not reach its end, or None if it did."""
+        return self.fault if self.over else f"interrupted at tick {self.recorder.ticks}"
+
     def recording(self) -> Recording:
         """Return the run so far, including dragged obstacles and whether anything was changed."""
         ticks = self.recorder.ticks
-        fault = self.fault if self.over else f"interrupted at tick {ticks}"
-        recording = self.recorder.finish(self.begun, fault)
+        recording = self.recorder.finish(self.begun, self.ending)
         if self._changed[:ticks].any():
             recording.signals["changed"] = self._changed[:ticks]
             recording.signals["obstacle_offset"] = self._offsets[:ticks]
