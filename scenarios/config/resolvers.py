@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from solvers.qp.backends import BACKENDS, installed
+from solvers.qp import backends
 from solvers.resolver import Handles
 
 # The methods that the letter compares, and ours; for inequalities all resolvers that accept them.
@@ -17,5 +17,5 @@ def default_resolvers(asked: Handles = "equalities") -> tuple[tuple[str, ...], d
     """Return the installed ones of DEFAULT_RESOLVERS, and how to install the others."""
     wanted = {spec: spec.partition(":backend=")[2] for spec in DEFAULT_RESOLVERS[asked]}
     missing = {spec: "pip install 'task-hierarchy[qp]'" for spec, backend in wanted.items()
-               if backend in BACKENDS and not installed(backend)}
+               if backend in backends.BACKENDS and not backends.installed(backend)}
     return tuple(spec for spec in wanted if spec not in missing), missing
