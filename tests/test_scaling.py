@@ -39,7 +39,7 @@ def test_a_crowded_scene_has_a_row_for_every_pair_and_no_obstacle_on_the_way(
     ticks.take_turn()
     assert ticks.failures == 0
     rows = ticks.rows()
-    assert [row["resolver"] for row in rows] == list(scaling.PARTS)
+    assert [row["resolver"] for row in rows] == list(scaling_timed.PARTS)
     assert rows[0]["rows"] == ticks.controller.hierarchy.m == 7 + (points + 1) * obstacles + 4
 
 
@@ -72,4 +72,4 @@ def test_the_figure_has_a_panel_for_what_was_timed():
     fig = scaling_figure.time_over_sizes(rows)
     shown = [ax.get_title(loc="left") for ax in fig.axes if ax.axison]
     assert shown == ["9 joints, 2 tasks"]
-    assert scaling.fixed("rows", rows) == shown[0]
+    assert scaling_figure.fixed("rows", rows) == shown[0]
