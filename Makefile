@@ -1,5 +1,6 @@
 # make demo    set up, run the main job, say where its report is
 # make test    set up, then lint, types, import rules and every test: what CI runs
+# make quick   the tests of less than a second, in under a minute: for while one works
 # make bench   time the resolvers, the control tick and the start, then all beside other packages
 # make stress  a resolver on a million generated problems, every answer certified; half an hour
 # make docs    build the documentation, any warning an error, and say where it is
@@ -19,7 +20,7 @@ export OPENBLAS_NUM_THREADS := 1
 INSTALLED  := .venv/installed
 
 .DELETE_ON_ERROR:
-.PHONY: demo test bench stress docs dist clean set-up
+.PHONY: demo test quick bench stress docs dist clean set-up
 
 demo: $(INSTALLED)
 	@rm -rf runs/demo
@@ -30,6 +31,9 @@ test: $(INSTALLED)
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-logo
 	$(BIN)/pytest -n auto --maxprocesses 4
+
+quick: $(INSTALLED)
+	$(BIN)/pytest -n auto --maxprocesses 4 -m "not slow"
 
 bench: $(INSTALLED)
 	@$(BIN)/hierarchy bench

@@ -11,6 +11,7 @@ from typing import Any, ClassVar, Literal, TypeVar
 import numpy as np
 
 from hierarchy.errors import HierarchyError, UnknownNameError
+from hierarchy.jit import announce_compilation
 from hierarchy.problem import Array, Hierarchy
 from solvers.status import TOO_SMALL
 from solvers.status import Status as Status
@@ -181,6 +182,7 @@ def make(name: str, /, **settings: Any) -> Resolver:
     """
     if name not in _REGISTRY:
         raise UnknownNameError("resolver", name, _REGISTRY)
+    announce_compilation()
     kind = _REGISTRY[name]
     known = [field.name for field in dataclasses.fields(kind)]
     for setting in settings:

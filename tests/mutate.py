@@ -1,6 +1,6 @@
 """Mutation testing: which single changes of a module does no test notice?
 
-    python tests/mutate.py solvers/explain.py --tests tests/test_hcod.py --count 10 --seed 0
+    python tests/mutate.py solvers/explain.py --tests tests/solvers/test_hcod.py --count 10 --seed 0
 
 Each mutant is one change (a comparison, an arithmetic or boolean operator, a constant, a returned
 value) in a temporary copy of the packages, which comes first on PYTHONPATH. Prints every survivor

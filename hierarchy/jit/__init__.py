@@ -2,8 +2,14 @@
 
 from hierarchy.jit.binding import bind
 from hierarchy.jit.compiling import Kernel as Kernel
+from hierarchy.jit.compiling import (
+    announce_compilation,
+    cache_folder,
+    compiled,
+    inlined,
+    unlocked,
+)
 from hierarchy.jit.compiling import as_integers as as_integers
 from hierarchy.jit.compiling import as_matrix as as_matrix
-from hierarchy.jit.compiling import cache_folder, compiled, inlined, unlocked
 
-__all__ = ["bind", "cache_folder", "compiled", "inlined", "unlocked"]
+__all__ = ["announce_compilation", "bind", "cache_folder", "compiled", "inlined", "unlocked"]

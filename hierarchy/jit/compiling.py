@@ -1,4 +1,4 @@
-"""The one decorator that compiles a kernel, caches it on disk and says so the first time.
+"""The one decorator that compiles a kernel and caches it on disk.
 
 numba caches machine code per source file but does not notice when a helper in *another* file
 changed. Here the cache folder carries a digest of the kernel's own file, of every file it calls
@@ -198,4 +198,7 @@ class _FirstCompilation(event.Listener):  # type: ignore[misc]
         pass
 
 
-event.register("numba:compile", _FirstCompilation())
+@cache
+def announce_compilation() -> None:
+    """Let the first compilation of a kernel be announced on stderr: it makes a program wait."""
+    event.register("numba:compile", _FirstCompilation())

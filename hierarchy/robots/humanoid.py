@@ -10,7 +10,8 @@ from __future__ import annotations
 
 from math import cos, radians
 
-from hierarchy.robots.table import Link, TreeFrame, TreeJoint, TreeTable, Vector
+from hierarchy.robots.table import Link, TreeFrame, TreeTable, Vector
+from hierarchy.robots.table import TreeJoint as Joint
 
 HEIGHT = 1.45  # [m]
 MASS = 40.0    # [kg]
@@ -26,69 +27,63 @@ _FOOT = 0.152 * HEIGHT               # length of the foot, a quarter of it behin
 _BEND = 25.0                         # [deg] of hips and ankles at rest; the knees bend twice this
 
 
-def _leg(side: str, left: float) -> tuple[TreeJoint, ...]:
+def _leg(side: str, left: float) -> tuple[Joint, ...]:
     """Hip yaw, roll, pitch; knee; ankle pitch, roll. `left` is 1 or -1."""
     inward, outward = (-20.0, 45.0) if left > 0 else (-45.0, 20.0)
     toes: Vector = (0.75 * _FOOT - 0.03, 0.0, -_ANKLE + 0.03)
     return (
-        _joint(f"{side}_hip_yaw", "", (0.0, left * _HIP, 0.0), "z", (-45, 45), 5.0, 60.0),
-        _joint(f"{side}_hip_roll", f"{side}_hip_yaw", _HERE, "x", (inward, outward), 5.0, 90.0),
-        _joint(f"{side}_hip_pitch", f"{side}_hip_roll", _HERE, "y", (-100, 30), 6.0, 120.0,
-               Link((0.0, 0.0, -_THIGH), 0.065, 0.100 * MASS), -_BEND),
-        _joint(f"{side}_knee", f"{side}_hip_pitch", (0.0, 0.0, -_THIGH), "y", (0, 130), 7.0, 120.0,
-               Link((0.0, 0.0, -_SHANK), 0.05, 0.0465 * MASS), 2 * _BEND),
-        _joint(f"{side}_ankle_pitch", f"{side}_knee", (0.0, 0.0, -_SHANK), "y", (-60, 40), 6.0,
-               90.0, rest=-_BEND),
-        _joint(f"{side}_ankle_roll", f"{side}_ankle_pitch", _HERE, "x", (-25, 25), 6.0, 60.0,
-               Link(toes, 0.03, 0.0145 * MASS, (-0.25 * _FOOT + 0.03, 0.0, toes[2]))),
+        Joint(f"{side}_hip_yaw", "", (0.0, left * _HIP, 0.0), "z", (-45, 45), 5.0, 60.0),
+        Joint(f"{side}_hip_roll", f"{side}_hip_yaw", _HERE, "x", (inward, outward), 5.0, 90.0),
+        Joint(f"{side}_hip_pitch", f"{side}_hip_roll", _HERE, "y", (-100, 30), 6.0, 120.0,
+              Link((0.0, 0.0, -_THIGH), 0.065, 0.100 * MASS), -_BEND),
+        Joint(f"{side}_knee", f"{side}_hip_pitch", (0.0, 0.0, -_THIGH), "y", (0, 130), 7.0, 120.0,
+              Link((0.0, 0.0, -_SHANK), 0.05, 0.0465 * MASS), 2 * _BEND),
+        Joint(f"{side}_ankle_pitch", f"{side}_knee", (0.0, 0.0, -_SHANK), "y", (-60, 40), 6.0,
+              90.0, rest=-_BEND),
+        Joint(f"{side}_ankle_roll", f"{side}_ankle_pitch", _HERE, "x", (-25, 25), 6.0, 60.0,
+              Link(toes, 0.03, 0.0145 * MASS, (-0.25 * _FOOT + 0.03, 0.0, toes[2]))),
     )
 
 
-def _arm(side: str, left: float) -> tuple[TreeJoint, ...]:
+def _arm(side: str, left: float) -> tuple[Joint, ...]:
     """Shoulder pitch, roll, yaw; elbow; wrist yaw, roll, pitch; straight down at zero."""
     inward, outward = (-20.0, 120.0) if left > 0 else (-120.0, 20.0)
     return (
-        _joint(f"{side}_shoulder_pitch", "trunk_pitch", (0.0, left * _SHOULDER, _TRUNK), "y",
-               (-160, 80), 5.0, 40.0, rest=15.0),
-        _joint(f"{side}_shoulder_roll", f"{side}_shoulder_pitch", _HERE, "x", (inward, outward),
-               5.0, 40.0, rest=left * 12.0),
-        _joint(f"{side}_shoulder_yaw", f"{side}_shoulder_roll", _HERE, "z", (-100, 100), 6.0, 25.0,
-               Link((0.0, 0.0, -_UPPER_ARM), 0.04, 0.028 * MASS)),
-        _joint(f"{side}_elbow", f"{side}_shoulder_yaw", (0.0, 0.0, -_UPPER_ARM), "y", (-140, 0),
-               6.0, 25.0, rest=-70.0),
-        _joint(f"{side}_wrist_yaw", f"{side}_elbow", _HERE, "z", (-120, 120), 8.0, 12.0,
-               Link((0.0, 0.0, -_FOREARM), 0.035, 0.016 * MASS)),
-        _joint(f"{side}_wrist_roll", f"{side}_wrist_yaw", (0.0, 0.0, -_FOREARM), "x", (-60, 60),
-               8.0, 8.0),
-        _joint(f"{side}_wrist_pitch", f"{side}_wrist_roll", _HERE, "y", (-70, 70), 8.0, 8.0,
-               Link((0.0, 0.0, -0.7 * _HAND), 0.03, 0.006 * MASS)),
+        Joint(f"{side}_shoulder_pitch", "trunk_pitch", (0.0, left * _SHOULDER, _TRUNK), "y",
+              (-160, 80), 5.0, 40.0, rest=15.0),
+        Joint(f"{side}_shoulder_roll", f"{side}_shoulder_pitch", _HERE, "x", (inward, outward),
+              5.0, 40.0, rest=left * 12.0),
+        Joint(f"{side}_shoulder_yaw", f"{side}_shoulder_roll", _HERE, "z", (-100, 100), 6.0, 25.0,
+              Link((0.0, 0.0, -_UPPER_ARM), 0.04, 0.028 * MASS)),
+        Joint(f"{side}_elbow", f"{side}_shoulder_yaw", (0.0, 0.0, -_UPPER_ARM), "y", (-140, 0),
+              6.0, 25.0, rest=-70.0),
+        Joint(f"{side}_wrist_yaw", f"{side}_elbow", _HERE, "z", (-120, 120), 8.0, 12.0,
+              Link((0.0, 0.0, -_FOREARM), 0.035, 0.016 * MASS)),
+        Joint(f"{side}_wrist_roll", f"{side}_wrist_yaw", (0.0, 0.0, -_FOREARM), "x", (-60, 60),
+              8.0, 8.0),
+        Joint(f"{side}_wrist_pitch", f"{side}_wrist_roll", _HERE, "y", (-70, 70), 8.0, 8.0,
+              Link((0.0, 0.0, -0.7 * _HAND), 0.03, 0.006 * MASS)),
     )
 
 
 _HERE: Vector = (0.0, 0.0, 0.0)
 
 
-def _joint(name: str, parent: str, at: Vector, axis: str, span: tuple[float, float],
-           velocity: float, effort: float, link: Link = Link(),  # noqa: B008, it is frozen
-           rest: float = 0.0) -> TreeJoint:
-    return TreeJoint(name, parent, at, axis, span, velocity, effort, link, rest)  # type: ignore[arg-type]
-
-
-def _head() -> tuple[TreeJoint, ...]:
+def _head() -> tuple[Joint, ...]:
     """Neck yaw and pitch; the gaze is along x."""
     return (
-        _joint("neck_yaw", "trunk_pitch", (0.0, 0.0, _NECK), "z", (-80, 80), 6.0, 12.0),
-        _joint("neck_pitch", "neck_yaw", _HERE, "y", (-40, 40), 6.0, 12.0,
-               Link((0.0, 0.0, 0.09), 0.08, 0.081 * MASS, (0.0, 0.0, 0.05))),
+        Joint("neck_yaw", "trunk_pitch", (0.0, 0.0, _NECK), "z", (-80, 80), 6.0, 12.0),
+        Joint("neck_pitch", "neck_yaw", _HERE, "y", (-40, 40), 6.0, 12.0,
+              Link((0.0, 0.0, 0.09), 0.08, 0.081 * MASS, (0.0, 0.0, 0.05))),
     )
 
 
-def _trunk() -> tuple[TreeJoint, ...]:
+def _trunk() -> tuple[Joint, ...]:
     """Yaw and pitch just above the hips."""
     return (
-        _joint("trunk_yaw", "", _HERE, "z", (-45, 45), 4.0, 90.0),
-        _joint("trunk_pitch", "trunk_yaw", _HERE, "y", (-30, 60), 4.0, 120.0,
-               Link((0.0, 0.0, _TRUNK - 0.06), 0.11, (0.139 + 0.216) * MASS, (0.0, 0.0, 0.16))),
+        Joint("trunk_yaw", "", _HERE, "z", (-45, 45), 4.0, 90.0),
+        Joint("trunk_pitch", "trunk_yaw", _HERE, "y", (-30, 60), 4.0, 120.0,
+              Link((0.0, 0.0, _TRUNK - 0.06), 0.11, (0.139 + 0.216) * MASS, (0.0, 0.0, 0.16))),
     )
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from hierarchy import Robot, Stack, State, Task
 from hierarchy.avoidance import Obstacles, SurveillanceAreas
+from hierarchy.jit import announce_compilation
 from hierarchy.problem import Array
 from hierarchy.tasks import JointLimits, Pointing, Position
 from scenarios.cell.avoidance import areas_of, avoidance_tasks
@@ -17,11 +18,11 @@ from scenarios.cell.sensor import sensor_of
 from scenarios.cell.sensors import Sensor
 from scenarios.cell.tasks import (
     limits_of,
-    listed_tasks,
     pointing_of,
     position_of,
     posture_of,
     reference_of,
+    task_of,
 )
 from scenarios.config import Scenario
 
@@ -56,6 +57,7 @@ def build(scenario: Scenario, kept: Cell | None = None) -> Cell:
     `kept` is the cell of a scenario that differs only in its resolver or task settings: its robot,
     start, state, plant and obstacles are reused, and its sensor if the sensor settings are equal.
     """
+    announce_compilation()
     control = scenario.control
     robot = kept.robot if kept else make_robot(scenario.robot)
     sensor = _kept_sensor(scenario, kept) if kept else sensor_of(scenario, robot)
@@ -70,13 +72,14 @@ def build(scenario: Scenario, kept: Cell | None = None) -> Cell:
         plant = plant_of(scenario, robot, start, sensor.obstacles if sensor else Obstacles())
     areas = areas_of(scenario)
     limits, first = limits_of(scenario, robot)
-    position, pointing = position_of(scenario, robot), pointing_of(scenario, robot)
-    listed = listed_tasks(scenario.tasks, State.at(robot, *start))
-    last = posture_of(scenario, robot, "task")
+    here = State.at(robot, *start)
+    position, pointing = position_of(scenario, here), pointing_of(scenario, here)
+    listed = [task_of(section, here) for section in scenario.tasks]
+    last = posture_of(scenario, here, "task")
     tasks = [*first, *avoidance_tasks(scenario, robot),
              *(task for task in (position, pointing, *listed, last) if task)]
     return Cell(scenario, robot, start, state, plant,
-                Stack(tasks, control.level, reference_of(scenario, robot)), sensor, areas,
+                Stack(tasks, control.level, reference_of(scenario, here)), sensor, areas,
                 position, pointing, limits, order_of(scenario, areas, first, tasks), tuple(listed))
 
 

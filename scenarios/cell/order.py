@@ -78,6 +78,6 @@ def order_of(scenario: Scenario, areas: SurveillanceAreas | None, first: Sequenc
     """Return the order of a scenario's tasks; those of `first` are always at the top."""
     if scenario.control.stack == "hierarchical":
         return Hierarchical([task.name for task in tasks])
-    always_point = bool(scenario.pointing and scenario.pointing.kind == "equality")
+    always_point = bool(scenario.pointing and scenario.pointing.rows == "equality")
     return Switched(areas, always_point, [task.name for task in first],
                     scenario.position is not None)

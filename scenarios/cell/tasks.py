@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import radians
 
 import numpy as np
@@ -25,13 +26,15 @@ from scenarios.cell.paths import make_path
 from scenarios.cell.robot import sensed_points
 from scenarios.config import Scenario, ScenarioError
 from scenarios.config.avoidance import AvoidanceSection
-from scenarios.config.sections import (
+from scenarios.config.tasks import (
+    AnyTask,
     ListedCentreOfMass,
     ListedPointing,
     ListedPose,
-    ListedPosition,
     ListedPosture,
-    ListedTask,
+    PointingSection,
+    PositionTask,
+    PostureSection,
 )
 
 
@@ -52,90 +55,82 @@ def limits_of(scenario: Scenario, robot: Robot) -> tuple[JointLimits | None, lis
     return limits, [box, *torque]
 
 
-def position_of(scenario: Scenario, robot: Robot) -> Position | None:
+def position_of(scenario: Scenario, start: State) -> Position | None:
     """Return the task of [position], or None."""
-    section = scenario.position
-    if section is None:
+    if scenario.position is None:
         return None
+    task = task_of(scenario.position, start)
+    assert isinstance(task, Position)
     avoidance = scenario.avoidance
-    within = avoidance.end_effector if isinstance(avoidance, AvoidanceSection) else -1.0
-    path = make_path(section.path)
-    return Position(robot.frame(robot.end_effector),
-                    Shifted(path, section.offset) if any(section.offset) else path,
-                    section.stiffness, section.damping, section.gain, repulsion_within=within)
+    if isinstance(avoidance, AvoidanceSection):
+        return replace(task, repulsion_within=avoidance.end_effector)
+    return task
 
 
-def pointing_of(scenario: Scenario, robot: Robot) -> Pointing | None:
+def pointing_of(scenario: Scenario, start: State) -> Pointing | None:
     """Return the task of [pointing], or None."""
-    section = scenario.pointing
-    if section is None:
+    if scenario.pointing is None:
         return None
+    task = task_of(scenario.pointing, start)
+    assert isinstance(task, Pointing)
     # Algorithm 1 adds the cone's surface to the stack while it is violated: an equality.
-    kind = section.kind if scenario.control.stack == "hierarchical" else "equality"
-    return Pointing(robot.frame(robot.end_effector), section.axis, radians(section.alpha_d),
-                    kind, section.stiffness, section.damping, section.gain)
+    return task if scenario.control.stack == "hierarchical" else replace(task, kind="equality")
 
 
-def posture_of(scenario: Scenario, robot: Robot, role: str) -> Posture | None:
+def posture_of(scenario: Scenario, start: State, role: str) -> Task | None:
     """Return the task of [posture] if it has this role ("task" or "null-space"), or None."""
     section = scenario.posture
-    if section is None or section.role != role:
-        return None
-    joints = robot.n - robot.actuated
-    if len(section.target) != joints:
-        raise ScenarioError(f"posture.target has {len(section.target)} entries, robot "
-                            f"{robot.name!r} has {joints} joints")
-    return Posture(section.target, section.stiffness, section.damping, section.gain)
+    return task_of(section, start) if section and section.role == role else None
 
 
-def reference_of(scenario: Scenario, robot: Robot) -> Task | None:
+def reference_of(scenario: Scenario, start: State) -> Task | None:
     """Return the null-space task: [damping], or [posture] in that role; or None."""
     if scenario.damping is not None:
-        return JointDamping(robot.n, scenario.damping.value, scenario.damping.weight)
-    return posture_of(scenario, robot, "null-space")
+        return JointDamping(start.n, scenario.damping.value, scenario.damping.weight)
+    return posture_of(scenario, start, "null-space")
 
 
-def listed_tasks(sections: tuple[ListedTask, ...], start: State) -> list[Task]:
-    """Make the tasks of `[[tasks]]`; values that they omit are those of the start."""
-    tasks = []
-    for section in sections:
-        try:
-            tasks.append(_task(section, start))
-        except UnknownNameError as error:
-            raise ScenarioError(f"task {section.title!r}: {error}") from error
-    return tasks
+def task_of(section: AnyTask, start: State) -> Task:
+    """Make a task; values that the section omits are those of the start.
+
+    Raises ScenarioError, naming the task, for an unknown frame or joint.
+    """
+    try:
+        return _task(section, start)
+    except UnknownNameError as error:
+        raise ScenarioError(f"task {section.title!r}: {error}") from error
 
 
-def _task(section: ListedTask, start: State) -> Task:
+def _task(section: AnyTask, start: State) -> Task:
     robot = start.robot
-    gains = {"stiffness": section.stiffness, "damping": section.damping, "gain": section.gain,
-             "name": section.title}
-    if isinstance(section, ListedPosture):
-        return Posture(_target(section, start), **gains)  # type: ignore[arg-type]
+    gains = (section.stiffness, section.damping, section.gain)
+    name = section.title
+    if isinstance(section, PostureSection | ListedPosture):
+        return Posture(_target(section, start), *gains, name=name)
     if isinstance(section, ListedCentreOfMass):
         anywhere = CentreOfMass(robot, Still((0.0, 0.0, 0.0)))
-        path = _path(section, anywhere.position(start))
-        return CentreOfMass(robot, path, tuple("xyz".index(axis) for axis in section.axes),
-                            **gains)  # type: ignore[arg-type]
-    frame = robot.frame(section.frame)
-    if isinstance(section, ListedPointing):
-        return Pointing(frame, section.axis, radians(section.alpha_d), section.rows,
-                        **gains)  # type: ignore[arg-type]
+        return CentreOfMass(robot, _path(section, anywhere.position(start)),
+                            tuple("xyz".index(axis) for axis in section.axes), *gains, name=name)
+    frame = robot.frame(section.frame or robot.end_effector)
+    if isinstance(section, PointingSection | ListedPointing):
+        half_angle = radians(section.alpha_d)
+        return Pointing(frame, section.axis, half_angle, section.rows, *gains, name=name)
     path = _path(section, start.position(frame))
     if isinstance(section, ListedPose):
         rotation = start.rotation(frame) if section.rotation is None else section.rotation
-        return Pose(frame, path, rotation, **gains)  # type: ignore[arg-type]
-    return Position(frame, path, **gains)  # type: ignore[arg-type]
+        return Pose(frame, path, rotation, *gains, name=name)
+    return Position(frame, path, *gains, name=name)
 
 
-def _path(section: ListedPosition | ListedPose | ListedCentreOfMass, here: Array) -> Path:
+def _path(section: PositionTask | ListedPose | ListedCentreOfMass, here: Array) -> Path:
+    offset = np.array(section.offset)
     if section.path is None:
-        return Still(here.tolist())
-    path = make_path(section.path)
-    return Shifted(path, here.tolist()) if section.from_start else path
+        return Still((here + offset).tolist())
+    path, shift = make_path(section.path), offset + here * section.from_start
+    return Shifted(path, shift.tolist()) if shift.any() else path
 
 
-def _target(section: ListedPosture, start: State) -> tuple[float, ...]:
+def _target(section: PostureSection | ListedPosture, start: State) -> tuple[float, ...]:
     robot = start.robot
     joints = robot.nq - (7 if robot.base == "floating" else 0)
     target = start.q[robot.nq - joints:].copy() if section.target is None else np.array(

@@ -316,7 +316,7 @@ def check(file: Annotated[str, typer.Argument(help="A scenario or a robot: file 
     print(f"  plant     {scenario.plant.kind}")
     print(f"  resolver  {scenario.make_resolver()!r}")
     if scenario.pointing is not None:
-        print(f"  pointing  {scenario.pointing.kind}, cone of {scenario.pointing.alpha_d:g} deg")
+        print(f"  pointing  {scenario.pointing.rows}, cone of {scenario.pointing.alpha_d:g} deg")
     if scenario.avoidance is not None:
         asked = scenario.avoidance
         body, tip = (" and ".join(f"{distance:g}" for distance in thresholds.values())

@@ -17,12 +17,14 @@ from scenarios.config.control import ControlSection
 from scenarios.config.faults import FaultSection
 from scenarios.config.plant import PlantSection
 from scenarios.config.robot import RobotSection, StartSection
-from scenarios.config.sections import ListedPointing, ListedTask, Section
+from scenarios.config.sections import Section
 from scenarios.config.sensor import SensorSection
 from scenarios.config.tasks import (
     DampingSection,
     LimitsSection,
+    ListedTask,
     PointingSection,
+    PointingTask,
     PositionSection,
     PostureSection,
 )
@@ -126,9 +128,9 @@ class Scenario(Section):
     def asks(self) -> Handles:
         """The kind of rows that its stack has under its resolver."""
         inequalities = self.control.stack == "hierarchical" and (
-            self.avoidance is not None or (self.pointing and self.pointing.kind == "inequality")
-            or any(isinstance(task, ListedPointing) and task.rows == "inequality"
-                   for task in self.tasks))
+            self.avoidance is not None
+            or any(isinstance(task, PointingTask) and task.rows == "inequality"
+                   for task in (self.pointing, *self.tasks)))
         limits = self.limits if self.limits_in_stack else None
         if inequalities or (limits and limits.torque):
             return "inequalities"

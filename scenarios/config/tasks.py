@@ -1,33 +1,151 @@
-"""The keys of the letter's tasks, the joint limits and the null-space task."""
+"""The keys of tasks: of [position], [pointing] and [posture], and of `[[tasks]]`.
+
+Each kind of task is one class. The sections are tasks of the end effector and of all joints;
+`[[tasks]]` adds names and frames.
+"""
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
-from scenarios.config.sections import Finite, NotNegative, PathSection, Positive, Section, Vector3
+from scenarios.config.sections import (
+    Finite,
+    NotNegative,
+    PathSection,
+    Positive,
+    Rows3,
+    Section,
+    Vector3,
+)
+
+Rows = Literal["equality", "inequality"]
+TaskName = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_ -]*$")]
 
 
-class PositionSection(Section):
-    """End-effector position along a path, shifted by `offset` [m]."""
+class TaskSection(Section):
+    """What every task has: gains of its error, in [1/s^2] and [1/s] (acceleration) and [1/s]."""
 
-    path: PathSection
-    offset: Vector3 = (0.0, 0.0, 0.0)
     stiffness: NotNegative = 40.0
     damping: NotNegative = 20.0
     gain: NotNegative = 10.0
 
 
-class PointingSection(Section):
-    """The end effector's z axis in a cone of half-angle `alpha_d` [deg] about `axis`."""
+class _AlongSection(TaskSection):
+    """Follow `path`, or stay at the initial position without one, shifted by `offset` [m].
 
-    kind: Literal["equality", "inequality"] = "inequality"
+    With `from_start` the path is relative to the initial position.
+    """
+
+    path: PathSection | None = None
+    offset: Vector3 = (0.0, 0.0, 0.0)
+    from_start: bool = False
+
+    @model_validator(mode="after")
+    def _has_a_path_to_shift(self) -> Self:
+        if self.from_start and self.path is None:
+            raise ValueError("from_start needs a path")
+        return self
+
+
+class PositionTask(_AlongSection):
+    """The origin of a frame along a path (3 rows)."""
+
+
+class PointingTask(TaskSection):
+    """The z axis of a frame on or in a cone (1 row)."""
+
     axis: Vector3
     alpha_d: Annotated[float, Field(ge=0.0, le=180.0)]
+    rows: Rows = "inequality"
     stiffness: NotNegative = 5.0
     damping: NotNegative = 2.0
     gain: NotNegative = 5.0
+
+
+class PostureTask(TaskSection):
+    """All joints to a posture."""
+
+    target: tuple[Finite, ...] | None = None
+    joints: dict[str, Finite] = Field(default_factory=dict)
+    stiffness: NotNegative = 10.0
+    damping: NotNegative = 5.0
+    gain: NotNegative = 1.0
+
+
+class PositionSection(PositionTask):
+    """The end effector's position along a path; without one it stays where it starts."""
+
+    title: ClassVar[str] = "position"
+    frame: ClassVar[None] = None
+
+
+class PointingSection(PointingTask):
+    """The end effector's z axis at `alpha_d` [deg] from `axis`, or with "inequality" within it."""
+
+    title: ClassVar[str] = "pointing"
+    frame: ClassVar[None] = None
+    rows: Rows = Field("inequality", alias="kind")
+
+
+class PostureSection(PostureTask):
+    """A posture [rad or m] as the null-space term, or with `role` = "task" as the last level."""
+
+    title: ClassVar[str] = "posture"
+    role: Literal["null-space", "task"] = "null-space"
+
+
+class _Listed(Section):
+    """A task of `[[tasks]]`; its name defaults to its kind."""
+
+    name: TaskName | None = None
+
+    @property
+    def title(self) -> str:
+        """The task's name in stacks, messages and tables."""
+        return self.name or str(getattr(self, "kind", ""))
+
+
+class ListedPosition(_Listed, PositionTask):
+    """The origin of `frame` along a path (3 rows), by default its initial position."""
+
+    kind: Literal["position"]
+    frame: str
+
+
+class ListedPose(_Listed, _AlongSection):
+    """Origin and axes of `frame` (6 rows); `rotation` (rows) defaults to the initial one."""
+
+    kind: Literal["pose"]
+    frame: str
+    rotation: Rows3 | None = None
+
+
+class ListedCentreOfMass(_Listed, _AlongSection):
+    """The centre of mass along some of the axes "x", "y", "z" of the world."""
+
+    kind: Literal["com"]
+    axes: Literal["x", "y", "z", "xy", "xz", "yz", "xyz"] = "xyz"
+
+
+class ListedPointing(_Listed, PointingTask):
+    """The z axis of `frame` at `alpha_d` [deg] from `axis`, or with "inequality" at most that."""
+
+    kind: Literal["pointing"]
+    frame: str
+
+
+class ListedPosture(_Listed, PostureTask):
+    """All joints to `target` [rad or m], by default the start; `joints` override it by name."""
+
+    kind: Literal["posture"]
+
+
+ListedTask = Annotated[
+    ListedPosition | ListedPose | ListedCentreOfMass | ListedPointing | ListedPosture,
+    Field(discriminator="kind")]
+AnyTask = PositionSection | PointingSection | PostureSection | ListedTask
 
 
 class LimitsSection(Section):
@@ -56,13 +174,3 @@ class DampingSection(Section):
 
     value: NotNegative
     weight: Literal["identity", "mass"] = "identity"
-
-
-class PostureSection(Section):
-    """A posture [rad or m] as the null-space term, or with `role` = "task" as the last level."""
-
-    target: tuple[Finite, ...]
-    role: Literal["null-space", "task"] = "null-space"
-    stiffness: NotNegative = 10.0
-    damping: NotNegative = 5.0
-    gain: NotNegative = 1.0

@@ -42,7 +42,8 @@ def _without_kinds(root: type[Section], loc: list[str]) -> list[str]:
 def _keys_beside(root: type[Section], keys: list[str]) -> list[str]:
     """Return the full names of the keys allowed in place of the last of `keys`."""
     beside = _sections_at(root, keys[:-1])
-    known = dict.fromkeys(key for section in beside for key in section.model_fields)
+    known = dict.fromkeys(field.alias or key for section in beside
+                          for key, field in section.model_fields.items())
     return [".".join([*keys[:-1], key]) for key in known]
 
 

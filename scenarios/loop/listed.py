@@ -12,7 +12,7 @@ from hierarchy.problem import Array
 from hierarchy.tasks import CentreOfMass, Pose, Position
 
 if TYPE_CHECKING:
-    from scenarios.config.sections import ListedTask
+    from scenarios.config.tasks import ListedTask
     from scenarios.loop.recording import Recording
 
 

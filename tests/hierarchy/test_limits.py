@@ -5,8 +5,8 @@ import os
 import numpy as np
 import pinocchio as pin
 import pytest
+from pendulum import LIMIT, URDF
 from scene import PATH, ROBOT, state_at, states
-from test_robot import LIMIT, URDF
 
 from hierarchy import HierarchyError, Robot, Stack, State
 from hierarchy.errors import RobotError

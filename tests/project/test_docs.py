@@ -19,7 +19,7 @@ from hierarchy.tasks import TASKS
 from scenarios.config import shipped
 from scenarios.report.gallery import main as draw_gallery
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
 PAGES = sorted(str(path.relative_to(DOCS).with_suffix("")) for path in DOCS.rglob("*.md")
                if "_build" not in path.parts)

@@ -9,7 +9,7 @@ from scenarios.config import load
 from scenarios.loop.controller import Controller
 from scenarios.loop.simulation import simulate
 
-DATA = Path(__file__).parent / "data" / "ellipse"
+DATA = Path(__file__).parents[1] / "data" / "ellipse"
 
 AS_PUBLISHED = ["control.jacobian_derivative=difference"]
 RUNS = {

@@ -11,7 +11,7 @@ import pytest
 from hierarchy import HierarchyError
 from solvers import Resolution, Status, make, names
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 
 
 def test_names_are_sorted_and_each_makes_its_resolver():

@@ -18,7 +18,7 @@ SLOW = os.environ.get("NUMBA_DISABLE_JIT") == "1"
 FEW = 12 if SLOW else 50
 COPIES = 1 if SLOW else 20  # of a family's 50 problems, each with targets of its own
 EQUALITIES = ("EQ7", "EQ7over", "EQ7sing", "EQ30L8")
-REGRESSIONS = sorted((Path(__file__).parent / "data" / "regressions").glob("*.npz"))
+REGRESSIONS = sorted((Path(__file__).parents[1] / "data" / "regressions").glob("*.npz"))
 INEQUALITIES = ("INEQ7", "DEGEN7", "HUM38")
 
 both = pytest.mark.parametrize("name", ["tpm", "hcod"])

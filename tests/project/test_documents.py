@@ -16,7 +16,7 @@ from scenarios.config import load
 from scenarios.sweep.config import load_sweep
 from solvers.resolver import _REGISTRY
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 BLOCK = re.compile(r"^```(\w*)\n(.*?)^```", re.DOTALL | re.MULTILINE)
 INLINE = re.compile(r"(?<!`)`((?:hierarchy |make |python -m |python docs/)[^`]+)`(?!`)")
 TEXTS = {str(path.relative_to(ROOT)): path.read_text(encoding="utf-8")

@@ -17,7 +17,7 @@ from scenarios.bench.peers.process import after_nan, stage
 from scenarios.bench.peers.scene import read_scenes, write_scenes
 from scenarios.bench.peers.urdf import roll_pitch_yaw, urdf
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 NUMPY = Package("numpy", "numpy")
 
 
@@ -29,7 +29,7 @@ def fake(name, **options):
 def only_what_the_tests_bring(tmp_path, monkeypatch):
     monkeypatch.setattr("scenarios.bench.peers.environments.folder_of",
                         lambda package: tmp_path / "cache" / package.name)
-    monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parent))
+    monkeypatch.setenv("PYTHONPATH", str(ROOT / "tests" / "helpers"))
     monkeypatch.setenv("COLUMNS", "80")
 
 

@@ -32,7 +32,7 @@ def test_the_letters_settings():
     assert (s.control.level, s.control.resolver, s.control.period) == ("acceleration", "tpm", 1e-3)
     assert s.control.settings() == {"form": "published", "damping": 0.05, "threshold": 0.1}
     assert s.control.duration == pytest.approx(6 * np.pi)
-    assert (s.pointing.alpha_d, s.pointing.kind) == (5.0, "inequality")
+    assert (s.pointing.alpha_d, s.pointing.rows) == (5.0, "inequality")
     assert (s.avoidance.near, s.avoidance.far, s.avoidance.end_effector) == (0.05, 0.15, 0.1)
     assert len(s.avoidance.obstacles) == 3
 
@@ -40,7 +40,7 @@ def test_the_letters_settings():
 def test_changes_are_toml_values_at_dotted_keys():
     s = load("ellipse", ["pointing.alpha_d=35", "pointing.kind=equality",
                          "avoidance.obstacles=[[1, 2, 3]]", "control.options.damping = 0.02"])
-    assert (s.pointing.alpha_d, s.pointing.kind) == (35.0, "equality")
+    assert (s.pointing.alpha_d, s.pointing.rows) == (35.0, "equality")
     assert s.avoidance.obstacles[0].centre == (1, 2, 3)
     assert s.control.settings() == {"form": "published", "damping": 0.02, "threshold": 0.1}
     assert load("ellipse", {"pointing.alpha_d": 35}).pointing.alpha_d == 35

@@ -280,7 +280,7 @@ def test_a_duration_must_be_positive_and_finite():
 
 # --- the examples -------------------------------------------------------------------------------
 
-EXAMPLES = Path(__file__).parents[1] / "examples"
+EXAMPLES = Path(__file__).parents[2] / "examples"
 
 
 def test_the_example_of_a_loop_runs():

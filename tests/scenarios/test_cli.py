@@ -220,8 +220,6 @@ INTERRUPTED_AT_TICK_500 = """
 import contextlib, os, signal
 import scenarios.cli.progress
 
-signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job ignores it
-
 @contextlib.contextmanager
 def bar():
     yield lambda label, done, total: done == 500 and os.kill(os.getpid(), signal.SIGINT)

@@ -9,7 +9,7 @@ from hierarchy import HierarchyError
 from solvers import Status, certify, make, problems
 from solvers.qp.backends import BACKENDS, installed
 
-FOLDER = Path(__file__).parent / "data" / "regressions" / "structured"
+FOLDER = Path(__file__).parents[1] / "data" / "regressions" / "structured"
 SQRT2, SQRT5 = 2.0**0.5, 5.0**0.5
 RIGHT = {
     "hcod_SOLVED_wrong_2x2_integer": [SQRT2, 0.0],

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from packaging.requirements import Requirement
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 UNCOMPILED = {**os.environ, "NUMBA_DISABLE_JIT": "1"}  # kernels run as plain Python
 
 
