@@ -48,8 +48,6 @@ def candidates() -> tuple[list[Candidate], dict[str, str]]:
     warm = [resolver for resolver in cold if _starts(resolver)]
     field += [Candidate(r.label, r.handles == "inequalities", _cold(r)) for r in cold]
     field += [Candidate(f"{r.label} warm", r.handles == "inequalities", _warm(r)) for r in warm]
-    if "hcod" not in names():
-        missing["hcod"] = "no resolver of this name"
     return field, missing
 
 

@@ -52,7 +52,7 @@ def solve(batch: Batch, resolver: Resolver | None = None) -> BatchResolution:
 
 
 def staircase(A: jax.Array, b: jax.Array, reference: jax.Array, sizes: tuple[int, ...],
-              damping: float = 0.0, threshold: float = 0.1, rank_tolerance: float = 1e-9
+              damping: float = 0.0, threshold: float = 0.1, rank_tolerance: float = 1e-8
               ) -> tuple[jax.Array, jax.Array]:
     """Return the answer (n,) of one problem, zero if it failed, and whether it is solved.
 

@@ -110,7 +110,7 @@ def slack_program(goal: Rows, limits: Rows, kept: Rows, F: Array, lam: float, *,
 
 
 def level_problem(h: Hierarchy, level: int, above: ArrayLike | None = None,
-                  rank_tolerance: float = 1e-9, settled: float = 1e-7, sparse: bool = False
+                  rank_tolerance: float = 1e-8, settled: float = 1e-7, sparse: bool = False
                   ) -> qpsolvers.Problem:
     """Return one level of a hierarchy as a `qpsolvers.Problem`, given an optimum of those above.
 
