@@ -52,8 +52,15 @@ kind = "separation"
 distance = 0.02
 influence = 0.3
 rate = 5.0
-obstacles = [{shape = "sphere", radius = 0.05, path = {kind = "ellipse", centre = [0.3, 0.2, 0.5],
-             cosine = [0.1, 0.0, 0.0], sine = [0.0, 0.1, 0.0], rate = 2.0}}]
+[[avoidance.obstacles]]
+shape = "sphere"
+radius = 0.05
+[avoidance.obstacles.path]
+kind = "ellipse"
+centre = [0.3, 0.2, 0.5]
+cosine = [0.1, 0.0, 0.0]
+sine = [0.0, 0.1, 0.0]
+rate = 2.0
 [limits]
 acceleration = 30.0
 [damping]

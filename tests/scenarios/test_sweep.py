@@ -84,13 +84,14 @@ def keys_kept(folder):
     ("start.q = { around = -0.1 }", {}, "parameters.start.q.around: "),
     ("start.q = { around = 0.1, mean = 0.0 }", {}, "parameters.start.q.mean"),
     ("start.q = { around = [0.1, 0.2] }", {}, "parameters.start.q: scenario 'ellipse': around"),
-    ("start.v = { around = 0.1 }", {}, "parameters.start.v: scenario 'ellipse': the scenario has"),
+    ("start.v = { around = 0.1 }", {}, "parameters.start.v: scenario 'ellipse': the scenario's own "
+     "value is None, not a number"),
     ("position.gain = { uniform = [2.0, 1.0] }", {},
      "parameters.position.gain.uniform: 2 is above 1"),
     ("position.gian = { uniform = [1.0, 2.0] }", {}, "[position] has no key 'gian'; it has path"),
-    ("limits.margin = { uniform = [1.0, 2.0] }", {}, "[limits] is not there"),
+    ("limits.margin = { uniform = [1.0, 2.0] }", {}, "[limits] is missing"),
     ("avoidance.obstacles.3.centre = { around = 0.1 }", {},
-     "3 entries, counted from 0, and no '3'"),
+     "3 entries, numbered from 0, and no '3'"),
     ("position.damping = { normal = [-9.0, 0.0] }", {},
      "sample 0 of scenario 'ellipse': position.damping: "),
     ("plant.measurement.seed = { integers = [1.5, 2] }", {}, "parameters.plant.measurement.seed"),
@@ -257,7 +258,7 @@ def test_a_run_that_kills_its_workers_is_a_row_and_those_beside_it_are_made(tmp_
     assert Counter(one.key for one in found) == Counter(job.key for job in jobs)
     broken = [one for one in found if one.error]
     assert [one.key for one in broken] == [jobs[2].key]
-    assert "died of it" in broken[0].error
+    assert "every worker that started this run died" in broken[0].error
 
 
 def test_a_sweep_that_is_killed_goes_on_where_it_stopped(tmp_path):
