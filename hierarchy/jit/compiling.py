@@ -12,6 +12,7 @@ import os
 import sys
 from collections.abc import Callable
 from functools import cache
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -20,10 +21,35 @@ import numpy as np
 from numba.core import cgutils, event, types
 from numba.core.registry import CPUDispatcher
 from numba.extending import intrinsic
-from numba.np import arrayobj
+from numba.np import arrayobj, linalg
 
 # What makes an array; a kernel that uses another way of numpy fails to compile, and belongs here.
 _MAKERS = {"empty", "empty_like", "zeros", "zeros_like", "ones", "full", "eye", "copy", "array"}
+
+
+
+def _import_array_functions() -> None:
+    """Import numba's array functions without scipy, which takes half of a program's first solve.
+
+    numba looks there for a BLAS when these functions are imported, and again when a kernel that
+    needs one is compiled; no kernel here does.
+    """
+    if "numba.np.arraymath" in sys.modules:
+        return
+    look, linalg.ensure_blas = linalg.ensure_blas, _expect_blas
+    try:
+        from numba.np import arraymath
+    finally:
+        linalg.ensure_blas = look
+    arraymath.ensure_blas = look
+
+
+def _expect_blas() -> None:
+    if find_spec("scipy") is None:
+        raise ImportError("scipy is not installed")
+
+
+_import_array_functions()
 
 # Kernels carry no annotations: their types are those of the first call.
 Kernel = Callable[..., Any]
@@ -157,9 +183,13 @@ def _called(function: Kernel) -> list[Any]:
 
 @cache
 def _digest(files: tuple[str, ...], constants: tuple[str, ...]) -> str:
-    content = b"".join(Path(file).read_bytes() for file in files)
-    more = "\n".join((*constants, numba.__version__))
-    return hashlib.sha256(content + more.encode()).hexdigest()[:16]
+    content = "\n".join((*map(_digest_of, files), *constants, numba.__version__))
+    return hashlib.sha256(content.encode()).hexdigest()[:16]
+
+
+@cache
+def _digest_of(file: str) -> str:
+    return hashlib.sha256(Path(file).read_bytes()).hexdigest()
 
 
 @cache
