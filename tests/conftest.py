@@ -15,3 +15,9 @@ def _interruptible():
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     yield
     signal.signal(signal.SIGINT, before)
+
+
+@pytest.fixture
+def _without_figures(monkeypatch):
+    """Runs are saved without their figures, which take most of the time of a short run."""
+    monkeypatch.setattr("scenarios.draw.figures.letter.write_all", lambda recording, folder: None)

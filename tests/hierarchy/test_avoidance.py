@@ -46,6 +46,7 @@ def surface_points(obstacle, count=200_000):
     return local @ np.asarray(obstacle.rotation).T + obstacle.centre
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shape", ["sphere", "capsule", "box"])
 def test_distance_is_that_of_the_nearest_surface_point(shape):
     obstacle = SHAPES[shape]

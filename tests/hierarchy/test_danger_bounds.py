@@ -51,6 +51,7 @@ def velocity_sides(q, v):
     return -V * (1.0 - backward), V * (1.0 - forward)
 
 
+@pytest.mark.slow
 def test_the_bounds_are_those_of_the_definition_at_velocity_level():
     brought_in = 0
     for q, v in STATES:
@@ -62,6 +63,7 @@ def test_the_bounds_are_those_of_the_definition_at_velocity_level():
     assert brought_in > 100
 
 
+@pytest.mark.slow
 def test_the_bounds_are_those_of_the_next_velocity_at_acceleration_level():
     for q, v in STATES:
         box = task(QUICK).box(state_at(q, 0.1 * v), "acceleration")
@@ -87,6 +89,7 @@ def test_the_box_is_never_empty_lies_in_that_of_the_limits_and_lets_a_joint_brak
             assert (halt <= up).all()
 
 
+@pytest.mark.slow
 def test_a_joint_that_is_too_fast_brakes_as_hard_as_it_may():
     braked = 0
     for q, _ in STATES:
@@ -99,6 +102,7 @@ def test_a_joint_that_is_too_fast_brakes_as_hard_as_it_may():
     assert braked > 20
 
 
+@pytest.mark.slow
 def test_no_command_of_the_box_nears_a_point_faster_than_the_danger_lets_it():
     rng = np.random.default_rng(1)
     for q, _ in STATES:
@@ -187,6 +191,7 @@ def closest(level, first, resolver, obstacles, goal, ticks=1500):
     return nearest, slack
 
 
+@pytest.mark.slow
 @levels
 @pytest.mark.parametrize("resolver", [make("sns"), make("sns", form="optimal", scales="miss")],
                          ids=str)

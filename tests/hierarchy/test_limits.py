@@ -145,6 +145,7 @@ def adversary(rng, joints, ticks):
 
 # ---- from a viable start ----------------------------------------------------------------------
 
+@pytest.mark.slow
 @LEVELS
 @pytest.mark.parametrize("seed", [0, 1])
 def test_no_limit_is_exceeded_whatever_is_chosen(level, seed):
@@ -154,6 +155,7 @@ def test_no_limit_is_exceeded_whatever_is_chosen(level, seed):
     Ride(q, v, limits, period, level, adversary(rng, JOINTS, TICKS)).keeps(limits)
 
 
+@pytest.mark.slow
 @LEVELS
 def test_every_state_of_such_a_ride_is_viable(level):
     rng = np.random.default_rng(2)
@@ -167,6 +169,7 @@ def test_every_state_of_such_a_ride_is_viable(level):
         assert ((at <= limits[1] + slack) & (at >= limits[0] - slack)).all()
 
 
+@pytest.mark.slow
 @LEVELS
 def test_beyond_the_box_a_limit_is_exceeded_or_the_joint_cannot_stop_in_time(level):
     rng = np.random.default_rng(3)
@@ -266,6 +269,7 @@ def wide(joints, T, velocity=np.inf):
 PERIODS = pytest.mark.parametrize("period", [0.01, 0.05] if PLAIN else [1e-4, 2e-3, 0.05])
 
 
+@pytest.mark.slow
 @LEVELS
 @pytest.mark.parametrize("seed", [6, 7])
 def test_from_any_start_the_box_is_not_empty_and_the_acceleration_holds(level, seed):
@@ -280,6 +284,7 @@ def test_from_any_start_the_box_is_not_empty_and_the_acceleration_holds(level, s
     assert (speed[1:] <= allowed * (1 + SPEED)).all(), "too fast, and not getting slower"
 
 
+@pytest.mark.slow
 @LEVELS
 def test_every_joint_ends_within_its_limits_wherever_it_started(level):
     """Ranges of 0.01 to 1000 A T^2, speed limits of 0.1 to 100 A T: both sides are in the way."""
@@ -314,6 +319,7 @@ def test_a_joint_that_is_too_fast_to_stop_goes_no_farther_than_it_must(level, pe
     assert (ride.high[~beyond] <= 1.0 + POSITION).all()
 
 
+@pytest.mark.slow
 @LEVELS
 @PERIODS
 @pytest.mark.parametrize("velocity", [0.3, np.inf])

@@ -16,6 +16,8 @@ from hierarchy import HierarchyError
 from hierarchy.loop import Loop
 from hierarchy.loop.watchdog import Once, Watchdog
 
+pytestmark = pytest.mark.slow
+
 PERIOD = 0.25  # with steps of eighths every time is exact
 
 

@@ -325,6 +325,7 @@ def test_neighbours_of_the_tree_are_not_kept_apart(arm):
         assert humanoid.capsules[i].joint != humanoid.parents[humanoid.capsules[j].joint]
 
 
+@pytest.mark.slow
 def test_check_says_what_was_found_and_gives_a_section_that_makes_the_same_robot(arm, capsys,
                                                                                  tmp_path):
     path = str(arm('<mesh filename="part.stl"/>'))

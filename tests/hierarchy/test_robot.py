@@ -24,6 +24,7 @@ def from_dh_table(q, joints=7):
     return T
 
 
+@pytest.mark.slow
 def test_kinematics_equal_the_table_multiplied_out():
     frame = ROBOT.frame("end_effector")
     for q in np.random.default_rng(0).uniform(-3, 3, (50, 7)):
@@ -81,6 +82,7 @@ def test_a_bad_state_is_named(q, v, said):
     assert said in str(error.value)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("what", "entry", "name"), [
     ("q", 0, "root_joint 1"), ("q", 6, "root_joint 7"), ("q", 7, "left_hip_yaw"),
     ("q", 36, "neck_pitch"), ("v", 5, "root_joint 6"), ("v", 10, "left_ankle_pitch"),

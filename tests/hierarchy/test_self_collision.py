@@ -67,6 +67,7 @@ def segments():
         yield np.array([shift, shift]), a[[0, 0]]
 
 
+@pytest.mark.slow
 def test_distance_of_segments_is_the_least_there_is():
     for a, b in segments():
         a, b = np.round(a, 12).tolist(), np.round(b, 12).tolist()
@@ -118,6 +119,7 @@ def test_distances_agree_with_coal_through_pinocchio():
             assert (coal_says[~apart] < 2e-6).all(), name
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", TASKS)
 def test_rows_are_the_derivative_of_the_distances(name):
     task, h = TASKS[name], 1e-6
@@ -207,6 +209,7 @@ OPEN = (0.3, 0.5, 0.4, -0.9, 0.2, 0.5, 0.0)
 INTO_THE_FOOT = (0.3, 2.05, 0.1, -2.05, 0.2, 1.8, 0.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("level", LEVELS)
 @pytest.mark.parametrize("period", [1e-3, 4e-3, 1e-2])
 @pytest.mark.parametrize("differences", [False, True])
@@ -250,6 +253,7 @@ def test_a_distance_that_no_joint_changes_is_left_alone():
         assert not make("hcod").solve(Stack([task], level).hierarchy(state)).x.any()
 
 
+@pytest.mark.slow
 def test_capsules_of_a_table_are_its_links():
     assert [(c.name, c.joint, c.start, c.end) for c in ARM] == [
         ("foot", 0, (0.0, 0.0, -0.3105), (0.0, 0.0, 0.0)),

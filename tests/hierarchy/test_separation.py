@@ -234,6 +234,7 @@ def beside_the_hand(*offset):
 GOAL = beside_the_hand(-0.25, 0.05, 0.1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("level", LEVELS)
 @pytest.mark.parametrize("period", PERIODS)
 @pytest.mark.parametrize("differences", [False, True])
@@ -247,6 +248,7 @@ def test_a_hand_driven_into_an_obstacle_stops_at_the_distance(level, period, dif
     assert d[-1, 8, 0] == pytest.approx(0.05, abs=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("level", LEVELS)
 @pytest.mark.parametrize("period", PERIODS)
 def test_a_hand_that_slides_along_an_obstacle_keeps_the_distance(level, period):
@@ -268,6 +270,7 @@ def test_an_arm_at_rest_makes_way_for_what_comes(level, period):
     assert 0.1 < np.abs(v).max() < 2.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("level", LEVELS)
 @pytest.mark.parametrize("period", PERIODS)
 def test_a_start_inside_recovers_at_a_bounded_speed(level, period):

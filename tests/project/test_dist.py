@@ -12,6 +12,8 @@ from pathlib import Path
 import pytest
 from packaging.requirements import Requirement
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).parents[2]
 UNCOMPILED = {**os.environ, "NUMBA_DISABLE_JIT": "1"}  # kernels run as plain Python
 

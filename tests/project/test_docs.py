@@ -19,6 +19,8 @@ from hierarchy.tasks import TASKS
 from scenarios.config import shipped
 from scenarios.report.gallery import main as draw_gallery
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
 PAGES = sorted(str(path.relative_to(DOCS).with_suffix("")) for path in DOCS.rglob("*.md")

@@ -16,6 +16,8 @@ from scenarios.config import load
 from scenarios.sweep.config import load_sweep
 from solvers.resolver import _REGISTRY
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).parents[2]
 BLOCK = re.compile(r"^```(\w*)\n(.*?)^```", re.DOTALL | re.MULTILINE)
 INLINE = re.compile(r"(?<!`)`((?:hierarchy |make |python -m |python docs/)[^`]+)`(?!`)")

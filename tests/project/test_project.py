@@ -76,6 +76,7 @@ def test_importing_the_package_costs_nothing():
     assert done.stdout == "False False\n"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("statement", ["import hierarchy", "from hierarchy import Hierarchy",
                                        "import solvers"])
 def test_a_program_with_arrays_only_does_not_load_pinocchio(statement):
@@ -84,6 +85,7 @@ def test_a_program_with_arrays_only_does_not_load_pinocchio(statement):
     assert done.stdout == "False\n"
 
 
+@pytest.mark.slow
 def test_a_hierarchy_is_resolved_without_pinocchio():
     code = ("import sys; sys.modules['pinocchio'] = None\n"
             "from hierarchy import Hierarchy; from solvers import make\n"

@@ -51,6 +51,7 @@ def test_the_letters_points_are_among_those_of_a_crowded_scene(path):
     assert points[7].offset.tolist() == [0.0, -0.39, 0.0]
 
 
+@pytest.mark.slow
 def test_a_small_run_writes_every_size_and_a_figure(tmp_path, monkeypatch):
     monkeypatch.setattr(scaling, "_TICKS", 60)
     sizes = {"tasks": ((9, 1, 2), (9, 3, 2)), "rows": ((9, 2, 1), (9, 2, 3)),

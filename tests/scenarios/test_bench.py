@@ -1,6 +1,7 @@
 import csv
 
 import numpy as np
+import pytest
 
 from scenarios.bench.plain import PlainTick
 from scenarios.cell.build import build
@@ -9,6 +10,7 @@ from scenarios.loop.controller import Controller
 from scenarios.loop.simulation import simulate
 
 
+@pytest.mark.slow
 def test_the_plain_numpy_tick_commands_what_the_compiled_one_does():
     """Else the benchmark would compare two different jobs."""
     scenario = load("ellipse")
@@ -19,6 +21,7 @@ def test_the_plain_numpy_tick_commands_what_the_compiled_one_does():
         np.testing.assert_allclose(plain.step(*state), controller.command(*state), atol=1e-8)
 
 
+@pytest.mark.slow
 def test_the_tick_benchmark_writes_a_row_for_every_candidate(tmp_path, monkeypatch):
     from scenarios.bench import tick
 

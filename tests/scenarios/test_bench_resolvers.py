@@ -13,6 +13,8 @@ from scenarios.bench.families import family
 from solvers import Status
 from solvers.qp import backends
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture
 def few(monkeypatch):

@@ -57,6 +57,7 @@ def traced(obstacle, pinhole, u, v):
     return 0.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SHAPES)
 def test_every_pixel_has_the_depth_at_which_its_ray_meets_the_shape(name):
     """Sphere tracing needs nothing but the distance function; grazing rays are left out."""

@@ -13,6 +13,7 @@ from scenarios import compare
 from scenarios.cli.main import run_command
 
 SHORT = ["--duration", "0.02"]
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("_without_figures")]
 
 
 @pytest.fixture(autouse=True)
@@ -225,6 +226,8 @@ def bar():
     yield lambda label, done, total: done == 500 and os.kill(os.getpid(), signal.SIGINT)
 
 scenarios.cli.progress.bar = bar
+import scenarios.draw.figures.letter
+scenarios.draw.figures.letter.write_all = lambda recording, folder: None
 from scenarios.cli.main import main
 main()
 """

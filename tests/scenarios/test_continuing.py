@@ -56,6 +56,7 @@ def test_a_change_of_a_scenario_is_validated():
         scenario.with_changes({"pointing.alpha": 35.0})
 
 
+@pytest.mark.slow
 def test_a_cell_that_is_kept_goes_on_where_it_was():
     scenario = load("ellipse", ["control.options.damping=0.0"])
     whole, parted = Controller(scenario), Controller(scenario)

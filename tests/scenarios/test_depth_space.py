@@ -67,6 +67,7 @@ def one_by_one(image, pinhole, point, region, thin=inf):
     return distance[nearest], off[nearest] / distance[nearest], mean / np.linalg.norm(mean)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("thin", [inf, 0.1, 0.0])
 @pytest.mark.parametrize("share", [0.002, 0.3])
 def test_distances_and_directions_are_those_of_all_pixels_one_by_one(share, thin):
@@ -169,6 +170,7 @@ def facing_surface(obstacle, place):
     return nearest, -float(seen.direction[0] @ ray) / np.linalg.norm(ray), seen.distance[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("noisy", [False, True], ids=["ideal", "noisy"])
 def test_the_distance_to_a_surface_that_is_seen_is_never_overestimated_beyond_its_bound(noisy):
     """Of random spheres, capsules and boxes, where the nearest point of the surface is seen."""
@@ -360,6 +362,7 @@ def troubles(run):
             for kind in {event.kind for event in run.events}}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["human", "human-hqp"])
 def test_a_scenario_runs_with_a_camera(name):
     run = simulate(load(name, QUICK))
@@ -368,6 +371,7 @@ def test_a_scenario_runs_with_a_camera(name):
     assert np.isfinite(run["command"]).all()
 
 
+@pytest.mark.slow
 def test_a_run_follows_from_its_seed():
     ball = "avoidance.obstacles=[{shape='sphere', centre=[0.4, 0.75, 0.2], radius=0.08}]"
     runs = [simulate(load("human", [*QUICK, ball, "control.duration=0.3", f"sensor.seed={seed}"]))
@@ -376,6 +380,7 @@ def test_a_run_follows_from_its_seed():
     assert (runs[0]["q"] != runs[2]["q"]).any()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["no_frames", "dark_frames"])
 @pytest.mark.parametrize("name", ["human", "human-hqp"])
 def test_a_blind_camera_leads_to_the_policy_for_stale_measurements(name, kind):
@@ -390,6 +395,7 @@ def test_a_blind_camera_leads_to_the_policy_for_stale_measurements(name, kind):
     assert {event.action for event in run.events} == {"brake"}
 
 
+@pytest.mark.slow
 def test_a_camera_that_is_late_leaves_the_arm_at_rest_until_it_sees():
     run = simulate(load("human", [*QUICK, "sensor.latency=0.2", "sensor.stale_after=0.3"]))
     assert troubles(run) == {"stale": list(range(40))}
@@ -397,6 +403,7 @@ def test_a_camera_that_is_late_leaves_the_arm_at_rest_until_it_sees():
     assert run["command"][40:].any()
 
 
+@pytest.mark.slow
 def test_a_latency_beyond_what_is_stale_stops_the_arm_for_good():
     run = simulate(load("human", [*QUICK, "sensor.latency=0.3", "control.policy.stale=stop"]))
     assert "stale" in run.fault
@@ -455,6 +462,7 @@ def written(tmp_path_factory):
     return record_frames.write(tmp_path_factory.mktemp("frames") / "some", run, frames=6), run
 
 
+@pytest.mark.slow
 def test_frames_written_are_those_the_camera_took(written):
     folder, run = written
     frames = RecordedFrames(folder, ROBOT)
@@ -469,6 +477,7 @@ def test_frames_written_are_those_the_camera_took(written):
         np.testing.assert_allclose(placements, state.placements, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_a_run_on_written_frames_goes_as_with_the_camera_until_they_end(written):
     folder, run = written
     again = simulate(load("human", [f"sensor={{kind='frames', folder='{folder}'}}",
@@ -495,6 +504,7 @@ def test_frames_that_cannot_be_used_are_refused_by_name(written, tmp_path):
             RecordedFrames(tmp_path, ROBOT)
 
 
+@pytest.mark.slow
 def test_the_figure_shows_points_and_distances_and_nothing_where_there_is_none():
     ball = "avoidance.obstacles=[{shape='sphere', centre=[0.4, 0.75, 0.2], radius=0.08}]"
     run = simulate(load("human", [*QUICK, "control.duration=0.05", ball]))

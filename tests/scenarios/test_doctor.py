@@ -7,6 +7,8 @@ import pytest
 from scenarios.cli import doctor
 from scenarios.cli.main import run_command
 
+pytestmark = pytest.mark.slow
+
 
 def test_the_doctor_finds_all_well_here(capsys):
     assert run_command(["doctor"]) == 0

@@ -39,6 +39,7 @@ def needs(format):
 # --- CSV ----------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_csv_has_units_in_its_header_and_every_number_to_the_last_bit(run, tmp_path):
     export(run, tmp_path / "run.csv")
     with (tmp_path / "run.csv").open(newline="", encoding="utf-8") as stream:

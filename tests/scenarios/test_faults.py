@@ -73,6 +73,7 @@ def within_limits(run):
     return True
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("limited", [False, True], ids=["free", "limited"])
 @pytest.mark.parametrize("policy", ["brake", "hold", "stop"])
 @pytest.mark.parametrize("name", ["ellipse", "ellipse-velocity"])
@@ -115,6 +116,7 @@ def test_faults_leave_the_run_before_them_as_it_was():
     assert clean.events == ()
 
 
+@pytest.mark.slow
 def test_a_blind_robot_brakes_to_rest_and_stays_there():
     for put in ("nan_position", "nan_velocity", "stale"):
         run = simulate(scenario("ellipse", faults((put, ""), at=500, lasts=1400), ticks=1900))
@@ -143,6 +145,7 @@ def test_an_obstacle_stands_where_the_body_was_and_goes_away_again():
     assert far["minimal_distance"][during].min() > 0.1
 
 
+@pytest.mark.slow
 def test_an_obstacle_outside_the_robot_is_avoided_and_is_no_trouble():
     fault = faults(("obstacle", "centre=[0.25, 0.6, 0.3], radius=0.02"), lasts=10_000)
     run = simulate(scenario("ellipse", fault, ticks=1000))
@@ -156,6 +159,7 @@ def test_two_faults_at_once_are_both_told():
     assert {event.kind for event in run.events if event.tick == AT} == {"overrun", "inaccurate"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("transition", ["none", "blend"])
 def test_faults_may_come_during_a_transition(transition):
     fault = faults(("nan_distance", ""), ("status", "status='inaccurate'"), at=2000, lasts=300)
@@ -166,6 +170,7 @@ def test_faults_may_come_during_a_transition(transition):
     assert (run["status"][2300:] == Status.SOLVED).all()
 
 
+@pytest.mark.slow
 def test_with_the_letters_wrong_jacobians_too():
     """Their rows are written in numpy and would refuse a NaN."""
     run = simulate(scenario("ellipse-published", faults(("nan_distance", ""),
@@ -173,6 +178,7 @@ def test_with_the_letters_wrong_jacobians_too():
     assert run.fault is None
 
 
+@pytest.mark.slow
 def test_a_hierarchical_stack_survives_its_sensor():
     fault = faults(("nan_distance", ""))
     run = simulate(scenario("ellipse-hqp", fault))
@@ -197,6 +203,8 @@ def test_what_happened_is_saved_counted_and_loaded_again(tmp_path):
          "first_time": pytest.approx((AT + 10) * 1e-3)}]
 
 
+@pytest.mark.slow
+@pytest.mark.usefixtures("_without_figures")
 def test_the_command_line_says_what_happened_and_fails_only_where_the_run_ended(
         tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)

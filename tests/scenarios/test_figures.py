@@ -155,6 +155,7 @@ def test_the_picture_is_seen_without_distortion():
     assert drawing.project(np.array([0.0, 0.0, 1.0]))[0] == pytest.approx(0.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("panel", panels.PANELS, ids=lambda panel: panel.name)
 def test_every_panel_draws_a_run_that_has_its_signal(panel):
     run = recording()
@@ -199,6 +200,7 @@ def test_the_stretches_in_which_a_task_is_active_are_red():
     np.testing.assert_array_equal(red.get_ydata(), [np.nan, 1.0, 2.0, np.nan, np.nan])
 
 
+@pytest.mark.slow
 def test_all_figures_of_a_run_are_written_as_svg_and_png(tmp_path):
     letter.write_all(recording(), tmp_path)
     stems = {path.stem for path in tmp_path.iterdir()}
@@ -207,6 +209,7 @@ def test_all_figures_of_a_run_are_written_as_svg_and_png(tmp_path):
     assert len(list(tmp_path.iterdir())) == 2 * len(stems)
 
 
+@pytest.mark.slow
 def test_the_same_figure_is_the_same_file(tmp_path):
     for name in ("a", "b"):
         (tmp_path / name).mkdir()
@@ -222,6 +225,7 @@ def test_a_scene_without_obstacles_or_a_path_asked_for_is_still_a_picture():
     assert picture({"hqp": run}).axes
 
 
+@pytest.mark.slow
 def test_an_inline_svg_follows_the_page_and_brings_no_ids_that_could_clash():
     fig, (ax,) = drawing.figure()
     ax.plot([0.0, 1.0], [0.123456, 1.0])
@@ -244,6 +248,7 @@ def paper(run_folder):
     return redraw(run_folder, "paper", run_folder.parent / "paper")
 
 
+@pytest.mark.slow
 def test_figures_for_a_paper_are_vectors_one_column_wide_with_their_fonts_inside(paper):
     assert {file.suffix for file in paper} == {".pdf"}
     assert {"figure-5-distances", "picture", "stack"} <= {file.stem for file in paper}
@@ -256,6 +261,7 @@ def test_figures_for_a_paper_are_vectors_one_column_wide_with_their_fonts_inside
         assert (b"/FontFile2" in content) is (file.stem != "picture")  # which has no letters
 
 
+@pytest.mark.slow
 def test_figures_for_a_paper_are_the_same_bytes_in_another_process(run_folder, paper, tmp_path):
     subprocess.run([sys.executable, "-c", "import sys\n"
                     "from scenarios.cli.figures import redraw\n"
@@ -265,6 +271,7 @@ def test_figures_for_a_paper_are_the_same_bytes_in_another_process(run_folder, p
         assert file.read_bytes() == (tmp_path / "there" / file.name).read_bytes()
 
 
+@pytest.mark.slow
 def test_joints_of_a_paper_figure_are_told_apart_in_grey_too():
     with drawing.styled(drawing.PAPER):
         fig = beside(panels.PANEL["joint-velocities"], {"hqp": recording()})["hqp"]
@@ -342,6 +349,7 @@ def test_stacks_beside_each_other_have_the_same_rows_and_time():
     assert axes[0].get_xlim() == axes[1].get_xlim() == (0.0, 4.0)
 
 
+@pytest.mark.slow
 def test_a_stack_that_changes_at_every_tick_is_still_a_small_figure():
     ticks = 20_000
     run = recording(t=np.arange(ticks) * 1e-3, order=np.arange(ticks) % 2)

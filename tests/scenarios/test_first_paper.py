@@ -13,6 +13,8 @@ from hierarchy.robots import KUKA_LWR, TABLES
 from scenarios.bench import accuracy, arms, exact, first_paper, growth, growth_figure
 from solvers import Resolution, Status, make, names
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def tables(tmp_path_factory):

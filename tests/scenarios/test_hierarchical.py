@@ -15,6 +15,7 @@ def names_of(*changes, scenario="ellipse-hqp"):
     return build(load(scenario, changes)).order(None, 0.0).order
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("level", ["velocity", "acceleration"])
 @pytest.mark.parametrize("resolver", ["hcod", "weighted"])
 def test_limits_and_distances_are_kept_and_no_tick_fails(level, resolver):
@@ -29,11 +30,13 @@ def test_limits_and_distances_are_kept_and_no_tick_fails(level, resolver):
     assert run["minimal_distance"].min() >= scenario.avoidance.distance - 1e-4
 
 
+@pytest.mark.slow
 def test_every_tick_of_hcod_is_certified():
     run = simulate(load("ellipse-hqp", [SHORT]), certified=True)
     assert run["certified"].all()
 
 
+@pytest.mark.slow
 def test_the_joint_that_passes_its_limit_in_the_letters_task_stops_at_it():
     """Joint 6 of `ellipse` reaches its limit within the first turn."""
     beyond = simulate(load("ellipse", {"control.duration": 5.0}))
@@ -75,6 +78,7 @@ def test_what_does_not_go_together_is_said(changes, says):
         build(load("ellipse-hqp", changes))
 
 
+@pytest.mark.slow
 def test_the_strictness_scenario_measures_what_a_lower_task_moves():
     strict = measure(simulate(load("strictness", ["control.duration=0.3"])))
     assert strict["moved_by_lower_max"].value < 1e-9

@@ -36,6 +36,7 @@ def some_states(robot, count=5, seed=1):
 CASES = [(name, task) for name, robot in ROBOTS.items() for task in tasks(robot)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "task"), CASES)
 def test_jacobian_and_its_derivative_agree_with_central_differences(name, task):
     robot = ROBOTS[name]
@@ -142,6 +143,7 @@ def standing():
     return simulate(load("humanoid"))
 
 
+@pytest.mark.slow
 def test_all_levels_above_the_posture_are_met(standing):
     assert standing.fault is None
     found = measure(standing)
@@ -174,6 +176,7 @@ def test_what_is_recorded_of_a_task_is_its_error(standing):
                                    task.error(cell.state), atol=1e-15)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["humanoid", "dual-arm"])
 @pytest.mark.parametrize("resolver", ["recursive", "hcod", "sns", "hqp:backend=proxqp"])
 def test_strict_resolvers_agree_over_a_short_run(name, resolver):
@@ -185,6 +188,7 @@ def test_strict_resolvers_agree_over_a_short_run(name, resolver):
     assert (other["status"] == 0).all()
 
 
+@pytest.mark.slow
 def test_both_hands_of_the_dual_arm_follow_their_ellipses():
     run = simulate(load("dual-arm"))
     found = measure(run)
@@ -202,6 +206,7 @@ def reaching():
     return {name: simulate(scenario.with_resolver(name)) for name in ("tpm", "hcod", "augmented")}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["tpm", "hcod"])
 def test_out_of_reach_strict_resolvers_keep_the_feet(reaching, name):
     run = reaching[name]
@@ -228,6 +233,8 @@ def test_resolvers_that_take_bounds_keep_the_humanoids_limits():
         assert np.linalg.norm(run["task_error_right_hand"], axis=1).max() < 1e-3
 
 
+@pytest.mark.slow
+@pytest.mark.usefixtures("_without_figures")
 def test_a_comparison_has_a_row_for_each_task(tmp_path):
     found = compare([load("humanoid", ["control.duration=0.1"])], ["tpm", "recursive"],
                     out=tmp_path / "out")

@@ -4,6 +4,7 @@ import json
 
 import hand_made
 import numpy as np
+import pytest
 from hand_made import HandMadeScenario, recording
 
 from scenarios import compare
@@ -88,6 +89,7 @@ def test_resolvers_that_are_not_strict_need_not_agree():
     assert partings([run_of("tpm"), run_of("recursive"), run_of("augmented", away_from(1))]) == []
 
 
+@pytest.mark.slow
 def test_the_page_says_it():
     runs = (run_of("recursive"), run_of("hqp", away_from(3)))
     text = page(Comparison(runs, "hierarchy compare", {}))
@@ -95,6 +97,8 @@ def test_the_page_says_it():
     assert "parts from recursive" in text
 
 
+@pytest.mark.slow
+@pytest.mark.usefixtures("_without_figures")
 def test_the_numbers_hold_it(tmp_path):
     from scenarios import load
 

@@ -138,6 +138,7 @@ def test_an_environment_that_is_there_is_not_made_again(tmp_path, monkeypatch):
     assert python_of(somebody) == str(tmp_path / "cache" / "somebody" / "bin" / "python")
 
 
+@pytest.mark.slow
 def test_everybody_is_judged_or_named_with_the_reason(tmp_path, capsys):
     nobody = Entrant("nobody", Package("nobody", "no_such_module", ("nobody==1",)), "a:B")
     entrants = [fake("Posture"), fake("Refuses"), fake("Lost"), fake("Ends"), nobody]
@@ -167,17 +168,20 @@ def test_everybody_is_judged_or_named_with_the_reason(tmp_path, capsys):
     assert max(len(line) for line in said.splitlines() if not line.startswith("skipped")) <= 80
 
 
+@pytest.mark.slow
 def test_a_velocity_beyond_its_limit_is_found(tmp_path):
     (row,) = run(None, [fake("Posture", speed=1.5)], ticks=50)
     assert row["excess_rad_s"] > 0.1
 
 
+@pytest.mark.slow
 def test_who_does_not_survive_a_nan_is_said_to_crash(tmp_path):
     file = tmp_path / "scenes.json"
     write_scenes(make_scenes(tmp_path), file)
     assert after_nan(fake("EndsAfterNan"), file, stage(tmp_path / "staged")) == "crashes, code 7"
 
 
+@pytest.mark.slow
 def test_our_own_stack_is_strict_keeps_limits_and_refuses_a_nan():
     (row,) = run(None, [one for one in ENTRANTS if one.label == "tpm"], ticks=50)
     assert row["moved_m"] < 1e-9

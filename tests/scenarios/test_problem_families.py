@@ -24,6 +24,7 @@ def test_a_seed_gives_the_same_problem_every_time_and_another_seed_another(name)
     assert not np.array_equal(first.upper, other.upper)
 
 
+@pytest.mark.slow
 @every_family
 def test_sizes_equalities_and_norms_of_rows_are_those_of_the_stored_problems(name):
     stored, fresh = [p.h for p in families.family(name)], [family(name, s) for s in SEEDS]
@@ -35,6 +36,7 @@ def test_sizes_equalities_and_norms_of_rows_are_those_of_the_stored_problems(nam
     np.testing.assert_allclose(found, expected, atol=0.35 * expected.max())
 
 
+@pytest.mark.slow
 @every_family
 def test_ranks_of_the_levels_are_those_of_the_stored_problems(name):
     stored = {ranks(p.h) for p in families.family(name)}

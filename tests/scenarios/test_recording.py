@@ -37,6 +37,7 @@ def test_a_switch_is_the_first_tick_of_the_new_order():
     assert recording(order=[0, 1, 1, 0, 0]).switches().tolist() == [1, 3]
 
 
+@pytest.mark.slow
 def test_a_run_folder_holds_arrays_metrics_scenario_versions_and_figures(tmp_path):
     save(recording(), tmp_path / "run")
     names = {path.name for path in (tmp_path / "run").iterdir()}

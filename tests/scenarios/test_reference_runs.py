@@ -26,6 +26,7 @@ def reference(name):
         return dict(file)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", RUNS)
 def test_the_authors_runs_are_reproduced_tick_for_tick(name):
     expected = reference(name)
@@ -46,6 +47,7 @@ def test_the_authors_runs_are_reproduced_tick_for_tick(name):
                                rtol=0, atol=1e-8)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["inequality_5deg", "inequality_35deg", "equality_35deg"])
 def test_exact_derivatives_command_nearly_the_same_from_every_recorded_state(name):
     expected = reference(name)
@@ -63,6 +65,7 @@ def test_exact_derivatives_command_nearly_the_same_from_every_recorded_state(nam
     assert np.median(differences) < 1e-3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["inequality_5deg", "inequality_35deg", "equality_35deg"])
 def test_exact_derivatives_leave_the_stack_of_every_recorded_state_as_it_was(name):
     expected = reference(name)

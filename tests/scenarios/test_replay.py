@@ -367,6 +367,7 @@ def folder(short, tmp_path):
     return save(short, tmp_path / "run", figures=False)
 
 
+@pytest.mark.slow
 def test_the_command_writes_a_file_beside_the_run(folder, capsys):
     assert run_command(["replay", str(folder)]) == 0
     assert (folder / "replay.html").read_text(encoding="utf-8").startswith("<!DOCTYPE html>")

@@ -167,6 +167,7 @@ def test_the_verdict_of_runs_that_all_broke_is_only_that():
                                                      "(hqp did not: broke).")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("runs", [
     [made("tpm")],
     [made("tpm"), made("tpm:form=staircase"), made("recursive")],
@@ -185,6 +186,7 @@ def test_a_page_is_whole_and_needs_nothing_outside_itself(runs):
     assert not re.search(r"<(?:link|img|(?:iframe|script)[^>]* src)\b|@import|url\((?!#)", text)
 
 
+@pytest.mark.slow
 def test_one_resolver_in_several_scenarios_is_one_table_and_nothing_is_best():
     asked = [HandMadeScenario(name=name) for name in ("slow", "jumpy")]
     runs = [dataclasses.replace(made("tpm", scenario=one, v=speed * np.eye(5, 7)), label=one.name)
@@ -202,6 +204,7 @@ def test_several_resolvers_in_several_scenarios_are_a_section_each():
     assert list(comparison(*runs).groups()) == ["one", "other"]
 
 
+@pytest.mark.slow
 def test_the_page_shows_verdict_replay_table_stack_panels_commands_settings():
     text = page(comparison(made("tpm"), made("hqp")))
     places = [text.index(mark) for mark in (
@@ -211,12 +214,14 @@ def test_the_page_shows_verdict_replay_table_stack_panels_commands_settings():
     assert places == sorted(places)
 
 
+@pytest.mark.slow
 def test_the_page_says_what_happened_to_a_run_that_faulted():
     text = page(comparison(made("tpm"), made("hqp", fault="the state is not finite from tick 5")))
     assert "the state is not finite from tick 5" in text
     assert "stopped at" in text
 
 
+@pytest.mark.slow
 def test_runs_of_the_same_motion_are_drawn_once_and_named_together():
     runs = [made("tpm"), made("hqp", q=np.full((5, 7), 1e-8)), made("augmented", q=np.ones((5, 7)))]
     assert [one.labels for one in motions(runs)] == [("tpm published", "hqp"), ("augmented",)]
@@ -230,6 +235,7 @@ def test_runs_of_two_scenarios_are_never_the_same_motion():
     assert len(motions(runs)) == 2
 
 
+@pytest.mark.slow
 def test_the_page_shows_every_event_in_words_and_in_the_stack_over_time():
     run = with_events(made("tpm", contacts=[0, 1, 0, 0, 0], **SOFTLY), (3, "not_finite", "hold"))
     text = page(comparison(run, made("hqp")))
@@ -243,10 +249,12 @@ def test_the_page_shows_every_event_in_words_and_in_the_stack_over_time():
     assert ">contact</text>" in drawn[0]
 
 
+@pytest.mark.slow
 def test_a_page_without_events_says_that_there_were_none():
     assert "No run had unsolved ticks" in page(comparison(made("tpm"), made("hqp")))
 
 
+@pytest.mark.slow
 def test_the_same_motion_with_other_events_has_a_stack_over_time_of_its_own():
     runs = [made("tpm"), with_events(made("hqp"), (2, "overrun", "use"))]
     assert len(motions(runs)) == 1
@@ -270,6 +278,7 @@ def test_a_run_of_a_file_of_ones_own_is_made_again_from_its_folder():
         "hierarchy run runs/a/hand-made/tpm/scenario.toml")
 
 
+@pytest.mark.slow
 def test_the_page_has_the_commands_to_run_view_replay_and_draw():
     text = html.unescape(page(dataclasses.replace(comparison(made("tpm")), folder="runs/my own")))
     for command in ("hierarchy run 'runs/my own/hand-made/tpm/scenario.toml'",
@@ -296,6 +305,7 @@ def short_comparison(tmp_path_factory):
     return file
 
 
+@pytest.mark.slow
 def test_the_replay_is_in_the_page_and_says_who_moves_as_whom(short_comparison):
     text = short_comparison.read_text(encoding="utf-8")
     assert len(re.findall(r"<iframe [^>]*data-document='", text)) == 1
@@ -312,6 +322,7 @@ def test_a_replay_that_would_be_too_large_has_fewer_pictures():
     assert len(small) < len(large)
 
 
+@pytest.mark.slow
 def test_a_page_in_a_browser_fits_its_window_and_has_no_complaints(short_comparison):
     with chromium() as tab:
         for width, dark in itertools.product((360, 1400), (False, True)):
@@ -328,6 +339,7 @@ def test_a_page_in_a_browser_fits_its_window_and_has_no_complaints(short_compari
         assert tab.complaints == []
 
 
+@pytest.mark.slow
 def test_text_from_a_scenario_file_cannot_become_markup():
     scenario = dataclasses.replace(HandMadeScenario(), title="<script>alert(1)</script> & co")
     text = page(comparison(made("tpm", scenario=scenario)))
@@ -335,6 +347,7 @@ def test_text_from_a_scenario_file_cannot_become_markup():
     assert "&lt;script&gt;alert" in text
 
 
+@pytest.mark.slow
 def test_a_page_of_long_runs_stays_small():
     ticks = 20_000
     noise = np.random.default_rng(0).normal(size=(ticks, 7))

@@ -15,6 +15,8 @@ from scenarios import load, simulate
 from scenarios.cell.build import build
 from scenarios.cell.plants import PhysicsArm
 
+pytestmark = pytest.mark.slow
+
 ROBOT = Robot.named("kuka_lwr")
 HOME = [1.1657, -0.9476, 0.5844, 1.4408, 1.1464, 1.7695, 0.0]  # rad, where the scenarios start
 KINEMATIC, EXACT = "plant={kind='kinematic'}", "sensor={kind='exact'}"

@@ -37,6 +37,7 @@ def ellipse(runs):
     return scene(runs["ellipse"])
 
 
+@pytest.mark.slow
 def test_frames_are_the_ticks_nearest_to_their_times(runs, ellipse):
     assert ellipse.ticks[0] == 0
     assert ellipse.ticks[-1] == runs["ellipse"].ticks - 1
@@ -93,6 +94,7 @@ def test_obstacles_that_move_are_where_their_path_says():
     assert np.allclose(np.linalg.norm(shown.nearest - shown.centres, axis=2), 0.05)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_violations_are_those_of_the_hierarchy_that_was_resolved(name):
     """A second run asks the loop's own hierarchy, tick by tick, what its command violates."""
@@ -234,6 +236,7 @@ def test_listed_tasks_have_their_paths_and_errors():
     assert np.allclose(hand, missed)
 
 
+@pytest.mark.slow
 def test_the_limits_of_a_floating_robot_are_those_of_its_joints():
     recording = simulate(load("humanoid-reach", ["control.duration=1.8"]))
     levels = levels_at(recording, range(340, 360))

@@ -18,6 +18,8 @@ from scenarios.loop.tree import joint_units, placements, tree_of
 from scenarios.measure.metrics import as_plain_data
 from scenarios.scene import scene
 
+pytestmark = pytest.mark.slow
+
 LINK = """<link name="{0}"><inertial><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1"
   iyz="0" izz="1"/></inertial><collision><origin xyz="0 0 {1}"/><geometry><cylinder radius="0.04"
   length="{2}"/></geometry></collision></link>"""

@@ -20,6 +20,7 @@ def test_seconds_of_what_is_compiled_within_are_not_counted_twice():
     assert own_seconds(events) == {"outer": 6.0, "inner": 4.0}
 
 
+@pytest.mark.slow
 def test_compiling_is_recorded_and_nested_rightly(tmp_path, monkeypatch):
     """One small kernel of our own, in an empty cache."""
     monkeypatch.setattr(start, "_COMPILE", """
@@ -43,6 +44,7 @@ def test_a_process_that_fails_is_an_error_with_its_words():
         start._run(["-c", "raise SystemExit('it went wrong')"])
 
 
+@pytest.mark.slow
 def test_memory_that_a_process_held_is_seen():
     small, large = (start._run(["-c", f"x = bytearray({n} * 2**20)"]).memory for n in (1, 200))
     assert 190.0 < large - small < 210.0

@@ -11,6 +11,8 @@ from hierarchy import Hierarchy
 from scenarios.bench import stress
 from solvers import Resolution, Resolver, Status, certify, make, names, problems
 
+pytestmark = pytest.mark.slow
+
 REGRESSIONS = sorted((Path(__file__).parents[1] / "data" / "regressions").glob("*.npz"))
 JUDGED = [name for name in ("hcod", "tpm", "recursive") if name in names()]
 COUNT = 200 if os.environ.get("NUMBA_DISABLE_JIT") == "1" else 8_000

@@ -15,6 +15,7 @@ ABLE = able()
 SHORT = 0.1  # [s]; the limits are active all the time, and a cascade needs ms for a solve
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("resolver", [r for r in ABLE if r.strict], ids=lambda r: r.label)
 def test_the_posture_does_not_move_the_end_effector(resolver):
     found = strictness(resolver, SHORT)
@@ -26,6 +27,7 @@ def test_the_posture_does_not_move_the_end_effector(resolver):
     assert found.met
 
 
+@pytest.mark.slow
 def test_nor_does_it_until_the_end_effector_has_arrived():
     found = strictness(make("hcod"))
     assert 0 < found.limited < found.ticks == 2000

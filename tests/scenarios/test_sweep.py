@@ -12,6 +12,7 @@ import numpy as np
 import psutil
 import pyarrow.parquet as parquet
 import pytest
+from deadly import dies_of_one
 
 from hierarchy import HierarchyError
 from scenarios import load, simulate
@@ -25,6 +26,8 @@ from scenarios.sweep.results import wilson
 from scenarios.sweep.run import Outcome, digest, run
 from scenarios.sweep.sampling import drawn
 from scenarios.sweep.store import FullError, Store, StoreError
+
+pytestmark = pytest.mark.slow
 
 BODY = {"name": '"small"', "scenarios": '["ellipse"]', "resolvers": '["tpm", "recursive"]',
         "duration": "0.02", "samples": "3", "seed": "7"}
@@ -88,7 +91,7 @@ def keys_kept(folder):
      "value is None, not a number"),
     ("position.gain = { uniform = [2.0, 1.0] }", {},
      "parameters.position.gain.uniform: 2 is above 1"),
-    ("position.gian = { uniform = [1.0, 2.0] }", {}, "[position] has no key 'gian'; it has path"),
+    ("position.gian = { uniform = [1.0, 2.0] }", {}, "[position] has no key 'gian'; it has "),
     ("limits.margin = { uniform = [1.0, 2.0] }", {}, "[limits] is missing"),
     ("avoidance.obstacles.3.centre = { around = 0.1 }", {},
      "3 entries, numbered from 0, and no '3'"),
@@ -238,13 +241,6 @@ def test_a_worker_that_is_killed_loses_nothing(tmp_path):
     kept = keys_kept(tmp_path / "out")
     assert kept == Counter(one.job.key for one in planned.runs)
     assert store.table()["error"].null_count == len(planned.runs)
-
-
-def dies_of_one(jobs, versions):
-    """Stands for runs of which one, of resolver "deadly", ends the process that it is in."""
-    if any(job.resolver == "deadly" for job in jobs):
-        os._exit(1)
-    return [Outcome(job.key, 1, None, None, 0.0, versions) for job in jobs]
 
 
 def test_a_run_that_kills_its_workers_is_a_row_and_those_beside_it_are_made(tmp_path):

@@ -71,6 +71,7 @@ def test_a_clock_that_begins_anew_is_another_run():
     np.testing.assert_array_equal(visited([C] * 3, blend), [[0.0, 0.0, 1.0]] * 3)
 
 
+@pytest.mark.slow
 def test_no_more_than_a_few_stacks_are_solved_and_that_makes_no_jump():
     """A jump would not get smaller with the time between two ticks."""
     def largest_change(period):
@@ -222,6 +223,7 @@ def runs(name, *changes):
             for more in ([], ["control.transition=blend", "control.transition_time=0.1"]))
 
 
+@pytest.mark.slow
 def test_at_velocity_level_the_speed_no_longer_jumps():
     jumping, smooth = runs("ellipse-velocity")
     assert steps(jumping, "v") > 1.0
@@ -236,6 +238,7 @@ def test_at_velocity_level_the_speed_no_longer_jumps():
     assert smooth["transition"].max() == 1.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("resolver", ["tpm", "hcod"])
 def test_at_acceleration_level_the_acceleration_no_longer_jumps(resolver):
     jumping, smooth = runs("ellipse-35deg", f"control.resolver={resolver}")

@@ -11,6 +11,8 @@ from scenarios.draw.replay.frames import Frames
 from scenarios.draw.replay.video import write_video
 from scenarios.scene import scene
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture
 def fake_ffmpeg(tmp_path, monkeypatch):

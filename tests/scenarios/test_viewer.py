@@ -115,6 +115,7 @@ def test_a_controller_at_work_and_its_recording_show_the_same_moments():
             assert getattr(one, name) == pytest.approx(getattr(other, name), abs=1e-9), name
 
 
+@pytest.mark.slow
 def test_the_list_says_what_is_active_given_up_saturated_and_out_of_the_stack(recording):
     now = of_scene(scene(recording), 0)
     saturated = np.array([0, 1, 0, 0, -1, 0, 0], np.int8)
@@ -128,6 +129,7 @@ def test_the_list_says_what_is_active_given_up_saturated_and_out_of_the_stack(re
         assert said in html
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("obstacle", [
     Obstacle("point", (0, 0, 0)), Obstacle("sphere", (0, 0, 0), (0.1,)),
     Obstacle("capsule", (0, 0, 0), (0.1, 0.2)), Obstacle("box", (0, 0, 0), (0.1, 0.2, 0.3)),
@@ -189,6 +191,7 @@ def test_an_obstacle_that_is_dragged_goes_there_no_faster_than_a_hand():
     assert not drawn.levels.known[-1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("key", "value", "read"), [
     ("pointing.alpha_d", 35.0, lambda cell: np.degrees(cell.pointing.half_angle)),
     ("avoidance.near", 0.1, lambda cell: cell.areas.near),
@@ -205,6 +208,7 @@ def test_a_setting_that_is_changed_holds_from_the_next_tick_on(key, value, read)
     assert live.changes == [{"t": pytest.approx(0.02), "key": key, "value": value}]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("spoil", [
     lambda live: live.change({"avoidance.near": 0.3}),
     lambda live: live.change({"pointing.alpha_d": float("nan")}),
@@ -265,6 +269,7 @@ def test_curves_of_what_was_before_stay_when_the_cone_is_another():
 # Pages, without a browser
 
 
+@pytest.mark.slow
 def test_a_page_plays_and_scrubs_runs_of_different_length(server, recording):
     from scenarios.draw.viewer.view import View, labelled
 
@@ -290,6 +295,7 @@ def test_runs_of_the_same_resolver_are_told_apart_by_their_folders(recording):
     assert list(labelled(["a", "b"], [recording, recording])) == ["tpm in a", "tpm in b"]
 
 
+@pytest.mark.slow
 def test_a_live_page_does_what_is_asked_for_and_says_what_it_refuses(server):
     from scenarios.draw.viewer.live_page import LivePage
 
@@ -317,6 +323,7 @@ def test_a_live_page_does_what_is_asked_for_and_says_what_it_refuses(server):
     assert page.live.t == t
 
 
+@pytest.mark.slow
 def test_a_live_page_at_its_end_begins_anew_when_it_is_played(server):
     from scenarios.draw.viewer.live_page import LivePage
 
@@ -337,6 +344,7 @@ def test_a_missing_extra_is_named(monkeypatch):
         open_server(0, "test")
 
 
+@pytest.mark.slow
 def test_a_live_run_is_kept_at_ctrl_c(tmp_path, monkeypatch, capsys):
     pytest.importorskip("viser", reason="needs the extra view")
     from scenarios.draw.viewer.live_page import LivePage
@@ -355,6 +363,7 @@ def test_a_live_run_is_kept_at_ctrl_c(tmp_path, monkeypatch, capsys):
     assert "fault: interrupted at tick 21" in err
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("arguments", [
     ["view", "nowhere", "--no-browser"], ["view", "nowhere", "--port", "70000"],
     ["run", "ellipse", "--live", "--certify"], ["run", "ellipse", "--live", "--json"]])
@@ -435,6 +444,7 @@ def test_in_a_browser_play_moves_the_arm(server, recording):
         assert errors(browser) == []
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("patient")
 def test_in_a_browser_the_resolver_is_switched_in_mid_motion(server):
     from scenarios.draw.viewer.live_page import LivePage

@@ -102,6 +102,7 @@ def test_of_two_tasks_in_conflict_the_first_is_served_exactly_and_in_pink_neithe
     assert np.abs(given - asked).max() > 0.01  # [m/s, rad/s]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("solver", ["tpm", "recursive", "hqp", "weighted", "sns"])
 def test_every_resolver_can_be_the_solver(configuration, solver):
     hand = frame_task(configuration, shift=(0.002, 0.0, 0.001), turn=0.0)
@@ -290,6 +291,7 @@ def arm():
     return model, data
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "kind"), [("tip", "site"), ("lower", "body"), ("pad", "geom")])
 def test_a_jacobian_of_mujoco_is_the_difference_of_its_frames(arm, name, kind):
     import mujoco

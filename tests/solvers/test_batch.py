@@ -59,6 +59,7 @@ def assert_same(answer, alone):
             assert not answer.memory[p].any()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("threads", [1, 3])
 @pytest.mark.parametrize(("name", "of"), [*(("tpm", of) for of in EQUALITIES), *(
     ("hcod", of) for of in ("EQ7", "EQ7sing", *INEQUALITIES))])
@@ -67,6 +68,7 @@ def test_each_problem_gets_what_it_gets_alone(name, of, threads):
     assert_same(solve(Batch.of(hs), resolver, threads), [resolver.solve(h) for h in hs])
 
 
+@pytest.mark.slow
 @both
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.__name__)
 @pytest.mark.parametrize("settings", [{}, {"damping": 0.05}], ids=["undamped", "damped"])
@@ -78,6 +80,7 @@ def test_a_batch_agrees_at_any_rank(name, case, settings):
 RECIPE = Recipe(joints=(6, 6), levels=(3, 3), rows=(3, 3), empty=0.0, near_parallel=0.5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("guesses", [1, 3])
 def test_answers_in_doubt_are_judged_as_they_are_alone(guesses):
     resolver = make("hcod", guesses=guesses)
@@ -270,6 +273,7 @@ def assert_near(x, expected):
     assert error.max() < 1e-9
 
 
+@pytest.mark.slow
 def test_the_benchmark_counts_problems_of_every_way(tmp_path, capsys):
     rows = bench.run(tmp_path, (8,), 0.0, (("EQ7", "tpm"), ("INEQ7", "hcod")))
     assert {(row["family"], row["way"]) for row in rows} >= {

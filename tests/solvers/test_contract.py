@@ -15,6 +15,8 @@ from scenarios.bench.families import EQUALITIES
 from solvers import Status, certify, make, names
 from solvers.qp.backends import BACKENDS
 
+pytestmark = pytest.mark.slow
+
 HQP = [make("hqp", backend=name, form=form)
        for name in BACKENDS for form in ("null-space", "slack")]
 RESOLVERS = [*(make(name) for name in names() if name != "hqp"), make("tpm", form="published"),

@@ -31,6 +31,7 @@ def stacks(run, reference):
         yield h
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("resolver", [*STRICT, *BACKENDS_AND_FORMS],
                          ids=lambda r: r.label.replace(" ", "-"))
 @pytest.mark.parametrize("level", LEVELS)
@@ -50,6 +51,7 @@ def test_every_strict_resolver_commands_what_the_staircase_does(resolver, level,
     assert solved >= 0.9 * (18850 // EVERY)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["ellipse", "ellipse-velocity", "ellipse-35deg-equality"])
 def test_hcod_and_the_staircase_are_the_same_run(name):
     """With the same singularity setting, over all 18,850 ticks."""

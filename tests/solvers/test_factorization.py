@@ -82,6 +82,7 @@ def orthogonality(factored):
     return np.abs(Q.T @ Q - np.eye(Q.shape[1])).max(initial=0.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("part", range(4))
 def test_after_random_edits_the_answers_are_those_of_tpm(part):
     """Ten thousand sequences; the gap between two roundings is far below 1e-12 in nearly all."""
@@ -101,6 +102,7 @@ def test_after_random_edits_the_answers_are_those_of_tpm(part):
     assert np.percentile(gaps, 99.9) < 1e-12
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_nothing_drifts_over_thousands_of_edits(seed):
     rng = np.random.default_rng(seed)

@@ -33,6 +33,7 @@ def test_an_answer_found_by_hand():
     assert res.multipliers[:2] == pytest.approx([1.5, 0.75])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", INEQUALITIES)
 def test_every_reference_problem_is_solved_and_certified(name):
     for h, _, norms in family(name):
@@ -42,6 +43,7 @@ def test_every_reference_problem_is_solved_and_certified(name):
         assert certify(h, res.x).certified
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", INEQUALITIES)
 def test_the_answer_does_not_depend_on_the_memory(name):
     rng = np.random.default_rng(0)
@@ -109,6 +111,7 @@ def test_multipliers_balance_the_pull_of_the_level_they_hold_back():
     np.testing.assert_allclose(pull + res.multipliers[:2] @ h.A[:2], 0, atol=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("limit", range(1, 12))
 def test_an_iteration_limit_keeps_the_levels_above_and_says_where_it_was(limit):
     resolver = make("hcod", max_iterations=limit, guesses=1)

@@ -25,6 +25,7 @@ def assert_close(hqp, x, expected):
     assert np.abs(x - expected).max() <= hqp.accuracy * (1.0 + np.abs(expected).max())
 
 
+@pytest.mark.slow
 @every_backend
 @pytest.mark.parametrize("name", ["INEQ7", "HUM38", "DEGEN7"])
 def test_an_answer_is_right_or_says_that_it_is_not(hqp, name):
@@ -39,6 +40,7 @@ def test_an_answer_is_right_or_says_that_it_is_not(hqp, name):
             assert_close(hqp, res.x, x)
 
 
+@pytest.mark.slow
 @every_backend
 def test_nearly_all_arms_with_limits_are_solved(hqp):
     assert sum(hqp.solve(h).status is Status.SOLVED for h, _, _ in family("INEQ7")) >= 48
@@ -47,6 +49,7 @@ def test_nearly_all_arms_with_limits_are_solved(hqp):
 SMALL = dataclasses.replace(problems.ANY, joints=(1, 15), levels=(1, 6), rows=(0, 10))
 
 
+@pytest.mark.slow
 @every_backend
 def test_no_answer_to_a_generated_problem_is_called_solved_without_being_right(hqp):
     solved = 0
@@ -100,6 +103,7 @@ def test_an_equality_between_inequalities_is_met_inside_them(hqp):
     assert_close(hqp, x, [1.0, 2.0, 2.0])
 
 
+@pytest.mark.slow
 @every_backend
 def test_a_lower_level_changes_no_violation_above_it(hqp):
     for h, _, _ in list(family("INEQ7"))[:5]:
@@ -140,6 +144,7 @@ def test_backends_differ_in_the_last_digits_of_an_equality():
     assert len(answers) > 3
 
 
+@pytest.mark.slow
 @every_backend
 @pytest.mark.parametrize("name", ["EQ7", "INEQ7"])
 def test_a_warm_start_does_not_change_the_answer(hqp, name):

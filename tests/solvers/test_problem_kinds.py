@@ -18,6 +18,7 @@ def norms(h):
     return np.linalg.norm(h.A, axis=1)
 
 
+@pytest.mark.slow
 @every_kind
 def test_every_problem_is_valid_and_the_same_for_a_seed(kind):
     for seed, h in enumerate(made(kind)):
@@ -27,6 +28,7 @@ def test_every_problem_is_valid_and_the_same_for_a_seed(kind):
             assert np.array_equal(getattr(h, part), getattr(again, part))
 
 
+@pytest.mark.slow
 @every_kind
 def test_equalities_alone_can_be_asked_for(kind):
     assert all(structured(seed, (kind,), equalities_only=True).is_equality for seed in SEEDS)
@@ -46,6 +48,7 @@ def test_a_box_goes_first_and_is_often_in_the_way():
     assert 0 < sum(within) < len(within)
 
 
+@pytest.mark.slow
 def test_all_kinds_are_drawn_unless_some_are_named():
     sizes = {tuple(structured(seed).sizes.tolist()) for seed in range(100)}
     assert len(sizes) > 50

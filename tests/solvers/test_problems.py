@@ -48,11 +48,13 @@ def test_one_size_can_be_asked_for():
     assert h.sizes.tolist() == [40] * 12
 
 
+@pytest.mark.slow
 def test_equalities_alone_can_be_asked_for():
     assert all(h.is_equality for h in everything(Recipe(equalities_only=True)))
     assert not all(h.is_equality for h in everything(Recipe()))
 
 
+@pytest.mark.slow
 def test_without_conflicts_all_rows_hold_at_one_point():
     for h in everything(dataclasses.replace(PLAIN, equalities_only=True, near_parallel=0.0)):
         assert h.violations(make("tpm").solve(h).x).max() < 1e-6
@@ -79,6 +81,7 @@ def rank(rows):
     return int(np.linalg.matrix_rank(rows, tol=1e-9)) if len(rows) else 0
 
 
+@pytest.mark.slow
 def test_ranks_are_lost_inside_levels_and_between_them():
     inside = between = 0
     for h in everything(Recipe(duplicates=0.0, zero_rows=0.0, simple_bounds=0.0)):
@@ -128,6 +131,7 @@ def test_a_file_gives_back_what_was_written(tmp_path):
         assert np.array_equal(getattr(same, part), getattr(h, part))
 
 
+@pytest.mark.slow
 @settings(max_examples=50, deadline=None, derandomize=True)
 @given(problems.strategy(Recipe(joints=(1, 8), levels=(1, 4), rows=(0, 6), equalities_only=True)))
 def test_hypothesis_draws_the_same_kind_of_problem(h):

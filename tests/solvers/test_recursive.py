@@ -33,6 +33,7 @@ def stacks(count, seed):
         yield Hierarchy.from_levels(levels, r.normal(size=n))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("damping", [0.0, 0.05, 1.0])
 @pytest.mark.parametrize("threshold", [0.1, 2.0])
 def test_recursion_staircase_and_oracle_agree_on_random_stacks(damping, threshold):

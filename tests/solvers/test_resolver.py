@@ -44,6 +44,7 @@ def test_labels_name_what_makes_another_method():
     assert make("hqp").label == "hqp proxqp"
 
 
+@pytest.mark.slow
 def test_importing_solvers_does_not_import_the_quadratic_programming_backends():
     code = ("import sys, solvers; "
             "print([m for m in ('qpsolvers', 'proxsuite', 'osqp') "
@@ -64,11 +65,13 @@ for name in ("tpm", "hcod", "recursive"):
 """
 
 
+@pytest.mark.slow
 def test_a_first_hierarchy_is_solved_without_pinocchio_matplotlib_and_qpsolvers():
     assert output_of(FIRST_SOLVE).splitlines() == [
         f"{name} [1.0, 2.0, 0.0] True" for name in ("tpm", "hcod", "recursive")]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("file", sorted((ROOT / "solvers").rglob("*.py")), ids=lambda f: f.stem)
 def test_scipy_qpsolvers_and_pinocchio_are_imported_where_first_needed(file):
     top = [node for node in ast.parse(file.read_text()).body
@@ -79,6 +82,7 @@ def test_scipy_qpsolvers_and_pinocchio_are_imported_where_first_needed(file):
         {"scipy", "qpsolvers", "pinocchio", "matplotlib"})
 
 
+@pytest.mark.slow
 def test_importing_backends_changes_no_environment_variable():
     code = ("import os; before = dict(os.environ)\n"
             "import solvers, solvers.qp.backends\n"

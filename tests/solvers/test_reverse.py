@@ -93,6 +93,7 @@ def test_in_order_is_strict_at_every_rank(case, reference):
     assert gap(IN_ORDER.solve(h).x, oracle.solve(h)) < EXACT
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", EQUALITIES)
 def test_in_order_is_strict_on_reference_problems(name):
     for h, x, _ in family(name):
@@ -108,6 +109,7 @@ def test_the_published_form_departs_in_just_these_rank_cases():
                          "last_level_wholly_dependent", "row_repeated_inside_a_level"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "departing", "at_level"), [
     ("EQ7", 0.0, None), ("EQ30L8", 0.0, None), ("EQ30L10", 0.0, None),
     ("EQ7over", 1.0, 1), ("EQ7sing", 1.0, 1)])

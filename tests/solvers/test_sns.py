@@ -59,6 +59,7 @@ def problems(count, seed, levels=None):
         yield h, low, up
 
 
+@pytest.mark.slow
 @every_form
 def test_bounds_are_kept_always(resolver):
     for h, low, up in problems(MANY, 1):
@@ -67,6 +68,7 @@ def test_bounds_are_kept_always(resolver):
         assert (np.clip(res.x, low, up) == res.x).all()
 
 
+@pytest.mark.slow
 @every_form
 def test_a_lower_level_never_changes_the_value_of_a_higher_one(resolver):
     for h, _, _ in problems(MANY, 2):
@@ -154,6 +156,7 @@ def as_printed(levels, low, up):
     return x, scalings
 
 
+@pytest.mark.slow
 def test_the_basic_form_is_the_algorithm_as_printed():
     judged = 0
     for seed in range(MANY):
@@ -201,6 +204,7 @@ def largest_scaling(a, c, low, up):
     return max(fits, default=-1.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("velocity", "scaling", "x"), [
     ([-4.0, -1.5], 10 / 11, [1.8545454545, -1.0, 0.9272727273, -4.0]),
     ([-8.0, -3.0], 5 / 11, [1.8545454545, -1.0, 0.9272727273, -4.0]),
@@ -263,6 +267,7 @@ def largest_possible(J, b, low, up):
                    bounds=[*zip(low, up, strict=True), (0.0, 1.0)]).x[-1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("resolver", [BASIC, OPTIMAL], ids=str)
 def test_scaling_is_never_above_what_the_box_allows_and_mostly_reaches_it(resolver):
     shares = []
@@ -377,6 +382,7 @@ def test_entries_that_are_not_finite_give_a_status_and_a_finite_answer(resolver,
     assert not res.x.any()
 
 
+@pytest.mark.slow
 @every_form
 def test_it_ends_within_its_sets(resolver):
     for h, _, _ in problems(MANY, 5):
@@ -427,6 +433,7 @@ def test_a_misspelt_form_or_scaling_is_named():
         make("sns", scales="targets")
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not JIT, reason="runs the others without compiling already")
 def test_it_runs_without_compiling():
     code = ("import numpy as np; from hierarchy import Hierarchy; from solvers import make\n"

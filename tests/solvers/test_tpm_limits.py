@@ -68,6 +68,7 @@ def assert_kept(h, x):
         assert not (x > high + KEPT * (1.0 + np.abs(high))).any()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("recipe", [TAME, WILD], ids=["tame", "wild"])
 def test_bounds_are_kept_and_the_answer_is_certified(recipe):
     doubtful = 0
@@ -124,6 +125,7 @@ def test_what_one_level_leaves_open_goes_to_the_reference(seed):
     np.testing.assert_allclose(x, expected, rtol=0, atol=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("room", [0.1, 0.4])
 def test_lower_levels_leave_upper_levels_untouched_at_the_bounds(room):
     for seed in range(3 if SLOW else 100):
@@ -136,6 +138,7 @@ def test_lower_levels_leave_upper_levels_untouched_at_the_bounds(room):
             np.testing.assert_allclose(full[:count], missed, rtol=0, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_no_point_of_the_box_does_better_in_the_order_of_the_levels():
     """Among points found by others, and points drawn near the answer."""
     r = rng()
@@ -225,6 +228,7 @@ def test_levels_without_rows_may_stand_before_the_bounds():
     assert TPM.solve(h).x.tolist() == [1.0, 0.5]
 
 
+@pytest.mark.slow
 def test_the_memory_of_another_tick_does_not_change_the_answer():
     for seed in range(3 if SLOW else 200):
         levels, r = random_levels(7, (3, 1, 1), seed), rng(seed)
@@ -307,6 +311,7 @@ def test_squares_that_overflow_give_a_status_and_a_finite_answer():
     assert not res.x.any()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("damping", [0.05, 0.5])
 def test_damping_keeps_the_bounds_and_ends(damping):
     damped = make("tpm", damping=damping, threshold=1.0)

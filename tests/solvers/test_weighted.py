@@ -111,6 +111,7 @@ def as_two_levels(h, resolver, hard):
 # The sum is minimised ----------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @every_case
 @pytest.mark.parametrize("ratio", [1.0, 10.0, 1e3])
 def test_equalities_give_the_minimiser_of_the_sum(case, ratio):
@@ -120,6 +121,7 @@ def test_equalities_give_the_minimiser_of_the_sum(case, ratio):
     assert gap(res.x, exactly(h, weighted, res.x)) < EXACT
 
 
+@pytest.mark.slow
 @every_case
 @pytest.mark.parametrize("ratio", [1.0, 10.0, 1e3])
 def test_within_limits_it_is_the_minimiser_and_shown_to_be(case, ratio):
@@ -129,6 +131,7 @@ def test_within_limits_it_is_the_minimiser_and_shown_to_be(case, ratio):
     assert gap(res.x, exactly(h, weighted, res.x, hard=1)) < EXACT
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ratio", [10.0, 100.0, 1e4, 1e8])
 def test_inequalities_at_all_levels_give_the_minimiser_whatever_the_ratio(ratio):
     weighted = make("weighted", ratio=ratio)
@@ -151,6 +154,7 @@ def test_humanoids_are_solved_step_by_step(ratio):
 SMALL = problems.Recipe(joints=(1, 12), levels=(1, 5), rows=(0, 8), scales=(0.1, 10.0), spread=3.0)
 
 
+@pytest.mark.slow
 def test_no_answer_to_a_generated_problem_is_called_solved_without_being_right():
     weighted, solved = make("weighted", ratio=10.0, regularisation=1e-2, hard_levels=0), 0
     for seed in range(150):
@@ -224,6 +228,7 @@ def test_normal_equations_are_destroyed():
     assert gap(weighted.solve(h).x, oracle.solve(h)) < EXACT
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ratio", [1e4, 1e8])
 def test_with_limits_too_it_comes_to_the_strict_answer(ratio):
     weighted = make("weighted", ratio=ratio)

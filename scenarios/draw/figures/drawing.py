@@ -186,6 +186,8 @@ def write(fig: Figure, stem: str) -> None:
     """
     undated = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
     with matplotlib.rc_context({**style(), "svg.hashsalt": "task-hierarchy"}):
+        fig.draw_without_rendering()  # arranges the figure, once for all formats
+        fig.set_layout_engine("none")
         for kind in present().formats:
             fig.savefig(f"{stem}.{kind}", facecolor="white", dpi=160, metadata=undated.get(kind))
 
