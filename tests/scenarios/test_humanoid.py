@@ -14,6 +14,8 @@ from scenarios.draw.figures.picture import picture
 from scenarios.measure.metrics import measure
 from scenarios.report.comparing import compare
 
+pytestmark = pytest.mark.slow
+
 ROBOTS = {name: Robot.named(name) for name in ("humanoid", "dual_arm")}
 PATH = Ellipse((0.1, 0.2, 0.8), (0.1, 0.0, 0.1), (0.0, 0.1, 0.0), rate=1.3)
 STEP = 1e-6
@@ -36,7 +38,6 @@ def some_states(robot, count=5, seed=1):
 CASES = [(name, task) for name, robot in ROBOTS.items() for task in tasks(robot)]
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("name", "task"), CASES)
 def test_jacobian_and_its_derivative_agree_with_central_differences(name, task):
     robot = ROBOTS[name]
@@ -143,7 +144,6 @@ def standing():
     return simulate(load("humanoid"))
 
 
-@pytest.mark.slow
 def test_all_levels_above_the_posture_are_met(standing):
     assert standing.fault is None
     found = measure(standing)
@@ -176,7 +176,6 @@ def test_what_is_recorded_of_a_task_is_its_error(standing):
                                    task.error(cell.state), atol=1e-15)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", ["humanoid", "dual-arm"])
 @pytest.mark.parametrize("resolver", ["recursive", "hcod", "sns", "hqp:backend=proxqp"])
 def test_strict_resolvers_agree_over_a_short_run(name, resolver):
@@ -188,7 +187,6 @@ def test_strict_resolvers_agree_over_a_short_run(name, resolver):
     assert (other["status"] == 0).all()
 
 
-@pytest.mark.slow
 def test_both_hands_of_the_dual_arm_follow_their_ellipses():
     run = simulate(load("dual-arm"))
     found = measure(run)
@@ -206,7 +204,6 @@ def reaching():
     return {name: simulate(scenario.with_resolver(name)) for name in ("tpm", "hcod", "augmented")}
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", ["tpm", "hcod"])
 def test_out_of_reach_strict_resolvers_keep_the_feet(reaching, name):
     run = reaching[name]
@@ -233,7 +230,6 @@ def test_resolvers_that_take_bounds_keep_the_humanoids_limits():
         assert np.linalg.norm(run["task_error_right_hand"], axis=1).max() < 1e-3
 
 
-@pytest.mark.slow
 @pytest.mark.usefixtures("_without_figures")
 def test_a_comparison_has_a_row_for_each_task(tmp_path):
     found = compare([load("humanoid", ["control.duration=0.1"])], ["tpm", "recursive"],

@@ -19,6 +19,8 @@ from scenarios.loop.controller import Controller
 from scenarios.loop.recording import load_run
 from scenarios.measure.metrics import measure
 
+pytestmark = pytest.mark.slow
+
 ROBOT = Robot.named("kuka_lwr")
 START = np.array([0.923, -0.854, 0.903, 1.195, 0.971, 1.796, 0.0])
 STILL = np.zeros(7)
@@ -47,7 +49,6 @@ def states(count=20):
 # The physics is that of the robot's model.
 
 
-@pytest.mark.slow
 def test_inertia_gravity_and_coriolis_forces_are_those_of_the_robots_model(mujoco):
     plant = arm(mujoco, joints={"armature": 0.0})
     model, data = plant.model, plant.data
@@ -279,7 +280,6 @@ def test_an_ideal_measurement_is_the_truth():
     np.testing.assert_array_equal(v, true_v)
 
 
-@pytest.mark.slow
 def test_noise_has_the_size_that_is_asked_for_and_no_memory():
     q, v, true_q, true_v = told({"position_noise": 1e-3, "velocity_noise": 0.02}, 3000)
     for noise, size in ((q - true_q, 1e-3), (v - true_v, 0.02)):
@@ -350,7 +350,6 @@ def test_noise_is_refused_for_joints_with_more_coordinates_than_velocities(tmp_p
 # Runs.
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("changes", [[*SHORT, *NOISY], [*PHYSICS, *NOISY]],
                          ids=["kinematic", "mujoco"])
 def test_a_run_repeats_to_the_byte(changes):
@@ -392,7 +391,6 @@ def test_a_kinematic_run_without_noise_has_one_state():
     assert not {"true_q", "true_v", "true_ee_position", "contacts"} & set(run.signals)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("feedback", ["measured", "commanded"])
 @pytest.mark.parametrize("period", [0.001, 0.005])
 def test_the_ellipse_away_from_obstacles_is_tracked(mujoco, period, feedback):
@@ -415,7 +413,6 @@ def test_a_commanded_state_is_what_the_commands_add_up_to(mujoco):
     assert 1e-5 < np.abs(run["q"] - run["true_q"]).max() < 1e-2
 
 
-@pytest.mark.slow
 def test_contacts_are_measured_in_a_run(mujoco, tmp_path):
     def touching(centre):
         return simulate(load("ellipse", [

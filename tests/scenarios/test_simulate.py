@@ -10,6 +10,8 @@ from scenarios.loop.controller import Controller
 from scenarios.loop.simulation import simulate
 from solvers import Resolution, Status
 
+pytestmark = pytest.mark.slow
+
 SHORT = ["control.duration=3.0"]
 
 
@@ -23,7 +25,6 @@ def velocity_run():
     return simulate(load("ellipse-velocity"))
 
 
-@pytest.mark.slow
 def test_row_0_is_the_start_and_time_runs_by_the_period(run):
     np.testing.assert_array_equal(run["q"][0], load("ellipse").start.q)
     assert not run["v"][0].any()
@@ -38,14 +39,12 @@ def test_the_command_of_a_row_leads_to_the_state_of_the_next(run):
     np.testing.assert_array_equal(run["a"], run["command"])
 
 
-@pytest.mark.slow
 def test_the_velocity_command_is_the_next_velocity(velocity_run):
     r = velocity_run
     np.testing.assert_array_equal(r["v"][1:], r["command"][:-1])
     np.testing.assert_allclose(r["a"][:-1], np.diff(r["v"], axis=0) / 1e-3, atol=1e-9)
 
 
-@pytest.mark.slow
 def test_every_answer_is_certified_where_asked_and_nothing_is_where_not(run):
     judged = simulate(load("ellipse", ["control.options.damping=0.0", "control.duration=0.4"]),
                       certified=True)
@@ -54,7 +53,6 @@ def test_every_answer_is_certified_where_asked_and_nothing_is_where_not(run):
     assert "certified" not in run
 
 
-@pytest.mark.slow
 def test_velocity_steps_are_bounded_at_acceleration_level_and_large_at_velocity_level(
         run, velocity_run):
     step, largest = np.abs(np.diff(run["v"], axis=0)).max(), np.abs(run["a"]).max()
@@ -88,14 +86,12 @@ def test_the_path_is_followed_where_nothing_is_near(run):
     assert (run["status"] == Status.SOLVED).all()
 
 
-@pytest.mark.slow
 def test_the_same_scenario_gives_the_same_run(run):
     again = simulate(load("ellipse"))
     for name in ("q", "v", "a", "order"):
         np.testing.assert_array_equal(again[name], run[name])
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", ["ellipse", "ellipse-velocity", "ellipse-35deg-equality"])
 def test_tpm_and_recursion_are_the_same_run(name):
     """(7) equals (5) and (12) equals (13), also with the damping of singularities on."""
@@ -133,7 +129,6 @@ def test_a_start_is_found_for_an_end_effector_position():
     np.testing.assert_allclose(run["ee_position"][0], [0.2, 0.6, 0.2], atol=1e-5)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("changes", "said"), [
     (["start.end_effector=[2, 0, 0]"], "start.end_effector [2.0, 0.0, 0.0] m cannot be reached"),
     (["start.q=[0, 0, 0]"], "start: robot 'kuka_lwr': q has shape (3,)"),
@@ -153,7 +148,6 @@ def test_a_scenario_that_does_not_fit_its_robot_is_named(changes, said):
     assert said in str(error.value)
 
 
-@pytest.mark.slow
 def test_an_unreachable_start_is_a_scenario_error():
     with pytest.raises(ScenarioError):
         simulate(load("ellipse", ["start.end_effector=[0, 0, -3]"]))

@@ -378,5 +378,6 @@ class Edits(RuleBasedStateMachine):
 
 
 TestEdits = Edits.TestCase
+TestEdits.pytestmark = [pytest.mark.slow]
 TestEdits.settings = hypothesis_settings(max_examples=60, stateful_step_count=25, deadline=None,
                                          derandomize=True)
