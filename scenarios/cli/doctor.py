@@ -151,8 +151,8 @@ def _required() -> Iterator[tuple[str, str | None]]:
 
     for line in requires(_PACKAGE) or ():
         one = Requirement(line)
-        extra = str(one.marker).rpartition('extra == "')[2].rstrip('"') if one.marker else None
-        yield one.name, extra
+        _, extra, name = str(one.marker or "").rpartition('extra == "')
+        yield one.name, name.rstrip('"') if extra else None
 
 
 def _version(package: str) -> str | None:
