@@ -48,7 +48,7 @@ def _joined(clauses: Sequence[Clause]) -> str:
 def _completion(runs: Sequence[Run], finished: Sequence[Run]) -> str:
     durations = {f"{run.scenario.control.duration:.4g} s" for run in runs}
     seconds = durations.pop() if len(durations) == 1 else "duration"
-    noun = "ways" if len({run.scenario.name for run in runs}) == 1 else "scenarios"
+    noun = "resolvers" if len({run.scenario.name for run in runs}) == 1 else "scenarios"
     if len(finished) == len(runs) == 1:
         return f"{runs[0].label} ran the whole {seconds}"
     if len(finished) == len(runs):

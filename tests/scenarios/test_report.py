@@ -82,7 +82,7 @@ def test_the_verdict_says_who_kept_distance_and_who_is_fast():
     runs = [made("tpm", time_resolve=np.full(5, 2e-6), minimal_distance=np.full(5, 0.052)),
             made("hqp", time_resolve=np.full(5, 80e-6))]
     said = verdict(runs)
-    assert said.startswith("Both ways ran the whole 4 s")
+    assert said.startswith("Both resolvers ran the whole 4 s")
     assert "hqp kept the most distance from obstacles (1000 mm, tpm published 52 mm)" in said
     assert "tpm published resolves a tick in 2 µs, hqp in 80 µs" in said
 
@@ -116,13 +116,13 @@ def test_the_verdict_finds_no_winner_where_all_agree():
 def test_the_verdict_says_which_ways_did_not_finish_and_takes_nothing_from_them():
     runs = [made("tpm"), made("hqp", fault="diverged", minimal_distance=np.full(5, 0.001))]
     said = verdict(runs)
-    assert said.startswith("One of two ways ran the whole 4 s (hqp did not: diverged)")
+    assert said.startswith("One of two resolvers ran the whole 4 s (hqp did not: diverged)")
     assert "at least 1000 mm" in said
 
 
 def test_the_verdict_names_those_together_that_ended_for_the_same_reason():
     runs = [made(spec, fault="stopped") for spec in ("recursive", "hqp", "hcod")]
-    assert verdict(runs) == ("No way ran the whole 4 s "
+    assert verdict(runs) == ("No resolver ran the whole 4 s "
                              "(recursive, hqp and hcod did not: stopped).")
 
 
@@ -163,7 +163,7 @@ def test_the_verdict_says_what_was_done_in_ticks_with_trouble():
 
 
 def test_the_verdict_of_runs_that_all_broke_is_only_that():
-    assert verdict([made("hqp", error="broke")]) == ("No way ran the whole 4 s "
+    assert verdict([made("hqp", error="broke")]) == ("No resolver ran the whole 4 s "
                                                      "(hqp did not: broke).")
 
 
