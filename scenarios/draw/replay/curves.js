@@ -170,12 +170,16 @@ class Curves {
 
   path({run, value, low, high}, scale) {
     const times = run.t.values, parts = [];
-    let pen = "M";
+    let pen = "M", before = 0;
     for (let f = 0; f < value.length; f++) {
       if (!Number.isFinite(value[f])) { pen = "M"; continue; }
       const x = this.x(times[f]).toFixed(1), top = scale.y(high[f]), bottom = scale.y(low[f]);
-      const ys = bottom - top > 1.5 ? [top, bottom] : [scale.y(value[f])];
-      for (const y of ys) { parts.push(`${pen}${x} ${y.toFixed(1)}`); pen = "L"; }
+      const y = scale.y(value[f]), ys = [];
+      if (pen === "M") before = y;
+      if (top < Math.min(before, y) - 1.5) ys.push(top);  // a peak between two frames
+      if (bottom > Math.max(before, y) + 1.5) ys.push(bottom);
+      for (const at of [...ys, y]) { parts.push(`${pen}${x} ${at.toFixed(1)}`); pen = "L"; }
+      before = y;
     }
     return parts.join("");
   }
