@@ -61,18 +61,18 @@ def build(scenario: Scenario, kept: Cell | None = None) -> Cell:
     control = scenario.control
     robot = kept.robot if kept else make_robot(scenario.robot)
     sensor = _kept_sensor(scenario, kept) if kept else sensor_of(scenario, robot)
+    start = kept.start if kept else start_of(robot, scenario.start)
+    here = State.at(robot, *start)
     if kept:
-        start, state, plant = kept.start, kept.state, kept.plant
+        state, plant = kept.state, kept.plant
     else:
-        start = start_of(robot, scenario.start)
         differences = control.jacobian_derivative == "difference"
         state = State(robot, control.period if differences else None)
         if sensor is not None:
-            sensor.check_start(State.at(robot, *start))
+            sensor.check_start(here)
         plant = plant_of(scenario, robot, start, sensor.obstacles if sensor else Obstacles())
     areas = areas_of(scenario)
     limits, first = limits_of(scenario, robot)
-    here = State.at(robot, *start)
     position, pointing = position_of(scenario, here), pointing_of(scenario, here)
     listed = [task_of(section, here) for section in scenario.tasks]
     last = posture_of(scenario, here, "task")
