@@ -7,10 +7,10 @@ from collections.abc import Sequence
 _NUMBERS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten")
 
 
-def listed(names: Sequence[str]) -> str:
+def listed(names: Sequence[str], last_by: str = "and") -> str:
     """Return names, at least one, as a list in a sentence: "a", "a and b", "a, b and c"."""
     *first, last = names
-    return f"{', '.join(first)} and {last}" if first else last
+    return f"{', '.join(first)} {last_by} {last}" if first else last
 
 
 def in_words(count: int) -> str:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from hierarchy.paths import Ellipse, Path, Still, Waypoints
 from scenarios.config.sections import EllipseSection, PathSection, WaypointsSection
 
@@ -9,7 +11,17 @@ from scenarios.config.sections import EllipseSection, PathSection, WaypointsSect
 def make_path(section: PathSection) -> Path:
     """Return the path of a section."""
     if isinstance(section, EllipseSection):
-        return Ellipse(section.centre, section.cosine, section.sine, section.rate)
+        return _ellipse(section)
     if isinstance(section, WaypointsSection):
         return Waypoints(section.times, section.points)
     return Still(section.position)
+
+
+def _ellipse(section: EllipseSection) -> Ellipse:
+    """Return the ellipse with its phase in the vectors, by the addition theorems."""
+    if section.phase == 0.0:
+        return Ellipse(section.centre, section.cosine, section.sine, section.rate)
+    cosine, sine = np.array(section.cosine), np.array(section.sine)
+    c, s = np.cos(section.phase), np.sin(section.phase)
+    turned = tuple((c * cosine + s * sine).tolist()), tuple((c * sine - s * cosine).tolist())
+    return Ellipse(section.centre, *turned, section.rate)

@@ -42,6 +42,11 @@ Duration = Annotated[float | None, typer.Option(
 Out = Annotated[Path | None, typer.Option(
     "--out", metavar="FOLDER", help="Output folder, new or empty. Default: a new folder in runs/.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
+Workers = Annotated[int | None, typer.Option(
+    "--workers", metavar="N", min=1,
+    help="Processes on this machine. Default: one per processor.")]
+Scheduler = Annotated[str | None, typer.Option(
+    "--scheduler", metavar="ADDRESS", help="Use the workers of this Dask scheduler instead.")]
 PORT = 8080
 Port = Annotated[int, typer.Option("--port", metavar="N", min=0, max=65535,
                                    help="Port of the page on 127.0.0.1; 0 for any free port.")]
@@ -167,17 +172,34 @@ def compare(scenarios: Annotated[list[str], typer.Argument(
                 autocompletion=completion.scenarios)],
             resolvers: Annotated[str | None, typer.Option(
                 "--resolvers", metavar="SPEC,SPEC,...", autocompletion=completion.resolvers,
-                help="Resolvers: name, or name:setting=value. Default: all suitable ones.")] = None,
+                help="Resolvers: name, or name:setting=value; own: that of each scenario. "
+                     "Default: all suitable ones.")] = None,
             changes: Changes = None, duration: Duration = None, out: Out = None,
+            starts: Annotated[int | None, typer.Option(
+                "--starts", metavar="N", min=2, help="Compare over N starts sampled from each "
+                "scenario's [variation]; needs the extra `sweep`.")] = None,
+            seed: Annotated[int, typer.Option(
+                "--seed", metavar="S", min=0, help="With --starts: seed of the samples.")] = 0,
+            workers: Workers = None, scheduler: Scheduler = None,
             as_json: AsJson = False) -> int:
-    """Run scenarios under several resolvers and report."""
+    """Run scenarios under several resolvers and report.
+
+    With --starts every resolver gets the same sampled starts, and the report gives statistics. An
+    interrupted comparison over starts is continued by the same command.
+    """
+    if starts is None and (seed or workers or scheduler):
+        raise typer.BadParameter("needs --starts", param_hint="--seed, --workers, --scheduler")
+    chosen = [_load(name, changes, duration) for name in scenarios]
+    specs = None if resolvers is None else _split(resolvers)
+    if starts is not None:
+        from scenarios.cli.sweep import starts_command
+
+        return starts_command(chosen, specs, starts, seed, out, workers, scheduler, as_json)
     from scenarios.cli.progress import bar
     from scenarios.config.resolvers import default_resolvers
     from scenarios.files import next_free
     from scenarios.report.comparing import compare as run_all
 
-    chosen = [_load(name, changes, duration) for name in scenarios]
-    specs = None if resolvers is None else _split(resolvers)
     missing: dict[str, str] = {}
     for scenario in chosen if specs is None else ():
         missing |= default_resolvers(scenario.asks)[1]
@@ -204,13 +226,7 @@ def sweep(file: Annotated[str, typer.Argument(help="Name of a sweep, or a sweep 
           out: Annotated[Path | None, typer.Option(
               "--out", metavar="FOLDER",
               help="Output folder, new or to be continued. Default: runs/sweep-NAME.")] = None,
-          workers: Annotated[int | None, typer.Option(
-              "--workers", metavar="N", min=1,
-              help="Processes on this machine. Default: one per processor.")] = None,
-          scheduler: Annotated[str | None, typer.Option(
-              "--scheduler", metavar="ADDRESS",
-              help="Use the workers of this Dask scheduler instead.")] = None,
-          as_json: AsJson = False) -> int:
+          workers: Workers = None, scheduler: Scheduler = None, as_json: AsJson = False) -> int:
     """Run scenarios with sampled parameters.
 
     An interrupted sweep is continued by the same command.

@@ -54,11 +54,12 @@ def _finite(data: Any) -> Any:
 
 
 def print_table(runs: list[Run]) -> None:
-    """Print the metrics of runs side by side, and where strict resolvers diverge."""
+    """Print the metrics of runs side by side, where strict resolvers diverge, and the verdict."""
     from rich.console import Console
 
     from scenarios.measure.partings import partings
     from scenarios.measure.runs import table
+    from scenarios.measure.verdict import verdict
 
     console = Console(markup=False, highlight=False)
     titles = dict.fromkeys(one.scenario.title or one.scenario.name for one in runs)
@@ -69,8 +70,7 @@ def print_table(runs: list[Run]) -> None:
         print()
         console.print(_table(runs, rows, range(first, min(first + beside, len(runs)))))
     said = [str(one) for one in partings(runs)]
-    if said:
-        console.print("", *said, sep="\n")
+    console.print("", *said, *verdict(runs).lines, sep="\n")
 
 
 def _table(runs: list[Run], rows: list[Row], chosen: range) -> Table:

@@ -15,7 +15,7 @@ from scenarios.config.sections import (
     Vector3,
     WaypointsSection,
 )
-from scenarios.config.variation import moved
+from scenarios.config.waypoints import moved
 
 
 class RepulsionSection(Section):

@@ -26,9 +26,9 @@ def load(name_or_path: str | Path, changes: Sequence[str] | Mapping[str, Any] = 
     """Read a shipped scenario by name, or a scenario file by path, and apply changes to it.
 
     A file with `extends = "ellipse"` (a shipped name or a relative path) contains only the
-    differences. `changes` are "dotted.key=value" texts with TOML values, or a mapping of dotted
-    keys. Raises ScenarioError, naming the file and the key, and UnknownNameError for an unknown
-    name.
+    differences; a `[variation]` replaces the other one. `changes` are "dotted.key=value" texts with
+    TOML values, or a mapping of dotted keys. Raises ScenarioError, naming the file and the key, and
+    UnknownNameError for an unknown name.
     """
     path = Path(name_or_path)
     if path.suffix != ".toml":
@@ -65,7 +65,10 @@ def _read_extended(path: Path, below: tuple[Path, ...] = ()) -> dict[str, Any]:
         raise ScenarioError(f"{path}: extends: {base!r} extends this file in turn")
     if source.suffix != ".toml":
         raise ScenarioError(f"{path}: extends: {UnknownNameError('scenario', base, shipped())}")
-    return _laid_over(_read_extended(source, (*below, path.resolve())), data)
+    extended = _read_extended(source, (*below, path.resolve()))
+    if "variation" in data:  # its keys belong together
+        extended.pop("variation", None)
+    return _laid_over(extended, data)
 
 
 def _laid_over(below: dict[str, Any], above: dict[str, Any]) -> dict[str, Any]:

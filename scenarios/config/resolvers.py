@@ -1,9 +1,19 @@
-"""The resolvers of a comparison by default."""
+"""The resolvers of a comparison: which by default, and which can resolve a scenario."""
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from hierarchy.errors import HierarchyError
 from solvers.qp import backends
 from solvers.resolver import Handles
+
+if TYPE_CHECKING:
+    from scenarios.config.scenario import Scenario
+
+OWN = "own"  # in place of a spec: the resolver that a scenario names itself
 
 # The methods that the letter compares, and ours; for inequalities all resolvers that accept them.
 DEFAULT_RESOLVERS: dict[Handles, tuple[str, ...]] = {
@@ -19,3 +29,35 @@ def default_resolvers(asked: Handles = "equalities") -> tuple[tuple[str, ...], d
     missing = {spec: "pip install 'task-hierarchy[qp]'" for spec, backend in wanted.items()
                if backend in backends.BACKENDS and not backends.installed(backend)}
     return tuple(spec for spec in wanted if spec not in missing), missing
+
+
+def under(scenario: Scenario, spec: str) -> Scenario:
+    """Return the scenario under the resolver of a spec; OWN leaves it as it is."""
+    return scenario if spec == OWN else scenario.with_resolver(spec)
+
+
+def usable(scenario: Scenario, specs: Sequence[str] | None
+           ) -> tuple[dict[str, Scenario], list[str]]:
+    """Return the scenario under each spec that can resolve it, and why others cannot.
+
+    `specs` None stands for the installed ones of DEFAULT_RESOLVERS.
+    """
+    wanted = default_resolvers(scenario.asks)[0] if specs is None else specs
+    can, refused = {}, []
+    for spec in dict.fromkeys(wanted):
+        changed = under(scenario, spec)
+        resolver, asked = changed.make_resolver(), changed.asks
+        if resolver.can_resolve(asked):
+            can[spec] = changed
+        else:
+            refused.append(f"{spec} is not run on {scenario.name}, which asks for {asked}: it "
+                           f"resolves {resolver.handles}")
+    return can, refused
+
+
+def check_names(scenarios: Sequence[Scenario], what: str = "") -> None:
+    """Raise HierarchyError, with `what` in front, if two scenarios have the same name."""
+    for name, count in Counter(scenario.name for scenario in scenarios).items():
+        if count > 1:
+            raise HierarchyError(f"{what}{count} scenarios are named {name!r}; give each its own "
+                                 "name")

@@ -14,6 +14,7 @@ from pydantic import Field, model_validator
 from scenarios.config.avoidance import AvoidanceKind
 from scenarios.config.changes import change, parse_changes, without_none
 from scenarios.config.control import ControlSection
+from scenarios.config.distributions import Parameters
 from scenarios.config.faults import FaultSection
 from scenarios.config.plant import PlantSection
 from scenarios.config.robot import RobotSection, StartSection
@@ -40,7 +41,8 @@ class Scenario(Section):
 
     Absent sections add no task. `tasks` are further tasks in order of priority, below limits,
     avoidance, position and pointing. `damping` and `posture` are both the null-space term of
-    eq. (14), so only one of them may be given.
+    eq. (14), so only one of them may be given. `variation` has the distributions of dotted keys
+    from which `hierarchy compare --starts` samples; a single run ignores it.
     """
 
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$")]
@@ -59,6 +61,7 @@ class Scenario(Section):
     posture: PostureSection | None = None
     tasks: tuple[ListedTask, ...] = ()
     faults: tuple[FaultSection, ...] = ()
+    variation: Parameters = Field(default_factory=dict)
 
     @model_validator(mode="after")
     def _asks_for_something(self) -> Self:

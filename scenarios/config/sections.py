@@ -28,13 +28,14 @@ class StillSection(Section):
 
 
 class EllipseSection(Section):
-    """p(t) = centre + cosine cos(rate t) + sine sin(rate t), [m] and [rad/s]."""
+    """p(t) = centre + cosine cos(s) + sine sin(s) [m] with s = rate t + phase [rad]."""
 
     kind: Literal["ellipse"]
     centre: Vector3
     cosine: Vector3
     sine: Vector3
     rate: Finite = 1.0
+    phase: Finite = 0.0
 
 
 class WaypointsSection(Section):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import shlex
 from dataclasses import dataclass
 from typing import Any
 
@@ -31,6 +32,13 @@ class Comparison:
         """The runs that did not reach their end."""
         return [run for run in self.runs if run.fault]
 
+    def sampled(self, starts: int) -> str:
+        """Return the command that compares the same from so many sampled starts."""
+        names = dict.fromkeys(run.scenario.name for run in self.runs)
+        specs = ",".join(dict.fromkeys(run.spec for run in self.runs))
+        return shlex.join(["hierarchy", "compare", *names, "--resolvers", specs,
+                           "--starts", str(starts)])
+
     def groups(self) -> dict[str, list[Run]]:
         """Return the runs that stand side by side, with the name of each group.
 
@@ -45,7 +53,8 @@ class Comparison:
     def as_plain_data(self) -> dict[str, Any]:
         """Return what `comparison.json` holds."""
         return {"command": self.command, "versions": self.versions,
-                "verdicts": {name: verdict(runs) for name, runs in self.groups().items()},
+                "verdicts": {name: list(verdict(runs).lines)
+                             for name, runs in self.groups().items()},
                 "runs": [_plain(run) for run in self.runs], "refused": list(self.refused),
                 "partings": {name: [_plain_parting(one) for one in partings(runs)]
                              for name, runs in self.groups().items()}}

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import shlex
-from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from pathlib import Path
@@ -12,7 +11,7 @@ from pathlib import Path
 from hierarchy.errors import HierarchyError
 from scenarios.cell.build import build
 from scenarios.config import Scenario, load
-from scenarios.config.resolvers import default_resolvers
+from scenarios.config.resolvers import check_names, usable
 from scenarios.draw.run_folder import save
 from scenarios.files import claim, write_json, write_text
 from scenarios.loop.recording import versions
@@ -69,21 +68,13 @@ def _plan(scenarios: Iterable[str | Scenario],
           resolvers: Sequence[str] | None) -> tuple[list[Run], list[str]]:
     """Return the planned runs, and why others are not possible."""
     loaded = [load(s) if isinstance(s, (str, Path)) else s for s in scenarios]
-    for name, count in Counter(scenario.name for scenario in loaded).items():
-        if count > 1:
-            raise HierarchyError(f"{count} scenarios are named {name!r}; give each its own name")
+    check_names(loaded)
     runs, refused = [], []
     for scenario in loaded:
         build(scenario)
-        usual = default_resolvers(scenario.asks)[0] if resolvers is None else resolvers
-        for spec in dict.fromkeys(usual):
-            changed = scenario.with_resolver(spec)
-            resolver, asked = changed.make_resolver(), changed.asks
-            if resolver.can_resolve(asked):
-                runs.append(Run(changed, spec, str(resolver.label)))
-            else:
-                refused.append(f"{spec} is not run on {scenario.name}, which asks for {asked}: it "
-                               f"resolves {resolver.handles}")
+        can, cannot = usable(scenario, resolvers)
+        runs += [Run(one, spec, str(one.make_resolver().label)) for spec, one in can.items()]
+        refused += cannot
     if not runs:
         raise HierarchyError("; ".join(refused) or "no resolver was given")
     return [_distinct(run, runs) for run in runs], refused

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from scenarios.measure.comparison import Comparison
     from scenarios.measure.runs import Run
 
+_STARTS = 16  # starts to sample before a difference is believed
 _REPLAY_BYTES, _REPLAYS_BYTES = 3_000_000, 8_000_000  # of one replay, and of all on a page
 
 
@@ -34,7 +35,8 @@ def comparison_page(comparison: Comparison) -> str:
     return str(render("report/page.html", title=f"{', '.join(groups)}: a comparison",
                       style=resource("report/style.css"), script=resource("report/page.js"),
                       contents=contents, count=in_words(len(groups)).capitalize(),
-                      groups=sections, refused=comparison.refused, command=comparison.command,
+                      sampled=comparison.sampled(_STARTS), groups=sections,
+                      refused=comparison.refused, command=comparison.command,
                       versions=comparison.versions))
 
 

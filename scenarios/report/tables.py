@@ -31,9 +31,11 @@ def numbers(runs: Sequence[Run], looks: Mapping[str, Look]) -> Markup:
     from scenarios.measure.runs import table
 
     rows = table(runs, details=False)
-    rest = [row for row in rows if not _is_first(row.name)]
-    return render("report/numbers.html", heads=[(run.label, _stopped(run)) for run in runs],
-                  looks=looks, first=_grouped([row for row in rows if _is_first(row.name)], runs),
+    first, rest = ([row for row in rows if _is_first(row.name) == is_first]
+                   for is_first in (True, False))
+    heads = [(run.label, _stopped(run), not _strict(run)) for run in runs]
+    return render("report/numbers.html", heads=heads, looks=looks,
+                  first=_grouped(first, runs),
                   rest=_grouped(rest, runs), count=len(rest),
                   said=_marks(runs)) if rows else Markup()
 
@@ -69,6 +71,10 @@ def _grouped(rows: Sequence[Row], runs: Sequence[Run]
 def _cells(row: Row, out: Sequence[bool]) -> list[Cell]:
     return [("best" if i in row.best else "out" if out[i] else "", note, cell)
             for i, (cell, note) in enumerate(zip(row.cells, row.notes, strict=True))]
+
+
+def _strict(run: Run) -> bool:
+    return run.recording is None or run.recording.facts.resolver.strict
 
 
 def _stopped(run: Run) -> str:

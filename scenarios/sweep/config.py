@@ -3,176 +3,41 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any, Self
+from typing import Annotated, Any
 
-import numpy as np
-from pydantic import (
-    BaseModel,
-    BeforeValidator,
-    ConfigDict,
-    Discriminator,
-    Field,
-    Tag,
-    ValidationError,
-    model_validator,
-)
+from pydantic import Field, ValidationError
 
 from hierarchy.errors import HierarchyError, UnknownNameError
+from scenarios.config.distributions import Parameters
+from scenarios.config.sections import Section
 from scenarios.files import read_toml
 
 LIBRARY = Path(__file__).parents[1] / "library" / "sweeps"
-
-Finite = Annotated[float, Field(allow_inf_nan=False)]
-NotNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
-Value = bool | int | float | str | list[Any]
 
 
 class SweepError(HierarchyError):
     """An invalid sweep file; the message names the file and the key."""
 
 
-class _Section(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=False)
-
-
-class Uniform(_Section):
-    """A number from a uniform distribution."""
-
-    uniform: tuple[Finite, Finite]
-
-    @model_validator(mode="after")
-    def _in_order(self) -> Self:
-        if self.uniform[0] > self.uniform[1]:
-            raise ValueError(f"{self.uniform[0]:g} is above {self.uniform[1]:g}")
-        return self
-
-    def draw(self, chance: np.random.Generator, own: Value | None) -> Value:
-        """Return a number within the bounds."""
-        return float(chance.uniform(*self.uniform))
-
-    def __str__(self) -> str:
-        return f"uniform from {self.uniform[0]:g} to {self.uniform[1]:g}"
-
-
-class Normal(_Section):
-    """A number from a normal distribution, given by mean and standard deviation."""
-
-    normal: tuple[Finite, NotNegative]
-
-    def draw(self, chance: np.random.Generator, own: Value | None) -> Value:
-        """Return a number; it is not bounded."""
-        return float(chance.normal(*self.normal))
-
-    def __str__(self) -> str:
-        return f"normal, mean {self.normal[0]:g}, standard deviation {self.normal[1]:g}"
-
-
-class Choice(_Section):
-    """One of several values of any type, each equally likely."""
-
-    choice: Annotated[tuple[Any, ...], Field(min_length=1)]
-
-    def draw(self, chance: np.random.Generator, own: Value | None) -> Value:
-        """Return one of the values."""
-        value: Value = self.choice[int(chance.integers(len(self.choice)))]
-        return value
-
-    def __str__(self) -> str:
-        return f"one of {', '.join(map(str, self.choice))}"
-
-
-class Around(_Section):
-    """The scenario's own value, a number or an array, plus a uniform offset in each entry.
-
-    `around` is the largest offset, one for all entries or one for each.
-    """
-
-    around: NotNegative | tuple[NotNegative, ...]
-
-    def draw(self, chance: np.random.Generator, own: Value | None) -> Value:
-        """Return the own value with offsets; raises ValueError if it is not numeric."""
-        try:
-            centre = np.array(own, dtype=float)
-            offset = np.broadcast_to(np.array(self.around), centre.shape)
-        except (TypeError, ValueError):
-            raise ValueError(f"around = {self.around} does not fit the scenario's own value "
-                             f"{own!r}") from None
-        if not np.isfinite(centre).all():
-            raise ValueError(f"the scenario's own value is {own!r}, not a number")
-        value: Value = (centre + chance.uniform(-offset, offset)).tolist()
-        return value
-
-    def __str__(self) -> str:
-        width = f"{self.around:g}" if isinstance(self.around, float) else str(list(self.around))
-        return f"the scenario's own ± {width}, uniform"
-
-
-class Integers(_Section):
-    """An integer from the first to the last, both included; for seeds."""
-
-    integers: tuple[int, int]
-
-    @model_validator(mode="after")
-    def _in_order(self) -> Self:
-        if self.integers[0] > self.integers[1]:
-            raise ValueError(f"{self.integers[0]} is above {self.integers[1]}")
-        return self
-
-    def draw(self, chance: np.random.Generator, own: Value | None) -> Value:
-        """Return an integer of the range."""
-        return int(chance.integers(self.integers[0], self.integers[1], endpoint=True))
-
-    def __str__(self) -> str:
-        return f"integers from {self.integers[0]} to {self.integers[1]}"
-
-
-_KINDS = ("uniform", "normal", "choice", "around", "integers")
-
-
-def _kind(table: Any) -> str | None:
-    if isinstance(table, dict):
-        return next((kind for kind in _KINDS if kind in table), None)
-    return type(table).__name__.lower()
-
-
-Distribution = Annotated[
-    Annotated[Uniform, Tag("uniform")] | Annotated[Normal, Tag("normal")]
-    | Annotated[Choice, Tag("choice")] | Annotated[Around, Tag("around")]
-    | Annotated[Integers, Tag("integers")],
-    Discriminator(_kind, custom_error_type="distribution",
-                  custom_error_message=f"expected a table with one of {', '.join(_KINDS)}")]
-
-
-def _flat(table: Any, above: str = "") -> Any:
-    """Flatten nested tables, which TOML makes of dotted keys, to one level."""
-    if not isinstance(table, dict):
-        return table
-    flat: dict[str, Any] = {}
-    for key, value in table.items():
-        if isinstance(value, dict) and value and _kind(value) is None:
-            flat |= _flat(value, f"{above}{key}.")
-        else:
-            flat[f"{above}{key}"] = value
-    return flat
-
-
-class Sweep(_Section):
+class Sweep(Section):
     """Every scenario under every resolver, with each of `samples` draws of the parameters.
 
     `parameters` are dotted keys of a scenario, with numbers as list indices. A drawn value depends
     only on `seed`, the sample's number and the key: adding samples, scenarios, resolvers or
     parameters does not change existing samples. `duration` [s] overrides that of the scenarios.
+    With `variation` the scenarios' own `[variation]` is drawn too. Without resolvers each scenario
+    has those that `hierarchy compare` takes by default.
     """
 
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$")]
     title: str = ""
     scenarios: Annotated[tuple[str, ...], Field(min_length=1)]
-    resolvers: Annotated[tuple[str, ...], Field(min_length=1)]
+    resolvers: tuple[str, ...] = ()
     duration: Annotated[float, Field(gt=0.0, allow_inf_nan=False)] | None = None
     samples: Annotated[int, Field(ge=1)]
     seed: Annotated[int, Field(ge=0)] = 0
-    parameters: Annotated[dict[str, Distribution], BeforeValidator(_flat)] = Field(
-        default_factory=dict)
+    variation: bool = False
+    parameters: Parameters = Field(default_factory=dict)
 
 
 def shipped_sweeps() -> tuple[str, ...]:

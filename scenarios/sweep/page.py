@@ -12,16 +12,17 @@ from typing import NamedTuple
 import numpy as np
 from markupsafe import Markup
 
-from scenarios.config import Scenario
+from scenarios.config.distributions import Distribution
 from scenarios.draw.figures.palette import Look, looks
 from scenarios.files import slug
 from scenarios.measure.metrics import Metric
+from scenarios.measure.verdict import Verdict
 from scenarios.report.templates import drawn, render, resource
 from scenarios.sweep import figures
 from scenarios.sweep.planning import Plan, Planned
-from scenarios.sweep.results import Failure, Results, Worst, summary
-from scenarios.sweep.success import success
-from scenarios.words import listed
+from scenarios.sweep.results import Failure, Results, Worst, compared, summary
+from scenarios.sweep.verdict import verdict
+from scenarios.words import in_words, listed
 
 _FAILURES = 20  # reasons listed
 
@@ -34,23 +35,33 @@ class Again(NamedTuple):
     command: str
 
 
-class Shown(NamedTuple):
-    """The content of the page for one scenario."""
+class Cell(NamedTuple):
+    """Median and quartiles of a column, how it compares with the first one, whether it is best."""
 
-    scenario: Scenario
-    verdict: str
+    text: str
+    compared: str
+    best: bool
+
+
+class Shown(NamedTuple):
+    """The content of the page for one group of runs."""
+
+    name: str
+    title: str
+    about: str
+    verdict: Verdict
     shares: Markup
     failures: list[tuple[Failure, Again]]
     more_failures: int
     spreads: list[tuple[Metric, str, Markup]]          # metric, unit and direction, figure
     worst: list[tuple[Planned, list[str], Again]]
-    numbers: list[tuple[str, list[tuple[str, list[str]]]]]  # groups of rows: label, cells
+    numbers: list[tuple[str, list[tuple[str, list[Cell]]]]]  # groups of rows: label, cells
     looks: dict[str, Look]
 
 
 @dataclass(frozen=True)
 class Page:
-    """The content of a page; `file` is the text of the sweep file, `folder` as the user gave it."""
+    """The content of a page; `file` is the text of the sweep file, if there is one."""
 
     plan: Plan
     found: Mapping[str, Results]
@@ -62,7 +73,8 @@ class Page:
     def html(self) -> str:
         """Return the page; it refers only to files beside it."""
         return str(render(
-            "sweep/page.html", sweep=self.plan.sweep, refused=self.plan.refused,
+            "sweep/page.html", sweep=self.plan.sweep, variations=self._variations(),
+            refused=self.plan.refused, made_by="sweep" if self.file else "compare --starts",
             style=resource("report/style.css"), counted=self._counted(),
             scenarios=[self._shown(name, one) for name, one in self.found.items()],
             command=self.command, file=self.file, versions=self.versions))
@@ -73,6 +85,14 @@ class Page:
                 for run in (*(worst.run for worst in results.worst()),
                             *(failure.run for failure in results.failures()[:_FAILURES]))}
         return list(runs.values())
+
+    def _variations(self) -> dict[str, dict[str, Distribution]]:
+        """Return what is sampled by scenario; "" where all share it."""
+        sweep = self.plan.sweep
+        each = {one.name: (one.variation if sweep.variation else {}) | sweep.parameters
+                for one in self.plan.scenarios}
+        first, *others = each.values()
+        return {"": first} if all(one == first for one in others) else each
 
     def _counted(self) -> str:
         """Return the numbers of runs and samples, and the resolvers."""
@@ -85,12 +105,19 @@ class Page:
     def _shown(self, name: str, results: Results) -> Shown:
         failures = results.failures()
         return Shown(
-            scenario=next(one for one in self.plan.scenarios if one.name == name),
-            verdict=success(results),
+            name, *self._about(name), verdict=verdict(results),
             shares=drawn(figures.shares(results), f"{results.runs[0].scenario}: shares of runs"),
             failures=[(one, self._again(one.run)) for one in failures[:_FAILURES]],
             more_failures=max(0, len(failures) - _FAILURES), spreads=_spreads(name, results),
             worst=self._worst(results), numbers=_numbers(results), looks=looks(results.labels))
+
+    def _about(self, name: str) -> tuple[str, str]:
+        """Return the title and the description of a group."""
+        one = next((one for one in self.plan.scenarios if one.name == name), None)
+        if one is not None:
+            return one.title, one.description
+        each = "; ".join(f"{one.name}: {one.title}" for one in self.plan.scenarios)
+        return f"{in_words(len(self.plan.scenarios))} scenarios side by side", f"{each}."
 
     def _worst(self, results: Results) -> list[tuple[Planned, list[str], Again]]:
         """Return each run that is worst in some metrics, with those metrics as text."""
@@ -118,11 +145,16 @@ def _spreads(name: str, results: Results) -> list[tuple[Metric, str, Markup]]:
             if np.nanmin(results.values[metric.name]) < np.nanmax(results.values[metric.name])]
 
 
-def _numbers(results: Results) -> list[tuple[str, list[tuple[str, list[str]]]]]:
-    """Return median and worst of each metric under each resolver, by group."""
-    return [(group, [(_with_unit(metric), [summary(results, metric, label)
-                                           for label in results.labels]) for metric in metrics])
+def _numbers(results: Results) -> list[tuple[str, list[tuple[str, list[Cell]]]]]:
+    """Return the spread of each metric under each resolver, by group."""
+    return [(group, [(_with_unit(metric), _cells(results, metric)) for metric in metrics])
             for group, metrics in groupby(results.shown(), key=lambda metric: metric.group)]
+
+
+def _cells(results: Results, metric: Metric) -> list[Cell]:
+    best = results.best(metric)
+    return [Cell(summary(results, metric, label), compared(results, metric, label), label in best)
+            for label in results.labels]
 
 
 def _with_unit(metric: Metric) -> str:

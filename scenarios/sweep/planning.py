@@ -3,21 +3,27 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from hierarchy.errors import HierarchyError
 from scenarios.config import Scenario, load
-from scenarios.sweep.config import Sweep, SweepError, Value
+from scenarios.config.distributions import Value
+from scenarios.config.resolvers import check_names, usable
+from scenarios.config.sampling import changed, drawn
+from scenarios.sweep.config import Sweep, SweepError
 from scenarios.sweep.run import Job, digest, key_of
-from scenarios.sweep.sampling import changed, drawn
 
 
 @dataclass(frozen=True)
 class Planned:
-    """A run of a sweep: scenario, resolver, sample and sampled values."""
+    """A run of a sweep: scenario, resolver, sample and sampled values.
+
+    `group` are the runs it stands beside, `label` its column there.
+    """
 
     scenario: str
+    group: str
     label: str
     sample: int
     values: dict[str, Value]
@@ -38,59 +44,71 @@ class Plan:
     refused: tuple[str, ...]
 
 
-def plan(sweep: Sweep) -> Plan:
+def plan(sweep: Sweep, scenarios: Sequence[Scenario] | None = None) -> Plan:
     """Return the runs of a sweep, sample by sample.
+
+    scenarios : in place of those that the sweep names.
 
     Raises
     ------
     HierarchyError : an unknown scenario, resolver or setting, a scenario that does not fit its
         robot, a parameter that a scenario does not have, an invalid sampled value.
     """
-    scenarios = _loaded(sweep)
-    labels, refused = _resolvers(scenarios, sweep.resolvers)
+    asked = _checked(sweep, _loaded(sweep) if scenarios is None else scenarios)
+    labels, refused = _resolvers(asked, sweep.resolvers)
+    specs = {spec for named in labels.values() for spec in named}
+    one = next(iter(specs)) if len(specs) == 1 and len(asked) > 1 else None
     versions = digest()
     runs: dict[str, Planned] = {}
     for index in range(sweep.samples):
-        for scenario in scenarios:
-            values = drawn(sweep, index, scenario)
+        for scenario in asked:
+            values = _drawn(sweep, index, scenario)
             what = f"sweep {sweep.name!r}: sample {index} of scenario {scenario.name!r}"
             text = changed(scenario, values, what).to_toml()
             for spec, label in labels[scenario.name].items():
                 key = key_of(text, spec, versions)
-                runs.setdefault(key, Planned(scenario.name, label, index, values,
-                                             Job(key, text, spec)))
-    return Plan(sweep, scenarios, tuple(runs.values()), refused)
+                runs.setdefault(key, Planned(
+                    scenario.name, one or scenario.name, scenario.name if one else label, index,
+                    values, Job(key, text, spec)))
+    return Plan(sweep, tuple(asked), tuple(runs.values()), refused)
+
+
+def _drawn(sweep: Sweep, index: int, scenario: Scenario) -> dict[str, Value]:
+    """Return the values of a sample: the scenario's own variation, overridden by the sweep's."""
+    own = drawn(scenario, scenario.variation, sweep.seed, index) if sweep.variation else {}
+    return own | drawn(scenario, sweep.parameters, sweep.seed, index,
+                       f"sweep {sweep.name!r}: parameters")
 
 
 def _loaded(sweep: Sweep) -> tuple[Scenario, ...]:
+    lasting = {} if sweep.duration is None else {"control.duration": sweep.duration}
+    return tuple(load(name, lasting) for name in sweep.scenarios)
+
+
+def _checked(sweep: Sweep, scenarios: Sequence[Scenario]) -> Sequence[Scenario]:
     from scenarios.cell.build import build
 
-    lasting = {} if sweep.duration is None else {"control.duration": sweep.duration}
-    scenarios = tuple(load(name, lasting) for name in sweep.scenarios)
-    for name, count in Counter(scenario.name for scenario in scenarios).items():
-        if count > 1:
-            raise SweepError(f"sweep {sweep.name!r}: scenarios: {count} are named {name!r}; give "
-                             "each its own name")
+    check_names(scenarios, f"sweep {sweep.name!r}: scenarios: ")
     for scenario in scenarios:
         build(scenario)
+        if sweep.variation and not scenario.variation:
+            raise SweepError(f"scenario {scenario.name!r} has no [variation] to sample from; add "
+                             "one, such as start.q = { around = 0.02 }")
     return scenarios
 
 
 def _resolvers(scenarios: Sequence[Scenario], specs: Sequence[str]
-               ) -> tuple[dict[str, dict[str, str]], tuple[str, ...]]:
+               ) -> tuple[Mapping[str, Mapping[str, str]], tuple[str, ...]]:
     """Return the labels of the usable specs by scenario, and why others are not usable."""
     labels: dict[str, dict[str, str]] = {}
-    refused = []
+    refused: list[str] = []
     for scenario in scenarios:
-        changed = {spec: scenario.with_resolver(spec) for spec in specs}
-        made = {spec: one.make_resolver() for spec, one in changed.items()}
-        can = {spec: str(one.label) for spec, one in made.items()
-               if one.can_resolve(changed[spec].asks)}
-        refused += [f"{spec} is not run on {scenario.name}, which asks for {changed[spec].asks}: "
-                    f"it resolves {one.handles}" for spec, one in made.items() if spec not in can]
-        shared = Counter(can.values())
+        can, cannot = usable(scenario, specs or None)
+        made = {spec: str(one.make_resolver().label) for spec, one in can.items()}
+        shared = Counter(made.values())
         labels[scenario.name] = {spec: spec if shared[label] > 1 else label
-                                 for spec, label in can.items()}
+                                 for spec, label in made.items()}
+        refused += cannot
     if not any(labels.values()):
         raise HierarchyError("; ".join(refused))
     return labels, tuple(refused)

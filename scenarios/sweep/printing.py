@@ -9,16 +9,17 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from scenarios.sweep.results import Results, summary
-from scenarios.sweep.success import success
+from scenarios.measure.metrics import Metric
+from scenarios.sweep.results import Results, compared, summary
+from scenarios.sweep.verdict import verdict
 
 _BESIDE = 3  # resolvers that fit into 80 columns
 
 
 def show(name: str, results: Results, console: Console | None = None) -> None:
-    """Print success rates and the median and worst value of each metric, by resolver."""
+    """Print the verdict, success rates, and the spread of each metric by resolver."""
     console = console or Console(markup=False, highlight=False)
-    console.print(f"\n{name}: {success(results)}")
+    console.print(f"\n{name}: {results.samples} samples, paired", *verdict(results).lines, sep="\n")
     beside = -(-len(results.labels) // -(-len(results.labels) // _BESIDE))
     for first in range(0, len(results.labels), beside):
         console.print()
@@ -27,7 +28,7 @@ def show(name: str, results: Results, console: Console | None = None) -> None:
 
 def _table(results: Results, labels: Sequence[str]) -> Table:
     laid_out = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False)
-    laid_out.add_column("median (worst)", overflow="fold")
+    laid_out.add_column("median [quartiles]", overflow="fold")
     for label in labels:
         laid_out.add_column(Text(re.sub(r"(?<=[^ :-])[ :-]", lambda m: m[0].strip() + "\n", label)),
                             justify="right", no_wrap=True)
@@ -36,6 +37,14 @@ def _table(results: Results, labels: Sequence[str]) -> Table:
                          *(str(results.share(criterion, label)) for label in labels))
     for metric in results.shown():
         unit = f" [{metric.shown_unit}]" if metric.shown_unit else ""
-        laid_out.add_row(Text(metric.label + unit),
-                         *(summary(results, metric, label) for label in labels))
+        best = results.best(metric)
+        laid_out.add_row(Text(metric.label + unit), *(
+            _cell(results, metric, label, label in best) for label in labels))
     return laid_out
+
+
+def _cell(results: Results, metric: Metric, label: str, best: bool) -> Text:
+    """Return the spread of a metric, a star if it is best, and how it compares with the first."""
+    text = Text(f"{summary(results, metric, label)}{'*' if best else ' '}", "bold" if best else "")
+    said = compared(results, metric, label)
+    return text.append(f"\n{said} ", "not bold dim") if said else text

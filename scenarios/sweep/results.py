@@ -13,7 +13,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from scenarios.measure import statistics
 from scenarios.measure.metrics import Metric
+from scenarios.measure.statistics import Paired, Spread, paired, wilson
 from scenarios.sweep.planning import Plan, Planned
 from scenarios.sweep.store import Store, metrics_of
 
@@ -64,7 +66,10 @@ class Failure:
 
 @dataclass(frozen=True)
 class Results:
-    """The runs of one scenario in the order of the plan; unknown values are NaN."""
+    """Runs that stand side by side, in the order of the plan; unknown values are NaN.
+
+    Those are the runs of one scenario under its resolvers, or, with one resolver, of all scenarios.
+    """
 
     runs: tuple[Planned, ...]
     reasons: tuple[str | None, ...]
@@ -85,6 +90,33 @@ class Results:
         """Return the known values of a metric under a resolver."""
         values = self.values[name][self._of[label]]
         return np.asarray(values[np.isfinite(values)])
+
+    @cached_property
+    def samples(self) -> int:
+        """Number of samples."""
+        return 1 + max(run.sample for run in self.runs)
+
+    def column(self, name: str, label: str) -> NDArray[np.float64]:
+        """Return a metric under a resolver by sample, (samples,)."""
+        found = np.full(self.samples, np.nan)
+        for i in np.flatnonzero(self._of[label]):
+            found[self.runs[i].sample] = self.values[name][i]
+        return found
+
+    def spread(self, name: str, label: str) -> Spread | None:
+        """Return the spread of a metric under a resolver; None if it has no value."""
+        return statistics.spread(self.column(name, label))
+
+    def paired(self, name: str, label: str, first: str | None = None) -> Paired:
+        """Return the paired differences of a metric from a column, by default the first."""
+        return paired(self.column(name, first or self.labels[0]), self.column(name, label))
+
+    def best(self, metric: Metric) -> tuple[str, ...]:
+        """Return the labels that are better than all others; empty where a test cannot tell."""
+        if metric.lower_is_better is None:
+            return ()
+        return statistics.best({label: self.column(metric.name, label) for label in self.labels},
+                               metric.lower_is_better)
 
     def share(self, criterion: Criterion, label: str) -> Share:
         """Return the share of a resolver's runs that meet a criterion."""
@@ -142,28 +174,24 @@ class Results:
         return sorted(found.values(), key=lambda one: -one.count)
 
 
-def wilson(met: int, of: int) -> tuple[float, float]:
-    """Return the 95 % interval of a share after Wilson (1927); 0 to 1 where nothing is known."""
-    from scipy.stats import binomtest
-
-    if of == 0:
-        return 0.0, 1.0
-    low, high = binomtest(met, of).proportion_ci(confidence_level=0.95, method="wilson")
-    return float(low), float(high)
-
-
 def valued(metric: Metric, value: float) -> Metric:
     """Return a metric with a value, None for NaN."""
     return dataclasses.replace(metric, value=float(value) if math.isfinite(value) else None)
 
 
 def summary(results: Results, metric: Metric, label: str) -> str:
-    """Return "median (worst)" of a metric; the largest value if it has no direction."""
-    values = results.of(metric.name, label)
-    if not values.size:
+    """Return "median [lower quartile, upper quartile]" of a metric under a resolver."""
+    found = results.spread(metric.name, label)
+    if found is None:
         return "–"
-    worst = values.min() if metric.lower_is_better is False else values.max()
-    return f"{valued(metric, np.median(values)).shown()} ({valued(metric, worst).shown()})"
+    median, low, high = (valued(metric, value).shown()
+                         for value in (found.median, found.lower, found.upper))
+    return median if low == high else f"{median} [{low}, {high}]"
+
+
+def compared(results: Results, metric: Metric, label: str) -> str:
+    """Return how a metric under a resolver compares with the first column; "" for that one."""
+    return "" if label == results.labels[0] else str(results.paired(metric.name, label))
 
 
 def joined(plan: Plan, store: Store) -> Any:
@@ -179,8 +207,8 @@ def joined(plan: Plan, store: Store) -> Any:
     asked = {"scenario": [run.scenario for run in plan.runs],
              "resolver": [run.job.resolver for run in plan.runs],
              "sample": [run.sample for run in plan.runs]}
-    for key in plan.sweep.parameters:
-        asked[key] = _of_one_type([run.values[key] for run in plan.runs])
+    for key in dict.fromkeys(key for run in plan.runs for key in run.values):
+        asked[key] = _of_one_type([run.values.get(key) for run in plan.runs])
     table = pa.table(asked)
     for field in kept.schema:
         table = table.append_column(field, kept[field.name])
@@ -188,11 +216,15 @@ def joined(plan: Plan, store: Store) -> Any:
 
 
 def results(plan: Plan, table: Any) -> dict[str, Results]:
-    """Return the results of each scenario from the table that `joined` returns."""
+    """Return the results of each group of runs from the table that `joined` returns.
+
+    A group is a scenario; with one resolver and several scenarios there is one group, named after
+    the resolver, whose columns are the scenarios.
+    """
     metrics = metrics_of(table)
     columns = {name: _floats(table[name]) for name in metrics}
     faults, errors = table["fault"].to_pylist(), table["error"].to_pylist()
-    names = np.array([run.scenario for run in plan.runs])
+    names = np.array([run.group for run in plan.runs])
     found = {}
     for name in dict.fromkeys(names.tolist()):
         chosen = np.flatnonzero(names == name)
@@ -210,5 +242,5 @@ def _floats(column: Any) -> NDArray[np.float64]:
 
 def _of_one_type(values: Sequence[Any]) -> list[Any]:
     """Return values of one type for a column: unchanged, or as text if types differ."""
-    same = len({type(value) for value in values}) == 1
-    return list(values) if same else [str(value) for value in values]
+    same = len({type(value) for value in values if value is not None}) == 1
+    return list(values) if same else [None if value is None else str(value) for value in values]

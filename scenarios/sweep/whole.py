@@ -4,18 +4,22 @@ from __future__ import annotations
 
 import json
 import shlex
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
-from scenarios.config import Scenario
+from scenarios.config import Scenario, load
+from scenarios.config.resolvers import under
 from scenarios.loop.recording import versions
-from scenarios.sweep.config import find, load_sweep
+from scenarios.sweep.config import Sweep, find, load_sweep
+from scenarios.sweep.data import as_plain_data
 from scenarios.sweep.engine import carry_out, connected
 from scenarios.sweep.page import Page, name_of
 from scenarios.sweep.planning import Plan, Planned, plan
 from scenarios.sweep.results import Results, joined, results
 from scenarios.sweep.store import Store, write_table, write_text
+from scenarios.words import listed
 
 Progress = Callable[[str, int, int], None]
 
@@ -40,8 +44,9 @@ def sweep(name_or_path: str | Path, out: str | Path, workers: int | None = None,
     """Make the runs of a sweep that `out` does not have yet, and write the results of all.
 
     `out` holds `parts/` (the runs, written as they finish), `runs.parquet` (all runs with their
-    sampled values), `index.html`, and the scenarios of worst and failed runs in `worst/`. After an
-    interruption, the same call continues. A failed run is a row with its reason.
+    sampled values), `results.json` (the statistics), `index.html`, and the scenarios of worst and
+    failed runs in `worst/`. After an interruption, the same call continues. A failed run is a row
+    with its reason.
 
     Parameters
     ----------
@@ -56,8 +61,56 @@ def sweep(name_or_path: str | Path, out: str | Path, workers: int | None = None,
     FullError : a file cannot be written, such as on a full disk.
     EngineError : the scheduler is lost, or a worker has another version of the code.
     """
-    planned = plan(load_sweep(name_or_path))
-    store = Store(Path(out))
+    text = find(name_or_path).read_text(encoding="utf-8")
+    said = command or shlex.join(["hierarchy", "sweep", str(name_or_path), "--out", str(out)])
+    return _made(plan(load_sweep(name_or_path)), Store(Path(out)), Source(said, text),
+                 Workers(workers, scheduler), progress)
+
+
+def compare_starts(scenarios: Sequence[str | Scenario], resolvers: Sequence[str] | None,
+                   starts: int, seed: int, out: str | Path, *, workers: int | None = None,
+                   scheduler: str | None = None, progress: Progress | None = None,
+                   command: str | None = None) -> Finished:
+    """Run every scenario under every resolver from the same sampled starts, and compare.
+
+    The samples are drawn from each scenario's `[variation]`; the rest is as for `sweep`.
+
+    Parameters
+    ----------
+    resolvers : specs as for `compare`; by default those that a comparison takes.
+    starts, seed : number of samples, and the seed from which they are drawn.
+    """
+    chosen = [load(one) if isinstance(one, str) else one for one in scenarios]
+    asked = Sweep(name="-".join(one.name for one in chosen)[:80], samples=starts, seed=seed,
+                  scenarios=tuple(one.name for one in chosen), resolvers=tuple(resolvers or ()),
+                  title=f"{listed([one.name for one in chosen])} from {starts} sampled starts",
+                  variation=True)
+    said = command or shlex.join(
+        ["hierarchy", "compare", *asked.scenarios, "--resolvers", ",".join(asked.resolvers),
+         "--starts", str(starts), "--seed", str(seed), "--out", str(out)])
+    return _made(plan(asked, chosen), Store(Path(out)), Source(said), Workers(workers, scheduler),
+                 progress)
+
+
+@dataclass(frozen=True)
+class Source:
+    """Where a sweep comes from: the command, and the text of its file, if there is one."""
+
+    command: str
+    file: str = ""
+
+
+@dataclass(frozen=True)
+class Workers:
+    """Number of processes on this machine, or the address of a Dask scheduler."""
+
+    processes: int | None = None
+    scheduler: str | None = None
+
+
+def _made(planned: Plan, store: Store, source: Source, workers: Workers,
+          progress: Progress | None) -> Finished:
+    """Make the runs of a plan that the store does not have, and write the results of all."""
     with store.opened():
         kept = store.keys()
         missing = [run.job for run in planned.runs if run.job.key not in kept]
@@ -70,21 +123,21 @@ def sweep(name_or_path: str | Path, out: str | Path, workers: int | None = None,
                 progress(planned.sweep.name, done, len(planned.runs))
 
         if missing:
-            with connected(workers, scheduler) as client:
+            with connected(workers.processes, workers.scheduler) as client:
                 told()
                 carry_out(missing, client, store.add, told)
-        text = find(name_or_path).read_text(encoding="utf-8")
-        said = command or shlex.join(["hierarchy", "sweep", str(name_or_path), "--out", str(out)])
-        return Finished(planned, _written(planned, store, text, said), len(missing))
+        return Finished(planned, _written(planned, store, source), len(missing))
 
 
-def _written(planned: Plan, store: Store, text: str, command: str) -> dict[str, Results]:
-    """Write the results of all parts, and return them by scenario."""
+def _written(planned: Plan, store: Store, source: Source) -> dict[str, Results]:
+    """Write the results of all parts, and return them by group."""
     table = joined(planned, store)
     found = results(planned, table)
-    page = Page(planned, found, store.folder, command, text, versions())
+    page = Page(planned, found, store.folder, source.command, source.file, versions())
     write_table(table, store.folder / "runs.parquet")
-    write_text(json.dumps(versions(), indent=2) + "\n", store.folder / "versions.json")
+    write_text(_json(versions()), store.folder / "versions.json")
+    write_text(_json(as_plain_data(planned, found, source.command, versions())),
+               store.folder / "results.json")
     (store.folder / "worst").mkdir(exist_ok=True)
     for run in page.worst_runs():
         write_text(_scenario_of(run), store.folder / "worst" / name_of(run))
@@ -92,7 +145,10 @@ def _written(planned: Plan, store: Store, text: str, command: str) -> dict[str, 
     return found
 
 
+def _json(data: Any) -> str:
+    return json.dumps(data, indent=2) + "\n"
+
+
 def _scenario_of(run: Planned) -> str:
     """Return the scenario of a run as TOML, with its resolver."""
-    return Scenario.from_toml(run.job.text).with_resolver(
-        run.job.resolver).to_toml()
+    return under(Scenario.from_toml(run.job.text), run.job.resolver).to_toml()

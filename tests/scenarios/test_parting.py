@@ -43,12 +43,12 @@ def test_runs_of_the_same_bits_are_said_to_be():
 
 
 def test_the_verdict_tells_a_run_that_parted_late_from_another_motion():
-    said = verdict([run_of("recursive"), run_of("hcod"), run_of("hqp", away_from(3)),
-                    run_of("augmented", away_from(1, 0.5))])
+    said = str(verdict([run_of("recursive"), run_of("hcod"), run_of("hqp", away_from(3)),
+                        run_of("augmented", away_from(1, 0.5))]))
     assert "recursive and hcod moved the arm alike to the last bit" in said
     assert "augmented moved otherwise" in said
     assert "hqp stayed within 1e-03 rad of recursive" in said
-    said = verdict([run_of("recursive"), run_of("hqp", away_from(3))])
+    said = str(verdict([run_of("recursive"), run_of("hqp", away_from(3))]))
     assert "alike" not in said
     assert "hqp stayed within 1e-03 rad of recursive" in said
 

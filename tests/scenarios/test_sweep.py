@@ -17,14 +17,14 @@ from deadly import dies_of_one
 from hierarchy import HierarchyError
 from scenarios import load, simulate
 from scenarios.cli.main import run_command
+from scenarios.config.sampling import drawn
 from scenarios.measure import metrics
+from scenarios.measure.statistics import wilson
 from scenarios.sweep import load_sweep, sweep
 from scenarios.sweep.config import SweepError, shipped_sweeps
 from scenarios.sweep.engine import carry_out, connected
 from scenarios.sweep.planning import plan
-from scenarios.sweep.results import wilson
 from scenarios.sweep.run import Outcome, digest, run
-from scenarios.sweep.sampling import drawn
 from scenarios.sweep.store import FullError, Store, StoreError
 
 pytestmark = pytest.mark.slow
@@ -131,22 +131,25 @@ def test_a_scenario_file_is_found_beside_the_sweep(tmp_path):
     assert {one.scenario for one in planned.runs} == {"mine", "ellipse"}
 
 
+def sampled(asked, index):
+    return drawn(load("ellipse"), asked.parameters, asked.seed, index)
+
+
 def test_samples_stay_as_they_are_when_others_are_added(tmp_path):
     few = load_sweep(write(tmp_path))
     more = load_sweep(write(tmp_path, PARAMETERS + "pointing.damping = { around = 0.5 }",
                             samples="9", resolvers='["hcod", "tpm"]'))
-    ellipse = load("ellipse")
     for index in range(3):
-        first, second = drawn(few, index, ellipse), drawn(more, index, ellipse)
+        first, second = sampled(few, index), sampled(more, index)
         assert first.items() <= second.items()
-    assert drawn(few, 0, ellipse) != drawn(few, 1, ellipse)
+    assert sampled(few, 0) != sampled(few, 1)
     other = few.model_copy(update={"seed": 8})
-    assert drawn(few, 0, ellipse)["start.q"] != drawn(other, 0, ellipse)["start.q"]
+    assert sampled(few, 0)["start.q"] != sampled(other, 0)["start.q"]
 
 
 def test_samples_are_drawn_from_what_the_file_says(tmp_path):
     asked, ellipse = load_sweep(write(tmp_path)), load("ellipse")
-    found = [drawn(asked, index, ellipse) for index in range(400)]
+    found = [sampled(asked, index) for index in range(400)]
     q = np.array([one["start.q"] for one in found]) - ellipse.start.q
     assert np.abs(q).max() <= 0.05
     assert q.std() == pytest.approx(0.05 / np.sqrt(3.0), rel=0.05)

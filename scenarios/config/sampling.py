@@ -1,44 +1,49 @@
-"""Draw the parameters of a sample, and put them into a scenario."""
+"""Draw the values of a sample, and put them into a scenario."""
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
 from pydantic import ValidationError
 
 from hierarchy.errors import HierarchyError
-from scenarios.config import Scenario
-from scenarios.sweep.config import Sweep, SweepError, Value
+from scenarios.config.distributions import Distribution, Value
+from scenarios.config.errors import ScenarioError
+from scenarios.config.scenario import Scenario
 
 
-def drawn(sweep: Sweep, index: int, scenario: Scenario) -> dict[str, Value]:
+def drawn(scenario: Scenario, parameters: Mapping[str, Distribution], seed: int, index: int,
+          what: str = "variation") -> dict[str, Value]:
     """Return the values of sample `index` by dotted key, for one scenario.
 
     They depend only on the seed, the index and the key, "around" also on the scenario's own value.
+    A `*` in a key stands for every entry of a list, each with a draw of its own.
 
     Raises
     ------
-    SweepError : the scenario does not have a key, or has no suitable value there.
+    ScenarioError : the scenario does not have a key, or has no suitable value there; the message
+        starts with `what` and the key.
     """
     own = scenario.model_dump(mode="json")
     values = {}
-    for key, distribution in sweep.parameters.items():
+    for pattern, distribution in parameters.items():
         try:
-            table, last = _place(own, key)
-            values[key] = distribution.draw(_chance(sweep.seed, index, key), table[last])
+            for key in _matching(own, pattern):
+                table, last = _place(own, key)
+                values[key] = distribution.draw(_chance(seed, index, key), table[last])
         except ValueError as error:
-            raise SweepError(f"sweep {sweep.name!r}: parameters.{key}: scenario "
-                             f"{scenario.name!r}: {error}") from error
+            raise ScenarioError(f"{what}.{pattern}: scenario {scenario.name!r}: {error}"
+                                ) from error
     return values
 
 
 def changed(scenario: Scenario, values: Mapping[str, Value], what: str) -> Scenario:
-    """Return the scenario with other values at dotted keys; raises SweepError for invalid ones.
+    """Return the scenario with other values at dotted keys.
 
-    The error message starts with `what`.
+    Raises ScenarioError for invalid ones; the message starts with `what`.
     """
     data = scenario.model_dump(mode="json")
     for key, value in values.items():
@@ -49,16 +54,30 @@ def changed(scenario: Scenario, values: Mapping[str, Value], what: str) -> Scena
     except ValidationError as error:
         one = error.errors()[0]
         where = ".".join(map(str, one["loc"])) or scenario.name
-        raise SweepError(f"{what}: {where}: {one['msg'].removeprefix('Value error, ')}, with "
-                         f"{_said(values)}") from error
+        raise ScenarioError(f"{what}: {where}: {one['msg'].removeprefix('Value error, ')}, with "
+                            f"{_said(values)}") from error
     except HierarchyError as error:  # what a resolver says of its settings
-        raise SweepError(f"{what}: {error}, with {_said(values)}") from error
+        raise ScenarioError(f"{what}: {error}, with {_said(values)}") from error
 
 
 def _chance(seed: int, index: int, key: str) -> np.random.Generator:
     """Return a random generator for one parameter of one sample, the same on every machine."""
     words = np.frombuffer(hashlib.sha256(key.encode()).digest()[:16], dtype="<u4").tolist()
     return np.random.Generator(np.random.PCG64(np.random.SeedSequence([seed, index, *words])))
+
+
+def _matching(data: Any, pattern: str) -> Iterator[str]:
+    """Yield the dotted keys that a pattern stands for: itself, if it has no `*`."""
+    before, star, after = pattern.partition("*")
+    if not star:
+        yield pattern
+        return
+    above = before.rstrip(".")
+    table, last = _place(data, above)
+    if not isinstance(table[last], list):
+        raise ValueError(f"[{above}] is not a list")
+    for i in range(len(table[last])):
+        yield from _matching(data, f"{before}{i}{after}")
 
 
 def _place(data: Any, dotted: str) -> tuple[Any, Any]:

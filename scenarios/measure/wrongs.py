@@ -1,0 +1,131 @@
+"""What went wrong in runs: faults, contacts, limits, distances, levels never met, no answer."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from scenarios.config.avoidance import SeparationSection
+from scenarios.measure.wording import Clause, digits, measured, mm, value, who
+from scenarios.words import in_words, listed
+
+if TYPE_CHECKING:
+    from scenarios.measure.runs import Run
+
+BEYOND = 1e-3      # [rad] beyond a joint limit that counts
+CLOSER = 1e-3      # [m] below a promised distance that counts
+THROUGHOUT = 0.99  # share of its ticks in which a level is missed throughout
+
+
+def wrongs(runs: Sequence[Run], finished: Sequence[Run]) -> Iterator[Clause]:
+    """Yield faults and violations, the gravest first; then that the runs ended, if they did."""
+    found = [*_faults(runs), *_contacts(finished), *_excess(finished), *_too_near(finished),
+             *_given_up(finished), *_troubles(finished)]
+    yield from found or [("", f"nothing went wrong: {_completion(finished)}")]
+
+
+def _faults(runs: Sequence[Run]) -> Iterator[Clause]:
+    why: dict[str, list[str]] = {}
+    for run in runs:
+        if run.fault:
+            why.setdefault(run.fault, []).append(run.label)
+    for fault, labels in why.items():
+        yield listed(labels), f"did not reach the end: {fault}"
+
+
+def _completion(runs: Sequence[Run]) -> str:
+    durations = {f"{run.scenario.control.duration:.4g} s" for run in runs}
+    seconds = durations.pop() if len(durations) == 1 else "duration"
+    every = {1: runs[0].label, 2: "both"}.get(len(runs), f"all {in_words(len(runs))}")
+    return f"{every} ran the whole {seconds}"
+
+
+def _contacts(runs: Sequence[Run]) -> Iterator[Clause]:
+    touched = [run for run in runs if min(value(run, "body_distance_min", 1.0),
+                                          value(run, "ee_distance_min", 1.0)) <= 0.0]
+    if touched:
+        yield who(touched, runs), "touched an obstacle"
+    ticks = {label: count for label, count in measured(runs, "contact_ticks").items() if count}
+    hit = [run for run in runs if run.label in ticks]
+    if hit:
+        yield who(hit, runs), f"touched something, for {_ticks(int(max(ticks.values())))} at most"
+
+
+def _excess(runs: Sequence[Run]) -> Iterator[Clause]:
+    beyond = [run for run in runs if value(run, "joint_limit_excess", 0.0) > BEYOND]
+    if beyond:
+        most = max(value(run, "joint_limit_excess", 0.0) for run in beyond)
+        yield who(beyond, runs), f"passed a joint limit, by {digits(most)} rad at most"
+
+
+def _too_near(runs: Sequence[Run]) -> Iterator[Clause]:
+    """Yield who came nearer to an obstacle than `avoidance.distance` promises."""
+    short = {run.label: short for run in runs if (short := _shortfall(run)) > CLOSER}
+    near = [run for run in runs if run.label in short]
+    if near:
+        yield (who(near, runs), f"came up to {mm(max(short.values()))} nearer to an obstacle "
+               "than asked")
+
+
+def _shortfall(run: Run) -> float:
+    """Return by how much a run went below the distance it should keep [m]; 0 if it did not."""
+    asked = run.scenario.avoidance
+    if not isinstance(asked, SeparationSection):
+        return 0.0
+    return max(asked.distance - value(run, name, np.inf)
+               for name in ("body_distance_min", "ee_distance_min"))
+
+
+def _given_up(runs: Sequence[Run]) -> Iterator[Clause]:
+    """Yield which levels were missed in all ticks in which they were in the stack."""
+    said: dict[str, list[Run]] = {}
+    for run in runs:
+        if levels := missed_throughout(run):
+            said.setdefault(f"never met {listed(levels)}", []).append(run)
+    for what, some in said.items():
+        yield who(some, runs), what
+
+
+def missed_throughout(run: Run) -> list[str]:
+    """Return the tasks of a run that were missed whenever they acted, and so never met."""
+    from scenarios.loop.fate import Fate
+
+    if run.recording is None or "level_fate" not in run.recording:
+        return []
+    fate = run.recording["level_fate"]
+    known = fate > Fate.UNKNOWN
+    share = (fate == Fate.MISSED).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
+    return [name for name, missed in zip(run.recording.task_names, share, strict=True)
+            if missed >= THROUGHOUT]
+
+
+_DONE = {"stop": "was stopped", "brake": "braked", "hold": "held its last command",
+         "use": "had trouble", "clamp": "was clamped to its limits"}
+
+
+def _troubles(runs: Sequence[Run]) -> Iterator[Clause]:
+    """Yield what was done in ticks with trouble, and who had no answer without that."""
+    said: dict[str, list[Run]] = {}
+    for run in runs:
+        events = run.recording.events if run.recording else ()
+        unsolved = value(run, "ticks_not_solved", 0.0)
+        for action, done in _DONE.items():
+            if ticks := {event.tick for event in events if event.action == action}:
+                said.setdefault(f"{done} in {_ticks(len(ticks))}", []).append(run)
+        if unsolved and not events:
+            said.setdefault(f"had no answer in {_ticks(int(unsolved))}", []).append(run)
+    for what, some in said.items():
+        yield who(some, runs), what
+
+
+def _ticks(count: int) -> str:
+    return f"{count} tick{'' if count == 1 else 's'}"
+
+
+def soundest(runs: Sequence[Run]) -> list[Run]:
+    """Return the runs with the fewest kinds of things wrong."""
+    wrong = [sum(any(True for _ in check([run])) for check in (
+        _contacts, _excess, _too_near, _given_up, _troubles)) for run in runs]
+    return [run for run, count in zip(runs, wrong, strict=True) if count == min(wrong)]

@@ -1,0 +1,127 @@
+"""What a sweep comes to, in three lines made from its statistics."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from scenarios.measure.metrics import Metric
+from scenarios.measure.verdict import Verdict
+from scenarios.sweep.results import Criterion, Results, Share, valued
+from scenarios.words import listed
+
+_IN_WORDS = {"Reached the end": "reached the end", "Touched nothing": "touched nothing",
+             "Kept the joint limits": "kept the joint limits",
+             "Every tick solved": "had every tick solved"}
+# What is weighed in the last line, in this order.
+_WEIGHED = ("position_error_median_settled", "body_distance_min", "ee_distance_min",
+            "cone_violation_max", "speed_max", "acceleration_max")
+
+
+def verdict(results: Results) -> Verdict:
+    """Return what went wrong and how often, which columns are the same, and what to use."""
+    return Verdict(success(results), _sentence(_sameness(results)), _sentence(_advice(results)))
+
+
+def success(results: Results) -> str:
+    """Return in how many runs each criterion was met, for all resolvers together if equal."""
+    said: dict[str, list[str]] = {}
+    for criterion in results.criteria()[:-1]:
+        said.setdefault(_who(results, criterion), []).append(_IN_WORDS[criterion.label])
+    text = "; ".join(f"{who} {listed(did)}" for who, did in said.items())
+    return f"{text[0].upper()}{text[1:]}."
+
+
+def _sentence(clauses: Iterator[str]) -> str:
+    text = "; ".join(clauses)
+    return f"{text}." if text else ""
+
+
+def _who(results: Results, criterion: Criterion) -> str:
+    shares = {label: results.share(criterion, label) for label in results.labels}
+    met, of = sum(s.met for s in shares.values()), sum(s.of for s in shares.values())
+    if met == of:
+        return f"all {of} runs" if of > 1 else "the run"
+    if met == 0:
+        return "no run"
+    if len({(share.met, share.of) for share in shares.values()}) == 1:
+        each = " under each resolver" if len(shares) > 1 else ""
+        return f"{next(iter(shares.values()))} runs{each}"
+    return listed([f"{share} runs under {label}" for label, share in shares.items()])
+
+
+def _sameness(results: Results) -> Iterator[str]:
+    """Yield which columns have the same metrics on every sample."""
+    groups = _alike(results)
+    if len(results.labels) < 2:
+        return
+    for group in groups:
+        if len(group) > 1:
+            yield f"{listed(group)} behave the same on every sample"
+    if len(groups) == len(results.labels):
+        yield "no two columns behave the same"
+
+
+def _alike(results: Results) -> list[list[str]]:
+    """Return the labels, together where no metric of any sample differs."""
+    found: list[list[str]] = []
+    for label in results.labels:
+        for group in found:
+            if all(_equal(results, metric, group[0], label) for metric in results.shown()):
+                group.append(label)
+                break
+        else:
+            found.append([label])
+    return found
+
+
+def _equal(results: Results, metric: Metric, first: str, second: str) -> bool:
+    return results.paired(metric.name, second, first).equal
+
+
+def _advice(results: Results) -> Iterator[str]:
+    """Yield what to use: by success first, then what is best beyond chance."""
+    if len(results.labels) < 2:
+        return
+    sound = _soundest(results)
+    if len(sound) < len(results.labels):
+        yield f"use {listed(sound, 'or')}: the others fail more often than chance explains"
+    told = [_merit(results, metric) for metric in _weighed(results)]
+    best = [said for said in told if said]
+    unclear = [metric.label[0].lower() + metric.label[1:] for metric, said
+               in zip(_weighed(results), told, strict=True) if not said]
+    yield from best
+    if unclear and not best:
+        yield f"no resolver is best beyond chance in {listed(unclear, 'or')}"
+
+
+def _soundest(results: Results) -> list[str]:
+    """Return the labels whose share of flawless runs is not clearly below the best one."""
+    flawless = results.criteria()[-1]
+    shares = {label: results.share(flawless, label) for label in results.labels}
+    top = max(shares.values(), key=_rate)
+    return [label for label, share in shares.items() if share.interval[1] >= top.interval[0]]
+
+
+def _rate(share: Share) -> float:
+    return share.met / share.of
+
+
+def _weighed(results: Results) -> Sequence[Metric]:
+    shown = {metric.name: metric for metric in results.shown()}
+    return [shown[name] for name in _WEIGHED if name in shown]
+
+
+def _merit(results: Results, metric: Metric) -> str:
+    """Return who is best in a metric, with medians; "" where no test tells."""
+    best = results.best(metric)
+    if not best:
+        return ""
+    medians = {label: found.median for label in results.labels
+               if (found := results.spread(metric.name, label)) is not None}
+    others = [value for label, value in medians.items() if label not in best]
+    near = min(others) if metric.lower_is_better else max(others)
+    shown = [valued(metric, value).shown() for value in (medians[best[0]], near)]
+    unit = f" {metric.shown_unit}" if metric.shown_unit else ""
+    way = "lowest" if metric.lower_is_better else "highest"
+    return (f"{listed(best)} has the {way} {metric.label[0].lower()}{metric.label[1:]} "
+            f"(median {shown[0]}{unit}, next {shown[1]}{unit})")
