@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 LEVEL = 0.05     # probability of calling a difference real that is chance
-SAME = 1e-6      # relative difference below which two values are one: rounding, not behaviour
+SAME = 1e-3      # relative difference below which two values count as the same
 FEWEST = 6       # pairs that differ; with fewer the signed-rank test cannot reach LEVEL
 
 

@@ -149,7 +149,7 @@ def _caveats(runs: Sequence[Run]) -> Iterator[Clause]:
     loose = [run.label for run in runs
              if run.recording and not run.recording.facts.resolver.strict]
     if loose:
-        yield "", f"{listed(loose)} {'is' if len(loose) == 1 else 'are'} not strict"
+        yield "", f"{listed(loose)} {'is' if len(loose) == 1 else 'are'} not strict at every rank"
 
 
 def _contrasts(runs: Sequence[Run]) -> Iterator[Clause]:

@@ -88,7 +88,7 @@ def _loaded(sweep: Sweep) -> tuple[Scenario, ...]:
 def _checked(sweep: Sweep, scenarios: Sequence[Scenario]) -> Sequence[Scenario]:
     from scenarios.cell.build import build
 
-    check_names(scenarios, f"sweep {sweep.name!r}: scenarios: ")
+    check_names(scenarios, f"sweep {sweep.name!r}: ")
     for scenario in scenarios:
         build(scenario)
         if sweep.variation and not scenario.variation:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
+from scenarios.config import Scenario
+from scenarios.config.resolvers import under
 from scenarios.measure.metrics import Metric
 from scenarios.measure.verdict import Verdict
 from scenarios.sweep.results import Criterion, Results, Share, valued
@@ -85,13 +87,27 @@ def _advice(results: Results) -> Iterator[str]:
     sound = _soundest(results)
     if len(sound) < len(results.labels):
         yield f"use {listed(sound, 'or')}: the others fail more often than chance explains"
-    told = [_merit(results, metric) for metric in _weighed(results)]
-    best = [said for said in told if said]
-    unclear = [metric.label[0].lower() + metric.label[1:] for metric, said
-               in zip(_weighed(results), told, strict=True) if not said]
-    yield from best
-    if unclear and not best:
+    merits: dict[str, list[str]] = {}
+    unclear = []
+    for metric in _weighed(results):
+        if best := results.best(metric):
+            merits.setdefault(listed(best), []).append(_merit(results, metric, best))
+        else:
+            unclear.append(_lowered(metric.label))
+    for who, what in merits.items():
+        yield f"{who} is best beyond chance in {'; '.join(what)}"
+    if unclear and not merits:
         yield f"no resolver is best beyond chance in {listed(unclear, 'or')}"
+    yield from _caveats(results)
+
+
+def _caveats(results: Results) -> Iterator[str]:
+    """Yield which resolvers have no strict priorities."""
+    specs = {run.label: run.job for run in results.runs}
+    loose = [label for label, job in specs.items() if not under(
+        Scenario.from_toml(job.text), job.resolver).make_resolver().strict]
+    if loose:
+        yield f"{listed(loose)} {'is' if len(loose) == 1 else 'are'} not strict at every rank"
 
 
 def _soundest(results: Results) -> list[str]:
@@ -111,17 +127,16 @@ def _weighed(results: Results) -> Sequence[Metric]:
     return [shown[name] for name in _WEIGHED if name in shown]
 
 
-def _merit(results: Results, metric: Metric) -> str:
-    """Return who is best in a metric, with medians; "" where no test tells."""
-    best = results.best(metric)
-    if not best:
-        return ""
+def _merit(results: Results, metric: Metric, best: Sequence[str]) -> str:
+    """Return a metric with the medians of the best and of the next column."""
     medians = {label: found.median for label in results.labels
                if (found := results.spread(metric.name, label)) is not None}
     others = [value for label, value in medians.items() if label not in best]
     near = min(others) if metric.lower_is_better else max(others)
     shown = [valued(metric, value).shown() for value in (medians[best[0]], near)]
     unit = f" {metric.shown_unit}" if metric.shown_unit else ""
-    way = "lowest" if metric.lower_is_better else "highest"
-    return (f"{listed(best)} has the {way} {metric.label[0].lower()}{metric.label[1:]} "
-            f"(median {shown[0]}{unit}, next {shown[1]}{unit})")
+    return f"{_lowered(metric.label)} ({shown[0]}{unit}, next {shown[1]}{unit})"
+
+
+def _lowered(text: str) -> str:
+    return f"{text[0].lower()}{text[1:]}"

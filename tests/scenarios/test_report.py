@@ -110,7 +110,7 @@ def test_the_verdict_says_who_served_the_scenarios_own_tasks_best():
 
 def test_the_verdict_finds_no_winner_where_all_agree():
     said = words([made("tpm"), made("recursive"), made("hcod")])
-    assert "all moved the arm alike to the last bit" in said
+    assert "All moved the arm alike to the last bit" in said
     assert "half of the time the tool was within 0 mm of its path" in said
     assert "the body kept at least 1000 mm from every obstacle" in said
     assert "best" not in said
@@ -134,7 +134,7 @@ def test_the_verdict_tells_who_moved_alike_and_what_the_others_did_instead():
             made("recursive", q=np.full((5, 7), 1e-11), minimal_distance=np.full(5, 0.04)),
             made("augmented", q=np.full((5, 7), 0.3), minimal_distance=np.full(5, 0.02))]
     said = words(runs)
-    assert "all but augmented moved the arm alike to 1e-11 rad" in said
+    assert "All but augmented moved the arm alike to 1e-11 rad" in said
     assert ("all but augmented kept the most distance from obstacles (40 mm, augmented 20 mm)"
             in said)
 
@@ -145,7 +145,7 @@ def test_the_verdict_says_who_is_near_without_being_the_same():
 
 
 def test_the_verdict_finds_no_agreement_where_there_is_none():
-    assert "no two moved the arm alike" in words([made("tpm"), made("hqp", q=np.ones((5, 7)))])
+    assert "No two moved the arm alike" in words([made("tpm"), made("hqp", q=np.ones((5, 7)))])
 
 
 def test_the_verdict_does_not_hide_a_collision():

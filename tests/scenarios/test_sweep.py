@@ -76,7 +76,7 @@ def keys_kept(folder):
     ("", {"sampels": "3"}, "did you mean 'samples'"),
     ("", {"samples": "0"}, "samples: "),
     ("", {"scenarios": '["elipse"]'}, "did you mean 'ellipse'"),
-    ("", {"scenarios": '["ellipse", "ellipse"]'}, "2 are named 'ellipse'"),
+    ("", {"scenarios": '["ellipse", "ellipse"]'}, "2 scenarios are named 'ellipse'"),
     ("", {"scenarios": '["there.toml"]'}, "there.toml"),
     ("", {"resolvers": '["tmp"]'}, "did you mean 'tpm'"),
     ("", {"resolvers": '["tpm:dampign=0.1"]'}, "dampign"),
