@@ -3,6 +3,7 @@
 # make quick   the tests of less than a second, in under a minute: for while one works
 # make bench   time the resolvers, the control tick and the start, then all beside other packages
 # make stress  a resolver on a million generated problems, every answer certified; half an hour
+# make reproduce  the studies behind the documents, their numbers written into the pages
 # make docs    build the documentation, any warning an error, and say where it is
 # make dist    build the wheel and the source archive, in dist/
 # make clean   remove what the targets above made
@@ -20,7 +21,7 @@ export OPENBLAS_NUM_THREADS := 1
 INSTALLED  := .venv/installed
 
 .DELETE_ON_ERROR:
-.PHONY: demo test quick bench stress docs dist clean set-up
+.PHONY: demo test quick bench stress reproduce docs dist clean set-up
 
 demo: $(INSTALLED)
 	@rm -rf runs/demo
@@ -44,6 +45,9 @@ RESOLVER ?= hcod
 
 stress: $(INSTALLED)
 	@$(BIN)/hierarchy bench stress --count $(COUNT) --resolver $(RESOLVER)
+
+reproduce: $(INSTALLED)
+	@$(BIN)/hierarchy reproduce
 
 docs: $(INSTALLED)
 	@$(BIN)/python -m sphinx -E -W --keep-going -q -b html docs build/docs

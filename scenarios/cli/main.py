@@ -237,6 +237,26 @@ def sweep(file: Annotated[str, typer.Argument(help="Name of a sweep, or a sweep 
 
 
 @app.command()
+def reproduce(studies: Annotated[list[str] | None, typer.Argument(
+                  metavar="[STUDY]...", help="letter, resolvers, blend, human. Default: all.")
+                  ] = None,
+              out: Annotated[Path, typer.Option(
+                  "--out", metavar="FOLDER", help="Where the runs are kept.")
+                  ] = Path("runs/reproduce"),
+              quick: Annotated[bool, typer.Option(
+                  "--quick", help="A tenth of the starts; leave the documents as they are.")
+                  ] = False,
+              workers: Workers = None, as_json: AsJson = False) -> int:
+    """Make the numbers of the documents anew, and write them into a checkout's pages.
+
+    An interrupted command continues where it was.
+    """
+    from scenarios.cli.reproduce import reproduce_command
+
+    return reproduce_command(studies or [], out, quick, workers, as_json)
+
+
+@app.command()
 def view(folders: Annotated[list[Path], typer.Argument(
              metavar="RUN...", help="Run folders of `hierarchy run` or `compare`.")],
          side_by_side: Annotated[bool, typer.Option(

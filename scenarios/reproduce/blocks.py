@@ -1,0 +1,138 @@
+"""The blocks of the documents that are made from rows: claims, tables, findings."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import partial
+
+from scenarios.reproduce.claims import Claim, Compares, Ends, Keeps, in_text, share
+from scenarios.reproduce.pages import Block
+from scenarios.reproduce.rows import Rows
+
+_EPS_1 = 0.05    # [m] eps_1 of `ellipse`
+_ON_CONE = 0.01  # [deg] beyond the cone that counts as on it
+_WITHIN = 1e-6   # [rad] beyond a joint limit that counts as within it
+
+LETTER_CLAIMS: tuple[Claim, ...] = (
+    Keeps("The tasks are executed while the whole body avoids collisions", "letter",
+          "body_distance_min", "ellipse", least=0.0),
+    Keeps("The body's distance stays above eps_1 during the whole simulation", "letter",
+          "body_distance_min", "ellipse", least=_EPS_1),
+    Compares("Acceleration level takes away the jumps of joint velocity", "letter",
+             "velocity_step_max", "velocity", "ellipse", "lower"),
+    Compares("A cone of 35 deg moves more calmly than one of 5 deg", "letter", "speed_max",
+             "ellipse", "35deg", "lower"),
+    Compares("An inequality moves more calmly than an equality (35 deg)", "letter", "speed_max",
+             "35deg-equality", "35deg", "lower"),
+    Compares("An equality of 35 deg moves more calmly than an inequality of 5 deg", "letter",
+             "speed_max", "ellipse", "35deg-equality", "lower"),
+    Keeps("The cone of 5 deg is kept", "letter", "cone_violation_max", "ellipse", most=_ON_CONE),
+    Keeps("The cone of 35 deg is kept", "letter", "cone_violation_max", "35deg", most=_ON_CONE),
+    Compares("One-dimensional avoidance moves more calmly than three-dimensional", "letter",
+             "speed_max", "3d", "ellipse", "lower"),
+    Keeps("The joint limits are kept (published Jacobians)", "letter", "joint_limit_excess",
+          "published", most=_WITHIN),
+    Keeps("The joint limits are kept (correct Jacobians)", "letter", "joint_limit_excess",
+          "ellipse", most=_WITHIN))
+
+OUR_CLAIMS: tuple[Claim, ...] = (
+    Compares("The wrong Jacobians of the published code flatter its speeds", "letter", "speed_max",
+             "ellipse", "published", "lower"),
+    Compares("Exact derivatives move faster than backward differences", "letter", "speed_max",
+             "differences", "ellipse", "higher"),
+    Ends("The letter's scheme runs undamped", "letter", "undamped"),
+    Compares("`weighted`, damped, is calmer than a strict resolver on `ellipse`", "resolvers",
+             "speed_max", "ellipse", "ellipse-weighted", "lower"),
+    Keeps("Joint limits in the stack are kept", "resolvers", "joint_limit_excess", "limits-tpm",
+          most=_WITHIN),
+    Compares("Joint limits cost tracking", "resolvers", "position_error_rms_settled", "ellipse",
+             "limits-tpm", "higher"),
+    Compares("Inequalities in the stack move more calmly than Algorithm 1 with limits", "resolvers",
+             "speed_max", "limits-tpm", "hqp-hcod", "lower"),
+    Compares("Inequalities in the stack leave the cone by less", "resolvers", "cone_violation_max",
+             "limits-tpm", "hqp-hcod", "lower"),
+    Keeps("Inequalities in the stack keep the 50 mm asked for", "resolvers", "body_distance_min",
+          "hqp-hcod", least=_EPS_1),
+    Compares("A blend of 0.02 s brings the body of `ellipse` nearer to the obstacles", "blend",
+             "body_distance_min", "ellipse", "ellipse-blend-0.02", "lower"),
+    Compares("A blend of 0.1 s brings the body of `ellipse` nearer to the obstacles", "blend",
+             "body_distance_min", "ellipse", "ellipse-blend-0.1", "lower"),
+    Compares("A blend of 0.02 s lowers the largest velocity step at velocity level", "blend",
+             "velocity_step_max", "velocity", "velocity-blend-0.02", "lower"))
+
+_LIMITS = ("joint_limit_excess", "speed_max", "acceleration_max", "body_distance_min",
+           "cone_violation_max", "position_error_rms_settled", "stack_changes")
+_BLEND = ("velocity_step_max", "acceleration_step_max", "body_distance_min")
+_HUMAN = ("contact_ticks", "position_error_max", "position_error_rms", "body_distance_min",
+          "ee_distance_min", "cone_violation_max", "speed_max", "velocity_step_max",
+          "ticks_not_solved")
+
+
+def claims(rows: Mapping[str, Rows], listed: Sequence[Claim]) -> str:
+    """Return a table of statements: what was found, and the verdict."""
+    lines = ["| statement | found: median [quartiles] | verdict |", "|---|---|---|"]
+    for claim in listed:
+        judged = claim.judge(rows[claim.study])
+        lines.append(f"| {claim.text} | {judged.found} | **{judged.verdict}** |")
+    return "\n".join([*lines, "", _source(rows, dict.fromkeys(one.study for one in listed))])
+
+
+def table(rows: Mapping[str, Rows], study: str, metrics: Sequence[str]) -> str:
+    """Return a table of a study, its columns as rows: median and quartiles of metrics."""
+    found = rows[study]
+    known = [name for name in metrics if name in found.metrics]
+    heads = [_head(found, name) for name in known]
+    lines = [f"| | reached the end | {' | '.join(heads)} |",
+             "|---" * (len(heads) + 2) + "|"]
+    lines += [f"| `{column}` | {found.ended[column]} of {found.starts} | "
+              f"{' | '.join(_bare(found, column, name) for name in known)} |"
+              for column in found.values]
+    return "\n".join([*lines, "", _source(rows, [study])])
+
+
+def findings(rows: Mapping[str, Rows]) -> str:
+    """Return what the README says was found."""
+    letter, resolvers = rows["letter"], rows["resolvers"]
+    return "\n".join(f"- {line}" for line in (
+        "The published code has two wrong Jacobians, and they flatter it: the largest joint speed "
+        f"is {in_text(letter, 'published', 'speed_max')} with them and "
+        f"{in_text(letter, 'ellipse', 'speed_max')} without "
+        f"({letter.paired('speed_max', 'ellipse', 'published')}).",
+        "At acceleration level joint velocity no longer jumps: the largest step in a tick is "
+        f"{in_text(letter, 'ellipse', 'velocity_step_max')}, at velocity level "
+        f"{in_text(letter, 'velocity', 'velocity_step_max')}.",
+        "The letter's scheme needs its damping: undamped, "
+        f"{share(letter.ended['undamped'], letter.starts)} of the runs reach their end.",
+        "With inequalities in the stack in place of Algorithm 1 and repulsion, the cone is left by "
+        f"{in_text(resolvers, 'hqp-hcod', 'cone_violation_max')} at most in a run, against "
+        f"{in_text(resolvers, 'limits-tpm', 'cone_violation_max')}, and the body keeps "
+        f"{in_text(resolvers, 'hqp-hcod', 'body_distance_min')}, against "
+        f"{in_text(resolvers, 'limits-tpm', 'body_distance_min')}."))
+
+
+def _head(rows: Rows, name: str) -> str:
+    metric = rows.metric(name)
+    unit = f" [{metric.shown_unit}]" if metric.shown_unit else ""
+    return f"{metric.label}{unit}"
+
+
+def _bare(rows: Rows, column: str, name: str) -> str:
+    text, unit = in_text(rows, column, name), rows.metric(name).shown_unit
+    return text.removesuffix(f" {unit}") if unit else text
+
+
+def _source(rows: Mapping[str, Rows], studies: Sequence[str] | Mapping[str, None]) -> str:
+    """Return which command made a table, and from how many starts."""
+    said = [f"`{rows[name].command}` ({rows[name].starts} starts, seed {rows[name].seed})"
+            for name in studies]
+    return f"From {', '.join(said)}."
+
+
+BLOCKS: dict[str, Block] = {
+    "letter-claims": partial(claims, listed=LETTER_CLAIMS),
+    "our-claims": partial(claims, listed=OUR_CLAIMS),
+    "inequalities": partial(table, study="resolvers", metrics=_LIMITS),
+    "letter-runs": partial(table, study="letter", metrics=_LIMITS),
+    "blend": partial(table, study="blend", metrics=_BLEND),
+    "human": partial(table, study="human", metrics=_HUMAN),
+    "findings": findings}

@@ -1,0 +1,57 @@
+"""Put the blocks that are made from rows into the pages of the documents."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+from hierarchy.errors import HierarchyError
+from scenarios.files import write_text
+from scenarios.reproduce.rows import Rows
+
+PAGES = ("README.md", "docs/reproduction.md", "docs/letter.md", "docs/experiment.md")
+RESULTS = "docs/results"
+_BLOCK = re.compile(r"(<!-- reproduce: (?P<name>[\w-]+) -->\n).*?(<!-- end of \w[\w-]* -->)",
+                    re.DOTALL)
+
+Block = Callable[[Mapping[str, Rows]], str]
+
+
+def checkout() -> Path:
+    """Return the folder of the checkout; raises HierarchyError for an installed package."""
+    root = Path(__file__).parents[2]
+    if not (root / "docs" / "reproduction.md").is_file():
+        raise HierarchyError("the documents are not part of the installed package; run this in a "
+                             "checkout, or with --out to keep the rows only")
+    return root
+
+
+def filled(text: str, blocks: Mapping[str, Block], rows: Mapping[str, Rows], page: str) -> str:
+    """Return a page with the content of its blocks made anew.
+
+    Raises HierarchyError, naming the page, for an unknown block or a study without rows.
+    """
+    def made(match: re.Match[str]) -> str:
+        name = match["name"]
+        if name not in blocks:
+            raise HierarchyError(f"{page}: there is no block {name!r}")
+        try:
+            return f"{match[1]}{blocks[name](rows).rstrip()}\n{match[3]}"
+        except KeyError as error:
+            raise HierarchyError(f"{page}: block {name!r}: no rows of study {error}") from None
+
+    return _BLOCK.sub(made, text)
+
+
+def write(root: Path, blocks: Mapping[str, Block], rows: Mapping[str, Rows]) -> list[Path]:
+    """Fill the pages of a checkout, and return those that changed."""
+    changed = []
+    for name in PAGES:
+        path = root / name
+        text = path.read_text(encoding="utf-8")
+        made = filled(text, blocks, rows, name)
+        if made != text:
+            write_text(path, made)
+            changed.append(path)
+    return changed

@@ -1,0 +1,79 @@
+"""The studies: which scenarios, with which changes, under which resolver, from how many starts."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from scenarios.config import Scenario, load
+
+STARTS = 24
+SEED = 14
+
+
+@dataclass(frozen=True)
+class Column:
+    """One column of a study: a scenario with changes at dotted keys, under a resolver."""
+
+    name: str
+    scenario: str
+    resolver: str
+    changes: Mapping[str, Any] = field(default_factory=dict)
+
+    def load(self) -> Scenario:
+        """Return the scenario, named after the column."""
+        scenario = load(self.scenario, {**self.changes, "name": self.name})
+        return scenario.with_resolver(self.resolver)
+
+
+@dataclass(frozen=True)
+class Study:
+    """Columns that are run from the same sampled starts; `extra` is what they need to be run."""
+
+    name: str
+    title: str
+    columns: tuple[Column, ...]
+    starts: int = STARTS
+    extra: str = ""
+
+
+def _variants(scenario: str, resolvers: Mapping[str, str]) -> tuple[Column, ...]:
+    return tuple(Column(name, scenario, resolver) for name, resolver in resolvers.items())
+
+
+def _blended(prefix: str, scenario: str) -> tuple[Column, ...]:
+    return (Column(prefix, scenario, "tpm"), *(
+        Column(f"{prefix}-blend-{time:g}", scenario, "tpm",
+               {"control.transition": "blend", "control.transition_time": time})
+        for time in (0.02, 0.1)))
+
+
+LETTER = Study("letter", "The letter's scheme", (
+    Column("ellipse", "ellipse", "tpm"),
+    Column("velocity", "ellipse-velocity", "tpm"),
+    Column("35deg", "ellipse-35deg", "tpm"),
+    Column("35deg-equality", "ellipse-35deg-equality", "tpm"),
+    Column("3d", "ellipse-3d", "tpm"),
+    Column("published", "ellipse-published", "tpm"),
+    Column("differences", "ellipse", "tpm", {"control.jacobian_derivative": "difference"}),
+    Column("undamped", "ellipse", "tpm", {"control.options.damping": 0.0})))
+
+RESOLVERS = Study("resolvers", "All resolvers on one task", (
+    Column("ellipse", "ellipse", "tpm:form=staircase"),
+    *_variants("ellipse", {"ellipse-weighted": "weighted", "ellipse-augmented": "augmented"}),
+    *_variants("ellipse-limits", {
+        "limits-tpm": "tpm:form=staircase", "limits-sns": "sns",
+        "limits-sns-optimal": "sns:form=optimal", "limits-hcod": "hcod",
+        "limits-weighted": "weighted"}),
+    *_variants("ellipse-hqp", {"hqp-hcod": "hcod", "hqp-weighted": "weighted"})))
+
+BLEND = Study("blend", "Switching without jumps", (
+    *_blended("velocity", "ellipse-velocity"), *_blended("ellipse", "ellipse")))
+
+HUMAN = Study("human", "The experiment", (
+    Column("human-tpm", "human", "tpm"), Column("human-recursive", "human", "recursive"),
+    Column("human-hcod", "human", "hcod"), Column("human-hqp", "human-hqp", "hcod")),
+    starts=16, extra="sim")
+
+STUDIES = (LETTER, RESOLVERS, BLEND, HUMAN)

@@ -1,0 +1,61 @@
+"""Run the studies, keep their rows, and write the pages."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from hierarchy.errors import HierarchyError, UnknownNameError
+from scenarios.config.resolvers import OWN
+from scenarios.reproduce import pages, rows
+from scenarios.reproduce.blocks import BLOCKS
+from scenarios.reproduce.rows import Rows
+from scenarios.reproduce.studies import SEED, STUDIES, Study
+from scenarios.sweep.whole import Progress, compare_starts
+
+QUICK = 10  # with `quick`, one in so many starts, but never fewer than two
+
+
+def chosen(names: Sequence[str]) -> list[Study]:
+    """Return the studies of these names, all without names; raises UnknownNameError."""
+    known = {study.name: study for study in STUDIES}
+    for name in names:
+        if name not in known:
+            raise UnknownNameError("study", name, tuple(known))
+    return [known[name] for name in names] if names else list(STUDIES)
+
+
+def reproduce(studies: Sequence[Study], out: Path, quick: bool = False, workers: int | None = None,
+              progress: Progress | None = None,
+              told: Callable[[Study], object] = lambda study: None) -> dict[str, Rows]:
+    """Run studies and return their rows by name; runs that `out` has are not repeated.
+
+    quick : a tenth of the starts. told : called with each study before it starts.
+    Raises what `compare_starts` raises.
+    """
+    found = {}
+    for study in studies:
+        told(study)
+        starts = max(2, study.starts // QUICK) if quick else study.starts
+        found[study.name] = _run(replace(study, starts=starts), out, workers, progress)
+    return found
+
+
+def _run(study: Study, out: Path, workers: int | None, progress: Progress | None) -> Rows:
+    command = f"hierarchy reproduce {study.name}"
+    done = compare_starts([column.load() for column in study.columns], [OWN], study.starts, SEED,
+                          out / study.name, workers=workers, progress=progress, command=command)
+    (results,) = done.found.values()
+    return rows.rows_of(study.name, results, command, SEED)
+
+
+def write_documents(found: dict[str, Rows], root: Path) -> list[Path]:
+    """Keep rows beside the documents of a checkout and fill its pages; return what was written."""
+    folder = root / pages.RESULTS
+    kept = [rows.write(one, folder) for one in found.values()]
+    missing = [study.name for study in STUDIES if not (folder / f"{study.name}.json").is_file()]
+    if missing:
+        raise HierarchyError(f"rows are kept in {folder}, but pages need those of "
+                             f"{', '.join(missing)} too: hierarchy reproduce {' '.join(missing)}")
+    return kept + pages.write(root, BLOCKS, rows.read(folder))
