@@ -2,9 +2,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from scene import FRAME, PATH, ROBOT, SENSOR, TASKS, state_at, states
+from scene import FRAME, PATH, ROBOT, SENSOR, TASKS, Elbow, state_at, states
 
-from hierarchy import HierarchyError, Stack, State, Task
+from hierarchy import HierarchyError, Stack, State
 from hierarchy.jit import bind, compiled
 from hierarchy.tasks import JointDamping, Position
 
@@ -108,24 +108,6 @@ def test_what_moves_between_two_calls_is_followed():
     for a, b in zip(rows_of(s.hierarchy(state)), rows_of(stack().hierarchy(state)), strict=True):
         np.testing.assert_array_equal(a, b)
     np.testing.assert_array_equal(s.hierarchy(state).reference, -10 * V)
-
-
-@dataclass(frozen=True)
-class Elbow(Task):
-    """A task in plain numpy."""
-
-    name: str = "elbow"
-    stiffness: float = 10.0
-    dimension = 1
-
-    def error(self, state):
-        return np.array([1.0 - state.q[3]])
-
-    def jacobian(self, state):
-        return np.eye(7)[3:4]
-
-    def jacobian_derivative(self, state):
-        return np.zeros((1, 7))
 
 
 @dataclass(frozen=True)

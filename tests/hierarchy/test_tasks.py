@@ -1,8 +1,20 @@
 import numpy as np
 import pytest
-from scene import BODY, FRAME, PATH, ROBOT, SENSOR, TASKS, TIP, state_at, states
+from scene import (
+    BODY,
+    FRAME,
+    PATH,
+    ROBOT,
+    SENSOR,
+    TASKS,
+    TIP,
+    Elbow,
+    compiled_rows,
+    state_at,
+    states,
+)
 
-from hierarchy import HierarchyError, State, Task
+from hierarchy import HierarchyError, State
 from hierarchy.tasks import Avoidance, JointDamping, Pointing, Position, Posture
 from hierarchy.tasks.pose import rotation_vector
 
@@ -80,14 +92,7 @@ def test_compiled_rows_equal_those_of_the_plain_methods(name, level, differences
     for q, v in STATES[:5]:
         state = state_at(q, v, differences=differences)
         state.move(0.8, q + 1e-3 * v, v)
-        written, plain = [(np.full((8, 7), 5.0), np.full(8, 5.0), np.full(8, 5.0))
-                          for _ in range(2)]
-        task.writer(state, level, *written, row=1)()
-        Task.writer(task, state, level, *plain, row=1)()
-        for a, b in zip(written, plain, strict=True):
-            np.testing.assert_allclose(a, b, rtol=1e-12, atol=1e-11)
-            assert a[0].max() == 5.0
-            assert (a[1 + task.dimension:] == 5.0).all(), "rows of others are left alone"
+        compiled_rows(task, state, level)
 
 
 @pytest.mark.parametrize("differences", [None, 1e-3])
@@ -192,26 +197,11 @@ def test_pose_error_falls_when_its_velocity_is_followed():
     assert np.linalg.norm(task.error(State.at(ROBOT, q + 1e-3 * v))) < np.linalg.norm(error)
 
 
-class Elbow(Task):
-    """A user's task in plain numpy: the fourth joint's angle."""
-
-    name, gain, stiffness, damping = "elbow", 2.0, 4.0, 3.0
-    dimension = 1
-
-    def error(self, state):
-        return np.array([1.0 - state.q[3]])
-
-    def jacobian(self, state):
-        return np.eye(7)[3:4]
-
-    def jacobian_derivative(self, state):
-        return np.zeros((1, 7))
-
-
 def test_a_task_in_plain_numpy_needs_three_methods():
     q, v = STATES[10]
     A, low, up = np.zeros((1, 7)), np.zeros(1), np.zeros(1)
-    Elbow().writer(State.at(ROBOT, q, v), "acceleration", A, low, up, 0)()
+    task = Elbow(stiffness=4.0, damping=3.0)
+    task.writer(State.at(ROBOT, q, v), "acceleration", A, low, up, 0)()
     assert low[0] == up[0] == pytest.approx(4 * (1 - q[3]) - 3 * v[3])
 
 
