@@ -126,6 +126,11 @@ def test_no_more_ticks_are_caught_up_than_was_allowed():
     np.testing.assert_array_equal(log.late[:4], [0.0, 0.375, 0.125, 0.0])
 
 
+def test_ten_ticks_are_caught_up_unless_said_otherwise():
+    _, log = ran([3.0], seconds=5.0, overrun="catch up")
+    assert log.tick[:2].tolist() == [0, 12 + 1 - 10]
+
+
 def test_a_loop_that_may_not_overrun_stops():
     robot, log = ran([0.0, 0.0, 0.375], overrun="stop")
     assert log.ended == "tick 2 ended 125 ms too late"

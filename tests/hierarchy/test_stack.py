@@ -153,6 +153,22 @@ def test_a_bound_kernel_is_the_kernel_at_whatever_number_comes_then():
         np.testing.assert_array_equal(out, expected)
 
 
+@compiled
+def _filled(count, by):
+    return np.full(count, by)
+
+
+@compiled
+def _total_of(count, by):
+    return _filled(count, by).sum()
+
+
+def test_a_kernel_counts_references_where_it_or_one_it_calls_makes_an_array():
+    assert _filled.allocates
+    assert _total_of.allocates
+    assert not _scaled.allocates
+
+
 def test_the_reference_is_the_null_space_term():
     state = state_at(Q, V)
     np.testing.assert_allclose(stack(reference=JointDamping(7, 5.0)).hierarchy(state).reference,

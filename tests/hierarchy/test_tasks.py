@@ -1,3 +1,5 @@
+from dataclasses import fields, replace
+
 import numpy as np
 import pytest
 from scene import (
@@ -15,8 +17,29 @@ from scene import (
 )
 
 from hierarchy import HierarchyError, State
-from hierarchy.tasks import Avoidance, JointDamping, Pointing, Position, Posture
+from hierarchy.avoidance import Barrier
+from hierarchy.robots import TABLES as ROBOT_TABLES
+from hierarchy.robots import link_capsules
+from hierarchy.tasks import (
+    Avoidance,
+    DangerBounds,
+    JointDamping,
+    JointLimits,
+    Pointing,
+    Position,
+    Posture,
+    SelfSeparation,
+    Separation,
+    TorqueLimits,
+)
 from hierarchy.tasks.pose import rotation_vector
+from scenarios.config.tasks import (
+    ListedCentreOfMass,
+    ListedPointing,
+    ListedPose,
+    ListedPosition,
+    ListedPosture,
+)
 
 STEP = 1e-6
 STATES = states(20)
@@ -235,3 +258,26 @@ def test_avoidance_without_a_measurement_is_an_error():
     with pytest.raises(HierarchyError, match="no measurement"):
         TASKS["avoidance 1-D"].jacobian(State.at(ROBOT, *STATES[0]))
     assert SENSOR.measurement is not None
+
+
+MADE = [*TASKS.values(), JointLimits(ROBOT, 10.0, 1e-3), TorqueLimits(ROBOT),
+        DangerBounds(JointLimits(ROBOT, 10.0, 1e-3), ROBOT.control_points),
+        Separation(ROBOT.control_points, Barrier(0.05)),
+        SelfSeparation(link_capsules(ROBOT_TABLES["kuka_lwr"], foot=0.3), Barrier(0.05))]
+
+
+@pytest.mark.parametrize("task", MADE, ids=lambda task: task.name)
+def test_tasks_of_the_same_settings_are_equal_and_print_their_settings_alone(task):
+    assert replace(task) == task
+    assert replace(task, name="another") != task
+    for field in fields(task):
+        assert (f" {field.name}=" in f" {repr(task).partition('(')[2]}") == field.init
+
+
+@pytest.mark.parametrize(("task", "section"), [
+    (Position(FRAME, PATH), ListedPosition), (TASKS["pose"], ListedPose),
+    (TASKS["centre of mass"], ListedCentreOfMass), (TASKS["pointing"], ListedPointing),
+    (TASKS["posture"], ListedPosture)], ids=lambda one: getattr(one, "name", ""))
+def test_a_gain_that_is_left_out_is_the_same_in_python_and_in_a_file(task, section):
+    for gain in ("stiffness", "damping", "gain"):
+        assert getattr(task, gain) == section.model_fields[gain].default
