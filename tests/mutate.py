@@ -1,41 +1,202 @@
-"""Mutation testing: which single changes of a module does no test notice?
+"""Mutation testing: which single changes of the packages does no test notice?
 
-    python tests/mutate.py solvers/explain.py --tests tests/solvers/test_hcod.py --count 10 --seed 0
+    python tests/mutate.py --count 100 --seed 1                      samples all modules below
+    python tests/mutate.py solvers/explain.py --count 10 --seed 0    samples one module
 
-Each mutant is one change (a comparison, an arithmetic or boolean operator, a constant, a returned
-value) in a temporary copy of the packages, which comes first on PYTHONPATH. Prints every survivor
-with its line, and the share of survivors. A mutant that runs past the time limit counts as killed.
-Compiled kernels are not mutated: each mutant would compile for minutes.
+Each mutant is one change: a comparison, an arithmetic or boolean operator, a constant or a returned
+value. Its module is replaced as it is imported, in the tests and in every program that they start;
+the checkout is not touched, so kernels come from the cache. The tests are those of `TESTS`, or of
+--tests: first those not marked slow, then, where these pass, the slow ones. Prints every survivor
+with its line, and the share of survivors. A mutant that takes over three times the CPU time
+of the unchanged tests, and 20 s, counts as killed.
+
+Not mutated: compiled kernels and the numbers they read (each mutant would compile for minutes),
+`strict=` of zip (a check that does not fire where shapes have been checked), what only a type
+checker reads, and solvers/batch/on_jax.py where jax is not installed.
 """
 
 from __future__ import annotations
 
 import argparse
 import ast
+import contextlib
+import marshal
+import math
 import os
 import random
-import shutil
-import subprocess
+import resource
+import signal
 import sys
 import tempfile
+import time
+import traceback
 from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cache
+from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
+from types import CodeType
+
+import pytest
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy is imported
+os.environ.setdefault("MPLBACKEND", "Agg")
 
 ROOT = Path(__file__).parents[1]
-PACKAGES = ("hierarchy", "solvers", "scenarios")
+SAMPLED = ("hierarchy", "solvers", "scenarios/measure")
+COMPILED = ("compiled", "unlocked", "inlined")
+# The folder of kernels, and the integer codes that kernels read.
+OF_KERNELS = ("solvers/kernels/", "solvers/status.py")
+
+# Test files of a module or a folder, quickest first; the longest path that fits counts.
+TESTS = {
+    "hierarchy/": "hierarchy/test_robot hierarchy/test_stack",
+    "hierarchy/allocation": "hierarchy/test_allocation scenarios/test_hierarchical",
+    "hierarchy/avoidance/": "hierarchy/test_avoidance hierarchy/test_danger_bounds",
+    "hierarchy/avoidance/barrier": "hierarchy/test_separation hierarchy/test_self_collision",
+    "hierarchy/avoidance/pairs": "hierarchy/test_separation",
+    "hierarchy/avoidance/self_collision": "hierarchy/test_self_collision hierarchy/test_models",
+    "hierarchy/jit/": "hierarchy/test_stack hierarchy/test_limits",
+    "hierarchy/limits": "hierarchy/test_limits hierarchy/test_danger_bounds",
+    "hierarchy/loop/": "hierarchy/test_loop",
+    "hierarchy/paths": "hierarchy/test_avoidance hierarchy/test_tasks scenarios/test_continuing",
+    "hierarchy/problem": "hierarchy/test_problem solvers/test_resolver",
+    "hierarchy/robot": "hierarchy/test_robot hierarchy/test_models",
+    "hierarchy/robots/": "hierarchy/test_robot hierarchy/test_models "
+                         "hierarchy/test_self_collision scenarios/test_humanoid",
+    "hierarchy/stack": "hierarchy/test_stack hierarchy/test_tasks",
+    "hierarchy/state": "hierarchy/test_robot hierarchy/test_stack hierarchy/test_tasks",
+    "hierarchy/task": "hierarchy/test_stack hierarchy/test_tasks",
+    "hierarchy/tasks/": "hierarchy/test_tasks scenarios/test_humanoid",
+    "hierarchy/tasks/avoidance": "hierarchy/test_tasks hierarchy/test_avoidance",
+    "hierarchy/tasks/danger_bounds": "hierarchy/test_danger_bounds hierarchy/test_models",
+    "hierarchy/tasks/joint_limits": "hierarchy/test_limits hierarchy/test_models",
+    "hierarchy/tasks/posture": "hierarchy/test_tasks hierarchy/test_models",
+    "hierarchy/tasks/self_separation": "hierarchy/test_self_collision",
+    "hierarchy/tasks/separation": "hierarchy/test_separation",
+    "hierarchy/tasks/torque_limits": "hierarchy/test_limits",
+    "scenarios/measure/": "scenarios/test_parting scenarios/test_report",
+    "scenarios/measure/metrics": "scenarios/test_metrics scenarios/test_hierarchical "
+                                 "scenarios/test_plants scenarios/test_faults",
+    "solvers/": "solvers/test_resolver solvers/test_contract",
+    "solvers/adapters/": "solvers/test_adapters",
+    "solvers/batch/": "solvers/test_batch",
+    "solvers/certificate": "solvers/test_certificate solvers/test_contract",
+    "solvers/explain": "solvers/test_hcod",
+    "solvers/factorization/": "solvers/test_factorization",
+    "solvers/problems/": "solvers/test_problems scenarios/test_problem_families",
+    "solvers/problems/kinds": "solvers/test_problem_kinds solvers/test_problems",
+    "solvers/qp/": "solvers/test_hqp solvers/test_failures solvers/test_contract",
+    "solvers/resolvers/hcod": "solvers/test_hcod solvers/test_contract",
+    "solvers/resolvers/hqp": "solvers/test_hqp solvers/test_failures solvers/test_contract",
+    "solvers/resolvers/recursive": "solvers/test_recursive solvers/test_contract",
+    "solvers/resolvers/reverse": "solvers/test_reverse solvers/test_contract",
+    "solvers/resolvers/sns": "solvers/test_sns solvers/test_contract",
+    "solvers/resolvers/saturation": "solvers/test_sns solvers/test_contract",
+    "solvers/resolvers/tpm": "solvers/test_tpm solvers/test_tpm_limits solvers/test_contract",
+    "solvers/resolvers/augmented": "solvers/test_contract",
+    "solvers/resolvers/weighted": "solvers/test_weighted solvers/test_contract",
+    "solvers/workspace": "solvers/test_workspace",
+}
+
+IMPORTED_ONCE = ("numpy", "numba", "numba.np.arraymath", "scipy.optimize", "scipy.stats",
+                 "scipy.spatial.transform", "pinocchio", "qpsolvers", "osqp", "matplotlib.pyplot",
+                 "pydantic", "typer", "rich.console", "jinja2", "mujoco")
+
+# Loaded by every Python that is started: takes the code of one module from a file.
+HOOK = '''
+import marshal, os, sys
+from importlib.machinery import SourceFileLoader
+from importlib.util import spec_from_file_location
+from pathlib import Path
+
+class Loader(SourceFileLoader):
+    def get_code(self, fullname):
+        return marshal.loads(Path(os.environ["MUTANT_CODE"]).read_bytes())
+
+class Finder:
+    @staticmethod
+    def find_spec(name, path=None, target=None):
+        if name == os.environ["MUTANT_NAME"]:
+            file = os.environ["MUTANT_FILE"]
+            return spec_from_file_location(name, file, loader=Loader(name, file))
+
+if "MUTANT_NAME" in os.environ:
+    sys.meta_path.insert(0, Finder)
+'''
+
 SWAPS = {ast.Lt: ast.LtE, ast.LtE: ast.Lt, ast.Gt: ast.GtE, ast.GtE: ast.Gt, ast.Eq: ast.NotEq,
          ast.NotEq: ast.Eq, ast.Is: ast.IsNot, ast.IsNot: ast.Is, ast.In: ast.NotIn,
          ast.NotIn: ast.In, ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Mult: ast.Div,
          ast.Div: ast.Mult, ast.And: ast.Or, ast.Or: ast.And}
 
 
-def mutants(source: str) -> Iterator[tuple[int, str, str]]:
-    """Yield line, description and source of every mutant."""
-    for index, node in enumerate(ast.walk(ast.parse(source))):
-        for kind in changes(node):
-            tree = ast.parse(source)
-            described = change(list(ast.walk(tree))[index], kind)
-            yield node.lineno, described, ast.unparse(tree)
+@dataclass(frozen=True)
+class Mutant:
+    """One change: of the node with this index in `ast.walk` over the module."""
+
+    module: str
+    line: int
+    index: int
+    kind: str
+
+    def code(self) -> tuple[str, CodeType]:
+        """Return what was and what is, and the changed module; lines stay where they are."""
+        tree = parsed(self.module)
+        described = change(list(ast.walk(tree))[self.index], self.kind)
+        tree = ast.fix_missing_locations(tree)
+        return described, compile(tree, str(ROOT / self.module), "exec")
+
+
+def parsed(module: str) -> ast.Module:
+    return ast.parse((ROOT / module).read_text())
+
+
+def modules() -> list[str]:
+    """Return every module that is sampled, relative to the root."""
+    files = sorted(file for folder in SAMPLED for file in (ROOT / folder).rglob("*.py"))
+    names = [file.relative_to(ROOT).as_posix() for file in files]
+    left_out = OF_KERNELS if find_spec("jax") else (*OF_KERNELS, "solvers/batch/on_jax.py")
+    return [name for name in names if not name.startswith(left_out)]
+
+
+def mutants(module: str) -> Iterator[Mutant]:
+    """Yield every mutant of a module."""
+    tree = parsed(module)
+    left_out = {id(node) for top in ast.walk(tree) if untested(top) for node in ast.walk(top)}
+    for index, node in enumerate(ast.walk(tree)):
+        if id(node) not in left_out:
+            for kind in changes(node):
+                yield Mutant(module, node.lineno, index, kind)
+
+
+def untested(node: ast.AST) -> bool:
+    """Whether a node and all inside it stays as it is, for the reasons in the module's text."""
+    if isinstance(node, ast.keyword):
+        return node.arg == "strict"
+    if isinstance(node, ast.If):
+        return ast.unparse(node.test) == "TYPE_CHECKING"
+    if isinstance(node, ast.Assign):
+        named = {name.id for name in ast.walk(node.targets[0]) if isinstance(name, ast.Name)}
+        return not named.isdisjoint(read_by_kernels()) and node.col_offset == 0
+    return is_kernel(node)
+
+
+def is_kernel(node: ast.AST) -> bool:
+    return isinstance(node, ast.FunctionDef) and any(
+        isinstance(mark, ast.Name) and mark.id in COMPILED for mark in node.decorator_list)
+
+
+@cache
+def read_by_kernels() -> frozenset[str]:
+    """Return every name that a kernel of the packages reads."""
+    files = [file for folder in ("hierarchy", "solvers", "scenarios")
+             for file in (ROOT / folder).rglob("*.py")]
+    kernels = [node for file in files for node in ast.parse(file.read_text()).body
+               if is_kernel(node)]
+    return frozenset(node.id for kernel in kernels for node in ast.walk(kernel)
+                     if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load))
 
 
 def changes(node: ast.AST) -> tuple[str, ...]:
@@ -46,7 +207,7 @@ def changes(node: ast.AST) -> tuple[str, ...]:
         return ("operator",)
     if isinstance(node, ast.Constant) and isinstance(node.value, (bool, int, float)):
         return ("constant",)
-    if isinstance(node, ast.Return) and node.value is not None:
+    if isinstance(node, ast.Return) and not isinstance(node.value, (ast.Constant, type(None))):
         return ("return",)
     return ()
 
@@ -72,52 +233,135 @@ def _other(value: bool | int | float) -> bool | int | float:
     return value + 1 if isinstance(value, int) else float(value == 0.0)
 
 
-def survives(copy: Path, tests: list[str], limit: float) -> bool:
-    """Whether the tests pass on the packages in `copy`."""
-    environment = {**os.environ, "PYTHONPATH": str(copy), "PYTHONSAFEPATH": "1"}
-    command = [sys.executable, "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider",
-               *(str(ROOT / test) for test in tests)]
-    try:
-        run = subprocess.run(command, cwd=copy, env=environment, capture_output=True,
-                             timeout=limit, check=False)
-    except subprocess.TimeoutExpired:
-        return False
-    return run.returncode == 0
+def tests_of(mutant: Mutant) -> tuple[str, ...]:
+    """Return the test files of a mutant, relative to the root."""
+    if "frozen=" in (ROOT / mutant.module).read_text().splitlines()[mutant.line - 1]:
+        return ("tests/project/test_records.py",)
+    path = max((path for path in TESTS if mutant.module.startswith(path)), key=len)
+    return tuple(f"tests/{name}.py" for name in TESTS[path].split())
 
 
-def fresh_copy() -> Path:
-    """Copy the packages, always to the same place: compiled kernels are cached by their path."""
-    copy = Path(tempfile.gettempdir()) / "task-hierarchy-mutants"
-    shutil.rmtree(copy, ignore_errors=True)
-    for package in PACKAGES:
-        shutil.copytree(ROOT / package, copy / package,
-                        ignore=shutil.ignore_patterns("__pycache__"))
-    return copy
+class Runner:
+    """Runs tests with one module replaced, each time in a fork of this process.
+
+    What the packages import from elsewhere is imported before, once, and so are the kernels with
+    what they import; a mutant of one of these modules makes a fork import all packages anew.
+    """
+
+    def __init__(self, folder: Path, limit: float) -> None:
+        self.folder, self.limit = folder, limit
+        self.seconds: dict[tuple[str, str], float] = {}
+        (folder / "sitecustomize.py").write_text(HOOK)
+        for name in IMPORTED_ONCE:
+            with contextlib.suppress(ImportError):
+                import_module(name)
+        sys.path.insert(0, str(ROOT))
+        for file in sorted((ROOT / "solvers" / "kernels").glob("*.py")):
+            import_module(f"solvers.kernels.{file.stem}")
+
+    def unchanged(self, test: str, mark: str) -> float:
+        """Return the CPU time of a test file on the packages as they are [s]; exit if it fails."""
+        if (test, mark) not in self.seconds:
+            passed, self.seconds[test, mark] = self._run([test], mark, {}, self.limit)
+            if not passed:
+                sys.exit(f"{(self.folder / 'output').read_text()}\n{test} ({mark}) fails without "
+                         f"any change, or takes over {self.limit:g} s")
+        return self.seconds[test, mark]
+
+    def survives(self, module: str, code: CodeType, tests: tuple[str, ...]) -> bool:
+        """Whether the tests pass with this code of a module."""
+        (self.folder / "mutant").write_bytes(marshal.dumps(code))
+        name = module.removesuffix(".py").removesuffix("/__init__").replace("/", ".")
+        environment = {"MUTANT_NAME": name, "MUTANT_FILE": str(ROOT / module),
+                       "MUTANT_CODE": str(self.folder / "mutant")}
+        for mark in ("not slow", "slow"):
+            limit = 20.0 + 3.0 * sum(self.unchanged(test, mark) for test in tests)
+            if not self._run([*tests], mark, environment, limit)[0]:
+                return False
+        return True
+
+    def _run(self, tests: list[str], mark: str, environment: dict[str, str],
+             limit: float) -> tuple[bool, float]:
+        """Return whether the tests pass, and their CPU time [s], which `limit` bounds."""
+        child = os.fork()
+        if child == 0:
+            try:
+                self._become(environment, math.ceil(limit))
+                code = int(pytest.main(["-q", "-x", "-p", "no:cacheprovider", "-m", mark, *tests]))
+            except BaseException:
+                traceback.print_exc()
+                code = 1
+            finally:
+                sys.stdout.flush()
+                sys.stderr.flush()
+                os._exit(code)
+        code, used = _ended(child, 20.0 * limit)
+        return code in (0, 5), used.ru_utime + used.ru_stime  # 5: no test has this mark
+
+    def _become(self, environment: dict[str, str], limit: int) -> None:
+        """Make this fork what a fresh Python in a session of its own would be."""
+        os.setsid()
+        resource.setrlimit(resource.RLIMIT_CPU, (limit, limit))
+        output = os.open(self.folder / "output", os.O_CREAT | os.O_TRUNC | os.O_WRONLY)
+        for stream in (1, 2):
+            os.dup2(output, stream)
+        os.chdir(ROOT)
+        path = [str(self.folder), str(ROOT)]
+        os.environ.update(environment, PYTHONPATH=os.pathsep.join(path), PYTHONSAFEPATH="1")
+        sys.path[:] = [*path, *(place for place in sys.path if place != str(ROOT / "tests"))]
+        if environment.get("MUTANT_NAME") in sys.modules:
+            for name in [*sys.modules]:
+                if name.partition(".")[0] in ("hierarchy", "solvers", "scenarios"):
+                    del sys.modules[name]
+        exec(HOOK, {})
+
+
+def _ended(child: int, limit: float) -> tuple[int, resource.struct_rusage]:
+    """Wait for a fork, end it and all that it started; return its exit status and its usage."""
+    end = time.monotonic() + limit
+    pid = 0
+    while pid == 0:
+        pid, status, used = os.wait4(child, os.WNOHANG)
+        if pid == 0 and time.monotonic() > end:
+            os.kill(child, signal.SIGKILL)
+        time.sleep(0.02)
+    with contextlib.suppress(ProcessLookupError):
+        os.killpg(child, signal.SIGKILL)
+    return os.waitstatus_to_exitcode(status), used
 
 
 def main() -> None:
-    """Try a random sample of the mutants of one module; exit with 1 if the tests fail unchanged."""
+    """Try a random sample of mutants; exit with 1 if the tests fail unchanged."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("module", help="file to change, relative to the root of the checkout")
-    parser.add_argument("--tests", nargs="+", required=True, help="test files of that module")
+    parser.add_argument("modules", nargs="*", help="files to change, relative to the root")
+    parser.add_argument("--tests", nargs="+", help="test files, in place of those in TESTS")
     parser.add_argument("--count", type=int, default=10, help="mutants to try")
     parser.add_argument("--seed", type=int, default=0, help="of the sample")
-    parser.add_argument("--limit", type=float, default=300.0, help="time limit per mutant [s]")
+    parser.add_argument("--limit", type=float, default=900.0,
+                        help="CPU time limit of an unchanged test file [s]")
     options = parser.parse_args()
-    source = (ROOT / options.module).read_text()
-    every = list(mutants(source))
+    every = [mutant for module in options.modules or modules() for mutant in mutants(module)]
     sample = random.Random(options.seed).sample(every, min(options.count, len(every)))
-    copy = fresh_copy()
-    if not survives(copy, options.tests, 10.0 * options.limit):  # compiles the kernels of the copy
-        sys.exit("the tests fail, or take too long, without any change")
+    with tempfile.TemporaryDirectory() as folder:
+        alive = _try(sample, options.tests, Runner(Path(folder), options.limit))
+    print(f"{alive} of {len(sample)} mutants survived: {alive / len(sample):.0%} "
+          f"(of {len(every)} possible, seed {options.seed})")
+
+
+def _try(sample: list[Mutant], tests: list[str] | None, runner: Runner) -> int:
+    """Return how many mutants survive, and print them."""
+    broken = compile("raise ImportError", "broken", "exec")
+    if runner.survives(sample[0].module, broken, tuple(tests or tests_of(sample[0]))):
+        sys.exit("the tests pass without the module")
     alive = 0
-    for line, described, mutant in sample:
-        (copy / options.module).write_text(mutant)
-        if survives(copy, options.tests, options.limit):
-            alive += 1
-            print(f"survived: {options.module}:{line}: {described}", flush=True)
-    print(f"{alive} of {len(sample)} mutants survived (of {len(every)} possible, "
-          f"seed {options.seed})")
+    for done, mutant in enumerate(sample, 1):
+        described, code = mutant.code()
+        survived = runner.survives(mutant.module, code, tuple(tests or tests_of(mutant)))
+        alive += survived
+        if survived:
+            print(f"survived: {mutant.module}:{mutant.line}: {described}", flush=True)
+        print(f"{done} of {len(sample)} tried, {alive} survived", file=sys.stderr, flush=True)
+    return alive
 
 
 if __name__ == "__main__":

@@ -105,7 +105,8 @@ class Loop:
             if late > 0.0 and self.overrun == "stop":
                 return f"tick {tick} ended {1e3 * late:.3g} ms too late"
             tick = self._next(tick, late)
-        return "all ticks were run"
+        self.log.due = ticks
+        return "all other ticks were run" if self.log.skipped else "all ticks were run"
 
     def _next(self, tick: int, late: float) -> int:
         """Return the tick to run after one that ended `late` [s] after the start of the next."""

@@ -17,12 +17,13 @@ class Log:
 
     tick (K,) is the planned number, which jumps where ticks were skipped; late (K,) [s] the delay
     of the start after its planned time; duration (K,) [s] the time until the command was sent;
-    command (K, n) if recorded. `ended` says why the loop ended, `notes` which settings could not be
-    applied.
+    command (K, n) if recorded. `due` is the number of planned ticks up to the last that ran, or all
+    where the loop ran to its end. `ended` says why the loop ended, `notes` which settings could not
+    be applied.
     """
 
     def __init__(self, period: float, ticks: int, width: int = 0) -> None:
-        self.period, self.planned, self.count = period, ticks, 0
+        self.period, self.planned, self.count, self.due = period, ticks, 0, 0
         self.ended, self.notes = "not begun", list[str]()
         self._tick = np.full(ticks, -1, dtype=np.int64)
         self._times = np.full((ticks, 2), np.nan)
@@ -34,7 +35,7 @@ class Log:
         self._tick[k], self._times[k] = tick, (late, duration)
         if self._command.shape[1]:
             self._command[k] = command
-        self.count = k + 1
+        self.count, self.due = k + 1, tick + 1
 
     @property
     def tick(self) -> NDArray[np.int64]:
@@ -63,8 +64,8 @@ class Log:
 
     @property
     def skipped(self) -> int:
-        """Number of ticks that were skipped, up to the last that ran."""
-        return int(self.tick[-1] + 1 - self.count) if self.count else 0
+        """Number of ticks that were due and did not run."""
+        return self.due - self.count
 
     def summary(self) -> dict[str, dict[str, float]]:
         """Return median, p95, p99.9 and max of `late` and `duration` [s]; NaN without a tick."""

@@ -1,8 +1,10 @@
 """A KUKA LWR among obstacles, for tests of tasks and stacks."""
 
+from dataclasses import dataclass
+
 import numpy as np
 
-from hierarchy import Robot, State
+from hierarchy import Robot, State, Task
 from hierarchy.avoidance import Obstacle, Obstacles, Repulsion
 from hierarchy.paths import Ellipse
 from hierarchy.tasks import (
@@ -51,3 +53,36 @@ def state_at(q, v, t=0.7, differences=None):
     state = State.at(ROBOT, q, v, t, differences)
     SENSOR.measure(state)
     return state
+
+
+@dataclass(frozen=True)
+class Elbow(Task):
+    """A user's task in plain numpy: the fourth joint's angle."""
+
+    name: str = "elbow"
+    gain: float = 2.0
+    stiffness: float = 10.0
+    damping: float = 0.0
+    dimension = 1
+
+    def error(self, state):
+        return np.array([1.0 - state.q[3]])
+
+    def jacobian(self, state):
+        return np.eye(7)[3:4]
+
+    def jacobian_derivative(self, state):
+        return np.zeros((1, 7))
+
+
+def compiled_rows(task, state, level, rtol=1e-12):
+    """The rows that a task writes (A, lower, upper), checked against those of its plain methods."""
+    count = task.dimension + 2
+    written, plain = [(np.full((count, 7), 5.0), np.full(count, 5.0), np.full(count, 5.0))
+                      for _ in range(2)]
+    task.writer(state, level, *written, row=1)()
+    Task.writer(task, state, level, *plain, row=1)()
+    for a, b in zip(written, plain, strict=True):
+        np.testing.assert_allclose(a, b, rtol=rtol, atol=1e-11)
+        assert (a[[0, -1]] == 5.0).all(), "rows of others are left alone"
+    return [a[1:-1] for a in written]

@@ -506,6 +506,11 @@ def test_settings_that_make_no_sense_are_named(settings, said):
     assert "task 'joint limits'" in str(error.value)
 
 
+def test_a_joint_with_a_single_position_is_kept_there():
+    box = Limits([1.0], [1.0], [2.0], [100.0], 0.01).box(np.ones(1), np.zeros(1), "velocity")
+    np.testing.assert_array_equal(box, np.zeros((2, 1)))
+
+
 @pytest.mark.parametrize(("limits", "said"), [
     (([0, 0], [1], [1], [1]), "have 2, 1, 1, 1 entries"),
     (([0], [np.nan], [1], [1]), "joint 0: no position lies between lower and upper, got 0.0, nan"),

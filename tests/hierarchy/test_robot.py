@@ -1,9 +1,11 @@
 import numpy as np
 import pytest
 from pendulum import LIMIT, URDF
+from pinned import leaves, read, robot_facts
 
 from hierarchy import HierarchyError, Robot, State
 from hierarchy.errors import RobotError, UnknownNameError
+from hierarchy.robots import TABLES
 
 ROBOT = Robot.named("kuka_lwr")
 
@@ -145,3 +147,9 @@ def test_bad_robot_files_are_named(tmp_path, pendulum):
             Robot.from_file(tmp_path / path)
     with pytest.raises(HierarchyError, match="unknown frame 'tool'"):
         Robot.from_file(pendulum(), end_effector="tool")
+
+
+@pytest.mark.parametrize("name", TABLES)
+def test_a_shipped_robot_is_the_one_that_recorded_runs_were_made_with(name):
+    found, expected = leaves(robot_facts(name)), leaves(read("robots")[name])
+    assert found == pytest.approx(expected, rel=1e-9, abs=1e-9)

@@ -2,9 +2,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from scene import FRAME, PATH, ROBOT, SENSOR, TASKS, state_at, states
+from scene import FRAME, PATH, ROBOT, SENSOR, TASKS, Elbow, state_at, states
 
-from hierarchy import HierarchyError, Stack, State, Task
+from hierarchy import HierarchyError, Stack, State
 from hierarchy.jit import bind, compiled
 from hierarchy.tasks import JointDamping, Position
 
@@ -111,24 +111,6 @@ def test_what_moves_between_two_calls_is_followed():
 
 
 @dataclass(frozen=True)
-class Elbow(Task):
-    """A task in plain numpy."""
-
-    name: str = "elbow"
-    stiffness: float = 10.0
-    dimension = 1
-
-    def error(self, state):
-        return np.array([1.0 - state.q[3]])
-
-    def jacobian(self, state):
-        return np.eye(7)[3:4]
-
-    def jacobian_derivative(self, state):
-        return np.zeros((1, 7))
-
-
-@dataclass(frozen=True)
 class Slower(Position):
     """A compiled task of the package, changed in plain numpy."""
 
@@ -169,6 +151,22 @@ def test_a_bound_kernel_is_the_kernel_at_whatever_number_comes_then():
         expected[row:] = by * values[row:]
         scale(by, row)
         np.testing.assert_array_equal(out, expected)
+
+
+@compiled
+def _filled(count, by):
+    return np.full(count, by)
+
+
+@compiled
+def _total_of(count, by):
+    return _filled(count, by).sum()
+
+
+def test_a_kernel_counts_references_where_it_or_one_it_calls_makes_an_array():
+    assert _filled.allocates
+    assert _total_of.allocates
+    assert not _scaled.allocates
 
 
 def test_the_reference_is_the_null_space_term():

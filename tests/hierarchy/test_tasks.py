@@ -1,10 +1,45 @@
+from dataclasses import fields, replace
+
 import numpy as np
 import pytest
-from scene import BODY, FRAME, PATH, ROBOT, SENSOR, TASKS, TIP, state_at, states
+from scene import (
+    BODY,
+    FRAME,
+    PATH,
+    ROBOT,
+    SENSOR,
+    TASKS,
+    TIP,
+    Elbow,
+    compiled_rows,
+    state_at,
+    states,
+)
 
-from hierarchy import HierarchyError, State, Task
-from hierarchy.tasks import Avoidance, JointDamping, Pointing, Position, Posture
+from hierarchy import HierarchyError, State
+from hierarchy.avoidance import Barrier
+from hierarchy.robots import TABLES as ROBOT_TABLES
+from hierarchy.robots import link_capsules
+from hierarchy.tasks import (
+    Avoidance,
+    DangerBounds,
+    JointDamping,
+    JointLimits,
+    Pointing,
+    Position,
+    Posture,
+    SelfSeparation,
+    Separation,
+    TorqueLimits,
+)
 from hierarchy.tasks.pose import rotation_vector
+from scenarios.config.tasks import (
+    ListedCentreOfMass,
+    ListedPointing,
+    ListedPose,
+    ListedPosition,
+    ListedPosture,
+)
 
 STEP = 1e-6
 STATES = states(20)
@@ -80,14 +115,7 @@ def test_compiled_rows_equal_those_of_the_plain_methods(name, level, differences
     for q, v in STATES[:5]:
         state = state_at(q, v, differences=differences)
         state.move(0.8, q + 1e-3 * v, v)
-        written, plain = [(np.full((8, 7), 5.0), np.full(8, 5.0), np.full(8, 5.0))
-                          for _ in range(2)]
-        task.writer(state, level, *written, row=1)()
-        Task.writer(task, state, level, *plain, row=1)()
-        for a, b in zip(written, plain, strict=True):
-            np.testing.assert_allclose(a, b, rtol=1e-12, atol=1e-11)
-            assert a[0].max() == 5.0
-            assert (a[1 + task.dimension:] == 5.0).all(), "rows of others are left alone"
+        compiled_rows(task, state, level)
 
 
 @pytest.mark.parametrize("differences", [None, 1e-3])
@@ -192,26 +220,11 @@ def test_pose_error_falls_when_its_velocity_is_followed():
     assert np.linalg.norm(task.error(State.at(ROBOT, q + 1e-3 * v))) < np.linalg.norm(error)
 
 
-class Elbow(Task):
-    """A user's task in plain numpy: the fourth joint's angle."""
-
-    name, gain, stiffness, damping = "elbow", 2.0, 4.0, 3.0
-    dimension = 1
-
-    def error(self, state):
-        return np.array([1.0 - state.q[3]])
-
-    def jacobian(self, state):
-        return np.eye(7)[3:4]
-
-    def jacobian_derivative(self, state):
-        return np.zeros((1, 7))
-
-
 def test_a_task_in_plain_numpy_needs_three_methods():
     q, v = STATES[10]
     A, low, up = np.zeros((1, 7)), np.zeros(1), np.zeros(1)
-    Elbow().writer(State.at(ROBOT, q, v), "acceleration", A, low, up, 0)()
+    task = Elbow(stiffness=4.0, damping=3.0)
+    task.writer(State.at(ROBOT, q, v), "acceleration", A, low, up, 0)()
     assert low[0] == up[0] == pytest.approx(4 * (1 - q[3]) - 3 * v[3])
 
 
@@ -245,3 +258,26 @@ def test_avoidance_without_a_measurement_is_an_error():
     with pytest.raises(HierarchyError, match="no measurement"):
         TASKS["avoidance 1-D"].jacobian(State.at(ROBOT, *STATES[0]))
     assert SENSOR.measurement is not None
+
+
+MADE = [*TASKS.values(), JointLimits(ROBOT, 10.0, 1e-3), TorqueLimits(ROBOT),
+        DangerBounds(JointLimits(ROBOT, 10.0, 1e-3), ROBOT.control_points),
+        Separation(ROBOT.control_points, Barrier(0.05)),
+        SelfSeparation(link_capsules(ROBOT_TABLES["kuka_lwr"], foot=0.3), Barrier(0.05))]
+
+
+@pytest.mark.parametrize("task", MADE, ids=lambda task: task.name)
+def test_tasks_of_the_same_settings_are_equal_and_print_their_settings_alone(task):
+    assert replace(task) == task
+    assert replace(task, name="another") != task
+    for field in fields(task):
+        assert (f" {field.name}=" in f" {repr(task).partition('(')[2]}") == field.init
+
+
+@pytest.mark.parametrize(("task", "section"), [
+    (Position(FRAME, PATH), ListedPosition), (TASKS["pose"], ListedPose),
+    (TASKS["centre of mass"], ListedCentreOfMass), (TASKS["pointing"], ListedPointing),
+    (TASKS["posture"], ListedPosture)], ids=lambda one: getattr(one, "name", ""))
+def test_a_gain_that_is_left_out_is_the_same_in_python_and_in_a_file(task, section):
+    for gain in ("stiffness", "damping", "gain"):
+        assert getattr(task, gain) == section.model_fields[gain].default

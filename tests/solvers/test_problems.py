@@ -5,6 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 from hypothesis import given, settings
+from pinned import problem_sums, read
 
 from hierarchy import Hierarchy, HierarchyError
 from solvers import certify, make, problems
@@ -137,3 +138,12 @@ def test_a_file_gives_back_what_was_written(tmp_path):
 def test_hypothesis_draws_the_same_kind_of_problem(h):
     assert h.n <= 8
     assert certify(h, make("tpm").solve(h).x).certified
+
+
+@pytest.mark.slow
+def test_a_seed_means_the_problem_that_it_meant_when_it_was_reported():
+    expected = read("problems")
+    for kind, sums in problem_sums().items():
+        allowed = 1e-6 if kind == "bounded" else 1e-10  # a box lies around a solution, as rounded
+        assert sums == pytest.approx(expected.pop(kind), rel=0.0, abs=allowed), kind
+    assert not expected
