@@ -106,7 +106,10 @@ def _all(recording: Recording) -> Iterator[tuple[str, Figure]]:
         panels = _fitting(wanted.panels, recording)
         if panels:
             stem, title = _named(wanted, recording)
-            yield stem, stacked([(recording, panels)], title)
+            whole = all(is_letters(recording, part.of) for part in wanted.parts)
+            yield stem, stacked([(recording, _fitting(part.panels, recording))
+                                 for part in wanted.parts] if whole else [(recording, panels)],
+                                title, lettered=whole)
     if "ee_position" in recording and recording.ticks > 1:
         yield "picture", picture({label_of(recording): recording})
     if recording.ticks > 1:

@@ -82,7 +82,7 @@ def active_point(ax: Axes, recording: Recording, colour: str) -> None:
     points = recording["control_point_distance"].shape[1] \
         if "control_point_distance" in recording else max(int(active.max()), 1)
     ax.set_ylim(0.3, points + 0.7)
-    ax.set_yticks(range(1, points + 1, 1 + points // 10))
+    ax.set_yticks(range(1, points + 1, 1 + points // 6))
 
 
 def body_distance(ax: Axes, recording: Recording, colour: str) -> None:
