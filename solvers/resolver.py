@@ -9,6 +9,7 @@ from functools import cached_property
 from typing import Any, ClassVar, Literal, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hierarchy.errors import HierarchyError, UnknownNameError
 from hierarchy.jit import announce_compilation
@@ -43,6 +44,11 @@ class Resolution:
         self.status = status
         self.iterations = iterations
         self.memory = memory
+
+    @property
+    def active(self) -> NDArray[np.int8] | None:
+        """State of each row (m,), values of `solvers.status.Row`; None if it is not reported."""
+        return None
 
     def __repr__(self) -> str:
         return f"Resolution(x={self.x}, status={self.status.name}, iterations={self.iterations})"

@@ -312,8 +312,8 @@ def replay(folders: Annotated[list[Path], typer.Argument(
 
 
 @app.command()
-def figures(folder: Annotated[Path, typer.Argument(
-                metavar="RUN", help="Run folder of `hierarchy run` or `compare`.")],
+def figures(folders: Annotated[list[Path], typer.Argument(
+                metavar="RUN...", help="Run folders of `hierarchy run` or `compare`.")],
             style: Annotated[str, typer.Option(
                 "--style", metavar="STYLE",
                 help="screen: SVG and PNG. paper: PDF, one column of a journal wide.")] = "screen",
@@ -321,10 +321,13 @@ def figures(folder: Annotated[Path, typer.Argument(
                 "--out", metavar="FOLDER",
                 help="Output folder, new or empty. Default: the run's folder.")] = None,
             as_json: AsJson = False) -> None:
-    """Draw a run's figures again, for screen or paper."""
+    """Draw a run's figures again, for screen or paper.
+
+    Several runs are drawn together, as parts (a), (b), ... of the letter's figures.
+    """
     from scenarios.cli.figures import redraw
 
-    files = [shown(file) for file in redraw(folder, style, out)]
+    files = [shown(file) for file in redraw(folders, style, out)]
     if as_json:
         return print_json({"files": files})
     print(*files, sep="\n")

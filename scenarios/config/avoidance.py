@@ -133,6 +133,11 @@ class AvoidanceSection(_Avoiding):
         """The same for the end effector."""
         return {r"$\epsilon_{ee}$": self.end_effector}
 
+    @property
+    def promised(self) -> dict[str, float]:
+        """Distances [m] to be kept: eps_1 of the body, below which its avoidance comes first."""
+        return {"body": self.near}
+
 
 class SeparationSection(_Avoiding):
     """Keep all control points and the end effector away from all obstacles, as one-sided rows.
@@ -168,6 +173,11 @@ class SeparationSection(_Avoiding):
     def tip_thresholds(self) -> dict[str, float]:
         """The same for the end effector."""
         return self.thresholds
+
+    @property
+    def promised(self) -> dict[str, float]:
+        """Distances [m] to be kept, of the body and of the end effector, "ee"."""
+        return {"body": self.distance, "ee": self.distance}
 
 
 def _avoidance_kind(section: Any) -> str:

@@ -14,8 +14,9 @@ if TYPE_CHECKING:
 
 CONSTANTS = ("joint_lower", "joint_upper", "velocity_limit")
 _METRES = ("ee_position", "desired_position", "position_error", "true_ee_position",
-           "control_point_distance", "minimal_distance", "ee_distance", "contact_depth",
-           "obstacle_offset")
+           "control_point_distance", "minimal_distance", "ee_distance",
+           "true_control_point_distance", "true_minimal_distance", "true_ee_distance",
+           "contact_depth", "obstacle_offset")
 
 
 @dataclass(frozen=True)

@@ -28,9 +28,10 @@ TOPICS = {
     "/end_effector": ("ee_position", "desired_position", "position_error", "true_ee_position",
                       "pointing_error"),
     "/distances": ("control_point_distance", "minimal_distance", "ee_distance",
-                   "active_control_point"),
+                   "active_control_point", "true_control_point_distance",
+                   "true_minimal_distance", "true_ee_distance"),
     "/stack": ("order", "status", "iterations", "transition", "pointing_active",
-               "repulsion_active"),
+               "repulsion_active", "active_set"),
     "/times": ("time_kinematics", "time_rows", "time_resolve", "time_tick"),
 }
 _KINDS = {"f": NUMBER, "i": INTEGER, "u": INTEGER, "b": TRUTH, "U": TEXT}

@@ -14,9 +14,11 @@ from hierarchy.robot import Frame, Robot
 from hierarchy.state import State
 from scenarios.config import Scenario
 from scenarios.loop import listed
+from scenarios.loop.active_sets import ActiveSets
 from scenarios.loop.controller import Controller
 from scenarios.loop.facts import facts_of
 from scenarios.loop.recording import Event, Recording
+from scenarios.loop.truth import truth_of
 
 FASTEST = 1e3  # [rad/s or m/s] of a joint; a faster motion has diverged
 _TIMES = ("time_kinematics", "time_rows", "time_resolve", "time_tick")
@@ -43,6 +45,7 @@ class Recorder:
                        for name, value in cell.plant.extra.items()}
         self._weights = np.empty(ticks if controller.blend else 0)
         self._events: list[Event] = []
+        self._truth, self._active = truth_of(cell, ticks), ActiveSets(ticks)
         self.facts = facts_of(cell.scenario, robot)
         self.follow(controller)
 
@@ -90,6 +93,18 @@ class Recorder:
         """Note the clock [s] at the end of the tick just written."""
         self._over[self.ticks - 1] = clock
 
+    def look(self) -> None:
+        """Note of the tick just written what only a simulation knows or nobody waits for.
+
+        That is not part of the tick's time: true distances, and which rows act.
+        """
+        controller, k = self._controller, self.ticks - 1
+        if controller.answered:
+            self._active.look(k, controller.hierarchy, controller.resolution)
+        if self._truth is not None:
+            state = controller.cell.state
+            self._truth.look(k, state.t, self._cell.plant.extra.get("true_q", state.q))
+
     def finish(self, scenario: Scenario, fault: str | None) -> Recording:
         """Return the run as recorded so far."""
         robot, rows = self._cell.robot, slice(0, self.ticks)
@@ -119,6 +134,9 @@ class Recorder:
             signals |= {"control_point_distance": body, "minimal_distance": body.min(axis=1),
                         "ee_distance": log[:, -1].copy(), "active_control_point": active,
                         "repulsion_active": repulsion.astype(bool)}
+        if self._truth is not None:
+            signals |= self._truth.signals(self.ticks)
+        signals |= self._active.signals(self.ticks)
         times = self._times[rows].copy()
         times[:, 3] = self._over[rows] - times[:, 3]
         signals |= dict(zip(_TIMES, times.T.copy(), strict=True))

@@ -59,10 +59,14 @@ class Recording:
     control_point_distance (T, K) [m] to the nearest obstacle; minimal_distance (T,) [m], eq. (31)
     active_control_point (T,) number 1..K of the point whose avoidance is in the stack, or -1
     ee_distance (T,) [m]; repulsion_active (T,) bool, whether eq. (30) was in force
+    true_control_point_distance, true_minimal_distance, true_ee_distance: the same of the true arm
+    and obstacles, where a camera or measured joints make them differ
     order (T,) index into `orders`; status (T,) value of solvers.Status; iterations (T,)
     transition (T,) weight of the present stack's answer in the command, where stacks are blended
     certified (T,) bool, whether x is the undamped answer, in a certified run
     moved_by_lower (T,) [m], see `scenarios.loop.audit.Strictness`
+    active_set (T,) number of the set of inequality rows that act, counted from 0 as they first
+    occur, -1 where unknown; present if the resolver reports it
     level_fate (T, N) value of `scenarios.loop.fate.Fate` of each of the `task_names` under the
     command that was sent; level_violation (T, N) Euclidean norm of the violation of its rows, in
     their unit, NaN where the task is absent or its fate unknown; saturated (T, n) -1 or 1 where a

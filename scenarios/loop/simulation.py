@@ -89,6 +89,7 @@ def tick(controller: Controller, recorder: Recorder, t: float,
         plant.act(controller.command(t, *faults.measure(t)))
     sound = recorder.write()
     recorder.stamp(controller.clock())
+    recorder.look()
     if not sound or (controller.policy.events and not _finite(plant.q, plant.v)):
         return _unsound(controller)
     return None

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from scenarios.loop.recording import Recording
 
 Array = NDArray[np.float64]
+_ON_IT = 1e-4  # [m] below a distance that still counts as keeping it
 _NOTHING = 1e-9  # errors of listed tasks below this are rounding and count as zero [m, deg, rad]
 
 # Display units by SI unit: how many of them make one, what it is called, decimals.
@@ -68,6 +69,9 @@ def measure(recording: Recording, settle: float = 2.0,
     ----------
     settle : [s] after which the start, which may lie off the path, no longer counts.
     cone_tolerance_deg : [deg] beyond the cone that still counts as being on it.
+
+    Distances, joint speeds and joint limits are judged by the true state where it is known apart
+    from the measured one.
     """
     if recording.ticks == 0:
         return {}
@@ -165,12 +169,30 @@ def _strictness(recording: Recording) -> Iterator[Metric]:
 
 
 def _distances(recording: Recording) -> Iterator[Metric]:
-    for name, signal, label in (("body_distance_min", "minimal_distance", "Body distance"),
-                                ("ee_distance_min", "ee_distance", "End effector distance")):
-        if signal in recording:
-            known = recording[signal][~np.isnan(recording[signal])]
-            yield Metric(name, f"{label}, min", _finite(known.min()) if known.size else None, "m",
-                         lower_is_better=False, group="Safety")
+    for who, signal, label in (("body", "minimal_distance", "Body"),
+                               ("ee", "ee_distance", "End effector")):
+        if signal not in recording:
+            continue
+        apart, group = f"true_{signal}" in recording, "Safety"
+        kept = _true(recording, signal)
+        seen = not apart and recording.scenario.sensor.kind != "exact"
+        yield Metric(f"{who}_distance_min", f"{label} distance, min", _least(kept), "m", False,
+                     group, note="as measured: the true one is not known" if seen else "")
+        yield from _below(recording, who, f"Time {label.lower()} is below its distance", kept)
+        if apart:
+            yield Metric(f"{who}_distance_min_measured", f"{label} distance measured, min",
+                         _least(recording[signal]), "m", None, group, detail=True,
+                         note="with the errors of the sensor")
+
+
+def _below(recording: Recording, who: str, label: str, distance: Array) -> Iterator[Metric]:
+    """Share of ticks below the distance that the scenario asks to keep, if it asks for one."""
+    avoidance = recording.scenario.avoidance
+    if avoidance is not None and who in avoidance.promised:
+        promised, known = avoidance.promised[who], distance[~np.isnan(distance)]
+        yield Metric(f"{who}_below_share", label,
+                     float(np.mean(known < promised - _ON_IT)) if known.size else None, "share",
+                     group="Safety", note=f"nearer than {promised:g} m")
 
 
 def _contacts(recording: Recording) -> Iterator[Metric]:
@@ -183,7 +205,7 @@ def _contacts(recording: Recording) -> Iterator[Metric]:
 
 
 def _true(recording: Recording, signal: str) -> Array:
-    """Return q or v as it was, where that is known apart from what was measured."""
+    """Return a signal as it was, where that is known apart from what was measured."""
     return recording[f"true_{signal}" if f"true_{signal}" in recording else signal]
 
 
@@ -191,12 +213,27 @@ def _motion(recording: Recording) -> Iterator[Metric]:
     v, group = _true(recording, "v"), "Safety"
     yield _joint_limit_excess(recording)
     yield Metric("speed_max", "Joint speed, max", _largest(v), "rad/s", group=group)
+    apart = "true_v" in recording
     yield Metric("velocity_step_max", "Joint speed step, max",
-                 _largest(np.diff(v, axis=0)), "rad/s", group=group)
+                 _largest(np.diff(v, axis=0)), "rad/s", group=group,
+                 note="of the joints, not of the command")
+    if apart:
+        yield Metric("velocity_step_max_measured", "Joint speed step measured, max",
+                     _largest(np.diff(recording["v"], axis=0)), "rad/s", None, group, detail=True,
+                     note="with the errors of the sensor")
+    yield Metric("command_step_max", "Commanded speed step, max", _command_step(recording),
+                 "rad/s", group=group, note="of the command, not of the joints")
     yield Metric("acceleration_max", "Joint acceleration, max", _largest(recording["a"]),
                  "rad/s^2", group=group)
     yield Metric("acceleration_step_max", "Joint acceleration step, max",
                  _largest(np.diff(recording["a"], axis=0)), "rad/s^2", group=group)
+
+
+def _command_step(recording: Recording) -> float | None:
+    """Return the largest change of a joint's commanded speed in one tick [rad/s]."""
+    control, command = recording.scenario.control, recording["command"]
+    return _largest(np.diff(command, axis=0) if control.level == "velocity"
+                    else command * control.period)
 
 
 def _joint_limit_excess(recording: Recording) -> Metric:
@@ -216,10 +253,21 @@ def _joint_limit_excess(recording: Recording) -> Metric:
 def _switching(recording: Recording) -> Iterator[Metric]:
     yield Metric("stack_changes", "Changes of the stack", float(recording.switches().size), "",
                  group="Switching")
+    if "active_set" in recording or recording.facts.asks != "equalities":
+        yield Metric("active_set_changes", "Changes of the active set", _set_changes(recording),
+                     "", None, "Switching",
+                     note="of the inequality rows that act, where the resolver reports them")
     if "active_control_point" in recording:
         changes = np.count_nonzero(np.diff(recording["active_control_point"].astype(int)))
         yield Metric("active_point_changes", "Changes of the active point",
                      float(changes), "", group="Switching")
+
+
+def _set_changes(recording: Recording) -> float | None:
+    if "active_set" not in recording:
+        return None
+    known = recording["active_set"][recording["active_set"] >= 0]
+    return float(np.count_nonzero(np.diff(known)))
 
 
 _DONE = {"brake": "Ticks braked", "hold": "Ticks with the last command held",
@@ -257,6 +305,11 @@ def _time(recording: Recording) -> Iterator[Metric]:
 
 def _largest(values: Array) -> float | None:
     return _finite(np.abs(values).max()) if values.size else None
+
+
+def _least(values: Array) -> float | None:
+    known = values[~np.isnan(values)]
+    return _finite(known.min()) if known.size else None
 
 
 def _finite(value: Any) -> float | None:

@@ -28,6 +28,20 @@ _NEAR = 1e-6  # distance, relative to 1 + |x|, at which a backend's x counts as 
 
 
 @final
+class WeightedResolution(Resolution):
+    """A resolution that reports the state of each row, the first m entries of its memory."""
+
+    __slots__ = ()
+
+    memory: Array
+
+    @property
+    def active(self) -> NDArray[np.int8]:
+        """State of each row: (m,)."""
+        return self.memory[:len(self.memory) // 2].astype(np.int8)
+
+
+@final
 @register
 @dataclass(frozen=True, kw_only=True)
 class Weighted(Resolver):
@@ -106,12 +120,12 @@ class Weighted(Resolver):
         settings = self._settings_for(len(h.sizes))
         code = weighted(h.A, h.lower, h.upper, h.sizes, x, record, settings, WORKSPACE.array)
         if code == SOLVED:
-            return Resolution(x, Status.SOLVED, int(record[-1]), record)
+            return WeightedResolution(x, Status.SOLVED, int(record[-1]), record)
         if code == TOO_SMALL:
             return self._otherwise(h, x, code, memory)
         if code == UNPROVED:
             return self._continued(h, settings, record)
-        return Resolution(x, Status(code), int(record[-1]), record)
+        return WeightedResolution(x, Status(code), int(record[-1]), record)
 
     def _weights(self, levels: int) -> Array:
         if self.weights is None:
@@ -132,7 +146,7 @@ class Weighted(Resolver):
             return self._by_backend(h, settings, record, hard, x)
         answer = np.array([x, h.reference])
         code = run(weighted_steps, h.A, h.lower, h.upper, h.sizes, answer, record, settings)
-        return Resolution(answer[0].copy(), Status(code), int(record[-1]), record)
+        return WeightedResolution(answer[0].copy(), Status(code), int(record[-1]), record)
 
     def _within(self, h: Hierarchy, hard: Mask) -> Resolution:
         """Return the feasible x nearest to the reference; INACCURATE if there is none."""
@@ -154,7 +168,7 @@ class Weighted(Resolver):
         code = run(weighted, h.A, h.lower, h.upper, h.sizes, x, record, settings)
         record[-1] += before
         if code != UNPROVED:
-            return Resolution(x, Status(code), int(record[-1]), record)
+            return WeightedResolution(x, Status(code), int(record[-1]), record)
         if vouched:
             return Resolution(found, Status.INACCURATE, int(record[-1]))
         return Resolution(inside, Status.BACKEND_FAILURE, int(record[-1]))

@@ -50,6 +50,7 @@ class HandMadeScenario:
         alpha_d=60.0, kind="inequality", axis=(1.0, 0.0, 0.0)))
     avoidance: Any = field(default_factory=lambda: SimpleNamespace(
         thresholds={"near": 0.05, "far": 0.15}, tip_thresholds={"tip": 0.1}, dimension=1,
+        promised={"body": 0.05},
         obstacles=[[0.1, 0.5, 0.1]],
         placed=(ObstacleSection(shape="point", centre=(0.1, 0.5, 0.1)),)))
     control: Any = field(default_factory=lambda: SimpleNamespace(

@@ -209,6 +209,84 @@ def test_all_figures_of_a_run_are_written_as_svg_and_png(tmp_path):
     assert len(list(tmp_path.iterdir())) == 2 * len(stems)
 
 
+def letters(name, **changed):
+    """A run made by hand that passes for the whole run of a shipped scenario."""
+    return recording(load(name), **changed)
+
+
+def headings(fig):
+    return [ax.get_title(loc="left") for ax in fig.axes]
+
+
+def test_only_the_letters_own_runs_have_the_numbers_of_its_figures():
+    def stems(run):
+        return {letter._named(figure, run)[0] for figure in letter.SIMULATION}
+
+    assert not [stem for stem in stems(recording()) if stem.startswith("figure")]
+    assert {stem for stem in stems(letters("ellipse")) if stem.startswith("figure")} == {
+        "figure-4b-joint-velocities", "figure-5-distances"}
+    assert "figure-4a-joint-velocities" in stems(letters("ellipse-velocity"))
+    assert "figure-6-velocities-and-distance" in stems(letters("ellipse-3d"))
+    other = load("ellipse").with_resolver("hcod"), load("ellipse", ["pointing.alpha_d=6.0"])
+    for scenario in other:
+        assert not [stem for stem in stems(recording(scenario)) if stem.startswith("figure")]
+    assert not [stem for stem in stems(letters("ellipse", fault="stopped"))
+                if stem.startswith("figure")]
+
+
+def test_the_letters_pairs_are_made_of_its_runs_in_its_order():
+    names = ("ellipse-35deg-equality", "ellipse", "ellipse-velocity", "ellipse-35deg", "ellipse-3d")
+    runs = [letters(name, v=np.full((5, 7), float(i))) for i, name in enumerate(names)]
+    drawn = dict(letter._together(runs))
+    assert list(drawn) == ["figure-4-joint-velocities", "figure-5-distances",
+                           "figure-6-velocities-and-distance", "figure-7-pointing-error"]
+    assert [text[:4] for text in headings(drawn["figure-5-distances"])] == ["(a) ", "(b) ", "Body"]
+    speeds = [ax.lines[0].get_ydata()[0] for ax in drawn["figure-4-joint-velocities"].axes]
+    assert speeds == [2.0, 1.0]  # the velocity level is (a)
+
+
+def test_two_other_runs_make_pairs_without_numbers():
+    drawn = dict(letter._together([recording(), recording()]))
+    assert set(drawn) == {"joint-velocities", "distances", "pointing-error", "position-error"}
+    assert [text[:4] for text in headings(drawn["joint-velocities"])] == ["(a) ", "(b) "]
+    assert len(drawn["distances"].axes) == 6
+
+
+def test_more_than_two_runs_that_are_not_the_letters_are_refused(tmp_path):
+    with pytest.raises(HierarchyError, match="only the letter's figures"):
+        letter.write_together([recording()] * 3, tmp_path)
+
+
+def test_figures_of_several_runs_need_a_folder_of_their_own(tmp_path):
+    with pytest.raises(HierarchyError, match="--out"):
+        redraw([tmp_path / "a", tmp_path / "b"])
+
+
+def test_a_legend_has_the_lines_of_all_panels_once():
+    run = recording(pointing_active=[False, True, True, False, False],
+                    true_ee_distance=np.ones(5), true_minimal_distance=np.ones(5))
+    chosen = [panels.PANEL[name] for name in ("position-components", "pointing-error",
+                                              "ee-distance", "body-distance")]
+    (legend,) = letter.stacked([(run, chosen)], "any").legends
+    assert [text.get_text() for text in legend.get_texts()] == [
+        "x", "y", "z", "task active", "measured", "true"]
+
+
+def test_the_experiment_shows_the_components_of_its_error_on_a_linear_scale():
+    error = np.arange(15.0).reshape(5, 3) * 1e-3
+    fig = letter.stacked([(recording(position_error=error),
+                           [panels.PANEL["position-components"]])], "any")
+    drawn = np.array([line.get_ydata() for line in fig.axes[0].lines])
+    np.testing.assert_allclose(drawn, 1e3 * error.T)
+    assert fig.axes[0].get_yscale() == "linear"
+    assert panels.PANEL["position-components"].name in letter.EXPERIMENT[1].panels
+
+
+def test_the_pointing_error_is_typeset():
+    heading = panels.PANEL["pointing-error"].heading
+    assert heading == r"Pointing error [$\cos\alpha_d - \cos\alpha$]"
+
+
 @pytest.mark.slow
 def test_the_same_figure_is_the_same_file(tmp_path):
     for name in ("a", "b"):
@@ -245,13 +323,13 @@ def run_folder(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def paper(run_folder):
-    return redraw(run_folder, "paper", run_folder.parent / "paper")
+    return redraw([run_folder], "paper", run_folder.parent / "paper")
 
 
 @pytest.mark.slow
 def test_figures_for_a_paper_are_vectors_one_column_wide_with_their_fonts_inside(paper):
     assert {file.suffix for file in paper} == {".pdf"}
-    assert {"figure-5-distances", "picture", "stack"} <= {file.stem for file in paper}
+    assert {"distances", "picture", "stack"} <= {file.stem for file in paper}
     for file in paper:
         content = file.read_bytes()
         assert re.findall(rb"/MediaBox \[ *0 0 ([0-9.]+) ", content) == [b"252"]  # 3.5 inch
@@ -265,7 +343,7 @@ def test_figures_for_a_paper_are_vectors_one_column_wide_with_their_fonts_inside
 def test_figures_for_a_paper_are_the_same_bytes_in_another_process(run_folder, paper, tmp_path):
     subprocess.run([sys.executable, "-c", "import sys\n"
                     "from scenarios.cli.figures import redraw\n"
-                    "redraw(sys.argv[1], 'paper', sys.argv[2])", run_folder, tmp_path / "there"],
+                    "redraw([sys.argv[1]], 'paper', sys.argv[2])", run_folder, tmp_path / "there"],
                    check=True, env={**os.environ, "PYTHONHASHSEED": "5"})
     for file in paper:
         assert file.read_bytes() == (tmp_path / "there" / file.name).read_bytes()
@@ -285,7 +363,7 @@ def test_figures_drawn_anew_take_the_place_of_those_in_the_run_folder(run_folder
         monkeypatch.setattr(letter, "write_all",
                             lambda recording, folder, text=text: [
                                 (folder / name).write_text(text) for name in ("a.svg", "b.svg")])
-        assert redraw(run_folder) == [run_folder / "a.svg", run_folder / "b.svg"]
+        assert redraw([run_folder]) == [run_folder / "a.svg", run_folder / "b.svg"]
     assert (run_folder / "b.svg").read_text() == "new"
     assert (run_folder / "run.npz").exists()
     assert not [path for path in run_folder.iterdir() if path.name.startswith(".")]
@@ -293,9 +371,9 @@ def test_figures_drawn_anew_take_the_place_of_those_in_the_run_folder(run_folder
 
 def test_a_style_or_folder_that_is_not_there_is_an_error_that_names_it(run_folder, tmp_path):
     with pytest.raises(HierarchyError, match="unknown style 'papr'; did you mean 'paper'"):
-        redraw(run_folder, "papr")
+        redraw([run_folder], "papr")
     with pytest.raises(HierarchyError, match="nothing"):
-        redraw(tmp_path / "nothing")
+        redraw([tmp_path / "nothing"])
 
 
 def test_the_command_says_which_files_it_drew(run_folder, monkeypatch, capsys):

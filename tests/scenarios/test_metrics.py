@@ -1,3 +1,5 @@
+import dataclasses
+
 import hand_made
 import numpy as np
 import pytest
@@ -135,3 +137,70 @@ def test_every_metric_has_a_label_and_a_group():
     found = measure(recording())
     assert len(found) > 15
     assert all(metric.label and metric.group for metric in found.values())
+
+
+def seen_by_a_camera(**signals):
+    asked = hand_made.HandMadeScenario()
+    asked.avoidance.promised = {"body": 0.2, "ee": 0.3}
+    return measure(recording(asked, **signals))
+
+
+def test_distances_are_the_true_ones_where_a_sensor_measured_others():
+    found = seen_by_a_camera(minimal_distance=[1, 0.05, 1, 1, 1], ee_distance=[1, 1, 1, 0.02, 1],
+                             true_minimal_distance=[1, 0.4, 0.3, 1, 1],
+                             true_ee_distance=[1, 1, 0.35, 1, 1])
+    assert found["body_distance_min"].value == 0.3
+    assert found["ee_distance_min"].value == 0.35
+    measured = found["body_distance_min_measured"], found["ee_distance_min_measured"]
+    assert [metric.value for metric in measured] == [0.05, 0.02]
+    assert all(metric.detail and metric.lower_is_better is None for metric in measured)
+
+
+def test_the_time_below_the_distance_that_is_asked_for_is_judged_by_the_true_one():
+    found = seen_by_a_camera(minimal_distance=np.zeros(5), ee_distance=np.zeros(5),
+                             true_minimal_distance=[0.2, 0.19995, 0.1998, 0.1, 1.0],
+                             true_ee_distance=[0.3, 0.4, 0.2, 0.4, np.nan])
+    assert found["body_below_share"].value == pytest.approx(2 / 5)  # 0.05 mm is rounding
+    assert found["ee_below_share"].value == pytest.approx(1 / 4)    # of the ticks in which known
+    assert found["ee_below_share"].note == "nearer than 0.3 m"
+
+
+def test_no_distance_promised_is_no_time_below_it():
+    found = measure(recording())  # the letter's scheme promises one for the body alone
+    assert "body_below_share" in found
+    assert "ee_below_share" not in found
+
+
+def test_a_distance_that_only_a_sensor_knows_says_so():
+    assert "as measured" in measure(recording())["body_distance_min"].note
+
+
+def test_steps_of_the_command_and_of_the_joints_are_told_apart():
+    v, seen, a = np.zeros((5, 2)), np.zeros((5, 2)), np.zeros((5, 2))
+    v[2, 1], seen[2, 1], a[1, 0] = 0.3, 0.5, -40.0  # the period is 1 ms
+    found = measure(recording(q=v, v=seen, true_v=v, command=a))
+    assert found["velocity_step_max"].value == pytest.approx(0.3)
+    assert found["velocity_step_max_measured"].value == pytest.approx(0.5)
+    assert found["command_step_max"].value == pytest.approx(0.04)
+    labels = {found[name].label for name in ("velocity_step_max", "command_step_max",
+                                             "velocity_step_max_measured")}
+    assert len(labels) == 3
+
+
+def test_a_commanded_velocity_steps_by_its_change():
+    asked = hand_made.HandMadeScenario()
+    asked.control.level = "velocity"
+    command = np.array([[1.0], [1.5], [1.25], [1.25], [1.25]])
+    assert measure(recording(asked, q=command, command=command))["command_step_max"].value == 0.5
+
+
+def test_changes_of_the_active_set_are_counted_between_the_ticks_in_which_it_is_known():
+    assert value("active_set_changes", active_set=[0, 0, 1, 1, 0]) == 2
+    assert value("active_set_changes", active_set=[2, -1, 2, -1, 0]) == 1
+
+
+def test_a_resolver_that_does_not_say_which_rows_act_has_no_changes_of_them():
+    assert "active_set_changes" not in measure(recording())  # there are equalities only
+    unsaid = recording()
+    facts = dataclasses.replace(unsaid.facts, asks="inequalities")
+    assert measure(dataclasses.replace(unsaid, facts=facts))["active_set_changes"].value is None

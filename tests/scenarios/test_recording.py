@@ -42,7 +42,7 @@ def test_a_run_folder_holds_arrays_metrics_scenario_versions_and_figures(tmp_pat
     save(recording(), tmp_path / "run")
     names = {path.name for path in (tmp_path / "run").iterdir()}
     assert {"run.npz", "facts.json", "metrics.json", "scenario.toml", "versions.json",
-            "picture.svg", "figure-4-joint-velocities.png", "figure-5-distances.svg"} <= names
+            "picture.svg", "joint-velocities.png", "distances.svg"} <= names
     assert "hand-made" in (tmp_path / "run" / "scenario.toml").read_text()
     assert {"python", "numpy", "pin", "task-hierarchy"} <= json.loads(
         (tmp_path / "run" / "versions.json").read_text()).keys()

@@ -24,6 +24,7 @@ Array = NDArray[np.float64]
 # Text, axes and desired curves. In an inline SVG it becomes the text colour of the page.
 INK = "#0b0c0d"
 ALERT = "#d33a2c"
+MEASURED = "#9aa1a9"  # what a sensor says, beside what is true
 
 # Tol's bright scheme, for the joints of one robot.
 JOINTS = ("#4477aa", "#ee6677", "#228833", "#ccbb44", "#66ccee", "#aa3377", "#999999", "#dd7733")

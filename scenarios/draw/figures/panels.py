@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from scenarios.draw.figures import drawing
-from scenarios.draw.figures.drawing import ALERT, INK, Array
+from scenarios.draw.figures.drawing import ALERT, INK, MEASURED, Array
 from scenarios.loop.listed import errors
 
 if TYPE_CHECKING:
@@ -24,7 +24,8 @@ Draw = Callable[[Axes, "Recording", str], None]
 class Panel:
     """One quantity of a run over time: its title, the signal it needs, how it is drawn.
 
-    A `signal` that ends in "_" stands for all signals with that prefix.
+    A `signal` that ends in "_" stands for all signals with that prefix. `typeset` is the unit as
+    matplotlib sets it, where that differs from plain text.
     """
 
     name: str
@@ -33,6 +34,12 @@ class Panel:
     signal: str
     draw: Draw
     explains: str = ""
+    typeset: str = ""
+
+    @property
+    def heading(self) -> str:
+        """Title and unit for a figure."""
+        return f"{self.title} [{self.typeset or self.unit}]"
 
     def fits(self, recording: Recording) -> bool:
         """Whether the recording has the signals of this panel."""
@@ -56,8 +63,7 @@ def joint_accelerations(ax: Axes, recording: Recording, colour: str) -> None:
 
 def ee_distance(ax: Axes, recording: Recording, colour: str) -> None:
     """Draw figure 5 (a): D_min of the end effector [m], with eps_ee; red while repelled."""
-    t, distance = recording["t"], recording["ee_distance"]
-    drawing.curve(ax, t, distance, color=colour)
+    t, distance = recording["t"], _distance(ax, recording, "ee_distance", colour)
     if "repulsion_active" in recording:
         _in_red(ax, t, distance, recording["repulsion_active"])
     avoidance = recording.scenario.avoidance
@@ -76,13 +82,13 @@ def active_point(ax: Axes, recording: Recording, colour: str) -> None:
     points = recording["control_point_distance"].shape[1] \
         if "control_point_distance" in recording else max(int(active.max()), 1)
     ax.set_ylim(0.3, points + 0.7)
-    ax.set_yticks(range(1, points + 1, 1 + points // 10))
+    ax.set_yticks(range(1, points + 1, 1 + points // 6))
 
 
 def body_distance(ax: Axes, recording: Recording, colour: str) -> None:
     """Draw figure 5 (b), below: D_minimal of the body [m], with eps_1 and eps_2."""
     t = recording["t"]
-    drawing.curve(ax, t, recording["minimal_distance"], color=colour)
+    _distance(ax, recording, "minimal_distance", colour)
     avoidance = recording.scenario.avoidance
     for symbol, distance in avoidance.thresholds.items() if avoidance else ():
         _threshold(ax, t, distance, symbol)
@@ -98,8 +104,15 @@ def pointing_error(ax: Axes, recording: Recording, colour: str) -> None:
     ax.axhline(0.0, color=INK, linewidth=0.6, linestyle=(0, (4, 3)))
 
 
+def position_components(ax: Axes, recording: Recording, colour: str) -> None:
+    """Draw figure 10 (a): the end effector's position error along x, y and z [mm]."""
+    for axis, error in enumerate(recording["position_error"].T):
+        drawing.curve(ax, recording["t"], 1e3 * error, **drawing.joint_line(axis), linewidth=0.9,
+                      label="xyz"[axis])
+
+
 def position_error(ax: Axes, recording: Recording, colour: str) -> None:
-    """Draw the distance of the end effector from its path [mm], on a logarithmic scale."""
+    """Draw the distance of the end effector from where it should be [mm], logarithmic."""
     error = 1e3 * np.linalg.norm(recording["position_error"], axis=1)
     drawing.curve(ax, recording["t"], np.maximum(error, 1e-6), color=colour)
     ax.set_yscale("log")
@@ -127,19 +140,20 @@ def _listed(ax: Axes, recording: Recording, unit: str, scale: float) -> None:
 
 PANELS = (
     Panel("joint-velocities", "Joint velocities", "rad/s", "v", joint_velocities,
-          "Figure 4: continuous at acceleration level, with jumps at velocity level."),
+          "Continuous at acceleration level, with jumps at velocity level."),
     Panel("joint-accelerations", "Joint accelerations", "rad/s²", "a", joint_accelerations,
-          "Figure 9 (b): jumps at every change of the stack, within the limits."),
-    Panel("position-error", "Distance from the path", "mm, logarithmic", "position_error",
-          position_error, "The start lies off the path on purpose."),
+          "Jumps at every change of the stack, within the limits."),
+    Panel("position-error", "Distance from the desired position", "mm, logarithmic",
+          "position_error", position_error, "The ellipses start off their path on purpose."),
     Panel("body-distance", "Body to the nearest obstacle", "m", "minimal_distance", body_distance,
-          "Figure 5 (b): below ε₂ a lowest-priority task pushes away, below ε₁ the first."),
+          "Below ε₂ a lowest-priority task pushes away, below ε₁ the first."),
     Panel("active-point", "Control point being pushed away", "number", "active_control_point",
-          active_point, "Figure 5 (b): the control point nearest to an obstacle, while within ε₂."),
+          active_point, "The control point nearest to an obstacle, while within ε₂."),
     Panel("ee-distance", "End effector to the nearest obstacle", "m", "ee_distance", ee_distance,
-          "Figure 5 (a): below ε_ee, in red, the position task is pushed off its path."),
+          "Below ε_ee, in red, the position task is pushed off its path."),
     Panel("pointing-error", "Pointing error", "cos α_d − cos α", "pointing_error", pointing_error,
-          "Figure 7: above zero the axis is outside the cone; red while the task is in the stack."),
+          "Above zero the axis is outside the cone; red while the task is in the stack.",
+          r"$\cos\alpha_d - \cos\alpha$"),
 )
 TASK_PANELS = (
     Panel("task-errors", "Errors of the tasks, lengths", "mm, logarithmic", "task_error_",
@@ -147,12 +161,30 @@ TASK_PANELS = (
     Panel("task-angles", "Errors of the tasks, angles", "°, logarithmic", "task_error_",
           task_angles),
 )
-PANEL = {panel.name: panel for panel in (*PANELS, *TASK_PANELS)}
+_COMPONENTS = Panel("position-components", "Position error of the end effector", "mm",
+                    "position_error", position_components)
+PANEL = {panel.name: panel for panel in (*PANELS, *TASK_PANELS, _COMPONENTS)}
+
+
+def _distance(ax: Axes, recording: Recording, signal: str, colour: str) -> Array:
+    """Draw a distance [m] and return it (T,): the true one, with the measured one behind it.
+
+    Where no other is known, it is the measured one.
+    """
+    t, measured, true = recording["t"], recording[signal], f"true_{signal}"
+    if true not in recording:
+        drawing.curve(ax, t, measured, color=colour)
+        return measured
+    drawing.curve(ax, t, np.where(np.isfinite(measured), measured, np.nan), color=MEASURED,
+                  linewidth=0.7, label="measured")
+    drawing.curve(ax, t, recording[true], color=colour, label="true")
+    return recording[true]
 
 
 def _in_red(ax: Axes, t: Array, y: Array, mask: Array) -> None:
     if mask.any():
-        drawing.curve(ax, t, np.where(mask, y, np.nan), color=ALERT, linewidth=1.7)
+        drawing.curve(ax, t, np.where(mask, y, np.nan), color=ALERT, linewidth=1.7,
+                      label="task active")
 
 
 def _threshold(ax: Axes, t: Array, value: float, name: str) -> None:

@@ -101,10 +101,11 @@ def _along(obstacle: Obstacle, centre: Array) -> Array:
 def _nearest(recording: Recording) -> int:
     """Return the tick in which the body is nearest to an obstacle, or the last tick.
 
-    With a camera the distance of the end effector counts, as in figure 8: those of the body often
-    belong to space that an obstacle hides.
+    With images whose true distances are not known that of the end effector counts, as in figure 8:
+    those of the body often belong to space that an obstacle hides.
     """
-    seen = "minimal_distance" if _exact(recording) else "ee_distance"
+    seen = next((name for name in ("true_minimal_distance", "minimal_distance")
+                 if name in recording and (name[:4] == "true" or _exact(recording))), "ee_distance")
     return int(np.argmin(recording[seen])) if seen in recording else recording.ticks - 1
 
 

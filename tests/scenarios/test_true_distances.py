@@ -1,0 +1,105 @@
+"""True distances beside measured ones, and the sets of rows that act."""
+
+import numpy as np
+import pytest
+
+from hierarchy import Hierarchy, Robot, State
+from scenarios.config import load
+from scenarios.loop.active_sets import ActiveSets
+from scenarios.loop.simulation import simulate
+from solvers import Resolution, Status, make
+
+HAND = ["control.duration=0.2", "plant.kind=kinematic"]
+
+
+def by_hand(robot, q, centre, radius):
+    """Distances (K,) of the control points and the end effector to one sphere."""
+    state, end = State.at(robot, q), robot.frame(robot.end_effector)
+    points = [(p.joint, p.offset) for p in robot.control_points] + [(end.joint, end.offset)]
+    found = []
+    for joint, offset in points:
+        rotation = state.placements[joint][:9].reshape(3, 3).T  # stored column by column
+        where = state.placements[joint][9:] + rotation @ np.asarray(offset)
+        found.append(np.linalg.norm(where - centre) - radius)
+    return np.array(found)
+
+
+def sphere(radius=0.06, centre=(0.1, 0.75, 0.3)):
+    return ["avoidance.obstacles=[{shape = 'sphere', "
+            f"radius = {radius}, centre = {list(centre)}}}]"]
+
+
+def test_measured_joints_leave_the_true_distances_on_record():
+    asked = load("ellipse", ["control.duration=0.05", *sphere(0.05, (0.1, 0.5, 0.1)),
+                             "plant.measurement.position_noise=0.01"])
+    run = simulate(asked)
+    robot = Robot.named("kuka_lwr")
+    for k in (0, 7, run.ticks - 1):
+        wanted = by_hand(robot, run["true_q"][k], (0.1, 0.5, 0.1), 0.05)
+        np.testing.assert_allclose(run["true_control_point_distance"][k], wanted[:-1], atol=1e-12)
+        assert run["true_ee_distance"][k] == pytest.approx(wanted[-1], abs=1e-12)
+        assert run["true_minimal_distance"][k] == pytest.approx(wanted[:-1].min(), abs=1e-12)
+    assert np.abs(run["true_ee_distance"] - run["ee_distance"]).max() > 1e-3
+
+
+@pytest.mark.slow
+def test_a_camera_leaves_the_true_distances_on_record():
+    run = simulate(load("human-hqp", [*HAND, *sphere(), "plant.measurement.velocity_noise=0.0",
+                                      "plant.measurement.quantisation=0.0"]))
+    robot = Robot.named("kuka_lwr")
+    for k in (0, run.ticks - 1):
+        wanted = by_hand(robot, run["q"][k], (0.1, 0.75, 0.3), 0.06)
+        np.testing.assert_allclose(run["true_control_point_distance"][k], wanted[:-1], atol=1e-12)
+        assert run["true_ee_distance"][k] == pytest.approx(wanted[-1], abs=1e-12)
+
+
+def test_an_exact_sensor_measures_the_true_distances_and_nothing_is_recorded_twice():
+    run = simulate(load("ellipse", ["control.duration=0.01"]))
+    assert not [name for name in run.signals if name.startswith("true_")]
+
+
+def noted(sets, hierarchies, resolver="hcod"):
+    for k, h in enumerate(hierarchies):
+        sets.look(k, h, make(resolver).solve(h))
+    return sets.signals(len(hierarchies))["active_set"].tolist()
+
+
+def bounded(target, box=1.0, names=("box", "task")):
+    """One unknown in a box of its own, and one that is asked for in vain beyond it."""
+    return Hierarchy.from_levels([(np.eye(2), -box * np.ones(2), box * np.ones(2)),
+                                  (np.eye(2), np.array(target, float))], names=names)
+
+
+@pytest.mark.parametrize("resolver", ["hcod", "tpm", "sns", "weighted"])
+def test_a_row_acts_where_its_side_holds_the_task_back(resolver):
+    rows = [bounded((0.0, 0.5)), bounded((2.0, 0.5)), bounded((3.0, 0.5)), bounded((-2.0, 0.5)),
+            bounded((-2.0, 5.0)), bounded((0.2, 0.1))]
+    assert noted(ActiveSets(6), rows, resolver) == [0, 1, 1, 2, 3, 0]
+
+
+def test_a_change_of_the_stack_alone_is_no_change_of_the_set():
+    alone = Hierarchy.from_levels([(np.eye(2), -np.ones(2), np.ones(2))], names=("box",),
+                                  reference=np.array([2.0, 0.0]))
+    renamed = bounded((2.0, 0.5), names=("other box", "task"))
+    assert noted(ActiveSets(3), [bounded((2.0, 0.5)), alone, renamed]) == [0, 0, 1]
+
+
+def test_a_tick_without_an_answer_or_without_a_report_has_no_set():
+    sets, h = ActiveSets(3), bounded((2.0, 0.5))
+    sets.look(0, h, Resolution(np.zeros(2)))
+    assert sets.signals(3) == {}
+    sets.look(1, h, make("hcod").solve(h))
+    failed = make("hcod").solve(h)
+    failed.status = Status.ITERATION_LIMIT
+    sets.look(2, h, failed)
+    assert sets.signals(3)["active_set"].tolist() == [-1, 0, -1]
+
+
+@pytest.mark.slow
+def test_the_set_is_that_of_the_rows_at_their_side_in_every_tick():
+    run = simulate(load("ellipse-hqp", ["control.duration=1.0"]))
+    changed = np.flatnonzero(np.diff(run["active_set"])) + 1
+    assert (run["active_set"] >= 0).all()
+    acts = run["saturated"] != 0  # as judged from the commands, without the resolver
+    for k in np.flatnonzero((np.diff(acts.astype(int), axis=0) != 0).any(axis=1)) + 1:
+        assert k in changed
