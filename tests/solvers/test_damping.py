@@ -22,7 +22,10 @@ def all_named(**settings):
     return [*(make(name, **settings) for name in
               ("tpm", "recursive", "hcod", "hqp", "sns", "reverse", "weighted", "augmented")),
             make("tpm", form="published", **settings), make("reverse", form="in-order", **settings),
-            make("sns", form="optimal", scales="miss", **settings)]
+            make("sns", form="optimal", scales="miss", **settings),
+            *(make("recursive", method=method, **settings)
+              for method in ("nakamura", "chiaverini")),
+            make("recursive", method="selective", largest=1.0, **settings)]
 
 
 RESOLVERS = all_named(**SETTINGS)
@@ -102,7 +105,8 @@ def test_strict_resolvers_that_damp_each_level_find_the_x_of_the_definition(equa
 def test_resolvers_that_name_another_meaning_find_another_x(equalities):
     others = [r for r in RESOLVERS if r.damps != "each level"]
     assert {r.label for r in others} == {
-        "tpm published", "reverse", "reverse in-order", "weighted", "augmented"}
+        "tpm published", "reverse", "reverse in-order", "weighted", "augmented",
+        "recursive nakamura", "recursive chiaverini", "recursive selective"}
     for resolver in others:
         if resolver.label != "tpm published":  # another x only where the stack loses rank
             assert max(gap(resolver.solve(h).x, oracle.solve(h, **SETTINGS))
