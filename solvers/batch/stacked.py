@@ -220,7 +220,8 @@ class _Run:
         written = self.record[inside]
         record_without_bounds(b.lower[inside], b.upper[inside], written)
         self.record[inside] = written
-        return which[~inside]
+        rest: Indices = which[~inside]
+        return rest
 
     def _set_reference(self, which: Indices) -> None:
         self.x[which] = self.batch.reference[which]

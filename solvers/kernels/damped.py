@@ -148,7 +148,7 @@ def _filtered(rows, y, at, inverse, space):
     for k in range(r):
         square, _ = _along(rows, at, space, k)
         if square < least:
-            least, smallest = square, k
+            least, smallest = square, ZERO + k
     ratio = least / (inverse.threshold * inverse.threshold)
     extra = inverse.damping * inverse.damping * max(0.0, 1.0 - ratio)  # lambda^2
     for c in range(r):
