@@ -139,6 +139,41 @@ class Shifted(Path):
         return write
 
 
+@dataclass(frozen=True)
+class Jittered(Path):
+    """Another path plus a small, smooth, random motion that depends on `seed` and t alone.
+
+    In each axis the motion is the mean of five sines with random phases and frequencies between
+    rate / 2 and rate, times `amplitude`, which bounds it. Its derivatives are part of the path's.
+
+    amplitude : >= 0 [m]. rate : > 0 [Hz]. seed : whole number >= 0.
+    """
+
+    path: Path
+    amplitude: float
+    rate: float
+    seed: int
+    _sines: Array = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.amplitude < inf or not 0.0 < self.rate < inf or self.seed < 0:
+            raise HierarchyError(f"jitter: amplitude {self.amplitude}, rate {self.rate}, seed "
+                                 f"{self.seed}, expected numbers >= 0, > 0 and >= 0")
+        random = np.random.default_rng(self.seed)
+        speeds = 2.0 * np.pi * self.rate * random.uniform(0.5, 1.0, (3, 5))  # rad/s
+        object.__setattr__(self, "_sines", np.stack(
+            [speeds, random.uniform(0.0, 2.0 * np.pi, (3, 5))]))
+
+    def write(self, t: float, out: Array) -> None:
+        """See `Path.write`."""
+        self.path.write(t, out)
+        speeds, phases = self._sines
+        angles, size = speeds * t + phases, self.amplitude / speeds.shape[1]
+        out[0] += size * np.sin(angles).sum(axis=1)
+        out[1] += size * (speeds * np.cos(angles)).sum(axis=1)
+        out[2] -= size * (speeds**2 * np.sin(angles)).sum(axis=1)
+
+
 def _check(name: str, vector: Vector) -> None:
     array = np.asarray(vector, dtype=float)
     if array.shape != (3,) or not np.isfinite(array).all():

@@ -58,12 +58,12 @@ class Resolution:
 class Resolver(ABC):
     """Abstract solver of a task hierarchy: an immutable record of its settings.
 
-    The settings below mean the same in every resolver; docs/theory/resolver-notes.md has the exact
-    definition of damping.
+    Without damping every strict resolver gives the same x. Damping has one meaning on equalities in
+    `tpm`, `recursive`, `hcod`, `hqp` and `sns`; `damps` and `damps_with_bounds` name it, and what
+    the others damp. docs/theory/resolver-notes.md has the exact definitions.
 
-    damping : lambda_max of the variable damping of a level near a singularity; 0 = off.
-    threshold : smallest singular value of a level below which damping starts, in the unit of the
-        rows.
+    damping : lambda_max of the variable damping near a singularity; 0 = off.
+    threshold : singular value below which damping starts, in the unit of the rows.
     rank_tolerance : a row counts as dependent on the rows above it when the norm of what is left
         of it is at most rank_tolerance times its norm as given. The scale of a row does not matter.
 
@@ -80,6 +80,11 @@ class Resolver(ABC):
     handles: ClassVar[Handles] = "equalities"
     """Rows with lower < upper that the resolver accepts: none; bounds on single unknowns in a first
     level that has no other rows; or any. It rejects all others."""
+    damps: ClassVar[str] = "each level"
+    """What is damped in a stack of equalities. Strict resolvers with the same text find the same x.
+    """
+    damps_with_bounds: ClassVar[str] = ""
+    """The same for a stack with inequalities; empty if the resolver handles none."""
 
     def __post_init__(self) -> None:
         self._number("damping", 0.0, math.inf)

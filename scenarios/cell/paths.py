@@ -4,12 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from hierarchy.paths import Ellipse, Path, Still, Waypoints
+from hierarchy.paths import Ellipse, Jittered, Path, Still, Waypoints
 from scenarios.config.sections import EllipseSection, PathSection, WaypointsSection
 
 
 def make_path(section: PathSection) -> Path:
     """Return the path of a section."""
+    path, jitter = _steady(section), section.jitter
+    return path if jitter is None else Jittered(path, jitter.amplitude, jitter.rate, jitter.seed)
+
+
+def _steady(section: PathSection) -> Path:
     if isinstance(section, EllipseSection):
         return _ellipse(section)
     if isinstance(section, WaypointsSection):

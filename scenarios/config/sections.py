@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from itertools import pairwise
+from typing import Annotated, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
@@ -20,14 +21,43 @@ class Section(BaseModel):
                               serialize_by_alias=True)
 
 
-class StillSection(Section):
+class JitterSection(Section):
+    """A smooth random motion of a path: at most `amplitude` [m] in each axis, up to `rate` [Hz].
+
+    The same `seed` gives the same motion.
+    """
+
+    amplitude: NotNegative
+    rate: Positive
+    seed: Annotated[int, Field(ge=0)] = 0
+
+
+class _AnyPath(Section):
+    """What every path may have.
+
+    `out_of_reach`: spans of time [s] in which the robot cannot be on the path. Nothing is done
+    with them in the loop; metrics tell how the robot comes back.
+    """
+
+    jitter: JitterSection | None = None
+    out_of_reach: tuple[tuple[NotNegative, NotNegative], ...] | None = None
+
+    @model_validator(mode="after")
+    def _spans_are_in_order(self) -> Self:
+        times = [t for span in self.out_of_reach or () for t in span]
+        if any(b <= a for a, b in pairwise(times)):
+            raise ValueError(f"out_of_reach: times must increase, got {times}")
+        return self
+
+
+class StillSection(_AnyPath):
     """A point that does not move, `position` [m]."""
 
     kind: Literal["still"]
     position: Vector3
 
 
-class EllipseSection(Section):
+class EllipseSection(_AnyPath):
     """p(t) = centre + cosine cos(s) + sine sin(s) [m] with s = rate t + phase [rad]."""
 
     kind: Literal["ellipse"]
@@ -38,7 +68,7 @@ class EllipseSection(Section):
     phase: Finite = 0.0
 
 
-class WaypointsSection(Section):
+class WaypointsSection(_AnyPath):
     """Points [m] at increasing times [s], at rest at each point."""
 
     kind: Literal["waypoints"]

@@ -19,6 +19,7 @@ _NOTHING = 1e-9  # errors of listed tasks below this are rounding and count as z
 # Display units by SI unit: how many of them make one, what it is called, decimals.
 _SHOWN = {"m": (1e3, "mm", 3), "s": (1e6, "µs", 2), "deg": (1.0, "°", 3), "share": (100.0, "%", 2),
           "rad": (1.0, "rad", 3), "rad/s": (1.0, "rad/s", 3), "rad/s^2": (1.0, "rad/s²", 2),
+          "rad/s^3": (1.0, "rad/s³", 0),
           "N": (1.0, "N", 1), "": (1.0, "", 0)}
 
 
@@ -78,6 +79,7 @@ def measure(recording: Recording, settle: float = 2.0,
     found = (*_tracking(recording, settle), *_pointing(recording, cone_tolerance_deg),
              *_listed(recording, settle), *_strictness(recording),
              *_distances(recording), *_contacts(recording), *_motion(recording),
+             *_returning(recording),
              *_switching(recording), *_troubles(recording), *_time(recording))
     return {metric.name: metric for metric in found}
 
@@ -248,6 +250,50 @@ def _joint_limit_excess(recording: Recording) -> Metric:
             note = f"joint {joint + 1}" if excess[joint] > 0.0 else ""
     return Metric("joint_limit_excess", "Beyond a joint limit, max", value, "rad",
                   group="Safety", note=note)
+
+
+_AFTER = 0.5  # [s] after the return within reach that do not count as error
+
+
+def _returning(recording: Recording) -> Iterator[Metric]:
+    """Metrics of runs whose path leaves the workspace: freezes, jerk, limits, the way back."""
+    from scenarios.measure.returning import frozen, jerk, returned
+
+    found = _left_path(recording)
+    if found is None:
+        return
+    spans, error = found
+    t, v, group = recording["t"], _true(recording, "v"), "Singularities"
+    yield Metric("ticks_frozen", "Ticks frozen", float(frozen(t, v, error, spans).sum()), "",
+                 group=group, note="still and off a path within reach")
+    back = error[returned(t, spans, _AFTER)]
+    yield Metric("error_returned_rms", "Error after return, rms",
+                 _finite(np.sqrt(np.mean(back**2))) if back.size else None, "m", group=group)
+    yield Metric("error_returned_max", "Error after return, max", _largest(back), "m", group=group,
+                 note=f"from {_AFTER:g} s after the path is within reach")
+    rate = jerk(t, recording["a"])
+    yield Metric("jerk_rms", "Joint jerk, rms",
+                 _finite(np.sqrt(np.mean(rate**2))) if rate.size else None, "rad/s^3", group=group)
+    yield Metric("jerk_max", "Joint jerk, max", _largest(rate), "rad/s^3", group=group)
+    if "velocity_limit" in recording:
+        excess = np.maximum(np.abs(v) - recording["velocity_limit"], 0.0)
+        yield Metric("speed_limit_excess", "Beyond a speed limit, max", _largest(excess), "rad/s",
+                     group=group)
+
+
+def _left_path(recording: Recording) -> tuple[tuple[tuple[float, float], ...], Array] | None:
+    """Return when the first path that leaves the workspace does so, and the error (T,) from it."""
+    from scenarios.loop.listed import errors
+
+    scenario = recording.scenario
+    path = scenario.position.path if scenario.position else None
+    if path is not None and path.out_of_reach and "position_error" in recording:
+        return path.out_of_reach, np.linalg.norm(recording["position_error"], axis=1)
+    for section, unit, error in errors(recording):
+        path = getattr(section, "path", None)
+        if unit == "m" and path is not None and path.out_of_reach:
+            return path.out_of_reach, error
+    return None
 
 
 def _switching(recording: Recording) -> Iterator[Metric]:

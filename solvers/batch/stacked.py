@@ -28,7 +28,7 @@ from solvers.kernels.batch import (
     batch_without_bounds,
 )
 from solvers.resolver import Resolver, make, refuse_inequality, set_frozen
-from solvers.resolvers.hcod import Hcod
+from solvers.resolvers.hcod import Hcod, record_without_bounds
 from solvers.resolvers.tpm import Tpm
 from solvers.status import INACCURATE, NO_LIMITS, NUMERICAL_FAILURE, SOLVED, UNPROVED, Status
 from solvers.workspace import run
@@ -205,9 +205,23 @@ class _Run:
         """Resolve with the kernels of `hcod`; let `certify` judge answers in doubt."""
         everything = np.arange(len(self.batch))
         self._set_reference(everything)
-        self._call(batch_exact, everything, self.x, self.codes, self.record, self.settings)
+        rest = everything if self.resolver.damping == 0.0 else self._outside_bounds(everything)
+        self._call(batch_exact, rest, self.x, self.codes, self.record, self.settings)
         self._judge()
         return self._answer(self.record[:, -3] + self.record[:, -2], self.record)
+
+    def _outside_bounds(self, which: Indices) -> Indices:
+        """Resolve those whose x without bounds is within them; return the others."""
+        b, x = self.batch, self.x.copy()
+        records = np.zeros((len(b), x.shape[1] + len(b.sizes) + self.record.shape[1]))
+        self._call(batch_without_bounds, which, x, self.codes, records, self.settings)
+        inside = self.codes == SOLVED
+        self.x[inside] = x[inside]
+        written = self.record[inside]
+        record_without_bounds(b.lower[inside], b.upper[inside], written)
+        self.record[inside] = written
+        rest: Indices = which[~inside]
+        return rest
 
     def _set_reference(self, which: Indices) -> None:
         self.x[which] = self.batch.reference[which]

@@ -36,7 +36,7 @@ class Projected(NamedTuple):
 
 
 @inlined
-def _carve(work, at, m, n):
+def carve(work, at, m, n):
     """Return Projected for m rows of n unknowns, and where it ends."""
     W, at = matrix(work, at, m, n)
     C, at = matrix(work, at, m, n)
@@ -54,7 +54,7 @@ def recursion(A, lower, upper, sizes, x, settings, work):
     Arguments and return codes are those of `solve_by_staircase`.
     """
     m, n = A.shape
-    rows, at = _carve(work, 0, m, n)
+    rows, at = carve(work, 0, m, n)
     y, at = vector(work, at, n)
     q, at = vector(work, at, n)
     of_block, at = vector(work, at, (m + n) * (n + 1))
@@ -64,26 +64,26 @@ def recursion(A, lower, upper, sizes, x, settings, work):
     code = load_rows(rows.W, rows.zero, A, lower, upper, x, settings.rank_tolerance)
     if code != SOLVED:
         return finish(x, code)
-    _begin(rows, q)
+    begin(rows, q)
 
     rank = first = ZERO
     for level in range(sizes.size):
         last, above = first + sizes[level], rank
-        _see(rows, A, lower, q, first, last, above)
-        rank = _decompose(rows, A, first, last, rank, settings.rank_tolerance)
+        see(rows, A, lower, q, first, last, above)
+        rank = decompose(rows, A, first, last, rank, settings.rank_tolerance)
         solve_level(rows.C, rows.miss, y, Block(first, last, above, rank), settings, of_block)
         for k in range(above, rank):
-            _add(q, y[k], rows.V[k])  # (5)
+            add(q, y[k], rows.V[k])  # (5)
         first = last
     for i in range(n):
-        _add(q, x[i], rows.P[i])  # (14): I - J^# J = P_l
+        add(q, x[i], rows.P[i])  # (14): I - J^# J = P_l
     for c in range(n):
         x[c] = q[c]
     return finish(x, SOLVED)
 
 
 @inlined
-def _begin(rows, q):
+def begin(rows, q):
     """Set C and q to zero, and P_0 to I."""
     n = q.size
     for i in range(rows.C.shape[0]):
@@ -96,14 +96,14 @@ def _begin(rows, q):
 
 
 @inlined
-def _add(q, s, v):
+def add(q, s, v):
     """Add s v to q."""
     for c in range(q.size):
         q[c] += v[c] * s
 
 
 @inlined
-def _see(rows, A, b, q, first, last, above):
+def see(rows, A, b, q, first, last, above):
     """Write the residual of a level, p_i - J_i x_{i-1} in (13), and its rows J_i P_{i-1}."""
     for i in range(first, last):
         miss = b[i]
@@ -115,7 +115,7 @@ def _see(rows, A, b, q, first, last, above):
 
 
 @inlined
-def _decompose(rows, A, first, last, rank, rank_tolerance):
+def decompose(rows, A, first, last, rank, rank_tolerance):
     """Decompose the rows of a level into unit vectors, largest first; return the rank."""
     for i in range(first, last):
         pivot, square = largest_row(rows.W, rows.zero, i, last, ZERO)

@@ -23,6 +23,7 @@ class Augmented(Resolver):
     """
 
     name: ClassVar[str] = "augmented"
+    damps: ClassVar[str] = "the whole stack"
 
     @property
     def strict(self) -> bool:

@@ -11,12 +11,13 @@ from numpy.typing import NDArray
 
 from hierarchy.problem import Array, Hierarchy
 from solvers.certificate import certify
+from solvers.kernels.bounds import solve_without_bounds
 from solvers.kernels.guess import solve_by_guesses
 from solvers.kernels.levels import solve_by_levels
 from solvers.kernels.staircase import solve_equalities
 from solvers.resolver import Handles, Resolution, Resolver, register
-from solvers.status import EQUAL, NO_LIMITS, TOO_SMALL, UNPROVED, Status
-from solvers.workspace import WORKSPACE
+from solvers.status import EQUAL, NO_LIMITS, SOLVED, TOO_SMALL, UNPROVED, Status
+from solvers.workspace import WORKSPACE, run
 
 
 @final
@@ -91,6 +92,8 @@ class Hcod(Resolver):
 
     name: ClassVar[str] = "hcod"
     handles: ClassVar[Handles] = "inequalities"
+    damps_with_bounds: ClassVar[str] = (
+        "each level on its active set, unless x without bounds is within them")
     tolerance: float = 1e-10
     guesses: int = 3
     max_iterations: int = 1000
@@ -111,7 +114,11 @@ class Hcod(Resolver):
         x = h.reference.copy()
         size = 3 * len(h.lower) + 3
         record, known = warm_record(memory, size, self.damping == 0.0)
-        code = solve_exactly(h, x, record, self._settings, known)
+        code = UNPROVED
+        if self.damping > 0.0:
+            code = solve_inside_bounds(h, x, record, self._settings)
+        if code != SOLVED:
+            code = solve_exactly(h, x, record, self._settings, known)
         if code == 0 or (code == _INACCURATE and certify(h, x).certified):
             return ActiveSetResolution(x, _SOLVED, record)
         return ActiveSetResolution(x, Status(code), record)
@@ -125,6 +132,29 @@ def warm_record(memory: Array | None, size: int, usable: bool) -> tuple[Array, b
     if memory is None or len(memory) != size or not usable:
         return np.zeros(size), False
     return memory.copy(), True
+
+
+def solve_inside_bounds(h: Hierarchy, x: Array, record: Array, settings: Array) -> int:
+    """Write x (n,) and record as if no bound were in the way; SOLVED if x is within the bounds.
+
+    Any other code: nothing is done, because x leaves the bounds or because h is anything but a
+    first level of bounds with equalities below. `tpm` begins in the same way.
+    """
+    whole, answer = np.zeros(len(x) + len(h.sizes) + len(record)), x.copy()
+    code = run(solve_without_bounds, h.A, h.lower, h.upper, h.sizes, answer, whole, settings)
+    if code == SOLVED:
+        x[:] = answer
+        record_without_bounds(h.lower, h.upper, record)
+    return code
+
+
+def record_without_bounds(lower: Array, upper: Array, record: Array) -> None:
+    """Write the records (..., 3 m + 3) of answers that no bound holds back; sides (..., m)."""
+    m = lower.shape[-1]
+    record[...] = 0.0
+    record[..., :m] = np.where(lower == upper, EQUAL, 0.0)
+    record[..., m:2 * m], record[..., -1] = -1.0, -1.0
+    record[..., -3] = 1.0
 
 
 def solve_exactly(h: Hierarchy, x: Array, record: Array, settings: Array, known: bool) -> int:

@@ -61,6 +61,7 @@ class Hqp(Resolver):
 
     name: ClassVar[str] = "hqp"
     handles: ClassVar[Handles] = "inequalities"
+    damps_with_bounds: ClassVar[str] = "each level as if no inequality were active"
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -216,9 +217,10 @@ class _Cascade:
         return split(level.M[chosen], level.norms[chosen], self.settings.rank_tolerance)
 
     def _lambda(self, level: _Level, own: Array) -> float:
-        """Return the variable damping of a level, in its scaled rows."""
-        s = self.settings
-        if not s.damping:
+        """Return lambda of a level, in its scaled rows; bounds at the top have none."""
+        s, first = self.settings, self.N.shape[1] == self.h.n
+        bounds = not level.equal.all() and (np.count_nonzero(level.rows.A, axis=1) <= 1).all()
+        if not s.damping or (first and bounds):
             return 0.0
         everything = np.ones_like(level.equal)
         seen = own if level.equal.all() else self._split(level, everything)[0]

@@ -36,6 +36,7 @@ class Reverse(Resolver):
     """
 
     name: ClassVar[str] = "reverse"
+    damps: ClassVar[str] = "each correction"
     form: str = "published"
 
     def __post_init__(self) -> None:

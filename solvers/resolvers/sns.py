@@ -42,6 +42,7 @@ class Sns(Resolver):
 
     name: ClassVar[str] = "sns"
     handles: ClassVar[Handles] = "bounds"
+    damps_with_bounds: ClassVar[str] = "each task on the joints that are not saturated"
     form: str = "basic"
     scales: str = "target"
 

@@ -53,13 +53,14 @@ class Tpm(Resolver):
 
     name: ClassVar[str] = "tpm"
     handles: ClassVar[Handles] = "bounds"
+    damps_with_bounds: ClassVar[str] = Hcod.damps_with_bounds
     form: str = "staircase"
 
     def __post_init__(self) -> None:
         super().__post_init__()
         self._one_of("form", FORMS)
         if self.form == "published":
-            set_frozen(self, handles="equalities")
+            set_frozen(self, handles="equalities", damps="each pivot", damps_with_bounds="")
 
     @property
     def strict(self) -> bool:

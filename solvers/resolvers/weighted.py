@@ -63,6 +63,8 @@ class Weighted(Resolver):
 
     name: ClassVar[str] = "weighted"
     handles: ClassVar[Handles] = "inequalities"
+    damps: ClassVar[str] = "all active soft rows as one level"
+    damps_with_bounds: ClassVar[str] = damps
     ratio: float = 100.0
     weights: Sequence[float] | None = None
     regularisation: float = 1e-6

@@ -99,10 +99,11 @@ def test_an_answer_that_is_inaccurate_alone_is_so_in_a_batch():
     assert Status.INACCURATE in statuses
 
 
+@both
 @pytest.mark.parametrize("half", [0.05, 0.3, 3.0])
 @pytest.mark.parametrize("settings", [{}, {"damping": 0.1}], ids=["undamped", "damped"])
-def test_bounds_and_their_memory_are_those_of_each_alone(half, settings):
-    resolver, hs = make("tpm", **settings), [bounded(seed, half) for seed in range(60)]
+def test_bounds_and_their_memory_are_those_of_each_alone(name, half, settings):
+    resolver, hs = make(name, **settings), [bounded(seed, half) for seed in range(60)]
     cold = solve(Batch.of(hs), resolver)
     alone = [resolver.solve(h) for h in hs]
     assert_same(cold, alone)

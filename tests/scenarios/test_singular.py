@@ -1,0 +1,119 @@
+"""Paths through singularities and out of reach: the jitter, the scenarios, and what is measured."""
+
+import numpy as np
+import pytest
+
+from hierarchy import HierarchyError
+from hierarchy.paths import Jittered, Still
+from scenarios.cell.paths import make_path
+from scenarios.config import ScenarioError, load
+from scenarios.loop.simulation import simulate
+from scenarios.measure.metrics import measure
+from scenarios.measure.returning import frozen, jerk, returned, within_reach
+
+NAMES = ("singular", "singular-limits", "singular-acceleration", "singular-acceleration-limits")
+UPPER_ARM, FOREARM, HAND = 0.4, 0.39, 0.078  # m, KUKA LWR
+
+
+def jittered(seed=3):
+    return Jittered(Still((1.0, 2.0, 3.0)), amplitude=0.002, rate=4.0, seed=seed)
+
+
+def test_jitter_is_bounded_and_moves_in_every_axis():
+    offsets = np.array([jittered()(t)[0] for t in np.arange(0.0, 5.0, 0.01)]) - [1.0, 2.0, 3.0]
+    assert np.abs(offsets).max() <= 0.002
+    assert (np.abs(offsets).max(axis=0) > 0.0005).all()
+
+
+def test_the_derivatives_of_jitter_are_those_of_its_position():
+    path, h = jittered(), 1e-5
+    for t in (0.0, 0.3, 1.7):
+        before, here, after = path(t - h), path(t), path(t + h)
+        np.testing.assert_allclose(here[1], (after[0] - before[0]) / (2 * h), atol=1e-6)
+        np.testing.assert_allclose(here[2], (after[1] - before[1]) / (2 * h), atol=1e-5)
+
+
+def test_jitter_depends_on_its_seed_alone():
+    assert np.array_equal(jittered()(0.7), jittered()(0.7))
+    assert not np.allclose(jittered()(0.7)[0], jittered(seed=4)(0.7)[0])
+
+
+@pytest.mark.parametrize("wrong", [{"amplitude": -1.0}, {"rate": 0.0}, {"seed": -1}],
+                         ids=["amplitude", "rate", "seed"])
+def test_jitter_that_makes_no_sense_is_named(wrong):
+    with pytest.raises(HierarchyError, match=f"{next(iter(wrong))} {next(iter(wrong.values()))}"):
+        Jittered(Still((0.0, 0.0, 0.0)), **{"amplitude": 0.1, "rate": 1.0, "seed": 0, **wrong})
+
+
+def test_spans_out_of_reach_must_be_in_order():
+    still = '{ kind = "still", position = [0.0, 0.5, 0.0], out_of_reach = [[2.0, 1.0]] }'
+    with pytest.raises(ScenarioError, match="out_of_reach: times must increase"):
+        load("strictness", [f"position.path = {still}"])
+
+
+def test_ticks_within_reach_frozen_and_returned():
+    t = np.arange(6.0)
+    spans = ((1.0, 2.0), (4.0, 4.5))
+    assert within_reach(t, spans).tolist() == [True, False, False, True, False, True]
+    assert returned(t, spans, 0.5).tolist() == [False, False, False, True, False, False]
+    v = np.zeros((6, 2))
+    v[5] = 1.0
+    error = np.array([0.0, 1.0, 1.0, 1.0, 1.0, 1.0])
+    assert frozen(t, v, error, spans).tolist() == [False, False, False, True, False, False]
+    assert frozen(t, v, error, ()).tolist() == [False, True, True, True, True, False]
+
+
+def test_the_jerk_of_a_ramp_is_its_slope():
+    t = np.array([0.0, 0.1, 0.3])
+    np.testing.assert_allclose(jerk(t, np.array([[0.0], [1.0], [3.0]])), [[10.0], [10.0]])
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_path_is_out_of_reach_when_it_says_so(name):
+    """The hand points along x, so the wrist is HAND behind the end effector."""
+    section = load(name).tasks[0].path
+    path, (span,) = make_path(section.model_copy(update={"jitter": None})), section.out_of_reach
+    for t in np.arange(0.0, 12.5, 0.01):
+        wrist = np.linalg.norm(path(t)[0] - [HAND, 0.0, 0.0])
+        outside = span[0] + 0.005 < t < span[1] - 0.005
+        inside = not span[0] - 0.005 < t < span[1] + 0.005
+        assert not (outside and wrist < UPPER_ARM + FOREARM), t
+        assert not (inside and wrist > UPPER_ARM + FOREARM), t
+
+
+def test_the_path_passes_through_a_singularity_of_shoulder_and_wrist_and_of_the_elbow():
+    scenario = load("singular")
+    path = make_path(scenario.tasks[0].path.model_copy(update={"jitter": None}))
+    points = np.array([path(t)[0] for t in np.arange(0.5, 3.0, 0.001)])
+    crossing = np.array([FOREARM + HAND, 0.0, UPPER_ARM])  # q = 0 but for the elbow at 90 deg
+    assert np.linalg.norm(points - crossing, axis=1).min() < 1e-3
+    assert np.linalg.svd(jacobian([0, 0, 0, np.pi / 2, 0, 0, 0]))[1][-1] < 1e-12
+    assert np.linalg.svd(jacobian([0, -0.73, 0, 0, 0, -0.83, 0]))[1][-1] < 1e-12
+    assert np.linalg.svd(jacobian(scenario.start.q))[1][-1] > 0.02
+
+
+def jacobian(q):
+    """Jacobian (6, 7) of the KUKA LWR's hand from its Denavit-Hartenberg table."""
+    T, axes, origins = np.eye(4), [], []
+    for angle, d, twist in zip(q, (0, 0, UPPER_ARM, 0, FOREARM, 0, HAND),
+                               np.radians([90, -90, -90, 90, 90, -90, 0]), strict=True):
+        axes.append(T[:3, 2])
+        origins.append(T[:3, 3])
+        c, s, ct, st = np.cos(angle), np.sin(angle), np.cos(twist), np.sin(twist)
+        T = T @ [[c, -s * ct, s * st, 0], [s, c * ct, -c * st, 0], [0, st, ct, d], [0, 0, 0, 1]]
+    return np.array([[*np.cross(z, T[:3, 3] - p), *z]
+                     for z, p in zip(axes, origins, strict=True)]).T
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", NAMES)
+def test_a_run_has_the_metrics_of_singularities(name):
+    found = measure(simulate(load(name, ["control.duration=0.05"])))
+    assert found["ticks_frozen"].value == 0.0
+    assert found["error_returned_max"].value is None  # it has not been away
+    assert found["jerk_max"].value > 0.0
+    assert found["speed_limit_excess"].value == 0.0
+
+
+def test_other_scenarios_have_no_metrics_of_singularities():
+    assert "ticks_frozen" not in measure(simulate(load("strictness", ["control.duration=0.01"])))

@@ -1,0 +1,172 @@
+"""What `damping` means: resolvers that name the same meaning find the same x, others another."""
+
+from pathlib import Path
+
+import numpy as np
+import oracle
+import pytest
+from rank_cases import family, rng
+
+from hierarchy import Hierarchy
+from scenarios.config import load
+from scenarios.loop.controller import Controller
+from solvers import make
+
+DATA = Path(__file__).parents[1] / "data" / "ellipse" / "inequality_5deg.npz"
+SETTINGS = {"damping": 0.05, "threshold": 0.1}
+EVERY = 60  # recorded states between two that are compared
+
+
+def all_named(**settings):
+    """Return every resolver in each form whose damping could differ."""
+    return [*(make(name, **settings) for name in
+              ("tpm", "recursive", "hcod", "hqp", "sns", "reverse", "weighted", "augmented")),
+            make("tpm", form="published", **settings), make("reverse", form="in-order", **settings),
+            make("sns", form="optimal", scales="miss", **settings),
+            *(make("recursive", method=method, **settings)
+              for method in ("nakamura", "chiaverini")),
+            make("recursive", method="selective", largest=1.0, **settings)]
+
+
+RESOLVERS = all_named(**SETTINGS)
+STRICT = [r for r in RESOLVERS if r.strict]
+
+
+def recorded(scenario):
+    """Return the hierarchies of a scenario at the recorded states of the letter's run."""
+    controller, found = Controller(load(scenario)), []
+    with np.load(DATA) as run:
+        for k in range(1, len(run["t"]), EVERY):
+            controller.command(run["t"][k], run["q"][k], run["v"][k])
+            h = controller.hierarchy
+            found.append(Hierarchy(h.A.copy(), h.lower.copy(), h.upper.copy(), h.sizes.copy(),
+                                   h.reference.copy(), h.names))
+    return found
+
+
+def near_singular():
+    """Return problems whose levels lose rank or nearly so."""
+    return [h for h, _, _ in family("EQ7sing")][:20]
+
+
+def boxed(count=40, seed=5):
+    """Return tasks that are nearly singular, below bounds that some of their answers leave."""
+    r, found = rng(seed), []
+    for _ in range(count):
+        upper, lower = r.normal(size=(3, 7)), r.normal(size=(2, 7))
+        upper[2] = upper[0] + 0.03 * r.normal(size=7)
+        half = r.uniform(0.3, 3.0, size=7)
+        found.append(Hierarchy.from_levels([(np.eye(7), -half, half), (upper, r.normal(size=3)),
+                                            (lower, r.normal(size=2))], r.normal(size=7)))
+    return found
+
+
+EQUALITIES = {"ellipse": lambda: recorded("ellipse"), "EQ7sing": near_singular}
+BOUNDED = {"ellipse-limits": lambda: recorded("ellipse-limits"), "boxed": boxed}
+
+
+@pytest.fixture(scope="module", params=EQUALITIES)
+def equalities(request):
+    return EQUALITIES[request.param]()
+
+
+@pytest.fixture(scope="module", params=BOUNDED)
+def bounded(request):
+    return BOUNDED[request.param]()
+
+
+def gap(x, y):
+    return np.abs(x - y).max() / (1.0 + np.abs(y).max())
+
+
+def damped_levels(h):
+    """Count the levels of equalities with a singular value below the threshold."""
+    N, count = np.eye(h.n), 0
+    for A, lower, upper in h.levels():
+        if len(A) and N.shape[1] and (lower == upper).all():
+            count += np.linalg.svd(A @ N, compute_uv=False).min() < SETTINGS["threshold"]
+            N = N @ np.linalg.svd(A @ N)[2][min(len(A), N.shape[1]):].T
+    return count
+
+
+def test_most_of_these_states_are_damped(equalities):
+    assert sum(damped_levels(h) > 0 for h in equalities) > 0.5 * len(equalities)
+
+
+def test_strict_resolvers_that_damp_each_level_find_the_x_of_the_definition(equalities):
+    same = [r for r in STRICT if r.damps == "each level"]
+    assert {r.name for r in same} == {"tpm", "recursive", "hcod", "hqp", "sns"}
+    for h in equalities:
+        expected = oracle.solve(h, **SETTINGS)
+        for resolver in same:
+            assert gap(resolver.solve(h).x, expected) <= resolver.accuracy, resolver.label
+
+
+def test_resolvers_that_name_another_meaning_find_another_x(equalities):
+    others = [r for r in RESOLVERS if r.damps != "each level"]
+    assert {r.label for r in others} == {
+        "tpm published", "reverse", "reverse in-order", "weighted", "augmented",
+        "recursive nakamura", "recursive chiaverini", "recursive selective"}
+    for resolver in others:
+        if resolver.label != "tpm published":  # another x only where the stack loses rank
+            assert max(gap(resolver.solve(h).x, oracle.solve(h, **SETTINGS))
+                       for h in equalities) > 1e-3, resolver.label
+
+
+def test_the_published_form_damps_its_pivots_which_is_the_same_while_no_rank_is_lost():
+    published, staircase = make("tpm", form="published", **SETTINGS), make("tpm", **SETTINGS)
+    assert published.damps == "each pivot"
+    for h in recorded("ellipse"):
+        assert gap(published.solve(h).x, staircase.solve(h).x) < 1e-9
+    r = rng(2)
+    A = r.normal(size=(3, 4))
+    A[2] = A[0] + A[1]
+    lost = Hierarchy.from_levels([(A, r.normal(size=3)), (r.normal(size=(2, 4)), r.normal(size=2))])
+    assert gap(published.solve(lost).x, staircase.solve(lost).x) > 1e-3
+
+
+def test_with_bounds_tpm_and_hcod_are_one_controller(bounded):
+    tpm, hcod = make("tpm", **SETTINGS), make("hcod", **SETTINGS)
+    assert tpm.damps_with_bounds == hcod.damps_with_bounds
+    for h in bounded:
+        x = tpm.solve(h).x
+        assert gap(hcod.solve(h).x, x) < 1e-12
+        assert (h.lower[:h.n] <= x).all()
+        assert (x <= h.upper[:h.n]).all()
+
+
+def test_with_bounds_the_named_others_find_another_x():
+    by_meaning = {r.damps_with_bounds: r for r in STRICT if r.handles != "equalities"}
+    assert {r.name for r in by_meaning.values()} == {"hcod", "hqp", "sns"}  # hcod and tpm are one
+    for meaning, resolver in by_meaning.items():
+        for other, rival in by_meaning.items():
+            if other != meaning:
+                assert max(gap(resolver.solve(h).x, rival.solve(h).x) for h in boxed()) > 1e-3
+
+
+def test_without_damping_every_strict_resolver_of_bounds_but_sns_finds_one_x(bounded):
+    tpm, hcod, hqp = make("tpm"), make("hcod"), make("hqp")
+    for h in bounded:
+        x = hcod.solve(h).x
+        assert gap(tpm.solve(h).x, x) < 1e-8
+        assert gap(hqp.solve(h).x, x) < 10.0 * hqp.accuracy
+
+
+@pytest.mark.parametrize("resolver", [make("tpm", **SETTINGS), make("hcod", **SETTINGS),
+                                      make("hqp", **SETTINGS), make("sns", **SETTINGS)],
+                         ids=lambda r: r.name)
+def test_bounds_are_never_damped(resolver):
+    """Else a joint that must move away from its limit would do so only in part."""
+    low, up = np.array([0.02, -1.0]), np.array([1.0, 1.0])
+    h = Hierarchy.from_levels([(np.eye(2), low, up), ([[1.0, 1.0]], [0.0])])
+    x = resolver.solve(h).x
+    assert (x >= low - 1e-7).all()
+    assert (x <= up + 1e-7).all()
+
+
+@pytest.mark.parametrize("resolver", RESOLVERS, ids=lambda r: r.label.replace(" ", "-"))
+def test_the_page_says_what_each_resolver_damps(resolver):
+    page = (Path(__file__).parents[2] / "docs" / "choosing.md").read_text()
+    assert resolver.damps in page
+    assert resolver.damps_with_bounds in page
+    assert bool(resolver.damps_with_bounds) == (resolver.handles != "equalities")
