@@ -75,20 +75,22 @@ class Measurement:
 
 
 def measure_exactly(measurement: Measurement, placements: Array, joints: NDArray[np.int64],
-                    offsets: Array, obstacles: Array, laws: Array, mean_within: float) -> None:
+                    offsets: Array, obstacles: Array, laws: Array,
+                    mean_within: Array) -> None:
     """Fill a Measurement from known geometry; see `exact_measurer`."""
     exact_measurer(measurement, placements, joints, offsets, obstacles, laws, mean_within)()
 
 
 def exact_measurer(measurement: Measurement, placements: Array, joints: NDArray[np.int64],
                    offsets: Array, obstacles: Array, laws: Array,
-                   mean_within: float) -> Callable[[], None]:
+                   mean_within: Array) -> Callable[[], None]:
     """Return a function that fills a Measurement from known geometry at each call.
 
     placements (joints + 1, 12) of a State; joints (K + 1,), offsets (K + 1, 3) of the control
     points and the end effector; obstacles (H, 16) a table of `Obstacles`; laws (2, 4) of
-    `repulsion.laws`. The direction is that of the nearest obstacle, or with `mean_within` > 0 the
-    mean (25)-(26) over the obstacles nearer than that [m].
+    `repulsion.laws`. The direction is that of the nearest obstacle, or the mean
+    (25)-(26) over the obstacles nearer than `mean_within` (2,) [m], for control points and end
+    effector, if there are any.
     """
     fill = bind(_measure, placements, joints, offsets, obstacles, laws, mean_within,
                 measurement.arrays)
@@ -110,13 +112,14 @@ def _measure(placements, joints, offsets, obstacles, laws, mean_within, seen):
             points[k, i] = point_at(placements, joint, offsets[k], i)
         D_min, at = np.inf, -1
         ax = ay = az = x = y = z = 0.0
+        within = mean_within[1 if k == count - 1 else 0]
         away = direction[k]  # overwritten for each obstacle
         for j in range(obstacles.shape[0]):
             D = distance_to_obstacle(obstacles[j], points[k, 0], points[k, 1], points[k, 2], away)
             if D < D_min:  # (22)
                 D_min, at = D, j
                 ax, ay, az = away[0], away[1], away[2]
-            if mean_within > 0.0 and D < mean_within:  # (25); the factor 1/h cancels in (26)
+            if D < within:  # (25); the factor 1/h cancels in (26)
                 x += away[0]
                 y += away[1]
                 z += away[2]
@@ -126,7 +129,7 @@ def _measure(placements, joints, offsets, obstacles, laws, mean_within, seen):
             magnitude[k] = 0.0
             continue
         norm = sqrt(x * x + y * y + z * z)
-        if norm > 1e-6:  # else the unit vectors cancel, or mean_within is 0
+        if norm > 1e-6:  # else the unit vectors cancel, or none is within
             direction[k, 0], direction[k, 1], direction[k, 2] = x / norm, y / norm, z / norm  # (26)
         law = 1 if k == count - 1 else 0
         magnitude[k] = repulsion(max(D_min, 0.0), laws[law, 0], laws[law, 1], laws[law, 2],

@@ -3,6 +3,7 @@
 from hierarchy.task import Task
 from hierarchy.tasks.avoidance import Avoidance
 from hierarchy.tasks.com import CentreOfMass
+from hierarchy.tasks.cumulated_repulsion import CumulatedRepulsion
 from hierarchy.tasks.danger_bounds import DangerBounds
 from hierarchy.tasks.joint_limits import JointLimits
 from hierarchy.tasks.pointing import Pointing
@@ -14,12 +15,13 @@ from hierarchy.tasks.separation import Separation
 from hierarchy.tasks.torque_limits import TorqueLimits
 
 TASKS: dict[str, type[Task]] = {
-    "avoidance": Avoidance, "centre of mass": CentreOfMass, "damping": JointDamping,
+    "avoidance": Avoidance, "centre of mass": CentreOfMass,
+    "cumulated repulsion": CumulatedRepulsion, "damping": JointDamping,
     "danger bounds": DangerBounds, "joint limits": JointLimits, "pointing": Pointing, "pose": Pose,
     "position": Position, "posture": Posture,
     "self-separation": SelfSeparation, "separation": Separation, "torque limits": TorqueLimits,
 }
 
-__all__ = ["TASKS", "Avoidance", "CentreOfMass", "DangerBounds", "JointDamping", "JointLimits",
-           "Pointing", "Pose", "Position", "Posture", "SelfSeparation", "Separation",
-           "TorqueLimits"]
+__all__ = ["TASKS", "Avoidance", "CentreOfMass", "CumulatedRepulsion", "DangerBounds",
+           "JointDamping", "JointLimits", "Pointing", "Pose", "Position", "Posture",
+           "SelfSeparation", "Separation", "TorqueLimits"]

@@ -18,7 +18,7 @@ from scenarios.config.avoidance import AvoidanceSection, RepulsionSection, Separ
 def areas_of(scenario: Scenario) -> SurveillanceAreas | None:
     """Return the areas of Algorithm 1, or None if it is not used."""
     section = scenario.avoidance
-    if not isinstance(section, AvoidanceSection):
+    if not isinstance(section, AvoidanceSection) or section.place == "null-space":
         return None
     return SurveillanceAreas(section.near, section.far, section.end_effector)
 
@@ -35,6 +35,8 @@ def avoidance_tasks(scenario: Scenario, robot: Robot) -> list[Task]:
         return []
     if isinstance(section, SeparationSection):
         return _separation(section, robot, scenario.sensor.kind == "exact")
+    if section.place == "null-space":
+        return []
     kind = PublishedAvoidance if section.jacobian == "published" else Avoidance
     return [kind(robot.control_points, section.dimension)]
 

@@ -76,11 +76,13 @@ def build(scenario: Scenario, kept: Cell | None = None) -> Cell:
     position, pointing = position_of(scenario, here), pointing_of(scenario, here)
     listed = [task_of(section, here) for section in scenario.tasks]
     last = posture_of(scenario, here, "task")
-    tasks = [*first, *avoidance_tasks(scenario, robot),
+    avoiding = avoidance_tasks(scenario, robot)
+    always = first if areas else [*first, *avoiding]  # repulsion is placed by Algorithm 1
+    tasks = [*first, *avoiding,
              *(task for task in (position, pointing, *listed, last) if task)]
     return Cell(scenario, robot, start, state, plant,
                 Stack(tasks, control.level, reference_of(scenario, here)), sensor, areas,
-                position, pointing, limits, order_of(scenario, areas, first, tasks), tuple(listed))
+                position, pointing, limits, order_of(scenario, areas, always, tasks), tuple(listed))
 
 
 def _kept_sensor(scenario: Scenario, kept: Cell) -> Sensor | None:

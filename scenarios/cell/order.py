@@ -12,6 +12,7 @@ from hierarchy import Task
 from hierarchy.allocation import POINTING, POSITION, Allocation, allocate
 from hierarchy.avoidance import Measurement, SurveillanceAreas
 from scenarios.config import Scenario
+from scenarios.config.avoidance import AvoidanceSection
 
 
 class Order(Protocol):
@@ -42,12 +43,13 @@ class Hierarchical:
 class Switched:
     """Algorithm 1, below the tasks named `first`; without `areas` only the cone is switched.
 
+    Without areas `tip` [m] is the distance within which the position has the repulsion of (30).
     With `always_point` the cone is an equality that is always in the stack.
     """
 
     def __init__(self, areas: SurveillanceAreas | None, always_point: bool,
-                 first: Sequence[str] = (), position: bool = True) -> None:
-        self._areas, self._always_point = areas, always_point
+                 first: Sequence[str] = (), position: bool = True, tip: float = -inf) -> None:
+        self._areas, self._always_point, self._tip = areas, always_point, tip
         self._first, self._position = tuple(first), position
         self._behind_first = cache(self._put_behind)
         distances = (inf,) if areas is None else (areas.near, areas.far, inf)
@@ -64,7 +66,7 @@ class Switched:
         if self._areas is None:
             point = cone_error > 0.0 or self._always_point
             chosen = Allocation((POSITION,) * self._position + (POINTING,) * point,
-                                repulsion=False)
+                                repulsion=end <= self._tip)
         else:
             chosen = allocate(body, end, cone_error, self._areas, self._always_point)
         return self._behind_first(chosen) if self._first else chosen
@@ -79,5 +81,7 @@ def order_of(scenario: Scenario, areas: SurveillanceAreas | None, first: Sequenc
     if scenario.control.stack == "hierarchical":
         return Hierarchical([task.name for task in tasks])
     always_point = bool(scenario.pointing and scenario.pointing.rows == "equality")
+    section = scenario.avoidance
+    tip = section.end_effector if isinstance(section, AvoidanceSection) else -inf
     return Switched(areas, always_point, [task.name for task in first],
-                    scenario.position is not None)
+                    scenario.position is not None, tip)

@@ -19,15 +19,15 @@ from scenarios.cell.sensors.depth_space import DepthSpace
 from scenarios.cell.sensors.errors import DepthErrors
 from scenarios.cell.sensors.frames import RecordedFrames
 from scenarios.config import Scenario, ScenarioError
-from scenarios.config.avoidance import SeparationSection
+from scenarios.config.avoidance import AvoidanceSection, SeparationSection
 from scenarios.config.sensor import SensorSection
 
 
 class _Asked(NamedTuple):
-    """What a sensor must provide: `region` [m], mean directions, repulsion laws."""
+    """What a sensor must provide: `region` [m], where directions are means [m], repulsion laws."""
 
     region: float
-    mean: bool = False
+    mean_within: tuple[float, float] = (0.0, 0.0)
     body: Repulsion | None = None
     tip: Repulsion | None = None
 
@@ -50,11 +50,15 @@ def sensor_of(scenario: Scenario, robot: Robot,
     if isinstance(section, SeparationSection):
         exact = ExactDistances(robot, obstacles, pairs=True)
         return _seen_by(scenario, robot, exact, _Asked(section.influence))
-    asked = _Asked(max(section.far, section.end_effector), section.direction == "mean",
+    asked = _Asked(max(section.far, section.end_effector), _mean_within(section),
                    repulsion_of(section.body), repulsion_of(section.tip))
-    exact = ExactDistances(robot, obstacles, asked.body, asked.tip,
-                           section.far if asked.mean else 0.0)
+    exact = ExactDistances(robot, obstacles, asked.body, asked.tip, asked.mean_within)
     return _seen_by(scenario, robot, exact, asked)
+
+
+def _mean_within(section: AvoidanceSection) -> tuple[float, float]:
+    """Return the distances [m] of body and end effector over which directions are means."""
+    return (section.far, section.end_effector) if section.direction == "mean" else (0.0, 0.0)
 
 
 def _seen_by(scenario: Scenario, robot: Robot, exact: ExactDistances, asked: _Asked) -> Sensor:
@@ -81,7 +85,7 @@ def _depth_sensor(section: SensorSection, robot: Robot, exact: ExactDistances,
         source = RecordedFrames(section.folder or "", robot, section.latency)
     space = DepthSpace(source.pinhole, exact.points, capsules, section.region or asked.region,
                        margin=section.margin, thin=inf if section.thin is None else section.thin,
-                       support=section.support, band=section.band, mean=asked.mean,
+                       support=section.support, band=section.band, mean_within=asked.mean_within,
                        body=asked.body, tip=asked.tip, pairs=exact.measurement.pairs is not None)
     return DepthSensor(source, space, section.stale_after, section.least_readings, checked)
 

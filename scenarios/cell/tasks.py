@@ -13,6 +13,7 @@ from hierarchy.paths import Path, Shifted, Still
 from hierarchy.problem import Array
 from hierarchy.tasks import (
     CentreOfMass,
+    CumulatedRepulsion,
     DangerBounds,
     JointDamping,
     JointLimits,
@@ -84,10 +85,17 @@ def posture_of(scenario: Scenario, start: State, role: str) -> Task | None:
 
 
 def reference_of(scenario: Scenario, start: State) -> Task | None:
-    """Return the null-space task: [damping], or [posture] in that role; or None."""
-    if scenario.damping is not None:
-        return JointDamping(start.n, scenario.damping.value, scenario.damping.weight)
-    return posture_of(scenario, start, "null-space")
+    """Return the null-space task: [damping], or [posture] in that role; or None.
+
+    The body's repulsion is added to it where that is its place.
+    """
+    base = (posture_of(scenario, start, "null-space") if scenario.damping is None
+            else JointDamping(start.n, scenario.damping.value, scenario.damping.weight))
+    avoidance = scenario.avoidance
+    if not isinstance(avoidance, AvoidanceSection) or avoidance.place == "stack":
+        return base
+    points = start.robot.control_points
+    return CumulatedRepulsion(start.n, points, avoidance.far, base) if points else base
 
 
 def task_of(section: AnyTask, start: State) -> Task:

@@ -12,6 +12,11 @@ def scenarios(incomplete: str) -> list[str]:
     return _names(_LIBRARY, incomplete)
 
 
+def compared(incomplete: str) -> list[str]:
+    """Return the matching scenarios and groups."""
+    return [*scenarios(incomplete), *_names(_LIBRARY / "groups", incomplete)]
+
+
 def sweeps(incomplete: str) -> list[str]:
     """Return the matching sweeps."""
     return _names(_LIBRARY / "sweeps", incomplete)

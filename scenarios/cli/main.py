@@ -92,15 +92,17 @@ def options(version: Annotated[bool, typer.Option(
 
 @app.command("list")
 def list_(as_json: AsJson = False) -> None:
-    """List scenarios, sweeps, resolvers, tasks and robots."""
+    """List scenarios, groups, sweeps, resolvers, tasks and robots."""
     import solvers
     from hierarchy.robot import ROBOTS
     from hierarchy.robots.table import in_words
     from hierarchy.tasks import TASKS
-    from scenarios.config import load, shipped
+    from scenarios.config import load, shipped, shipped_groups
+    from scenarios.config.groups import load_group
     from scenarios.sweep.config import load_sweep, shipped_sweeps
 
     entries = {"scenarios": {name: load(name).title for name in shipped()},
+               "groups": {name: load_group(name).title for name in shipped_groups()},
                "sweeps": {name: load_sweep(name).title for name in shipped_sweeps()},
                "resolvers": {name: first_line(solvers.make(name)) for name in solvers.names()},
                "tasks": {name: first_line(task) for name, task in TASKS.items()},
@@ -168,12 +170,12 @@ def run(scenario: Annotated[str, typer.Argument(
 
 @app.command()
 def compare(scenarios: Annotated[list[str], typer.Argument(
-                help="Names of scenarios, or scenario files.",
-                autocompletion=completion.scenarios)],
+                help="Names of scenarios or groups, or scenario files.",
+                autocompletion=completion.compared)],
             resolvers: Annotated[str | None, typer.Option(
                 "--resolvers", metavar="SPEC,SPEC,...", autocompletion=completion.resolvers,
-                help="Resolvers: name, or name:setting=value; own: that of each scenario. "
-                     "Default: all suitable ones.")] = None,
+                help="Resolvers: name, or name:setting=value; or own, that of each scenario. "
+                     "Default: all suitable ones; own for a group.")] = None,
             changes: Changes = None, duration: Duration = None, out: Out = None,
             starts: Annotated[int | None, typer.Option(
                 "--starts", metavar="N", min=2, help="Compare over N starts sampled from each "
@@ -189,8 +191,12 @@ def compare(scenarios: Annotated[list[str], typer.Argument(
     """
     if starts is None and (seed or workers or scheduler):
         raise typer.BadParameter("needs --starts", param_hint="--seed, --workers, --scheduler")
-    chosen = [_load(name, changes, duration) for name in scenarios]
-    specs = None if resolvers is None else _split(resolvers)
+    from scenarios.config import members, shipped_groups
+    from scenarios.config.scenario import OWN
+
+    chosen = [_load(name, changes, duration) for name in members(scenarios)]
+    grouped = any(name in shipped_groups() for name in scenarios)
+    specs = _split(resolvers) if resolvers is not None else [OWN] if grouped else None
     if starts is not None:
         from scenarios.cli.sweep import starts_command
 
@@ -206,7 +212,8 @@ def compare(scenarios: Annotated[list[str], typer.Argument(
     for spec, remedy in missing.items():
         print(f"skipped: {spec} is not installed; {remedy}",
               file=sys.stderr if as_json else sys.stdout)
-    folder = out if out is not None else next_free(Path("runs") / f"compare-{chosen[0].name}")
+    name = scenarios[0] if grouped else chosen[0].name
+    folder = out if out is not None else next_free(Path("runs") / f"compare-{name}")
     command = shlex.join(["hierarchy", *sys.argv[1:]])
     with bar() as told:
         comparison = run_all(chosen, specs, out=folder, progress=told, command=command)

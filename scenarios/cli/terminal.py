@@ -62,7 +62,7 @@ def print_table(runs: list[Run]) -> None:
     from scenarios.measure.verdict import verdict
 
     console = Console(markup=False, highlight=False)
-    titles = dict.fromkeys(one.scenario.title or one.scenario.name for one in runs)
+    titles = dict.fromkeys(run.title for run in runs)
     print("", *titles, sep="\n")
     rows = table(runs, details=False)
     beside = -(-len(runs) // -(-len(runs) // _BESIDE))  # so that tables are about equally wide

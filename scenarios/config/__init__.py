@@ -1,7 +1,9 @@
 """Reading and validating scenario files; one module per section."""
 
 from scenarios.config.errors import ScenarioError
+from scenarios.config.groups import members, shipped_groups
 from scenarios.config.reading import load, shipped
 from scenarios.config.scenario import Scenario
 
-__all__ = ["Scenario", "ScenarioError", "load", "shipped"]
+__all__ = ["Scenario", "ScenarioError", "load", "members", "shipped",
+           "shipped_groups"]

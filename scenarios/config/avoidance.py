@@ -104,7 +104,15 @@ class _Avoiding(Section):
 
 
 class AvoidanceSection(_Avoiding):
-    """Avoidance for the body and repulsion of the end effector, switched by Algorithm 1."""
+    """Avoidance for the body and repulsion of the end effector, switched by Algorithm 1.
+
+    `place` = "null-space": the body's repulsion is no task. That of all control points within `far`
+    is added up as joint commands in the null-space term, and `near` has no effect, see
+    hierarchy.tasks.CumulatedRepulsion.
+
+    With `direction` = "mean" the direction is the mean (25)-(26) over the obstacles within `far` of
+    a control point, and within `end_effector` of the end effector.
+    """
 
     kind: Literal["repulsion"] = "repulsion"
     dimension: Literal[1, 3] = 1
@@ -115,9 +123,12 @@ class AvoidanceSection(_Avoiding):
     body: RepulsionSection
     tip: RepulsionSection
     jacobian: Literal["exact", "published"] = "exact"
+    place: Literal["stack", "null-space"] = "stack"
 
     @model_validator(mode="after")
     def _areas_nested(self) -> Self:
+        if self.place == "null-space" and self.jacobian == "published":
+            raise ValueError('place = "null-space" goes with jacobian = "exact"')
         if self.near > self.far:
             raise ValueError(f"near = {self.near} m is beyond far = {self.far} m")
         return self
@@ -125,6 +136,8 @@ class AvoidanceSection(_Avoiding):
     @property
     def thresholds(self) -> dict[str, float]:
         """Distances of the body [m] at which avoidance changes, by symbol."""
+        if self.place == "null-space":
+            return {r"$\epsilon_2$": self.far}
         outer = {r"$\epsilon_2$": self.far} if self.far > self.near else {}
         return {r"$\epsilon_1$": self.near} | outer
 

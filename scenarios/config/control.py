@@ -43,7 +43,8 @@ class PolicySection(Section):
 class ControlSection(Section):
     """How the tasks are resolved, and how often.
 
-    `stack` = "switched": Algorithm 1 selects the tasks in the stack, all as equalities.
+    `stack` = "switched": Algorithm 1 selects the tasks in the stack, all as equalities. With
+    avoidance.kind = "separation" only the cone is left to select: limits and avoidance are first.
     "hierarchical": limits, avoidance, position and pointing are always in it, in this order, and
     inequalities stay inequalities.
 

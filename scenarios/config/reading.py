@@ -10,6 +10,7 @@ from hierarchy.errors import UnknownNameError
 from hierarchy.robots.names import in_package
 from scenarios.config.changes import change, parse_changes
 from scenarios.config.errors import ScenarioError
+from scenarios.config.groups import load_group, shipped_groups
 from scenarios.config.scenario import Scenario
 from scenarios.config.validation import validated
 from scenarios.files import read_toml
@@ -26,14 +27,14 @@ def load(name_or_path: str | Path, changes: Sequence[str] | Mapping[str, Any] = 
     """Read a shipped scenario by name, or a scenario file by path, and apply changes to it.
 
     A file with `extends = "ellipse"` (a shipped name or a relative path) contains only the
-    differences; a `[variation]` replaces the other one. `changes` are "dotted.key=value" texts with
-    TOML values, or a mapping of dotted keys. Raises ScenarioError, naming the file and the key, and
+    differences; `replaces = ["avoidance"]` names sections of which nothing is taken over, and a
+    `[variation]` replaces the other one. `changes` are "dotted.key=value" texts with TOML values,
+    or a mapping of dotted keys. Raises ScenarioError, naming the file and the key, and
     UnknownNameError for an unknown name.
     """
     path = Path(name_or_path)
     if path.suffix != ".toml":
-        if str(name_or_path) not in shipped():
-            raise UnknownNameError("scenario", str(name_or_path), shipped())
+        _check_name(str(name_or_path))
         path = LIBRARY / f"{name_or_path}.toml"
     data = _read_extended(path)
     if not isinstance(changes, Mapping):
@@ -52,11 +53,22 @@ def load(name_or_path: str | Path, changes: Sequence[str] | Mapping[str, Any] = 
     return validated(Scenario, data, what)
 
 
+def _check_name(name: str) -> None:
+    if name in shipped_groups():
+        listed = ", ".join(load_group(name).scenarios)
+        raise ScenarioError(f"{name!r} is a group of scenarios, to be run by `hierarchy compare "
+                            f"{name}`; its scenarios are {listed}")
+    if name not in shipped():
+        raise UnknownNameError("scenario", name, shipped())
+
+
 def _read_extended(path: Path, below: tuple[Path, ...] = ()) -> dict[str, Any]:
     """Read a file, merged over the scenario or file that its `extends` names."""
     data = read_toml(path, "scenario file", ScenarioError)
-    base = data.pop("extends", None)
+    base, replaced = data.pop("extends", None), data.pop("replaces", None)
     if base is None:
+        if replaced is not None:
+            raise ScenarioError(f"{path}: replaces: goes with extends")
         return data
     if not isinstance(base, str):
         raise ScenarioError(f"{path}: extends: expected a name or a path, got {base!r}")
@@ -65,10 +77,21 @@ def _read_extended(path: Path, below: tuple[Path, ...] = ()) -> dict[str, Any]:
         raise ScenarioError(f"{path}: extends: {base!r} extends this file in turn")
     if source.suffix != ".toml":
         raise ScenarioError(f"{path}: extends: {UnknownNameError('scenario', base, shipped())}")
-    extended = _read_extended(source, (*below, path.resolve()))
+    found = _read_extended(source, (*below, path.resolve()))
     if "variation" in data:  # its keys belong together
-        extended.pop("variation", None)
-    return _laid_over(extended, data)
+        found.pop("variation", None)
+    return _laid_over(_without(found, replaced or [], path), data)
+
+
+def _without(below: dict[str, Any], sections: Any, path: Path) -> dict[str, Any]:
+    """Return the tables of a file without some sections; `path` is the file that replaces them."""
+    if not isinstance(sections, list):
+        raise ScenarioError(f"{path}: replaces: expected a list of sections, got {sections!r}")
+    for section in sections:
+        if section not in below:
+            error = UnknownNameError("section", str(section), below)
+            raise ScenarioError(f"{path}: replaces: {error}")
+    return {key: value for key, value in below.items() if key not in sections}
 
 
 def _laid_over(below: dict[str, Any], above: dict[str, Any]) -> dict[str, Any]:

@@ -13,8 +13,6 @@ from solvers.resolver import Handles
 if TYPE_CHECKING:
     from scenarios.config.scenario import Scenario
 
-OWN = "own"  # in place of a spec: the resolver that a scenario names itself
-
 # The methods that the letter compares, and ours; for inequalities all resolvers that accept them.
 DEFAULT_RESOLVERS: dict[Handles, tuple[str, ...]] = {
     "equalities": ("tpm", "tpm:form=staircase", "recursive", "augmented", "hqp",
@@ -31,11 +29,6 @@ def default_resolvers(asked: Handles = "equalities") -> tuple[tuple[str, ...], d
     return tuple(spec for spec in wanted if spec not in missing), missing
 
 
-def under(scenario: Scenario, spec: str) -> Scenario:
-    """Return the scenario under the resolver of a spec; OWN leaves it as it is."""
-    return scenario if spec == OWN else scenario.with_resolver(spec)
-
-
 def usable(scenario: Scenario, specs: Sequence[str] | None
            ) -> tuple[dict[str, Scenario], list[str]]:
     """Return the scenario under each spec that can resolve it, and why others cannot.
@@ -45,7 +38,7 @@ def usable(scenario: Scenario, specs: Sequence[str] | None
     wanted = default_resolvers(scenario.asks)[0] if specs is None else specs
     can, refused = {}, []
     for spec in dict.fromkeys(wanted):
-        changed = under(scenario, spec)
+        changed = scenario.with_resolver(spec)
         resolver, asked = changed.make_resolver(), changed.asks
         if resolver.can_resolve(asked):
             can[spec] = changed

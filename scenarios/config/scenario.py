@@ -36,6 +36,9 @@ if TYPE_CHECKING:
     from solvers.resolver import Handles
 
 
+OWN = "own"  # the spec of the resolver that a scenario names itself
+
+
 class Scenario(Section):
     """One scenario: a robot, a start, tasks, and how they are resolved.
 
@@ -74,11 +77,10 @@ class Scenario(Section):
             raise ValueError('posture.role = "task" goes with control.stack = "hierarchical"')
         if self.control.strictness and not self.position:
             raise ValueError("control.strictness needs [position]")
-        switched = self.control.stack == "switched"
-        if self.avoidance and switched != (self.avoidance.kind == "repulsion"):
-            raise ValueError('avoidance.kind = "repulsion" goes with control.stack = "switched", '
-                             '"separation" with "hierarchical"')
-        if self.avoidance and switched and not self.position:
+        repels = self.avoidance is not None and self.avoidance.kind == "repulsion"
+        if repels and self.control.stack != "switched":
+            raise ValueError('avoidance.kind = "repulsion" goes with control.stack = "switched"')
+        if repels and not self.position:
             raise ValueError("[avoidance] needs [position]: Algorithm 1 orders one by the other")
         if self.limits and self.limits.danger_reach and not self.avoidance:
             raise ValueError("limits.danger_reach needs the obstacles of [avoidance]")
@@ -130,10 +132,10 @@ class Scenario(Section):
     @property
     def asks(self) -> Handles:
         """The kind of rows that its stack has under its resolver."""
-        inequalities = self.control.stack == "hierarchical" and (
-            self.avoidance is not None
-            or any(isinstance(task, PointingTask) and task.rows == "inequality"
-                   for task in (self.pointing, *self.tasks)))
+        one_sided = self.avoidance is not None and self.avoidance.kind == "separation"
+        inequalities = one_sided or (self.control.stack == "hierarchical" and any(
+            isinstance(task, PointingTask) and task.rows == "inequality"
+            for task in (self.pointing, *self.tasks)))
         limits = self.limits if self.limits_in_stack else None
         if inequalities or (limits and limits.torque):
             return "inequalities"
@@ -149,10 +151,12 @@ class Scenario(Section):
         """Return this scenario under another resolver.
 
         `spec` is `name` or `name:setting=value:setting=value`. The scenario's settings are kept
-        if the resolver has them; those of the spec override them.
+        if the resolver has them; those of the spec override them. The spec "own" changes nothing.
         """
         from solvers import make
 
+        if spec == OWN:
+            return self
         name, *settings = spec.split(":")
         own = {field.name for field in dataclasses.fields(make(name))}
         kept = {key: value for key, value in self.control.options.items()

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
+from scenarios.config.scenario import OWN
 from scenarios.files import slug
 from scenarios.measure import metrics
 from scenarios.measure.metrics import Metric
@@ -33,6 +34,13 @@ class Run:
     def fault(self) -> str | None:
         """Why the run did not reach its end, or None when it did."""
         return self.error or (self.recording.fault if self.recording else None)
+
+    @property
+    def title(self) -> str:
+        """The scenario's title, with its resolver where each scenario has its own."""
+        title = self.scenario.title or self.scenario.name
+        by = f" ({self.scenario.make_resolver().label})" if self.spec == OWN else ""
+        return f"{title}{by}"
 
     @property
     def folder(self) -> str:

@@ -10,8 +10,9 @@ from pathlib import Path
 
 from hierarchy.errors import HierarchyError
 from scenarios.cell.build import build
-from scenarios.config import Scenario, load
+from scenarios.config import Scenario, load, members, shipped_groups
 from scenarios.config.resolvers import check_names, usable
+from scenarios.config.scenario import OWN
 from scenarios.draw.run_folder import save
 from scenarios.files import claim, write_json, write_text
 from scenarios.loop.recording import versions
@@ -35,9 +36,10 @@ def compare(scenarios: Iterable[str | Scenario] | str, resolvers: Sequence[str] 
 
     Parameters
     ----------
-    scenarios : names, paths or Scenario objects.
-    resolvers : specs `name` or `name:setting=value:setting=value`; by default those of
-        DEFAULT_RESOLVERS that can resolve the scenario and are installed.
+    scenarios : names of scenarios or groups, paths or Scenario objects.
+    resolvers : specs `name` or `name:setting=value:setting=value`, or "own", the one that each
+        scenario names; by default those of DEFAULT_RESOLVERS that can resolve the scenario and are
+        installed, with a group "own".
     progress : called as progress(label, ticks done, total ticks).
     command : the command line shown on the page; derived from the names by default.
 
@@ -67,7 +69,10 @@ def compare(scenarios: Iterable[str | Scenario] | str, resolvers: Sequence[str] 
 def _plan(scenarios: Iterable[str | Scenario],
           resolvers: Sequence[str] | None) -> tuple[list[Run], list[str]]:
     """Return the planned runs, and why others are not possible."""
-    loaded = [load(s) if isinstance(s, (str, Path)) else s for s in scenarios]
+    named = list(scenarios)
+    if resolvers is None and any(one in shipped_groups() for one in named):
+        resolvers = [OWN]
+    loaded = [load(s) if isinstance(s, (str, Path)) else s for s in members(named)]
     check_names(loaded)
     runs, refused = [], []
     for scenario in loaded:

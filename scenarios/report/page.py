@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from markupsafe import Markup
 
+from scenarios.config.scenario import OWN
 from scenarios.draw.figures import drawing
 from scenarios.draw.figures.palette import Look, looks
 from scenarios.draw.figures.picture import picture
@@ -59,8 +60,9 @@ def _about(name: str, runs: Sequence[Run]) -> dict[str, Any]:
     """Return the title, and each scenario's description by name ("" if there is only one)."""
     asked = {run.scenario.name: run.scenario for run in runs}
     if len(asked) > 1:
-        return {"title": f"{in_words(len(asked)).capitalize()} scenarios, resolved by {name}",
-                "about": {key: one.title for key, one in asked.items()}}
+        by = "each by its own resolver" if name == OWN else f"by {name}"
+        return {"title": f"{in_words(len(asked)).capitalize()} scenarios, resolved {by}",
+                "about": {run.scenario.name: run.title for run in runs}}
     by = "one resolver" if len(runs) == 1 else f"{in_words(len(runs))} resolvers"
     return {"title": f"{runs[0].scenario.title or name}: {by}",
             "about": {"": runs[0].scenario.description}}

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from hierarchy.errors import HierarchyError, UnknownNameError
-from scenarios.config.resolvers import OWN
+from scenarios.config.scenario import OWN
 from scenarios.reproduce import pages, rows
 from scenarios.reproduce.blocks import BLOCKS
 from scenarios.reproduce.rows import Rows

@@ -79,12 +79,11 @@ def run(text: str, resolver: str, key: str) -> Outcome:
     """Run a scenario under a resolver and measure it; an exception becomes its `error`."""
     from scenarios import simulate
     from scenarios.config import Scenario
-    from scenarios.config.resolvers import under
     from scenarios.measure.metrics import measure
 
     begun = perf_counter()
     try:
-        scenario = under(Scenario.from_toml(text), resolver)
+        scenario = Scenario.from_toml(text).with_resolver(resolver)
         recording = simulate(scenario)
         measured = tuple(measure(recording).values())
     except Exception as error:  # the failed run is a row too, with the reason

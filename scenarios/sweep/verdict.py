@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from scenarios.config import Scenario
-from scenarios.config.resolvers import under
 from scenarios.measure.metrics import Metric
 from scenarios.measure.verdict import Verdict
 from scenarios.sweep.results import Criterion, Results, Share, valued
@@ -104,8 +103,8 @@ def _advice(results: Results) -> Iterator[str]:
 def _caveats(results: Results) -> Iterator[str]:
     """Yield which resolvers have no strict priorities."""
     specs = {run.label: run.job for run in results.runs}
-    loose = [label for label, job in specs.items() if not under(
-        Scenario.from_toml(job.text), job.resolver).make_resolver().strict]
+    loose = [label for label, job in specs.items() if not Scenario.from_toml(
+        job.text).with_resolver(job.resolver).make_resolver().strict]
     if loose:
         yield f"{listed(loose)} {'is' if len(loose) == 1 else 'are'} not strict at every rank"
 

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 from scenarios.config import Scenario, load
-from scenarios.config.resolvers import under
 from scenarios.loop.recording import versions
 from scenarios.sweep.config import Sweep, find, load_sweep
 from scenarios.sweep.data import as_plain_data
@@ -151,4 +150,4 @@ def _json(data: Any) -> str:
 
 def _scenario_of(run: Planned) -> str:
     """Return the scenario of a run as TOML, with its resolver."""
-    return under(Scenario.from_toml(run.job.text), run.job.resolver).to_toml()
+    return Scenario.from_toml(run.job.text).with_resolver(run.job.resolver).to_toml()

@@ -159,12 +159,32 @@ def at_origin_between(*centres, mean_within):
 
 
 def test_mean_direction_is_that_of_all_near_obstacles():
-    seen = at_origin_between((0.1, 0, 0), (0, 0.2, 0), (0, 0, 5.0), mean_within=1.0)
+    seen = at_origin_between((0.1, 0, 0), (0, 0.2, 0), (0, 0, 5.0), mean_within=(1.0, 1.0))
     np.testing.assert_allclose(seen.direction[8], [-(0.5**0.5), -(0.5**0.5), 0], atol=1e-12)
 
 
+def test_the_mean_of_the_end_effector_has_its_own_distance():
+    """The sum of unit vectors of eq. (25), over what is within eps_ee of it and far of the body."""
+    offsets = np.array([(0.05, 0.02, 0.0), (0.0, -0.09, 0.01), (-0.12, 0.0, 0.05)])
+    for within in (0.06, 0.1, 0.2):
+        seen = at_origin_between(*offsets, mean_within=(0.9, within))
+        near = offsets[np.linalg.norm(offsets, axis=1) < within]
+        mean = -(near / np.linalg.norm(near, axis=1)[:, None]).sum(axis=0)
+        np.testing.assert_allclose(seen.direction[8], mean / np.linalg.norm(mean), atol=1e-12)
+        away = seen.points[3] - (seen.points[8] + offsets)
+        distances = np.linalg.norm(away, axis=1)
+        assert (distances < 0.9).all(), "all count for the body's points"
+        mean = (away / distances[:, None]).sum(axis=0)
+        np.testing.assert_allclose(seen.direction[3], mean / np.linalg.norm(mean), atol=1e-12)
+
+
+def test_beyond_the_distance_of_the_mean_the_direction_is_that_of_the_nearest():
+    seen = at_origin_between((0.1, 0, 0), (0, 0.11, 0), mean_within=(0.9, 0.05))
+    np.testing.assert_allclose(seen.direction[8], [-1, 0, 0], atol=1e-12)
+
+
 def test_mean_direction_falls_back_to_the_nearest_where_the_unit_vectors_cancel():
-    seen = at_origin_between((0.1, 0, 0), (-0.2, 0, 0), mean_within=1.0)
+    seen = at_origin_between((0.1, 0, 0), (-0.2, 0, 0), mean_within=(1.0, 1.0))
     np.testing.assert_allclose(seen.direction[8], [-1, 0, 0], atol=1e-12)
 
 

@@ -279,7 +279,7 @@ def test_json_lists_what_there_is(capsys):
     found = said(["list"], capsys)
     assert "ellipse" in found["scenarios"]
     assert "hcod" in found["resolvers"]
-    assert list(found) == ["scenarios", "sweeps", "resolvers", "tasks", "robots"]
+    assert list(found) == ["scenarios", "groups", "sweeps", "resolvers", "tasks", "robots"]
 
 
 def test_json_of_a_check_is_the_whole_scenario(capsys):
@@ -310,6 +310,7 @@ def completed(words):
 def test_the_shell_completes_commands_scenarios_and_resolvers():
     assert completed(["hierarchy", "comp"]) == ["compare"]
     assert completed(["hierarchy", "run", "human-h"]) == ["human-hqp"]
+    assert completed(["hierarchy", "compare", "ladder"])[-1] == "ladder"
     assert completed(["hierarchy", "compare", "ellipse", "--resolvers", "tpm,hc"]) == ["tpm,hcod"]
     assert completed(["hierarchy", "sweep", "ell"]) == ["ellipse-starts"]
 

@@ -51,8 +51,11 @@ def image_of(pixels, shape=(81, 101)):
     return image
 
 
-def one_by_one(image, pinhole, point, region, thin=inf):
-    """Distance, direction from the nearest and mean direction over all pixels; plain numpy."""
+def one_by_one(image, pinhole, point, region, thin=inf, within=inf):
+    """Distance, direction from the nearest and mean direction over all pixels; plain numpy.
+
+    The mean is over what is nearer than `within`, and the nearest where nothing is.
+    """
     v, u = np.nonzero(image)
     depth = image[v, u].astype(float)
     own = pinhole.project(point)[2]
@@ -62,8 +65,9 @@ def one_by_one(image, pinhole, point, region, thin=inf):
     if not (distance < region).any():
         return inf, np.zeros(3), np.zeros(3)
     off, distance = off[distance < region], distance[distance < region]
-    mean = (off / distance[:, None]).mean(axis=0)
     nearest = np.argmin(distance)
+    counted = distance < within if distance.min() < within else distance == distance.min()
+    mean = (off / distance[:, None])[counted].mean(axis=0)
     return distance[nearest], off[nearest] / distance[nearest], mean / np.linalg.norm(mean)
 
 
@@ -78,10 +82,11 @@ def test_distances_and_directions_are_those_of_all_pixels_one_by_one(share, thin
         image = rng.uniform(0.6, 2.5, (81, 101)) * (rng.random((81, 101)) < share)
         image = image.astype(np.float32)
         points = rng.uniform((-1, -1, 0.3), (1, 1, 2.8), (6, 3))
-        for mean in (False, True):
-            seen = seen_in(image, *points, thin=thin, mean=mean)
+        for body, tip in ((0.0, 0.0), (0.2, 0.3), (0.3, 0.1), (inf, inf)):
+            seen = seen_in(image, *points, thin=thin, mean_within=(body, tip))
             for k, point in enumerate(points):
-                D, nearest, average = one_by_one(image, FACING, point, 0.4, thin)
+                mean = tip if k == len(points) - 1 else body
+                D, nearest, average = one_by_one(image, FACING, point, 0.4, thin, mean)
                 assert seen.distance[k] == pytest.approx(D, abs=1e-6)
                 seen_some += D < inf
                 if 0.05 < D < inf:
@@ -127,7 +132,7 @@ def test_a_thin_obstacle_counts_at_its_back():
 def test_a_point_in_the_shadow_of_an_obstacle_touches_it_and_leaves_it_where_it_ends_first():
     image = np.zeros((81, 101))
     image[20:61, 40:91] = 0.7  # its left side is 10 pixels off the point, all others farther
-    seen = seen_in(image, (0.0, 0.0, 1.0), mean=False, pairs=True)
+    seen = seen_in(image, (0.0, 0.0, 1.0), mean_within=(0.0, 0.0), pairs=True)
     assert seen.distance[0] == pytest.approx(0.0, abs=1e-9)
     assert seen.direction[0] @ (-1.0, 0.0, 0.0) > 0.99
     np.testing.assert_array_equal(seen.pairs.direction[0, 0], seen.direction[0])

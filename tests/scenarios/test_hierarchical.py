@@ -66,7 +66,6 @@ def test_resolvers_that_cannot_do_inequalities_refuse_with_the_level_and_the_row
 
 
 @pytest.mark.parametrize(("changes", "says"), [
-    (["control.stack=switched"], "goes with control.stack"),
     (["avoidance.influence=0.01"], "is not below influence"),
     (["control.level=velocity", "limits.torque=0.5"], "needs control.level"),
     (["limits.acceleration=0"], "limits.acceleration"),
@@ -76,6 +75,18 @@ def test_resolvers_that_cannot_do_inequalities_refuse_with_the_level_and_the_row
 def test_what_does_not_go_together_is_said(changes, says):
     with pytest.raises(HierarchyError, match=says):
         build(load("ellipse-hqp", changes))
+
+
+def test_repulsion_is_placed_by_algorithm_1_only():
+    with pytest.raises(HierarchyError, match=r'"repulsion" goes with control\.stack = "switched"'):
+        load("ellipse", ["control.stack=hierarchical"])
+
+
+def test_beside_one_sided_distances_algorithm_1_switches_the_cone_alone():
+    cell = build(load("ellipse-hqp", ["control.stack=switched"]))
+    assert cell.order(None, 1.0).order == ("joint limits", "separation", "position", "pointing")
+    assert cell.order(None, -1.0).order == ("joint limits", "separation", "position")
+    assert cell.pointing.kind == "equality"
 
 
 @pytest.mark.slow

@@ -44,14 +44,16 @@ class DepthSpace:
         an obstacle counts as occupied up to that depth.
     support, band : a pixel counts if `support` of the 3 x 3 around it agree within `band` [m] in
         depth, which removes outliers, but also surfaces that are smaller or steeper.
-    mean : use the mean direction (25)-(26) over all pixels in the region, otherwise that of the
-        nearest pixel, except for a point in the shadow of its own pixel.
+    mean_within : distances [m], for control points and end effector, within which the direction is
+        the mean (25)-(26) over all pixels of the region; with 0 it is that of the nearest pixel,
+        except for a point in the shadow of its own pixel.
     body, tip : repulsion laws. `measurement.nearest` is a pixel v width + u, -1 for none.
     """
 
     def __init__(self, pinhole: Pinhole, points: Sequence[ControlPoint],
                  capsules: Sequence[Capsule], region: float, *, margin: float = 0.05,
-                 thin: float = inf, support: int = 3, band: float = 0.05, mean: bool = True,
+                 thin: float = inf, support: int = 3, band: float = 0.05,
+                 mean_within: tuple[float, float] = (inf, inf),
                  body: Repulsion | None = None, tip: Repulsion | None = None,
                  pairs: bool = False) -> None:
         for name, value, least in (("region", region, 1e-9), ("margin", margin, 0.0),
@@ -67,7 +69,7 @@ class DepthSpace:
             self.measurement.pairs = self._pairs
         self._eye, self._margin = pinhole.packed(), margin
         self._support, self._band = support, band
-        self._thin, self._mean = thin, mean
+        self._thin, self._mean = thin, np.array(mean_within)
         self._joints, self._offsets = pack_points(points)
         self._links, self._capsules = pack_capsules(capsules)
         self._laws = laws(body, tip) if body and tip else NO_LAWS

@@ -27,20 +27,21 @@ class ExactDistances:
     """Measures a robot's control points and end effector against obstacles.
 
     `body` and `tip` are the magnitudes of the repulsion of the control points and of the end
-    effector; without both there is no repulsion. With `mean_within` > 0 [m] directions are the mean
-    (25)-(26) over the obstacles nearer than that, otherwise those of the nearest obstacle. With
-    `pairs`, every point is also measured against every obstacle, as `Separation` needs.
+    effector; without both there is no repulsion. Directions are the mean (25)-(26) over the
+    obstacles nearer than `mean_within` [m], for control points and end effector, where there are
+    any; with 0 those of the nearest obstacle. With `pairs`, every point is also measured against
+    every obstacle, as `Separation` needs.
     """
 
     outside = 0.0  # [s] of a measurement that is not part of the control loop
 
     def __init__(self, robot: Robot, obstacles: Obstacles, body: Repulsion | None = None,
-                 tip: Repulsion | None = None, mean_within: float = 0.0,
-                 pairs: bool = False) -> None:
+                 tip: Repulsion | None = None,
+                 mean_within: tuple[float, float] = (0.0, 0.0), pairs: bool = False) -> None:
         end = robot.frame(robot.end_effector)
         self.points = (*robot.control_points,
                        ControlPoint(robot.end_effector, end.joint, end.offset))
-        self.obstacles, self.mean_within = obstacles, mean_within
+        self.obstacles, self._mean_within = obstacles, np.array(mean_within)
         self._joints, self._offsets = pack_points(self.points)
         self._laws = laws(body, tip) if body and tip else _NO_LAWS
         self.measurement = Measurement(len(robot.control_points))
@@ -64,7 +65,7 @@ class ExactDistances:
         self._followed = state
         self._measure = exact_measurer(self.measurement, state.placements, self._joints,
                                        self._offsets, self.obstacles.table, self._laws,
-                                       self.mean_within)
+                                       self._mean_within)
 
     def check_start(self, state: State) -> None:
         """Raise a HierarchyError if an obstacle lies at a control point, or a point inside one."""

@@ -81,7 +81,8 @@ def measure_pixels(placements, joints, offsets, eye, depth, tiles, region, thin,
     """Fill the arrays of a Measurement, and pairs (P, 1, 14), from an obstacle image.
 
     joints (P,), offsets (P, 3) of the control points, the end effector last; see `DepthSpace` for
-    region, thin and mean; laws (2, 4) of `repulsion.laws`. Returns the active control point.
+    region and thin; mean (2,) is its mean_within; laws (2, 4) of `repulsion.laws`. Returns the
+    active control point.
     """
     count = len(joints)
     active, D_minimal = -1, np.inf
@@ -89,10 +90,10 @@ def measure_pixels(placements, joints, offsets, eye, depth, tiles, region, thin,
         x, y, z = place(placements[joints[k]], offsets[k, 0], offsets[k, 1], offsets[k, 2])
         points[k, 0], points[k, 1], points[k, 2] = x, y, z
         pair = pairs[k, 0]
-        D_min = _nearest(eye, depth, tiles, region, thin, mean, x, y, z, direction[k], pair,
+        law = 1 if k == count - 1 else 0
+        D_min = _nearest(eye, depth, tiles, region, thin, mean[law], x, y, z, direction[k], pair,
                          nearest, k)
         distance[k] = pair[0] = D_min
-        law = 1 if k == count - 1 else 0
         magnitude[k] = repulsion(D_min, laws[law, 0], laws[law, 1], laws[law, 2],
                                  laws[law, 3]) if D_min < np.inf else 0.0  # (23)
         if k < count - 1 and D_min < D_minimal:  # (31)
@@ -108,6 +109,7 @@ def _nearest(eye, depth, tiles, region, thin, mean, x, y, z, direction, pair, ne
     u0, u1 = pixels_of_ball(eye[0], eye[2], width, cx, cz, region)
     v0, v1 = pixels_of_ball(eye[1], eye[3], height, cy, cz, region)
     per_x, per_y, reach = 1.0 / eye[0], 1.0 / eye[1], region * region
+    averaged = mean * mean if mean > 0.0 else reach
     DD, at = reach, -1
     nx = ny = nz = sx = sy = sz = 0.0
     for tv in range(v0 // TILE, (v1 + TILE - 1) // TILE):
@@ -128,7 +130,7 @@ def _nearest(eye, depth, tiles, region, thin, mean, x, y, z, direction, pair, ne
                         continue
                     if oo < DD:  # (22)
                         DD, at, nx, ny, nz = oo, v * width + u, ox, oy, oz
-                    if oo > 0.0:  # (25); the factor 1/h is lost in (26)
+                    if 0.0 < oo < averaged:  # (25); the factor 1/h is lost in (26)
                         per = 1.0 / sqrt(oo)
                         sx, sy, sz = sx + per * ox, sy + per * oy, sz + per * oz
     nearest[k] = at
@@ -141,7 +143,7 @@ def _nearest(eye, depth, tiles, region, thin, mean, x, y, z, direction, pair, ne
     if D < cz * max(per_x, per_y):  # in the shadow of a pixel, where its centre says nothing
         nx, ny, nz = (sx, sy, sz) if norm > 1e-6 else (1.0, 0.0, 0.0)
     _turn_unit_back(eye, nx, ny, nz, pair[1:4])
-    if mean and norm > 1e-6:
+    if mean > 0.0 and norm > 1e-6:
         _turn_unit_back(eye, sx, sy, sz, direction)  # (26)
     else:
         direction[0], direction[1], direction[2] = pair[1], pair[2], pair[3]

@@ -1,0 +1,152 @@
+"""Repulsion of all control points as one joint command, for the null space of the tasks."""
+
+# mypy: disable-error-code="no-untyped-def"
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hierarchy.avoidance.control_points import ControlPoint, pack_points
+from hierarchy.avoidance.measurement import Measurement
+from hierarchy.errors import HierarchyError
+from hierarchy.jit import bind, compiled
+from hierarchy.kinematics import (
+    add_row,
+    drift_of_point,
+    place,
+    write_point_jacobian,
+    write_point_jacobian_derivative,
+)
+from hierarchy.problem import Array
+from hierarchy.state import State
+from hierarchy.task import Level, Task
+from hierarchy.tasks.posture import JointTask
+
+
+@dataclass(frozen=True)
+class CumulatedRepulsion(JointTask):
+    """Push every control point within a distance away, as the null-space reference of a stack.
+
+    Each control point nearer than `within` asks for the joint command of its own avoidance task
+    (29), J_n^T (r - dJ_n/dt v) / max(|J_n|^2, lever^2), and the commands are added up; `base` is
+    the null-space term to which they are added. No point is certain to get what it asks for: the
+    commands add up in any direction, and the tasks of the stack take what they need first.
+
+    joints : number of joints n. points : the control points in the order of the measurement.
+    within : distance [m]. lever : length of J_n [m] below which it no longer enlarges the command.
+
+    Source: reference [5] of the letter, as the letter's introduction describes it; there the
+    commands are velocities. At velocity level r is a velocity, without dJ_n/dt v.
+    """
+
+    joints: int
+    points: Sequence[ControlPoint]
+    within: float
+    base: Task | None = None
+    lever: float = 0.05
+    name: str = "cumulated repulsion"
+    bodies: NDArray[np.int64] = field(init=False, repr=False, compare=False)
+    offsets: Array = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        if not self.points:
+            raise HierarchyError(f"task {self.name!r}: needs at least one control point")
+        if not self.lever > 0.0:
+            raise HierarchyError(f"task {self.name!r}: lever {self.lever} m must be positive")
+        if self.base is not None and self.base.dimension != self.joints:
+            raise HierarchyError(f"task {self.name!r}: {self.base.name!r} has "
+                                 f"{self.base.dimension} rows, expected {self.joints}")
+        bodies, offsets = pack_points(self.points)
+        object.__setattr__(self, "bodies", bodies)
+        object.__setattr__(self, "offsets", offsets)
+
+    def error(self, state: State) -> Array:
+        """Zero (n,): there is no target position."""
+        return np.zeros(self.joints)
+
+    def reference_velocity(self, state: State) -> Array:
+        """The sum of the commands, and of `base` (n,) [rad/s]."""
+        base = np.zeros(self.joints) if self.base is None else self.base.reference_velocity(state)
+        return base + self._sum(state, "velocity")
+
+    def reference_acceleration(self, state: State) -> Array:
+        """The sum of the commands, and of `base` (n,) [rad/s^2]."""
+        base = (np.zeros(self.joints) if self.base is None
+                else self.base.reference_acceleration(state))
+        return base + self._sum(state, "acceleration")
+
+    def _sum(self, state: State, level: Level) -> Array:
+        """Sum of the commands (n,)."""
+        seen, total = self._seen(state), np.zeros(self.joints)
+        J, dJ = np.zeros((2, 3, state.n))
+        for k in np.flatnonzero(seen.distance[:-1] <= self.within):
+            r, body, offset = seen.direction[k], int(self.bodies[k]), self.offsets[k]
+            write_point_jacobian(state.J, state.placements, state.supports, body, offset, J, 0)
+            if level == "acceleration":
+                write_point_jacobian_derivative(state.kinematics, body, offset, dJ)
+            row, asked = r @ J, seen.magnitude[k] - r @ dJ @ state.v
+            total += row * asked / max(row @ row, self.lever**2)
+        return total
+
+    def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
+               row: int) -> Callable[[], object]:
+        """See `Task.writer`."""
+        seen = self._seen(state)
+        below = (lambda: lower[row:row + self.joints].fill(0.0)) if self.base is None else (
+            self.base.writer(state, level, A, lower, upper, row))
+        parameters = _Parameters(self.bodies, self.offsets, self.within, self.lever,
+                                 level == "acceleration", np.empty((1, state.n)))
+        add = bind(_add, state.kinematics, parameters, seen.arrays, lower, upper, row)
+
+        def write() -> None:
+            below()
+            add()
+
+        return write
+
+    def _seen(self, state: State) -> Measurement:
+        if state.measurement is None:
+            raise HierarchyError(f"task {self.name!r}: the state carries no measurement")
+        if self.joints != state.n:
+            raise HierarchyError(f"task {self.name!r}: {self.joints} joints, the robot has "
+                                 f"{state.n} velocities")
+        return state.measurement
+
+
+class _Parameters(NamedTuple):
+    bodies: NDArray[np.int64]
+    offsets: Array
+    within: float
+    lever: float
+    acceleration: bool
+    scratch: Array
+
+
+@compiled
+def _add(kinematics, parameters, seen, lower, upper, row):
+    """Add each point's command to the n equalities from `row` on."""
+    bodies, offsets, within, lever, acceleration, scratch = parameters
+    n = scratch.shape[1]
+    for k in range(len(bodies)):
+        if not seen.distance[k] <= within:
+            continue
+        body, offset, r, asked = bodies[k], offsets[k], seen.direction[k], seen.magnitude[k]
+        if acceleration:
+            _, _, _, ax, ay, az, _, _, _ = drift_of_point(kinematics, body, offset[0], offset[1],
+                                                          offset[2])
+            asked -= r[0] * ax + r[1] * ay + r[2] * az
+        point = place(kinematics.placements[body], offset[0], offset[1], offset[2])
+        scratch[0, :] = 0.0
+        add_row(kinematics.J, kinematics.supports, body, point, (r[0], r[1], r[2]), scratch, 0)
+        square = 0.0
+        for c in range(n):
+            square += scratch[0, c] * scratch[0, c]
+        for c in range(n):
+            lower[row + c] += scratch[0, c] * asked / max(square, lever * lever)
+    for c in range(n):
+        upper[row + c] = lower[row + c]

@@ -1,0 +1,155 @@
+"""The ladder from `ellipse` to `ellipse-hqp`: one change at a time, run as one group."""
+
+import json
+import tomllib
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+import scenarios.config.groups as groups_of
+from hierarchy import HierarchyError
+from scenarios import compare, load, simulate
+from scenarios.cli.main import run_command
+from scenarios.config import ScenarioError, members, shipped_groups
+from scenarios.config.reading import LIBRARY
+
+# What each step changes: a key, or a section as a whole.
+STEPS = {"ladder-1-staircase": "control.options.tpm.form", "ladder-2-limits": "limits",
+         "ladder-3-undamped": "control.options.damping", "ladder-4-priority": "avoidance.near",
+         "ladder-5-hcod": "control.resolver", "ladder-6-barrier": "avoidance",
+         "ladder-7-cone": "control.stack"}
+WORDS = ("name", "title", "description")
+
+
+def flat(table, above=""):
+    """Dotted keys and values; an absent section is a key with the value None."""
+    for key, value in table.items():
+        if isinstance(value, dict) and value:
+            yield from flat(value, f"{above}{key}.")
+        else:
+            yield f"{above}{key}", value
+
+
+def differing(a, b):
+    """The keys that differ between two scenarios, words apart."""
+    first, second = (dict(flat(load(name).model_dump(mode="json"))) for name in (a, b))
+    return {key for key in {*first, *second} - set(WORDS)
+            if key not in first or key not in second or first[key] != second[key]}
+
+
+def test_the_group_is_the_ladder_from_its_first_step_to_its_last():
+    assert members(["ladder"]) == ["ellipse", *STEPS]
+    assert members(["strictness", "ladder"])[:2] == ["strictness", "ellipse"]
+    assert "ladder" in shipped_groups()
+
+
+@pytest.mark.parametrize(("before", "name"), list(pairwise(["ellipse", *STEPS])))
+def test_a_step_extends_the_one_before_and_changes_what_it_says_and_nothing_else(name, before):
+    assert tomllib.loads((LIBRARY / f"{name}.toml").read_text())["extends"] == before
+    found = differing(before, name)
+    assert found
+    assert all(key == STEPS[name] or key.startswith(f"{STEPS[name]}.") for key in found)
+
+
+def test_the_second_step_is_ellipse_limits_and_the_last_is_ellipse_hqp_but_for_unused_options():
+    assert differing("ladder-2-limits", "ellipse-limits") == set()
+    assert all(key.startswith("control.options") for key in differing("ladder-7-cone",
+                                                                       "ellipse-hqp"))
+    assert load("ladder-7-cone").make_resolver().damping == 0.0
+
+
+@pytest.mark.slow
+def test_the_last_step_runs_as_ellipse_hqp_to_the_last_bit():
+    last, hqp = (simulate(load(name)) for name in ("ladder-7-cone", "ellipse-hqp"))
+    assert last.ticks == hqp.ticks == 18850
+    for signal in ("q", "v", "a", "command"):
+        np.testing.assert_array_equal(last[signal], hqp[signal])
+
+
+@pytest.mark.slow
+def test_from_the_same_states_the_change_of_resolver_changes_no_command():
+    """The states are those of the fourth step, and so are the commands to compare with."""
+    from scenarios.cell.build import build
+
+    run = simulate(load("ladder-4-priority", ["control.duration=3.0"]))
+    scenario = load("ladder-5-hcod")
+    cell, resolver = build(scenario), scenario.make_resolver()
+    worst = 0.0
+    for k in range(0, run.ticks, 10):
+        cell.state.move(float(run["t"][k]), run["q"][k], run["v"][k])
+        seen = cell.sensor.measure(cell.state)
+        order = cell.order(seen, float(run["pointing_error"][k])).order
+        assert order == run.order_names[run["order"][k]]
+        x = resolver.solve(cell.stack.hierarchy(cell.state, order)).x
+        worst = max(worst, np.abs(x - run["command"][k]).max())
+    assert worst < 1e-6
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("_without_figures")
+def test_compare_runs_a_group_side_by_side_each_scenario_with_its_own_resolver(
+        tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert run_command(["compare", "ladder", "--duration", "0.02"]) == 0
+    out = capsys.readouterr().out
+    assert "Step 2: joint limits above all tasks (tpm)" in out
+    assert "Step 6: one-sided distances in place of repulsion (hcod)" in out
+    folder = tmp_path / "runs" / "compare-ladder"
+    found = json.loads((folder / "comparison.json").read_text())
+    assert [run["scenario"] for run in found["runs"]] == ["ellipse", *STEPS]
+    assert [run["label"] for run in found["runs"]] == ["ellipse", *STEPS]
+    assert list(found["verdicts"]) == ["own"]
+    page = (folder / "index.html").read_text()
+    assert "Eight scenarios, resolved each by its own resolver" in page
+    assert "Step 6: one-sided distances in place of repulsion (hcod)" in page
+
+
+@pytest.mark.usefixtures("_without_figures")
+def test_own_is_the_resolver_that_a_scenario_names():
+    assert load("ellipse-hqp").with_resolver("own") == load("ellipse-hqp")
+    short = [load(name, ["control.duration=0.01"]) for name in ("ellipse", "ellipse-limits")]
+    done = compare(short, ["own"])
+    assert [run.scenario.make_resolver().label for run in done.runs] == ["tpm published", "tpm"]
+
+
+def test_a_group_is_not_a_scenario():
+    with pytest.raises(ScenarioError, match=r"'ladder' is a group .*`hierarchy compare ladder`.*"
+                                            "ladder-7-cone"):
+        load("ladder")
+
+
+@pytest.mark.parametrize(("text", "says"), [
+    ("scenarios = ['ellipse']", r"group 'mine': title"),
+    ("title = 'x'\nscenarios = []", r"group 'mine': scenarios"),
+    ("title = 'x'\nscenarios = ['ellipse']\nresolver = 'hcod'", r"group 'mine': .*'resolver'"),
+    ("title = 'x'\nscenarios = ['elipse']", r"unknown scenario 'elipse'; did you mean 'ellipse'"),
+])
+def test_a_bad_group_is_an_error_that_names_it(text, says, tmp_path, monkeypatch):
+    monkeypatch.setattr(groups_of, "LIBRARY", tmp_path)
+    (tmp_path / "mine.toml").write_text(text)
+    with pytest.raises(HierarchyError, match=says):
+        compare("mine")
+
+
+@pytest.mark.parametrize(("text", "says"), [
+    ('extends = "ellipse"\nreplaces = "avoidance"', r"replaces: expected a list of sections, got"),
+    ('extends = "ellipse"\nreplaces = ["avoidence"]', r"replaces: .*did you mean 'avoidance'"),
+    ('replaces = ["avoidance"]', r"replaces: goes with extends"),
+])
+def test_replacing_nothing_is_an_error_that_names_file_and_key(text, says, tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text(text)
+    with pytest.raises(ScenarioError, match=says) as error:
+        load(path)
+    assert "mine.toml" in str(error.value)
+
+
+def test_a_replaced_section_takes_nothing_over(tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text('extends = "ellipse"\nreplaces = ["damping", "pointing"]\nname = "mine"\n'
+                    "[damping]\nvalue = 1.0\n")
+    mine = load(path)
+    assert mine.pointing is None
+    assert mine.damping.value == 1.0
+    assert mine.position == load("ellipse").position
