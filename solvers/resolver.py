@@ -17,11 +17,12 @@ from solvers.status import TOO_SMALL
 from solvers.status import Status as Status
 from solvers.workspace import WORKSPACE
 
-Handles = Literal["equalities", "bounds", "inequalities"]
-_KINDS: tuple[Handles, ...] = ("equalities", "bounds", "inequalities")
+Handles = Literal["equalities", "bounds", "inequalities", "activations"]
+_KINDS: tuple[Handles, ...] = ("equalities", "bounds", "inequalities", "activations")
 _RESOLVED: dict[str, str] = {
     "equalities": "equalities only",
-    "bounds": "equalities, and bounds on single unknowns in a first level of their own"}
+    "bounds": "equalities, and bounds on single unknowns in a first level of their own",
+    "activations": "equalities, and rows that come with an activation"}
 
 
 class Resolution:
@@ -73,7 +74,8 @@ class Resolver(ABC):
     name: ClassVar[str]
     handles: ClassVar[Handles] = "equalities"
     """Rows with lower < upper that the resolver accepts: none; bounds on single unknowns in a first
-    level that has no other rows; or any. It rejects all others."""
+    level that has no other rows; or any. It rejects all others. "activations": rows that come with
+    an activation, see solvers.resolvers.smooth."""
 
     def __post_init__(self) -> None:
         self._number("damping", 0.0, math.inf)
@@ -169,8 +171,8 @@ def register(kind: type[_Kind]) -> type[_Kind]:
 
 
 def names() -> tuple[str, ...]:
-    """Return the names of all resolvers, sorted."""
-    return tuple(sorted(_REGISTRY))
+    """Return the names of all resolvers that a hierarchy alone is enough for, sorted."""
+    return tuple(sorted(name for name, kind in _REGISTRY.items() if kind.handles != "activations"))
 
 
 def make(name: str, /, **settings: Any) -> Resolver:

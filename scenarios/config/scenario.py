@@ -19,6 +19,7 @@ from scenarios.config.plant import PlantSection
 from scenarios.config.robot import RobotSection, StartSection
 from scenarios.config.sections import Section
 from scenarios.config.sensor import SensorSection
+from scenarios.config.stacks import RIVALS, unfit
 from scenarios.config.tasks import (
     DampingSection,
     LimitsSection,
@@ -74,7 +75,7 @@ class Scenario(Section):
         switched = self.control.stack == "switched"
         if self.avoidance and switched != (self.avoidance.kind == "repulsion"):
             raise ValueError('avoidance.kind = "repulsion" goes with control.stack = "switched", '
-                             '"separation" with "hierarchical"')
+                             '"separation" with the others')
         if self.avoidance and switched and not self.position:
             raise ValueError("[avoidance] needs [position]: Algorithm 1 orders one by the other")
         if self.limits and self.limits.danger_reach and not self.avoidance:
@@ -84,6 +85,16 @@ class Scenario(Section):
             raise ValueError('limits.torque and limits.danger_reach need limits.place = "stack"')
         if self.limits and self.limits.torque and self.control.level == "velocity":
             raise ValueError("limits.torque needs control.level = \"acceleration\"")
+        return self
+
+    @model_validator(mode="after")
+    def _fits_its_stack(self) -> Self:
+        pointing = {"pointing": self.pointing} if self.pointing else {}
+        listed = {f"tasks.{i}": task for i, task in enumerate(self.tasks)
+                  if isinstance(task, PointingTask)}
+        refused = unfit(self.control, self.limits, self.avoidance, {**pointing, **listed})
+        for reason in refused:
+            raise ValueError(reason)
         return self
 
     @model_validator(mode="after")
@@ -120,13 +131,15 @@ class Scenario(Section):
     @property
     def limits_in_stack(self) -> bool:
         """Whether the joint limits are a level of the stack under its resolver."""
-        if self.limits is None or self.limits.place == "guard":
+        if self.limits is None or self.limits.place == "guard" or self.control.stack in RIVALS:
             return False
         return self.limits.place == "stack" or self.make_resolver().handles != "equalities"
 
     @property
     def asks(self) -> Handles:
         """The kind of rows that its stack has under its resolver."""
+        if self.control.stack in RIVALS:
+            return "activations" if self.control.stack == "smooth" else "equalities"
         inequalities = self.control.stack == "hierarchical" and (
             self.avoidance is not None
             or any(isinstance(task, PointingTask) and task.rows == "inequality"
