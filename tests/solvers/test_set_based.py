@@ -28,6 +28,12 @@ def in_tangent_cone(rate, value, least, most):
     return rate >= -1e-9 if value <= least else rate <= 1e-9
 
 
+def pseudoinverse(M):
+    """The pseudoinverse, singular values of rounding errors being zero; rows have size one."""
+    U, s, V = np.linalg.svd(M, full_matrices=False)
+    return (V.T * np.array([1.0 / one if one > 1e-9 else 0.0 for one in s])) @ U.T
+
+
 def by_the_paper(sets, tasks, n):
     """Resolve with set-based tasks (J, value, least, most) above equality tasks (J, rate).
 
@@ -37,8 +43,9 @@ def by_the_paper(sets, tasks, n):
         for frozen in combinations(range(len(sets)), count):
             x, N = np.zeros(n), np.eye(n)
             for J, rate in [*((sets[k][0], np.zeros(1)) for k in frozen), *tasks]:
-                x = x + np.linalg.pinv(J @ N) @ (rate - J @ x)
-                N = N - np.linalg.pinv(J @ N) @ (J @ N)
+                inverse = pseudoinverse(J @ N)
+                x = x + inverse @ (rate - J @ x)
+                N = N - inverse @ J @ N
             if all(in_tangent_cone(float(J[0] @ x), *bounds) for k, (J, *bounds) in enumerate(sets)
                    if k not in frozen):
                 return x, frozen
@@ -68,7 +75,7 @@ def problems(count, inside=0.0):
 
 def test_with_every_task_at_its_bound_the_mode_and_the_answer_are_those_of_the_paper():
     counts = set()
-    for sets, tasks, n in problems(200):
+    for sets, tasks, n in problems(60):
         x, frozen = by_the_paper(sets, tasks, n)
         found = SET_BASED.solve(as_rows(sets, tasks))
         assert found.status is Status.SOLVED
@@ -79,7 +86,7 @@ def test_with_every_task_at_its_bound_the_mode_and_the_answer_are_those_of_the_p
 
 
 def test_a_task_inside_its_set_changes_nothing():
-    for sets, tasks, n in problems(200, inside=0.6):
+    for sets, tasks, n in problems(60, inside=0.6):
         at_bound = [one for one in sets if one[1] != 0.5]
         x, frozen = by_the_paper(at_bound, tasks, n)
         found = SET_BASED.solve(as_rows(sets, tasks))
@@ -146,19 +153,19 @@ def test_a_setting_out_of_range_is_refused(setting):
 
 def test_in_closed_loop_the_tip_stops_at_the_wall_and_the_joint_at_its_limit():
     """An arm of three joints that is sent beyond a wall; then it is called back."""
-    q, period, wall, limit = np.array([0.6, 0.9, 0.5]), 0.002, 1.5, 1.2
+    q, period, wall, limit = np.array([0.6, 0.9, 0.5]), 0.006, 1.5, 1.2
     values, farthest = [], -INF
-    for k in range(3000):
+    for k in range(900):
         p, J = tip(q)
-        rate = 2.0 * (np.array([2.2, 1.6] if k < 2000 else [0.6, 1.8]) - p)
+        rate = 2.0 * (np.array([2.2, 1.6] if k < 600 else [0.6, 1.8]) - p)
         edge = [0.0 if p[0] >= wall else INF, 0.0 if q[1] >= limit else INF]
         h = Hierarchy.from_levels([(np.vstack([J[:1], np.eye(3)[1:2]]), np.full(2, -INF), edge),
                                    (J, rate)])
         q = q + period * SET_BASED.solve(h).x
         values.append(tip(q)[0][0] - wall)
         farthest = max(farthest, q[1] - limit)
-    assert np.max(values) < 4e-3, "at most what one period carries the tip over the wall"
-    assert np.min(np.abs(values[1000:2000])) < 4e-3, "it was at the wall"
-    assert np.abs(np.array(values[1500:2000])).max() < 4e-3, "and stayed there while sent beyond"
+    assert np.max(values) < 0.012, "at most what one period carries the tip over the wall"
+    assert np.min(np.abs(values[300:600])) < 0.012, "it was at the wall"
+    assert np.abs(np.array(values[450:600])).max() < 0.012, "and stayed there while sent beyond"
     assert values[-1] == pytest.approx(0.6 - wall, abs=1e-3), "and left it when called back"
-    assert farthest < 4e-3
+    assert farthest < 0.012

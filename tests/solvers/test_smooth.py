@@ -48,7 +48,7 @@ def solved(levels, acts, resolver=SMOOTH):
 
 def test_the_answer_is_that_of_the_paper_with_all_its_matrices():
     rng = np.random.default_rng(3)
-    for _ in range(200):
+    for _ in range(60):
         levels, acts = problem(rng, 7, rng.integers(1, 5, 3), [0.0, 1.0])
         want = by_the_paper([(J, a, rate) for (J, rate), a in zip(levels, acts, strict=True)], 7)
         found = solved(levels, acts)
@@ -71,7 +71,7 @@ def test_near_a_singularity_it_is_regularised_as_in_the_paper():
 
 def test_fully_active_well_conditioned_rows_are_resolved_strictly():
     rng = np.random.default_rng(5)
-    for _ in range(50):
+    for _ in range(20):
         h = Hierarchy.from_levels([(rng.normal(size=(2, 7)), rng.normal(size=2)),
                                    (rng.normal(size=(3, 7)), rng.normal(size=3))],
                                   reference=rng.normal(size=7))
@@ -110,8 +110,8 @@ def test_the_command_is_continuous_where_that_of_the_set_based_task_jumps():
         least = 0.0 if value <= 0.0 else -INF
         return set_based.solve(Hierarchy.from_levels([(J, [least], [INF]), (tip, rate)])).x
 
-    assert steps(smooth, 20001) < 0.15 * steps(smooth, 2001), "it falls with the step taken"
-    assert steps(switched, 20001) > 0.99 * steps(switched, 2001) > 0.1, "a jump stays a jump"
+    assert steps(smooth, 2001) < 0.15 * steps(smooth, 201), "it falls with the step taken"
+    assert steps(switched, 2001) > 0.9 * steps(switched, 201) > 0.1, "a jump stays a jump"
 
 
 def test_the_activation_is_one_at_the_bound_zero_beyond_the_buffer_and_has_no_kink():
@@ -126,9 +126,9 @@ def test_the_activation_is_one_at_the_bound_zero_beyond_the_buffer_and_has_no_ki
 
 def test_in_closed_loop_the_wall_is_kept_without_a_jump():
     """An arm of three joints is sent beyond a wall; its buffer begins 0.3 m before it."""
-    q, period, wall, width = np.array([0.6, 0.9, 0.5]), 0.002, 1.5, 0.3
+    q, period, wall, width = np.array([0.6, 0.9, 0.5]), 0.006, 1.5, 0.3
     farthest, before, jump = -INF, None, 0.0
-    for _ in range(3000):
+    for _ in range(900):
         angles = np.cumsum(q)
         p = np.array([np.cos(angles).sum(), np.sin(angles).sum()])
         J = np.array([[-np.sin(angles[j:]).sum() for j in range(3)],
