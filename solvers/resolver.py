@@ -18,11 +18,12 @@ from solvers.status import TOO_SMALL
 from solvers.status import Status as Status
 from solvers.workspace import WORKSPACE
 
-Handles = Literal["equalities", "bounds", "inequalities"]
-_KINDS: tuple[Handles, ...] = ("equalities", "bounds", "inequalities")
+Handles = Literal["equalities", "bounds", "inequalities", "activations"]
+_KINDS: tuple[Handles, ...] = ("equalities", "bounds", "inequalities", "activations")
 _RESOLVED: dict[str, str] = {
     "equalities": "equalities only",
-    "bounds": "equalities, and bounds on single unknowns in a first level of their own"}
+    "bounds": "equalities, and bounds on single unknowns in a first level of their own",
+    "activations": "equalities, and rows that come with an activation"}
 
 
 class Resolution:
@@ -79,7 +80,8 @@ class Resolver(ABC):
     name: ClassVar[str]
     handles: ClassVar[Handles] = "equalities"
     """Rows with lower < upper that the resolver accepts: none; bounds on single unknowns in a first
-    level that has no other rows; or any. It rejects all others."""
+    level that has no other rows; or any. It rejects all others. "activations": rows that come with
+    an activation, see solvers.resolvers.smooth."""
     damps: ClassVar[str] = "each level"
     """What is damped in a stack of equalities. Strict resolvers with the same text find the same x.
     """
@@ -180,8 +182,8 @@ def register(kind: type[_Kind]) -> type[_Kind]:
 
 
 def names() -> tuple[str, ...]:
-    """Return the names of all resolvers, sorted."""
-    return tuple(sorted(_REGISTRY))
+    """Return the names of all resolvers that a hierarchy alone is enough for, sorted."""
+    return tuple(sorted(name for name, kind in _REGISTRY.items() if kind.handles != "activations"))
 
 
 def make(name: str, /, **settings: Any) -> Resolver:

@@ -86,7 +86,7 @@ class Separation(Task):
 
     def error(self, state: State) -> Array:
         """distance - d (m,) [m], positive where a point is too close."""
-        return np.array([self.barrier.distance - pair[0] for _, pair in self._rows(state)])
+        return np.asarray(self.barrier.distance - self._pairs(state)[:, 0])
 
     def jacobian(self, state: State) -> Array:
         """r^T J_c (m, n): the derivative of the distances to obstacles at rest."""
@@ -110,7 +110,8 @@ class Separation(Task):
 
     def desired_velocity(self, state: State) -> Array:
         """r . v_o (m,) [m/s]."""
-        return np.array([pair[1:4] @ pair[4:7] for _, pair in self._rows(state)])
+        pairs = self._pairs(state)
+        return np.asarray((pairs[:, 1:4] * pairs[:, 4:7]).sum(axis=1))
 
     def desired_acceleration(self, state: State) -> Array:
         """r . a_o (m,) [m/s^2]."""
@@ -154,10 +155,15 @@ class Separation(Task):
 
     def _rows(self, state: State) -> list[tuple[int, Array]]:
         """Point and pair (14,) of each row."""
-        seen = self._seen(state)
+        per_point = 1 if self.obstacles is None else self.obstacles
+        return [(row // per_point, pair) for row, pair in enumerate(self._pairs(state))]
+
+    def _pairs(self, state: State) -> Array:
+        """The pair of each row (m, 14)."""
+        table = self._seen(state).table
         if self.obstacles is None:
-            return [(k, pairs[int(np.argmin(pairs[:, 0]))]) for k, pairs in enumerate(seen.table)]
-        return [(k, pair) for k, pairs in enumerate(seen.table) for pair in pairs]
+            return np.asarray(table[np.arange(len(table)), table[..., 0].argmin(axis=1)])
+        return table.reshape(-1, table.shape[2])
 
     def _seen(self, state: State) -> Pairs:
         seen = None if state.measurement is None else state.measurement.pairs

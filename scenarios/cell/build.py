@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from hierarchy import Robot, Stack, State, Task
+from hierarchy.activation import Activation
 from hierarchy.avoidance import Obstacles, SurveillanceAreas
 from hierarchy.jit import announce_compilation
 from hierarchy.problem import Array
@@ -16,6 +17,7 @@ from scenarios.cell.plants import Plant
 from scenarios.cell.robot import make_robot, start_of
 from scenarios.cell.sensor import sensor_of
 from scenarios.cell.sensors import Sensor
+from scenarios.cell.stacked import stacked
 from scenarios.cell.tasks import (
     limits_of,
     pointing_of,
@@ -33,7 +35,8 @@ class Cell:
 
     `start` is q (nq,) and v (n,). `order` selects the tasks in the stack from the measurement and
     the cone error. `position`, `pointing`, `limits` are the tasks of these names or None, `listed`
-    those of `[[tasks]]`; `areas` are those of Algorithm 1.
+    those of `[[tasks]]`; `areas` are those of Algorithm 1. `activation` is that of the stack's rows
+    with control.stack = "smooth", else None.
     """
 
     scenario: Scenario
@@ -49,6 +52,7 @@ class Cell:
     limits: JointLimits | None
     order: Order
     listed: tuple[Task, ...] = ()
+    activation: Activation | None = None
 
 
 def build(scenario: Scenario, kept: Cell | None = None) -> Cell:
@@ -80,9 +84,11 @@ def build(scenario: Scenario, kept: Cell | None = None) -> Cell:
     always = first if areas else [*first, *avoiding]  # repulsion is placed by Algorithm 1
     tasks = [*first, *avoiding,
              *(task for task in (position, pointing, *listed, last) if task)]
+    rows, activation = stacked(scenario, tasks, state)
     return Cell(scenario, robot, start, state, plant,
-                Stack(tasks, control.level, reference_of(scenario, here)), sensor, areas,
-                position, pointing, limits, order_of(scenario, areas, always, tasks), tuple(listed))
+                Stack(rows, control.level, reference_of(scenario, here)), sensor, areas,
+                position, pointing, limits, order_of(scenario, areas, always, tasks), tuple(listed),
+                activation)
 
 
 def _kept_sensor(scenario: Scenario, kept: Cell) -> Sensor | None:

@@ -78,7 +78,7 @@ class Switched:
 def order_of(scenario: Scenario, areas: SurveillanceAreas | None, first: Sequence[Task],
              tasks: Sequence[Task]) -> Order:
     """Return the order of a scenario's tasks; those of `first` are always at the top."""
-    if scenario.control.stack == "hierarchical":
+    if scenario.control.stack != "switched":
         return Hierarchical([task.name for task in tasks])
     always_point = bool(scenario.pointing and scenario.pointing.rows == "equality")
     section = scenario.avoidance

@@ -75,7 +75,7 @@ def pointing_of(scenario: Scenario, start: State) -> Pointing | None:
     task = task_of(scenario.pointing, start)
     assert isinstance(task, Pointing)
     # Algorithm 1 adds the cone's surface to the stack while it is violated: an equality.
-    return task if scenario.control.stack == "hierarchical" else replace(task, kind="equality")
+    return replace(task, kind="equality") if scenario.control.stack == "switched" else task
 
 
 def posture_of(scenario: Scenario, start: State, role: str) -> Task | None:

@@ -159,6 +159,10 @@ class SeparationSection(_Avoiding):
     `influence` [m] have no effect. Below the clearance the robot retreats at up to `recovery` [m/s]
     and `limit` [m/s^2]. `self_collision` [m] is the clearance between links that are not
     neighbours, None for no self-collision avoidance. See hierarchy.avoidance.Barrier.
+
+    With control.stack = "set-based" only the clearances apply. With "smooth" rows act within
+    `buffer` [m] outside the clearance, and their rate toward its end is `rate` times what is
+    missing, at most `recovery`.
     """
 
     kind: Literal["separation"]
@@ -168,6 +172,7 @@ class SeparationSection(_Avoiding):
     recovery: NotNegative = 0.2
     limit: Positive = 50.0
     self_collision: NotNegative | None = None
+    buffer: Positive | None = None
     obstacles: Obstacles = ()
 
     @model_validator(mode="after")

@@ -10,6 +10,7 @@ from scenarios.config.sections import NotNegative, Positive, Section
 
 AnswerPolicy = Literal["brake", "hold", "stop", "use"]
 BlindPolicy = Literal["brake", "hold", "stop"]
+StackKind = Literal["switched", "hierarchical", "set-based", "smooth"]
 
 
 class PolicySection(Section):
@@ -46,7 +47,10 @@ class ControlSection(Section):
     `stack` = "switched": Algorithm 1 selects the tasks in the stack, all as equalities. With
     avoidance.kind = "separation" only the cone is left to select: limits and avoidance are first.
     "hierarchical": limits, avoidance, position and pointing are always in it, in this order, and
-    inequalities stay inequalities.
+    inequalities stay inequalities. "set-based" and "smooth", at velocity level only, have the same
+    tasks in the same order: inequalities are frozen at their bounds, see
+    solvers.resolvers.set_based, or act gradually within a `buffer`, see solvers.resolvers.smooth,
+    which needs `resolver` = "smooth".
 
     With `strictness` every tick is also resolved without the levels below the position, to measure
     whether they move the end effector; this is not part of the measured times.
@@ -61,7 +65,7 @@ class ControlSection(Section):
     """
 
     level: Literal["velocity", "acceleration"] = "acceleration"
-    stack: Literal["switched", "hierarchical"] = "switched"
+    stack: StackKind = "switched"
     strictness: bool = False
     period: Annotated[float, Field(gt=0.0, le=1.0)] = 0.001
     duration: Positive

@@ -18,7 +18,8 @@ DEFAULT_RESOLVERS: dict[Handles, tuple[str, ...]] = {
     "equalities": ("tpm", "tpm:form=staircase", "recursive", "augmented", "hqp",
                    "hqp:backend=osqp", "hqp:backend=daqp", "hcod"),
     "bounds": ("tpm:form=staircase", "sns", "sns:form=optimal", "weighted", "hqp", "hcod"),
-    "inequalities": ("weighted", "hqp", "hqp:backend=daqp", "hcod")}
+    "inequalities": ("weighted", "hqp", "hqp:backend=daqp", "hcod"),
+    "activations": ("smooth",)}
 
 
 def default_resolvers(asked: Handles = "equalities") -> tuple[tuple[str, ...], dict[str, str]]:

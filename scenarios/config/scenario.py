@@ -20,6 +20,7 @@ from scenarios.config.plant import PlantSection
 from scenarios.config.robot import RobotSection, StartSection
 from scenarios.config.sections import Section
 from scenarios.config.sensor import SensorSection
+from scenarios.config.stacks import RIVALS, unfit
 from scenarios.config.tasks import (
     DampingSection,
     LimitsSection,
@@ -92,6 +93,16 @@ class Scenario(Section):
         return self
 
     @model_validator(mode="after")
+    def _fits_its_stack(self) -> Self:
+        pointing = {"pointing": self.pointing} if self.pointing else {}
+        listed = {f"tasks.{i}": task for i, task in enumerate(self.tasks)
+                  if isinstance(task, PointingTask)}
+        refused = unfit(self.control, self.limits, self.avoidance, {**pointing, **listed})
+        for reason in refused:
+            raise ValueError(reason)
+        return self
+
+    @model_validator(mode="after")
     def _lists_tasks_apart(self) -> Self:
         if self.tasks and self.control.stack == "switched":
             raise ValueError('[[tasks]] goes with control.stack = "hierarchical"')
@@ -125,13 +136,15 @@ class Scenario(Section):
     @property
     def limits_in_stack(self) -> bool:
         """Whether the joint limits are a level of the stack under its resolver."""
-        if self.limits is None or self.limits.place == "guard":
+        if self.limits is None or self.limits.place == "guard" or self.control.stack in RIVALS:
             return False
         return self.limits.place == "stack" or self.make_resolver().handles != "equalities"
 
     @property
     def asks(self) -> Handles:
         """The kind of rows that its stack has under its resolver."""
+        if self.control.stack in RIVALS:
+            return "activations" if self.control.stack == "smooth" else "equalities"
         one_sided = self.avoidance is not None and self.avoidance.kind == "separation"
         inequalities = one_sided or (self.control.stack == "hierarchical" and any(
             isinstance(task, PointingTask) and task.rows == "inequality"

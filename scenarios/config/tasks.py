@@ -54,11 +54,15 @@ class PositionTask(_AlongSection):
 
 
 class PointingTask(TaskSection):
-    """The z axis of a frame on or in a cone (1 row)."""
+    """The z axis of a frame on or in a cone (1 row).
+
+    `buffer` [deg] goes with control.stack = "smooth": an inequality acts within it inside the cone.
+    """
 
     axis: Vector3
     alpha_d: Annotated[float, Field(ge=0.0, le=180.0)]
     rows: Rows = "inequality"
+    buffer: Positive | None = None
     stiffness: NotNegative = 5.0
     damping: NotNegative = 2.0
     gain: NotNegative = 5.0

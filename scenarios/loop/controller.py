@@ -14,6 +14,7 @@ from hierarchy.allocation import Allocation
 from hierarchy.jit import bind
 from hierarchy.problem import Array, Hierarchy
 from scenarios.cell.build import Cell, build
+from scenarios.cell.stacked import stack_resolver
 from scenarios.config import Scenario
 from scenarios.loop.policy import Policy, smallest
 from scenarios.loop.transition import Blend
@@ -40,7 +41,8 @@ class Controller:
                  resolver: Resolver | None = None,
                  clock: Callable[[], float] = perf_counter) -> None:
         self.cell = cell = build(scenario) if cell is None else cell
-        self.resolver = scenario.make_resolver() if resolver is None else resolver
+        self.resolver = (stack_resolver(scenario, cell.activation) if resolver is None
+                         else resolver)
         control = scenario.control
         self.level, self.clock = control.level, clock
         clamp = partial(cell.limits.clamp, cell.state, control.level) if cell.limits else None

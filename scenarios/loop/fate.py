@@ -42,7 +42,8 @@ def judged(cell: Cell, h: Hierarchy, x: Array, accuracy: float) -> Judged:
     """Judge a command x (n,) by the rows of its tick; `accuracy` is the resolver's."""
     near, levels = tolerance(accuracy, x), len(h.sizes)
     found = Judged(np.zeros(levels, np.int8), np.zeros(levels), np.zeros(len(x), np.int8))
-    _judge_levels(h.A, h.lower, h.upper, h.offsets, x, near, found.fate, found.violation)
+    lower = h.lower if cell.activation is None else cell.activation.demanded(h)
+    _judge_levels(h.A, lower, h.upper, h.offsets, x, near, found.fate, found.violation)
     if (limits := cell.limits) is not None:
         lower, upper = (limits.box(cell.state, cell.stack.level) if limits.name not in h.names
                         else _sides(h, limits.name))

@@ -15,6 +15,7 @@ from hierarchy.robot import Frame, Robot
 from hierarchy.state import State
 from scenarios.cell.build import build
 from scenarios.cell.sensors import DepthSensor, Sensor
+from scenarios.cell.stacked import stack_resolver
 from scenarios.config import Scenario, ScenarioError
 from scenarios.config.avoidance import ObstacleSection
 from scenarios.config.faults import FaultSection
@@ -44,7 +45,7 @@ class Faults:
         self._last = cell.plant.q.copy(), cell.plant.v.copy(), 0.0
         self._skipped, self._skipped_at = 0.0, -1.0
         self._standing: set[int] = set()
-        resolver = _FaultyResolver(inner=scenario.make_resolver(), faults=self)
+        resolver = _FaultyResolver(inner=stack_resolver(scenario, cell.activation), faults=self)
         self.controller = Controller(scenario, cell, resolver, self.clock)
 
     def measure(self, t: float) -> tuple[Array, Array, float]:

@@ -5,6 +5,8 @@ from solvers.resolvers import hcod as hcod
 from solvers.resolvers import hqp as hqp
 from solvers.resolvers import recursive as recursive
 from solvers.resolvers import reverse as reverse
+from solvers.resolvers import set_based as set_based
+from solvers.resolvers import smooth as smooth
 from solvers.resolvers import sns as sns
 from solvers.resolvers import tpm as tpm
 from solvers.resolvers import weighted as weighted

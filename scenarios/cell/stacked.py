@@ -1,0 +1,59 @@
+"""Tasks and resolver as the kind of `control.stack` has them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from math import cos, radians
+
+from hierarchy import State, Task
+from hierarchy.activation import Activation
+from hierarchy.tasks import Pointing, Separation
+from hierarchy.tasks.self_separation import SelfSeparation
+from hierarchy.tasks.tangent_cone import TangentCone
+from scenarios.config import Scenario, ScenarioError
+from solvers import Resolver
+from solvers.resolvers.set_based import SetBased
+from solvers.resolvers.smooth import Activated, Smooth
+
+
+def stacked(scenario: Scenario, tasks: Sequence[Task],
+            state: State) -> tuple[Sequence[Task], Activation | None]:
+    """Return the tasks with the rows of their stack, and their activations if it has any."""
+    if scenario.control.stack == "set-based":
+        return [TangentCone(task) if task.kind == "inequality" else task for task in tasks], None
+    if scenario.control.stack != "smooth":
+        return tasks, None
+    widened = {task.name: _widened(task, scenario) for task in tasks if task.kind == "inequality"}
+    found = [widened[task.name][0] if task.name in widened else task for task in tasks]
+    buffers = {name: width for name, (_, width) in widened.items()}
+    return found, Activation(state, found, buffers)
+
+
+def stack_resolver(scenario: Scenario, activation: Activation | None) -> Resolver:
+    """Return the scenario's resolver, as its kind of stack uses it; `activation` as in a Cell.
+
+    Raises ScenarioError if the stack has activations and the resolver does not take them.
+    """
+    resolver = scenario.make_resolver()
+    if scenario.control.stack == "set-based":
+        return SetBased(inner=resolver)
+    if activation is None:
+        return resolver
+    if not isinstance(resolver, Smooth):
+        raise ScenarioError('control.stack = "smooth" needs control.resolver = "smooth", got '
+                            f'"{resolver.name}"')
+    return Activated(inner=resolver, activation=activation)
+
+
+def _widened(task: Task, scenario: Scenario) -> tuple[Task, float]:
+    """Return a task that aims at the far end of its buffer, and the buffer in its unit."""
+    if isinstance(task, Pointing):
+        sections = {section.title: section for section in (scenario.pointing, *scenario.tasks)
+                    if section is not None}
+        inner = task.half_angle - radians(getattr(sections[task.name], "buffer", None) or 0.0)
+        return replace(task, half_angle=inner), cos(inner) - task.cos_alpha_d
+    assert isinstance(task, Separation | SelfSeparation)
+    width = float(getattr(scenario.avoidance, "buffer", None) or 0.0)
+    barrier = replace(task.barrier, distance=task.barrier.distance + width)
+    return replace(task, barrier=barrier), width

@@ -1,0 +1,83 @@
+"""What goes with the kinds of `control.stack` that are defined at velocity level."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+from scenarios.config.avoidance import AvoidanceSection, SeparationSection
+from scenarios.config.control import ControlSection
+from scenarios.config.tasks import LimitsSection, PointingTask
+
+RIVALS = ("set-based", "smooth")
+_PUSHES = ("rate", "influence", "recovery", "limit")  # keys that say how fast a row is left
+
+
+def unfit(control: ControlSection, limits: LimitsSection | None,
+          avoidance: AvoidanceSection | SeparationSection | None,
+          pointing: Mapping[str, PointingTask]) -> Iterator[str]:
+    """Yield what a scenario asks for that its kind of stack does not have.
+
+    `pointing` has the pointing tasks by their dotted keys.
+    """
+    section = avoidance if isinstance(avoidance, SeparationSection) else None
+    if control.stack in RIVALS:
+        yield from _unfit_control(control, limits)
+    if control.stack == "smooth":
+        yield from _unfit_buffers(section, pointing)
+        return
+    if control.stack == "set-based":
+        yield from _unused(section, pointing)
+    yield from (f'{key} = {value:g} goes with control.stack = "smooth", got "{control.stack}"'
+                for key, value in _buffers(section, pointing).items() if value is not None)
+
+
+def _unfit_control(control: ControlSection, limits: LimitsSection | None) -> Iterator[str]:
+    kind = f'control.stack = "{control.stack}"'
+    if control.level != "velocity":
+        yield (f'{kind} needs control.level = "velocity", got "{control.level}": the method '
+               "commands rates that may change at once, which accelerations cannot")
+    if limits and limits.place == "stack":
+        yield f'{kind} needs limits.place = "guard", got "stack"'
+    if control.transition != "none":
+        yield f'control.transition = "{control.transition}" does not go with {kind}'
+    if control.strictness:
+        yield f"control.strictness = true does not go with {kind}"
+
+
+def _unused(section: SeparationSection | None,
+            pointing: Mapping[str, PointingTask]) -> Iterator[str]:
+    """Yield the keys of pushing back that are set: a set-based task is frozen."""
+    why = 'does not go with control.stack = "set-based": a task is frozen, not pushed'
+    for key in _PUSHES if section else ():
+        if (value := getattr(section, key)) != SeparationSection.model_fields[key].default:
+            yield f"avoidance.{key} = {value:g} {why}"
+    for where, task in pointing.items():
+        if task.rows == "inequality" and task.gain != PointingTask.model_fields["gain"].default:
+            yield f"{where}.gain = {task.gain:g} {why}"
+
+
+def _unfit_buffers(section: SeparationSection | None,
+                   pointing: Mapping[str, PointingTask]) -> Iterator[str]:
+    """Yield the buffers that are missing, not used, or too wide."""
+    for where, task in pointing.items():
+        if task.rows == "equality" and task.buffer is not None:
+            yield f'{where}.buffer = {task.buffer:g} does not go with {where}.kind = "equality"'
+        if task.rows == "inequality" and task.buffer is not None and task.buffer > task.alpha_d:
+            yield (f"{where}.buffer = {task.buffer:g} deg is wider than {where}.alpha_d = "
+                   f"{task.alpha_d:g} deg")
+    equalities = {f"{where}.buffer" for where, task in pointing.items() if task.rows == "equality"}
+    for key, value in _buffers(section, pointing).items():
+        if value is None and key not in equalities:
+            yield f'control.stack = "smooth" needs {key}, in which an inequality comes into effect'
+    if section and section.buffer is not None:
+        widest = max(section.distance, section.self_collision or 0.0)
+        if widest + section.buffer >= section.influence:
+            yield (f"avoidance.buffer = {section.buffer:g} m reaches from {widest:g} m beyond "
+                   f"avoidance.influence = {section.influence:g} m")
+
+
+def _buffers(section: SeparationSection | None,
+             pointing: Mapping[str, PointingTask]) -> dict[str, float | None]:
+    """Return the width of each buffer that could be given, by its dotted key."""
+    found = {f"{where}.buffer": task.buffer for where, task in pointing.items()}
+    return {**found, "avoidance.buffer": section.buffer} if section else found

@@ -1,0 +1,136 @@
+"""Set-based tasks: one-sided rows that are ignored, or frozen as equalities."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import chain, combinations, islice
+from typing import ClassVar, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hierarchy.errors import HierarchyError
+from hierarchy.problem import Array, Hierarchy
+from solvers.resolver import Handles, Resolution, Resolver
+from solvers.status import EQUAL, FREE, LOWER, UPPER, Status
+
+
+@final
+class ModeResolution(Resolution):
+    """The resolution of the mode that was chosen; `iterations` is the number of modes resolved.
+
+    active : (m,) int8, 2 for an equality, +1 or -1 for a row frozen at its upper or lower side, 0
+        for a row that is ignored.
+    """
+
+    __slots__ = ("active",)
+
+    def __init__(self, x: Array, status: Status, modes: int, active: NDArray[np.int8]) -> None:
+        super().__init__(x, status, modes)
+        self.active = active
+
+
+@final
+@dataclass(frozen=True, kw_only=True)
+class SetBased(Resolver):
+    """The modes of set-based tasks over the equality stacks that `inner` resolves.
+
+    A hierarchy has equalities, and rows with one side or none. A row with a side is the extended
+    tangent cone of a task that is at the bound of its set or beyond (`hierarchy.tasks.TangentCone`
+    writes such rows): its rate must not pass the side. A mode freezes some of these rows, which
+    become equalities at their side, and ignores the others. The answer is that of the first mode
+    that leaves the rates of all ignored rows in their cones, from the least restrictive mode (no
+    row frozen) to the most restrictive one (all frozen), which is taken untested.
+
+    Differences from the source: a row without a side, of a task inside its set, is frozen in no
+    mode; frozen rows of one level have equal priority; and after `most` modes, the source having no
+    limit, the most restrictive one is taken.
+
+    tolerance : of a rate beyond its side, relative to 1 + |x|.
+    most : modes resolved before the most restrictive one.
+
+    Raises HierarchyError from `solve`, naming level, row and sides, if a row has two sides.
+
+    Source: Moe, Antonelli, Teel, Pettersen, Schrimpf, "Set-Based Tasks within the
+    Singularity-Robust Multiple Task-Priority Inverse Kinematics Framework", Frontiers in Robotics
+    and AI 3:16 (2016).
+    """
+
+    inner: Resolver
+    tolerance: float = 1e-10
+    most: int = 256
+    name: ClassVar[str] = "set-based"
+    handles: ClassVar[Handles] = "inequalities"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self._number("tolerance", 0.0, 1e-3)
+        self._whole_number("most", 1)
+
+    @property
+    def label(self) -> str:
+        """The label of the inner resolver."""
+        return self.inner.label
+
+    @property
+    def strict(self) -> bool:
+        """Whether the inner resolver is."""
+        return self.inner.strict
+
+    @property
+    def accuracy(self) -> float:
+        """The accuracy of the inner resolver."""
+        return self.inner.accuracy
+
+    def solve(self, h: Hierarchy, memory: Array | None = None) -> ModeResolution:
+        """Resolve h; every mode is resolved afresh, `memory` is not used."""
+        active = _states(h)
+        edges = np.flatnonzero((active == LOWER) | (active == UPPER))
+        for number, frozen in enumerate(_modes(edges, self.most), 1):
+            ignored = np.setdiff1d(edges, frozen, assume_unique=True)
+            found = self.inner.solve(_mode(h, active, ignored))
+            if self._in_tangent_cones(h, ignored, found.x):
+                active[ignored] = FREE
+                return ModeResolution(found.x, found.status, number, active)
+        raise AssertionError("the last mode ignores no row")
+
+    def _in_tangent_cones(self, h: Hierarchy, rows: NDArray[np.int64], x: Array) -> bool:
+        """Whether the rates A x of the rows are in T_RC, in_T_RC of the source."""
+        if not len(rows):
+            return True
+        rates, near = h.A[rows] @ x, self.tolerance * (1.0 + np.sqrt(x @ x))
+        return bool(((rates >= h.lower[rows] - near) & (rates <= h.upper[rows] + near)).all())
+
+
+def _states(h: Hierarchy) -> NDArray[np.int8]:
+    """Return what each row (m,) is: an equality, at its lower or upper side, or inside."""
+    low, up, equal = np.isfinite(h.lower), np.isfinite(h.upper), h.lower == h.upper
+    for (row,) in np.argwhere(low & up & ~equal)[:1]:
+        level = int((h.offsets[1:] <= row).sum())
+        raise HierarchyError(f"{h.names[level]}, row {row - h.offsets[level]}: two sides, "
+                             f"{h.lower[row]:g} <= a x <= {h.upper[row]:g}; a set-based task is at "
+                             "one of its bounds or at none")
+    return np.select([equal, low, up], [EQUAL, LOWER, UPPER], FREE).astype(np.int8)
+
+
+def _modes(edges: NDArray[np.int64], most: int) -> Iterator[NDArray[np.int64]]:
+    """Yield the rows frozen in each mode, the fewest first; the last mode freezes all."""
+    sizes = range(len(edges))
+    fewer = chain.from_iterable(combinations(edges.tolist(), size) for size in sizes)
+    for rows in islice(fewer, most):
+        yield np.array(rows, dtype=np.int64)
+    yield edges
+
+
+def _mode(h: Hierarchy, active: NDArray[np.int8], ignored: NDArray[np.int64]) -> Hierarchy:
+    """Return the equality stack of a mode: h without the rows inside and those ignored."""
+    keep = active != FREE
+    keep[ignored] = False
+    if keep.all():
+        b = np.where(active == UPPER, h.upper, h.lower)
+        return Hierarchy(h.A, b, b, h.sizes, h.reference, h.names)
+    level = np.repeat(np.arange(len(h.sizes)), h.sizes)[keep]
+    b = np.where(active == UPPER, h.upper, h.lower)[keep]
+    sizes = np.bincount(level, minlength=len(h.sizes)).astype(np.int64)
+    return Hierarchy(h.A[keep], b, b, sizes, h.reference, h.names)

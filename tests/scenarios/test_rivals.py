@@ -1,0 +1,172 @@
+"""The letter's task with set-based tasks and with smooth activation in place of Algorithm 1."""
+
+import numpy as np
+import pytest
+
+from hierarchy import HierarchyError
+from hierarchy.tasks import Pointing
+from hierarchy.tasks.tangent_cone import TangentCone
+from scenarios import load, simulate
+from scenarios.cell.build import build
+from scenarios.loop.controller import Controller
+from solvers import make
+from tests.helpers.scene import FRAME, ROBOT, state_at, states
+
+SHORT = ["control.duration=1.5"]
+RIVALS = ["ellipse-set-based", "ellipse-smooth"]
+
+
+def controller_at(name, q, *changes):
+    """A controller of a scenario that has commanded once, with the joints at q and at rest."""
+    controller = Controller(load(name, changes))
+    controller.command(0.0, q, np.zeros(7))
+    return controller
+
+
+def distances(cell):
+    """The distance of every point to every obstacle, point by point, by plain arithmetic."""
+    seen, centres = cell.sensor.measurement, np.array([o.centre for o in
+                                                       cell.scenario.avoidance.obstacles])
+    return np.linalg.norm(seen.points[:, None] - centres[None], axis=2).ravel()
+
+
+def near_obstacles(name, count, least):
+    """Joint positions from random ones where some point is nearer than `least` [m]."""
+    controller = Controller(load(name))
+    for q, _ in states(400, seed=5):
+        controller.command(0.0, q, np.zeros(7))
+        if 0.0 < distances(controller.cell).min() < least:
+            yield q
+            count -= 1
+            if count == 0:
+                return
+
+
+def test_rows_ask_nothing_inside_a_set_and_no_worse_at_its_bound():
+    found = set()
+    for q in near_obstacles("ellipse-set-based", 5, 0.1):
+        controller = controller_at("ellipse-set-based", q, "avoidance.distance=0.1")
+        h, d = controller.hierarchy, distances(controller.cell)
+        np.testing.assert_array_equal(h.lower[:27], np.where(d <= 0.1, 0.0, -np.inf))
+        outside = controller.cone_error >= 0.0
+        assert h.lower[-1] == (0.0 if outside else -np.inf)
+        assert np.isinf(h.upper[[*range(27), -1]]).all()
+        found |= {bool((d <= 0.1).any()), outside}
+    assert found == {True, False} or found == {True}
+
+
+def test_the_tangent_cone_of_the_letters_cone_has_its_jacobian_and_refuses_accelerations():
+    cone = TangentCone(Pointing(FRAME, (1.0, 0.2, 0.0), 0.3, "inequality"))
+    assert (cone.name, cone.kind, cone.dimension) == ("pointing", "inequality", 1)
+    for q, v in states(20):
+        state = state_at(q, v)
+        cosine = np.array([1.0, 0.2, 0.0]) / np.sqrt(1.04) @ state.rotation(FRAME)[:, 2]
+        outside = cosine <= np.cos(0.3)
+        np.testing.assert_array_equal(cone.reference_velocity(state),
+                                      [0.0 if outside else -np.inf])
+        np.testing.assert_array_equal(cone.jacobian(state), cone.task.jacobian(state))
+    A, lower, upper = np.zeros((1, ROBOT.n)), np.zeros(1), np.zeros(1)
+    with pytest.raises(HierarchyError, match="velocity level, got level = 'acceleration'"):
+        cone.writer(state, "acceleration", A, lower, upper, 0)
+    with pytest.raises(HierarchyError, match="kind = 'equality'"):
+        TangentCone(Pointing(FRAME, (1.0, 0.0, 0.0), 0.3))
+
+
+def test_the_set_based_command_is_that_of_the_rows_that_it_says_are_active():
+    for q in near_obstacles("ellipse-set-based", 5, 0.1):
+        controller = controller_at("ellipse-set-based", q, "avoidance.distance=0.1",
+                                   "control.options.damping=0.0", "control.resolver=recursive")
+        h, active = controller.hierarchy, controller.resolution.active
+        x, N = np.zeros(7), np.eye(7)
+        for level in range(len(h.sizes)):
+            rows = [i for i in range(h.offsets[level], h.offsets[level + 1]) if active[i]]
+            if rows:
+                X = h.A[rows] @ N
+                x = x + np.linalg.pinv(X, rcond=1e-9) @ (h.lower[rows] - h.A[rows] @ x)
+                N = N - np.linalg.pinv(X, rcond=1e-9) @ X
+        np.testing.assert_allclose(controller.resolution.x, x, atol=1e-6 * (1 + np.abs(x).max()))
+        ignored = np.isfinite(h.lower) & (active == 0)
+        assert (h.A[ignored] @ x >= -1e-8).all()
+
+
+def test_the_smooth_stack_aims_at_the_end_of_its_buffers_and_weights_by_them():
+    for q in near_obstacles("ellipse-smooth", 5, 0.1):
+        controller = controller_at("ellipse-smooth", q, "avoidance.rate=3.0",
+                                   "avoidance.recovery=0.1")
+        cell, h, d = controller.cell, controller.hierarchy, distances(controller.cell)
+        missing = 0.1 - d  # distance 0.05 and buffer 0.05
+        seen = d <= 0.3
+        np.testing.assert_allclose(h.lower[:27][seen], np.minimum(3.0 * missing, 0.1)[seen],
+                                   atol=1e-12)
+        share = np.clip(missing / 0.05, 0.0, 1.0)
+        np.testing.assert_allclose(cell.activation()[:27], 0.5 - 0.5 * np.cos(np.pi * share),
+                                   atol=1e-12)
+        np.testing.assert_array_equal(cell.activation()[27:30], 1.0)
+        cosine = np.cos(np.radians(5.0)) - controller.cone_error
+        to_end = np.cos(np.radians(3.0)) - cosine
+        width = np.cos(np.radians(3.0)) - np.cos(np.radians(5.0))
+        share = np.clip(to_end / width, 0.0, 1.0)
+        np.testing.assert_allclose(cell.activation()[30], 0.5 - 0.5 * np.cos(np.pi * share),
+                                   atol=1e-9)
+        assert h.lower[30] == pytest.approx(5.0 * to_end)
+        alone = make("smooth").solve_activated(h, cell.activation()).x
+        np.testing.assert_array_equal(controller.resolution.x, alone)
+
+
+@pytest.mark.parametrize("name", RIVALS)
+def test_the_first_seconds_keep_distance_and_cone(name):
+    run = simulate(load(name, SHORT))
+    assert run.fault is None
+    assert (run["status"] == 0).all()
+    assert set(run.order_names) == {("separation", "position", "pointing")}
+    nearest = np.minimum(run["minimal_distance"], run["ee_distance"]).min()
+    moved = np.abs(run["v"]).max() * 1.5 * 0.001  # of a point, in one period [m]
+    assert nearest >= 0.05 - (moved if name == "ellipse-set-based" else 0.0)
+    assert np.linalg.norm(run["position_error"][-1]) < 0.1
+
+
+def test_a_frozen_task_is_recorded_as_met_and_one_inside_its_set_as_free():
+    from scenarios.loop.fate import Fate
+    run = simulate(load("ellipse-set-based", ["control.duration=0.3", "avoidance.distance=0.12"]))
+    fates = run["level_fate"][:, run.task_names.index("separation")]
+    assert set(np.unique(fates)) <= {Fate.FREE, Fate.MET}
+    assert Fate.MET in fates
+
+
+@pytest.mark.parametrize(("name", "changes", "says"), [
+    ("ellipse-set-based", ["control.level=acceleration"],
+     r'needs control.level = "velocity", got "acceleration"'),
+    ("ellipse-smooth", ["control.level=acceleration"],
+     r'needs control.level = "velocity", got "acceleration"'),
+    ("ellipse-set-based", ["avoidance.rate=3.0"], r"avoidance.rate = 3 does not go with"),
+    ("ellipse-set-based", ["avoidance.recovery=0.3"], r"avoidance.recovery = 0.3 does not go with"),
+    ("ellipse-set-based", ["pointing.gain=2.0"], r"pointing.gain = 2 does not go with"),
+    ("ellipse-set-based", ["pointing.buffer=2.0"], r"pointing.buffer = 2 goes with"),
+    ("ellipse-hqp", ["avoidance.buffer=0.02"], r'buffer = 0.02 goes with control.stack = "smooth"'),
+    ("ellipse-smooth", ["pointing.buffer=9.0"], r"buffer = 9 deg is wider than pointing.alpha_d"),
+    ("ellipse-smooth", ["avoidance.buffer=0.4"], r"buffer = 0.4 m reaches from 0.05 m"),
+    ("ellipse-smooth", ["pointing.kind=equality"], r"buffer = 2 does not go with pointing.kind"),
+    ("ellipse-hqp", ["control.stack=smooth", "control.level=velocity", "limits.place=guard"],
+     r"needs pointing.buffer"),
+    ("ellipse-hqp", ["control.stack=set-based", "control.level=velocity"],
+     r'needs limits.place = "guard", got "stack"'),
+    ("ellipse-set-based", ["control.transition=blend"], r'control.transition = "blend"'),
+    ("ellipse-smooth", ["control.strictness=true"], r"control.strictness = true"),
+    ("ellipse-velocity", ["control.stack=set-based"], r'"separation" with the others'),
+])
+def test_what_does_not_go_together_is_said_with_key_and_value(name, changes, says):
+    with pytest.raises(HierarchyError, match=says):
+        load(name, changes)
+
+
+def test_the_smooth_stack_refuses_a_resolver_without_activations():
+    scenario = load("ellipse-smooth").with_resolver("tpm")
+    with pytest.raises(HierarchyError, match=r'needs control.resolver = "smooth", got "tpm"'):
+        Controller(scenario)
+
+
+def test_limits_go_with_both_as_a_guard():
+    for name in RIVALS:
+        scenario = load(name, ["limits={acceleration=10.0, place='either'}"])
+        assert not scenario.limits_in_stack
+        assert build(scenario).limits is not None

@@ -1,0 +1,171 @@
+"""Set-based tasks against the few lines of Moe et al. (2016), on planar arms."""
+
+from itertools import combinations
+
+import numpy as np
+import pytest
+
+from hierarchy import Hierarchy, HierarchyError
+from solvers import Status, make
+from solvers.resolvers.set_based import SetBased
+
+SET_BASED = SetBased(inner=make("recursive"))
+INF = np.inf
+
+
+def tip(q):
+    """Position (2,) of the tip of a planar arm of links of length 1, and its Jacobian (2, n)."""
+    angles = np.cumsum(q)
+    J = np.array([[-np.sin(angles[j:]).sum() for j in range(len(q))],
+                  [np.cos(angles[j:]).sum() for j in range(len(q))]])
+    return np.array([np.cos(angles).sum(), np.sin(angles).sum()]), J
+
+
+def in_tangent_cone(rate, value, least, most):
+    """in_T_RC of the paper: whether a rate is in the extended tangent cone."""
+    if least < value < most:
+        return True
+    return rate >= -1e-9 if value <= least else rate <= 1e-9
+
+
+def pseudoinverse(M):
+    """The pseudoinverse, singular values of rounding errors being zero; rows have size one."""
+    U, s, V = np.linalg.svd(M, full_matrices=False)
+    return (V.T * np.array([1.0 / one if one > 1e-9 else 0.0 for one in s])) @ U.T
+
+
+def by_the_paper(sets, tasks, n):
+    """Resolve with set-based tasks (J, value, least, most) above equality tasks (J, rate).
+
+    All modes in the paper's order, from none frozen to all; each by null-space projections.
+    """
+    for count in range(len(sets) + 1):
+        for frozen in combinations(range(len(sets)), count):
+            x, N = np.zeros(n), np.eye(n)
+            for J, rate in [*((sets[k][0], np.zeros(1)) for k in frozen), *tasks]:
+                inverse = pseudoinverse(J @ N)
+                x = x + inverse @ (rate - J @ x)
+                N = N - inverse @ J @ N
+            if all(in_tangent_cone(float(J[0] @ x), *bounds) for k, (J, *bounds) in enumerate(sets)
+                   if k not in frozen):
+                return x, frozen
+    raise AssertionError("the last mode has no condition")
+
+
+def as_rows(sets, tasks):
+    """The same problem as a Hierarchy: one level of tangent cones, then the equalities."""
+    sides = [(0.0, INF) if value <= least else (-INF, 0.0) if value >= most else (-INF, INF)
+             for _, value, least, most in sets]
+    rows = np.vstack([J for J, *_ in sets])
+    return Hierarchy.from_levels([(rows, *np.array(sides).T), *tasks])
+
+
+def problems(count, inside=0.0):
+    """Random arms with joint limits, a wall for the tip, and a rate asked of the tip."""
+    rng = np.random.default_rng(7)
+    for _ in range(count):
+        n = int(rng.integers(4, 7))
+        q = rng.uniform(-2.0, 2.0, n)
+        J = tip(q)[1]
+        rows = [np.eye(n)[[j]] for j in rng.permutation(n)[:2]] + [J[:1]]
+        values = np.where(rng.random(3) < inside, 0.5, rng.choice([0.0, 1.0], 3))
+        sets = [(row, float(value), 0.0, 1.0) for row, value in zip(rows, values, strict=True)]
+        yield sets, [(J, rng.normal(size=2)), (np.eye(n)[-1:], rng.normal(size=1))], n
+
+
+def test_with_every_task_at_its_bound_the_mode_and_the_answer_are_those_of_the_paper():
+    counts = set()
+    for sets, tasks, n in problems(60):
+        x, frozen = by_the_paper(sets, tasks, n)
+        found = SET_BASED.solve(as_rows(sets, tasks))
+        assert found.status is Status.SOLVED
+        assert tuple(np.flatnonzero(np.abs(found.active[:3]) == 1)) == frozen
+        np.testing.assert_allclose(found.x, x, atol=1e-8 * (1 + np.abs(x).max()))
+        counts.add(len(frozen))
+    assert counts >= {0, 1, 2}, "the problems reach modes with none, one and two frozen tasks"
+
+
+def test_a_task_inside_its_set_changes_nothing():
+    for sets, tasks, n in problems(60, inside=0.6):
+        at_bound = [one for one in sets if one[1] != 0.5]
+        x, frozen = by_the_paper(at_bound, tasks, n)
+        found = SET_BASED.solve(as_rows(sets, tasks))
+        np.testing.assert_allclose(found.x, x, atol=1e-8 * (1 + np.abs(x).max()))
+        assert np.count_nonzero(np.abs(found.active[:3]) == 1) == len(frozen)
+
+
+def test_a_task_below_the_equalities_is_frozen_as_far_as_they_leave_it():
+    J = np.array([[1.0, 0.0, 0.0]])
+    both = np.array([[1.0, 1.0, 0.0]])
+    free = Hierarchy.from_levels([(J, [-1.0]), (both, [0.0], [INF])])
+    np.testing.assert_allclose(SET_BASED.solve(free).x, [-1.0, 1.0, 0.0], atol=1e-12)
+    taken = Hierarchy.from_levels([(J, [-1.0]), (J, [0.0], [INF])])
+    np.testing.assert_allclose(SET_BASED.solve(taken).x, [-1.0, 0.0, 0.0], atol=1e-12)
+
+
+def test_at_the_bound_a_task_that_moves_back_is_left_alone_and_one_that_leaves_is_frozen():
+    def resolved(rate):
+        return SET_BASED.solve(Hierarchy.from_levels([([[1.0, 0.0]], [0.0], [INF]),
+                                                      ([[1.0, 1.0]], [rate])]))
+    back, out = resolved(2.0), resolved(-2.0)
+    np.testing.assert_allclose(back.x, [1.0, 1.0], atol=1e-12)
+    np.testing.assert_allclose(out.x, [0.0, -2.0], atol=1e-12)
+    assert (back.iterations, out.iterations) == (1, 2)
+    assert (back.active.tolist(), out.active.tolist()) == ([0, 2], [-1, 2])
+
+
+def test_a_moving_bound_is_followed():
+    h = Hierarchy.from_levels([([[1.0, 0.0]], [0.3], [INF]), ([[1.0, 0.0]], [-1.0])])
+    np.testing.assert_allclose(SET_BASED.solve(h).x, [0.3, 0.0], atol=1e-12)
+
+
+def test_after_the_most_modes_everything_at_a_bound_is_frozen():
+    rows = np.eye(6)
+    h = Hierarchy.from_levels([(rows, np.zeros(6), np.full(6, INF)), (rows, [-1, -1, -1, 1, 1, 1])])
+    found = SET_BASED.solve(h)
+    np.testing.assert_allclose(found.x, [0, 0, 0, 1, 1, 1], atol=1e-12)
+    assert found.iterations == 1 + 6 + 15 + 1, "one mode of none, 6 of one, 15 of two, then 0 1 2"
+    short = SetBased(inner=make("recursive"), most=5).solve(h)
+    np.testing.assert_allclose(short.x, np.zeros(6), atol=1e-12)
+    assert short.iterations == 6
+
+
+def test_every_resolver_of_equalities_serves_as_the_inner_one():
+    sets, tasks, n = next(problems(1))
+    x, _ = by_the_paper(sets, tasks, n)
+    for name in ("tpm", "hcod", "recursive", "sns"):
+        found = SetBased(inner=make(name)).solve(as_rows(sets, tasks))
+        np.testing.assert_allclose(found.x, x, atol=1e-7 * (1 + np.abs(x).max()))
+
+
+def test_a_row_with_two_sides_is_refused_with_its_level_and_sides():
+    h = Hierarchy.from_levels([([[1.0, 0.0], [0.0, 1.0]], [0.0, -1.0], [INF, 2.0])],
+                              names=["walls"])
+    with pytest.raises(HierarchyError, match=r"walls, row 1: two sides, -1 <= a x <= 2"):
+        SET_BASED.solve(h)
+
+
+@pytest.mark.parametrize("setting", [{"tolerance": -1.0}, {"most": 0}])
+def test_a_setting_out_of_range_is_refused(setting):
+    with pytest.raises(HierarchyError, match=next(iter(setting))):
+        SetBased(inner=make("tpm"), **setting)
+
+
+def test_in_closed_loop_the_tip_stops_at_the_wall_and_the_joint_at_its_limit():
+    """An arm of three joints that is sent beyond a wall; then it is called back."""
+    q, period, wall, limit = np.array([0.6, 0.9, 0.5]), 0.006, 1.5, 1.2
+    values, farthest = [], -INF
+    for k in range(900):
+        p, J = tip(q)
+        rate = 2.0 * (np.array([2.2, 1.6] if k < 600 else [0.6, 1.8]) - p)
+        edge = [0.0 if p[0] >= wall else INF, 0.0 if q[1] >= limit else INF]
+        h = Hierarchy.from_levels([(np.vstack([J[:1], np.eye(3)[1:2]]), np.full(2, -INF), edge),
+                                   (J, rate)])
+        q = q + period * SET_BASED.solve(h).x
+        values.append(tip(q)[0][0] - wall)
+        farthest = max(farthest, q[1] - limit)
+    assert np.max(values) < 0.012, "at most what one period carries the tip over the wall"
+    assert np.min(np.abs(values[300:600])) < 0.012, "it was at the wall"
+    assert np.abs(np.array(values[450:600])).max() < 0.012, "and stayed there while sent beyond"
+    assert values[-1] == pytest.approx(0.6 - wall, abs=1e-3), "and left it when called back"
+    assert farthest < 0.012

@@ -1,0 +1,168 @@
+"""Smooth activation against the equations of Simetti and Casalino (2016), written out."""
+
+import numpy as np
+import pytest
+
+from hierarchy import Hierarchy, HierarchyError
+from hierarchy.activation import activation
+from solvers import Status, make, names
+from solvers.resolvers.set_based import SetBased
+
+LAMBDA, THRESHOLD, ETA = 1e-4, 1e-2, 10.0
+SMOOTH = make("smooth")
+INF = np.inf
+
+
+def pseudoinverse(X, A, Q):
+    """X^(#,A,Q) of the paper, with the singular values and vectors of the matrix inverted."""
+    n = len(Q)
+    M = X.T @ A @ X + ETA * (np.eye(n) - Q).T @ (np.eye(n) - Q)
+    _, s, V = np.linalg.svd(M)
+    P = np.diag([LAMBDA * (1 + np.cos(np.pi * one / THRESHOLD)) / 2 if one < THRESHOLD else 0.0
+                 for one in s])
+    return np.linalg.pinv(M + V.T @ P @ V) @ X.T @ A @ A
+
+
+def by_the_paper(levels, n):
+    """The recursion of the paper over (J, activations, rates) with all rows, and the identity."""
+    rho, Q, one = np.zeros(n), np.eye(n), np.eye(n)
+    for J, a, rate in [*levels, (one, np.ones(n), np.zeros(n))]:
+        A, X = np.diag(a), J @ Q
+        W = X @ pseudoinverse(X, A, Q)
+        T = one - Q @ pseudoinverse(X, A, one) @ W @ J
+        rho, Q = (T @ rho + Q @ pseudoinverse(X, A, one) @ W @ rate,
+                  Q @ (one - pseudoinverse(X, A, one) @ X))
+    return rho
+
+
+def problem(rng, n, sizes, choices):
+    """Random rows of unit size, with activations of which some are exactly 0 or 1."""
+    levels = [(rng.normal(size=(m, n)), rng.normal(size=m)) for m in sizes]
+    acts = [np.where(rng.random(m) < 0.5, rng.choice(choices, m), rng.random(m)) for m in sizes]
+    return levels, acts
+
+
+def solved(levels, acts, resolver=SMOOTH):
+    return resolver.solve_activated(Hierarchy.from_levels(levels), np.concatenate(acts))
+
+
+def test_the_answer_is_that_of_the_paper_with_all_its_matrices():
+    rng = np.random.default_rng(3)
+    for _ in range(60):
+        levels, acts = problem(rng, 7, rng.integers(1, 5, 3), [0.0, 1.0])
+        want = by_the_paper([(J, a, rate) for (J, rate), a in zip(levels, acts, strict=True)], 7)
+        found = solved(levels, acts)
+        assert found.status is Status.SOLVED
+        np.testing.assert_allclose(found.x, want, atol=1e-7 * (1 + np.abs(want).max()))
+
+
+def test_near_a_singularity_it_is_regularised_as_in_the_paper():
+    rng = np.random.default_rng(4)
+    for scale in (1e-1, 1e-2, 1e-3, 0.0):
+        row = rng.normal(size=(1, 4))
+        J = np.vstack([row, row + scale * rng.normal(size=(1, 4))])
+        levels, acts = [(J, rng.normal(size=2)), (rng.normal(size=(1, 4)), [1.0])], [[1, 0.7], [1]]
+        want = by_the_paper([(*levels[0][:1], np.array(acts[0]), levels[0][1]),
+                             (levels[1][0], np.ones(1), np.ones(1))], 4)
+        np.testing.assert_allclose(solved(levels, list(map(np.array, acts))).x, want,
+                                   atol=1e-6 * (1 + np.abs(want).max()))
+        assert np.abs(want).max() < 1e4
+
+
+def test_fully_active_well_conditioned_rows_are_resolved_strictly():
+    rng = np.random.default_rng(5)
+    for _ in range(20):
+        h = Hierarchy.from_levels([(rng.normal(size=(2, 7)), rng.normal(size=2)),
+                                   (rng.normal(size=(3, 7)), rng.normal(size=3))],
+                                  reference=rng.normal(size=7))
+        strict = make("recursive").solve(h).x
+        np.testing.assert_allclose(make("smooth", damping=0.0).solve(h).x, strict, atol=1e-8)
+
+
+def test_an_inactive_row_is_as_if_it_were_not_there():
+    rng = np.random.default_rng(6)
+    J, rate = rng.normal(size=(3, 6)), rng.normal(size=3)
+    below = (rng.normal(size=(2, 6)), rng.normal(size=2))
+    with_it = solved([(J, rate), below], [np.array([1.0, 0.0, 0.4]), np.ones(2)]).x
+    without = solved([(J[[0, 2]], rate[[0, 2]]), below], [np.array([1.0, 0.4]), np.ones(2)]).x
+    np.testing.assert_allclose(with_it, without, atol=1e-10)
+    free = solved([(J, rate), below], [np.zeros(3), np.ones(2)]).x
+    np.testing.assert_allclose(free, make("recursive").solve(Hierarchy.from_levels([below])).x,
+                               atol=1e-8)
+
+
+def steps(answer, count):
+    """The largest change of the answer between neighbours on a path through the buffer."""
+    answers = np.array([answer(value) for value in np.linspace(1.4, -0.2, count)])
+    return np.abs(np.diff(answers, axis=0)).max()
+
+
+def test_the_command_is_continuous_where_that_of_the_set_based_task_jumps():
+    """A distance falls through its buffer, from 1.4 to below 0; the buffer is 0 .. 1."""
+    J, tip, rate = np.array([[1.0, 0.2, -0.3]]), np.array([[1.0, 0.5, 0.1]]), np.array([-1.0])
+    set_based = SetBased(inner=make("recursive"))
+
+    def smooth(value):
+        a = activation([1.0 - value], 1.0)
+        return solved([(J, [1.0 - value]), (tip, rate)], [a, np.ones(1)]).x
+
+    def switched(value):
+        least = 0.0 if value <= 0.0 else -INF
+        return set_based.solve(Hierarchy.from_levels([(J, [least], [INF]), (tip, rate)])).x
+
+    assert steps(smooth, 2001) < 0.15 * steps(smooth, 201), "it falls with the step taken"
+    assert steps(switched, 2001) > 0.9 * steps(switched, 201) > 0.1, "a jump stays a jump"
+
+
+def test_the_activation_is_one_at_the_bound_zero_beyond_the_buffer_and_has_no_kink():
+    error = np.array([-0.1, 0.0, 0.1, 0.2, 0.3, 0.4, 0.9])  # to the far end of a buffer of 0.4
+    found = activation(error, 0.4)
+    np.testing.assert_allclose(found[[0, 1, 3, 5, 6]], [0.0, 0.0, 0.5, 1.0, 1.0], atol=1e-15)
+    assert (np.diff(found) >= 0.0).all()
+    step = 1e-5
+    slopes = np.diff(activation(np.array([-step, 0.0, step, 0.4 - step, 0.4, 0.4 + step]), 0.4))
+    np.testing.assert_allclose(slopes[[0, 1, 3, 4]] / step, 0.0, atol=1e-3)
+
+
+def test_in_closed_loop_the_wall_is_kept_without_a_jump():
+    """An arm of three joints is sent beyond a wall; its buffer begins 0.3 m before it."""
+    q, period, wall, width = np.array([0.6, 0.9, 0.5]), 0.006, 1.5, 0.3
+    farthest, before, jump = -INF, None, 0.0
+    for _ in range(900):
+        angles = np.cumsum(q)
+        p = np.array([np.cos(angles).sum(), np.sin(angles).sum()])
+        J = np.array([[-np.sin(angles[j:]).sum() for j in range(3)],
+                      [np.cos(angles[j:]).sum() for j in range(3)]])
+        error = p[:1] - (wall - width)  # what is missing to the far end of the buffer
+        x = solved([(-J[:1], 5.0 * error), (J, 2.0 * (np.array([2.2, 1.6]) - p))],
+                   [activation(error, width), np.ones(2)]).x
+        jump = jump if before is None else max(jump, np.abs(x - before).max())
+        before, q = x, q + period * x
+        farthest = max(farthest, p[0] - wall)
+    assert -width < farthest < 0.0, "inside, in the buffer"
+    assert jump < 0.1
+
+
+def test_what_has_no_answer_is_refused_or_has_a_status():
+    h = Hierarchy.from_levels([([[1.0, 0.0]], [0.0], [INF])], names=["walls"])
+    with pytest.raises(HierarchyError, match=r"walls, row 0: an inequality.*activation"):
+        SMOOTH.solve(h)
+    with pytest.raises(HierarchyError, match=r"walls, row 0: activation 1\.5 is outside 0 \.\. 1"):
+        SMOOTH.solve_activated(h, np.array([1.5]))
+    with pytest.raises(HierarchyError, match=r"shape \(2,\), expected \(1,\)"):
+        SMOOTH.solve_activated(h, np.ones(2))
+    with pytest.raises(HierarchyError, match="eta = 0"):
+        make("smooth", eta=0.0)
+    h.lower[0] = np.nan
+    found = SMOOTH.solve_activated(h, np.ones(1))
+    assert found.status is Status.NUMERICAL_FAILURE
+    assert (found.x == 0.0).all()
+
+
+def test_it_is_made_by_name_but_not_listed_since_a_hierarchy_is_not_enough():
+    assert SMOOTH.name == "smooth"
+    assert "smooth" not in names()
+    assert SMOOTH.can_resolve("equalities")
+    assert SMOOTH.can_resolve("activations")
+    assert not SMOOTH.can_resolve("inequalities")
+    assert not any(make(name).can_resolve("activations") for name in names())
