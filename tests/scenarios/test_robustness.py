@@ -227,7 +227,8 @@ def windows(values, seconds, found):
 @pytest.mark.parametrize("level", ["acceleration", "velocity"])
 def test_separation_rests_at_its_distance_from_an_obstacle_on_the_target(level, parts):
     """The distance is kept to a centimetre, the arm comes to rest there, nothing is touched."""
-    found = run("human-hqp", "hcod", ONTO, seconds=6.0, parts=parts, level=level)
+    found = run("human-hqp", "hcod", ONTO, "avoidance.distance=0.2", seconds=6.0, parts=parts,
+                level=level)
     assert found["ee_distance"].min() > 0.19
     assert found["ee_distance"][-1] == pytest.approx(0.2, abs=1e-3)
     assert speed(found)[-100:].max() < 0.05
@@ -239,7 +240,7 @@ def test_separation_keeps_off_what_the_camera_sees_on_the_target():
     pytest.importorskip("mujoco")
     found = run("human-hqp", "hcod", ONTO.replace("[0.0, 2.0]", "[0.0, 3.0]"),
                 "sensor={kind='camera', position=[0.3, -1.8, 1.2], look_at=[0.0, 0.3, 0.1], "
-                "thin=0.15}", seconds=5.0, parts="camera")
+                "thin=0.15}", "avoidance.distance=0.2", seconds=5.0, parts="camera")
     assert distances(found).min() > 0.1
     assert not touched(found)
 
