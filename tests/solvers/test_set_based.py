@@ -164,8 +164,8 @@ def test_in_closed_loop_the_tip_stops_at_the_wall_and_the_joint_at_its_limit():
         q = q + period * SET_BASED.solve(h).x
         values.append(tip(q)[0][0] - wall)
         farthest = max(farthest, q[1] - limit)
-    assert np.max(values) < 0.012, "at most what one period carries the tip over the wall"
-    assert np.min(np.abs(values[300:600])) < 0.012, "it was at the wall"
-    assert np.abs(np.array(values[450:600])).max() < 0.012, "and stayed there while sent beyond"
-    assert values[-1] == pytest.approx(0.6 - wall, abs=1e-3), "and left it when called back"
-    assert farthest < 0.012
+    assert np.max(values) < 0.01, "at most what one period carries the tip over the wall"
+    assert np.min(np.abs(values[300:600])) < 0.01, "it was at the wall"
+    assert np.abs(np.array(values[450:600])).max() < 0.01, "and stayed there while sent beyond"
+    assert values[-1] < -0.5, "and left it when called back"
+    assert farthest < 0.01
