@@ -196,7 +196,7 @@ def _distances(fixed: Stage, recording: Recording, ticks: NDArray[np.int64],
     seen, now = Measurement(len(fixed.points) - 1), np.empty(placements.shape[1:])
     measure = exact_measurer(seen, now, np.array([point.joint for point in fixed.points]),
                              np.array([point.offset for point in fixed.points]),
-                             fixed.obstacles.table, _NO_LAWS, 0.0)
+                             fixed.obstacles.table, _NO_LAWS, np.zeros(2))
     frames: dict[str, list[Array]] = {name: [] for name in (
         "points", "nearest", "distance", "centres")}
     offsets = recording.signals.get("obstacle_offset", np.empty((recording.ticks, 0, 3)))

@@ -24,11 +24,16 @@ class ModeResolution(Resolution):
         for a row that is ignored.
     """
 
-    __slots__ = ("active",)
+    __slots__ = ("_active",)
 
     def __init__(self, x: Array, status: Status, modes: int, active: NDArray[np.int8]) -> None:
         super().__init__(x, status, modes)
-        self.active = active
+        self._active = active
+
+    @property
+    def active(self) -> NDArray[np.int8]:
+        """State of each row (m,)."""
+        return self._active
 
 
 @final
