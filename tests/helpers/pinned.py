@@ -33,7 +33,7 @@ def robot_facts(name):
         "effort_limit": robot.effort_limit, "rest": robot.rest, "masses": robot.masses,
         "inertia": np.diag(pin.crba(model, data, q)), "gravity": pin.nonLinearEffects(
             model, data, q, np.cos(np.arange(robot.n))),
-        "frames": {frame.name: [place.translation, place.rotation[:, 2]]
+        "frames": {frame.name: [place.translation, *place.rotation]
                    for frame, place in zip(model.frames, data.oMf, strict=True)},
         "control_points": {point.name: data.oMi[point.joint].act(np.asarray(point.offset))
                            for point in robot.control_points},

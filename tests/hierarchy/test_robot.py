@@ -149,6 +149,12 @@ def test_bad_robot_files_are_named(tmp_path, pendulum):
         Robot.from_file(pendulum(), end_effector="tool")
 
 
+def test_a_state_begins_at_rest_at_time_zero():
+    state = State(ROBOT)
+    assert state.t == 0.0
+    assert not state.v.any()
+
+
 @pytest.mark.parametrize("name", TABLES)
 def test_a_shipped_robot_is_the_one_that_recorded_runs_were_made_with(name):
     found, expected = leaves(robot_facts(name)), leaves(read("robots")[name])

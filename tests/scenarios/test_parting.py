@@ -73,6 +73,14 @@ def test_a_tick_that_was_not_solved_is_the_reason():
     assert one.why == "tick 2 of hqp was not solved"
 
 
+@pytest.mark.parametrize(("tick", "is_the_reason"), [(3, True), (4, False)])
+def test_a_tick_is_a_reason_only_where_it_was_not_solved_before_the_runs_diverge(tick,
+                                                                                 is_the_reason):
+    failing = run_of("hqp", away_from(3), status=3 * (np.arange(5) == tick))
+    (one,) = partings([run_of("recursive"), failing])
+    assert (one.why == f"tick {tick} of hqp was not solved") == is_the_reason
+
+
 def test_a_stack_switched_at_another_tick_is_the_reason():
     switched = run_of("hqp", away_from(3), order=np.array([0, 1, 0, 0, 0]))
     assert "another one at tick 1" in partings([run_of("recursive"), switched])[0].why
@@ -107,8 +115,6 @@ def test_the_numbers_hold_it(tmp_path):
     (one,) = json.loads((tmp_path / "a" / "comparison.json").read_text())["partings"]["ellipse"]
     assert (one["label"], one["from"], one["tick"]) == ("hqp proxqp", "tpm", None)
     assert one["largest_rad"] < 1e-9
-
-
 
 
 def test_a_backend_that_is_not_installed_leaves_the_default_comparison_and_is_named(monkeypatch):

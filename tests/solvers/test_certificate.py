@@ -346,3 +346,17 @@ def test_least_squares_of_no_columns_leave_everything():
     y, left = certificate._least_squares(np.eye(2), b, np.zeros(2, dtype=bool))
     assert (y == 0.0).all()
     assert np.array_equal(left, b)
+
+
+@pytest.mark.parametrize(("stationarity", "nearest", "verdict"), [
+    (1e-6, 1e-6, "certified: optimal at every level and nearest to the reference, to 1.0e-06"),
+    (1e-6, 2e-6, "optimal at every level, but not nearest to the reference: residual 2.0e-06, "
+                 "tolerance 1e-06"),
+    (2e-6, 0.0, "not optimal at posture: residual 2.0e-06, tolerance 1e-06"),
+    (np.nan, 0.0, "not optimal at posture: residual nan, tolerance 1e-06")])
+def test_a_residual_may_be_the_tolerance_and_no_more(stationarity, nearest, verdict):
+    found = certificate.Certificate(np.zeros(2), np.array([0.0, stationarity]), nearest, 1e-6,
+                                    ("hand", "posture"))
+    assert str(found) == verdict
+    assert found.certified == verdict.startswith("certified")
+    assert found.optimal == (not verdict.startswith("not optimal"))

@@ -38,6 +38,15 @@ def test_a_form_that_does_not_exist_names_those_that_do():
         make("tpm", form="publishd")
 
 
+@pytest.mark.parametrize("resolver", ["hcod", "weighted"])
+def test_a_count_is_a_whole_number_that_a_kernel_can_hold(resolver):
+    assert make(resolver, max_iterations=1).max_iterations == 1
+    assert make(resolver, max_iterations=2**31 - 1).max_iterations == 2147483647
+    for wrong in (0, 2**31, 1.5, True):
+        with pytest.raises(HierarchyError, match=r"max_iterations = .*, expected a whole number"):
+            make(resolver, max_iterations=wrong)
+
+
 def test_labels_name_what_makes_another_method():
     assert make("tpm").label == "tpm"
     assert make("tpm", form="published").label == "tpm published"
