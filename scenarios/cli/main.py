@@ -245,8 +245,8 @@ def sweep(file: Annotated[str, typer.Argument(help="Name of a sweep, or a sweep 
 
 @app.command()
 def reproduce(studies: Annotated[list[str] | None, typer.Argument(
-                  metavar="[STUDY]...", help="letter, resolvers, blend, human. Default: all.")
-                  ] = None,
+                  metavar="[STUDY]...", help="letter, resolvers, blend, ladder, inertia or "
+                  "rivals. Default: all.")] = None,
               out: Annotated[Path, typer.Option(
                   "--out", metavar="FOLDER", help="Where the runs are kept.")
                   ] = Path("runs/reproduce"),

@@ -62,10 +62,11 @@ OUR_CLAIMS: tuple[Claim, ...] = (
 
 _LIMITS = ("joint_limit_excess", "speed_max", "acceleration_max", "body_distance_min",
            "cone_violation_max", "position_error_rms_settled", "stack_changes")
+_LADDER = ("speed_max", "joint_limit_excess", "body_distance_min", "ee_distance_min",
+           "cone_violation_max", "cone_violation_share", "stack_changes")
+_RIVALS = ("position_error_median_settled", "body_distance_min", "ee_distance_min",
+           "cone_violation_max", "cone_violation_share", "speed_max", "velocity_step_max")
 _BLEND = ("velocity_step_max", "acceleration_step_max", "body_distance_min")
-_HUMAN = ("contact_ticks", "position_error_max", "position_error_rms", "body_distance_min",
-          "ee_distance_min", "cone_violation_max", "speed_max", "velocity_step_max",
-          "ticks_not_solved")
 
 
 def claims(rows: Mapping[str, Rows], listed: Sequence[Claim]) -> str:
@@ -134,5 +135,7 @@ BLOCKS: dict[str, Block] = {
     "inequalities": partial(table, study="resolvers", metrics=_LIMITS),
     "letter-runs": partial(table, study="letter", metrics=_LIMITS),
     "blend": partial(table, study="blend", metrics=_BLEND),
-    "human": partial(table, study="human", metrics=_HUMAN),
+    "ladder": partial(table, study="ladder", metrics=_LADDER),
+    "inertia": partial(table, study="inertia", metrics=_LIMITS),
+    "rivals": partial(table, study="rivals", metrics=_RIVALS),
     "findings": findings}

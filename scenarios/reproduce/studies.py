@@ -7,8 +7,10 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from scenarios.config import Scenario, load
+from scenarios.config.groups import load_group
+from scenarios.config.scenario import OWN
 
-STARTS = 24
+STARTS = 16
 SEED = 14
 
 
@@ -29,13 +31,12 @@ class Column:
 
 @dataclass(frozen=True)
 class Study:
-    """Columns that are run from the same sampled starts; `extra` is what they need to be run."""
+    """Columns that are run from the same sampled starts."""
 
     name: str
     title: str
     columns: tuple[Column, ...]
     starts: int = STARTS
-    extra: str = ""
 
 
 def _variants(scenario: str, resolvers: Mapping[str, str]) -> tuple[Column, ...]:
@@ -71,9 +72,19 @@ RESOLVERS = Study("resolvers", "All resolvers on one task", (
 BLEND = Study("blend", "Switching without jumps", (
     *_blended("velocity", "ellipse-velocity"), *_blended("ellipse", "ellipse")))
 
-HUMAN = Study("human", "The experiment", (
-    Column("human-tpm", "human", "tpm"), Column("human-recursive", "human", "recursive"),
-    Column("human-hcod", "human", "hcod"), Column("human-hqp", "human-hqp", "hcod")),
-    starts=16, extra="sim")
+LADDER = Study("ladder", "From the letter's scheme to inequalities, one change at a time", tuple(
+    Column(name, name, OWN) for name in load_group("ladder").scenarios))
 
-STUDIES = (LETTER, RESOLVERS, BLEND, HUMAN)
+INERTIA = Study("inertia", "Null-space damping by the inertia matrix", (
+    Column("identity", "ellipse", "tpm"), *(
+        Column(f"inertia-{k:g}", "ellipse-inertia", "tpm", {"damping.value": k})
+        for k in (1.0, 5.0, 20.0))))
+
+RIVALS = Study("rivals", "Other ways to avoid obstacles", (
+    Column("algorithm-1", "ellipse", OWN), Column("algorithm-1-velocity", "ellipse-velocity", OWN),
+    Column("nullspace", "ellipse-nullspace", OWN),
+    Column("danger-bounds", "ellipse-danger-bounds", OWN),
+    Column("set-based-velocity", "ellipse-set-based", OWN),
+    Column("smooth-velocity", "ellipse-smooth", OWN), Column("barrier", "ellipse-hqp", OWN)))
+
+STUDIES = (LETTER, RESOLVERS, BLEND, LADDER, INERTIA, RIVALS)
