@@ -19,7 +19,7 @@ def nakamura(B, e, lam0, w0):
 
 
 def chiaverini(B, e, lam_max, epsilon, beta=0.0):
-    """J^T (J J^T + beta^2 I + lambda^2 u_m u_m^T)^-1 e, as in Chiaverini (1997), (24)-(25)."""
+    """J^T (J J^T + beta^2 I + lambda^2 u_m u_m^T)^-1 e, as in Chiaverini (1997)."""
     U, s, _ = np.linalg.svd(B)
     lam2 = (1.0 - (s[-1] / epsilon) ** 2) * lam_max**2 if s[-1] < epsilon else 0.0
     u = U[:, len(B) - 1]
