@@ -42,7 +42,7 @@ class Smooth(Resolver):
     eta : weight of what keeps a level off the directions that levels above use in part.
 
     `names()` does not list it: the activations come from beside the hierarchy, and
-    `control.stack = "smooth"` provides them. Defaults are those of code from the authors' group.
+    `control.stack = "smooth"` provides them. Defaults are our own.
 
     Source: E. Simetti, G. Casalino, "A Novel Practical Technique to Integrate Inequality Control
     Objectives and Task Transitions in Priority Based Control", Journal of Intelligent and Robotic
