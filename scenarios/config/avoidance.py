@@ -97,8 +97,9 @@ class _Avoiding(Section):
 
     @model_validator(mode="after")
     def _varies_something(self) -> Self:
-        if self.variation and not any(isinstance(obstacle.path, WaypointsSection)
-                                      for obstacle in self.obstacles):
+        moves = self.variation is not None and self.variation.spread + self.variation.timing > 0.0
+        if moves and not any(isinstance(obstacle.path, WaypointsSection)
+                             for obstacle in self.obstacles):
             raise ValueError("variation needs an obstacle with waypoints")
         return self
 
