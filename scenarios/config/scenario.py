@@ -80,7 +80,8 @@ class Scenario(Section):
             raise ValueError("control.strictness needs [position]")
         repels = self.avoidance is not None and self.avoidance.kind == "repulsion"
         if repels and self.control.stack != "switched":
-            raise ValueError('avoidance.kind = "repulsion" goes with control.stack = "switched"')
+            raise ValueError('avoidance.kind = "repulsion" goes with control.stack = "switched", '
+                             f'got "{self.control.stack}"')
         if repels and not self.position:
             raise ValueError("[avoidance] needs [position]: Algorithm 1 orders one by the other")
         if self.limits and self.limits.danger_reach and not self.avoidance:

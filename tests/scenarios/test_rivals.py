@@ -72,6 +72,13 @@ def test_the_tangent_cone_of_the_letters_cone_has_its_jacobian_and_refuses_accel
         TangentCone(Pointing(FRAME, (1.0, 0.0, 0.0), 0.3))
 
 
+def pseudoinverse(X, least=1e-9):
+    """Singular values up to `least` are rounding of rows that depend on those above."""
+    U, s, Vt = np.linalg.svd(X, full_matrices=False)
+    keep = s > least
+    return Vt[keep].T / s[keep] @ U[:, keep].T
+
+
 def test_the_set_based_command_is_that_of_the_rows_that_it_says_are_active():
     for q in near_obstacles("ellipse-set-based", 5, 0.1):
         controller = controller_at("ellipse-set-based", q, "avoidance.distance=0.1",
@@ -82,8 +89,9 @@ def test_the_set_based_command_is_that_of_the_rows_that_it_says_are_active():
             rows = [i for i in range(h.offsets[level], h.offsets[level + 1]) if active[i]]
             if rows:
                 X = h.A[rows] @ N
-                x = x + np.linalg.pinv(X, rcond=1e-9) @ (h.lower[rows] - h.A[rows] @ x)
-                N = N - np.linalg.pinv(X, rcond=1e-9) @ X
+                inverse = pseudoinverse(X)
+                x = x + inverse @ (h.lower[rows] - h.A[rows] @ x)
+                N = N - inverse @ X
         np.testing.assert_allclose(controller.resolution.x, x, atol=1e-6 * (1 + np.abs(x).max()))
         ignored = np.isfinite(h.lower) & (active == 0)
         assert (h.A[ignored] @ x >= -1e-8).all()
@@ -152,7 +160,7 @@ def test_a_frozen_task_is_recorded_as_met_and_one_inside_its_set_as_free():
      r'needs limits.place = "guard", got "stack"'),
     ("ellipse-set-based", ["control.transition=blend"], r'control.transition = "blend"'),
     ("ellipse-smooth", ["control.strictness=true"], r"control.strictness = true"),
-    ("ellipse-velocity", ["control.stack=set-based"], r'"separation" with the others'),
+    ("ellipse-velocity", ["control.stack=set-based"], r'"repulsion" goes with control.stack = "switched", got "set-based"'),
 ])
 def test_what_does_not_go_together_is_said_with_key_and_value(name, changes, says):
     with pytest.raises(HierarchyError, match=says):
