@@ -46,6 +46,7 @@ class HandMadeScenario:
     description: str = "Nothing was simulated."
     resolver: str = "tpm"
     tasks: tuple[Any, ...] = ()
+    position: Any = None
     pointing: Any = field(default_factory=lambda: SimpleNamespace(
         alpha_d=60.0, kind="inequality", axis=(1.0, 0.0, 0.0)))
     avoidance: Any = field(default_factory=lambda: SimpleNamespace(
