@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from hierarchy.errors import HierarchyError, UnknownNameError
+from hierarchy.errors import UnknownNameError
 from scenarios.config.scenario import OWN
 from scenarios.reproduce import pages, rows
 from scenarios.reproduce.blocks import BLOCKS
@@ -51,11 +51,10 @@ def _run(study: Study, out: Path, workers: int | None, progress: Progress | None
 
 
 def write_documents(found: dict[str, Rows], root: Path) -> list[Path]:
-    """Keep rows beside the documents of a checkout and fill its pages; return what was written."""
+    """Keep rows beside the documents of a checkout and fill its pages; return what was written.
+
+    Raises HierarchyError for a page that needs a study without rows; the rows are kept.
+    """
     folder = root / pages.RESULTS
     kept = [rows.write(one, folder) for one in found.values()]
-    missing = [study.name for study in STUDIES if not (folder / f"{study.name}.json").is_file()]
-    if missing:
-        raise HierarchyError(f"rows are kept in {folder}, but pages need those of "
-                             f"{', '.join(missing)} too: hierarchy reproduce {' '.join(missing)}")
     return kept + pages.write(root, BLOCKS, rows.read(folder))

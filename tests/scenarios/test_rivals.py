@@ -160,7 +160,8 @@ def test_a_frozen_task_is_recorded_as_met_and_one_inside_its_set_as_free():
      r'needs limits.place = "guard", got "stack"'),
     ("ellipse-set-based", ["control.transition=blend"], r'control.transition = "blend"'),
     ("ellipse-smooth", ["control.strictness=true"], r"control.strictness = true"),
-    ("ellipse-velocity", ["control.stack=set-based"], r'"repulsion" goes with control.stack = "switched", got "set-based"'),
+    ("ellipse-velocity", ["control.stack=set-based"],
+     r'"repulsion" goes with control.stack = "switched", got "set-based"'),
 ])
 def test_what_does_not_go_together_is_said_with_key_and_value(name, changes, says):
     with pytest.raises(HierarchyError, match=says):
