@@ -9,7 +9,7 @@ from time import perf_counter
 from scenarios.cli.progress import bar
 from scenarios.cli.terminal import print_json, shown
 from scenarios.reproduce import rows
-from scenarios.reproduce.blocks import LETTER_CLAIMS, OUR_CLAIMS
+from scenarios.reproduce.blocks import CLAIMS
 from scenarios.reproduce.pages import checkout
 from scenarios.reproduce.whole import chosen, reproduce, write_documents
 from scenarios.sweep.engine import EngineError
@@ -31,8 +31,7 @@ def reproduce_command(names: list[str], out: Path, quick: bool, workers: int | N
     except KeyboardInterrupt:
         print("hierarchy: interrupted; the same command continues from here", file=sys.stderr)
         return 1
-    judged = [(claim, claim.judge(found[claim.study])) for claim in (*LETTER_CLAIMS, *OUR_CLAIMS)
-              if claim.study in found]
+    judged = [(claim, claim.judge(found[claim.study])) for claim in CLAIMS if claim.study in found]
     written = [shown(rows.write(one, out)) for one in found.values()]
     if root is not None:
         written += [shown(path) for path in write_documents(found, root)]
