@@ -12,7 +12,7 @@ import typer
 from hierarchy.robots import TABLES
 from hierarchy.tasks import TASKS
 from scenarios.cli.main import app, run_command
-from scenarios.config import load
+from scenarios.config import load, members
 from scenarios.sweep.config import load_sweep
 from solvers.resolver import _REGISTRY
 
@@ -121,7 +121,7 @@ def check_hierarchy(command, arguments):
     asked = found.make_context(command, list(arguments)).params
     named = [*asked.get("scenarios", ()), asked.get("scenario"), asked.get("file")]
     specs = [asked.get("resolver"), *(asked.get("resolvers") or "").split(",")]
-    for name in filter(is_name, named):
+    for name in members(filter(is_name, named)):
         if command == "sweep":
             load_sweep(name)
             continue
