@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from scenarios.config import Scenario, load, shipped
-    from scenarios.draw.run_folder import save
     from scenarios.loop.recording import Recording, load_run
     from scenarios.loop.simulation import simulate
     from scenarios.measure.comparison import Comparison
+    from scenarios.measure.run_folder import save
     from scenarios.report.comparing import compare
 
 __all__ = ["Comparison", "Recording", "Scenario", "compare", "load", "load_run", "save", "shipped",
@@ -19,7 +19,7 @@ __all__ = ["Comparison", "Recording", "Scenario", "compare", "load", "load_run",
 
 _HOME = {"Comparison": "measure.comparison", "Recording": "loop.recording", "Scenario": "config",
          "compare": "report.comparing", "load": "config", "load_run": "loop.recording",
-         "save": "draw.run_folder", "shipped": "config", "simulate": "loop.simulation"}
+         "save": "measure.run_folder", "shipped": "config", "simulate": "loop.simulation"}
 
 
 def __getattr__(name: str) -> Any:

@@ -4,9 +4,15 @@ import os
 import signal
 
 import pytest
+from hypothesis import HealthCheck, settings
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # small matrices: threads wait for each other
 os.environ.setdefault("MPLBACKEND", "Agg")
+
+# How fast a machine generates examples, or compiles kernels meanwhile, says nothing of the product.
+settings.register_profile("any machine", deadline=None,
+                          suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("any machine")
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -15,9 +21,3 @@ def _interruptible():
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     yield
     signal.signal(signal.SIGINT, before)
-
-
-@pytest.fixture
-def _without_figures(monkeypatch):
-    """Runs are saved without their figures, which take most of the time of a short run."""
-    monkeypatch.setattr("scenarios.draw.figures.letter.write_all", lambda recording, folder: None)

@@ -122,6 +122,9 @@ def run(scenario: Annotated[str, typer.Argument(
         changes: Changes = None, duration: Duration = None, out: Out = None,
         certify: Annotated[bool, typer.Option(
             "--certify", help="Certify the answer of every tick; not part of the measured times.")
+            ] = False,
+        figures: Annotated[bool, typer.Option(
+            "--figures", help="Draw the figures of the run too, as `hierarchy figures` does.")
             ] = False, as_json: AsJson = False,
         live: Annotated[bool, typer.Option(
             "--live", help="Show the run in the browser and change it interactively; needs the "
@@ -131,8 +134,9 @@ def run(scenario: Annotated[str, typer.Argument(
             help="With --live: real-time factor.")] = 1.0,
         port: Port = PORT, browser: Browser = True) -> int:
     """Run a scenario, measure it, and save the run."""
-    if live and (certify or as_json):
-        raise typer.BadParameter("cannot be combined with --certify or --json", param_hint="--live")
+    if live and (certify or figures or as_json):
+        raise typer.BadParameter("cannot be combined with --certify, --figures or --json",
+                                 param_hint="--live")
     chosen = _load(scenario, changes, duration)
     if resolver is not None:
         chosen = chosen.with_resolver(resolver)
@@ -145,14 +149,18 @@ def run(scenario: Annotated[str, typer.Argument(
 
         return live_command(chosen, folder, port, speed, browser)
     from scenarios.cli.progress import bar
-    from scenarios.draw.run_folder import save
     from scenarios.loop.simulation import simulate
+    from scenarios.measure.run_folder import save
 
     with bar() as told:
         label = str(chosen.make_resolver().label)
         recording = simulate(chosen, progress=partial(told, label) if told else None,
                              certified=certify)
     save(recording, folder)
+    if figures:
+        from scenarios.cli.figures import redraw
+
+        redraw([folder])
     if as_json:
         from scenarios.measure.metrics import as_plain_data
 

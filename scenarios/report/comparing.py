@@ -13,11 +13,11 @@ from scenarios.cell.build import build
 from scenarios.config import Scenario, load, members, shipped_groups
 from scenarios.config.resolvers import check_names, usable
 from scenarios.config.scenario import OWN
-from scenarios.draw.run_folder import save
 from scenarios.files import claim, write_json, write_text
 from scenarios.loop.recording import versions
 from scenarios.loop.simulation import simulate
 from scenarios.measure.comparison import Comparison
+from scenarios.measure.run_folder import save
 from scenarios.measure.runs import Run
 
 Progress = Callable[[str, int, int], None]

@@ -76,7 +76,7 @@ def departure(recordings: Mapping[str, Recording], looks: Mapping[str, Look]) ->
         apart = np.abs(recordings[label]["q"][:ticks] - reference["q"][:ticks]).max(axis=1)
         drawing.curve(ax, reference["t"][:ticks], np.maximum(apart, 1e-16),
                       color=looks[label].colour, linestyle=_dashed(looks[label]))
-    ax.set_yscale("log")
+    drawing.make_logarithmic(ax, "y")
     ax.set_xlabel("time [s]")
     return fig
 
@@ -96,7 +96,10 @@ def computing_time(recordings: Mapping[str, Recording], looks: Mapping[str, Look
         else:
             _bar(ax, row, recording, looks[label].colour)
         ax.plot(_micro(recording, "time_tick", 50.0), row, "|", color=INK, markersize=8)
-    ax.set_xscale("log") if wide else ax.set_xlim(left=0.0)
+    if wide:
+        drawing.make_logarithmic(ax, "x")
+    else:
+        ax.set_xlim(left=0.0)
     _slowest(ax, recordings, wide)
     ax.set_yticks(range(len(recordings)), list(recordings))
     ax.set_ylim(len(recordings) - 0.5, -0.5)

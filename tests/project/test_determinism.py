@@ -23,7 +23,7 @@ def run_of(name, changes=()):
 
 
 def bytes_of(run, folder):
-    return (save(run, folder, figures=False) / "run.npz").read_bytes()
+    return (save(run, folder) / "run.npz").read_bytes()
 
 
 @pytest.mark.parametrize("name", RUNS)
@@ -37,7 +37,7 @@ def test_the_same_run_is_written_as_the_same_bytes(name, tmp_path):
 def test_another_process_writes_the_same_bytes(tmp_path):
     mine = bytes_of(run_of("ellipse"), tmp_path / "mine")
     code = ("import sys; from scenarios import load, save, simulate; "
-            "save(simulate(load('ellipse', [sys.argv[2]])), sys.argv[1], figures=False)")
+            "save(simulate(load('ellipse', [sys.argv[2]])), sys.argv[1])")
     subprocess.run([sys.executable, "-c", code, str(tmp_path / "other"), *RUNS["ellipse"]],
                    check=True)
     assert (tmp_path / "other" / "run.npz").read_bytes() == mine
@@ -49,7 +49,7 @@ def test_another_seed_gives_other_bytes(tmp_path):
 
 
 def test_times_are_in_a_file_of_their_own(tmp_path):
-    folder = save(run_of("ellipse"), tmp_path / "run", figures=False)
+    folder = save(run_of("ellipse"), tmp_path / "run")
     with np.load(folder / "run.npz") as data, np.load(folder / "timings.npz") as times:
         assert not [name for name in data.files if name.startswith("time_")]
         assert set(times.files) == {f"time_{part}"

@@ -136,10 +136,8 @@ def is_name(text):
     return bool(text) and not set("./:") & set(text) and not text.isupper()
 
 
-def test_the_tutorial_can_be_followed_from_top_to_bottom(tmp_path, monkeypatch):
-    """Files get the name in their first line, commands are run (but for figures), Python goes on.
-    """
-    monkeypatch.setattr("scenarios.draw.figures.letter.write_all", lambda recording, folder: None)
+def test_the_tutorial_can_be_followed_from_top_to_bottom(tmp_path):
+    """Files get the name in their first line, commands are run, Python goes on."""
     names, followed = {"__name__": "document"}, set()
     for language, text in BLOCK.findall(TEXTS[FOLLOWED]):
         followed.add(language)

@@ -7,7 +7,6 @@ from scenarios import compare, load
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("_without_figures")
 def test_a_resolver_that_cannot_resolve_a_scenario_is_not_run_and_is_named(tmp_path):
     limited = load("ellipse", {"name": "limited", "control.duration": 0.01,
                                "control.options": {}, "limits.acceleration": 20.0})

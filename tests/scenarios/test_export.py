@@ -12,12 +12,12 @@ import pytest
 from hierarchy import HierarchyError, Robot, State
 from scenarios import load, simulate
 from scenarios.cli.main import run_command
-from scenarios.draw.run_folder import save
 from scenarios.export import export, foxglove
 from scenarios.export.columns import CONSTANTS, columns
 from scenarios.files import OutputError
 from scenarios.loop.recording import Event
 from scenarios.loop.tree import joint_units, tree_of
+from scenarios.measure.run_folder import save
 from scenarios.scene import scene
 
 FORMATS = ("csv", "parquet", "mcap")
@@ -323,7 +323,7 @@ def test_a_package_that_is_missing_names_its_extra(run, tmp_path, monkeypatch):
 
 
 def test_the_command_exports_a_run_beside_it_or_where_it_is_told(run, tmp_path, capsys):
-    folder = save(run, tmp_path / "run", figures=False)
+    folder = save(run, tmp_path / "run")
     assert run_command(["export", str(folder), "--format", "csv"]) == 0
     assert (folder / "run.csv").exists()
     assert run_command(["export", str(folder), "--out", str(tmp_path / "other.csv")]) == 0

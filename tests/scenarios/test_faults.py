@@ -10,11 +10,11 @@ from hierarchy import HierarchyError
 from scenarios.cell.build import build
 from scenarios.cli.main import run_command
 from scenarios.config import load
-from scenarios.draw.run_folder import save
 from scenarios.loop.faults import Faults, FaultySensor
 from scenarios.loop.recording import load_run
 from scenarios.loop.simulation import simulate
 from scenarios.measure.metrics import measure
+from scenarios.measure.run_folder import save
 from solvers import Status
 
 AT, LASTS, END = 50, 60, 200  # ticks of 1 ms
@@ -193,7 +193,7 @@ def test_what_happened_is_saved_counted_and_loaded_again(tmp_path):
                             policy="hold"))
     found = measure(run)
     assert (found["ticks_hold"].value, found["ticks_brake"].value) == (10, LASTS - 10)
-    loaded = load_run(save(run, tmp_path / "run", figures=False))
+    loaded = load_run(save(run, tmp_path / "run"))
     assert loaded.events == run.events
     events = json.loads((tmp_path / "run" / "metrics.json").read_text())["events"]
     assert events == [
@@ -204,7 +204,6 @@ def test_what_happened_is_saved_counted_and_loaded_again(tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("_without_figures")
 def test_the_command_line_says_what_happened_and_fails_only_where_the_run_ended(
         tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)

@@ -21,9 +21,9 @@ from scenarios.config import load
 from scenarios.draw.figures import drawing, letter, palette, panels
 from scenarios.draw.figures.picture import picture
 from scenarios.draw.figures.timeline import timeline
-from scenarios.draw.run_folder import save
 from scenarios.loop.recording import Event
 from scenarios.loop.simulation import simulate
+from scenarios.measure.run_folder import save
 from scenarios.report.figures import computing_time, overlay, side_by_side
 
 
@@ -200,13 +200,37 @@ def test_the_stretches_in_which_a_task_is_active_are_red():
     np.testing.assert_array_equal(red.get_ydata(), [np.nan, 1.0, 2.0, np.nan, np.nan])
 
 
+@pytest.fixture(scope="module")
+def drawn(tmp_path_factory):
+    """The folder of all figures of a run."""
+    folder = tmp_path_factory.mktemp("drawn")
+    letter.write_all(recording(), folder)
+    return folder
+
+
 @pytest.mark.slow
-def test_all_figures_of_a_run_are_written_as_svg_and_png(tmp_path):
-    letter.write_all(recording(), tmp_path)
-    stems = {path.stem for path in tmp_path.iterdir()}
-    drawn = {figure.name for figure in letter.SIMULATION} - {"task-errors"}  # it lists none
-    assert stems == drawn | {"picture", "stack", "tick-times"}
-    assert len(list(tmp_path.iterdir())) == 2 * len(stems)
+def test_all_figures_of_a_run_are_written_as_svg_and_png(drawn):
+    stems = {path.stem for path in drawn.iterdir()}
+    asked = {figure.name for figure in letter.SIMULATION} - {"task-errors"}  # it lists none
+    assert stems == asked | {"picture", "stack", "tick-times"}
+    assert len(list(drawn.iterdir())) == 2 * len(stems)
+
+
+@pytest.mark.slow
+def test_the_same_figure_is_the_same_file(drawn, tmp_path):
+    with drawing.styled(dataclasses.replace(drawing.SCREEN, formats=("svg",))):
+        letter.write_all(recording(), tmp_path)
+    for path in drawn.glob("*.svg"):
+        assert path.read_bytes() == (tmp_path / path.name).read_bytes()
+
+
+def test_numbers_on_a_logarithmic_axis_are_plain_text():
+    assert [drawing.in_powers(x) for x in (1e-8, 0.01, 20.0, 1500.0, 1e4, 2e5)] == [
+        "10⁻⁸", "0.01", "20", "1500", "10⁴", "2·10⁵"]
+    fig, (ax,) = drawing.figure()
+    ax.plot([1.0, 2.0], [1e-7, 1.0])
+    drawing.make_logarithmic(ax, "y")
+    assert "10⁻⁴" in drawing.svg(fig, "any")
 
 
 def letters(name, **changed):
@@ -287,15 +311,6 @@ def test_the_pointing_error_is_typeset():
     assert heading == r"Pointing error [$\cos\alpha_d - \cos\alpha$]"
 
 
-@pytest.mark.slow
-def test_the_same_figure_is_the_same_file(tmp_path):
-    for name in ("a", "b"):
-        (tmp_path / name).mkdir()
-        letter.write_all(recording(), tmp_path / name)
-    first, second = sorted((tmp_path / "a").glob("*.svg")), sorted((tmp_path / "b").glob("*.svg"))
-    assert [path.read_bytes() for path in first] == [path.read_bytes() for path in second]
-
-
 def test_a_scene_without_obstacles_or_a_path_asked_for_is_still_a_picture():
     run = recording()
     for signal in ("desired_position", "minimal_distance", "control_point_distance"):
@@ -318,7 +333,7 @@ def test_an_inline_svg_follows_the_page_and_brings_no_ids_that_could_clash():
 @pytest.fixture(scope="module")
 def run_folder(tmp_path_factory):
     short = load("ellipse", ["control.duration=0.3"])
-    return save(simulate(short), tmp_path_factory.mktemp("runs") / "run", figures=False)
+    return save(simulate(short), tmp_path_factory.mktemp("runs") / "run")
 
 
 @pytest.fixture(scope="module")

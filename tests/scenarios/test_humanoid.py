@@ -230,7 +230,6 @@ def test_resolvers_that_take_bounds_keep_the_humanoids_limits():
         assert np.linalg.norm(run["task_error_right_hand"], axis=1).max() < 1e-3
 
 
-@pytest.mark.usefixtures("_without_figures")
 def test_a_comparison_has_a_row_for_each_task(tmp_path):
     found = compare([load("humanoid", ["control.duration=0.1"])], ["tpm", "recursive"],
                     out=tmp_path / "out")

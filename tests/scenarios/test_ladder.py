@@ -87,7 +87,6 @@ def test_from_the_same_states_the_change_of_resolver_changes_no_command():
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("_without_figures")
 def test_compare_runs_a_group_side_by_side_each_scenario_with_its_own_resolver(
         tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
@@ -105,7 +104,6 @@ def test_compare_runs_a_group_side_by_side_each_scenario_with_its_own_resolver(
     assert "Step 6: one-sided distances in place of repulsion (hcod)" in page
 
 
-@pytest.mark.usefixtures("_without_figures")
 def test_own_is_the_resolver_that_a_scenario_names():
     assert load("ellipse-hqp").with_resolver("own") == load("ellipse-hqp")
     short = [load(name, ["control.duration=0.01"]) for name in ("ellipse", "ellipse-limits")]

@@ -106,7 +106,6 @@ def test_the_page_says_it():
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("_without_figures")
 def test_the_numbers_hold_it(tmp_path):
     from scenarios import load
 

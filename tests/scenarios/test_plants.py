@@ -14,10 +14,10 @@ from scenarios.cell.plants import Apart, JointSensor, KinematicArm, PhysicsArm
 from scenarios.cli.main import run_command
 from scenarios.config import ScenarioError
 from scenarios.config.plant import JointsSection, MeasurementSection, ServoSection
-from scenarios.draw.run_folder import save
 from scenarios.loop.controller import Controller
 from scenarios.loop.recording import load_run
 from scenarios.measure.metrics import measure
+from scenarios.measure.run_folder import save
 
 pytestmark = pytest.mark.slow
 
@@ -426,7 +426,7 @@ def test_contacts_are_measured_in_a_run(mujoco, tmp_path):
     assert found["contact_force_max"].value == run["contact_force"].max() > 1.0
     assert found["contact_force_max"].shown_unit == "N"
     assert run["contacts"].shape == (run.ticks,)
-    again = load_run(save(run, tmp_path / "run", figures=False))
+    again = load_run(save(run, tmp_path / "run"))
     np.testing.assert_array_equal(again["contact_force"], run["contact_force"])
     assert again.scenario == run.scenario
 

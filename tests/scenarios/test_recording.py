@@ -7,9 +7,9 @@ from hand_made import HandMadeScenario, recording
 
 from hierarchy.errors import HierarchyError
 from scenarios import config
-from scenarios.draw.run_folder import save
 from scenarios.files import OutputError, claim, next_free, whole
 from scenarios.loop.recording import load_run
+from scenarios.measure.run_folder import save
 
 
 @pytest.fixture
@@ -20,7 +20,7 @@ def hand_made_scenarios(monkeypatch):
 @pytest.mark.usefixtures("hand_made_scenarios")
 def test_what_was_saved_is_loaded_again_to_the_last_bit(tmp_path):
     saved = recording(q=np.random.default_rng(0).normal(size=(5, 2)), fault="stopped at tick 5")
-    loaded = load_run(save(saved, tmp_path / "run", figures=False))
+    loaded = load_run(save(saved, tmp_path / "run"))
     assert loaded.signals.keys() == saved.signals.keys()
     for name, signal in saved.signals.items():
         np.testing.assert_array_equal(loaded[name], signal)
@@ -30,19 +30,18 @@ def test_what_was_saved_is_loaded_again_to_the_last_bit(tmp_path):
 
 @pytest.mark.usefixtures("hand_made_scenarios")
 def test_a_run_without_a_fault_comes_back_without_one(tmp_path):
-    assert load_run(save(recording(), tmp_path / "run", figures=False)).fault is None
+    assert load_run(save(recording(), tmp_path / "run")).fault is None
 
 
 def test_a_switch_is_the_first_tick_of_the_new_order():
     assert recording(order=[0, 1, 1, 0, 0]).switches().tolist() == [1, 3]
 
 
-@pytest.mark.slow
-def test_a_run_folder_holds_arrays_metrics_scenario_versions_and_figures(tmp_path):
+def test_a_run_folder_holds_arrays_metrics_scenario_and_versions(tmp_path):
     save(recording(), tmp_path / "run")
     names = {path.name for path in (tmp_path / "run").iterdir()}
-    assert {"run.npz", "facts.json", "metrics.json", "scenario.toml", "versions.json",
-            "picture.svg", "joint-velocities.png", "distances.svg"} <= names
+    assert names == {"run.npz", "timings.npz", "facts.json", "metrics.json", "scenario.toml",
+                     "versions.json"}
     assert "hand-made" in (tmp_path / "run" / "scenario.toml").read_text()
     assert {"python", "numpy", "pin", "task-hierarchy"} <= json.loads(
         (tmp_path / "run" / "versions.json").read_text()).keys()
@@ -50,7 +49,7 @@ def test_a_run_folder_holds_arrays_metrics_scenario_versions_and_figures(tmp_pat
 
 
 def test_arrays_are_found_by_name_without_this_package(tmp_path):
-    save(recording(), tmp_path / "run", figures=False)
+    save(recording(), tmp_path / "run")
     with np.load(tmp_path / "run" / "run.npz", allow_pickle=False) as file:
         assert file["t"].shape == (5,)
         assert file["q"].shape == (5, 7)
@@ -63,15 +62,15 @@ def test_a_save_that_breaks_leaves_nothing_behind(tmp_path):
     scenario = SimpleNamespace(pointing=None, to_toml=broken, tasks=(),
                                control=SimpleNamespace(period=1.0))
     with pytest.raises(KeyboardInterrupt):
-        save(recording(scenario), tmp_path / "run", figures=False)
+        save(recording(scenario), tmp_path / "run")
     assert list(tmp_path.iterdir()) == []
 
 
 def test_an_earlier_run_is_never_overwritten(tmp_path):
-    save(recording(), tmp_path / "run", figures=False)
+    save(recording(), tmp_path / "run")
     before = (tmp_path / "run" / "run.npz").read_bytes()
     with pytest.raises(OutputError):
-        save(recording(t=[0.0, 1.0]), tmp_path / "run", figures=False)
+        save(recording(t=[0.0, 1.0]), tmp_path / "run")
     assert (tmp_path / "run" / "run.npz").read_bytes() == before
     assert [path.name for path in tmp_path.iterdir()] == ["run"]
 

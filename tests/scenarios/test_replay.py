@@ -364,7 +364,7 @@ def short():
 
 @pytest.fixture
 def folder(short, tmp_path):
-    return save(short, tmp_path / "run", figures=False)
+    return save(short, tmp_path / "run")
 
 
 @pytest.mark.slow
@@ -375,7 +375,7 @@ def test_the_command_writes_a_file_beside_the_run(folder, capsys):
 
 
 def test_the_command_takes_several_runs_and_a_name(folder, short, tmp_path):
-    other = save(short, tmp_path / "other", figures=False)
+    other = save(short, tmp_path / "other")
     file = tmp_path / "new" / "two.html"
     assert run_command(["replay", str(folder), str(other), "--out", str(file)]) == 0
     assert len(data_of(file.read_text(encoding="utf-8"))["runs"]) == 2

@@ -78,7 +78,7 @@ def test_an_ffmpeg_that_fails_is_heard_and_leaves_nothing(short, fake_ffmpeg, tm
 
 @pytest.fixture
 def folder(short, tmp_path):
-    return save(short, tmp_path / "run", figures=False)
+    return save(short, tmp_path / "run")
 
 
 def test_without_ffmpeg_the_command_says_what_to_do(folder, tmp_path, monkeypatch, capsys):

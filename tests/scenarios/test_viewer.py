@@ -13,7 +13,6 @@ from hierarchy.errors import HierarchyError
 from scenarios.cell.build import build
 from scenarios.cli.main import run_command
 from scenarios.config import load
-from scenarios.draw.run_folder import save
 from scenarios.draw.viewer.curves import Lately
 from scenarios.draw.viewer.live import Live
 from scenarios.draw.viewer.moment import Became, Watched, of_scene
@@ -24,6 +23,7 @@ from scenarios.loop.judging import judge
 from scenarios.loop.recorder import Recorder
 from scenarios.loop.recording import load_run
 from scenarios.loop.simulation import simulate, tick
+from scenarios.measure.run_folder import save
 from scenarios.scene import scene
 from scenarios.scene.levels import Fate
 
@@ -229,8 +229,7 @@ def test_what_cannot_be_is_refused_and_the_run_goes_on(spoil, recording):
     assert live.changes == []
 
 
-def test_a_restart_keeps_the_settings_and_puts_obstacles_back(tmp_path, monkeypatch):
-    monkeypatch.setattr("scenarios.draw.figures.letter.write_all", lambda *_: None)
+def test_a_restart_keeps_the_settings_and_puts_obstacles_back(tmp_path):
     live = Live(LIMITED)
     live.change({"pointing.alpha_d": 20.0})
     live.drag(1, (0.0, 0.1, 0.0))
@@ -354,7 +353,6 @@ def test_a_live_run_is_kept_at_ctrl_c(tmp_path, monkeypatch, capsys):
         raise KeyboardInterrupt
 
     monkeypatch.setattr(LivePage, "step", interrupted)
-    monkeypatch.setattr("scenarios.draw.figures.letter.write_all", lambda *_: None)
     line = ["run", "ellipse", "--live", "--no-browser", "--port", "0", "--out"]
     assert run_command([*line, str(tmp_path / "a")]) == 1
     assert load_run(tmp_path / "a").ticks == 21
@@ -474,6 +472,6 @@ def test_a_run_is_shown_by_its_folder(tmp_path, recording, monkeypatch, capsys):
         raise KeyboardInterrupt
 
     monkeypatch.setattr(View, "serve", interrupt)
-    save(recording, tmp_path / "a", figures=False)
+    save(recording, tmp_path / "a")
     assert run_command(["view", str(tmp_path / "a"), "--no-browser", "--port", "0"]) == 0
     assert "Page: http://127.0.0.1:" in capsys.readouterr().out

@@ -212,8 +212,9 @@ def tick_times(recording: Recording) -> Figure:
     label = label_of(recording)
     times = 1e6 * recording["time_tick"]
     edges = np.geomspace(max(times.min(), 1.0), max(times.max(), 2.0) * 1.01, 80)
-    ax.hist(times, edges.tolist(), color=drawing.colours([label])[label], log=True)
-    ax.set_xscale("log")
+    ax.hist(times, edges.tolist(), color=drawing.colours([label])[label])
+    drawing.make_logarithmic(ax, "x")
+    drawing.make_logarithmic(ax, "y")
     period = 1e6 * recording.scenario.control.period
     ax.axvline(period, color=INK, linewidth=0.6, linestyle=(0, (4, 3)))
     ax.annotate("period", (period, 1.0), xycoords=("data", "axes fraction"), fontsize="small",

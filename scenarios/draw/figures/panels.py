@@ -115,7 +115,7 @@ def position_error(ax: Axes, recording: Recording, colour: str) -> None:
     """Draw the distance of the end effector from where it should be [mm], logarithmic."""
     error = 1e3 * np.linalg.norm(recording["position_error"], axis=1)
     drawing.curve(ax, recording["t"], np.maximum(error, 1e-6), color=colour)
-    ax.set_yscale("log")
+    drawing.make_logarithmic(ax, "y")
 
 
 def task_errors(ax: Axes, recording: Recording, colour: str) -> None:
@@ -135,7 +135,7 @@ def _listed(ax: Axes, recording: Recording, unit: str, scale: float) -> None:
             drawing.curve(ax, recording["t"], np.maximum(scale * error, 1e-6),
                           **drawing.joint_line(titles.index(section.title)), linewidth=0.9,
                           label=section.title)
-    ax.set_yscale("log")
+    drawing.make_logarithmic(ax, "y")
 
 
 PANELS = (

@@ -15,12 +15,12 @@ from hierarchy.problem import Array
 from scenarios.cell.build import build
 from scenarios.config import Scenario, ScenarioError
 from scenarios.config.plant import PlantSection
-from scenarios.draw.run_folder import save
 from scenarios.loop.controller import Controller
 from scenarios.loop.judging import completed
 from scenarios.loop.recorder import Recorder
 from scenarios.loop.recording import Recording
 from scenarios.loop.simulation import tick
+from scenarios.measure.run_folder import save
 
 _HAND = 1.0     # [m/s] greatest speed of a dragged obstacle
 _FARTHEST = 5.0  # [m] greatest distance of dragging

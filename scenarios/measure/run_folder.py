@@ -1,24 +1,21 @@
-"""The folder of one run: its recording, metrics and figures."""
+"""The folder of one run: its recording and its metrics."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
-from scenarios.draw.figures import letter
 from scenarios.files import whole, write_json
 from scenarios.loop.recording import Recording, write
 from scenarios.measure import metrics
 
 
-def save(recording: Recording, folder: str | Path, figures: bool = True) -> Path:
+def save(recording: Recording, folder: str | Path) -> Path:
     """Write a run's folder, completely or not at all, and return its path.
 
-    It has the files of `scenarios.loop.recording.write`, `metrics.json` and, with `figures`, the
-    letter's figures. `folder` must be new or empty.
+    It has the files of `scenarios.loop.recording.write` and `metrics.json`; `hierarchy figures`
+    adds the figures. `folder` must be new or empty.
     """
     with whole(folder) as partial:
         write(recording, partial)
         write_json(partial / "metrics.json", metrics.as_plain_data(recording))
-        if figures:
-            letter.write_all(recording, partial)
     return Path(folder)
