@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, final
 
 import numpy as np
 
+from hierarchy.errors import UnknownNameError
 from hierarchy.problem import Array, Hierarchy
 from solvers import Resolution, Resolver, Status, make, names
 from solvers.qp.backends import BACKENDS, installed
@@ -34,8 +35,15 @@ class Candidate:
     read: Callable[[Any], Resolution] = lambda answer: answer
 
 
-def candidates() -> tuple[list[Candidate], dict[str, str]]:
-    """Return the available candidates, and why others are missing, by name."""
+def candidates(wanted: Sequence[str] | None = None) -> tuple[list[Candidate], dict[str, str]]:
+    """Return the available candidates, and why others are missing, by name.
+
+    wanted : names of resolvers, with all their variants and backends; None for all. The yardsticks
+        are always there. Raises UnknownNameError.
+    """
+    for name in wanted or ():
+        if name not in names():
+            raise UnknownNameError("resolver", name, names())
     missing = {f"hqp {name}": "pip install 'task-hierarchy[qp]'"
                for name in BACKENDS if not installed(name)}
     field = [Candidate(NUMPY, False, lambda h: lambda: plain_numpy(h))]
@@ -48,7 +56,9 @@ def candidates() -> tuple[list[Candidate], dict[str, str]]:
     warm = [resolver for resolver in cold if _starts(resolver)]
     field += [Candidate(r.label, r.handles == "inequalities", _cold(r)) for r in cold]
     field += [Candidate(f"{r.label} warm", r.handles == "inequalities", _warm(r)) for r in warm]
-    return field, missing
+    asked = {*names(), "plain", "DAQP"} if wanted is None else {*wanted, "plain", "DAQP"}
+    return ([one for one in field if one.label.split()[0] in asked],
+            {label: why for label, why in missing.items() if label.split()[0] in asked})
 
 
 def plain_numpy(h: Hierarchy) -> Resolution:

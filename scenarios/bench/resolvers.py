@@ -6,6 +6,7 @@ families, with seeds not used for tuning, are timed and reported separately.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from time import perf_counter_ns
@@ -15,6 +16,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+from hierarchy.errors import UnknownNameError
 from scenarios.bench.candidates import DAQP, NUMPY, Call, Candidate, candidates
 from scenarios.bench.families import DATA, FAMILIES, Problem, family, fresh
 from scenarios.bench.machine import machine, one_core
@@ -96,9 +98,9 @@ class _Timed:
 
 
 def run(out: Path | None = None, seconds: float = 0.5, folder: Path = DATA,
-        families: tuple[str, ...] = FAMILIES, seed: int | None = None, count: int = COUNT
-        ) -> list[dict[str, Any]]:
-    """Time all candidates on every family on one core, and check every answer.
+        families: Sequence[str] = FAMILIES, seed: int | None = None, count: int = COUNT,
+        resolvers: Sequence[str] | None = None) -> list[dict[str, Any]]:
+    """Time the candidates on every family on one core, and check every answer.
 
     Candidates take turns problem by problem, so that noise of the machine affects all equally; the
     untimed check of every problem before also warms up. Prints a table per family and the targets;
@@ -109,15 +111,19 @@ def run(out: Path | None = None, seconds: float = 0.5, folder: Path = DATA,
     folder : folder of the families.
     seed : seed of the first fresh problem of each family; None for stored problems only.
     count : number of fresh problems of each family.
+    resolvers : names of those to time, with their variants, beside the yardsticks; None for all.
 
     Raises
     ------
-    HierarchyError : a family's file is not in the folder.
+    HierarchyError : unknown family or resolver, or a family's file is not in the folder.
     """
+    for name in families:
+        if name not in FAMILIES:
+            raise UnknownNameError("family", name, FAMILIES)
+    entrants, missing = candidates(resolvers)
     problems = {(name, KNOWN): family(name, folder) for name in families}
     if seed is not None:
         problems |= {(name, FRESH): fresh(name, seed, count) for name in families}
-    entrants, missing = candidates()
     console = Console(highlight=False)
     rows: list[dict[str, Any]] = []
     console.print(f"Resolvers on reference problems, one core of {machine()['processor']}")

@@ -54,12 +54,22 @@ def resolvers(
             "--fresh", metavar="SEED", help="Time new problems too, from this seed on.")] = None,
         count: Annotated[int, typer.Option(
             "--count", min=1, metavar="N", help="New problems of each family.")] = 200,
+        family: Annotated[list[str] | None, typer.Option(
+            "--family", metavar="NAME", help="Only this family. May be repeated.")] = None,
+        resolver: Annotated[list[str] | None, typer.Option(
+            "--resolver", metavar="NAME",
+            help="Only this resolver, with its variants and backends, beside the yardsticks. May "
+                 "be repeated.")] = None,
+        seconds: Annotated[float, typer.Option(
+            "--seconds", min=0.0, metavar="S",
+            help="Time for each resolver in each family.")] = 0.5,
         out: Out = None) -> None:
     """Time every resolver on the reference problems."""
+    from scenarios.bench.families import FAMILIES
     from scenarios.bench.resolvers import run
 
     folder = _claimed(out)
-    run(folder, seed=fresh, count=count)
+    run(folder, seconds, families=family or FAMILIES, seed=fresh, count=count, resolvers=resolver)
     _say(folder)
 
 

@@ -10,6 +10,7 @@ import pytest
 from hierarchy import HierarchyError
 from scenarios.bench import candidates, families, machine, resolvers
 from scenarios.bench.families import family
+from scenarios.cli.main import run_command
 from solvers import Status
 from solvers.qp import backends
 
@@ -149,3 +150,19 @@ def test_timing_on_one_core_gives_the_others_back():
 def test_a_benchmark_without_its_problems_says_where_they_are(tmp_path):
     with pytest.raises(HierarchyError, match="tests/data/hlsp of a source checkout"):
         resolvers.run(folder=tmp_path)
+
+
+def test_only_the_families_and_resolvers_asked_for_are_timed_beside_the_yardsticks(few):
+    rows = resolvers.run(seconds=0.0, families=["EQ7"], resolvers=["hcod", "tpm"])
+    assert {row["family"] for row in rows} == {"EQ7"}
+    assert [row["resolver"] for row in rows] == [candidates.NUMPY, candidates.DAQP, "hcod", "tpm",
+                                                 "tpm published", "hcod warm"]
+
+
+@pytest.mark.parametrize(("asked", "says"), [
+    (["--family", "EQ8"], "unknown family 'EQ8'; did you mean 'EQ7'"),
+    (["--resolver", "hqod"], "unknown resolver 'hqod'; did you mean 'hcod'"),
+])
+def test_an_unknown_family_or_resolver_is_named(asked, says, tmp_path, capsys):
+    assert run_command(["bench", "resolvers", *asked, "--out", str(tmp_path / "out")]) == 2
+    assert says in capsys.readouterr().err
