@@ -82,7 +82,7 @@ $(INSTALLED): pyproject.toml constraints.txt
 	fi; \
 	echo "Setting up .venv with $$("$$python" --version) (once; downloads about 250 MB) ..."; \
 	"$$python" -m venv --clear .venv
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --progress-bar off \
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --progress-bar off --no-compile \
 	  --constraint constraints.txt --editable '.[dev]'
 	@echo "Installed $$($(BIN)/python -m pip list --disable-pip-version-check --format freeze | wc -l) packages into .venv."
 	@touch $@

@@ -9,13 +9,11 @@ from typing import Annotated, Any
 
 import typer
 
+from scenarios.cli.options import Out, output
 from scenarios.cli.terminal import shown
 
 _USUAL = ("resolvers", "tick", "first_paper", "strictness", "start")  # modules of scenarios.bench
 
-Out = Annotated[Path | None, typer.Option(
-    "--out", metavar="FOLDER",
-    help="Output folder, new or empty. Default: a new folder in runs/.")]
 Seconds = Annotated[float, typer.Option("--seconds", min=0.0, metavar="S",
                                         help="Time for all measurements together.")]
 
@@ -185,9 +183,8 @@ def stress(count: Annotated[int, typer.Option("--count", min=1, metavar="N",
                                               help="First seed.")] = 0,
            processes: Annotated[int | None, typer.Option(
                "--processes", min=1, metavar="N", help="Default: one for each core.")] = None,
-           out: Annotated[Path, typer.Option(
-               "--out", metavar="FOLDER", help="Where failing problems are kept.")
-               ] = Path("runs/stress")) -> int:
+           out: Annotated[Path, output("Where failing problems are kept.")
+                          ] = Path("runs/stress")) -> int:
     """Certify a resolver on generated problems.
 
     Exit code 1 if an answer fails.

@@ -17,6 +17,18 @@ import typer
 
 from scenarios.cli import completion
 from scenarios.cli.bench import bench
+from scenarios.cli.options import (
+    PORT,
+    AsJson,
+    Browser,
+    Changes,
+    Duration,
+    Out,
+    Port,
+    Scheduler,
+    Workers,
+    output,
+)
 from scenarios.cli.terminal import (
     certified,
     first_line,
@@ -34,24 +46,6 @@ if TYPE_CHECKING:
 app = typer.Typer(rich_markup_mode=None, pretty_exceptions_enable=False)
 app.add_typer(bench, name="bench")
 
-Changes = Annotated[list[str] | None, typer.Option(
-    "--set", metavar="KEY=VALUE",
-    help="Change a scenario value: dotted key and TOML value. May be repeated.")]
-Duration = Annotated[float | None, typer.Option(
-    "--duration", metavar="SECONDS", help="Duration of the run. Default: that of the scenario.")]
-Out = Annotated[Path | None, typer.Option(
-    "--out", metavar="FOLDER", help="Output folder, new or empty. Default: a new folder in runs/.")]
-AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
-Workers = Annotated[int | None, typer.Option(
-    "--workers", metavar="N", min=1,
-    help="Processes on this machine. Default: one per processor.")]
-Scheduler = Annotated[str | None, typer.Option(
-    "--scheduler", metavar="ADDRESS", help="Use the workers of this Dask scheduler instead.")]
-PORT = 8080
-Port = Annotated[int, typer.Option("--port", metavar="N", min=0, max=65535,
-                                   help="Port of the page on 127.0.0.1; 0 for any free port.")]
-Browser = Annotated[bool, typer.Option("--browser/--no-browser",
-                                       help="Open a browser, or only print the address.")]
 
 def main() -> None:
     """Run the command line and exit with its code."""
@@ -129,14 +123,16 @@ def run(scenario: Annotated[str, typer.Argument(
         live: Annotated[bool, typer.Option(
             "--live", help="Show the run in the browser and change it interactively; needs the "
                            "extra `view`.")] = False,
-        speed: Annotated[float, typer.Option(
+        speed: Annotated[float | None, typer.Option(
             "--speed", metavar="X", min=0.01, max=100.0,
-            help="With --live: real-time factor.")] = 1.0,
+            help="With --live: real-time factor. Default: 1.")] = None,
         port: Port = PORT, browser: Browser = True) -> int:
     """Run a scenario, measure it, and save the run."""
     if live and (certify or figures or as_json):
         raise typer.BadParameter("cannot be combined with --certify, --figures or --json",
                                  param_hint="--live")
+    if speed is not None and not live:
+        raise typer.BadParameter("needs --live", param_hint="--speed")
     chosen = _load(scenario, changes, duration)
     if resolver is not None:
         chosen = chosen.with_resolver(resolver)
@@ -147,7 +143,7 @@ def run(scenario: Annotated[str, typer.Argument(
     if live:
         from scenarios.cli.view import live_command
 
-        return live_command(chosen, folder, port, speed, browser)
+        return live_command(chosen, folder, port, speed or 1.0, browser)
     from scenarios.cli.progress import bar
     from scenarios.loop.simulation import simulate
     from scenarios.measure.run_folder import save
@@ -238,9 +234,8 @@ def compare(scenarios: Annotated[list[str], typer.Argument(
 @app.command()
 def sweep(file: Annotated[str, typer.Argument(help="Name of a sweep, or a sweep file.",
                                               autocompletion=completion.sweeps)],
-          out: Annotated[Path | None, typer.Option(
-              "--out", metavar="FOLDER",
-              help="Output folder, new or to be continued. Default: runs/sweep-NAME.")] = None,
+          out: Annotated[Path | None, output(
+              "Output folder, new or to be continued. Default: runs/sweep-NAME.")] = None,
           workers: Workers = None, scheduler: Scheduler = None, as_json: AsJson = False) -> int:
     """Run scenarios with sampled parameters.
 
@@ -255,9 +250,7 @@ def sweep(file: Annotated[str, typer.Argument(help="Name of a sweep, or a sweep 
 def reproduce(studies: Annotated[list[str] | None, typer.Argument(
                   metavar="[STUDY]...", help="letter, resolvers, blend, ladder, inertia or "
                   "rivals. Default: all.")] = None,
-              out: Annotated[Path, typer.Option(
-                  "--out", metavar="FOLDER", help="Where the runs are kept.")
-                  ] = Path("runs/reproduce"),
+              out: Annotated[Path, output("Where the runs are kept.")] = Path("runs/reproduce"),
               quick: Annotated[bool, typer.Option(
                   "--quick", help="A tenth of the starts; leave the documents as they are.")
                   ] = False,
@@ -292,8 +285,8 @@ def export(folder: Annotated[Path, typer.Argument(
            format: Annotated[str | None, typer.Option(
                "--format", metavar="FORMAT", help="csv, parquet or mcap. Default: by the suffix of "
                "--out, or csv.")] = None,
-           out: Annotated[Path | None, typer.Option(
-               "--out", metavar="FILE", help="A new file. Default: run.FORMAT in RUN.")] = None,
+           out: Annotated[Path | None, output(
+               "A new file. Default: run.FORMAT in RUN.", "FILE")] = None,
            as_json: AsJson = False) -> None:
     """Export a run as CSV, Parquet or MCAP.
 
@@ -310,9 +303,8 @@ def export(folder: Annotated[Path, typer.Argument(
 @app.command()
 def replay(folders: Annotated[list[Path], typer.Argument(
                metavar="RUN...", help="Run folders of `hierarchy run` or `compare`.")],
-           out: Annotated[Path | None, typer.Option(
-               "--out", metavar="FILE",
-               help="HTML file to write. Default: RUN/replay.html.")] = None,
+           out: Annotated[Path | None, output(
+               "HTML file to write. Default: RUN/replay.html.", "FILE")] = None,
            video: Annotated[Path | None, typer.Option(
                "--video", metavar="FILE", help="Write a video of one run with ffmpeg.")] = None,
            rate: Annotated[float, typer.Option(
@@ -332,9 +324,8 @@ def figures(folders: Annotated[list[Path], typer.Argument(
             style: Annotated[str, typer.Option(
                 "--style", metavar="STYLE",
                 help="screen: SVG and PNG. paper: PDF, one column of a journal wide.")] = "screen",
-            out: Annotated[Path | None, typer.Option(
-                "--out", metavar="FOLDER",
-                help="Output folder, new or empty. Default: the run's folder.")] = None,
+            out: Annotated[Path | None, output(
+                "Output folder, new or empty. Default: the run's folder.")] = None,
             as_json: AsJson = False) -> None:
     """Draw a run's figures again, for screen or paper.
 
@@ -402,9 +393,9 @@ def _load(name: str, changes: list[str] | None, duration: float | None) -> Scena
 
 
 def _split(specs: str) -> list[str]:
-    named = [spec.strip() for spec in specs.split(",") if spec.strip()]
-    if not named:
-        raise typer.BadParameter("no resolver given", param_hint="--resolvers")
+    named = [spec.strip() for spec in specs.split(",")]
+    if not all(named):
+        raise typer.BadParameter(f"an empty name in {specs!r}", param_hint="--resolvers")
     return named
 
 

@@ -1,0 +1,39 @@
+"""The options that several commands share."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+
+def _given(text: str) -> Path:
+    """Return the path, which an unset variable of a shell would leave empty."""
+    if not text.strip():
+        raise typer.BadParameter("the path is empty")
+    return Path(text)
+
+
+def output(help: str, metavar: str = "FOLDER") -> Any:
+    """Return the option `--out`."""
+    return typer.Option("--out", metavar=metavar, help=help, parser=_given)
+
+
+Changes = Annotated[list[str] | None, typer.Option(
+    "--set", metavar="KEY=VALUE",
+    help="Change a scenario value: dotted key and TOML value. May be repeated.")]
+Duration = Annotated[float | None, typer.Option(
+    "--duration", metavar="SECONDS", help="Duration of the run. Default: that of the scenario.")]
+Out = Annotated[Path | None, output("Output folder, new or empty. Default: a new folder in runs/.")]
+AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
+Workers = Annotated[int | None, typer.Option(
+    "--workers", metavar="N", min=1,
+    help="Processes on this machine. Default: one per processor.")]
+Scheduler = Annotated[str | None, typer.Option(
+    "--scheduler", metavar="ADDRESS", help="Use the workers of this Dask scheduler instead.")]
+PORT = 8080
+Port = Annotated[int, typer.Option("--port", metavar="N", min=0, max=65535,
+                                   help="Port of the page on 127.0.0.1; 0 for any free port.")]
+Browser = Annotated[bool, typer.Option("--browser/--no-browser",
+                                       help="Open a browser, or only print the address.")]
