@@ -8,11 +8,11 @@ from typing import Annotated, Any
 import typer
 
 
-def _given(text: str) -> Path:
-    """Return the path, which an unset variable of a shell would leave empty."""
-    if not text.strip():
+def _given(path: str | Path) -> Path:
+    """Return a path or a default; an unset variable of a shell would leave it empty."""
+    if not str(path).strip():
         raise typer.BadParameter("the path is empty")
-    return Path(text)
+    return Path(path)
 
 
 def output(help: str, metavar: str = "FOLDER") -> Any:
