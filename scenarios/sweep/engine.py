@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import os
 import signal
+import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
@@ -30,6 +31,7 @@ except ImportError as error:
 LARGEST_BATCH = 16     # runs per worker that are lost if everything is killed
 _BATCHES_EACH = 4      # per worker at least, so that workers finish at about the same time
 _QUEUED_EACH = 3       # batches per worker that are submitted at a time
+_PATIENCE = 90.0       # [s] without any worker: Dask gives one up that is slow to start again
 _DEATHS = 1            # workers a batch may kill; after one more its jobs run one at a time
 _PATIENCE = 30.0       # [s] for a scheduler to answer and to have a worker
 
@@ -95,7 +97,7 @@ def carry_out(jobs: Sequence[Job], client: Client, keep: Callable[[list[Outcome]
 
     Raises
     ------
-    EngineError : the scheduler is lost, or a worker has another version.
+    EngineError : the scheduler is lost, a worker has another version, or none has come back.
     """
     threads = max(1, _threads(client))
     size = batch or max(1, min(LARGEST_BATCH, len(jobs) // (_BATCHES_EACH * threads)))
@@ -131,10 +133,26 @@ def _results(client: Client, work: Work, batches: Sequence[Sequence[Job]], queue
 
     fill()
     while running:
-        future = next(done)
+        future = _next(done, client)
         yield running.pop(future.key), _outcomes(future)
         future.release()
         fill()
+
+
+def _next(done: as_completed, client: Client) -> Future:
+    """Return the next future that is done; EngineError when no worker has come back."""
+    seen = looked = time.monotonic()
+    while not done.has_ready():
+        time.sleep(0.01)
+        now = time.monotonic()
+        if now - looked > 2.0:
+            looked = now
+            if client.status != "running" or client.nthreads():
+                seen = now
+            elif now - seen > _PATIENCE:
+                raise EngineError(f"no worker has come back for {_PATIENCE:.0f} s; the same command "
+                                  "goes on from what is finished")
+    return next(done)
 
 
 def _outcomes(future: Future) -> list[Outcome] | None:
