@@ -150,8 +150,8 @@ def _next(done: as_completed, client: Client) -> Future:
             if client.status != "running" or client.nthreads():
                 seen = now
             elif now - seen > _PATIENCE:
-                raise EngineError(f"no worker has come back for {_PATIENCE:.0f} s; the same command "
-                                  "goes on from what is finished")
+                raise EngineError(f"no worker has come back for {_PATIENCE:.0f} s; the same "
+                                  "command goes on from what is finished")
     return next(done)
 
 
