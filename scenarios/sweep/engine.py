@@ -31,9 +31,9 @@ except ImportError as error:
 LARGEST_BATCH = 16     # runs per worker that are lost if everything is killed
 _BATCHES_EACH = 4      # per worker at least, so that workers finish at about the same time
 _QUEUED_EACH = 3       # batches per worker that are submitted at a time
-_PATIENCE = 90.0       # [s] without any worker: Dask gives one up that is slow to start again
 _DEATHS = 1            # workers a batch may kill; after one more its jobs run one at a time
 _PATIENCE = 30.0       # [s] for a scheduler to answer and to have a worker
+_RESTART = 600.0       # [s] for a worker that died to be started again, on a machine under load
 
 Work = Callable[[Sequence[Job], str], list[Outcome]]
 
@@ -72,6 +72,8 @@ def connected(workers: int | None = None, scheduler: str | None = None) -> Itera
         return
     settings = {"distributed.scheduler.allowed-failures": _DEATHS,
                 "distributed.scheduler.worker-saturation": 1.0,
+                # By default Dask gives up a worker that is not back after 15 s, and waits for ever.
+                "distributed.deploy.lost-worker-timeout": f"{_RESTART:.0f} s",
                 "distributed.worker.profile.enabled": False}  # its samples would fill the memory
     with dask.config.set(settings), LocalCluster(
             n_workers=workers or processors(), threads_per_worker=1, processes=True,
@@ -149,8 +151,8 @@ def _next(done: as_completed, client: Client) -> Future:
             looked = now
             if client.status != "running" or client.nthreads():
                 seen = now
-            elif now - seen > _PATIENCE:
-                raise EngineError(f"no worker has come back for {_PATIENCE:.0f} s; the same "
+            elif now - seen > _RESTART:
+                raise EngineError(f"no worker has come back for {_RESTART:.0f} s; the same "
                                   "command goes on from what is finished")
     return next(done)
 

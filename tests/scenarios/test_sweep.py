@@ -246,7 +246,6 @@ def test_a_worker_that_is_killed_loses_nothing(tmp_path):
     assert store.table()["error"].null_count == len(planned.runs)
 
 
-@pytest.mark.skip(reason="waits without end on a slow machine: the worker is not started again")
 def test_a_run_that_kills_its_workers_is_a_row_and_those_beside_it_are_made(tmp_path):
     from dataclasses import replace
 
