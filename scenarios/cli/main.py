@@ -248,8 +248,8 @@ def sweep(file: Annotated[str, typer.Argument(help="Name of a sweep, or a sweep 
 
 @app.command()
 def reproduce(studies: Annotated[list[str] | None, typer.Argument(
-                  metavar="[STUDY]...", help="letter, resolvers, blend, ladder, inertia or "
-                  "rivals. Default: all.")] = None,
+                  metavar="[STUDY]...", help="letter, resolvers, blend, ladder, inertia, "
+                  "rivals, singular or human. Default: all.")] = None,
               out: Annotated[Path, output("Where the runs are kept.")] = Path("runs/reproduce"),
               quick: Annotated[bool, typer.Option(
                   "--quick", help="A tenth of the starts; leave the documents as they are.")

@@ -12,6 +12,7 @@ from scenarios.reproduce.rows import Rows
 
 _WIDTH = 100     # columns of a page
 _EPS_1 = 0.05    # [m] eps_1 of `ellipse`
+_HUMAN = 0.3     # [m] what both scenarios of the experiment are to keep
 _ON_CONE = 0.01  # [deg] beyond the cone that counts as on it
 _WITHIN = 1e-6   # [rad] beyond a joint limit that counts as within it
 
@@ -66,14 +67,60 @@ BLEND_CLAIMS: tuple[Claim, ...] = (
     Compares("A blend of 0.02 s lowers the largest velocity step at velocity level", "blend",
              "velocity_step_max", "velocity", "velocity-blend-0.02", "lower"))
 
-CLAIMS = (*LETTER_CLAIMS, *JACOBIAN_CLAIMS, *RESOLVER_CLAIMS, *BLEND_CLAIMS)
+INERTIA_CLAIMS: tuple[Claim, ...] = (
+    Ends("D = M(q), the letter's example of (15), can be run", "inertia", "inertia-1"),
+    Compares("D = 5 M(q) moves faster than D = 5 I", "inertia", "speed_max", "identity",
+             "inertia-5", "higher"))
+
+RIVAL_CLAIMS: tuple[Claim, ...] = (
+    Compares("Algorithm 1 follows the path more accurately than avoidance in the null space ([5])",
+             "rivals", "position_error_median_settled", "nullspace", "algorithm-1", "lower"),
+    Compares("Algorithm 1 follows the path more accurately than danger bounds ([10])", "rivals",
+             "position_error_median_settled", "danger-bounds", "algorithm-1", "lower"),
+    Compares("Algorithm 1 keeps the body farther away than avoidance in the null space ([5])",
+             "rivals", "body_distance_min", "nullspace", "algorithm-1", "higher"),
+    Compares("Algorithm 1 keeps the body farther away than danger bounds ([10])", "rivals",
+             "body_distance_min", "danger-bounds", "algorithm-1", "higher"))
+
+SINGULAR_CLAIMS: tuple[Claim, ...] = (
+    Compares("Limits without damping freeze for fewer ticks than damped pivots", "singular",
+             "ticks_frozen", "pivots", "limits", "lower"),
+    Compares("Limits without damping move faster than damped pivots", "singular", "speed_max",
+             "pivots", "limits", "higher"),
+    Compares("Limits without damping have a smaller error after the return", "singular",
+             "error_returned_rms", "pivots", "limits", "lower"),
+    Compares("The same at acceleration level", "singular", "error_returned_rms",
+             "acceleration-pivots", "acceleration-limits", "lower"))
+
+HUMAN_CLAIMS: tuple[Claim, ...] = (
+    Keeps("`human` keeps the body 0.3 m away", "human", "body_distance_min", "human",
+          least=_HUMAN),
+    Keeps("`human-hqp` keeps the body 0.3 m away", "human", "body_distance_min", "human-hqp",
+          least=_HUMAN),
+    Compares("`human-hqp` comes nearer with the end effector than `human`", "human",
+             "ee_distance_min", "human", "human-hqp", "lower"),
+    Compares("`human-hqp` leaves the cone by less", "human", "cone_violation_max", "human",
+             "human-hqp", "lower"),
+    Compares("`human-hqp` moves more slowly", "human", "speed_max", "human", "human-hqp", "lower"),
+    Compares("The mean direction (25)-(26) changes the stack less often than the nearest obstacle",
+             "human", "stack_changes", "human-nearest", "human", "lower"))
+
+CLAIMS = (*LETTER_CLAIMS, *JACOBIAN_CLAIMS, *RESOLVER_CLAIMS, *BLEND_CLAIMS, *INERTIA_CLAIMS,
+          *RIVAL_CLAIMS, *SINGULAR_CLAIMS, *HUMAN_CLAIMS)
 
 _LIMITS = ("joint_limit_excess", "speed_max", "acceleration_max", "body_distance_min",
-           "cone_violation_max", "position_error_rms_settled", "stack_changes")
+           "cone_violation_max", "position_error_rms_settled", "stack_changes",
+           "active_set_changes")
 _LADDER = ("speed_max", "joint_limit_excess", "body_distance_min", "ee_distance_min",
-           "cone_violation_max", "cone_violation_share", "stack_changes")
+           "cone_violation_max", "cone_violation_share", "stack_changes",
+           "active_set_changes", "position_error_median_settled")
 _RIVALS = ("position_error_median_settled", "body_distance_min", "ee_distance_min",
            "cone_violation_max", "cone_violation_share", "speed_max", "velocity_step_max")
+_SINGULAR = ("ticks_frozen", "speed_max", "speed_limit_excess", "acceleration_max", "jerk_max",
+             "joint_limit_excess", "error_returned_rms", "error_returned_max")
+_HUMAN_RUNS = ("true_position_error_rms", "true_position_error_max", "body_distance_min",
+               "ee_distance_min", "cone_violation_max", "speed_max", "command_step_max",
+               "velocity_step_max", "stack_changes", "active_set_changes")
 _BLEND = ("velocity_step_max", "acceleration_step_max", "body_distance_min")
 
 
@@ -147,4 +194,10 @@ BLOCKS: dict[str, Block] = {
     "ladder": partial(table, study="ladder", metrics=_LADDER),
     "inertia": partial(table, study="inertia", metrics=_LIMITS),
     "rivals": partial(table, study="rivals", metrics=_RIVALS),
+    "inertia-claims": partial(claims, listed=INERTIA_CLAIMS),
+    "rival-claims": partial(claims, listed=RIVAL_CLAIMS),
+    "singular-claims": partial(claims, listed=SINGULAR_CLAIMS),
+    "singular": partial(table, study="singular", metrics=_SINGULAR),
+    "human-claims": partial(claims, listed=HUMAN_CLAIMS),
+    "human": partial(table, study="human", metrics=_HUMAN_RUNS),
     "findings": findings}

@@ -87,4 +87,21 @@ RIVALS = Study("rivals", "Other ways to avoid obstacles", (
     Column("set-based-velocity", "ellipse-set-based", OWN),
     Column("smooth-velocity", "ellipse-smooth", OWN), Column("barrier", "ellipse-hqp", OWN)))
 
-STUDIES = (LETTER, RESOLVERS, BLEND, LADDER, INERTIA, RIVALS)
+_DAMPINGS = {
+    "pivots": "tpm:form=published", "level": "tpm:form=staircase",
+    "nakamura": "recursive:method=nakamura:threshold=0.05",
+    "chiaverini": "recursive:method=chiaverini",
+    "selective": "recursive:method=selective:largest=2.0"}
+
+SINGULAR = Study("singular", "Through singularities and out of reach", (
+    *_variants("singular", _DAMPINGS), Column("limits", "singular-limits", OWN),
+    Column("acceleration-pivots", "singular-acceleration", "tpm:form=published"),
+    Column("acceleration-level", "singular-acceleration", "tpm:form=staircase"),
+    Column("acceleration-limits", "singular-acceleration-limits", OWN)))
+
+HUMAN = Study("human", "A hand, a depth camera, an arm under position control", (
+    Column("human", "human", OWN),
+    Column("human-nearest", "human", OWN, {"avoidance.direction": "nearest"}),
+    Column("human-hqp", "human-hqp", OWN)))
+
+STUDIES = (LETTER, RESOLVERS, BLEND, LADDER, INERTIA, RIVALS, SINGULAR, HUMAN)
