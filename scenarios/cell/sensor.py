@@ -20,7 +20,7 @@ from scenarios.cell.sensors.errors import DepthErrors
 from scenarios.cell.sensors.frames import RecordedFrames
 from scenarios.config import Scenario, ScenarioError
 from scenarios.config.avoidance import AvoidanceSection, SeparationSection
-from scenarios.config.sensor import SensorSection
+from scenarios.config.sensor import CameraSection, ExactSection, FramesSection
 
 
 class _Asked(NamedTuple):
@@ -63,7 +63,7 @@ def _mean_within(section: AvoidanceSection) -> tuple[float, float]:
 
 def _seen_by(scenario: Scenario, robot: Robot, exact: ExactDistances, asked: _Asked) -> Sensor:
     """Return the sensor of the scenario's kind, given the exact one."""
-    if scenario.sensor.kind == "exact":
+    if isinstance(scenario.sensor, ExactSection):
         return exact
     danger = scenario.limits.danger_reach if scenario.limits else None
     try:
@@ -73,16 +73,16 @@ def _seen_by(scenario: Scenario, robot: Robot, exact: ExactDistances, asked: _As
         raise ScenarioError(f"sensor: {error}") from error
 
 
-def _depth_sensor(section: SensorSection, robot: Robot, exact: ExactDistances,
+def _depth_sensor(section: CameraSection | FramesSection, robot: Robot, exact: ExactDistances,
                   asked: _Asked) -> DepthSensor:
     """Make the depth sensor of a section for the points that `exact` measures."""
     capsules = _capsules(robot, section.foot)
     source: Source
     checked: ExactDistances | None = None
-    if section.kind == "camera":
+    if isinstance(section, CameraSection):
         source, checked = _camera(section, exact, capsules), exact
     else:
-        source = RecordedFrames(section.folder or "", robot, section.latency)
+        source = RecordedFrames(section.folder, robot, section.latency)
     space = DepthSpace(source.pinhole, exact.points, capsules, section.region or asked.region,
                        margin=section.margin, thin=inf if section.thin is None else section.thin,
                        support=section.support, band=section.band, mean_within=asked.mean_within,
@@ -90,7 +90,7 @@ def _depth_sensor(section: SensorSection, robot: Robot, exact: ExactDistances,
     return DepthSensor(source, space, section.stale_after, section.least_readings, checked)
 
 
-def _camera(section: SensorSection, exact: ExactDistances,
+def _camera(section: CameraSection, exact: ExactDistances,
                 capsules: tuple[Capsule, ...]) -> DepthCamera:
     """Make the simulated camera of a section."""
     rotation = (looking_at(section.position, section.look_at) if section.rotation is None

@@ -13,7 +13,7 @@ from hierarchy import Robot
 from hierarchy.robots import TABLES
 from hierarchy.robots.names import file_of, in_package
 from scenarios.config import ScenarioError, shipped
-from scenarios.config.changes import changed
+from scenarios.config.changes import change, parse_changes
 from scenarios.config.robot import RobotSection
 
 _FRAMES = 12   # names listed at most
@@ -30,7 +30,9 @@ def look_at(model: str, changes: Sequence[str] = ()) -> tuple[RobotSection, Robo
     """Make the robot of a model with changes "robot.key=value"; raises HierarchyError."""
     from scenarios.cell.robot import make_robot
 
-    data = changed({"robot": {"model": model}}, changes)
+    data: dict[str, Any] = {"robot": {"model": model}}
+    for key, value in parse_changes(changes, what="--set").items():
+        change(data, key, value)
     if unknown := [key for key in data if key != "robot"]:
         raise ScenarioError(f"--set {unknown[0]}: only keys of [robot] can be set for a robot")
     try:

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
 
 from scenarios.config.sections import (
+    Count,
     NotNegative,
     PathSection,
     Positive,
     Section,
     Vector3,
     WaypointsSection,
+    kind_or,
 )
 from scenarios.config.waypoints import moved
 
@@ -30,6 +32,7 @@ class RepulsionSection(Section):
 class ObstacleSection(Section):
     """An obstacle: shape, centre [m], sizes [m], rows of its rotation, and a path if it moves."""
 
+    tag: ClassVar[str] = "shape"
     shape: Literal["point", "sphere", "capsule", "box"] = "point"
     centre: Vector3 | None = None
     radius: Positive | None = None
@@ -50,12 +53,12 @@ class ObstacleSection(Section):
         return self
 
 
-def _point_as_table(obstacle: Any) -> Any:
-    """Accept [x, y, z] as a point obstacle."""
+def as_table(obstacle: Any) -> Any:
+    """Return the table of an obstacle; [x, y, z] is a point."""
     return {"centre": obstacle} if isinstance(obstacle, list | tuple) else obstacle
 
 
-Obstacles = tuple[Annotated[ObstacleSection, BeforeValidator(_point_as_table)], ...]
+Obstacles = tuple[Annotated[ObstacleSection, BeforeValidator(as_table)], ...]
 
 
 class VariationSection(Section):
@@ -66,9 +69,9 @@ class VariationSection(Section):
     `timing` of half the shorter adjacent interval. Obstacles without waypoints do not change.
     """
 
-    seed: Annotated[int, Field(ge=0)]
+    seed: Count
     spread: NotNegative = 0.05
-    timing: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.1
+    timing: Annotated[float, Field(strict=True, ge=0.0, lt=1.0)] = 0.1
 
 
 def _varied(obstacle: ObstacleSection, variation: VariationSection,
@@ -199,11 +202,6 @@ class SeparationSection(_Avoiding):
         return {"body": self.distance, "ee": self.distance}
 
 
-def _avoidance_kind(section: Any) -> str:
-    return (str(section.get("kind", "repulsion")) if isinstance(section, dict)
-            else str(getattr(section, "kind", "repulsion")))
-
-
 AvoidanceKind = Annotated[
     Annotated[AvoidanceSection, Tag("repulsion")] | Annotated[SeparationSection, Tag("separation")],
-    Discriminator(_avoidance_kind)]
+    Discriminator(kind_or("repulsion"))]

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-from scenarios.config.sections import NotNegative, Positive, Section
+from scenarios.config.sections import Count, Flag, NotNegative, Positive, Section
 
 AnswerPolicy = Literal["brake", "hold", "stop", "use"]
 BlindPolicy = Literal["brake", "hold", "stop"]
@@ -36,7 +36,7 @@ class PolicySection(Section):
     stale: BlindPolicy = "brake"
     overrun: AnswerPolicy = "brake"
     inside: AnswerPolicy = "brake"
-    patience: Annotated[int, Field(ge=0)] = 10
+    patience: Count = 10
     stale_after: NotNegative = 0.02
     deadline: Positive | None = None
 
@@ -66,8 +66,8 @@ class ControlSection(Section):
 
     level: Literal["velocity", "acceleration"] = "acceleration"
     stack: StackKind = "switched"
-    strictness: bool = False
-    period: Annotated[float, Field(gt=0.0, le=1.0)] = 0.001
+    strictness: Flag = False
+    period: Annotated[float, Field(strict=True, gt=0.0, le=1.0)] = 0.001
     duration: Positive
     jacobian_derivative: Literal["exact", "difference"] = "exact"
     resolver: str

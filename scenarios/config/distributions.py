@@ -9,6 +9,7 @@ from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
 
 from scenarios.config.sections import Finite, NotNegative, Section
 
+Whole = Annotated[int, Field(strict=True)]
 Value = bool | int | float | str | list[Any]
 
 
@@ -87,7 +88,7 @@ class Around(Section):
 class Integers(Section):
     """An integer from the first to the last, both included; for seeds."""
 
-    integers: tuple[int, int]
+    integers: tuple[Whole, Whole]
 
     @model_validator(mode="after")
     def _in_order(self) -> Self:

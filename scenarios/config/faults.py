@@ -25,8 +25,8 @@ class FaultSection(Section):
                   "obstacle", "no_frames", "dark_frames"]
     at: NotNegative
     duration: Positive
-    joint: Annotated[int, Field(ge=1)] | None = None
-    point: Annotated[int, Field(ge=1)] | None = None
+    joint: Annotated[int, Field(strict=True, ge=1)] | None = None
+    point: Annotated[int, Field(strict=True, ge=1)] | None = None
     status: Literal["iteration_limit", "numerical_failure", "backend_failure",
                     "inaccurate"] | None = None
     takes: Positive | None = None

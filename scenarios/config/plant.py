@@ -4,9 +4,16 @@ from __future__ import annotations
 
 from typing import Annotated, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import Discriminator, Field, Tag, model_validator
 
-from scenarios.config.sections import NotNegative, Positive, Section
+from scenarios.config.sections import (
+    Count,
+    Flag,
+    NotNegative,
+    Positive,
+    Section,
+    kind_or,
+)
 
 
 class MeasurementSection(Section):
@@ -22,7 +29,7 @@ class MeasurementSection(Section):
     velocity_noise: NotNegative = 0.0
     quantisation: NotNegative = 0.0
     delay: NotNegative = 0.0
-    seed: Annotated[int, Field(ge=0)] = 0
+    seed: Count = 0
     velocity: Literal["measured", "differenced"] = "measured"
     filter_time: NotNegative = 0.0
 
@@ -51,10 +58,10 @@ class ServoSection(Section):
     that a blocked arm does not rush to catch up.
     """
 
-    rate: Annotated[float, Field(ge=200.0, le=10000.0)] = 1000.0
+    rate: Annotated[float, Field(strict=True, ge=200.0, le=10000.0)] = 1000.0
     bandwidth: Positive | tuple[Positive, ...] = 80.0
     gravity: NotNegative = 1.0
-    feedforward: bool = True
+    feedforward: Flag = True
     lead: Positive = 0.1
 
 
@@ -70,17 +77,32 @@ class JointsSection(Section):
     armature: NotNegative | tuple[NotNegative, ...] = 0.3
 
 
-class PlantSection(Section):
-    """The simulated robot: "kinematic" follows commands exactly, "mujoco" simulates physics.
+class _Plant(Section):
+    """What every plant has.
 
-    `servo` and `joints` belong to "mujoco", which integrates the commands to a joint position
-    reference. With feedback = "commanded" the controller receives that reference instead of a
-    measurement: it sees neither noise nor the real joints, as when commands through FRI are
-    integrated blindly. Both are stable with the letter's gains.
+    With feedback = "commanded" the controller receives its own commands, integrated to a joint
+    position reference, instead of a measurement: it sees neither noise nor the real joints, as when
+    commands through FRI are integrated blindly. Both are stable with the letter's gains.
     """
 
-    kind: Literal["kinematic", "mujoco"] = "kinematic"
     feedback: Literal["measured", "commanded"] = "measured"
     measurement: MeasurementSection = MeasurementSection()
+
+
+class KinematicSection(_Plant):
+    """A robot that follows its commands exactly."""
+
+    kind: Literal["kinematic"] = "kinematic"
+
+
+class PhysicsSection(_Plant):
+    """A robot in a physics simulation, under position servos (extra `sim`)."""
+
+    kind: Literal["mujoco"]
     servo: ServoSection = ServoSection()
     joints: JointsSection = JointsSection()
+
+
+PlantKind = Annotated[
+    Annotated[KinematicSection, Tag("kinematic")] | Annotated[PhysicsSection, Tag("mujoco")],
+    Discriminator(kind_or("kinematic"))]

@@ -8,7 +8,8 @@ from typing import Any
 
 from hierarchy.errors import UnknownNameError
 from hierarchy.robots.names import in_package
-from scenarios.config.changes import change, parse_changes
+from scenarios.config.avoidance import as_table
+from scenarios.config.changes import change_all, laid_over, parse_changes
 from scenarios.config.errors import ScenarioError
 from scenarios.config.groups import load_group, shipped_groups
 from scenarios.config.scenario import Scenario
@@ -16,6 +17,7 @@ from scenarios.config.validation import validated
 from scenarios.files import read_toml
 
 LIBRARY = Path(__file__).parents[1] / "library"
+_DEEPEST = 50  # files that may extend each other
 
 
 def shipped() -> tuple[str, ...]:
@@ -27,9 +29,10 @@ def load(name_or_path: str | Path, changes: Sequence[str] | Mapping[str, Any] = 
     """Read a shipped scenario by name, or a scenario file by path, and apply changes to it.
 
     A file with `extends = "ellipse"` (a shipped name or a relative path) contains only the
-    differences; `replaces = ["avoidance"]` names sections of which nothing is taken over, and a
-    `[variation]` replaces the other one. `changes` are "dotted.key=value" texts with TOML values,
-    or a mapping of dotted keys. Raises ScenarioError, naming the file and the key, and
+    differences. Nothing is taken over of a section of another kind, nor of those named in
+    `replaces = ["avoidance"]`, and a `[variation]` replaces the other one. `changes` are
+    "dotted.key=value" texts with TOML values, or a mapping of dotted keys, see
+    scenarios.config.changes. Raises ScenarioError, naming the file and the key, and
     UnknownNameError for an unknown name.
     """
     path = Path(name_or_path)
@@ -39,8 +42,8 @@ def load(name_or_path: str | Path, changes: Sequence[str] | Mapping[str, Any] = 
     data = _read_extended(path)
     if not isinstance(changes, Mapping):
         changes = parse_changes(changes, what="--set")
-    for key, value in changes.items():
-        change(data, key, value)
+    _list_points_as_tables(data)
+    change_all(data, changes, Scenario.tag_at)
     robot = data.get("robot")
     if isinstance(robot, dict) and not in_package(model := str(robot.get("model", ""))) and (
             model.endswith((".urdf", ".xml", ".mjcf"))):
@@ -75,12 +78,14 @@ def _read_extended(path: Path, below: tuple[Path, ...] = ()) -> dict[str, Any]:
     source = LIBRARY / f"{base}.toml" if base in shipped() else path.parent / base
     if source.resolve() in (*below, path.resolve()):
         raise ScenarioError(f"{path}: extends: {base!r} extends this file in turn")
+    if len(below) >= _DEEPEST:
+        raise ScenarioError(f"{path}: extends: more than {_DEEPEST} files, one over the other")
     if source.suffix != ".toml":
         raise ScenarioError(f"{path}: extends: {UnknownNameError('scenario', base, shipped())}")
     found = _read_extended(source, (*below, path.resolve()))
     if "variation" in data:  # its keys belong together
         found.pop("variation", None)
-    return _laid_over(_without(found, replaced or [], path), data)
+    return laid_over(_without(found, replaced or [], path), data, Scenario.tag_at)
 
 
 def _without(below: dict[str, Any], sections: Any, path: Path) -> dict[str, Any]:
@@ -94,9 +99,8 @@ def _without(below: dict[str, Any], sections: Any, path: Path) -> dict[str, Any]
     return {key: value for key, value in below.items() if key not in sections}
 
 
-def _laid_over(below: dict[str, Any], above: dict[str, Any]) -> dict[str, Any]:
-    merged = dict(below)
-    for key, value in above.items():
-        both = isinstance(value, dict) and isinstance(merged.get(key), dict)
-        merged[key] = _laid_over(merged[key], value) if both else value
-    return merged
+def _list_points_as_tables(data: dict[str, Any]) -> None:
+    """Write obstacles given as [x, y, z] as tables, so that changes find their keys."""
+    section = data.get("avoidance")
+    if isinstance(section, dict) and isinstance(section.get("obstacles"), list):
+        section["obstacles"] = [as_table(obstacle) for obstacle in section["obstacles"]]

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator, Mapping
-from typing import Any
+from collections.abc import Mapping
 
 import numpy as np
 from pydantic import ValidationError
 
 from hierarchy.errors import HierarchyError
+from scenarios.config.changes import matching, place
 from scenarios.config.distributions import Distribution, Value
 from scenarios.config.errors import ScenarioError
 from scenarios.config.scenario import Scenario
@@ -31,8 +31,8 @@ def drawn(scenario: Scenario, parameters: Mapping[str, Distribution], seed: int,
     values = {}
     for pattern, distribution in parameters.items():
         try:
-            for key in _matching(own, pattern):
-                table, last = _place(own, key)
+            for key in matching(own, pattern):
+                table, last = place(own, key)
                 values[key] = distribution.draw(_chance(seed, index, key), table[last])
         except ValueError as error:
             raise ScenarioError(f"{what}.{pattern}: scenario {scenario.name!r}: {error}"
@@ -47,7 +47,7 @@ def changed(scenario: Scenario, values: Mapping[str, Value], what: str) -> Scena
     """
     data = scenario.model_dump(mode="json")
     for key, value in values.items():
-        table, last = _place(data, key)
+        table, last = place(data, key)
         table[last] = value
     try:
         return Scenario.model_validate(data)
@@ -64,42 +64,6 @@ def _chance(seed: int, index: int, key: str) -> np.random.Generator:
     """Return a random generator for one parameter of one sample, the same on every machine."""
     words = np.frombuffer(hashlib.sha256(key.encode()).digest()[:16], dtype="<u4").tolist()
     return np.random.Generator(np.random.PCG64(np.random.SeedSequence([seed, index, *words])))
-
-
-def _matching(data: Any, pattern: str) -> Iterator[str]:
-    """Yield the dotted keys that a pattern stands for: itself, if it has no `*`."""
-    before, star, after = pattern.partition("*")
-    if not star:
-        yield pattern
-        return
-    above = before.rstrip(".")
-    table, last = _place(data, above)
-    if not isinstance(table[last], list):
-        raise ValueError(f"[{above}] is not a list")
-    for i in range(len(table[last])):
-        yield from _matching(data, f"{before}{i}{after}")
-
-
-def _place(data: Any, dotted: str) -> tuple[Any, Any]:
-    """Return the table or list that contains a dotted key, and the key or index in it."""
-    *path, last = dotted.split(".")
-    for i, key in enumerate(path):
-        data = data[_within(data, key, ".".join(path[:i]))]
-    return data, _within(data, last, ".".join(path))
-
-
-def _within(data: Any, key: str, above: str) -> Any:
-    """Return the key of a table or the index of a list; raises ValueError if it has none."""
-    where = f"[{above}]" if above else "the file"
-    if isinstance(data, list):
-        if not (key.isdigit() and int(key) < len(data)):
-            raise ValueError(f"{where} has {len(data)} entries, numbered from 0, and no {key!r}")
-        return int(key)
-    if not isinstance(data, dict):
-        raise ValueError(f"{where} is missing" if data is None else f"{where} is not a table")
-    if key not in data and above != "control.options":
-        raise ValueError(f"{where} has no key {key!r}; it has {', '.join(data)}")
-    return key
 
 
 def _said(values: Mapping[str, Value]) -> str:

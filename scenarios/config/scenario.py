@@ -5,21 +5,21 @@ from __future__ import annotations
 import dataclasses
 import tomllib
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Annotated, Any, Self
 
 import tomli_w
 from pydantic import Field, model_validator
 
 from scenarios.config.avoidance import AvoidanceKind
-from scenarios.config.changes import change, parse_changes, without_none
+from scenarios.config.changes import Tag, change_all, parse_changes, without_none
 from scenarios.config.control import ControlSection
 from scenarios.config.distributions import Parameters
 from scenarios.config.faults import FaultSection
-from scenarios.config.plant import PlantSection
+from scenarios.config.plant import KinematicSection, PlantKind
 from scenarios.config.robot import RobotSection, StartSection
 from scenarios.config.sections import Section
-from scenarios.config.sensor import SensorSection
+from scenarios.config.sensor import ExactSection, SensorKind
 from scenarios.config.stacks import RIVALS, unfit
 from scenarios.config.tasks import (
     DampingSection,
@@ -30,7 +30,7 @@ from scenarios.config.tasks import (
     PositionSection,
     PostureSection,
 )
-from scenarios.config.validation import validated
+from scenarios.config.validation import tag_at, validated
 
 if TYPE_CHECKING:
     from solvers import Resolver
@@ -55,8 +55,8 @@ class Scenario(Section):
     robot: RobotSection
     start: StartSection = StartSection()
     control: ControlSection
-    plant: PlantSection = PlantSection()
-    sensor: SensorSection = SensorSection()
+    plant: PlantKind = KinematicSection()
+    sensor: SensorKind = ExactSection()
     position: PositionSection | None = None
     pointing: PointingSection | None = None
     avoidance: AvoidanceKind | None = None
@@ -181,10 +181,14 @@ class Scenario(Section):
 
     def with_changes(self, changes: Mapping[str, Any]) -> Scenario:
         """Return this scenario with other values at dotted keys; raises ScenarioError."""
-        data = self.model_dump()
-        for key, value in changes.items():
-            change(data, key, value)
+        data = self.model_dump(mode="json")
+        change_all(data, changes, self.tag_at)
         return validated(Scenario, data, f"scenario {self.name!r}")
+
+    @classmethod
+    def tag_at(cls, path: Sequence[str]) -> Tag | None:
+        """Return which key says the kind of the section at a path, None if there is one kind."""
+        return tag_at(cls, path)
 
     @classmethod
     def from_toml(cls, text: str) -> Self:

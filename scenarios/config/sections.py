@@ -2,23 +2,42 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from itertools import pairwise
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-Finite = Annotated[float, Field(allow_inf_nan=False)]
-Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
-NotNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
+# Strict: true is not 1.0, and "5" is not 5. A whole number may be given for a float.
+Finite = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+Positive = Annotated[float, Field(strict=True, gt=0.0, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(strict=True, ge=0.0, allow_inf_nan=False)]
+Share = Annotated[float, Field(strict=True, ge=0.0, le=1.0)]
+Count = Annotated[int, Field(strict=True, ge=0)]
+Flag = Annotated[bool, Field(strict=True)]
 Vector3 = tuple[Finite, Finite, Finite]
 Rows3 = tuple[Vector3, Vector3, Vector3]
 
 
 class Section(BaseModel):
-    """A table of a scenario file: unknown keys are rejected, and it is immutable."""
+    """A table of a scenario file: unknown keys are rejected, and it is immutable.
 
+    `tag` is the key that says its kind, where there are several.
+    """
+
+    tag: ClassVar[str] = "kind"
     model_config = ConfigDict(frozen=True, extra="forbid", strict=False,
                               serialize_by_alias=True)
+
+
+def kind_or(default: str) -> Callable[[Any], str]:
+    """Return a function that reads the kind of a table or section, `default` if it has none."""
+    def kind(section: Any) -> str:
+        found = (section.get("kind", default) if isinstance(section, dict)
+                 else getattr(section, "kind", default))
+        return str(found)
+
+    return kind
 
 
 class JitterSection(Section):
@@ -29,7 +48,7 @@ class JitterSection(Section):
 
     amplitude: NotNegative
     rate: Positive
-    seed: Annotated[int, Field(ge=0)] = 0
+    seed: Count = 0
 
 
 class _AnyPath(Section):

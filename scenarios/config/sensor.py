@@ -2,52 +2,70 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, ClassVar, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Discriminator, Field, Tag
 
-from scenarios.config.sections import Finite, NotNegative, Positive, Section, Vector3
+from scenarios.config.sections import (
+    Count,
+    Finite,
+    Flag,
+    NotNegative,
+    Positive,
+    Section,
+    Share,
+    Vector3,
+    kind_or,
+)
 
-Share = Annotated[float, Field(ge=0.0, le=1.0)]
+Pixels = Annotated[int, Field(strict=True, ge=1, le=8192)]
+_FOOT = 0.31  # [m] height of the column that a robot without floor stands on
 
 
-class SensorSection(Section):
-    """The source of distances; settings that the kind does not use have no effect.
+class ExactSection(Section):
+    """Distances of the known geometry, without errors."""
 
-    "exact": known geometry. "camera": a simulated depth camera that sees obstacles and robot.
-    "frames": depth images from a `folder` or a shipped set, with their camera and times; see
-    scenarios.cell.sensors.frames.
+    foot: ClassVar[float] = _FOOT
+    kind: Literal["exact"] = "exact"
 
-    Both image sources (scenarios.cell.sensors.depth_space): a frame is available `latency` [s]
-    after it was taken. Without a new frame for more than `stale_after` [s] the camera is blind and
-    `control.policy.stale` applies; frames with fewer valid pixels than the share `least_readings`
-    do not count. The robot's capsules, with a column of height `foot` [m] below the base, are
-    removed from the image with a `margin` [m]. Obstacles are seen within `region` [m] of a point,
-    by default the largest distance at which avoidance acts. Obstacles extend `thin` [m] behind
-    their surface, by default without bound. A pixel counts if `support` of the nine around it agree
-    within `band` [m].
 
-    The camera (scenarios.cell.sensors.camera): image size, focal lengths and centre [px], by
-    default the middle; position [m]; a point [m] to look at, or a rotation, which takes precedence:
-    rows, whose columns are the camera's axes right, down and forward in the world. `rate` [Hz] and
-    `jitter` [s] of the frames; random `seed`; `ideal` for no errors (else those of
-    scenarios.cell.sensors.errors); `backdrop` [m], the depth of a wall, 0 for none, which may leave
-    too few readings; `point_radius` [m] of the balls that represent points.
+class _ImageSection(Section):
+    """What sources of depth images have; see scenarios.cell.sensors.depth_space.
+
+    A frame is available `latency` [s] after it was taken. Without a new frame for more than
+    `stale_after` [s] the camera is blind and `control.policy.stale` applies; frames with fewer
+    valid pixels than the share `least_readings` do not count. The robot's capsules, with a column
+    of height `foot` [m] below the base, are removed from the image with a `margin` [m]. Obstacles
+    are seen within `region` [m] of a point, by default the largest distance at which avoidance
+    acts. Obstacles extend `thin` [m] behind their surface, by default without bound. A pixel counts
+    if `support` of the nine around it agree within `band` [m].
     """
 
-    kind: Literal["exact", "camera", "frames"] = "exact"
-    folder: str | None = None
     latency: NotNegative = 0.0
     stale_after: NotNegative = 0.2
     least_readings: Share = 0.1
-    foot: NotNegative = 0.31
+    foot: NotNegative = _FOOT
     margin: NotNegative = 0.05
     region: Positive | None = None
     thin: NotNegative | None = None
-    support: Annotated[int, Field(ge=1, le=9)] = 3
+    support: Annotated[int, Field(strict=True, ge=1, le=9)] = 3
     band: NotNegative = 0.05
-    width: Annotated[int, Field(ge=1)] = 640
-    height: Annotated[int, Field(ge=1)] = 480
+
+
+class CameraSection(_ImageSection):
+    """A simulated depth camera that sees obstacles and robot; see scenarios.cell.sensors.camera.
+
+    Image size, focal lengths and centre [px], by default the middle; position [m]; a point [m] to
+    look at, or a rotation, which takes precedence: rows, whose columns are the camera's axes right,
+    down and forward in the world. `rate` [Hz] and `jitter` [s] of the frames; random `seed`;
+    `ideal` for no errors (else those of scenarios.cell.sensors.errors); `backdrop` [m], the depth
+    of a wall, 0 for none, which may leave too few readings; `point_radius` [m] of the balls that
+    represent points.
+    """
+
+    kind: Literal["camera"]
+    width: Pixels = 640
+    height: Pixels = 480
     fx: Positive = 525.0
     fy: Positive = 525.0
     cx: Finite | None = None
@@ -57,8 +75,8 @@ class SensorSection(Section):
     rotation: tuple[Vector3, Vector3, Vector3] | None = None
     rate: Positive = 30.0
     jitter: NotNegative = 0.0
-    seed: Annotated[int, Field(ge=0)] = 0
-    ideal: bool = False
+    seed: Count = 0
+    ideal: Flag = False
     noise_floor: NotNegative = 1.2e-3
     noise_growth: NotNegative = 1.9e-3
     noise_from: NotNegative = 0.4
@@ -69,14 +87,22 @@ class SensorSection(Section):
     missing: Share = 0.002
     missing_at_edges: Share = 0.3
     outliers: Share = 0.02
-    outlier_size: Annotated[int, Field(ge=0)] = 2
+    outlier_size: Count = 2
     point_radius: NotNegative = 0.02
     backdrop: NotNegative = 4.0
 
-    @model_validator(mode="after")
-    def _complete(self) -> Self:
-        if self.model_fields_set and "kind" not in self.model_fields_set:
-            raise ValueError("give its kind: exact, camera or frames")
-        if self.kind == "frames" and self.folder is None:
-            raise ValueError('kind = "frames" needs a folder')
-        return self
+
+class FramesSection(_ImageSection):
+    """Depth images from a `folder` or a shipped set, with their camera and times.
+
+    See scenarios.cell.sensors.frames.
+    """
+
+    kind: Literal["frames"]
+    folder: str
+
+
+SensorKind = Annotated[
+    Annotated[ExactSection, Tag("exact")] | Annotated[CameraSection, Tag("camera")]
+    | Annotated[FramesSection, Tag("frames")],
+    Discriminator(kind_or("exact"))]

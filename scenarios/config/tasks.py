@@ -12,6 +12,7 @@ from pydantic import Field, model_validator
 
 from scenarios.config.sections import (
     Finite,
+    Flag,
     NotNegative,
     PathSection,
     Positive,
@@ -40,7 +41,7 @@ class _AlongSection(TaskSection):
 
     path: PathSection | None = None
     offset: Vector3 = (0.0, 0.0, 0.0)
-    from_start: bool = False
+    from_start: Flag = False
 
     @model_validator(mode="after")
     def _has_a_path_to_shift(self) -> Self:
@@ -60,7 +61,7 @@ class PointingTask(TaskSection):
     """
 
     axis: Vector3
-    alpha_d: Annotated[float, Field(ge=0.0, le=180.0)]
+    alpha_d: Annotated[float, Field(strict=True, ge=0.0, le=180.0)]
     rows: Rows = "inequality"
     buffer: Positive | None = None
     stiffness: NotNegative = 5.0
@@ -170,7 +171,7 @@ class LimitsSection(Section):
     place: Literal["stack", "guard", "either"] = "stack"
     margin: NotNegative = 0.0
     danger_reach: Positive | None = None
-    torque: Annotated[float, Field(gt=0.0, le=1.0)] | None = None
+    torque: Annotated[float, Field(strict=True, gt=0.0, le=1.0)] | None = None
 
 
 class DampingSection(Section):

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, TypeVar
 
 from pydantic import ValidationError
 
 from hierarchy.errors import HierarchyError, UnknownNameError
+from scenarios.config.changes import Tag
 from scenarios.config.errors import ScenarioError
 from scenarios.config.sections import Section
 
@@ -23,11 +25,30 @@ def validated(kind: type[Kind], data: dict[str, Any], what: str) -> Kind:
         raise ScenarioError(f"{what}: control: {error}") from error
 
 
+def tag_at(root: type[Section], path: Sequence[str]) -> Tag | None:
+    """Return which key says the kind of the section at a path, None if there is one kind."""
+    found = dict.fromkeys(sections_at(root, path))
+    tagged = {kind: kind.model_fields.get(kind.tag) for kind in found}
+    if not all(tagged.values()) or (len(found) < 2 and all(kind.tag == "kind" for kind in found)):
+        return None
+    key = next(iter(found)).tag if found else ""
+    defaults = [field.default for field in tagged.values() if field and not field.is_required()]
+    return Tag(key, defaults[0] if defaults else None) if found else None
+
+
 def _say(root: type[Section], what: str, error: Any) -> str:
     keys = _without_kinds(root, [str(key) for key in error["loc"]])
     where = ".".join(keys) or "file"
     if error["type"] == "extra_forbidden":
+        if (having := _kinds_with(root, keys)) and len(keys) < len(error["loc"]):
+            return (f"{what}: {where}: only kind {' and '.join(map(repr, having))} has it; the "
+                    f"kind here is {str(error['loc'][-2])!r}")
         return f"{what}: {UnknownNameError('key', where, _keys_beside(root, keys))}"
+    if error["type"] in ("union_tag_invalid", "union_tag_not_found"):
+        tag = error["ctx"].get("tag")
+        known = error["ctx"].get("expected_tags") or ", ".join(map(repr, sorted(
+            _kinds_at(root, [key for key in keys if not key.isdigit()]))))
+        return f"{what}: {where}: expected a kind, {known}" + (f"; got {tag!r}" if tag else "")
     text = error["msg"].removeprefix("Value error, ")
     value = "" if isinstance(error["input"], dict) else f", got {error['input']!r}"
     return f"{what}: {where}: {text}{value}"
@@ -39,20 +60,28 @@ def _without_kinds(root: type[Section], loc: list[str]) -> list[str]:
             if i in (0, len(loc) - 1) or key not in _kinds_at(root, loc[:i])]
 
 
+def _kinds_with(root: type[Section], keys: list[str]) -> list[str]:
+    """Return the kinds of sections that have the last of `keys`."""
+    found = [section for section in dict.fromkeys(sections_at(root, keys[:-1]))
+             if keys[-1] in section.model_fields and "kind" in section.model_fields]
+    return [kind for section in found
+            for kind in getattr(section.model_fields["kind"].annotation, "__args__", ())]
+
+
 def _keys_beside(root: type[Section], keys: list[str]) -> list[str]:
     """Return the full names of the keys allowed in place of the last of `keys`."""
-    beside = _sections_at(root, keys[:-1])
+    beside = sections_at(root, keys[:-1])
     known = dict.fromkeys(field.alias or key for section in beside
                           for key, field in section.model_fields.items())
     return [".".join([*keys[:-1], key]) for key in known]
 
 
 def _kinds_at(root: type[Section], path: list[str]) -> set[str]:
-    found = (section.model_fields.get("kind") for section in _sections_at(root, path))
+    found = (section.model_fields.get("kind") for section in sections_at(root, path))
     return {kind for field in found if field for kind in getattr(field.annotation, "__args__", ())}
 
 
-def _sections_at(root: type[Section], path: list[str]) -> list[Any]:
+def sections_at(root: type[Section], path: Sequence[str]) -> list[Any]:
     """Return the sections allowed at a path: several if a kind selects one."""
     sections: list[Any] = [root]
     for key in (key for key in path if not key.isdigit()):  # a list index is not a key

@@ -6,7 +6,7 @@ import numpy as np
 
 from scenarios.cell.build import build
 from scenarios.cell.sensors import DepthSensor
-from scenarios.config.plant import PlantSection
+from scenarios.config.plant import KinematicSection
 from scenarios.loop.depth_view import DepthView
 from scenarios.loop.recording import Recording
 
@@ -21,7 +21,8 @@ def depth_view(recording: Recording, t: float | None = None) -> DepthView | None
         return None
     k = _nearest(recording) if t is None else int(np.argmin(np.abs(recording["t"] - t)))
     sensor = recording.scenario.sensor.model_copy(update={"latency": 0.0})
-    cell = build(recording.scenario.model_copy(update={"sensor": sensor, "plant": PlantSection()}))
+    at_rest = {"sensor": sensor, "plant": KinematicSection()}
+    cell = build(recording.scenario.model_copy(update=at_rest))
     moved = cell.state.move(float(recording["t"][k]), recording["q"][k], recording["v"][k])
     if not moved or not isinstance(cell.sensor, DepthSensor):
         return None

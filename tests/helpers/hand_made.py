@@ -12,7 +12,7 @@ import numpy as np
 from hierarchy import Robot
 from scenarios.config.avoidance import ObstacleSection
 from scenarios.config.robot import RobotSection
-from scenarios.config.sensor import SensorSection
+from scenarios.config.sensor import FramesSection
 from scenarios.loop.facts import Facts, ResolverFacts, RobotFacts, robot_facts
 from scenarios.loop.recording import Recording
 
@@ -58,7 +58,7 @@ class HandMadeScenario:
         level="acceleration", resolver="tpm", options={}, period=0.001, duration=4.0,
         jacobian_derivative="exact"))
     robot: Any = field(default_factory=lambda: RobotSection(model="kuka_lwr"))
-    sensor: Any = field(default_factory=lambda: SensorSection(kind="frames", folder="hand"))
+    sensor: Any = field(default_factory=lambda: FramesSection(kind="frames", folder="hand"))
 
     def with_resolver(self, spec: str) -> HandMadeScenario:
         return replace(self, resolver=spec)

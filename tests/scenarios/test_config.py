@@ -111,7 +111,7 @@ def test_files_that_extend_each_other_are_refused(tmp_path):
     ("start.q=[nan, 0, 0, 0, 0, 0, 0]", "start.q.0"),
     ("pointing.alpha_d", "expected key=value"),
     ("pointing.alpha_d=[1", "not a TOML value"),
-    ("name.first=1", "'name' is not a table"),
+    ("name.first=1", "[name] is not a table"),
 ])
 def test_a_bad_change_names_key_and_value(change, said):
     with pytest.raises(HierarchyError) as error:

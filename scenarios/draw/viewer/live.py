@@ -14,7 +14,7 @@ from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array
 from scenarios.cell.build import build
 from scenarios.config import Scenario, ScenarioError
-from scenarios.config.plant import PlantSection
+from scenarios.config.plant import KinematicSection
 from scenarios.loop.controller import Controller
 from scenarios.loop.judging import completed
 from scenarios.loop.recorder import Recorder
@@ -117,7 +117,8 @@ class Live:
         if self._changed[:ticks].any():
             recording.signals["changed"] = self._changed[:ticks]
             recording.signals["obstacle_offset"] = self._offsets[:ticks]
-        return completed(recording, build(self.begun.model_copy(update={"plant": PlantSection()})))
+        exact = self.begun.model_copy(update={"plant": KinematicSection()})
+        return completed(recording, build(exact))
 
     def save(self, folder: Path) -> Recording:
         """Write the run's folder as `hierarchy run` does, and any changes to `changes.json`."""
