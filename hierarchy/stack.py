@@ -95,6 +95,11 @@ class Stack:
                                  f"{list(order)}")
         self._order = tuple(order)
 
+    def row_names(self, order: tuple[str, ...] | None = None) -> tuple[str, ...]:
+        """Return what each row of `hierarchy` is about, in its order; None for the stack's own."""
+        return tuple(name for task in (self._order if order is None else order)
+                     for name in self[task].row_names)
+
     def hierarchy(self, state: State, order: tuple[str, ...] | None = None) -> Hierarchy:
         """Write the tasks' rows at a state and return them as a Hierarchy.
 

@@ -44,6 +44,11 @@ class Task(ABC):
     def dimension(self) -> int:
         """Number of rows m."""
 
+    @property
+    def row_names(self) -> tuple[str, ...]:
+        """What each row is about, m names for messages; by default "row 0", "row 1", ..."""
+        return tuple(f"row {i}" for i in range(self.dimension))
+
     @abstractmethod
     def error(self, state: State) -> Array:
         """Error p_d - p at a state: (m,), in the task's unit."""

@@ -137,6 +137,10 @@ def read_toml(path: Path, what: str, error: type[HierarchyError]) -> dict[str, A
         raise error(f"{what} {str(path)!r} is not UTF-8 text") from cause
     except tomllib.TOMLDecodeError as cause:  # its text gives line and column
         raise error(f"{what} {str(path)!r}: {cause}") from cause
+    except RecursionError as cause:
+        raise error(f"{what} {str(path)!r} is nested too deep") from cause
+    except ValueError as cause:  # an integer of thousands of digits
+        raise error(f"{what} {str(path)!r}: {cause}") from cause
 
 
 def slug(text: str) -> str:

@@ -101,6 +101,11 @@ class DangerBounds(Task):
         """One row per joint."""
         return self.limits.dimension
 
+    @property
+    def row_names(self) -> tuple[str, ...]:
+        """The joint of each row."""
+        return self.limits.row_names
+
     def box(self, state: State, level: Level) -> tuple[Array, Array]:
         """Return the least and greatest command (n,), (n,) at a state; the box is never empty."""
         lower, upper = self.limits.box(state, level)

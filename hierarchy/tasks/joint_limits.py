@@ -50,6 +50,10 @@ class JointLimits(Task):
         if not 0.0 <= self.margin < np.inf:
             raise HierarchyError(f"task {self.name!r}: margin {self.margin} must not be negative")
         lower, upper = robot.position_limits()
+        for i in np.flatnonzero(upper - lower < 2.0 * self.margin)[:1]:
+            raise HierarchyError(f"task {self.name!r}: margin {self.margin:g} leaves "
+                                 f"{robot.velocity_names[i]} no room between {lower[i]:.4g} and "
+                                 f"{upper[i]:.4g}")
         try:
             limits = Limits(lower[of_joints] + self.margin, upper[of_joints] - self.margin,
                             robot.velocity_limit[of_joints], np.broadcast_to(acceleration, n),
@@ -62,6 +66,11 @@ class JointLimits(Task):
     def dimension(self) -> int:
         """One row per actuated joint."""
         return self.robot.n - self.robot.actuated
+
+    @property
+    def row_names(self) -> tuple[str, ...]:
+        """The joint of each row."""
+        return tuple(self.robot.velocity_names[self.robot.actuated:])
 
     def box(self, state: State, level: Level) -> tuple[Array, Array]:
         """Return the least and greatest command (n,), (n,) at a state; the box is never empty."""

@@ -98,6 +98,12 @@ class SelfSeparation(Task):
         """One row per pair."""
         return len(self.indices)
 
+    @property
+    def row_names(self) -> tuple[str, ...]:
+        """The two capsules of each row."""
+        return tuple(f"{self.capsules[i].name} to {self.capsules[j].name}"
+                     for i, j in self.indices)
+
     def distances(self, state: State) -> Array:
         """Distances d (m,) [m], negative where capsules overlap."""
         return self._seen(state)[:, 0]

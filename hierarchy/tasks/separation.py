@@ -84,6 +84,14 @@ class Separation(Task):
         """One row per pair, or per point."""
         return len(self.joints) * (1 if self.obstacles is None else self.obstacles)
 
+    @property
+    def row_names(self) -> tuple[str, ...]:
+        """The point of each row, and its obstacle, numbered from 0 as in a scenario file."""
+        if self.obstacles is None:
+            return tuple(point.name for point in self.points)
+        return tuple(f"{point.name} to obstacle {j}" for point in self.points
+                     for j in range(self.obstacles))
+
     def error(self, state: State) -> Array:
         """distance - d (m,) [m], positive where a point is too close."""
         return np.asarray(self.barrier.distance - self._pairs(state)[:, 0])

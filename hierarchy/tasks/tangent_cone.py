@@ -46,6 +46,11 @@ class TangentCone(Task):
         """One row per row of `task`."""
         return self.task.dimension
 
+    @property
+    def row_names(self) -> tuple[str, ...]:
+        """The names of the rows of `task`."""
+        return self.task.row_names
+
     def error(self, state: State) -> Array:
         """The error of `task` (m,)."""
         return self.task.error(state)

@@ -46,6 +46,11 @@ class TorqueLimits(Task):
         """One row per joint."""
         return self.robot.n
 
+    @property
+    def row_names(self) -> tuple[str, ...]:
+        """The joint of each row."""
+        return tuple(self.robot.velocity_names)
+
     def error(self, state: State) -> Array:
         """Distance of the torque at constant velocity from the limits (n,) [N m or N]."""
         h = state.bias_effort()

@@ -15,6 +15,7 @@ from solvers import make
 
 _REACHED = 1e-6      # [m]
 _REACH_STEPS = 500   # damped Newton steps; a reachable point takes about ten
+_ON_LIMIT = 1e-9     # [rad or m] beyond a limit that is rounding
 _LONGEST_STEP = 0.3  # [rad] of any joint
 
 
@@ -51,7 +52,19 @@ def start_of(robot: Robot, section: StartSection) -> tuple[Array, Array]:
     q, v = state.q.copy(), state.v.copy()
     if section.end_effector is not None:
         q = _reach(robot, q, np.array(section.end_effector))
+    if not section.allow_outside_limits:
+        _check_limits(robot, q)
     return q, v
+
+
+def _check_limits(robot: Robot, q: Array) -> None:
+    """Raise a ScenarioError that names the first joint beyond its limits, or far out of range."""
+    for i in np.flatnonzero((q < robot.lower - _ON_LIMIT) | (q > robot.upper + _ON_LIMIT))[:1]:
+        degrees = " Are these degrees?" if abs(q[i]) > 2.0 * np.pi else ""
+        raise ScenarioError(
+            f"start: {robot.coordinate_names[i]} at {q[i]:g} is beyond its limits, "
+            f"{robot.lower[i]:.4g} to {robot.upper[i]:.4g} (rad or m).{degrees} "
+            "start.allow_outside_limits = true allows it")
 
 
 def _state(robot: Robot, section: StartSection) -> State:

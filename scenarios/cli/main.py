@@ -343,38 +343,18 @@ def figures(folders: Annotated[list[Path], typer.Argument(
 def check(file: Annotated[str, typer.Argument(help="A scenario or a robot: file or name.",
                                               autocompletion=completion.scenarios)],
           changes: Changes = None, as_json: AsJson = False) -> None:
-    """Validate a scenario or robot file and summarize it."""
-    from scenarios.cli import robot_check
+    """Validate a scenario or robot file: build it, run the first tick, and summarize it."""
+    from scenarios.cli import robot_check, scenario_check
+    from scenarios.loop.first_tick import first_tick
 
     if robot_check.is_robot(file):
-        found = robot_check.look_at(file, changes or [])
-        return print_json(robot_check.as_plain_data(*found)) if as_json else print(
-            robot_check.say(*found))
+        robot = robot_check.look_at(file, changes or [])
+        return print_json(robot_check.as_plain_data(*robot)) if as_json else print(
+            robot_check.say(*robot))
     scenario = _load(file, changes, None)
-    if as_json:
-        return print_json(scenario.model_dump(mode="json"))
-    ticks = round(scenario.control.duration / scenario.control.period)
-    print(f"{scenario.name}: {scenario.title}")
-    print(f"  robot     {scenario.robot.model}")
-    print(f"  control   {scenario.control.level} level, {ticks} ticks of "
-          f"{1e3 * scenario.control.period:g} ms")
-    print(f"  plant     {scenario.plant.kind}")
-    print(f"  resolver  {scenario.make_resolver()!r}")
-    if scenario.pointing is not None:
-        print(f"  pointing  {scenario.pointing.rows}, cone of {scenario.pointing.alpha_d:g} deg")
-    if scenario.avoidance is not None:
-        asked = scenario.avoidance
-        body, tip = (" and ".join(f"{distance:g}" for distance in thresholds.values())
-                     for thresholds in (asked.thresholds, asked.tip_thresholds))
-        print(f"  avoidance {asked.kind}, {len(asked.obstacles)} obstacles; within {body} m of the "
-              f"body, {tip} m of the end effector")
-    if scenario.limits is not None:
-        print(f"  limits    positions and velocities of the robot, "
-              f"{scenario.limits.acceleration} rad/s^2, "
-              f"{'in the stack' if scenario.limits_in_stack else 'as a guard outside the stack'}")
-    for i, task in enumerate(scenario.tasks, 1):
-        print(f"  task {i:<4} {task.title}" + (f", {task.kind}" if task.name else ""))
-    print("Valid.")
+    found = first_tick(scenario)
+    return print_json(scenario_check.as_plain_data(scenario, found)) if as_json else print(
+        scenario_check.say(scenario, found))
 
 
 @app.command()

@@ -10,6 +10,7 @@ from scenarios.config.sections import Count, Flag, NotNegative, Positive, Sectio
 
 AnswerPolicy = Literal["brake", "hold", "stop", "use"]
 BlindPolicy = Literal["brake", "hold", "stop"]
+MOST_TICKS = 10_000_000  # some kB each in memory
 StackKind = Literal["switched", "hierarchical", "set-based", "smooth"]
 
 
@@ -85,6 +86,19 @@ class ControlSection(Section):
                 make(name, **self.options[name])
         make(self.resolver, **self.settings())
         return self
+
+    @model_validator(mode="after")
+    def _can_be_kept(self) -> Self:
+        if self.ticks > MOST_TICKS:
+            raise ValueError(f"duration = {self.duration:g} s at period = {self.period:g} s is "
+                             f"{self.duration / self.period:.3g} ticks; a recording keeps at most "
+                             f"{MOST_TICKS:,}")
+        return self
+
+    @property
+    def ticks(self) -> int:
+        """Number of ticks of a run, at least one."""
+        return max(1, round(min(self.duration / self.period, 1e18)))
 
     def settings(self) -> dict[str, Any]:
         """Return the resolver's settings: those of its table, overridden by plain ones."""

@@ -7,7 +7,7 @@ from typing import Self
 from pydantic import Field, model_validator
 
 from hierarchy.robots.table import Base
-from scenarios.config.sections import Finite, NotNegative, Section, Vector3
+from scenarios.config.sections import Finite, Flag, NotNegative, Section, Vector3
 
 
 class ControlPointSection(Section):
@@ -61,13 +61,15 @@ class RobotSection(Section):
 
 
 class StartSection(Section):
-    """The start: positions `q` [rad or m] and velocities `v`.
+    """The start: positions `q` [rad or m] and velocities `v` [rad/s or m/s].
 
     `q` defaults to the robot's own posture, and `joints` override it by name. With `end_effector`
-    [m] the start is the posture, reached from q, that puts the end effector there.
+    [m] the start is the posture, reached from q, that puts the end effector there. A joint beyond
+    its limits is an error unless `allow_outside_limits`.
     """
 
     q: tuple[Finite, ...] | None = None
     joints: dict[str, Finite] = Field(default_factory=dict)
     v: tuple[Finite, ...] | None = None
     end_effector: Vector3 | None = None
+    allow_outside_limits: Flag = False

@@ -36,7 +36,7 @@ def simulate(scenario: Scenario, progress: Callable[[int, int], None] | None = N
     Recorder(rehearsal, 1).write()
     faults = Faults(scenario) if scenario.faults else None
     controller = Controller(scenario) if faults is None else faults.controller
-    ticks = max(1, round(scenario.control.duration / scenario.control.period))
+    ticks = scenario.control.ticks
     recorder = Recorder(controller, ticks)
     audits = _audits(controller, scenario, ticks, certified)
     try:

@@ -285,10 +285,12 @@ def test_json_lists_what_there_is(capsys):
     assert list(found) == ["scenarios", "groups", "sweeps", "resolvers", "tasks", "robots"]
 
 
-def test_json_of_a_check_is_the_whole_scenario(capsys):
+def test_json_of_a_check_is_the_whole_scenario_and_its_first_tick(capsys):
     found = said(["check", "ellipse", "--set", "pointing.alpha_d=35"], capsys)
-    assert found["pointing"]["alpha_d"] == 35.0
-    assert found["control"]["resolver"] == "tpm"
+    assert found["scenario"]["pointing"]["alpha_d"] == 35.0
+    assert found["scenario"]["control"]["resolver"] == "tpm"
+    assert found["first_tick"]["levels"] == ["position", "avoidance"]
+    assert (found["first_tick"]["unmet"], found["warnings"]) == ([], [])
 
 
 def test_a_mistake_with_json_is_an_error_on_stderr_all_the_same(capsys):

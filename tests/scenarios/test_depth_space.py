@@ -431,7 +431,7 @@ def test_the_camera_tells_the_controller_what_exact_distances_would_nearly():
     (["sensor.kind=radar"], "sensor"),
     (["sensor.kind=camera", "sensor.missing=2.0"], "sensor.missing"),
     (["sensor.kind=camera", "sensor.hight=2"], "sensor.height"),
-    (["sensor={position=[1,1,1]}"], "give its kind"),
+    (["sensor={position=[1,1,1]}"], "only kind 'camera' has it"),
     (["sensor={kind='frames'}"], "folder"),
     (["sensor.kind=exact", "faults=[{kind='no_frames', at=0.0, duration=1.0}]"], "camera"),
     (["sensor={kind='frames', folder='hand'}",

@@ -282,7 +282,7 @@ def test_repulsion_with_clamped_commands_may_swing_but_does_not_grow(parts):
 def start(beyond_limit):
     q = list(HOME)
     q[3] = float(ROBOT.upper[3]) + beyond_limit
-    return f"start.q={q}"
+    return f"start={{q={q}, allow_outside_limits=true}}"
 
 
 STARTS = {"stretched": "start.q=[0, 0, 0, 0, 0, 0, 0]", "on a limit": start(0.0),

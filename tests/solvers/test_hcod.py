@@ -132,7 +132,7 @@ def test_explain_says_in_words_what_blocks_what():
     text = explain(h, HCOD.solve(h)).splitlines()
     assert text[0] == "limits is met."
     assert text[1] == ("hand is missed by 1.5: held back by limits row 0 at its upper side and "
-                       "limits row 1 at its upper side.")
+                       "row 1 at its upper side.")
     assert text[2].startswith("posture is missed by 1.25: held back by")
 
 

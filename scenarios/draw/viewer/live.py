@@ -49,7 +49,7 @@ class Live:
         self.begun, self.over = self.scenario, False
         self.fault: str | None = None
         self.controller = Controller(self.scenario)
-        self.ticks = max(1, round(control.duration / control.period))
+        self.ticks = control.ticks
         self.recorder = Recorder(self.controller, self.ticks)
         self.changes: list[dict[str, Any]] = []
         sensor = self.controller.cell.sensor

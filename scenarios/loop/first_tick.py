@@ -1,0 +1,83 @@
+"""The first tick of a scenario: does it fit together, and what can its stack meet?"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from math import isfinite, tau
+
+from scenarios.config import Scenario
+from scenarios.loop.controller import Controller
+from solvers import Status, explain, make
+
+_ROUNDING = 1e-6  # [m] below a distance that is not said
+_NARROW = 1.0     # [deg] a cone this narrow may have been meant in radians
+_MET = 1e-6       # violation of a level relative to its terms, below which it is met
+
+
+@dataclass(frozen=True)
+class FirstTick:
+    """What the first tick showed.
+
+    status : of the resolver, None if the measurement could not be used. levels : the level names
+    of the stack, most important first. unmet : one line for each level that cannot be met, and what
+    holds it back. distances : to the nearest obstacle [m], of "body" and "end effector", where
+    they are measured. warnings : what is allowed, but perhaps not meant.
+    """
+
+    status: Status | None
+    levels: tuple[str, ...]
+    unmet: tuple[str, ...]
+    distances: dict[str, float]
+    warnings: tuple[str, ...]
+
+
+def first_tick(scenario: Scenario) -> FirstTick:
+    """Build a scenario and run its first tick.
+
+    Raises HierarchyError where a run would: the scenario does not fit its robot or resolver.
+    """
+    controller = Controller(scenario)
+    plant = controller.cell.plant
+    controller.command(0.0, plant.q, plant.v)
+    distances = _distances(controller)
+    warnings = tuple(_warnings(scenario, distances))
+    if not controller.answered:
+        return FirstTick(None, (), (), distances, warnings)
+    return FirstTick(controller.resolution.status, controller.hierarchy.names,
+                     tuple(_unmet(controller)), distances, warnings)
+
+
+def _unmet(controller: Controller) -> Iterator[str]:
+    """Yield what `explain` says of each level that the exact resolver cannot meet."""
+    h = controller.hierarchy
+    exact = make("hcod").solve(h)
+    words = explain(h, exact, _MET, controller.cell.stack.row_names(h.names)).splitlines()
+    yield from (line for line in words if " is missed by " in line)
+
+
+def _distances(controller: Controller) -> dict[str, float]:
+    if controller.cell.sensor is None:
+        return {}
+    seen = controller.cell.sensor.measurement
+    both = {"body": seen.minimal_distance, "end effector": seen.end_effector_distance}
+    return {name: distance for name, distance in both.items() if isfinite(distance)}
+
+
+def _warnings(scenario: Scenario, distances: dict[str, float]) -> Iterator[str]:
+    if scenario.avoidance is not None:
+        kept = scenario.avoidance.promised
+        for name, key in (("body", "body"), ("end effector", "ee")):
+            if key in kept and distances.get(name, kept[key]) < kept[key] - _ROUNDING:
+                yield (f"{name}: {1e3 * distances[name]:.0f} mm from the nearest obstacle at the "
+                       f"start, less than the {1e3 * kept[key]:.0f} mm to be kept")
+    cones = {"pointing": scenario.pointing} | {
+        f"tasks.{i}": task for i, task in enumerate(scenario.tasks)}
+    for key, task in cones.items():
+        if 0.0 < getattr(task, "alpha_d", 0.0) < _NARROW:
+            yield (f"{key}.alpha_d = {getattr(task, 'alpha_d', 0.0):g} deg: cones are in degrees; "
+                   "all other angles are in radians")
+    for key, posture in {"posture": scenario.posture, **cones}.items():
+        for i, value in enumerate(getattr(posture, "target", None) or ()):
+            if abs(value) > tau:
+                yield f"{key}.target.{i} = {value:g}: joint angles are in radians"

@@ -1,0 +1,204 @@
+"""Wrong files, values and command lines: each with the message that a user gets."""
+
+import pytest
+
+from hierarchy import HierarchyError
+from scenarios import load
+from scenarios.cli.main import run_command
+from scenarios.config import ScenarioError
+from scenarios.loop.first_tick import first_tick
+
+WAYPOINTS = ["position.path.times=[0, 1]", "position.path.points=[[0, 0, 0], [0, 0.1, 0]]"]
+
+
+@pytest.mark.parametrize(("change", "said"), [
+    # Types are strict.
+    ("control.period=true", "control.period: Input should be a valid number, got True"),
+    ("control.period='0.001'", "control.period: Input should be a valid number, got '0.001'"),
+    ("control.duration=[1]", "control.duration"),
+    ("control.strictness=1", "control.strictness: Input should be a valid boolean, got 1"),
+    ("control.policy.patience=1.5", "control.policy.patience"),
+    ("control.policy.patience=true", "control.policy.patience"),
+    ("pointing.alpha_d='5'", "pointing.alpha_d"),
+    ("pointing.alpha_d=true", "pointing.alpha_d"),
+    ("pointing.axis=[0, 0, '1']", "pointing.axis.2"),
+    ("position.from_start='no'", "position.from_start"),
+    ("avoidance.near=true", "avoidance.near"),
+    ("avoidance.dimension=2", "avoidance.dimension"),
+    ("robot.model=7", "robot.model"),
+    ("name=''", "name"),
+    # Values that cannot be.
+    ("control.period=0", "control.period"),
+    ("control.period=-0.001", "control.period"),
+    ("control.period=nan", "control.period"),
+    ("control.duration=inf", "control.duration"),
+    ("control.duration=1e9", "1e+12 ticks; a recording keeps at most 10,000,000"),
+    ("control.period=1e-12", "a recording keeps at most 10,000,000"),
+    ("pointing.alpha_d=-5", "pointing.alpha_d"),
+    ("pointing.alpha_d=200", "pointing.alpha_d"),
+    ("position.stiffness=-1", "position.stiffness"),
+    ("avoidance.near=0.5", "near = 0.5 m is beyond far = 0.15 m"),
+    ("avoidance.body.maximum=-3", "avoidance.body.maximum"),
+    ("start.q=[nan, 0, 0, 0, 0, 0, 0]", "start.q.0"),
+    ("control.options.damping=-1", "damping"),
+    ("control.options.dampign=0.1", "dampign"),
+    ("control.resolver=hcdo", "did you mean 'hcod'"),
+    # Keys.
+    ("pointing.alfa_d=5", "did you mean 'pointing.alpha_d'"),
+    ("positoin.stiffness=1", "did you mean 'position'"),
+    ("nonsense=1", "unknown key 'nonsense'"),
+    ("name.first=1", "[name] is not a table"),
+    ("avoidance.obstacles.7.centre=[0, 0, 1]", "[avoidance.obstacles] has 3 entries"),
+    ("avoidance.obstacles.first.centre=[0, 0, 1]", "no 'first'"),
+    ("avoidance.*.centre=[0, 0, 1]", "[avoidance] is not a list"),
+    # Keys of another kind, and kinds that do not exist.
+    ("sensor.width=320", "sensor.width: only kind 'camera' has it; the kind here is 'exact'"),
+    ("plant.servo.rate=500", "only kind 'mujoco' has it; the kind here is 'kinematic'"),
+    ("position.path.times=[1]", "only kind 'waypoints' has it; the kind here is 'ellipse'"),
+    ("avoidance.distance=0.1", "only kind 'separation' has it; the kind here is 'repulsion'"),
+    ("sensor.kind=radar", "sensor: expected a kind, 'exact', 'camera', 'frames'; got 'radar'"),
+    ("plant.kind=real", "plant: expected a kind, 'kinematic', 'mujoco'; got 'real'"),
+    ("position.path.kind=spiral", "position.path: expected a kind"),
+    ("position.path.kind=waypoints", "position.path.times: Field required"),
+    ("avoidance.obstacles.0.shape=sphere", "a sphere takes radius"),
+    ("avoidance.obstacles.0.shape=cone", "avoidance.obstacles.0.shape"),
+    ("sensor={kind='camera', width=1e21}", "sensor.width"),
+    ("sensor={kind='camera', width=1180591620717411303424}", "sensor.width"),
+    ("sensor={kind='camera', folder='x'}", "only kind 'frames' has it; the kind here is 'camera'"),
+    # What goes together.
+    ("control.stack=hierarchical", "avoidance.kind = \"repulsion\" goes with"),
+    ("limits={acceleration=10, torque=0.5, place='guard'}", "need limits.place = \"stack\""),
+    ("posture={}", "give [damping] or [posture], not both"),
+    ("tasks=[{kind='posture'}]", "[[tasks]] goes with control.stack"),
+    ("faults=[{kind='no_frames', at=0.0, duration=1.0}]", "need a sensor of kind \"camera\""),
+])
+def test_a_value_that_is_wrong_is_named_with_its_key(change, said):
+    with pytest.raises(HierarchyError) as error:
+        load("ellipse", [change])
+    assert said in str(error.value)
+
+
+@pytest.mark.parametrize(("changes", "said"), [
+    (["start.q=[0, 0, 0]"], "q has shape (3,)"),
+    (["start.q=[0, 0, 0, 90, 0, 0, 0]"], "joint_4 at 90 is beyond its limits, -2.094 to 2.094 (rad "
+                                         "or m). Are these degrees?"),
+    (["start.q=[0, 0, 0, 2.2, 0, 0, 0]"], "joint_4 at 2.2 is beyond its limits"),
+    (["start.joints={joint_9=1.0}"], "joint_9"),
+    (["start.end_effector=[5, 5, 5]"], "cannot be reached"),
+    (["pointing.axis=[0, 0, 0]"], "axis"),
+    (["robot.model=nowhere.urdf"], "nowhere.urdf"),
+    (["robot.end_effector=thumb"], "thumb"),
+    (["damping.value=0", "limits={acceleration=10}", "control.resolver=recursive"], "row"),
+    (["robot.control_points=[]"], "no control points"),
+    (["limits={acceleration=10, margin=3}"], "margin 3 leaves joint_1 no room between"),
+])
+def test_what_does_not_fit_the_robot_is_said_by_check_and_run(changes, said, capsys, tmp_path):
+    sets = [part for change in changes for part in ("--set", change)]
+    assert run_command(["check", "ellipse", *sets]) == 2
+    checked = capsys.readouterr().err
+    assert said in checked
+    assert run_command(["run", "ellipse", *sets, "--duration", "0.01",
+                        "--out", str(tmp_path / "run")]) == 2
+    assert capsys.readouterr().err.splitlines()[-1] == checked.splitlines()[-1]
+    assert not list(tmp_path.rglob("*.npz"))
+
+
+def test_a_start_beyond_the_limits_can_be_allowed():
+    start = "start={q=[0, 0, 0, 2.2, 0, 0, 0], allow_outside_limits=true}"
+    assert first_tick(load("ellipse", [start])).status is not None
+
+
+# Another kind replaces a section, whatever was below it.
+
+def test_a_path_of_another_kind_replaces_the_one_below_in_any_order():
+    for changes in (["position.path.kind=waypoints", *WAYPOINTS],
+                    [*WAYPOINTS, "position.path.kind=waypoints"]):
+        path = load("ellipse", changes).position.path
+        assert (path.kind, path.times) == ("waypoints", (0.0, 1.0))
+
+
+def test_a_file_that_extends_another_replaces_sections_of_another_kind(tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text('extends = "human"\nname = "mine"\n[sensor]\nkind = "exact"\n'
+                    '[plant]\nkind = "kinematic"\n[avoidance]\nkind = "separation"\n'
+                    'obstacles = [[1.0, 1.0, 1.0]]\n'
+                    '[control]\nstack = "hierarchical"\nresolver = "hcod"\noptions = {}\n')
+    found = load(path)
+    assert found.sensor.kind == "exact"
+    assert found.plant.measurement.velocity_noise == 0.0
+    assert found.avoidance.distance == 0.03
+    assert list(found.variation) == ["start.q"]
+
+
+def test_the_same_kind_keeps_what_is_below_it():
+    changed = load("ellipse", ["position.path.kind=ellipse", "position.path.rate=2.0"])
+    assert changed.position.path.centre == load("ellipse").position.path.centre
+    assert load("ellipse", ["pointing.kind=equality"]).pointing.alpha_d == 5.0
+
+
+def test_obstacles_are_reached_by_number_or_all_at_once():
+    found = load("ellipse", ["avoidance.obstacles.1.centre=[0, 0, 1]"]).avoidance.obstacles
+    assert found[1].centre == (0.0, 0.0, 1.0)
+    balls = load("ellipse", ["avoidance.obstacles.*={shape='sphere', radius=0.1, "
+                             "centre=[1, 1, 1]}"]).avoidance.obstacles
+    assert [ball.radius for ball in balls] == [0.1] * 3
+
+
+# Files that are no scenario.
+
+@pytest.mark.parametrize(("text", "said"), [
+    ('name = "x"\n[robot\n', "line 2"),
+    ("a = " + "[" * 5000 + "]" * 5000, "nested too deep"),
+    ("a = " + "1" * 6000, "digits"),
+    ("\udcff", "not UTF-8"),
+    ("", "Field required"),
+    ('extends = "nowhere"', "unknown scenario 'nowhere'"),
+    ("extends = 3", "expected a name or a path, got 3"),
+    ('extends = "bad.toml"', "extends this file in turn"),
+    ('extends = "ellipse"\nreplaces = "avoidance"', "expected a list of sections"),
+    ('extends = "ellipse"\nreplaces = ["avoidence"]', "did you mean 'avoidance'"),
+    ('replaces = ["avoidance"]', "goes with extends"),
+])
+def test_a_file_that_cannot_be_read_is_named(text, said, tmp_path):
+    path = tmp_path / "bad.toml"
+    path.write_bytes(text.encode("utf-8", "surrogateescape"))
+    with pytest.raises(ScenarioError) as error:
+        load(path)
+    assert said in str(error.value)
+    assert "bad.toml" in str(error.value)
+
+
+def test_files_that_extend_each_other_a_thousand_deep_are_refused(tmp_path):
+    for i in range(1000):
+        base = "ellipse" if i == 0 else f"{i - 1}.toml"
+        (tmp_path / f"{i}.toml").write_text(f'extends = "{base}"\n')
+    with pytest.raises(ScenarioError, match="more than 50 files"):
+        load(tmp_path / "999.toml")
+    assert load(tmp_path / "20.toml").robot.model == "kuka_lwr"
+
+
+# What check says of a scenario that is valid, and perhaps not meant.
+
+def checked(capsys, *changes, name="ellipse"):
+    assert run_command(["check", name, *(p for c in changes for p in ("--set", c))]) == 0
+    return " ".join(capsys.readouterr().out.split())
+
+
+def test_check_names_the_level_that_is_missed_and_what_holds_it_back(capsys):
+    out = checked(capsys, name="strictness")
+    assert "position is missed by" in out
+    assert "held back by joint limits joint_1 at its upper side, joint_2 at its lower side" in out
+
+
+def test_check_warns_of_cones_and_joint_angles_in_the_other_unit(capsys):
+    assert ("Warning: pointing.alpha_d = 0.6 deg: cones are in degrees; all other angles are in "
+            "radians." in checked(capsys, "pointing.alpha_d=0.6"))
+    posture = "posture={target=[0, 0, 0, 90, 0, 0, 0], role='task'}"
+    assert "posture.target.3 = 90: joint angles are in radians" in checked(
+        capsys, posture, name="strictness")
+
+
+def test_check_warns_of_a_start_that_is_too_near(capsys):
+    out = checked(capsys, "avoidance.near=0.2", "avoidance.far=0.3")
+    assert "body: 112 mm from the nearest obstacle at the start, less than the 200 mm" in out
+    assert "Warning" not in checked(capsys)
