@@ -83,22 +83,23 @@ RIVAL_CLAIMS: tuple[Claim, ...] = (
              "body_distance_min", "danger-bounds", "algorithm-1", "higher"))
 
 SINGULAR_CLAIMS: tuple[Claim, ...] = (
-    Compares("Limits without damping freeze for fewer ticks than damped pivots", "singular",
-             "ticks_frozen", "pivots", "limits", "lower"),
-    Compares("Limits without damping move faster than damped pivots", "singular", "speed_max",
-             "pivots", "limits", "higher"),
-    Compares("Limits without damping have a smaller error after the return", "singular",
-             "error_returned_rms", "pivots", "limits", "lower"),
-    Compares("The same at acceleration level", "singular", "error_returned_rms",
-             "acceleration-pivots", "acceleration-limits", "lower"))
+    Compares("Undamped below limits the joints are slower than with damped pivots", "singular",
+             "speed_max", "pivots", "limits", "lower"),
+    Compares("Undamped below limits the error after the return is smaller, velocity level",
+             "singular", "error_returned_rms", "pivots", "limits", "lower"),
+    Compares("Undamped below limits the error after the return is smaller, acceleration level",
+             "singular", "error_returned_rms", "acceleration-pivots", "acceleration-limits",
+             "lower"))
 
 HUMAN_CLAIMS: tuple[Claim, ...] = (
     Keeps("`human` keeps the body 0.3 m away", "human", "body_distance_min", "human",
           least=_HUMAN),
     Keeps("`human-hqp` keeps the body 0.3 m away", "human", "body_distance_min", "human-hqp",
           least=_HUMAN),
-    Compares("`human-hqp` comes nearer with the end effector than `human`", "human",
-             "ee_distance_min", "human", "human-hqp", "lower"),
+    Compares("`human-hqp` keeps the end effector farther away than `human`", "human",
+             "ee_distance_min", "human", "human-hqp", "higher"),
+    Compares("`human-hqp` keeps the body farther away than `human`", "human",
+             "body_distance_min", "human", "human-hqp", "higher"),
     Compares("`human-hqp` leaves the cone by less", "human", "cone_violation_max", "human",
              "human-hqp", "lower"),
     Compares("`human-hqp` moves more slowly", "human", "speed_max", "human", "human-hqp", "lower"),
@@ -148,7 +149,7 @@ def table(rows: Mapping[str, Rows], study: str, metrics: Sequence[str]) -> str:
 
 def findings(rows: Mapping[str, Rows]) -> str:
     """Return what the README says was found."""
-    letter = rows["letter"]
+    letter, resolvers = rows["letter"], rows["resolvers"]
     return "\n".join(fill(f"- {line}", _WIDTH, subsequent_indent="  ") for line in (
         "The published code has two wrong Jacobians, and they flatter it: the largest joint speed "
         f"is {in_text(letter, 'published', 'speed_max')} with them and "
@@ -162,7 +163,12 @@ def findings(rows: Mapping[str, Rows]) -> str:
         "The relaxed cone frees the robot: with 35 deg in place of 5 deg its largest joint speed "
         "is "
         f"{in_text(letter, '35deg', 'speed_max')} "
-        f"({letter.paired('speed_max', 'ellipse', '35deg')})."))
+        f"({letter.paired('speed_max', 'ellipse', '35deg')}).",
+        "Inequalities in the stack keep what they promise: `ellipse-hqp` asks for 50 mm, keeps "
+        f"{in_text(resolvers, 'hqp-hcod', 'body_distance_min')}, and moves with "
+        f"{in_text(resolvers, 'hqp-hcod', 'speed_max')}; Algorithm 1 below the same joint limits "
+        f"moves with {in_text(resolvers, 'limits-tpm', 'speed_max')} ([one change at a time]"
+        "(docs/ladder.md))."))
 
 
 def _head(rows: Rows, name: str) -> str:

@@ -10,7 +10,7 @@ from hierarchy.errors import HierarchyError
 from scenarios.files import write_text
 from scenarios.reproduce.rows import Rows
 
-PAGES = ("README.md", "docs/reproduction.md", "docs/ladder.md")
+PAGES = ("README.md", "docs/reproduction.md", "docs/ladder.md", "docs/experiment.md")
 RESULTS = "docs/results"
 _BLOCK = re.compile(r"(<!-- reproduce: (?P<name>[\w-]+) -->\n).*?(<!-- end of \w[\w-]* -->)",
                     re.DOTALL)
