@@ -31,6 +31,7 @@ first, so that rounding in rows of norm 1000 does not hide a row of norm 0.001.
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import final
 
@@ -49,6 +50,7 @@ _EITHER = 4.0       # rows within this factor of `parallel` may count as depende
 _DUST = 1e-13       # norm of a row relative to the largest of its level: smaller ones are dust
 _SMALLEST = 1e-30   # norm of a row relative to the largest of its level: lower bound
 _CLEAR = 0.1        # relative pivot: smaller ones do not add to the uncertainty of parallel rows
+_SPAN = 4.0         # turn of a span over the angle of a dropped row, per smallest pivot, at most
 _UNSEEN = 1e4       # weight of directions that no row of a level sees, relative to the weakest seen
 _LARGEST = 1e150    # length: its square stays finite
 _SMALL = 1e-15      # relative: smaller steps and pivots are rounding
@@ -154,7 +156,7 @@ def _judged(levels: list[_Rows], gap: Array, reach: float, tolerance: float, par
             break
         stationarity[k] = _residual(cone, level, tolerance * reach) / reach
         cone.add(level)
-    return stationarity, _projected(gap, cone) / reach
+    return stationarity, _projected(gap, cone, tolerance * reach) / reach
 
 
 @final
@@ -226,6 +228,7 @@ class _NormalCone:
         self._kept = self._kept[seen_at_all]
         self.rows = seen[seen_at_all] / left[seen_at_all, None]
         self.thinnest = min(self.thinnest, float(left[seen_at_all].min(initial=1.0)))
+        self.angle = max(self.angle, float(left[~seen_at_all].max(initial=0.0)))
 
 
 def _complement(Z: Array, rows: Array, parallel: float) -> tuple[Array, float, float]:
@@ -269,7 +272,10 @@ def _least_change(cone: _NormalCone, level: _Rows, Z: Array, size: Array, judged
     none, t = np.zeros(len(C) - view.rank), level.t[judged]
     f = np.concatenate([view.Q.T @ t, none, -np.maximum(own_t, 0.0)])
     sizes = np.concatenate([np.abs(view.Q).T @ np.abs(t), none, np.zeros(len(own_t))])
-    unknown = _unknown(min(cone.thinnest, view.thinnest), max(cone.angle, view.angle))
+    unknown = np.full(len(f), _unknown(min(cone.thinnest, view.thinnest),
+                                       max(cone.angle, view.angle)))
+    unseen = slice(view.rank, len(C))  # up to the angle at which rows count as dependent
+    unknown[unseen] = np.maximum(unknown[unseen], cone.parallel)
     return _balanced(np.vstack([C, held]), np.vstack([terms, held]), f, sizes, unknown,
                      1e-3 * enough)
 
@@ -281,26 +287,35 @@ def _on_sides(level: _Rows, size: Array) -> tuple[Array, Array, Array]:
             np.concatenate([size[up], size[low]]), np.concatenate([level.t[up], -level.t[low]]))
 
 
-def _projected(gap: Array, cone: _NormalCone) -> float:
+def _projected(gap: Array, cone: _NormalCone, enough: float) -> float:
     """Return the length of the projection of -gap (n,) on the polar cone, in coordinates of Z."""
     C, f = cone.rows.T, cone.Z.T @ gap
     size = norm(f if cone.angle == 0.0 else gap)
     return _balanced(C, np.ones_like(C), f, np.full(len(f), size),
-                     _unknown(cone.thinnest, cone.angle), 0.0)
+                     _unknown(cone.thinnest, cone.angle), 1e-3 * enough)
 
 
 def _unknown(thinnest: float, angle: float) -> float:
     """Return the share of a term that rounding or rows counted as parallel may explain."""
-    return _ROUNDING / thinnest + 2.0 * angle / max(thinnest, _CLEAR)
+    return _ROUNDING / thinnest + _SPAN * angle / max(thinnest, _CLEAR)
 
 
-def _balanced(C: Array, terms: Array, f: Array, size: Array, unknown: float, enough: float
-              ) -> float:
-    """Return the least |C z + f| for z >= 0, ignoring entries within the unknown share of terms."""
-    z = _non_negative(C, -f, enough)
-    left = C @ z + f
-    noise = unknown * (size + terms @ z)
-    return _length(left[np.abs(left) > noise])
+def _balanced(C: Array, terms: Array, f: Array, size: Array, unknown: Array | float,
+              enough: float) -> float:
+    """Return the least |C z + f| for z >= 0, ignoring entries within the unknown share of terms.
+
+    Any z proves what it reaches. A search that rounding ends early on dependent columns is repeated
+    by scipy's, which chooses otherwise.
+    """
+    least = np.inf
+    for search in (_non_negative, _non_negative_by_scipy):
+        z = search(C, -f, enough)
+        left = C @ z + f
+        noise = unknown * (size + terms @ z)
+        least = min(least, _length(left[np.abs(left) > noise]))
+        if least <= enough:
+            break
+    return least
 
 
 @final
@@ -401,6 +416,23 @@ def _non_negative(C: Array, b: Array, enough: float) -> Array:
     D, target = C[:, usable][heavy], b[heavy] / largest
     z[usable] = largest * _active_set(D, target, D / peak[usable], enough, largest)
     return z
+
+
+def _non_negative_by_scipy(C: Array, b: Array, enough: float) -> Array:
+    """Return z >= 0 that minimises |C z - b|, zero where the search fails.
+
+    It gets finite numbers of at most 1: others can end the process.
+    """
+    from scipy.optimize import nnls
+
+    z, largest = np.zeros(C.shape[1]), float(np.abs(b).max(initial=0.0))
+    peak = np.abs(C).max(axis=0, initial=0.0)
+    usable = (peak > 0.0) & (peak < np.inf)
+    if not usable.any() or not 0.0 < largest < np.inf:
+        return z
+    with suppress(RuntimeError):  # it takes too many steps
+        z[usable] = nnls(C[:, usable] / peak[usable], b / largest)[0] * (largest / peak[usable])
+    return z if np.isfinite(z).all() else np.zeros(C.shape[1])
 
 
 def _active_set(D: Array, b: Array, unit: Array, enough: float, scale: float) -> Array:

@@ -24,7 +24,8 @@ from hierarchy.jit import compiled, inlined
 from solvers.kernels.level import (
     Part,
     balance,
-    has_dust,
+    is_unclear,
+    is_uneven,
     pull_of_rows,
     smallest_share,
     solve_part,
@@ -69,6 +70,7 @@ from solvers.kernels.tableau import (
     around,
     asks_for_x,
     factor,
+    has_dust,
     has_outgrown,
     keep,
     measure,
@@ -78,7 +80,7 @@ from solvers.kernels.tableau import (
     side_of,
     value_of,
 )
-from solvers.kernels.tolerances import CANCELLED, DOUBTFUL
+from solvers.kernels.tolerances import CANCELLED, DOUBTFUL, LIGHT
 from solvers.status import (
     EQUAL,
     FREE,
@@ -243,7 +245,7 @@ def _prove(s, whole):
     """
     levels = s.count[LEVELS]
     verdict = _add_violated(s)
-    if has_outgrown(s) or smallest_share(s, ZERO, s.index[RANKS, levels]) < DOUBTFUL:
+    if has_outgrown(s) or has_dust(s) or smallest_share(s, ZERO, s.index[RANKS, levels]) < DOUBTFUL:
         return UNCLEAR
     for k in range(levels + 1):
         above = s.index[RANKS, k]
@@ -252,6 +254,8 @@ def _prove(s, whole):
             goal = s.number[GOAL if k == whole else REFERENCE]
             weight = s.number[ENTRY, s.index[LIST, s.index[BEGIN, k]]] ** 2 if k == whole else 1.0
             missed = above > 0 and _pull_of_goal(s, goal, weight, above)
+        elif _is_unclear_level(s, k):
+            return UNCLEAR
         elif s.index[BEGIN, k + 1] - s.index[BEGIN, k] == s.index[RANKS, k + 1] - above:
             continue
         else:
@@ -262,6 +266,17 @@ def _prove(s, whole):
         if verdict != RIGHT:
             break
     return verdict
+
+
+@inlined
+def _is_unclear_level(s, k):
+    """Whether a level has a row that is nearly, but not quite, dependent."""
+    begin, end, rank = s.index[BEGIN, k], s.index[BEGIN, k + 1], s.index[RANKS, k + 1]
+    unclear = False
+    for q in range(begin + rank - s.index[RANKS, k], end):
+        i = s.index[LIST, q]
+        unclear |= is_unclear(s, i, rank) or is_unclear(s, i, s.index[RANKS, k])
+    return unclear
 
 
 @inlined
@@ -310,7 +325,7 @@ def _pull_of_level(s, k, above):
     worst = s.scalar[WORST]
     if worst < DOUBTFUL:
         return False, UNCLEAR if worst > s.settings.tolerance else RIGHT
-    if has_dust(s, part):
+    if is_uneven(s, part, LIGHT):
         return False, UNCLEAR
     for q in range(part.q0, part.q1):
         i = s.index[LIST, q]

@@ -39,7 +39,7 @@ from solvers.kernels.tableau import (
     left_of,
     side_of,
 )
-from solvers.kernels.tolerances import CANCELLED, DUST, EPSILON, SAME
+from solvers.kernels.tolerances import CANCELLED, DOUBTFUL, EPSILON, SAME, SLIGHT
 
 
 class Part(NamedTuple):
@@ -180,13 +180,20 @@ def weigh_rows(s, part):
 
 
 @inlined
-def has_dust(s, part):
-    """Whether a row of a level is so small that it may be the rounding of another."""
+def is_uneven(s, part, share):
+    """Whether a row of a level is smaller than this share of another."""
     least, most = np.inf, 0.0
     for q in range(part.q0, part.q1):
         norm = s.number[NORM, s.index[LIST, q]]
         least, most = min(least, norm), max(most, norm)
-    return least < DUST * most
+    return least < share * most
+
+
+@inlined
+def is_unclear(s, i, begin):
+    """Whether what is left of row i from this basis vector on is neither rounding nor much."""
+    left, norm = np.sqrt(left_of(s, i, begin, s.x.size)), s.number[NORM, i]
+    return SLIGHT * s.settings.rank_tolerance * norm < left < DOUBTFUL * norm
 
 
 @inlined

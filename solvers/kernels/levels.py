@@ -27,7 +27,8 @@ from solvers.kernels.level import (
     Part,
     balance,
     damping_of,
-    has_dust,
+    is_unclear,
+    is_uneven,
     least_squares_part,
     nearly_parallel,
     pull_of_rows,
@@ -83,6 +84,7 @@ from solvers.kernels.tableau import (
     asks_for_x,
     factor,
     fold,
+    has_dust,
     has_outgrown,
     keep,
     left_of,
@@ -99,6 +101,7 @@ from solvers.kernels.tolerances import (
     CANCELLED,
     DOUBTFUL,
     FLOOR,
+    LIGHT,
     NO_STEP,
     PATIENCE,
     RELAXATION,
@@ -169,7 +172,7 @@ def solve_by_levels(A, lower, upper, sizes, x, record, settings, work):
 @inlined
 def _verdict(s, code):
     """Return how the solve ended; x becomes zero if it is not finite."""
-    doubt = s.count[DOUBT] == 1 or has_outgrown(s)
+    doubt = s.count[DOUBT] == 1 or has_outgrown(s) or has_dust(s)
     if code == SOLVED and doubt and s.settings.damping == 0.0:
         code = ZERO + INACCURATE
     return code if finish(s.x, SOLVED) == SOLVED else ZERO + NUMERICAL_FAILURE
@@ -228,7 +231,9 @@ def _begin(s, k, first, last, whole):
             s.index[STATE, i] = SOFT
             s.index[LIST, count[ROWS]] = i
             count[ROWS] += 1
-        elif number[ACTIVE, i] != EQUAL:
+            continue
+        count[DOUBT] |= is_unclear(s, i, count[FIX])
+        if number[ACTIVE, i] != EQUAL:
             number[HOLDS, i], number[MULTIPLIER, i] = k, value - side_of(number, i)
     for c in range(n):
         number[START, c] = s.x[c]
@@ -394,6 +399,7 @@ def _enter(s, i, first, last):
     column, lo = s.index[COLUMN, i], count[FIRST]
     if left_of(s, i, begin, n) <= (s.settings.rank_tolerance * s.number[NORM, i]) ** 2:
         s.index[STATE, i], s.number[ACTIVE, i] = PARALLEL, FREE
+        count[DOUBT] |= is_unclear(s, i, begin)
         return
     free = min(begin + count[RANK], n - 1)
     reflect(M, free, n, column, lo, s.room)
@@ -604,14 +610,18 @@ def _settle(s, k, whole):
         if q < count[RANK]:
             left = left_of(s, i, end + q, end + q + 1)
             least = min(least, np.sqrt(left) / number[NORM, i])
+        else:
+            count[DOUBT] |= is_unclear(s, i, end + count[RANK]) or is_unclear(s, i, end)
         if number[ACTIVE, i] == EQUAL:
             continue
         if count[MISSED] == 1 and number[ACTIVE, i] * over > unclear * scale:
             number[HOLDS, i], number[MULTIPLIER, i] = k, over
         else:
             state[i] = HELD
-    slight = not whole and count[MISSED] == 1 and SLIGHT * unclear < s.scalar[WORST] < DOUBTFUL
-    if least < DOUBTFUL or slight or (missed and has_dust(s, Part(ZERO, count[ROWS], end, ZERO))):
+    slight = not whole and count[MISSED] == 1 and (
+        SLIGHT * unclear * least < s.scalar[WORST] < DOUBTFUL)
+    part = Part(ZERO, count[ROWS], end, ZERO)
+    if least < DOUBTFUL or slight or (missed and is_uneven(s, part, LIGHT)):
         count[DOUBT] = 1
 
 

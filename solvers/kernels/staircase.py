@@ -36,7 +36,7 @@ from solvers.kernels.space import (
     shared,
     vector,
 )
-from solvers.kernels.tolerances import DOUBTFUL
+from solvers.kernels.tolerances import DOUBTFUL, DUST, SLIGHT
 from solvers.status import EQUAL, INACCURATE, SOLVED, TOO_SMALL, UNPROVED
 
 
@@ -100,22 +100,41 @@ def climb(A, lower, upper, sizes, x, settings, work):
         reflect(basis, ZERO, above, rows.W, first, last)  # J_i Q: the level as seen from above
         _ask(rows, lower, first, last)
         rank = factor_level(rows, basis, first, last, rank)
-        least = _smallest_pivot(rows, first, above, rank, least)
+        block = Block(first, last, above, rank)
+        least = _smallest_remainder(rows, block, least)
         subtract(rows, y, first, last, above)  # p_i - J_i x_{i-1}, in (13)
-        solve_level(rows.W, rows.miss, y, Block(first, last, above, rank), settings, of_block)
+        solve_level(rows.W, rows.miss, y, block, settings, of_block)
         first = last
     _to_unknowns(basis, y, rank, x, of_x)
+    least = 0.0 if _has_dust(rows.zero) else least
     return finish(x, SOLVED), np.sqrt(least) * settings.rank_tolerance
 
 
 @inlined
-def _smallest_pivot(rows, first, above, rank, least):
-    """Return the least squared pivot, relative to the square at which a row counts as zero."""
-    for k in range(above, rank):
-        i = first + k - above
+def _smallest_remainder(rows, block, least):
+    """Return the least squared pivot, relative to the square at which a row counts as zero.
+
+    Zero if a row without pivot is not quite dependent on the others.
+    """
+    for k in range(block.k0, block.k1):
+        i = block.i0 + k - block.k0
         square, zero = rows.W[i, k] * rows.W[i, k], rows.zero[i]
         least = min(least, square / zero) if zero > 0.0 else least
+    for i in range(block.i0 + block.k1 - block.k0, block.i1):
+        left = 0.0
+        for c in range(block.k1, rows.W.shape[1]):
+            left += rows.W[i, c] * rows.W[i, c]
+        least = 0.0 if left > SLIGHT * SLIGHT * rows.zero[i] else least
     return least
+
+
+@inlined
+def _has_dust(zero):
+    """Whether a row is so small that it may be the rounding of another."""
+    least, most = np.inf, 0.0
+    for i in range(zero.size):
+        least, most = min(least, zero[i] if zero[i] > 0.0 else np.inf), max(most, zero[i])
+    return least < DUST * DUST * most
 
 
 @compiled

@@ -21,7 +21,7 @@ import numpy as np
 from hierarchy.jit import as_matrix, compiled, inlined
 from solvers.kernels.rows import ZERO, finish
 from solvers.kernels.space import View, integers, matrix, vector
-from solvers.kernels.tolerances import FLOOR, OUTGROWN
+from solvers.kernels.tolerances import DUST, FLOOR, OUTGROWN
 from solvers.status import EQUAL, FREE, NUMERICAL_FAILURE, SOLVED, TOO_SMALL
 
 # Rows of `number`. Per row of A: its norm, its only entry (1 if there are more), its sides, the
@@ -337,6 +337,16 @@ def measure(s):
 def has_outgrown(s):
     """Whether x is so small relative to its terms that its tolerances mean little."""
     return s.scalar[SIZE] > OUTGROWN * (1.0 + length_of(s.x))
+
+
+@inlined
+def has_dust(s):
+    """Whether a row is so small that it may be the rounding of another."""
+    least, most = np.inf, 0.0
+    for i in range(s.A.shape[0]):
+        norm = s.number[NORM, i]
+        least, most = min(least, norm if norm > 0.0 else np.inf), max(most, norm)
+    return least < DUST * most
 
 
 @inlined

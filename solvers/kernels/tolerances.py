@@ -13,9 +13,10 @@ EPSILON = 2e-15     # miss of a row: smaller ones are rounding
 CANCELLED = 1e-14   # sum relative to the norms of its terms: smaller ones are rounding
 SAME = 1e-12        # remainder of a row outside the others: smaller ones are rounding
 WEAK = 1e-4         # share of a row in its own basis vector: smaller ones pivot the level again
-DOUBTFUL = 1e-6     # remainder or miss of a row: smaller ones leave the answer in doubt
-DUST = 1e-12        # norm of a row over the largest of its level: smaller ones leave a doubt
-SLIGHT = 0.25       # of rank_tolerance: a level with a smaller miss is met, without doubt
+DOUBTFUL = 1e-5     # remainder or miss of a row: smaller ones leave the answer in doubt
+DUST = 1e-12        # norm of a row over the largest: smaller ones leave a doubt
+LIGHT = 1e-5        # the same in a level that is missed, over the largest of the level
+SLIGHT = 0.25       # of rank_tolerance: a smaller remainder or miss counts as zero, without doubt
 NO_STEP = 1e-12     # length of a step: smaller ones count as zero
 
 STALLED = 5         # consecutive steps of zero length before the sides are moved apart
