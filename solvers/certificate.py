@@ -31,7 +31,6 @@ first, so that rounding in rows of norm 1000 does not hide a row of norm 0.001.
 
 from __future__ import annotations
 
-from contextlib import suppress
 from dataclasses import dataclass
 from typing import final
 
@@ -430,8 +429,10 @@ def _non_negative_by_scipy(C: Array, b: Array, enough: float) -> Array:
     usable = (peak > 0.0) & (peak < np.inf)
     if not usable.any() or not 0.0 < largest < np.inf:
         return z
-    with suppress(RuntimeError):  # it takes too many steps
+    try:
         z[usable] = nnls(C[:, usable] / peak[usable], b / largest)[0] * (largest / peak[usable])
+    except RuntimeError:  # it takes too many steps
+        return z
     return z if np.isfinite(z).all() else np.zeros(C.shape[1])
 
 

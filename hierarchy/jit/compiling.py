@@ -1,8 +1,9 @@
 """The one decorator that compiles a kernel and caches it on disk.
 
 numba caches machine code per source file but does not notice when a helper in *another* file
-changed. Here the cache folder carries a digest of the kernel's own file, of every file it calls
-into, of the constants that it reads, and of this one, so a stale kernel cannot be loaded.
+changed. Here the cache folder carries a digest of the kernel's own file, of every file from which
+that file imports kernels, of the CONSTANTS that it knows, and of this one, so a stale kernel cannot
+be loaded. What a file imports counts for all its kernels: a helper further down may use it.
 """
 
 from __future__ import annotations
@@ -155,16 +156,17 @@ def _compiled(function: Kernel, inline: bool = False, nogil: bool = False) -> Ke
 
 
 def _files_behind(function: Kernel) -> frozenset[str]:
-    behind = (getattr(kernel, "source_files", ()) for kernel in _called(function))
+    """Return the files of a kernel and of all kernels that its file knows."""
+    behind = (getattr(known, "source_files", ()) for known in function.__globals__.values())
     return frozenset({function.__code__.co_filename}).union(*behind)
 
 
 def _constants_behind(function: Kernel) -> frozenset[str]:
-    """Return what a kernel, and those that it calls, read of numbers in other files."""
-    behind = (getattr(kernel, "constants", ()) for kernel in _called(function))
-    own = zip(function.__code__.co_names, _called(function), strict=True)
-    return frozenset(f"{name} = {value!r}" for name, value in own
-                     if isinstance(value, (int, float, np.integer))).union(*behind)
+    """Return the numbers that a kernel's file knows, and those behind all kernels it knows."""
+    known = function.__globals__
+    behind = (getattr(value, "constants", ()) for value in known.values())
+    return frozenset(f"{name} = {value!r}" for name, value in known.items() if name.isupper()
+                     and isinstance(value, (int, float, np.integer))).union(*behind)
 
 
 def _allocates(function: Kernel) -> bool:

@@ -38,6 +38,7 @@ from solvers.kernels.tableau import (
     BASE,
     BEGIN,
     COLUMN,
+    DOUBT,
     ENTRY,
     EXTENT,
     FIRST,
@@ -245,7 +246,8 @@ def _prove(s, whole):
     """
     levels = s.count[LEVELS]
     verdict = _add_violated(s)
-    if has_outgrown(s) or has_dust(s) or smallest_share(s, ZERO, s.index[RANKS, levels]) < DOUBTFUL:
+    in_doubt = s.count[DOUBT] == 1 or has_outgrown(s) or has_dust(s)
+    if in_doubt or smallest_share(s, ZERO, s.index[RANKS, levels]) < DOUBTFUL:
         return UNCLEAR
     for k in range(levels + 1):
         above = s.index[RANKS, k]

@@ -39,7 +39,7 @@ from solvers.kernels.tableau import (
     left_of,
     side_of,
 )
-from solvers.kernels.tolerances import CANCELLED, DOUBTFUL, EPSILON, SAME, SLIGHT
+from solvers.kernels.tolerances import CANCELLED, DOUBTFUL, EPSILON, NEARLY, SAME
 
 
 class Part(NamedTuple):
@@ -193,7 +193,7 @@ def is_uneven(s, part, share):
 def is_unclear(s, i, begin):
     """Whether what is left of row i from this basis vector on is neither rounding nor much."""
     left, norm = np.sqrt(left_of(s, i, begin, s.x.size)), s.number[NORM, i]
-    return SLIGHT * s.settings.rank_tolerance * norm < left < DOUBTFUL * norm
+    return NEARLY * s.settings.rank_tolerance * norm < left < DOUBTFUL * norm
 
 
 @inlined

@@ -43,6 +43,7 @@ from solvers.kernels.tableau import (
     BASE,
     COLUMN,
     DAMPED,
+    DOUBT,
     ENTRY,
     EXTENT,
     FIRST,
@@ -101,6 +102,7 @@ from solvers.kernels.tolerances import (
     CANCELLED,
     DOUBTFUL,
     FLOOR,
+    LAST,
     LIGHT,
     NO_STEP,
     PATIENCE,
@@ -123,8 +125,8 @@ from solvers.status import (
 WATCHED, HELD, SOFT, FIXED, PARALLEL = range(1, 6)
 # Entries of `count`: basis vectors of the fixed, hard and soft rows, soft rows, equalities of the
 # level that have columns; steps of zero length, steps at a level's optimum, whether sides are moved
-# apart, how often that was done; whether the level is missed, whether the answer is in doubt.
-FIX, HARD, RANK, ROWS, EQUALITIES, STILL, TRIES, APART, TIMES, MISSED, DOUBT = range(4, 15)
+# apart, how often that was done; whether the level is missed.
+FIX, HARD, RANK, ROWS, EQUALITIES, STILL, TRIES, APART, TIMES, MISSED = range(5, 15)
 GOLDEN = 0.6180339887498949
 
 
@@ -567,11 +569,17 @@ def _forgive(s, part, whole):
 
 @inlined
 def _worst(s):
-    """Return the row whose force has the worst wrong sign, or the first by Bland; -1 if none."""
+    """Return the row whose force has the worst wrong sign, or the first by Bland; -1 if none.
+
+    After many tries only rounding chooses: then the level ends as it is, in doubt.
+    """
     count, fixed, hard = s.count, s.count[FIX], s.count[HARD]
     bland = count[STILL] > BLAND_AFTER
     least, leaving = 0.0, -1
     if count[MISSED] == 0:
+        return leaving
+    if count[TRIES] > LAST * (hard + count[ROWS] + 1):
+        count[DOUBT] = 1
         return leaving
     for q in range(hard + count[ROWS]):
         i = s.index[OWNER, fixed + q] if q < hard else s.index[LIST, q - hard]
@@ -619,7 +627,7 @@ def _settle(s, k, whole):
         else:
             state[i] = HELD
     slight = not whole and count[MISSED] == 1 and (
-        SLIGHT * unclear * least < s.scalar[WORST] < DOUBTFUL)
+        SLIGHT * unclear < s.scalar[WORST] < DOUBTFUL)
     part = Part(ZERO, count[ROWS], end, ZERO)
     if least < DOUBTFUL or slight or (missed and is_uneven(s, part, LIGHT)):
         count[DOUBT] = 1

@@ -36,7 +36,7 @@ from solvers.kernels.space import (
     shared,
     vector,
 )
-from solvers.kernels.tolerances import DOUBTFUL, DUST, SLIGHT
+from solvers.kernels.tolerances import DOUBTFUL, DUST, NEARLY
 from solvers.status import EQUAL, INACCURATE, SOLVED, TOO_SMALL, UNPROVED
 
 
@@ -124,7 +124,7 @@ def _smallest_remainder(rows, block, least):
         left = 0.0
         for c in range(block.k1, rows.W.shape[1]):
             left += rows.W[i, c] * rows.W[i, c]
-        least = 0.0 if left > SLIGHT * SLIGHT * rows.zero[i] else least
+        least = 0.0 if left > NEARLY * NEARLY * rows.zero[i] else least
     return least
 
 

@@ -21,7 +21,7 @@ import numpy as np
 from hierarchy.jit import as_matrix, compiled, inlined
 from solvers.kernels.rows import ZERO, finish
 from solvers.kernels.space import View, integers, matrix, vector
-from solvers.kernels.tolerances import DUST, FLOOR, OUTGROWN
+from solvers.kernels.tolerances import DOUBTFUL, DUST, FLOOR, OUTGROWN
 from solvers.status import EQUAL, FREE, NUMERICAL_FAILURE, SOLVED, TOO_SMALL
 
 # Rows of `number`. Per row of A: its norm, its only entry (1 if there are more), its sides, the
@@ -38,8 +38,9 @@ from solvers.status import EQUAL, FREE, NUMERICAL_FAILURE, SOLVED, TOO_SMALL
 # the basis.
 UNIT, COLUMN, STATE, LIST, OWNER, ORDER, EXTENT, BEGIN, RANKS = range(9)
 # In `count`: levels; first column of M in use; first column of the remaining unknowns; removed
-# unknowns, which were put on a bound before all else. The others are those of `levels.py`.
-LEVELS, FIRST, BASE, REMOVED = range(4)
+# unknowns, which were put on a bound before all else; whether the answer is in doubt. The others
+# are those of `levels.py`.
+LEVELS, FIRST, BASE, REMOVED, DOUBT = range(5)
 COUNTS = 15
 # In `scalar`: the largest number so far, the scale of tolerances; a level's damping and weight; the
 # largest miss of its rows, the sum of their pulls, the part of that which may be rounding; guesses,
@@ -179,7 +180,7 @@ def open_tableau(s, rows):
     at = removed
     for i in range(m):
         at += rows == ACTING and unit[i] < 0 and active[i] == FREE
-    s.count[FIRST] = at
+    s.count[FIRST], s.count[DOUBT] = at, 0
     for equal in (True, False):
         for i in range(m):
             if unit[i] < 0 and (active[i] == EQUAL) == equal and not (
@@ -279,6 +280,8 @@ def factor(s, q0, q1, begin, rank):
             break
         q = q0 + rank
         rows[q], rows[best] = rows[best], rows[q]
+        if largest < (DOUBTFUL * s.number[NORM, rows[q]]) ** 2:
+            s.count[DOUBT] = 1
         reflect(s.M, begin + rank, n, s.index[COLUMN, rows[q]], s.count[FIRST], s.room)
         rank += 1
     return rank

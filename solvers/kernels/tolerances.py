@@ -16,11 +16,13 @@ WEAK = 1e-4         # share of a row in its own basis vector: smaller ones pivot
 DOUBTFUL = 1e-5     # remainder or miss of a row: smaller ones leave the answer in doubt
 DUST = 1e-12        # norm of a row over the largest: smaller ones leave a doubt
 LIGHT = 1e-5        # the same in a level that is missed, over the largest of the level
-SLIGHT = 0.25       # of rank_tolerance: a smaller remainder or miss counts as zero, without doubt
+SLIGHT = 0.25       # of rank_tolerance: a smaller miss counts as zero, without doubt
+NEARLY = 0.6        # of rank_tolerance: a smaller remainder counts as zero, without doubt
 NO_STEP = 1e-12     # length of a step: smaller ones count as zero
 
 STALLED = 5         # consecutive steps of zero length before the sides are moved apart
 RELAXATION = 1e-6   # amount by which they are moved, times 1 to 2
 RELAXATIONS = 3     # most times per level; then the rule of least index applies
 BLAND_AFTER = 30    # consecutive steps of zero length before the row of least index leaves
-PATIENCE = 10       # steps per row of a level before small multipliers count as zero
+PATIENCE = 10       # releases per row of a level before small multipliers count as zero
+LAST = 20           # releases per row of a level before it ends in doubt

@@ -1,0 +1,54 @@
+"""Compiled kernels are cached by all that they are made of."""
+
+import importlib
+import sys
+
+from hierarchy.jit import compiling
+
+HELPER = """
+from hierarchy.jit import compiled
+
+@compiled
+def twice(x):
+    return 2.0 * x
+"""
+KERNEL = """
+from helper_of_test_jit import twice
+from numbers_of_test_jit import SHARE
+from hierarchy.jit import compiled
+
+@compiled
+def outer(x):
+    return further_down(x)
+
+@compiled
+def further_down(x):
+    return SHARE * twice(x)
+"""
+
+
+def kernel(folder, share):
+    """The kernel `outer` of modules in a folder, imported anew."""
+    (folder / "numbers_of_test_jit.py").write_text(f"SHARE = {share}\n")
+    (folder / "helper_of_test_jit.py").write_text(HELPER)
+    (folder / "kernel_of_test_jit.py").write_text(KERNEL)
+    for name in ("numbers_of_test_jit", "helper_of_test_jit", "kernel_of_test_jit"):
+        sys.modules.pop(name, None)
+    importlib.invalidate_caches()
+    return importlib.import_module("kernel_of_test_jit").outer
+
+
+def test_a_kernel_knows_what_helpers_below_it_use(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "cache"))
+    compiling.cache_folder.cache_clear()
+    try:
+        half, whole = kernel(tmp_path, 0.5), kernel(tmp_path, 1.25)
+        if hasattr(half, "constants"):  # plain functions under NUMBA_DISABLE_JIT
+            assert "SHARE = 0.5" in half.constants
+            assert "SHARE = 1.25" in whole.constants
+            assert str(tmp_path / "helper_of_test_jit.py") in half.source_files
+        assert (half(4.0), whole(4.0)) == (4.0, 10.0)
+    finally:
+        compiling.cache_folder.cache_clear()
