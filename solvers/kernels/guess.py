@@ -272,12 +272,11 @@ def _prove(s, whole):
 
 @inlined
 def _is_unclear_level(s, k):
-    """Whether a level has a row that is nearly, but not quite, dependent."""
+    """Whether a level has a row that is nearly, but not quite, dependent on the rows above."""
     begin, end, rank = s.index[BEGIN, k], s.index[BEGIN, k + 1], s.index[RANKS, k + 1]
     unclear = False
     for q in range(begin + rank - s.index[RANKS, k], end):
-        i = s.index[LIST, q]
-        unclear |= is_unclear(s, i, rank) or is_unclear(s, i, s.index[RANKS, k])
+        unclear |= is_unclear(s, s.index[LIST, q], s.index[RANKS, k])
     return unclear
 
 

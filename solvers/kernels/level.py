@@ -39,7 +39,7 @@ from solvers.kernels.tableau import (
     left_of,
     side_of,
 )
-from solvers.kernels.tolerances import CANCELLED, DOUBTFUL, EPSILON, NEARLY, SAME
+from solvers.kernels.tolerances import CANCELLED, DOUBTFUL, EPSILON, SAME
 
 
 class Part(NamedTuple):
@@ -191,9 +191,9 @@ def is_uneven(s, part, share):
 
 @inlined
 def is_unclear(s, i, begin):
-    """Whether what is left of row i from this basis vector on is neither rounding nor much."""
+    """Whether little, but more than nothing, is left of row i from this basis vector on."""
     left, norm = np.sqrt(left_of(s, i, begin, s.x.size)), s.number[NORM, i]
-    return NEARLY * s.settings.rank_tolerance * norm < left < DOUBTFUL * norm
+    return s.settings.rank_tolerance * norm < left < DOUBTFUL * norm
 
 
 @inlined

@@ -233,9 +233,7 @@ def _begin(s, k, first, last, whole):
             s.index[STATE, i] = SOFT
             s.index[LIST, count[ROWS]] = i
             count[ROWS] += 1
-            continue
-        count[DOUBT] |= is_unclear(s, i, count[FIX])
-        if number[ACTIVE, i] != EQUAL:
+        elif number[ACTIVE, i] != EQUAL:
             number[HOLDS, i], number[MULTIPLIER, i] = k, value - side_of(number, i)
     for c in range(n):
         number[START, c] = s.x[c]
@@ -401,7 +399,6 @@ def _enter(s, i, first, last):
     column, lo = s.index[COLUMN, i], count[FIRST]
     if left_of(s, i, begin, n) <= (s.settings.rank_tolerance * s.number[NORM, i]) ** 2:
         s.index[STATE, i], s.number[ACTIVE, i] = PARALLEL, FREE
-        count[DOUBT] |= is_unclear(s, i, begin)
         return
     free = min(begin + count[RANK], n - 1)
     reflect(M, free, n, column, lo, s.room)
@@ -619,10 +616,11 @@ def _settle(s, k, whole):
             left = left_of(s, i, end + q, end + q + 1)
             least = min(least, np.sqrt(left) / number[NORM, i])
         else:
-            count[DOUBT] |= is_unclear(s, i, end + count[RANK]) or is_unclear(s, i, end)
+            count[DOUBT] |= is_unclear(s, i, end)
         if number[ACTIVE, i] == EQUAL:
             continue
         if count[MISSED] == 1 and number[ACTIVE, i] * over > unclear * scale:
+            count[DOUBT] |= number[ACTIVE, i] * over < DOUBTFUL * scale
             number[HOLDS, i], number[MULTIPLIER, i] = k, over
         else:
             state[i] = HELD

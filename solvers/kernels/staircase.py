@@ -36,7 +36,7 @@ from solvers.kernels.space import (
     shared,
     vector,
 )
-from solvers.kernels.tolerances import DOUBTFUL, DUST, NEARLY
+from solvers.kernels.tolerances import DOUBTFUL, DUST
 from solvers.status import EQUAL, INACCURATE, SOLVED, TOO_SMALL, UNPROVED
 
 
@@ -101,7 +101,7 @@ def climb(A, lower, upper, sizes, x, settings, work):
         _ask(rows, lower, first, last)
         rank = factor_level(rows, basis, first, last, rank)
         block = Block(first, last, above, rank)
-        least = _smallest_remainder(rows, block, least)
+        least = _smallest_pivot(rows, block, least)
         subtract(rows, y, first, last, above)  # p_i - J_i x_{i-1}, in (13)
         solve_level(rows.W, rows.miss, y, block, settings, of_block)
         first = last
@@ -111,20 +111,12 @@ def climb(A, lower, upper, sizes, x, settings, work):
 
 
 @inlined
-def _smallest_remainder(rows, block, least):
-    """Return the least squared pivot, relative to the square at which a row counts as zero.
-
-    Zero if a row without pivot is not quite dependent on the others.
-    """
+def _smallest_pivot(rows, block, least):
+    """Return the least squared pivot, relative to the square at which a row counts as zero."""
     for k in range(block.k0, block.k1):
         i = block.i0 + k - block.k0
         square, zero = rows.W[i, k] * rows.W[i, k], rows.zero[i]
         least = min(least, square / zero) if zero > 0.0 else least
-    for i in range(block.i0 + block.k1 - block.k0, block.i1):
-        left = 0.0
-        for c in range(block.k1, rows.W.shape[1]):
-            left += rows.W[i, c] * rows.W[i, c]
-        least = 0.0 if left > NEARLY * NEARLY * rows.zero[i] else least
     return least
 
 

@@ -17,7 +17,6 @@ DOUBTFUL = 1e-5     # remainder or miss of a row: smaller ones leave the answer 
 DUST = 1e-12        # norm of a row over the largest: smaller ones leave a doubt
 LIGHT = 1e-5        # the same in a level that is missed, over the largest of the level
 SLIGHT = 0.25       # of rank_tolerance: a smaller miss counts as zero, without doubt
-NEARLY = 0.6        # of rank_tolerance: a smaller remainder counts as zero, without doubt
 NO_STEP = 1e-12     # length of a step: smaller ones count as zero
 
 STALLED = 5         # consecutive steps of zero length before the sides are moved apart
