@@ -165,7 +165,7 @@ def solve_exactly(h: Hierarchy, x: Array, record: Array, settings: Array, known:
     see `solve_by_guesses`. Entry kernels do not call each other: that would compile them twice.
     """
     work, code = WORKSPACE.array, UNPROVED
-    if not known or record[0] == EQUAL:
+    if not known or record.item(0) == EQUAL:  # an index takes twice the time
         code = solve_equalities(h.A, h.lower, h.upper, h.sizes, x, record, settings, work)
     if code == UNPROVED and known:
         code = solve_by_guesses(h.A, h.lower, h.upper, h.sizes, x, record, settings, work)
