@@ -49,27 +49,39 @@ def _level(h: Hierarchy, resolution: ActiveSetResolution, k: int, tolerance: flo
     missed = float(np.linalg.norm(w))
     if missed <= tolerance * size:
         return f"{h.names[k]} is met."
-    blocking = _inequalities(h, resolution, k, names) + _equalities(h, resolution, k, w)
+    blocking = held_back_by(h, resolution, k, names)
     if not blocking:
         return f"{h.names[k]} is missed by {missed:.3g}: its own rows disagree."
-    return f"{h.names[k]} is missed by {missed:.3g}: held back by {_and(blocking)}."
+    by = _and(_said_once(blocking, h.names))
+    return f"{h.names[k]} is missed by {missed:.3g}: held back by {by}."
+
+
+def held_back_by(h: Hierarchy, resolution: ActiveSetResolution, k: int,
+                 rows: Sequence[str]) -> list[str]:
+    """Return what holds level k back: rows at a side, by their names, and levels of equalities."""
+    w = h.slacks(resolution.x)[h.offsets[k]:h.offsets[k + 1]]
+    return _inequalities(h, resolution, k, rows) + _equalities(h, resolution, k, w)
 
 
 def _inequalities(h: Hierarchy, resolution: ActiveSetResolution, k: int,
                   names: Sequence[str]) -> list[str]:
     """Name the inequality rows above level k that hold it back."""
-    holding = [int(i) for i in np.flatnonzero(resolution.holds_back == k) if i < h.offsets[k]]
-    levels = [int((h.offsets[1:] <= i).sum()) for i in holding]
-    said = [-1, *levels][:len(levels)]
-    return [_row(h, resolution, i, names[i], "" if level == before else f"{h.names[level]} ")
-            for i, level, before in zip(holding, levels, said, strict=True)]
+    holding = np.flatnonzero(resolution.holds_back == k)
+    return [_row(h, resolution, i, names[i]) for i in holding.tolist() if i < h.offsets[k]]
 
 
-def _row(h: Hierarchy, resolution: ActiveSetResolution, i: int, name: str, level: str) -> str:
-    """Name a row and its side; the level's name is said once for the rows of a level."""
-    alone = bool(h.sizes[int((h.offsets[1:] <= i).sum())] == 1)
-    side = "upper" if resolution.active[i] > 0 else "lower"
-    return f"{level.strip() if alone else level + name} at its {side} side"
+def _row(h: Hierarchy, resolution: ActiveSetResolution, i: int, name: str) -> str:
+    level = int((h.offsets[1:] <= i).sum())
+    of_level = f"{h.names[level]} {name}" if h.sizes[level] > 1 else h.names[level]
+    return f"{of_level} at its {'upper' if resolution.active[i] > 0 else 'lower'} side"
+
+
+def _said_once(blocking: Sequence[str], levels: Sequence[str]) -> list[str]:
+    """Return names without that of their level where the one before is of the same level."""
+    of = [max((f"{level} " for level in levels if name.startswith(f"{level} ")), key=len,
+              default=name) for name in blocking]
+    return [name.removeprefix(level) if level == before else name
+            for name, level, before in zip(blocking, of, ["", *of], strict=False)]
 
 
 def _equalities(h: Hierarchy, resolution: ActiveSetResolution, k: int, w: Array) -> list[str]:

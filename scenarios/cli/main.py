@@ -32,6 +32,7 @@ from scenarios.cli.options import (
 from scenarios.cli.terminal import (
     certified,
     first_line,
+    levels_given_up,
     print_json,
     print_list,
     print_table,
@@ -166,7 +167,7 @@ def run(scenario: Annotated[str, typer.Argument(
     print_table([_run_of(chosen, recording)])
     if certify:
         print(f"\n{certified(recording, chosen.make_resolver().damping)}")
-    for line in troubles(recording):
+    for line in (*troubles(recording), *levels_given_up(recording)):
         print(line)
     print(f"\n{recording.ticks} ticks in {shown(folder)}")
     return _fault(recording.fault)

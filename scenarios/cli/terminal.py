@@ -6,7 +6,7 @@ import json
 import re
 from math import isfinite
 from pathlib import Path
-from textwrap import wrap
+from textwrap import fill, wrap
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -23,6 +23,14 @@ def troubles(recording: Any) -> list[str]:
     lines = [f"{kind}: {action} in {len(ticks)} ticks, first in tick {ticks[0]} "
              f"(t = {recording['t'][ticks[0]]:.3f} s)"
              for (kind, action), ticks in recording.troubles().items()]
+    return ["", *lines] if lines else []
+
+
+def levels_given_up(recording: Any) -> list[str]:
+    """Return one line per level that the run missed: for how long, and what held it back."""
+    from scenarios.loop.given_up import given_up
+
+    lines = [fill(str(one), _WIDTH, subsequent_indent="  ") for one in given_up(recording)]
     return ["", *lines] if lines else []
 
 

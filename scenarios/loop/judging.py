@@ -35,7 +35,7 @@ def judge(recording: Recording, cell: Cell) -> None:
     Adds the signals level_fate, level_violation and saturated. Levels are UNKNOWN in ticks whose
     distances do not follow from the recorded joints, or whose settings were changed by hand.
     """
-    orders, rows = recording.order_names, _Rows(recording, cell)
+    orders, rows = recording.order_names, Rows(recording, cell)
     fates = Fates(recording.task_names, recording.ticks, cell.robot.n)
     accuracy, commands = recording.facts.resolver.accuracy, recording["command"]
     changed = recording.signals.get("changed", np.zeros(recording.ticks, bool))
@@ -47,7 +47,7 @@ def judge(recording: Recording, cell: Cell) -> None:
     recording.signals.update(fates.signals(recording))
 
 
-class _Rows:
+class Rows:
     """Moves a cell through the recorded ticks."""
 
     def __init__(self, recording: Recording, cell: Cell) -> None:
