@@ -5,19 +5,22 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable
 
+_NEAR = 0.6  # similarity of two names, 0 to 1, from which one is suggested
+
 
 class HierarchyError(ValueError):
     """A caller's mistake; the text names the task or level, the row and the value."""
 
 
 class UnknownNameError(HierarchyError):
-    """An unknown name, with the most similar known one."""
+    """An unknown name, with the most similar known one; `more` is a further sentence."""
 
-    def __init__(self, what: str, name: str, known: Iterable[str]) -> None:
+    def __init__(self, what: str, name: str, known: Iterable[str], more: str = "") -> None:
         known = sorted(known)
-        near = difflib.get_close_matches(str(name), known, n=1, cutoff=0.4)
-        hint = f"; did you mean {near[0]!r}?" if near else ""
-        super().__init__(f"unknown {what} {name!r}{hint} Known: {', '.join(known) or 'none'}.")
+        near = difflib.get_close_matches(str(name), known, n=1, cutoff=_NEAR)
+        hint = f"; did you mean {near[0]!r}?" if near else "."
+        super().__init__(f"unknown {what} {name!r}{hint} Known: {', '.join(known) or 'none'}."
+                         + (f" {more}" if more else ""))
 
 
 class RobotError(HierarchyError):

@@ -19,7 +19,7 @@ from hierarchy.robots import TABLES
 from hierarchy.robots.files import read_file
 from hierarchy.robots.found import Found, is_floating
 from hierarchy.robots.from_table import from_table
-from hierarchy.robots.names import file_of, in_package
+from hierarchy.robots.names import elsewhere, file_of, in_package
 from hierarchy.robots.points import points_along_chain
 from hierarchy.robots.table import Base, Table
 
@@ -105,7 +105,7 @@ class Robot:
         `base` "fixed" or "floating" overrides that of its table.
         """
         if name not in TABLES:
-            raise UnknownNameError("robot", name, TABLES)
+            raise UnknownNameError("robot", name, TABLES, elsewhere(name))
         robot = cls._of(from_table(TABLES[name], base), name)
         robot.table = TABLES[name]
         return robot

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from importlib import import_module
-from importlib.metadata import PackageNotFoundError, distribution
+from importlib.metadata import PackageNotFoundError, PackagePath, distribution
 from pathlib import Path
 
 from hierarchy.errors import RobotError, UnknownNameError
@@ -15,6 +16,34 @@ _REMEDY = "pip install 'task-hierarchy[robots]'"
 def in_package(model: str) -> bool:
     """Whether `model` is "package:name" with a known package."""
     return model.partition(":")[0] in PACKAGES and ":" in model
+
+
+def elsewhere(name: str) -> str:
+    """Return where a robot that the package does not ship may be found, as a sentence."""
+    found = [f"{package}:{known}" for package, names in _installed().items() for known in names
+             if name.lower() in known.lower()]
+    if found:
+        return f"The installed packages have {', '.join(sorted(found, key=len)[:3])}."
+    return ("Others: a URDF or MJCF file, or with the extra `robots` example_robot_data:NAME and "
+            "robot_descriptions:NAME, such as example_robot_data:ur5_robot.")
+
+
+def _installed() -> dict[str, list[str]]:
+    """Return the names of the robots in each package of robots that is installed."""
+    found: dict[str, list[str]] = {}
+    with suppress(PackageNotFoundError):
+        found["example_robot_data"] = list(_example_files())
+    with suppress(ImportError):
+        found["robot_descriptions"] = list(
+            import_module("robot_descriptions._descriptions").DESCRIPTIONS)
+    return found
+
+
+def _example_files() -> dict[str, PackagePath]:
+    """Return the URDF files of example_robot_data by name; raises PackageNotFoundError."""
+    files = distribution("example-robot-data").files or []
+    return {file.name.removesuffix(".urdf"): file for file in sorted(files, reverse=True)
+            if file.name.endswith(".urdf")}
 
 
 def file_of(model: str) -> Path:
@@ -34,12 +63,10 @@ def file_of(model: str) -> Path:
 def _in_example_robot_data(name: str) -> Path:
     """Names are those of its URDF files, without the suffix."""
     try:
-        files = distribution("example-robot-data").files or []
+        found = _example_files()
     except PackageNotFoundError as error:
         raise RobotError(f"robot 'example_robot_data:{name}' needs the package "
                          f"example-robot-data: {_REMEDY}") from error
-    found = {file.name.removesuffix(".urdf"): file for file in sorted(files, reverse=True)
-             if file.name.endswith(".urdf")}
     if name not in found:
         raise UnknownNameError("robot of example_robot_data", name, found)
     return Path(str(found[name].locate())).resolve()
