@@ -84,6 +84,24 @@ def test_a_folder_that_is_no_run_or_is_damaged_is_named(tmp_path):
         load_run(tmp_path)
 
 
+@pytest.mark.usefixtures("hand_made_scenarios")
+def test_a_file_that_is_cut_off_or_has_wrong_bits_is_named(tmp_path):
+    save(recording(), tmp_path)
+    whole, rng, refused = (tmp_path / "run.npz").read_bytes(), np.random.default_rng(1), 0
+    for trial in range(150):
+        damaged = bytearray(whole)
+        if trial < 50:
+            damaged = damaged[:rng.integers(len(whole))]
+        for at in rng.integers(len(damaged), size=3) if len(damaged) else ():
+            damaged[at] ^= 1 << int(rng.integers(8))
+        (tmp_path / "run.npz").write_bytes(damaged)
+        try:
+            load_run(tmp_path)
+        except HierarchyError as error:
+            refused += "run.npz" in str(error)
+    assert refused > 100
+
+
 def test_an_empty_or_new_folder_can_be_claimed_with_its_parents(tmp_path):
     (tmp_path / "empty").mkdir()
     assert claim(tmp_path / "empty") == tmp_path / "empty"
