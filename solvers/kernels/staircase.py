@@ -36,7 +36,7 @@ from solvers.kernels.space import (
     shared,
     vector,
 )
-from solvers.kernels.tolerances import DOUBTFUL, DUST
+from solvers.kernels.tolerances import DOUBTFUL, DUST, LIGHT
 from solvers.status import EQUAL, INACCURATE, SOLVED, TOO_SMALL, UNPROVED
 
 
@@ -71,7 +71,7 @@ def solve_by_staircase(A, lower, upper, sizes, x, settings, work):
 
     settings: an array that starts with damping, threshold, rank_tolerance. work: any contents.
     Returns SOLVED, NUMERICAL_FAILURE, TOO_SMALL, -(i + 1) if row i is an inequality, or INACCURATE
-    if a row is nearly parallel to others and damping is off.
+    if a row is nearly parallel to others or far lighter, and damping is off.
     """
     code, least = climb(A, lower, upper, sizes, x, settings, work)
     if code == SOLVED and least < DOUBTFUL and settings[0] == 0.0:
@@ -102,11 +102,13 @@ def climb(A, lower, upper, sizes, x, settings, work):
         rank = factor_level(rows, basis, first, last, rank)
         block = Block(first, last, above, rank)
         least = _smallest_pivot(rows, block, least)
+        if rank - above < last - first and _is_uneven(rows.zero[first:last], LIGHT):
+            least = 0.0  # least squares: rounding in the heavy rows hides the light ones
         subtract(rows, y, first, last, above)  # p_i - J_i x_{i-1}, in (13)
         solve_level(rows.W, rows.miss, y, block, settings, of_block)
         first = last
     _to_unknowns(basis, y, rank, x, of_x)
-    least = 0.0 if _has_dust(rows.zero) else least
+    least = 0.0 if _is_uneven(rows.zero, DUST) else least
     return finish(x, SOLVED), np.sqrt(least) * settings.rank_tolerance
 
 
@@ -121,12 +123,12 @@ def _smallest_pivot(rows, block, least):
 
 
 @inlined
-def _has_dust(zero):
-    """Whether a row is so small that it may be the rounding of another."""
+def _is_uneven(zero, share):
+    """Whether a row is smaller than this share of another; zero: squares proportional to theirs."""
     least, most = np.inf, 0.0
     for i in range(zero.size):
         least, most = min(least, zero[i] if zero[i] > 0.0 else np.inf), max(most, zero[i])
-    return least < DUST * DUST * most
+    return least < share * share * most
 
 
 @compiled
