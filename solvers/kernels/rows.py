@@ -76,6 +76,15 @@ def largest_row(W, zero, i0, i1, c0):
 
 
 @inlined
+def has_outlier(sizes, share):
+    """Whether a positive entry is smaller than this share of another."""
+    least, most = np.inf, 0.0
+    for i in range(sizes.size):
+        least, most = min(least, sizes[i] if sizes[i] > 0.0 else np.inf), max(most, sizes[i])
+    return least < share * most
+
+
+@inlined
 def swap(values, i, j):
     """Exchange entries i and j."""
     values[i], values[j] = values[j], values[i]

@@ -21,6 +21,7 @@ from solvers.kernels.rows import (
     all_equal,
     factor_level,
     finish,
+    has_outlier,
     load_rows,
     reflect,
     reflect_back,
@@ -102,13 +103,13 @@ def climb(A, lower, upper, sizes, x, settings, work):
         rank = factor_level(rows, basis, first, last, rank)
         block = Block(first, last, above, rank)
         least = _smallest_pivot(rows, block, least)
-        if rank - above < last - first and _is_uneven(rows.zero[first:last], LIGHT):
+        if rank - above < last - first and has_outlier(rows.zero[first:last], LIGHT * LIGHT):
             least = 0.0  # least squares: rounding in the heavy rows hides the light ones
         subtract(rows, y, first, last, above)  # p_i - J_i x_{i-1}, in (13)
         solve_level(rows.W, rows.miss, y, block, settings, of_block)
         first = last
     _to_unknowns(basis, y, rank, x, of_x)
-    least = 0.0 if _is_uneven(rows.zero, DUST) else least
+    least = 0.0 if has_outlier(rows.zero, DUST * DUST) else least
     return finish(x, SOLVED), np.sqrt(least) * settings.rank_tolerance
 
 
@@ -120,15 +121,6 @@ def _smallest_pivot(rows, block, least):
         square, zero = rows.W[i, k] * rows.W[i, k], rows.zero[i]
         least = min(least, square / zero) if zero > 0.0 else least
     return least
-
-
-@inlined
-def _is_uneven(zero, share):
-    """Whether a row is smaller than this share of another; zero: squares proportional to theirs."""
-    least, most = np.inf, 0.0
-    for i in range(zero.size):
-        least, most = min(least, zero[i] if zero[i] > 0.0 else np.inf), max(most, zero[i])
-    return least < share * share * most
 
 
 @compiled

@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hierarchy.jit import as_matrix, compiled, inlined
-from solvers.kernels.rows import ZERO, finish
+from solvers.kernels.rows import ZERO, finish, has_outlier
 from solvers.kernels.space import View, integers, matrix, vector
 from solvers.kernels.tolerances import DOUBTFUL, DUST, FLOOR, OUTGROWN
 from solvers.status import EQUAL, FREE, NUMERICAL_FAILURE, SOLVED, TOO_SMALL
@@ -345,11 +345,7 @@ def has_outgrown(s):
 @inlined
 def has_dust(s):
     """Whether a row is so small that it may be the rounding of another."""
-    least, most = np.inf, 0.0
-    for i in range(s.A.shape[0]):
-        norm = s.number[NORM, i]
-        least, most = min(least, norm if norm > 0.0 else np.inf), max(most, norm)
-    return least < DUST * most
+    return has_outlier(s.number[NORM, :s.A.shape[0]], DUST)
 
 
 @inlined
