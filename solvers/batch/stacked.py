@@ -30,7 +30,7 @@ from solvers.kernels.batch import (
 from solvers.resolver import Resolver, make, refuse_inequality, set_frozen
 from solvers.resolvers.hcod import Hcod, record_without_bounds
 from solvers.resolvers.tpm import Tpm
-from solvers.status import INACCURATE, NO_LIMITS, NUMERICAL_FAILURE, SOLVED, UNPROVED, Status
+from solvers.status import INACCURATE, NUMERICAL_FAILURE, SOLVED, UNPROVED, Status
 from solvers.workspace import run
 
 Indices = NDArray[np.int64]
@@ -171,35 +171,39 @@ class _Run:
         self.settings = resolver._settings
 
     def by_tpm(self) -> BatchResolution:
-        """Resolve equalities with the staircase, and bounds or a warm start with exact kernels."""
-        self._set_reference(np.arange(len(self.codes)))
-        self._staircase(~self.warm)
-        bounded = self.warm | (self.codes < 0)
-        if not bounded.any():
-            self._judge()
-            return self._answer(np.ones(len(self.codes)), None)
-        self._within_bounds(np.flatnonzero(bounded))
-        unlimited = self.codes == NO_LIMITS
-        self._staircase(unlimited)
+        """Resolve those with a memory exactly; if no bound is active there, and the others, anew.
+
+        Anew: with the staircase, then as if there were no bounds, then exactly.
+        """
+        saturated = np.zeros(len(self.codes), dtype=bool)
+        if self.warm.any() and self.resolver.damping == 0.0:
+            saturated = self._at_bounds(self.warm)
+        anew = np.flatnonzero(~saturated)
+        self.record[anew] = 0.0
+        self._set_reference(anew)
+        self._call(batch_staircase, anew, self.x, self.codes, self.settings)
+        bounded = anew[self.codes[anew] < 0]
+        self._set_reference(bounded)
+        self._call(batch_without_bounds, bounded, self.x, self.codes, self.record, self.settings)
+        saturated |= self._at_bounds(self.codes == UNPROVED)
         self._judge()
         for p in np.flatnonzero(self.codes < 0)[:1]:
             refuse_inequality(self.resolver, self.batch[p], -int(self.codes[p]) - 1)
-        self.record[unlimited | (self.codes == NUMERICAL_FAILURE)] = 0.0
         steps = np.maximum(self.record[:, -3] + self.record[:, -2], 1.0)
-        return self._answer(steps, self.record)
+        self.record[~saturated] = 0.0
+        return self._answer(steps, self.record if saturated.any() else None)
 
-    def _staircase(self, chosen: NDArray[np.bool_]) -> None:
-        self._call(batch_staircase, np.flatnonzero(chosen), self.x, self.codes, self.settings)
-
-    def _within_bounds(self, which: Indices) -> None:
-        """Resolve problems with bounds, and write their saturation into the records."""
+    def _at_bounds(self, chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Resolve the chosen problems exactly; return those of them with an unknown at a bound."""
+        which, saturated = np.flatnonzero(chosen), np.zeros(len(chosen), dtype=bool)
         self._set_reference(which)
-        self._call(batch_without_bounds, which, self.x, self.codes, self.record, self.settings)
-        self._call(batch_exact, np.flatnonzero(self.codes == UNPROVED), self.x, self.codes,
-                   self.record, self.settings)
-        answered = ((self.codes >= 0) & (self.codes != NO_LIMITS)
-                    & (self.codes != NUMERICAL_FAILURE))
-        self._call(batch_saturation, which[answered[which]], self.x, self.record)
+        self._call(batch_exact, which, self.x, self.codes, self.record, self.settings)
+        named = np.full(len(chosen), NUMERICAL_FAILURE)
+        self._call(batch_saturation, which[self.codes[which] != NUMERICAL_FAILURE], self.x, named,
+                   self.record)
+        self.codes[named < 0] = named[named < 0]
+        saturated[which] = named[which] == SOLVED
+        return saturated
 
     def by_hcod(self) -> BatchResolution:
         """Resolve with the kernels of `hcod`; let `certify` judge answers in doubt."""

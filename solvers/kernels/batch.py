@@ -43,11 +43,11 @@ def batch_without_bounds(problems, x, codes, records, settings, which, work):
 
 
 @unlocked
-def batch_saturation(problems, x, records, which, work):
-    """Write the saturation and scaling of the problems `which`."""
+def batch_saturation(problems, x, codes, records, which, work):
+    """Write the saturation and scaling of the problems `which`; codes: of `name_saturation`."""
     A, lower, upper, sizes = problems
     for p in which:
-        name_saturation(A[p], lower[p], upper[p], sizes, x[p], records[p], work)
+        codes[p] = name_saturation(A[p], lower[p], upper[p], sizes, x[p], records[p], work)
     return SOLVED
 
 

@@ -1,7 +1,8 @@
-"""Bounds in a first level, equalities below: where no bound is active, the staircase alone.
+"""Bounds in a first level, equalities below.
 
-The exact resolver does the rest; bounds cost nothing in its tableau. This file finds the bounds of
-each unknown and, after the solve, its saturation and the scaling of each level.
+The exact resolver solves them; bounds cost nothing in its tableau. This file adds what is particular
+to them: the answer of the staircase where damping is on and no bound is active, and after the solve
+the saturation of each unknown and the scaling of each level.
 """
 
 # mypy: disable-error-code="no-untyped-def"
@@ -42,11 +43,11 @@ def solve_without_bounds(A, lower, upper, sizes, x, record, settings, work):
     """Solve as if there were no bounds; return SOLVED if x is within them, otherwise UNPROVED.
 
     x (n,) is the reference on entry and, if SOLVED, the answer on return. record
-    (n + L + 3 m + 3,) is that of an earlier solve, or zeros; for its layout see `name_saturation`.
-    With a known saturation nothing is tried. settings: those of `Hcod`. Other codes:
-    NUMERICAL_FAILURE, TOO_SMALL, NO_LIMITS, or -(i + 1) if row i is an inequality but not a bound.
+    (n + L + 3 m + 3,): zeros; for its layout see `name_saturation`. settings: those of `Hcod`. Other
+    codes: NUMERICAL_FAILURE, TOO_SMALL, NO_LIMITS, or -(i + 1) if row i is an inequality but not a
+    bound.
     """
-    n, known = x.size, False
+    n = x.size
     sides, at = vector(work, ZERO, 3 * n)
     if at > work.size:
         return TOO_SMALL
@@ -55,20 +56,15 @@ def solve_without_bounds(A, lower, upper, sizes, x, record, settings, work):
     box = _first_level(sizes, sides, n)
     code = _refused(A, lower, upper, box.end)
     if code != SOLVED:
-        return code if code < 0 else finish(x, code)
+        return finish(x, code) if code == NUMERICAL_FAILURE else code
     for c in range(n):
-        known |= abs(record[c]) == 1.0 and settings[0] == 0.0
         sides[2 * n + c] = x[c]
-    if known:
-        return UNPROVED
     _intersect(A, lower, upper, box)
     end = box.end
     code = solve_by_staircase(A[end:], lower[end:], upper[end:], sizes[box.top + 1:], x, settings,
                               work[at:])
     if code == TOO_SMALL:
         return code
-    for i in range(n + sizes.size, record.size):
-        record[i] = 0.0
     within = code == SOLVED
     for c in range(n):
         within &= box.low[c] <= x[c] <= box.high[c]
@@ -84,10 +80,16 @@ def name_saturation(A, lower, upper, sizes, x, record, work):
 
     That part has the state of each unknown (-1 or +1: at its lower or upper bound, 2: both, 0:
     free) and the scaling of each level. The second part is the record of the exact resolver.
+    Returns SOLVED if an unknown is at a bound and NO_LIMITS if none is or if there are no bounds.
+    With -(i + 1) as `solve_without_bounds`, nothing is written.
     """
-    n = x.size
-    inner = record[n + sizes.size:]
-    box = _first_level(sizes, work, n)
+    n, end = x.size, ZERO + NO_LIMITS
+    if all_equal(lower, upper):
+        return end
+    inner, box = record[n + sizes.size:], _first_level(sizes, work, n)
+    code = _refused(A, lower, upper, box.end)
+    if code < 0:
+        return code
     _intersect(A, lower, upper, box)
     for c in range(n):
         record[c] = CONFLICT if box.low[c] >= box.high[c] else NONE
@@ -99,6 +101,9 @@ def name_saturation(A, lower, upper, sizes, x, record, work):
             record[c] = inner[i] if A[i, c] > 0.0 else -inner[i]
             x[c] = box.high[c] if record[c] > 0.0 else box.low[c]
     _scale(A, upper, sizes, box, x, record)
+    for c in range(n):
+        end = ZERO + SOLVED if record[c] != NONE else end
+    return end
 
 
 @inlined

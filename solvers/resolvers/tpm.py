@@ -76,7 +76,7 @@ class Tpm(Resolver):
         """Resolve h, with bounds starting from the saturation of an earlier resolution if given.
 
         Without bounds a direct method that ignores `memory`; with them it returns a
-        `SaturatedResolution`.
+        `SaturatedResolution`, which has a memory where an unknown is at a bound.
         """
         staircased = self.form == "staircase"
         if staircased and memory is not None:
@@ -94,23 +94,30 @@ class Tpm(Resolver):
         return np.array([self.damping, self.threshold, self.rank_tolerance, *_OF_THE_ENGINE])
 
     def _within_bounds(self, h: Hierarchy, memory: Array | None) -> Resolution:
-        """Resolve h if its first level is bounds; otherwise reject it, or drop the memory."""
-        x = h.reference.copy()
-        first = len(x) + len(h.sizes)
-        record, _ = warm_record(memory, first + 3 * len(h.lower) + 3, self.damping == 0.0)
-        code = run(solve_without_bounds, h.A, h.lower, h.upper, h.sizes, x, record, self._settings)
+        """Resolve h if its first level is bounds; otherwise reject it, or drop the memory.
+
+        With a memory, which only an answer at a bound leaves, the exact resolver starts from it;
+        otherwise, or if no bound is active any more, the staircase is tried first.
+        """
+        x, settings, levels = h.reference.copy(), self._settings, len(h.sizes)
+        first = len(x) + levels
+        record, known = warm_record(memory, first + 3 * len(h.lower) + 3, self.damping == 0.0)
+        code, inner = UNPROVED, record[first:]
+        if not known:
+            code = run(solve_without_bounds, h.A, h.lower, h.upper, h.sizes, x, record, settings)
         if code == UNPROVED:
-            inner = record[first:]
-            known = bool(inner[-3] + inner[-2] > 0.0)
-            code = solve_exactly(h, x, inner, self._settings, known)
+            code = solve_exactly(h, x, inner, settings, known)
         if code == NO_LIMITS:
             return self.solve(h)
         if code < 0 or code == NUMERICAL_FAILURE:
             return self._otherwise(h, x, code)
-        name_saturation(h.A, h.lower, h.upper, h.sizes, x, record, WORKSPACE.array)
+        named = name_saturation(h.A, h.lower, h.upper, h.sizes, x, record, WORKSPACE.array)
+        if named != SOLVED and known:
+            return self.solve(h)
         solved = code == SOLVED or certify(h, x).certified
         return SaturatedResolution(x, _SOLVED if solved else Status.INACCURATE,
-                                   int(record[-3] + record[-2]), record, len(h.sizes), record)
+                                   int(inner.item(-3) + inner.item(-2)), record, levels,
+                                   record if named == SOLVED else None)
 
 
 @final
