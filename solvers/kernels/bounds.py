@@ -1,8 +1,7 @@
 """Bounds in a first level, equalities below.
 
-The exact resolver solves them; bounds cost nothing in its tableau. This file adds what is particular
-to them: the answer of the staircase where damping is on and no bound is active, and after the solve
-the saturation of each unknown and the scaling of each level.
+Where no bound is active the staircase solves them, else the exact resolver, in whose tableau bounds
+cost nothing. This file also finds the saturation of each unknown and the scaling of each level.
 """
 
 # mypy: disable-error-code="no-untyped-def"
@@ -43,9 +42,9 @@ def solve_without_bounds(A, lower, upper, sizes, x, record, settings, work):
     """Solve as if there were no bounds; return SOLVED if x is within them, otherwise UNPROVED.
 
     x (n,) is the reference on entry and, if SOLVED, the answer on return. record
-    (n + L + 3 m + 3,): zeros; for its layout see `name_saturation`. settings: those of `Hcod`. Other
-    codes: NUMERICAL_FAILURE, TOO_SMALL, NO_LIMITS, or -(i + 1) if row i is an inequality but not a
-    bound.
+    (n + L + 3 m + 3,): zeros; for its layout see `name_saturation`. settings: those of `Hcod`.
+    Other codes: NUMERICAL_FAILURE, TOO_SMALL, NO_LIMITS, or -(i + 1) if row i is an inequality but
+    not a bound.
     """
     n = x.size
     sides, at = vector(work, ZERO, 3 * n)
