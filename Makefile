@@ -3,7 +3,7 @@
 # make quick   the tests of less than a second, in under a minute: for while one works
 # make bench   time the resolvers, the control tick and the start, then all beside other packages
 # make stress  a resolver on a million generated problems, every answer certified; half an hour
-# make reproduce  the studies behind the documents, their numbers written into the pages
+# make reproduce  the studies and timings behind the documents, written into the pages
 # make docs    build the documentation, any warning an error, and say where it is
 # make dist    build the wheel and the source archive, in dist/
 # make clean   remove what the targets above made
@@ -48,6 +48,7 @@ stress: $(INSTALLED)
 
 reproduce: $(INSTALLED)
 	@$(BIN)/hierarchy reproduce
+	@$(BIN)/python docs/studies/measured.py
 
 docs: $(INSTALLED)
 	@$(BIN)/python -m sphinx -E -W --keep-going -q -b html docs build/docs

@@ -1,7 +1,7 @@
 """Null-space damping by the inertia matrix, eq. (15): python docs/studies/inertia.py.
 
-How fast D = M(q) damps the freedom that the tasks of `ellipse` leave, and what becomes of the run
-if only the joints that it hardly damps are damped as by D = 5 I.
+How fast D = M(q) damps the freedom that the tasks of `ellipse` leave, and what becomes of the runs
+if only the wrist, or all but the wrist, is damped as by D = 5 I; from sampled starts.
 """
 
 from __future__ import annotations
@@ -14,12 +14,14 @@ import numpy as np
 from hierarchy import Stack, State
 from hierarchy.problem import Array
 from hierarchy.tasks import JointDamping
-from scenarios import load
+from scenarios import Scenario, load
 from scenarios.cell.build import build
+from scenarios.config.sampling import changed, drawn
 from scenarios.loop.controller import Controller
 
 LIGHT = (4, 5, 6)  # the joints of the wrist
-FASTEST = 100.0      # [rad/s] a run that is faster has diverged
+FASTEST = 100.0    # [rad/s] a run that is faster has diverged
+STARTS, SEED = 16, 14
 
 
 @dataclasses.dataclass(frozen=True)
@@ -63,21 +65,31 @@ def _rates(A: Array, M: Array) -> tuple[float, float]:
     return found[0], found[-1]
 
 
+def starts(scenario: Scenario) -> list[Scenario]:
+    """Return the scenario from every sampled start."""
+    return [changed(scenario, drawn(scenario, scenario.variation, SEED, index), "variation")
+            for index in range(STARTS)]
+
+
 def main() -> None:
     """Print everything."""
-    plain = run(load("ellipse"))
-    low, high = plain["rates"].T
-    print("ellipse: inertia seen by each joint, median [kg m^2]:",
-          np.array2string(np.median(plain["inertia"], axis=0), precision=4))
-    print(f"rate per k in the null space, median: slowest {np.median(low):.2g}, fastest "
-          f"{np.median(high):.2g} 1/s; from {low.min():.2g} to {high.max():.2g}")
+    plain = [run(scenario) for scenario in starts(load("ellipse"))]
+    inertia = np.concatenate([one["inertia"] for one in plain])
+    low, high = np.concatenate([one["rates"] for one in plain]).T
+    joints = ", ".join(f"{value:.2g}" for value in np.median(inertia, axis=0))
+    print(f"inertia seen by each joint of ellipse, median [kg m^2]: {joints}")
+    print(f"k = 1: the freedom that is left is damped at {np.median(low):.2g} 1/s (slowest "
+          f"direction, median) to {np.median(high):.2g} 1/s (fastest), at most {high.max():.2g}")
+    print(f"largest joint speed [rad/s], median of {STARTS} starts, and how many end:")
     for k in (1.0, 5.0):
-        scenario = load("ellipse-inertia", {"damping.value": k})
         cases = {"k M": None, "k M, wrist 5 I": PartlyInertia(7, k, "mass"),
                  "5 I, wrist k M": PartlyInertia(7, k, "mass", plain=(0, 1, 2, 3))}
         for name, damping in cases.items():
-            done = run(scenario, damping)
-            print(f"k = {k:g}, {name}: {done['speed']:.3g} rad/s, {done['seconds']:.1f} s")
+            done = [run(one, damping) for one in
+                    starts(load("ellipse-inertia", {"damping.value": k}))]
+            speed = np.median([one["speed"] for one in done])
+            ended = sum(one["speed"] < FASTEST for one in done)
+            print(f"  k = {k:g}, {name:15} {speed:8.3g} {ended:4} of {STARTS}")
 
 
 if __name__ == "__main__":

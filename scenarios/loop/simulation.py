@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -19,7 +19,7 @@ _REPORT_EVERY = 500  # ticks between two calls of `progress`
 
 
 def simulate(scenario: Scenario, progress: Callable[[int, int], None] | None = None,
-             certified: bool = False) -> Recording:
+             certified: bool = False, audits: Sequence[Audit] = ()) -> Recording:
     """Run a scenario from its start to its end.
 
     `progress(done, total)` is called every 500 ticks. A run ends early if it is interrupted
@@ -27,9 +27,9 @@ def simulate(scenario: Scenario, progress: Callable[[int, int], None] | None = N
     `recorder.FASTEST`: the Recording then has all ticks so far and says why in `fault`. With
     `certified`, `solvers.certify` judges every answer after its tick was timed, and the Recording
     has the verdicts as its signal `certified`; with `control.strictness` it has `moved_by_lower`,
-    see scenarios.loop.audit.Strictness. What became of each level is judged after the last tick,
-    or, with a camera, after each tick. Raises HierarchyError where the scenario does not fit its
-    robot or resolver.
+    see scenarios.loop.audit.Strictness; `audits` are further checks of that kind. What became of
+    each level is judged after the last tick, or, with a camera, after each tick. Raises
+    HierarchyError where the scenario does not fit its robot or resolver.
     """
     rehearsal = Controller(scenario)
     rehearsal.rehearse()
@@ -38,14 +38,14 @@ def simulate(scenario: Scenario, progress: Callable[[int, int], None] | None = N
     controller = Controller(scenario) if faults is None else faults.controller
     ticks = scenario.control.ticks
     recorder = Recorder(controller, ticks)
-    audits = _audits(controller, scenario, ticks, certified)
+    every = (*_audits(controller, scenario, ticks, certified), *audits)
     try:
         fault = _run(controller, recorder, scenario.control.period, ticks, progress or _silent,
-                     audits, faults)
+                     every, faults)
     except KeyboardInterrupt:
         fault = f"interrupted at tick {recorder.ticks}"
     recording = recorder.finish(scenario, fault)
-    for audit in audits:
+    for audit in every:
         recording.signals.update(audit.signals(recording))
     return completed(recording, rehearsal.cell)
 
@@ -61,7 +61,7 @@ def _audits(controller: Controller, scenario: Scenario, ticks: int, certified: b
 
 
 def _run(controller: Controller, recorder: Recorder, period: float, ticks: int,
-         progress: Callable[[int, int], None], audits: list[Audit],
+         progress: Callable[[int, int], None], audits: Sequence[Audit],
          faults: Faults | None) -> str | None:
     policy = controller.policy
     for k in range(ticks):

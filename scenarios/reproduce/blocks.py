@@ -9,10 +9,12 @@ from textwrap import fill
 from scenarios.reproduce.claims import Claim, Compares, Ends, Keeps, in_text, share
 from scenarios.reproduce.pages import Block
 from scenarios.reproduce.rows import Rows
+from scenarios.reproduce.watched import DAMPED, LARGEST, LEFT, MEDIAN
 
 _WIDTH = 100     # columns of a page
 _EPS_1 = 0.05    # [m] eps_1 of `ellipse`
 _HUMAN = 0.3     # [m] what both scenarios of the experiment are to keep
+_SAME = 1e-6     # [rad/s^2] commands that differ by less count as the same
 _ON_CONE = 0.01  # [deg] beyond the cone that counts as on it
 _WITHIN = 1e-6   # [rad] beyond a joint limit that counts as within it
 
@@ -58,6 +60,16 @@ RESOLVER_CLAIMS: tuple[Claim, ...] = (
              "limits-tpm", "hqp-hcod", "lower"),
     Keeps("Inequalities in the stack keep the 50 mm asked for", "resolvers", "body_distance_min",
           "hqp-hcod", least=_EPS_1))
+
+STATE_CLAIMS: tuple[Claim, ...] = (
+    Keeps("`weighted` commands what `tpm` does in half of the ticks, damped", "states", MEDIAN,
+          "weighted", most=_SAME),
+    Keeps("`weighted` commands what `tpm` does in half of the ticks, undamped", "states", MEDIAN,
+          "weighted-undamped", most=_SAME),
+    Keeps("`hcod` commands what `tpm` does in every tick, damped", "states", LARGEST, "hcod",
+          most=_SAME),
+    Keeps("`recursive` commands what `tpm` does in every tick, damped", "states", LARGEST,
+          "recursive", most=_SAME))
 
 BLEND_CLAIMS: tuple[Claim, ...] = (
     Compares("A blend of 0.02 s brings the body of `ellipse` nearer to the obstacles", "blend",
@@ -106,8 +118,8 @@ HUMAN_CLAIMS: tuple[Claim, ...] = (
     Compares("The mean direction (25)-(26) changes the stack less often than the nearest obstacle",
              "human", "stack_changes", "human-nearest", "human", "lower"))
 
-CLAIMS = (*LETTER_CLAIMS, *JACOBIAN_CLAIMS, *RESOLVER_CLAIMS, *BLEND_CLAIMS, *INERTIA_CLAIMS,
-          *RIVAL_CLAIMS, *SINGULAR_CLAIMS, *HUMAN_CLAIMS)
+CLAIMS = (*LETTER_CLAIMS, *JACOBIAN_CLAIMS, *STATE_CLAIMS, *RESOLVER_CLAIMS, *BLEND_CLAIMS,
+          *INERTIA_CLAIMS, *RIVAL_CLAIMS, *SINGULAR_CLAIMS, *HUMAN_CLAIMS)
 
 _LIMITS = ("joint_limit_excess", "speed_max", "acceleration_max", "body_distance_min",
            "cone_violation_max", "position_error_rms_settled", "stack_changes",
@@ -122,6 +134,8 @@ _SINGULAR = ("ticks_frozen", "speed_max", "speed_limit_excess", "acceleration_ma
 _HUMAN_RUNS = ("true_position_error_rms", "true_position_error_max", "body_distance_min",
                "ee_distance_min", "cone_violation_max", "speed_max", "command_step_max",
                "velocity_step_max", "stack_changes", "active_set_changes")
+_STATES = (MEDIAN, LARGEST)
+_THROTTLE = (DAMPED, LEFT)
 _BLEND = ("velocity_step_max", "acceleration_step_max", "body_distance_min")
 
 
@@ -193,6 +207,9 @@ BLOCKS: dict[str, Block] = {
     "letter-claims": partial(claims, listed=LETTER_CLAIMS),
     "jacobian-claims": partial(claims, listed=JACOBIAN_CLAIMS),
     "resolver-claims": partial(claims, listed=RESOLVER_CLAIMS),
+    "state-claims": partial(claims, listed=STATE_CLAIMS),
+    "throttle": partial(table, study="throttle", metrics=_THROTTLE),
+    "states": partial(table, study="states", metrics=_STATES),
     "blend-claims": partial(claims, listed=BLEND_CLAIMS),
     "inequalities": partial(table, study="resolvers", metrics=_LIMITS),
     "letter-runs": partial(table, study="letter", metrics=_LIMITS),

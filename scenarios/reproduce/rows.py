@@ -64,14 +64,15 @@ def rows_of(study: str, results: Results, command: str, seed: int) -> Rows:
     shown = results.shown()
     metrics: dict[str, dict[str, object]] = {
         one.name: {"label": one.label, "unit": one.unit} for one in shown}
-    values = {label: {one.name: _plain(results.column(one.name, label)) for one in shown}
+    values = {label: {one.name: plain(results.column(one.name, label)) for one in shown}
               for label in results.labels}
     ended = {label: sum(run.label == label and reason is None for run, reason in zip(
         results.runs, results.reasons, strict=True)) for label in results.labels}
     return Rows(study, command, results.samples, seed, metrics, values, ended)
 
 
-def _plain(values: Array) -> list[float | None]:
+def plain(values: Array) -> list[float | None]:
+    """Return values as they are kept: None for one that is not finite."""
     return [float(f"{value:.{_DIGITS}g}") if np.isfinite(value) else None
             for value in values.tolist()]
 

@@ -39,6 +39,34 @@ class Study:
     starts: int = STARTS
 
 
+@dataclass(frozen=True)
+class Pair:
+    """Two resolvers, as specs, whose answers to every tick are compared."""
+
+    name: str
+    first: str
+    second: str
+
+
+@dataclass(frozen=True)
+class Pivot:
+    """A level of one row, whose share outside the rows above it is measured in every tick."""
+
+    name: str
+
+
+@dataclass(frozen=True)
+class Watched:
+    """What is measured in every tick of runs of `scenario` under `resolver`."""
+
+    name: str
+    title: str
+    scenario: str
+    resolver: str
+    columns: tuple[Pair | Pivot, ...]
+    starts: int = STARTS
+
+
 def _variants(scenario: str, resolvers: Mapping[str, str]) -> tuple[Column, ...]:
     return tuple(Column(name, scenario, resolver) for name, resolver in resolvers.items())
 
@@ -104,4 +132,19 @@ HUMAN = Study("human", "A hand, a depth camera, an arm under position control", 
     Column("human-nearest", "human", OWN, {"avoidance.direction": "nearest"}),
     Column("human-hqp", "human-hqp", OWN)))
 
-STUDIES = (LETTER, RESOLVERS, BLEND, LADDER, INERTIA, RIVALS, SINGULAR, HUMAN)
+_EXACT = "tpm:form=staircase"
+
+STATES = Watched("states", "Resolvers in the same states", "ellipse", _EXACT, (
+    *(Pair(name, _EXACT, name) for name in ("recursive", "hcod", "weighted", "augmented")),
+    Pair("published", _EXACT, "tpm:form=published"),
+    *(Pair(f"{name}-undamped", f"{_EXACT}:damping=0.0", f"{name}:damping=0.0")
+      for name in ("recursive", "hcod", "weighted", "augmented")),
+    Pair("published-undamped", f"{_EXACT}:damping=0.0", "tpm:form=published:damping=0.0")))
+
+THROTTLE = Watched("throttle", "What damping leaves of avoidance", "ellipse", _EXACT,
+                   (Pivot("avoidance"),))
+
+AnyStudy = Study | Watched
+
+STUDIES: tuple[AnyStudy, ...] = (
+    STATES, THROTTLE, LETTER, RESOLVERS, BLEND, LADDER, INERTIA, RIVALS, SINGULAR, HUMAN)

@@ -11,13 +11,14 @@ from scenarios.config.scenario import OWN
 from scenarios.reproduce import pages, rows
 from scenarios.reproduce.blocks import BLOCKS
 from scenarios.reproduce.rows import Rows
-from scenarios.reproduce.studies import SEED, STUDIES, Study
+from scenarios.reproduce.studies import SEED, STUDIES, AnyStudy, Watched
+from scenarios.reproduce.watched import rows_of_watched
 from scenarios.sweep.whole import Progress, compare_starts
 
 QUICK = 10  # with `quick`, one in so many starts, but never fewer than two
 
 
-def chosen(names: Sequence[str]) -> list[Study]:
+def chosen(names: Sequence[str]) -> list[AnyStudy]:
     """Return the studies of these names, all without names; raises UnknownNameError."""
     known = {study.name: study for study in STUDIES}
     for name in names:
@@ -26,9 +27,9 @@ def chosen(names: Sequence[str]) -> list[Study]:
     return [known[name] for name in names] if names else list(STUDIES)
 
 
-def reproduce(studies: Sequence[Study], out: Path, quick: bool = False, workers: int | None = None,
-              progress: Progress | None = None,
-              told: Callable[[Study], object] = lambda study: None) -> dict[str, Rows]:
+def reproduce(studies: Sequence[AnyStudy], out: Path, quick: bool = False,
+              workers: int | None = None, progress: Progress | None = None,
+              told: Callable[[AnyStudy], object] = lambda study: None) -> dict[str, Rows]:
     """Run studies and return their rows by name; runs that `out` has are not repeated.
 
     quick : a tenth of the starts. told : called with each study before it starts.
@@ -42,8 +43,10 @@ def reproduce(studies: Sequence[Study], out: Path, quick: bool = False, workers:
     return found
 
 
-def _run(study: Study, out: Path, workers: int | None, progress: Progress | None) -> Rows:
+def _run(study: AnyStudy, out: Path, workers: int | None, progress: Progress | None) -> Rows:
     command = f"hierarchy reproduce {study.name}"
+    if isinstance(study, Watched):
+        return rows_of_watched(study, command, SEED, progress)
     done = compare_starts([column.load() for column in study.columns], [OWN], study.starts, SEED,
                           out / study.name, workers=workers, progress=progress, command=command)
     (results,) = done.found.values()

@@ -37,7 +37,7 @@ from solvers.kernels.space import (
     shared,
     vector,
 )
-from solvers.kernels.tolerances import DOUBTFUL, DUST, LIGHT
+from solvers.kernels.tolerances import BORDER, DOUBTFUL, DUST, LIGHT
 from solvers.status import EQUAL, INACCURATE, SOLVED, TOO_SMALL, UNPROVED
 
 
@@ -103,14 +103,28 @@ def climb(A, lower, upper, sizes, x, settings, work):
         rank = factor_level(rows, basis, first, last, rank)
         block = Block(first, last, above, rank)
         least = _smallest_pivot(rows, block, least)
-        if rank - above < last - first and has_outlier(rows.zero[first:last], LIGHT * LIGHT):
-            least = 0.0  # least squares: rounding in the heavy rows hides the light ones
+        if rank - above < last - first and (
+                has_outlier(rows.zero[first:last], LIGHT * LIGHT)
+                or is_borderline(rows, first + rank - above, last, rank, BORDER)):
+            least = 0.0  # rounding in heavy rows hides light ones; or a row is hardly dependent
         subtract(rows, y, first, last, above)  # p_i - J_i x_{i-1}, in (13)
         solve_level(rows.W, rows.miss, y, block, settings, of_block)
         first = last
     _to_unknowns(basis, y, rank, x, of_x)
     least = 0.0 if has_outlier(rows.zero, DUST * DUST) else least
     return finish(x, SOLVED), np.sqrt(least) * settings.rank_tolerance
+
+
+@inlined
+def is_borderline(rows, begin, end, rank, share):
+    """Whether more than this share of the tolerance is left of a row that counts as dependent."""
+    borderline = False
+    for i in range(begin, end):
+        square, w = 0.0, rows.W[i, rank:]
+        for c in range(w.size):
+            square += w[c] * w[c]
+        borderline |= square > share * share * rows.zero[i]
+    return borderline
 
 
 @inlined

@@ -16,6 +16,7 @@ WEAK = 1e-4         # share of a row in its own basis vector: smaller ones pivot
 DOUBTFUL = 1e-5     # remainder or miss of a row: smaller ones leave the answer in doubt
 DUST = 1e-12        # norm of a row over the largest: smaller ones leave a doubt
 LIGHT = 1e-5        # the same in a level that is missed, over the largest of the level
+BORDER = 0.3        # of rank_tolerance: a dependent row with more left leaves the answer in doubt
 SLIGHT = 0.25       # of rank_tolerance: a smaller miss counts as zero, without doubt
 NO_STEP = 1e-12     # length of a step: smaller ones count as zero
 

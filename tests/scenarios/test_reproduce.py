@@ -9,7 +9,7 @@ from scenarios.reproduce import pages
 from scenarios.reproduce.blocks import BLOCKS, CLAIMS
 from scenarios.reproduce.claims import Compares, Ends, Keeps
 from scenarios.reproduce.rows import Rows, read, write
-from scenarios.reproduce.studies import STUDIES
+from scenarios.reproduce.studies import STUDIES, Study
 
 ROOT = Path(__file__).parents[2]
 
@@ -88,7 +88,8 @@ def test_every_claim_names_a_column_of_its_study():
         assert named <= columns[claim.study]
 
 
-@pytest.mark.parametrize("study", STUDIES, ids=lambda study: study.name)
+@pytest.mark.parametrize("study", [study for study in STUDIES if isinstance(study, Study)],
+                         ids=lambda study: study.name)
 def test_every_column_is_a_scenario_of_its_own_name(study):
     for column in study.columns:
         assert column.scenario in shipped()

@@ -30,7 +30,7 @@ RIGHT = {
 }
 UNKNOWN = ["hcod_nested_2004163_shift"]  # near-ties of 1e-9: any answer that says it is not sure
 RESOLVERS = ("hcod", "tpm", "hqp")
-# Found by `hierarchy bench stress` (seeds 50,000,000 and 95,000,000 on), reduced: an answer was
+# Found by `hierarchy bench stress` (seeds from 50,000,000 on), reduced: an answer was
 # called solved and wrong, the certificate rejected a right one (CERTAIN), or steps cycled.
 STRESS = sorted(path.stem for path in (FOLDER.parent / "stress").glob("*.npz"))
 CERTAIN = ["contacts-50000500", "contacts-50067440", "contacts-50081046",

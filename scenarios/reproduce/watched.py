@@ -1,0 +1,126 @@
+"""What is measured in every tick of sampled runs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Protocol, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenarios.config import Scenario, load
+from scenarios.config.sampling import changed, drawn
+from scenarios.loop.controller import Controller
+from scenarios.loop.recording import Recording
+from scenarios.loop.simulation import simulate
+from scenarios.reproduce.rows import Rows, plain
+from scenarios.reproduce.studies import Pair, Pivot, Watched
+from scenarios.sweep.whole import Progress
+
+Array = NDArray[np.float64]
+MEDIAN, LARGEST = "command_difference_median", "command_difference_max"
+DAMPED, LEFT = "damped_share", "left_median"
+_METRICS: dict[str, dict[str, object]] = {
+    MEDIAN: {"label": "Difference of the command, median", "unit": "rad/s^2"},
+    LARGEST: {"label": "Difference of the command, max", "unit": "rad/s^2"},
+    DAMPED: {"label": "Ticks in which its pivot is damped", "unit": "share"},
+    LEFT: {"label": "What damping leaves of its step, median", "unit": "share"}}
+
+
+class Watch(Protocol):
+    """An audit (see `scenarios.loop.audit`) that sums up a run."""
+
+    def look(self, tick: int, controller: Controller) -> None:
+        """Examine a tick."""
+
+    def signals(self, recording: Recording) -> Mapping[str, NDArray[Any]]:
+        """Return signals for the recording."""
+
+    def metrics(self) -> dict[str, float]:
+        """Return the metrics of the run by name."""
+
+
+@final
+class Beside:
+    """Solves every tick with two resolvers more, and keeps the distance between their answers."""
+
+    def __init__(self, pair: Pair, scenario: Scenario) -> None:
+        self._pair = [scenario.with_resolver(spec).make_resolver()
+                      for spec in (pair.first, pair.second)]
+        self._memory: list[Any] = [None, None]
+        self._distances: list[float] = []
+
+    def look(self, tick: int, controller: Controller) -> None:
+        """Solve the hierarchy of a tick."""
+        answers: list[Array] = []
+        for k, resolver in enumerate(self._pair):
+            resolution = resolver.solve(controller.hierarchy, self._memory[k])
+            self._memory[k] = resolution.memory
+            answers.append(resolution.x)
+        self._distances.append(float(np.linalg.norm(answers[0] - answers[1])))
+
+    def signals(self, recording: Recording) -> Mapping[str, NDArray[Any]]:
+        """Return nothing: the recording is that of the run."""
+        return {}
+
+    def metrics(self) -> dict[str, float]:
+        """Return the median and the largest distance."""
+        return {MEDIAN: float(np.median(self._distances)), LARGEST: max(self._distances)}
+
+
+@final
+class Outside:
+    """Measures the pivot of a level of one row: what of it is outside the rows above.
+
+    Damping by lambda leaves pivot^2 / (pivot^2 + lambda^2) of the step of such a level.
+    """
+
+    def __init__(self, pivot: Pivot, scenario: Scenario) -> None:
+        resolver = scenario.make_resolver()
+        self._level, self._pivots = pivot.name, list[float]()
+        self._damping, self._threshold = resolver.damping, resolver.threshold
+
+    def look(self, tick: int, controller: Controller) -> None:
+        """Measure the pivot in a tick whose stack has the level."""
+        h = controller.hierarchy
+        if self._level in h.names:
+            i = h.offsets[h.names.index(self._level)]
+            Q = np.linalg.qr(h.A[:i].T)[0]
+            self._pivots.append(float(np.linalg.norm(h.A[i] - Q @ (Q.T @ h.A[i]))))
+
+    def signals(self, recording: Recording) -> Mapping[str, NDArray[Any]]:
+        """Return nothing: the recording is that of the run."""
+        return {}
+
+    def metrics(self) -> dict[str, float]:
+        """Return the share of ticks that are damped, and the median of what is left in a tick."""
+        squares = np.square(self._pivots)
+        share = np.minimum(1.0, squares / self._threshold**2)
+        damping = self._damping**2 * (1.0 - share)
+        return {DAMPED: float((share < 1.0).mean()),
+                LEFT: float(np.median(squares / (squares + damping)))}
+
+
+def rows_of_watched(study: Watched, command: str, seed: int,
+                    progress: Progress | None = None) -> Rows:
+    """Run the scenario from each start, and return what the columns of the study measure."""
+    scenario = load(study.scenario).with_resolver(study.resolver)
+    found: dict[str, list[dict[str, float]]] = {column.name: [] for column in study.columns}
+    ended = 0
+    for start in range(study.starts):
+        if progress is not None:
+            progress(study.name, start, study.starts)
+        values = drawn(scenario, scenario.variation, seed, start)
+        one = changed(scenario, values, "variation")
+        watches = {column.name: _watch(column, one) for column in study.columns}
+        ended += simulate(one, audits=tuple(watches.values())).fault is None
+        for name, watch in watches.items():
+            found[name].append(watch.metrics())
+    kept = {name: {metric: plain(np.array([run[metric] for run in runs])) for metric in runs[0]}
+            for name, runs in found.items()}
+    used = {name: _METRICS[name] for metrics in kept.values() for name in metrics}
+    return Rows(study.name, command, study.starts, seed, used, kept, dict.fromkeys(found, ended))
+
+
+def _watch(column: Pair | Pivot, scenario: Scenario) -> Watch:
+    return Beside(column, scenario) if isinstance(column, Pair) else Outside(column, scenario)
