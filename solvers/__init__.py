@@ -3,7 +3,8 @@
 from solvers import resolvers as resolvers
 from solvers.certificate import Certificate, certify
 from solvers.explain import explain
-from solvers.resolver import Resolution, Resolver, make, names
+from solvers.resolver import Resolution, Resolver, make, names, variants
 from solvers.status import Status
 
-__all__ = ["Certificate", "Resolution", "Resolver", "Status", "certify", "explain", "make", "names"]
+__all__ = ["Certificate", "Resolution", "Resolver", "Status", "certify", "explain", "make", "names",
+           "variants"]

@@ -164,14 +164,17 @@ def set_frozen(record: object, **values: object) -> None:
 def refuse_inequality(resolver: Resolver, h: Hierarchy, row: int) -> None:
     """Raise a HierarchyError that names the level and row of a row (counted over all levels)."""
     level = int((h.offsets[1:] <= row).sum())
-    able = sorted(name for name, kind in _REGISTRY.items() if kind.handles == "inequalities")
+    able = {handles: ", ".join(sorted(name for name, kind in _REGISTRY.items()
+                                      if kind.handles == handles))
+            for handles in ("inequalities", "bounds")}
     raise HierarchyError(
         f"{h.names[level]}, row {row - h.offsets[level]}: an inequality, {h.lower[row]:g} <= a x "
-        f"<= {h.upper[row]:g}; {resolver.name} resolves {_RESOLVED[resolver.handles]}"
-        f" (inequalities: {', '.join(able)})")
+        f"<= {h.upper[row]:g}; {resolver.label} resolves {_RESOLVED[resolver.handles]}"
+        f" (inequalities: {able['inequalities']}; bounds in a first level: {able['bounds']})")
 
 
 _REGISTRY: dict[str, type[Resolver]] = {}
+_VARIANTS: dict[str, tuple[str, dict[str, Any]]] = {}  # a resolver with settings, by its own name
 _Kind = TypeVar("_Kind", bound=Resolver)
 
 
@@ -179,6 +182,16 @@ def register(kind: type[_Kind]) -> type[_Kind]:
     """Register a class of resolvers under its name."""
     _REGISTRY[kind.name] = kind
     return kind
+
+
+def register_variant(name: str, resolver: str, **settings: Any) -> None:
+    """Register a resolver with these settings under a name of its own."""
+    _VARIANTS[name] = resolver, settings
+
+
+def variants() -> tuple[str, ...]:
+    """Return the names of resolvers of `names` with settings of their own, sorted."""
+    return tuple(sorted(_VARIANTS))
 
 
 def names() -> tuple[str, ...]:
@@ -193,8 +206,11 @@ def make(name: str, /, **settings: Any) -> Resolver:
     ------
     HierarchyError : no such resolver or setting (suggests the nearest), or an invalid value.
     """
+    if name in _VARIANTS:
+        resolver, own = _VARIANTS[name]
+        return make(resolver, **own | settings)
     if name not in _REGISTRY:
-        raise UnknownNameError("resolver", name, _REGISTRY)
+        raise UnknownNameError("resolver", name, (*_REGISTRY, *_VARIANTS))
     announce_compilation()
     kind = _REGISTRY[name]
     known = [field.name for field in dataclasses.fields(kind)]

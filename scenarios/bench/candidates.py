@@ -51,7 +51,7 @@ def candidates(wanted: Sequence[str] | None = None) -> tuple[list[Candidate], di
         field.append(Candidate(DAQP, True, _daqp, _read_daqp))
     else:
         missing[DAQP] = "pip install 'task-hierarchy[qp]'"
-    cold = [*(make(name) for name in names() if name != "hqp"), make("tpm", form="published"),
+    cold = [*(make(name) for name in names() if name != "hqp"), make("tpm-published"),
             *(make("hqp", backend=name) for name in BACKENDS if installed(name))]
     warm = [resolver for resolver in cold if _starts(resolver)]
     field += [Candidate(r.label, r.handles == "inequalities", _cold(r)) for r in cold]

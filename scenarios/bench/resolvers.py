@@ -47,7 +47,7 @@ error: the largest such difference. /DAQP, /numpy: ratios of medians. warm: with
 same problem with targets changed by up to 1 %.
 Known limitations. DAQP's hierarchical mode minimizes violations divided by the norms of the rows, \
 a different problem if rows conflict and differ in norm, softened by a finite weight; it treats \
-zero rows as infeasible; its arrays are prepared before timing. augmented and tpm published are \
+zero rows as infeasible; its arrays are prepared before timing. augmented and tpm-published are \
 not strict at every rank. Resolvers for equalities skip problems with inequalities. Fresh problems \
 have no stored answers: wrong and error compare with certified answers of hqp for the first few; \
 for the others, wrong means not certified."""

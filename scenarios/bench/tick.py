@@ -20,7 +20,7 @@ from scenarios.loop.recorder import Recorder
 from scenarios.loop.recording import Recording
 from scenarios.loop.simulation import simulate
 
-SPECS = ("tpm", "tpm:form=staircase", "recursive", "augmented")
+SPECS = ("tpm-published", "tpm", "recursive", "augmented")
 PARTS = ("kinematics", "rows", "resolve", "act and record")
 _WARM_UP = 2000    # ticks before counting starts
 _BLOCK = 500       # ticks per turn of a candidate

@@ -27,7 +27,8 @@ def resolvers(incomplete: str) -> list[str]:
     import solvers
 
     before, comma, last = incomplete.rpartition(",")
-    return [f"{before}{comma}{name}" for name in solvers.names() if name.startswith(last)]
+    return [f"{before}{comma}{name}" for name in (*solvers.names(), *solvers.variants())
+            if name.startswith(last)]
 
 
 def _names(folder: Path, incomplete: str) -> list[str]:

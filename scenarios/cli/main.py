@@ -100,7 +100,8 @@ def list_(as_json: AsJson = False) -> None:
                "groups": {name: load_group(name).title for name in shipped_groups()},
                "sweeps": {name: load_sweep(name).title for name in shipped_sweeps()},
                "resolvers": {name: f"{first_line(one)} Damps {one.damps}."
-                             for name in solvers.names() for one in [solvers.make(name)]},
+                             for name in (*solvers.names(), *solvers.variants())
+                             for one in [solvers.make(name)]},
                "tasks": {name: first_line(task) for name, task in TASKS.items()},
                "robots": {name: in_words(table) for name, table in ROBOTS.items()}}
     if as_json:

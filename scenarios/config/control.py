@@ -79,11 +79,11 @@ class ControlSection(Section):
 
     @model_validator(mode="after")
     def _makes_a_resolver(self) -> Self:
-        from solvers import make, names
+        from solvers import make, names, variants
 
-        for name in self.options:
-            if name in names() and isinstance(self.options[name], dict):
-                make(name, **self.options[name])
+        for name in {*names(), *variants()} & self.options.keys():
+            table = self.options[name]
+            make(name, **(table if isinstance(table, dict) else {name: table}))
         make(self.resolver, **self.settings())
         return self
 
@@ -102,8 +102,9 @@ class ControlSection(Section):
 
     def settings(self) -> dict[str, Any]:
         """Return the resolver's settings: those of its table, overridden by plain ones."""
-        from solvers import names
+        from solvers import names, variants
 
         own = self.options.get(self.resolver, {})
-        plain = {key: value for key, value in self.options.items() if key not in names()}
+        tables = (*names(), *variants())
+        plain = {key: value for key, value in self.options.items() if key not in tables}
         return {**(own if isinstance(own, dict) else {self.resolver: own}), **plain}

@@ -15,9 +15,9 @@ if TYPE_CHECKING:
 
 # The methods that the letter compares, and ours; for inequalities all resolvers that accept them.
 DEFAULT_RESOLVERS: dict[Handles, tuple[str, ...]] = {
-    "equalities": ("tpm", "tpm:form=staircase", "recursive", "augmented", "hqp",
+    "equalities": ("tpm-published", "tpm", "recursive", "augmented", "hqp",
                    "hqp:backend=osqp", "hqp:backend=daqp", "hcod"),
-    "bounds": ("tpm:form=staircase", "sns", "sns:form=optimal", "weighted", "hqp", "hcod"),
+    "bounds": ("tpm", "sns", "sns:form=optimal", "weighted", "hqp", "hcod"),
     "inequalities": ("weighted", "hqp", "hqp:backend=daqp", "hcod"),
     "activations": ("smooth",)}
 

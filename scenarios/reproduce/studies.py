@@ -72,27 +72,27 @@ def _variants(scenario: str, resolvers: Mapping[str, str]) -> tuple[Column, ...]
 
 
 def _blended(prefix: str, scenario: str) -> tuple[Column, ...]:
-    return (Column(prefix, scenario, "tpm"), *(
-        Column(f"{prefix}-blend-{time:g}", scenario, "tpm",
+    return (Column(prefix, scenario, OWN), *(
+        Column(f"{prefix}-blend-{time:g}", scenario, OWN,
                {"control.transition": "blend", "control.transition_time": time})
         for time in (0.02, 0.1)))
 
 
 LETTER = Study("letter", "The letter's scheme", (
-    Column("ellipse", "ellipse", "tpm"),
-    Column("velocity", "ellipse-velocity", "tpm"),
-    Column("35deg", "ellipse-35deg", "tpm"),
-    Column("35deg-equality", "ellipse-35deg-equality", "tpm"),
-    Column("3d", "ellipse-3d", "tpm"),
-    Column("published", "ellipse-published", "tpm"),
-    Column("differences", "ellipse", "tpm", {"control.jacobian_derivative": "difference"}),
-    Column("undamped", "ellipse", "tpm", {"control.options.damping": 0.0})))
+    Column("ellipse", "ellipse", OWN),
+    Column("velocity", "ellipse-velocity", OWN),
+    Column("35deg", "ellipse-35deg", OWN),
+    Column("35deg-equality", "ellipse-35deg-equality", OWN),
+    Column("3d", "ellipse-3d", OWN),
+    Column("published", "ellipse-published", OWN),
+    Column("differences", "ellipse", OWN, {"control.jacobian_derivative": "difference"}),
+    Column("undamped", "ellipse", OWN, {"control.options.damping": 0.0})))
 
 RESOLVERS = Study("resolvers", "All resolvers on one task", (
-    Column("ellipse", "ellipse", "tpm:form=staircase"),
+    Column("ellipse", "ellipse", "tpm"),
     *_variants("ellipse", {"ellipse-weighted": "weighted", "ellipse-augmented": "augmented"}),
     *_variants("ellipse-limits", {
-        "limits-tpm": "tpm:form=staircase", "limits-sns": "sns",
+        "limits-tpm": "tpm", "limits-sns": "sns",
         "limits-sns-optimal": "sns:form=optimal", "limits-hcod": "hcod",
         "limits-weighted": "weighted"}),
     *_variants("ellipse-hqp", {"hqp-hcod": "hcod", "hqp-weighted": "weighted"})))
@@ -104,8 +104,8 @@ LADDER = Study("ladder", "From the letter's scheme to inequalities, one change a
     Column(name, name, OWN) for name in load_group("ladder").scenarios))
 
 INERTIA = Study("inertia", "Null-space damping by the inertia matrix", (
-    Column("identity", "ellipse", "tpm"), *(
-        Column(f"inertia-{k:g}", "ellipse-inertia", "tpm", {"damping.value": k})
+    Column("identity", "ellipse", OWN), *(
+        Column(f"inertia-{k:g}", "ellipse-inertia", OWN, {"damping.value": k})
         for k in (1.0, 5.0, 20.0))))
 
 RIVALS = Study("rivals", "Other ways to avoid obstacles", (
@@ -116,15 +116,15 @@ RIVALS = Study("rivals", "Other ways to avoid obstacles", (
     Column("smooth-velocity", "ellipse-smooth", OWN), Column("barrier", "ellipse-hqp", OWN)))
 
 _DAMPINGS = {
-    "pivots": "tpm:form=published", "level": "tpm:form=staircase",
+    "pivots": "tpm-published", "level": "tpm",
     "nakamura": "recursive:method=nakamura:threshold=0.05",
     "chiaverini": "recursive:method=chiaverini",
     "selective": "recursive:method=selective:largest=2.0"}
 
 SINGULAR = Study("singular", "Through singularities and out of reach", (
     *_variants("singular", _DAMPINGS), Column("limits", "singular-limits", OWN),
-    Column("acceleration-pivots", "singular-acceleration", "tpm:form=published"),
-    Column("acceleration-level", "singular-acceleration", "tpm:form=staircase"),
+    Column("acceleration-pivots", "singular-acceleration", "tpm-published"),
+    Column("acceleration-level", "singular-acceleration", "tpm"),
     Column("acceleration-limits", "singular-acceleration-limits", OWN)))
 
 HUMAN = Study("human", "A hand, a depth camera, an arm under position control", (
@@ -132,16 +132,14 @@ HUMAN = Study("human", "A hand, a depth camera, an arm under position control", 
     Column("human-nearest", "human", OWN, {"avoidance.direction": "nearest"}),
     Column("human-hqp", "human-hqp", OWN)))
 
-_EXACT = "tpm:form=staircase"
-
-STATES = Watched("states", "Resolvers in the same states", "ellipse", _EXACT, (
-    *(Pair(name, _EXACT, name) for name in ("recursive", "hcod", "weighted", "augmented")),
-    Pair("published", _EXACT, "tpm:form=published"),
-    *(Pair(f"{name}-undamped", f"{_EXACT}:damping=0.0", f"{name}:damping=0.0")
+STATES = Watched("states", "Resolvers in the same states", "ellipse", "tpm", (
+    *(Pair(name, "tpm", name) for name in ("recursive", "hcod", "weighted", "augmented")),
+    Pair("published", "tpm", "tpm-published"),
+    *(Pair(f"{name}-undamped", "tpm:damping=0.0", f"{name}:damping=0.0")
       for name in ("recursive", "hcod", "weighted", "augmented")),
-    Pair("published-undamped", f"{_EXACT}:damping=0.0", "tpm:form=published:damping=0.0")))
+    Pair("published-undamped", "tpm:damping=0.0", "tpm-published:damping=0.0")))
 
-THROTTLE = Watched("throttle", "What damping leaves of avoidance", "ellipse", _EXACT,
+THROTTLE = Watched("throttle", "What damping leaves of avoidance", "ellipse", "tpm",
                    (Pivot("avoidance"),))
 
 AnyStudy = Study | Watched

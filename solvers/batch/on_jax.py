@@ -42,7 +42,7 @@ def solve(batch: Batch, resolver: Resolver | None = None) -> BatchResolution:
     if not isinstance(resolver, Tpm) or not resolver.strict:
         raise HierarchyError(f"{resolver.label} is not available in jax; tpm is")
     for p, row in np.argwhere(batch.lower < batch.upper)[:1]:
-        refuse_inequality(make("tpm", form="published"), batch[p], int(row))
+        refuse_inequality(make("tpm-published"), batch[p], int(row))
     with jax.enable_x64(True):
         b = np.where(batch.lower == batch.upper, batch.lower, np.nan)
         x, solved = _staircases(batch.A, b, batch.reference, tuple(batch.sizes.tolist()),

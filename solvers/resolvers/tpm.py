@@ -20,6 +20,7 @@ from solvers.resolver import (
     Resolver,
     refuse_inequality,
     register,
+    register_variant,
     set_frozen,
 )
 from solvers.resolvers.hcod import Hcod, solve_exactly, warm_record
@@ -43,9 +44,10 @@ class Tpm(Resolver):
         the bounds, the method of `hcod` finds the exact answer, as a `SaturatedResolution` that
         keeps the bounds to rounding; its `scaling` is max(0, 1 - |A_k x - b_k| / |b_k|), exactly 1
         for a level that is met.
-    form = "published": plain QR and Gauss-Jordan elimination as printed. It departs from the strict
-        answer where a level above the last loses rank and no freedom remains. Equalities only; its
-        rank_tolerance is absolute for singular values, times the largest row norm of J.
+    form = "published", also `make("tpm-published")`: plain QR and Gauss-Jordan elimination as
+        printed. It departs from the strict answer where a level above the last loses rank and no
+        freedom remains. Equalities only; its rank_tolerance is absolute for singular values, times
+        the largest row norm of J.
 
     See docs/theory/tpm.md, docs/tpm-limits.md, and docs/theory/resolver-notes.md for damping,
     memory and status.
@@ -69,8 +71,8 @@ class Tpm(Resolver):
 
     @property
     def label(self) -> str:
-        """`tpm`, or `tpm published`."""
-        return self.name if self.strict else f"{self.name} {self.form}"
+        """`tpm`, or `tpm-published`."""
+        return self.name if self.strict else f"{self.name}-{self.form}"
 
     def solve(self, h: Hierarchy, memory: Array | None = None) -> Resolution:
         """Resolve h, with bounds starting from the saturation of an earlier resolution if given.
@@ -118,6 +120,9 @@ class Tpm(Resolver):
         return SaturatedResolution(x, _SOLVED if solved else Status.INACCURATE,
                                    int(inner.item(-3) + inner.item(-2)), record, levels,
                                    record if named == SOLVED else None)
+
+
+register_variant("tpm-published", "tpm", form="published")
 
 
 @final

@@ -16,8 +16,6 @@ from scenarios.config.sensor import FramesSection
 from scenarios.loop.facts import Facts, ResolverFacts, RobotFacts, robot_facts
 from scenarios.loop.recording import Recording
 
-LABELS = {"tpm": "tpm published", "tpm:form=staircase": "tpm"}
-
 
 @dataclass(frozen=True)
 class HandMadeResolver:
@@ -27,11 +25,11 @@ class HandMadeResolver:
 
     @property
     def label(self) -> str:
-        return LABELS.get(self.name, self.name)
+        return self.name
 
     @property
     def strict(self) -> bool:
-        return self.name not in ("tpm", "augmented")
+        return self.name not in ("tpm-published", "augmented")
 
     accuracy = 1e-9
     handles = "equalities"

@@ -29,7 +29,7 @@ def test_a_row_for_everybody_and_every_family(few, tmp_path, capsys, monkeypatch
     known = {row["resolver"] for row in rows}
     assert known == expected_labels()
     equalities = {candidates.NUMPY, "augmented", "recursive", "reverse", "sns", "tpm",
-                  "tpm published"}
+                  "tpm-published"}
     assert {(row["family"], row["resolver"]) for row in rows} == {
         (name, label) for name in families.FAMILIES for label in known
         if label not in equalities or name in families.EQUALITIES}
@@ -57,7 +57,7 @@ def expected_labels():
     there = [name for name in backends.BACKENDS if backends.installed(name)]
     warm = [f"hqp {name}" for name in there if name in ("proxqp", "osqp", "daqp")]
     return {candidates.NUMPY, "augmented", "hcod", "recursive", "reverse", "sns", "tpm",
-            "tpm published", "weighted", "hcod warm", "weighted warm",
+            "tpm-published", "weighted", "hcod warm", "weighted warm",
             *(f"hqp {name}" for name in there), *(f"{label} warm" for label in warm),
             *([candidates.DAQP] if "daqp" in there else [])}
 
@@ -156,7 +156,7 @@ def test_only_the_families_and_resolvers_asked_for_are_timed_beside_the_yardstic
     rows = resolvers.run(seconds=0.0, families=["EQ7"], resolvers=["hcod", "tpm"])
     assert {row["family"] for row in rows} == {"EQ7"}
     assert [row["resolver"] for row in rows] == [candidates.NUMPY, candidates.DAQP, "hcod", "tpm",
-                                                 "tpm published", "hcod warm"]
+                                                 "tpm-published", "hcod warm"]
 
 
 @pytest.mark.parametrize(("asked", "says"), [

@@ -82,14 +82,14 @@ def test_a_loaded_run_is_the_run_that_was_saved(tmp_path):
 
 
 def test_compare_writes_page_numbers_and_a_folder_for_each_run(tmp_path, capsys):
-    arguments = ["compare", "ellipse", "--resolvers", "tpm,tpm:form=staircase,recursive", *SHORT]
+    arguments = ["compare", "ellipse", "--resolvers", "tpm-published,tpm,recursive", *SHORT]
     assert run_command([*arguments, "--out", "b"]) == 0
     assert "Report: b/index.html" in capsys.readouterr().out
     assert {path.name for path in (tmp_path / "b" / "ellipse").iterdir()} == {
-        "tpm", "tpm-form-staircase", "recursive"}
+        "tpm-published", "tpm", "recursive"}
     numbers = json.loads((tmp_path / "b" / "comparison.json").read_text())
     assert [run["label"] for run in numbers["runs"]] == [
-        "tpm published", "tpm", "recursive"]
+        "tpm-published", "tpm", "recursive"]
     assert numbers["runs"][0]["settings"]["damping"] == 0.05
 
 

@@ -29,8 +29,9 @@ def test_a_scenario_as_run_reads_back_the_same(name, tmp_path):
 
 def test_the_letters_settings():
     s = load("ellipse")
-    assert (s.control.level, s.control.resolver, s.control.period) == ("acceleration", "tpm", 1e-3)
-    assert s.control.settings() == {"form": "published", "damping": 0.05, "threshold": 0.1}
+    assert (s.control.level, s.control.resolver, s.control.period) == (
+        "acceleration", "tpm-published", 1e-3)
+    assert s.control.settings() == {"damping": 0.05, "threshold": 0.1}
     assert s.control.duration == pytest.approx(6 * np.pi)
     assert (s.pointing.alpha_d, s.pointing.rows) == (5.0, "inequality")
     assert (s.avoidance.near, s.avoidance.far, s.avoidance.end_effector) == (0.05, 0.15, 0.1)
@@ -42,7 +43,7 @@ def test_changes_are_toml_values_at_dotted_keys():
                          "avoidance.obstacles=[[1, 2, 3]]", "control.options.damping = 0.02"])
     assert (s.pointing.alpha_d, s.pointing.rows) == (35.0, "equality")
     assert s.avoidance.obstacles[0].centre == (1, 2, 3)
-    assert s.control.settings() == {"form": "published", "damping": 0.02, "threshold": 0.1}
+    assert s.control.settings() == {"damping": 0.02, "threshold": 0.1}
     assert load("ellipse", {"pointing.alpha_d": 35}).pointing.alpha_d == 35
 
 
@@ -61,9 +62,9 @@ def test_a_resolver_is_swapped_by_name_keeping_the_shared_settings():
     assert s.control.resolver == "recursive"
     assert s.control.settings() == {"damping": 0.05, "threshold": 0.1}
     assert load("ellipse", ["control.resolver=recursive"]) == s, "changing its name is enough"
-    assert s.with_resolver("tpm") == load("ellipse")
-    t = load("ellipse").with_resolver("tpm:form=staircase:damping=0.01")
-    assert t.control.settings() == {"form": "staircase", "damping": 0.01, "threshold": 0.1}
+    assert s.with_resolver("tpm-published") == load("ellipse")
+    t = load("ellipse").with_resolver("tpm:damping=0.01")
+    assert t.control.settings() == {"damping": 0.01, "threshold": 0.1}
 
 
 def test_a_file_extends_another(tmp_path):

@@ -105,16 +105,16 @@ def test_every_resolver_there_is_has_a_colour_of_its_own():
 
 
 def test_a_resolver_has_the_same_colour_in_any_company():
-    for label in ("recursive", "hqp osqp", "tpm published"):
+    for label in ("recursive", "hqp osqp", "tpm-published"):
         for others in ([], ["hqp proxqp", "something new"], ["tpm", "hqp daqp", "my own"]):
             assert drawing.colours([*others, label])[label] == palette.colour(label)
 
 
 def test_a_variant_has_the_colour_of_its_resolver_and_a_line_of_its_own():
-    looks = palette.looks(["tpm published", "tpm", "hqp osqp", "hqp daqp", "hqp proxqp"])
-    assert list(looks) == ["tpm published", "tpm", "hqp osqp", "hqp daqp", "hqp proxqp"]
+    looks = palette.looks(["tpm-published", "tpm", "hqp osqp", "hqp daqp", "hqp proxqp"])
+    assert list(looks) == ["tpm-published", "tpm", "hqp osqp", "hqp daqp", "hqp proxqp"]
     assert looks["tpm"] == (palette.COLOURS["tpm"], palette.SOLID)
-    assert looks["tpm published"].colour == looks["tpm"].colour
+    assert looks["tpm-published"].colour == looks["tpm"].colour
     assert looks["hqp proxqp"].dash == palette.SOLID
     assert len(set(looks.values())) == 5
 
@@ -122,7 +122,7 @@ def test_a_variant_has_the_colour_of_its_resolver_and_a_line_of_its_own():
 def test_only_a_plain_name_and_what_it_stands_for_are_solid():
     for label in ("hqp", "hqp proxqp", "tpm"):
         assert palette.dash(label) == palette.SOLID
-    dashes = [palette.dash(label) for label in ("hqp osqp", "hqp daqp", "tpm published", "hqp new")]
+    dashes = [palette.dash(label) for label in ("hqp osqp", "hqp daqp", "tpm-published", "hqp new")]
     assert palette.SOLID not in dashes
     assert dashes[0] != dashes[1]
 
@@ -132,7 +132,7 @@ def test_a_label_and_the_spec_that_asks_for_it_have_one_colour():
 
 
 def test_no_two_that_stand_side_by_side_look_alike():
-    labels = ["tpm published", "one", "two", "three", "hqp", "weighted 10", "weighted 20",
+    labels = ["tpm-published", "one", "two", "three", "hqp", "weighted 10", "weighted 20",
               "weighted 30", "ellipse", "human"]
     assert len(set(palette.looks(labels).values())) == len(labels)
 
@@ -160,9 +160,9 @@ def test_the_picture_is_seen_without_distortion():
 def test_every_panel_draws_a_run_that_has_its_signal(panel):
     run = recording()
     assert panel.fits(run)
-    drawn = beside(panel, {"tpm published": run, "hqp": run})
-    assert list(drawn) == ["tpm published", "hqp"]
-    assert drawn["hqp"].axes[0].get_ylim() == drawn["tpm published"].axes[0].get_ylim()
+    drawn = beside(panel, {"tpm-published": run, "hqp": run})
+    assert list(drawn) == ["tpm-published", "hqp"]
+    assert drawn["hqp"].axes[0].get_ylim() == drawn["tpm-published"].axes[0].get_ylim()
 
 
 @pytest.mark.parametrize("panel", panels.PANELS, ids=lambda panel: panel.name)
@@ -399,7 +399,7 @@ def test_the_command_says_which_files_it_drew(run_folder, monkeypatch, capsys):
     assert run_command(["figures", str(run_folder), "--style", "papr"]) == 2
 
 
-@pytest.mark.parametrize("label", ["tpm published", "recursive", "hqp osqp"])
+@pytest.mark.parametrize("label", ["tpm-published", "recursive", "hqp osqp"])
 def test_a_resolver_has_its_colour_in_every_figure(label):
     runs, wanted = {label: recording(), "hcod": recording()}, palette.colour(label)
     looks = palette.looks(runs)

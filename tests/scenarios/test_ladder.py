@@ -15,7 +15,7 @@ from scenarios.config import ScenarioError, members, shipped_groups
 from scenarios.config.reading import LIBRARY
 
 # What each step changes: a key, or a section as a whole.
-STEPS = {"ladder-1-staircase": "control.options.tpm.form", "ladder-2-limits": "limits",
+STEPS = {"ladder-1-staircase": "control.resolver", "ladder-2-limits": "limits",
          "ladder-3-undamped": "control.options.damping", "ladder-4-priority": "avoidance.near",
          "ladder-5-hcod": "control.resolver", "ladder-6-barrier": "avoidance",
          "ladder-7-cone": "control.stack"}
@@ -108,7 +108,7 @@ def test_own_is_the_resolver_that_a_scenario_names():
     assert load("ellipse-hqp").with_resolver("own") == load("ellipse-hqp")
     short = [load(name, ["control.duration=0.01"]) for name in ("ellipse", "ellipse-limits")]
     done = compare(short, ["own"])
-    assert [run.scenario.make_resolver().label for run in done.runs] == ["tpm published", "tpm"]
+    assert [run.scenario.make_resolver().label for run in done.runs] == ["tpm-published", "tpm"]
 
 
 def test_a_group_is_not_a_scenario():

@@ -395,7 +395,7 @@ def test_a_kinematic_run_without_noise_has_one_state():
 @pytest.mark.parametrize("period", [0.001, 0.005])
 def test_the_ellipse_away_from_obstacles_is_tracked(mujoco, period, feedback):
     changes = ["control.duration=4.0", f"control.period={period}", "limits.acceleration=10.0",
-               "control.options.tpm.form=staircase", "avoidance.obstacles=[[5.0, 5.0, 5.0]]"]
+               "control.resolver=tpm", "avoidance.obstacles=[[5.0, 5.0, 5.0]]"]
     exact = simulate(load("ellipse", changes))
     run = simulate(load("ellipse", [*changes, "plant.kind=mujoco", f"plant.feedback={feedback}"]))
     settled = run["t"] > 2.0

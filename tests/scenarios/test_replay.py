@@ -22,7 +22,7 @@ VOID = {"meta", "input", "br", "link", "img"}
 def runs():
     """Two ways of resolving two seconds, in which the order of the stack changes."""
     asked = load("ellipse", ["control.duration=2.0"])
-    return {"tpm published": simulate(asked),
+    return {"tpm-published": simulate(asked),
             "recursive": simulate(asked.with_resolver("recursive"))}
 
 
@@ -221,7 +221,7 @@ def test_keys_step_by_a_frame_and_by_a_second(page):
 
 
 def test_the_list_is_the_order_of_the_stack_and_says_what_is_given_up(page, runs):
-    recording = runs["tpm published"]
+    recording = runs["tpm-published"]
     shown = scene(recording)
     for f in (0, *(int(np.searchsorted(shown.t, t)) for t in shown.switches[:3])):
         page.run(f"player.seek({float(shown.t[f])} + 1e-4)")
@@ -239,7 +239,7 @@ def test_runs_stand_side_by_side_and_can_be_hidden(page):
     page.press("s")
     page.painted()
     assert page.run("[...document.querySelectorAll('#names span')].map(s => s.textContent)") == [
-        "tpm published", "recursive"]
+        "tpm-published", "recursive"]
     page.run("document.querySelectorAll('#legend button')[1].click()")
     page.painted()
     assert page.run("document.querySelectorAll('.card')[1].hidden")

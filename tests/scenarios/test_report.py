@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import hand_made
 import numpy as np
 import pytest
-from hand_made import LABELS, HandMadeScenario, recording
+from hand_made import HandMadeScenario, recording
 from headless import chromium
 
 from scenarios.config import load
@@ -23,13 +23,15 @@ from scenarios.report import comparison_page as page
 from scenarios.report.commands import run_command
 from scenarios.report.embedded import replay
 
+LETTER = "tpm-published"
+
 SOFTLY = {"contact_depth": np.zeros(5), "contact_force": np.zeros(5)}
 
 
-def made(spec="tpm", fault=None, error=None, scenario=None, **signals):
+def made(spec="tpm-published", fault=None, error=None, scenario=None, **signals):
     scenario = (scenario or HandMadeScenario()).with_resolver(spec)
     run = None if error else recording(scenario, fault, **signals)
-    return Run(scenario, spec, LABELS.get(spec, spec), run, error)
+    return Run(scenario, spec, spec, run, error)
 
 
 def comparison(*runs):
@@ -50,51 +52,51 @@ def row(runs, label):
 
 
 def test_the_best_of_each_row_is_marked():
-    runs = [made("tpm", minimal_distance=np.full(5, 0.2)), made("hqp")]
+    runs = [made(LETTER, minimal_distance=np.full(5, 0.2)), made("hqp")]
     assert row(runs, "Body distance").best == {1}  # 1 m beats 0.2 m: more is better
-    runs = [made("tpm", a=np.ones((5, 7))), made("hqp")]
+    runs = [made(LETTER, a=np.ones((5, 7))), made("hqp")]
     assert row(runs, "Joint acceleration").best == {1}
 
 
 def test_values_within_a_percent_are_equally_good():
-    runs = [made("tpm", a=np.full((5, 7), 1.005)), made("hqp", a=np.ones((5, 7))),
+    runs = [made(LETTER, a=np.full((5, 7), 1.005)), made("hqp", a=np.ones((5, 7))),
             made("recursive", a=np.full((5, 7), 2.0))]
     assert row(runs, "Joint acceleration").best == {0, 1}
 
 
 def test_what_rounding_makes_of_nothing_is_nothing():
-    runs = [made("tpm", a=np.full((5, 7), 1e-17)), made("hqp", a=np.zeros((5, 7)))]
+    runs = [made(LETTER, a=np.full((5, 7), 1e-17)), made("hqp", a=np.zeros((5, 7)))]
     assert row(runs, "Joint acceleration, max").best == set()
 
 
 def test_where_all_are_equally_good_none_is_marked():
-    assert all(not line.best for line in table([made("tpm"), made("hqp")]))
+    assert all(not line.best for line in table([made(LETTER), made("hqp")]))
 
 
 def test_a_run_that_stopped_early_wins_nothing():
-    runs = [made("tpm", fault="diverged at tick 5"), made("hqp", a=np.ones((5, 7))),
+    runs = [made(LETTER, fault="diverged at tick 5"), made("hqp", a=np.ones((5, 7))),
             made("recursive", a=np.full((5, 7), 2.0))]
     assert row(runs, "Joint acceleration").best == {1}
 
 
 def test_a_run_that_never_began_has_empty_cells_and_loses_nobody_else_theirs():
-    runs = [made("tpm"), made("hqp", error="HierarchyError: cannot")]
+    runs = [made(LETTER), made("hqp", error="HierarchyError: cannot")]
     assert row(runs, "Joint speed, max").cells == ("0.000", "–")
 
 
 def test_the_verdict_says_who_kept_distance_and_who_is_fast():
-    runs = [made("tpm", time_resolve=np.full(5, 2e-6), minimal_distance=np.full(5, 0.052)),
+    runs = [made(LETTER, time_resolve=np.full(5, 2e-6), minimal_distance=np.full(5, 0.052)),
             made("hqp", time_resolve=np.full(5, 80e-6))]
     said = words(runs)
     assert said.startswith("Nothing went wrong: both ran the whole 4 s.")
-    assert "hqp kept the most distance from obstacles (1000 mm, tpm published 52 mm)" in said
-    assert "tpm published resolves a tick in 2 µs, hqp in 80 µs" in said
+    assert "hqp kept the most distance from obstacles (1000 mm, tpm-published 52 mm)" in said
+    assert "tpm-published resolves a tick in 2 µs, hqp in 80 µs" in said
 
 
 def test_the_verdict_says_who_tracked_best():
     off = np.zeros((5, 3))
     off[:, 0] = 2e-3
-    runs = [made("tpm"), made("recursive"), made("augmented", position_error=off)]
+    runs = [made(LETTER), made("recursive"), made("augmented", position_error=off)]
     assert ("all but augmented tracked best (median path error 0 mm, augmented 2 mm)"
             in words(runs))
 
@@ -109,7 +111,7 @@ def test_the_verdict_says_who_served_the_scenarios_own_tasks_best():
 
 
 def test_the_verdict_finds_no_winner_where_all_agree():
-    said = words([made("tpm"), made("recursive"), made("hcod")])
+    said = words([made(LETTER), made("recursive"), made("hcod")])
     assert "All moved the arm alike to the last bit" in said
     assert "half of the time the tool was within 0 mm of its path" in said
     assert "the body kept at least 1000 mm from every obstacle" in said
@@ -118,7 +120,7 @@ def test_the_verdict_finds_no_winner_where_all_agree():
 
 
 def test_the_verdict_says_which_ways_did_not_finish_and_takes_nothing_from_them():
-    runs = [made("tpm"), made("hqp", fault="diverged", minimal_distance=np.full(5, 0.001))]
+    runs = [made(LETTER), made("hqp", fault="diverged", minimal_distance=np.full(5, 0.001))]
     said = words(runs)
     assert said.startswith("hqp did not reach the end: diverged.")
     assert "at least 1000 mm" in said
@@ -130,7 +132,7 @@ def test_the_verdict_names_those_together_that_ended_for_the_same_reason():
 
 
 def test_the_verdict_tells_who_moved_alike_and_what_the_others_did_instead():
-    runs = [made("tpm", minimal_distance=np.full(5, 0.04)),
+    runs = [made(LETTER, minimal_distance=np.full(5, 0.04)),
             made("recursive", q=np.full((5, 7), 1e-11), minimal_distance=np.full(5, 0.04)),
             made("augmented", q=np.full((5, 7), 0.3), minimal_distance=np.full(5, 0.02))]
     said = words(runs)
@@ -140,29 +142,29 @@ def test_the_verdict_tells_who_moved_alike_and_what_the_others_did_instead():
 
 
 def test_the_verdict_says_who_is_near_without_being_the_same():
-    assert "hqp stayed within 1e-04 rad of tpm published" in words(
-        [made("tpm"), made("hqp", q=np.full((5, 7), 1e-4))])
+    assert "hqp stayed within 1e-04 rad of tpm-published" in words(
+        [made(LETTER), made("hqp", q=np.full((5, 7), 1e-4))])
 
 
 def test_the_verdict_finds_no_agreement_where_there_is_none():
-    assert "No two moved the arm alike" in words([made("tpm"), made("hqp", q=np.ones((5, 7)))])
+    assert "No two moved the arm alike" in words([made(LETTER), made("hqp", q=np.ones((5, 7)))])
 
 
 def test_the_verdict_does_not_hide_a_collision():
-    assert "touched an obstacle" in words([made("tpm", minimal_distance=np.zeros(5))])
+    assert "touched an obstacle" in words([made(LETTER, minimal_distance=np.zeros(5))])
 
 
 def test_the_verdict_does_not_hide_contact_limits_or_ticks_without_an_answer():
-    said = words([made("tpm", contacts=[0, 0, 1, 2, 0], **SOFTLY, q=np.full((5, 7), 2.3)),
+    said = words([made(LETTER, contacts=[0, 0, 1, 2, 0], **SOFTLY, q=np.full((5, 7), 2.3)),
                     made("hqp", status=[0, 0, 0, 3, 0], q=np.ones((5, 7)))])
-    assert "tpm published touched something, for 2 ticks at most" in said
+    assert "tpm-published touched something, for 2 ticks at most" in said
     assert "passed a joint limit, by 0.3 rad at most" in said
     assert "hqp had no answer in 1 tick" in said
 
 
 def test_the_verdict_says_what_was_done_in_ticks_with_trouble():
-    runs = [with_events(made("tpm"), (1, "inside", "brake"), (2, "stale", "brake")), made("hqp")]
-    assert "tpm published braked in 2 ticks" in words(runs)
+    runs = [with_events(made(LETTER), (1, "inside", "brake"), (2, "stale", "brake")), made("hqp")]
+    assert "tpm-published braked in 2 ticks" in words(runs)
 
 
 def test_the_verdict_of_runs_that_all_broke_is_only_that():
@@ -171,14 +173,14 @@ def test_the_verdict_of_runs_that_all_broke_is_only_that():
 
 @pytest.mark.slow
 @pytest.mark.parametrize("runs", [
-    [made("tpm")],
-    [made("tpm"), made("tpm:form=staircase"), made("recursive")],
-    [made("tpm"), made("hqp", fault="diverged at tick 5")],
-    [made("tpm"), made("hqp", error="HierarchyError: cannot")],
+    [made(LETTER)],
+    [made(LETTER), made("tpm"), made("recursive")],
+    [made(LETTER), made("hqp", fault="diverged at tick 5")],
+    [made(LETTER), made("hqp", error="HierarchyError: cannot")],
     [made("hqp", error="HierarchyError: cannot")],
-    [made("tpm", t=[0.0])],
-    [made("tpm"), made("tpm", scenario=HandMadeScenario(name="other"))],
-    [made("tpm", scenario=HandMadeScenario(pointing=None, avoidance=None))],
+    [made(LETTER, t=[0.0])],
+    [made(LETTER), made(LETTER, scenario=HandMadeScenario(name="other"))],
+    [made(LETTER, scenario=HandMadeScenario(pointing=None, avoidance=None))],
 ], ids=["one", "three", "a fault", "an error", "only an error", "one tick", "two scenarios",
         "no tasks but position"])
 def test_a_page_is_whole_and_needs_nothing_outside_itself(runs):
@@ -191,10 +193,10 @@ def test_a_page_is_whole_and_needs_nothing_outside_itself(runs):
 @pytest.mark.slow
 def test_one_resolver_in_several_scenarios_is_one_table_and_nothing_is_best():
     asked = [HandMadeScenario(name=name) for name in ("slow", "jumpy")]
-    runs = [dataclasses.replace(made("tpm", scenario=one, v=speed * np.eye(5, 7)), label=one.name)
+    runs = [dataclasses.replace(made(LETTER, scenario=one, v=speed * np.eye(5, 7)), label=one.name)
             for one, speed in zip(asked, (0.1, 2.0), strict=True)]
     text = page(comparison(*runs))
-    assert list(comparison(*runs).groups()) == ["tpm"]
+    assert list(comparison(*runs).groups()) == ["tpm-published"]
     assert all(not line.best for line in table(runs))
     assert "0.1 rad/s in slow, 2 rad/s in jumpy" in text
     assert "none is marked as best" in text
@@ -202,13 +204,13 @@ def test_one_resolver_in_several_scenarios_is_one_table_and_nothing_is_best():
 
 def test_several_resolvers_in_several_scenarios_are_a_section_each():
     runs = [made(spec, scenario=HandMadeScenario(name=name))
-            for name in ("one", "other") for spec in ("tpm", "hqp")]
+            for name in ("one", "other") for spec in ("tpm-published", "hqp")]
     assert list(comparison(*runs).groups()) == ["one", "other"]
 
 
 @pytest.mark.slow
 def test_the_page_shows_verdict_replay_table_stack_panels_commands_settings():
-    text = page(comparison(made("tpm"), made("hqp")))
+    text = page(comparison(made(LETTER), made("hqp")))
     places = [text.index(mark) for mark in (
         'class="verdict"', "<h2>Replay", "<h2>In numbers", "<h2>The stack over time",
         "<h2>Side by side", "<h2>How to reproduce this<", "<h2>Settings",
@@ -218,34 +220,35 @@ def test_the_page_shows_verdict_replay_table_stack_panels_commands_settings():
 
 @pytest.mark.slow
 def test_the_page_says_what_happened_to_a_run_that_faulted():
-    text = page(comparison(made("tpm"), made("hqp", fault="the state is not finite from tick 5")))
+    text = page(comparison(made(LETTER), made("hqp", fault="the state is not finite from tick 5")))
     assert "the state is not finite from tick 5" in text
     assert "stopped at" in text
 
 
 @pytest.mark.slow
 def test_runs_of_the_same_motion_are_drawn_once_and_named_together():
-    runs = [made("tpm"), made("hqp", q=np.full((5, 7), 1e-8)), made("augmented", q=np.ones((5, 7)))]
-    assert [one.labels for one in motions(runs)] == [("tpm published", "hqp"), ("augmented",)]
+    runs = [made(LETTER), made("hqp", q=np.full((5, 7), 1e-8)),
+            made("augmented", q=np.ones((5, 7)))]
+    assert [one.labels for one in motions(runs)] == [("tpm-published", "hqp"), ("augmented",)]
     text = page(comparison(*runs))
-    assert "tpm published and hqp are the same motion to 1e-08 rad" in text
+    assert "tpm-published and hqp are the same motion to 1e-08 rad" in text
     assert len(re.findall(r'aria-label="hand-made, [^"]*: Joint velocities"', text)) == 2
 
 
 def test_runs_of_two_scenarios_are_never_the_same_motion():
-    runs = [made("tpm", scenario=HandMadeScenario(name=name)) for name in ("one", "other")]
+    runs = [made(LETTER, scenario=HandMadeScenario(name=name)) for name in ("one", "other")]
     assert len(motions(runs)) == 2
 
 
 @pytest.mark.slow
 def test_the_page_shows_every_event_in_words_and_in_the_stack_over_time():
-    run = with_events(made("tpm", contacts=[0, 1, 0, 0, 0], **SOFTLY), (3, "not_finite", "hold"))
+    run = with_events(made(LETTER, contacts=[0, 1, 0, 0, 0], **SOFTLY), (3, "not_finite", "hold"))
     text = page(comparison(run, made("hqp")))
     cells = re.search(r"<td>not finite</td><td>hold</td><td>1</td><td>([^<]*)</td>", text)
     assert cells is not None
     assert cells[1] == "3.000 s"
     assert "<td>contact</td>" in text
-    drawn = re.search(r'aria-label="hand-made, tpm published: the stack over time".*?</svg>', text)
+    drawn = re.search(r'aria-label="hand-made, tpm-published: the stack over time".*?</svg>', text)
     assert drawn is not None
     assert ">not finite: hold</text>" in drawn[0]
     assert ">contact</text>" in drawn[0]
@@ -253,12 +256,12 @@ def test_the_page_shows_every_event_in_words_and_in_the_stack_over_time():
 
 @pytest.mark.slow
 def test_a_page_without_events_says_that_there_were_none():
-    assert "No run had unsolved ticks" in page(comparison(made("tpm"), made("hqp")))
+    assert "No run had unsolved ticks" in page(comparison(made(LETTER), made("hqp")))
 
 
 @pytest.mark.slow
 def test_the_same_motion_with_other_events_has_a_stack_over_time_of_its_own():
-    runs = [made("tpm"), with_events(made("hqp"), (2, "overrun", "use"))]
+    runs = [made(LETTER), with_events(made("hqp"), (2, "overrun", "use"))]
     assert len(motions(runs)) == 1
     text = page(comparison(*runs))
     assert len(re.findall(r'aria-label="[^"]*the stack over time"', text)) == 2
@@ -276,22 +279,22 @@ def test_every_run_has_a_command_that_makes_it_again():
 
 
 def test_a_run_of_a_file_of_ones_own_is_made_again_from_its_folder():
-    assert run_command(made("tpm"), "runs/a") == (
-        "hierarchy run runs/a/hand-made/tpm/scenario.toml")
+    assert run_command(made(LETTER), "runs/a") == (
+        "hierarchy run runs/a/hand-made/tpm-published/scenario.toml")
 
 
 @pytest.mark.slow
 def test_the_page_has_the_commands_to_run_view_replay_and_draw():
-    text = html.unescape(page(dataclasses.replace(comparison(made("tpm")), folder="runs/my own")))
-    for command in ("hierarchy run 'runs/my own/hand-made/tpm/scenario.toml'",
-                    "hierarchy view 'runs/my own/hand-made/tpm'",
-                    "hierarchy replay 'runs/my own/hand-made/tpm'",
-                    "hierarchy figures 'runs/my own/hand-made/tpm' --style paper"):
+    text = html.unescape(page(dataclasses.replace(comparison(made(LETTER)), folder="runs/my own")))
+    for command in ("hierarchy run 'runs/my own/hand-made/tpm-published/scenario.toml'",
+                    "hierarchy view 'runs/my own/hand-made/tpm-published'",
+                    "hierarchy replay 'runs/my own/hand-made/tpm-published'",
+                    "hierarchy figures 'runs/my own/hand-made/tpm-published' --style paper"):
         assert command in text
 
 
 def test_the_numbers_as_data_hold_the_verdicts():
-    both = comparison(made("tpm"), made("hqp"))
+    both = comparison(made(LETTER), made("hqp"))
     assert both.as_plain_data()["verdicts"] == {"hand-made": list(verdict(both.runs).lines)}
 
 
@@ -299,9 +302,9 @@ def test_the_numbers_as_data_hold_the_verdicts():
 def short_comparison(tmp_path_factory):
     """A page on disk, of real runs of which two are the same motion."""
     short = [load("ellipse", ["control.duration=0.3"]).with_resolver(spec)
-             for spec in ("tpm", "recursive", "augmented")]
+             for spec in ("tpm-published", "recursive", "augmented")]
     runs = tuple(Run(one, spec, spec, simulate(one)) for one, spec in
-                 zip(short, ("tpm", "recursive", "augmented"), strict=True))
+                 zip(short, ("tpm-published", "recursive", "augmented"), strict=True))
     file = tmp_path_factory.mktemp("report") / "index.html"
     file.write_text(page(comparison(*runs)), encoding="utf-8")
     return file
@@ -317,7 +320,7 @@ def test_the_replay_is_in_the_page_and_says_who_moves_as_whom(short_comparison):
 
 def test_a_replay_that_would_be_too_large_has_fewer_pictures():
     run = simulate(load("ellipse", ["control.duration=1.0"]))
-    found = motions([Run(run.scenario, "tpm", "tpm", run)])
+    found = motions([Run(run.scenario, "tpm-published", "tpm-published", run)])
     small, large = (replay("ellipse", found, most) for most in (1, 10**7))
     assert "5 frames per second" in small
     assert "30 frames per second" in large
@@ -344,7 +347,7 @@ def test_a_page_in_a_browser_fits_its_window_and_has_no_complaints(short_compari
 @pytest.mark.slow
 def test_text_from_a_scenario_file_cannot_become_markup():
     scenario = dataclasses.replace(HandMadeScenario(), title="<script>alert(1)</script> & co")
-    text = page(comparison(made("tpm", scenario=scenario)))
+    text = page(comparison(made(LETTER, scenario=scenario)))
     assert "<script>alert" not in text
     assert "&lt;script&gt;alert" in text
 
@@ -357,7 +360,7 @@ def test_a_page_of_long_runs_stays_small():
                  position_error=noise[:, :3], pointing_error=noise[:, 0],
                  active_control_point=np.full(ticks, 6), minimal_distance=np.abs(noise[:, 0]),
                  control_point_distance=np.ones((ticks, 8)), ee_distance=np.abs(noise[:, 1]))
-            for spec in ("tpm", "recursive", "augmented", "hqp", "tpm:form=staircase")]
+            for spec in ("tpm-published", "recursive", "augmented", "hqp", "tpm")]
     assert len(page(comparison(*runs)).encode()) < 3_000_000
 
 

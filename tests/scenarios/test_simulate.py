@@ -96,7 +96,7 @@ def test_the_same_scenario_gives_the_same_run(run):
 def test_tpm_and_recursion_are_the_same_run(name):
     """(7) equals (5) and (12) equals (13), also with the damping of singularities on."""
     scenario = load(name)
-    runs = [simulate(scenario.with_resolver(spec)) for spec in ("tpm:form=staircase", "recursive")]
+    runs = [simulate(scenario.with_resolver(spec)) for spec in ("tpm", "recursive")]
     np.testing.assert_allclose(runs[0]["q"], runs[1]["q"], rtol=0, atol=1e-8)
     np.testing.assert_array_equal(runs[0]["order"], runs[1]["order"])
 

@@ -165,7 +165,7 @@ def test_the_resolver_is_switched_in_mid_motion_and_back():
     live = Live(load("ellipse", ["control.duration=0.6"]))
     ticks(live, 100)
     q = live.controller.cell.plant.q.copy()
-    for spec, label in (("tpm:form=staircase", "tpm"), ("hcod", "hcod"), ("tpm", "tpm published")):
+    for spec, label in (("tpm", "tpm"), ("hcod", "hcod"), ("tpm-published", "tpm-published")):
         live.switch(spec)
         assert live.controller.resolver.label == label
         assert live.controller.cell.plant.q == pytest.approx(q, abs=0.01)

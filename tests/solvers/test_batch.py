@@ -188,8 +188,8 @@ def test_a_resolver_or_a_number_of_threads_that_makes_no_sense_is_refused():
     batch = Batch.of([bounded(0, 1.0)])
     with pytest.raises(HierarchyError, match="recursive resolves no batches"):
         solve(batch, make("recursive"))
-    with pytest.raises(HierarchyError, match="tpm published resolves no batches"):
-        solve(batch, make("tpm", form="published"))
+    with pytest.raises(HierarchyError, match="tpm-published resolves no batches"):
+        solve(batch, make("tpm-published"))
     with pytest.raises(HierarchyError, match="threads = 0"):
         solve(batch, threads=0)
 

@@ -19,7 +19,7 @@ pytestmark = pytest.mark.slow
 
 HQP = [make("hqp", backend=name, form=form)
        for name in BACKENDS for form in ("null-space", "slack")]
-RESOLVERS = [*(make(name) for name in names() if name != "hqp"), make("tpm", form="published"),
+RESOLVERS = [*(make(name) for name in names() if name != "hqp"), make("tpm-published"),
              make("sns", form="optimal"), *HQP]
 STRICT = [r for r in RESOLVERS if r.strict]
 INEQUALITIES = [r for r in STRICT if r.handles == "inequalities"]

@@ -56,7 +56,7 @@ def test_every_strict_resolver_commands_what_the_staircase_does(resolver, level,
 def test_hcod_and_the_staircase_are_the_same_run(name):
     """With the same singularity setting, over all 18,850 ticks."""
     scenario = load(name)
-    a, b = (simulate(scenario.with_resolver(spec)) for spec in ("hcod", "tpm:form=staircase"))
+    a, b = (simulate(scenario.with_resolver(spec)) for spec in ("hcod", "tpm"))
     assert a.ticks == b.ticks == 18850
     np.testing.assert_allclose(a["q"], b["q"], rtol=0, atol=1e-8)
     np.testing.assert_array_equal(a["order"], b["order"])

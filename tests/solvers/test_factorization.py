@@ -300,7 +300,7 @@ def test_what_is_given_and_what_is_returned_are_copies():
     (lambda f: Factorization([]), "no levels and no n"),
     (lambda f: Factorization([[1.0]]), r"level 1: A has shape \(1,\), expected \(rows, n\)"),
     (lambda f: Factorization([np.eye(2), np.eye(3)]), r"level 2: A has shape \(3, 3\)"),
-    (lambda f: Factorization([], n=2, settings=make("tpm", form="published")), "staircase form"),
+    (lambda f: Factorization([], n=2, settings=make("tpm-published")), "staircase form"),
 ], ids=lambda part: part if isinstance(part, str) else "")
 def test_a_mistake_is_named_and_changes_nothing(mistake, text):
     factored = Factorization([np.eye(3)[:2], np.eye(3)[2:]], names=["hand", "elbow"])

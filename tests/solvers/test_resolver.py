@@ -49,7 +49,7 @@ def test_a_count_is_a_whole_number_that_a_kernel_can_hold(resolver):
 
 def test_labels_name_what_makes_another_method():
     assert make("tpm").label == "tpm"
-    assert make("tpm", form="published").label == "tpm published"
+    assert make("tpm-published").label == "tpm-published"
     assert make("hqp").label == "hqp proxqp"
 
 

@@ -11,7 +11,7 @@ from solvers.resolvers.tpm import FORMS, task_priority_matrix
 
 every_case = pytest.mark.parametrize("case", CASES, ids=lambda c: c.__name__)
 every_form = pytest.mark.parametrize("form", FORMS)
-PUBLISHED = make("tpm", form="published")
+PUBLISHED = make("tpm-published")
 STAIRCASE = make("tpm")
 
 
@@ -95,7 +95,7 @@ DETERMINED = [case for case in CASES if case.__name__ not in (*ARBITRARY, "no_le
 def test_the_published_form_is_what_its_equations_say(case, damping):
     h = build(case, True)
     x, F = oracle.published(h, damping=damping)
-    close(make("tpm", form="published", damping=damping).solve(h).x, x)
+    close(make("tpm-published", damping=damping).solve(h).x, x)
     close(task_priority_matrix(h, form="published", damping=damping).F.T @ h.lower,
           F.T @ h.lower)
 
@@ -159,7 +159,7 @@ def test_damped_pivots_are_the_damped_recursion_while_rows_are_independent(seed)
     levels[1][0][0] = levels[0][0][2] + 0.01 * noise[1]
     h = Hierarchy.from_levels(levels, noise[0])
     settings = {"damping": 0.05, "threshold": 0.1}
-    close(make("tpm", form="published", **settings).solve(h).x, oracle.solve(h, **settings))
+    close(make("tpm-published", **settings).solve(h).x, oracle.solve(h, **settings))
     assert np.abs(oracle.solve(h, **settings) - oracle.solve(h)).max() > 0.1
 
 

@@ -270,10 +270,10 @@ def test_inequalities_that_are_no_bounds_are_refused_by_level_and_row(form):
 
 
 def test_the_published_form_refuses_bounds():
-    published = make("tpm", form="published")
+    published = make("tpm-published")
     assert published.handles == "equalities"
     assert TPM.handles == "bounds"
-    with pytest.raises(HierarchyError, match="tpm resolves equalities only"):
+    with pytest.raises(HierarchyError, match="tpm-published resolves equalities only"):
         published.solve(boxed(Hierarchy.from_levels(generic()), -1.0, 1.0))
 
 

@@ -228,7 +228,7 @@ def tick_times(recording: Recording) -> Figure:
 
 
 def label_of(recording: Recording) -> str:
-    """Return the label of a run's resolver, such as "tpm published"."""
+    """Return the label of a run's resolver, such as "tpm-published"."""
     return recording.facts.resolver.label
 
 

@@ -41,12 +41,12 @@ class Look(NamedTuple):
 
 def colour(label: str) -> str:
     """Return the colour of a resolver's label: "hqp osqp" has that of "hqp"."""
-    return COLOURS.get(_resolver(label), SPARE[0])
+    return COLOURS.get(_parts(label)[0], SPARE[0])
 
 
 def dash(label: str) -> Dash:
     """Return the dashes of a resolver's label: solid except for variants."""
-    variant = label.partition(" ")[2]
+    variant = _parts(label)[1]
     return SOLID if variant in _USUAL else _VARIANTS.get(variant, _DASHES[1])
 
 
@@ -57,12 +57,12 @@ def looks(labels: Iterable[str]) -> dict[str, Look]:
     labels that are no resolver get unused colours.
     """
     labels = list(dict.fromkeys(labels))
-    known = {_resolver(label) for label in labels} & set(COLOURS)
+    known = {_parts(label)[0] for label in labels} & set(COLOURS)
     free = [shade for name, shade in COLOURS.items() if name not in known]
     free = [*SPARE, *free] if known else [*free, *SPARE]
     found: dict[str, Look] = {}
-    for label in sorted(labels, key=lambda label: label.partition(" ")[2] not in _USUAL):
-        shade = COLOURS.get(_resolver(label)) or (free.pop(0) if free else SPARE[0])
+    for label in sorted(labels, key=lambda label: _parts(label)[1] not in _USUAL):
+        shade = COLOURS.get(_parts(label)[0]) or (free.pop(0) if free else SPARE[0])
         lines = (line for line in (dash(label), *_DASHES)
                  if Look(shade, line) not in found.values())
         found[label] = Look(shade, next(lines, SOLID))
@@ -77,6 +77,9 @@ def task_colours(names: Iterable[str]) -> dict[str, str]:
     return {name: _TASKS.get(name) or left[others.index(name) % len(left)] for name in names}
 
 
-def _resolver(label: str) -> str:
-    """Return the resolver's name in a label "tpm published" or a spec "tpm:form=published"."""
-    return label.partition(" ")[0].partition(":")[0]
+def _parts(label: str) -> tuple[str, str]:
+    """Return resolver and variant of a label "hqp osqp" or "tpm-published", or a spec."""
+    first, _, variant = label.partition(" ")
+    name = first.partition(":")[0]
+    resolver = name.removesuffix("-published")
+    return resolver, variant if resolver == name else "published"

@@ -69,11 +69,11 @@ def resolvers(scenario: Scenario) -> dict[str, str]:
     The scenario's own resolver is the first.
     """
     from scenarios.config.resolvers import default_resolvers
-    from solvers import names
+    from solvers import names, variants
 
     own = scenario.control.resolver
     found: dict[str, str] = {}
-    for spec in (own, *default_resolvers(scenario.asks)[0], *names()):
+    for spec in (own, *default_resolvers(scenario.asks)[0], *names(), *variants()):
         try:
             other = scenario if spec == own else scenario.with_resolver(spec)
             resolver = other.make_resolver()
