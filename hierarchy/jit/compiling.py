@@ -15,6 +15,7 @@ from collections.abc import Callable
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
+from time import monotonic
 from typing import Any
 
 import numba
@@ -26,7 +27,7 @@ from numba.np import arrayobj, linalg
 
 # What makes an array; a kernel that uses another way of numpy fails to compile, and belongs here.
 _MAKERS = {"empty", "empty_like", "zeros", "zeros_like", "ones", "full", "eye", "copy", "array"}
-
+_EVERY = 5.0  # [s] between two words on a compilation that goes on
 
 
 def _import_array_functions() -> None:
@@ -216,21 +217,36 @@ def _jit_into(folder: Path, function: Kernel, **options: bool) -> Any:
         numba.config.CACHE_DIR = before
 
 
-class _FirstCompilation(event.Listener):  # type: ignore[misc]
-    """Says once that kernels are being compiled; numba sends the event only on a cache miss."""
+class _Compilations(event.Listener):  # type: ignore[misc]
+    """Says that kernels are being compiled, and how many are; numba compiles on a cache miss."""
+
+    def __init__(self) -> None:
+        self._count, self._begun, self._said = 0, 0.0, 0.0
 
     def on_start(self, event: Any) -> None:
-        module = event.data["dispatcher"].py_func.__module__.partition(".")[0]
-        if module in ("hierarchy", "solvers", "scenarios"):
-            numba.core.event.unregister("numba:compile", self)
-            print("task-hierarchy: compiling kernels for this machine, once "
-                  "(some seconds) ...", file=sys.stderr, flush=True)
+        if self._begun == 0.0 and _is_own(event):
+            self._begun = self._said = monotonic()
+            _say("compiling kernels for this machine, once; a scenario needs some 80, in 20 to "
+                 "40 s ...")
 
     def on_end(self, event: Any) -> None:
-        pass
+        self._count += _is_own(event)
+        now = monotonic()
+        if self._begun > 0.0 and now - self._said > _EVERY:
+            self._said = now
+            _say(f"{self._count} kernels in {now - self._begun:.0f} s ...")
+
+
+def _is_own(event: Any) -> bool:
+    module: str = event.data["dispatcher"].py_func.__module__
+    return module.partition(".")[0] in ("hierarchy", "solvers", "scenarios")
+
+
+def _say(what: str) -> None:
+    print(f"task-hierarchy: {what}", file=sys.stderr, flush=True)
 
 
 @cache
 def announce_compilation() -> None:
-    """Let the first compilation of a kernel be announced on stderr: it makes a program wait."""
-    event.register("numba:compile", _FirstCompilation())
+    """Let the compilation of kernels be announced on stderr: it makes a program wait."""
+    event.register("numba:compile", _Compilations())

@@ -129,6 +129,9 @@ def run(scenario: Annotated[str, typer.Argument(
         speed: Annotated[float | None, typer.Option(
             "--speed", metavar="X", min=0.01, max=100.0,
             help="With --live: real-time factor. Default: 1.")] = None,
+        wait: Annotated[bool, typer.Option(
+            "--wait/--no-wait", help="With --live: start when a browser has opened the page, or "
+            "at once.")] = True,
         port: Port = PORT, browser: Browser = True) -> int:
     """Run a scenario, measure it, and save the run."""
     if live and (certify or figures or as_json):
@@ -146,14 +149,14 @@ def run(scenario: Annotated[str, typer.Argument(
     if live:
         from scenarios.cli.view import live_command
 
-        return live_command(chosen, folder, port, speed or 1.0, browser)
+        return live_command(chosen, folder, port, speed or 1.0, browser, wait)
     from scenarios.cli.progress import bar
     from scenarios.loop.simulation import simulate
     from scenarios.measure.run_folder import save
 
     with bar() as told:
         label = str(chosen.make_resolver().label)
-        recording = simulate(chosen, progress=partial(told, label) if told else None,
+        recording = simulate(chosen, progress=partial(told, label),
                              certified=certify)
     save(recording, folder)
     if figures:
@@ -269,7 +272,7 @@ def reproduce(studies: Annotated[list[str] | None, typer.Argument(
 
 @app.command()
 def view(folders: Annotated[list[Path], typer.Argument(
-             metavar="RUN...", help="Run folders of `hierarchy run` or `compare`.")],
+             metavar="RUN...", help="Folders of `hierarchy run` or `compare`.")],
          side_by_side: Annotated[bool, typer.Option(
              "--side-by-side/--overlay", help="Placement of several runs.")] = True,
          port: Port = PORT, browser: Browser = True) -> int:
@@ -305,7 +308,7 @@ def export(folder: Annotated[Path, typer.Argument(
 
 @app.command()
 def replay(folders: Annotated[list[Path], typer.Argument(
-               metavar="RUN...", help="Run folders of `hierarchy run` or `compare`.")],
+               metavar="RUN...", help="Folders of `hierarchy run` or `compare`.")],
            out: Annotated[Path | None, output(
                "HTML file to write. Default: RUN/replay.html.", "FILE")] = None,
            video: Annotated[Path | None, typer.Option(
@@ -323,7 +326,7 @@ def replay(folders: Annotated[list[Path], typer.Argument(
 
 @app.command()
 def figures(folders: Annotated[list[Path], typer.Argument(
-                metavar="RUN...", help="Run folders of `hierarchy run` or `compare`.")],
+                metavar="RUN...", help="Folders of `hierarchy run` or `compare`.")],
             style: Annotated[str, typer.Option(
                 "--style", metavar="STYLE",
                 help="screen: SVG and PNG. paper: PDF, one column of a journal wide.")] = "screen",

@@ -24,7 +24,7 @@ def replay_command(folders: Sequence[Path], out: Path | None, video: Path | None
 
         with bar("frames") as told:
             write_video(next(iter(recordings.values())), video, rate=rate,
-                        progress=partial(told, "video") if told else None)
+                        progress=partial(told, "video"))
         _say(video)
     if out is not None or video is None:
         from scenarios.draw.replay.page import html

@@ -13,6 +13,8 @@ if TYPE_CHECKING:
     from scenarios.config import Scenario
     from scenarios.draw.viewer.live_page import LivePage
 
+_POLL = 0.05  # [s] between two looks for the first browser
+
 
 def view_command(folders: Sequence[Path], port: int, side_by_side: bool, browser: bool) -> int:
     """Show finished runs until Ctrl-C, and return the exit code 0."""
@@ -20,8 +22,9 @@ def view_command(folders: Sequence[Path], port: int, side_by_side: bool, browser
     from scenarios.draw.viewer.view import View, labelled
     from scenarios.loop.recording import load_run
 
-    runs = labelled(folders, [load_run(folder) for folder in folders])
-    server = open_server(port, "hierarchy view")
+    found = [run for folder in folders for run in _runs_in(folder)]
+    runs = labelled(found, [load_run(folder) for folder in found])
+    server = open_server(port, ", ".join(folder.name for folder in folders))
     try:
         view = View(server, runs, side_by_side)
         announce(server, browser)
@@ -33,8 +36,18 @@ def view_command(folders: Sequence[Path], port: int, side_by_side: bool, browser
     return 0
 
 
-def live_command(scenario: Scenario, folder: Path, port: int, speed: float, browser: bool) -> int:
+def _runs_in(folder: Path) -> list[Path]:
+    """Return a run folder, or those of a comparison."""
+    if (folder / "comparison.json").is_file():
+        return sorted(file.parent for file in folder.glob("*/*/run.npz"))
+    return [folder]
+
+
+def live_command(scenario: Scenario, folder: Path, port: int, speed: float, browser: bool,
+                 wait: bool = True) -> int:
     """Run a scenario live in the browser, save the run, and return 1 if it stopped with a fault.
+
+    With `wait` the run starts when the first browser has opened the page.
 
     The run is saved when it ends or at Ctrl-C, in `folder` or, after a restart, beside it. A run
     that is restarted before its end is not saved.
@@ -44,10 +57,12 @@ def live_command(scenario: Scenario, folder: Path, port: int, speed: float, brow
     from scenarios.draw.viewer.server import announce, close, open_server
 
     live = Live(scenario)
-    server = open_server(port, f"hierarchy run {scenario.name} --live")
+    server = open_server(port, f"{scenario.name}, live")
     page = LivePage(server, live, speed)
     try:
         announce(server, browser)
+        while wait and not server.get_clients():
+            time.sleep(_POLL)
         _serve(page, folder)
     except KeyboardInterrupt:
         print()

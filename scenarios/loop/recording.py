@@ -156,9 +156,13 @@ def load_run(folder: str | Path) -> Recording:
     from scenarios.config import load
 
     path = Path(folder)
-    scenario = load(str(path / "scenario.toml"))
+    if not path.is_dir():
+        raise HierarchyError(f"run folder {path} does not exist")
     if not (path / "run.npz").exists():
-        raise HierarchyError(f"{path} is not a run folder: it has no run.npz")
+        inside = sorted(file.parent for file in path.glob("*/*/run.npz"))
+        hint = f"; it holds runs, such as {inside[0]}" if inside else ""
+        raise HierarchyError(f"{path} is not a run folder: it has no run.npz{hint}")
+    scenario = load(str(path / "scenario.toml"))
     signals = _arrays(path / "run.npz")
     if not (path / "facts.json").exists():
         raise HierarchyError(f"{path} was written by an earlier version; run the scenario again")

@@ -266,7 +266,7 @@ def said(arguments, capsys, code=0):
 def test_json_of_a_run_is_its_metrics_and_where_it_is(tmp_path, capsys):
     found = said(["run", "ellipse", *SHORT, "--out", "a"], capsys)
     kept = json.loads((tmp_path / "a" / "metrics.json").read_text())
-    assert found == {"scenario": "ellipse", "resolver": "tpm", "folder": "a", **kept}
+    assert found == {"scenario": "ellipse", "resolver": "tpm-published", "folder": "a", **kept}
     assert found["ticks"] == 20
 
 
@@ -288,7 +288,7 @@ def test_json_lists_what_there_is(capsys):
 def test_json_of_a_check_is_the_whole_scenario_and_its_first_tick(capsys):
     found = said(["check", "ellipse", "--set", "pointing.alpha_d=35"], capsys)
     assert found["scenario"]["pointing"]["alpha_d"] == 35.0
-    assert found["scenario"]["control"]["resolver"] == "tpm"
+    assert found["scenario"]["control"]["resolver"] == "tpm-published"
     assert found["first_tick"]["levels"] == ["position", "avoidance"]
     assert (found["first_tick"]["unmet"], found["warnings"]) == ([], [])
 

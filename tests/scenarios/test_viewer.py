@@ -353,7 +353,7 @@ def test_a_live_run_is_kept_at_ctrl_c(tmp_path, monkeypatch, capsys):
         raise KeyboardInterrupt
 
     monkeypatch.setattr(LivePage, "step", interrupted)
-    line = ["run", "ellipse", "--live", "--no-browser", "--port", "0", "--out"]
+    line = ["run", "ellipse", "--live", "--no-wait", "--no-browser", "--port", "0", "--out"]
     assert run_command([*line, str(tmp_path / "a")]) == 1
     assert load_run(tmp_path / "a").ticks == 21
     out, err = capsys.readouterr()

@@ -138,8 +138,10 @@ class Live:
         except HierarchyError:
             before.state.measurement, before.state.commanded = measurement, commanded
             raise
-        self.scenario, self.controller = scenario, controller
-        self.recorder.follow(controller)
+        self.scenario = scenario
+        if not self.over:  # what is seen after the end stays; a restart takes the new settings
+            self.controller = controller
+            self.recorder.follow(controller)
 
     def _drag_on(self) -> None:
         """Move dragged obstacles by one tick toward their targets."""

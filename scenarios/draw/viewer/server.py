@@ -13,6 +13,7 @@ import numpy as np
 
 from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array
+from scenarios.draw.viewer.guard import guarded
 
 HOST = "127.0.0.1"
 _ELEVATION = 22.0  # [deg] of the camera
@@ -25,6 +26,8 @@ _WIDTH = 330  # [px] width of the panels
 def open_server(port: int, label: str) -> Any:
     """Return a viser server that listens on 127.0.0.1; port 0 takes a free port.
 
+    `label` is the title of the page. Requests of pages of other hosts are rejected.
+
     Raises HierarchyError if viser is not installed or the port is in use.
     """
     try:
@@ -33,7 +36,7 @@ def open_server(port: int, label: str) -> Any:
         raise HierarchyError("the page in the browser needs viser, which is not installed: "
                              "pip install 'task-hierarchy[view]'") from error
     port = _free(port)
-    with redirect_stdout(io.StringIO()):  # viser prints a table
+    with redirect_stdout(io.StringIO()), guarded():  # viser prints a table
         server = viser.ViserServer(host=HOST, port=port, label=label, verbose=False)
     server.gui.configure_theme(show_logo=False, show_share_button=False, control_width="medium",
                                brand_color=(0, 114, 178))
