@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import atexit
+import glob
 import itertools
 import json
 import os
@@ -24,11 +26,13 @@ class OutputError(HierarchyError):
 def claim(folder: str | Path) -> Path:
     """Make sure that `folder` can be written later, and return its absolute path.
 
-    It is not made yet, only the folders above it.
+    It is not made yet, only the folders above it, and a hidden file beside it that keeps it for
+    this process until its end. What killed processes left there is removed.
 
     Raises
     ------
-    OutputError : it holds something, is no folder, or its parent cannot be written.
+    OutputError : it holds something, is no folder, its parent cannot be written, or another process
+        is going to write it.
     """
     path = Path(folder).expanduser().resolve()
     with named(f"output folder {folder}"):
@@ -36,9 +40,42 @@ def claim(folder: str | Path) -> Path:
         if path.exists() and any(path.iterdir()):
             raise OutputError(f"output folder {folder} exists and is not empty; "
                               "choose another, or remove it first")
-        with tempfile.TemporaryFile(dir=path.parent):
-            pass
+        _keep(path)
     return path
+
+
+def _keep(path: Path) -> None:
+    """Keep a folder for this process; raises OutputError if another has kept it."""
+    for left in path.parent.glob(f".{glob.escape(path.name)}.*"):
+        owner = _owner(left, path.name)
+        if owner is not None and not _is_alive(owner):
+            shutil.rmtree(left) if left.is_dir() else left.unlink(missing_ok=True)
+        elif owner not in (None, os.getpid()):
+            raise OutputError(f"output folder {path} is going to be written by process {owner}; "
+                              "choose another, or wait for it to end")
+    _mark(path).touch()
+    atexit.register(_mark(path).unlink, missing_ok=True)
+
+
+def _mark(path: Path) -> Path:
+    """Return the hidden file that keeps a folder for this process."""
+    return path.with_name(f".{path.name}.{os.getpid()}.kept")
+
+
+def _owner(left: Path, name: str) -> int | None:
+    """Return the process that made a hidden file or folder beside a folder called `name`."""
+    found = re.fullmatch(re.escape(f".{name}.") + r"(\d+)\..*", left.name)
+    return int(found[1]) if found else None
+
+
+def _is_alive(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except OSError:  # another user's
+        return True
+    return True
 
 
 def next_free(base: str | Path) -> Path:
@@ -56,15 +93,19 @@ def whole(folder: str | Path) -> Iterator[Path]:
     """
     path = Path(folder).expanduser().resolve()
     path.parent.mkdir(parents=True, exist_ok=True)
-    partial = Path(tempfile.mkdtemp(prefix=f".{path.name}.", dir=path.parent))
+    with named(path):
+        prefix = f".{path.name}.{os.getpid()}."
+        partial = Path(tempfile.mkdtemp(prefix=prefix, dir=path.parent))
     try:
-        yield partial
-        partial.chmod(0o777 & ~_umask())
         with named(path):
+            yield partial
+            partial.chmod(0o777 & ~_umask())
             partial.rename(path)
     except BaseException:
         shutil.rmtree(partial, ignore_errors=True)
         raise
+    finally:
+        _mark(path).unlink(missing_ok=True)
 
 
 @contextmanager

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import pickle
 import sys
 from collections.abc import Callable
 from functools import cache
@@ -20,13 +21,14 @@ from typing import Any
 
 import numba
 import numpy as np
-from numba.core import cgutils, event, types
+from numba.core import caching, cgutils, event, types
 from numba.core.registry import CPUDispatcher
 from numba.extending import intrinsic
 from numba.np import arrayobj, linalg
 
 # What makes an array; a kernel that uses another way of numpy fails to compile, and belongs here.
 _MAKERS = {"empty", "empty_like", "zeros", "zeros_like", "ones", "full", "eye", "copy", "array"}
+_DAMAGE = (pickle.UnpicklingError, EOFError, ValueError, AttributeError, ImportError, IndexError)
 _EVERY = 5.0  # [s] between two words on a compilation that goes on
 
 
@@ -195,6 +197,22 @@ def _digest_of(file: str) -> str:
     return hashlib.sha256(Path(file).read_bytes()).hexdigest()
 
 
+class _Mending(caching.IndexDataCacheFile):  # type: ignore[misc]
+    """Files of compiled kernels; one that is damaged, as by a full disk, counts as missing."""
+
+    def _load_index(self) -> Any:
+        try:
+            return super()._load_index()
+        except _DAMAGE:
+            return {}
+
+    def _load_data(self, name: str) -> Any:
+        try:
+            return super()._load_data(name)
+        except _DAMAGE as error:
+            raise OSError(f"{name} is damaged") from error  # numba then compiles anew
+
+
 @cache
 def cache_folder() -> Path:
     """Return where compiled kernels are kept."""
@@ -212,7 +230,11 @@ def _jit_into(folder: Path, function: Kernel, **options: bool) -> Any:
     except OSError:  # a home that cannot be written: numba's own choice of folder
         numba.config.CACHE_DIR = before
     try:
-        return numba.njit(cache=True, error_model="numpy", **options)(function)
+        kernel = numba.njit(cache=True, error_model="numpy", **options)(function)
+        kept = getattr(kernel, "_cache", None)  # not with NUMBA_DISABLE_JIT=1
+        if isinstance(kept, caching.FunctionCache):
+            kept._cache_file.__class__ = _Mending
+        return kernel
     finally:
         numba.config.CACHE_DIR = before
 

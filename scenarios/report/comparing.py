@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import shlex
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import nullcontext
 from functools import partial
 from pathlib import Path
 
@@ -13,7 +14,7 @@ from scenarios.cell.build import build
 from scenarios.config import Scenario, load, members, shipped_groups
 from scenarios.config.resolvers import check_names, usable
 from scenarios.config.scenario import OWN
-from scenarios.files import claim, write_json, write_text
+from scenarios.files import claim, whole, write_json, write_text
 from scenarios.loop.recording import versions
 from scenarios.loop.simulation import simulate
 from scenarios.measure.comparison import Comparison
@@ -31,8 +32,8 @@ def compare(scenarios: Iterable[str | Scenario] | str, resolvers: Sequence[str] 
     A resolver that cannot resolve a scenario's rows is skipped, and the Comparison says so.
 
     With `out`, each run's folder is out/<scenario>/<resolver>, the page is out/index.html and the
-    numbers are in out/comparison.json. A run that fails does not affect the others; Ctrl-C keeps
-    the runs made so far.
+    numbers are in out/comparison.json; `out` appears when all is there. A run that fails does not
+    affect the others; Ctrl-C keeps the runs made so far.
 
     Parameters
     ----------
@@ -49,20 +50,19 @@ def compare(scenarios: Iterable[str | Scenario] | str, resolvers: Sequence[str] 
         not fit its robot, no resolver that can resolve any scenario, or an output folder in use.
     """
     planned, refused = _plan([scenarios] if isinstance(scenarios, str) else scenarios, resolvers)
-    folder = None if out is None else claim(out)
-    runs: list[Run] = []
-    for run in planned:
-        try:
-            runs.append(_carried_out(run, folder, progress))
-        except KeyboardInterrupt:
-            runs.append(dataclasses.replace(run, error="interrupted"))
-        if _interrupted(runs[-1]):
-            break
-    comparison = Comparison(tuple(runs), command or _command(planned, out), versions(),
-                            tuple(refused), None if out is None else str(out))
-    if folder is not None:
-        folder.mkdir(exist_ok=True)
-        _write(comparison, folder)
+    with nullcontext() if out is None else whole(claim(out)) as folder:
+        runs: list[Run] = []
+        for run in planned:
+            try:
+                runs.append(_carried_out(run, folder, progress))
+            except KeyboardInterrupt:
+                runs.append(dataclasses.replace(run, error="interrupted"))
+            if _interrupted(runs[-1]):
+                break
+        comparison = Comparison(tuple(runs), command or _command(planned, out), versions(),
+                                tuple(refused), None if out is None else str(out))
+        if folder is not None:
+            _write(comparison, folder)
     return comparison
 
 

@@ -3,6 +3,8 @@
 import importlib
 import sys
 
+import pytest
+
 from hierarchy.jit import compiling
 
 HELPER = """
@@ -36,6 +38,23 @@ def kernel(folder, share):
         sys.modules.pop(name, None)
     importlib.invalidate_caches()
     return importlib.import_module("kernel_of_test_jit").outer
+
+
+@pytest.mark.parametrize("kind", ["nbi", "nbc"])
+def test_a_damaged_cache_is_compiled_again(tmp_path, monkeypatch, kind):
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "cache"))
+    compiling.cache_folder.cache_clear()
+    try:
+        assert kernel(tmp_path, 0.5)(4.0) == 4.0
+        kept = list((tmp_path / "cache").rglob(f"*.{kind}"))
+        for file in kept:
+            file.write_bytes(file.read_bytes()[:50])
+        assert kernel(tmp_path, 0.5)(4.0) == 4.0
+        assert not any(file.stat().st_size == 50 for file in kept)
+    finally:
+        compiling.cache_folder.cache_clear()
 
 
 def test_a_kernel_knows_what_helpers_below_it_use(tmp_path, monkeypatch):

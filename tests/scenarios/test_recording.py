@@ -1,4 +1,8 @@
+import errno
 import json
+import os
+import subprocess
+import sys
 from types import SimpleNamespace
 
 import numpy as np
@@ -111,6 +115,44 @@ def test_an_empty_or_new_folder_can_be_claimed_with_its_parents(tmp_path):
 
 def test_claiming_a_folder_does_not_make_it(tmp_path):
     claim(tmp_path / "run")
+    assert not (tmp_path / "run").exists()
+
+
+def test_what_is_written_whole_leaves_nothing_else(tmp_path):
+    with whole(claim(tmp_path / "run")) as partial:
+        (partial / "file").touch()
+        assert not (tmp_path / "run").exists()
+    assert [path.name for path in tmp_path.iterdir()] == ["run"]
+
+
+def test_a_folder_that_another_process_is_going_to_write_cannot_be_claimed(tmp_path):
+    (tmp_path / f".run.{os.getppid()}.kept").touch()
+    with pytest.raises(OutputError, match=f"written by process {os.getppid()}"):
+        claim(tmp_path / "run")
+
+
+def test_what_killed_processes_left_is_removed_and_nothing_else(tmp_path):
+    ended = subprocess.Popen([sys.executable, "-c", ""])
+    ended.wait()
+    (tmp_path / f".run.{ended.pid}.kept").touch()
+    (tmp_path / f".run.{ended.pid}.abcd").mkdir()
+    (tmp_path / f".run.{ended.pid}.abcd" / "run.npz").touch()
+    (tmp_path / f".other.{ended.pid}.abcd").mkdir()
+    (tmp_path / ".run.toml").touch()
+    claim(tmp_path / "run")
+    left = {path.name for path in tmp_path.iterdir()}
+    assert left == {f".run.{os.getpid()}.kept", f".other.{ended.pid}.abcd", ".run.toml"}
+
+
+def write_to_a_full_disk(folder):
+    with whole(folder) as partial:
+        (partial / "file").touch()
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+
+def test_a_full_disk_is_named_and_leaves_nothing(tmp_path):
+    with pytest.raises(OutputError, match=r"run cannot be written: No space left"):
+        write_to_a_full_disk(tmp_path / "run")
     assert list(tmp_path.iterdir()) == []
 
 
