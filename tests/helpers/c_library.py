@@ -1,0 +1,100 @@
+"""The C library as Python sees it through ctypes, beside the resolvers of the same names."""
+
+import ctypes
+import dataclasses
+
+import numpy as np
+
+NUMBERS, INTEGERS = ctypes.POINTER(ctypes.c_double), ctypes.POINTER(ctypes.c_int64)
+SOLVED, ITERATION_LIMIT, NUMERICAL_FAILURE, INACCURATE = 0, 1, 2, 4
+TOO_SMALL, CONTRADICTION, REFUSED, INVALID = 8, 10, 11, 12
+CANARY = -3.14159e77
+
+
+class Problem(ctypes.Structure):
+    _fields_ = [(name, ctypes.c_int64) for name in ("n", "m", "levels")] + [
+        ("A", NUMBERS), ("lower", NUMBERS), ("upper", NUMBERS), ("sizes", INTEGERS),
+        ("reference", NUMBERS)]
+
+
+class Record(ctypes.Structure):
+    _fields_ = [("values", NUMBERS)] + [
+        (name, ctypes.c_int64) for name in ("size", "used", "warm", "iterations", "row")]
+
+
+class Settings(ctypes.Structure):
+    _fields_ = [(name, ctypes.c_double) for name in (
+        "damping", "threshold", "rank_tolerance", "tolerance", "isotropic", "largest")] + [
+        (name, ctypes.c_int64) for name in (
+            "guesses", "max_iterations", "optimal", "miss", "method")]
+
+
+def settings_of(**given):
+    """Settings with the defaults of the header but for those given."""
+    return Settings(**{"threshold": 0.1, "rank_tolerance": 1e-8, "tolerance": 1e-10,
+                       "largest": np.inf, "guesses": 3, "max_iterations": 1000, **given})
+
+
+def problem_of(h, **changed):
+    """A th_problem that reads the arrays of a hierarchy, with some fields changed."""
+    fields = {"n": h.n, "m": h.m, "levels": len(h.sizes), "A": numbers(h.A),
+              "lower": numbers(h.lower), "upper": numbers(h.upper),
+              "sizes": h.sizes.ctypes.data_as(INTEGERS), "reference": numbers(h.reference)}
+    return Problem(**{**fields, **changed})
+
+
+def numbers(array):
+    return array.ctypes.data_as(NUMBERS)
+
+
+@dataclasses.dataclass
+class Memory:
+    """What a caller owns, each array followed by a canary."""
+
+    record: Record
+    x: np.ndarray
+    values: np.ndarray
+    work: np.ndarray
+
+    @property
+    def untouched(self):
+        return all(array[-1] == CANARY for array in (self.x, self.values, self.work))
+
+
+class Library:
+    """A loaded library."""
+
+    def __init__(self, path):
+        self.code = ctypes.CDLL(str(path))
+        for name in ("th_work_size", "th_record_size"):
+            getattr(self.code, name).restype = ctypes.c_int64
+            getattr(self.code, name).argtypes = [ctypes.c_int64] * 3
+        self.code.th_digest.restype = self.code.th_version.restype = ctypes.c_char_p
+
+    def work_size(self, *sizes):
+        return self.code.th_work_size(*sizes)
+
+    def record_size(self, *sizes):
+        return self.code.th_record_size(*sizes)
+
+    def memory(self, h, missing=0, missing_values=0):
+        """Memory for a hierarchy, less `missing` numbers."""
+        sizes = h.n, h.m, len(h.sizes)
+        values = np.full(self.record_size(*sizes) + 1 - missing_values, CANARY)
+        work = np.full(self.work_size(*sizes) + 1 - missing, CANARY)
+        return Memory(Record(numbers(values), len(values) - 1), np.full(h.n + 1, CANARY), values,
+                      work)
+
+    def call(self, name, problem, memory, settings=None):
+        """One call; returns the status."""
+        return self.code[f"th_solve_{name}"](
+            ctypes.byref(problem), None if settings is None else ctypes.byref(settings),
+            ctypes.byref(memory.record), numbers(memory.x), numbers(memory.work),
+            ctypes.c_int64(len(memory.work) - 1))
+
+    def solve(self, name, h, settings=None, memory=None):
+        """Solve a hierarchy; return the status and what the caller then has."""
+        memory = memory or self.memory(h)
+        status = self.call(name, problem_of(h), memory, settings)
+        assert memory.untouched, "a number past the end of an array was written"
+        return status, memory
