@@ -3,6 +3,7 @@
 import ctypes
 import dataclasses
 
+import llvmlite.binding as llvm
 import numpy as np
 
 NUMBERS, INTEGERS = ctypes.POINTER(ctypes.c_double), ctypes.POINTER(ctypes.c_int64)
@@ -57,40 +58,63 @@ class Memory:
     work: np.ndarray
 
     @property
+    def answer(self):
+        return self.x[:-1]
+
+    @property
     def untouched(self):
         return all(array[-1] == CANARY for array in (self.x, self.values, self.work))
 
 
 class Library:
-    """A loaded library."""
+    """The functions of a library at their addresses."""
 
-    def __init__(self, path):
-        self.code = ctypes.CDLL(str(path))
-        for name in ("th_work_size", "th_record_size"):
-            getattr(self.code, name).restype = ctypes.c_int64
-            getattr(self.code, name).argtypes = [ctypes.c_int64] * 3
-        self.code.th_digest.restype = self.code.th_version.restype = ctypes.c_char_p
+    def __init__(self, address):
+        self.address = address
+        sizes = ctypes.CFUNCTYPE(ctypes.c_int64, *[ctypes.c_int64] * 3)
+        self.work_size, self.record_size = (sizes(address(f"th_{name}_size"))
+                                            for name in ("work", "record"))
 
-    def work_size(self, *sizes):
-        return self.code.th_work_size(*sizes)
+    @classmethod
+    def linked(cls, path):
+        """A shared library, loaded by the system."""
+        code = ctypes.CDLL(str(path))
+        return cls(lambda name: ctypes.cast(code[name], ctypes.c_void_p).value)
 
-    def record_size(self, *sizes):
-        return self.code.th_record_size(*sizes)
+    @classmethod
+    def unlinked(cls, path):
+        """The object in a static library, loaded by LLVM: no linker is needed."""
+        llvm.initialize_native_target()
+        llvm.initialize_native_asmprinter()
+        engine = llvm.create_mcjit_compiler(
+            llvm.parse_assembly(""), llvm.Target.from_default_triple().create_target_machine())
+        content = path.read_bytes()
+        start = content.index(b"kernels.o/") + 60
+        engine.add_object_file(llvm.ObjectFileRef.from_data(content[start:]))
+        engine.finalize_object()
+        library = cls(engine.get_function_address)
+        library.engine = engine  # which owns the code
+        return library
+
+    def text(self, name):
+        return ctypes.CFUNCTYPE(ctypes.c_char_p)(self.address(name))().decode()
 
     def memory(self, h, missing=0, missing_values=0):
-        """Memory for a hierarchy, less `missing` numbers."""
+        """Memory for a hierarchy, less so many numbers of work space and record."""
         sizes = h.n, h.m, len(h.sizes)
         values = np.full(self.record_size(*sizes) + 1 - missing_values, CANARY)
         work = np.full(self.work_size(*sizes) + 1 - missing, CANARY)
         return Memory(Record(numbers(values), len(values) - 1), np.full(h.n + 1, CANARY), values,
                       work)
 
-    def call(self, name, problem, memory, settings=None):
-        """One call; returns the status."""
-        return self.code[f"th_solve_{name}"](
-            ctypes.byref(problem), None if settings is None else ctypes.byref(settings),
-            ctypes.byref(memory.record), numbers(memory.x), numbers(memory.work),
-            ctypes.c_int64(len(memory.work) - 1))
+    def call(self, name, problem, memory, settings=None, /, **changed):
+        """One call, some of its pointers changed; returns the status."""
+        given = {"problem": ctypes.addressof(problem),
+                 "settings": None if settings is None else ctypes.addressof(settings),
+                 "record": ctypes.addressof(memory.record), "x": memory.x.ctypes.data,
+                 "work": memory.work.ctypes.data, **changed}
+        solve = ctypes.CFUNCTYPE(ctypes.c_int, *[ctypes.c_void_p] * 5, ctypes.c_int64)
+        return solve(self.address(f"th_solve_{name}"))(*given.values(), len(memory.work) - 1)
 
     def solve(self, name, h, settings=None, memory=None):
         """Solve a hierarchy; return the status and what the caller then has."""

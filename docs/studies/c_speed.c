@@ -1,9 +1,9 @@
 /* Solves a recorded sequence again and again, and says what that cost: time of each solve,
  * allocations, page faults.
  *
- *   c_library FILE RESOLVER SOLVES
+ *   c_speed FILE RESOLVER SOLVES
  *
- * FILE, written by c_library.py: n, m, levels, count and the sizes as int64; then count times A,
+ * FILE, written by c_speed.py: n, m, levels, count and the sizes as int64; then count times A,
  * lower, upper and the reference. One line of numbers is printed, in the order of `printf` below. */
 #define _GNU_SOURCE
 #include <stdio.h>
