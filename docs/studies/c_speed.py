@@ -1,6 +1,8 @@
 """Time of a solve in C and in Python, on the same warm sequences: python docs/studies/c_speed.py.
 
-Needs a compiler of C. The library is made, linked into c_speed.c, and takes turns with Python.
+Needs a compiler of C. The library is made, linked into c_speed.c, and takes turns with Python. A
+sequence is a problem of a reference family that changes from tick to tick, or the problems of a
+scenario's run. All with default settings.
 """
 
 from __future__ import annotations
@@ -20,14 +22,16 @@ from rich.console import Console
 from rich.table import Table
 
 from hierarchy.problem import Hierarchy
-from scenarios.bench.families import family
+from scenarios import load, simulate
+from scenarios.bench.families import FAMILIES, family
 from scenarios.bench.machine import one_core
 from scenarios.bench.rows import write_rows
+from scenarios.loop.controller import Controller
 from solvers import Resolver, make
 from solvers.library import write
 
 SEQUENCES = (("EQ7", "tpm"), ("EQ7", "recursive"), ("EQ7", "hcod"), ("INEQ7", "hcod"),
-             ("HUM38", "hcod"))
+             ("HUM38", "hcod"), ("ellipse-limits", "tpm"), ("humanoid-reach", "hcod"))
 TICKS, TURNS, SOLVES = 100, 5, 20_000
 _PROGRAM = Path(__file__).with_suffix(".c")
 
@@ -78,26 +82,43 @@ def record_sequence(file: Path, ticks: list[Hierarchy]) -> None:
     file.write_bytes(head.tobytes() + np.concatenate(parts).tobytes())
 
 
-def build(folder: Path) -> Path:
-    """Make the library in a folder that exists, and link c_speed.c with it; return the program."""
+def recorded(name: str, ticks: int) -> list[Hierarchy]:
+    """Return the problems of the first ticks of a scenario, which all have one shape."""
+    scenario = load(name)
+    run = simulate(scenario.with_changes({"control.duration": ticks * scenario.control.period}))
+    controller, problems = Controller(scenario), []
+    for t, q, v in zip(run["t"], run["q"], run["v"], strict=True):
+        controller.command(t, q, v)
+        h = controller.hierarchy
+        problems.append(Hierarchy(h.A.copy(), h.lower.copy(), h.upper.copy(), h.sizes.copy(),
+                                  h.reference.copy(), h.names))
+    return problems
+
+
+def linked(library: Path, program: Path) -> Path:
+    """Link c_speed.c with a library; return the program."""
     compiler = next(filter(None, map(shutil.which, ("cc", "gcc", "clang"))), None)
     if compiler is None:
         raise SystemExit("needs a compiler of C: cc, gcc or clang")
-    write(folder)
-    program = folder / "c_speed"
-    subprocess.run([compiler, "-O2", _PROGRAM, "-I", folder / "include",
-                    folder / "lib" / "libtask_hierarchy.a", "-lm", "-o", program], check=True)
+    subprocess.run([compiler, "-O2", _PROGRAM, "-I", library / "include",
+                    library / "lib" / "libtask_hierarchy.a", "-lm", "-o", program], check=True)
     return program
 
 
-def run(out: Path | None = None, turns: int = TURNS) -> list[dict[str, Any]]:
+def run(out: Path | None = None, turns: int = TURNS,
+        library: Path | None = None) -> list[dict[str, Any]]:
     """Time all sequences in C and in Python by turns; print a table and return its rows.
 
-    Writes c_speed.csv into the folder `out` if given.
+    Writes c_speed.csv into the folder `out` if given. library : None to make it.
     """
-    with tempfile.TemporaryDirectory() as folder, one_core():
-        program = build(Path(folder))
-        everything = [_recorded(name, resolver, Path(folder)) for name, resolver in SEQUENCES]
+    with tempfile.TemporaryDirectory() as name, one_core():
+        folder = Path(name)
+        if library is None:
+            library = folder / "library"
+            library.mkdir()
+            write(library)
+        program = linked(library, folder / "c_speed")
+        everything = [_prepared(problems, resolver, folder) for problems, resolver in SEQUENCES]
         for _ in range(turns):
             for timed in everything:
                 _take_turn(timed, program)
@@ -108,8 +129,9 @@ def run(out: Path | None = None, turns: int = TURNS) -> list[dict[str, Any]]:
     return rows
 
 
-def _recorded(name: str, resolver: str, folder: Path) -> _Timed:
-    ticks, file = sequence(family(name)[0].h, TICKS), folder / f"{name}-{resolver}"
+def _prepared(name: str, resolver: str, folder: Path) -> _Timed:
+    ticks = (sequence(family(name)[0].h, TICKS) if name in FAMILIES else recorded(name, TICKS))
+    file = folder / f"{name}-{resolver}"
     record_sequence(file, ticks)
     _in_python(make(resolver), ticks)
     return _Timed(name, resolver, ticks, file)
@@ -142,9 +164,8 @@ def _in_python(resolver: Resolver, ticks: list[Hierarchy]) -> list[int]:
 def _print(rows: list[dict[str, Any]]) -> None:
     console, table = Console(highlight=False, markup=False), Table(
         box=None, padding=(0, 2, 0, 0), pad_edge=False)
-    table.add_column("")
-    for title in ("C, median [us]", "p99.9", "largest", "Python, median [us]", "p99.9",
-                  "C / Python"):
+    table.add_column("time of a solve [us]", no_wrap=True)
+    for title in ("C median", "p99.9", "largest", "Python", "p99.9", "ratio"):
         table.add_column(title, justify="right", no_wrap=True)
     for row in rows:
         table.add_row(f"{row['problems']}, {row['resolver']}", *(f"{row[key]:.2f}" for key in (

@@ -14,12 +14,12 @@ from typing import Any, final
 import llvmlite.binding as llvm
 import numba
 from llvmlite import ir
-from numba.core import cgutils, compiler, dispatcher, registry, types
+from numba.core import cgutils, compiler, registry, types
 from numba.core.compiler_lock import global_compiler_lock
 from numba.extending import intrinsic
 from numba.np import arrayobj
 
-from hierarchy.jit.compiling import Kernel, _constants_behind, _digest_of, _files_behind
+from hierarchy.jit.compiling import Kernel, constants_behind, digest_of, files_behind
 
 INTEGER, STATUS = types.int64, types.int32  # of arguments and results; a pointer is an INTEGER too
 
@@ -91,24 +91,20 @@ def hide(module: Any, visible: set[str]) -> None:
 
 def source_digest(*functions: Kernel) -> str:
     """Return a digest of all sources and constants behind functions, the same on every machine."""
-    files = frozenset[str]().union(*map(_files_behind, functions))
-    constants = frozenset[str]().union(*map(_constants_behind, functions))
-    content = "\n".join((*sorted(map(_digest_of, files)), *sorted(constants)))
+    files = frozenset[str]().union(*map(files_behind, functions))
+    constants = frozenset[str]().union(*map(constants_behind, functions))
+    content = "\n".join((*sorted(map(digest_of, files)), *sorted(constants)))
     return hashlib.sha256(content.encode()).hexdigest()[:16]
-
-
-class _Compiler(dispatcher._FunctionCompiler):  # type: ignore[misc]
-    """Leaves the library open, so that the entry can be added."""
-
-    def _customize_flags(self, flags: Any) -> Any:
-        flags.no_compile = True
-        return flags
 
 
 def _compile(name: str, entry: Entry) -> Any:
     """Return numba's library of a function with its C entry."""
-    one = _Compiler(entry.function, registry.cpu_target, _OPTIONS, {}, compiler.Compiler)
-    compiled = one.compile((INTEGER,) * entry.arguments, entry.result)
+    target, flags = registry.cpu_target, compiler.Flags()
+    target.options.parse_as_flags(flags, _OPTIONS)
+    flags.no_compile = True  # not yet: the entry is still to come
+    compiled = compiler.compile_extra(
+        target.typing_context, target.target_context, entry.function,
+        args=(INTEGER,) * entry.arguments, return_type=entry.result, flags=flags, locals={})
     compiled.library.add_ir_module(_c_entry(name, compiled.fndesc, entry.failed))
     return compiled.library
 

@@ -14,11 +14,13 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import c_library as c
+import c_speed
 import numpy as np
 import pytest
-from c_speed import record_sequence, sequence
+from c_speed import record_sequence, recorded, sequence
 
 from hierarchy import Hierarchy, HierarchyError
+from scenarios import load
 from scenarios.bench.families import FAMILIES, family
 from scenarios.cli.main import run_command
 from solvers import make, problems
@@ -423,6 +425,26 @@ def test_a_million_solves_allocate_nothing_and_touch_no_new_page(folder, tmp_pat
     solves, failed, allocated, faults, *_ = map(int, said(
         program, tmp_path / "ticks", resolver, "1000000").split())
     assert (solves, failed, allocated, faults) == (1_000_000, 0, 0, 0)
+
+
+@needs_c
+@pytest.mark.slow
+def test_the_study_of_speed_prints_a_row_for_every_sequence(folder, tmp_path, capsys):
+    rows = c_speed.run(tmp_path, turns=1, library=folder)
+    assert all(row["c_median_us"] > 0.0 and row["ratio"] > 0.0 for row in rows)
+    said = capsys.readouterr().out
+    assert all(f"{row['problems']}, {row['resolver']}" in said for row in rows)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["ellipse-limits", "humanoid-reach", "panda-ellipse"])
+def test_the_commands_of_a_scenario_come_out_of_c_to_the_last_bit(library, name, unverified):
+    scenario = load(name)
+    resolver, memory = scenario.make_resolver(), None
+    damped, before = {"damping": resolver.damping}, None
+    for h in recorded(name, 200):
+        memory = memory or library.memory(h)
+        before = check_same(library, (resolver.name, damped, damped), h, memory, before).memory
 
 
 @needs_c

@@ -1,7 +1,7 @@
 // A thin C++17 face of task_hierarchy.h: buffers with an owner, a problem filled level by level.
 //
 // Memory is allocated when a Solver is made, never while it solves; nothing here throws but what
-// std::vector throws when memory is short. With TASK_HIERARCHY_EIGEN defined before the include,
+// std::vector throws when memory is short. Sizes out of range are TH_INVALID when it solves. With TASK_HIERARCHY_EIGEN defined before the include,
 // levels and answers may be Eigen objects.
 #ifndef TASK_HIERARCHY_HPP
 #define TASK_HIERARCHY_HPP
@@ -31,6 +31,7 @@ class Solver {
       : resolve_(resolve), settings_(settings), sizes_(std::move(sizes)), n_(n) {
     for (const auto size : sizes_) m_ += size;
     const auto levels = static_cast<std::int64_t>(sizes_.size());
+    if (th_work_size(n_, m_, levels) < 0) return;
     A_.resize(m_ * n_);
     lower_.resize(m_);
     upper_.resize(m_);
@@ -87,6 +88,7 @@ class Solver {
   Eigen::Map<Eigen::VectorXd> upper(std::size_t level) noexcept {
     return {upper_.data() + first_row(level), sizes_[level]};
   }
+  Eigen::Map<Eigen::VectorXd> reference_vector() noexcept { return {reference_.data(), n_}; }
   Eigen::Map<const Eigen::VectorXd> answer() const noexcept { return {x_.data(), n_}; }
 #endif
 
