@@ -374,6 +374,14 @@ def said(*command):
     return subprocess.run(command, capture_output=True, text=True, check=True).stdout
 
 
+def test_the_code_that_documents_show_is_that_of_the_examples():
+    shown = [block for page in (ROOT / "docs").rglob("*.md") for block in re.findall(
+        r"^```c\n(.*?)^```", page.read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE)]
+    examples = "".join(path.read_text(encoding="utf-8") for path in EXAMPLES.iterdir())
+    assert shown
+    assert all(block in examples for block in shown)
+
+
 @needs_c
 @pytest.mark.slow
 def test_the_examples_compile_without_a_warning_and_run(folder, tmp_path):
@@ -437,11 +445,12 @@ def test_the_study_of_speed_prints_a_row_for_every_sequence(folder, tmp_path, ca
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["ellipse-limits", "humanoid-reach", "panda-ellipse"])
+@pytest.mark.parametrize("name", ["ellipse-limits", "humanoid-reach", "dual-arm"])
 def test_the_commands_of_a_scenario_come_out_of_c_to_the_last_bit(library, name, unverified):
     scenario = load(name)
     resolver, memory = scenario.make_resolver(), None
     damped, before = {"damping": resolver.damping}, None
+    assert resolver == make(resolver.name, **damped)
     for h in recorded(name, 200):
         memory = memory or library.memory(h)
         before = check_same(library, (resolver.name, damped, damped), h, memory, before).memory
