@@ -285,6 +285,27 @@ def test_a_missing_pointer_is_invalid(library, pointer):
 
 
 @pytest.mark.slow
+def test_a_record_without_room_is_invalid(library):
+    h, memory = box(), library.memory(box())
+    memory.record.values = None
+    assert library.call("hcod", c.problem_of(h), memory) == c.INVALID
+    assert not memory.answer.any()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("garbage", [np.nan, np.inf, 1e300, -1.0, 2.0])
+@pytest.mark.parametrize("name", NAMES)
+def test_a_record_of_garbage_does_no_harm(library, name, garbage):
+    h, memory = box(), library.memory(box())
+    for used in (3 * h.m + 3, h.n + len(h.sizes) + 3 * h.m + 3):
+        memory.values[:-1], memory.record.used, memory.record.warm = garbage, used, 1
+        status, left = library.solve(name, h, memory=memory)
+        assert np.isfinite(left.answer).all()
+        if status == c.SOLVED and name in ("hcod", "tpm"):
+            np.testing.assert_allclose(left.answer, make(name).solve(h).x, atol=1e-9)
+
+
+@pytest.mark.slow
 def test_without_a_reference_it_is_zero(library):
     h, one, other = box(), library.memory(box()), library.memory(box())
     assert library.call("hcod", c.problem_of(h), one) == c.SOLVED
@@ -548,6 +569,18 @@ def test_a_wrong_name_is_an_error_that_names_it(tmp_path, capsys, options, words
     assert run_command(["library", "--out", str(tmp_path / "lib"), *options]) == 2
     assert words in capsys.readouterr().err
     assert not (tmp_path / "lib").exists()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("target", ["native", "x86_64"])
+def test_kernels_that_are_not_compiled_are_an_error(tmp_path, target):
+    done = subprocess.run(
+        [sys.executable, "-m", "scenarios.cli.main", "library", "--target", target, "--out",
+         tmp_path / "lib"], capture_output=True, text=True, check=False,
+        env={**os.environ, "NUMBA_DISABLE_JIT": "1"})
+    assert done.returncode == 2
+    assert "NUMBA_DISABLE_JIT is set" in done.stderr
+    assert "Traceback" not in done.stderr
 
 
 def test_a_folder_without_a_library_is_an_error(tmp_path):
