@@ -10,6 +10,7 @@ NUMBERS, INTEGERS = ctypes.POINTER(ctypes.c_double), ctypes.POINTER(ctypes.c_int
 SOLVED, ITERATION_LIMIT, NUMERICAL_FAILURE, INACCURATE = 0, 1, 2, 4
 TOO_SMALL, CONTRADICTION, REFUSED, INVALID = 8, 10, 11, 12
 CANARY = -3.14159e77
+NAMES = ("hcod", "tpm", "recursive", "sns")
 
 
 class Problem(ctypes.Structure):
@@ -74,6 +75,13 @@ class Library:
         sizes = ctypes.CFUNCTYPE(ctypes.c_int64, *[ctypes.c_int64] * 3)
         self.work_size, self.record_size = (sizes(address(f"th_{name}_size"))
                                             for name in ("work", "record"))
+
+    @classmethod
+    def of(cls, folder):
+        """The library in a folder, whether it was linked or not."""
+        shared = folder / "lib" / "libtask_hierarchy.so"
+        return cls.linked(shared) if shared.exists() else cls.unlinked(
+            folder / "lib" / "libtask_hierarchy.a")
 
     @classmethod
     def linked(cls, path):
