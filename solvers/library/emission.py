@@ -2,8 +2,8 @@
 
 Kernels are compiled as they are for Python: by numba, for the processor that LLVM detects. For
 another one numba is told so by its environment when a process starts, so `emitted` starts one. Code
-for aarch64 is that for x86-64 without extensions, whose vectors have the same width, translated by
-LLVM's back end for aarch64.
+for another kind of processor is the code without extensions for this one, whose vectors have the
+same width, translated by the back end of the other.
 """
 
 from __future__ import annotations
@@ -89,11 +89,13 @@ def emit(resolvers: Sequence[str], target: str, version: str) -> Emitted:
     """Return the object file for what this process compiles for, see `emitted`."""
     import llvmlite.binding as llvm
 
+    from hierarchy.jit import announce_compilation
     from hierarchy.jit.exporting import compiles, hide, lowered, machine
     from solvers.library import entries
 
     if not compiles():
         raise HierarchyError("kernels are not compiled: NUMBA_DISABLE_JIT is set")
+    announce_compilation()
     functions = {f"th_solve_{name}": entries.RESOLVERS[name] for name in resolvers}
     functions |= entries.SIZES
     module, found = lowered(functions), digest()

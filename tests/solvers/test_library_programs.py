@@ -22,8 +22,9 @@ from hierarchy.tasks import JointLimits, Position
 from scenarios.bench.families import family
 from scenarios.cli.main import run_command
 from solvers import make
-from solvers.library import differs, write
+from solvers.library import differs, entries, write
 from solvers.library.archive import archive
+from solvers.library.emission import RESOLVERS
 
 if not sys.platform.startswith("linux"):
     pytest.skip("the C library is made on Linux", allow_module_level=True)
@@ -248,6 +249,10 @@ def test_kernels_that_are_not_compiled_are_an_error(tmp_path, target):
     assert done.returncode == 2
     assert "NUMBA_DISABLE_JIT is set" in done.stderr
     assert "Traceback" not in done.stderr
+
+
+def test_every_resolver_that_the_command_names_has_a_function():
+    assert tuple(entries.RESOLVERS) == RESOLVERS == c.NAMES
 
 
 def test_a_folder_without_a_library_is_an_error(tmp_path):

@@ -32,7 +32,8 @@
 extern "C" {
 #endif
 
-/* How a solve ended. x is finite in every case, and zero where no answer is named here. */
+/* How a solve ended. x is finite, and zero where no answer is named here; it is left alone if it is
+ * missing or n is out of range. */
 typedef enum th_status {
   TH_SOLVED = 0,
   /* The budget max_iterations is spent. x is optimal for the levels above the unfinished one. */
