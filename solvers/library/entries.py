@@ -198,9 +198,9 @@ def _within_bounds(call, record, warm):
                                     call.settings, call.work)
     if code == UNPROVED:
         code = exactly(call, inner, warm)
-    call.state[ITERATIONS] = np.int64(inner[inner.size - 3] + inner[inner.size - 2])
     if code < 0 or code in (NUMERICAL_FAILURE, TOO_SMALL):
         return code
+    call.state[ITERATIONS] = np.int64(inner[inner.size - 3] + inner[inner.size - 2])
     named = name_saturation(call.A, call.lower, call.upper, call.sizes, call.x, record, call.work)
     call.state[WARM] = 1 if named == SOLVED else 0
     return code

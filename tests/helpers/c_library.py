@@ -6,6 +6,9 @@ import dataclasses
 import llvmlite.binding as llvm
 import numpy as np
 
+from hierarchy import HierarchyError
+from solvers import make
+
 NUMBERS, INTEGERS = ctypes.POINTER(ctypes.c_double), ctypes.POINTER(ctypes.c_int64)
 SOLVED, ITERATION_LIMIT, NUMERICAL_FAILURE, INACCURATE = 0, 1, 2, 4
 TOO_SMALL, CONTRADICTION, REFUSED, INVALID = 8, 10, 11, 12
@@ -130,3 +133,24 @@ class Library:
         status = self.call(name, problem_of(h), memory, settings)
         assert memory.untouched, "a number past the end of an array was written"
         return status, memory
+
+
+def check_same(library, resolver, h, memory=None, before=None):
+    """One solve in both, from memories of both; returns what Python leaves."""
+    name, python, settings = resolver
+    try:
+        res = make(name, **python).solve(h, before)
+    except HierarchyError:
+        status, left = library.solve(name, h, settings_of(**settings), memory)
+        assert status in (REFUSED, CONTRADICTION)
+        assert 0 <= left.record.row < h.m
+        assert not left.answer.any()
+        return None
+    status, left = library.solve(name, h, settings_of(**settings), memory)
+    assert left.answer.tobytes() == res.x.tobytes()
+    assert status == res.status or (name, status) == ("tpm", ITERATION_LIMIT)
+    assert left.record.iterations == res.iterations
+    assert (left.record.warm == 1) == (res.memory is not None)
+    if res.memory is not None:
+        assert left.values[:left.record.used].tobytes() == res.memory.tobytes()
+    return res

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from c_speed import recorded, sequence
 
-from hierarchy import Hierarchy, HierarchyError
+from hierarchy import Hierarchy
 from scenarios import load
 from scenarios.bench.families import FAMILIES, family
 from solvers import make, problems
@@ -42,32 +42,11 @@ def hierarchies(count, first=0):
                     problems.bounded(equal, seed))
 
 
-def check_same(library, resolver, h, memory=None, before=None):
-    """One solve in both, from memories of both; returns what Python leaves."""
-    name, python, settings = resolver
-    try:
-        res = make(name, **python).solve(h, before)
-    except HierarchyError:
-        status, left = library.solve(name, h, c.settings_of(**settings), memory)
-        assert status in (c.REFUSED, c.CONTRADICTION)
-        assert 0 <= left.record.row < h.m
-        assert not left.answer.any()
-        return None
-    status, left = library.solve(name, h, c.settings_of(**settings), memory)
-    assert left.answer.tobytes() == res.x.tobytes()
-    assert status == res.status or (name, status) == ("tpm", c.ITERATION_LIMIT)
-    assert left.record.iterations == res.iterations
-    assert (left.record.warm == 1) == (res.memory is not None)
-    if res.memory is not None:
-        assert left.values[:left.record.used].tobytes() == res.memory.tobytes()
-    return res
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("resolver", RESOLVERS, ids=str)
 @pytest.mark.usefixtures("unverified")
 def test_c_and_python_give_the_same_bits(library, resolver):
-    answered = [check_same(library, resolver, h) for h in hierarchies(60)]
+    answered = [c.check_same(library, resolver, h) for h in hierarchies(60)]
     assert sum(res is not None for res in answered) > 60
 
 
@@ -78,7 +57,7 @@ def test_c_and_python_give_the_same_bits_on_ten_thousand_hierarchies(library):
     for h in hierarchies(2500, first=1_000_000):
         count += 1
         for name in c.NAMES:
-            check_same(library, (name, {}, {}), h)
+            c.check_same(library, (name, {}, {}), h)
     assert count == 10_000
 
 
@@ -88,7 +67,7 @@ def test_c_and_python_give_the_same_bits_on_ten_thousand_hierarchies(library):
 def test_c_and_python_give_the_same_bits_on_the_reference_families(library, name):
     for problem in family(name):
         for resolver in RESOLVERS:
-            check_same(library, resolver, problem.h)
+            c.check_same(library, resolver, problem.h)
 
 
 @pytest.mark.slow
@@ -102,7 +81,7 @@ def test_warm_sequences_give_the_same_bits(library, name):
         memory, before = library.memory(starts), None
         for tick in sequence(starts, 10, seed):
             warm += before is not None
-            res = check_same(library, (name, {}, {}), tick, memory, before)
+            res = c.check_same(library, (name, {}, {}), tick, memory, before)
             before = None if res is None else res.memory
     assert warm > 100
 
@@ -117,14 +96,14 @@ def test_a_record_goes_on_with_another_kind_of_rows(library):
     equal = Hierarchy.from_levels([(A[:3], b[:3]), (A[3:], b[3:])])
     memory, before = library.memory(wide), None
     for h in (wide, equal, wide, wide, equal, equal):
-        before = check_same(library, ("hcod", {}, {}), h, memory, before).memory
+        before = c.check_same(library, ("hcod", {}, {}), h, memory, before).memory
 
 
 @pytest.mark.slow
 def test_the_object_loaded_without_a_linker_gives_the_same_bits(folder, unverified):
     library = c.Library.unlinked(folder / "lib" / "libtask_hierarchy.a")
     for h in hierarchies(5):
-        check_same(library, RESOLVERS[0], h)
+        c.check_same(library, RESOLVERS[0], h)
 
 
 @pytest.mark.slow
@@ -159,7 +138,7 @@ def test_the_commands_of_a_scenario_come_out_of_c_to_the_last_bit(library, name,
     assert resolver == make(resolver.name, **damped)
     for h in recorded(name, 200):
         memory = memory or library.memory(h)
-        before = check_same(library, (resolver.name, damped, damped), h, memory, before).memory
+        before = c.check_same(library, (resolver.name, damped, damped), h, memory, before).memory
 
 
 @pytest.mark.slow

@@ -8,7 +8,7 @@ import pytest
 
 from hierarchy import Hierarchy
 from scenarios.bench.families import family
-from solvers import make
+from solvers import make, problems
 
 if not sys.platform.startswith("linux"):
     pytest.skip("the C library is made on Linux", allow_module_level=True)
@@ -34,6 +34,29 @@ def test_numbers_that_are_none_are_a_status(library, name, array, value):
             assert status == c.NUMERICAL_FAILURE
         if status not in (c.SOLVED, c.INACCURATE):
             assert not left.answer.any()
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("unverified")
+def test_spoilt_data_give_the_bits_and_statuses_of_python(library):
+    rng = np.random.default_rng(1)
+    worst = np.array([np.nan, np.inf, -np.inf, 1e308, -1e200, 5e-324, 0.0, 1e-300])
+    for seed in range(500):
+        h = problems.structured(seed) if seed % 2 else problems.generate(seed)
+        for array in (h.A.ravel(), h.lower, h.upper, h.reference):
+            if array.size and rng.random() < 0.5:
+                array[rng.integers(array.size)] = rng.choice(worst)
+        for name in c.NAMES:
+            for damped in ({}, {"damping": 0.1}):
+                c.check_same(library, (name, damped, damped), h)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["hcod", "tpm", "sns"])
+def test_a_bound_beyond_the_largest_number_leaves_x_finite(library, name):
+    h = box()
+    h.A[0, 0] = 5e-324
+    assert np.isfinite(library.solve(name, h)[1].answer).all()
 
 
 @pytest.mark.slow
