@@ -146,7 +146,7 @@ else:
 
 
 def _compiled(function: Kernel, inline: bool = False, nogil: bool = False) -> Kernel:
-    files, constants = _files_behind(function), _constants_behind(function)
+    files, constants = files_behind(function), constants_behind(function)
     folder = cache_folder() / _digest((__file__, *sorted(files)), tuple(sorted(constants)))
     allocates = _allocates(function)
     kernel: Kernel = _jit_into(folder, function, forceinline=inline, nogil=nogil, _nrt=allocates,
@@ -158,13 +158,13 @@ def _compiled(function: Kernel, inline: bool = False, nogil: bool = False) -> Ke
     return kernel
 
 
-def _files_behind(function: Kernel) -> frozenset[str]:
+def files_behind(function: Kernel) -> frozenset[str]:
     """Return the files of a kernel and of all kernels that its file knows."""
     behind = (getattr(known, "source_files", ()) for known in function.__globals__.values())
     return frozenset({function.__code__.co_filename}).union(*behind)
 
 
-def _constants_behind(function: Kernel) -> frozenset[str]:
+def constants_behind(function: Kernel) -> frozenset[str]:
     """Return the numbers that a kernel's file knows, and those behind all kernels it knows."""
     known = function.__globals__
     behind = (getattr(value, "constants", ()) for value in known.values())
@@ -188,12 +188,13 @@ def _called(function: Kernel) -> list[Any]:
 
 @cache
 def _digest(files: tuple[str, ...], constants: tuple[str, ...]) -> str:
-    content = "\n".join((*map(_digest_of, files), *constants, numba.__version__))
+    content = "\n".join((*map(digest_of, files), *constants, numba.__version__))
     return hashlib.sha256(content.encode()).hexdigest()[:16]
 
 
 @cache
-def _digest_of(file: str) -> str:
+def digest_of(file: str) -> str:
+    """Return the digest of one file."""
     return hashlib.sha256(Path(file).read_bytes()).hexdigest()
 
 

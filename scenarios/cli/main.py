@@ -346,6 +346,27 @@ def figures(folders: Annotated[list[Path], typer.Argument(
 
 
 @app.command()
+def library(out: Annotated[Path, output("Folder of the library: new or empty, or an existing one "
+                                        "with --check.")],
+            resolvers: Annotated[str, typer.Option(
+                "--resolvers", metavar="NAMES", help="hcod, tpm, recursive, sns.")
+                ] = "hcod,tpm,recursive,sns",
+            target: Annotated[str, typer.Option(
+                "--target", metavar="TARGET", help="native, x86_64 (any) or aarch64 (any).")
+                ] = "native",
+            compare_: Annotated[bool, typer.Option(
+                "--check", help="Write nothing: compare the kernels of the library in the folder "
+                                "with those installed.")] = False,
+            as_json: AsJson = False) -> int:
+    """Write the resolvers as a C library: the same kernels, without Python."""
+    from scenarios.cli.library import check_command, library_command
+
+    if compare_:
+        return check_command(out, as_json)
+    return library_command(out, _split(resolvers), target, as_json)
+
+
+@app.command()
 def check(file: Annotated[str, typer.Argument(help="A scenario or a robot: file or name.",
                                               autocompletion=completion.scenarios)],
           changes: Changes = None, as_json: AsJson = False) -> None:

@@ -80,14 +80,14 @@ def name_saturation(A, lower, upper, sizes, x, record, work):
     That part has the state of each unknown (-1 or +1: at its lower or upper bound, 2: both, 0:
     free) and the scaling of each level. The second part is the record of the exact resolver.
     Returns SOLVED if an unknown is at a bound and NO_LIMITS if none is or if there are no bounds.
-    With -(i + 1) as `solve_without_bounds`, nothing is written.
+    With NUMERICAL_FAILURE, or -(i + 1) as `solve_without_bounds`, nothing is written.
     """
     n, end = x.size, ZERO + NO_LIMITS
     if all_equal(lower, upper):
         return end
     inner, box = record[n + sizes.size:], _first_level(sizes, work, n)
     code = _refused(A, lower, upper, box.end)
-    if code < 0:
+    if code != SOLVED:
         return code
     _intersect(A, lower, upper, box)
     for c in range(n):
@@ -123,12 +123,15 @@ def _refused(A, lower, upper, end):
     """
     sane, mixed, refused, bound = True, False, ZERO, ZERO
     for i in range(lower.size):
-        entries, square = 0, 0.0
+        entries, square, entry = 0, 0.0, 1.0
         for c in range(A.shape[1]):
             entries += A[i, c] != 0.0
             square += A[i, c] * A[i, c]
+            entry = A[i, c] if A[i, c] != 0.0 else entry
         sane &= np.isfinite(square) and lower[i] <= upper[i]
         sane &= lower[i] < np.inf and upper[i] > -np.inf
+        if i < end and entries == 1:
+            sane &= not (_overflows(lower[i], entry) or _overflows(upper[i], entry))
         mixed |= i < end and entries != 1
         if lower[i] == upper[i]:
             continue
@@ -141,6 +144,12 @@ def _refused(A, lower, upper, end):
     if refused == 0 and mixed:
         refused = bound
     return refused if refused < 0 else ZERO + SOLVED
+
+
+@inlined
+def _overflows(side, entry):
+    """Whether a bound on one unknown lies beyond the largest number."""
+    return np.isfinite(side) and not np.isfinite(side / entry)
 
 
 @inlined

@@ -26,7 +26,7 @@ TEXTS = {str(path.relative_to(ROOT)): path.read_text(encoding="utf-8")
                       *sorted(path for path in (ROOT / "docs").rglob("*.md")
                               if "_build" not in path.parts)]}
 FENCE = re.compile(r"^(\s*)```(.*)$", re.MULTILINE)
-CHECKED = {"", "python", "toml", "sh", "console", "bash"}
+CHECKED = {"", "python", "toml", "sh", "console", "bash", "c"}  # c: test_library_programs.py
 OF_THE_SITE = {"{toctree}", "{eval-rst}"}
 FOLLOWED = "docs/tutorial.md"  # whose commands are run, not only read
 COMMANDS = typer.main.get_command(app).commands

@@ -356,3 +356,14 @@ def test_the_benchmark_has_a_row_for_everybody_and_finds_tpm_exact(tmp_path, cap
     assert all(row["beyond"] < 1e-12 for row in rows)
     assert len((tmp_path / "saturation.csv").read_text().splitlines()) == 7
     assert max(map(len, capsys.readouterr().out.splitlines())) <= 80
+
+
+@pytest.mark.parametrize("damping", [0.0, 0.1])
+@pytest.mark.parametrize("lower", [-np.inf, -0.5])
+def test_a_bound_beyond_the_largest_number_is_a_failure_with_a_finite_x(damping, lower):
+    """5e-324 x <= -1e-5 asked for x <= -inf, which was the answer."""
+    tiny = [[5e-324, 0.0], [0.0, 1.0]]
+    h = Hierarchy.from_levels([(tiny, [lower, -0.5], [-1e-5, 0.5]), (np.ones((1, 2)), [1.0])])
+    res = make("tpm", damping=damping).solve(h)
+    assert res.status is Status.NUMERICAL_FAILURE
+    assert not res.x.any()

@@ -1,0 +1,148 @@
+"""From the functions of the library to an object file, through LLVM; no compiler is needed.
+
+Kernels are compiled as they are for Python: by numba, for the processor that LLVM detects. For
+another one numba is told so by its environment when a process starts, so `emitted` starts one. Code
+for another kind of processor is the code without extensions for this one, whose vectors have the
+same width, translated by the back end of the other.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, final
+
+from hierarchy.errors import HierarchyError, UnknownNameError
+
+TARGETS = ("native", "x86_64", "aarch64")
+RESOLVERS = ("hcod", "tpm", "recursive", "sns")
+_TRIPLES = {"x86_64": "x86_64-unknown-linux-gnu", "aarch64": "aarch64-unknown-linux-gnu"}
+_WORKER = "import sys; from solvers.library.emission import work; work(*sys.argv[1:])"
+_TEXTS = ("th_version", "th_digest")
+
+
+@final
+@dataclass(frozen=True)
+class Emitted:
+    """An object file, the names of the functions in it, and the machine that it is for.
+
+    digest : of the sources of the kernels, see `source_digest`.
+    """
+
+    content: bytes
+    symbols: tuple[str, ...]
+    machine: str
+    digest: str
+
+
+def emitted(resolvers: Sequence[str], target: str, version: str) -> Emitted:
+    """Return the object file of these resolvers for a target.
+
+    Raises
+    ------
+    HierarchyError : an unknown or missing resolver or target, kernels are not compiled, or this
+        LLVM or this machine cannot make code for the target.
+    """
+    check(resolvers, target)
+    if target == "native":
+        return emit(resolvers, target, version)
+    with tempfile.TemporaryDirectory() as folder:
+        out = Path(folder) / "kernels.o"
+        done = subprocess.run(
+            [sys.executable, "-c", _WORKER, target, version, str(out), *resolvers],
+            env={**os.environ, "NUMBA_CPU_NAME": "generic"}, check=False, capture_output=True,
+            text=True)
+        if done.returncode != 0:
+            lines = done.stderr.strip().splitlines()
+            raise HierarchyError(f"no code for {target}: {lines[-1] if lines else 'no reason'}")
+        symbols, machine, digest = done.stdout.splitlines()
+        return Emitted(out.read_bytes(), tuple(symbols.split()), machine, digest)
+
+
+def check(resolvers: Sequence[str], target: str) -> None:
+    """Raise a HierarchyError for an unknown name, or for a machine that has no objects in ELF."""
+    if target not in TARGETS:
+        raise UnknownNameError("target", target, TARGETS)
+    for name in resolvers:
+        if name not in RESOLVERS:
+            raise UnknownNameError("resolver of the C library", name, RESOLVERS)
+    if not resolvers:
+        raise HierarchyError("a C library needs at least one resolver")
+    if not sys.platform.startswith("linux"):
+        raise HierarchyError(f"the C library is made on Linux, not on {sys.platform}")
+
+
+def digest() -> str:
+    """Return the digest of the kernels' sources as they are installed."""
+    from hierarchy.jit.exporting import source_digest
+    from solvers.library.entries import solve_hcod
+
+    return source_digest(solve_hcod)
+
+
+def emit(resolvers: Sequence[str], target: str, version: str) -> Emitted:
+    """Return the object file for what this process compiles for, see `emitted`."""
+    import llvmlite.binding as llvm
+
+    from hierarchy.jit import announce_compilation
+    from hierarchy.jit.exporting import compiles, hide, lowered, machine
+    from solvers.library import entries
+
+    if not compiles():
+        raise HierarchyError("kernels are not compiled: NUMBA_DISABLE_JIT is set")
+    announce_compilation()
+    functions = {f"th_solve_{name}": entries.RESOLVERS[name] for name in resolvers}
+    functions |= entries.SIZES
+    module, found = lowered(functions), digest()
+    module.link_in(llvm.parse_assembly(_texts(dict(zip(_TEXTS, (version, found), strict=True)))))
+    symbols = (*functions, *_TEXTS)
+    hide(module, set(symbols))
+    here = machine()
+    if target == "native":
+        triple, processor, features = here.triple, here.processor, here.features
+    else:
+        triple, processor, features = _TRIPLES[target], "generic", ""
+    return Emitted(_object(module, triple, processor, features), symbols,
+                   f"{triple}, {processor}", found)
+
+
+def _object(module: Any, triple: str, processor: str, features: str) -> bytes:
+    import llvmlite.binding as llvm
+
+    llvm.initialize_all_targets()
+    llvm.initialize_all_asmprinters()
+    try:
+        target = llvm.Target.from_triple(triple)
+    except RuntimeError as error:
+        raise HierarchyError(f"this llvmlite has no back end for {triple}: {error}") from error
+    machine = target.create_target_machine(cpu=processor, features=features, opt=3, reloc="pic",
+                                           codemodel="default")
+    module.triple, module.data_layout = triple, str(machine.target_data)
+    return bytes(machine.emit_object(module))
+
+
+def _texts(texts: dict[str, str]) -> str:
+    """Return LLVM code of functions without arguments that return constant texts."""
+    from llvmlite import ir
+
+    module, byte = ir.Module("texts"), ir.IntType(8)
+    for name, text in texts.items():
+        content = ir.Constant(ir.ArrayType(byte, len(text) + 1), bytearray(text.encode() + b"\0"))
+        constant = ir.GlobalVariable(module, content.type, f"{name}_text")
+        constant.initializer, constant.global_constant = content, True
+        function = ir.Function(module, ir.FunctionType(byte.as_pointer(), []), name)
+        builder = ir.IRBuilder(function.append_basic_block())
+        builder.ret(builder.bitcast(constant, byte.as_pointer()))
+    return str(module)
+
+
+def work(target: str, version: str, out: str, *resolvers: str) -> None:
+    """Write the object file `out` and print the rest of what `emit` returns, for `emitted`."""
+    made = emit(resolvers, target, version)
+    Path(out).write_bytes(made.content)
+    print(" ".join(made.symbols), made.machine, made.digest, sep="\n")

@@ -1,0 +1,156 @@
+"""The C library as Python sees it through ctypes, beside the resolvers of the same names."""
+
+import ctypes
+import dataclasses
+
+import llvmlite.binding as llvm
+import numpy as np
+
+from hierarchy import HierarchyError
+from solvers import make
+
+NUMBERS, INTEGERS = ctypes.POINTER(ctypes.c_double), ctypes.POINTER(ctypes.c_int64)
+SOLVED, ITERATION_LIMIT, NUMERICAL_FAILURE, INACCURATE = 0, 1, 2, 4
+TOO_SMALL, CONTRADICTION, REFUSED, INVALID = 8, 10, 11, 12
+CANARY = -3.14159e77
+NAMES = ("hcod", "tpm", "recursive", "sns")
+
+
+class Problem(ctypes.Structure):
+    _fields_ = [(name, ctypes.c_int64) for name in ("n", "m", "levels")] + [
+        ("A", NUMBERS), ("lower", NUMBERS), ("upper", NUMBERS), ("sizes", INTEGERS),
+        ("reference", NUMBERS)]
+
+
+class Record(ctypes.Structure):
+    _fields_ = [("values", NUMBERS)] + [
+        (name, ctypes.c_int64) for name in ("size", "used", "warm", "iterations", "row")]
+
+
+class Settings(ctypes.Structure):
+    _fields_ = [(name, ctypes.c_double) for name in (
+        "damping", "threshold", "rank_tolerance", "tolerance", "isotropic", "largest")] + [
+        (name, ctypes.c_int64) for name in (
+            "guesses", "max_iterations", "optimal", "miss", "method")]
+
+
+def settings_of(**given):
+    """Settings with the defaults of the header but for those given."""
+    return Settings(**{"threshold": 0.1, "rank_tolerance": 1e-8, "tolerance": 1e-10,
+                       "largest": np.inf, "guesses": 3, "max_iterations": 1000, **given})
+
+
+def problem_of(h, **changed):
+    """A th_problem that reads the arrays of a hierarchy, with some fields changed."""
+    fields = {"n": h.n, "m": h.m, "levels": len(h.sizes), "A": numbers(h.A),
+              "lower": numbers(h.lower), "upper": numbers(h.upper),
+              "sizes": h.sizes.ctypes.data_as(INTEGERS), "reference": numbers(h.reference)}
+    return Problem(**{**fields, **changed})
+
+
+def numbers(array):
+    return array.ctypes.data_as(NUMBERS)
+
+
+@dataclasses.dataclass
+class Memory:
+    """What a caller owns, each array followed by a canary."""
+
+    record: Record
+    x: np.ndarray
+    values: np.ndarray
+    work: np.ndarray
+
+    @property
+    def answer(self):
+        return self.x[:-1]
+
+    @property
+    def untouched(self):
+        return all(array[-1] == CANARY for array in (self.x, self.values, self.work))
+
+
+class Library:
+    """The functions of a library at their addresses."""
+
+    def __init__(self, address):
+        self.address = address
+        sizes = ctypes.CFUNCTYPE(ctypes.c_int64, *[ctypes.c_int64] * 3)
+        self.work_size, self.record_size = (sizes(address(f"th_{name}_size"))
+                                            for name in ("work", "record"))
+
+    @classmethod
+    def of(cls, folder):
+        """The library in a folder, whether it was linked or not."""
+        shared = folder / "lib" / "libtask_hierarchy.so"
+        return cls.linked(shared) if shared.exists() else cls.unlinked(
+            folder / "lib" / "libtask_hierarchy.a")
+
+    @classmethod
+    def linked(cls, path):
+        """A shared library, loaded by the system."""
+        code = ctypes.CDLL(str(path))
+        return cls(lambda name: ctypes.cast(code[name], ctypes.c_void_p).value)
+
+    @classmethod
+    def unlinked(cls, path):
+        """The object in a static library, loaded by LLVM: no linker is needed."""
+        llvm.initialize_native_target()
+        llvm.initialize_native_asmprinter()
+        engine = llvm.create_mcjit_compiler(
+            llvm.parse_assembly(""), llvm.Target.from_default_triple().create_target_machine())
+        content = path.read_bytes()
+        start = content.index(b"kernels.o/") + 60
+        engine.add_object_file(llvm.ObjectFileRef.from_data(content[start:]))
+        engine.finalize_object()
+        library = cls(engine.get_function_address)
+        library.engine = engine  # which owns the code
+        return library
+
+    def text(self, name):
+        return ctypes.CFUNCTYPE(ctypes.c_char_p)(self.address(name))().decode()
+
+    def memory(self, h, missing=0, missing_values=0):
+        """Memory for a hierarchy, less so many numbers of work space and record."""
+        sizes = h.n, h.m, len(h.sizes)
+        values = np.full(self.record_size(*sizes) + 1 - missing_values, CANARY)
+        work = np.full(self.work_size(*sizes) + 1 - missing, CANARY)
+        return Memory(Record(numbers(values), len(values) - 1), np.full(h.n + 1, CANARY), values,
+                      work)
+
+    def call(self, name, problem, memory, settings=None, /, **changed):
+        """One call, some of its pointers changed; returns the status."""
+        given = {"problem": ctypes.addressof(problem),
+                 "settings": None if settings is None else ctypes.addressof(settings),
+                 "record": ctypes.addressof(memory.record), "x": memory.x.ctypes.data,
+                 "work": memory.work.ctypes.data, **changed}
+        solve = ctypes.CFUNCTYPE(ctypes.c_int, *[ctypes.c_void_p] * 5, ctypes.c_int64)
+        return solve(self.address(f"th_solve_{name}"))(*given.values(), len(memory.work) - 1)
+
+    def solve(self, name, h, settings=None, memory=None):
+        """Solve a hierarchy; return the status and what the caller then has."""
+        memory = memory or self.memory(h)
+        status = self.call(name, problem_of(h), memory, settings)
+        assert memory.untouched, "a number past the end of an array was written"
+        return status, memory
+
+
+def check_same(library, resolver, h, memory=None, before=None):
+    """One solve in both, from memories of both; returns what Python leaves."""
+    name, python, settings = resolver
+    try:
+        res = make(name, **python).solve(h, before)
+    except HierarchyError:
+        status, left = library.solve(name, h, settings_of(**settings), memory)
+        assert status in (REFUSED, CONTRADICTION)
+        assert 0 <= left.record.row < h.m
+        assert not left.answer.any()
+        return None
+    status, left = library.solve(name, h, settings_of(**settings), memory)
+    assert left.answer.tobytes() == res.x.tobytes()
+    assert status == res.status or (name, status) == ("tpm", ITERATION_LIMIT)
+    assert left.record.iterations == res.iterations
+    assert (left.record.warm == 1) == (res.memory is not None)
+    if res.memory is not None:
+        assert left.values[:left.record.used].tobytes() == res.memory.tobytes()
+    return res

@@ -1,0 +1,192 @@
+"""What the C library does with wrong data, wrong sizes and wrong memory: a status, nothing more."""
+
+import sys
+
+import c_library as c
+import numpy as np
+import pytest
+
+from hierarchy import Hierarchy
+from scenarios.bench.families import family
+from solvers import make, problems
+
+if not sys.platform.startswith("linux"):
+    pytest.skip("the C library is made on Linux", allow_module_level=True)
+
+
+def box():
+    """Bounds, a task and a posture of three unknowns, in fresh arrays."""
+    return Hierarchy.from_levels([(np.eye(3), -np.ones(3), np.ones(3)), (np.ones((1, 3)), [5.0]),
+                                  (np.eye(3), np.zeros(3))])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", c.NAMES)
+@pytest.mark.parametrize("array", ["A", "lower", "upper", "reference"])
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, 1e200])
+def test_numbers_that_are_none_are_a_status(library, name, array, value):
+    for at in range(3):
+        h = box()
+        getattr(h, array).ravel()[at] = value
+        status, left = library.solve(name, h)
+        assert np.isfinite(left.answer).all()
+        if np.isnan(value) and name != "recursive":
+            assert status == c.NUMERICAL_FAILURE
+        if status not in (c.SOLVED, c.INACCURATE):
+            assert not left.answer.any()
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("unverified")
+def test_spoilt_data_give_the_bits_and_statuses_of_python(library):
+    rng = np.random.default_rng(1)
+    worst = np.array([np.nan, np.inf, -np.inf, 1e308, -1e200, 5e-324, 0.0, 1e-300])
+    for seed in range(500):
+        h = problems.structured(seed) if seed % 2 else problems.generate(seed)
+        for array in (h.A.ravel(), h.lower, h.upper, h.reference):
+            if array.size and rng.random() < 0.5:
+                array[rng.integers(array.size)] = rng.choice(worst)
+        for name in c.NAMES:
+            for damped in ({}, {"damping": 0.1}):
+                c.check_same(library, (name, damped, damped), h)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["hcod", "tpm", "sns"])
+def test_a_bound_beyond_the_largest_number_leaves_x_finite(library, name):
+    h = box()
+    h.A[0, 0] = 5e-324
+    assert np.isfinite(library.solve(name, h)[1].answer).all()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", c.NAMES)
+def test_a_lower_side_above_the_upper_is_a_status(library, name):
+    h = box()
+    h.lower[1], h.upper[1] = 1.0, -1.0
+    if name == "recursive":
+        h = Hierarchy(h.A[3:], h.lower[3:], h.upper[3:], h.sizes[1:], h.reference, h.names[1:])
+        h.lower[0], h.upper[0] = 1.0, -1.0
+    status, left = library.solve(name, h)
+    assert status == c.NUMERICAL_FAILURE
+    assert not left.answer.any()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", c.NAMES)
+@pytest.mark.parametrize("wrong", [
+    {"n": 0}, {"n": -3}, {"n": 2**40}, {"m": -1}, {"m": 6}, {"m": 2**62}, {"levels": -1},
+    {"levels": 2}, {"levels": 2**33}, {"A": None}, {"lower": None}, {"upper": None},
+    {"sizes": None}], ids=str)
+def test_sizes_that_do_not_add_up_are_invalid(library, name, wrong):
+    h = box()
+    memory = library.memory(h)
+    assert library.call(name, c.problem_of(h, **wrong), memory) == c.INVALID
+    assert memory.untouched
+    assert (memory.work == c.CANARY).all()
+    assert (memory.values == c.CANARY).all()
+    assert (memory.answer == (c.CANARY if "n" in wrong else 0.0)).all()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("sizes", [[3, 2, 3], [9, -1, -1], [2**62, 2**62, 7 - 2**63]])
+def test_sizes_of_levels_that_do_not_add_up_are_invalid(library, sizes):
+    h, memory = box(), library.memory(box())
+    h.sizes[:] = sizes
+    assert library.call("hcod", c.problem_of(h), memory) == c.INVALID
+    assert (memory.work == c.CANARY).all()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("pointer", ["problem", "record", "x", "work"])
+def test_a_missing_pointer_is_invalid(library, pointer):
+    h, memory = box(), library.memory(box())
+    assert library.call("hcod", c.problem_of(h), memory, **{pointer: None}) == c.INVALID
+    assert memory.untouched
+
+
+@pytest.mark.slow
+def test_a_record_without_room_is_invalid(library):
+    h, memory = box(), library.memory(box())
+    memory.record.values = None
+    assert library.call("hcod", c.problem_of(h), memory) == c.INVALID
+    assert not memory.answer.any()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("garbage", [np.nan, np.inf, 1e300, -1.0, 2.0])
+@pytest.mark.parametrize("name", c.NAMES)
+def test_a_record_of_garbage_does_no_harm(library, name, garbage):
+    h, memory = box(), library.memory(box())
+    for used in (3 * h.m + 3, h.n + len(h.sizes) + 3 * h.m + 3):
+        memory.values[:-1], memory.record.used, memory.record.warm = garbage, used, 1
+        status, left = library.solve(name, h, memory=memory)
+        assert np.isfinite(left.answer).all()
+        if status == c.SOLVED and name in ("hcod", "tpm"):
+            np.testing.assert_allclose(left.answer, make(name).solve(h).x, atol=1e-9)
+
+
+@pytest.mark.slow
+def test_without_a_reference_it_is_zero(library):
+    h, one, other = box(), library.memory(box()), library.memory(box())
+    assert library.call("hcod", c.problem_of(h), one) == c.SOLVED
+    assert library.call("hcod", c.problem_of(h, reference=None), other) == c.SOLVED
+    assert one.answer.tobytes() == other.answer.tobytes()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", c.NAMES)
+@pytest.mark.parametrize("missing", [{"missing": 1}, {"missing": 10_000}, {"missing_values": 1}],
+                         ids=str)
+def test_too_little_memory_is_a_status(library, name, missing):
+    h = family("HUM38")[0].h
+    status, left = library.solve(name, h, memory=library.memory(h, **missing))
+    assert status == c.TOO_SMALL
+    assert not left.answer.any()
+    assert (left.work == c.CANARY).all()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("wrong", [
+    {"damping": -0.1}, {"damping": np.nan}, {"threshold": 0.0}, {"rank_tolerance": 1.0},
+    {"rank_tolerance": np.nan}, {"tolerance": 0.0}, {"tolerance": 0.1}, {"isotropic": -1.0},
+    {"largest": 0.0}, {"guesses": 0}, {"max_iterations": 0}, {"optimal": 2}, {"miss": -1},
+    {"method": 4}], ids=str)
+def test_a_setting_out_of_range_is_invalid(library, wrong):
+    assert library.solve("hcod", box(), c.settings_of(**wrong))[0] == c.INVALID
+
+
+@pytest.mark.slow
+def test_the_default_settings_are_those_of_python(library):
+    h = family("INEQ7")[0].h
+    assert (library.solve("hcod", h)[1].answer.tobytes()
+            == library.solve("hcod", h, c.settings_of())[1].answer.tobytes()
+            == make("hcod").solve(h).x.tobytes())
+
+
+@pytest.mark.slow
+def test_a_spent_budget_keeps_the_finished_levels(library):
+    limited = 0
+    for problem in family("HUM38")[:10]:
+        h = problem.h
+        for budget in (1, 5, 20):
+            status, left = library.solve("hcod", h, c.settings_of(max_iterations=budget))
+            if status == c.ITERATION_LIMIT:
+                limited, unfinished = limited + 1, int(left.values[3 * h.m + 2])
+                np.testing.assert_allclose(h.violations(left.answer)[:unfinished],
+                                           problem.norms[:unfinished], atol=1e-8)
+    assert limited > 5
+
+
+@pytest.mark.slow
+def test_the_row_that_is_refused_is_named(library):
+    h = Hierarchy.from_levels([(np.eye(2), [0.0, 0.0]), (np.ones((1, 2)), [0.0], [1.0])])
+    status, left = library.solve("tpm", h)
+    assert (status, left.record.row) == (c.REFUSED, 2)
+
+
+@pytest.mark.slow
+def test_bounds_that_contradict_each_other_are_named(library):
+    h = Hierarchy.from_levels([(np.eye(2)[[0, 1, 0]], [0.0, 0.0, 2.0], [1.0, 1.0, 3.0])])
+    status, left = library.solve("sns", h)
+    assert (status, left.record.row) == (c.CONTRADICTION, 2)

@@ -1,0 +1,270 @@
+"""The folder of the C library, programs in C and C++ that use it, and its command.
+
+What needs a compiler is skipped by name where there is none.
+"""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import c_library as c
+import c_speed
+import numpy as np
+import pytest
+from c_speed import record_sequence, sequence
+
+from hierarchy import HierarchyError, Robot, Stack, State
+from hierarchy.paths import Still
+from hierarchy.tasks import JointLimits, Position
+from scenarios.bench.families import family
+from scenarios.cli.main import run_command
+from solvers import make
+from solvers.library import differs, entries, write
+from solvers.library.archive import archive
+from solvers.library.emission import RESOLVERS
+
+if not sys.platform.startswith("linux"):
+    pytest.skip("the C library is made on Linux", allow_module_level=True)
+
+ROOT = Path(__file__).parents[2]
+ROS2 = ROOT / "examples" / "ros2_control"
+EXAMPLES, PROGRAM = ROOT / "examples" / "c", ROOT / "docs" / "studies" / "c_speed.c"
+STRICT = ["-Wall", "-Wextra", "-Werror", "-pedantic", "-O2"]
+COMPILER = next(filter(None, map(shutil.which, ("cc", "gcc", "clang"))), None)
+CXX = next(filter(None, map(shutil.which, ("c++", "g++", "clang++"))), None)
+needs_c = pytest.mark.skipif(COMPILER is None, reason="no compiler of C")
+LIBM = {"hypot", "memset", "memcpy"}  # all that the library asks for
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(shutil.which("nm") is None, reason="no nm")
+def test_it_asks_for_nothing_but_libm_and_owns_no_variable(folder):
+    done = subprocess.run(["nm", folder / "lib" / "libtask_hierarchy.a"], capture_output=True,
+                          text=True, check=True)
+    kinds = re.findall(r"^\w* +(\w) (\S+)$", done.stdout, re.MULTILINE)
+    assert {name for kind, name in kinds if kind == "U"} <= LIBM
+    assert {kind for kind, _ in kinds} <= set("UTtr")  # code and constants
+    assert {name for kind, name in kinds if kind == "T"} == {
+        *(f"th_solve_{name}" for name in c.NAMES), "th_work_size", "th_record_size", "th_version",
+        "th_digest"}
+
+
+def built(out, source, folder, *flags, compiler=COMPILER):
+    """Compile one file with the static library; returns the program."""
+    subprocess.run([compiler, *flags, source, "-I", folder / "include",
+                    folder / "lib" / "libtask_hierarchy.a", "-lm", "-o", out], check=True)
+    return out
+
+
+def said(*command):
+    return subprocess.run(command, capture_output=True, text=True, check=True).stdout
+
+
+def test_the_code_that_documents_show_is_that_of_the_examples():
+    shown = [block for page in (ROOT / "docs").rglob("*.md") for block in re.findall(
+        r"^```c\n(.*?)^```", page.read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE)]
+    examples = "".join(path.read_text(encoding="utf-8") for path in EXAMPLES.iterdir())
+    assert shown
+    assert all(block in examples for block in shown)
+
+
+@needs_c
+@pytest.mark.slow
+def test_the_examples_compile_without_a_warning_and_run(folder, tmp_path):
+    once = built(tmp_path / "once", EXAMPLES / "once.c", folder, "-std=c99", *STRICT)
+    assert said(once) == "status 0, x = 0.9 0.1\n"
+    loop = built(tmp_path / "loop", EXAMPLES / "loop.c", folder, "-std=c99", *STRICT)
+    assert re.match(r"6000 ticks, 0 braked, speeds at a bound [1-9]\d* times, error at most 0\.",
+                    said(loop))
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(CXX is None, reason="no compiler of C++")
+def test_the_header_of_cxx_compiles_without_exceptions(folder, tmp_path):
+    once = built(tmp_path / "once", EXAMPLES / "once.cpp", folder, "-std=c++17",
+                 "-fno-exceptions", *STRICT, compiler=CXX)
+    assert said(once) == "status 0, x = 0.9 0.1\n"
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(CXX is None, reason="no compiler of C++")
+def test_the_controller_of_ros2_control_sends_what_python_sends(folder, tmp_path):
+    """Against stub headers: the same arm, tasks and period, with two writers of the rows."""
+    program = built(tmp_path / "simulated", ROS2 / "simulated.cpp", folder, "-std=c++17", *STRICT,
+                    "-I", ROS2 / "stub", compiler=CXX)
+    sent = np.array([line.split() for line in said(program).splitlines()], dtype=float)
+    robot, period = Robot.named("kuka_lwr"), 0.001
+    q, v = np.array([0.0, 0.6, 0.0, -1.4, 0.0, 0.8, 0.0]), np.zeros(7)
+    state, hand = State.at(robot, q), robot.frame("end_effector")
+    goal = Still(state.position(hand) + np.array([0.0, 0.3, 0.2]))
+    stack = Stack([JointLimits(robot, 10.0, period), Position(hand, goal, gain=5.0)], "velocity")
+    resolver, memory = make("hcod"), None
+    for tick, command in enumerate(sent):
+        state.move(period * tick, q, v)
+        res = resolver.solve(stack.hierarchy(state), memory)
+        np.testing.assert_allclose(command, res.x, atol=1e-9)
+        v, memory = res.x, res.memory
+        q = q + period * v
+    assert len(sent) == 2000
+    assert np.abs(np.diff(sent, axis=0)).max() <= 10.0 * period * (1.0 + 1e-9)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(CXX is None or not Path("/usr/include/eigen3").exists(), reason="no Eigen")
+def test_the_example_with_eigen_compiles(folder, tmp_path):
+    program = built(tmp_path / "eigen", EXAMPLES / "eigen.cpp", folder, "-std=c++17",
+                    "-DTASK_HIERARCHY_EIGEN", "-isystem", "/usr/include/eigen3", compiler=CXX)
+    assert said(program) == "status 0, x = 0.9 0.1\n"
+
+
+@needs_c
+@pytest.mark.slow
+@pytest.mark.skipif(shutil.which("cmake") is None, reason="no cmake")
+@pytest.mark.parametrize("linked", ["task_hierarchy", "shared"])
+def test_cmake_finds_it(folder, tmp_path, linked):
+    (tmp_path / "CMakeLists.txt").write_text(
+        "cmake_minimum_required(VERSION 3.16)\nproject(once C)\n"
+        "find_package(task_hierarchy 0.1.0 REQUIRED)\n"
+        f"add_executable(once {EXAMPLES / 'once.c'})\n"
+        f"target_link_libraries(once task_hierarchy::{linked})\n")
+    out = tmp_path / "out"
+    said("cmake", "-S", tmp_path, "-B", out, f"-DCMAKE_PREFIX_PATH={folder}")
+    said("cmake", "--build", out)
+    assert said(out / "once") == "status 0, x = 0.9 0.1\n"
+
+
+@needs_c
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "resolver"), [("INEQ7", "hcod"), ("EQ7", "tpm")])
+def test_a_million_solves_allocate_nothing_and_touch_no_new_page(folder, tmp_path, name, resolver):
+    record_sequence(tmp_path / "ticks", sequence(family(name)[0].h, 100))
+    program = built(tmp_path / "study", PROGRAM, folder, "-O2")
+    solves, failed, allocated, faults, *_ = map(int, said(
+        program, tmp_path / "ticks", resolver, "1000000").split())
+    assert (solves, failed, allocated, faults) == (1_000_000, 0, 0, 0)
+
+
+@needs_c
+@pytest.mark.slow
+def test_the_study_of_speed_prints_a_row_for_every_sequence(folder, tmp_path, capsys):
+    rows = c_speed.run(tmp_path, turns=1, library=folder)
+    assert all(row["c_median_us"] > 0.0 and row["ratio"] > 0.0 for row in rows)
+    said = capsys.readouterr().out
+    assert all(f"{row['problems']}, {row['resolver']}" in said for row in rows)
+
+
+@needs_c
+@pytest.mark.slow
+def test_the_program_that_counts_allocations_sees_them(folder, tmp_path):
+    source = tmp_path / "allocating.c"
+    source.write_text(PROGRAM.read_text().replace(
+        "double begin = now();", "double begin = now(); free(malloc(16));"))
+    record_sequence(tmp_path / "ticks", sequence(family("EQ7")[0].h, 2))
+    program = built(tmp_path / "study", source, folder, "-O0")
+    assert int(said(program, tmp_path / "ticks", "hcod", "10").split()[2]) == 10
+
+
+@needs_c
+@pytest.mark.slow
+def test_the_examples_pass_the_address_sanitizer(folder, tmp_path):
+    program = built(tmp_path / "loop", EXAMPLES / "loop.c", folder, "-g",
+                    "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
+    assert said(program).startswith("6000 ticks, 0 braked")
+
+
+@needs_c
+@pytest.mark.slow
+@pytest.mark.skipif(shutil.which("valgrind") is None, reason="no valgrind")
+def test_the_examples_pass_valgrind(generic, tmp_path):
+    """With the library for any x86-64, since valgrind knows no AVX-512."""
+    program = built(tmp_path / "loop", EXAMPLES / "loop.c", generic, "-g")
+    done = subprocess.run(["valgrind", "--error-exitcode=9", "--leak-check=full", program],
+                          capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.slow
+def test_code_for_aarch64_is_made_here(tmp_path):
+    written = write(tmp_path, ["recursive"], "aarch64")
+    content = (tmp_path / "lib" / "libtask_hierarchy.a").read_bytes()
+    elf = content[content.index(b"\x7fELF"):]
+    assert int.from_bytes(elf[18:20], "little") == 183  # EM_AARCH64
+    assert "aarch64" in written.shared
+    assert "th_solve_sns" not in (tmp_path / "include" / "task_hierarchy.h").read_text()
+
+
+@pytest.mark.slow
+def test_header_and_library_state_the_same_version_and_digest(folder, library):
+    header = (folder / "include" / "task_hierarchy.h").read_text()
+    assert f'#define TH_VERSION "{library.text("th_version")}"' in header
+    assert f'#define TH_DIGEST "{library.text("th_digest")}"' in header
+    assert "@" not in header
+    assert "Apache License" in (folder / "share/doc/task_hierarchy/LICENSE").read_text()
+
+
+@pytest.mark.slow
+def test_check_compares_the_kernels(folder, tmp_path, capsys):
+    assert run_command(["library", "--check", "--out", str(folder)]) == 0
+    assert "same kernels" in capsys.readouterr().out
+    other = tmp_path / "other"
+    shutil.copytree(folder, other)
+    header = other / "include" / "task_hierarchy.h"
+    digest = re.search(r'TH_DIGEST "(\w+)"', header.read_text()).group(1)
+    header.write_text(header.read_text().replace(digest, "0" * 16))
+    assert "and libtask_hierarchy.a another" in differs(other)
+    code = other / "lib" / "libtask_hierarchy.a"
+    code.write_bytes(code.read_bytes().replace(digest.encode(), b"0" * 16))
+    assert run_command(["library", "--check", "--out", str(other)]) == 1
+    assert f"those installed have {digest}" in capsys.readouterr().err
+
+
+@pytest.mark.slow
+def test_the_command_writes_a_library(tmp_path, capsys):
+    out = str(tmp_path / "lib")
+    assert run_command(["library", "--out", out, "--resolvers", "recursive"]) == 0
+    assert "libtask_hierarchy.a" in capsys.readouterr().out
+    assert run_command(["library", "--out", out]) == 2
+    assert "not empty" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("options", "words"), [
+    (["--resolvers", "hcdo"], "did you mean 'hcod'"), (["--resolvers", "hqp"], "'hqp'"),
+    (["--resolvers", "hcod,"], "empty name"), (["--target", "x86"], "did you mean 'x86_64'")])
+def test_a_wrong_name_is_an_error_that_names_it(tmp_path, capsys, options, words):
+    assert run_command(["library", "--out", str(tmp_path / "lib"), *options]) == 2
+    assert words in capsys.readouterr().err
+    assert not (tmp_path / "lib").exists()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("target", ["native", "x86_64"])
+def test_kernels_that_are_not_compiled_are_an_error(tmp_path, target):
+    done = subprocess.run(
+        [sys.executable, "-m", "scenarios.cli.main", "library", "--target", target, "--out",
+         tmp_path / "lib"], capture_output=True, text=True, check=False,
+        env={**os.environ, "NUMBA_DISABLE_JIT": "1"})
+    assert done.returncode == 2
+    assert "NUMBA_DISABLE_JIT is set" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_every_resolver_that_the_command_names_has_a_function():
+    assert tuple(entries.RESOLVERS) == RESOLVERS == c.NAMES
+
+
+def test_a_folder_without_a_library_is_an_error(tmp_path):
+    with pytest.raises(HierarchyError, match=r"task_hierarchy\.h is missing"):
+        differs(tmp_path)
+
+
+@pytest.mark.skipif(shutil.which("ar") is None, reason="no ar")
+@pytest.mark.parametrize("content", [b"odd", b"even"])
+def test_ar_reads_the_archive(tmp_path, content):
+    file = tmp_path / "one.a"
+    file.write_bytes(archive("one.o", content, ["first", "second"]))
+    assert said("ar", "t", file) == "one.o\n"
+    assert said("ar", "p", file, "one.o").encode() == content
+    assert "first in one.o\nsecond in one.o" in said("nm", "--print-armap", file)
