@@ -126,7 +126,7 @@ class Robot:
         return cls._of(found, Path(path).stem, end_effector)
 
     @classmethod
-    def load(cls, model: str, end_effector: str | None = None, base: Base | None = None,
+    def load(cls, model: str | Path, end_effector: str | None = None, base: Base | None = None,
              locked: Mapping[str, float] | None = None) -> Robot:
         """Make a robot by a name of `ROBOTS`, a file, or "package:name".
 
@@ -134,6 +134,7 @@ class Robot:
         download files. `locked` joints of a file are fixed at a position [rad or m] and are not
         joints of the robot. Raises RobotError and UnknownNameError.
         """
+        model = str(model)
         if in_package(model):
             robot = cls.from_file(file_of(model), end_effector, base, locked=locked)
             robot.name = model.partition(":")[2]

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from functools import cached_property
 from typing import Any, ClassVar, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hierarchy.errors import HierarchyError, UnknownNameError
+from hierarchy.errors import HierarchyError, UnknownNameError, expect
 from hierarchy.jit import announce_compilation
+from hierarchy.notebook import html_table, numbers
 from hierarchy.problem import Array, Hierarchy
 from solvers.status import TOO_SMALL
 from solvers.status import Status as Status
@@ -52,7 +55,13 @@ class Resolution:
         return None
 
     def __repr__(self) -> str:
-        return f"Resolution(x={self.x}, status={self.status.name}, iterations={self.iterations})"
+        return (f"{type(self).__name__}({self.status.name}, x={numbers(self.x)}, "
+                f"iterations={self.iterations})")
+
+    def _repr_html_(self) -> str:
+        rows = [("status", self.status), ("x", numbers(self.x)), ("iterations", self.iterations),
+                ("memory", "none" if self.memory is None else f"{self.memory.size} numbers")]
+        return html_table(type(self).__name__, (), rows)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -87,6 +96,11 @@ class Resolver(ABC):
     """
     damps_with_bounds: ClassVar[str] = ""
     """The same for a stack with inequalities; empty if the resolver handles none."""
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        super().__init_subclass__(**options)
+        if "solve" in vars(cls):
+            cls.solve = _at_the_door(cls.solve)  # type: ignore[method-assign]
 
     def __post_init__(self) -> None:
         self._number("damping", 0.0, math.inf)
@@ -155,6 +169,37 @@ class Resolver(ABC):
         return Resolution(x, Status(code))
 
 
+Solve = Callable[[Any, Hierarchy, Array | None], Resolution]
+
+
+def _at_the_door(solve: Solve) -> Solve:
+    """Return `solve` with a HierarchyError in place of what a wrong type breaks inside it.
+
+    The arguments are judged after a failure, which costs a correct call next to nothing.
+    """
+    @functools.wraps(solve)
+    def checked(self: Any, h: Hierarchy, memory: Array | None = None) -> Resolution:
+        try:
+            return solve(self, h, memory)
+        except (AttributeError, TypeError):
+            expect(f"{self.name}: h", h, Hierarchy,
+                   "make one with Hierarchy.from_levels([(A, b), ...])")
+            _check_memory(self.name, memory)
+            raise
+
+    return checked
+
+
+def _check_memory(name: str, memory: Any) -> None:
+    if memory is not None:
+        expect(f"{name}: memory", memory, np.ndarray, "give the memory of an earlier resolution, "
+                                                      "res.memory, or None")
+        if memory.dtype != np.float64 or memory.ndim > 2:
+            raise HierarchyError(f"{name}: memory has the type {memory.dtype} and shape "
+                                 f"{memory.shape}; give the memory of an earlier resolution, "
+                                 "res.memory, or None")
+
+
 def set_frozen(record: object, **values: object) -> None:
     """Set fields of a frozen dataclass; only for its own `__post_init__`."""
     for name, value in values.items():
@@ -193,6 +238,7 @@ def make(name: str, /, **settings: Any) -> Resolver:
     ------
     HierarchyError : no such resolver or setting (suggests the nearest), or an invalid value.
     """
+    expect("make", name, str, f"names are {', '.join(names())}")
     if name not in _REGISTRY:
         raise UnknownNameError("resolver", name, _REGISTRY)
     announce_compilation()

@@ -185,6 +185,12 @@ class Scenario(Section):
         change_all(data, changes, self.tag_at)
         return validated(Scenario, data, f"scenario {self.name!r}")
 
+    def __repr__(self) -> str:
+        return (f"Scenario({self.name!r}, robot={self.robot.model!r}, "
+                f"resolver={self.control.resolver!r})")
+
+    __str__ = __repr__
+
     @classmethod
     def tag_at(cls, path: Sequence[str]) -> Tag | None:
         """Return which key says the kind of the section at a path, None if there is one kind."""

@@ -49,7 +49,13 @@ def hierarchy(configuration: object, n: int, period: float, limits: Sequence[Lim
         together = entry if isinstance(entry, Sequence) else [entry]
         packed.append(_packed([task_rows(task, configuration, period) for task in together], n))
         kept.append(" + ".join(map(label, together)))
-    return Hierarchy.from_levels(packed, np.zeros(n), kept)
+    return Hierarchy.from_levels(packed, np.zeros(n), _apart(kept))
+
+
+def _apart(names: Sequence[str]) -> list[str]:
+    """Return names with a number where one occurs again: two tasks may be of one frame."""
+    return [name if name not in names[:i] else f"{name} ({names[:i].count(name) + 1})"
+            for i, name in enumerate(names)]
 
 
 def task_rows(task: Task, configuration: object, period: float, weighted: bool = True
