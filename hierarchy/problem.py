@@ -182,5 +182,5 @@ def _array(what: str, value: Any) -> Array:
             return np.array(given, dtype=np.float64)
     except (TypeError, ValueError) as error:
         raise HierarchyError(f"{what} is not an array of numbers: {brief(value)}") from error
-    kind = "complex" if given.dtype.kind == "c" else str(given.dtype)
-    raise HierarchyError(f"{what} is not an array of real numbers: it is {kind}, {brief(value)}")
+    kind = "real numbers: it is complex," if given.dtype.kind == "c" else "numbers:"
+    raise HierarchyError(f"{what} is not an array of {kind} {brief(value)}")

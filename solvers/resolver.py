@@ -13,7 +13,8 @@ from typing import Any, ClassVar, Literal, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from hierarchy.errors import HierarchyError, UnknownNameError, expect
+from hierarchy import plugins
+from hierarchy.errors import HierarchyError, UnknownNameError, brief, expect
 from hierarchy.jit import announce_compilation
 from hierarchy.notebook import html_table, numbers
 from hierarchy.problem import Array, Hierarchy
@@ -173,31 +174,23 @@ Solve = Callable[[Any, Hierarchy, Array | None], Resolution]
 
 
 def _at_the_door(solve: Solve) -> Solve:
-    """Return `solve` with a HierarchyError in place of what a wrong type breaks inside it.
+    """Return `solve` with a HierarchyError for arguments of a wrong type.
 
-    The arguments are judged after a failure, which costs a correct call next to nothing.
+    The hierarchy is judged after a failure, which costs a correct call next to nothing.
     """
     @functools.wraps(solve)
     def checked(self: Any, h: Hierarchy, memory: Array | None = None) -> Resolution:
+        if memory is not None and (type(memory) is not np.ndarray or memory.dtype != np.float64):
+            raise HierarchyError(f"{self.name}: memory: got {brief(memory)}; give the memory of an "
+                                 "earlier resolution, res.memory, or None")
         try:
             return solve(self, h, memory)
         except (AttributeError, TypeError):
             expect(f"{self.name}: h", h, Hierarchy,
                    "make one with Hierarchy.from_levels([(A, b), ...])")
-            _check_memory(self.name, memory)
             raise
 
     return checked
-
-
-def _check_memory(name: str, memory: Any) -> None:
-    if memory is not None:
-        expect(f"{name}: memory", memory, np.ndarray, "give the memory of an earlier resolution, "
-                                                      "res.memory, or None")
-        if memory.dtype != np.float64 or memory.ndim > 2:
-            raise HierarchyError(f"{name}: memory has the type {memory.dtype} and shape "
-                                 f"{memory.shape}; give the memory of an earlier resolution, "
-                                 "res.memory, or None")
 
 
 def set_frozen(record: object, **values: object) -> None:
@@ -231,6 +224,15 @@ def names() -> tuple[str, ...]:
     return tuple(sorted(name for name, kind in _REGISTRY.items() if kind.handles != "activations"))
 
 
+def _find_elsewhere(name: str) -> None:
+    """Register the resolver that a plugin has under a name; UnknownNameError if there is none."""
+    found = plugins.find("resolvers", name)
+    if name not in _REGISTRY:  # a plugin may have used `register` of this module
+        if not (isinstance(found, type) and issubclass(found, Resolver)):
+            raise UnknownNameError("resolver", name, {*_REGISTRY, *plugins.own("resolvers")})
+        _REGISTRY[name] = found
+
+
 def make(name: str, /, **settings: Any) -> Resolver:
     """Return the resolver called `name` with these settings and defaults for the rest.
 
@@ -238,9 +240,9 @@ def make(name: str, /, **settings: Any) -> Resolver:
     ------
     HierarchyError : no such resolver or setting (suggests the nearest), or an invalid value.
     """
-    expect("make", name, str, f"names are {', '.join(names())}")
+    expect("make", name, str, "give one of solvers.names()")
     if name not in _REGISTRY:
-        raise UnknownNameError("resolver", name, _REGISTRY)
+        _find_elsewhere(name)
     announce_compilation()
     kind = _REGISTRY[name]
     known = [field.name for field in dataclasses.fields(kind)]

@@ -8,7 +8,7 @@ from math import radians
 import numpy as np
 
 from hierarchy import HierarchyError, Robot, State, Task
-from hierarchy.errors import UnknownNameError
+from hierarchy.errors import UnknownNameError, brief
 from hierarchy.paths import Path, Shifted, Still
 from hierarchy.problem import Array
 from hierarchy.tasks import (
@@ -23,6 +23,7 @@ from hierarchy.tasks import (
     Posture,
     TorqueLimits,
 )
+from scenarios.cell.own import make_own
 from scenarios.cell.paths import make_path
 from scenarios.cell.robot import sensed_points
 from scenarios.config import Scenario, ScenarioError
@@ -33,6 +34,7 @@ from scenarios.config.tasks import (
     ListedPointing,
     ListedPose,
     ListedPosture,
+    OwnTask,
     PointingSection,
     PositionTask,
     PostureSection,
@@ -110,6 +112,8 @@ def task_of(section: AnyTask, start: State) -> Task:
 
 
 def _task(section: AnyTask, start: State) -> Task:
+    if isinstance(section, OwnTask):
+        return _own(section, start)
     robot = start.robot
     gains = (section.stiffness, section.damping, section.gain)
     name = section.title
@@ -128,6 +132,16 @@ def _task(section: AnyTask, start: State) -> Task:
         rotation = start.rotation(frame) if section.rotation is None else section.rotation
         return Pose(frame, path, rotation, *gains, name=name)
     return Position(frame, path, *gains, name=name)
+
+
+def _own(section: OwnTask, start: State) -> Task:
+    task = make_own(section, start.robot, state=start, name=section.title)
+    if not isinstance(task, Task):
+        raise ScenarioError(f"task {section.title!r}: the plugin made {brief(task)}, not a Task")
+    if task.name != section.title:
+        raise ScenarioError(f"task {section.title!r}: its name is {task.name!r}; take the name as "
+                            "the parameter `name`, or give the section this name")
+    return task
 
 
 def _path(section: PositionTask | ListedPose | ListedCentreOfMass, here: Array) -> Path:

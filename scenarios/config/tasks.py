@@ -8,9 +8,12 @@ from __future__ import annotations
 
 from typing import Annotated, ClassVar, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import Discriminator, Field, Tag, model_validator
 
+from hierarchy.plugins import Door
+from scenarios.config.own import OwnSection
 from scenarios.config.sections import (
+    PLUGIN,
     Finite,
     Flag,
     NotNegative,
@@ -19,6 +22,7 @@ from scenarios.config.sections import (
     Rows3,
     Section,
     Vector3,
+    kind_or,
 )
 
 Rows = Literal["equality", "inequality"]
@@ -26,8 +30,12 @@ TaskName = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_ -]*$")]
 
 
 class TaskSection(Section):
-    """What every task has: gains of its error, in [1/s^2] and [1/s] (acceleration) and [1/s]."""
+    """What every task has: gains of its error, in [1/s^2] and [1/s] (acceleration) and [1/s].
 
+    `unit` is that of its error, "m", "rad" or "".
+    """
+
+    unit: ClassVar[str] = "m"
     stiffness: NotNegative = 40.0
     damping: NotNegative = 20.0
     gain: NotNegative = 10.0
@@ -68,10 +76,16 @@ class PointingTask(TaskSection):
     damping: NotNegative = 2.0
     gain: NotNegative = 5.0
 
+    @property
+    def one_sided(self) -> bool:
+        """Whether its rows are inequalities."""
+        return self.rows == "inequality"
+
 
 class PostureTask(TaskSection):
     """All joints to a posture."""
 
+    unit: ClassVar[str] = "rad"
     target: tuple[Finite, ...] | None = None
     joints: dict[str, Finite] = Field(default_factory=dict)
     stiffness: NotNegative = 10.0
@@ -107,6 +121,11 @@ class _Listed(Section):
     name: TaskName | None = None
 
     @property
+    def one_sided(self) -> bool:
+        """Whether its rows are inequalities."""
+        return False
+
+    @property
     def title(self) -> str:
         """The task's name in stacks, messages and tables."""
         return self.name or str(getattr(self, "kind", ""))
@@ -134,7 +153,7 @@ class ListedCentreOfMass(_Listed, _AlongSection):
     axes: Literal["x", "y", "z", "xy", "xz", "yz", "xyz"] = "xyz"
 
 
-class ListedPointing(_Listed, PointingTask):
+class ListedPointing(PointingTask, _Listed):
     """The z axis of `frame` at `alpha_d` [deg] from `axis`, or with "inequality" at most that."""
 
     kind: Literal["pointing"]
@@ -147,9 +166,24 @@ class ListedPosture(_Listed, PostureTask):
     kind: Literal["posture"]
 
 
+class OwnTask(_Listed, OwnSection):
+    """A task of a plugin; its keys are those of the plugin."""
+
+    door: ClassVar[Door] = "tasks"
+    unit: ClassVar[str] = ""
+
+    @property
+    def one_sided(self) -> bool:
+        """Whether its rows are inequalities, as the plugin's class says with `kind`."""
+        return str(getattr(self.maker, "kind", "equality")) == "inequality"
+
+
+_KINDS = ("position", "pose", "com", "pointing", "posture")
 ListedTask = Annotated[
-    ListedPosition | ListedPose | ListedCentreOfMass | ListedPointing | ListedPosture,
-    Field(discriminator="kind")]
+    Annotated[ListedPosition, Tag("position")] | Annotated[ListedPose, Tag("pose")]
+    | Annotated[ListedCentreOfMass, Tag("com")] | Annotated[ListedPointing, Tag("pointing")]
+    | Annotated[ListedPosture, Tag("posture")] | Annotated[OwnTask, Tag(PLUGIN)],
+    Discriminator(kind_or(None, "tasks", _KINDS))]
 AnyTask = PositionSection | PointingSection | PostureSection | ListedTask
 
 

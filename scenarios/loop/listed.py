@@ -69,5 +69,5 @@ def errors(recording: Recording) -> Iterator[tuple[ListedTask, str, Array]]:
             yield section, "deg", np.maximum(beyond, 0.0 if section.rows == "inequality"
                                              else -beyond)
         else:
-            unit = "rad" if section.kind == "posture" else "m"
-            yield section, unit, np.linalg.norm(error, axis=1)
+            missed = np.maximum(error, 0.0) if section.one_sided else error
+            yield section, section.unit, np.linalg.norm(missed, axis=1)
