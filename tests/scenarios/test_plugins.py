@@ -2,6 +2,7 @@
 
 import sys
 from importlib.metadata import distributions
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -225,7 +226,7 @@ def test_check_and_run_use_what_an_allowed_plugin_brings(capsys):
     code, text = said(["run", "own.toml", "--plugin", "doors_of_mine", "--out", "a"], capsys)
     assert code == 0, text
     assert 'plugins = [\n    "doors_of_mine",\n]' in (
-        open("a/scenario.toml", encoding="utf-8").read())
+        Path("a/scenario.toml").read_text(encoding="utf-8"))
 
 
 @pytest.mark.slow
@@ -350,7 +351,7 @@ def test_a_name_of_an_entry_point_is_found_without_being_imported_first(group, l
 
 def test_an_entry_point_that_leads_nowhere_is_named(folder):
     install(folder, "resolvers", "ghost = nowhere_at_all:Ghost")
-    with pytest.raises(HierarchyError, match="entry point 'ghost' of task_hierarchy.resolvers "
+    with pytest.raises(HierarchyError, match="entry point 'ghost' of task_hierarchy\\.resolvers "
                                              "cannot be imported"):
         make("ghost")
 
@@ -359,7 +360,7 @@ def test_two_things_of_one_name_are_refused():
     plugins.register("tasks", "thing")(type("One", (), {}))
     with pytest.raises(HierarchyError, match="tasks: 'thing' is already"):
         plugins.register("tasks", "thing")(type("Two", (), {}))
-    with pytest.raises(HierarchyError, match="unknown door 'task'; did you mean 'tasks'?"):
+    with pytest.raises(HierarchyError, match="unknown door 'task'; did you mean 'tasks'"):
         plugins.register("task", "thing")
 
 
