@@ -125,9 +125,8 @@ class Robot:
         if isinstance(made, str | Path):
             made = cls.from_file(made, base=base)
         elif isinstance(made, Table):
-            robot = cls._of(from_table(made, base), name)
-            robot.table = made
-            return robot
+            table, made = made, cls._of(from_table(made, base), name)
+            made.table = table
         expect(f"robot {name!r} of a plugin", made, cls, "return a Robot, a table or a file")
         robot: Robot = made
         robot.name = name

@@ -101,7 +101,7 @@ class Resolver(ABC):
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)
         if "solve" in vars(cls):
-            cls.solve = _at_the_door(cls.solve)  # type: ignore[method-assign]
+            cls.solve = _at_the_door(cls.solve)  # type: ignore[assignment,method-assign]
 
     def __post_init__(self) -> None:
         self._number("damping", 0.0, math.inf)

@@ -8,7 +8,7 @@ from math import radians
 import numpy as np
 
 from hierarchy import HierarchyError, Robot, State, Task
-from hierarchy.errors import UnknownNameError, brief
+from hierarchy.errors import UnknownNameError
 from hierarchy.paths import Path, Shifted, Still
 from hierarchy.problem import Array
 from hierarchy.tasks import (
@@ -23,22 +23,23 @@ from hierarchy.tasks import (
     Posture,
     TorqueLimits,
 )
-from scenarios.cell.own import make_own
 from scenarios.cell.paths import make_path
 from scenarios.cell.robot import sensed_points
+from scenarios.cell.special import special_task
 from scenarios.config import Scenario, ScenarioError
 from scenarios.config.avoidance import AvoidanceSection
-from scenarios.config.tasks import (
+from scenarios.config.listed import (
     AnyTask,
     ListedCentreOfMass,
     ListedPointing,
     ListedPose,
+    ListedPosition,
     ListedPosture,
-    OwnTask,
-    PointingSection,
-    PositionTask,
-    PostureSection,
 )
+from scenarios.config.tasks import PointingSection, PositionSection, PositionTask, PostureSection
+
+_OF_A_FRAME = (PositionSection, PointingSection, PostureSection, ListedPosition, ListedPose,
+               ListedCentreOfMass, ListedPointing, ListedPosture)
 
 
 def limits_of(scenario: Scenario, robot: Robot) -> tuple[JointLimits | None, list[Task]]:
@@ -112,8 +113,8 @@ def task_of(section: AnyTask, start: State) -> Task:
 
 
 def _task(section: AnyTask, start: State) -> Task:
-    if isinstance(section, OwnTask):
-        return _own(section, start)
+    if not isinstance(section, _OF_A_FRAME):
+        return special_task(section, start)
     robot = start.robot
     gains = (section.stiffness, section.damping, section.gain)
     name = section.title
@@ -132,16 +133,6 @@ def _task(section: AnyTask, start: State) -> Task:
         rotation = start.rotation(frame) if section.rotation is None else section.rotation
         return Pose(frame, path, rotation, *gains, name=name)
     return Position(frame, path, *gains, name=name)
-
-
-def _own(section: OwnTask, start: State) -> Task:
-    task = make_own(section, start.robot, state=start, name=section.title)
-    if not isinstance(task, Task):
-        raise ScenarioError(f"task {section.title!r}: the plugin made {brief(task)}, not a Task")
-    if task.name != section.title:
-        raise ScenarioError(f"task {section.title!r}: its name is {task.name!r}; take the name as "
-                            "the parameter `name`, or give the section this name")
-    return task
 
 
 def _path(section: PositionTask | ListedPose | ListedCentreOfMass, here: Array) -> Path:

@@ -106,8 +106,9 @@ def list_(plugin: Plugins = None, as_json: AsJson = False) -> None:
                "tasks": {name: first_line(task) for name, task in TASKS.items()},
                "robots": {name: in_words(table) for name, table in ROBOTS.items()}}
     for door in plugins.DOORS:
-        entries.setdefault(door, {}).update({
-            name: f"{first_line(thing)} (plugin)" for name, thing in plugins.own(door).items()})
+        if own := plugins.own(door):
+            entries.setdefault(door, {}).update({
+                name: f"{first_line(thing)} (plugin)" for name, thing in own.items()})
     if as_json:
         return print_json(entries)
     for what, named in entries.items():

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable
-from typing import Any, ClassVar, Self, get_args, get_origin, get_type_hints
+from typing import Any, ClassVar, Self, cast, get_args, get_origin, get_type_hints
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model, model_validator
 
@@ -45,8 +45,9 @@ class OwnSection(Section):
     @property
     def maker(self) -> Maker:
         """What the plugin registered under this kind."""
-        found: Maker = plugins.find(self.door, self.kind)
-        return found
+        found = plugins.find(self.door, self.kind)
+        assert found is not None, "the kind was found when the section was read"
+        return cast(Maker, found)
 
     def settings(self) -> dict[str, tuple[Any, Any]]:
         """Return annotation and value of each key; raises ValueError for a wrong one."""
@@ -69,9 +70,9 @@ def _said(kind: str, error: Any, known: dict[str, inspect.Parameter]) -> str:
 
 def _parameters(maker: Maker, door: Door) -> dict[str, inspect.Parameter]:
     """Return the parameters of a maker that are keys, with annotations that are not text."""
-    init = maker.__init__ if isinstance(maker, type) else maker
     try:
-        hints = get_type_hints(init)
+        hints = get_type_hints(inspect.getattr_static(maker, "__init__")
+                               if isinstance(maker, type) else maker)
     except NameError:  # a name that is imported for type checkers only
         hints = {}
     return {name: parameter.replace(annotation=hints.get(name, Any))

@@ -45,17 +45,27 @@ def load(name_or_path: str | Path, changes: Sequence[str] | Mapping[str, Any] = 
         changes = parse_changes(changes, what="--set")
     _list_points_as_tables(data)
     change_all(data, changes, Scenario.tag_at)
-    robot = data.get("robot")
-    if isinstance(robot, dict) and not in_package(model := str(robot.get("model", ""))) and (
-            model.endswith((".urdf", ".xml", ".mjcf"))):
-        robot["model"] = str(path.parent.resolve() / robot["model"])
-    sensor = data.get("sensor")
-    folder = sensor.get("folder") if isinstance(sensor, dict) else None
-    if isinstance(folder, str) and not (LIBRARY / "frames" / folder).is_dir():
-        data["sensor"]["folder"] = str(path.parent.resolve() / folder)
+    _make_files_absolute(data, path.parent.resolve())
     what = str(path) if path.parent != LIBRARY else f"scenario {path.stem!r}"
     _require_plugins(data, what)
     return validated(Scenario, data, what)
+
+
+def _make_files_absolute(data: dict[str, Any], here: Path) -> None:
+    """Put the folder `here` in front of the files that a scenario names."""
+    robot = data.get("robot")
+    if isinstance(robot, dict) and not in_package(model := str(robot.get("model", ""))) and (
+            model.endswith((".urdf", ".xml", ".mjcf"))):
+        robot["model"] = str(here / robot["model"])
+    sensor = data.get("sensor")
+    folder = sensor.get("folder") if isinstance(sensor, dict) else None
+    if isinstance(folder, str) and not (LIBRARY / "frames" / folder).is_dir():
+        data["sensor"]["folder"] = str(here / folder)
+    listed = data.get("tasks")
+    for task in (data.get("position"), *(listed if isinstance(listed, list) else ())):
+        along = task.get("path") if isinstance(task, dict) else None
+        if isinstance(along, dict) and isinstance(along.get("file"), str):
+            along["file"] = str(here / along["file"])
 
 
 def _require_plugins(data: dict[str, Any], what: str) -> None:

@@ -17,6 +17,7 @@ from scenarios.config.changes import Tag, change_all, parse_changes, without_non
 from scenarios.config.control import ControlSection
 from scenarios.config.distributions import Parameters
 from scenarios.config.faults import FaultSection
+from scenarios.config.listed import ListedTask
 from scenarios.config.plant import KinematicSection, PlantKind
 from scenarios.config.robot import RobotSection, StartSection
 from scenarios.config.sections import Section
@@ -25,7 +26,6 @@ from scenarios.config.stacks import RIVALS, unfit
 from scenarios.config.tasks import (
     DampingSection,
     LimitsSection,
-    ListedTask,
     PointingSection,
     PointingTask,
     PositionSection,
@@ -122,6 +122,16 @@ class Scenario(Section):
         for name, count in Counter(names).items():
             if count > 1:
                 raise ValueError(f"{count} tasks are named {name!r}; give each its own name")
+        return self
+
+    @model_validator(mode="after")
+    def _lists_collision_once(self) -> Self:
+        listed = [task for task in self.tasks if task.kind == "collision"]
+        if listed and (self.avoidance is None or self.avoidance.kind != "separation"):
+            raise ValueError('a task of kind "collision" needs [avoidance] with kind = '
+                             '"separation", which says what is kept apart')
+        if len(listed) > 1:
+            raise ValueError(f'{len(listed)} tasks are of kind "collision"')
         return self
 
     @model_validator(mode="after")

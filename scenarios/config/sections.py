@@ -102,12 +102,45 @@ class EllipseSection(_AnyPath):
 
 
 class WaypointsSection(_AnyPath):
-    """Points [m] at increasing times [s], at rest at each point."""
+    """Points [m] at increasing times [s], at rest at each point.
+
+    With `blend` [s] it passes each point in a curve of that time, without stopping, half of it
+    later: see hierarchy.paths.Blended.
+    """
 
     kind: Literal["waypoints"]
     times: tuple[NotNegative, ...]
     points: tuple[Vector3, ...]
+    blend: Positive | None = None
 
 
-PathSection = Annotated[StillSection | EllipseSection | WaypointsSection,
-                        Field(discriminator="kind")]
+class LineSection(_AnyPath):
+    """Straight from `start` to `end` [m] within `duration` [s], from `begin` [s] on."""
+
+    kind: Literal["line"]
+    start: Vector3
+    end: Vector3
+    duration: Positive
+    begin: NotNegative = 0.0
+
+
+class CircleSection(_AnyPath):
+    """A circle of `radius` [m] about `normal`; rate [rad/s], phase [rad]."""
+
+    kind: Literal["circle"]
+    centre: Vector3
+    radius: NotNegative
+    normal: Vector3 = (0.0, 0.0, 1.0)
+    rate: Finite = 1.0
+    phase: Finite = 0.0
+
+
+class RecordedSection(_AnyPath):
+    """A recorded motion: a CSV `file` with t [s], x, y, z [m], relative to the scenario's file."""
+
+    kind: Literal["recorded"]
+    file: str
+
+
+PathSection = Annotated[StillSection | LineSection | CircleSection | EllipseSection
+                        | WaypointsSection | RecordedSection, Field(discriminator="kind")]

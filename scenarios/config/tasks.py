@@ -1,28 +1,22 @@
-"""The keys of tasks: of [position], [pointing] and [posture], and of `[[tasks]]`.
+"""The keys of the tasks of the end effector and of all joints, of [limits] and [damping].
 
-Each kind of task is one class. The sections are tasks of the end effector and of all joints;
-`[[tasks]]` adds names and frames.
+Each kind of task is one class; `scenarios.config.listed` adds names and frames for `[[tasks]]`.
 """
 
 from __future__ import annotations
 
 from typing import Annotated, ClassVar, Literal, Self
 
-from pydantic import Discriminator, Field, Tag, model_validator
+from pydantic import Field, model_validator
 
-from hierarchy.plugins import Door
-from scenarios.config.own import OwnSection
 from scenarios.config.sections import (
-    PLUGIN,
     Finite,
     Flag,
     NotNegative,
     PathSection,
     Positive,
-    Rows3,
     Section,
     Vector3,
-    kind_or,
 )
 
 Rows = Literal["equality", "inequality"]
@@ -41,7 +35,7 @@ class TaskSection(Section):
     gain: NotNegative = 10.0
 
 
-class _AlongSection(TaskSection):
+class AlongSection(TaskSection):
     """Follow `path`, or stay at the initial position without one, shifted by `offset` [m].
 
     With `from_start` the path is relative to the initial position.
@@ -58,7 +52,7 @@ class _AlongSection(TaskSection):
         return self
 
 
-class PositionTask(_AlongSection):
+class PositionTask(AlongSection):
     """The origin of a frame along a path (3 rows)."""
 
 
@@ -113,78 +107,6 @@ class PostureSection(PostureTask):
 
     title: ClassVar[str] = "posture"
     role: Literal["null-space", "task"] = "null-space"
-
-
-class _Listed(Section):
-    """A task of `[[tasks]]`; its name defaults to its kind."""
-
-    name: TaskName | None = None
-
-    @property
-    def one_sided(self) -> bool:
-        """Whether its rows are inequalities."""
-        return False
-
-    @property
-    def title(self) -> str:
-        """The task's name in stacks, messages and tables."""
-        return self.name or str(getattr(self, "kind", ""))
-
-
-class ListedPosition(_Listed, PositionTask):
-    """The origin of `frame` along a path (3 rows), by default its initial position."""
-
-    kind: Literal["position"]
-    frame: str
-
-
-class ListedPose(_Listed, _AlongSection):
-    """Origin and axes of `frame` (6 rows); `rotation` (rows) defaults to the initial one."""
-
-    kind: Literal["pose"]
-    frame: str
-    rotation: Rows3 | None = None
-
-
-class ListedCentreOfMass(_Listed, _AlongSection):
-    """The centre of mass along some of the axes "x", "y", "z" of the world."""
-
-    kind: Literal["com"]
-    axes: Literal["x", "y", "z", "xy", "xz", "yz", "xyz"] = "xyz"
-
-
-class ListedPointing(PointingTask, _Listed):
-    """The z axis of `frame` at `alpha_d` [deg] from `axis`, or with "inequality" at most that."""
-
-    kind: Literal["pointing"]
-    frame: str
-
-
-class ListedPosture(_Listed, PostureTask):
-    """All joints to `target` [rad or m], by default the start; `joints` override it by name."""
-
-    kind: Literal["posture"]
-
-
-class OwnTask(_Listed, OwnSection):
-    """A task of a plugin; its keys are those of the plugin."""
-
-    door: ClassVar[Door] = "tasks"
-    unit: ClassVar[str] = ""
-
-    @property
-    def one_sided(self) -> bool:
-        """Whether its rows are inequalities, as the plugin's class says with `kind`."""
-        return str(getattr(self.maker, "kind", "equality")) == "inequality"
-
-
-_KINDS = ("position", "pose", "com", "pointing", "posture")
-ListedTask = Annotated[
-    Annotated[ListedPosition, Tag("position")] | Annotated[ListedPose, Tag("pose")]
-    | Annotated[ListedCentreOfMass, Tag("com")] | Annotated[ListedPointing, Tag("pointing")]
-    | Annotated[ListedPosture, Tag("posture")] | Annotated[OwnTask, Tag(PLUGIN)],
-    Discriminator(kind_or(None, "tasks", _KINDS))]
-AnyTask = PositionSection | PointingSection | PostureSection | ListedTask
 
 
 class LimitsSection(Section):
