@@ -17,7 +17,7 @@ BASE = {"name": "listed", "robot": {"model": "kuka_lwr"},
 COUPLING = {"kind": "coupling", "joints": {"joint_2": 1.0, "joint_5": -0.5}, "value": -1.0}
 LOOK = {"kind": "look-at", "frame": "end_effector", "target": [0.3, 0.9, 0.9]}
 RELATIVE = {"kind": "relative", "frame": "end_effector", "to": "joint_3",
-            "position": [0.35, -0.1, 0.55]}
+            "position": [0.405, -0.065, 0.521]}
 
 
 def scenario_of(tmp_path, *tasks, **sections):
