@@ -10,10 +10,11 @@ from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array, Hierarchy, check_rows
-from solvers.adapters.packing import ODD, narrow, write_bounds, write_several, write_task
+from solvers.adapters.packing import ODD, damp, narrow, write_bounds, write_several, write_task
 
 _NO_DAMPING = 1e-12  # pink's default, a regularisation of its QP that ours does not need
 
@@ -51,86 +52,119 @@ def hierarchy(configuration: object, n: int, period: float, limits: Sequence[Lim
     n unknowns [rad/s or m/s]; period [s]. An entry of `tasks` is a task, or a sequence of tasks
     that share a level, weighted by their costs. Constraints have no cost, as in pink and mink.
     Without `pull` a task's lm_damping is refused; with it, each level asks for no more than its
-    own damped step would reach, see `_damped`.
+    own damped step would reach.
     """
     if not 0.0 < period < np.inf:
         raise HierarchyError(f"period {period} s must be positive and finite")
     entries = [entry if isinstance(entry, Sequence) else [entry] for entry in tasks]
-    packed = _Packed(configuration, n, period, pull)
-    packed.add_limits([(_plain(G), _plain(h)) for G, h in limits])
+    damped = pull is not None
+    levels = [(" + ".join(map(label, together)),
+               [_read(task, configuration, damped) for task in together]) for together in entries]
     if constraints:
-        packed.add("constraints", constraints, weighted=False)
-    for together in entries:
-        packed.add(" + ".join(map(label, together)), together)
+        held = [_read(task, configuration, damped, weighted=False) for task in constraints]
+        levels.insert(0, ("constraints", held))
+    found = _Limits.of(limits, n, period)
+    packed = _Packed(n, found.most + sum(len(one.e) for _, read in levels for one in read))
+    packed.keep("limits", found.write(packed))
+    for name, read in levels:
+        last = packed.write(read, period)
+        if pull is not None and name != "constraints":
+            packed.damp(last, sum(one.damping for one in read), pull)
+        packed.keep(name, last)
     return packed.hierarchy()
 
 
 class _Packed:
-    """Rows of levels in the order in which they are added."""
+    """Arrays for at most `most` rows, and the levels written so far."""
 
-    def __init__(self, configuration: object, n: int, period: float, pull: Pull | None) -> None:
-        self.configuration, self.n, self.period, self.pull = configuration, n, period, pull
-        self.reference = np.zeros(n)
+    def __init__(self, n: int, most: int) -> None:
+        self.A, (self.lower, self.upper) = np.empty((most, n)), np.empty((2, most))
+        self.reference, self.rows = np.zeros(n), 0
         self.names: list[str] = []
-        self.levels: list[tuple[Array, Array, Array]] = []
+        self.sizes: list[int] = []
 
-    def add_limits(self, limits: Sequence[Limit]) -> None:
-        """Add the level of limits, if there is one."""
-        A, lower, upper = limit_level(limits, self.n, self.period)
-        self._keep("limits", A, lower, upper)
-
-    def add(self, name: str, tasks: Sequence[Task], weighted: bool = True) -> None:
-        """Add a level of tasks that share it; raises HierarchyError for one that is no rows."""
-        read = [_read(task, self.configuration, self.pull is not None, weighted) for task in tasks]
-        A = np.empty((sum(len(one.e) for one in read), self.n))
-        b, row = np.empty((2, len(A))), 0
-        for one, task in zip(read, tasks, strict=True):
-            found = write_task(one.J, one.e, one.cost, one.gain / self.period, A, b[0], b[1], row)
-            if found == ODD:
-                check_rows(label(task), one.J, one.e, one.e)
-                raise HierarchyError(f"{label(task)}: its costs {one.cost} or gain {one.gain} are "
-                                     "not finite")
-            row = found
-        A, target = A[:row], b[0, :row]
-        if weighted and self.pull is not None:
-            target = self._damped(A, target, sum(one.damping for one in read))
-        self._keep(name, A, target, target)
-
-    def _damped(self, A: Array, b: Array, own: float) -> Array:
-        """Return what A x is for the x that minimises |A x - b|^2 + own |x|^2 + the pull.
-
-        A level that asks for this is met by that x alone, as in pink, and leaves its null space to
-        the levels below; a strict level cannot weigh its own step against its target.
-        """
-        assert self.pull is not None
-        weight = own + self.pull.weight
-        if weight <= _NO_DAMPING or not len(A):
-            return b
-        centre = self.pull.weight / weight * self.pull.centre
-        self.reference = centre
-        there = A @ centre
-        square = A @ A.T
-        step = np.linalg.solve(square + weight * np.eye(len(A)), b - there)
-        return np.asarray(there + square @ step)
-
-    def _keep(self, name: str, A: Array, lower: Array, upper: Array) -> None:
-        if len(A):
+    def keep(self, name: str, last: int) -> None:
+        """Make the rows written up to `last` a level, unless there are none."""
+        if last > self.rows:
             again = self.names.count(name)
             self.names.append(f"{name} ({again + 1})" if again else name)
-            self.levels.append((A, lower, upper))
+            self.sizes.append(last - self.rows)
+            self.rows = last
+
+    def write(self, read: Sequence[_Read], period: float) -> int:
+        """Write the rows of tasks that share a level; return the row after them."""
+        row = self.rows
+        for one in read:
+            found = write_task(one.J, one.e, one.cost, one.gain / period, self.A, self.lower,
+                               self.upper, row)
+            if found == ODD:
+                check_rows(label(one.task), one.J, one.e, one.e)
+                raise HierarchyError(f"{label(one.task)}: its costs {one.cost} or gain {one.gain} "
+                                     "are not finite")
+            row = int(found)
+        return row
+
+    def damp(self, last: int, own: float, pull: Pull) -> None:
+        """Ask of the rows up to `last` for no more than a damped step reaches.
+
+        They ask for A x of the x that minimises |A x - b|^2 + own |x|^2 + the pull. That x alone meets it, as in pink, and its null space is left to the levels below; a strict
+        level cannot weigh its own step against its target.
+        """
+        weight = own + pull.weight
+        if weight > _NO_DAMPING:
+            self.reference = pull.weight / weight * pull.centre
+            damp(self.A, self.lower, weight, self.reference, self.rows, last)
+            self.upper[self.rows:last] = self.lower[self.rows:last]
 
     def hierarchy(self) -> Hierarchy:
         """Return the levels; a level is named like another one with a number."""
-        if not self.levels:
-            return Hierarchy.from_levels([], self.reference)
-        A, lower, upper = (np.concatenate(parts) for parts in zip(*self.levels, strict=True))
-        sizes = np.array([len(level[0]) for level in self.levels], dtype=np.int64)
-        return Hierarchy(A, lower, upper, sizes, self.reference, tuple(self.names))
+        m = self.rows
+        return Hierarchy(self.A[:m], self.lower[:m], self.upper[:m],
+                         np.array(self.sizes, dtype=np.int64), self.reference, tuple(self.names))
+
+
+class _Limits(NamedTuple):
+    """Rows G x <= h / period, sorted: bounds of single unknowns, and marks of the other rows."""
+
+    lower: Array
+    upper: Array
+    pairs: list[Limit]
+    several: list[NDArray[np.bool_]]
+    left: int
+    period: float
+
+    @classmethod
+    def of(cls, limits: Iterable[Limit], n: int, period: float) -> _Limits:
+        """Sort rows; raises HierarchyError for numbers that are not finite."""
+        pairs = [(_plain(G), _plain(h)) for G, h in limits]
+        lower, upper = np.full(n, -np.inf), np.full(n, np.inf)
+        several, left = [np.empty(len(h), dtype=np.bool_) for _, h in pairs], 0
+        for (G, h), mark in zip(pairs, several, strict=True):
+            found = narrow(G, h, period, lower, upper, mark)
+            if found == ODD:
+                check_rows("limits", G, np.full(len(h), -np.inf), h)
+            left += int(found)
+        return cls(lower, upper, pairs, several, left, period)
+
+    @property
+    def most(self) -> int:
+        """The largest number of rows that `write` may write."""
+        return self.left + 2 * len(self.lower)
+
+    def write(self, packed: _Packed) -> int:
+        """Write all rows from row 0 on, and return how many."""
+        row = write_bounds(self.lower, self.upper, packed.A, packed.lower, packed.upper)
+        for (G, h), mark in zip(self.pairs, self.several, strict=True):
+            if self.left:
+                row = write_several(G, h, self.period, mark, packed.A, packed.lower, packed.upper,
+                                    row)
+        return int(row)
 
 
 class _Read(NamedTuple):
     """What a task says: J (k, n), e (k,), cost (k,), gain, and the weight of its lm_damping."""
 
+    task: Task
     J: Array
     e: Array
     cost: Array
@@ -138,7 +172,7 @@ class _Read(NamedTuple):
     damping: float
 
 
-def _read(task: Task, configuration: object, damped: bool, weighted: bool) -> _Read:
+def _read(task: Task, configuration: object, damped: bool, weighted: bool = True) -> _Read:
     if not (hasattr(task, "compute_error") and hasattr(task, "compute_jacobian")):
         raise HierarchyError(f"{label(task)}: not a task with an error and a Jacobian, so it "
                              "cannot be a level")
@@ -151,7 +185,7 @@ def _read(task: Task, configuration: object, damped: bool, weighted: bool) -> _R
     cost = costs(task, len(e)) if weighted else np.ones(len(e))
     gain = float(task.gain)
     weighed = cost * e * gain if lm else e
-    return _Read(J, e, cost, gain, lm * float(weighed @ weighed) if lm else 0.0)
+    return _Read(task, J, e, cost, gain, lm * float(weighed @ weighed) if lm else 0.0)
 
 
 def _plain(values: Any) -> Array:
@@ -168,7 +202,7 @@ def residual(task: Task, configuration: object, weighted: bool = True) -> tuple[
     ------
     HierarchyError : the task is not of the form J dq = -gain e, or has lm_damping.
     """
-    J, e, cost, _, _ = _read(task, configuration, False, weighted)
+    _, J, e, cost, _, _ = _read(task, configuration, False, weighted)
     asked = cost != 0.0
     return cost[asked, None] * J[asked], -cost[asked] * e[asked]
 
@@ -190,22 +224,10 @@ def limit_level(limits: Iterable[Limit], n: int, period: float) -> tuple[Array, 
     Rows on a single joint become bounds of that joint, unless they contradict each other. Rows
     with infinite h are left out.
     """
-    pairs = [(_plain(G), _plain(h)) for G, h in limits]
-    lower, upper = np.full(n, -np.inf), np.full(n, np.inf)
-    several = [np.empty(len(h), dtype=np.bool_) for _, h in pairs]
-    left = 0
-    for (G, h), mark in zip(pairs, several, strict=True):
-        found = narrow(G, h, period, lower, upper, mark)
-        if found == ODD:
-            check_rows("limits", G, np.full(len(h), -np.inf), h)
-        left += found
-    rows = left + 2 * n
-    A, low, up = np.empty((rows, n)), np.empty(rows), np.empty(rows)
-    row = write_bounds(lower, upper, A, low, up)
-    for (G, h), mark in zip(pairs, several, strict=True):
-        if left:
-            row = write_several(G, h, period, mark, A, low, up, row)
-    return A[:row], low[:row], up[:row]
+    found = _Limits.of(limits, n, period)
+    packed = _Packed(n, found.most)
+    row = found.write(packed)
+    return packed.A[:row], packed.lower[:row], packed.upper[:row]
 
 
 def label(task: object) -> str:

@@ -14,6 +14,7 @@ from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array, Hierarchy
 from solvers.adapters.displacements import Task
 from solvers.adapters.from_pink import hierarchy
+from solvers.adapters.packing import largest_violation
 from solvers.resolver import Resolution, Resolver, make
 from solvers.status import Status
 
@@ -98,9 +99,7 @@ def _check_held(h: Hierarchy, resolution: Resolution, tolerance: float) -> None:
     for name, size in zip(h.names, h.sizes.tolist(), strict=True):
         if name not in _ALWAYS:
             return
-        rows = slice(first, first + size)
-        value = h.A[rows] @ resolution.x
-        beyond = max((value - h.upper[rows]).max(), (h.lower[rows] - value).max())
+        beyond = largest_violation(h.A, h.lower, h.upper, resolution.x, first, first + size)
         if beyond > tolerance:
             raise _no_solution(h, resolution, f"the {name} cannot all hold: they are violated by "
                                               f"at least {beyond:.3g}")

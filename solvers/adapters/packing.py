@@ -99,3 +99,47 @@ def write_task(J, e, cost, rate, A, low, up, row):
         low[row] = up[row] = value
         row += 1
     return row
+
+
+@compiled
+def largest_violation(A, lower, upper, x, first, last):
+    """The largest distance of a row from its bounds at x, over the rows from first to last."""
+    largest = 0.0
+    for i in range(first, last):
+        value = 0.0
+        for c in range(A.shape[1]):
+            value += A[i, c] * x[c]
+        largest = max(largest, value - upper[i], lower[i] - value)
+    return largest
+
+
+@compiled
+def damp(A, b, weight, centre, first, last):
+    """Replace b of the rows from first to last by A x of the x that minimises a damped cost.
+
+    The cost is |A x - b|^2 + weight |x - centre|^2, and A x = b - weight y with
+    (A A^T + weight 1) y = b - A centre.
+    """
+    k = last - first
+    L, y = np.empty((k, k)), np.empty(k)
+    for i in range(k):
+        y[i] = b[first + i]
+        for c in range(A.shape[1]):
+            y[i] -= A[first + i, c] * centre[c]
+        for j in range(i + 1):
+            total = weight if i == j else 0.0
+            for c in range(A.shape[1]):
+                total += A[first + i, c] * A[first + j, c]
+            for c in range(j):
+                total -= L[i, c] * L[j, c]
+            L[i, j] = np.sqrt(max(total, weight)) if i == j else total / L[j, j]
+    for i in range(k):
+        for c in range(i):
+            y[i] -= L[i, c] * y[c]
+        y[i] /= L[i, i]
+    for i in range(k - 1, -1, -1):
+        for c in range(i + 1, k):
+            y[i] -= L[c, i] * y[c]
+        y[i] /= L[i, i]
+    for i in range(k):
+        b[first + i] -= weight * y[i]
