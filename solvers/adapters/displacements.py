@@ -107,8 +107,9 @@ class _Packed:
     def damp(self, last: int, own: float, pull: Pull) -> None:
         """Ask of the rows up to `last` for no more than a damped step reaches.
 
-        They ask for A x of the x that minimises |A x - b|^2 + own |x|^2 + the pull. That x alone meets it, as in pink, and its null space is left to the levels below; a strict
-        level cannot weigh its own step against its target.
+        They ask for A x of the x that minimises |A x - b|^2 + own |x|^2 + the pull. That x alone
+        meets them, as in pink, and their null space is left to the levels below; a strict level
+        cannot weigh its own step against its target.
         """
         weight = own + pull.weight
         if weight > _NO_DAMPING:

@@ -144,7 +144,8 @@ def hierarchy(configuration: Configuration,
                                  f"{barrier.safe_displacement_gain:g} weighs a displacement "
                                  "against the tasks; set it to 0")
         if barrier.safe_displacement_gain and pull is not None:
-            pull = _pulled(pull, *barrier.compute_qp_objective(configuration), dt)
+            H, c = barrier.compute_qp_objective(configuration)
+            pull = _pulled(pull, H, c, dt)
     return displacements.hierarchy(configuration, n, dt,
                                    [pair for pair in found if pair is not None],
                                    list(constraints or ()), tasks, pull)
