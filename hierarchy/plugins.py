@@ -20,11 +20,13 @@ import sys
 from collections.abc import Callable, Iterable
 from functools import cache
 from importlib import import_module
-from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
-from typing import Any, Literal, TypeVar, get_args
+from typing import TYPE_CHECKING, Any, Literal, TypeVar, get_args
 
 from hierarchy.errors import HierarchyError, UnknownNameError
+
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
 
 Door = Literal["tasks", "resolvers", "robots", "plants", "sensors"]
 DOORS: tuple[Door, ...] = get_args(Door)
@@ -75,10 +77,12 @@ def allow(module: str) -> None:
 
     Raises HierarchyError with the cause if it cannot be imported.
     """
-    here = str(Path.cwd())
-    if here not in sys.path:
-        sys.path.append(here)  # at the end, where it hides no installed module
-    _import(module, f"plugin {module!r}")
+    path = list(sys.path)
+    sys.path.append(str(Path.cwd()))  # at the end, where it hides no installed module
+    try:
+        _import(module, f"plugin {module!r}")
+    finally:
+        sys.path[:] = path
     _loaded.setdefault(module)
     _flagged.setdefault(module)
 
@@ -143,6 +147,8 @@ def _loaded_object(point: EntryPoint, door: Door) -> Any:
 
 @cache
 def _points(door: Door) -> tuple[EntryPoint, ...]:
+    from importlib.metadata import entry_points
+
     return tuple(entry_points(group=f"{_GROUP}.{door}"))
 
 

@@ -1,4 +1,6 @@
-"""Common parts of tasks written in numpy: frames with their Jacobians and motion."""
+"""Common parts of tasks of several frames: their Jacobians and motion, in numpy and in kernels."""
+
+# mypy: disable-error-code="no-untyped-def"
 
 from __future__ import annotations
 
@@ -8,7 +10,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from hierarchy.jit import compiled, inlined
 from hierarchy.kinematics import (
+    axis_at,
+    drift_of_point,
+    point_at,
+    velocity_of_point,
     write_point_jacobian,
     write_point_jacobian_derivative,
     write_rotation_jacobian,
@@ -94,3 +101,79 @@ def rates_of(state: State, frame: Frame, placed: Placed) -> Rates:
 def cross(a: Array) -> Array:
     """Return the matrix (3, 3) with which a x b is a product."""
     return np.array([[0.0, -a[2], a[1]], [a[2], 0.0, -a[0]], [-a[1], a[0], 0.0]])
+
+
+class Spot(NamedTuple):
+    """A frame for kernels: its joint, offset (3,) and rotation (3, 3) in the joint's frame."""
+
+    joint: int
+    offset: Array
+    rotation: Array
+
+    @classmethod
+    def of(cls, frame: Frame) -> Spot:
+        """Return the spot of a frame."""
+        return cls(frame.joint, frame.offset, np.ascontiguousarray(frame.rotation))
+
+
+@inlined
+def crossed(a, b):
+    """a x b of tuples."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@inlined
+def less(a, b):
+    """a - b of tuples."""
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+@inlined
+def plus(a, b):
+    """a + b of tuples."""
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+
+
+@inlined
+def turned_back(R, a):
+    """R^T a of a rotation (3, 3) and a tuple."""
+    return (R[0, 0] * a[0] + R[1, 0] * a[1] + R[2, 0] * a[2],
+            R[0, 1] * a[0] + R[1, 1] * a[1] + R[2, 1] * a[2],
+            R[0, 2] * a[0] + R[1, 2] * a[1] + R[2, 2] * a[2])
+
+
+@inlined
+def position_of(placements, spot):
+    """World position of a spot, as a tuple."""
+    return (point_at(placements, spot.joint, spot.offset, 0),
+            point_at(placements, spot.joint, spot.offset, 1),
+            point_at(placements, spot.joint, spot.offset, 2))
+
+
+@compiled
+def rotation_of(placements, joint, rotation):
+    """World rotation (3, 3) of a spot."""
+    R = np.empty((3, 3))
+    for k in range(3):
+        for i in range(3):
+            R[i, k] = axis_at(placements, joint, rotation[:, k], i)
+    return R
+
+
+@inlined
+def motion_of(kinematics, spot):
+    """Velocity, angular velocity, and their drifts dJ/dt v and dW/dt v, of a spot; exact ones."""
+    vx, vy, vz, ax, ay, az, wx, wy, wz = drift_of_point(
+        kinematics, spot.joint, spot.offset[0], spot.offset[1], spot.offset[2])
+    _, _, _, bx, by, bz = velocity_of_point(kinematics.dJ, kinematics.supports, spot.joint,
+                                            kinematics.v, 0.0, 0.0, 0.0)
+    return (vx, vy, vz), (wx, wy, wz), (ax, ay, az), (bx, by, bz)
+
+
+@inlined
+def jacobians_of(J, placements, supports, spot):
+    """Linear and angular Jacobian (3, n) of a spot."""
+    linear, angular = np.empty((3, J.shape[1])), np.empty((3, J.shape[1]))
+    write_point_jacobian(J, placements, supports, spot.joint, spot.offset, linear, 0)
+    write_rotation_jacobian(J, supports, spot.joint, angular, 0)
+    return linear, angular

@@ -16,17 +16,13 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 
 from hierarchy import plugins
 from hierarchy.errors import UnknownNameError
-from hierarchy.paths import Path
 from hierarchy.plugins import Door
-from hierarchy.robot import Frame
 from scenarios.config.sections import Finite, Flag, PathSection, Section, Whole
 
 GIVEN: dict[Door, tuple[str, ...]] = {
     "tasks": ("robot", "state", "name", "kind"),
     "plants": ("robot", "q", "v", "period", "level", "obstacles"),
     "sensors": ("robot", "exact", "body", "tip")}
-_IN_A_FILE: dict[Any, Any] = {Frame: str, Path: PathSection, float: Finite, int: Whole, bool: Flag}
-
 Maker = Callable[..., Any]
 
 
@@ -92,8 +88,12 @@ def _model(parameters: dict[str, inspect.Parameter]) -> type[BaseModel]:
 
 def _in_a_file(annotation: Any) -> Any:
     """Return the type that the value of a parameter has in a file, with strict numbers."""
-    if isinstance(annotation, type) and annotation in _IN_A_FILE:
-        return _IN_A_FILE[annotation]
+    from hierarchy.paths import Path
+    from hierarchy.robot import Frame  # loads pinocchio, which reading a file does not need
+
+    kinds: dict[Any, Any] = {Frame: str, Path: PathSection, float: Finite, int: Whole, bool: Flag}
+    if isinstance(annotation, type) and annotation in kinds:
+        return kinds[annotation]
     origin, inside = get_origin(annotation), get_args(annotation)
     if origin in (tuple, list):
         return origin[tuple(part if part is ... else _in_a_file(part) for part in inside)]

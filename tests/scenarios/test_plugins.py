@@ -286,6 +286,15 @@ def test_workers_of_a_sweep_import_the_plugin(capsys, folder):
     assert "4 runs; 0 did not finish" in text
 
 
+def test_the_working_directory_is_searched_for_plugins_only(folder):
+    (folder / "pandas_of_mine.py").write_text("")
+    before = list(sys.path)
+    plugins.allow("doors_of_mine")
+    assert sys.path == before
+    with pytest.raises(ImportError):
+        __import__("pandas_of_mine")
+
+
 def test_a_changed_plugin_is_another_version(folder):
     plugins.allow("doors_of_mine")
     before = plugins.fingerprint()
