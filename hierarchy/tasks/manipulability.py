@@ -6,20 +6,22 @@ dS_k/dq_i = S_i x S_k for every joint i that moves joint k, x being the product 
 gradient of w and its time derivative are known without differences.
 """
 
+# mypy: disable-error-code="no-untyped-def"
+
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hierarchy.errors import HierarchyError
+from hierarchy.jit import compiled
 from hierarchy.problem import Array
 from hierarchy.robot import Frame
 from hierarchy.state import State
 from hierarchy.task import Kind, check_parts
-from hierarchy.tasks.geometric import Geometric, View, rates_of, view_of
+from hierarchy.tasks.geometric import Geometric, View, crossed, plus, rates_of, view_of
 
 _SINGULAR = 1e-12  # w below which it has no gradient
 
@@ -71,8 +73,8 @@ class Manipulability(Geometric):
         w = _measure(J)
         if w < _SINGULAR:
             return np.zeros((1, J.shape[1]))
-        inverse = np.linalg.pinv(J)
-        return np.asarray(w * np.einsum("irk,kr->i", self._gradient(view), inverse)[None])
+        inverse = J.T @ np.linalg.inv(J @ J.T)
+        return np.asarray(w * _traces(self._gradient(view), inverse)[None])
 
     def rows_derivative(self, state: State) -> Array:
         """The derivative of `rows`, with d(J+)/dt out of J+ = J^T (J J^T)^-1."""
@@ -83,12 +85,12 @@ class Manipulability(Geometric):
             return np.zeros((1, state.n))
         rates = rates_of(state, self.frame, view.frame(self.frame))
         dJ = np.vstack([rates.dJ, rates.dW])[:len(J)]
-        inverse, square = np.linalg.pinv(J), np.linalg.inv(J @ J.T)
+        square = np.linalg.inv(J @ J.T)
+        inverse = J.T @ square
         dinverse = dJ.T @ square - inverse @ (dJ @ J.T + J @ dJ.T) @ square
-        along = np.einsum("irk,kr->i", D, inverse)
+        along = _traces(D, inverse)
         dw = w * float(along @ state.v)
-        turned = (np.einsum("irk,kr->i", self._gradient_rate(state), inverse)
-                  + np.einsum("irk,kr->i", D, dinverse))
+        turned = _traces(self._gradient_rate(state), inverse) + _traces(D, dinverse)
         return np.asarray((dw * along + w * turned)[None])
 
     def _jacobian(self, view: View) -> Array:
@@ -98,42 +100,31 @@ class Manipulability(Geometric):
     def _gradient(self, view: View) -> Array:
         """dJ/dq_i of the frame (n, rows, n), the joint of the derivative first."""
         placed = view.frame(self.frame)
-        V, W = view.J[:3].T, view.J[3:].T  # of the screws, (n, 3)
-        moves = self._moves(view.supports)[..., None]
-        dV = moves * (_cross(W[:, None], V[None]) + _cross(V[:, None], W[None]))
-        dW = moves * _cross(W[:, None], W[None])
-        linear = dV + _cross(dW, placed.p) + _cross(W[None], placed.J.T[:, None])
-        return self._stacked(linear, dW, view.supports)
+        out = np.empty((self._joints(view), *self._jacobian(view).shape))
+        _write_gradient(view.J, view.supports, self.frame.joint, placed.p, placed.J, out)
+        return out
 
     def _gradient_rate(self, state: State) -> Array:
         """Time derivative of `_gradient` (n, rows, n)."""
         view = view_of(state)
         placed = view.frame(self.frame)
-        rates = rates_of(state, self.frame, placed)
-        V, W, aV, aW = state.J[:3].T, state.J[3:].T, state.dJ[:3].T, state.dJ[3:].T
-        moves = self._moves(view.supports)[..., None]
-        dW = moves * _cross(W[:, None], W[None])
-        bV = moves * (_cross(aW[:, None], V[None]) + _cross(W[:, None], aV[None])
-                      + _cross(aV[:, None], W[None]) + _cross(V[:, None], aW[None]))
-        bW = moves * (_cross(aW[:, None], W[None]) + _cross(W[:, None], aW[None]))
-        linear = (bV + _cross(bW, placed.p) + _cross(dW, rates.v)
-                  + _cross(aW[None], placed.J.T[:, None])
-                  + _cross(W[None], rates.dJ.T[:, None]))
-        return self._stacked(linear, bW, view.supports)
+        rates, out = rates_of(state, self.frame, placed), self._gradient(view)
+        _write_gradient_rate(state.J, state.dJ, view.supports, self.frame.joint,
+                             np.array([placed.p, rates.v]), placed.J, rates.dJ, out)
+        return out
 
-    def _stacked(self, linear: Array, angular: Array, supports: NDArray[np.bool_]) -> Array:
-        """Return (n, rows, n) of (n, n, 3), without the joints that do not move the frame."""
-        both = linear if self.part == "position" else np.concatenate([linear, angular], axis=2)
-        both = both * supports[self.frame.joint][None, :, None]
-        return np.moveaxis(both, 2, 1)
-
-    def _moves(self, supports: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """Whether joint i moves the screw of joint k, and is not k itself: (n, n)."""
-        n = supports.shape[1]
-        if len(supports) != n + 1:
+    def _joints(self, view: View) -> int:
+        """Return n; raises HierarchyError for a joint with several velocities."""
+        n = view.supports.shape[1]
+        if len(view.supports) != n + 1:
             raise HierarchyError(f"task {self.name!r}: a joint of the robot has several "
                                  "velocities, or the base floats")
-        return supports[1:].T & ~np.eye(n, dtype=bool)
+        return n
+
+
+def _traces(D: Array, B: Array) -> Array:
+    """tr(D_i B) of each D_i (rows, n): (n,)."""
+    return np.asarray(D.reshape(len(D), -1) @ B.T.ravel())
 
 
 def _measure(J: Array) -> float:
@@ -141,5 +132,47 @@ def _measure(J: Array) -> float:
     return float(np.prod(np.linalg.svd(J, compute_uv=False)))
 
 
-def _cross(a: Array, b: Array) -> Array:
-    return np.cross(a, b)
+@compiled
+def _write_gradient(J, supports, joint, p, linear, out):
+    """Write dJ/dq_i of the frame on `joint` at p into out (n, rows, n); linear (3, n) its J."""
+    out[:] = 0.0
+    for k in range(J.shape[1]):
+        if not supports[joint, k]:
+            continue
+        V, W = (J[0, k], J[1, k], J[2, k]), (J[3, k], J[4, k], J[5, k])
+        for i in range(J.shape[1]):
+            vi, wi = (J[0, i], J[1, i], J[2, i]), (J[3, i], J[4, i], J[5, i])
+            dV = dW = (0.0, 0.0, 0.0)
+            if i != k and supports[k + 1, i]:  # joint i moves the screw of joint k
+                dV, dW = plus(crossed(wi, V), crossed(vi, W)), crossed(wi, W)
+            moved = plus(dV, crossed(dW, (p[0], p[1], p[2])))
+            moved = plus(moved, crossed(W, (linear[0, i], linear[1, i], linear[2, i])))
+            for r in range(out.shape[1]):
+                out[i, r, k] = moved[r] if r < 3 else dW[r - 3]
+
+
+@compiled
+def _write_gradient_rate(J, dJ, supports, joint, motion, linear, dlinear, out):
+    """Write the time derivative of `_write_gradient` into out; motion (2, 3) is p and dp/dt."""
+    out[:] = 0.0
+    p = (motion[0, 0], motion[0, 1], motion[0, 2])
+    dp = (motion[1, 0], motion[1, 1], motion[1, 2])
+    for k in range(J.shape[1]):
+        if not supports[joint, k]:
+            continue
+        V, W = (J[0, k], J[1, k], J[2, k]), (J[3, k], J[4, k], J[5, k])
+        aV, aW = (dJ[0, k], dJ[1, k], dJ[2, k]), (dJ[3, k], dJ[4, k], dJ[5, k])
+        for i in range(J.shape[1]):
+            vi, wi = (J[0, i], J[1, i], J[2, i]), (J[3, i], J[4, i], J[5, i])
+            avi, awi = (dJ[0, i], dJ[1, i], dJ[2, i]), (dJ[3, i], dJ[4, i], dJ[5, i])
+            dW = bV = bW = (0.0, 0.0, 0.0)
+            if i != k and supports[k + 1, i]:
+                dW = crossed(wi, W)
+                bV = plus(plus(crossed(awi, V), crossed(wi, aV)),
+                          plus(crossed(avi, W), crossed(vi, aW)))
+                bW = plus(crossed(awi, W), crossed(wi, aW))
+            moved = plus(plus(bV, crossed(bW, p)), crossed(dW, dp))
+            moved = plus(moved, crossed(aW, (linear[0, i], linear[1, i], linear[2, i])))
+            moved = plus(moved, crossed(W, (dlinear[0, i], dlinear[1, i], dlinear[2, i])))
+            for r in range(out.shape[1]):
+                out[i, r, k] = moved[r] if r < 3 else bW[r - 3]
