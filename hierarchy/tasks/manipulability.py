@@ -115,7 +115,7 @@ class Manipulability(Geometric):
 
     def _joints(self, view: View) -> int:
         """Return n; raises HierarchyError for a joint with several velocities."""
-        n = view.supports.shape[1]
+        n = int(view.supports.shape[1])
         if len(view.supports) != n + 1:
             raise HierarchyError(f"task {self.name!r}: a joint of the robot has several "
                                  "velocities, or the base floats")
