@@ -26,7 +26,9 @@ class UnknownNameError(HierarchyError):
 def expect(what: str, value: object, kind: type, remedy: str) -> None:
     """Raise a HierarchyError that says what was given and what is expected, or return None."""
     if not isinstance(value, kind):
-        raise HierarchyError(f"{what}: expected a {kind.__name__}, got {brief(value)}; {remedy}")
+        article = "an" if kind.__name__[0] in "AEIOU" else "a"
+        raise HierarchyError(f"{what}: expected {article} {kind.__name__}, got {brief(value)}; "
+                             f"{remedy}")
 
 
 def brief(value: object) -> str:

@@ -34,8 +34,8 @@ def solve_ik(configuration: Configuration, tasks: Iterable[Task | Sequence[Task]
              tolerance: float = 1e-6, **of_the_solver: Any) -> Array:
     """Return the joint velocity (n,) [rad/s or m/s] that serves pink's tasks in strict order.
 
-    Takes the arguments of `pink.solve_ik` in its order, and differs in one thing: the order of
-    `tasks` is their priority. An entry may be a sequence of tasks that share a level, weighted by
+    Takes the arguments of `pink.solve_ik`, all nine in its order, and differs in one thing: the
+    order of `tasks` is their priority. An entry may be a sequence of tasks that share a level, weighted by
     their costs as in pink.
 
     dt : period [s].

@@ -53,7 +53,7 @@ def refused(call):
     (lambda: Pointing(FRAME, (0, 0, 1), 0.1, damping=float("nan")), "damping = nan"),
     (lambda: Pose(FRAME, HERE, np.eye(3), gain="fast"), "gain = 'fast', expected a number"),
     (lambda: Stack(["position"]), "a stack: expected a Task, got str 'position'"),
-    (lambda: Stack(Position(FRAME, HERE)), "tasks of a stack: expected a Iterable"),
+    (lambda: Stack(Position(FRAME, HERE)), "tasks of a stack: expected an Iterable"),
     (lambda: Stack([Position(FRAME, HERE)]).hierarchy(ROBOT),
      "Stack.hierarchy: state: expected a State, got Robot"),
     (lambda: simulate(7), "simulate: expected a Scenario, got int 7"),
