@@ -35,8 +35,8 @@ def solve_ik(configuration: Configuration, tasks: Iterable[Task | Sequence[Task]
     """Return the joint velocity (n,) [rad/s or m/s] that serves pink's tasks in strict order.
 
     Takes the arguments of `pink.solve_ik`, all nine in its order, and differs in one thing: the
-    order of `tasks` is their priority. An entry may be a sequence of tasks that share a level, weighted by
-    their costs as in pink.
+    order of `tasks` is their priority. An entry may be a sequence of tasks that share a level,
+    weighted by their costs as in pink.
 
     dt : period [s].
     solver : the name of a resolver of this package, or a resolver. The name of a solver of
