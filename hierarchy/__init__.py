@@ -18,10 +18,15 @@ if TYPE_CHECKING:
 
 __all__ = ["Hierarchy", "HierarchyError", "Robot", "Stack", "State", "Task"]
 
+_PARTS = ("activation", "allocation", "avoidance", "kinematics", "limits", "loop", "paths",
+          "robots", "tasks")  # modules that are public
+
 _HOME = {"Robot": "robot", "Stack": "stack", "State": "state", "Task": "task"}
 
 
 def __getattr__(name: str) -> Any:
+    if name in _PARTS:
+        return import_module(f"hierarchy.{name}")
     if name not in _HOME:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     value = globals()[name] = getattr(import_module(f"hierarchy.{_HOME[name]}"), name)
@@ -29,4 +34,4 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+    return sorted({*(name for name in globals() if name[:2] == "__"), *__all__, *_PARTS})

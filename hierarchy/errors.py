@@ -23,5 +23,19 @@ class UnknownNameError(HierarchyError):
                          + (f" {more}" if more else ""))
 
 
+def expect(what: str, value: object, kind: type, remedy: str) -> None:
+    """Raise a HierarchyError that says what was given and what is expected, or return None."""
+    if not isinstance(value, kind):
+        article = "an" if kind.__name__[0] in "AEIOU" else "a"
+        raise HierarchyError(f"{what}: expected {article} {kind.__name__}, got {brief(value)}; "
+                             f"{remedy}")
+
+
+def brief(value: object) -> str:
+    """Return the type of a value and the value itself, in at most 80 characters."""
+    text = " ".join(repr(value).split())
+    return f"{type(value).__name__} {text if len(text) <= 60 else text[:57] + '...'}"
+
+
 class RobotError(HierarchyError):
     """A robot model that cannot be read, or a state that does not fit the robot."""

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hierarchy.errors import HierarchyError
+from hierarchy.errors import HierarchyError, brief
+from hierarchy.notebook import html_table
 
 Array = NDArray[np.float64]
+_NUMBERS = "biufO"  # kinds of numpy's types that are real numbers, or may be
 
 
 class Hierarchy:
@@ -37,7 +40,8 @@ class Hierarchy:
         """Wrap arrays without copying or checking them; `from_levels` checks."""
         self.A, self.lower, self.upper = A, lower, upper
         self.sizes, self.reference, self.names = sizes, reference, names
-        self.offsets = np.concatenate(([0], np.cumsum(sizes))).astype(np.int64)
+        self.offsets = np.zeros(len(sizes) + 1, dtype=np.int64)
+        np.cumsum(sizes, out=self.offsets[1:])
 
     @classmethod
     def from_levels(cls, levels: Sequence[Sequence[ArrayLike]], reference: ArrayLike | None = None,
@@ -48,13 +52,16 @@ class Hierarchy:
         ----------
         levels : each `A (m_k, n)` with `b (m_k,)`, or with `lower (m_k,)` and `upper (m_k,)`.
         reference : (n,) or None for zero.
-        names : one name per level for messages, or None for "level 1", "level 2", ...
+        names : one name per level for messages, each different, or None for "level 1", ...
 
         Raises
         ------
-        HierarchyError : a wrong shape, a NaN, an infinite entry of A or of an equality,
+        HierarchyError : a wrong type or shape, a NaN, an infinite entry of A or of an equality,
             lower > upper, n = 0, or no level and no reference; names level, row and value.
         """
+        if not isinstance(levels, Sequence) or isinstance(levels, str):
+            raise HierarchyError("levels: expected a list of (A, b) or (A, lower, upper), got "
+                                 f"{brief(levels)}")
         names = _level_names(names, len(levels))
         packed = [_checked_level(name, level) for name, level in zip(names, levels, strict=True)]
         n = _columns(packed, names, reference)
@@ -101,18 +108,29 @@ class Hierarchy:
     def __repr__(self) -> str:
         return f"Hierarchy(n={self.n}, sizes={self.sizes.tolist()})"
 
+    def _repr_html_(self) -> str:
+        rows = [(name, len(A), int((lower == upper).sum()), int((lower < upper).sum()))
+                for name, (A, lower, upper) in zip(self.names, self.levels(), strict=True)]
+        return html_table(f"Hierarchy: {self.n} unknowns, most important level first",
+                          ("level", "rows", "equalities", "inequalities"), rows)
+
 
 def _level_names(names: Sequence[str] | None, count: int) -> tuple[str, ...]:
     if names is None:
         return tuple(f"level {k + 1}" for k in range(count))
+    if isinstance(names, str) or not all(isinstance(name, str) for name in names):
+        raise HierarchyError(f"names: expected a list of texts, got {brief(names)}")
     if len(names) != count:
         raise HierarchyError(f"{len(names)} names for {count} levels")
+    for name, times in Counter(names).items():
+        if times > 1:
+            raise HierarchyError(f"{times} levels are named {name!r}; give each its own name")
     return tuple(names)
 
 
 def _checked_level(name: str, level: Sequence[ArrayLike]) -> tuple[Array, Array, Array]:
     if not isinstance(level, (tuple, list)) or len(level) not in (2, 3):
-        raise HierarchyError(f"{name}: expected (A, b) or (A, lower, upper), got {_brief(level)}")
+        raise HierarchyError(f"{name}: expected (A, b) or (A, lower, upper), got {brief(level)}")
     A = _array(f"{name}: A", level[0])
     if A.ndim != 2:
         raise HierarchyError(f"{name}: A has shape {A.shape}, expected (rows, n)")
@@ -127,6 +145,9 @@ def check_rows(name: str, A: Array, lower: Array, upper: Array) -> None:
 
     Shapes: A (m_k, n), lower and upper (m_k,).
     """
+    if (np.isfinite(A).all() and (lower <= upper).all() and (lower < np.inf).all()
+            and (upper > -np.inf).all()):
+        return
     for row, column in np.argwhere(~np.isfinite(A))[:1]:
         raise HierarchyError(f"{name}, row {row}: A[{row}, {column}] is {A[row, column]}")
     for side, values in (("lower", lower), ("upper", upper)):
@@ -160,11 +181,10 @@ def _vector(what: str, value: ArrayLike, size: int) -> Array:
 
 def _array(what: str, value: Any) -> Array:
     try:
-        return np.array(value, dtype=np.float64)
+        given = np.asarray(value)
+        if given.dtype.kind in _NUMBERS:
+            return np.array(given, dtype=np.float64)
     except (TypeError, ValueError) as error:
-        raise HierarchyError(f"{what} is not an array of numbers: {_brief(value)}") from error
-
-
-def _brief(value: Any) -> str:
-    text = repr(value)
-    return text if len(text) <= 60 else text[:57] + "..."
+        raise HierarchyError(f"{what} is not an array of numbers: {brief(value)}") from error
+    kind = "real numbers: it is complex," if given.dtype.kind == "c" else "numbers:"
+    raise HierarchyError(f"{what} is not an array of {kind} {brief(value)}")

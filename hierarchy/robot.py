@@ -11,9 +11,10 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
+from hierarchy import plugins
 from hierarchy.avoidance.control_points import ControlPoint
 from hierarchy.avoidance.self_collision import Capsule
-from hierarchy.errors import RobotError, UnknownNameError
+from hierarchy.errors import RobotError, UnknownNameError, expect
 from hierarchy.problem import Array
 from hierarchy.robots import TABLES
 from hierarchy.robots.files import read_file
@@ -105,9 +106,30 @@ class Robot:
         `base` "fixed" or "floating" overrides that of its table.
         """
         if name not in TABLES:
-            raise UnknownNameError("robot", name, TABLES, elsewhere(name))
+            return cls._of_plugin(name, base)
         robot = cls._of(from_table(TABLES[name], base), name)
         robot.table = TABLES[name]
+        return robot
+
+    @classmethod
+    def _of_plugin(cls, name: str, base: Base | None) -> Robot:
+        """Make a robot that a plugin registered: a table, a file, or a function that returns one.
+
+        A function may return a Robot too.
+        """
+        found = plugins.find("robots", name)
+        if found is None:
+            known = {*TABLES, *plugins.own("robots")}
+            raise UnknownNameError("robot", name, known, elsewhere(name))
+        made = found if isinstance(found, Table | str | Path) else found()
+        if isinstance(made, str | Path):
+            made = cls.from_file(made, base=base)
+        elif isinstance(made, Table):
+            table, made = made, cls._of(from_table(made, base), name)
+            made.table = table
+        expect(f"robot {name!r} of a plugin", made, cls, "return a Robot, a table or a file")
+        robot: Robot = made
+        robot.name = name
         return robot
 
     @classmethod
@@ -126,7 +148,7 @@ class Robot:
         return cls._of(found, Path(path).stem, end_effector)
 
     @classmethod
-    def load(cls, model: str, end_effector: str | None = None, base: Base | None = None,
+    def load(cls, model: str | Path, end_effector: str | None = None, base: Base | None = None,
              locked: Mapping[str, float] | None = None) -> Robot:
         """Make a robot by a name of `ROBOTS`, a file, or "package:name".
 
@@ -134,6 +156,7 @@ class Robot:
         download files. `locked` joints of a file are fixed at a position [rad or m] and are not
         joints of the robot. Raises RobotError and UnknownNameError.
         """
+        model = str(model)
         if in_package(model):
             robot = cls.from_file(file_of(model), end_effector, base, locked=locked)
             robot.name = model.partition(":")[2]

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hierarchy.avoidance.measurement import Measurement
-from hierarchy.errors import HierarchyError, UnknownNameError
+from hierarchy.errors import HierarchyError, UnknownNameError, expect
 from hierarchy.problem import Hierarchy
 from hierarchy.state import State
 from hierarchy.task import Level, Task
@@ -46,6 +46,7 @@ class Stack:
         self._tasks: dict[str, Task] = {}
         self._order: tuple[str, ...] = ()
         self._prepared: dict[tuple[str, ...], _Prepared] = {}
+        expect("tasks of a stack", tasks, Iterable, "give a list of tasks")
         for task in tasks:
             self.insert(task)
 
@@ -57,6 +58,9 @@ class Stack:
     def __len__(self) -> int:
         return len(self._order)
 
+    def __repr__(self) -> str:
+        return f"Stack({' > '.join(self._order)}; {self.level} level)"
+
     def __getitem__(self, name: str) -> Task:
         if name not in self._tasks:
             raise UnknownNameError("task", name, self._tasks)
@@ -64,6 +68,7 @@ class Stack:
 
     def insert(self, task: Task, index: int | None = None) -> None:
         """Insert a task at `index` of the order, 0 being the most important; None for the end."""
+        expect("a stack", task, Task, "a task says itself what it moves; see hierarchy.tasks")
         if task.name in self._tasks:
             raise HierarchyError(f"the stack already has a task {task.name!r}")
         position = len(self._order) if index is None else index
@@ -117,6 +122,7 @@ class Stack:
 
     def prepare(self, state: State, order: tuple[str, ...]) -> _Prepared:
         """Bind the tasks of an order to a state now rather than in the first tick that uses it."""
+        expect("Stack.hierarchy: state", state, State, "make one with State.at(robot, q)")
         if not self._tasks:
             raise HierarchyError("the stack is empty: there are no tasks")
         known = self._prepared.get(order)

@@ -13,9 +13,10 @@ import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from hierarchy.avoidance.measurement import Measurement
-from hierarchy.errors import RobotError
+from hierarchy.errors import RobotError, brief, expect
 from hierarchy.jit import compiled
 from hierarchy.kinematics import Kinematics
+from hierarchy.notebook import numbers
 from hierarchy.problem import Array
 from hierarchy.robot import Frame, Robot
 
@@ -63,11 +64,15 @@ class State:
         `differences` is the period [s] of backward differences, None for exact derivatives.
         RobotError where a shape is wrong or an entry is not finite.
         """
+        expect("State.at: robot", robot, Robot, "make one with Robot.load(name or file)")
         state = cls(robot, differences)
         state.move(t, _checked(robot, "q", q, robot.coordinate_names),
                    _checked(robot, "v", np.zeros(robot.n) if v is None else v,
                             robot.velocity_names))
         return state
+
+    def __repr__(self) -> str:
+        return f"State({self.robot!r}, t={self.t:g}, q={numbers(self.q)})"
 
     @property
     def n(self) -> int:
@@ -168,7 +173,11 @@ def _supports(model: Any) -> NDArray[np.bool_]:
 
 
 def _checked(robot: Robot, what: str, value: ArrayLike, names: Sequence[str]) -> Array:
-    vector = np.array(value, dtype=float)
+    try:
+        vector = np.array(value, dtype=float)
+    except (TypeError, ValueError):
+        raise RobotError(f"robot {robot.name!r}: {what} is not an array of numbers: "
+                         f"{brief(value)}") from None
     if vector.shape != (len(names),):
         raise RobotError(f"robot {robot.name!r}: {what} has shape {vector.shape}, "
                          f"expected ({len(names)},)")

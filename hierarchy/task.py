@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from hierarchy.errors import HierarchyError
+from hierarchy.errors import HierarchyError, brief
 from hierarchy.paths import Path
 from hierarchy.problem import Array, check_rows
 
@@ -38,6 +38,13 @@ class Task(ABC):
     stiffness: float = 0.0
     damping: float = 0.0
     gain: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Check what the task was made with; raises HierarchyError.
+
+        Dataclasses call it. An override calls it too.
+        """
+        check_gains(self)
 
     @property
     @abstractmethod
@@ -106,6 +113,33 @@ class Task(ABC):
         drift = _shaped(self, "jacobian_derivative", self.jacobian_derivative(state),
                         (self.dimension, state.n)) @ state.v
         return self.reference_acceleration(state) - drift
+
+
+def check_gains(task: Task) -> None:
+    """Raise a HierarchyError for a gain of a task that is not a number >= 0, or return None."""
+    for gain in ("stiffness", "damping", "gain"):
+        value = getattr(task, gain)
+        try:
+            sound = bool((np.asarray(value, dtype=float) >= 0.0).all())
+        except (TypeError, ValueError):
+            sound = False
+        if not sound:
+            raise HierarchyError(f"task {task.name!r}: {gain} = {value!r}, expected a number >= 0")
+
+
+def check_parts(task: Task) -> None:
+    """Raise a HierarchyError where a name or a point stands for a robot, frame or path of a task.
+
+    A task has no robot at hand in which it could look up a frame.
+    """
+    for part, remedy in (("robot", "Robot.load({!r})"), ("frame", "robot.frame({!r})")):
+        if isinstance(value := getattr(task, part, None), str):
+            raise HierarchyError(f"task {task.name!r}: {part} is the name {value!r}; give "
+                                 f"{remedy.format(value)}")
+    path = getattr(task, "path", None)
+    if path is not None and not isinstance(path, Path):
+        raise HierarchyError(f"task {task.name!r}: path is a {brief(path)}; give a path of "
+                             "hierarchy.paths, such as Still([x, y, z])")
 
 
 def along(path: Path, target: Array, state: State,

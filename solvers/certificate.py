@@ -38,6 +38,8 @@ import numpy as np
 from numpy.linalg import norm
 from numpy.typing import ArrayLike, NDArray
 
+from hierarchy.errors import expect
+from hierarchy.notebook import html_table
 from hierarchy.problem import Array, Hierarchy
 
 TOLERANCE = 1e-8
@@ -59,7 +61,7 @@ Mask = NDArray[np.bool_]
 
 
 @final
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Certificate:
     """The verdict on one x.
 
@@ -113,6 +115,21 @@ class Certificate:
                 f"{worst:.1e}")
 
 
+    def __repr__(self) -> str:
+        return f"Certificate({self})"
+
+    def _repr_html_(self) -> str:
+        rows: list[tuple[object, ...]] = [
+            (name, f"{missed:.3g}", f"{residual:.1e}",
+             "yes" if residual <= self.tolerance else "no")
+            for name, missed, residual in zip(self.names, self.violations, self.stationarity,
+                                              strict=True)]
+        near = "yes" if self.is_nearest else "no"
+        rows.append(("nearest to the reference", "", f"{self.nearest:.1e}", near))
+        return html_table(f"Certificate: {self}", ("level", "violation", "residual", "optimal"),
+                          rows)
+
+
 def certify(h: Hierarchy, x: ArrayLike, tolerance: float = TOLERANCE,
             parallel: float = PARALLEL) -> Certificate:
     """Judge level by level whether x (n,) is the answer of h; see the module's docstring.
@@ -129,6 +146,7 @@ def certify(h: Hierarchy, x: ArrayLike, tolerance: float = TOLERANCE,
     ------
     HierarchyError : x has the wrong shape.
     """
+    expect("certify: h", h, Hierarchy, "make one with Hierarchy.from_levels([(A, b), ...])")
     with np.errstate(all="ignore"):
         slack = h.slacks(x)
         x = np.asarray(x, dtype=np.float64)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from hierarchy.errors import HierarchyError
+from hierarchy.errors import HierarchyError, expect
 from hierarchy.problem import Array, Hierarchy
 from solvers.resolver import Resolution
 from solvers.resolvers.hcod import ActiveSetResolution
@@ -25,6 +25,7 @@ def explain(h: Hierarchy, resolution: Resolution, tolerance: float = 1e-9,
     unless the resolution is from `hcod`, the only resolver that reports the state of each row, and
     if the names are not m.
     """
+    expect("explain: h", h, Hierarchy, "make one with Hierarchy.from_levels([(A, b), ...])")
     if rows is None:
         rows = [f"row {i}" for size in h.sizes for i in range(size)]
     if len(rows) != h.m:

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from functools import cached_property
 from typing import Any, ClassVar, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hierarchy.errors import HierarchyError, UnknownNameError
+from hierarchy import plugins
+from hierarchy.errors import HierarchyError, UnknownNameError, brief, expect
 from hierarchy.jit import announce_compilation
+from hierarchy.notebook import html_table, numbers
 from hierarchy.problem import Array, Hierarchy
 from solvers.status import TOO_SMALL
 from solvers.status import Status as Status
@@ -52,7 +56,13 @@ class Resolution:
         return None
 
     def __repr__(self) -> str:
-        return f"Resolution(x={self.x}, status={self.status.name}, iterations={self.iterations})"
+        return (f"{type(self).__name__}({self.status.name}, x={numbers(self.x)}, "
+                f"iterations={self.iterations})")
+
+    def _repr_html_(self) -> str:
+        rows = [("status", self.status), ("x", numbers(self.x)), ("iterations", self.iterations),
+                ("memory", "none" if self.memory is None else f"{self.memory.size} numbers")]
+        return html_table(type(self).__name__, (), rows)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -87,6 +97,11 @@ class Resolver(ABC):
     """
     damps_with_bounds: ClassVar[str] = ""
     """The same for a stack with inequalities; empty if the resolver handles none."""
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        super().__init_subclass__(**options)
+        if "solve" in vars(cls):
+            cls.solve = _at_the_door(cls.solve)  # type: ignore[assignment,method-assign]
 
     def __post_init__(self) -> None:
         self._number("damping", 0.0, math.inf)
@@ -155,6 +170,29 @@ class Resolver(ABC):
         return Resolution(x, Status(code))
 
 
+Solve = Callable[[Any, Hierarchy, Array | None], Resolution]
+
+
+def _at_the_door(solve: Solve) -> Solve:
+    """Return `solve` with a HierarchyError for arguments of a wrong type.
+
+    The hierarchy is judged after a failure, which costs a correct call next to nothing.
+    """
+    @functools.wraps(solve)
+    def checked(self: Any, h: Hierarchy, memory: Array | None = None) -> Resolution:
+        if memory is not None and (type(memory) is not np.ndarray or memory.dtype != np.float64):
+            raise HierarchyError(f"{self.name}: memory: got {brief(memory)}; give the memory of an "
+                                 "earlier resolution, res.memory, or None")
+        try:
+            return solve(self, h, memory)
+        except (AttributeError, TypeError):
+            expect(f"{self.name}: h", h, Hierarchy,
+                   "make one with Hierarchy.from_levels([(A, b), ...])")
+            raise
+
+    return checked
+
+
 def set_frozen(record: object, **values: object) -> None:
     """Set fields of a frozen dataclass; only for its own `__post_init__`."""
     for name, value in values.items():
@@ -199,6 +237,16 @@ def names() -> tuple[str, ...]:
     return tuple(sorted(name for name, kind in _REGISTRY.items() if kind.handles != "activations"))
 
 
+def _find_elsewhere(name: str) -> None:
+    """Register the resolver that a plugin has under a name; UnknownNameError if there is none."""
+    found = plugins.find("resolvers", name)
+    if name not in _REGISTRY:  # a plugin may have used `register` of this module
+        if not (isinstance(found, type) and issubclass(found, Resolver)):
+            known = {*_REGISTRY, *_VARIANTS, *plugins.own("resolvers")}
+            raise UnknownNameError("resolver", name, known)
+        _REGISTRY[name] = found
+
+
 def make(name: str, /, **settings: Any) -> Resolver:
     """Return the resolver called `name` with these settings and defaults for the rest.
 
@@ -206,11 +254,12 @@ def make(name: str, /, **settings: Any) -> Resolver:
     ------
     HierarchyError : no such resolver or setting (suggests the nearest), or an invalid value.
     """
+    expect("make", name, str, "give one of solvers.names()")
     if name in _VARIANTS:
         resolver, own = _VARIANTS[name]
         return make(resolver, **own | settings)
     if name not in _REGISTRY:
-        raise UnknownNameError("resolver", name, (*_REGISTRY, *_VARIANTS))
+        _find_elsewhere(name)
     announce_compilation()
     kind = _REGISTRY[name]
     known = [field.name for field in dataclasses.fields(kind)]

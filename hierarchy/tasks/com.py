@@ -25,7 +25,7 @@ from hierarchy.paths import Path
 from hierarchy.problem import Array
 from hierarchy.robot import Robot
 from hierarchy.state import State
-from hierarchy.task import Level, Task, along
+from hierarchy.task import Level, Task, along, check_parts
 
 
 @dataclass(frozen=True)
@@ -47,6 +47,8 @@ class CentreOfMass(Task):
     shares: Array = field(init=False, repr=False, compare=False)  # of the mass, one per body
 
     def __post_init__(self) -> None:
+        super().__post_init__()
+        check_parts(self)
         axes = tuple(self.axes)
         if not axes or any(axis not in (0, 1, 2) for axis in axes) or list(axes) != sorted(
                 set(axes)):

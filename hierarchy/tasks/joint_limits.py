@@ -15,7 +15,7 @@ from hierarchy.limits import Limits, write_box
 from hierarchy.problem import Array
 from hierarchy.robot import Robot
 from hierarchy.state import State
-from hierarchy.task import Level, Task
+from hierarchy.task import Level, Task, check_parts
 
 
 @dataclass(frozen=True)
@@ -42,6 +42,8 @@ class JointLimits(Task):
     kind = "inequality"
 
     def __post_init__(self) -> None:
+        super().__post_init__()
+        check_parts(self)
         robot, acceleration = self.robot, np.asarray(self.acceleration, dtype=float)
         n, of_joints = robot.n - robot.actuated, slice(robot.actuated, robot.n)
         if acceleration.shape not in ((), (n,)):

@@ -17,7 +17,7 @@ from hierarchy.kinematics import axis_at, subtract_over_period, velocity_of_poin
 from hierarchy.problem import Array
 from hierarchy.robot import Frame
 from hierarchy.state import State
-from hierarchy.task import Kind, Level, Task
+from hierarchy.task import Kind, Level, Task, check_parts
 
 
 @dataclass(frozen=True)
@@ -42,6 +42,8 @@ class Pointing(Task):
     cos_alpha_d: float = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
+        super().__post_init__()
+        check_parts(self)
         axis = np.array(self.axis, dtype=float)
         length = float(np.linalg.norm(axis))
         if axis.shape != (3,) or not 1e-9 < length < np.inf:

@@ -27,7 +27,7 @@ from hierarchy.paths import Path
 from hierarchy.problem import Array
 from hierarchy.robot import Frame
 from hierarchy.state import State
-from hierarchy.task import Level, Task, along
+from hierarchy.task import Level, Task, along, check_parts
 
 
 @dataclass(frozen=True)
@@ -45,6 +45,10 @@ class Pose(Task):
     damping: float = 20.0
     gain: float = 10.0
     name: str = "pose"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        check_parts(self)
 
     @property
     def dimension(self) -> int:

@@ -14,7 +14,7 @@ from hierarchy.jit import compiled
 from hierarchy.problem import Array
 from hierarchy.robot import Robot
 from hierarchy.state import State
-from hierarchy.task import Level, Task
+from hierarchy.task import Level, Task, check_parts
 
 
 @dataclass(frozen=True)
@@ -33,6 +33,8 @@ class TorqueLimits(Task):
     kind = "inequality"
 
     def __post_init__(self) -> None:
+        super().__post_init__()
+        check_parts(self)
         if not 0.0 < self.fraction <= 1.0:
             raise HierarchyError(f"task {self.name!r}: fraction {self.fraction} is not more than 0 "
                                  "and at most 1")

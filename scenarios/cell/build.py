@@ -9,7 +9,7 @@ from hierarchy.activation import Activation
 from hierarchy.avoidance import Obstacles, SurveillanceAreas
 from hierarchy.jit import announce_compilation
 from hierarchy.problem import Array
-from hierarchy.tasks import JointLimits, Pointing, Position
+from hierarchy.tasks import JointLimits, Pointing, Position, Separation
 from scenarios.cell.avoidance import areas_of, avoidance_tasks
 from scenarios.cell.order import Order, order_of
 from scenarios.cell.plant import plant_of
@@ -78,17 +78,30 @@ def build(scenario: Scenario, kept: Cell | None = None) -> Cell:
     areas = areas_of(scenario)
     limits, first = limits_of(scenario, robot)
     position, pointing = position_of(scenario, here), pointing_of(scenario, here)
-    listed = [task_of(section, here) for section in scenario.tasks]
+    listed = [task_of(section, here) for section in scenario.tasks if section.kind != "collision"]
     last = posture_of(scenario, here, "task")
     avoiding = avoidance_tasks(scenario, robot)
     always = first if areas else [*first, *avoiding]  # repulsion is placed by Algorithm 1
-    tasks = [*first, *avoiding,
-             *(task for task in (position, pointing, *listed, last) if task)]
+    tasks = _in_order(scenario, [*first, *avoiding, *(
+        task for task in (position, pointing, *listed, last) if task)])
     rows, activation = stacked(scenario, tasks, state)
     return Cell(scenario, robot, start, state, plant,
                 Stack(rows, control.level, reference_of(scenario, here)), sensor, areas,
                 position, pointing, limits, order_of(scenario, areas, always, tasks), tuple(listed),
                 activation)
+
+
+def _in_order(scenario: Scenario, tasks: list[Task]) -> list[Task]:
+    """Move the separation from obstacles to the place of the listed task "collision"."""
+    sections = [section.kind for section in scenario.tasks]
+    if "collision" not in sections:
+        return tasks
+    apart = [task for task in tasks if isinstance(task, Separation)]
+    rest = [task for task in tasks if not isinstance(task, Separation)]
+    below = len(sections) - sections.index("collision") - 1  # of the list
+    below += scenario.posture is not None and scenario.posture.role == "task"
+    place = len(rest) - below
+    return [*rest[:place], *apart, *rest[place:]]
 
 
 def _kept_sensor(scenario: Scenario, kept: Cell) -> Sensor | None:

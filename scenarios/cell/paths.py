@@ -4,13 +4,35 @@ from __future__ import annotations
 
 import numpy as np
 
-from hierarchy.paths import Ellipse, Jittered, Path, Still, Waypoints
-from scenarios.config.sections import EllipseSection, PathSection, WaypointsSection
+from hierarchy import HierarchyError
+from hierarchy.paths import (
+    Blended,
+    Ellipse,
+    Jittered,
+    Path,
+    Recorded,
+    Still,
+    Waypoints,
+    circle,
+    line,
+)
+from scenarios.config import ScenarioError
+from scenarios.config.sections import (
+    CircleSection,
+    EllipseSection,
+    LineSection,
+    PathSection,
+    RecordedSection,
+    WaypointsSection,
+)
 
 
 def make_path(section: PathSection) -> Path:
-    """Return the path of a section."""
-    path, jitter = _steady(section), section.jitter
+    """Return the path of a section; raises ScenarioError where its values are no path."""
+    try:
+        path, jitter = _steady(section), section.jitter
+    except HierarchyError as error:
+        raise ScenarioError(f"path of kind {section.kind!r}: {error}") from error
     return path if jitter is None else Jittered(path, jitter.amplitude, jitter.rate, jitter.seed)
 
 
@@ -18,7 +40,14 @@ def _steady(section: PathSection) -> Path:
     if isinstance(section, EllipseSection):
         return _ellipse(section)
     if isinstance(section, WaypointsSection):
-        return Waypoints(section.times, section.points)
+        return (Waypoints(section.times, section.points) if section.blend is None
+                else Blended(section.times, section.points, section.blend))
+    if isinstance(section, LineSection):
+        return line(section.start, section.end, section.duration, section.begin)
+    if isinstance(section, CircleSection):
+        return circle(section.centre, section.radius, section.normal, section.rate, section.phase)
+    if isinstance(section, RecordedSection):
+        return Recorded.from_csv(section.file)
     return Still(section.position)
 
 

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from typing import cast
+
 from hierarchy import Robot
 from hierarchy.avoidance import Obstacles
 from hierarchy.problem import Array
+from scenarios.cell.own import make_own
 from scenarios.cell.plants import Apart, Commanded, JointSensor, KinematicArm, PhysicsArm, Plant
+from scenarios.cell.plants.plant import Driven
 from scenarios.config import Scenario, ScenarioError
+from scenarios.config.plant import OwnPlant
 
 
 def plant_of(scenario: Scenario, robot: Robot, start: tuple[Array, Array],
@@ -20,6 +25,10 @@ def plant_of(scenario: Scenario, robot: Robot, start: tuple[Array, Array],
         raise ScenarioError(f"plant.measurement: robot {robot.name!r} has joints with more "
                             "coordinates than velocities, which support no noise, steps or delay")
     sensor = JointSensor(section.measurement, control.period)
+    if isinstance(section, OwnPlant):
+        own = make_own(section, robot, q=q, v=v, period=control.period, level=control.level,
+                       obstacles=obstacles)
+        return own if _unmeasured(section) else Apart(own, _feedback(section, own, sensor))
     if section.kind == "mujoco":
         arm = PhysicsArm(robot, q, v, control.period, control.level, obstacles, section.servo,
                          section.joints)
@@ -27,3 +36,16 @@ def plant_of(scenario: Scenario, robot: Robot, start: tuple[Array, Array],
     exact = KinematicArm(robot, q, v, control.period, control.level)
     ideal = section.measurement.ideal or section.feedback == "commanded"
     return exact if ideal else Apart(exact, sensor)
+
+
+def _unmeasured(section: OwnPlant) -> bool:
+    return section.measurement.ideal and section.feedback == "measured"
+
+
+def _feedback(section: OwnPlant, plant: Plant, sensor: JointSensor) -> JointSensor | Commanded:
+    if section.feedback == "measured":
+        return sensor
+    if not hasattr(plant, "reference_q"):
+        raise ScenarioError(f'plant.feedback = "commanded": a plant of kind {section.kind!r} has '
+                            "no reference_q and reference_v")
+    return Commanded(cast(Driven, plant))

@@ -12,6 +12,7 @@ from hierarchy import HierarchyError, Robot
 from hierarchy.avoidance import Capsule, Obstacles, Repulsion
 from scenarios.cell.avoidance import repulsion_of
 from scenarios.cell.obstacles import make_obstacles
+from scenarios.cell.own import make_own
 from scenarios.cell.sensors import ExactDistances, Sensor
 from scenarios.cell.sensors.camera import DepthCamera, Pinhole, looking_at
 from scenarios.cell.sensors.depth_sensor import DepthSensor, Source
@@ -20,7 +21,7 @@ from scenarios.cell.sensors.errors import DepthErrors
 from scenarios.cell.sensors.frames import RecordedFrames
 from scenarios.config import Scenario, ScenarioError
 from scenarios.config.avoidance import AvoidanceSection, SeparationSection
-from scenarios.config.sensor import CameraSection, ExactSection, FramesSection
+from scenarios.config.sensor import CameraSection, ExactSection, FramesSection, OwnSensor
 
 
 class _Asked(NamedTuple):
@@ -65,6 +66,9 @@ def _seen_by(scenario: Scenario, robot: Robot, exact: ExactDistances, asked: _As
     """Return the sensor of the scenario's kind, given the exact one."""
     if isinstance(scenario.sensor, ExactSection):
         return exact
+    if isinstance(scenario.sensor, OwnSensor):
+        own: Sensor = make_own(scenario.sensor, robot, exact=exact, body=asked.body, tip=asked.tip)
+        return own
     danger = scenario.limits.danger_reach if scenario.limits else None
     try:
         return _depth_sensor(scenario.sensor, robot, exact,

@@ -53,7 +53,8 @@ def _widened(task: Task, scenario: Scenario) -> tuple[Task, float]:
                     if section is not None}
         inner = task.half_angle - radians(getattr(sections[task.name], "buffer", None) or 0.0)
         return replace(task, half_angle=inner), cos(inner) - task.cos_alpha_d
-    assert isinstance(task, Separation | SelfSeparation)
+    if not isinstance(task, Separation | SelfSeparation):
+        raise ScenarioError(f"task {task.name!r}: control.stack = \"smooth\" has no buffer for it")
     width = float(getattr(scenario.avoidance, "buffer", None) or 0.0)
     barrier = replace(task.barrier, distance=task.barrier.distance + width)
     return replace(task, barrier=barrier), width

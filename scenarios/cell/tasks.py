@@ -25,18 +25,21 @@ from hierarchy.tasks import (
 )
 from scenarios.cell.paths import make_path
 from scenarios.cell.robot import sensed_points
+from scenarios.cell.special import special_task
 from scenarios.config import Scenario, ScenarioError
 from scenarios.config.avoidance import AvoidanceSection
-from scenarios.config.tasks import (
+from scenarios.config.listed import (
     AnyTask,
     ListedCentreOfMass,
     ListedPointing,
     ListedPose,
+    ListedPosition,
     ListedPosture,
-    PointingSection,
-    PositionTask,
-    PostureSection,
 )
+from scenarios.config.tasks import PointingSection, PositionSection, PositionTask, PostureSection
+
+_OF_A_FRAME = (PositionSection, PointingSection, PostureSection, ListedPosition, ListedPose,
+               ListedCentreOfMass, ListedPointing, ListedPosture)
 
 
 def limits_of(scenario: Scenario, robot: Robot) -> tuple[JointLimits | None, list[Task]]:
@@ -110,6 +113,8 @@ def task_of(section: AnyTask, start: State) -> Task:
 
 
 def _task(section: AnyTask, start: State) -> Task:
+    if not isinstance(section, _OF_A_FRAME):
+        return special_task(section, start)
     robot = start.robot
     gains = (section.stiffness, section.damping, section.gain)
     name = section.title

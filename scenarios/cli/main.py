@@ -24,6 +24,7 @@ from scenarios.cli.options import (
     Changes,
     Duration,
     Out,
+    Plugins,
     Port,
     Scheduler,
     Workers,
@@ -86,9 +87,10 @@ def options(version: Annotated[bool, typer.Option(
 
 
 @app.command("list")
-def list_(as_json: AsJson = False) -> None:
+def list_(plugin: Plugins = None, as_json: AsJson = False) -> None:
     """List scenarios, groups, sweeps, resolvers, tasks and robots."""
     import solvers
+    from hierarchy import plugins
     from hierarchy.robot import ROBOTS
     from hierarchy.robots.table import in_words
     from hierarchy.tasks import TASKS
@@ -104,6 +106,10 @@ def list_(as_json: AsJson = False) -> None:
                              for one in [solvers.make(name)]},
                "tasks": {name: first_line(task) for name, task in TASKS.items()},
                "robots": {name: in_words(table) for name, table in ROBOTS.items()}}
+    for door in plugins.DOORS:
+        if own := plugins.own(door):
+            entries.setdefault(door, {}).update({
+                name: f"{first_line(thing)} (plugin)" for name, thing in own.items()})
     if as_json:
         return print_json(entries)
     for what, named in entries.items():
@@ -116,8 +122,8 @@ def run(scenario: Annotated[str, typer.Argument(
         resolver: Annotated[str | None, typer.Option(
             "--resolver", metavar="SPEC", autocompletion=completion.resolvers,
             help="Use another resolver: name, or name:setting=value:setting=value.")] = None,
-        changes: Changes = None, duration: Duration = None, out: Out = None,
-        certify: Annotated[bool, typer.Option(
+        changes: Changes = None, plugin: Plugins = None, duration: Duration = None,
+        out: Out = None, certify: Annotated[bool, typer.Option(
             "--certify", help="Certify the answer of every tick; not part of the measured times.")
             ] = False,
         figures: Annotated[bool, typer.Option(
@@ -186,8 +192,8 @@ def compare(scenarios: Annotated[list[str], typer.Argument(
                 "--resolvers", metavar="SPEC,SPEC,...", autocompletion=completion.resolvers,
                 help="Resolvers: name, or name:setting=value; or own, that of each scenario. "
                      "Default: all suitable ones; own for a group.")] = None,
-            changes: Changes = None, duration: Duration = None, out: Out = None,
-            starts: Annotated[int | None, typer.Option(
+            changes: Changes = None, plugin: Plugins = None, duration: Duration = None,
+            out: Out = None, starts: Annotated[int | None, typer.Option(
                 "--starts", metavar="N", min=2, help="Compare over N starts sampled from each "
                 "scenario's [variation]; needs the extra `sweep`.")] = None,
             seed: Annotated[int, typer.Option(
@@ -242,7 +248,8 @@ def sweep(file: Annotated[str, typer.Argument(help="Name of a sweep, or a sweep 
                                               autocompletion=completion.sweeps)],
           out: Annotated[Path | None, output(
               "Output folder, new or to be continued. Default: runs/sweep-NAME.")] = None,
-          workers: Workers = None, scheduler: Scheduler = None, as_json: AsJson = False) -> int:
+          plugin: Plugins = None, workers: Workers = None, scheduler: Scheduler = None,
+          as_json: AsJson = False) -> int:
     """Run scenarios with sampled parameters.
 
     An interrupted sweep is continued by the same command.
@@ -275,6 +282,7 @@ def view(folders: Annotated[list[Path], typer.Argument(
              metavar="RUN...", help="Folders of `hierarchy run` or `compare`.")],
          side_by_side: Annotated[bool, typer.Option(
              "--side-by-side/--overlay", help="Placement of several runs.")] = True,
+         plugin: Plugins = None,
          port: Port = PORT, browser: Browser = True) -> int:
     """Show finished runs in the browser.
 
@@ -293,6 +301,7 @@ def export(folder: Annotated[Path, typer.Argument(
                "--out, or csv.")] = None,
            out: Annotated[Path | None, output(
                "A new file. Default: run.FORMAT in RUN.", "FILE")] = None,
+           plugin: Plugins = None,
            as_json: AsJson = False) -> None:
     """Export a run as CSV, Parquet or MCAP.
 
@@ -314,7 +323,8 @@ def replay(folders: Annotated[list[Path], typer.Argument(
            video: Annotated[Path | None, typer.Option(
                "--video", metavar="FILE", help="Write a video of one run with ffmpeg.")] = None,
            rate: Annotated[float, typer.Option(
-               "--rate", metavar="HZ", help="Frames per second.")] = 30.0) -> int:
+               "--rate", metavar="HZ", help="Frames per second.")] = 30.0,
+           plugin: Plugins = None) -> int:
     """Write runs as one HTML file, or one run as a video.
 
     The HTML file plays without a server.
@@ -332,6 +342,7 @@ def figures(folders: Annotated[list[Path], typer.Argument(
                 help="screen: SVG and PNG. paper: PDF, one column of a journal wide.")] = "screen",
             out: Annotated[Path | None, output(
                 "Output folder, new or empty. Default: the run's folder.")] = None,
+            plugin: Plugins = None,
             as_json: AsJson = False) -> None:
     """Draw a run's figures again, for screen or paper.
 
@@ -369,7 +380,7 @@ def library(out: Annotated[Path, output("Folder of the library: new or empty, or
 @app.command()
 def check(file: Annotated[str, typer.Argument(help="A scenario or a robot: file or name.",
                                               autocompletion=completion.scenarios)],
-          changes: Changes = None, as_json: AsJson = False) -> None:
+          changes: Changes = None, plugin: Plugins = None, as_json: AsJson = False) -> None:
     """Validate a scenario or robot file: build it, run the first tick, and summarize it."""
     from scenarios.cli import robot_check, scenario_check
     from scenarios.loop.first_tick import first_tick

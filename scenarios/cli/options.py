@@ -20,6 +20,19 @@ def output(help: str, metavar: str = "FOLDER") -> Any:
     return typer.Option("--out", metavar=metavar, help=help, parser=_given)
 
 
+def _allow(modules: list[str] | None) -> list[str] | None:
+    """Import the plugins that the user names."""
+    from hierarchy import plugins
+
+    for module in modules or ():
+        plugins.allow(module)
+    return modules
+
+
+Plugins = Annotated[list[str] | None, typer.Option(
+    "--plugin", metavar="MODULE", callback=_allow, is_eager=True,
+    help="Import a module of yours with tasks, resolvers, robots, plants or sensors. May be "
+         "repeated.")]
 Changes = Annotated[list[str] | None, typer.Option(
     "--set", metavar="KEY=VALUE",
     help="Change a scenario value: dotted key and TOML value. May be repeated.")]

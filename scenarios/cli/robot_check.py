@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
-from hierarchy import Robot
+from hierarchy import Robot, plugins
 from hierarchy.robots import TABLES
 from hierarchy.robots.names import file_of, in_package
 from scenarios.config import ScenarioError, shipped
@@ -23,7 +23,8 @@ _ROUND = 4     # decimals of proposed positions [m]
 def is_robot(text: str) -> bool:
     """Whether the text names a robot; a name that is also a scenario's means the scenario."""
     of_file = in_package(text) or text.endswith((".urdf", ".xml", ".mjcf"))
-    return of_file or (text in TABLES and text not in shipped())
+    named = text in TABLES or (not text.endswith(".toml") and text in plugins.own("robots"))
+    return of_file or (named and text not in shipped())
 
 
 def look_at(model: str, changes: Sequence[str] = ()) -> tuple[RobotSection, Robot]:

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
+from hierarchy.plugins import Door
+from scenarios.config.own import OwnSection
 from scenarios.config.sections import (
+    PLUGIN,
     Count,
     Flag,
     NotNegative,
@@ -103,6 +106,13 @@ class PhysicsSection(_Plant):
     joints: JointsSection = JointsSection()
 
 
+class OwnPlant(_Plant, OwnSection):
+    """A plant of a plugin; further keys are those of the plugin."""
+
+    door: ClassVar[Door] = "plants"
+
+
 PlantKind = Annotated[
-    Annotated[KinematicSection, Tag("kinematic")] | Annotated[PhysicsSection, Tag("mujoco")],
-    Discriminator(kind_or("kinematic"))]
+    Annotated[KinematicSection, Tag("kinematic")] | Annotated[PhysicsSection, Tag("mujoco")]
+    | Annotated[OwnPlant, Tag(PLUGIN)],
+    Discriminator(kind_or("kinematic", "plants", ("kinematic", "mujoco")))]

@@ -6,7 +6,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from hierarchy.errors import UnknownNameError
+from hierarchy import plugins
+from hierarchy.errors import HierarchyError, UnknownNameError
 from hierarchy.robots.names import in_package
 from scenarios.config.avoidance import as_table
 from scenarios.config.changes import change_all, laid_over, parse_changes
@@ -44,16 +45,40 @@ def load(name_or_path: str | Path, changes: Sequence[str] | Mapping[str, Any] = 
         changes = parse_changes(changes, what="--set")
     _list_points_as_tables(data)
     change_all(data, changes, Scenario.tag_at)
+    _make_files_absolute(data, path.parent.resolve())
+    what = str(path) if path.parent != LIBRARY else f"scenario {path.stem!r}"
+    _require_plugins(data, what)
+    return validated(Scenario, data, what)
+
+
+def _make_files_absolute(data: dict[str, Any], here: Path) -> None:
+    """Put the folder `here` in front of the files that a scenario names."""
     robot = data.get("robot")
     if isinstance(robot, dict) and not in_package(model := str(robot.get("model", ""))) and (
             model.endswith((".urdf", ".xml", ".mjcf"))):
-        robot["model"] = str(path.parent.resolve() / robot["model"])
+        robot["model"] = str(here / robot["model"])
     sensor = data.get("sensor")
     folder = sensor.get("folder") if isinstance(sensor, dict) else None
     if isinstance(folder, str) and not (LIBRARY / "frames" / folder).is_dir():
-        data["sensor"]["folder"] = str(path.parent.resolve() / folder)
-    what = str(path) if path.parent != LIBRARY else f"scenario {path.stem!r}"
-    return validated(Scenario, data, what)
+        data["sensor"]["folder"] = str(here / folder)
+    listed = data.get("tasks")
+    for task in (data.get("position"), *(listed if isinstance(listed, list) else ())):
+        along = task.get("path") if isinstance(task, dict) else None
+        if isinstance(along, dict) and isinstance(along.get("file"), str):
+            along["file"] = str(here / along["file"])
+
+
+def _require_plugins(data: dict[str, Any], what: str) -> None:
+    """Check the plugins of a file before its sections, and add those that the user named."""
+    asked = data.get("plugins", [])
+    if not isinstance(asked, list) or not all(isinstance(module, str) for module in asked):
+        raise ScenarioError(f"{what}: plugins: expected a list of modules, got {asked!r}")
+    try:
+        plugins.require(asked)
+    except HierarchyError as error:
+        raise ScenarioError(f"{what}: {error}") from error
+    if named := [*asked, *plugins.allowed()]:  # a run says what it needs
+        data["plugins"] = list(dict.fromkeys(named))
 
 
 def _check_name(name: str) -> None:

@@ -9,13 +9,15 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Annotated, Any, Self
 
 import tomli_w
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
+from hierarchy import plugins
 from scenarios.config.avoidance import AvoidanceKind
 from scenarios.config.changes import Tag, change_all, parse_changes, without_none
 from scenarios.config.control import ControlSection
 from scenarios.config.distributions import Parameters
 from scenarios.config.faults import FaultSection
+from scenarios.config.listed import ListedTask
 from scenarios.config.plant import KinematicSection, PlantKind
 from scenarios.config.robot import RobotSection, StartSection
 from scenarios.config.sections import Section
@@ -24,7 +26,6 @@ from scenarios.config.stacks import RIVALS, unfit
 from scenarios.config.tasks import (
     DampingSection,
     LimitsSection,
-    ListedTask,
     PointingSection,
     PointingTask,
     PositionSection,
@@ -46,12 +47,15 @@ class Scenario(Section):
     Absent sections add no task. `tasks` are further tasks in order of priority, below limits,
     avoidance, position and pointing. `damping` and `posture` are both the null-space term of
     eq. (14), so only one of them may be given. `variation` has the distributions of dotted keys
-    from which `hierarchy compare --starts` samples; a single run ignores it.
+    from which `hierarchy compare --starts` samples; a single run ignores it. `plugins` are the
+    modules with the file's own kinds, resolvers and robots; they must be allowed from outside the
+    file, see hierarchy.plugins.
     """
 
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$")]
     title: str = ""
     description: str = ""
+    plugins: tuple[str, ...] | None = None
     robot: RobotSection
     start: StartSection = StartSection()
     control: ControlSection
@@ -66,6 +70,12 @@ class Scenario(Section):
     tasks: tuple[ListedTask, ...] = ()
     faults: tuple[FaultSection, ...] = ()
     variation: Parameters = Field(default_factory=dict)
+
+    @field_validator("plugins")
+    @classmethod
+    def _are_allowed(cls, modules: tuple[str, ...] | None) -> tuple[str, ...] | None:
+        plugins.require(modules or ())  # before the sections below, which have their kinds
+        return modules
 
     @model_validator(mode="after")
     def _asks_for_something(self) -> Self:
@@ -115,6 +125,16 @@ class Scenario(Section):
         return self
 
     @model_validator(mode="after")
+    def _lists_collision_once(self) -> Self:
+        listed = [task for task in self.tasks if task.kind == "collision"]
+        if listed and (self.avoidance is None or self.avoidance.kind != "separation"):
+            raise ValueError('a task of kind "collision" needs [avoidance] with kind = '
+                             '"separation", which says what is kept apart')
+        if len(listed) > 1:
+            raise ValueError(f'{len(listed)} tasks are of kind "collision"')
+        return self
+
+    @model_validator(mode="after")
     def _faults_have_a_sensor(self) -> Self:
         blind = next((fault.kind for fault in self.faults
                       if fault.kind in ("nan_distance", "obstacle")), None)
@@ -148,8 +168,7 @@ class Scenario(Section):
             return "activations" if self.control.stack == "smooth" else "equalities"
         one_sided = self.avoidance is not None and self.avoidance.kind == "separation"
         inequalities = one_sided or (self.control.stack == "hierarchical" and any(
-            isinstance(task, PointingTask) and task.rows == "inequality"
-            for task in (self.pointing, *self.tasks)))
+            task.one_sided for task in (self.pointing, *self.tasks) if task))
         limits = self.limits if self.limits_in_stack else None
         if inequalities or (limits and limits.torque):
             return "inequalities"
@@ -184,6 +203,12 @@ class Scenario(Section):
         data = self.model_dump(mode="json")
         change_all(data, changes, self.tag_at)
         return validated(Scenario, data, f"scenario {self.name!r}")
+
+    def __repr__(self) -> str:
+        return (f"Scenario({self.name!r}, robot={self.robot.model!r}, "
+                f"resolver={self.control.resolver!r})")
+
+    __str__ = __repr__
 
     @classmethod
     def tag_at(cls, path: Sequence[str]) -> Tag | None:

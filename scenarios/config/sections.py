@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from itertools import pairwise
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from hierarchy import plugins
+from hierarchy.plugins import Door
 
 # Strict: true is not 1.0, and "5" is not 5. A whole number may be given for a float.
 Finite = Annotated[float, Field(strict=True, allow_inf_nan=False)]
@@ -14,6 +17,7 @@ Positive = Annotated[float, Field(strict=True, gt=0.0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(strict=True, ge=0.0, allow_inf_nan=False)]
 Share = Annotated[float, Field(strict=True, ge=0.0, le=1.0)]
 Count = Annotated[int, Field(strict=True, ge=0)]
+Whole = Annotated[int, Field(strict=True)]
 Flag = Annotated[bool, Field(strict=True)]
 Vector3 = tuple[Finite, Finite, Finite]
 Rows3 = tuple[Vector3, Vector3, Vector3]
@@ -30,12 +34,22 @@ class Section(BaseModel):
                               serialize_by_alias=True)
 
 
-def kind_or(default: str) -> Callable[[Any], str]:
-    """Return a function that reads the kind of a table or section, `default` if it has none."""
-    def kind(section: Any) -> str:
+PLUGIN = "plugin"  # the tag of sections whose kind a plugin has registered
+
+
+def kind_or(default: str | None, door: Door | None = None, known: Collection[str] = ()
+            ) -> Callable[[Any], str | None]:
+    """Return a function that reads the kind of a table or section, `default` if it has none.
+
+    With a `door` the kind is PLUGIN for one that is not `known`, but registered there.
+    """
+    def kind(section: Any) -> str | None:
         found = (section.get("kind", default) if isinstance(section, dict)
                  else getattr(section, "kind", default))
-        return str(found)
+        if not isinstance(found, str):
+            return None if found is None else str(found)
+        own = door and found not in known and plugins.find(door, found) is not None
+        return PLUGIN if own else found
 
     return kind
 
@@ -88,12 +102,45 @@ class EllipseSection(_AnyPath):
 
 
 class WaypointsSection(_AnyPath):
-    """Points [m] at increasing times [s], at rest at each point."""
+    """Points [m] at increasing times [s], at rest at each point.
+
+    With `blend` [s] it passes each point in a curve of that time, without stopping, half of it
+    later: see hierarchy.paths.Blended.
+    """
 
     kind: Literal["waypoints"]
     times: tuple[NotNegative, ...]
     points: tuple[Vector3, ...]
+    blend: Positive | None = None
 
 
-PathSection = Annotated[StillSection | EllipseSection | WaypointsSection,
-                        Field(discriminator="kind")]
+class LineSection(_AnyPath):
+    """Straight from `start` to `end` [m] within `duration` [s], from `begin` [s] on."""
+
+    kind: Literal["line"]
+    start: Vector3
+    end: Vector3
+    duration: Positive
+    begin: NotNegative = 0.0
+
+
+class CircleSection(_AnyPath):
+    """A circle of `radius` [m] about `normal`; rate [rad/s], phase [rad]."""
+
+    kind: Literal["circle"]
+    centre: Vector3
+    radius: NotNegative
+    normal: Vector3 = (0.0, 0.0, 1.0)
+    rate: Finite = 1.0
+    phase: Finite = 0.0
+
+
+class RecordedSection(_AnyPath):
+    """A recorded motion: a CSV `file` with t [s], x, y, z [m], relative to the scenario's file."""
+
+    kind: Literal["recorded"]
+    file: str
+
+
+PathSection = Annotated[StillSection | LineSection | CircleSection | EllipseSection
+                        | WaypointsSection | RecordedSection, Field(discriminator="kind")]

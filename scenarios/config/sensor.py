@@ -6,7 +6,10 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import Discriminator, Field, Tag
 
+from hierarchy.plugins import Door
+from scenarios.config.own import OwnSection
 from scenarios.config.sections import (
+    PLUGIN,
     Count,
     Finite,
     Flag,
@@ -102,7 +105,14 @@ class FramesSection(_ImageSection):
     folder: str
 
 
+class OwnSensor(OwnSection):
+    """A sensor of a plugin; its keys are those of the plugin."""
+
+    door: ClassVar[Door] = "sensors"
+    foot: ClassVar[float] = _FOOT
+
+
 SensorKind = Annotated[
     Annotated[ExactSection, Tag("exact")] | Annotated[CameraSection, Tag("camera")]
-    | Annotated[FramesSection, Tag("frames")],
-    Discriminator(kind_or("exact"))]
+    | Annotated[FramesSection, Tag("frames")] | Annotated[OwnSensor, Tag(PLUGIN)],
+    Discriminator(kind_or("exact", "sensors", ("exact", "camera", "frames")))]

@@ -1,7 +1,6 @@
-"""The keys of tasks: of [position], [pointing] and [posture], and of `[[tasks]]`.
+"""The keys of the tasks of the end effector and of all joints, of [limits] and [damping].
 
-Each kind of task is one class. The sections are tasks of the end effector and of all joints;
-`[[tasks]]` adds names and frames.
+Each kind of task is one class; `scenarios.config.listed` adds names and frames for `[[tasks]]`.
 """
 
 from __future__ import annotations
@@ -16,7 +15,6 @@ from scenarios.config.sections import (
     NotNegative,
     PathSection,
     Positive,
-    Rows3,
     Section,
     Vector3,
 )
@@ -26,14 +24,18 @@ TaskName = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_ -]*$")]
 
 
 class TaskSection(Section):
-    """What every task has: gains of its error, in [1/s^2] and [1/s] (acceleration) and [1/s]."""
+    """What every task has: gains of its error, in [1/s^2] and [1/s] (acceleration) and [1/s].
 
+    `unit` is that of its error, "m", "rad" or "".
+    """
+
+    unit: ClassVar[str] = "m"
     stiffness: NotNegative = 40.0
     damping: NotNegative = 20.0
     gain: NotNegative = 10.0
 
 
-class _AlongSection(TaskSection):
+class AlongSection(TaskSection):
     """Follow `path`, or stay at the initial position without one, shifted by `offset` [m].
 
     With `from_start` the path is relative to the initial position.
@@ -50,7 +52,7 @@ class _AlongSection(TaskSection):
         return self
 
 
-class PositionTask(_AlongSection):
+class PositionTask(AlongSection):
     """The origin of a frame along a path (3 rows)."""
 
 
@@ -68,10 +70,16 @@ class PointingTask(TaskSection):
     damping: NotNegative = 2.0
     gain: NotNegative = 5.0
 
+    @property
+    def one_sided(self) -> bool:
+        """Whether its rows are inequalities."""
+        return self.rows == "inequality"
+
 
 class PostureTask(TaskSection):
     """All joints to a posture."""
 
+    unit: ClassVar[str] = "rad"
     target: tuple[Finite, ...] | None = None
     joints: dict[str, Finite] = Field(default_factory=dict)
     stiffness: NotNegative = 10.0
@@ -99,58 +107,6 @@ class PostureSection(PostureTask):
 
     title: ClassVar[str] = "posture"
     role: Literal["null-space", "task"] = "null-space"
-
-
-class _Listed(Section):
-    """A task of `[[tasks]]`; its name defaults to its kind."""
-
-    name: TaskName | None = None
-
-    @property
-    def title(self) -> str:
-        """The task's name in stacks, messages and tables."""
-        return self.name or str(getattr(self, "kind", ""))
-
-
-class ListedPosition(_Listed, PositionTask):
-    """The origin of `frame` along a path (3 rows), by default its initial position."""
-
-    kind: Literal["position"]
-    frame: str
-
-
-class ListedPose(_Listed, _AlongSection):
-    """Origin and axes of `frame` (6 rows); `rotation` (rows) defaults to the initial one."""
-
-    kind: Literal["pose"]
-    frame: str
-    rotation: Rows3 | None = None
-
-
-class ListedCentreOfMass(_Listed, _AlongSection):
-    """The centre of mass along some of the axes "x", "y", "z" of the world."""
-
-    kind: Literal["com"]
-    axes: Literal["x", "y", "z", "xy", "xz", "yz", "xyz"] = "xyz"
-
-
-class ListedPointing(_Listed, PointingTask):
-    """The z axis of `frame` at `alpha_d` [deg] from `axis`, or with "inequality" at most that."""
-
-    kind: Literal["pointing"]
-    frame: str
-
-
-class ListedPosture(_Listed, PostureTask):
-    """All joints to `target` [rad or m], by default the start; `joints` override it by name."""
-
-    kind: Literal["posture"]
-
-
-ListedTask = Annotated[
-    ListedPosition | ListedPose | ListedCentreOfMass | ListedPointing | ListedPosture,
-    Field(discriminator="kind")]
-AnyTask = PositionSection | PointingSection | PostureSection | ListedTask
 
 
 class LimitsSection(Section):

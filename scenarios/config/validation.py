@@ -7,10 +7,11 @@ from typing import Any, TypeVar
 
 from pydantic import ValidationError
 
+from hierarchy import plugins
 from hierarchy.errors import HierarchyError, UnknownNameError
 from scenarios.config.changes import Tag
 from scenarios.config.errors import ScenarioError
-from scenarios.config.sections import Section
+from scenarios.config.sections import PLUGIN, Section
 
 Kind = TypeVar("Kind", bound=Section)
 
@@ -46,18 +47,27 @@ def _say(root: type[Section], what: str, error: Any) -> str:
         return f"{what}: {UnknownNameError('key', where, _keys_beside(root, keys))}"
     if error["type"] in ("union_tag_invalid", "union_tag_not_found"):
         tag = error["ctx"].get("tag")
-        known = error["ctx"].get("expected_tags") or ", ".join(map(repr, sorted(
-            _kinds_at(root, [key for key in keys if not key.isdigit()]))))
+        found = sorted(_kinds_at(root, [key for key in keys if not key.isdigit()]) - {PLUGIN})
+        known = _with_own(root, keys, error["ctx"].get("expected_tags")) or ", ".join(
+            map(repr, found))
         return f"{what}: {where}: expected a kind, {known}" + (f"; got {tag!r}" if tag else "")
     text = error["msg"].removeprefix("Value error, ")
     value = "" if isinstance(error["input"], dict) else f", got {error['input']!r}"
     return f"{what}: {where}: {text}{value}"
 
 
+def _with_own(root: type[Section], keys: list[str], tags: str | None) -> str | None:
+    """Return the kinds that pydantic lists, with those of plugins in place of their tag."""
+    doors = [section.door for section in sections_at(root, keys) if hasattr(section, "door")]
+    own = "".join(f", {kind!r}" for door in doors[:1] for kind in plugins.own(door))
+    return tags and tags.replace(f", {PLUGIN!r}", own)
+
+
 def _without_kinds(root: type[Section], loc: list[str]) -> list[str]:
     """Drop the kinds of sections that pydantic inserts into the location of an error."""
     return [key for i, key in enumerate(loc)
-            if i in (0, len(loc) - 1) or key not in _kinds_at(root, loc[:i])]
+            if i == 0 or key not in _kinds_at(root, loc[:i])
+            or (i == len(loc) - 1 and key != PLUGIN)]
 
 
 def _kinds_with(root: type[Section], keys: list[str]) -> list[str]:
@@ -78,7 +88,9 @@ def _keys_beside(root: type[Section], keys: list[str]) -> list[str]:
 
 def _kinds_at(root: type[Section], path: list[str]) -> set[str]:
     found = (section.model_fields.get("kind") for section in sections_at(root, path))
-    return {kind for field in found if field for kind in getattr(field.annotation, "__args__", ())}
+    named = {kind for field in found if field
+             for kind in getattr(field.annotation, "__args__", ())}
+    return named | {PLUGIN} if named else named
 
 
 def sections_at(root: type[Section], path: Sequence[str]) -> list[Any]:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from numpy.typing import NDArray
 
 from scenarios.export import new_file
-from scenarios.export.columns import columns
+from scenarios.loop.columns import columns
 
 if TYPE_CHECKING:
     from scenarios.loop.recording import Recording

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 from numpy.typing import NDArray
 
 from scenarios.export import foxglove, new_file
-from scenarios.export.columns import of_ticks, signal_units, stacks
 from scenarios.export.layout import layout
 from scenarios.export.numbers import plain
 from scenarios.export.schemas import FOXGLOVE, INTEGER, NUMBER, TEXT, TRUTH, a_list, an_object
+from scenarios.loop.columns import of_ticks, signal_units, stacks
 from scenarios.scene import scene
 
 if TYPE_CHECKING:

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from scenarios.export import new_file
-from scenarios.export.columns import CONSTANTS, Column, columns
 from scenarios.export.numbers import plain
+from scenarios.loop.columns import CONSTANTS, Column, columns
 
 if TYPE_CHECKING:
     from scenarios.loop.recording import Recording

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hierarchy import Robot, State, Task
+from hierarchy import HierarchyError, Robot, State, Task
 from hierarchy.problem import Array
 from hierarchy.tasks import CentreOfMass, Pose, Position
 
 if TYPE_CHECKING:
-    from scenarios.config.tasks import ListedTask
+    from scenarios.config.listed import ListedTask
     from scenarios.loop.recording import Recording
 
 
@@ -39,10 +39,18 @@ def signals(robot: Robot, tasks: Iterable[Task], t: Array, q: Array, v: Array) -
         if not state.move(t[k], q[k], v[k]):
             continue
         for task in tasks:
-            found[error_of(task.name)][k] = task.error(state)
+            found[error_of(task.name)][k] = _error(task, state)
             if (position := _position(task, state)) is not None:
                 found[position_of(task.name)][k] = position
     return found
+
+
+def _error(task: Task, state: State) -> Array | float:
+    """The error of a task, NaN for a plugin's that needs the measurement of its tick."""
+    try:
+        return task.error(state)
+    except (AttributeError, TypeError, HierarchyError):
+        return np.nan
 
 
 def _position(task: Task, state: State) -> Array | None:
@@ -54,20 +62,25 @@ def _position(task: Task, state: State) -> Array | None:
 def errors(recording: Recording) -> Iterator[tuple[ListedTask, str, Array]]:
     """Yield section, unit and size of the error (T,) of each listed task.
 
-    A pose comes twice, in [m] and [deg]; a pointing task in [deg], off its cone or outside it.
+    A pose comes twice, in [m] and [deg]; a pointing task in [deg], off its cone or outside it; a
+    task that looks at a point in [deg].
     """
+    from scenarios.config.listed import ListedPointing
+
     for section in recording.scenario.tasks:
         if error_of(section.title) not in recording:
             continue
         error = recording[error_of(section.title)]
-        if section.kind == "pose":
+        if section.kind in ("pose", "relative") and error.shape[1] == 6:
             yield section, "m", np.linalg.norm(error[:, :3], axis=1)
             yield section, "deg", np.degrees(np.linalg.norm(error[:, 3:], axis=1))
-        elif section.kind == "pointing":
+        elif isinstance(section, ListedPointing):
             cosine = np.clip(np.cos(np.radians(section.alpha_d)) - error[:, 0], -1.0, 1.0)
             beyond = np.degrees(np.arccos(cosine)) - section.alpha_d
             yield section, "deg", np.maximum(beyond, 0.0 if section.rows == "inequality"
                                              else -beyond)
+        elif section.kind == "look-at":
+            yield section, "deg", np.degrees(2 * np.arctan(np.linalg.norm(error, axis=1) / 2))
         else:
-            unit = "rad" if section.kind == "posture" else "m"
-            yield section, unit, np.linalg.norm(error, axis=1)
+            missed = np.maximum(error, 0.0) if section.one_sided else error
+            yield section, section.unit, np.linalg.norm(missed, axis=1)

@@ -17,12 +17,15 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import TypeAdapter
 
-from hierarchy.errors import HierarchyError
+from hierarchy.errors import HierarchyError, UnknownNameError
 from scenarios.files import write_json
+from scenarios.loop import notebook
 from scenarios.loop.depth_view import DepthView
 from scenarios.loop.facts import Facts
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from scenarios.config import Scenario
 
 
@@ -37,7 +40,7 @@ class Event(NamedTuple):
 _EVENT = np.dtype([("tick", np.int64), ("kind", "U24"), ("action", "U8")])
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Recording:
     """One run, tick by tick.
 
@@ -91,7 +94,32 @@ class Recording:
     depth: DepthView | None = None
 
     def __getitem__(self, name: str) -> NDArray[Any]:
+        if name not in self.signals:
+            raise UnknownNameError("signal", name, self.signals)
         return self.signals[name]
+
+    def __repr__(self) -> str:
+        end = f", fault={self.fault!r}" if self.fault else ""
+        return (f"Recording({self.scenario.name!r}, {self.facts.resolver.label!r}, "
+                f"{self.ticks} ticks, {len(self.signals)} signals{end})")
+
+    def _repr_html_(self) -> str:
+        return notebook.html(self)
+
+    def plot(self, *names: str) -> Figure:
+        """Return a matplotlib figure of signals over time, one panel each; by default the usual.
+
+        `savefig` writes it to a file. Raises UnknownNameError for a signal that the run lacks.
+        """
+        return notebook.plot(self, names)
+
+    def to_dataframe(self, library: str | None = None) -> Any:
+        """Return all signals as a data frame, one row per tick, columns as `hierarchy export` has.
+
+        `library` is "pandas" or "polars"; None takes the first that is installed. Raises
+        HierarchyError, saying what to install, where none is.
+        """
+        return notebook.data_frame(self, library)
 
     def __contains__(self, name: str) -> bool:
         return name in self.signals

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from pathlib import Path
 
 import numpy as np
 
+from hierarchy.errors import expect
 from hierarchy.problem import Array
-from scenarios.config import Scenario
+from scenarios.config import Scenario, load
 from scenarios.loop.audit import Audit, Certified, Judging, Strictness
 from scenarios.loop.controller import Controller
 from scenarios.loop.faults import Faults
@@ -18,9 +20,9 @@ from scenarios.loop.recording import Recording
 _REPORT_EVERY = 500  # ticks between two calls of `progress`
 
 
-def simulate(scenario: Scenario, progress: Callable[[int, int], None] | None = None,
+def simulate(scenario: Scenario | str | Path, progress: Callable[[int, int], None] | None = None,
              certified: bool = False, audits: Sequence[Audit] = ()) -> Recording:
-    """Run a scenario from its start to its end.
+    """Run a scenario, or the one of a name or a file, from its start to its end.
 
     `progress(done, total)` is called every 500 ticks. A run ends early if it is interrupted
     (Ctrl-C), if its policy stops it, if its state is no longer finite, or if a joint is faster than
@@ -31,6 +33,9 @@ def simulate(scenario: Scenario, progress: Callable[[int, int], None] | None = N
     each level is judged after the last tick, or, with a camera, after each tick. Raises
     HierarchyError where the scenario does not fit its robot or resolver.
     """
+    if isinstance(scenario, (str, Path)):
+        scenario = load(scenario)
+    expect("simulate", scenario, Scenario, "give a name, a file, or what `load` returns")
     rehearsal = Controller(scenario)
     rehearsal.rehearse()
     Recorder(rehearsal, 1).write()

@@ -46,5 +46,5 @@ def truth_of(cell: Cell, ticks: int) -> Truth | None:
     The obstacles in recorded frames are not known.
     """
     kind = cell.scenario.sensor.kind
-    apart = kind == "camera" or "true_q" in cell.plant.extra
+    apart = kind != "exact" or "true_q" in cell.plant.extra
     return Truth(cell, ticks) if cell.sensor and apart and kind != "frames" else None

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import math
 import shlex
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from hierarchy.notebook import html_table
 from scenarios.measure import metrics
 from scenarios.measure.partings import Parting, partings
-from scenarios.measure.runs import Run
+from scenarios.measure.runs import Run, table
 from scenarios.measure.verdict import verdict
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Comparison:
     """Runs in the order asked for, scenario by scenario.
 
@@ -26,6 +28,15 @@ class Comparison:
     versions: dict[str, str]
     refused: tuple[str, ...] = ()
     folder: str | None = None
+
+    def __repr__(self) -> str:
+        names = dict.fromkeys(run.scenario.name for run in self.runs)
+        labels = dict.fromkeys(run.label for run in self.runs)
+        return (f"Comparison({', '.join(names)} under {', '.join(labels)}; "
+                f"{len(self.runs)} runs, {len(self.faults)} faults)")
+
+    def _repr_html_(self) -> str:
+        return "".join(_html(name, runs) for name, runs in self.groups().items())
 
     @property
     def faults(self) -> list[Run]:
@@ -58,6 +69,16 @@ class Comparison:
                 "runs": [_plain(run) for run in self.runs], "refused": list(self.refused),
                 "partings": {name: [_plain_parting(one) for one in partings(runs)]
                              for name, runs in self.groups().items()}}
+
+
+def _html(name: str, runs: Sequence[Run]) -> str:
+    """Return the table of runs that stand side by side: a row per metric, the best in bold."""
+    rows = table(runs, details=False)
+    best = {(i, j + 1) for i, row in enumerate(rows) for j in row.best}
+    cells = [(f"{row.label} [{row.unit}]" if row.unit else row.label, *row.cells) for row in rows]
+    faults = [("fault", *(run.fault or "" for run in runs))] if any(
+        run.fault for run in runs) else []
+    return html_table(name, ("", *(run.label for run in runs)), [*cells, *faults], best)
 
 
 def _plain(run: Run) -> dict[str, Any]:

@@ -77,7 +77,7 @@ def _key(panel: str, recordings: Mapping[str, Recording]) -> dict[str, str]:
     if panel in ("task-errors", "task-angles"):
         first = next(iter(recordings.values()))
         return {section.title: drawing.joint_colour(i)
-                for i, section in enumerate(first.scenario.tasks) if section.kind != "posture"}
+                for i, section in enumerate(first.scenario.tasks) if section.unit == "m"}
     return {}
 
 

@@ -9,7 +9,7 @@ from contextlib import nullcontext
 from functools import partial
 from pathlib import Path
 
-from hierarchy.errors import HierarchyError
+from hierarchy.errors import HierarchyError, expect
 from scenarios.cell.build import build
 from scenarios.config import Scenario, load, members, shipped_groups
 from scenarios.config.resolvers import check_names, usable
@@ -73,6 +73,8 @@ def _plan(scenarios: Iterable[str | Scenario],
     if resolvers is None and any(one in shipped_groups() for one in named):
         resolvers = [OWN]
     loaded = [load(s) if isinstance(s, (str, Path)) else s for s in members(named)]
+    for one in loaded:
+        expect("compare", one, Scenario, "give names, files, or what `load` returns")
     check_names(loaded)
     runs, refused = [], []
     for scenario in loaded:

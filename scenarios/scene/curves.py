@@ -16,7 +16,7 @@ from scenarios.measure.metrics import pointing_angle
 if TYPE_CHECKING:
     from scenarios.loop.recording import Recording
 
-_ERRORS = {"m": "positions", "deg": "directions", "rad": "postures"}
+_ERRORS = {"m": ", positions", "deg": ", directions", "rad": ", joints", "": ""}
 _SYMBOLS = {r"$\epsilon_1$": "ε₁", r"$\epsilon_2$": "ε₂", r"$\epsilon_{ee}$": "ε_ee",
             r"$d_{min}$": "d_min"}
 
@@ -76,7 +76,7 @@ def _task_errors(recording: Recording, ticks: NDArray[np.int64]) -> Iterator[Ser
     for section, unit, error in listed.errors(recording):
         found.setdefault(unit, {})[section.title] = error
     for unit, errors in found.items():
-        yield _sampled(f"Errors of tasks, {_ERRORS[unit]}", unit, tuple(errors),
+        yield _sampled(f"Errors of tasks{_ERRORS[unit]}", unit, tuple(errors),
                        np.column_stack(list(errors.values())), ticks)
 
 

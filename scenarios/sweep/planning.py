@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from hierarchy import plugins
 from hierarchy.errors import HierarchyError
 from scenarios.config import Scenario, load
 from scenarios.config.distributions import Value
@@ -69,7 +70,7 @@ def plan(sweep: Sweep, scenarios: Sequence[Scenario] | None = None) -> Plan:
                 key = key_of(text, spec, versions)
                 runs.setdefault(key, Planned(
                     scenario.name, one or scenario.name, scenario.name if one else label, index,
-                    values, Job(key, text, spec)))
+                    values, Job(key, text, spec, plugins.loaded())))
     return Plan(sweep, tuple(asked), tuple(runs.values()), refused)
 
 

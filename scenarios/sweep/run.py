@@ -11,6 +11,7 @@ from functools import cache
 from pathlib import Path
 from time import perf_counter
 
+from hierarchy import plugins
 from scenarios.measure.metrics import Metric
 
 # Code that only requests or shows runs: changing it does not change the measurements.
@@ -23,11 +24,12 @@ _ONE_AT_A_TIME = threading.Lock()  # the kernels' work arrays are shared in a pr
 
 @dataclass(frozen=True)
 class Job:
-    """A planned run: the scenario's text, the resolver, and the key of both."""
+    """A planned run: the scenario's text, the resolver, the key of both, and needed plugins."""
 
     key: str
     text: str
     resolver: str
+    plugins: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -56,12 +58,17 @@ def key_of(text: str, resolver: str, versions: str) -> str:
     return hashlib.sha256("\0".join((text, resolver, versions)).encode()).hexdigest()[:32]
 
 
-@cache
 def digest() -> str:
     """Return a digest of everything besides the scenario that the numbers of a run depend on.
 
-    This is the source code used in a run, including kernels, and the versions of dependencies.
+    This is the source code used in a run, including kernels and plugins, and the versions of
+    dependencies.
     """
+    return _of_the_package() + plugins.fingerprint()
+
+
+@cache
+def _of_the_package() -> str:
     from scenarios.loop.recording import versions
 
     root = Path(__file__).parents[2]
@@ -95,6 +102,8 @@ def run(text: str, resolver: str, key: str) -> Outcome:
 
 def run_batch(jobs: Sequence[Job], versions: str) -> list[Outcome]:
     """Run jobs one after the other; raises OtherVersionsError unless this code is `versions`."""
+    for module in dict.fromkeys(name for job in jobs for name in job.plugins):
+        plugins.allow(module)  # as the process that planned the runs has done
     if digest() != versions:
         raise OtherVersionsError("a worker has other versions of task-hierarchy or its "
                                  "dependencies than this machine; install the same on both")

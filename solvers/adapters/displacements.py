@@ -7,14 +7,17 @@ is the velocity, and priorities are strict.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hierarchy.errors import HierarchyError
-from hierarchy.problem import Array, Hierarchy
+from hierarchy.problem import Array, Hierarchy, check_rows
+from solvers.adapters.packing import ODD, damp, narrow, write_bounds, write_several, write_task
 
-Level = tuple[Array, ...]
+_NO_DAMPING = 1e-12  # pink's default, a regularisation of its QP that ours does not need
+
 Limit = tuple[Array, Array]  # G (k, n), h (k,)
 
 
@@ -30,33 +33,165 @@ class Task(Protocol):
         """Return J (k, n)."""
 
 
+class Pull(NamedTuple):
+    """A weight on the length of the step, as pink adds to its cost, and its centre.
+
+    weight : of |x - centre|^2 next to |W (J x - b)|^2 of a level, in the unit of its rows squared.
+    centre : (n,) the velocity to which it pulls.
+    """
+
+    weight: float
+    centre: Array
+
+
 def hierarchy(configuration: object, n: int, period: float, limits: Sequence[Limit],
-              constraints: Sequence[Task], tasks: Iterable[Task | Sequence[Task]]) -> Hierarchy:
+              constraints: Sequence[Task], tasks: Iterable[Task | Sequence[Task]],
+              pull: Pull | None = None) -> Hierarchy:
     """Pack limits, constraints and tasks into levels, without the empty ones.
 
     n unknowns [rad/s or m/s]; period [s]. An entry of `tasks` is a task, or a sequence of tasks
     that share a level, weighted by their costs. Constraints have no cost, as in pink and mink.
+    Without `pull` a task's lm_damping is refused; with it, each level asks for no more than its
+    own damped step would reach.
     """
     if not 0.0 < period < np.inf:
         raise HierarchyError(f"period {period} s must be positive and finite")
-    levels: dict[str, Level] = {"limits": limit_level(limits, n, period)}
-    held = list(constraints)
-    levels["constraints"] = _packed([task_rows(task, configuration, period, weighted=False)
-                                     for task in held], n)
-    kept = [name for name, level in levels.items() if len(level[0])]
-    packed = [levels[name] for name in kept]
-    for entry in tasks:
-        together = entry if isinstance(entry, Sequence) else [entry]
-        packed.append(_packed([task_rows(task, configuration, period) for task in together], n))
-        kept.append(" + ".join(map(label, together)))
-    return Hierarchy.from_levels(packed, np.zeros(n), kept)
+    entries = [entry if isinstance(entry, Sequence) else [entry] for entry in tasks]
+    damped = pull is not None
+    levels = [(" + ".join(map(label, together)),
+               [_read(task, configuration, damped) for task in together]) for together in entries]
+    if constraints:
+        held = [_read(task, configuration, damped, weighted=False) for task in constraints]
+        levels.insert(0, ("constraints", held))
+    found = _Limits.of(limits, n, period)
+    packed = _Packed(n, found.most + sum(len(one.e) for _, read in levels for one in read))
+    packed.keep("limits", found.write(packed))
+    for name, read in levels:
+        last = packed.write(read, period)
+        if pull is not None and name != "constraints":
+            packed.damp(last, sum(one.damping for one in read), pull)
+        packed.keep(name, last)
+    return packed.hierarchy()
 
 
-def task_rows(task: Task, configuration: object, period: float, weighted: bool = True
-              ) -> tuple[Array, Array]:
-    """Return the rows W J (k, n) and -gain W e / period (k,) of a task; see `residual`."""
-    J, r = residual(task, configuration, weighted)
-    return J, r * (float(task.gain) / period)
+class _Packed:
+    """Arrays for at most `most` rows, and the levels written so far."""
+
+    def __init__(self, n: int, most: int) -> None:
+        self.A, (self.lower, self.upper) = np.empty((most, n)), np.empty((2, most))
+        self.reference, self.rows = np.zeros(n), 0
+        self.names: list[str] = []
+        self.sizes: list[int] = []
+
+    def keep(self, name: str, last: int) -> None:
+        """Make the rows written up to `last` a level, unless there are none."""
+        if last > self.rows:
+            again = self.names.count(name)
+            self.names.append(f"{name} ({again + 1})" if again else name)
+            self.sizes.append(last - self.rows)
+            self.rows = last
+
+    def write(self, read: Sequence[_Read], period: float) -> int:
+        """Write the rows of tasks that share a level; return the row after them."""
+        row = self.rows
+        for one in read:
+            found = write_task(one.J, one.e, one.cost, one.gain / period, self.A, self.lower,
+                               self.upper, row)
+            if found == ODD:
+                check_rows(label(one.task), one.J, one.e, one.e)
+                raise HierarchyError(f"{label(one.task)}: its costs {one.cost} or gain {one.gain} "
+                                     "are not finite")
+            row = int(found)
+        return row
+
+    def damp(self, last: int, own: float, pull: Pull) -> None:
+        """Ask of the rows up to `last` for no more than a damped step reaches.
+
+        They ask for A x of the x that minimises |A x - b|^2 + own |x|^2 + the pull. That x alone
+        meets them, as in pink, and their null space is left to the levels below; a strict level
+        cannot weigh its own step against its target.
+        """
+        weight = own + pull.weight
+        if weight > _NO_DAMPING:
+            self.reference = pull.weight / weight * pull.centre
+            damp(self.A, self.lower, weight, self.reference, self.rows, last)
+            self.upper[self.rows:last] = self.lower[self.rows:last]
+
+    def hierarchy(self) -> Hierarchy:
+        """Return the levels; a level is named like another one with a number."""
+        m = self.rows
+        return Hierarchy(self.A[:m], self.lower[:m], self.upper[:m],
+                         np.array(self.sizes, dtype=np.int64), self.reference, tuple(self.names))
+
+
+class _Limits(NamedTuple):
+    """Rows G x <= h / period, sorted: bounds of single unknowns, and marks of the other rows."""
+
+    lower: Array
+    upper: Array
+    pairs: list[Limit]
+    several: list[NDArray[np.bool_]]
+    left: int
+    period: float
+
+    @classmethod
+    def of(cls, limits: Iterable[Limit], n: int, period: float) -> _Limits:
+        """Sort rows; raises HierarchyError for numbers that are not finite."""
+        pairs = [(_plain(G), _plain(h)) for G, h in limits]
+        lower, upper = np.full(n, -np.inf), np.full(n, np.inf)
+        several, left = [np.empty(len(h), dtype=np.bool_) for _, h in pairs], 0
+        for (G, h), mark in zip(pairs, several, strict=True):
+            found = narrow(G, h, period, lower, upper, mark)
+            if found == ODD:
+                check_rows("limits", G, np.full(len(h), -np.inf), h)
+            left += int(found)
+        return cls(lower, upper, pairs, several, left, period)
+
+    @property
+    def most(self) -> int:
+        """The largest number of rows that `write` may write."""
+        return self.left + 2 * len(self.lower)
+
+    def write(self, packed: _Packed) -> int:
+        """Write all rows from row 0 on, and return how many."""
+        row = write_bounds(self.lower, self.upper, packed.A, packed.lower, packed.upper)
+        for (G, h), mark in zip(self.pairs, self.several, strict=True):
+            if self.left:
+                row = write_several(G, h, self.period, mark, packed.A, packed.lower, packed.upper,
+                                    row)
+        return int(row)
+
+
+class _Read(NamedTuple):
+    """What a task says: J (k, n), e (k,), cost (k,), gain, and the weight of its lm_damping."""
+
+    task: Task
+    J: Array
+    e: Array
+    cost: Array
+    gain: float
+    damping: float
+
+
+def _read(task: Task, configuration: object, damped: bool, weighted: bool = True) -> _Read:
+    if not (hasattr(task, "compute_error") and hasattr(task, "compute_jacobian")):
+        raise HierarchyError(f"{label(task)}: not a task with an error and a Jacobian, so it "
+                             "cannot be a level")
+    lm = float(getattr(task, "lm_damping", 0.0) or 0.0)
+    if lm and not damped:
+        raise HierarchyError(f"{label(task)}: lm_damping = {lm:g} weighs the task against its "
+                             "own step, which a strict level cannot; set it to 0 and use the "
+                             "damping of the resolver")
+    J, e = _plain(task.compute_jacobian(configuration)), _plain(task.compute_error(configuration))
+    cost = costs(task, len(e)) if weighted else np.ones(len(e))
+    gain = float(task.gain)
+    weighed = cost * e * gain if lm else e
+    return _Read(task, J, e, cost, gain, lm * float(weighed @ weighed) if lm else 0.0)
+
+
+def _plain(values: Any) -> Array:
+    """Return numbers as an array that kernels take without being compiled anew."""
+    return np.array(values, dtype=np.float64, order="C")
 
 
 def residual(task: Task, configuration: object, weighted: bool = True) -> tuple[Array, Array]:
@@ -68,17 +203,7 @@ def residual(task: Task, configuration: object, weighted: bool = True) -> tuple[
     ------
     HierarchyError : the task is not of the form J dq = -gain e, or has lm_damping.
     """
-    if not (hasattr(task, "compute_error") and hasattr(task, "compute_jacobian")):
-        raise HierarchyError(f"{label(task)}: not a task with an error and a Jacobian, so it "
-                             "cannot be a level")
-    damping = getattr(task, "lm_damping", 0.0)
-    if damping:
-        raise HierarchyError(f"{label(task)}: lm_damping = {damping:g} weighs the task against its "
-                             "own step, which a strict level cannot; set it to 0 and use the "
-                             "damping of the resolver")
-    J = np.asarray(task.compute_jacobian(configuration), dtype=float)
-    e = np.asarray(task.compute_error(configuration), dtype=float)
-    cost = costs(task, len(e)) if weighted else np.ones(len(e))
+    _, J, e, cost, _, _ = _read(task, configuration, False, weighted)
     asked = cost != 0.0
     return cost[asked, None] * J[asked], -cost[asked] * e[asked]
 
@@ -86,10 +211,12 @@ def residual(task: Task, configuration: object, weighted: bool = True) -> tuple[
 def costs(task: Task, rows: int) -> Array:
     """Return the cost of each row of a task: (rows,); ones for a task without a cost."""
     given = getattr(task, "cost", None)
-    cost = np.asarray(1.0 if given is None else given, dtype=float)
-    if cost.shape not in ((), (1,), (rows,)):
+    cost = np.asarray(1.0 if given is None else given, dtype=np.float64)
+    if cost.shape == (rows,):
+        return cost.copy()
+    if cost.shape not in ((), (1,)):
         raise HierarchyError(f"{label(task)}: {cost.size} costs for {rows} rows")
-    return np.array(np.broadcast_to(cost, rows))
+    return np.full(rows, float(cost.item()))
 
 
 def limit_level(limits: Iterable[Limit], n: int, period: float) -> tuple[Array, Array, Array]:
@@ -98,41 +225,13 @@ def limit_level(limits: Iterable[Limit], n: int, period: float) -> tuple[Array, 
     Rows on a single joint become bounds of that joint, unless they contradict each other. Rows
     with infinite h are left out.
     """
-    pairs = [(np.asarray(G, dtype=float), np.asarray(h, dtype=float)) for G, h in limits]
-    G = np.vstack([np.empty((0, n)), *(G for G, _ in pairs)])
-    h = np.concatenate([np.empty(0), *(h for _, h in pairs)]) / period
-    G, h = G[h != np.inf], h[h != np.inf]
-    single = np.count_nonzero(G, axis=1) == 1
-    joint = np.argmax(G[single] != 0.0, axis=1)
-    factor = G[single, joint]
-    side, up = h[single] / factor, factor > 0.0
-    lower, upper = np.full(n, -np.inf), np.full(n, np.inf)
-    np.minimum.at(upper, joint[up], side[up])
-    np.maximum.at(lower, joint[~up], side[~up])
-    bounds, rest = _bounds(lower, upper), G[~single]
-    return _stacked(bounds, (rest, np.full(len(rest), -np.inf), h[~single]))
-
-
-def _bounds(lower: Array, upper: Array) -> tuple[Array, Array, Array]:
-    """Return the rows of joint bounds; contradictory bounds become one row for each side."""
-    empty = lower > upper
-    boxed = ~empty & ((lower != -np.inf) | (upper != np.inf))
-    none, identity = np.full(np.count_nonzero(empty), np.inf), np.eye(len(lower))
-    return _stacked((identity[boxed], lower[boxed], upper[boxed]),
-                    (identity[empty], lower[empty], none), (identity[empty], -none, upper[empty]))
-
-
-def _stacked(*levels: tuple[Array, Array, Array]) -> tuple[Array, Array, Array]:
-    A, lower, upper = zip(*levels, strict=True)
-    return np.vstack(A), np.concatenate(lower), np.concatenate(upper)
+    found = _Limits.of(limits, n, period)
+    packed = _Packed(n, found.most)
+    row = found.write(packed)
+    return packed.A[:row], packed.lower[:row], packed.upper[:row]
 
 
 def label(task: object) -> str:
     """Return the class and frame of a task, for messages."""
     frame = getattr(task, "frame", None) or getattr(task, "frame_name", None)
     return f"{type(task).__name__}" + (f" of {frame}" if isinstance(frame, str) else "")
-
-
-def _packed(rows: Sequence[tuple[Array, Array]], n: int) -> tuple[Array, Array]:
-    return (np.vstack([np.empty((0, n)), *(A for A, _ in rows)]),
-            np.concatenate([np.empty(0), *(b for _, b in rows)]))

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING
+from functools import cache
+from pkgutil import iter_modules
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array, Hierarchy
 from solvers.adapters.displacements import Task
 from solvers.adapters.from_pink import hierarchy
+from solvers.adapters.packing import largest_violation
 from solvers.resolver import Resolution, Resolver, make
 from solvers.status import Status
 
@@ -19,45 +24,86 @@ if TYPE_CHECKING:
     from pink.limits import Limit
 
 _ALWAYS = ("limits", "constraints")
+_noted: set[tuple[str, ...]] = set()
 
 
 def solve_ik(configuration: Configuration, tasks: Iterable[Task | Sequence[Task]], dt: float,
-             solver: str | Resolver = "hcod", *, limits: Iterable[Limit] | None = None,
-             barriers: Iterable[Barrier] | None = None,
-             constraints: Iterable[Task] | None = None, safety_break: bool = True,
-             tolerance: float = 1e-6) -> Array:
+             solver: str | Resolver = "hcod", damping: float = 1e-12,
+             limits: Iterable[Limit] | None = None, barriers: Iterable[Barrier] | None = None,
+             constraints: Iterable[Task] | None = None, safety_break: bool = True, *,
+             tolerance: float = 1e-6, **of_the_solver: Any) -> Array:
     """Return the joint velocity (n,) [rad/s or m/s] that serves pink's tasks in strict order.
 
-    Called like `pink.solve_ik`, with three differences. The order of `tasks` is their priority, and
-    an entry may be a sequence of tasks that share a level, weighted by their costs. `solver` is the
-    name of a resolver of this package, or a resolver. There is no `damping`: of all velocities that
-    serve the tasks equally well the shortest is returned, the limit of pink's as its damping tends
-    to zero.
+    Takes the arguments of `pink.solve_ik`, all nine in its order, and differs in one thing: the
+    order of `tasks` is their priority. An entry may be a sequence of tasks that share a level,
+    weighted by their costs as in pink.
 
     dt : period [s].
+    solver : the name of a resolver of this package, or a resolver. The name of a solver of
+        qpsolvers is accepted: `hcod` answers in its place, and a warning says so once.
+    damping, and lm_damping of a task, and safe_displacement_gain of a barrier: as in pink while no
+        limit acts, level by level. Up to 1e-12, pink's default, it is off: of all velocities that
+        serve the tasks equally well the shortest is returned.
     limits, barriers, constraints : as in pink. They come first, and must hold to `tolerance`
         [rad/s, or the unit of the row].
+    of_the_solver : settings of the resolver; those of a solver of qpsolvers have no effect.
 
     Raises
     ------
     pink.exceptions.NotWithinConfigurationLimits : as in pink, unless `safety_break` is false.
     pink.exceptions.NoSolutionFound : limits or constraints cannot hold, or the resolver failed;
         says which.
-    HierarchyError : an unknown resolver, rows it cannot resolve, or a weight that has no meaning in
-        a strict order; see `solvers.adapters.from_pink.hierarchy`.
+    HierarchyError : an unknown solver or setting, or rows that the resolver cannot handle.
     """
-    resolver = make(solver) if isinstance(solver, str) else solver
+    resolver = solver if isinstance(solver, Resolver) else _resolver(solver, of_the_solver)
     configuration.check_limits(safety_break=safety_break)
-    h = hierarchy(configuration, tasks, dt, limits, barriers, constraints)
+    if not 0.0 <= damping < np.inf:
+        raise HierarchyError(f"damping {damping} must not be negative")
+    h = hierarchy(configuration, tasks, dt, limits, barriers, constraints, damping)
     resolution = resolver.solve(h)
     if resolution.status is not Status.SOLVED:
         raise _no_solution(h, resolution, f"{resolver.name}: {resolution.status}")
-    broken = dict(zip(h.names, h.violations(resolution.x), strict=True))
-    for name in _ALWAYS:
-        if broken.get(name, 0.0) > tolerance:
-            raise _no_solution(h, resolution, f"the {name} cannot all hold: they are violated by "
-                                              f"at least {broken[name]:.3g}")
+    _check_held(h, resolution, tolerance)
     return np.asarray(resolution.x)
+
+
+def _resolver(solver: str, settings: dict[str, Any]) -> Resolver:
+    """Return the resolver for a name, which may be that of a solver of qpsolvers."""
+    if solver not in _qp_solvers():
+        return make(solver, **settings) if settings else _made(solver)
+    note = (solver, *sorted(settings))
+    if note not in _noted:
+        _noted.add(note)
+        unused = f"; without effect: {', '.join(note[1:])}" if settings else ""
+        warnings.warn(f"solver {solver!r} minimises one cost; the tasks are resolved in strict "
+                      f"order by 'hcod'{unused}", stacklevel=3)
+    return _made("hcod")
+
+
+@cache
+def _made(name: str) -> Resolver:
+    return make(name)
+
+
+@cache
+def _qp_solvers() -> frozenset[str]:
+    """Return the names that qpsolvers knows, installed or not: one module each."""
+    from qpsolvers import solvers
+
+    return frozenset(module.name.rstrip("_") for module in iter_modules(solvers.__path__))
+
+
+def _check_held(h: Hierarchy, resolution: Resolution, tolerance: float) -> None:
+    """Raise NoSolutionFound if limits or constraints do not hold."""
+    first = 0
+    for name, size in zip(h.names, h.sizes.tolist(), strict=True):
+        if name not in _ALWAYS:
+            return
+        beyond = largest_violation(h.A, h.lower, h.upper, resolution.x, first, first + size)
+        if beyond > tolerance:
+            raise _no_solution(h, resolution, f"the {name} cannot all hold: they are violated by "
+                                              f"at least {beyond:.3g}")
+        first += size
 
 
 def _no_solution(h: Hierarchy, resolution: Resolution, text: str) -> Exception:

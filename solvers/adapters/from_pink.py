@@ -116,29 +116,46 @@ class PinkTask(Task):
 def hierarchy(configuration: Configuration,
               tasks: Iterable[displacements.Task | Sequence[displacements.Task]], dt: float,
               limits: Iterable[Limit] | None = None, barriers: Iterable[Barrier] | None = None,
-              constraints: Iterable[displacements.Task] | None = None) -> Hierarchy:
+              constraints: Iterable[displacements.Task] | None = None,
+              damping: float | None = None) -> Hierarchy:
     """Return the problem of `pink.build_ik` as levels: limits, constraints, then the tasks.
 
     The unknown is the velocity (n,); dt [s]. The order of `tasks` is their priority; an entry may
     be a sequence of tasks that share a level, weighted by their costs. Without `limits` those of
     the model are used, as in pink. Barriers are rows of the level of limits.
 
+    damping : None for exact levels. With a number, pink's damping, a task's lm_damping and a
+        barrier's safe_displacement_gain act on each level as they do on pink's only one: the level
+        asks for what its own step, damped by them, would reach.
+
     Raises
     ------
-    HierarchyError : lm_damping, or a barrier's safe_displacement_gain: both are weights against all
-        tasks, which a strict order has no place for.
+    HierarchyError : without `damping`, for lm_damping and safe_displacement_gain: both are weights
+        against all tasks, which exact levels have no place for.
     """
-    pairs = [limit.compute_qp_inequalities(configuration, dt)
+    found = [limit.compute_qp_inequalities(configuration, dt)
              for limit in (_limits_of_model(configuration) if limits is None else limits)]
-    for barrier in barriers or ():
-        if barrier.safe_displacement_gain:
+    given, n = list(barriers or ()), configuration.model.nv
+    found += [barrier.compute_qp_inequalities(configuration, dt) for barrier in given]
+    pull = None if damping is None else displacements.Pull(damping, np.zeros(n))
+    for barrier in given:
+        if barrier.safe_displacement_gain and pull is None:
             raise HierarchyError(f"{type(barrier).__name__}: safe_displacement_gain = "
                                  f"{barrier.safe_displacement_gain:g} weighs a displacement "
                                  "against the tasks; set it to 0")
-        pairs.append(barrier.compute_qp_inequalities(configuration, dt))
-    return displacements.hierarchy(configuration, configuration.model.nv, dt,
-                                   [pair for pair in pairs if pair is not None],
-                                   list(constraints or ()), tasks)
+        if barrier.safe_displacement_gain and pull is not None:
+            H, c = barrier.compute_qp_objective(configuration)
+            pull = _pulled(pull, H, c, dt)
+    return displacements.hierarchy(configuration, n, dt,
+                                   [pair for pair in found if pair is not None],
+                                   list(constraints or ()), tasks, pull)
+
+
+def _pulled(pull: displacements.Pull, H: Array, c: Array, dt: float) -> displacements.Pull:
+    """Return a pull with that of a barrier's objective, H = weight I and c = -weight dq_safe."""
+    weight = pull.weight + float(H[0, 0])
+    centre = pull.weight * pull.centre - c / dt
+    return displacements.Pull(weight, centre / weight if weight > 0.0 else pull.centre)
 
 
 def _limits_of_model(configuration: Configuration) -> list[Limit]:

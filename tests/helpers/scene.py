@@ -10,11 +10,15 @@ from hierarchy.paths import Ellipse
 from hierarchy.tasks import (
     Avoidance,
     CentreOfMass,
+    JointCoupling,
     JointDamping,
+    LookAt,
+    Manipulability,
     Pointing,
     Pose,
     Position,
     Posture,
+    RelativePose,
 )
 from scenarios.cell.sensors import ExactDistances
 
@@ -38,6 +42,13 @@ TASKS = {
     "centre of mass, x and z": CentreOfMass(ROBOT, PATH, (0, 2)),
     "posture": Posture((0.1,) * 7),
     "damping": JointDamping(7),
+    "relative pose": RelativePose(FRAME, ROBOT.frame("joint_3"), (0.1, 0.2, 0.3),
+                                  np.eye(3)[[1, 2, 0]]),
+    "relative position": RelativePose(FRAME, ROBOT.frame("joint_3"), (0.1, 0.2, 0.3)),
+    "coupling": JointCoupling(ROBOT, {"joint_2": 1.0, "joint_5": -0.5}, 0.3),
+    "look-at": LookAt(FRAME, (0.3, 0.9, 1.4)),
+    "manipulability": Manipulability(ROBOT.frame("joint_6"), 0.1),
+    "manipulability of the pose": Manipulability(FRAME, 0.1, "pose", "equality"),
 }
 
 

@@ -13,8 +13,8 @@ from hierarchy import HierarchyError, Robot, State
 from scenarios import load, simulate
 from scenarios.cli.main import run_command
 from scenarios.export import export, foxglove
-from scenarios.export.columns import CONSTANTS, columns
 from scenarios.files import OutputError
+from scenarios.loop.columns import CONSTANTS, columns
 from scenarios.loop.recording import Event
 from scenarios.loop.tree import joint_units, tree_of
 from scenarios.measure.run_folder import save

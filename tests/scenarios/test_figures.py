@@ -5,7 +5,6 @@ import os
 import re
 import subprocess
 import sys
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -18,6 +17,7 @@ from hierarchy import HierarchyError
 from scenarios.cli.figures import redraw
 from scenarios.cli.main import run_command
 from scenarios.config import load
+from scenarios.config.listed import ListedPosition
 from scenarios.draw.figures import drawing, letter, palette, panels
 from scenarios.draw.figures.picture import picture
 from scenarios.draw.figures.timeline import timeline
@@ -173,8 +173,8 @@ def test_a_panel_without_its_signal_is_left_out_and_not_drawn_empty(panel):
 
 
 def test_the_errors_of_listed_tasks_are_drawn_with_a_line_for_each():
-    asked = HandMadeScenario(tasks=(SimpleNamespace(title="left foot", kind="position"),
-                                    SimpleNamespace(title="right foot", kind="position")))
+    asked = HandMadeScenario(tasks=(ListedPosition(name="left foot", kind="position", frame=""),
+                                    ListedPosition(name="right foot", kind="position", frame="")))
     run = recording(asked, task_error_left_foot=np.ones((5, 3)),
                     task_error_right_foot=np.full((5, 3), 1e-3))
     (ax,) = beside(panels.PANEL["task-errors"], {"hqp": run})["hqp"].axes

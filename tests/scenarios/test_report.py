@@ -4,7 +4,6 @@ import itertools
 import re
 import shlex
 from html.parser import HTMLParser
-from types import SimpleNamespace
 
 import hand_made
 import numpy as np
@@ -13,6 +12,7 @@ from hand_made import HandMadeScenario, recording
 from headless import chromium
 
 from scenarios.config import load
+from scenarios.config.listed import ListedPosition
 from scenarios.loop.recording import Event
 from scenarios.loop.simulation import simulate
 from scenarios.measure.comparison import Comparison
@@ -102,8 +102,8 @@ def test_the_verdict_says_who_tracked_best():
 
 
 def test_the_verdict_says_who_served_the_scenarios_own_tasks_best():
-    asked = HandMadeScenario(tasks=(SimpleNamespace(title="left foot", kind="position"),
-                                    SimpleNamespace(title="gaze", kind="position")))
+    asked = HandMadeScenario(tasks=(ListedPosition(name="left foot", kind="position", frame=""),
+                                    ListedPosition(name="gaze", kind="position", frame="")))
     runs = [made(spec, scenario=asked, task_error_left_foot=np.full((5, 1), error),
                  task_error_gaze=np.ones((5, 1)))
             for spec, error in (("recursive", 1e-3), ("augmented", 5e-3))]

@@ -161,22 +161,119 @@ def test_a_configuration_outside_its_limits_is_refused_as_in_pink(robot):
     assert np.isfinite(back).all()
 
 
-def test_what_has_no_meaning_in_a_strict_order_is_refused_by_name(configuration):
+def test_weights_against_all_tasks_are_refused_where_levels_are_exact(configuration):
     from pink.barriers import PositionBarrier
 
     hand = frame_task(configuration)
     hand.lm_damping = 1.0
     with pytest.raises(HierarchyError, match="FrameTask of end_effector: lm_damping = 1"):
-        solve_ik(configuration, [hand], DT)
+        pink_hierarchy(configuration, [hand], DT)
     barrier = PositionBarrier("end_effector", p_max=np.ones(3), safe_displacement_gain=2.0)
     with pytest.raises(HierarchyError, match="PositionBarrier: safe_displacement_gain = 2"):
-        solve_ik(configuration, [posture_task(Q)], DT, barriers=[barrier])
-    with pytest.raises(HierarchyError, match="unknown resolver 'proxqp'"):
-        solve_ik(configuration, [posture_task(Q)], DT, solver="proxqp")
-    with pytest.raises(TypeError, match="damping"):
-        solve_ik(configuration, [posture_task(Q)], DT, damping=1e-6)
+        pink_hierarchy(configuration, [posture_task(Q)], DT, barriers=[barrier])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("damping", "lm_damping"), [(1e-2, 0.0), (0.0, 3.0), (1e-3, 50.0)])
+def test_damping_does_what_it_does_in_pink_while_no_limit_acts(configuration, damping, lm_damping):
+    import pink
+
+    pytest.importorskip("quadprog")
+    hand, posture = frame_task(configuration, shift=(0.02, 0.01, 0.0)), posture_task(Q + 0.1)
+    hand.lm_damping = lm_damping
+    for tasks in ([hand], [hand, posture]):
+        ours = solve_ik(configuration, [tasks], DT, "hcod", damping, limits=[])
+        theirs = pink.solve_ik(configuration, tasks, DT, "quadprog", damping or 1e-12, limits=[])
+        undamped = solve_ik(configuration, [[frame_task(configuration, shift=(0.02, 0.01, 0.0)),
+                                             *tasks[1:]]], DT, limits=[])
+        np.testing.assert_allclose(ours, theirs, atol=1e-7)
+        assert np.abs(ours - undamped).max() > 1e-4
+
+
+def test_a_damped_level_leaves_its_null_space_to_the_levels_below(configuration):
+    hand, posture = frame_task(configuration, turn=0.0), posture_task(Q + 0.05)
+    hand.lm_damping = 1e4
+    alone = solve_ik(configuration, [hand], DT, limits=[])
+    both = solve_ik(configuration, [hand, posture], DT, limits=[])
+    J = hand.compute_jacobian(configuration)
+    np.testing.assert_allclose(J @ both, J @ alone, atol=1e-9)
+    assert np.abs(both - alone).max() > 1e-3
+
+
+@pytest.mark.slow
+def test_a_barrier_pulls_toward_its_safe_displacement_as_in_pink(configuration):
+    import pink
+    from pink.barriers import PositionBarrier
+
+    pytest.importorskip("quadprog")
+
+    class Backing(PositionBarrier):
+        def compute_safe_displacement(self, configuration):
+            return np.linspace(-0.01, 0.01, 7)
+
+    here = configuration.get_transform_frame_to_world("end_effector").translation
+    barrier = Backing("end_effector", indices=[0], p_max=here[:1] + 1.0, gain=1.0,
+                      safe_displacement_gain=0.7)
+    hand = frame_task(configuration, shift=(0.001, 0.0, 0.0), turn=0.0)
+    settings = {"barriers": [barrier], "limits": []}
+    ours = solve_ik(configuration, [[hand]], DT, **settings)
+    np.testing.assert_allclose(ours, pink.solve_ik(configuration, [hand], DT, "quadprog",
+                                                   **settings), atol=1e-6)
+    free = solve_ik(configuration, [[hand]], DT, limits=[])
+    assert np.abs(ours - free).max() > 0.01
+
+
+def test_pinks_arguments_are_taken_in_pinks_order(configuration):
+    import inspect
+
+    import pink
+
+    theirs = [one for one in inspect.signature(pink.solve_ik).parameters.values()
+              if one.kind is one.POSITIONAL_OR_KEYWORD]
+    ours = list(inspect.signature(solve_ik).parameters.values())[:len(theirs)]
+    assert [one.name for one in ours] == [one.name for one in theirs]
+    assert {one.name: one.default for one in ours if one.name != "solver"} == {
+        one.name: one.default for one in theirs if one.name != "solver"}
+    hand = [frame_task(configuration, turn=0.0)]
+    given = solve_ik(configuration, hand, DT, "hcod", 1e-12, [], None, None, True)
+    np.testing.assert_array_equal(given, solve_ik(configuration, hand, DT, limits=[]))
+
+
+def test_a_solver_of_qpsolvers_is_answered_by_hcod_with_a_note(configuration):
+    from solvers.adapters import for_pink
+
+    for_pink._noted.clear()
+    hand = [frame_task(configuration)]
+    expected = solve_ik(configuration, hand, DT)
+    with pytest.warns(UserWarning, match="solver 'proxqp' minimises one cost; the tasks are "
+                                         "resolved in strict order by 'hcod'"):
+        np.testing.assert_array_equal(solve_ik(configuration, hand, DT, "proxqp"), expected)
+    solve_ik(configuration, hand, DT, "proxqp")  # said once; a second warning would be an error
+    with pytest.warns(UserWarning, match="without effect: eps_abs, max_iter"):
+        solve_ik(configuration, hand, DT, solver="mosek", max_iter=3, eps_abs=1e-3)
+    np.testing.assert_allclose(solve_ik(configuration, hand, DT, solver="hcod", guesses=1),
+                               expected)
+
+
+def test_wrong_arguments_are_named(configuration):
+    hand = [posture_task(Q)]
+    with pytest.raises(HierarchyError, match="unknown resolver 'proxpq'"):
+        solve_ik(configuration, hand, DT, solver="proxpq")
+    with pytest.raises(HierarchyError, match="unknown setting of hcod 'guess'"):
+        solve_ik(configuration, hand, DT, solver="hcod", guess=1)
+    with pytest.raises(HierarchyError, match="damping -1 must not be negative"):
+        solve_ik(configuration, hand, DT, damping=-1)
     with pytest.raises(HierarchyError, match="period 0"):
-        solve_ik(configuration, [posture_task(Q)], 0.0)
+        solve_ik(configuration, hand, 0.0)
+
+
+def test_numbers_that_are_not_finite_are_named(configuration):
+    posture = posture_task(np.full(7, np.nan))
+    with pytest.raises(HierarchyError, match="PostureTask"):
+        solve_ik(configuration, [posture], DT)
+    wrong = SimpleNamespace(compute_qp_inequalities=lambda *_: (np.eye(7)[:1] * np.nan, np.ones(1)))
+    with pytest.raises(HierarchyError, match="limits, row 0"):
+        solve_ik(configuration, [posture_task(Q)], DT, limits=[wrong])
 
 
 def test_tasks_of_pink_serve_in_a_stack_and_their_configuration_follows(robot, configuration):

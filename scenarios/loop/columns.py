@@ -4,19 +4,41 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from scenarios.loop.recording import Recording
+from scenarios.config import Scenario
+from scenarios.loop.facts import Facts
 
 CONSTANTS = ("joint_lower", "joint_upper", "velocity_limit")
 _METRES = ("ee_position", "desired_position", "position_error", "true_ee_position",
            "control_point_distance", "minimal_distance", "ee_distance",
            "true_control_point_distance", "true_minimal_distance", "true_ee_distance",
            "contact_depth", "obstacle_offset")
+
+
+class Recorded(Protocol):
+    """The part of a `Recording` that its columns need."""
+
+    @property
+    def signals(self) -> dict[str, NDArray[Any]]: ...  # noqa: D102
+
+    @property
+    def orders(self) -> tuple[str, ...]: ...  # noqa: D102
+
+    @property
+    def scenario(self) -> Scenario: ...  # noqa: D102
+
+    @property
+    def facts(self) -> Facts: ...  # noqa: D102
+
+    @property
+    def fault(self) -> str | None: ...  # noqa: D102
+
+    @property
+    def events(self) -> tuple[Any, ...]: ...  # noqa: D102
 
 
 @dataclass(frozen=True)
@@ -33,7 +55,7 @@ class Column:
         return f"{self.name} [{self.unit}]" if self.unit else self.name
 
 
-def columns(recording: Recording) -> Iterator[Column]:
+def columns(recording: Recorded) -> Iterator[Column]:
     """Yield every per-tick signal number by number, then the stack and the events as text."""
     units = signal_units(recording)
     for name, signal in of_ticks(recording).items():
@@ -44,24 +66,24 @@ def columns(recording: Recording) -> Iterator[Column]:
             unit = unit_of[i] if len(unit_of) == int(np.prod(shape)) else unit_of[0]
             yield Column(name + index, unit, signal[(slice(None), *place)])
     yield Column("stack", "", stacks(recording))
-    events = [""] * recording.ticks
+    events = [""] * len(recording.signals["t"])
     for tick, kind, action in recording.events:
         events[tick] += f"{'; ' if events[tick] else ''}{kind}: {action}"
     yield Column("events", "", np.array(events, dtype=np.str_))
 
 
-def of_ticks(recording: Recording) -> dict[str, NDArray[Any]]:
+def of_ticks(recording: Recorded) -> dict[str, NDArray[Any]]:
     """Return the signals that have one entry per tick."""
     return {name: signal for name, signal in recording.signals.items() if name not in CONSTANTS}
 
 
-def stacks(recording: Recording) -> NDArray[Any]:
+def stacks(recording: Recorded) -> NDArray[Any]:
     """Return the tasks of each tick's stack (T,), most important first."""
     names: NDArray[Any] = np.array(recording.orders or ("",), dtype=np.str_)
-    return np.asarray(names[recording["order"]])
+    return np.asarray(names[recording.signals["order"]])
 
 
-def signal_units(recording: Recording) -> dict[str, tuple[str, ...]]:
+def signal_units(recording: Recorded) -> dict[str, tuple[str, ...]]:
     """Return the units of the entries of each signal with units; a single one holds for all."""
     positions, rates = (recording.facts.robot.position_units,
                         recording.facts.robot.velocity_units)

@@ -43,7 +43,7 @@ class Still(Path):
     position: Vector
 
     def __post_init__(self) -> None:
-        _check("position", self.position)
+        check_point("position", self.position)
 
     def write(self, t: float, out: Array) -> None:
         """See `Path.write`."""
@@ -63,7 +63,7 @@ class Ellipse(Path):
 
     def __post_init__(self) -> None:
         for name in ("centre", "cosine", "sine"):
-            _check(name, getattr(self, name))
+            check_point(name, getattr(self, name))
         if not abs(self.rate) < inf:
             raise HierarchyError(f"ellipse: rate {self.rate} is not finite")
         object.__setattr__(self, "_packed", np.array([self.centre, self.cosine, self.sine],
@@ -78,39 +78,26 @@ class Ellipse(Path):
         return bind(_write_ellipse, self._packed, self.rate, out, then=(0.0,))
 
 
-@dataclass(frozen=True)
-class Waypoints(Path):
-    """Straight lines between points, quintic in time, at rest at every point.
+def circle(centre: Vector, radius: float, normal: Vector = (0.0, 0.0, 1.0), rate: float = 1.0,
+           phase: float = 0.0) -> Ellipse:
+    """Return a circle of `radius` [m] about `normal` (3,); rate [rad/s], phase [rad].
 
-    `times` (N,) [s] increasing, `points` (N, 3) [m]; before the first and after the last it rests.
+    It starts, at phase zero, in the direction of the world's x axis as seen in its plane, or of y
+    where the normal is along x. Raises HierarchyError for a radius < 0 or a normal of length zero.
     """
-
-    times: Sequence[float]
-    points: Sequence[Vector]
-
-    def __post_init__(self) -> None:
-        if len(self.times) != len(self.points) or not self.times:
-            raise HierarchyError(f"waypoints: {len(self.times)} times for "
-                                 f"{len(self.points)} points")
-        if any(b <= a for a, b in zip(self.times, self.times[1:], strict=False)):
-            raise HierarchyError(f"waypoints: times must increase, got {list(self.times)}")
-        for i, point in enumerate(self.points):
-            _check(f"points[{i}]", point)
-
-    def write(self, t: float, out: Array) -> None:
-        """See `Path.write`."""
-        i = int(np.searchsorted(self.times, t, side="right"))
-        out[1:] = 0.0
-        if i == 0 or i == len(self.times):
-            out[0] = self.points[min(i, len(self.times) - 1)]
-            return
-        span = self.times[i] - self.times[i - 1]
-        s = (t - self.times[i - 1]) / span
-        start = np.asarray(self.points[i - 1], dtype=float)
-        step = np.asarray(self.points[i], dtype=float) - start
-        out[0] = start + step * (s**3 * (10 - 15 * s + 6 * s * s))
-        out[1] = step * (30 * s * s * (1 - s) ** 2 / span)
-        out[2] = step * (60 * s * (1 - s) * (1 - 2 * s) / span**2)
+    check_point("centre", centre)
+    z = np.array(normal, dtype=float)
+    length = float(np.linalg.norm(z))
+    if z.shape != (3,) or not 1e-9 < length < inf or not 0.0 <= radius < inf:
+        raise HierarchyError(f"circle: radius {radius} and normal {list(normal)}, expected a "
+                             "number >= 0 and a direction")
+    z = z / length
+    toward = np.eye(3)[1 if abs(z[0]) > 0.9 else 0]
+    x = toward - (toward @ z) * z
+    x, y = x / np.linalg.norm(x), np.cross(z, x / np.linalg.norm(x))
+    c, s = cos(phase), sin(phase)
+    return Ellipse(centre, tuple((radius * (c * x + s * y)).tolist()),
+                   tuple((radius * (c * y - s * x)).tolist()), rate)
 
 
 @dataclass(frozen=True)
@@ -121,7 +108,7 @@ class Shifted(Path):
     offset: Vector
 
     def __post_init__(self) -> None:
-        _check("offset", self.offset)
+        check_point("offset", self.offset)
 
     def write(self, t: float, out: Array) -> None:
         """See `Path.write`."""
@@ -174,7 +161,8 @@ class Jittered(Path):
         out[2] -= size * (speeds**2 * np.sin(angles)).sum(axis=1)
 
 
-def _check(name: str, vector: Vector) -> None:
+def check_point(name: str, vector: Vector) -> None:
+    """Raise a HierarchyError unless a vector is three finite numbers, or return None."""
     array = np.asarray(vector, dtype=float)
     if array.shape != (3,) or not np.isfinite(array).all():
         raise HierarchyError(f"{name} must be three finite numbers [m], got {list(vector)}")

@@ -1,0 +1,42 @@
+"""Tables for notebooks: short, with every value escaped.
+
+String building is enough here: the core does not import a template engine.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from html import escape
+
+import numpy as np
+from numpy.typing import NDArray
+
+_MOST = 30      # rows of a table that are shown
+_ENTRIES = 8    # entries of an array that are shown
+
+
+def html_table(caption: str, head: Sequence[object], rows: Sequence[Sequence[object]],
+               best: Collection[tuple[int, int]] = ()) -> str:
+    """Return an HTML table with at most 30 rows; cells at the (row, column) of `best` are bold."""
+    shown = [_row([_cell(value, (i, j) in best) for j, value in enumerate(row)])
+             for i, row in enumerate(rows[:_MOST])]
+    left = len(rows) - _MOST
+    if left > 0:
+        shown.append(_row([f'<td colspan="{max(1, len(head))}">... and {left} more</td>']))
+    top = _row([f"<th>{escape(str(name))}</th>" for name in head]) if head else ""
+    return f"<table><caption>{escape(caption)}</caption>{top}{''.join(shown)}</table>"
+
+
+def numbers(values: NDArray[np.float64]) -> str:
+    """Return an array in one line with four digits, without the middle where it is long."""
+    return np.array2string(np.asarray(values), precision=4, threshold=_ENTRIES, edgeitems=3,
+                           suppress_small=True, max_line_width=1000)
+
+
+def _row(cells: Sequence[str]) -> str:
+    return f"<tr>{''.join(cells)}</tr>"
+
+
+def _cell(value: object, best: bool) -> str:
+    text = escape(str(value))
+    return f"<td><b>{text}</b></td>" if best else f"<td>{text}</td>"

@@ -1,0 +1,166 @@
+"""Own tasks, resolvers, robots, plants and sensors, found by name without changing the package.
+
+A plugin is a module that registers what it adds when it is imported:
+
+    from hierarchy.plugins import register
+
+    @register("tasks", "elbow")
+    class Elbow(Task): ...
+
+Which modules are imported is the user's decision, never that of a file. A module is allowed by
+`allow` (on the command line `--plugin MODULE`), or by an entry point of an installed package in the
+group `task_hierarchy.tasks`, `.resolvers`, `.robots`, `.plants` or `.sensors`. A file may say with
+`plugins = ["my_module"]` what it needs; `require` refuses it where that is not allowed.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import sys
+from collections.abc import Callable, Iterable
+from functools import cache
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, TypeVar, get_args
+
+from hierarchy.errors import HierarchyError, UnknownNameError
+
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
+
+Door = Literal["tasks", "resolvers", "robots", "plants", "sensors"]
+DOORS: tuple[Door, ...] = get_args(Door)
+_GROUP = "task_hierarchy"
+_Thing = TypeVar("_Thing")
+
+_registered: dict[str, dict[str, Any]] = {door: {} for door in DOORS}
+_loaded: dict[str, None] = {}   # names of the modules that were allowed, by whatever rule
+_flagged: dict[str, None] = {}  # those of `allow`
+
+
+def register(door: Door, name: str) -> Callable[[_Thing], _Thing]:
+    """Return a decorator that makes a thing available under a name.
+
+    Raises UnknownNameError for an unknown door, HierarchyError if the name is taken.
+    """
+    if door not in DOORS:
+        raise UnknownNameError("door", door, DOORS)
+
+    def keep(thing: _Thing) -> _Thing:
+        before = _registered[door].get(name, thing)
+        if _origin(before) != _origin(thing):  # a module that is imported anew is welcome
+            raise HierarchyError(f"{door}: {name!r} is already {_origin(before)}")
+        _registered[door][name] = thing
+        return thing
+
+    return keep
+
+
+def own(door: Door) -> dict[str, Any]:
+    """Return what is registered at a door by name, and what installed packages offer there."""
+    for point in _points(door):
+        _load(point, door)
+    return dict(_registered[door])
+
+
+def find(door: Door, name: str) -> Any | None:
+    """Return what has a name at a door, None if nothing has; loads an entry point of that name."""
+    if name not in _registered[door]:
+        for point in _points(door):
+            if point.name == name:
+                _load(point, door)
+    return _registered[door].get(name)
+
+
+def allow(module: str) -> None:
+    """Import a plugin, also from the working directory: the user says that it may run.
+
+    Raises HierarchyError with the cause if it cannot be imported.
+    """
+    path = list(sys.path)
+    sys.path.append(str(Path.cwd()))  # at the end, where it hides no installed module
+    try:
+        _import(module, f"plugin {module!r}")
+    finally:
+        sys.path[:] = path
+    _loaded.setdefault(module)
+    _flagged.setdefault(module)
+
+
+def allowed() -> tuple[str, ...]:
+    """Return the modules of `allow`, in its order."""
+    return tuple(_flagged)
+
+
+def loaded() -> tuple[str, ...]:
+    """Return all plugins that this process uses, which its workers need too."""
+    return tuple(_loaded)
+
+
+def require(modules: Iterable[str]) -> None:
+    """Make sure that the plugins which a file names may run, and import them.
+
+    Raises HierarchyError with the remedy for one that was not allowed. One that this process has
+    imported already is allowed, since nothing is loaded for it.
+    """
+    for module in modules:
+        if module not in _loaded and module not in sys.modules:
+            if not any(point.module == module for door in DOORS for point in _points(door)):
+                raise HierarchyError(
+                    f"plugin {module!r} is not allowed: a file alone loads no code. If you trust "
+                    f"it, add --plugin {module} to the command (in Python: import {module}), or "
+                    f"install a package with an entry point {_GROUP}.* into it")
+            _import(module, f"plugin {module!r}")
+        _loaded.setdefault(module)
+
+
+def fingerprint() -> str:
+    """Return a digest of the source of the plugins loaded so far, "" without plugins."""
+    if not _loaded:
+        return ""
+    found = hashlib.sha256()
+    for module in sorted(_loaded):
+        file = getattr(sys.modules[module], "__file__", None)
+        for path in _sources(Path(file)) if file else ():
+            found.update(path.name.encode() + path.read_bytes())
+    return found.hexdigest()[:16]
+
+
+def _sources(file: Path) -> list[Path]:
+    return sorted(file.parent.rglob("*.py")) if file.name == "__init__.py" else [file]
+
+
+def _load(point: EntryPoint, door: Door) -> None:
+    if point.name not in _registered[door]:
+        _import(point.module, f"entry point {point.name!r} of {_GROUP}.{door}")
+        if point.name not in _registered[door]:  # unless the module registers it itself
+            register(door, point.name)(_loaded_object(point, door))
+    _loaded.setdefault(point.module)
+
+
+def _loaded_object(point: EntryPoint, door: Door) -> Any:
+    try:
+        return point.load()
+    except AttributeError as error:
+        raise HierarchyError(f"entry point {point.name!r} of {_GROUP}.{door}: {error}") from error
+
+
+@cache
+def _points(door: Door) -> tuple[EntryPoint, ...]:
+    from importlib.metadata import entry_points
+
+    return tuple(entry_points(group=f"{_GROUP}.{door}"))
+
+
+def _import(module: str, what: str) -> None:
+    try:
+        import_module(module)
+    except HierarchyError as error:
+        raise HierarchyError(f"{what}: {error}") from error
+    except Exception as error:  # a plugin is the user's code and may fail in any way
+        raise HierarchyError(f"{what} cannot be imported: {type(error).__name__}: "
+                             f"{error}") from error
+
+
+def _origin(thing: Any) -> str:
+    return f"{getattr(thing, '__module__', '')}.{getattr(thing, '__qualname__', repr(thing))}"

@@ -1,0 +1,100 @@
+"""Sections of own kinds: their keys are the parameters of what a plugin registered.
+
+A task of `[[tasks]]`, [plant] and [sensor] may have a kind that the package lacks. Its maker is the
+class or function that a plugin registered under that name. The parameters of the maker are the keys
+of the section, except for those that the scenario provides (`GIVEN`). A parameter annotated `Frame`
+is the name of a frame in the file, one annotated `Path` a table as in `position.path`.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from typing import Any, ClassVar, Self, cast, get_args, get_origin, get_type_hints
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model, model_validator
+
+from hierarchy import plugins
+from hierarchy.errors import UnknownNameError
+from hierarchy.plugins import Door
+from scenarios.config.sections import Finite, Flag, PathSection, Section, Whole
+
+GIVEN: dict[Door, tuple[str, ...]] = {
+    "tasks": ("robot", "state", "name", "kind"),
+    "plants": ("robot", "q", "v", "period", "level", "obstacles"),
+    "sensors": ("robot", "exact", "body", "tip")}
+Maker = Callable[..., Any]
+
+
+class OwnSection(Section):
+    """A section whose kind and keys are those of a plugin."""
+
+    model_config = ConfigDict(extra="allow")
+    door: ClassVar[Door]
+    kind: str
+
+    @model_validator(mode="after")
+    def _fits_its_maker(self) -> Self:
+        self.settings()
+        return self
+
+    @property
+    def maker(self) -> Maker:
+        """What the plugin registered under this kind."""
+        found = plugins.find(self.door, self.kind)
+        assert found is not None, "the kind was found when the section was read"
+        return cast(Maker, found)
+
+    def settings(self) -> dict[str, tuple[Any, Any]]:
+        """Return annotation and value of each key; raises ValueError for a wrong one."""
+        given = dict(self.model_extra or {})
+        known = _parameters(self.maker, self.door)
+        try:
+            values = _model(known).model_validate(given)
+        except ValidationError as error:
+            raise ValueError(_said(self.kind, error.errors()[0], known)) from None
+        return {key: (known[key].annotation, getattr(values, key)) for key in given}
+
+
+def _said(kind: str, error: Any, known: dict[str, inspect.Parameter]) -> str:
+    key = ".".join(str(part) for part in error["loc"])
+    if error["type"] == "extra_forbidden":
+        return str(UnknownNameError(f"key of kind {kind!r}", key, known))
+    value = "" if isinstance(error["input"], dict) else f", got {error['input']!r}"
+    return f"{key}: {error['msg']}{value}"
+
+
+def _parameters(maker: Maker, door: Door) -> dict[str, inspect.Parameter]:
+    """Return the parameters of a maker that are keys, with annotations that are not text."""
+    try:
+        hints = get_type_hints(inspect.getattr_static(maker, "__init__")
+                               if isinstance(maker, type) else maker)
+    except NameError:  # a name that is imported for type checkers only
+        hints = {}
+    return {name: parameter.replace(annotation=hints.get(name, Any))
+            for name, parameter in inspect.signature(maker).parameters.items()
+            if name not in GIVEN[door] and parameter.kind not in (
+                inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD)}
+
+
+def _model(parameters: dict[str, inspect.Parameter]) -> type[BaseModel]:
+    fields: dict[str, Any] = {
+        name: (_in_a_file(parameter.annotation),
+               Field() if parameter.default is parameter.empty else Field(parameter.default))
+        for name, parameter in parameters.items()}
+    return create_model("Own", __config__=ConfigDict(
+        extra="forbid", arbitrary_types_allowed=True, protected_namespaces=()), **fields)
+
+
+def _in_a_file(annotation: Any) -> Any:
+    """Return the type that the value of a parameter has in a file, with strict numbers."""
+    from hierarchy.paths import Path
+    from hierarchy.robot import Frame  # loads pinocchio, which reading a file does not need
+
+    kinds: dict[Any, Any] = {Frame: str, Path: PathSection, float: Finite, int: Whole, bool: Flag}
+    if isinstance(annotation, type) and annotation in kinds:
+        return kinds[annotation]
+    origin, inside = get_origin(annotation), get_args(annotation)
+    if origin in (tuple, list):
+        return origin[tuple(part if part is ... else _in_a_file(part) for part in inside)]
+    return annotation

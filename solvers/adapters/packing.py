@@ -1,0 +1,145 @@
+"""Kernels that write tasks and limits of pink and mink into the rows of a hierarchy.
+
+An adapter is called once per tick of somebody's loop; small arrays in numpy would take longer than
+the solve.
+"""
+
+# mypy: disable-error-code="no-untyped-def"
+
+from __future__ import annotations
+
+import numpy as np
+
+from hierarchy.jit import compiled
+
+ODD = -1  # returned for rows with numbers that are not finite, apart from missing limits
+
+
+@compiled
+def narrow(G, h, period, lower, upper, several):
+    """Narrow the bounds lower, upper (n,) by the rows G x <= h / period on single unknowns.
+
+    `several` (k,) marks the rows on several unknowns, whose number is returned. Rows with infinite
+    h are no limits.
+    """
+    left = 0
+    for i in range(len(h)):
+        several[i] = False
+        if np.isnan(h[i]) or h[i] == -np.inf:
+            return ODD
+        if h[i] == np.inf:
+            continue
+        unknown, count = -1, 0
+        for c in range(G.shape[1]):
+            if not np.isfinite(G[i, c]):
+                return ODD
+            if G[i, c] != 0.0:
+                unknown, count = c, count + 1
+        if count != 1:
+            several[i] = True
+            left += 1
+            continue
+        side = h[i] / period / G[i, unknown]
+        if G[i, unknown] > 0.0:
+            upper[unknown] = min(upper[unknown], side)
+        else:
+            lower[unknown] = max(lower[unknown], side)
+    return left
+
+
+@compiled
+def write_bounds(lower, upper, A, low, up):
+    """Write the bounds that exist as rows of the identity from row 0 on; return how many.
+
+    Bounds of one unknown that contradict each other become a row for each side.
+    """
+    row = 0
+    for c in range(len(lower)):
+        if lower[c] == -np.inf and upper[c] == np.inf:
+            continue
+        for k in range(2 if lower[c] > upper[c] else 1):
+            apart = lower[c] > upper[c]
+            for j in range(A.shape[1]):
+                A[row, j] = 0.0
+            A[row, c] = 1.0
+            low[row] = -np.inf if apart and k == 1 else lower[c]
+            up[row] = np.inf if apart and k == 0 else upper[c]
+            row += 1
+    return row
+
+
+@compiled
+def write_several(G, h, period, several, A, low, up, row):
+    """Write the marked rows of G x <= h / period from `row` on; return the row after them."""
+    for i in range(len(h)):
+        if several[i]:
+            for c in range(A.shape[1]):
+                A[row, c] = G[i, c]
+            low[row], up[row] = -np.inf, h[i] / period
+            row += 1
+    return row
+
+
+@compiled
+def write_task(J, e, cost, rate, A, low, up, row):
+    """Write cost J x = -cost rate e from `row` on, without rows that cost nothing.
+
+    Returns the row after them, or ODD.
+    """
+    for i in range(len(e)):
+        if cost[i] == 0.0:
+            continue
+        value = -cost[i] * rate * e[i]
+        if not np.isfinite(value):
+            return ODD
+        for c in range(A.shape[1]):
+            A[row, c] = cost[i] * J[i, c]
+            if not np.isfinite(A[row, c]):
+                return ODD
+        low[row] = up[row] = value
+        row += 1
+    return row
+
+
+@compiled
+def largest_violation(A, lower, upper, x, first, last):
+    """The largest distance of a row from its bounds at x, over the rows from first to last."""
+    largest = 0.0
+    for i in range(first, last):
+        value = 0.0
+        for c in range(A.shape[1]):
+            value += A[i, c] * x[c]
+        largest = max(largest, value - upper[i], lower[i] - value)
+    return largest
+
+
+@compiled
+def damp(A, b, weight, centre, first, last):
+    """Replace b of the rows from first to last by A x of the x that minimises a damped cost.
+
+    The cost is |A x - b|^2 + weight |x - centre|^2, and A x = b - weight y with
+    (A A^T + weight 1) y = b - A centre.
+    """
+    k = last - first
+    L, y = np.empty((k, k)), np.empty(k)
+    for i in range(k):
+        y[i] = b[first + i]
+        for c in range(A.shape[1]):
+            y[i] -= A[first + i, c] * centre[c]
+        for j in range(i + 1):
+            total = weight if i == j else 0.0
+            for c in range(A.shape[1]):
+                total += A[first + i, c] * A[first + j, c]
+            for c in range(j):
+                total -= L[i, c] * L[j, c]
+            L[i, j] = np.sqrt(max(total, weight)) if i == j else total / L[j, j]
+    for i in range(k):
+        for c in range(i):
+            y[i] -= L[i, c] * y[c]
+        y[i] /= L[i, i]
+    for i in range(k - 1, -1, -1):
+        for c in range(i + 1, k):
+            y[i] -= L[c, i] * y[c]
+        y[i] /= L[i, i]
+    for i in range(k):
+        b[first + i] -= weight * y[i]

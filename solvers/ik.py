@@ -1,0 +1,132 @@
+"""Inverse kinematics of a robot in one call: tasks in order of priority, within joint limits.
+
+It is here, above the resolvers and below scenarios, because it joins a stack of `hierarchy` with a
+resolver and needs nothing else. Like the adapters it meets pinocchio only through `hierarchy`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple, final
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from hierarchy.errors import HierarchyError, expect
+from hierarchy.notebook import numbers
+from hierarchy.problem import Array
+from hierarchy.robot import Robot
+from hierarchy.stack import Stack
+from hierarchy.state import State
+from hierarchy.task import Level, Task, check_parts
+from solvers.resolver import Resolver, make
+from solvers.status import Status
+
+
+class Step(NamedTuple):
+    """The answer of `solve_ik`: velocity v (n,), how the solve ended, memory for the next call."""
+
+    v: Array
+    status: Status
+    memory: Array | None
+
+    def __repr__(self) -> str:
+        return f"Step({self.status.name}, v={numbers(self.v)})"
+
+
+def solve_ik(robot: Robot, q: ArrayLike, tasks: Sequence[Task], *, dt: float = 0.01,
+             limits: bool | Task = True, resolver: str | Resolver = "hcod",
+             memory: Array | None = None, t: float = 0.0) -> Step:
+    """Return the joint velocity that serves `tasks` at q, most important first.
+
+    Move on with `q = robot.integrate(q, step.v * dt)`. A loop at a fixed rate saves the set-up of
+    each call with a `Stack` and a `State` of its own, see docs/tutorial.md.
+
+    Parameters
+    ----------
+    q : (nq,) joint positions [rad or m].
+    tasks : tasks of `hierarchy.tasks`, plugins or your own, at velocity level.
+    dt : period [s] for which the velocity will be held.
+    limits : above all tasks: True for the position and velocity limits of the robot, False for
+        none, or a task such as `JointLimits`, which also limits accelerations. Beyond a limit the
+        joint moves back, as fast as its velocity limit allows.
+    resolver : a name of `solvers.names()`, or a resolver; with limits it must take bounds.
+    memory : that of the last call with the same tasks, to start from.
+    t : time [s], for tasks that follow a path.
+
+    Raises
+    ------
+    HierarchyError : q does not fit the robot, a task is none, dt is not positive, or the resolver
+        cannot handle a row. A numerical failure is a status, with a finite v.
+    """
+    expect("solve_ik: robot", robot, Robot, "make one with Robot.load(name or file)")
+    expect("solve_ik: tasks", tasks, Sequence, "give a list of tasks")
+    if not 0.0 < dt < np.inf:
+        raise HierarchyError(f"solve_ik: dt = {dt} s must be positive and finite")
+    first = [limits] if isinstance(limits, Task) else [StepLimits(robot, dt)] if limits else []
+    h = Stack([*first, *tasks], "velocity").hierarchy(State.at(robot, q, t=t))
+    found = (make(resolver) if isinstance(resolver, str) else resolver).solve(h, memory)
+    return Step(found.x, found.status, found.memory)
+
+
+@final
+@dataclass(frozen=True)
+class StepLimits(Task):
+    """Keep each joint within its position limits after a step of `period` [s], and its speed.
+
+    One row per actuated joint. Accelerations are not limited, so that a step does not depend on
+    the one before; see `hierarchy.tasks.JointLimits` for limits that a robot can obey.
+    """
+
+    robot: Robot
+    period: float
+    name: str = "limits"
+    kind = "inequality"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        check_parts(self)
+
+    @property
+    def dimension(self) -> int:
+        """One row per actuated joint."""
+        return self.robot.n - self.robot.actuated
+
+    @property
+    def row_names(self) -> tuple[str, ...]:
+        """The joints."""
+        return tuple(self.robot.velocity_names[self.robot.actuated:])
+
+    def box(self, state: State) -> tuple[Array, Array]:
+        """Least and largest velocity of each joint (m,), (m,) [rad/s or m/s]."""
+        of = slice(self.robot.actuated, self.robot.n)
+        lower, upper = (side[of] for side in self.robot.position_limits())
+        q, fastest = state.q[self.robot.coordinates[of]], self.robot.velocity_limit[of]
+        return (np.clip((lower - q) / self.period, -fastest, fastest),
+                np.clip((upper - q) / self.period, -fastest, fastest))
+
+    def error(self, state: State) -> Array:
+        """How far each velocity would have to be raised from zero (m,) [rad/s or m/s]."""
+        return np.maximum(self.box(state)[0], 0.0)
+
+    def jacobian(self, state: State) -> Array:
+        """The identity (m, n), right of zeros for a floating base."""
+        return np.eye(state.n)[self.robot.actuated:]
+
+    def jacobian_derivative(self, state: State) -> Array:
+        """Zero (m, n)."""
+        return np.zeros((self.dimension, state.n))
+
+    def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
+               row: int) -> Callable[[], object]:
+        """See `Task.writer`; for velocity level."""
+        if level != "velocity":
+            raise HierarchyError(f"task {self.name!r}: for velocity level; see JointLimits")
+        rows = slice(row, row + self.dimension)
+
+        def write() -> None:
+            A[rows] = self.jacobian(state)
+            lower[rows], upper[rows] = self.box(state)
+
+        return write

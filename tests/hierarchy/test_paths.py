@@ -1,0 +1,125 @@
+"""Paths: position, velocity and acceleration agree, and pass where they should."""
+
+import numpy as np
+import pytest
+
+from hierarchy import HierarchyError
+from hierarchy.paths import Blended, Ellipse, Jittered, Recorded, Shifted, Waypoints, circle, line
+
+TIMES = (0.5, 1.2, 2.0, 3.5)
+POINTS = ((0.0, 0.0, 0.1), (0.3, 0.1, 0.2), (0.3, 0.5, 0.0), (0.1, 0.2, 0.4))
+PATHS = {
+    "line": line(POINTS[0], POINTS[1], 1.5, begin=0.4),
+    "circle": circle((0.1, 0.2, 0.3), 0.2, (0.2, -0.4, 1.0), rate=1.7, phase=0.4),
+    "circle about x": circle((0.1, 0.2, 0.3), 0.2, (1.0, 0.0, 0.0)),
+    "waypoints": Waypoints(TIMES, POINTS),
+    "blended": Blended(TIMES, POINTS, blend=0.3),
+    "recorded": Recorded(TIMES, POINTS),
+    "ellipse": Ellipse((0.0, 0.6, 0.0), (0.2, 0.0, 0.2), (0.0, 0.1, 0.0), rate=1.3),
+    "shifted": Shifted(Blended(TIMES, POINTS, blend=0.7), (0.1, 0.0, 0.0)),
+    "jittered": Jittered(line(POINTS[0], POINTS[1], 2.0), 0.01, 1.0, 3),
+}
+MOMENTS = np.linspace(-0.2, 5.0, 401) + 1e-4  # not where a piece begins
+
+
+@pytest.mark.parametrize("name", PATHS)
+def test_velocity_and_acceleration_are_the_derivatives(name):
+    path, h = PATHS[name], 1e-6
+    for t in MOMENTS:
+        before, now, later = path(t - h), path(t), path(t + h)
+        rates = (later[:2] - before[:2]) / (2 * h)
+        np.testing.assert_allclose(rates, now[1:], atol=2e-8, rtol=1e-6)
+
+
+@pytest.mark.parametrize("name", [name for name in PATHS if name != "recorded"])
+def test_position_velocity_and_acceleration_do_not_jump(name):
+    path = PATHS[name]
+    for t in (*TIMES, *(t + 0.3 for t in TIMES), *(t + 0.7 for t in TIMES), 0.4, 1.9):
+        np.testing.assert_allclose(path(t - 1e-9), path(t + 1e-9), atol=1e-6)
+
+
+def test_a_line_goes_straight_from_rest_to_rest():
+    path = PATHS["line"]
+    np.testing.assert_allclose(path(0.4), [POINTS[0], [0] * 3, [0] * 3], atol=1e-12)
+    np.testing.assert_allclose(path(1.9), [POINTS[1], [0] * 3, [0] * 3], atol=1e-12)
+    aside = np.cross(path(1.0)[0] - POINTS[0], np.subtract(POINTS[1], POINTS[0]))
+    np.testing.assert_allclose(aside, 0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize(("name", "normal"), [("circle", (0.2, -0.4, 1.0)),
+                                              ("circle about x", (1.0, 0.0, 0.0))])
+def test_a_circle_keeps_its_radius_and_its_plane(name, normal):
+    path = PATHS[name]
+    for t in MOMENTS[::20]:
+        out = path(t)[0] - [0.1, 0.2, 0.3]
+        assert np.linalg.norm(out) == pytest.approx(0.2)
+        assert out @ normal == pytest.approx(0.0, abs=1e-12)
+
+
+def test_a_circle_turns_about_its_normal():
+    start, later = (circle((0, 0, 0), 1.0)(t)[0] for t in (0.0, 0.1))
+    np.testing.assert_allclose(start, [1.0, 0.0, 0.0])
+    assert np.cross(start, later)[2] == pytest.approx(np.sin(0.1))
+
+
+def test_blended_waypoints_do_not_stop_and_miss_corners_by_what_is_said():
+    path = PATHS["blended"]
+    for i in (1, 2):
+        at = path(TIMES[i] + 0.15)
+        before = np.subtract(POINTS[i], POINTS[i - 1]) / (TIMES[i] - TIMES[i - 1])
+        after = np.subtract(POINTS[i + 1], POINTS[i]) / (TIMES[i + 1] - TIMES[i])
+        assert np.linalg.norm(at[1]) > 0.1
+        assert np.linalg.norm(at[0] - POINTS[i]) == pytest.approx(
+            5 / 64 * 0.3 * np.linalg.norm(after - before))
+    np.testing.assert_allclose(path(0.5)[0], POINTS[0])
+    np.testing.assert_allclose(path(3.8), [POINTS[3], [0] * 3, [0] * 3], atol=1e-12)
+
+
+def test_a_recorded_path_passes_its_points_with_continuous_acceleration():
+    path = PATHS["recorded"]
+    for t, point in zip(TIMES, POINTS, strict=True):
+        np.testing.assert_allclose(path(t)[0], point, atol=1e-12)
+    for t in TIMES[1:-1]:
+        np.testing.assert_allclose(path(t - 1e-9), path(t + 1e-9), atol=1e-6)
+    np.testing.assert_allclose(path(TIMES[0] + 1e-9)[1], 0.0, atol=1e-6)
+    np.testing.assert_allclose(path(TIMES[-1] - 1e-9)[1], 0.0, atol=1e-6)
+
+
+def test_a_csv_file_is_read_with_or_without_names(tmp_path):
+    rows = "\n".join(",".join(map(str, (t, *p))) for t, p in zip(TIMES, POINTS, strict=True))
+    (tmp_path / "plain.csv").write_text(rows)
+    (tmp_path / "named.csv").write_text(f"t, x, y, z\n{rows}\n\n")
+    for name in ("plain", "named"):
+        np.testing.assert_allclose(Recorded.from_csv(tmp_path / f"{name}.csv")(1.5),
+                                   PATHS["recorded"](1.5))
+
+
+@pytest.mark.parametrize(("text", "said"), [
+    ("t,x,y,z\n0,0,0,0\n1,0,0\n", "line 3: expected t, x, y, z, got '1,0,0'"),
+    ("0,0,0,0\n1,a,0,0\n", "line 2: expected t, x, y, z, got '1,a,0,0'"),
+    ("0,0,0,0\n0,1,0,0\n", "times must increase"),
+    ("0,0,0,0\n1,nan,0,0\n", "points[1] must be three finite numbers"),
+    ("0,0,0,0\n", "one point is no motion"), ("", "0 times for 0 points")])
+def test_a_wrong_csv_file_is_named_with_its_line(text, said, tmp_path):
+    (tmp_path / "a.csv").write_text(text)
+    with pytest.raises(HierarchyError) as error:
+        Recorded.from_csv(tmp_path / "a.csv")
+    assert str(error.value).startswith(str(tmp_path / "a.csv"))
+    assert said in str(error.value)
+    with pytest.raises(HierarchyError, match="cannot be read"):
+        Recorded.from_csv(tmp_path / "none.csv")
+
+
+@pytest.mark.parametrize(("make", "said"), [
+    (lambda: Blended(TIMES, POINTS, 0.0), "blend 0.0 s must be positive"),
+    (lambda: Blended(TIMES, POINTS, 0.71), "at most 0.7 s, the shortest interval"),
+    (lambda: Blended(TIMES[:2], POINTS, 0.1), "2 times for 4 points"),
+    (lambda: line(POINTS[0], POINTS[1], 0.0), "duration 0.0 s must be positive"),
+    (lambda: line(POINTS[0], (1, 2), 1.0), "points[1] must be three finite numbers"),
+    (lambda: circle((0, 0, 0), -0.1), "circle: radius -0.1"),
+    (lambda: circle((0, 0, 0), 0.1, (0, 0, 0)), "normal [0, 0, 0]"),
+    (lambda: circle((0, 0), 0.1), "centre must be three finite numbers")])
+def test_wrong_values_are_named(make, said):
+    with pytest.raises(HierarchyError) as error:
+        make()
+    assert said in str(error.value)

@@ -1,0 +1,190 @@
+"""Every kind of `[[tasks]]` in a scenario: what it reaches, and what is refused."""
+
+import numpy as np
+import pytest
+
+from hierarchy import HierarchyError, State
+from hierarchy.tasks import Manipulability, SelfSeparation, Separation
+from scenarios import load, simulate
+from scenarios.cell.build import build
+from scenarios.config.listed import KINDS
+from scenarios.measure.metrics import measure
+
+BASE = {"name": "listed", "robot": {"model": "kuka_lwr"},
+        "start": {"q": [0.9, -0.9, 0.9, 1.2, 1.0, 1.0, 0.3]},
+        "control": {"level": "velocity", "stack": "hierarchical", "period": 0.01,
+                    "duration": 1.5, "resolver": "hcod"}, "damping": {"value": 1.0}}
+COUPLING = {"kind": "coupling", "joints": {"joint_2": 1.0, "joint_5": -0.5}, "value": -1.0}
+LOOK = {"kind": "look-at", "frame": "end_effector", "target": [0.3, 0.9, 0.9]}
+RELATIVE = {"kind": "relative", "frame": "end_effector", "to": "joint_3",
+            "position": [0.405, -0.065, 0.521]}
+
+
+def scenario_of(tmp_path, *tasks, **sections):
+    """A scenario with these tasks, read from a file as a user's is."""
+    import tomli_w
+
+    file = tmp_path / "listed.toml"
+    file.write_text(tomli_w.dumps({**BASE, **sections, "tasks": list(tasks)}))
+    return load(file)
+
+
+def at_level(level):
+    return {**BASE["control"], "level": level, "period": 0.002, "duration": 3.0}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("level", ["velocity", "acceleration"])
+@pytest.mark.parametrize(("task", "metric"), [
+    (COUPLING, "task_coupling_end"), (LOOK, "task_look-at_end"),
+    ({**RELATIVE, "orientation": False}, "task_relative_end"),
+    (RELATIVE | {"position": None, "name": "hold"}, "task_hold_end")])
+def test_a_task_reaches_its_target_at_both_levels(task, metric, level, tmp_path):
+    task = {key: value for key, value in task.items() if value is not None}
+    run = simulate(scenario_of(tmp_path, task, control=at_level(level)))
+    assert run.fault is None
+    assert measure(run)[metric].value < (0.1 if "look" in metric else 1e-3)  # deg, or m and rad
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("level", ["velocity", "acceleration"])
+def test_manipulability_is_kept_while_the_hand_reaches_out(level, tmp_path):
+    reach = {"kind": "position", "frame": "end_effector", "offset": [0.03, 0.12, 0.02]}
+    keep = {"kind": "manipulability", "frame": "end_effector", "least": 0.08}
+
+    def least(*tasks):
+        run = simulate(scenario_of(tmp_path, *tasks, control=at_level(level)))
+        robot = build(run.scenario).robot
+        task = Manipulability(robot.frame("end_effector"), 0.0)
+        assert run.fault is None
+        return min(task.value(State.at(robot, q)) for q in run["q"][::20])
+
+    assert least(reach) < 0.07
+    assert least(keep, reach) > 0.08
+
+
+@pytest.mark.slow
+def test_two_hands_hold_one_thing():
+    hold = {"kind": "relative", "name": "hold", "frame": "right_hand", "to": "left_hand"}
+    base = load("dual-arm")
+    frames = build(base).robot.frame_names
+    left, right = (next(f for f in frames if side in f.lower() and "hand" in f.lower())
+                   for side in ("left", "right"))
+    lead = {"kind": "position", "name": "lead", "frame": left, "offset": [0.03, 0.0, 0.05]}
+    run = simulate(base.with_changes({
+        "tasks": [{**hold, "frame": right, "to": left}, lead], "control.duration": 3.0}))
+    assert run.fault is None
+    found = measure(run)
+    assert found["task_hold_max_settled"].value is None or (
+        found["task_hold_max_settled"].value < 1e-4)
+    assert np.abs(run["task_error_hold"]).max() < 1e-4
+    assert found["task_lead_end"].value < 5e-3
+
+
+@pytest.mark.slow
+def test_self_collision_is_a_task_of_the_list(tmp_path):
+    apart = {"kind": "self-collision", "distance": 0.02, "name": "apart"}
+    home = {"kind": "posture", "target": [0.9, -1.9, 0.9, 2.0, 1.0, 1.9, 0.3]}
+    cell = build(scenario_of(tmp_path, home, apart))
+    assert cell.stack.names == ("posture", "apart")
+    assert isinstance(cell.stack["apart"], SelfSeparation)
+    scenario = scenario_of(tmp_path, apart, home)
+    assert scenario.asks == "inequalities"
+    run = simulate(scenario)
+    task = build(scenario).stack["apart"]
+    robot = build(scenario).robot
+    assert min(task.distances(State.at(robot, q)).min() for q in run["q"]) > 0.0199
+
+
+@pytest.mark.slow
+def test_collision_says_where_in_the_list_the_obstacles_come(tmp_path):
+    avoidance = {"kind": "separation", "distance": 0.05, "obstacles": [[0.1, 0.5, 0.1]]}
+    hold = {"kind": "position", "frame": "end_effector"}
+    first = build(scenario_of(tmp_path, hold, avoidance=avoidance))
+    assert first.stack.names == ("separation", "position")
+    later = build(scenario_of(tmp_path, hold, {"kind": "collision"}, COUPLING,
+                              avoidance=avoidance))
+    assert later.stack.names == ("position", "separation", "coupling")
+    assert isinstance(later.stack["separation"], Separation)
+    last = build(scenario_of(tmp_path, hold, {"kind": "collision"}, avoidance=avoidance,
+                             damping={"value": 1.0}))
+    assert next(iter(last.order.possible)) == ("position", "separation")
+    run = simulate(scenario_of(tmp_path, hold, {"kind": "collision"}, avoidance=avoidance,
+                               control={**BASE["control"], "duration": 0.1}))
+    assert run.fault is None
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("path", [
+    {"kind": "line", "start": [0.0, 0.6, 0.1], "end": [0.1, 0.6, 0.2], "duration": 1.0},
+    {"kind": "circle", "centre": [0.05, 0.6, 0.1], "radius": 0.05, "normal": [0.0, 1.0, 0.0]},
+    {"kind": "waypoints", "times": [0.2, 0.6, 1.0], "blend": 0.2,
+     "points": [[0.0, 0.6, 0.1], [0.1, 0.6, 0.1], [0.1, 0.6, 0.2]]},
+    {"kind": "recorded", "file": "motion.csv"}], ids=lambda path: path["kind"])
+def test_a_path_is_followed(path, tmp_path):
+    (tmp_path / "motion.csv").write_text("t,x,y,z\n0,0,0.6,0.1\n0.7,0.1,0.6,0.15\n"
+                                         "1.2,0.1,0.6,0.2\n")
+    run = simulate(scenario_of(tmp_path, position={"path": path, "gain": 20.0}))
+    assert run.fault is None
+    # What is left is what integrating velocities over a period leaves: v T / 2 and less.
+    assert np.linalg.norm(run["position_error"][-30:], axis=1).max() < 2e-3
+
+
+def test_a_recorded_file_is_found_beside_the_scenario(tmp_path, monkeypatch):
+    monkeypatch.chdir("/")
+    there = {"kind": "recorded", "file": "motion.csv"}
+    scenario = scenario_of(tmp_path, {"kind": "position", "frame": "end_effector", "path": there})
+    assert scenario.tasks[0].path.file == str(tmp_path / "motion.csv")
+
+
+@pytest.mark.parametrize(("task", "said"), [
+    (COUPLING | {"joints": {}}, "tasks.0.joints"),
+    (COUPLING | {"joints": {"joint_2": "1"}}, "tasks.0.joints.joint_2"),
+    (LOOK | {"target": [0.0, 1.0]}, "tasks.0.target"),
+    (LOOK | {"axis": [0, 0, 1]}, "tasks.0.axis: only kind 'pointing' has it"),
+    (RELATIVE | {"rotation": np.eye(3).tolist(), "orientation": False},
+     "rotation goes with orientation = true"),
+    ({"kind": "manipulability", "frame": "end_effector"}, "tasks.0.least"),
+    ({"kind": "manipulability", "frame": "end_effector", "least": 0.1, "part": "speed"},
+     "tasks.0.part"),
+    ({"kind": "collision"}, "needs [avoidance] with kind = \"separation\""),
+    ({"kind": "self-collision", "distance": True}, "tasks.0.distance"),
+    ({"kind": "look_at", "frame": "end_effector"}, "'look-at'"),
+])
+def test_wrong_values_are_named(task, said, tmp_path):
+    with pytest.raises(HierarchyError) as error:
+        scenario_of(tmp_path, task)
+    assert said in str(error.value)
+
+
+@pytest.mark.parametrize(("task", "said"), [
+    (COUPLING | {"joints": {"joint_9": 1.0}}, "task 'coupling': unknown joint 'joint_9'"),
+    (LOOK | {"frame": "thumb"}, "task 'look-at': unknown frame 'thumb'"),
+    (RELATIVE | {"to": "thumb"}, "task 'relative': unknown frame 'thumb'"),
+    ({"kind": "self-collision", "distance": 0.5}, "influence"),
+    ({"kind": "position", "frame": "end_effector",
+      "path": {"kind": "recorded", "file": "none.csv"}}, "none.csv cannot be read"),
+    ({"kind": "position", "frame": "end_effector",
+      "path": {"kind": "circle", "centre": [0, 0, 0], "radius": 1, "normal": [0, 0, 0]}},
+     "path of kind 'circle': circle: radius 1"),
+    ({"kind": "position", "frame": "end_effector", "path": {
+        "kind": "waypoints", "times": [0, 1], "points": [[0, 0, 0], [0, 0, 1]], "blend": 2.0}},
+     "blend 2.0 s must be positive and at most 1 s"),
+])
+def test_what_does_not_fit_the_robot_is_named(task, said, tmp_path):
+    with pytest.raises(HierarchyError) as error:
+        build(scenario_of(tmp_path, task))
+    assert said in str(error.value)
+
+
+@pytest.mark.slow
+def test_a_floating_base_has_no_manipulability():
+    with pytest.raises(HierarchyError, match="several velocities, or the base floats"):
+        build(load("humanoid", {"tasks": [{"kind": "manipulability", "frame": "right_hand",
+                                           "least": 0.1}]}))
+
+
+def test_every_kind_has_a_test_here(request):
+    text = request.path.read_text(encoding="utf-8")
+    tested = {"pose", "com", "pointing"}  # in test_humanoid.py
+    assert [kind for kind in KINDS if f'"{kind}"' not in text and kind not in tested] == []

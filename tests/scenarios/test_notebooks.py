@@ -1,0 +1,197 @@
+"""Notebooks: what objects show there, what a run gives, and the notebooks of the documents."""
+
+import json
+import re
+import sys
+import types
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import hierarchy
+import scenarios
+import solvers
+from hierarchy import Hierarchy, HierarchyError, Robot, Stack, State
+from hierarchy.notebook import html_table
+from hierarchy.tasks import Posture
+from scenarios import compare, load, simulate
+from scenarios.loop.columns import columns
+from solvers import certify, make
+
+ROOT = Path(__file__).parents[2]
+NOTEBOOKS = sorted((ROOT / "docs" / "notebooks").glob("*.ipynb"))
+SHORT = ["control.duration=0.02"]
+
+
+@pytest.fixture(scope="module")
+def run():
+    return simulate(load("ellipse", SHORT))
+
+
+@pytest.fixture(scope="module")
+def h():
+    return Hierarchy.from_levels([(np.eye(2), [-1, -1], [1, 1]), ([[1.0, 2.0]], [9.0])],
+                                 names=["<limits>", "hand & arm"])
+
+
+class Balanced(HTMLParser):
+    """Fails unless every tag is closed in order."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.open, self.cells = [], []
+        self.feed(text)
+        assert self.open == []
+
+    def handle_starttag(self, tag, attributes):
+        self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, text):
+        self.cells.append(text)
+
+
+def test_a_table_escapes_every_value_and_marks_the_best():
+    text = html_table("<b>", ("a&b",), [("<i>",), (2,)], best={(1, 0)})
+    assert "&lt;b&gt;" in text
+    assert "a&amp;b" in text
+    assert "<td>&lt;i&gt;</td>" in text
+    assert "<td><b>2</b></td>" in text
+
+
+def test_a_long_table_says_how_much_is_left_out():
+    assert "... and 70 more" in html_table("t", ("n",), [(i,) for i in range(100)])
+
+
+def test_a_hierarchy_shows_its_levels(h):
+    cells = Balanced(h._repr_html_()).cells
+    assert cells[-8:] == ["<limits>", "2", "0", "2", "hand & arm", "1", "1", "0"]
+
+
+@pytest.mark.slow
+def test_resolution_and_certificate_show_how_they_ended(h):
+    found = make("hcod").solve(h)
+    assert "solved: nothing to do" in Balanced(found._repr_html_()).cells
+    shown = Balanced(certify(h, found.x)._repr_html_()).cells
+    assert shown[0].startswith("Certificate: certified")
+    assert "<limits>" in shown
+    assert "not optimal" in repr(certify(h, np.zeros(2)))
+
+
+@pytest.mark.slow
+def test_texts_of_objects_are_one_short_line(h, run):
+    robot = Robot.named("kuka_lwr")
+    state, stack = State.at(robot, np.zeros(7)), Stack([Posture((0.0,) * 7)])
+    found = make("hcod").solve(h)
+    scenario = run.scenario
+    for thing in (h, found, certify(h, found.x), run, robot, state, stack, scenario,
+                  compare([scenario], ["tpm"])):
+        text = repr(thing)
+        assert text.startswith(type(thing).__name__)
+        assert "\n" not in text
+        assert len(text) < 160
+
+
+@pytest.mark.slow
+def test_a_recording_shows_what_ran_and_its_signals(run):
+    cells = Balanced(run._repr_html_()).cells
+    assert {"scenario", "resolver", "position_error", "20 x 7"} <= set(cells)
+
+
+@pytest.mark.slow
+def test_a_comparison_shows_a_column_for_each_run():
+    found = compare([load("ellipse", SHORT)], ["tpm", "recursive"])
+    cells = Balanced(found._repr_html_()).cells
+    assert "recursive" in cells
+    assert any(cell.startswith("Position error, rms [") for cell in cells)
+
+
+@pytest.mark.slow
+def test_an_unknown_signal_is_answered_with_the_nearest(run):
+    with pytest.raises(HierarchyError, match=re.escape("unknown signal 'qq'; did you mean 'q'?")):
+        run["qq"]
+    with pytest.raises(HierarchyError, match="unknown signal 'positon_error'; did you mean "
+                                             "'position_error'"):
+        run.plot("positon_error")
+
+
+@pytest.mark.slow
+def test_plot_draws_a_panel_for_each_signal_with_its_unit(run):
+    figure = run.plot("q", "position_error", "certified" if "certified" in run else "order")
+    assert [ax.get_ylabel() for ax in figure.axes] == ["q [rad]", "position_error [m]", "order"]
+    assert [len(ax.lines) for ax in figure.axes] == [7, 3, 1]
+    np.testing.assert_array_equal(figure.axes[0].lines[3].get_ydata(), run["q"][:, 3])
+    assert len(run.plot().axes) >= 3
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("library", ["pandas", "polars"])
+def test_a_data_frame_has_a_column_for_each_number(run, library, monkeypatch):
+    fake = types.ModuleType(library)
+    fake.DataFrame = dict
+    for name in ("pandas", "polars"):  # None: the import fails
+        monkeypatch.setitem(sys.modules, name, fake if name == library else None)
+    for found in (run.to_dataframe(), run.to_dataframe(library)):
+        assert list(found) == [column.name for column in columns(run)]
+        np.testing.assert_array_equal(found["q[3]"], run["q"][:, 3])
+
+
+@pytest.mark.slow
+def test_without_a_library_a_data_frame_says_what_to_install(run, monkeypatch):
+    for name in ("pandas", "polars"):
+        monkeypatch.setitem(sys.modules, name, None)
+    with pytest.raises(HierarchyError, match="needs pandas or polars: pip install pandas"):
+        run.to_dataframe()
+    with pytest.raises(HierarchyError, match="needs polars: pip install polars"):
+        run.to_dataframe("polars")
+    with pytest.raises(HierarchyError, match="unknown library 'panda'; did you mean 'pandas'"):
+        run.to_dataframe("panda")
+
+
+@pytest.mark.slow
+def test_simulate_takes_a_name():
+    with pytest.raises(HierarchyError, match="did you mean 'strictness'"):
+        simulate("strictnes")
+
+
+@pytest.mark.parametrize("package", [hierarchy, solvers, scenarios])
+def test_dir_lists_every_public_name_and_each_can_be_had(package):
+    assert set(package.__all__) <= set(dir(package))
+    for name in dir(package):
+        getattr(package, name)
+
+
+def test_parts_of_hierarchy_need_no_import_of_their_own():
+    assert {"tasks", "paths", "avoidance"} <= set(dir(hierarchy))
+    assert hierarchy.tasks.Posture is Posture
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+def test_the_notebooks_of_the_documents_run_from_top_to_bottom(path, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    names = {"__name__": "__main__"}
+    for number, cell in enumerate(cells_of(path, "code")):
+        exec(compile("".join(cell["source"]), f"{path.name}, code cell {number}", "exec"), names)
+
+
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+def test_notebooks_keep_no_outputs_and_no_paths_of_a_machine(path):
+    assert all(cell["outputs"] == [] and cell["execution_count"] is None
+               for cell in cells_of(path, "code"))
+    assert not re.search(r"/(home|root|tmp|work|Users)/", path.read_text(encoding="utf-8"))
+    assert len({cell["id"] for cell in cells_of(path)}) == len(cells_of(path))
+
+
+def test_there_are_two_notebooks():
+    assert [path.stem for path in NOTEBOOKS] == ["compare-resolvers", "first-stack"]
+
+
+def cells_of(path, kind=None):
+    """The cells of a notebook, of one kind."""
+    return [cell for cell in json.loads(path.read_text(encoding="utf-8"))["cells"]
+            if kind in (None, cell["cell_type"])]

@@ -1,0 +1,380 @@
+"""Own tasks, resolvers, robots, plants and sensors, and who may load their code."""
+
+import sys
+from importlib.metadata import distributions
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hierarchy import HierarchyError, Robot, plugins
+from scenarios import compare, load, simulate
+from scenarios.cli.main import run_command
+from scenarios.config import Scenario
+from solvers import make
+from solvers.resolver import _REGISTRY
+
+MODULE = '''
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from hierarchy import Robot, Task
+from hierarchy.paths import Path
+from hierarchy.plugins import register
+from hierarchy.robot import Frame
+from scenarios.cell.plants import KinematicArm
+from solvers import Resolution, Resolver, make
+
+
+@register("tasks", "elbow")
+@dataclass(frozen=True)
+class Elbow(Task):
+    """Bring one joint to an angle [rad]."""
+
+    robot: Robot
+    joint: str
+    angle: float
+    steps: int = 1
+    gain: float = 2.0
+    name: str = "elbow"
+    dimension = 1
+
+    def error(self, state):
+        return np.array([self.angle - state.q[self.robot.coordinate(self.joint)]])
+
+    def jacobian(self, state):
+        return np.eye(state.n)[self.robot.joint(self.joint) - 1][None]
+
+    def jacobian_derivative(self, state):
+        return np.zeros((1, state.n))
+
+
+@register("tasks", "along")
+def along(frame: Frame, path: Path, name: str):
+    """The position of a frame, made by a function."""
+    from hierarchy.tasks import Position
+
+    return Position(frame, path, name=name)
+
+
+@register("tasks", "broken")
+def broken(depth: float):
+    raise KeyError("a mistake of mine")
+
+
+@register("resolvers", "halved")
+@dataclass(frozen=True, kw_only=True)
+class Halved(Resolver):
+    """Half of hcod."""
+
+    name: ClassVar[str] = "halved"
+    handles: ClassVar[str] = "inequalities"
+    share: float = 0.5
+
+    def solve(self, h, memory=None):
+        return Resolution(self.share * make("hcod").solve(h).x)
+
+
+@register("robots", "my_arm")
+def my_arm():
+    return Robot.named("kuka_lwr")
+
+
+@register("plants", "weak")
+class Weak(KinematicArm):
+    """Does a share of each command."""
+
+    def __init__(self, robot, q, v, period, level, share: float):
+        super().__init__(robot, q, v, period, level)
+        self.share = share
+
+    def act(self, command):
+        super().act(self.share * command)
+
+
+@register("sensors", "coarse")
+class Coarse:
+    """Distances in steps [m]."""
+
+    outside = 0.0
+
+    def __init__(self, exact, step: float = 0.01):
+        self.exact, self.step = exact, step
+        self.points, self.obstacles = exact.points, exact.obstacles
+        self.measurement = exact.measurement
+
+    def measure(self, state):
+        seen = self.exact.measure(state)
+        seen.distance[:] = np.floor(seen.distance / self.step) * self.step
+        return seen
+
+    def check_start(self, state):
+        self.exact.check_start(state)
+'''
+
+SCENARIO = '''
+name = "own"
+plugins = ["doors_of_mine"]
+
+[robot]
+model = "my_arm"
+
+[start]
+q = [0.923, -0.854, 0.903, 1.195, 0.971, 1.796, 0.0]
+
+[control]
+level = "velocity"
+stack = "hierarchical"
+period = 0.01
+duration = 0.2
+resolver = "halved"
+
+[plant]
+kind = "weak"
+share = 0.5
+
+[[tasks]]
+kind = "elbow"
+joint = "joint_4"
+angle = 1.0
+
+[[tasks]]
+kind = "along"
+name = "hand"
+frame = "end_effector"
+path = { kind = "still", position = [0.1, 0.6, 0.1] }
+'''
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path, monkeypatch):
+    """A folder with a plugin and a scenario; what is loaded in a test is forgotten after it."""
+    (tmp_path / "doors_of_mine.py").write_text(MODULE)
+    (tmp_path / "own.toml").write_text(SCENARIO)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", list(sys.path))
+    monkeypatch.setattr(plugins, "_registered", {door: {} for door in plugins.DOORS})
+    monkeypatch.setattr(plugins, "_loaded", {})
+    monkeypatch.setattr(plugins, "_flagged", {})
+    before = dict(_REGISTRY)
+    yield tmp_path
+    sys.modules.pop("doors_of_mine", None)
+    _REGISTRY.clear()
+    _REGISTRY.update(before)
+    plugins._points.cache_clear()
+
+
+def said(arguments, capsys):
+    """Exit code and output of a command."""
+    code = run_command(arguments)
+    found = capsys.readouterr()
+    return code, found.out + found.err
+
+
+def install(folder, group, line):
+    """Put a distribution with an entry point on the path, as pip would."""
+    info = folder / "mine-1.0.dist-info"
+    info.mkdir(exist_ok=True)
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: mine\nVersion: 1.0\n")
+    with (info / "entry_points.txt").open("a") as file:
+        file.write(f"[task_hierarchy.{group}]\n{line}\n")
+    sys.path.insert(0, str(folder))
+    plugins._points.cache_clear()
+    assert any(one.metadata["Name"] == "mine" for one in distributions())
+
+
+@pytest.mark.parametrize("command", [["check"], ["run"], ["compare"]])
+def test_a_file_alone_loads_no_code(command, capsys, folder):
+    (folder / "doors_of_mine.py").write_text("raise SystemExit('this was run')")
+    code, text = said([*command, "own.toml"], capsys)
+    assert code == 2
+    assert "own.toml: plugin 'doors_of_mine' is not allowed: a file alone loads no code" in text
+    assert "add --plugin doors_of_mine to the command" in text
+    assert "\n" not in text.strip()
+    assert "doors_of_mine" not in sys.modules
+
+
+@pytest.mark.parametrize("text", ["name='x'\nplugins='mine'", "name='x'\nplugins=[1]",
+                                  "name='x'\nplugins={a=1}"])
+def test_plugins_are_a_list_of_modules(text, folder):
+    (folder / "own.toml").write_text(text)
+    with pytest.raises(HierarchyError, match="plugins: expected a list of modules"):
+        load("own.toml")
+
+
+def test_a_scenario_out_of_text_loads_no_code_either():
+    with pytest.raises(ValueError, match="a file alone loads no code"):
+        Scenario.from_toml(SCENARIO)
+
+
+def test_a_plugin_that_cannot_be_imported_says_why(capsys, folder):
+    assert "plugin 'nowhere' cannot be imported: ModuleNotFoundError" in said(
+        ["check", "ellipse", "--plugin", "nowhere"], capsys)[1]
+    (folder / "wrong.py").write_text("1 / 0")
+    code, text = said(["list", "--plugin", "wrong"], capsys)
+    assert code == 2
+    assert "plugin 'wrong' cannot be imported: ZeroDivisionError" in text
+
+
+@pytest.mark.slow
+def test_check_and_run_use_what_an_allowed_plugin_brings(capsys):
+    code, text = said(["check", "own.toml", "--plugin", "doors_of_mine"], capsys)
+    assert code == 0, text
+    assert "elbow > hand" in text
+    code, text = said(["run", "own.toml", "--plugin", "doors_of_mine", "--out", "a"], capsys)
+    assert code == 0, text
+    assert 'plugins = [\n    "doors_of_mine",\n]' in (
+        Path("a/scenario.toml").read_text(encoding="utf-8"))
+
+
+@pytest.mark.slow
+def test_the_plant_and_the_resolver_of_a_plugin_do_what_they_say():
+    plugins.allow("doors_of_mine")
+    scenario = load("own.toml")
+    run = simulate(scenario)
+    joint = run["q"][:, 3]
+    # The error of the elbow shrinks by gain x resolver's share x plant's share of each period.
+    factor = 1.0 - 2.0 * 0.5 * 0.5 * 0.01
+    np.testing.assert_allclose(1.0 - joint, (1.0 - joint[0]) * factor ** np.arange(run.ticks),
+                               rtol=1e-9)
+    exact = simulate(scenario.with_resolver("hcod"))
+    np.testing.assert_allclose(exact["command"][0], 2.0 * run["command"][0], rtol=1e-9)
+
+
+@pytest.mark.slow
+def test_a_sensor_of_a_plugin_measures():
+    plugins.allow("doors_of_mine")
+    run = simulate(load("ellipse", ["control.duration=0.02", "sensor.kind=coarse",
+                                    "sensor.step=0.05"]))
+    steps = run["minimal_distance"] / 0.05
+    np.testing.assert_allclose(steps, np.round(steps), atol=1e-9)
+    assert (run["true_minimal_distance"] > run["minimal_distance"]).all()
+
+
+@pytest.mark.slow
+def test_compare_sees_a_resolver_of_a_plugin(capsys):
+    code, text = said(["compare", "own.toml", "--resolvers", "halved,halved:share=1.0,hcod",
+                       "--plugin", "doors_of_mine", "--out", "b"], capsys)
+    assert code == 0, text
+    runs = compare([load("own.toml")], ["halved:share=1.0", "hcod"]).runs
+    np.testing.assert_array_equal(*(run.recording["q"] for run in runs))
+
+
+@pytest.mark.slow
+def test_a_finished_run_of_a_plugin_is_opened_with_the_plugin_only(capsys):
+    assert said(["run", "own.toml", "--plugin", "doors_of_mine", "--out", "a"], capsys)[0] == 0
+    plugins._loaded.clear()
+    plugins._flagged.clear()
+    sys.modules.pop("doors_of_mine")
+    code, text = said(["export", "a"], capsys)
+    assert code == 2
+    assert "--plugin doors_of_mine" in text
+    assert said(["export", "a", "--plugin", "doors_of_mine"], capsys)[0] == 0
+
+
+@pytest.mark.slow
+def test_workers_of_a_sweep_import_the_plugin(capsys, folder):
+    pytest.importorskip("distributed")
+    (folder / "s.toml").write_text(
+        'name = "s"\nscenarios = ["own.toml"]\nresolvers = ["halved", "hcod"]\nsamples = 2\n'
+        '[parameters]\n"tasks.0.angle" = { uniform = [0.9, 1.1] }\n')
+    code, text = said(["sweep", "s.toml", "--plugin", "doors_of_mine", "--workers", "1",
+                       "--out", "c"], capsys)
+    assert code == 0, text
+    assert "4 runs; 0 did not finish" in text
+
+
+def test_the_working_directory_is_searched_for_plugins_only(folder):
+    (folder / "pandas_of_mine.py").write_text("")
+    before = list(sys.path)
+    plugins.allow("doors_of_mine")
+    assert sys.path == before
+    with pytest.raises(ImportError):
+        __import__("pandas_of_mine")
+
+
+def test_a_changed_plugin_is_another_version(folder):
+    plugins.allow("doors_of_mine")
+    before = plugins.fingerprint()
+    (folder / "doors_of_mine.py").write_text(MODULE + "\n# changed\n")
+    assert before
+    assert plugins.fingerprint() != before
+
+
+@pytest.mark.parametrize(("change", "said"), [
+    ("tasks.0.angel=1.0", "tasks.0: unknown key of kind 'elbow' 'angel'; did you mean 'angle'?"),
+    ("tasks.0.angle=true", "tasks.0: angle: Input should be a valid number, got True"),
+    ("tasks.0.steps=1.5", "tasks.0: steps: Input should be a valid integer, got 1.5"),
+    ("tasks.0.dimension=2", "unknown key of kind 'elbow' 'dimension'"),
+    ("tasks.0.name='1'", "tasks.0.name"),
+    ("tasks.1.path.kind=spiral", "tasks.1: path: Input tag 'spiral'"),
+    ("plant.share='all'", "plant: share: Input should be a valid number, got 'all'"),
+    ("plant.kind=waek", "plant: expected a kind, 'kinematic', 'mujoco', 'weak'; got 'waek'"),
+    ("tasks.0.kind=elbwo", "'collision', 'elbow', 'along', 'broken'; got 'elbwo'"),
+    ("control.resolver=havled", "unknown resolver 'havled'; did you mean 'halved'?"),
+    ("control.options.shar=0.1", "unknown setting of halved 'shar'; did you mean 'share'?"),
+    ("robot.model=my_arn", "unknown robot 'my_arn'; did you mean 'my_arm'?"),
+])
+def test_wrong_keys_of_own_kinds_are_named(change, said):
+    plugins.allow("doors_of_mine")
+    with pytest.raises(HierarchyError) as error:
+        simulate(load("own.toml", [change]))
+    assert said in str(error.value)
+
+
+@pytest.mark.slow
+def test_what_goes_wrong_in_a_plugin_is_said_with_its_name():
+    plugins.allow("doors_of_mine")
+    broken = load("own.toml", {"tasks": [{"kind": "broken", "depth": 1.0}]})
+    with pytest.raises(HierarchyError, match="task of kind 'broken': KeyError: 'a mistake of mine"):
+        simulate(broken)
+    missing = load("own.toml", {"tasks.1.frame": "thumb"})
+    with pytest.raises(HierarchyError, match="task of kind 'along': unknown frame 'thumb'"):
+        simulate(missing)
+
+
+@pytest.mark.slow
+def test_an_installed_entry_point_needs_no_flag(capsys, folder):
+    install(folder, "tasks", "elbow = doors_of_mine:Elbow")
+    code, text = said(["check", "own.toml"], capsys)  # the file names the entry point's module
+    assert code == 0, text
+
+
+@pytest.mark.parametrize(("group", "line", "use"), [
+    ("resolvers", "third = entry_of_mine:Third", lambda: make("third").name),
+    ("robots", "arm_of_mine = entry_of_mine:TABLE", lambda: Robot.load("arm_of_mine").name)])
+def test_a_name_of_an_entry_point_is_found_without_being_imported_first(group, line, use, folder):
+    (folder / "entry_of_mine.py").write_text(
+        "from dataclasses import dataclass, replace\nfrom hierarchy.robots import TABLES\n"
+        "from solvers.resolvers.hcod import Hcod\n"
+        "@dataclass(frozen=True, kw_only=True)\nclass Third(type(Hcod()).__mro__[1]):\n"
+        "    name = 'third'\n    def solve(self, h, memory=None): ...\n"
+        "TABLE = replace(TABLES['kuka_lwr'], name='arm_of_mine')\n")
+    install(folder, group, line)
+    assert "entry_of_mine" not in sys.modules
+    assert use() == line.partition(" ")[0]
+    sys.modules.pop("entry_of_mine")
+
+
+def test_an_entry_point_that_leads_nowhere_is_named(folder):
+    install(folder, "resolvers", "ghost = nowhere_at_all:Ghost")
+    with pytest.raises(HierarchyError, match="entry point 'ghost' of task_hierarchy\\.resolvers "
+                                             "cannot be imported"):
+        make("ghost")
+
+
+def test_two_things_of_one_name_are_refused():
+    plugins.register("tasks", "thing")(type("One", (), {}))
+    with pytest.raises(HierarchyError, match="tasks: 'thing' is already"):
+        plugins.register("tasks", "thing")(type("Two", (), {}))
+    with pytest.raises(HierarchyError, match="unknown door 'task'; did you mean 'tasks'"):
+        plugins.register("task", "thing")
+
+
+@pytest.mark.slow
+def test_list_shows_what_plugins_bring(capsys):
+    code, text = said(["list", "--plugin", "doors_of_mine"], capsys)
+    assert code == 0
+    assert all(name in text for name in ("elbow", "halved", "my_arm", "weak", "coarse"))
