@@ -77,6 +77,8 @@ TESTS = {
     "hierarchy/tasks/separation": "hierarchy/test_separation",
     "hierarchy/tasks/torque_limits": "hierarchy/test_limits",
     "scenarios/measure/": "scenarios/test_parting scenarios/test_report",
+    "scenarios/measure/returning": "scenarios/test_singular",
+    "scenarios/measure/statistics": "scenarios/test_statistics",
     "scenarios/measure/metrics": "scenarios/test_metrics scenarios/test_hierarchical "
                                  "scenarios/test_plants scenarios/test_faults",
     "solvers/": "solvers/test_resolver solvers/test_contract",

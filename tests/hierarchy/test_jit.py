@@ -67,6 +67,7 @@ def test_a_kernel_knows_what_helpers_below_it_use(tmp_path, monkeypatch):
         if hasattr(half, "constants"):  # plain functions under NUMBA_DISABLE_JIT
             assert "SHARE = 0.5" in half.constants
             assert "SHARE = 1.25" in whole.constants
+            assert all(name.partition(" ")[0].isupper() for name in half.constants)
             assert str(tmp_path / "helper_of_test_jit.py") in half.source_files
         assert (half(4.0), whole(4.0)) == (4.0, 10.0)
     finally:

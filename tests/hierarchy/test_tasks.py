@@ -251,6 +251,7 @@ def test_a_wrong_task_is_named(method, value, said, monkeypatch):
 def test_bad_settings_of_tasks_are_named():
     for make, said in [
         (lambda: Pointing(FRAME, (0.0, 0.0, 0.0), 0.1), "axis"),
+        (lambda: Pointing(FRAME, (1e-12, 0.0, 0.0), 0.1), "axis"),
         (lambda: Pointing(FRAME, (1.0, 0.0, 0.0), 4.0), "half_angle"),
         (lambda: Avoidance(ROBOT.control_points, 2), "rows must be 1 or 3"),
         (lambda: Avoidance(()), "control point"),

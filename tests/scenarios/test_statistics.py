@@ -76,6 +76,9 @@ def test_nothing_is_best_where_one_cannot_be_told_from_it():
     assert best(columns, lower_is_better=True) == ()
     assert best({"a": low, "b": low.copy()}, lower_is_better=True) == ()
     assert best({"a": low, "b": np.full(16, np.nan)}, lower_is_better=True) == ()
+    assert best({"a": low}, lower_is_better=True) == ()
+    skewed = low + np.r_[np.full(12, 1.0), np.full(4, -50.0)]
+    assert best({"a": low, "b": skewed}, lower_is_better=True) == ()
 
 
 def test_many_rivals_need_stronger_evidence():

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from hierarchy import Hierarchy, HierarchyError
-from hierarchy.activation import activation
+from hierarchy.activation import Activation, activation
 from solvers import Status, make, names
 from solvers.resolvers.set_based import SetBased
 
@@ -141,6 +141,12 @@ def test_in_closed_loop_the_wall_is_kept_without_a_jump():
         farthest = max(farthest, p[0] - wall)
     assert -width < farthest < 0.0, "inside, in the buffer"
     assert jump < 0.1
+
+
+@pytest.mark.parametrize("width", [0.0, -0.1, INF])
+def test_a_buffer_without_a_width_is_refused(width):
+    with pytest.raises(HierarchyError, match="must be positive and finite"):
+        Activation(None, (), {"wall": width})
 
 
 def test_what_has_no_answer_is_refused_or_has_a_status():

@@ -238,6 +238,12 @@ def test_with_limits_too_it_comes_to_the_strict_answer(ratio):
         assert max(gaps) < max(1e4 / ratio**2, EXACT)
 
 
+def test_a_ratio_weighs_the_lowest_level_by_one():
+    """Two levels ask one unknown for 0 and 1: the answer is the mean with squared weights."""
+    h = Hierarchy.from_levels([([[1.0]], [0.0]), ([[1.0]], [1.0])])
+    assert make("weighted", ratio=10.0).solve(h).x == pytest.approx([1.0 / 101.0], rel=1e-6)
+
+
 def test_weights_that_overflow_give_a_status_and_a_finite_answer():
     with np.errstate(all="ignore"):  # without compilation numpy warns
         res = make("weighted", ratio=1e200).solve(build(generic, True))
