@@ -20,8 +20,8 @@ class Hierarchy:
     """Levels of rows `lower <= A x <= upper`, most important first.
 
     Level k minimises the Euclidean norm of its violation without giving up any of the norms above
-    it; among all such x the answer is the one nearest to `reference`. An equality row has
-    `lower == upper`; a missing bound is infinite.
+    it; among all such x the answer is the one nearest to `reference`, with the distance d^T W d of
+    a step d in the metric W. An equality row has `lower == upper`; a missing bound is infinite.
 
     Attributes
     ----------
@@ -31,21 +31,24 @@ class Hierarchy:
     offsets : (L + 1,) first row of each level, and m.
     reference : (n,) the x preferred where the levels leave freedom.
     names : L level names, used in messages.
+    metric : (n, n) W, symmetric and positive definite, or None for the identity.
     """
 
-    __slots__ = ("A", "lower", "names", "offsets", "reference", "sizes", "upper")
+    __slots__ = ("A", "lower", "metric", "names", "offsets", "reference", "sizes", "upper")
 
     def __init__(self, A: Array, lower: Array, upper: Array, sizes: NDArray[np.int64],
-                 reference: Array, names: tuple[str, ...]) -> None:
+                 reference: Array, names: tuple[str, ...], metric: Array | None = None) -> None:
         """Wrap arrays without copying or checking them; `from_levels` checks."""
         self.A, self.lower, self.upper = A, lower, upper
         self.sizes, self.reference, self.names = sizes, reference, names
+        self.metric = metric
         self.offsets = np.zeros(len(sizes) + 1, dtype=np.int64)
         np.cumsum(sizes, out=self.offsets[1:])
 
     @classmethod
     def from_levels(cls, levels: Sequence[Sequence[ArrayLike]], reference: ArrayLike | None = None,
-                    names: Sequence[str] | None = None) -> Hierarchy:
+                    names: Sequence[str] | None = None,
+                    metric: ArrayLike | None = None) -> Hierarchy:
         """Pack levels given as `(A, b)` or `(A, lower, upper)`.
 
         Parameters
@@ -53,11 +56,13 @@ class Hierarchy:
         levels : each `A (m_k, n)` with `b (m_k,)`, or with `lower (m_k,)` and `upper (m_k,)`.
         reference : (n,) or None for zero.
         names : one name per level for messages, each different, or None for "level 1", ...
+        metric : (n, n) symmetric and positive definite, or None for the identity.
 
         Raises
         ------
         HierarchyError : a wrong type or shape, a NaN, an infinite entry of A or of an equality,
-            lower > upper, n = 0, or no level and no reference; names level, row and value.
+            lower > upper, n = 0, or no level and no reference; names level, row and value. A
+            metric that is not symmetric and positive definite.
         """
         if not isinstance(levels, Sequence) or isinstance(levels, str):
             raise HierarchyError("levels: expected a list of (A, b) or (A, lower, upper), got "
@@ -72,7 +77,8 @@ class Hierarchy:
         return cls(np.ascontiguousarray(np.vstack([np.empty((0, n)), *(A for A, _, _ in packed)])),
                    np.concatenate([np.empty(0), *(low for _, low, _ in packed)]),
                    np.concatenate([np.empty(0), *(up for _, _, up in packed)]),
-                   np.array([A.shape[0] for A, _, _ in packed], dtype=np.int64), ref, names)
+                   np.array([A.shape[0] for A, _, _ in packed], dtype=np.int64), ref, names,
+                   None if metric is None else checked_metric(metric, n))
 
     @property
     def n(self) -> int:
@@ -156,6 +162,29 @@ def check_rows(name: str, A: Array, lower: Array, upper: Array) -> None:
     for (row,) in np.argwhere((lower > upper) | (lower == np.inf) | (upper == -np.inf))[:1]:
         raise HierarchyError(
             f"{name}, row {row}: no value lies between lower {lower[row]} and upper {upper[row]}")
+
+
+def checked_metric(metric: ArrayLike, n: int | None = None) -> Array:
+    """Return a metric (n, n), n being any number if None.
+
+    Raises HierarchyError if it has another shape, an entry that is not finite, or is not symmetric
+    or not positive definite, up to rounding.
+    """
+    W = _array("metric", metric)
+    size = W.shape[0] if n is None and W.ndim else n or 0
+    if W.shape != (size, size):
+        raise HierarchyError(f"metric has shape {W.shape}, expected ({size}, {size})")
+    for i, j in np.argwhere(~np.isfinite(W))[:1]:
+        raise HierarchyError(f"metric[{i}, {j}] is {W[i, j]}")
+    rounding = size * float(np.finfo(float).eps) * abs(W).max(initial=0.0)
+    for i, j in np.argwhere(abs(W - W.T) > rounding)[:1]:
+        raise HierarchyError(f"metric is not symmetric: [{i}, {j}] is {W[i, j]} and [{j}, {i}] is "
+                             f"{W[j, i]}")
+    smallest = np.linalg.eigvalsh(W).min(initial=np.inf)
+    if not smallest > rounding:
+        raise HierarchyError("metric is not positive definite: its smallest eigenvalue is "
+                             f"{smallest:.3g}")
+    return W
 
 
 def _columns(packed: list[tuple[Array, Array, Array]], names: tuple[str, ...],

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from typing import NamedTuple
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from hierarchy.avoidance.measurement import Measurement
+from hierarchy.contacts import Contacts
 from hierarchy.errors import HierarchyError, UnknownNameError, expect
-from hierarchy.problem import Hierarchy
+from hierarchy.problem import Array, Hierarchy, checked_metric
 from hierarchy.state import State
-from hierarchy.task import Level, Task
+from hierarchy.task import Level, Task, writer_in_stack
 
 
 class _Prepared(NamedTuple):
@@ -32,17 +34,33 @@ class Stack:
     Parameters
     ----------
     tasks : the tasks; their names must differ.
-    level : "velocity" or "acceleration", the meaning of x in the hierarchy.
+    level : "velocity", "acceleration" or "torque", the meaning of x in the hierarchy: joint
+        velocities, joint accelerations, or accelerations and contact forces, see `Contacts`.
     reference : a joint task (posture, damping) whose value is the hierarchy's reference, the
-        null-space term of eq. (14); None for zero.
+        null-space term of eq. (14); None for zero. That of forces is zero.
+    contacts : at level "torque" only, where they are required; `Contacts(robot)` for none.
+    metric : W of the hierarchy, see `Hierarchy`: (n, n), or "mass" for M(q) of each state; None for
+        the identity.
+
+    Raises
+    ------
+    HierarchyError : an unknown level or metric, contacts missing or not needed, a task of contact
+        forces at another level or of other contacts than the stack's.
     """
 
     def __init__(self, tasks: Iterable[Task] = (), level: Level = "acceleration",
-                 reference: Task | None = None) -> None:
-        if level not in ("velocity", "acceleration"):
-            raise HierarchyError(f"level must be 'velocity' or 'acceleration', got {level!r}")
+                 reference: Task | None = None, contacts: Contacts | None = None,
+                 metric: ArrayLike | Literal["mass"] | None = None) -> None:
+        if level not in get_args(Level):
+            raise HierarchyError("level must be 'velocity', 'acceleration' or 'torque', got "
+                                 f"{level!r}")
+        if (level == "torque") != (contacts is not None):
+            raise HierarchyError(
+                "level 'torque' needs contacts, Contacts(robot) for none" if contacts is None else
+                f"contacts need the level 'torque', not {level!r}")
         self.level: Level = level
-        self.reference = reference
+        self.reference, self.contacts = reference, contacts
+        self._metric = _metric(metric, contacts)
         self._tasks: dict[str, Task] = {}
         self._order: tuple[str, ...] = ()
         self._prepared: dict[tuple[str, ...], _Prepared] = {}
@@ -71,6 +89,7 @@ class Stack:
         expect("a stack", task, Task, "a task says itself what it moves; see hierarchy.tasks")
         if task.name in self._tasks:
             raise HierarchyError(f"the stack already has a task {task.name!r}")
+        _check_forces(task, self.level, self.contacts)
         position = len(self._order) if index is None else index
         if not 0 <= position <= len(self._order):
             raise HierarchyError(f"task {task.name!r}: index {index} is outside "
@@ -127,18 +146,46 @@ class Stack:
             raise HierarchyError("the stack is empty: there are no tasks")
         known = self._prepared.get(order)
         h = self._buffers(order, state.n) if known is None else known.hierarchy
-        writers = [self[name].writer(state, self.level, h.A, h.lower, h.upper, int(row))
+        h.metric = state.dynamics.M if isinstance(self._metric, str) else self._metric
+        writers = [writer_in_stack(self[name], state, self.level, h.A, h.lower, h.upper, int(row))
                    for name, row in zip(order, h.offsets, strict=False)]
         if self.reference is not None:
             m = self.reference.dimension
-            joints = h.reference[state.n - m:]  # without those of a floating base
-            writers.append(self.reference.writer(state, self.level, np.empty((m, state.n)), joints,
-                                                 joints, 0))
+            joints = h.reference[state.n - m:state.n]  # without those of a floating base
+            writers.append(writer_in_stack(self.reference, state, self.level,
+                                           np.empty((m, state.n)), joints, joints, 0))
         prepared = _Prepared(h, state, state.measurement, tuple(writers))
         self._prepared[order] = prepared
         return prepared
 
-    def _buffers(self, order: tuple[str, ...], n: int) -> Hierarchy:
+    def _buffers(self, order: tuple[str, ...], joints: int) -> Hierarchy:
+        n = joints if self.contacts is None else self.contacts.unknowns
         sizes = np.array([self[name].dimension for name in order], dtype=np.int64)
         m = int(sizes.sum())
         return Hierarchy(np.zeros((m, n)), np.zeros(m), np.zeros(m), sizes, np.zeros(n), order)
+
+
+def _check_forces(task: Task, level: Level, contacts: Contacts | None) -> None:
+    """Raise HierarchyError if a task's contact forces are not those of the stack."""
+    if not task.of_forces or (level != "torque" and task.contacts is None):
+        return
+    if level != "torque":
+        raise HierarchyError(f"task {task.name!r}: contact forces need the level 'torque', "
+                             f"not {level!r}")
+    if task.contacts is not contacts:
+        raise HierarchyError(f"task {task.name!r}: its contacts are not those of the stack; give "
+                             "both the same object")
+
+
+def _metric(metric: ArrayLike | Literal["mass"] | None,
+            contacts: Contacts | None) -> Array | Literal["mass"] | None:
+    if metric is None:
+        return None
+    if not isinstance(metric, str):
+        return checked_metric(metric)
+    if metric != "mass":
+        raise HierarchyError(f"metric must be (n, n), 'mass' or None, got {metric!r}")
+    if contacts is not None and contacts.contacts:
+        raise HierarchyError("metric 'mass' is over accelerations alone, and contact forces have "
+                             "no mass; give a metric over both")
+    return "mass"

@@ -4,9 +4,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from functools import partial
-from typing import Any
+from collections.abc import Callable, Sequence
+from functools import cached_property, partial
+from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -19,6 +19,29 @@ from hierarchy.kinematics import Kinematics
 from hierarchy.notebook import numbers
 from hierarchy.problem import Array
 from hierarchy.robot import Frame, Robot
+
+
+class Dynamics(NamedTuple):
+    """The equations of motion M a + h = efforts: M (n, n) [kg m^2] and h (n,) [N m or N].
+
+    M(q) is the joint-space inertia matrix, h(q, v) the efforts of gravity, Coriolis and centrifugal
+    forces.
+    """
+
+    M: Array
+    h: Array
+
+
+class Momentum(NamedTuple):
+    """The momentum A v of the whole robot: A(q) (6, n), and its time derivative dA (6, n).
+
+    The first three rows are linear [kg m/s], the others angular about the centre of mass
+    [kg m^2/s], in world axes. Source: D. Orin, A. Goswami, S.-H. Lee, "Centroidal dynamics of a
+    humanoid robot", Autonomous Robots (2013).
+    """
+
+    A: Array
+    dA: Array  # noqa: N815
 
 
 class State:
@@ -45,8 +68,9 @@ class State:
         self._model, self._data = robot.model, robot.model.createData()
         self._compute = partial(pin.computeJointJacobiansTimeVariation, self._model, self._data,
                                 self.q, self.v)
+        self._further: tuple[Callable[[], object], ...] = ()
         self._compute()
-        self.J, self.dJ = self._data.J, self._data.dJ
+        self.J, self.dJ = _columns(self._data.J, 6), _columns(self._data.dJ, 6)
         self.placements = _placements_view(self._data, robot.model.njoints)
         self.supports = _supports(robot.model)
         self.period = differences or 0.0
@@ -80,7 +104,7 @@ class State:
         return self.robot.n
 
     def move(self, t: float, q: Array, v: Array) -> bool:
-        """Go to time t [s] at q (nq,), v (n,): the one kinematics call of a tick.
+        """Go to time t [s] at q (nq,), v (n,): the one place of a tick that calls pinocchio.
 
         Shapes are not checked. Returns False and changes nothing if an entry is not finite.
         """
@@ -90,10 +114,33 @@ class State:
             self._keep_kinematics()
         self.t = t
         self._compute()
+        for compute in self._further:
+            compute()
         if self.period > 0.0 and not self._started:  # no previous tick: differences are zero
             self._keep_kinematics()
         self._started = True
         return True
+
+    @cached_property
+    def dynamics(self) -> Dynamics:
+        """M(q) and h(q, v): views of what each `move` computes from the first use of this on."""
+        model, data = self._model, self._data
+        self._from_now_on(partial(pin.crba, model, data, self.q),
+                          partial(pin.nonLinearEffects, model, data, self.q, self.v))
+        return Dynamics(_columns(data.M, self.n), data.nle)
+
+    @cached_property
+    def momentum(self) -> Momentum:
+        """The centroidal momentum matrix and its derivative: views, as those of `dynamics`."""
+        model, data = self._model, self._data
+        # Not computeCentroidalMapTimeVariation: its dA is not the derivative of A (pinocchio 4.1).
+        self._from_now_on(partial(pin.dccrba, model, data, self.q, self.v))
+        return Momentum(_columns(data.Ag, 6), _columns(data.dAg, 6))
+
+    def _from_now_on(self, *computations: Callable[[], object]) -> None:
+        self._further += computations
+        for compute in computations:
+            compute()
 
     def _keep_kinematics(self) -> None:
         _copy_kinematics(self.J, self.placements, self.previous_J, self.previous_placements)
@@ -160,6 +207,11 @@ def _placements_view(data: Any, joints: int) -> Array:
                 and (view[i] == np.r_[here.rotation.T.ravel(), here.translation]).all()):
             raise RobotError("this version of pinocchio has an unknown layout of placements")
     return view
+
+
+def _columns(matrix: Array, rows: int) -> Array:
+    """Return a view with this many rows; pinocchio gives a single column as a vector."""
+    return matrix.reshape((rows, -1), order="F")
 
 
 def _supports(model: Any) -> NDArray[np.bool_]:

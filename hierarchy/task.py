@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, ClassVar, Literal
 
 import numpy as np
 
+from hierarchy.contacts import Contacts
 from hierarchy.errors import HierarchyError, brief
 from hierarchy.paths import Path
 from hierarchy.problem import Array, check_rows
@@ -15,7 +16,7 @@ from hierarchy.problem import Array, check_rows
 if TYPE_CHECKING:
     from hierarchy.state import State
 
-Level = Literal["velocity", "acceleration"]
+Level = Literal["velocity", "acceleration", "torque"]
 Kind = Literal["equality", "inequality"]
 
 
@@ -31,10 +32,15 @@ class Task(ABC):
     With `kind` "equality" the rows require this value, with "inequality" at least this value (for
     an upper bound, write rows of opposite sign). `name` is used in stacks and messages;
     stiffness [1/s^2], damping [1/s] and gain [1/s] are the gains.
+
+    A task with `of_forces` has rows over accelerations and contact forces, see `ForceTask`; all
+    others have rows over the joints, and serve in a stack at level "torque" unchanged.
     """
 
     name: str
     kind: Kind = "equality"
+    of_forces: ClassVar[bool] = False  # whether contact forces enter the rows
+    contacts: Contacts | None  # whose forces these are; only then
     stiffness: float = 0.0
     damping: float = 0.0
     gain: float = 0.0
@@ -99,7 +105,8 @@ class Task(ABC):
         rows = slice(row, row + self.dimension)
 
         def write() -> None:
-            A[rows] = _shaped(self, "jacobian", self.jacobian(state), (self.dimension, state.n))
+            A[rows] = _shaped(self, "jacobian", self.jacobian(state),
+                              (self.dimension, A.shape[1]))
             lower[rows] = _shaped(self, "reference", self._sides(state, level), (self.dimension,))
             upper[rows] = lower[rows] if self.kind == "equality" else np.inf
             check_rows(f"task {self.name!r}", A[rows], lower[rows], upper[rows])
@@ -140,6 +147,14 @@ def check_parts(task: Task) -> None:
     if path is not None and not isinstance(path, Path):
         raise HierarchyError(f"task {task.name!r}: path is a {brief(path)}; give a path of "
                              "hierarchy.paths, such as Still([x, y, z])")
+
+
+def writer_in_stack(task: Task, state: State, level: Level, A: Array, lower: Array, upper: Array,
+                    row: int) -> Callable[[], object]:
+    """Return the writer of a task; at level "torque" one of the joints writes their columns."""
+    if level == "torque" and not task.of_forces:
+        level, A = "acceleration", A[:, :state.n]
+    return task.writer(state, level, A, lower, upper, row)
 
 
 def along(path: Path, target: Array, state: State,

@@ -139,6 +139,9 @@ def certify(h: Hierarchy, x: ArrayLike, tolerance: float = TOLERANCE,
     explains count as zero. An x or data that are not finite, or lengths whose squares overflow, are
     never certified.
 
+    With a metric W all lengths and angles are those of W: in place of x it judges
+    y = L^T (x - reference), with W = L L^T.
+
     tolerance : largest residual, relative to 1 + |x|.
     parallel : angle [rad] up to which rows count as dependent.
 
@@ -149,7 +152,7 @@ def certify(h: Hierarchy, x: ArrayLike, tolerance: float = TOLERANCE,
     expect("certify: h", h, Hierarchy, "make one with Hierarchy.from_levels([(A, b), ...])")
     with np.errstate(all="ignore"):
         slack = h.slacks(x)
-        x = np.asarray(x, dtype=np.float64)
+        h, x = _euclidean(h, np.asarray(x, dtype=np.float64))
         pairs = list(zip(h.offsets[:-1].tolist(), h.offsets[1:].tolist(), strict=True))
         violations = np.array([_length(slack[i:j]) for i, j in pairs])
         rows = _Rows.of(h, x, tolerance)
@@ -162,6 +165,20 @@ def certify(h: Hierarchy, x: ArrayLike, tolerance: float = TOLERANCE,
                     for angle in (parallel, parallel / _EITHER, parallel * _EITHER))
         first = next(verdicts)
         return first if first.certified else next((v for v in verdicts if v.certified), first)
+
+
+def _euclidean(h: Hierarchy, x: Array) -> tuple[Hierarchy, Array]:
+    """Return h and x in variables in which the metric is the identity; NaN if there are none."""
+    if h.metric is None:
+        return h, x
+    try:
+        L = np.linalg.cholesky(h.metric)
+    except np.linalg.LinAlgError:
+        L = np.full_like(h.metric, np.nan)
+    at = h.A @ h.reference
+    changed = Hierarchy(np.linalg.solve(L, h.A.T).T, h.lower - at, h.upper - at, h.sizes,
+                        np.zeros(h.n), h.names)
+    return changed, L.T @ (x - h.reference)
 
 
 def _judged(levels: list[_Rows], gap: Array, reach: float, tolerance: float, parallel: float

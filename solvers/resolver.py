@@ -136,6 +136,8 @@ class Resolver(ABC):
     def solve(self, h: Hierarchy, memory: Array | None = None) -> Resolution:
         """Resolve h, warm-started with the memory of an earlier resolution if there is one.
 
+        A hierarchy with a metric goes through `solvers.metric.in_metric`.
+
         Raises
         ------
         HierarchyError : the resolver cannot handle a row. A numerical outcome is a status.

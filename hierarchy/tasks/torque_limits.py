@@ -1,4 +1,4 @@
-"""Joint torque limits as rows over the joint accelerations."""
+"""Joint torque limits as rows over the accelerations, and the contact forces if there are any."""
 
 # mypy: disable-error-code="no-untyped-def"
 
@@ -6,11 +6,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 import numpy as np
 
+from hierarchy.contacts import Contacts, write_dynamics
 from hierarchy.errors import HierarchyError
-from hierarchy.jit import compiled
+from hierarchy.jit import bind, compiled
 from hierarchy.problem import Array
 from hierarchy.robot import Robot
 from hierarchy.state import State
@@ -19,18 +21,23 @@ from hierarchy.task import Level, Task, check_parts
 
 @dataclass(frozen=True)
 class TorqueLimits(Task):
-    """Keep every joint torque within its limits: -limit <= M(q) a + h(q, v) <= limit.
+    """Keep every joint torque within its limits: -limit <= M(q) a + h(q, v) - J_c^T f <= limit.
 
-    n rows, at acceleration level only. The limit is `fraction`, more than 0 and at most 1, of the
-    robot's `effort_limit` [N m or N]; rows of joints without one have infinite bounds. The torques
-    are those of the robot's model: rigid bodies, no friction, no payload.
+    One row per actuated joint, n in number below, at acceleration level without contacts and at
+    level "torque" with those of the stack. The limit is `fraction`, more than 0 and at most 1, of
+    the robot's `effort_limit` [N m or N]; rows of joints without one have infinite bounds. The
+    torques are those of the robot's model: rigid bodies, no friction, no payload.
+
+    Raises HierarchyError for another fraction, or a floating base without contacts.
     """
 
     robot: Robot
     fraction: float = 1.0
     name: str = "torque limits"
+    contacts: Contacts | None = None
     limit: Array = field(init=False, repr=False, compare=False)  # (n,) [N m or N]
     kind = "inequality"
+    of_forces: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -38,48 +45,55 @@ class TorqueLimits(Task):
         if not 0.0 < self.fraction <= 1.0:
             raise HierarchyError(f"task {self.name!r}: fraction {self.fraction} is not more than 0 "
                                  "and at most 1")
-        if self.robot.base == "floating":
+        if self.robot.base == "floating" and self.contacts is None:
             raise HierarchyError(f"task {self.name!r}: robot {self.robot.name!r} has a floating "
-                                 "base; its torques depend on contact forces, which are not known")
-        object.__setattr__(self, "limit", self.fraction * self.robot.effort_limit)
+                                 "base; its torques depend on contact forces, so give the contacts")
+        limit = self.robot.effort_limit[self.robot.actuated:]
+        object.__setattr__(self, "limit", self.fraction * limit)
 
     @property
     def dimension(self) -> int:
-        """One row per joint."""
-        return self.robot.n
+        """One row per actuated joint."""
+        return self.robot.n - self.robot.actuated
 
     @property
     def row_names(self) -> tuple[str, ...]:
         """The joint of each row."""
-        return tuple(self.robot.velocity_names)
+        return tuple(self.robot.velocity_names[self.robot.actuated:])
 
     def error(self, state: State) -> Array:
-        """Distance of the torque at constant velocity from the limits (n,) [N m or N]."""
-        h = state.bias_effort()
+        """Distance of the torque with x = 0 from the limits (n,) [N m or N]."""
+        h = state.bias_effort()[self.robot.actuated:]
         return np.asarray(np.clip(h, -self.limit, self.limit) - h)
 
     def jacobian(self, state: State) -> Array:
-        """Mass matrix M(q) (n, n) [kg m^2]."""
-        return state.mass_matrix()
+        """Rows of the mass matrix M(q) [kg m^2], to the left of -J_c^T [m] with contacts."""
+        M = state.mass_matrix()
+        J = np.empty((0, state.n)) if self.contacts is None else self.contacts.jacobian(state)
+        return np.hstack([M, -J.T])[self.robot.actuated:]
 
     def jacobian_derivative(self, state: State) -> Array:
-        """Its time derivative (n, n) [kg m^2/s]; no row uses it."""
-        return state.mass_matrix_derivative()
+        """Time derivative of M(q) [kg m^2/s] without contacts, else zero; no row uses it."""
+        if self.contacts is None:
+            return state.mass_matrix_derivative()
+        return np.zeros((self.dimension, self.contacts.unknowns))
 
     def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
                row: int) -> Callable[[], object]:
         """See `Task.writer`; HierarchyError at velocity level."""
-        if level != "acceleration":
+        if level == "velocity":
             raise HierarchyError(f"task {self.name!r}: torque limits need the acceleration level, "
                                  f"not {level!r}")
-        return lambda: _write(state.mass_matrix(), state.bias_effort(), self.limit, A, lower, upper,
-                              row)
+        M, h = state.dynamics
+        contacts = Contacts(self.robot) if self.contacts is None else self.contacts
+        parameters = M, h, state.kinematics, contacts.points, self.robot.actuated
+        return bind(_write, parameters, self.limit, A, lower, upper, row)
 
 
 @compiled
-def _write(M, h, limit, A, lower, upper, row):
-    for i in range(len(h)):
-        for j in range(len(h)):
-            A[row + i, j] = M[i, j]
-        lower[row + i] = -limit[i] - h[i]
-        upper[row + i] = limit[i] - h[i]
+def _write(parameters, limit, A, lower, upper, row):
+    M, h, kinematics, points, first = parameters
+    write_dynamics(M, kinematics, points, A, row, first, len(limit))
+    for i in range(len(limit)):
+        lower[row + i] = -limit[i] - h[first + i]
+        upper[row + i] = limit[i] - h[first + i]

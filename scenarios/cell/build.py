@@ -86,7 +86,8 @@ def build(scenario: Scenario, kept: Cell | None = None) -> Cell:
         task for task in (position, pointing, *listed, last) if task)])
     rows, activation = stacked(scenario, tasks, state)
     return Cell(scenario, robot, start, state, plant,
-                Stack(rows, control.level, reference_of(scenario, here)), sensor, areas,
+                Stack(rows, control.level, reference_of(scenario, here),
+                      metric="mass" if control.metric == "mass" else None), sensor, areas,
                 position, pointing, limits, order_of(scenario, areas, always, tasks), tuple(listed),
                 activation)
 

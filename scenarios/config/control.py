@@ -60,6 +60,10 @@ class ControlSection(Section):
     `[control.options.tpm]`, applies to that resolver only, so that changing `resolver` is enough to
     swap it. Plain settings override those from such a table.
 
+    `metric` = "mass": of the commands that serve the tasks equally well, the one nearest to the
+    null-space term in the robot's inertia M(q), at acceleration level that of operational-space
+    control. "identity": in the plain sum of squares over the joints.
+
     `transition` = "blend": when the order of the stack or the active control point changes, the
     command moves from the old stack's to the new one's within `transition_time` [s], and a new
     task has its full effect only after that time. "none": it changes at once.
@@ -73,6 +77,7 @@ class ControlSection(Section):
     jacobian_derivative: Literal["exact", "difference"] = "exact"
     resolver: str
     options: dict[str, Any] = Field(default_factory=dict)
+    metric: Literal["identity", "mass"] = "identity"
     policy: PolicySection = PolicySection()
     transition: Literal["none", "blend"] = "none"
     transition_time: Positive = 0.02

@@ -163,14 +163,18 @@ class Scenario(Section):
 
     @property
     def asks(self) -> Handles:
-        """The kind of rows that its stack has under its resolver."""
+        """The kind of rows that its stack has under its resolver.
+
+        In the metric "mass" bounds are rows over several unknowns, see solvers.metric.
+        """
         if self.control.stack in RIVALS:
             return "activations" if self.control.stack == "smooth" else "equalities"
         one_sided = self.avoidance is not None and self.avoidance.kind == "separation"
         inequalities = one_sided or (self.control.stack == "hierarchical" and any(
             task.one_sided for task in (self.pointing, *self.tasks) if task))
         limits = self.limits if self.limits_in_stack else None
-        if inequalities or (limits and limits.torque):
+        bounds = self.control.metric == "identity" and not (limits and limits.torque)
+        if inequalities or (limits and not bounds):
             return "inequalities"
         return "bounds" if limits else "equalities"
 

@@ -79,7 +79,8 @@ class Batch:
 
         Raises
         ------
-        HierarchyError : no hierarchies, or one with other sizes or unknowns than the first.
+        HierarchyError : no hierarchies, one with other sizes or unknowns than the first, or one
+            with a metric.
         """
         if not hierarchies:
             raise HierarchyError("a batch of no hierarchies has no shape; pass arrays instead")
@@ -87,6 +88,8 @@ class Batch:
         for p, h in enumerate(hierarchies):
             if h.n != first.n or h.sizes.tolist() != first.sizes.tolist():
                 raise HierarchyError(f"problem {p} is {h}, where problem 0 is {first}")
+            if h.metric is not None:
+                raise HierarchyError(f"problem {p} has a metric; a batch has none")
         stacked = (np.stack([getattr(h, name) for h in hierarchies])
                    for name in ("A", "lower", "upper", "reference"))
         A, lower, upper, reference = stacked

@@ -36,7 +36,7 @@ def scene(robot: Robot, capsules: Sequence[Capsule], obstacles: Sequence[Obstacl
                                     gravity=f"0 0 {-GRAVITY}", integrator="implicitfast")
     ElementTree.SubElement(option, "flag", autoreset="disable")  # a diverged state is not reset
     default = ElementTree.SubElement(root, "default")
-    ElementTree.SubElement(default, "geom", solref=_text(_SOFTNESS, 1.0), friction=_FRICTION)
+    ElementTree.SubElement(default, "geom", solref=text(_SOFTNESS, 1.0), friction=_FRICTION)
     world = ElementTree.SubElement(root, "worldbody")
     _arm(world, robot, capsules, joints, servo)
     _obstacles(world, obstacles)
@@ -63,30 +63,30 @@ def _arm(world: Element, robot: Robot, capsules: Sequence[Capsule], joints: Join
         elements.append(element)
         joint = ElementTree.SubElement(
             element, "joint", name=body.name, type="hinge", axis="0 0 1",
-            frictionloss=_text(friction[i]), damping=_text(damping[i]),
-            armature=_text(armature[i]), actuatorgravcomp="true")
+            frictionloss=text(friction[i]), damping=text(damping[i]),
+            armature=text(armature[i]), actuatorgravcomp="true")
         if np.isfinite([robot.lower[i], robot.upper[i]]).all():
             joint.set("limited", "true")
-            joint.set("range", _text(robot.lower[i], robot.upper[i]))
+            joint.set("range", text(robot.lower[i], robot.upper[i]))
         if np.isfinite(robot.effort_limit[i]):
             joint.set("actuatorfrclimited", "true")
-            joint.set("actuatorfrcrange", _text(-robot.effort_limit[i], robot.effort_limit[i]))
+            joint.set("actuatorfrcrange", text(-robot.effort_limit[i], robot.effort_limit[i]))
     for capsule in capsules:
         ElementTree.SubElement(
             elements[capsule.joint], "geom", name=capsule.name, type="capsule",
-            fromto=_text(*capsule.start, *capsule.end), size=_text(capsule.radius),
+            fromto=text(*capsule.start, *capsule.end), size=text(capsule.radius),
             contype="1", conaffinity="0")
 
 
 def _body(parent: Element, body: Body, gravity: float) -> Element:
     element = ElementTree.SubElement(parent, "body", name=f"body {body.name}",
-                                     pos=_text(*body.position),
-                                     xyaxes=_text(*body.rotation[:, 0], *body.rotation[:, 1]),
-                                     gravcomp=_text(gravity))
+                                     pos=text(*body.position),
+                                     xyaxes=text(*body.rotation[:, 0], *body.rotation[:, 1]),
+                                     gravcomp=text(gravity))
     I = body.inertia  # noqa: E741
     ElementTree.SubElement(
-        element, "inertial", mass=_text(body.mass), pos=_text(*body.centre),
-        fullinertia=_text(I[0, 0], I[1, 1], I[2, 2], I[0, 1], I[0, 2], I[1, 2]))
+        element, "inertial", mass=text(body.mass), pos=text(*body.centre),
+        fullinertia=text(I[0, 0], I[1, 1], I[2, 2], I[0, 1], I[0, 2], I[1, 2]))
     return element
 
 
@@ -98,8 +98,8 @@ def _obstacles(world: Element, obstacles: Sequence[Obstacle]) -> None:
         axes = np.asarray(obstacle.rotation, dtype=float)
         element = ElementTree.SubElement(
             world, "body", name=f"obstacle {number}", mocap="true",
-            pos=_text(*obstacle.centre), xyaxes=_text(*axes[:, 0], *axes[:, 1]))
-        ElementTree.SubElement(element, "geom", type=obstacle.shape, size=_text(*obstacle.size),
+            pos=text(*obstacle.centre), xyaxes=text(*axes[:, 0], *axes[:, 1]))
+        ElementTree.SubElement(element, "geom", type=obstacle.shape, size=text(*obstacle.size),
                                contype="0", conaffinity="1")
 
 
@@ -107,8 +107,9 @@ def _servos(root: Element, robot: Robot, gains: tuple[Array, Array]) -> None:
     actuator = ElementTree.SubElement(root, "actuator")
     for kind, key, values in (("position", "kp", gains[0]), ("velocity", "kv", gains[1])):
         for name, gain in zip(robot.joint_names, values, strict=True):
-            ElementTree.SubElement(actuator, kind, {"joint": name, key: _text(gain)})
+            ElementTree.SubElement(actuator, kind, {"joint": name, key: text(gain)})
 
 
-def _text(*numbers: ArrayLike) -> str:
+def text(*numbers: ArrayLike) -> str:
+    """Return numbers as an attribute of MJCF."""
     return " ".join(repr(float(number)) for number in np.array(numbers, dtype=float))

@@ -39,7 +39,7 @@ class PhysicsArm:
     def __init__(self, robot: Robot, q: Array, v: Array, period: float, level: Level,
                  obstacles: Obstacles | None = None, servo: ServoSection | None = None,
                  joints: JointsSection | None = None) -> None:
-        mujoco = _mujoco()
+        mujoco = mujoco_module()
         servo, joints = servo or ServoSection(), joints or JointsSection()
         if not isinstance(robot.table, DHTable):
             raise ScenarioError(f'plant.kind = "mujoco": robot {robot.name!r} is not one of '
@@ -116,7 +116,8 @@ class PhysicsArm:
             self._force[...] = max(float(self._force), float(self._wrench[0]))
 
 
-def _mujoco() -> Any:
+def mujoco_module() -> Any:
+    """Return the module mujoco; ScenarioError, with the remedy, if it is not installed."""
     try:
         import mujoco
     except ImportError as error:

@@ -1,0 +1,236 @@
+"""Contacts: points of a robot that push on rigid surroundings, and the unknowns that they add.
+
+With contacts the unknowns of a stack are x = (a, f): n joint accelerations and three components of
+force for each contact point. The equations of motion are linear in both,
+
+    M(q) a + h(q, v) = S^T tau + J_c^T f,
+
+where S picks the actuated joints: the rows of a floating base have no torque, and the others say
+which torques an x takes. Source: L. Sentis, O. Khatib, "Synthesis of Whole-Body Behaviors through
+Hierarchical Control of Behavioral Primitives", International Journal of Humanoid Robotics (2005).
+"""
+
+# mypy: disable-error-code="no-untyped-def"
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from hierarchy.errors import HierarchyError, UnknownNameError
+from hierarchy.jit import compiled
+from hierarchy.kinematics import drift_of_point, place, write_point_jacobian
+from hierarchy.problem import Array
+from hierarchy.robot import Frame, Robot
+from hierarchy.state import State
+
+Vector = Sequence[float]
+
+
+class Points(NamedTuple):
+    """Contact points, for kernels: the joint (p,) that moves each, its offset (p, 3) [m] there."""
+
+    joints: NDArray[np.int64]
+    offsets: Array
+
+
+@dataclass(frozen=True)
+class Contact:
+    """Points fixed to one frame that can push against a rigid surface.
+
+    `points` (k, 3) [m] are in the frame: one for a point contact, at least three that are not on
+    one line for a surface, such as the corners of a sole. `friction` is Coulomb's coefficient,
+    `normal` (3,) the direction in the world in which the surface pushes the robot. `open` has the
+    intervals (from, until) [s] of a contact that lifts off and touches down; its load ramps down
+    for `ramp` [s] before each and up after it. The name is that of the frame unless given.
+
+    Raises HierarchyError, naming the contact, if the coefficient is not positive, the normal is
+    zero, a number is not finite, the points are on a line, or an interval ends before it begins.
+    """
+
+    frame: Frame
+    points: Sequence[Vector] = ((0.0, 0.0, 0.0),)
+    friction: float = 0.7
+    normal: Vector = (0.0, 0.0, 1.0)
+    name: str = ""
+    open: Sequence[tuple[float, float]] = ()
+    ramp: float = 0.1
+    axes: Array = field(init=False, repr=False, compare=False)  # (3, 3) rows: two tangents, normal
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "name", self.name or self.frame.name)
+        points, normal = np.array(self.points, dtype=float), np.array(self.normal, dtype=float)
+        if points.ndim != 2 or points.shape[1] != 3 or not np.isfinite(points).all():
+            raise HierarchyError(f"contact {self.name!r}: points {self.points!r} are not (k, 3) "
+                                 "numbers")
+        if len(points) != 1 and np.linalg.matrix_rank(points - points.mean(0), tol=1e-6) < 2:
+            raise HierarchyError(f"contact {self.name!r}: {len(points)} points on one line; a "
+                                 "contact has one point, or at least three of a surface")
+        if not 0.0 < self.friction < np.inf:
+            raise HierarchyError(f"contact {self.name!r}: friction {self.friction} must be "
+                                 "positive and finite")
+        if normal.shape != (3,) or not 0.0 < np.linalg.norm(normal) < np.inf:
+            raise HierarchyError(f"contact {self.name!r}: normal {self.normal!r} is no direction")
+        for start, end in self.open:
+            if not start < end:
+                raise HierarchyError(f"contact {self.name!r}: it cannot be open from {start} s "
+                                     f"until {end} s")
+        if not 0.0 <= self.ramp < np.inf:
+            raise HierarchyError(f"contact {self.name!r}: ramp {self.ramp} s must not be negative")
+        object.__setattr__(self, "axes", _axes(normal))
+
+    @classmethod
+    def rectangle(cls, frame: Frame, x: tuple[float, float], y: tuple[float, float],
+                  friction: float = 0.7, open: Sequence[tuple[float, float]] = (),
+                  ramp: float = 0.1) -> Contact:
+        """Return a sole in the xy plane of its frame: its corners, from `x` and `y` (2,) [m]."""
+        corners = [(x[0], y[0], 0.0), (x[1], y[0], 0.0), (x[1], y[1], 0.0), (x[0], y[1], 0.0)]
+        return cls(frame, corners, friction, open=open, ramp=ramp)
+
+    def load(self, t: float) -> float:
+        """Share of its largest force that the contact may carry at t [s]: 0 while it is open."""
+        away = min((max(start - t, t - end) for start, end in self.open), default=np.inf)
+        return 0.0 if away <= 0.0 else min(1.0, away / self.ramp) if self.ramp else 1.0
+
+    @property
+    def is_surface(self) -> bool:
+        """Whether the contact has several points, and so holds the orientation of its frame."""
+        return len(self.points) > 1
+
+
+@dataclass(frozen=True)
+class Contacts:
+    """The contacts of a robot, and the unknowns x = (a, f) of a stack at level "torque".
+
+    a (n,) are the joint accelerations [rad/s^2 or m/s^2], f (3 p,) the forces on the robot [N] in
+    world axes, three components a point, in the order of `contacts` and of their points. Without
+    contacts x = a. Raises HierarchyError if two contacts share a name, one is on a body that no
+    joint moves, or the robot has no masses.
+    """
+
+    robot: Robot
+    contacts: Sequence[Contact] = ()
+    points: Points = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        contacts = tuple(self.contacts)
+        object.__setattr__(self, "contacts", contacts)
+        if not self.robot.masses.sum() > 0.0:
+            raise HierarchyError(f"contacts: robot {self.robot.name!r} has no masses, so no torque "
+                                 "or force moves it")
+        for i, contact in enumerate(contacts):
+            if contact.name in self.names[:i]:
+                raise HierarchyError(f"contact {contact.name!r}: two contacts have this name")
+            if contact.frame.joint == 0:
+                raise HierarchyError(f"contact {contact.name!r}: no joint moves frame "
+                                     f"{contact.frame.name!r}")
+        frames = [contact.frame for contact in contacts for _ in contact.points]
+        offsets = [contact.frame.offset + contact.frame.rotation @ np.array(point, dtype=float)
+                   for contact in contacts for point in contact.points]
+        object.__setattr__(self, "points", Points(
+            np.array([frame.joint for frame in frames], dtype=np.int64),
+            np.array(offsets, dtype=float).reshape(-1, 3)))
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the contacts."""
+        return tuple(contact.name for contact in self.contacts)
+
+    @property
+    def unknowns(self) -> int:
+        """Number of unknowns, n + 3 p."""
+        return self.robot.n + 3 * len(self.points.joints)
+
+    @cached_property
+    def blocks(self) -> dict[str, slice]:
+        """The part of x that holds the "accelerations", and the forces of each contact by name."""
+        blocks, at = {"accelerations": slice(0, self.robot.n)}, self.robot.n
+        for contact in self.contacts:
+            blocks[contact.name] = slice(at, at := at + 3 * len(contact.points))
+        return blocks
+
+    def __getitem__(self, name: str) -> Contact:
+        if name not in self.names:
+            raise UnknownNameError("contact", name, self.names)
+        return self.contacts[self.names.index(name)]
+
+    def accelerations(self, x: ArrayLike) -> Array:
+        """Joint accelerations (n,) [rad/s^2 or m/s^2] of an x."""
+        return self._checked(x)[:self.robot.n]
+
+    def forces(self, x: ArrayLike, contact: str | None = None) -> Array:
+        """Forces (k, 3) [N] at the points of one contact of an x, or of all."""
+        x = self._checked(x)
+        part = slice(self.robot.n, None) if contact is None else self.blocks[self[contact].name]
+        return x[part].reshape(-1, 3)
+
+    def torques(self, state: State, x: ArrayLike) -> Array:
+        """Torques M a + h - J_c^T f (n,) [N m or N] of the actuated joints that an x takes."""
+        M, h = state.dynamics
+        pushed = self.jacobian(state).T @ self.forces(x).ravel()
+        efforts: Array = M @ self.accelerations(x) + h - pushed
+        return efforts[self.robot.actuated:]
+
+    def jacobian(self, state: State) -> Array:
+        """Jacobian J_c (3 p, n) of all contact points [m], world axes."""
+        J = np.empty((3 * len(self.points.joints), state.n))
+        for k, (joint, offset) in enumerate(zip(*self.points, strict=True)):
+            write_point_jacobian(state.J, state.placements, state.supports, joint, offset, J, 3 * k)
+        return J
+
+    def drift(self, state: State) -> Array:
+        """Accelerations dJ_c/dt v (3 p,) [m/s^2] of the contact points with a = 0."""
+        drift = np.empty(3 * len(self.points.joints))
+        _write_drift(state.kinematics, self.points, drift)
+        return drift
+
+    def _checked(self, x: ArrayLike) -> Array:
+        x = np.asarray(x, dtype=float)
+        if x.shape != (self.unknowns,):
+            raise HierarchyError(f"x has shape {x.shape}, expected ({self.unknowns},): "
+                                 f"{self.robot.n} accelerations and "
+                                 f"{self.unknowns - self.robot.n} components of force")
+        return x
+
+
+def _axes(normal: Array) -> Array:
+    """Return two tangents and the normal as rows (3, 3); x, y and z of the world for normal z."""
+    n = normal / np.linalg.norm(normal)
+    x = np.eye(3)[0 if abs(n[0]) < 0.9 else 1]
+    tangent = x - (x @ n) * n
+    tangent /= np.linalg.norm(tangent)
+    return np.array([tangent, np.cross(n, tangent), n])
+
+
+@compiled
+def write_dynamics(M, kinematics, points, A, row, first, count):
+    """Write the rows of the velocities `first`, ... of [M, -J_c^T] into A, from `row` on."""
+    J, placements, supports = kinematics.J, kinematics.placements, kinematics.supports
+    n = M.shape[0]
+    for i in range(count):
+        for c in range(n):
+            A[row + i, c] = M[first + i, c]
+    for k in range(len(points.joints)):
+        joint, o, f = points.joints[k], points.offsets[k], n + 3 * k
+        x, y, z = place(placements[joint], o[0], o[1], o[2])
+        for i in range(count):
+            c = first + i
+            if supports[joint, c]:
+                A[row + i, f] = J[5, c] * y - J[4, c] * z - J[0, c]
+                A[row + i, f + 1] = J[3, c] * z - J[5, c] * x - J[1, c]
+                A[row + i, f + 2] = J[4, c] * x - J[3, c] * y - J[2, c]
+            else:
+                A[row + i, f], A[row + i, f + 1], A[row + i, f + 2] = 0.0, 0.0, 0.0
+
+
+@compiled
+def _write_drift(kinematics, points, drift):
+    for k in range(len(points.joints)):
+        o = points.offsets[k]
+        _, _, _, x, y, z, _, _, _ = drift_of_point(kinematics, points.joints[k], o[0], o[1], o[2])
+        drift[3 * k], drift[3 * k + 1], drift[3 * k + 2] = x, y, z

@@ -1,0 +1,132 @@
+"""Contacts that stay where they are."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import cast
+
+import numpy as np
+
+from hierarchy.contacts import Contact, Contacts
+from hierarchy.errors import HierarchyError
+from hierarchy.paths import Still
+from hierarchy.problem import Array
+from hierarchy.robot import Frame
+from hierarchy.state import State
+from hierarchy.task import Level, Task
+from hierarchy.tasks.pose import Pose
+from hierarchy.tasks.position import Position
+from hierarchy.tasks.together import Together
+
+
+@dataclass(frozen=True)
+class ContactMotion(Task):
+    """Keep contacts at rest: J_c a + dJ_c/dt v = -damping v_c + stiffness e [m/s^2, rad/s^2].
+
+    Three rows for a point, those of `Position`; six for a surface, those of `Pose`. With e = 0 and
+    no damping the contact accelerates nowhere; damping [1/s] takes away what velocity it has, and
+    stiffness [1/s^2] brings it back to its anchor. `anchors` are (4, 3) for each contact: where its
+    point, or the frame of a surface, belongs [m], then the rotation of the frame;
+    `ContactMotion.at` takes them from a state. While a contact is open its rows ask for nothing: a
+    `Pose` or `Position` task swings the foot.
+
+    Raises HierarchyError for no contacts, a stiffness without anchors, or a stiffness of a contact
+    that opens, because it may come down elsewhere. Source: J. Baumgarte,
+    "Stabilization of constraints and integrals of motion in dynamical systems", Computer Methods in
+    Applied Mechanics and Engineering (1972).
+    """
+
+    of: Contacts
+    anchors: Sequence[Array] | None = None
+    stiffness: float = 0.0
+    damping: float = 20.0
+    gain: float = 10.0
+    name: str = "contact motion"
+
+    def __post_init__(self) -> None:
+        if not self.of.contacts:
+            raise HierarchyError(f"task {self.name!r}: there are no contacts")
+        if self.anchors is None and self.stiffness:
+            raise HierarchyError(f"task {self.name!r}: stiffness {self.stiffness} needs anchors")
+        for contact in self.of.contacts:
+            if contact.open and self.stiffness:
+                raise HierarchyError(f"task {self.name!r}: contact {contact.name!r} opens, so its "
+                                     f"stiffness must be 0, not {self.stiffness}")
+        if self.anchors is not None and [np.shape(one) for one in self.anchors] != [
+                (4, 3)] * len(self.of.contacts):
+            raise HierarchyError(f"task {self.name!r}: anchors are not (4, 3) for each of "
+                                 f"{len(self.of.contacts)} contacts")
+
+    @classmethod
+    def at(cls, state: State, of: Contacts, stiffness: float = 100.0, damping: float = 20.0,
+           name: str = "contact motion") -> ContactMotion:
+        """Return the task that keeps contacts where they are at a state."""
+        frames = [_held(contact) for contact in of.contacts]
+        anchors = [np.vstack([state.position(frame), state.rotation(frame)]) for frame in frames]
+        return cls(of, anchors, stiffness, damping, name=name)
+
+    @property
+    def dimension(self) -> int:
+        """Three rows per point contact, six per surface."""
+        return sum(6 if contact.is_surface else 3 for contact in self.of.contacts)
+
+    @property
+    def row_names(self) -> tuple[str, ...]:
+        """Contact, and axis of translation or turn, of each row."""
+        axes = [f"{kind} {axis}" for kind in ("along", "about") for axis in "xyz"]
+        return tuple(f"{contact.name} {axis}" for contact in self.of.contacts
+                     for axis in axes[:6 if contact.is_surface else 3])
+
+    def error(self, state: State) -> Array:
+        """Distance of each contact from its anchor (m,) [m, rad]; zero without anchors."""
+        return np.zeros(self.dimension) if self.anchors is None else self._tasks.error(state)
+
+    def jacobian(self, state: State) -> Array:
+        """Linear, and for surfaces angular, Jacobians of the contacts' frames (m, n)."""
+        return self._tasks.jacobian(state)
+
+    def jacobian_derivative(self, state: State) -> Array:
+        """Their time derivatives (m, n)."""
+        return self._tasks.jacobian_derivative(state)
+
+    def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
+               row: int) -> Callable[[], object]:
+        """See `Task.writer`."""
+        write_rows, opening = self._tasks.writer(state, level, A, lower, upper, row), []
+        for contact in self.of.contacts:
+            rows = slice(row, row := row + (6 if contact.is_surface else 3))
+            if contact.open:
+                opening.append((rows, contact))
+
+        def write() -> None:
+            write_rows()
+            for rows, contact in opening:
+                if contact.load(state.t) == 0.0:
+                    lower[rows], upper[rows] = -np.inf, np.inf
+
+        return write if opening else write_rows
+
+    @property
+    def _tasks(self) -> Together:
+        anchors = self.anchors or [np.vstack([np.zeros(3), np.eye(3)])] * len(self.of.contacts)
+        return Together([self._task(*pair) for pair in zip(self.of.contacts, anchors, strict=True)])
+
+    def _task(self, contact: Contact, anchor: Array) -> Task:
+        path, gain = Still(cast("list[float]", anchor[0].tolist())), self.gain
+        if self.anchors is None:
+            gain = 0.0
+        if contact.is_surface:
+            return Pose(_held(contact), path, anchor[1:], self.stiffness, self.damping, gain,
+                        contact.name)
+        return Position(_held(contact), path, self.stiffness, self.damping, gain,
+                        name=contact.name)
+
+
+def _held(contact: Contact) -> Frame:
+    """Return the frame whose origin is held: that of a surface, or one at the only point."""
+    frame = contact.frame
+    if contact.is_surface:
+        return frame
+    offset = frame.offset + frame.rotation @ np.array(contact.points[0], dtype=float)
+    return Frame(contact.name, frame.joint, offset, frame.rotation)

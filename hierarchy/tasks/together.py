@@ -1,0 +1,85 @@
+"""Several tasks as one level of a stack."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from hierarchy.contacts import Contacts
+from hierarchy.errors import HierarchyError
+from hierarchy.problem import Array
+from hierarchy.state import State
+from hierarchy.task import Level, Task, writer_in_stack
+
+
+@dataclass(frozen=True)
+class Together(Task):
+    """The rows of several tasks as one level: m is the sum of theirs.
+
+    What cannot all be met is missed by the smallest sum of squares over all rows, so the rows
+    should share a unit, or be ones that can be met together. Raises HierarchyError for no tasks, or
+    contact forces of different contacts.
+    """
+
+    tasks: Sequence[Task]
+    name: str = "together"
+
+    def __post_init__(self) -> None:
+        if not self.tasks:
+            raise HierarchyError(f"task {self.name!r}: there are no tasks in it")
+        for task in self.tasks:
+            if task.of_forces and task.contacts is not self.contacts:
+                raise HierarchyError(f"task {self.name!r}: its tasks have different contacts; give "
+                                     "all of them the same object")
+
+    @property
+    def of_forces(self) -> bool:  # type: ignore[override]
+        """Whether contact forces enter any row."""
+        return any(task.of_forces for task in self.tasks)
+
+    @property
+    def contacts(self) -> Contacts | None:  # type: ignore[override]
+        """Those of the tasks."""
+        return next((task.contacts for task in self.tasks if task.of_forces), None)
+
+    @property
+    def dimension(self) -> int:
+        """The rows of all tasks."""
+        return sum(task.dimension for task in self.tasks)
+
+    @property
+    def row_names(self) -> tuple[str, ...]:
+        """Task and row of each row."""
+        return tuple(f"{task.name} {row}" for task in self.tasks for row in task.row_names)
+
+    def error(self, state: State) -> Array:
+        """The errors of the tasks (m,)."""
+        return np.concatenate([task.error(state) for task in self.tasks])
+
+    def jacobian(self, state: State) -> Array:
+        """The rows of the tasks (m, n), or (m, n + 3 p) with contact forces."""
+        return self._stacked([task.jacobian(state) for task in self.tasks])
+
+    def jacobian_derivative(self, state: State) -> Array:
+        """Their time derivatives, of the same shape."""
+        return self._stacked([task.jacobian_derivative(state) for task in self.tasks])
+
+    def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
+               row: int) -> Callable[[], object]:
+        """See `Task.writer`."""
+        writers = []
+        for task in self.tasks:
+            writers.append(writer_in_stack(task, state, level, A, lower, upper, row))
+            row += task.dimension
+
+        def write() -> None:
+            for write_rows in writers:
+                write_rows()
+
+        return write
+
+    def _stacked(self, rows: list[Array]) -> Array:
+        columns = max(part.shape[1] for part in rows)
+        return np.vstack([np.pad(part, ((0, 0), (0, columns - part.shape[1]))) for part in rows])

@@ -1,0 +1,115 @@
+"""A robot on a floor as a MuJoCo scene in the format MJCF: torque motors, soles, friction."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from xml.etree import ElementTree
+
+import numpy as np
+
+from hierarchy import Robot, State
+from hierarchy.contacts import Contact, Contacts
+from hierarchy.problem import Array
+from hierarchy.robot import Body
+from scenarios.cell.plants.mjcf import GRAVITY, text
+from scenarios.config import ScenarioError
+
+_LEAST_MASS, _LEAST_INERTIA = 1e-6, 1e-9  # [kg], [kg m^2] of a body that only joins two joints
+_THICKNESS = 0.01                         # [m] half of that of a sole
+Element = ElementTree.Element
+
+
+@dataclass(frozen=True)
+class Floor:
+    """What the controller's model leaves out.
+
+    `friction` is the coefficient between sole and floor, `softness` [s] the time constant of a
+    contact, `joint_friction` [N m] Coulomb's friction and `armature` [kg m^2] the inertia of the
+    drive of every joint.
+    """
+
+    friction: float = 0.7
+    softness: float = 0.005
+    joint_friction: float = 0.0
+    armature: float = 0.0
+
+
+def on_floor(robot: Robot, contacts: Contacts, floor: Floor, timestep: float) -> str:
+    """Return the scene of a robot whose soles, the surfaces of `contacts`, touch a floor at z = 0.
+
+    A sole is a box in the place of its four corners; nothing else touches anything. Actuators are
+    the torques of the actuated joints. Raises ScenarioError unless each joint, but for that of a
+    floating base, turns about one axis.
+    """
+    root = Element("mujoco", model=robot.name)
+    ElementTree.SubElement(root, "compiler", angle="radian", inertiafromgeom="false")
+    option = ElementTree.SubElement(root, "option", timestep=repr(timestep), cone="elliptic",
+                                    gravity=f"0 0 {-GRAVITY}", integrator="Euler",
+                                    tolerance="1e-12", iterations="200")
+    ElementTree.SubElement(option, "flag", autoreset="disable")
+    world = ElementTree.SubElement(root, "worldbody")
+    touching = {"condim": "3", "solref": text(floor.softness, 1.0),
+                "friction": text(floor.friction, 0.0, 0.0)}
+    ElementTree.SubElement(world, "geom", {"type": "plane", "size": "20 20 1"} | touching)
+    elements = _bodies(world, robot, floor)
+    for contact in contacts.contacts:
+        if contact.is_surface:
+            _sole(elements[contact.frame.joint], contact, touching)
+    actuator = ElementTree.SubElement(root, "actuator")
+    for name, limit in zip(robot.velocity_names[robot.actuated:],
+                           robot.effort_limit[robot.actuated:], strict=True):
+        motor = ElementTree.SubElement(actuator, "motor", joint=name)
+        if np.isfinite(limit):
+            motor.set("ctrllimited", "true")
+            motor.set("ctrlrange", text(-limit, limit))
+    return ElementTree.tostring(root, encoding="unicode")
+
+
+def _bodies(world: Element, robot: Robot, floor: Floor) -> list[Element]:
+    axes, elements = _axes(robot), [world]
+    for i, body in enumerate(robot.bodies()):
+        element = _body(elements[body.parent], body)
+        elements.append(element)
+        if i == 0 and robot.base == "floating":
+            ElementTree.SubElement(element, "freejoint")
+            continue
+        ElementTree.SubElement(element, "joint", name=body.name, type="hinge",
+                               axis=text(*axes[i + 1]), armature=text(floor.armature),
+                               frictionloss=text(floor.joint_friction))
+    return elements
+
+
+def _body(parent: Element, body: Body) -> Element:
+    element = ElementTree.SubElement(parent, "body", name=f"body {body.name}",
+                                     pos=text(*body.position),
+                                     xyaxes=text(*body.rotation[:, 0], *body.rotation[:, 1]))
+    I = body.inertia + _LEAST_INERTIA * np.eye(3)  # noqa: E741
+    ElementTree.SubElement(
+        element, "inertial", mass=text(max(body.mass, _LEAST_MASS)), pos=text(*body.centre),
+        fullinertia=text(I[0, 0], I[1, 1], I[2, 2], I[0, 1], I[0, 2], I[1, 2]))
+    return element
+
+
+def _sole(parent: Element, contact: Contact, touching: dict[str, str]) -> None:
+    corners = np.array(contact.points, dtype=float)
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    frame = contact.frame
+    middle = frame.offset + frame.rotation @ ((low + high) / 2 + [0.0, 0.0, _THICKNESS])
+    R = frame.rotation
+    ElementTree.SubElement(parent, "geom", {
+        "name": contact.name, "type": "box", "pos": text(*middle),
+        "xyaxes": text(*R[:, 0], *R[:, 1]),
+        "size": text(*(high - low)[:2] / 2, _THICKNESS)} | touching)
+
+
+def _axes(robot: Robot) -> dict[int, Array]:
+    """Return the axis (3,) of each joint with one velocity, in its own frame."""
+    state, axes = State(robot), {}
+    for joint in range(2 if robot.base == "floating" else 1, len(robot.parents)):
+        own = np.flatnonzero(state.supports[joint] & ~state.supports[robot.parents[joint]])
+        turn = state.J[3:, own].sum(axis=1)
+        if len(own) != 1 or abs(np.linalg.norm(turn) - 1.0) > 1e-9:
+            raise ScenarioError(f"joint {robot.joint_names[joint - 1]!r} does not turn about one "
+                                "axis")
+        axes[joint] = state.placements[joint, :9].reshape(3, 3) @ turn
+    return axes

@@ -1,0 +1,101 @@
+"""The humanoid of our own tables on two feet, for tests of whole-body dynamics."""
+
+import numpy as np
+import pinocchio as pin
+
+from hierarchy import Robot, Stack, State
+from hierarchy.contacts import Contact, Contacts
+from hierarchy.paths import Still, Waypoints
+from hierarchy.tasks import (
+    BaseDynamics,
+    CentreOfMass,
+    ContactMotion,
+    Friction,
+    LeastForce,
+    Pose,
+    Position,
+    Posture,
+    Together,
+    TorqueLimits,
+)
+from solvers import make
+
+ROBOT = Robot.named("humanoid")
+GRAVITY = 9.81
+WEIGHT = GRAVITY * ROBOT.masses.sum()
+HANDS = "left_hand", "right_hand"
+
+
+def feet(friction=0.7, robot=ROBOT):
+    """Both soles as contacts."""
+    return Contacts(robot, [Contact.rectangle(robot.frame(f"{side}_foot"), (-0.05, 0.16),
+                                              (-0.04, 0.04), friction)
+                            for side in ("left", "right")])
+
+
+def soles_and_palm(robot=ROBOT):
+    """A sole, a point of a hand on a wall, and the other sole: every kind of contact."""
+    sole, other = feet(robot=robot).contacts
+    palm = Contact(robot.frame("left_hand"), [(0.01, 0.02, 0.03)], 0.4, (-1.0, 0.2, 0.1))
+    return Contacts(robot, [sole, palm, other])
+
+
+def moving_state(seed, spread=0.3):
+    """A state near the rest posture that moves in all joints."""
+    rng = np.random.default_rng(seed)
+    q = pin.integrate(ROBOT.model, ROBOT.rest, spread * rng.normal(size=ROBOT.n))
+    return State.at(ROBOT, q, rng.normal(size=ROBOT.n))
+
+
+def standing_stack(state, contacts, shift=(0.0, 0.0, 0.0), fraction=1.0, faces=4):
+    """Seven levels: the centre of mass is asked `shift` [m] beside where it is."""
+    com = CentreOfMass(ROBOT, Still((0.0, 0.0, 0.0))).position(state)
+    hands = [Position(ROBOT.frame(hand), Still(state.position(ROBOT.frame(hand))), name=hand)
+             for hand in HANDS]
+    return Stack([
+        Together([BaseDynamics(contacts), ContactMotion(contacts)], "physics"),
+        Together([TorqueLimits(ROBOT, fraction, contacts=contacts), Friction(contacts, faces)],
+                 "limits"),
+        CentreOfMass(ROBOT, Still(com + shift)), *hands,
+        Posture(tuple(state.q[7:])), LeastForce(contacts),
+    ], "torque", contacts=contacts)
+
+
+def external_forces(state, contacts, forces):
+    """Contact forces (p, 3) as pinocchio takes them: a wrench on each joint, in its own frame."""
+    wrenches = [pin.Force.Zero() for _ in range(ROBOT.model.njoints)]
+    for joint, offset, force in zip(*contacts.points, forces, strict=True):
+        local = state._placement(joint)[0].T @ force
+        wrenches[joint] += pin.Force(local, np.cross(offset, local))
+    return wrenches
+
+
+def stepping(ramp, period=0.004, duration=2.6):
+    """A step in place by the model itself: the weight shifts, the right foot rises and comes down.
+
+    Yields time [s], hierarchy, resolution, contacts and state of each tick; the foot is open from
+    1.2 to 1.8 s. Before and after it carries some 50 N.
+    """
+    left, right = feet().contacts
+    right = Contact(right.frame, right.points, right.friction, open=((1.2, 1.8),), ramp=ramp)
+    contacts = Contacts(ROBOT, [left, right])
+    state, foot = State.at(ROBOT, ROBOT.rest), right.frame
+    com, low = CentreOfMass(ROBOT, Still((0.0, 0.0, 0.0))).position(state), state.position(foot)
+    over_left = com + np.array([0.0, 0.1085 - com[1], 0.0])
+    lift = Waypoints((1.2, 1.5, 1.8), [low, low + np.array([0.0, 0.0, 0.04]), low])
+    stack = Stack([
+        Together([BaseDynamics(contacts), ContactMotion(contacts)], "physics"),
+        Together([TorqueLimits(ROBOT, contacts=contacts), Friction(contacts, largest=300.0)],
+                 "limits"),
+        CentreOfMass(ROBOT, Waypoints((0.0, 0.8), [com, over_left])),
+        Pose(foot, lift, state.rotation(foot), 200.0, 30.0, name="swing foot"),
+        Posture(tuple(ROBOT.rest[7:])), LeastForce(contacts)], "torque", contacts=contacts)
+    resolver, memory = make("hcod"), None
+    for _ in range(round(duration / period)):
+        h = stack.hierarchy(state)
+        res = resolver.solve(h, memory)
+        memory = res.memory
+        yield h, res, contacts, state
+        a = contacts.accelerations(res.x)
+        v = state.v + period * a
+        state.move(state.t + period, ROBOT.integrate(state.q, period * (v - period * a / 2)), v)

@@ -1,0 +1,535 @@
+"""Contacts and tasks over their forces, each against an algorithm that shares no code with it."""
+
+from dataclasses import fields, replace
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from standing import (
+    ROBOT,
+    WEIGHT,
+    external_forces,
+    feet,
+    moving_state,
+    soles_and_palm,
+)
+
+from hierarchy import HierarchyError, Robot, Stack, State
+from hierarchy.contacts import Contact, Contacts
+from hierarchy.errors import UnknownNameError
+from hierarchy.paths import Still
+from hierarchy.robots.from_table import from_table
+from hierarchy.robots.table import Link, TreeFrame, TreeJoint, TreeTable
+from hierarchy.task import Task
+from hierarchy.tasks import (
+    BaseDynamics,
+    CentreOfPressure,
+    ContactForce,
+    ContactMotion,
+    Friction,
+    LeastForce,
+    Momentum,
+    Pose,
+    Position,
+    Posture,
+    Together,
+    TorqueLimits,
+)
+
+STEP = 1e-6
+CONTACTS = soles_and_palm()
+P = len(CONTACTS.points.joints)
+N = ROBOT.n
+
+
+def moved(state, step):
+    """The state a little later along its velocity."""
+    return State.at(ROBOT, pin.integrate(ROBOT.model, state.q, step * state.v), state.v)
+
+
+def positions(state):
+    """World positions (3 p,) of the contact points, from the frames alone."""
+    return np.concatenate([state.position(contact.frame)
+                           + state.rotation(contact.frame) @ np.array(point)
+                           for contact in CONTACTS.contacts for point in contact.points])
+
+
+def random_x(seed):
+    return np.random.default_rng(seed).normal(size=CONTACTS.unknowns)
+
+
+# Contacts
+
+
+def test_the_contact_jacobian_is_the_derivative_of_the_positions():
+    state = moving_state(1)
+    J = CONTACTS.jacobian(state)
+    for c, e in enumerate(np.eye(N)):
+        later, before = (State.at(ROBOT, pin.integrate(ROBOT.model, state.q, s * STEP * e))
+                         for s in (1, -1))
+        np.testing.assert_allclose(J[:, c], (positions(later) - positions(before)) / (2 * STEP),
+                                   atol=1e-8)
+
+
+def test_the_contact_drift_is_the_change_of_the_jacobian_times_the_velocity():
+    state = moving_state(2)
+    change = CONTACTS.jacobian(moved(state, STEP)) - CONTACTS.jacobian(moved(state, -STEP))
+    np.testing.assert_allclose(CONTACTS.drift(state), change @ state.v / (2 * STEP), atol=1e-7)
+
+
+def test_torques_are_those_of_inverse_dynamics_with_external_forces():
+    state, x = moving_state(3), random_x(3)
+    wrenches = external_forces(state, CONTACTS, CONTACTS.forces(x))
+    efforts = pin.rnea(ROBOT.model, ROBOT.model.createData(), state.q, state.v,
+                       CONTACTS.accelerations(x), wrenches)
+    np.testing.assert_allclose(CONTACTS.torques(state, x), efforts[6:], atol=1e-10)
+
+
+def test_blocks_name_every_unknown_once():
+    x = np.arange(float(CONTACTS.unknowns))
+    assert list(CONTACTS.blocks) == ["accelerations", "left_foot", "left_hand", "right_foot"]
+    np.testing.assert_array_equal(np.concatenate([x[part] for part in CONTACTS.blocks.values()]), x)
+    np.testing.assert_array_equal(CONTACTS.forces(x, "left_hand"), [x[N + 12:N + 15]])
+    np.testing.assert_array_equal(CONTACTS.forces(x).ravel(), x[N:])
+
+
+def test_dynamics_of_a_state_follow_it_and_are_those_of_pinocchio():
+    state = State.at(ROBOT, ROBOT.rest)
+    M, h = state.dynamics
+    A, dA = state.momentum
+    other = moving_state(4)
+    state.move(0.0, other.q, other.v)
+    data = ROBOT.model.createData()
+    np.testing.assert_allclose(M, pin.crba(ROBOT.model, data, other.q))
+    np.testing.assert_allclose(h, pin.rnea(ROBOT.model, data, other.q, other.v, np.zeros(N)))
+    np.testing.assert_allclose(state.J, other.J)
+    np.testing.assert_allclose(state.dJ, other.dJ, atol=1e-12)
+    a = random_x(4)[:N]
+    pin.computeCentroidalMomentumTimeVariation(ROBOT.model, data, other.q, other.v, a)
+    np.testing.assert_allclose(A @ other.v, data.hg.vector, atol=1e-11)
+    np.testing.assert_allclose(A @ a + dA @ other.v, data.dhg.vector, atol=1e-10)
+
+
+def test_a_state_without_force_tasks_computes_no_dynamics():
+    state = State.at(ROBOT, ROBOT.rest)
+    Stack([Posture((0.0,) * 30)]).hierarchy(state)
+    assert state._further == ()
+
+
+# Rows of the tasks
+
+
+def test_base_rows_hold_exactly_where_forward_dynamics_does():
+    """aba gives the acceleration that contact forces and joint torques cause."""
+    state, rng = moving_state(5), np.random.default_rng(5)
+    forces, tau = 50.0 * rng.normal(size=(P, 3)), rng.normal(size=N)
+    tau[:6] = 0.0
+    a = pin.aba(ROBOT.model, ROBOT.model.createData(), state.q, state.v, tau,
+                external_forces(state, CONTACTS, forces))
+    x = np.concatenate([a, forces.ravel()])
+    A, lower, upper = BaseDynamics(CONTACTS).rows(state)
+    np.testing.assert_array_equal(lower, upper)
+    np.testing.assert_allclose(A @ x, lower, atol=1e-9)
+    np.testing.assert_allclose(CONTACTS.torques(state, x), tau[6:], atol=1e-9)
+
+
+def test_torque_rows_hold_up_to_both_limits():
+    state, x = moving_state(6), random_x(6)
+    task = TorqueLimits(ROBOT, 0.5, contacts=CONTACTS)
+    A, lower, upper = np.zeros((30, CONTACTS.unknowns)), np.zeros(30), np.zeros(30)
+    task.writer(state, "torque", A, lower, upper, 0)()
+    tau, limit = CONTACTS.torques(state, x), 0.5 * ROBOT.effort_limit[6:]
+    np.testing.assert_allclose(upper - A @ x, limit - tau, atol=1e-9)
+    np.testing.assert_allclose(A @ x - lower, tau + limit, atol=1e-9)
+    np.testing.assert_allclose(A, task.jacobian(state), atol=1e-12)
+    np.testing.assert_allclose(task.error(state), np.clip(state.dynamics.h[6:], -limit, limit)
+                               - state.dynamics.h[6:])
+
+
+@pytest.mark.parametrize("faces", [4, 8])
+def test_what_friction_rows_allow_is_in_the_cone_and_their_edges_touch_it(faces):
+    contact = CONTACTS["left_hand"]
+    task = Friction(Contacts(ROBOT, [contact]), faces)
+    rows, (lower, _) = task.forces, task.sides
+    normal = np.array(contact.normal) / np.linalg.norm(contact.normal)
+    rng, allowed = np.random.default_rng(7), []
+    for _ in range(2000):
+        f = rng.normal(size=3) + normal
+        tangential = np.linalg.norm(f - (f @ normal) * normal)
+        allowed.append(bool((rows @ f >= lower).all()))
+        assert not allowed[-1] or tangential <= contact.friction * (f @ normal) + 1e-12
+    assert 0 < sum(allowed) < 2000
+    for i in range(faces):  # the force on two neighbouring faces is on the cone
+        edge = np.cross(rows[i], rows[(i + 1) % faces])
+        edge *= np.sign(edge @ normal)
+        tangential = edge - (edge @ normal) * normal
+        assert np.linalg.norm(tangential) == pytest.approx(contact.friction * (edge @ normal))
+
+
+def test_each_friction_row_changes_sides_where_its_face_is_passed():
+    task = Friction(feet(0.5), 4, least=2.0, largest=100.0)
+    assert task.dimension == len(task.row_names) == 8 * 5
+    rows, (lower, upper) = task.forces[:5, :3], task.sides
+    slope = 0.5 * np.cos(np.pi / 4)
+    for share, holds in ((0.99, True), (1.01, False)):
+        for i, (x, y) in enumerate([(1, 0), (0, 1), (-1, 0), (0, -1)]):
+            value = rows @ [x * share * slope * 10.0, y * share * slope * 10.0, 10.0]
+            inside = (value >= lower[:5]) & (value <= upper[:5])
+            assert inside.tolist() == [j != i or holds for j in range(5)]
+    for normal, holds in ((1.99, False), (2.01, True), (99.9, True), (100.1, False)):
+        value = rows @ [0.0, 0.0, normal]
+        assert ((value >= lower[:5]) & (value <= upper[:5])).all() == holds
+
+
+def test_the_centre_of_pressure_rows_change_sides_at_the_margin():
+    contacts, margin = feet(), 0.02
+    task = CentreOfPressure(contacts, margin)
+    assert task.row_names == tuple(f"{side}_foot edge {i}" for side in ("left", "right")
+                                   for i in (1, 2, 3, 4))
+    corners = np.array(contacts["right_foot"].points)[:, :2]
+    rng, seen = np.random.default_rng(8), []
+    for _ in range(300):
+        normal = rng.exponential(size=4) ** 3
+        x, y = corners.T @ normal / normal.sum()
+        f = np.zeros((8, 3))
+        f[4:, 2] = normal
+        value = task.forces @ f.ravel()
+        seen.append(-0.03 < x < 0.14 and -0.02 < y < 0.02)
+        assert bool((value >= 0.0).all()) == seen[-1]
+        distance = sorted([x + 0.05, 0.16 - x, y + 0.04, 0.04 - y])
+        np.testing.assert_allclose(sorted(value[4:] / normal.sum()), np.array(distance) - margin,
+                                   atol=1e-12)
+        assert not value[:4].any()
+    assert 0 < sum(seen) < 300
+
+
+def test_points_inside_a_sole_or_on_its_edge_make_no_edges_of_their_own():
+    frame = ROBOT.frame("left_foot")
+    plain = Contact.rectangle(frame, (-0.05, 0.16), (-0.04, 0.04))
+    dotted = Contact(frame, [*plain.points, (0.0, 0.0, 0.0), (0.05, 0.04, 0.0), plain.points[0]])
+    rows, more = (CentreOfPressure(Contacts(ROBOT, [one])).forces for one in (plain, dotted))
+    assert len(rows) == len(more) == 4
+    assert sorted(map(tuple, more[:, :12])) == sorted(map(tuple, rows))
+
+
+def test_a_plain_contact_pushes_up_with_one_point_in_the_middle_of_its_frame():
+    contact = Contact(ROBOT.frame("left_foot"))
+    np.testing.assert_array_equal(contact.axes, np.eye(3))
+    assert np.array_equal(contact.points, [[0.0, 0.0, 0.0]])
+    assert contact.load(0.0) == 1.0
+
+
+@pytest.mark.parametrize("normal", [(0.0, 0.0, 1.0), (-1.0, 0.2, 0.1), (1.0, 0.0, 0.0)])
+def test_the_last_row_of_a_point_is_its_normal_force(normal):
+    contacts = Contacts(ROBOT, [Contact(ROBOT.frame("left_hand"), normal=normal)])
+    np.testing.assert_allclose(Friction(contacts).forces[-1], normal / np.linalg.norm(normal),
+                               atol=1e-15)
+    axes = contacts["left_hand"].axes
+    np.testing.assert_allclose(axes @ axes.T, np.eye(3), atol=1e-15)
+    assert np.linalg.det(axes) > 0.0
+
+
+@pytest.mark.parametrize("task", [
+    BaseDynamics(CONTACTS), ContactMotion(CONTACTS), Friction(CONTACTS),
+    CentreOfPressure(CONTACTS), ContactForce(CONTACTS, "left_hand", (1.0,)), LeastForce(CONTACTS),
+    Momentum(), Together((LeastForce(CONTACTS),)), TorqueLimits(ROBOT, contacts=CONTACTS)],
+    ids=lambda task: task.name)
+def test_tasks_of_the_same_settings_are_equal_and_print_their_settings_alone(task):
+    assert replace(task) == task
+    assert replace(task, name="another") != task
+    for record in (task, CONTACTS, CONTACTS.contacts[0]):
+        assert all(field.repr == field.init == field.compare for field in fields(record))
+
+
+def test_faces_alone_say_that_a_contact_pushes():
+    task = Friction(feet(), 4)
+    assert np.isinf(task.sides[0][4::5]).all()
+    for pull in np.random.default_rng(20).normal(size=(100, 3)):
+        pull[2] = -abs(pull[2])
+        assert not (task.forces[:4, :3] @ pull >= 0.0).all()
+
+
+def opening(ramp=0.2):
+    """The left foot stays; the right one is open from 1 to 2 s."""
+    left, right = feet().contacts
+    return Contacts(ROBOT, [left, Contact(right.frame, right.points, open=((1.0, 2.0),),
+                                          ramp=ramp)])
+
+
+@pytest.mark.parametrize(("t", "ramp", "load"), [
+    (0.0, 0.2, 1.0), (0.8, 0.2, 1.0), (0.9, 0.2, 0.5), (1.0, 0.2, 0.0), (1.5, 0.2, 0.0),
+    (2.0, 0.2, 0.0), (2.05, 0.2, 0.25), (2.5, 0.2, 1.0), (0.99, 0.0, 1.0), (1.5, 0.0, 0.0)])
+def test_the_load_of_a_contact_ramps_around_the_time_in_which_it_is_open(t, ramp, load):
+    left, right = opening(ramp).contacts
+    assert right.load(t) == pytest.approx(load)
+    assert left.load(t) == 1.0
+
+
+@pytest.mark.parametrize("faces", [4, 8])
+def test_an_open_contact_has_no_force_and_is_free_to_move(faces):
+    contacts = opening()
+    state = State.at(ROBOT, ROBOT.rest, t=1.5)
+    A, lower, upper = Friction(contacts, faces, largest=50.0).rows(state)
+    of_right = slice(4 * (faces + 1), None)
+    held = (lower == upper)[of_right]
+    assert np.linalg.matrix_rank(A[of_right][held]) == held.sum() == 12
+    assert not lower[of_right][held].any()
+    assert np.isinf(lower[of_right][~held]).all()
+    closed = Friction(feet(), faces, largest=50.0).rows(state)
+    for now, plain in zip((A, lower, upper), closed, strict=True):
+        np.testing.assert_array_equal(now[:4 * (faces + 1)], plain[:4 * (faces + 1)])
+    motion = np.zeros((12, N)), np.zeros(12), np.zeros(12)
+    ContactMotion(contacts).writer(state, "acceleration", *motion, 0)()
+    assert np.isfinite(motion[1]).tolist() == [True] * 6 + [False] * 6
+
+
+def test_a_ramp_scales_the_normal_force_of_each_point_at_the_state_s_time():
+    task = Friction(opening(), least=2.0, largest=50.0)
+    state = State.at(ROBOT, ROBOT.rest)
+    A, lower, upper = np.zeros((40, 60)), np.zeros(40), np.zeros(40)
+    write = task.writer(state, "torque", A, lower, upper, 0)
+    for t, load in ((0.0, 1.0), (0.9, 0.5), (1.5, 0.0), (2.1, 0.5), (3.0, 1.0)):
+        state.move(t, state.q, state.v)
+        write()
+        np.testing.assert_allclose(lower[4::5], [2.0] * 4 + [2.0 * load] * 4)
+        np.testing.assert_allclose(upper[4::5], [50.0] * 4 + [50.0 * load] * 4)
+        assert np.isinf(upper[20]) == (load > 0.0)
+
+
+@pytest.mark.parametrize("target", [(20.0,), (1.0, 2.0, 3.0), (1.0, 2.0, 3.0, 0.4, 0.5, 0.6)])
+@pytest.mark.parametrize("name", ["left_hand", "right_foot"])
+def test_contact_force_rows_are_the_sum_over_the_points(target, name):
+    state, x = moving_state(9), random_x(9)
+    task, contact = ContactForce(CONTACTS, name, target), CONTACTS[name]
+    A, lower, upper = task.rows(state)
+    forces = CONTACTS.forces(x, name)
+    R = state.rotation(contact.frame)
+    moment = sum(np.cross(R @ np.array(point), f)
+                 for point, f in zip(contact.points, forces, strict=True))
+    wrench = np.concatenate([forces.sum(axis=0), moment])
+    normal = np.array(contact.normal) / np.linalg.norm(contact.normal)
+    expected = [forces.sum(axis=0) @ normal] if len(target) == 1 else wrench[:len(target)]
+    np.testing.assert_allclose(A @ x, expected, atol=1e-12)
+    np.testing.assert_array_equal(lower, target)
+    np.testing.assert_array_equal(upper, target)
+    assert len(task.row_names) == task.dimension
+
+
+def test_least_force_asks_for_zero_of_every_force():
+    A, lower, upper = LeastForce(CONTACTS).rows(moving_state(10))
+    np.testing.assert_array_equal(A, np.eye(CONTACTS.unknowns)[N:])
+    assert not lower.any()
+    assert not upper.any()
+
+
+def test_contact_motion_rows_are_the_accelerations_of_contacts_with_baumgartes_terms():
+    state = moving_state(11)
+    start = State.at(ROBOT, ROBOT.rest)
+    task = ContactMotion.at(start, CONTACTS, stiffness=100.0, damping=20.0)
+    assert task.dimension == len(task.row_names) == 15
+    A, lower, upper = np.zeros((15, N)), np.zeros(15), np.zeros(15)
+    task.writer(state, "acceleration", A, lower, upper, 0)()
+    J, dJ = CONTACTS.jacobian(state)[12:15], CONTACTS.drift(state)[12:15]  # of the palm
+    gone = (positions(start) - positions(state))[12:15]
+    np.testing.assert_allclose(A[6:9], J, atol=1e-12)
+    np.testing.assert_allclose(lower[6:9], -dJ - 20.0 * J @ state.v + 100.0 * gone, atol=1e-9)
+    np.testing.assert_array_equal(lower, upper)
+    assert np.abs(task.error(start)).max() < 1e-12
+
+
+def test_contacts_at_rest_move_no_point_of_a_sole():
+    """a from the rows of the frame gives each corner the acceleration of the rows: rigidity."""
+    state = State.at(ROBOT, ROBOT.rest)
+    contacts = feet()
+    task = ContactMotion(contacts)
+    a = np.linalg.pinv(task.jacobian(state)) @ task.reference_acceleration(state)
+    N_c = np.eye(N) - np.linalg.pinv(task.jacobian(state)) @ task.jacobian(state)
+    corners = contacts.jacobian(state) @ (a + N_c @ random_x(12)[:N])
+    np.testing.assert_allclose(corners, 0.0, atol=1e-9)
+
+
+def test_without_anchors_a_contact_is_damped_where_it_is():
+    state = moving_state(13)
+    task = ContactMotion(CONTACTS, damping=7.0)
+    rows = np.zeros((15, N)), np.zeros(15), np.zeros(15)
+    task.writer(state, "acceleration", *rows, 0)()
+    drift = task.jacobian_derivative(state) @ state.v
+    np.testing.assert_allclose(rows[1], -drift - 7.0 * rows[0] @ state.v, atol=1e-9)
+    assert not task.error(state).any()
+    task.writer(state, "velocity", *rows, 0)()
+    assert not rows[1].any()
+
+
+@pytest.mark.parametrize("part", ["both", "linear", "angular"])
+def test_momentum_rows_are_the_rate_of_the_momentum(part):
+    state, a = moving_state(14), random_x(14)[:N]
+    task = Momentum(part, damping=4.0)
+    of_part = {"both": slice(0, 6), "linear": slice(0, 3), "angular": slice(3, 6)}[part]
+    A, lower, upper = (np.zeros((task.dimension, N)), np.zeros(task.dimension),
+                       np.zeros(task.dimension))
+    task.writer(state, "acceleration", A, lower, upper, 0)()
+    data = ROBOT.model.createData()
+    pin.computeCentroidalMomentumTimeVariation(ROBOT.model, data, state.q, state.v, a)
+    rate, momentum = data.dhg.vector[of_part], data.hg.vector[of_part]
+    np.testing.assert_allclose(A @ a - lower, rate + 4.0 * momentum, atol=1e-9)
+    plain = [np.zeros_like(A), np.zeros_like(lower), np.zeros_like(lower)]
+    Task.writer(task, state, "acceleration", *plain, 0)()
+    np.testing.assert_allclose(plain[0], A)
+    np.testing.assert_allclose(plain[1], lower, atol=1e-10)
+    task.writer(state, "velocity", A, lower, upper, 0)()
+    assert not lower.any()
+    assert len(task.row_names) == task.dimension
+
+
+def test_the_derivative_of_the_momentum_matrix_agrees_with_central_differences():
+    """pinocchio has a function for it whose result does not."""
+    state, task = moving_state(15), Momentum()
+    later, before = (task.jacobian(moved(state, s * STEP)) for s in (1, -1))
+    np.testing.assert_allclose(task.jacobian_derivative(state), (later - before) / (2 * STEP),
+                               atol=1e-7)
+
+
+def test_a_momentum_target_is_approached():
+    state = moving_state(16)
+    task = Momentum("linear", (1.0, 2.0, 3.0), damping=5.0)
+    gone = np.array([1.0, 2.0, 3.0]) - task.jacobian(state) @ state.v
+    np.testing.assert_allclose(task.reference_acceleration(state), 5.0 * gone)
+
+
+# Stacks at level "torque"
+
+
+def test_tasks_of_the_joints_write_the_first_columns_and_leave_the_forces_alone():
+    state, frame = moving_state(17), ROBOT.frame("right_hand")
+    tasks = [Position(frame, Still((0.1, 0.2, 0.3))), Pose(frame, Still((0, 0, 0)), np.eye(3)),
+             Posture((0.1,) * 30), Momentum()]
+    torque = Stack(tasks, "torque", contacts=CONTACTS).hierarchy(state)
+    plain = Stack(tasks, "acceleration").hierarchy(state)
+    np.testing.assert_array_equal(torque.A[:, :N], plain.A)
+    assert not torque.A[:, N:].any()
+    np.testing.assert_array_equal(torque.lower, plain.lower)
+    np.testing.assert_array_equal(torque.upper, plain.upper)
+
+
+def test_the_reference_of_a_torque_stack_is_that_of_the_joints_and_no_force():
+    state = moving_state(18)
+    posture = Posture((0.1,) * 30)
+    h = Stack([BaseDynamics(CONTACTS)], "torque", posture, CONTACTS).hierarchy(state)
+    np.testing.assert_allclose(h.reference[6:N], posture.reference_acceleration(state))
+    assert not h.reference[N:].any()
+
+
+def test_together_has_the_rows_of_its_tasks_in_order():
+    state = moving_state(19)
+    tasks = [BaseDynamics(CONTACTS), ContactMotion(CONTACTS), Friction(CONTACTS)]
+    one = Stack([Together(tasks, "physics")], "torque", contacts=CONTACTS).hierarchy(state)
+    apart = Stack(tasks, "torque", contacts=CONTACTS).hierarchy(state)
+    assert one.sizes.tolist() == [sum(apart.sizes)]
+    np.testing.assert_array_equal(one.A, apart.A)
+    np.testing.assert_array_equal(one.lower, apart.lower)
+    together = Together(tasks)
+    np.testing.assert_array_equal(together.jacobian(state), apart.A)
+    assert together.error(state).shape == (together.dimension,)
+    assert together.jacobian_derivative(state).shape == apart.A.shape
+    assert together.row_names[0] == "base dynamics force x"
+    assert Together([Posture((0.0,) * 30)]).of_forces is False
+
+
+def test_without_contacts_the_robot_falls():
+    contacts = Contacts(ROBOT)
+    stack = Stack([BaseDynamics(contacts), Posture(tuple(ROBOT.rest[7:]))], "torque",
+                  contacts=contacts)
+    state = State.at(ROBOT, ROBOT.rest)
+    h = stack.hierarchy(state)
+    x = np.linalg.solve(h.A, h.lower)
+    rate = state.momentum.A @ x
+    np.testing.assert_allclose(rate, [0, 0, -WEIGHT, 0, 0, 0], atol=1e-9)
+    np.testing.assert_allclose(contacts.torques(state, x), 0.0, atol=1e-9)
+
+
+def test_a_fixed_base_has_no_base_rows():
+    arm = Robot.named("kuka_lwr")
+    contacts = Contacts(arm, [Contact(arm.frame("end_effector"))])
+    assert BaseDynamics(contacts).dimension == 0
+    h = Stack([BaseDynamics(contacts), TorqueLimits(arm, contacts=contacts)], "torque",
+              contacts=contacts).hierarchy(State.at(arm, np.full(7, 0.3)))
+    assert (h.n, h.m) == (10, 7)
+
+
+# Bad input
+
+
+def massless():
+    table = TreeTable("light", (TreeJoint("one", "", (0.0, 0.0, 0.0), "z", (-90, 90), 1.0, 1.0),),
+                      (), "one")
+    found = from_table(table)
+    return Robot(found.model, "light", "one")
+
+
+FRAME = ROBOT.frame("left_foot")
+
+
+@pytest.mark.parametrize(("make", "said"), [
+    (lambda: Contact(ROBOT.frame("left_fot")), "did you mean 'left_foot'"),
+    (lambda: Contact(FRAME, friction=0.0), "contact 'left_foot': friction 0.0 must be positive"),
+    (lambda: Contact(FRAME, friction=np.nan), "friction nan"),
+    (lambda: Contact(FRAME, normal=(0, 0, 0)), "contact 'left_foot': normal (0, 0, 0) is no"),
+    (lambda: Contact(FRAME, [(0, 0, 0), (0.1, 0, 0)]), "2 points on one line"),
+    (lambda: Contact(FRAME, [(0, 0, 0), (0.1, 0, 0), (0.2, 0, 0)]), "3 points on one line"),
+    (lambda: Contact(FRAME, [(0, 0)]), "are not (k, 3) numbers"),
+    (lambda: Contact(FRAME, [(0, 0, np.inf)]), "are not (k, 3) numbers"),
+    (lambda: Contacts(ROBOT, [Contact(FRAME), Contact(FRAME)]), "two contacts have this name"),
+    (lambda: Contacts(ROBOT, [Contact(ROBOT.frame("universe"))]), "no joint moves frame"),
+    (lambda: Contacts(massless()), "robot 'light' has no masses"),
+    (lambda: CONTACTS["left_knee"], "unknown contact 'left_knee'"),
+    (lambda: CONTACTS.forces(np.zeros(N)), f"expected ({N + 27},): {N} accelerations and 27"),
+    (lambda: Friction(Contacts(ROBOT)), "task 'friction': there are no contacts"),
+    (lambda: Friction(CONTACTS, 6), "6 faces, expected 4 or 8"),
+    (lambda: Friction(CONTACTS, least=-1.0), "least -1.0 N"),
+    (lambda: Friction(CONTACTS, least=5.0, largest=5.0), "largest 5.0 N"),
+    (lambda: CentreOfPressure(Contacts(ROBOT)), "there are no contacts"),
+    (lambda: CentreOfPressure(Contacts(ROBOT, [Contact(FRAME)])), "no contact is a surface"),
+    (lambda: CentreOfPressure(CONTACTS, 0.05), "margin 0.05 m of contact 'left_foot'"),
+    (lambda: CentreOfPressure(CONTACTS, -0.01), "margin -0.01 m"),
+    (lambda: ContactForce(CONTACTS, "knee", (1.0,)), "unknown contact 'knee'"),
+    (lambda: ContactForce(CONTACTS, "left_foot", (1.0, 2.0)), "is not 1, 3 or 6"),
+    (lambda: ContactForce(CONTACTS, "left_foot", (np.nan,)), "is not 1, 3 or 6"),
+    (lambda: ContactMotion(Contacts(ROBOT)), "there are no contacts"),
+    (lambda: ContactMotion(CONTACTS, stiffness=5.0), "stiffness 5.0 needs anchors"),
+    (lambda: ContactMotion(CONTACTS, [np.eye(3)] * 3), "anchors are not (4, 3) for each of 3"),
+    (lambda: Contact(FRAME, open=((2.0, 1.0),)), "it cannot be open from 2.0 s until 1.0 s"),
+    (lambda: Contact(FRAME, ramp=-1.0), "ramp -1.0 s"),
+    (lambda: Friction(opening()), "'right_foot' opens; give a finite largest force"),
+    (lambda: ContactMotion(opening(), [np.eye(4, 3)] * 2, 9.0), "opens, so its stiffness must be"),
+    (lambda: Momentum("all"), "part 'all' is not one of both, linear, angular"),
+    (lambda: Momentum("linear", (1.0,)), "is not 3 finite numbers"),
+    (lambda: Together([]), "there are no tasks in it"),
+    (lambda: Together([Friction(feet()), Friction(feet())]), "different contacts"),
+    (lambda: TorqueLimits(ROBOT), "give the contacts"),
+    (lambda: Stack(level="torque"), "level 'torque' needs contacts, Contacts(robot) for none"),
+    (lambda: Stack(contacts=CONTACTS), "contacts need the level 'torque', not 'acceleration'"),
+    (lambda: Stack([Friction(CONTACTS)]), "task 'friction': contact forces need the level"),
+    (lambda: Stack([Friction(feet())], "torque", contacts=CONTACTS), "not those of the stack"),
+    (lambda: Stack([TorqueLimits(Robot.named("kuka_lwr"))], "torque", contacts=CONTACTS),
+     "not those of the stack"),
+    (lambda: Stack(level="torque", contacts=CONTACTS, metric="mass"), "contact forces have no"),
+])
+def test_bad_input_is_named(make, said):
+    with pytest.raises((HierarchyError, UnknownNameError)) as error:
+        make()
+    assert said in str(error.value)
+
+
+def test_a_robot_of_one_joint_has_matrices_of_one_column():
+    table = TreeTable("lever", (TreeJoint("one", "", (0.0, 0.0, 0.0), "x", (-90, 90), 1.0, 9.0,
+                                          Link((0.0, 0.4, 0.0), 0.02, 0.5)),),
+                      (TreeFrame("tip", "one", (0.0, 0.4, 0.0)),), "tip")
+    lever = Robot(from_table(table).model, "lever", "tip")
+    state = State.at(lever, [0.2], [0.5])
+    assert [part.shape for part in (state.J, state.dJ, *state.momentum)] == [(6, 1)] * 4
+    contacts = Contacts(lever, [Contact(lever.frame("tip"))])
+    h = Stack([TorqueLimits(lever, contacts=contacts), ContactMotion(contacts)], "torque",
+              contacts=contacts).hierarchy(state)
+    held = [0.0, 0.0, 0.0, 0.5 * 0.5 * 9.81]  # half the weight at the end of a rod
+    assert np.linalg.norm(contacts.torques(State.at(lever, [0.0]), held)) < 1e-9
+    assert h.A.shape == (4, 4)
