@@ -57,8 +57,13 @@ def candidates(wanted: Sequence[str] | None = None) -> tuple[list[Candidate], di
     field += [Candidate(r.label, r.handles == "inequalities", _cold(r)) for r in cold]
     field += [Candidate(f"{r.label} warm", r.handles == "inequalities", _warm(r)) for r in warm]
     asked = {*names(), "plain", "DAQP"} if wanted is None else {*wanted, "plain", "DAQP"}
-    return ([one for one in field if one.label.split()[0] in asked],
-            {label: why for label, why in missing.items() if label.split()[0] in asked})
+    return ([one for one in field if _resolver(one.label) in asked],
+            {label: why for label, why in missing.items() if _resolver(label) in asked})
+
+
+def _resolver(label: str) -> str:
+    """Return the resolver of a label such as "hqp osqp warm" or "tpm-published"."""
+    return label.split()[0].removesuffix("-published")
 
 
 def plain_numpy(h: Hierarchy) -> Resolution:

@@ -112,7 +112,7 @@ def test_the_numbers_hold_it(tmp_path):
     compare([load("ellipse", ["control.duration=0.02"])], ["tpm", "hqp"],
             out=tmp_path / "a")
     (one,) = json.loads((tmp_path / "a" / "comparison.json").read_text())["partings"]["ellipse"]
-    assert (one["label"], one["from"], one["tick"]) == ("hqp proxqp", "tpm-published", None)
+    assert (one["label"], one["from"], one["tick"]) == ("hqp proxqp", "tpm", None)
     assert one["largest_rad"] < 1e-9
 
 
