@@ -2,6 +2,7 @@
 
 import os
 import signal
+import sys
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -21,3 +22,22 @@ def _interruptible():
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     yield
     signal.signal(signal.SIGINT, before)
+
+
+@pytest.fixture
+def no_plugins(monkeypatch):
+    """No plugin is known at the beginning of a test; what it loads is forgotten after it."""
+    from hierarchy import plugins
+    from solvers.resolver import _REGISTRY
+
+    monkeypatch.setattr(sys, "path", list(sys.path))
+    monkeypatch.setattr(plugins, "_registered", {door: {} for door in plugins.DOORS})
+    monkeypatch.setattr(plugins, "_loaded", {})
+    monkeypatch.setattr(plugins, "_flagged", {})
+    before = dict(_REGISTRY)
+    yield
+    for module in plugins._loaded:
+        sys.modules.pop(module, None)
+    _REGISTRY.clear()
+    _REGISTRY.update(before)
+    plugins._points.cache_clear()

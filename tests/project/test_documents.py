@@ -51,7 +51,7 @@ def having(found):
 
 
 @pytest.fixture(autouse=True)
-def _in_a_folder_of_its_own(tmp_path, monkeypatch):
+def _in_a_folder_of_its_own(tmp_path, monkeypatch, no_plugins):
     """What a document writes or registers is gone after it."""
     monkeypatch.chdir(tmp_path)
     kept = [(registry, dict(registry)) for registry in (_REGISTRY, TABLES, TASKS)]
@@ -88,6 +88,8 @@ def test_the_files_that_a_document_shows_can_be_read(name, tmp_path):
 
 @pytest.mark.parametrize("name", having(commands))
 def test_the_commands_of_a_document_exist(name):
+    if any("--plugin my_module" in command for command in commands(name)):
+        exec(compile("\n".join(blocks(name, "python")), name, "exec"), {"__name__": "document"})
     for command in commands(name):
         check(shlex.split(command))
 

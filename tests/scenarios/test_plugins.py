@@ -12,7 +12,6 @@ from scenarios import compare, load, simulate
 from scenarios.cli.main import run_command
 from scenarios.config import Scenario
 from solvers import make
-from solvers.resolver import _REGISTRY
 
 MODULE = '''
 from dataclasses import dataclass
@@ -149,21 +148,13 @@ path = { kind = "still", position = [0.1, 0.6, 0.1] }
 
 
 @pytest.fixture(autouse=True)
-def folder(tmp_path, monkeypatch):
-    """A folder with a plugin and a scenario; what is loaded in a test is forgotten after it."""
+def folder(tmp_path, monkeypatch, no_plugins):
+    """A folder with a plugin and a scenario."""
     (tmp_path / "doors_of_mine.py").write_text(MODULE)
     (tmp_path / "own.toml").write_text(SCENARIO)
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(sys, "path", list(sys.path))
-    monkeypatch.setattr(plugins, "_registered", {door: {} for door in plugins.DOORS})
-    monkeypatch.setattr(plugins, "_loaded", {})
-    monkeypatch.setattr(plugins, "_flagged", {})
-    before = dict(_REGISTRY)
     yield tmp_path
     sys.modules.pop("doors_of_mine", None)
-    _REGISTRY.clear()
-    _REGISTRY.update(before)
-    plugins._points.cache_clear()
 
 
 def said(arguments, capsys):
