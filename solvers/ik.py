@@ -20,6 +20,7 @@ from hierarchy.robot import Robot
 from hierarchy.stack import Stack
 from hierarchy.state import State
 from hierarchy.task import Level, Task, check_parts
+from hierarchy.tasks.joint_rows import JointRows
 from solvers.resolver import Resolver, make
 from solvers.status import Status
 
@@ -72,7 +73,7 @@ def solve_ik(robot: Robot, q: ArrayLike, tasks: Sequence[Task], *, dt: float = 0
 
 @final
 @dataclass(frozen=True)
-class StepLimits(Task):
+class StepLimits(JointRows):
     """Keep each joint within its position limits after a step of `period` [s], and its speed.
 
     One row per actuated joint. Accelerations are not limited, so that a step does not depend on
@@ -87,16 +88,6 @@ class StepLimits(Task):
     def __post_init__(self) -> None:
         super().__post_init__()
         check_parts(self)
-
-    @property
-    def dimension(self) -> int:
-        """One row per actuated joint."""
-        return self.robot.n - self.robot.actuated
-
-    @property
-    def row_names(self) -> tuple[str, ...]:
-        """The joints."""
-        return tuple(self.robot.velocity_names[self.robot.actuated:])
 
     def box(self, state: State) -> tuple[Array, Array]:
         """Least and largest velocity of each joint (m,), (m,) [rad/s or m/s]."""

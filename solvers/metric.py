@@ -3,17 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TypeVar
+from typing import Protocol, TypeVar
 
 import numpy as np
 
 from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array, Hierarchy
 from solvers.kernels.metric import change_back, change_variables
-from solvers.resolver import Resolution
 from solvers.status import Status
 
-_Kind = TypeVar("_Kind", bound=Resolution)
+
+class Answer(Protocol):
+    """As much of a `Resolution` as a change of variables concerns."""
+
+    x: Array
+    status: Status
+
+
+_Kind = TypeVar("_Kind", bound=Answer)
 
 
 def in_metric(solve: Callable[[Hierarchy, Array | None], _Kind], h: Hierarchy,

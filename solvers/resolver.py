@@ -18,6 +18,7 @@ from hierarchy.errors import HierarchyError, UnknownNameError, brief, expect
 from hierarchy.jit import announce_compilation
 from hierarchy.notebook import html_table, numbers
 from hierarchy.problem import Array, Hierarchy
+from solvers.metric import in_metric
 from solvers.status import TOO_SMALL
 from solvers.status import Status as Status
 from solvers.workspace import WORKSPACE
@@ -136,7 +137,8 @@ class Resolver(ABC):
     def solve(self, h: Hierarchy, memory: Array | None = None) -> Resolution:
         """Resolve h, warm-started with the memory of an earlier resolution if there is one.
 
-        A hierarchy with a metric goes through `solvers.metric.in_metric`.
+        Implementations get hierarchies without a metric: those with one come in the variables of
+        `solvers.metric.in_metric`.
 
         Raises
         ------
@@ -176,7 +178,7 @@ Solve = Callable[[Any, Hierarchy, Array | None], Resolution]
 
 
 def _at_the_door(solve: Solve) -> Solve:
-    """Return `solve` with a HierarchyError for arguments of a wrong type.
+    """Return `solve` for hierarchies with a metric too, with errors for arguments of wrong types.
 
     The hierarchy is judged after a failure, which costs a correct call next to nothing.
     """
@@ -186,6 +188,8 @@ def _at_the_door(solve: Solve) -> Solve:
             raise HierarchyError(f"{self.name}: memory: got {brief(memory)}; give the memory of an "
                                  "earlier resolution, res.memory, or None")
         try:
+            if h.metric is not None:
+                return in_metric(functools.partial(solve, self), h, memory)
             return solve(self, h, memory)
         except (AttributeError, TypeError):
             expect(f"{self.name}: h", h, Hierarchy,

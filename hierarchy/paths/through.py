@@ -40,10 +40,8 @@ class Waypoints(Path):
 
     def write(self, t: float, out: Array) -> None:
         """See `Path.write`."""
-        i = int(np.searchsorted(self.times, t, side="right"))
-        out[1:] = 0.0
-        if i == 0 or i == len(self.times):
-            out[0] = self.points[min(i, len(self.times) - 1)]
+        i = _interval(self.times, self.points, t, out)
+        if i is None:
             return
         span = self.times[i] - self.times[i - 1]
         s = (t - self.times[i - 1]) / span
@@ -142,10 +140,8 @@ class Recorded(Path):
 
     def write(self, t: float, out: Array) -> None:
         """See `Path.write`."""
-        i = int(np.searchsorted(self.times, t, side="right"))
-        out[1:] = 0.0
-        if i == 0 or i == len(self.times):
-            out[0] = self.points[min(i, len(self.times) - 1)]
+        i = _interval(self.times, self.points, t, out)
+        if i is None:
             return
         h = self.times[i] - self.times[i - 1]
         s = (t - self.times[i - 1]) / h
@@ -155,6 +151,16 @@ class Recorded(Path):
         out[0] = p0 + s * (m0 + s * (c2 + s * c3))
         out[1] = (m0 + s * (2 * c2 + s * 3 * c3)) / h
         out[2] = (2 * c2 + s * 6 * c3) / h**2
+
+
+def _interval(times: Sequence[float], points: Sequence[Vector], t: float, out: Array
+              ) -> int | None:
+    """Return the point at which the interval around t ends; outside, write the rest and None."""
+    i = int(np.searchsorted(times, t, side="right"))
+    if 0 < i < len(times):
+        return i
+    out[0], out[1:] = points[min(i, len(times) - 1)], 0.0
+    return None
 
 
 def _spline_slopes(t: Array, p: Array) -> Array:

@@ -15,11 +15,12 @@ from hierarchy.limits import Limits, write_box
 from hierarchy.problem import Array
 from hierarchy.robot import Robot
 from hierarchy.state import State
-from hierarchy.task import Level, Task, check_parts
+from hierarchy.task import Level, check_parts
+from hierarchy.tasks.joint_rows import JointRows
 
 
 @dataclass(frozen=True)
-class JointLimits(Task):
+class JointLimits(JointRows):
     """Keep every joint within its limits and able to stop before them: lower <= x <= upper.
 
     One row of the identity per actuated joint, at both levels: n rows, or n - 6 with a floating
@@ -63,16 +64,6 @@ class JointLimits(Task):
         except HierarchyError as error:
             raise HierarchyError(f"task {self.name!r}: {error}") from error
         object.__setattr__(self, "limits", limits)
-
-    @property
-    def dimension(self) -> int:
-        """One row per actuated joint."""
-        return self.robot.n - self.robot.actuated
-
-    @property
-    def row_names(self) -> tuple[str, ...]:
-        """The joint of each row."""
-        return tuple(self.robot.velocity_names[self.robot.actuated:])
 
     def box(self, state: State, level: Level) -> tuple[Array, Array]:
         """Return the least and greatest command (n,), (n,) at a state; the box is never empty."""

@@ -16,11 +16,12 @@ from hierarchy.jit import bind, compiled
 from hierarchy.problem import Array
 from hierarchy.robot import Robot
 from hierarchy.state import State
-from hierarchy.task import Level, Task, check_parts
+from hierarchy.task import Level, check_parts
+from hierarchy.tasks.joint_rows import JointRows
 
 
 @dataclass(frozen=True)
-class TorqueLimits(Task):
+class TorqueLimits(JointRows):
     """Keep every joint torque within its limits: -limit <= M(q) a + h(q, v) - J_c^T f <= limit.
 
     One row per actuated joint, n in number below, at acceleration level without contacts and at
@@ -50,16 +51,6 @@ class TorqueLimits(Task):
                                  "base; its torques depend on contact forces, so give the contacts")
         limit = self.robot.effort_limit[self.robot.actuated:]
         object.__setattr__(self, "limit", self.fraction * limit)
-
-    @property
-    def dimension(self) -> int:
-        """One row per actuated joint."""
-        return self.robot.n - self.robot.actuated
-
-    @property
-    def row_names(self) -> tuple[str, ...]:
-        """The joint of each row."""
-        return tuple(self.robot.velocity_names[self.robot.actuated:])
 
     def error(self, state: State) -> Array:
         """Distance of the torque with x = 0 from the limits (n,) [N m or N]."""

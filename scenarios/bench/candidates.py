@@ -45,25 +45,19 @@ def candidates(wanted: Sequence[str] | None = None) -> tuple[list[Candidate], di
         if name not in names():
             raise UnknownNameError("resolver", name, names())
     missing = {f"hqp {name}": "pip install 'task-hierarchy[qp]'"
-               for name in BACKENDS if not installed(name)}
+               for name in BACKENDS if not installed(name) and (wanted is None or "hqp" in wanted)}
     field = [Candidate(NUMPY, False, lambda h: lambda: plain_numpy(h))]
     if installed("daqp"):
         field.append(Candidate(DAQP, True, _daqp, _read_daqp))
     else:
         missing[DAQP] = "pip install 'task-hierarchy[qp]'"
-    cold = [*(make(name) for name in names() if name != "hqp"), make("tpm-published"),
-            *(make("hqp", backend=name) for name in BACKENDS if installed(name))]
+    every = [*(make(name) for name in names() if name != "hqp"), make("tpm-published"),
+             *(make("hqp", backend=name) for name in BACKENDS if installed(name))]
+    cold = [resolver for resolver in every if wanted is None or resolver.name in wanted]
     warm = [resolver for resolver in cold if _starts(resolver)]
     field += [Candidate(r.label, r.handles == "inequalities", _cold(r)) for r in cold]
     field += [Candidate(f"{r.label} warm", r.handles == "inequalities", _warm(r)) for r in warm]
-    asked = {*names(), "plain", "DAQP"} if wanted is None else {*wanted, "plain", "DAQP"}
-    return ([one for one in field if _resolver(one.label) in asked],
-            {label: why for label, why in missing.items() if _resolver(label) in asked})
-
-
-def _resolver(label: str) -> str:
-    """Return the resolver of a label such as "hqp osqp warm" or "tpm-published"."""
-    return label.split()[0].removesuffix("-published")
+    return field, missing
 
 
 def plain_numpy(h: Hierarchy) -> Resolution:

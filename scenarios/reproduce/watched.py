@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from scenarios.config import Scenario, load
 from scenarios.config.sampling import changed, drawn
+from scenarios.loop.audit import Audit
 from scenarios.loop.controller import Controller
 from scenarios.loop.recording import Recording
 from scenarios.loop.simulation import simulate
@@ -27,14 +28,8 @@ _METRICS: dict[str, dict[str, object]] = {
     LEFT: {"label": "What damping leaves of its step, median", "unit": "share"}}
 
 
-class Watch(Protocol):
-    """An audit (see `scenarios.loop.audit`) that sums up a run."""
-
-    def look(self, tick: int, controller: Controller) -> None:
-        """Examine a tick."""
-
-    def signals(self, recording: Recording) -> Mapping[str, NDArray[Any]]:
-        """Return signals for the recording."""
+class Watch(Audit, Protocol):
+    """An audit that sums up a run."""
 
     def metrics(self) -> dict[str, float]:
         """Return the metrics of the run by name."""

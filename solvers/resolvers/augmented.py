@@ -7,7 +7,6 @@ from typing import ClassVar, final
 
 from hierarchy.problem import Array, Hierarchy
 from solvers.kernels.staircase import solve_by_staircase
-from solvers.metric import in_metric
 from solvers.resolver import Resolution, Resolver, register
 from solvers.status import INACCURATE, SOLVED
 from solvers.workspace import WORKSPACE
@@ -33,8 +32,6 @@ class Augmented(Resolver):
 
     def solve(self, h: Hierarchy, memory: Array | None = None) -> Resolution:
         """Resolve h; a direct method that ignores `memory`."""
-        if h.metric is not None:
-            return in_metric(self.solve, h, memory)
         x, whole = h.reference.copy(), h.offsets[-1:]  # one level of m rows
         code = solve_by_staircase(h.A, h.lower, h.upper, whole, x, self._settings,
                                   WORKSPACE.array)

@@ -15,7 +15,6 @@ from solvers.kernels.bounds import solve_without_bounds
 from solvers.kernels.guess import solve_by_guesses
 from solvers.kernels.levels import solve_by_levels
 from solvers.kernels.staircase import solve_equalities
-from solvers.metric import in_metric
 from solvers.resolver import Handles, Resolution, Resolver, register
 from solvers.status import EQUAL, NO_LIMITS, SOLVED, TOO_SMALL, UNPROVED, Status
 from solvers.workspace import WORKSPACE, run
@@ -112,8 +111,6 @@ class Hcod(Resolver):
 
     def solve(self, h: Hierarchy, memory: Array | None = None) -> ActiveSetResolution:
         """Resolve h, starting from the active set of an earlier resolution if given."""
-        if h.metric is not None:
-            return in_metric(self.solve, h, memory)
         x = h.reference.copy()
         size = 3 * len(h.lower) + 3
         record, known = warm_record(memory, size, self.damping == 0.0)

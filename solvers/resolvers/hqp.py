@@ -10,7 +10,6 @@ from numpy.linalg import norm
 from numpy.typing import NDArray
 
 from hierarchy.problem import Array, Hierarchy
-from solvers.metric import in_metric
 from solvers.qp.backends import Backend, backend_of
 from solvers.qp.programs import null_space_program, slack_program
 from solvers.qp.refinement import EXACT, Rows, below_largest, refined, split
@@ -87,8 +86,6 @@ class Hqp(Resolver):
         NUMERICAL_FAILURE and x = 0 for numbers that are not finite, or so large that products of a
         few of them overflow: some backends kill the process on those.
         """
-        if h.metric is not None:
-            return in_metric(self.solve, h, memory)
         if not _in_range(h):
             return Resolution(np.zeros(h.n), Status.NUMERICAL_FAILURE)
         shape = len(h.sizes) + 1, h.n

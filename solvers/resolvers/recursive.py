@@ -13,7 +13,6 @@ from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array, Hierarchy
 from solvers.kernels.damped import CHIAVERINI, NAKAMURA, SELECTIVE, damped_recursion
 from solvers.kernels.recursion import recursion
-from solvers.metric import in_metric
 from solvers.resolver import Resolution, Resolver, register, set_frozen
 from solvers.workspace import WORKSPACE
 
@@ -69,8 +68,6 @@ class Recursive(Resolver):
 
     def solve(self, h: Hierarchy, memory: Array | None = None) -> Resolution:
         """Resolve h; a direct method that ignores `memory`."""
-        if h.metric is not None:
-            return in_metric(self.solve, h, memory)
         x = h.reference.copy()
         kernel = recursion if self.method == "level" else damped_recursion
         code = kernel(h.A, h.lower, h.upper, h.sizes, x, self._settings, WORKSPACE.array)

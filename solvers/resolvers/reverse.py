@@ -10,7 +10,6 @@ import numpy as np
 
 from hierarchy.problem import Array, Hierarchy
 from solvers.kernels.reverse import reverse
-from solvers.metric import in_metric
 from solvers.resolver import Resolution, Resolver, register
 from solvers.workspace import WORKSPACE
 
@@ -60,8 +59,6 @@ class Reverse(Resolver):
 
     def solve(self, h: Hierarchy, memory: Array | None = None) -> Resolution:
         """Resolve h; a direct method that ignores `memory`."""
-        if h.metric is not None:
-            return in_metric(self.solve, h, memory)
         x = h.reference.copy()
         code = reverse(h.A, h.lower, h.upper, h.sizes, x, self._settings, WORKSPACE.array)
         return self._otherwise(h, x, code) if code else Resolution(x)

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array, Hierarchy
-from solvers.metric import in_metric
 from solvers.resolver import Handles, Resolution, Resolver
 from solvers.status import EQUAL, FREE, LOWER, UPPER, Status
 
@@ -91,8 +90,6 @@ class SetBased(Resolver):
 
     def solve(self, h: Hierarchy, memory: Array | None = None) -> ModeResolution:
         """Resolve h; every mode is resolved afresh, `memory` is not used."""
-        if h.metric is not None:
-            return in_metric(self.solve, h, memory)
         active = _states(h)
         edges = np.flatnonzero((active == LOWER) | (active == UPPER))
         for number, frozen in enumerate(_modes(edges, self.most), 1):

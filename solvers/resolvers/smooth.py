@@ -10,7 +10,6 @@ import numpy as np
 
 from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array, Hierarchy
-from solvers.metric import in_metric
 from solvers.resolver import Handles, Resolution, Resolver, refuse_inequality, register
 from solvers.status import Status
 
@@ -76,8 +75,6 @@ class Smooth(Resolver):
 
     def solve(self, h: Hierarchy, memory: Array | None = None) -> Resolution:
         """Resolve h with all rows fully active; HierarchyError for an inequality."""
-        if h.metric is not None:
-            return in_metric(self.solve, h, memory)
         for (row,) in np.argwhere(h.lower != h.upper)[:1]:
             refuse_inequality(self, h, int(row))
         return self.solve_activated(h, np.ones(h.m))
@@ -146,8 +143,6 @@ class Activated(Resolver):
 
     def solve(self, h: Hierarchy, memory: Array | None = None) -> Resolution:
         """Resolve h at the present activations."""
-        if h.metric is not None:
-            return in_metric(self.solve, h, memory)
         return self.inner.solve_activated(h, self.activation()[:h.m])
 
 

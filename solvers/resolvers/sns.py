@@ -11,7 +11,6 @@ import numpy as np
 from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array, Hierarchy
 from solvers.kernels.sns import sns
-from solvers.metric import in_metric
 from solvers.resolver import Handles, Resolution, Resolver, register
 from solvers.resolvers.saturation import SaturatedResolution
 from solvers.status import CONTRADICTION, TOO_SMALL, Status
@@ -65,8 +64,6 @@ class Sns(Resolver):
 
     def solve(self, h: Hierarchy, memory: Array | None = None) -> Resolution:
         """Resolve h and return a `SaturatedResolution`; `memory` is ignored."""
-        if h.metric is not None:
-            return in_metric(self.solve, h, memory)
         x = h.reference.copy()
         record = np.empty(len(x) + len(h.sizes) + 1)
         code = sns(h.A, h.lower, h.upper, h.sizes, x, record, self._settings, WORKSPACE.array)

@@ -14,7 +14,6 @@ from solvers.certificate import certify
 from solvers.kernels.bounds import name_saturation, solve_without_bounds
 from solvers.kernels.published import matrix_as_published, solve_as_published
 from solvers.kernels.staircase import solve_by_staircase
-from solvers.metric import in_metric
 from solvers.resolver import (
     Handles,
     Resolution,
@@ -81,8 +80,6 @@ class Tpm(Resolver):
         Without bounds a direct method that ignores `memory`; with them it returns a
         `SaturatedResolution`, which has a memory where an unknown is at a bound.
         """
-        if h.metric is not None:
-            return in_metric(self.solve, h, memory)
         staircased = self.form == "staircase"
         if staircased and memory is not None:
             return self._within_bounds(h, memory)

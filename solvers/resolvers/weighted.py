@@ -13,7 +13,6 @@ from numpy.typing import ArrayLike, NDArray
 from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array, Hierarchy
 from solvers.kernels.weighted import weighted, weighted_steps
-from solvers.metric import in_metric
 from solvers.qp.backends import BACKENDS, backend_of
 from solvers.qp.programs import slack_program
 from solvers.qp.refinement import Rows
@@ -118,8 +117,6 @@ class Weighted(Resolver):
 
     def solve(self, h: Hierarchy, memory: Array | None = None) -> Resolution:
         """Resolve h, starting from the row states of an earlier resolution if given."""
-        if h.metric is not None:
-            return in_metric(self.solve, h, memory)
         x = h.reference.copy()
         record, _ = warm_record(memory, 2 * len(h.lower) + 1, True)
         settings = self._settings_for(len(h.sizes))

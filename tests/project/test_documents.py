@@ -14,7 +14,6 @@ from hierarchy.tasks import TASKS
 from scenarios.cli.main import app, run_command
 from scenarios.config import load, members
 from scenarios.sweep.config import load_sweep
-from solvers.resolver import _REGISTRY
 
 pytestmark = pytest.mark.slow
 
@@ -54,7 +53,7 @@ def having(found):
 def _in_a_folder_of_its_own(tmp_path, monkeypatch, no_plugins):
     """What a document writes or registers is gone after it."""
     monkeypatch.chdir(tmp_path)
-    kept = [(registry, dict(registry)) for registry in (_REGISTRY, TABLES, TASKS)]
+    kept = [(registry, dict(registry)) for registry in (TABLES, TASKS)]
     yield
     for registry, before in kept:
         registry.clear()
