@@ -97,11 +97,19 @@ def _kernels() -> Iterator[Finding]:
     part, folder = "compiled kernels", cache_folder()
     jit = not numba.config.DISABLE_JIT
     yield Finding(part, "compiling", "on" if jit else "off: NUMBA_DISABLE_JIT is set", jit)
-    files = [path for path in folder.rglob("*") if path.is_file()] if folder.is_dir() else []
-    size = sum(path.stat().st_size for path in files) / 1e6
+    size = sum(_size(Path(parent, name)) for parent, _, names in os.walk(folder)
+               for name in names) / 1e6
     can = os.access(next(path for path in (folder, *folder.parents) if path.exists()), os.W_OK)
     yield Finding(part, "cache", f"{_home(folder)}, {size:.0f} MB", can,
                   "" if can else "not writable; set NUMBA_CACHE_DIR to a writable folder")
+
+
+def _size(path: Path) -> int:
+    """Return the bytes of a file: 0 for one that another process has just moved or removed."""
+    try:
+        return path.stat().st_size
+    except OSError:
+        return 0
 
 
 def _tests() -> Iterator[Finding]:

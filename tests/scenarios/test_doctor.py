@@ -59,3 +59,12 @@ def test_a_cache_that_cannot_be_written_is_not_well(monkeypatch):
     assert cache.well is False
     assert "NUMBA_CACHE_DIR" in cache.remedy
     assert sys.version.split()[0] in [one.found for one in doctor._versions()]
+
+
+def test_a_cache_file_that_vanishes_while_it_is_looked_at_counts_nothing(monkeypatch, tmp_path):
+    """Another process that compiles moves its files from their temporary names."""
+    (tmp_path / "kernel.nbi").write_bytes(bytes(2_000_000))
+    (tmp_path / "kernel.nbi.tmp.1").symlink_to(tmp_path / "gone")
+    monkeypatch.setattr("hierarchy.jit.cache_folder", lambda: tmp_path)
+    cache = {one.what: one for one in doctor._kernels()}["cache"]
+    assert cache.found.endswith(", 2 MB")
