@@ -20,7 +20,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array, Hierarchy
-from solvers.certificate import certify
 from solvers.kernels.batch import (
     batch_exact,
     batch_saturation,
@@ -28,7 +27,7 @@ from solvers.kernels.batch import (
     batch_without_bounds,
 )
 from solvers.resolver import Resolver, make, refuse_inequality, set_frozen
-from solvers.resolvers.hcod import Hcod, record_without_bounds
+from solvers.resolvers.hcod import Hcod, record_without_bounds, settle_doubt
 from solvers.resolvers.tpm import Tpm
 from solvers.status import INACCURATE, NUMERICAL_FAILURE, SOLVED, UNPROVED, Status
 from solvers.workspace import run
@@ -185,11 +184,12 @@ class _Run:
         self.record[anew] = 0.0
         self._set_reference(anew)
         self._call(batch_staircase, anew, self.x, self.codes, self.settings)
+        self._settle(anew, record=False)
         bounded = anew[self.codes[anew] < 0]
         self._set_reference(bounded)
         self._call(batch_without_bounds, bounded, self.x, self.codes, self.record, self.settings)
+        self._settle(bounded)
         saturated |= self._at_bounds(self.codes == UNPROVED)
-        self._judge()
         for p in np.flatnonzero(self.codes < 0)[:1]:
             refuse_inequality(self.resolver, self.batch[p], -int(self.codes[p]) - 1)
         steps = np.maximum(self.record[:, -3] + self.record[:, -2], 1.0)
@@ -201,6 +201,7 @@ class _Run:
         which, saturated = np.flatnonzero(chosen), np.zeros(len(chosen), dtype=bool)
         self._set_reference(which)
         self._call(batch_exact, which, self.x, self.codes, self.record, self.settings)
+        self._settle(which)
         named = np.full(len(chosen), NUMERICAL_FAILURE)
         self._call(batch_saturation, which[self.codes[which] != NUMERICAL_FAILURE], self.x, named,
                    self.record)
@@ -214,7 +215,7 @@ class _Run:
         self._set_reference(everything)
         rest = everything if self.resolver.damping == 0.0 else self._outside_bounds(everything)
         self._call(batch_exact, rest, self.x, self.codes, self.record, self.settings)
-        self._judge()
+        self._settle(rest)
         return self._answer(self.record[:, -3] + self.record[:, -2], self.record)
 
     def _outside_bounds(self, which: Indices) -> Indices:
@@ -248,10 +249,13 @@ class _Run:
         with ThreadPoolExecutor(threads) as pool:
             list(pool.map(call, parts))
 
-    def _judge(self) -> None:
-        """Let `certify` judge the answers in doubt."""
-        for p in np.flatnonzero(self.codes == INACCURATE).tolist():
-            self.codes[p] = SOLVED if certify(self.batch[p], self.x[p]).certified else INACCURATE
+    def _settle(self, which: Indices, record: bool = True) -> None:
+        """Settle the answers in doubt of the problems `which`, in their records or without any."""
+        size = 3 * self.batch.A.shape[1] + 3
+        for p in which[self.codes[which] == INACCURATE].tolist():
+            written = self.record[p, -size:] if record else np.zeros(size)
+            if settle_doubt(self.batch[p], self.x[p], written, self.settings):
+                self.codes[p] = SOLVED
 
 
 def cores() -> int:

@@ -119,7 +119,7 @@ class Hcod(Resolver):
             code = solve_inside_bounds(h, x, record, self._settings)
         if code != SOLVED:
             code = solve_exactly(h, x, record, self._settings, known)
-        if code == 0 or (code == _INACCURATE and certify(h, x).certified):
+        if code == 0 or (code == _INACCURATE and settle_doubt(h, x, record, self._settings)):
             return ActiveSetResolution(x, _SOLVED, record)
         return ActiveSetResolution(x, Status(code), record)
 
@@ -178,4 +178,25 @@ def solve_exactly(h: Hierarchy, x: Array, record: Array, settings: Array, known:
     return code
 
 
+def settle_doubt(h: Hierarchy, x: Array, record: Array, settings: Array) -> bool:
+    """Return whether an answer in doubt is certified, if need be after rows are counted anew.
+
+    Where the angle between rows is close to rank_tolerance, rounding decides which of them count
+    as dependent, and an answer may mix both readings. So h is resolved again with a tolerance on
+    either side of that angle; the first answer that is certified replaces x (n,) and record.
+    """
+    if certify(h, x).certified:
+        return True
+    for factor in _READINGS:
+        other, again, changed = h.reference.copy(), np.zeros(len(record)), settings.copy()
+        changed[_RANK_TOLERANCE] = min(factor * settings[_RANK_TOLERANCE], _LARGEST)
+        code = solve_exactly(h, other, again, changed, False)
+        if code in (SOLVED, _INACCURATE) and certify(h, other).certified:
+            x[:], record[:] = other, again
+            return True
+    return False
+
+
+_READINGS = 10.0, 0.1  # times rank_tolerance
+_RANK_TOLERANCE, _LARGEST = 2, 0.1  # its place in the settings; at most
 _SOLVED, _INACCURATE = Status.SOLVED, Status.INACCURATE

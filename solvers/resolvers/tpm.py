@@ -10,7 +10,6 @@ import numpy as np
 
 from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array, Hierarchy
-from solvers.certificate import certify
 from solvers.kernels.bounds import name_saturation, solve_without_bounds
 from solvers.kernels.published import matrix_as_published, solve_as_published
 from solvers.kernels.staircase import solve_by_staircase
@@ -23,14 +22,13 @@ from solvers.resolver import (
     register_variant,
     set_frozen,
 )
-from solvers.resolvers.hcod import Hcod, solve_exactly, warm_record
+from solvers.resolvers.hcod import Hcod, settle_doubt, solve_exactly, warm_record
 from solvers.resolvers.saturation import SaturatedResolution
 from solvers.status import INACCURATE, NO_LIMITS, NUMERICAL_FAILURE, SOLVED, UNPROVED, Status
 from solvers.workspace import WORKSPACE, run
 
 FORMS = ("staircase", "published")
 _OF_THE_ENGINE = Hcod.tolerance, Hcod.guesses, Hcod.max_iterations
-_SOLVED = Status.SOLVED
 
 
 @final
@@ -86,7 +84,8 @@ class Tpm(Resolver):
         x = h.reference.copy()
         kernel = solve_by_staircase if staircased else solve_as_published
         code = kernel(h.A, h.lower, h.upper, h.sizes, x, self._settings, WORKSPACE.array)
-        if code == SOLVED or (code == INACCURATE and certify(h, x).certified):
+        if code == SOLVED or (code == INACCURATE and settle_doubt(
+                h, x, np.zeros(3 * h.m + 3), self._settings)):
             return Resolution(x)
         return (self._within_bounds(h, None) if code < 0 and staircased
                 else self._otherwise(h, x, code, memory))
@@ -111,15 +110,15 @@ class Tpm(Resolver):
             code = solve_exactly(h, x, inner, settings, known)
         if code == NO_LIMITS:
             return self.solve(h)
+        if code == INACCURATE and settle_doubt(h, x, inner, settings):
+            code = SOLVED
         if code < 0 or code == NUMERICAL_FAILURE:
             return self._otherwise(h, x, code)
         named = name_saturation(h.A, h.lower, h.upper, h.sizes, x, record, WORKSPACE.array)
         if named != SOLVED and known:
             return self.solve(h)
-        solved = code == SOLVED or certify(h, x).certified
-        return SaturatedResolution(x, _SOLVED if solved else Status.INACCURATE,
-                                   int(inner.item(-3) + inner.item(-2)), record, levels,
-                                   record if named == SOLVED else None)
+        return SaturatedResolution(x, Status(code), int(inner.item(-3) + inner.item(-2)), record,
+                                   levels, record if named == SOLVED else None)
 
 
 register_variant("tpm-published", "tpm", form="published")
