@@ -16,7 +16,7 @@ from solvers.kernels.guess import solve_by_guesses
 from solvers.kernels.levels import solve_by_levels
 from solvers.kernels.staircase import solve_equalities
 from solvers.resolver import Handles, Resolution, Resolver, register
-from solvers.status import EQUAL, NO_LIMITS, SOLVED, TOO_SMALL, UNPROVED, Status
+from solvers.status import EQUAL, INACCURATE, NO_LIMITS, SOLVED, TOO_SMALL, UNPROVED, Status
 from solvers.workspace import WORKSPACE, run
 
 
@@ -111,15 +111,12 @@ class Hcod(Resolver):
 
     def solve(self, h: Hierarchy, memory: Array | None = None) -> ActiveSetResolution:
         """Resolve h, starting from the active set of an earlier resolution if given."""
-        x = h.reference.copy()
-        size = 3 * len(h.lower) + 3
-        record, known = warm_record(memory, size, self.damping == 0.0)
-        code = UNPROVED
-        if self.damping > 0.0:
-            code = solve_inside_bounds(h, x, record, self._settings)
+        x, settings, undamped = h.reference.copy(), self._settings, self.damping == 0.0
+        record, known = warm_record(memory, 3 * h.lower.size + 3, undamped)
+        code = UNPROVED if undamped else solve_inside_bounds(h, x, record, settings)
         if code != SOLVED:
-            code = solve_exactly(h, x, record, self._settings, known)
-        if code == 0 or (code == _INACCURATE and settle_doubt(h, x, record, self._settings)):
+            code = solve_exactly(h, x, record, settings, known)
+        if code == SOLVED or (code == INACCURATE and settle_doubt(h, x, record, settings)):
             return ActiveSetResolution(x, _SOLVED, record)
         return ActiveSetResolution(x, Status(code), record)
 
@@ -129,7 +126,7 @@ def warm_record(memory: Array | None, size: int, usable: bool) -> tuple[Array, b
 
     usable : whether the settings allow a warm start.
     """
-    if memory is None or len(memory) != size or not usable:
+    if memory is None or memory.size != size or not usable:
         return np.zeros(size), False
     return memory.copy(), True
 
@@ -167,8 +164,10 @@ def solve_exactly(h: Hierarchy, x: Array, record: Array, settings: Array, known:
     work, code = WORKSPACE.array, UNPROVED
     if not known or record.item(0) == EQUAL:  # an index takes twice the time
         code = solve_equalities(h.A, h.lower, h.upper, h.sizes, x, record, settings, work)
-    if code == UNPROVED and known:
+    if known and code == UNPROVED:
         code = solve_by_guesses(h.A, h.lower, h.upper, h.sizes, x, record, settings, work)
+    if code == SOLVED:
+        return code
     if code == UNPROVED:
         code = solve_by_levels(h.A, h.lower, h.upper, h.sizes, x, record, settings, work)
     if code == TOO_SMALL:
@@ -191,7 +190,7 @@ def settle_doubt(h: Hierarchy, x: Array, record: Array, settings: Array) -> bool
         other, again, changed = h.reference.copy(), np.zeros(len(record)), settings.copy()
         changed[_RANK_TOLERANCE] = min(factor * settings[_RANK_TOLERANCE], _LARGEST)
         code = solve_exactly(h, other, again, changed, False)
-        if code in (SOLVED, _INACCURATE) and certify(h, other).certified:
+        if code in (SOLVED, INACCURATE) and certify(h, other).certified:
             x[:], record[:] = other, again
             return True
     return False
@@ -199,4 +198,4 @@ def settle_doubt(h: Hierarchy, x: Array, record: Array, settings: Array) -> bool
 
 _READINGS = 10.0, 0.1  # times rank_tolerance
 _RANK_TOLERANCE, _LARGEST = 2, 0.1  # its place in the settings; at most
-_SOLVED, _INACCURATE = Status.SOLVED, Status.INACCURATE
+_SOLVED = Status.SOLVED
