@@ -27,8 +27,8 @@ from solvers.kernels.batch import (
     batch_without_bounds,
 )
 from solvers.resolver import Resolver, make, refuse_inequality, set_frozen
-from solvers.resolvers.hcod import Hcod, record_without_bounds, settle_doubt
-from solvers.resolvers.tpm import Tpm
+from solvers.resolvers.hcod import Hcod, record_without_bounds, settle_doubt, solve_anew
+from solvers.resolvers.tpm import Tpm, solve_at_bounds
 from solvers.status import INACCURATE, NUMERICAL_FAILURE, SOLVED, UNPROVED, Status
 from solvers.workspace import run
 
@@ -184,7 +184,7 @@ class _Run:
         self.record[anew] = 0.0
         self._set_reference(anew)
         self._call(batch_staircase, anew, self.x, self.codes, self.settings)
-        self._settle(anew, record=False)
+        self._settle(anew)
         bounded = anew[self.codes[anew] < 0]
         self._set_reference(bounded)
         self._call(batch_without_bounds, bounded, self.x, self.codes, self.record, self.settings)
@@ -201,11 +201,11 @@ class _Run:
         which, saturated = np.flatnonzero(chosen), np.zeros(len(chosen), dtype=bool)
         self._set_reference(which)
         self._call(batch_exact, which, self.x, self.codes, self.record, self.settings)
-        self._settle(which)
         named = np.full(len(chosen), NUMERICAL_FAILURE)
         self._call(batch_saturation, which[self.codes[which] != NUMERICAL_FAILURE], self.x, named,
                    self.record)
         self.codes[named < 0] = named[named < 0]
+        self._settle(which)
         saturated[which] = named[which] == SOLVED
         return saturated
 
@@ -249,12 +249,11 @@ class _Run:
         with ThreadPoolExecutor(threads) as pool:
             list(pool.map(call, parts))
 
-    def _settle(self, which: Indices, record: bool = True) -> None:
-        """Settle the answers in doubt of the problems `which`, in their records or without any."""
-        size = 3 * self.batch.A.shape[1] + 3
+    def _settle(self, which: Indices) -> None:
+        """Settle the answers in doubt of the problems `which`, as `resolver.solve` does."""
+        solve = solve_at_bounds if isinstance(self.resolver, Tpm) else solve_anew
         for p in which[self.codes[which] == INACCURATE].tolist():
-            written = self.record[p, -size:] if record else np.zeros(size)
-            if settle_doubt(self.batch[p], self.x[p], written, self.settings):
+            if settle_doubt(self.batch[p], self.x[p], self.record[p], self.settings, solve):
                 self.codes[p] = SOLVED
 
 

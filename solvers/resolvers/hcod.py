@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import ClassVar, final
@@ -177,11 +178,20 @@ def solve_exactly(h: Hierarchy, x: Array, record: Array, settings: Array, known:
     return code
 
 
-def settle_doubt(h: Hierarchy, x: Array, record: Array, settings: Array) -> bool:
+def solve_anew(h: Hierarchy, x: Array, record: Array, settings: Array) -> int:
+    """Call `solve_exactly` without a memory."""
+    return solve_exactly(h, x, record, settings, False)
+
+
+Anew = Callable[[Hierarchy, Array, Array, Array], int]
+
+
+def settle_doubt(h: Hierarchy, x: Array, record: Array, settings: Array,
+                 solve: Anew = solve_anew) -> bool:
     """Return whether an answer in doubt is certified, if need be after rows are counted anew.
 
     Where the angle between rows is close to rank_tolerance, rounding decides which of them count
-    as dependent, and an answer may mix both readings. So h is resolved again with a tolerance on
+    as dependent, and an answer may mix both readings. So `solve` is called with a tolerance on
     either side of that angle; the first answer that is certified replaces x (n,) and record.
     """
     if certify(h, x).certified:
@@ -189,7 +199,7 @@ def settle_doubt(h: Hierarchy, x: Array, record: Array, settings: Array) -> bool
     for factor in _READINGS:
         other, again, changed = h.reference.copy(), np.zeros(len(record)), settings.copy()
         changed[_RANK_TOLERANCE] = min(factor * settings[_RANK_TOLERANCE], _LARGEST)
-        code = solve_exactly(h, other, again, changed, False)
+        code = solve(h, other, again, changed)
         if code in (SOLVED, INACCURATE) and certify(h, other).certified:
             x[:], record[:] = other, again
             return True

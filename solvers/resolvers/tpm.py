@@ -22,7 +22,7 @@ from solvers.resolver import (
     register_variant,
     set_frozen,
 )
-from solvers.resolvers.hcod import Hcod, settle_doubt, solve_exactly, warm_record
+from solvers.resolvers.hcod import Hcod, settle_doubt, solve_anew, solve_exactly, warm_record
 from solvers.resolvers.saturation import SaturatedResolution
 from solvers.status import INACCURATE, NO_LIMITS, NUMERICAL_FAILURE, SOLVED, UNPROVED, Status
 from solvers.workspace import WORKSPACE, run
@@ -110,15 +110,26 @@ class Tpm(Resolver):
             code = solve_exactly(h, x, inner, settings, known)
         if code == NO_LIMITS:
             return self.solve(h)
-        if code == INACCURATE and settle_doubt(h, x, inner, settings):
-            code = SOLVED
         if code < 0 or code == NUMERICAL_FAILURE:
             return self._otherwise(h, x, code)
         named = name_saturation(h.A, h.lower, h.upper, h.sizes, x, record, WORKSPACE.array)
         if named != SOLVED and known:
             return self.solve(h)
+        if code == INACCURATE and settle_doubt(h, x, record, settings, solve_at_bounds):
+            code = SOLVED
         return SaturatedResolution(x, Status(code), int(inner.item(-3) + inner.item(-2)), record,
                                    levels, record if named == SOLVED else None)
+
+
+def solve_at_bounds(h: Hierarchy, x: Array, record: Array, settings: Array) -> int:
+    """Solve exactly, without a memory, and name the unknowns at a bound; return the first code.
+
+    record : (n + L + 3 m + 3,); see `name_saturation`, which changes the last digits of x.
+    """
+    code = solve_anew(h, x, record[len(x) + len(h.sizes):], settings)
+    if code in (SOLVED, INACCURATE):
+        name_saturation(h.A, h.lower, h.upper, h.sizes, x, record, WORKSPACE.array)
+    return code
 
 
 register_variant("tpm-published", "tpm", form="published")
