@@ -13,7 +13,7 @@ from hierarchy.jit.compiling import Kernel
 
 
 def bind(kernel: Kernel, *arguments: Any, then: tuple[Any, ...] = ()) -> Callable[..., Any]:
-    """Return `kernel` bound to its first arguments; a call gives the rest, numbers or tuples of them.
+    """Return `kernel` bound to its first arguments; a call gives the rest: numbers, tuples of them.
 
     A call of a kernel looks at the type of every argument, each time (20 arrays: 0.4 us). Here that
     is done once, and a call costs a third. `then` has an example of each argument of a call; where
