@@ -106,6 +106,24 @@ def test_what_a_package_says_it_exports_is_there(package):
         _ = module.nothing
 
 
+@pytest.mark.parametrize("package", ["hierarchy", "solvers", "scenarios"])
+def test_the_map_names_every_part_of_a_package_in_the_order_of_the_layers(package):
+    told = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    section = told.partition(f"### `{package}/`")[2].partition("\n#")[0]
+    on_map = [name.removesuffix("/").removesuffix(".py")
+              for name in re.findall(r"^\| `([^`]+)` \|", section, re.MULTILINE)]
+    assert sorted(on_map) == sorted(
+        path.stem for path in (ROOT / package).iterdir()
+        if path.suffix == ".py" or (path.is_dir() and path.name != "__pycache__")
+        if path.name != "__init__.py")
+    linted = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["importlinter"]
+    layers = next(contract["layers"] for contract in linted["contracts"]
+                  if contract.get("containers") == [package])
+    layer_of = {name: i for i, layer in enumerate(layers) for name in layer.split(" | ")}
+    code = [name for name in on_map if name != "library" or package != "scenarios"]  # TOML only
+    assert [layer_of[name] for name in code] == sorted(layer_of.values())
+
+
 @pytest.fixture(scope="module")
 def functions():
     """Return every function of the packages outside `solvers/kernels`, with where it is."""
