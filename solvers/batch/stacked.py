@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array, Hierarchy
+from hierarchy.records import set_frozen
 from solvers.certificate import certify
 from solvers.kernels.batch import (
     batch_exact,
@@ -27,7 +28,7 @@ from solvers.kernels.batch import (
     batch_staircase,
     batch_without_bounds,
 )
-from solvers.resolver import Resolver, make, refuse_inequality, set_frozen
+from solvers.resolver import Resolver, make, refuse_inequality
 from solvers.resolvers.hcod import Hcod, record_without_bounds
 from solvers.resolvers.tpm import Tpm
 from solvers.status import INACCURATE, NUMERICAL_FAILURE, SOLVED, UNPROVED, Status

@@ -10,6 +10,7 @@ import numpy as np
 
 from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array, Hierarchy
+from hierarchy.records import set_frozen
 from solvers.certificate import certify
 from solvers.kernels.bounds import name_saturation, solve_without_bounds
 from solvers.kernels.published import matrix_as_published, solve_as_published
@@ -21,7 +22,6 @@ from solvers.resolver import (
     refuse_inequality,
     register,
     register_variant,
-    set_frozen,
 )
 from solvers.resolvers.hcod import Hcod, solve_exactly, warm_record
 from solvers.resolvers.saturation import SaturatedResolution
