@@ -110,6 +110,7 @@ TESTS = {
     "solvers/problems/": "solvers/test_problems scenarios/test_problem_families",
     "solvers/problems/kinds": "solvers/test_problem_kinds solvers/test_problems",
     "solvers/qp/": "solvers/test_hqp solvers/test_failures solvers/test_contract",
+    "solvers/qp/programs": "solvers/test_adapters solvers/test_hqp solvers/test_contract",
     "solvers/resolvers/hcod": "solvers/test_hcod solvers/test_contract",
     "solvers/resolvers/hqp": "solvers/test_hqp solvers/test_failures solvers/test_contract",
     "solvers/resolvers/recursive": "solvers/test_recursive solvers/test_dampings_of_recursive "
