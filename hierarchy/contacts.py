@@ -26,6 +26,7 @@ from hierarchy.errors import HierarchyError, UnknownNameError
 from hierarchy.jit import compiled
 from hierarchy.kinematics import drift_of_point, place, write_point_jacobian
 from hierarchy.problem import Array
+from hierarchy.records import set_frozen
 from hierarchy.robot import Frame, Robot
 from hierarchy.state import State
 
@@ -63,7 +64,7 @@ class Contact:
     axes: Array = field(init=False, repr=False, compare=False)  # (3, 3) rows: two tangents, normal
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "name", self.name or self.frame.name)
+        set_frozen(self, name=self.name or self.frame.name)
         points, normal = np.array(self.points, dtype=float), np.array(self.normal, dtype=float)
         if points.ndim != 2 or points.shape[1] != 3 or not np.isfinite(points).all():
             raise HierarchyError(f"contact {self.name!r}: points {self.points!r} are not (k, 3) "
@@ -82,7 +83,7 @@ class Contact:
                                      f"until {end} s")
         if not 0.0 <= self.ramp < np.inf:
             raise HierarchyError(f"contact {self.name!r}: ramp {self.ramp} s must not be negative")
-        object.__setattr__(self, "axes", _axes(normal))
+        set_frozen(self, axes=_axes(normal))
 
     @classmethod
     def rectangle(cls, frame: Frame, x: tuple[float, float], y: tuple[float, float],
@@ -119,7 +120,7 @@ class Contacts:
 
     def __post_init__(self) -> None:
         contacts = tuple(self.contacts)
-        object.__setattr__(self, "contacts", contacts)
+        set_frozen(self, contacts=contacts)
         if not self.robot.masses.sum() > 0.0:
             raise HierarchyError(f"contacts: robot {self.robot.name!r} has no masses, so no torque "
                                  "or force moves it")
@@ -132,7 +133,7 @@ class Contacts:
         frames = [contact.frame for contact in contacts for _ in contact.points]
         offsets = [contact.frame.offset + contact.frame.rotation @ np.array(point, dtype=float)
                    for contact in contacts for point in contact.points]
-        object.__setattr__(self, "points", Points(
+        set_frozen(self, points=Points(
             np.array([frame.joint for frame in frames], dtype=np.int64),
             np.array(offsets, dtype=float).reshape(-1, 3)))
 

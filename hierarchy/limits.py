@@ -53,6 +53,7 @@ from numpy.typing import ArrayLike, NDArray
 from hierarchy.errors import HierarchyError
 from hierarchy.jit import compiled, inlined
 from hierarchy.problem import Array
+from hierarchy.records import set_frozen
 from hierarchy.task import Level
 
 ROUNDING = 1e-12  # of a position, relative to 1 + its limit: closer to a limit counts as on it
@@ -90,7 +91,7 @@ class Limits:
                 "acceleration must be positive and finite", acceleration)
         if not 0.0 < self.period < np.inf:
             raise HierarchyError(f"limits: period {self.period} s must be positive and finite")
-        object.__setattr__(self, "packed", np.array(rows))
+        set_frozen(self, packed=np.array(rows))
 
     def box(self, q: Array, v: Array, level: Level) -> tuple[Array, Array]:
         """Return the least and greatest command (n,), (n,) at positions q and velocities v.

@@ -8,6 +8,7 @@ import numpy as np
 
 from hierarchy.errors import HierarchyError, expect
 from hierarchy.problem import Array, Hierarchy
+from hierarchy.words import listed
 from solvers.resolver import Resolution
 from solvers.resolvers.hcod import ActiveSetResolution
 from solvers.status import EQUAL
@@ -53,7 +54,7 @@ def _level(h: Hierarchy, resolution: ActiveSetResolution, k: int, tolerance: flo
     blocking = held_back_by(h, resolution, k, names)
     if not blocking:
         return f"{h.names[k]} is missed by {missed:.3g}: its own rows disagree."
-    by = _and(_said_once(blocking, h.names))
+    by = listed(_said_once(blocking, h.names))
     return f"{h.names[k]} is missed by {missed:.3g}: held back by {by}."
 
 
@@ -97,7 +98,3 @@ def _equalities(h: Hierarchy, resolution: ActiveSetResolution, k: int, w: Array)
     matters = (resolution.active[acting] == EQUAL) & (shares > _MATTERS)
     levels = np.searchsorted(h.offsets, acting[matters], side="right") - 1
     return [h.names[level] for level in np.unique(levels)]
-
-
-def _and(names: list[str]) -> str:
-    return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)

@@ -18,6 +18,7 @@ from hierarchy.errors import HierarchyError, UnknownNameError, brief, expect
 from hierarchy.jit import announce_compilation
 from hierarchy.notebook import html_table, numbers
 from hierarchy.problem import Array, Hierarchy
+from hierarchy.records import set_frozen
 from solvers.metric import in_metric
 from solvers.status import TOO_SMALL
 from solvers.status import Status as Status
@@ -199,12 +200,6 @@ def _at_the_door(solve: Solve) -> Solve:
             raise
 
     return checked
-
-
-def set_frozen(record: object, **values: object) -> None:
-    """Set fields of a frozen dataclass; only for its own `__post_init__`."""
-    for name, value in values.items():
-        object.__setattr__(record, name, value)
 
 
 def refuse_inequality(resolver: Resolver, h: Hierarchy, row: int) -> None:

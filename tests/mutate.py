@@ -52,56 +52,74 @@ OF_KERNELS = ("solvers/kernels/", "solvers/status.py")
 # Test files of a module or a folder, quickest first; the longest path that fits counts.
 TESTS = {
     "hierarchy/": "hierarchy/test_robot hierarchy/test_stack",
+    "hierarchy/activation": "solvers/test_smooth",
     "hierarchy/allocation": "hierarchy/test_allocation scenarios/test_hierarchical",
     "hierarchy/avoidance/": "hierarchy/test_avoidance hierarchy/test_danger_bounds",
     "hierarchy/avoidance/barrier": "hierarchy/test_separation hierarchy/test_self_collision",
     "hierarchy/avoidance/pairs": "hierarchy/test_separation",
     "hierarchy/avoidance/self_collision": "hierarchy/test_self_collision hierarchy/test_models",
     "hierarchy/contacts": "hierarchy/test_contacts",
-    "hierarchy/jit/": "hierarchy/test_stack hierarchy/test_limits",
+    "hierarchy/jit/": "hierarchy/test_jit hierarchy/test_stack hierarchy/test_limits",
+    "hierarchy/jit/exporting": "solvers/test_library",
+    "hierarchy/kinematics": "hierarchy/test_tasks",
     "hierarchy/limits": "hierarchy/test_limits hierarchy/test_danger_bounds",
     "hierarchy/loop/": "hierarchy/test_loop",
-    "hierarchy/paths": "hierarchy/test_avoidance hierarchy/test_tasks scenarios/test_continuing",
-    "hierarchy/problem": "hierarchy/test_problem solvers/test_resolver",
+    "hierarchy/notebook": "scenarios/test_notebooks",
+    "hierarchy/paths": "hierarchy/test_paths hierarchy/test_tasks scenarios/test_continuing",
+    "hierarchy/plugins": "scenarios/test_plugins",
+    "hierarchy/problem": "hierarchy/test_problem solvers/test_wrong_types solvers/test_resolver "
+                         "scenarios/test_notebooks",
     "hierarchy/robot": "hierarchy/test_robot hierarchy/test_models",
     "hierarchy/robots/": "hierarchy/test_robot hierarchy/test_models "
                          "hierarchy/test_self_collision scenarios/test_humanoid",
-    "hierarchy/stack": "hierarchy/test_stack hierarchy/test_tasks",
-    "hierarchy/state": "hierarchy/test_robot hierarchy/test_stack hierarchy/test_tasks",
-    "hierarchy/task": "hierarchy/test_stack hierarchy/test_tasks",
-    "hierarchy/tasks/": "hierarchy/test_tasks scenarios/test_humanoid",
+    "hierarchy/stack": "hierarchy/test_stack hierarchy/test_tasks solvers/test_wrong_types",
+    "hierarchy/state": "hierarchy/test_robot hierarchy/test_stack hierarchy/test_tasks "
+                       "solvers/test_wrong_types hierarchy/test_contacts",
+    "hierarchy/task": "hierarchy/test_stack hierarchy/test_tasks solvers/test_wrong_types",
+    "hierarchy/tasks/": "hierarchy/test_tasks solvers/test_wrong_types scenarios/test_humanoid",
     "hierarchy/tasks/avoidance": "hierarchy/test_tasks hierarchy/test_avoidance",
-    **{f"hierarchy/tasks/{name}": "hierarchy/test_contacts"
+    **{f"hierarchy/tasks/{name}": "hierarchy/test_contacts solvers/test_whole_body"
        for name in ("base_dynamics", "centre_of_pressure", "contact_force", "contact_motion",
                     "forces", "friction", "least_force", "momentum", "together")},
+    **{f"hierarchy/tasks/{name}": "hierarchy/test_tasks scenarios/test_listed_kinds"
+       for name in ("coupling", "geometric", "look_at", "manipulability", "relative")},
+    "hierarchy/tasks/cumulated_repulsion": "hierarchy/test_cumulated_repulsion",
     "hierarchy/tasks/danger_bounds": "hierarchy/test_danger_bounds hierarchy/test_models",
     "hierarchy/tasks/joint_limits": "hierarchy/test_limits hierarchy/test_models",
     "hierarchy/tasks/posture": "hierarchy/test_tasks hierarchy/test_models",
     "hierarchy/tasks/self_separation": "hierarchy/test_self_collision",
     "hierarchy/tasks/separation": "hierarchy/test_separation",
+    "hierarchy/tasks/tangent_cone": "scenarios/test_rivals",
     "hierarchy/tasks/torque_limits": "hierarchy/test_limits hierarchy/test_contacts",
     "scenarios/measure/": "scenarios/test_parting scenarios/test_report",
     "scenarios/measure/returning": "scenarios/test_singular",
+    "scenarios/measure/run_folder": "scenarios/test_recording scenarios/test_plants",
     "scenarios/measure/statistics": "scenarios/test_statistics",
     "scenarios/measure/metrics": "scenarios/test_metrics scenarios/test_hierarchical "
                                  "scenarios/test_plants scenarios/test_faults",
-    "solvers/": "solvers/test_resolver solvers/test_contract",
+    "solvers/": "solvers/test_resolver solvers/test_wrong_types solvers/test_contract",
     "solvers/adapters/": "solvers/test_adapters",
     "solvers/batch/": "solvers/test_batch",
     "solvers/certificate": "solvers/test_certificate solvers/test_contract",
     "solvers/explain": "solvers/test_hcod",
     "solvers/factorization/": "solvers/test_factorization",
+    "solvers/ik": "solvers/test_ik solvers/test_wrong_types",
+    "solvers/library/": "solvers/test_library solvers/test_library_inputs "
+                        "solvers/test_library_programs",
     "solvers/metric": "solvers/test_metric",
-    "solvers/kernels/metric": "solvers/test_metric",
     "solvers/problems/": "solvers/test_problems scenarios/test_problem_families",
     "solvers/problems/kinds": "solvers/test_problem_kinds solvers/test_problems",
     "solvers/qp/": "solvers/test_hqp solvers/test_failures solvers/test_contract",
+    "solvers/qp/programs": "solvers/test_adapters solvers/test_hqp solvers/test_contract",
     "solvers/resolvers/hcod": "solvers/test_hcod solvers/test_contract",
     "solvers/resolvers/hqp": "solvers/test_hqp solvers/test_failures solvers/test_contract",
-    "solvers/resolvers/recursive": "solvers/test_recursive solvers/test_contract",
+    "solvers/resolvers/recursive": "solvers/test_recursive solvers/test_dampings_of_recursive "
+                                   "solvers/test_contract",
     "solvers/resolvers/reverse": "solvers/test_reverse solvers/test_contract",
     "solvers/resolvers/sns": "solvers/test_sns solvers/test_contract",
     "solvers/resolvers/saturation": "solvers/test_sns solvers/test_contract",
+    "solvers/resolvers/set_based": "solvers/test_set_based solvers/test_contract",
+    "solvers/resolvers/smooth": "solvers/test_smooth solvers/test_contract",
     "solvers/resolvers/tpm": "solvers/test_tpm solvers/test_tpm_limits solvers/test_contract",
     "solvers/resolvers/augmented": "solvers/test_contract",
     "solvers/resolvers/weighted": "solvers/test_weighted solvers/test_contract",
@@ -345,29 +363,32 @@ def main() -> None:
     parser.add_argument("--tests", nargs="+", help="test files, in place of those in TESTS")
     parser.add_argument("--count", type=int, default=10, help="mutants to try")
     parser.add_argument("--seed", type=int, default=0, help="of the sample")
+    parser.add_argument("--start", type=int, default=1, metavar="N",
+                        help="leave out what comes before mutant N of the sample")
     parser.add_argument("--limit", type=float, default=900.0,
                         help="CPU time limit of an unchanged test file [s]")
     options = parser.parse_args()
     every = [mutant for module in options.modules or modules() for mutant in mutants(module)]
     sample = random.Random(options.seed).sample(every, min(options.count, len(every)))
     with tempfile.TemporaryDirectory() as folder:
-        alive = _try(sample, options.tests, Runner(Path(folder), options.limit))
-    print(f"{alive} of {len(sample)} mutants survived: {alive / len(sample):.0%} "
+        alive = _try(sample, options.start, options.tests, Runner(Path(folder), options.limit))
+    tried = len(sample) - options.start + 1
+    print(f"{alive} of {tried} mutants survived: {alive / tried:.0%} "
           f"(of {len(every)} possible, seed {options.seed})")
 
 
-def _try(sample: list[Mutant], tests: list[str] | None, runner: Runner) -> int:
-    """Return how many mutants survive, and print them."""
+def _try(sample: list[Mutant], start: int, tests: list[str] | None, runner: Runner) -> int:
+    """Return how many mutants from `start` on survive, and print them."""
     broken = compile("raise ImportError", "broken", "exec")
     if runner.survives(sample[0].module, broken, tuple(tests or tests_of(sample[0]))):
         sys.exit("the tests pass without the module")
     alive = 0
-    for done, mutant in enumerate(sample, 1):
+    for done, mutant in enumerate(sample[start - 1:], start):
         described, code = mutant.code()
         survived = runner.survives(mutant.module, code, tuple(tests or tests_of(mutant)))
         alive += survived
         if survived:
-            print(f"survived: {mutant.module}:{mutant.line}: {described}", flush=True)
+            print(f"survived: {done}: {mutant.module}:{mutant.line}: {described}", flush=True)
         print(f"{done} of {len(sample)} tried, {alive} survived", file=sys.stderr, flush=True)
     return alive
 

@@ -12,12 +12,12 @@ import numpy as np
 from hierarchy.jit.compiling import Kernel
 
 
-def bind(kernel: Kernel, *arguments: Any, then: tuple[float, ...] = ()) -> Callable[..., Any]:
-    """Return `kernel` bound to its first arguments; what is left for each call is numbers.
+def bind(kernel: Kernel, *arguments: Any, then: tuple[Any, ...] = ()) -> Callable[..., Any]:
+    """Return `kernel` bound to its first arguments; a call gives the rest: numbers, tuples of them.
 
     A call of a kernel looks at the type of every argument, each time (20 arrays: 0.4 us). Here that
-    is done once, and a call costs a third. `then` has a number of the type of each that is handed
-    over at a call; those of a call may be any that Python can convert.
+    is done once, and a call costs a third. `then` has an example of each argument of a call; where
+    it has a number, a call may give any that Python can convert.
     """
     dispatcher: Any = kernel
     if not hasattr(dispatcher, "overloads"):  # NUMBA_DISABLE_JIT

@@ -14,6 +14,7 @@ import numpy as np
 from hierarchy.errors import HierarchyError
 from hierarchy.jit import bind, compiled
 from hierarchy.problem import Array
+from hierarchy.records import set_frozen
 
 Vector = Sequence[float]
 
@@ -66,8 +67,7 @@ class Ellipse(Path):
             check_point(name, getattr(self, name))
         if not abs(self.rate) < inf:
             raise HierarchyError(f"ellipse: rate {self.rate} is not finite")
-        object.__setattr__(self, "_packed", np.array([self.centre, self.cosine, self.sine],
-                                                     dtype=float))
+        set_frozen(self, _packed=np.array([self.centre, self.cosine, self.sine], dtype=float))
 
     def write(self, t: float, out: Array) -> None:
         """See `Path.write`."""
@@ -148,8 +148,7 @@ class Jittered(Path):
                                  f"{self.seed}, expected numbers >= 0, > 0 and >= 0")
         random = np.random.default_rng(self.seed)
         speeds = 2.0 * np.pi * self.rate * random.uniform(0.5, 1.0, (3, 5))  # rad/s
-        object.__setattr__(self, "_sines", np.stack(
-            [speeds, random.uniform(0.0, 2.0 * np.pi, (3, 5))]))
+        set_frozen(self, _sines=np.stack([speeds, random.uniform(0.0, 2.0 * np.pi, (3, 5))]))
 
     def write(self, t: float, out: Array) -> None:
         """See `Path.write`."""

@@ -13,6 +13,7 @@ import numpy as np
 from hierarchy.errors import HierarchyError
 from hierarchy.paths.path import Path, Vector, check_point
 from hierarchy.problem import Array
+from hierarchy.records import set_frozen
 
 
 def line(start: Vector, end: Vector, duration: float, begin: float = 0.0) -> Waypoints:
@@ -77,7 +78,7 @@ class Blended(Path):
                                  f"most {shortest:g} s, the shortest interval")
         points = np.array(self.points, dtype=float)
         lines = np.diff(points, axis=0) / np.diff(self.times)[:, None]
-        object.__setattr__(self, "_velocities", np.vstack([np.zeros(3), lines, np.zeros(3)]))
+        set_frozen(self, _velocities=np.vstack([np.zeros(3), lines, np.zeros(3)]))
 
     def write(self, t: float, out: Array) -> None:
         """See `Path.write`."""
@@ -113,7 +114,7 @@ class Recorded(Path):
         _check_points("recorded path", self.times, self.points)
         if len(self.times) < 2:
             raise HierarchyError("recorded path: one point is no motion; use a path of kind still")
-        object.__setattr__(self, "_slopes", _spline_slopes(
+        set_frozen(self, _slopes=_spline_slopes(
             np.array(self.times, dtype=float), np.array(self.points, dtype=float)))
 
     @classmethod

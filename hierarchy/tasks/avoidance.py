@@ -24,6 +24,7 @@ from hierarchy.kinematics import (
     write_point_jacobian_derivative,
 )
 from hierarchy.problem import Array
+from hierarchy.records import set_frozen
 from hierarchy.state import State
 from hierarchy.task import Level, Task
 
@@ -54,8 +55,7 @@ class Avoidance(Task):
         if not self.points:
             raise HierarchyError(f"task {self.name!r}: needs at least one control point")
         joints, offsets = pack_points(self.points)
-        object.__setattr__(self, "joints", joints)
-        object.__setattr__(self, "offsets", offsets)
+        set_frozen(self, joints=joints, offsets=offsets)
 
     @property
     def dimension(self) -> int:

@@ -23,6 +23,7 @@ from hierarchy.kinematics import (
 )
 from hierarchy.paths import Path
 from hierarchy.problem import Array
+from hierarchy.records import set_frozen
 from hierarchy.robot import Robot
 from hierarchy.state import State
 from hierarchy.task import Level, Task, along, check_parts
@@ -57,7 +58,7 @@ class CentreOfMass(Task):
         mass = float(self.robot.masses.sum())
         if not mass > 0.0:
             raise HierarchyError(f"task {self.name!r}: robot {self.robot.name!r} has no masses")
-        object.__setattr__(self, "shares", self.robot.masses / mass)
+        set_frozen(self, shares=self.robot.masses / mass)
 
     @property
     def dimension(self) -> int:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array
+from hierarchy.records import set_frozen
 from hierarchy.robot import Robot
 from hierarchy.state import State
 from hierarchy.task import Task, check_parts
@@ -43,8 +44,7 @@ class JointCoupling(Task):
         row = np.zeros((1, self.robot.n))
         for place, factor in zip(positions, self.joints.values(), strict=True):
             row[0, self.robot.coordinates == place] = factor
-        object.__setattr__(self, "positions", positions)
-        object.__setattr__(self, "row", row)
+        set_frozen(self, positions=positions, row=row)
 
     @property
     def dimension(self) -> int:

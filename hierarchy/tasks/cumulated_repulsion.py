@@ -23,6 +23,7 @@ from hierarchy.kinematics import (
     write_point_jacobian_derivative,
 )
 from hierarchy.problem import Array
+from hierarchy.records import set_frozen
 from hierarchy.state import State
 from hierarchy.task import Level, Task
 from hierarchy.tasks.posture import JointTask
@@ -62,8 +63,7 @@ class CumulatedRepulsion(JointTask):
             raise HierarchyError(f"task {self.name!r}: {self.base.name!r} has "
                                  f"{self.base.dimension} rows, expected {self.joints}")
         bodies, offsets = pack_points(self.points)
-        object.__setattr__(self, "bodies", bodies)
-        object.__setattr__(self, "offsets", offsets)
+        set_frozen(self, bodies=bodies, offsets=offsets)
 
     def error(self, state: State) -> Array:
         """Zero (n,): there is no target position."""

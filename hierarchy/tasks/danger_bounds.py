@@ -42,6 +42,7 @@ from hierarchy.jit import bind, compiled
 from hierarchy.kinematics import point_at
 from hierarchy.limits import clipped
 from hierarchy.problem import Array
+from hierarchy.records import set_frozen
 from hierarchy.state import State
 from hierarchy.task import Level, Task
 from hierarchy.tasks.joint_limits import JointLimits
@@ -92,9 +93,7 @@ class DangerBounds(Task):
         except HierarchyError as error:
             raise HierarchyError(f"task {self.name!r}: {error}") from error
         joints, offsets = pack_points(self.points)
-        object.__setattr__(self, "danger", danger)
-        object.__setattr__(self, "joints", joints)
-        object.__setattr__(self, "offsets", offsets)
+        set_frozen(self, danger=danger, joints=joints, offsets=offsets)
 
     @property
     def dimension(self) -> int:

@@ -13,6 +13,7 @@ from hierarchy.jit import bind
 from hierarchy.kinematics import write_identity
 from hierarchy.limits import Limits, write_box
 from hierarchy.problem import Array
+from hierarchy.records import set_frozen
 from hierarchy.robot import Robot
 from hierarchy.state import State
 from hierarchy.task import Level, check_parts
@@ -63,7 +64,7 @@ class JointLimits(JointRows):
                             self.period)
         except HierarchyError as error:
             raise HierarchyError(f"task {self.name!r}: {error}") from error
-        object.__setattr__(self, "limits", limits)
+        set_frozen(self, limits=limits)
 
     def box(self, state: State, level: Level) -> tuple[Array, Array]:
         """Return the least and greatest command (n,), (n,) at a state; the box is never empty."""

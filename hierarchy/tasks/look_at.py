@@ -14,6 +14,7 @@ from hierarchy.errors import HierarchyError
 from hierarchy.jit import bind, compiled
 from hierarchy.kinematics import row_times, write_equality
 from hierarchy.problem import Array
+from hierarchy.records import set_frozen
 from hierarchy.robot import Frame
 from hierarchy.state import State
 from hierarchy.task import Level, check_parts
@@ -64,7 +65,7 @@ class LookAt(Geometric):
         if point.shape != (3,) or not np.isfinite(point).all():
             raise HierarchyError(f"task {self.name!r}: target {list(self.target)} must be three "
                                  "finite numbers [m]")
-        object.__setattr__(self, "point", point)
+        set_frozen(self, point=point)
 
     @property
     def dimension(self) -> int:

@@ -15,6 +15,7 @@ from hierarchy.errors import HierarchyError
 from hierarchy.jit import bind, compiled, inlined
 from hierarchy.kinematics import axis_at, subtract_over_period, velocity_of_point
 from hierarchy.problem import Array
+from hierarchy.records import set_frozen
 from hierarchy.robot import Frame
 from hierarchy.state import State
 from hierarchy.task import Kind, Level, Task, check_parts
@@ -51,9 +52,8 @@ class Pointing(Task):
         if not 0.0 <= self.half_angle <= np.pi:
             raise HierarchyError(f"task {self.name!r}: half_angle {self.half_angle} rad is "
                                  "outside 0 .. pi")
-        object.__setattr__(self, "z_d", axis / length)
-        object.__setattr__(self, "cos_alpha_d", cos(self.half_angle))
-        object.__setattr__(self, "z_e", np.ascontiguousarray(self.frame.rotation[:, 2]))
+        set_frozen(self, z_d=axis / length, cos_alpha_d=cos(self.half_angle),
+                   z_e=np.ascontiguousarray(self.frame.rotation[:, 2]))
 
     @property
     def dimension(self) -> int:

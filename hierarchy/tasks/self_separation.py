@@ -51,6 +51,7 @@ from hierarchy.kinematics import (
     write_point_jacobian_derivative,
 )
 from hierarchy.problem import Array
+from hierarchy.records import set_frozen
 from hierarchy.state import State
 from hierarchy.task import Kind, Level, Task
 
@@ -88,10 +89,8 @@ class SelfSeparation(Task):
         if self.kind != "inequality":
             raise HierarchyError(f"task {self.name!r}: its rows are inequalities")
         joints, table = pack_capsules(self.capsules)
-        object.__setattr__(self, "joints", joints)
-        object.__setattr__(self, "table", table)
-        object.__setattr__(self, "indices", np.array(pairs, dtype=np.int64))
-        object.__setattr__(self, "settings", self.barrier.packed())
+        set_frozen(self, joints=joints, table=table, indices=np.array(pairs, dtype=np.int64),
+                   settings=self.barrier.packed())
 
     @property
     def dimension(self) -> int:

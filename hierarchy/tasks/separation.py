@@ -43,6 +43,7 @@ from hierarchy.kinematics import (
     write_point_jacobian_derivative,
 )
 from hierarchy.problem import Array
+from hierarchy.records import set_frozen
 from hierarchy.state import State
 from hierarchy.task import Kind, Level, Task
 
@@ -75,9 +76,7 @@ class Separation(Task):
         if self.kind != "inequality":
             raise HierarchyError(f"task {self.name!r}: its rows are inequalities")
         joints, offsets = pack_points(self.points)
-        object.__setattr__(self, "joints", joints)
-        object.__setattr__(self, "offsets", offsets)
-        object.__setattr__(self, "settings", self.barrier.packed())
+        set_frozen(self, joints=joints, offsets=offsets, settings=self.barrier.packed())
 
     @property
     def dimension(self) -> int:

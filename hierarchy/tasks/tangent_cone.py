@@ -9,6 +9,7 @@ import numpy as np
 
 from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array
+from hierarchy.records import set_frozen
 from hierarchy.state import State
 from hierarchy.task import Kind, Level, Task
 
@@ -39,7 +40,7 @@ class TangentCone(Task):
         if self.task.kind != "inequality":
             raise HierarchyError(f"task {self.task.name!r}: a set-based task has inequalities, got "
                                  f"kind = {self.task.kind!r}")
-        object.__setattr__(self, "name", self.task.name)
+        set_frozen(self, name=self.task.name)
 
     @property
     def dimension(self) -> int:

@@ -14,6 +14,7 @@ from hierarchy.contacts import Contacts, write_dynamics
 from hierarchy.errors import HierarchyError
 from hierarchy.jit import bind, compiled
 from hierarchy.problem import Array
+from hierarchy.records import set_frozen
 from hierarchy.robot import Robot
 from hierarchy.state import State
 from hierarchy.task import Level, check_parts
@@ -50,7 +51,7 @@ class TorqueLimits(JointRows):
             raise HierarchyError(f"task {self.name!r}: robot {self.robot.name!r} has a floating "
                                  "base; its torques depend on contact forces, so give the contacts")
         limit = self.robot.effort_limit[self.robot.actuated:]
-        object.__setattr__(self, "limit", self.fraction * limit)
+        set_frozen(self, limit=self.fraction * limit)
 
     def error(self, state: State) -> Array:
         """Distance of the torque with x = 0 from the limits (n,) [N m or N]."""

@@ -11,10 +11,10 @@ from rich.console import Console
 from rich.table import Table
 
 from hierarchy.problem import Array, Hierarchy
+from hierarchy.words import listed
 from scenarios.bench.arms import near_singular, regular
 from scenarios.bench.candidates import NUMPY, plain_numpy
 from scenarios.bench.exact import damped, exact
-from scenarios.words import listed
 from solvers import Resolution, Resolver, Status, certify, make, names
 
 DAMPING, THRESHOLD = 0.05, 0.1  # the letter's code

@@ -21,8 +21,8 @@ from rich.table import Table
 from hierarchy import Hierarchy, Robot, State
 from hierarchy.kinematics import write_point_jacobian
 from hierarchy.problem import Array
+from hierarchy.words import listed
 from scenarios.bench.rows import write_rows
-from scenarios.words import listed
 from solvers import Resolution, Resolver, Status, make, names
 from solvers.qp.backends import BACKENDS, installed
 from solvers.resolver import Handles

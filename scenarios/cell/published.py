@@ -18,6 +18,7 @@ from hierarchy import HierarchyError, State, Task
 from hierarchy.jit import compiled
 from hierarchy.kinematics import subtract_over_period, write_point_jacobian
 from hierarchy.problem import Array
+from hierarchy.records import set_frozen
 from hierarchy.task import Level
 from hierarchy.tasks import Avoidance
 
@@ -40,7 +41,7 @@ class PublishedAvoidance(Avoidance):
         # Each point's Jacobian is taken at the mirrored place on its link [m].
         from_shoulder = [(0.0, i / 4 * 0.2, 0.0) for i in range(_UPPER_ARM_POINTS)]
         from_elbow = [(0.0, -i / 4 * 0.39, 0.0) for i in range(4)]
-        object.__setattr__(self, "offsets", np.array([*from_shoulder, *from_elbow]))
+        set_frozen(self, offsets=np.array([*from_shoulder, *from_elbow]))
 
     def jacobian(self, state: State) -> Array:
         """J_c (3, n) or r^T J_c (1, n) of the active point, with the errors."""

@@ -7,11 +7,9 @@ run stopped with a reported fault, 2 the command line or a file is invalid.
 
 from __future__ import annotations
 
-import shlex
 import sys
-from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -30,20 +28,10 @@ from scenarios.cli.options import (
     Workers,
     output,
 )
-from scenarios.cli.terminal import (
-    certified,
-    first_line,
-    levels_given_up,
-    print_json,
-    print_list,
-    print_table,
-    shown,
-    troubles,
-)
+from scenarios.cli.terminal import first_line, print_json, print_list, shown
 
 if TYPE_CHECKING:
     from scenarios.config import Scenario
-    from scenarios.measure.runs import Run
 
 app = typer.Typer(rich_markup_mode=None, pretty_exceptions_enable=False)
 app.add_typer(bench, name="bench")
@@ -156,32 +144,9 @@ def run(scenario: Annotated[str, typer.Argument(
         from scenarios.cli.view import live_command
 
         return live_command(chosen, folder, port, speed or 1.0, browser, wait)
-    from scenarios.cli.progress import bar
-    from scenarios.loop.simulation import simulate
-    from scenarios.measure.run_folder import save
+    from scenarios.cli.run import run_scenario
 
-    with bar() as told:
-        label = str(chosen.make_resolver().label)
-        recording = simulate(chosen, progress=partial(told, label),
-                             certified=certify)
-    save(recording, folder)
-    if figures:
-        from scenarios.cli.figures import redraw
-
-        redraw([folder])
-    if as_json:
-        from scenarios.measure.metrics import as_plain_data
-
-        print_json({"scenario": chosen.name, "resolver": chosen.control.resolver,
-                    "folder": shown(folder), **as_plain_data(recording)})
-        return _fault(recording.fault)
-    print_table([_run_of(chosen, recording)])
-    if certify:
-        print(f"\n{certified(recording, chosen.make_resolver().damping)}")
-    for line in (*troubles(recording), *levels_given_up(recording)):
-        print(line)
-    print(f"\n{recording.ticks} ticks in {shown(folder)}")
-    return _fault(recording.fault)
+    return run_scenario(chosen, folder, certify, figures, as_json)
 
 
 @app.command()
@@ -217,30 +182,12 @@ def compare(scenarios: Annotated[list[str], typer.Argument(
         from scenarios.cli.sweep import starts_command
 
         return starts_command(chosen, specs, starts, seed, out, workers, scheduler, as_json)
-    from scenarios.cli.progress import bar
-    from scenarios.config.resolvers import default_resolvers
+    from scenarios.cli.compare import compare_scenarios
     from scenarios.files import next_free
-    from scenarios.report.comparing import compare as run_all
 
-    missing: dict[str, str] = {}
-    for scenario in chosen if specs is None else ():
-        missing |= default_resolvers(scenario.asks)[1]
-    for spec, remedy in missing.items():
-        print(f"skipped: {spec} is not installed; {remedy}",
-              file=sys.stderr if as_json else sys.stdout)
     name = scenarios[0] if grouped else chosen[0].name
     folder = out if out is not None else next_free(Path("runs") / f"compare-{name}")
-    command = shlex.join(["hierarchy", *sys.argv[1:]])
-    with bar() as told:
-        comparison = run_all(chosen, specs, out=folder, progress=told, command=command)
-    if as_json:
-        print_json({"report": shown(folder / "index.html"), **comparison.as_plain_data()})
-    else:
-        for runs in comparison.groups().values():
-            print_table(runs)
-        print("", *comparison.refused, sep="\n" if comparison.refused else "")
-        print(f"\nReport: {shown(folder / 'index.html')}")
-    return max([_fault(f"{run.label}: {run.fault}") for run in comparison.faults], default=0)
+    return compare_scenarios(chosen, specs, folder, as_json)
 
 
 @app.command()
@@ -415,19 +362,6 @@ def _split(specs: str) -> list[str]:
     if not all(named):
         raise typer.BadParameter(f"an empty name in {specs!r}", param_hint="--resolvers")
     return named
-
-
-def _run_of(scenario: Scenario, recording: Any) -> Run:
-    from scenarios.measure.runs import Run
-
-    return Run(scenario, scenario.control.resolver, str(scenario.make_resolver().label), recording)
-
-
-def _fault(fault: str | None) -> int:
-    if fault is None:
-        return 0
-    print(f"hierarchy: fault: {fault}", file=sys.stderr)
-    return 1
 
 
 def _wrong(text: str) -> int:

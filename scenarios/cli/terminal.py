@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import sys
 from math import isfinite
 from pathlib import Path
 from textwrap import fill, wrap
@@ -116,6 +117,14 @@ def print_list(what: str, entries: dict[str, str]) -> None:
 def first_line(thing: Any) -> str:
     """Return the first line of the docstring of a class or an instance."""
     return (thing.__doc__ or "").strip().partition("\n")[0]
+
+
+def exit_code(fault: str | None) -> int:
+    """Return 0, or print a fault on standard error and return 1."""
+    if fault is None:
+        return 0
+    print(f"hierarchy: fault: {fault}", file=sys.stderr)
+    return 1
 
 
 def shown(path: Path) -> str:

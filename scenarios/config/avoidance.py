@@ -7,6 +7,7 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 import numpy as np
 from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
 
+from hierarchy.words import listed
 from scenarios.config.sections import (
     Count,
     NotNegative,
@@ -47,7 +48,7 @@ class ObstacleSection(Section):
                  "box": ("half_lengths",)}[self.shape]
         for key in ("radius", "half_length", "half_lengths"):
             if (getattr(self, key) is None) == (key in needs):
-                raise ValueError(f"a {self.shape} takes {' and '.join(needs) or 'no size'}")
+                raise ValueError(f"a {self.shape} takes {listed(needs) if needs else 'no size'}")
         if (self.centre is None) == (self.path is None):
             raise ValueError("give either a centre or a path")
         return self

@@ -9,6 +9,7 @@ from pydantic import ValidationError
 
 from hierarchy import plugins
 from hierarchy.errors import HierarchyError, UnknownNameError
+from hierarchy.words import listed
 from scenarios.config.changes import Tag
 from scenarios.config.errors import ScenarioError
 from scenarios.config.sections import PLUGIN, Section
@@ -42,8 +43,9 @@ def _say(root: type[Section], what: str, error: Any) -> str:
     where = ".".join(keys) or "file"
     if error["type"] == "extra_forbidden":
         if (having := _kinds_with(root, keys)) and len(keys) < len(error["loc"]):
-            return (f"{what}: {where}: only kind {' and '.join(map(repr, having))} has it; the "
-                    f"kind here is {str(error['loc'][-2])!r}")
+            kinds = listed([repr(kind) for kind in having])
+            return (f"{what}: {where}: only kind {kinds} has it; the kind here is "
+                    f"{str(error['loc'][-2])!r}")
         return f"{what}: {UnknownNameError('key', where, _keys_beside(root, keys))}"
     if error["type"] in ("union_tag_invalid", "union_tag_not_found"):
         tag = error["ctx"].get("tag")

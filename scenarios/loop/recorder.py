@@ -4,7 +4,10 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
+from numpy.typing import NDArray
 
 from hierarchy.allocation import AVOIDANCE
 from hierarchy.jit import bind, compiled
@@ -22,6 +25,24 @@ from scenarios.loop.truth import truth_of
 
 FASTEST = 1e3  # [rad/s or m/s] of a joint; a faster motion has diverged
 _TIMES = ("time_kinematics", "time_rows", "time_resolve", "time_tick")
+
+
+class _Tables(NamedTuple):
+    """What is written, one row per tick: numbers, choices (T, 5), times (T, 4) [s]."""
+
+    log: Array
+    choices: NDArray[np.int16]
+    times: Array
+
+
+class _Seen(NamedTuple):
+    """What is read in each tick: the state, the end effector's target, the distances [m]."""
+
+    q: Array
+    v: Array
+    placements: Array
+    target: Array
+    distance: Array
 
 
 class Recorder:
@@ -58,9 +79,9 @@ class Recorder:
         self._target = np.full((3, 3), np.nan)
         self._move_target = cell.position.path.writer(self._target) if cell.position else None
         self._write_rest = bind(
-            _write, self._log, self._choices, self._times, state.q, state.v, state.placements,
-            self._frame.joint, self._frame.offset, self._target, self._distance,
-            then=(*(0,) * 6, *(0.0,) * 6))
+            _write, _Tables(self._log, self._choices, self._times),
+            _Seen(state.q, state.v, state.placements, self._target, self._distance),
+            self._frame.joint, self._frame.offset, then=(0, (0,) * 5, (0.0,) * 6))
         self._blend, self._policy = controller.blend, controller.policy
 
     def write(self) -> bool:
@@ -76,9 +97,9 @@ class Recorder:
         if self._move_target is not None:
             self._move_target(cell.state.t)
         finite = _write_given(self._log, k, self._given, plant.a, controller.sent)
-        finite &= self._write_rest(k, index, active, repulsion, resolution.status,
-                                   resolution.iterations, cell.state.t, controller.cone_error,
-                                   *controller.stamps)
+        finite &= self._write_rest(
+            k, (index, active, repulsion, resolution.status, resolution.iterations),
+            (cell.state.t, controller.cone_error, *controller.stamps))
         if self._extra:
             for name, value in plant.extra.items():
                 self._extra[name][k] = value
@@ -168,36 +189,34 @@ def _write_given(log, k, first, a, command):
 
 
 @compiled
-def _write(log, choices, times, q, v, placements, joint, offset, target, distance,
-           k, order, active, repulsion, status, iterations, t, cone_error,
-           begin, moved, written, resolved):
-    """Write the rest of tick k; return whether q is finite and v within FASTEST."""
-    row = log[k]
+def _write(tables, seen, joint, offset, k, chosen, measured):
+    """Write the rest of tick k; return whether q is finite and v within FASTEST.
+
+    chosen: order, active point, repulsion, status, iterations. measured: t, the error of the cone,
+    and the clock at the begin of the tick and after kinematics, rows and resolution.
+    """
+    row, finite = tables.log[k], True
+    t, cone_error, begin, moved, written, resolved = measured
     row[0] = t
     i = 1
-    finite = True
-    for j in range(len(q)):
-        row[i + j] = q[j]
-        finite &= np.isfinite(q[j])
-    i += len(q)
-    for j in range(len(v)):
-        row[i + j] = v[j]
-        finite &= abs(v[j]) <= FASTEST
-    i += 3 * len(v)
+    for j in range(len(seen.q)):
+        row[i + j] = seen.q[j]
+        finite &= np.isfinite(seen.q[j])
+    i += len(seen.q)
+    for j in range(len(seen.v)):
+        row[i + j] = seen.v[j]
+        finite &= abs(seen.v[j]) <= FASTEST
+    i += 3 * len(seen.v)
     for j in range(3):
-        row[i + j] = point_at(placements, joint, offset, j)
-        row[i + 3 + j] = target[0, j]
+        row[i + j] = point_at(seen.placements, joint, offset, j)
+        row[i + 3 + j] = seen.target[0, j]
     row[i + 6] = cone_error
     i += 7
-    for j in range(len(distance)):
-        row[i + j] = distance[j]
-    choices[k, 0] = order
-    choices[k, 1] = active
-    choices[k, 2] = repulsion
-    choices[k, 3] = status
-    choices[k, 4] = min(iterations, 32767)
-    times[k, 0] = moved - begin
-    times[k, 1] = written - moved
-    times[k, 2] = resolved - written
-    times[k, 3] = begin
+    for j in range(len(seen.distance)):
+        row[i + j] = seen.distance[j]
+    for j in range(len(chosen)):
+        tables.choices[k, j] = min(chosen[j], 32767)
+    times = tables.times[k]
+    times[0], times[1], times[2] = moved - begin, written - moved, resolved - written
+    times[3] = begin
     return finite

@@ -8,10 +8,10 @@ from itertools import groupby
 from operator import itemgetter
 from typing import TYPE_CHECKING
 
+from hierarchy.words import listed
 from scenarios.measure.motions import ALIKE, departure, motions
 from scenarios.measure.wording import TIE, Clause, at, digits, measured, mm, who, within
 from scenarios.measure.wrongs import soundest, wrongs
-from scenarios.words import listed
 
 if TYPE_CHECKING:
     from scenarios.measure.runs import Run

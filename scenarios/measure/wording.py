@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from scenarios.words import listed
+from hierarchy.words import listed
 
 if TYPE_CHECKING:
     from scenarios.measure.runs import Run

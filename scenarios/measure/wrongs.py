@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hierarchy.words import in_words, listed
 from scenarios.config.avoidance import SeparationSection
 from scenarios.measure.wording import Clause, digits, measured, mm, value, who
-from scenarios.words import in_words, listed
 
 if TYPE_CHECKING:
     from scenarios.measure.runs import Run

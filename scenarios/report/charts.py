@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from markupsafe import Markup
 
+from hierarchy.words import listed
 from scenarios.draw.figures import drawing, panels
 from scenarios.draw.figures.palette import Look, task_colours
 from scenarios.draw.figures.timeline import tasks, timeline
@@ -14,7 +15,6 @@ from scenarios.measure.motions import ALIKE, Motion, motions
 from scenarios.report import figures
 from scenarios.report.tables import events
 from scenarios.report.templates import drawn, render
-from scenarios.words import listed
 
 if TYPE_CHECKING:
     from scenarios.loop.recording import Recording

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 from markupsafe import Markup
 
 from hierarchy.errors import HierarchyError
+from hierarchy.words import in_words, listed
 from scenarios.measure.motions import Motion
 from scenarios.report.templates import render
-from scenarios.words import in_words, listed
 
 if TYPE_CHECKING:
     from scenarios.loop.recording import Recording

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from markupsafe import Markup
 
+from hierarchy.words import in_words
 from scenarios.config.scenario import OWN
 from scenarios.draw.figures import drawing
 from scenarios.draw.figures.palette import Look, looks
@@ -17,7 +18,6 @@ from scenarios.report import charts, tables
 from scenarios.report.commands import commands
 from scenarios.report.embedded import replay
 from scenarios.report.templates import drawn, render, resource
-from scenarios.words import in_words
 
 if TYPE_CHECKING:
     from scenarios.measure.comparison import Comparison

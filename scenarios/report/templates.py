@@ -11,9 +11,9 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 from matplotlib.figure import Figure
 
+from hierarchy.words import listed
 from scenarios.draw.figures import drawing
 from scenarios.files import slug
-from scenarios.words import listed
 
 _NUMBER = re.compile(r"[0-9.]+e-[0-9]+")
 

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from markupsafe import Markup
 
+from hierarchy.words import in_words, listed
 from scenarios.config.distributions import Distribution
 from scenarios.draw.figures.palette import Look, looks
 from scenarios.files import slug
@@ -22,7 +23,6 @@ from scenarios.sweep import figures
 from scenarios.sweep.planning import Plan, Planned
 from scenarios.sweep.results import Failure, Results, Worst, compared, summary
 from scenarios.sweep.verdict import verdict
-from scenarios.words import in_words, listed
 
 _FAILURES = 20  # reasons listed
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
+from hierarchy.words import listed
 from scenarios.config import Scenario
 from scenarios.measure.metrics import Metric
 from scenarios.measure.verdict import Verdict
 from scenarios.sweep.results import Criterion, Results, Share, valued
-from scenarios.words import listed
 
 _IN_WORDS = {"Reached the end": "reached the end", "Touched nothing": "touched nothing",
              "Kept the joint limits": "kept the joint limits",

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from hierarchy.words import listed
 from scenarios.config import Scenario, load
 from scenarios.loop.recording import versions
 from scenarios.sweep.config import Sweep, find, load_sweep
@@ -18,7 +19,6 @@ from scenarios.sweep.page import Page, name_of
 from scenarios.sweep.planning import Plan, Planned, plan
 from scenarios.sweep.results import Results, joined, results
 from scenarios.sweep.store import Store, write_table, write_text
-from scenarios.words import listed
 
 Progress = Callable[[str, int, int], None]
 

@@ -10,10 +10,10 @@ import numpy as np
 
 from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array, Hierarchy, check_rows
+from hierarchy.records import set_frozen
 from hierarchy.state import State
 from hierarchy.task import Level, Task
 from solvers.adapters import displacements
-from solvers.resolver import set_frozen
 
 if TYPE_CHECKING:
     from pink import Configuration

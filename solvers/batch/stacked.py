@@ -20,13 +20,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array, Hierarchy
+from hierarchy.records import set_frozen
 from solvers.kernels.batch import (
     batch_exact,
     batch_saturation,
     batch_staircase,
     batch_without_bounds,
 )
-from solvers.resolver import Resolver, make, refuse_inequality, set_frozen
+from solvers.resolver import Resolver, make, refuse_inequality
 from solvers.resolvers.hcod import Hcod, record_without_bounds, settle_doubt, solve_anew
 from solvers.resolvers.tpm import Tpm, solve_at_bounds
 from solvers.status import INACCURATE, NUMERICAL_FAILURE, SOLVED, UNPROVED, Status

@@ -11,9 +11,10 @@ import numpy as np
 
 from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array, Hierarchy
+from hierarchy.records import set_frozen
 from solvers.kernels.damped import CHIAVERINI, NAKAMURA, SELECTIVE, damped_recursion
 from solvers.kernels.recursion import recursion
-from solvers.resolver import Resolution, Resolver, register, set_frozen
+from solvers.resolver import Resolution, Resolver, register
 from solvers.workspace import WORKSPACE
 
 _METHODS = {"level": 0.0, "nakamura": NAKAMURA, "chiaverini": CHIAVERINI, "selective": SELECTIVE}

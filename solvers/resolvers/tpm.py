@@ -10,6 +10,7 @@ import numpy as np
 
 from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array, Hierarchy
+from hierarchy.records import set_frozen
 from solvers.kernels.bounds import name_saturation, solve_without_bounds
 from solvers.kernels.published import matrix_as_published, solve_as_published
 from solvers.kernels.staircase import solve_by_staircase
@@ -20,7 +21,6 @@ from solvers.resolver import (
     refuse_inequality,
     register,
     register_variant,
-    set_frozen,
 )
 from solvers.resolvers.hcod import Hcod, settle_doubt, solve_anew, solve_exactly, warm_record
 from solvers.resolvers.saturation import SaturatedResolution

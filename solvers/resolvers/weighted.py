@@ -12,11 +12,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array, Hierarchy
+from hierarchy.records import set_frozen
 from solvers.kernels.weighted import weighted, weighted_steps
 from solvers.qp.backends import BACKENDS, backend_of
 from solvers.qp.programs import slack_program
 from solvers.qp.refinement import Rows
-from solvers.resolver import Handles, Resolution, Resolver, register, set_frozen
+from solvers.resolver import Handles, Resolution, Resolver, register
 from solvers.resolvers.hcod import Hcod, warm_record
 from solvers.status import SOLVED, TOO_SMALL, UNPROVED, Status
 from solvers.workspace import WORKSPACE, run

@@ -1,5 +1,6 @@
 """The repository itself: what it promises about set-up, documents and imports."""
 
+import ast
 import re
 import subprocess
 import sys
@@ -103,3 +104,47 @@ def test_what_a_package_says_it_exports_is_there(package):
         assert callable(getattr(module, name))
     with pytest.raises(AttributeError, match="no attribute 'nothing'"):
         _ = module.nothing
+
+
+@pytest.mark.parametrize("package", ["hierarchy", "solvers", "scenarios"])
+def test_the_map_names_every_part_of_a_package_in_the_order_of_the_layers(package):
+    told = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    section = told.partition(f"### `{package}/`")[2].partition("\n#")[0]
+    on_map = [name.removesuffix("/").removesuffix(".py")
+              for name in re.findall(r"^\| `([^`]+)` \|", section, re.MULTILINE)]
+    assert sorted(on_map) == sorted(
+        path.stem for path in (ROOT / package).iterdir()
+        if path.suffix == ".py" or (path.is_dir() and path.name != "__pycache__")
+        if path.name != "__init__.py")
+    linted = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["importlinter"]
+    layers = next(contract["layers"] for contract in linted["contracts"]
+                  if contract.get("containers") == [package])
+    layer_of = {name: i for i, layer in enumerate(layers) for name in layer.split(" | ")}
+    code = [name for name in on_map if name != "library" or package != "scenarios"]  # TOML only
+    assert [layer_of[name] for name in code] == sorted(layer_of.values())
+
+
+@pytest.fixture(scope="module")
+def functions():
+    """Return every function of the packages outside `solvers/kernels`, with where it is."""
+    return [(f"{file.relative_to(ROOT)}: {node.name}", node)
+            for package in ("hierarchy", "solvers", "scenarios")
+            for file in sorted((ROOT / package).rglob("*.py"))
+            if "kernels" not in file.parts
+            for node in ast.walk(ast.parse(file.read_text(encoding="utf-8")))
+            if isinstance(node, ast.FunctionDef)]
+
+
+def test_functions_are_short(functions):
+    lengths = sorted(node.end_lineno - node.lineno + 1 for _, node in functions)
+    assert lengths[len(lengths) // 2] <= 8
+    assert lengths[len(lengths) * 9 // 10] <= 20
+
+
+def test_no_function_has_more_than_eight_positional_arguments(functions):
+    """Those of commands are options of a command line; `solve_ik` has those of pink."""
+    many = [where for where, node in functions
+            if len([one for one in (*node.args.posonlyargs, *node.args.args)
+                    if one.arg not in ("self", "cls")]) > 8
+            and not any("app.command" in ast.unparse(mark) for mark in node.decorator_list)]
+    assert many == ["solvers/adapters/for_pink.py: solve_ik"]

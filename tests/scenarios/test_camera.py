@@ -18,6 +18,8 @@ TURNED = ((0.36, 0.48, -0.8), (-0.8, 0.6, 0.0), (0.48, 0.64, 0.6))
 SHAPES = {
     "sphere": Obstacle("sphere", (0.1, 0.0, 2.0), (0.3,)),
     "capsule": Obstacle("capsule", (-0.1, 0.1, 2.0), (0.1, 0.4), TURNED),
+    "capsule across": Obstacle("capsule", (0.05, 0.1, 2.0), (0.1, 0.4),
+                               ((0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))),
     "capsule along the axis": Obstacle("capsule", (0.02, 0.01, 2.0), (0.1, 0.4)),
     "box": Obstacle("box", (0.0, 0.1, 2.0), (0.3, 0.2, 0.5), TURNED),
     "box along the axes": Obstacle("box", (0.2, 0.1, 1.5), (0.3, 0.2, 0.5)),

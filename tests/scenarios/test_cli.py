@@ -176,7 +176,7 @@ def test_an_output_folder_that_cannot_be_written_stops_the_run_before_it_begins(
 
 
 def simulation_is(stand_in, monkeypatch):
-    for module in ("scenarios.loop.simulation", "scenarios.report.comparing"):
+    for module in ("scenarios.cli.run", "scenarios.report.comparing"):
         monkeypatch.setattr(importlib.import_module(module), "simulate", stand_in)
 
 

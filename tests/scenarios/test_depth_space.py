@@ -38,7 +38,7 @@ def at(*places):
 def seen_in(image, *places, pinhole=FACING, region=0.4, support=1, **settings):
     """Measure points in an image (h, w) without a robot in it."""
     space = DepthSpace(pinhole, at(*places), (), region, support=support, **settings)
-    obstacles = ObstacleImage(pinhole)
+    obstacles = ObstacleImage.empty(pinhole.height, pinhole.width)
     space.find_obstacles(np.asarray(image, np.float32), STATE.placements, obstacles)
     return space.measure(obstacles, STATE.placements)
 
@@ -195,7 +195,7 @@ def test_the_distance_to_a_surface_that_is_seen_is_never_overestimated_beyond_it
             continue
         scene = DepthCamera(SIDE, Obstacles([obstacle]), (), errors, seed=i)
         space = DepthSpace(SIDE, at(place), (), region=2.0)
-        obstacles = ObstacleImage(SIDE)
+        obstacles = ObstacleImage.empty(SIDE.height, SIDE.width)
         space.find_obstacles(scene.image(0, STATE)[0], STATE.placements, obstacles)
         estimate = space.measure(obstacles, STATE.placements).distance[0]
         bound = space.overestimate(nearest, errors.bound(depth) if noisy else 0.0)
@@ -213,7 +213,7 @@ def test_the_arm_does_not_avoid_itself():
     errors = DepthErrors(outliers=0.0)
     camera = DepthCamera(SIDE, Obstacles(), CAPSULES, errors, backdrop=4.0)
     space = DepthSpace(SIDE, ExactDistances(ROBOT, Obstacles()).points, CAPSULES, region=0.4)
-    rng, obstacles = np.random.default_rng(8), ObstacleImage(SIDE)
+    rng, obstacles = np.random.default_rng(8), ObstacleImage.empty(SIDE.height, SIDE.width)
     for i in range(60):
         state = State.at(ROBOT, rng.uniform(0.9 * ROBOT.lower, 0.9 * ROBOT.upper))
         space.find_obstacles(*camera.image(i, state), obstacles)

@@ -167,6 +167,12 @@ def test_the_verdict_says_what_was_done_in_ticks_with_trouble():
     assert "tpm-published braked in 2 ticks" in words(runs)
 
 
+def test_a_run_that_does_not_say_whether_its_ticks_were_solved_had_an_answer_in_all():
+    silent = made(LETTER)
+    del silent.recording.signals["status"]
+    assert "had no answer" not in words([silent, made("hqp")])
+
+
 def test_the_verdict_of_runs_that_all_broke_is_only_that():
     assert words([made("hqp", error="broke")]) == "hqp did not reach the end: broke."
 

@@ -1,6 +1,7 @@
 """The certificate accepts the answer, and nothing that differs from it where it matters."""
 
 import ast
+import itertools
 from pathlib import Path
 
 import lexicographic
@@ -346,6 +347,51 @@ def test_least_squares_of_no_columns_leave_everything():
     y, left = certificate._least_squares(np.eye(2), b, np.zeros(2, dtype=bool))
     assert (y == 0.0).all()
     assert np.array_equal(left, b)
+
+
+def least_of_all_subsets(C, b):
+    """Residual of min |C z - b| over z >= 0, by trying every set of positive entries."""
+    residuals = [np.linalg.norm(b)]
+    for count in range(1, C.shape[1] + 1):
+        for chosen in itertools.combinations(range(C.shape[1]), count):
+            part = C[:, chosen]
+            y = np.linalg.lstsq(part, b, rcond=None)[0]
+            if (y >= 0.0).all():
+                residuals.append(np.linalg.norm(part @ y - b))
+    return min(residuals)
+
+
+both_searches = pytest.mark.parametrize("search", [certificate._non_negative,
+                                                   certificate._non_negative_by_scipy])
+
+
+@both_searches
+@pytest.mark.parametrize("scale", [1.0, 1e-4, 1e-200])
+def test_each_search_finds_the_non_negative_least_squares(search, scale):
+    r = rng()
+    for _ in range(60):
+        C = r.normal(size=(4, 5)) * 10.0 ** r.uniform(-3.0, 0.0, 5)
+        b = r.normal(size=4)
+        z = search(C, scale * b, 0.0) / scale
+        assert (z >= 0.0).all()
+        assert np.linalg.norm(C @ z - b) <= least_of_all_subsets(C, b) + 1e-9
+
+
+@both_searches
+def test_a_search_leaves_out_columns_of_zeros_and_of_what_is_not_finite(search):
+    C = np.array([[0.0, 0.5, np.inf, 0.0], [0.0, 0.0, 1.0, 0.25]])
+    assert search(C, np.array([1.0, 1.0]), 0.0) == pytest.approx([0.0, 2.0, 0.0, 4.0])
+    assert (search(C, np.zeros(2), 0.0) == 0.0).all()
+    assert (search(C[:, ::2], np.ones(2), 0.0) == 0.0).all()
+
+
+def test_a_row_counts_as_parallel_to_another_where_only_rounding_tells_them_apart():
+    """Three rows of two directions: the third is the first, but for 1e-13 along the second."""
+    P = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 1e-13, 0.0]])
+    _, T, pivot, angle, rank = certificate._graded(P, np.array([2.0, 1.0, 1.0]), 1e-9)
+    assert rank == 2
+    np.testing.assert_array_equal(np.abs(T), [[1.0, 0.0, 1.0], [0.0, 1.0, 0.0], [0.0, 0.0, 0.0]])
+    assert (pivot, angle) == pytest.approx((1.0, 1e-13))
 
 
 @pytest.mark.parametrize(("stationarity", "nearest", "verdict"), [

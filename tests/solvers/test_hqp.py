@@ -137,6 +137,12 @@ def test_inequalities_that_hold_already_are_not(hqp):
     assert hqp.solve(Hierarchy.from_levels(satisfied)).iterations <= 1
 
 
+@every_backend
+def test_without_rows_no_program_is_put_to_the_backend_and_no_answer_corrected(hqp):
+    found = hqp.solve(Hierarchy.from_levels([(np.empty((0, 7)), [])]))
+    assert (found.iterations, found.corrected) == (0, 0)
+
+
 def test_backends_differ_in_the_last_digits_of_an_equality():
     """Else they would all be one and the same least squares."""
     h = Hierarchy.from_levels(generic())

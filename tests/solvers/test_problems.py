@@ -73,6 +73,13 @@ def test_many_sides_pass_through_one_point():
     pytest.fail("no vertex of many rows")
 
 
+def test_two_rows_are_enough_to_repeat_one():
+    made = everything(dataclasses.replace(PLAIN, joints=(3, 3), levels=(1, 1), rows=(2, 2),
+                                          duplicates=1.0, rank_lost=0.0, simple_bounds=0.0,
+                                          empty=0.0, near_parallel=0.0))
+    assert sum(rank(unit(h)) == 1 for h in made) > len(made) / 3  # in half a row copies itself
+
+
 def test_conflicts_leave_violations():
     made = everything(Recipe(equalities_only=True, conflicting=1.0))
     assert sum(h.violations(make("tpm").solve(h).x).max() > 1e-3 for h in made) > len(made) / 3

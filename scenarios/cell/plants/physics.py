@@ -5,14 +5,14 @@
 from __future__ import annotations
 
 from math import ceil
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hierarchy import Robot, State
 from hierarchy.avoidance import Obstacles
-from hierarchy.jit import compiled
+from hierarchy.jit import bind, compiled
 from hierarchy.problem import Array
 from hierarchy.robots import TABLES, DHTable
 from hierarchy.task import Level
@@ -22,6 +22,26 @@ from scenarios.config.plant import JointsSection, ServoSection
 
 _ROUNDING = 1e-9  # of a number of steps
 _ARMS = [name for name, table in TABLES.items() if isinstance(table, DHTable)]
+
+
+class _Servo(NamedTuple):
+    """How a reference follows commands: period [s], joint limits (n,), lead, share fed forward."""
+
+    period: float
+    acceleration: bool
+    lower: Array
+    upper: Array
+    lead: float
+    feedforward: float
+
+
+class _Reference(NamedTuple):
+    """The servos' reference: position and rate (n,), acceleration, and its steps (steps, 2 n)."""
+
+    q: Array
+    v: Array
+    a: Array
+    steps: Array
 
 
 class PhysicsArm:
@@ -45,7 +65,7 @@ class PhysicsArm:
             raise ScenarioError(f'plant.kind = "mujoco": robot {robot.name!r} is not one of '
                                 f"{', '.join(_ARMS)}, the arms given as tables")
         self._steps = ceil(period * servo.rate - _ROUNDING)
-        self._period, self._acceleration = period, level == "acceleration"
+        self._period = period
         self.stiffness, self.damping = _gains(robot, q, servo, joints)
         self._obstacles = obstacles or Obstacles()
         self.model = mujoco.MjModel.from_xml_string(
@@ -53,8 +73,8 @@ class PhysicsArm:
                   servo, (self.stiffness, self.damping), period / self._steps))
         self.data = mujoco.MjData(self.model)
         self._step, self._force_of = mujoco.mj_step, mujoco.mj_contactForce
-        self._lower, self._upper = robot.lower, robot.upper
-        self._lead, self._feedforward = servo.lead, float(servo.feedforward)
+        self._servo = _Servo(period, level == "acceleration", robot.lower, robot.upper, servo.lead,
+                             float(servo.feedforward))
         self._placed = self._bodies(mujoco)
         self._start(mujoco, q, v)
 
@@ -66,7 +86,11 @@ class PhysicsArm:
         self.q, self.v, self.a = q.copy(), v.copy(), np.zeros(len(v))
         self.reference_q, self.reference_v = q.copy(), v.copy()
         self._time, self._wrench = 0.0, np.zeros(6)
+        self._command = np.zeros(len(v))
         self._references = np.zeros((self._steps, 2 * len(v)))
+        self._follow = bind(
+            _follow, self._command, self.q, self._servo,
+            _Reference(self.reference_q, self.reference_v, self.a, self._references))
         self._contacts = np.zeros((), dtype=np.int16)
         self._depth, self._force = np.zeros(()), np.zeros(())
         self.extra: dict[str, NDArray[Any]] = {
@@ -77,9 +101,8 @@ class PhysicsArm:
 
     def act(self, command: Array) -> None:
         """Apply a command (n,) for one period."""
-        _follow(command, self._period, self._acceleration, self._lower, self._upper, self._lead,
-                self._feedforward, self.q, self.reference_q, self.reference_v, self.a,
-                self._references)
+        self._command[:] = command
+        self._follow()
         self._contacts[...], self._depth[...], self._force[...] = 0, 0.0, 0.0
         dt = self._period / self._steps
         for i, reference in enumerate(self._references):
@@ -136,29 +159,28 @@ def _gains(robot: Robot, q: Array, servo: ServoSection,
 
 
 @compiled
-def _follow(x, T, acceleration, lower, upper, lead, feedforward, q, reference_q, reference_v, a,
-            references):
-    """Move the reference by one command, and interpolate it: `references` (steps, 2 n)."""
-    n, steps = len(q), references.shape[0]
+def _follow(x, q, servo, reference):
+    """Move the reference by one command, and interpolate it: `reference.steps` (steps, 2 n)."""
+    T, lead, n, steps = servo.period, servo.lead, len(q), reference.steps.shape[0]
     for i in range(n):
-        rate = reference_v[i]
-        if acceleration:
-            a[i] = x[i]
+        rate = reference.v[i]
+        if servo.acceleration:
+            reference.a[i] = x[i]
             after = rate + x[i] * T
             step = rate * T + x[i] * T * T / 2
         else:
-            a[i] = (x[i] - rate) / T
+            reference.a[i] = (x[i] - rate) / T
             after = x[i]
             step = x[i] * T
-        asked = reference_q[i] + step
+        asked = reference.q[i] + step
         # A reference beyond a limit, where the arm started, may come back at its own pace.
-        low, up = min(lower[i], reference_q[i]), max(upper[i], reference_q[i])
+        low, up = min(servo.lower[i], reference.q[i]), max(servo.upper[i], reference.q[i])
         allowed = min(max(asked, q[i] - lead, low), q[i] + lead, up)
         if allowed != asked:  # the reference is held, and its rate is what it still does
-            step = allowed - reference_q[i]
+            step = allowed - reference.q[i]
             after = step / T
         for k in range(steps):
-            references[k, i] = reference_q[i] + step * (k + 1) / steps
-            references[k, n + i] = feedforward * step / T
-        reference_q[i] += step
-        reference_v[i] = after
+            reference.steps[k, i] = reference.q[i] + step * (k + 1) / steps
+            reference.steps[k, n + i] = servo.feedforward * step / T
+        reference.q[i] += step
+        reference.v[i] = after

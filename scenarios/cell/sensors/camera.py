@@ -12,6 +12,7 @@ from hierarchy import HierarchyError, State
 from hierarchy.avoidance import Capsule, Obstacles
 from hierarchy.avoidance.self_collision import pack_capsules
 from hierarchy.problem import Array
+from hierarchy.records import set_frozen
 from scenarios.cell.sensors.errors import DepthErrors, Image, expose
 from scenarios.cell.sensors.rendering import draw_scene
 
@@ -43,7 +44,7 @@ class Pinhole:
                 raise HierarchyError(f"camera: {name} = {getattr(self, name)} px must be positive")
         for name, size in (("cx", self.width), ("cy", self.height)):
             if getattr(self, name) is None:
-                object.__setattr__(self, name, (size - 1) / 2)
+                set_frozen(self, **{name: (size - 1) / 2})
         R = np.asarray(self.rotation, dtype=float)
         if R.shape != (3, 3) or not np.abs(R @ R.T - np.eye(3)).max() < _SKEW or (
                 np.linalg.det(R) < 0.0):

@@ -11,9 +11,10 @@ from hierarchy import State
 from hierarchy.avoidance import ControlPoint, Measurement, Obstacles
 from hierarchy.problem import Array
 from scenarios.cell.sensors.camera import Pinhole
-from scenarios.cell.sensors.depth_space import DepthSpace, ObstacleImage
+from scenarios.cell.sensors.depth_space import DepthSpace
 from scenarios.cell.sensors.errors import Image
 from scenarios.cell.sensors.exact import ExactDistances
+from scenarios.cell.sensors.pixels import ObstacleImage
 
 _ROUNDING = 1e-9  # [s] of times that are compared
 
@@ -56,7 +57,7 @@ class DepthSensor:
         self.stopped = self.covered = False
         self.outside = 0.0
         self._exact = exact
-        self._nothing = self._current = ObstacleImage(space.pinhole)
+        self._nothing = self._current = self._empty()
         self._spare: list[ObstacleImage] = []
         self._coming: deque[tuple[float, ObstacleImage]] = deque()
         self._frame, self._now = -1, -inf
@@ -94,12 +95,16 @@ class DepthSensor:
         self.outside = perf_counter() - begin
         if self.covered:
             self.reading[:] = 0.0
-        image = self._spare.pop() if self._spare else ObstacleImage(self.space.pinhole)
+        image = self._spare.pop() if self._spare else self._empty()
         read = self.space.find_obstacles(self.reading, placements, image)
         if read < self.least_readings or read == 0.0:
             self._keep(image)
         else:
             self._coming.append((state.t, image))
+
+    def _empty(self) -> ObstacleImage:
+        pinhole = self.space.pinhole
+        return ObstacleImage.empty(pinhole.height, pinhole.width)
 
     def _keep(self, image: ObstacleImage) -> None:
         if image is not self._nothing:

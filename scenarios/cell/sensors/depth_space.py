@@ -12,25 +12,21 @@ from hierarchy.avoidance import Capsule, ControlPoint, Measurement, Pairs, Repul
 from hierarchy.avoidance.control_points import pack_points
 from hierarchy.avoidance.repulsion import laws
 from hierarchy.avoidance.self_collision import pack_capsules
+from hierarchy.jit import bind
 from hierarchy.problem import Array
 from scenarios.cell.sensors.camera import Pinhole
 from scenarios.cell.sensors.errors import Image
-from scenarios.cell.sensors.pixels import TILE, farthest, find_obstacles, measure_pixels
+from scenarios.cell.sensors.pixels import (
+    ObstacleImage,
+    Space,
+    farthest,
+    find_obstacles,
+    measure_pixels,
+)
 from scenarios.cell.sensors.rendering import draw_robot
 
 NO_LAWS = np.array([[0.0, 1.0, 1.0, 1.0]] * 2)  # r_max = 0
 _ON_ITS_WAY = 0.3  # [m]
-
-
-class ObstacleImage:
-    """Depths (h, w) [m] of the pixels that show an obstacle, 0 elsewhere."""
-
-    __slots__ = ("depth", "tiles")
-
-    def __init__(self, pinhole: Pinhole) -> None:
-        self.depth = np.zeros((pinhole.height, pinhole.width), np.float32)
-        self.tiles = np.full((-(-pinhole.height // TILE), -(-pinhole.width // TILE)), inf,
-                             np.float32)
 
 
 class DepthSpace:
@@ -69,11 +65,12 @@ class DepthSpace:
             self.measurement.pairs = self._pairs
         self._eye, self._margin = pinhole.packed(), margin
         self._support, self._band = support, band
-        self._thin, self._mean = thin, np.array(mean_within)
-        self._joints, self._offsets = pack_points(points)
         self._links, self._capsules = pack_capsules(capsules)
-        self._laws = laws(body, tip) if body and tip else NO_LAWS
-        self._robot = ObstacleImage(pinhole).depth
+        self._space = Space(*pack_points(points), self._eye, region, thin, np.array(mean_within),
+                            laws(body, tip) if body and tip else NO_LAWS)
+        self._image: ObstacleImage | None = None
+        self._placements: Array | None = None
+        self._robot = ObstacleImage.empty(pinhole.height, pinhole.width).depth
 
     def find_obstacles(self, reading: Image, placements: Array, into: ObstacleImage) -> float:
         """Fill an obstacle image from a reading (h, w) [m] and the robot's placements then.
@@ -82,17 +79,18 @@ class DepthSpace:
         next frame, are ignored. Returns the share of valid pixels, which are neither 0 nor NaN.
         """
         draw_robot(self._robot, self._eye, placements, self._links, self._capsules, self._margin)
-        beyond = farthest(placements, self._joints, self._offsets, self._eye)
+        beyond = farthest(placements, self._space.joints, self._space.offsets, self._eye)
         return float(find_obstacles(reading, self._robot, self._support, self._band,
                                     beyond + self.region + _ON_ITS_WAY, into.depth, into.tiles))
 
     def measure(self, obstacles: ObstacleImage, placements: Array) -> Measurement:
         """Measure the points of the robot at its current placements; valid until the next call."""
         seen = self.measurement
-        seen.active = measure_pixels(
-            placements, self._joints, self._offsets, self._eye, obstacles.depth, obstacles.tiles,
-            self.region, self._thin, self._mean, self._laws, seen.points, seen.distance,
-            seen.direction, seen.magnitude, seen.nearest, self._pairs.table)
+        if obstacles is not self._image or placements is not self._placements:
+            self._image, self._placements = obstacles, placements
+            self._measure = bind(measure_pixels, placements, self._space, obstacles, seen.arrays,
+                                 self._pairs.table)
+        seen.active = self._measure()
         return seen
 
     def overestimate(self, point: Array, error: float) -> float:

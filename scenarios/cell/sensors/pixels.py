@@ -11,15 +11,48 @@ avoidance", ICRA 2012 (the letter's [8]); equation numbers are those of the lett
 from __future__ import annotations
 
 from math import sqrt
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hierarchy.avoidance.repulsion import repulsion
+from hierarchy.avoidance.self_collision import dot
 from hierarchy.jit import compiled
 from hierarchy.kinematics import place
+from hierarchy.problem import Array
 from scenarios.cell.sensors.rendering import in_camera, pixels_of_ball
 
 TILE = 16  # pixels to a side
+
+
+class ObstacleImage(NamedTuple):
+    """Depths (h, w) [m] of the pixels that show an obstacle, 0 elsewhere; least depths of tiles."""
+
+    depth: NDArray[np.float32]
+    tiles: NDArray[np.float32]
+
+    @staticmethod
+    def empty(height: int, width: int) -> ObstacleImage:
+        """Return an image without obstacles."""
+        return ObstacleImage(np.zeros((height, width), np.float32),
+                             np.full((-(-height // TILE), -(-width // TILE)), np.inf, np.float32))
+
+
+class Space(NamedTuple):
+    """What is measured, and how; see `DepthSpace`.
+
+    joints (P,), offsets (P, 3) of the control points, the end effector last; region, thin [m]; mean
+    (2,) is its mean_within; laws (2, 4) of `repulsion.laws`.
+    """
+
+    joints: NDArray[np.int64]
+    offsets: Array
+    eye: Array
+    region: float
+    thin: float
+    mean: Array
+    laws: Array
 
 
 @compiled
@@ -76,36 +109,62 @@ def _supported(depth, v, u, support, band):
 
 
 @compiled
-def measure_pixels(placements, joints, offsets, eye, depth, tiles, region, thin, mean, laws,
-                   points, distance, direction, magnitude, nearest, pairs):
-    """Fill the arrays of a Measurement, and pairs (P, 1, 14), from an obstacle image.
+def measure_pixels(placements, space, image, seen, pairs):
+    """Fill the readings of a Measurement, and pairs (P, 1, 14), from an obstacle image.
 
-    joints (P,), offsets (P, 3) of the control points, the end effector last; see `DepthSpace` for
-    region and thin; mean (2,) is its mean_within; laws (2, 4) of `repulsion.laws`. Returns the
-    active control point.
+    Returns the active control point.
     """
-    count = len(joints)
+    count = len(space.joints)
     active, D_minimal = -1, np.inf
     for k in range(count):
-        x, y, z = place(placements[joints[k]], offsets[k, 0], offsets[k, 1], offsets[k, 2])
-        points[k, 0], points[k, 1], points[k, 2] = x, y, z
-        pair = pairs[k, 0]
-        law = 1 if k == count - 1 else 0
-        D_min = _nearest(eye, depth, tiles, region, thin, mean[law], x, y, z, direction[k], pair,
-                         nearest, k)
-        distance[k] = pair[0] = D_min
-        magnitude[k] = repulsion(D_min, laws[law, 0], laws[law, 1], laws[law, 2],
-                                 laws[law, 3]) if D_min < np.inf else 0.0  # (23)
+        offset = space.offsets[k]
+        point = place(placements[space.joints[k]], offset[0], offset[1], offset[2])
+        seen.points[k, 0], seen.points[k, 1], seen.points[k, 2] = point
+        which = 1 if k == count - 1 else 0
+        D_min, at = _nearest(space, image, space.mean[which], point, seen.direction[k], pairs[k, 0])
+        seen.nearest[k], seen.distance[k], pairs[k, 0, 0] = at, D_min, D_min
+        law = space.laws[which]
+        seen.magnitude[k] = repulsion(D_min, law[0], law[1], law[2],
+                                      law[3]) if D_min < np.inf else 0.0  # (23)
         if k < count - 1 and D_min < D_minimal:  # (31)
             D_minimal, active = D_min, k
     return active
 
 
 @compiled
-def _nearest(eye, depth, tiles, region, thin, mean, x, y, z, direction, pair, nearest, k):
-    """Return the distance of a point, infinite beyond the region; directions into two arrays."""
+def _nearest(space, image, mean, point, direction, pair):
+    """Return the distance of a point, infinite beyond the region, and its pixel, -1 if none.
+
+    Writes the directions away from what is near and from the nearest into direction and pair.
+    """
+    eye = space.eye
+    c = in_camera(eye, point[0], point[1], point[2])
+    DD, at, nearest, total = _search(space, image, mean, c)
+    if at < 0:
+        direction[0] = direction[1] = direction[2] = 0.0
+        pair[1] = pair[2] = pair[3] = 0.0
+        return np.inf, at
+    D = sqrt(DD)
+    norm = sqrt(dot(*total, *total))
+    if D < c[2] * max(1.0 / eye[0], 1.0 / eye[1]):  # in the shadow of a pixel: its centre is void
+        nearest = total if norm > 1e-6 else (1.0, 0.0, 0.0)
+    _turn_unit_back(eye, nearest, pair[1:4])
+    if mean > 0.0 and norm > 1e-6:
+        _turn_unit_back(eye, total, direction)  # (26)
+    else:
+        direction[0], direction[1], direction[2] = pair[1], pair[2], pair[3]
+    return D, at
+
+
+@compiled
+def _search(space, image, mean, c):
+    """Return the smallest squared distance to c and its pixel; the vector from it; their mean.
+
+    c and vectors are in the camera's frame; the mean is a sum of unit vectors.
+    """
+    eye, region, depth = space.eye, space.region, image.depth
+    cx, cy, cz = c
     height, width = depth.shape
-    cx, cy, cz = in_camera(eye, x, y, z)
     u0, u1 = pixels_of_ball(eye[0], eye[2], width, cx, cz, region)
     v0, v1 = pixels_of_ball(eye[1], eye[3], height, cy, cz, region)
     per_x, per_y, reach = 1.0 / eye[0], 1.0 / eye[1], region * region
@@ -114,7 +173,7 @@ def _nearest(eye, depth, tiles, region, thin, mean, x, y, z, direction, pair, ne
     nx = ny = nz = sx = sy = sz = 0.0
     for tv in range(v0 // TILE, (v1 + TILE - 1) // TILE):
         for tu in range(u0 // TILE, (u1 + TILE - 1) // TILE):
-            if tiles[tv, tu] >= cz + region:
+            if image.tiles[tv, tu] >= cz + region:
                 continue
             for v in range(max(v0, tv * TILE), min(v1, tv * TILE + TILE)):
                 ry = (v - eye[3]) * per_y
@@ -123,7 +182,7 @@ def _nearest(eye, depth, tiles, region, thin, mean, x, y, z, direction, pair, ne
                     if d == 0.0:
                         continue
                     if d < cz:  # it shadows what is behind it
-                        d = min(d + thin, cz)
+                        d = min(d + space.thin, cz)
                     ox, oy, oz = cx - (u - eye[2]) * per_x * d, cy - ry * d, cz - d
                     oo = ox * ox + oy * oy + oz * oz
                     if oo >= reach:
@@ -133,26 +192,13 @@ def _nearest(eye, depth, tiles, region, thin, mean, x, y, z, direction, pair, ne
                     if 0.0 < oo < averaged:  # (25); the factor 1/h is lost in (26)
                         per = 1.0 / sqrt(oo)
                         sx, sy, sz = sx + per * ox, sy + per * oy, sz + per * oz
-    nearest[k] = at
-    if at < 0:
-        direction[0] = direction[1] = direction[2] = 0.0
-        pair[1] = pair[2] = pair[3] = 0.0
-        return np.inf
-    D = sqrt(DD)
-    norm = sqrt(sx * sx + sy * sy + sz * sz)
-    if D < cz * max(per_x, per_y):  # in the shadow of a pixel, where its centre says nothing
-        nx, ny, nz = (sx, sy, sz) if norm > 1e-6 else (1.0, 0.0, 0.0)
-    _turn_unit_back(eye, nx, ny, nz, pair[1:4])
-    if mean > 0.0 and norm > 1e-6:
-        _turn_unit_back(eye, sx, sy, sz, direction)  # (26)
-    else:
-        direction[0], direction[1], direction[2] = pair[1], pair[2], pair[3]
-    return D
+    return DD, at, (nx, ny, nz), (sx, sy, sz)
 
 
 @compiled
-def _turn_unit_back(eye, x, y, z, out):
-    """Write the unit vector along x, y, z of the camera's frame into out (3,), in the world's."""
+def _turn_unit_back(eye, vector, out):
+    """Write the unit vector along one in the camera's frame into out (3,), in the world's."""
+    x, y, z = vector
     length = sqrt(x * x + y * y + z * z)
     for i in range(3):
         out[i] = (eye[7 + 3 * i] * x + eye[8 + 3 * i] * y + eye[9 + 3 * i] * z) / length

@@ -39,7 +39,7 @@ def draw_scene(depth, eye, backdrop, obstacles, point_radius, placements, joints
         half = row[2] if shape == 2 else 0.0
         x, y, z = in_camera(eye, row[4], row[5], row[6])
         ax, ay, az = turned_into_camera(eye, half * row[9], half * row[12], half * row[15])
-        _draw_capsule(depth, eye, x - ax, y - ay, z - az, 2 * ax, 2 * ay, 2 * az, radius)
+        _draw_capsule(depth, eye, (x - ax, y - ay, z - az), (2 * ax, 2 * ay, 2 * az), radius)
     _draw_robot(depth, eye, placements, joints, capsules, 0.0)
 
 
@@ -55,15 +55,15 @@ def _draw_robot(depth, eye, placements, joints, capsules, margin):
     for k in range(len(joints)):
         T, capsule = placements[joints[k]], capsules[k]
         x, y, z = place(T, capsule[0], capsule[1], capsule[2])
-        x, y, z = in_camera(eye, x, y, z)
         ax, ay, az = turned(T, capsule)
-        ax, ay, az = turned_into_camera(eye, ax, ay, az)
-        _draw_capsule(depth, eye, x, y, z, ax, ay, az, capsule[6] + margin)
+        _draw_capsule(depth, eye, in_camera(eye, x, y, z), turned_into_camera(eye, ax, ay, az),
+                      capsule[6] + margin)
 
 
 @compiled
-def _draw_capsule(depth, eye, x, y, z, ax, ay, az, radius):
-    """Draw a capsule from x, y, z along ax, ay, az, in the camera's frame."""
+def _draw_capsule(depth, eye, start, along, radius):
+    """Draw a capsule from its start along its axis, both in the camera's frame."""
+    (x, y, z), (ax, ay, az) = start, along
     height, width = depth.shape
     u0, u1 = _pixels_of_capsule(eye[0], eye[2], width, x, z, ax, az, radius)
     v0, v1 = _pixels_of_capsule(eye[1], eye[3], height, y, z, ay, az, radius)

@@ -1,4 +1,4 @@
-"""Words that several texts share."""
+"""Names and numbers as they stand in a sentence."""
 
 from __future__ import annotations
 

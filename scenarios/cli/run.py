@@ -1,0 +1,52 @@
+"""`hierarchy run`: simulate a scenario, save the run, print its metrics."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+
+from scenarios.cli.figures import redraw
+from scenarios.cli.progress import bar
+from scenarios.cli.terminal import (
+    certified,
+    exit_code,
+    levels_given_up,
+    print_json,
+    print_table,
+    shown,
+    troubles,
+)
+from scenarios.config import Scenario
+from scenarios.loop.recording import Recording
+from scenarios.loop.simulation import simulate
+from scenarios.measure.metrics import as_plain_data
+from scenarios.measure.run_folder import save
+from scenarios.measure.runs import Run
+
+
+def run_scenario(scenario: Scenario, folder: Path, certify: bool, figures: bool,
+                 as_json: bool) -> int:
+    """Run a scenario, save and print the run, and return the exit code."""
+    with bar() as told:
+        told_of_it = partial(told, str(scenario.make_resolver().label))
+        recording = simulate(scenario, progress=told_of_it, certified=certify)
+    save(recording, folder)
+    if figures:
+        redraw([folder])
+    if as_json:
+        print_json({"scenario": scenario.name, "resolver": scenario.control.resolver,
+                    "folder": shown(folder), **as_plain_data(recording)})
+    else:
+        _print(scenario, recording, certify)
+        print(f"\n{recording.ticks} ticks in {shown(folder)}")
+    return exit_code(recording.fault)
+
+
+def _print(scenario: Scenario, recording: Recording, certify: bool) -> None:
+    """Print the metrics of a run, its certificate, its troubles and the levels that it missed."""
+    resolver = scenario.make_resolver()
+    print_table([Run(scenario, scenario.control.resolver, str(resolver.label), recording)])
+    if certify:
+        print(f"\n{certified(recording, resolver.damping)}")
+    for line in (*troubles(recording), *levels_given_up(recording)):
+        print(line)
