@@ -268,13 +268,18 @@ def reproduce(names: Annotated[list[str] | None, typer.Argument(
               quick: Annotated[bool, typer.Option(
                   "--quick", help="A tenth of the starts and no commands; leave the documents as "
                   "they are.")] = False,
+              fill: Annotated[bool, typer.Option(
+                  "--fill", help="Run nothing; write the pages from what docs/results keeps.")
+                  ] = False,
               workers: Workers = None, as_json: AsJson = False) -> int:
     """Make the numbers of the documents anew, and write them into a checkout's pages.
 
     An interrupted command continues where it was. While timings are made nothing else should run.
     """
-    from scenarios.cli.reproduce import reproduce_command
+    from scenarios.cli.reproduce import fill_command, reproduce_command
 
+    if fill:
+        return fill_command()
     return reproduce_command(names or [], out, quick, workers, as_json)
 
 

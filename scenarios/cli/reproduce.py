@@ -43,6 +43,12 @@ def reproduce_command(names: list[str], out: Path, quick: bool, workers: int | N
     return 0
 
 
+def fill_command() -> int:
+    """Write the pages of the checkout from the rows and outputs that are kept."""
+    print(*map(shown, write_documents({}, {}, checkout())), sep="\n")
+    return 0
+
+
 def _report(found: dict[str, Rows], written: list[Path], as_json: bool) -> None:
     """Print the claims with their verdicts, and the files."""
     files = [shown(path) for path in written]

@@ -43,6 +43,7 @@ def test_a_comparison_is_true_reversed_or_not_told():
     assert speed("a", "b", "lower").judge(found).verdict == "reversed"
     assert speed("a", "c", "lower").judge(found).verdict == "not distinguishable"
     assert speed("a", "d", "lower").judge(found).verdict == "the same"
+    assert speed("a", "b", "higher").judge(rows(a=[1.0], b=[None])).verdict == "not decided"
     said = speed("a", "b", "higher").judge(found).found
     assert said == ("2.000 [1.750, 2.250] rad/s against 1.500 [1.250, 1.750] rad/s; "
                     "higher in 16 of 16, p < 0.001")
