@@ -48,7 +48,6 @@ stress: $(INSTALLED)
 
 reproduce: $(INSTALLED)
 	@$(BIN)/hierarchy reproduce
-	@$(BIN)/python docs/studies/measured.py
 
 docs: $(INSTALLED)
 	@$(BIN)/python -m sphinx -E -W --keep-going -q -b html docs build/docs

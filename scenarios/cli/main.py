@@ -207,21 +207,27 @@ def sweep(file: Annotated[str, typer.Argument(help="Name of a sweep, or a sweep 
 
 
 @app.command()
-def reproduce(studies: Annotated[list[str] | None, typer.Argument(
-                  metavar="[STUDY]...", help="letter, resolvers, blend, ladder, inertia, "
-                  "rivals, singular or human. Default: all.")] = None,
+def reproduce(names: Annotated[list[str] | None, typer.Argument(
+                  metavar="[NAME]...", help="states, throttle, letter, resolvers, blend, ladder, "
+                  "inertia, rivals, singular, human, or a page such as docs/first-paper.md for the "
+                  "commands in it. Default: all.")] = None,
               out: Annotated[Path, output("Where the runs are kept.")] = Path("runs/reproduce"),
               quick: Annotated[bool, typer.Option(
-                  "--quick", help="A tenth of the starts; leave the documents as they are.")
+                  "--quick", help="A tenth of the starts and no commands; leave the documents as "
+                  "they are.")] = False,
+              fill: Annotated[bool, typer.Option(
+                  "--fill", help="Run nothing; write the pages from what docs/results keeps.")
                   ] = False,
               workers: Workers = None, as_json: AsJson = False) -> int:
     """Make the numbers of the documents anew, and write them into a checkout's pages.
 
-    An interrupted command continues where it was.
+    An interrupted command continues where it was. While timings are made nothing else should run.
     """
-    from scenarios.cli.reproduce import reproduce_command
+    from scenarios.cli.reproduce import fill_command, reproduce_command
 
-    return reproduce_command(studies or [], out, quick, workers, as_json)
+    if fill:
+        return fill_command()
+    return reproduce_command(names or [], out, quick, workers, as_json)
 
 
 @app.command()

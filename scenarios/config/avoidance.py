@@ -117,6 +117,9 @@ class AvoidanceSection(_Avoiding):
 
     With `direction` = "mean" the direction is the mean (25)-(26) over the obstacles within `far` of
     a control point, and within `end_effector` of the end effector.
+
+    `asked` [m] is the distance of body and end effector that metrics judge by, without effect on
+    the run; by default it is `near`, of the body.
     """
 
     kind: Literal["repulsion"] = "repulsion"
@@ -129,6 +132,7 @@ class AvoidanceSection(_Avoiding):
     tip: RepulsionSection
     jacobian: Literal["exact", "published"] = "exact"
     place: Literal["stack", "null-space"] = "stack"
+    asked: Positive | None = None
 
     @model_validator(mode="after")
     def _areas_nested(self) -> Self:
@@ -153,8 +157,8 @@ class AvoidanceSection(_Avoiding):
 
     @property
     def promised(self) -> dict[str, float]:
-        """Distances [m] to be kept: eps_1 of the body, below which its avoidance comes first."""
-        return {"body": self.near}
+        """Distances [m] to be kept; eps_1 of the body, below which its avoidance comes first."""
+        return {"body": self.near} if self.asked is None else {"body": self.asked, "ee": self.asked}
 
 
 class SeparationSection(_Avoiding):

@@ -18,7 +18,7 @@ from scenarios.cell.robot import sensed_points
 from scenarios.config import Scenario
 from scenarios.loop.links import capsules, lowest
 from scenarios.loop.tree import Joint, Matrix, Vector, joint_units, placements, tree_of
-from solvers.resolver import Handles
+from solvers.resolver import Handles, Resolver
 
 Setting = bool | int | float | str | tuple[float | str, ...] | None
 
@@ -73,7 +73,10 @@ class RobotFacts:
 
 @dataclass(frozen=True)
 class ResolverFacts:
-    """A resolver's properties of the same names, and its settings as they were used."""
+    """A resolver's properties of the same names, and its settings as they were used.
+
+    damped : what it damped near singularities in the stack of the run; empty without damping.
+    """
 
     name: str
     label: str
@@ -81,6 +84,7 @@ class ResolverFacts:
     accuracy: float
     handles: Handles
     settings: dict[str, Setting]
+    damped: str
 
 
 @dataclass(frozen=True)
@@ -118,7 +122,14 @@ def resolver_facts(scenario: Scenario) -> ResolverFacts:
     settings = {field.name: _plain(getattr(resolver, field.name))
                 for field in dataclasses.fields(resolver)}
     return ResolverFacts(resolver.name, str(resolver.label), resolver.strict,
-                         float(resolver.accuracy), resolver.handles, settings)
+                         float(resolver.accuracy), resolver.handles, settings,
+                         _damped(resolver, scenario.asks))
+
+
+def _damped(resolver: Resolver, asked: Handles) -> str:
+    if not resolver.damping:
+        return ""
+    return resolver.damps if asked == "equalities" else resolver.damps_with_bounds
 
 
 def _plain(value: Any) -> Setting:

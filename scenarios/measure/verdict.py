@@ -9,6 +9,7 @@ from operator import itemgetter
 from typing import TYPE_CHECKING
 
 from hierarchy.words import listed
+from scenarios.measure.caveats import caveats
 from scenarios.measure.motions import ALIKE, departure, motions
 from scenarios.measure.wording import TIE, Clause, at, digits, measured, mm, who, within
 from scenarios.measure.wrongs import soundest, wrongs
@@ -94,7 +95,8 @@ def _advice(runs: Sequence[Run], alike: float) -> Iterator[Clause]:
         yield "", f"choose {who(sound, runs, 'any')} by time"
     yield from merits
     yield from _speed(sound)
-    yield from _caveats(sound)
+    facts = {run.label: run.recording.facts.resolver for run in sound if run.recording}
+    yield from (("", one) for one in caveats(facts))
 
 
 def _tracking(runs: Sequence[Run]) -> Iterator[Clause]:
@@ -142,14 +144,6 @@ def _speed(runs: Sequence[Run]) -> Iterator[Clause]:
     against = f", {at(found, high)} in {digits(1e6 * high)} µs" if high > 1.2 * low else ""
     if found:
         yield "", f"{at(found, low)} resolves a tick in {digits(1e6 * low)} µs{against}"
-
-
-def _caveats(runs: Sequence[Run]) -> Iterator[Clause]:
-    """Yield who of them has no strict priorities."""
-    loose = [run.label for run in runs
-             if run.recording and not run.recording.facts.resolver.strict]
-    if loose:
-        yield "", f"{listed(loose)} {'is' if len(loose) == 1 else 'are'} not strict at every rank"
 
 
 def _contrasts(runs: Sequence[Run]) -> Iterator[Clause]:

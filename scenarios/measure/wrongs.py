@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hierarchy.words import in_words, listed
-from scenarios.config.avoidance import SeparationSection
 from scenarios.measure.wording import Clause, digits, measured, mm, value, who
 
 if TYPE_CHECKING:
@@ -61,7 +60,7 @@ def _excess(runs: Sequence[Run]) -> Iterator[Clause]:
 
 
 def _too_near(runs: Sequence[Run]) -> Iterator[Clause]:
-    """Yield who came nearer to an obstacle than `avoidance.distance` promises."""
+    """Yield who came nearer to an obstacle than `avoidance.distance` or `asked` says."""
     short = {run.label: short for run in runs if (short := _shortfall(run)) > CLOSER}
     near = [run for run in runs if run.label in short]
     if near:
@@ -72,9 +71,9 @@ def _too_near(runs: Sequence[Run]) -> Iterator[Clause]:
 def _shortfall(run: Run) -> float:
     """Return by how much a run went below the distance it should keep [m]; 0 if it did not."""
     asked = run.scenario.avoidance
-    if not isinstance(asked, SeparationSection):
+    if asked is None or "ee" not in asked.promised:
         return 0.0
-    return max(asked.distance - value(run, name, np.inf)
+    return max(asked.promised["ee"] - value(run, name, np.inf)
                for name in ("body_distance_min", "ee_distance_min"))
 
 

@@ -59,7 +59,9 @@ RESOLVER_CLAIMS: tuple[Claim, ...] = (
     Compares("Inequalities in the stack leave the cone by less", "resolvers", "cone_violation_max",
              "limits-tpm", "hqp-hcod", "lower"),
     Keeps("Inequalities in the stack keep the 50 mm asked for", "resolvers", "body_distance_min",
-          "hqp-hcod", least=_EPS_1))
+          "hqp-hcod", least=_EPS_1),
+    Keeps("Algorithm 1 with limits keeps them", "resolvers", "body_distance_min", "limits-tpm",
+          least=_EPS_1))
 
 STATE_CLAIMS: tuple[Claim, ...] = (
     Keeps("`weighted` commands what `tpm` does in half of the ticks, damped", "states", MEDIAN,
@@ -108,6 +110,10 @@ HUMAN_CLAIMS: tuple[Claim, ...] = (
           least=_HUMAN),
     Keeps("`human-hqp` keeps the body 0.3 m away", "human", "body_distance_min", "human-hqp",
           least=_HUMAN),
+    Compares("The body is below 0.3 m for less time with `human-hqp`", "human", "body_below_share",
+             "human", "human-hqp", "lower"),
+    Compares("The end effector is below 0.3 m for less time with `human-hqp`", "human",
+             "ee_below_share", "human", "human-hqp", "lower"),
     Compares("`human-hqp` keeps the end effector farther away than `human`", "human",
              "ee_distance_min", "human", "human-hqp", "higher"),
     Compares("`human-hqp` keeps the body farther away than `human`", "human",
@@ -131,8 +137,12 @@ _RIVALS = ("position_error_median_settled", "body_distance_min", "ee_distance_mi
            "cone_violation_max", "cone_violation_share", "speed_max", "velocity_step_max")
 _SINGULAR = ("ticks_frozen", "speed_max", "speed_limit_excess", "acceleration_max", "jerk_max",
              "joint_limit_excess", "error_returned_rms", "error_returned_max")
+_LETTER = ("joint_limit_excess", "speed_max", "acceleration_max", "body_distance_min",
+           "body_below_share", "cone_violation_max", "cone_violation_share",
+           "position_error_rms_settled", "stack_changes")
 _HUMAN_RUNS = ("true_position_error_rms", "true_position_error_max", "body_distance_min",
-               "ee_distance_min", "cone_violation_max", "speed_max", "command_step_max",
+               "body_below_share", "ee_distance_min", "ee_below_share",
+               "cone_violation_max", "speed_max", "command_step_max",
                "velocity_step_max", "stack_changes", "active_set_changes")
 _STATES = (MEDIAN, LARGEST)
 _THROTTLE = (DAMPED, LEFT)
@@ -212,7 +222,7 @@ BLOCKS: dict[str, Block] = {
     "states": partial(table, study="states", metrics=_STATES),
     "blend-claims": partial(claims, listed=BLEND_CLAIMS),
     "inequalities": partial(table, study="resolvers", metrics=_LIMITS),
-    "letter-runs": partial(table, study="letter", metrics=_LIMITS),
+    "letter-runs": partial(table, study="letter", metrics=_LETTER),
     "blend": partial(table, study="blend", metrics=_BLEND),
     "ladder": partial(table, study="ladder", metrics=_LADDER),
     "inertia": partial(table, study="inertia", metrics=_LIMITS),

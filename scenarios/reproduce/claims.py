@@ -93,6 +93,8 @@ def _always(met: int, of: int) -> str:
 
 
 def _agrees(pair: Paired, expected: Direction) -> str:
+    if not pair.count:
+        return "not decided"
     if pair.equal:
         return "the same"
     if not pair.distinguishable:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from hierarchy.errors import HierarchyError
 from scenarios.files import write_text
+from scenarios.reproduce import commands
 from scenarios.reproduce.rows import Rows
 
 PAGES = ("README.md", "docs/reproduction.md", "docs/ladder.md", "docs/experiment.md")
@@ -47,10 +48,10 @@ def filled(text: str, blocks: Mapping[str, Block], rows: Mapping[str, Rows], pag
 def write(root: Path, blocks: Mapping[str, Block], rows: Mapping[str, Rows]) -> list[Path]:
     """Fill the pages of a checkout, and return those that changed."""
     changed = []
-    for name in PAGES:
+    for name in dict.fromkeys((*PAGES, *commands.PAGES)):
         path = root / name
         text = path.read_text(encoding="utf-8")
-        made = filled(text, blocks, rows, name)
+        made = commands.filled(filled(text, blocks, rows, name), root, name)
         if made != text:
             write_text(path, made)
             changed.append(path)

@@ -84,6 +84,8 @@ LETTER = Study("letter", "The letter's scheme", (
     Column("35deg", "ellipse-35deg", OWN),
     Column("35deg-equality", "ellipse-35deg-equality", OWN),
     Column("3d", "ellipse-3d", OWN),
+    Column("3d-published", "ellipse-3d", OWN, {"avoidance.jacobian": "published",
+                                               "control.jacobian_derivative": "difference"}),
     Column("published", "ellipse-published", OWN),
     Column("differences", "ellipse", OWN, {"control.jacobian_derivative": "difference"}),
     Column("undamped", "ellipse", OWN, {"control.options.damping": 0.0})))

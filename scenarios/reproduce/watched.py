@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
+from pathlib import Path
 from typing import Any, Protocol, final
 
 import numpy as np
@@ -14,18 +16,22 @@ from scenarios.loop.audit import Audit
 from scenarios.loop.controller import Controller
 from scenarios.loop.recording import Recording
 from scenarios.loop.simulation import simulate
+from scenarios.measure.metrics import Metric
 from scenarios.reproduce.rows import Rows, plain
 from scenarios.reproduce.studies import Pair, Pivot, Watched
-from scenarios.sweep.whole import Progress
+from scenarios.sweep.run import Job, digest, key_of, run_batch
+from scenarios.sweep.store import Store
+from scenarios.sweep.whole import Progress, Workers, complete
 
 Array = NDArray[np.float64]
 MEDIAN, LARGEST = "command_difference_median", "command_difference_max"
 DAMPED, LEFT = "damped_share", "left_median"
-_METRICS: dict[str, dict[str, object]] = {
+_METRICS: dict[str, dict[str, str]] = {
     MEDIAN: {"label": "Difference of the command, median", "unit": "rad/s^2"},
     LARGEST: {"label": "Difference of the command, max", "unit": "rad/s^2"},
     DAMPED: {"label": "Ticks in which its pivot is damped", "unit": "share"},
     LEFT: {"label": "What damping leaves of its step, median", "unit": "share"}}
+_MEASURED = {Pair: (MEDIAN, LARGEST), Pivot: (DAMPED, LEFT)}
 
 
 class Watch(Audit, Protocol):
@@ -96,25 +102,46 @@ class Outside:
                 LEFT: float(np.median(squares / (squares + damping)))}
 
 
-def rows_of_watched(study: Watched, command: str, seed: int,
-                    progress: Progress | None = None) -> Rows:
-    """Run the scenario from each start, and return what the columns of the study measure."""
-    scenario = load(study.scenario).with_resolver(study.resolver)
-    found: dict[str, list[dict[str, float]]] = {column.name: [] for column in study.columns}
-    ended = 0
+def rows_of_watched(study: Watched, command: str, seed: int, out: Path,
+                    workers: Workers | None = None, progress: Progress | None = None) -> Rows:
+    """Run the scenario from each start, and return what the columns of the study measure.
+
+    Runs that `out` has are not repeated. Raises what `compare_starts` raises.
+    """
+    asked, store = jobs(study, seed), Store(out)
+    with store.opened():
+        complete(asked, store, workers or Workers(), study.name, progress,
+                 partial(run_batch, measured=partial(measured, study)))
+        runs = {row["key"]: row for row in store.table().to_pylist()}
+    found = [runs[job.key] for job in asked]
+    names = {column.name: _MEASURED[type(column)] for column in study.columns}
+    kept = {column: {name: plain(np.array([run[f"{column} {name}"] for run in found], dtype=float))
+                     for name in metrics} for column, metrics in names.items()}
+    ended = sum(run["fault"] is None and run["error"] is None for run in found)
+    used: dict[str, dict[str, object]] = {
+        name: {**_METRICS[name]} for metrics in names.values() for name in metrics}
+    return Rows(study.name, command, study.starts, seed, used, kept, dict.fromkeys(kept, ended))
+
+
+def jobs(study: Watched, seed: int) -> list[Job]:
+    """Return the runs of a study, one for each start."""
+    scenario = load(study.scenario)
+    found = []
     for start in range(study.starts):
-        if progress is not None:
-            progress(study.name, start, study.starts)
         values = drawn(scenario, scenario.variation, seed, start)
-        one = changed(scenario, values, "variation")
-        watches = {column.name: _watch(column, one) for column in study.columns}
-        ended += simulate(one, audits=tuple(watches.values())).fault is None
-        for name, watch in watches.items():
-            found[name].append(watch.metrics())
-    kept = {name: {metric: plain(np.array([run[metric] for run in runs])) for metric in runs[0]}
-            for name, runs in found.items()}
-    used = {name: _METRICS[name] for metrics in kept.values() for name in metrics}
-    return Rows(study.name, command, study.starts, seed, used, kept, dict.fromkeys(found, ended))
+        text = changed(scenario, values, "variation").to_toml()
+        key = key_of(text, f"{study.resolver} {study.columns}", digest())
+        found.append(Job(key, text, study.resolver))
+    return found
+
+
+def measured(study: Watched, scenario: Scenario) -> tuple[Recording, tuple[Metric, ...]]:
+    """Return the recording of a run and what the columns of the study measured in its ticks."""
+    watches = {column.name: _watch(column, scenario) for column in study.columns}
+    recording = simulate(scenario, audits=tuple(watches.values()))
+    return recording, tuple(
+        Metric(f"{column} {name}", _METRICS[name]["label"], value, _METRICS[name]["unit"])
+        for column, watch in watches.items() for name, value in watch.metrics().items())
 
 
 def _watch(column: Pair | Pivot, scenario: Scenario) -> Watch:

@@ -13,17 +13,26 @@ from scenarios.measure.metrics import Metric
 from scenarios.sweep.results import Results, compared, summary
 from scenarios.sweep.verdict import verdict
 
-_BESIDE = 3  # resolvers that fit into 80 columns
+_WIDTH = 80    # columns of a terminal
+_LABELS = 26   # columns of it for the names of metrics
 
 
 def show(name: str, results: Results, console: Console | None = None) -> None:
     """Print the verdict, success rates, and the spread of each metric by resolver."""
     console = console or Console(markup=False, highlight=False)
     console.print(f"\n{name}: {results.samples} samples, paired", *verdict(results).lines, sep="\n")
-    beside = -(-len(results.labels) // -(-len(results.labels) // _BESIDE))
+    beside = _beside(results)
     for first in range(0, len(results.labels), beside):
         console.print()
         console.print(_table(results, results.labels[first:first + beside]))
+
+
+def _beside(results: Results) -> int:
+    """Return how many columns stand beside each other, in tables that are about equally wide."""
+    widest = max((len(line) for metric in results.shown() for label in results.labels
+                  for line in _cell(results, metric, label, False).plain.splitlines()), default=1)
+    fit = max(1, (_WIDTH - _LABELS) // (widest + 1))
+    return -(-len(results.labels) // -(-len(results.labels) // fit))
 
 
 def _table(results: Results, labels: Sequence[str]) -> Table:

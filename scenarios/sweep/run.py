@@ -5,19 +5,26 @@ from __future__ import annotations
 import hashlib
 import json
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from time import perf_counter
+from typing import TYPE_CHECKING
 
 from hierarchy import plugins
 from scenarios.measure.metrics import Metric
 
+if TYPE_CHECKING:
+    from scenarios.config import Scenario
+    from scenarios.loop.recording import Recording
+
 # Code that only requests or shows runs: changing it does not change the measurements.
 _NOT_IN_A_RUN = ("bench/", "cli/", "draw/", "export/", "library/", "report/", "scene/", "sweep/",
                  "files.py", "words.py", *(f"measure/{name}.py" for name in (
-                     "comparison", "motions", "partings", "runs", "verdict")))
+                     "comparison", "motions", "partings", "runs", "verdict")),
+                 *(f"reproduce/{name}.py" for name in (
+                     "blocks", "claims", "commands", "pages", "rows", "studies", "whole")))
 _PLACE = ("system", "processor")  # entries of versions() that describe the machine
 _ONE_AT_A_TIME = threading.Lock()  # the kernels' work arrays are shared in a process
 
@@ -47,6 +54,9 @@ class Outcome:
     wall_seconds: float
     versions: str
     metrics: tuple[Metric, ...] = ()
+
+
+Measured = Callable[["Scenario"], tuple["Recording", tuple[Metric, ...]]]
 
 
 class OtherVersionsError(RuntimeError):
@@ -82,25 +92,30 @@ def _of_the_package() -> str:
     return found.hexdigest()[:16]
 
 
-def run(text: str, resolver: str, key: str) -> Outcome:
-    """Run a scenario under a resolver and measure it; an exception becomes its `error`."""
+def simulated(scenario: Scenario) -> tuple[Recording, tuple[Metric, ...]]:
+    """Return the recording of a run and what is measured on it."""
     from scenarios import simulate
-    from scenarios.config import Scenario
     from scenarios.measure.metrics import measure
+
+    recording = simulate(scenario)
+    return recording, tuple(measure(recording).values())
+
+
+def run(text: str, resolver: str, key: str, measured: Measured = simulated) -> Outcome:
+    """Run a scenario under a resolver and measure it; an exception becomes its `error`."""
+    from scenarios.config import Scenario
 
     begun = perf_counter()
     try:
-        scenario = Scenario.from_toml(text).with_resolver(resolver)
-        recording = simulate(scenario)
-        measured = tuple(measure(recording).values())
+        recording, metrics = measured(Scenario.from_toml(text).with_resolver(resolver))
     except Exception as error:  # the failed run is a row too, with the reason
         return Outcome(key, 0, None, f"{type(error).__name__}: {error}",
                        perf_counter() - begun, digest())
     return Outcome(key, recording.ticks, recording.fault, None, perf_counter() - begun, digest(),
-                   measured)
+                   metrics)
 
 
-def run_batch(jobs: Sequence[Job], versions: str) -> list[Outcome]:
+def run_batch(jobs: Sequence[Job], versions: str, measured: Measured = simulated) -> list[Outcome]:
     """Run jobs one after the other; raises OtherVersionsError unless this code is `versions`."""
     for module in dict.fromkeys(name for job in jobs for name in job.plugins):
         plugins.allow(module)  # as the process that planned the runs has done
@@ -108,4 +123,4 @@ def run_batch(jobs: Sequence[Job], versions: str) -> list[Outcome]:
         raise OtherVersionsError("a worker has other versions of task-hierarchy or its "
                                  "dependencies than this machine; install the same on both")
     with _ONE_AT_A_TIME:
-        return [run(job.text, job.resolver, job.key) for job in jobs]
+        return [run(job.text, job.resolver, job.key, measured) for job in jobs]

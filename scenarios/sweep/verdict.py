@@ -4,18 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
+import numpy as np
+
 from hierarchy.words import listed
 from scenarios.config import Scenario
+from scenarios.loop.facts import resolver_facts
+from scenarios.measure.caveats import caveats
 from scenarios.measure.metrics import Metric
 from scenarios.measure.verdict import Verdict
 from scenarios.sweep.results import Criterion, Results, Share, valued
 
+_DISTANCE = "Kept the distance asked for"
 _IN_WORDS = {"Reached the end": "reached the end", "Touched nothing": "touched nothing",
              "Kept the joint limits": "kept the joint limits",
-             "Every tick solved": "had every tick solved"}
-# What is weighed in the last line, in this order.
-_WEIGHED = ("position_error_median_settled", "body_distance_min", "ee_distance_min",
-            "cone_violation_max", "speed_max", "acceleration_max")
+             "Every tick solved": "had every tick solved", _DISTANCE: "kept the distance asked for"}
+# What is weighed in the last line, in this order, and in which words.
+_WEIGHED = {"position_error_median_settled": "path error", "body_distance_min": "body distance",
+            "ee_distance_min": "end effector distance", "cone_violation_max": "excess of the cone",
+            "speed_max": "joint speed", "acceleration_max": "joint acceleration"}
 
 
 def verdict(results: Results) -> Verdict:
@@ -26,10 +32,19 @@ def verdict(results: Results) -> Verdict:
 def success(results: Results) -> str:
     """Return in how many runs each criterion was met, for all resolvers together if equal."""
     said: dict[str, list[str]] = {}
-    for criterion in results.criteria()[:-1]:
+    for criterion in (*results.criteria()[:-1], *_distances(results)):
         said.setdefault(_who(results, criterion), []).append(_IN_WORDS[criterion.label])
     text = "; ".join(f"{who} {listed(did)}" for who, did in said.items())
     return f"{text[0].upper()}{text[1:]}."
+
+
+def _distances(results: Results) -> Iterator[Criterion]:
+    """Yield in which runs no distance that the scenario asks for was given up, if it asks."""
+    below = [results.values[name] for name in ("body_below_share", "ee_below_share")
+             if name in results.values]
+    if below:
+        measured = ~np.isnan(below).all(axis=0)
+        yield Criterion(_DISTANCE, measured & ~np.any(np.array(below) > 0.0, axis=0))
 
 
 def _sentence(clauses: Iterator[str]) -> str:
@@ -59,7 +74,7 @@ def _sameness(results: Results) -> Iterator[str]:
         if len(group) > 1:
             yield f"{listed(group)} behave the same on every sample"
     if len(groups) == len(results.labels):
-        yield "no two columns behave the same"
+        yield "No two behave the same"
 
 
 def _alike(results: Results) -> list[list[str]]:
@@ -85,28 +100,21 @@ def _advice(results: Results) -> Iterator[str]:
         return
     sound = _soundest(results)
     if len(sound) < len(results.labels):
-        yield f"use {listed(sound, 'or')}: the others fail more often than chance explains"
+        yield f"Use {listed(sound, 'or')}: the others fail more often than chance explains"
     merits: dict[str, list[str]] = {}
     unclear = []
     for metric in _weighed(results):
         if best := results.best(metric):
             merits.setdefault(listed(best), []).append(_merit(results, metric, best))
         else:
-            unclear.append(_lowered(metric.label))
+            unclear.append(_WEIGHED[metric.name])
     for who, what in merits.items():
-        yield f"{who} is best beyond chance in {'; '.join(what)}"
+        yield f"{who} is best beyond chance in {listed(what)}"
     if unclear and not merits:
-        yield f"no resolver is best beyond chance in {listed(unclear, 'or')}"
-    yield from _caveats(results)
-
-
-def _caveats(results: Results) -> Iterator[str]:
-    """Yield which resolvers have no strict priorities."""
-    specs = {run.label: run.job for run in results.runs}
-    loose = [label for label, job in specs.items() if not Scenario.from_toml(
-        job.text).with_resolver(job.resolver).make_resolver().strict]
-    if loose:
-        yield f"{listed(loose)} {'is' if len(loose) == 1 else 'are'} not strict at every rank"
+        yield f"None is best beyond chance in {listed(unclear, 'or')}"
+    jobs = {run.label: run.job for run in results.runs}
+    yield from caveats({label: resolver_facts(Scenario.from_toml(job.text).with_resolver(
+        job.resolver)) for label, job in jobs.items()})
 
 
 def _soundest(results: Results) -> list[str]:
@@ -134,8 +142,4 @@ def _merit(results: Results, metric: Metric, best: Sequence[str]) -> str:
     near = min(others) if metric.lower_is_better else max(others)
     shown = [valued(metric, value).shown() for value in (medians[best[0]], near)]
     unit = f" {metric.shown_unit}" if metric.shown_unit else ""
-    return f"{_lowered(metric.label)} ({shown[0]}{unit}, next {shown[1]}{unit})"
-
-
-def _lowered(text: str) -> str:
-    return f"{text[0].lower()}{text[1:]}"
+    return f"{_WEIGHED[metric.name]} ({shown[0]}{unit}, next {shown[1]}{unit})"

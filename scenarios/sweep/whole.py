@@ -14,10 +14,11 @@ from scenarios.config import Scenario, load
 from scenarios.loop.recording import versions
 from scenarios.sweep.config import Sweep, find, load_sweep
 from scenarios.sweep.data import as_plain_data
-from scenarios.sweep.engine import carry_out, connected
+from scenarios.sweep.engine import Work, carry_out, connected
 from scenarios.sweep.page import Page, name_of
 from scenarios.sweep.planning import Plan, Planned, plan
 from scenarios.sweep.results import Results, joined, results
+from scenarios.sweep.run import Job, run_batch
 from scenarios.sweep.store import Store, write_table, write_text
 
 Progress = Callable[[str, int, int], None]
@@ -111,21 +112,32 @@ def _made(planned: Plan, store: Store, source: Source, workers: Workers,
           progress: Progress | None) -> Finished:
     """Make the runs of a plan that the store does not have, and write the results of all."""
     with store.opened():
-        kept = store.keys()
-        missing = [run.job for run in planned.runs if run.job.key not in kept]
-        done = len(planned.runs) - len(missing)
+        made = complete([run.job for run in planned.runs], store, workers, planned.sweep.name,
+                        progress)
+        return Finished(planned, _written(planned, store, source), made)
 
-        def told(count: int = 0) -> None:
-            nonlocal done
-            done += count
-            if progress is not None:
-                progress(planned.sweep.name, done, len(planned.runs))
 
-        if missing:
-            with connected(workers.processes, workers.scheduler) as client:
-                told()
-                carry_out(missing, client, store.add, told)
-        return Finished(planned, _written(planned, store, source), len(missing))
+def complete(jobs: Sequence[Job], store: Store, workers: Workers, name: str,
+             progress: Progress | None = None, work: Work = run_batch) -> int:
+    """Make the runs that an opened store does not have, and return how many those were.
+
+    name : what `progress` is called with. work : runs a batch. Raises what `sweep` raises.
+    """
+    kept = store.keys()
+    missing = [job for job in jobs if job.key not in kept]
+    done = len(jobs) - len(missing)
+
+    def told(count: int = 0) -> None:
+        nonlocal done
+        done += count
+        if progress is not None:
+            progress(name, done, len(jobs))
+
+    if missing:
+        with connected(workers.processes, workers.scheduler) as client:
+            told()
+            carry_out(missing, client, store.add, told, work=work)
+    return len(missing)
 
 
 def _written(planned: Plan, store: Store, source: Source) -> dict[str, Results]:

@@ -32,6 +32,7 @@ class HandMadeResolver:
         return self.name not in ("tpm-published", "augmented")
 
     accuracy = 1e-9
+    damping = 0.0
     handles = "equalities"
 
 
@@ -88,7 +89,7 @@ def kuka() -> RobotFacts:
 def facts(spec: str) -> Facts:
     resolver = HandMadeResolver(spec)
     return Facts(kuka(), ResolverFacts(spec, resolver.label, resolver.strict, resolver.accuracy,
-                                       "equalities", {}), "equalities", False)
+                                       "equalities", {}, ""), "equalities", False)
 
 
 def recording(scenario: Any = None, fault: str | None = None, orders: tuple[str, ...] = ("a", "b"),

@@ -1,29 +1,12 @@
 """The letter's simulation against runs of its authors' code (tests/data/ellipse)."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
+from reference_runs import EVERY, RIGHT, RUNS, differences, reference
 
 from scenarios.config import load
 from scenarios.loop.controller import Controller
 from scenarios.loop.simulation import simulate
-
-DATA = Path(__file__).parents[1] / "data" / "ellipse"
-
-AS_PUBLISHED = ["control.jacobian_derivative=difference"]
-RUNS = {
-    "inequality_5deg": ("ellipse", AS_PUBLISHED),
-    "inequality_35deg": ("ellipse-35deg", AS_PUBLISHED),
-    "equality_35deg": ("ellipse-35deg-equality", AS_PUBLISHED),
-    "avoidance_3d_first5s": ("ellipse-3d", [*AS_PUBLISHED, "control.duration=5.0"]),
-    "published_jacobians_inequality_5deg": ("ellipse-published", []),
-}
-
-
-def reference(name):
-    with np.load(DATA / f"{name}.npz") as file:
-        return dict(file)
 
 
 @pytest.mark.slow
@@ -31,7 +14,7 @@ def reference(name):
 def test_the_authors_runs_are_reproduced_tick_for_tick(name):
     expected = reference(name)
     run = simulate(load(*RUNS[name]))
-    every = slice(None, None, 10)
+    every = slice(None, None, EVERY)
     assert run.fault is None
     assert run.ticks == (5000 if name.endswith("5s") else 18850)
     np.testing.assert_allclose(run["t"][every], expected["t"], atol=1e-12)
@@ -48,25 +31,16 @@ def test_the_authors_runs_are_reproduced_tick_for_tick(name):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["inequality_5deg", "inequality_35deg", "equality_35deg"])
+@pytest.mark.parametrize("name", RIGHT)
 def test_exact_derivatives_command_nearly_the_same_from_every_recorded_state(name):
-    expected = reference(name)
-    scenario = load(RUNS[name][0])
-    T, controller = scenario.control.period, Controller(scenario)
-    differences = []
-    for k in range(1, len(expected["t"])):
-        # The state of the tick before, whose command was recorded: undo one integration.
-        a = expected["a_previous"][k]
-        v = expected["v"][k] - a * T
-        q = expected["q"][k] - v * T - a * T * T / 2
-        command = controller.command(expected["t"][k] - T, q, v)
-        differences.append(np.abs(command - a).max())
-    assert max(differences) < 0.1
-    assert np.median(differences) < 1e-3
+    found = differences(name)
+    assert len(found) == len(reference(name)["t"]) - 1
+    assert max(found) < 0.1
+    assert np.median(found) < 1e-3
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["inequality_5deg", "inequality_35deg", "equality_35deg"])
+@pytest.mark.parametrize("name", RIGHT)
 def test_exact_derivatives_leave_the_stack_of_every_recorded_state_as_it_was(name):
     expected = reference(name)
     controller = Controller(load(RUNS[name][0]))

@@ -1,15 +1,23 @@
+import re
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
+import typer
 
 from hierarchy.errors import HierarchyError
+from scenarios.cli.main import app
 from scenarios.config import shipped
-from scenarios.reproduce import pages
+from scenarios.reproduce import commands, pages
 from scenarios.reproduce.blocks import BLOCKS, CLAIMS
 from scenarios.reproduce.claims import Compares, Ends, Keeps
 from scenarios.reproduce.rows import Rows, read, write
-from scenarios.reproduce.studies import STUDIES, Study
+from scenarios.reproduce.studies import STUDIES, Pair, Pivot, Study, Watched
+from scenarios.reproduce.watched import DAMPED, LARGEST, LEFT, jobs, measured, rows_of_watched
+from scenarios.reproduce.whole import chosen
+from scenarios.sweep.run import digest, run_batch
+from scenarios.sweep.store import Store
 
 ROOT = Path(__file__).parents[2]
 
@@ -35,6 +43,7 @@ def test_a_comparison_is_true_reversed_or_not_told():
     assert speed("a", "b", "lower").judge(found).verdict == "reversed"
     assert speed("a", "c", "lower").judge(found).verdict == "not distinguishable"
     assert speed("a", "d", "lower").judge(found).verdict == "the same"
+    assert speed("a", "b", "higher").judge(rows(a=[1.0], b=[None])).verdict == "not decided"
     said = speed("a", "b", "higher").judge(found).found
     assert said == ("2.000 [1.750, 2.250] rad/s against 1.500 [1.250, 1.750] rad/s; "
                     "higher in 16 of 16, p < 0.001")
@@ -101,3 +110,123 @@ def test_every_column_is_a_scenario_of_its_own_name(study):
 def test_a_page_has_what_its_rows_say(name):
     text = (ROOT / name).read_text(encoding="utf-8")
     assert pages.filled(text, BLOCKS, read(ROOT / pages.RESULTS), name) == text
+
+
+# Commands whose output stands in a page.
+
+BENCH = """\
+EQ7
+            median  p95
+plain numpy   55.3 83.4
+hcod warm     1.85 2.43
+
+INEQ7
+            median  p95
+hqp proxqp    1443 1945
+Times of one call
+"""
+
+
+@pytest.mark.parametrize("name", commands.PAGES)
+def test_a_page_has_what_its_commands_printed(name):
+    text = (ROOT / name).read_text(encoding="utf-8")
+    assert commands.commands(text)
+    assert commands.filled(text, ROOT, name) == text
+
+
+def test_every_output_that_is_kept_stands_in_a_page():
+    texts = [(ROOT / name).read_text(encoding="utf-8") for name in commands.PAGES]
+    printed = {one: "" for text in texts for one in commands.commands(text)}
+    kept = {path.name for path in (ROOT / commands.OUTPUT).iterdir()}
+    assert kept == {commands.file_of(command, ROOT).name for command in printed}
+
+
+def test_every_page_with_a_mark_is_written():
+    for path in [ROOT / "README.md", *(ROOT / "docs").rglob("*.md")]:
+        name, text = path.relative_to(ROOT).as_posix(), path.read_text(encoding="utf-8")
+        assert ("<!-- measured: " in text) == (name in commands.PAGES), name
+        assert ("<!-- reproduce: " in text) == (name in pages.PAGES), name
+
+
+def page(mark, inside=""):
+    return f"before\n<!-- measured: {mark} -->\n{inside}<!-- end of measurement -->\nafter\n"
+
+
+def test_a_page_gets_the_whole_output_or_the_lines_between_two(tmp_path):
+    commands.keep({"python a.py": BENCH}, tmp_path)
+    whole = commands.filled(page("python a.py"), tmp_path, "page.md")
+    assert whole == page("python a.py", f"```\n{BENCH}```\n")
+    mark = "python a.py | INEQ7 .. Times of"
+    part = commands.filled(page(mark, "old\n"), tmp_path, "page.md")
+    assert part == page(mark, "```\nINEQ7\n            median  p95\n"
+                              "hqp proxqp    1443 1945\n```\n")
+
+
+def test_a_table_gets_the_medians_of_its_rows_and_columns(tmp_path):
+    commands.keep({"hierarchy bench resolvers": BENCH}, tmp_path)
+    table = "| | EQ7 [us] | INEQ7 | notes |\n|---|---|---|---|\n{}"
+    old = "| `hcod`, warm | 9 | 9 | kept |\n| `hqp` | 9 | 9 | too |\n"
+    new = "| `hcod`, warm | 1.9 | – | kept |\n| `hqp` | – | 1443 | too |\n"
+    mark = "table of hierarchy bench resolvers"
+    found = commands.filled(page(mark, table.format(old)), tmp_path, "page.md")
+    assert found == page(mark, table.format(new))
+
+
+def test_an_output_that_is_missing_or_lacks_the_lines_is_named(tmp_path):
+    with pytest.raises(HierarchyError, match=r"page\.md: no output of 'python a\.py' is kept"):
+        commands.filled(page("python a.py"), tmp_path, "page.md")
+    commands.keep({"python a.py": BENCH}, tmp_path)
+    with pytest.raises(HierarchyError, match=r"page\.md: no line of the output .* with 'EQ8'"):
+        commands.filled(page("python a.py | EQ8 .. EQ9"), tmp_path, "page.md")
+
+
+def test_a_command_is_run_once_for_the_same_code(tmp_path):
+    script = tmp_path / "script.py"
+    script.write_text("print('one  ')\nprint('Numbers: runs/a')\n")
+    assert commands.run("python script.py", tmp_path, tmp_path / "out") == "one\n"
+    script.write_text("print('two')\n")
+    assert commands.run("python script.py", tmp_path, tmp_path / "out") == "one\n"
+    (tmp_path / "docs" / "studies").mkdir(parents=True)
+    (tmp_path / "docs" / "studies" / "new.py").write_text("")
+    assert commands.run("python script.py", tmp_path, tmp_path / "out") == "two\n"
+
+
+def test_a_command_that_fails_is_named_and_keeps_nothing(tmp_path):
+    (tmp_path / "script.py").write_text("print('half')\nraise SystemExit(3)\n")
+    with pytest.raises(commands.CommandError, match=r"python script\.py: exit code 3\nhalf"):
+        commands.run("python script.py", tmp_path, tmp_path / "out")
+    assert not list((tmp_path / "out").rglob("output.txt"))
+
+
+def test_studies_and_pages_are_chosen_by_name():
+    assert chosen([]).studies == STUDIES
+    assert chosen([]).pages == commands.PAGES
+    some = chosen(["docs/batch.md", "letter"])
+    assert [study.name for study in some.studies] == ["letter"]
+    assert some.pages == ("docs/batch.md",)
+    with pytest.raises(HierarchyError, match=r"'docs/peers\.md'"):
+        chosen(["docs/peers.md"])
+
+
+def test_the_help_names_every_study():
+    found = typer.main.get_command(app).commands["reproduce"].params[0].help
+    assert {study.name for study in STUDIES} <= set(re.findall(r"\w+", found))
+
+
+@pytest.mark.slow
+def test_what_is_measured_in_ticks_is_kept_for_each_start(tmp_path):
+    scenario = tmp_path / "short.toml"
+    scenario.write_text('extends = "ellipse"\nname = "short"\n[control]\nduration = 0.5\n')
+    study = Watched("short", "a title", str(scenario), "tpm", (
+        Pair("recursive", "tpm", "recursive"), Pivot("avoidance")), starts=2)
+    store = Store(tmp_path / "out")
+    with store.opened():
+        store.add(run_batch(jobs(study, 1), digest(), partial(measured, study)))
+    found = rows_of_watched(study, "a command", 1, store.folder, progress=pytest.fail)
+    assert found.ended == {"recursive": 2, "avoidance": 2}
+    assert (found.column("recursive", LARGEST) < 1e-9).all()
+    assert (found.column("avoidance", DAMPED) == 1.0).all()
+    one, other = found.column("avoidance", LEFT)
+    assert 0.0 < one < 1.0
+    assert 0.0 < other < 1.0
+    assert one != other
