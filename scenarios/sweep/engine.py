@@ -55,9 +55,9 @@ class _LeaveInterrupts(WorkerPlugin):  # type: ignore[misc]
 def _security() -> Security:
     """Return keys made for one sweep: the scheduler's port runs whatever code it is sent."""
     if find_spec("cryptography") is None:
-        print("hierarchy: without the package cryptography the sweep's port on 127.0.0.1 is open to "
-              "every user of this machine, who can run code as you through it; "
-              "pip install '.[sweep]' in the checkout installs it", file=sys.stderr)
+        print("hierarchy: without the package cryptography, every user of this machine can run "
+              "code as you through the sweep's port on 127.0.0.1; in the checkout, "
+              "pip install '.[sweep]' installs it", file=sys.stderr)
         return Security()
     return Security.temporary()
 
