@@ -18,7 +18,7 @@ from hierarchy.errors import RobotError, UnknownNameError, expect
 from hierarchy.problem import Array
 from hierarchy.robots import TABLES
 from hierarchy.robots.files import read_file
-from hierarchy.robots.found import Found, is_floating
+from hierarchy.robots.found import Coupled, Found, is_floating
 from hierarchy.robots.from_table import from_table
 from hierarchy.robots.names import elsewhere, file_of, in_package
 from hierarchy.robots.points import points_along_chain
@@ -66,7 +66,8 @@ class Robot:
     of each velocity. `parents` (joints + 1) has the joint that carries each joint, `masses`
     (joints + 1) [kg] and `centres` (joints + 1, 3) [m] the body that each moves. `rest` (nq,) is
     the default initial configuration. `missing` has sentences about files that are named but
-    missing; `table` is the table that the robot was made from, or None.
+    missing; `coupled` joints follow another one in the file, and move on their own here; `table`
+    is the table that the robot was made from, or None.
     """
 
     def __init__(self, model: Any, name: str, end_effector: str | None = None,
@@ -97,6 +98,7 @@ class Robot:
         self.control_points, self.capsules = control_points, capsules
         self.rest = np.array(pin.neutral(model)) if rest is None else rest
         self.missing = missing
+        self.coupled: tuple[Coupled, ...] = ()
         self.table: Table | None = None
 
     @classmethod
@@ -174,6 +176,7 @@ class Robot:
     def _of(cls, found: Found, name: str, end_effector: str | None = None) -> Robot:
         robot = cls(found.model, name, end_effector or found.end_effector,
                     found.control_points or (), found.capsules, found.rest, found.missing)
+        robot.coupled = found.coupled
         if found.control_points is None:
             robot.control_points = points_along_chain(found.model, robot.end_effector)
         return robot
@@ -187,6 +190,11 @@ class Robot:
     def velocity_names(self) -> list[str]:
         """The joint name of each velocity (n), numbered where a joint has several."""
         return self._numbered([joint.nv for joint in self.model.joints[1:]])
+
+    @property
+    def velocity_units(self) -> list[str]:
+        """The unit of the position of each velocity (n): "rad" or "m"."""
+        return [unit for joint in self.model.joints[1:] for unit in _units(joint)]
 
     @property
     def coordinate_names(self) -> list[str]:
@@ -271,6 +279,14 @@ class Robot:
 
 
 _UNIT = 1.01  # limit in pinocchio of a cosine, a sine or an entry of a quaternion
+
+
+def _units(joint: Any) -> tuple[str, ...]:
+    kind = joint.shortname().removeprefix("JointModel")
+    if kind == "Planar":
+        return ("m", "m", "rad")
+    slides = kind.startswith(("FreeFlyer", "Translation", "P"))
+    return tuple("m" if slides and i < 3 else "rad" for i in range(joint.nv))
 
 
 def _coordinates(model: Any) -> NDArray[np.int64]:

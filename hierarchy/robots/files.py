@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import os
+import re
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from copy import deepcopy
 from dataclasses import replace
 from pathlib import Path
-from tempfile import TemporaryDirectory
+from tempfile import TemporaryDirectory, TemporaryFile
 from types import MappingProxyType
 from typing import Any
 from xml.etree import ElementTree
@@ -14,7 +19,8 @@ import numpy as np
 import pinocchio as pin
 
 from hierarchy.errors import RobotError, UnknownNameError
-from hierarchy.robots.found import Found, is_floating, neutral_within_limits
+from hierarchy.robots import mjcf, urdf
+from hierarchy.robots.found import Coupled, Found, is_floating, neutral_within_limits
 from hierarchy.robots.points import proposed_end_effector
 from hierarchy.robots.shapes import capsules_of
 from hierarchy.robots.table import Base
@@ -36,20 +42,51 @@ def read_file(path: str | Path, base: Base | None = None, shapes: bool = True,
         raise RobotError(f"robot file {str(path)!r} does not exist")
     if path.suffix not in SUFFIXES:
         raise RobotError(f"robot file {str(path)!r}: expected .urdf, .xml or .mjcf")
-    urdf = path.suffix == ".urdf"
-    try:
-        model = _urdf_model(path, base) if urdf else _mjcf_model(path, base)
-    except Exception as error:  # the parsers raise many types; all mean an invalid file
-        raise RobotError(f"robot file {str(path)!r} cannot be read: {_in_one_line(error)}"
-                         ) from error
-    model = _without(model, locked, str(path))
-    found = Found(model, proposed_end_effector(model),
-                  rest=neutral_within_limits(model, pin.neutral(model)))
-    if not shapes:
-        return found
-    geometries, missing = _geometry(path, model, _urdf_shapes if urdf else _mjcf_shapes)
-    capsules, left_out = capsules_of(geometries)
+    is_urdf = path.suffix == ".urdf"
+    root = urdf.checked(path) if is_urdf else mjcf.expanded(path)
+    with _printed() as lines:
+        try:
+            model = _urdf_model(root, base) if is_urdf else _mjcf_model(root, base)
+        except Exception as error:  # the parsers raise many types; all mean an invalid file
+            raise RobotError(f"robot file {str(path)!r} cannot be read: "
+                             f"{'; '.join([*lines(), _in_one_line(error)])}") from error
+        model = _without(model, locked, str(path))
+        found = _found(model, (urdf if is_urdf else mjcf).coupled(root))
+        if not shapes:
+            return found
+        geometries, missing = _geometry(path, root, model,
+                                        _urdf_shapes if is_urdf else _mjcf_shapes)
+        capsules, left_out = capsules_of(geometries)
     return replace(found, capsules=_held_by(model, capsules), missing=(*missing, *left_out))
+
+
+def _found(model: Any, coupled: tuple[Coupled, ...]) -> Found:
+    names = set(model.names)
+    return Found(model, proposed_end_effector(model),
+                 rest=neutral_within_limits(model, pin.neutral(model)),
+                 coupled=tuple(one for one in coupled if {one.joint, one.other} <= names))
+
+
+@contextmanager
+def _printed() -> Iterator[Callable[[], list[str]]]:
+    """Keep what parsers print on standard error from it; yield a function that returns its lines.
+
+    Lines that name the parser's source files are left out.
+    """
+    sys.stderr.flush()
+    kept = os.dup(2)
+    with TemporaryFile("w+", errors="replace") as file:
+        def lines() -> list[str]:
+            file.seek(0)
+            return [re.sub(r"^(Error|Warning):\s*", "", line.strip()) for line in file
+                    if line.strip() and not line.strip().startswith("at line ")]
+
+        os.dup2(file.fileno(), 2)
+        try:
+            yield lines
+        finally:
+            os.dup2(kept, 2)
+            os.close(kept)
 
 
 def _without(model: Any, locked: Mapping[str, float], file: str) -> Any:
@@ -69,29 +106,39 @@ def _without(model: Any, locked: Mapping[str, float], file: str) -> Any:
     return pin.buildReducedModel(model, indices, q)
 
 
-def _urdf_model(path: Path, base: Base | None) -> Any:
-    root = (pin.JointModelFreeFlyer(),) if base == "floating" else ()
-    return pin.buildModelFromUrdf(str(path), *root)
+def _urdf_model(root: Element, base: Base | None) -> Any:
+    free = (pin.JointModelFreeFlyer(),) if base == "floating" else ()
+    return pin.buildModelFromXML(ElementTree.tostring(root, encoding="unicode"), *free)
 
 
-def _mjcf_model(path: Path, base: Base | None) -> Any:
-    model = pin.buildModelFromMJCF(str(path))
-    if base == "floating" and not is_floating(model):
-        return pin.buildModelFromMJCF(str(path), pin.JointModelFreeFlyer())
+def _mjcf_model(root: Element, base: Base | None) -> Any:
+    with _copied(root) as path:
+        model = pin.buildModelFromMJCF(path)
+        if base == "floating" and not is_floating(model):
+            return pin.buildModelFromMJCF(path, pin.JointModelFreeFlyer())
     if base == "fixed" and is_floating(model):
         return pin.buildReducedModel(model, [1], pin.neutral(model))
     return model
 
 
-Shapes = Callable[[Path, Any, bool], tuple[Any, list[str]]]
+@contextmanager
+def _copied(root: Element) -> Iterator[str]:
+    """Yield the path of a temporary file with the text of an MJCF."""
+    with TemporaryDirectory() as copies:
+        copy = Path(copies) / "model.xml"
+        copy.write_text(ElementTree.tostring(root, encoding="unicode"), encoding="utf-8")
+        yield str(copy)
 
 
-def _geometry(path: Path, model: Any, read: Shapes) -> tuple[Any, list[str]]:
+Shapes = Callable[[Path, Element, Any, bool], tuple[Any, list[str]]]
+
+
+def _geometry(path: Path, root: Element, model: Any, read: Shapes) -> tuple[Any, list[str]]:
     """Return collision geometries; without meshes, or none at all, if they cannot be read."""
     said: list[str] = []
     for meshes in (True, False):
         try:
-            geometries, missing = read(path, model, meshes)
+            geometries, missing = read(path, deepcopy(root), model, meshes)
         except Exception as error:  # coal and assimp raise many types
             what = "meshes" if meshes else "collision geometry"
             said.append(f"the {what} cannot be read: {_in_one_line(error)}")
@@ -107,9 +154,9 @@ def _in_one_line(error: Exception) -> str:
     return " ".join(of_use).strip()[:200] or type(error).__name__
 
 
-def _urdf_shapes(path: Path, model: Any, meshes: bool) -> tuple[Any, list[str]]:
+def _urdf_shapes(path: Path, root: Element, model: Any, meshes: bool) -> tuple[Any, list[str]]:
     """Read a copy of the text with absolute mesh paths and without the missing meshes."""
-    root, missing = ElementTree.parse(path).getroot(), []
+    missing = []
     for link in root.iter("link"):
         for collision in link.findall("collision"):
             mesh = collision.find("geometry/mesh")
@@ -145,15 +192,10 @@ def _mesh_file(name: str, path: Path) -> Path | None:
     return None
 
 
-def _mjcf_shapes(path: Path, model: Any, meshes: bool) -> tuple[Any, list[str]]:
-    """Read a copy with an absolute mesh folder and without the missing meshes."""
-    root, missing = ElementTree.parse(path).getroot(), []
-    compiler = root.find("compiler")
-    if compiler is None:
-        compiler = ElementTree.SubElement(root, "compiler")
-    folder = (path.parent / (compiler.get("meshdir") or compiler.get("assetdir") or "")).resolve()
-    compiler.set("meshdir", str(folder))
-    absent = set()
+def _mjcf_shapes(path: Path, root: Element, model: Any, meshes: bool) -> tuple[Any, list[str]]:
+    """Read a copy without the missing meshes."""
+    compiler, missing, absent = root.find("compiler"), [], set()
+    folder = Path("" if compiler is None else compiler.get("meshdir", ""))
     for mesh in root.iter("mesh"):
         file = mesh.get("file")
         if file is not None and not (folder / file).is_file():
@@ -164,10 +206,8 @@ def _mjcf_shapes(path: Path, model: Any, meshes: bool) -> tuple[Any, list[str]]:
             name = geom.get("mesh")
             if name is not None and (name in absent or not meshes):
                 parent.remove(geom)
-    with TemporaryDirectory() as copies:
-        copy = Path(copies) / path.name
-        copy.write_text(ElementTree.tostring(root, encoding="unicode"), encoding="utf-8")
-        geometry = pin.buildGeomFromMJCF(model, str(copy), pin.GeometryType.COLLISION)
+    with _copied(root) as copy:
+        geometry = pin.buildGeomFromMJCF(model, copy, pin.GeometryType.COLLISION)
     return geometry.geometryObjects, missing
 
 

@@ -13,11 +13,26 @@ from hierarchy.problem import Array
 
 
 @dataclass(frozen=True)
+class Coupled:
+    """A joint that the file couples to another one: q = factor q_other + offset [rad or m]."""
+
+    joint: str
+    other: str
+    factor: float
+    offset: float
+
+    def __str__(self) -> str:
+        rest = f" {'-' if self.offset < 0 else '+'} {abs(self.offset):g}" if self.offset else ""
+        return f"{self.joint} = {self.factor:g} {self.other}{rest} in the file"
+
+
+@dataclass(frozen=True)
 class Found:
     """A pinocchio model, its shapes, and what is missing.
 
     `end_effector` is a frame's name; `rest` (nq,) the default initial configuration, or None;
-    `missing` are sentences. `control_points` is None if they are to be proposed.
+    `missing` are sentences. `control_points` is None if they are to be proposed. `coupled` joints
+    move on their own here.
     """
 
     model: Any
@@ -26,6 +41,7 @@ class Found:
     control_points: tuple[ControlPoint, ...] | None = None
     rest: Array | None = None
     missing: tuple[str, ...] = ()
+    coupled: tuple[Coupled, ...] = ()
 
 
 def is_floating(model: Any) -> bool:

@@ -42,7 +42,7 @@ def points_along_chain(model: Any, end_effector: str, count: int = COUNT,
     carry it (a floating base does not count) to the end effector, which is omitted because sensors
     measure it anyway. A point between two origins is fixed to the joint before it.
     """
-    frame = model.frames[model.getFrameId(end_effector)]
+    frame = next(one for one in model.frames if one.name == end_effector)
     chain = [joint for joint in model.supports[frame.parentJoint].tolist()
              if joint > 0 and model.joints[joint].nv == 1]
     chain = chain[min(first, len(chain)) - 1:]

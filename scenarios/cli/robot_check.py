@@ -18,6 +18,8 @@ from scenarios.config.robot import RobotSection
 
 _FRAMES = 12   # names listed at most
 _ROUND = 4     # decimals of proposed positions [m]
+_TURNS = 50.0  # [rad] between limits of a joint beyond which they are taken for degrees
+_UNITS = {"rad": "rad, rad/s, N m", "m": "m, m/s, N"}
 
 
 def is_robot(text: str) -> bool:
@@ -58,7 +60,9 @@ def as_plain_data(section: RobotSection, robot: Robot) -> dict[str, Any]:
                      for c in robot.capsules],
         "control_points": [{"joint": _carrier(robot, p.joint), "offset": _rounded(p.offset)}
                            for p in robot.control_points],
-        "missing": list(_missing(robot))}
+        "missing": list(_missing(robot)),
+        "coupled": [{"joint": one.joint, "other": one.other, "factor": one.factor,
+                     "offset": one.offset} for one in robot.coupled]}
 
 
 def say(section: RobotSection, robot: Robot) -> str:
@@ -82,6 +86,9 @@ def say(section: RobotSection, robot: Robot) -> str:
              f"  capsules        {capsules}",
              f"  control points  {len(robot.control_points)}, {points}"]
     lines += [f"  missing         {sentence}" for sentence in found["missing"]]
+    lines += [f"  coupled         {one}, and moves on its own here: lock it, or add the task below"
+              for one in robot.coupled]
+    lines += _suspicious(found["joints"])
     return "\n".join([*lines, "", "For a scenario file:", "", paste(section, robot)])
 
 
@@ -100,6 +107,10 @@ def paste(section: RobotSection, robot: Robot) -> str:
                                      for k, v in row.items() if v is not None) + " },"
                 for row in found[key]]
         lines += [f"{key} = [", *rows, "]"] if rows else []
+    for one in robot.coupled:
+        joints = f"{{ {_quoted(one.joint)} = 1.0, {_quoted(one.other)} = {-one.factor} }}"
+        lines += ["", "[[tasks]]", 'kind = "coupling"', f"joints = {joints}",
+                  f"value = {one.offset}"]
     return "\n".join(lines)
 
 
@@ -112,8 +123,9 @@ def _joints(robot: Robot) -> list[dict[str, Any]]:
     """Return the names and limits of the actuated joints."""
     lower, upper = robot.position_limits()
     names = robot.velocity_names
-    return [{"name": names[i], "lower": _or_none(lower[i]), "upper": _or_none(upper[i]),
-             "velocity": _or_none(robot.velocity_limit[i]),
+    units = robot.velocity_units
+    return [{"name": names[i], "unit": units[i], "lower": _or_none(lower[i]),
+             "upper": _or_none(upper[i]), "velocity": _or_none(robot.velocity_limit[i]),
              "effort": _or_none(robot.effort_limit[i])} for i in range(robot.actuated, robot.n)]
 
 
@@ -121,11 +133,19 @@ def _joint_table(joints: list[dict[str, Any]]) -> list[str]:
     if not joints:
         return []
     width = max(len(joint["name"]) for joint in joints)
-    rows = [("", "lower", "upper", "velocity", "effort"), *(
-        (joint["name"], *(_shown(joint[key]) for key in ("lower", "upper", "velocity", "effort")))
-        for joint in joints)]
-    return [f"    {name:{width}}  " + "  ".join(f"{cell:>8}" for cell in cells)
-            for name, *cells in rows]
+    rows = [("", "lower", "upper", "velocity", "effort", ""), *(
+        (joint["name"], *(_shown(joint[key]) for key in ("lower", "upper", "velocity", "effort")),
+         _UNITS[joint["unit"]]) for joint in joints)]
+    return [f"    {name:{width}}  {'  '.join(f'{cell:>8}' for cell in cells)}  {units}".rstrip()
+            for name, *cells, units in rows]
+
+
+def _suspicious(joints: list[dict[str, Any]]) -> list[str]:
+    """Return warnings of limits that look like degrees."""
+    return [f"Warning: joint {joint['name']} may turn from {joint['lower']:g} to "
+            f"{joint['upper']:g} rad. Are these degrees?" for joint in joints
+            if joint["unit"] == "rad" and joint["lower"] is not None
+            and joint["upper"] is not None and joint["upper"] - joint["lower"] > _TURNS]
 
 
 def _missing(robot: Robot) -> list[str]:

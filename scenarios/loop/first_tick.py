@@ -6,7 +6,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from math import isfinite, tau
 
+from hierarchy import Robot
 from scenarios.config import Scenario
+from scenarios.config.listed import ListedCoupling
 from scenarios.loop.controller import Controller
 from solvers import Status, explain, make
 
@@ -41,7 +43,7 @@ def first_tick(scenario: Scenario) -> FirstTick:
     plant = controller.cell.plant
     controller.command(0.0, plant.q, plant.v)
     distances = _distances(controller)
-    warnings = tuple(_warnings(scenario, distances))
+    warnings = (*_warnings(scenario, distances), *_loose(scenario, controller.cell.robot))
     if not controller.answered:
         return FirstTick(None, (), (), distances, warnings)
     return FirstTick(controller.resolution.status, controller.hierarchy.names,
@@ -62,6 +64,15 @@ def _distances(controller: Controller) -> dict[str, float]:
     seen = controller.cell.sensor.measurement
     both = {"body": seen.minimal_distance, "end effector": seen.end_effector_distance}
     return {name: distance for name, distance in both.items() if isfinite(distance)}
+
+
+def _loose(scenario: Scenario, robot: Robot) -> Iterator[str]:
+    """Yield the joints that the robot's file couples and the scenario lets move on their own."""
+    held = [set(task.joints) for task in scenario.tasks if isinstance(task, ListedCoupling)]
+    for one in robot.coupled:
+        if not any({one.joint, one.other} <= joints for joints in held):
+            yield (f"{one}, and moves on its own here: put it into robot.locked, or couple it in "
+                   "[[tasks]]")
 
 
 def _warnings(scenario: Scenario, distances: dict[str, float]) -> Iterator[str]:

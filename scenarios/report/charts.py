@@ -60,7 +60,7 @@ def multiples(name: str, found: Sequence[Motion], looks: Mapping[str, Look]) -> 
     cards = []
     for panel in (*panels.PANELS, *panels.TASK_PANELS):
         small = figures.side_by_side(panel, recordings, looks)
-        if small:
+        if any(panel.shows(recordings[label]) for label in small):
             cards.append((panel, _key(panel.name, recordings), [
                 (one, drawn(small[one.label], f"{name}, {one.label}: {panel.title}"))
                 for one in found if one.label in small]))

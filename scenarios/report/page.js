@@ -1,8 +1,14 @@
 "use strict";
 
-// A replay is drawn when it comes into view, so that the page itself is there at once.
+// A replay is drawn when it comes into view, so that the page itself is there at once; its frame is
+// then as tall as what it shows.
 const show = (frame) => {
-  if (!frame.srcdoc) frame.srcdoc = frame.dataset.document;
+  if (frame.srcdoc) return;
+  frame.addEventListener("load", () => {
+    const shown = frame.contentDocument.querySelector("main");
+    new ResizeObserver(() => { frame.style.height = `${shown.offsetHeight}px`; }).observe(shown);
+  });
+  frame.srcdoc = frame.dataset.document;
 };
 const frames = document.querySelectorAll("iframe[data-document]");
 if ("IntersectionObserver" in window) {

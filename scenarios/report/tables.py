@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from itertools import groupby
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -65,8 +64,9 @@ def _grouped(rows: Sequence[Row], runs: Sequence[Run]
              ) -> list[tuple[str, list[tuple[Row, list[Cell]]]]]:
     """Return rows with their cells, by group."""
     out = [run.fault is not None for run in runs]
-    return [(group, [(row, _cells(row, out)) for row in some])
-            for group, some in groupby(rows, key=lambda row: row.group)]
+    groups = dict.fromkeys(row.group for row in rows)
+    return [(group, [(row, _cells(row, out)) for row in rows if row.group == group])
+            for group in groups]
 
 
 def _cells(row: Row, out: Sequence[bool]) -> list[Cell]:

@@ -15,6 +15,7 @@ from hierarchy.words import listed
 from scenarios.draw.figures import drawing
 from scenarios.files import slug
 
+_CODE = re.compile(r"`([^`]+)`")
 _NUMBER = re.compile(r"[0-9.]+e-[0-9]+")
 
 
@@ -38,9 +39,14 @@ def unbroken(text: str) -> Markup:
     return Markup(_NUMBER.sub(r'<span class="number">\g<0></span>', str(escape(text))))
 
 
+def code(text: str) -> Markup:
+    """Return text with what is between backticks set as code."""
+    return Markup(_CODE.sub(r"<code>\g<1></code>", str(escape(text))))
+
+
 @cache
 def _environment() -> Environment:
     made = Environment(loader=PackageLoader("scenarios", "."), autoescape=True,
                        undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    made.filters |= {"unbroken": unbroken, "listed": listed, "slug": slug}
+    made.filters |= {"code": code, "unbroken": unbroken, "listed": listed, "slug": slug}
     return made

@@ -5,9 +5,11 @@ from __future__ import annotations
 import logging
 import os
 import signal
+import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from importlib.util import find_spec
 from typing import Any
 
 from hierarchy.errors import HierarchyError
@@ -24,6 +26,7 @@ try:
         WorkerPlugin,
         as_completed,
     )
+    from distributed.security import Security
 except ImportError as error:
     raise HierarchyError("a sweep needs dask.distributed and pyarrow: "
                          "pip install 'task-hierarchy[sweep]'") from error
@@ -49,6 +52,16 @@ class _LeaveInterrupts(WorkerPlugin):  # type: ignore[misc]
         signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
+def _security() -> Security:
+    """Return keys made for one sweep: the scheduler's port runs whatever code it is sent."""
+    if find_spec("cryptography") is None:
+        print("hierarchy: without the package cryptography, every user of this machine can run "
+              "code as you through the sweep's port on 127.0.0.1; in the checkout, "
+              "pip install '.[sweep]' installs it", file=sys.stderr)
+        return Security()
+    return Security.temporary()
+
+
 def processors() -> int:
     """Return the number of processors this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else (
@@ -60,7 +73,7 @@ def connected(workers: int | None = None, scheduler: str | None = None) -> Itera
     """Yield a client of the Dask scheduler at an address, or of local worker processes.
 
     There are `workers` local processes with one thread each, by default one per processor; they
-    listen on 127.0.0.1 only and end with this process.
+    listen on 127.0.0.1 only, speak TLS with keys made for this call, and end with this process.
 
     Raises
     ------
@@ -78,8 +91,8 @@ def connected(workers: int | None = None, scheduler: str | None = None) -> Itera
     with dask.config.set(settings), LocalCluster(
             n_workers=workers or processors(), threads_per_worker=1, processes=True,
             host="127.0.0.1", dashboard_address="127.0.0.1:0",  # any free port and no dashboard
-            scheduler_kwargs={"dashboard": False}, silence_logs=logging.CRITICAL) as cluster, \
-            Client(cluster) as client:
+            scheduler_kwargs={"dashboard": False}, security=_security(),
+            silence_logs=logging.CRITICAL) as cluster, Client(cluster) as client:
         client.register_plugin(_LeaveInterrupts())
         yield client
 

@@ -454,3 +454,91 @@ def test_the_panda_follows_its_ellipse_within_its_limits():
     assert (run["q"] >= run["joint_lower"]).all()
     assert (run["q"] <= run["joint_upper"]).all()
     assert run["minimal_distance"].min() > 0.05
+
+
+# What is wrong in a file is named before pinocchio reads it, which would end the process or say
+# "not a valid URDF model".
+
+TWO_JOINTS = """<robot name="arm">
+<link name="base"/><link name="upper">{link}</link><link name="fore"/>
+<joint name="shoulder" type="{kind}"><parent link="{parent}"/><child link="upper"/>
+<axis xyz="{axis}"/>{limit}</joint>
+<joint name="elbow" type="prismatic"><parent link="upper"/><child link="fore"/>
+<axis xyz="0 1 0"/><limit lower="-2" upper="2" velocity="1" effort="10"/>{mimic}</joint>{more}
+</robot>"""
+PLAIN = {"link": "", "kind": "revolute", "parent": "base", "axis": "0 0 1", "mimic": "", "more": "",
+         "limit": '<limit lower="-2" upper="2" velocity="1" effort="10"/>'}
+LOOP = '<joint name="back" type="fixed"><parent link="fore"/><child link="upper"/></joint>'
+
+
+@pytest.mark.parametrize(("changed", "said"), [
+    ({"axis": "0 0 0"}, "joint 'shoulder': its axis is zero"),
+    ({"axis": "0 1"}, "joint 'shoulder': its axis '0 1' is not three finite numbers"),
+    ({"kind": "revolut"}, "joint 'shoulder': its type is 'revolut'"),
+    ({"parent": "nobody"}, "joint 'shoulder': its parent link 'nobody' does not exist"),
+    ({"limit": ""}, "joint 'shoulder': it is revolute and has no <limit>"),
+    ({"limit": '<limit lower="nan" upper="2"/>'}, "joint 'shoulder': its limit lower = 'nan'"),
+    ({"limit": '<limit lower="2" upper="-2"/>'}, "its lower limit 2 is above its upper limit -2"),
+    ({"limit": '<limit lower="0" upper="1" velocity="-1"/>'}, "velocity = -1 is negative"),
+    ({"mimic": '<mimic joint="wrist"/>'}, "joint 'elbow': it is to follow joint 'wrist'"),
+    ({"link": '<inertial><mass value="-1"/></inertial>'}, "link 'upper': its mass '-1'"),
+    ({"link": '<collision><geometry><sphere radius="-1"/></geometry></collision>'},
+     "link 'upper': its sphere has radius = '-1'"),
+    ({"more": LOOP}, "joints 'back', 'elbow' are a loop"),
+    ({"more": '<link name="alone"/>'}, "links 'base', 'alone' have no parent"),
+    ({"more": '<link name="base"/>'}, "link 'base' occurs 2 times"),
+    ({"more": '<xacro:include/>'}, "not valid XML"),
+])
+def test_a_wrong_urdf_is_refused_with_the_name_of_its_joint(changed, said, tmp_path, capfd):
+    path = tmp_path / "arm.urdf"
+    path.write_text(TWO_JOINTS.format(**{**PLAIN, **changed}))
+    with pytest.raises(RobotError) as error:
+        Robot.load(path)
+    assert said in str(error.value)
+    assert "arm.urdf" in str(error.value)
+    assert capfd.readouterr() == ("", "")
+
+
+def test_units_and_coupled_joints_are_told(tmp_path):
+    path = tmp_path / "arm.urdf"
+    mimic = '<mimic joint="shoulder" multiplier="2" offset="0.1"/>'
+    path.write_text(TWO_JOINTS.format(**{**PLAIN, "mimic": mimic}))
+    robot = Robot.load(path)
+    assert robot.velocity_units == ["rad", "m"]
+    assert list(map(str, robot.coupled)) == ["elbow = 2 shoulder + 0.1 in the file"]
+    assert Robot.load(path, locked={"elbow": 0.0}).coupled == ()
+
+
+ONE_BODY = """<body name="{0}"><joint name="{0}" axis="0 0 1" range="-90 90"/><geom size="0.03"/>
+{1}</body>"""
+
+
+def test_an_mjcf_includes_files(tmp_path):
+    (tmp_path / "hand.xml").write_text(
+        f"<mujocoinclude>{ONE_BODY.format('hand', '')}</mujocoinclude>")
+    include = '<include file="hand.xml"/>'
+    equal = '<equality><joint joint1="hand" joint2="arm" polycoef="0 0.5 0 0 0"/></equality>'
+    (tmp_path / "arm.xml").write_text(
+        f"<mujoco><worldbody>{ONE_BODY.format('arm', include)}</worldbody>{equal}</mujoco>")
+    (tmp_path / "scene.xml").write_text(
+        '<mujoco><include file="arm.xml"/><worldbody><light pos="0 0 1"/></worldbody></mujoco>')
+    robot = Robot.load(tmp_path / "scene.xml")
+    assert robot.velocity_names == ["arm", "hand"]
+    assert list(map(str, robot.coupled)) == ["hand = 0.5 arm in the file"]
+
+
+@pytest.mark.parametrize(("text", "said"), [
+    ('<mujoco><include file="no.xml"/></mujoco>', "the file 'no.xml', which it includes"),
+    ('<mujoco><include file="it.xml"/></mujoco>', "'it.xml' is included more than once"),
+    ("<mujoco/>", "it has no body"),
+    ("<robot/>", "is no MJCF: it starts with <robot>"),
+    (f"<mujoco><worldbody>{ONE_BODY.format('a', ONE_BODY.format('a', ''))}</worldbody></mujoco>",
+     "joint 'a' occurs 2 times"),
+    (f"<mujoco><worldbody>{ONE_BODY.format('a', '')}</worldbody></mujoco>".replace("1", "0"),
+     "joint 'a': its axis is zero"),
+])
+def test_a_wrong_mjcf_is_refused(text, said, tmp_path):
+    path = tmp_path / "it.xml"
+    path.write_text(text)
+    with pytest.raises(RobotError, match=said):
+        Robot.load(path)

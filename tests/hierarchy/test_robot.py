@@ -141,7 +141,7 @@ def test_an_mjcf_file_is_read(tmp_path):
 def test_bad_robot_files_are_named(tmp_path, pendulum):
     (tmp_path / "broken.urdf").write_text("<robot")
     (tmp_path / "arm.stl").write_text("solid")
-    for path, said in [("none.urdf", "does not exist"), ("broken.urdf", "cannot be read"),
+    for path, said in [("none.urdf", "does not exist"), ("broken.urdf", "not valid XML"),
                        ("arm.stl", "expected .urdf")]:
         with pytest.raises(HierarchyError, match=said):
             Robot.from_file(tmp_path / path)

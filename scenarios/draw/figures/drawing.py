@@ -39,8 +39,8 @@ _SCREEN: dict[Any, Any] = {
     "ytick.major.width": 0.6, "svg.fonttype": "none", "figure.dpi": 72.0}
 # Line styles that differ in grey, one for each of JOINTS.
 _IN_GREY = ("-", "--", ":", "-.", (0, (5, 1, 1, 1, 1, 1)), (0, (8, 2)), (0, (3, 1)), (0, (1, 3)))
-_PAPER = {**_SCREEN, "font.family": "STIXGeneral", "mathtext.fontset": "stix", "font.size": 8.0,
-          "axes.titlesize": 8.0, "pdf.fonttype": 42}
+_PAPER = {**_SCREEN, "font.family": ["STIXGeneral", "DejaVu Serif"], "mathtext.fontset": "stix",
+          "font.size": 8.0, "axes.titlesize": 8.0, "pdf.fonttype": 42}
 
 
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")

@@ -25,7 +25,8 @@ class Panel:
     """One quantity of a run over time: its title, the signal it needs, how it is drawn.
 
     A `signal` that ends in "_" stands for all signals with that prefix. `typeset` is the unit as
-    matplotlib sets it, where that differs from plain text.
+    matplotlib sets it, where that differs from plain text. With `zero_is_empty` there is nothing to
+    see while the signal is zero.
     """
 
     name: str
@@ -35,6 +36,7 @@ class Panel:
     draw: Draw
     explains: str = ""
     typeset: str = ""
+    zero_is_empty: bool = False
 
     @property
     def heading(self) -> str:
@@ -46,6 +48,10 @@ class Panel:
         known = (any(name.startswith(self.signal) for name in recording.signals)
                  if self.signal.endswith("_") else self.signal in recording)
         return known and recording.ticks > 1
+
+    def shows(self, recording: Recording) -> bool:
+        """Whether there is something to see of a recording that fits."""
+        return not self.zero_is_empty or bool(recording[self.signal].any())
 
 
 def joint_velocities(ax: Axes, recording: Recording, colour: str) -> None:
@@ -142,15 +148,18 @@ PANELS = (
     Panel("joint-velocities", "Joint velocities", "rad/s", "v", joint_velocities,
           "Continuous at acceleration level, with jumps at velocity level."),
     Panel("joint-accelerations", "Joint accelerations", "rad/s²", "a", joint_accelerations,
-          "Jumps at every change of the stack, within the limits."),
+          "It jumps where the stack changes."),
     Panel("position-error", "Distance from the desired position", "mm, logarithmic",
-          "position_error", position_error, "The ellipses start off their path on purpose."),
+          "position_error", position_error,
+          "The shipped ellipses start off their path on purpose."),
     Panel("body-distance", "Body to the nearest obstacle", "m", "minimal_distance", body_distance,
-          "Below ε₂ a lowest-priority task pushes away, below ε₁ the first."),
+          "Dashed: below ε₂ a lowest-priority task pushes away, below ε₁ the first; d_min is "
+          "kept."),
     Panel("active-point", "Control point being pushed away", "number", "active_control_point",
-          active_point, "The control point nearest to an obstacle, while within ε₂."),
+          active_point, "The control point nearest to an obstacle, while within ε₂.",
+          zero_is_empty=True),
     Panel("ee-distance", "End effector to the nearest obstacle", "m", "ee_distance", ee_distance,
-          "Below ε_ee, in red, the position task is pushed off its path."),
+          "Dashed: below ε_ee, in red, the position task is pushed off its path; d_min is kept."),
     Panel("pointing-error", "Pointing error", "cos α_d − cos α", "pointing_error", pointing_error,
           "Above zero the axis is outside the cone; red while the task is in the stack.",
           r"$\cos\alpha_d - \cos\alpha$"),

@@ -1,6 +1,6 @@
 // Curves over time and the fate of each task, under one movable cursor.
 
-const RIGHT = 8, TOP = 5, BELOW = 15, HEIGHT = 104, LANE = 15;
+const RIGHT = 8, TOP = 5, BELOW = 16, HEIGHT = 106, LANE = 15;
 const DAMPED = 4;  // a range this many times the usual one is cut, as it would flatten the others
 
 function element(name, attributes = {}, ...children) {
@@ -49,7 +49,7 @@ class Curves {
     this.outputs = [];
     const shown = this.runs.filter(run => run.visible && run.frames > 1);
     const names = [...new Set(shown.flatMap(run => run.series.map(one => one.name)))];
-    this.left = Math.max(44, ...shown.flatMap(run => run.tasks).map(task => 5.6 * task.length + 10));
+    this.left = Math.max(44, ...shown.flatMap(run => run.tasks).map(task => 6.2 * task.length + 10));
     this.left = Math.min(this.left, this.width / 3);
     this.place.replaceChildren(...(this.width > 100 ?
       [...shown.map((run, i) => this.lanes(run, shown.length > 1, i === 0)),

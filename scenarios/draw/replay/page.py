@@ -27,8 +27,8 @@ def html(recordings: Mapping[str, Recording], title: str, *, rate: float = 30.0,
     """Return a replay of runs, by label, as a self-contained document.
 
     `rate` is the frame rate in frames per second. With `embedded` the document has no heading,
-    fills its frame and leaves the mouse wheel to the surrounding page. Raises HierarchyError if
-    there is nothing to show.
+    is as tall as its content, and leaves the mouse wheel to the surrounding page. Raises
+    HierarchyError if there is nothing to show.
     """
     from scenarios.draw.figures.drawing import JOINTS
 

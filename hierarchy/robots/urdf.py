@@ -1,0 +1,167 @@
+"""What a URDF says, read before pinocchio, whose complaints name no joint or end the process."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from itertools import pairwise
+from math import isfinite
+from pathlib import Path
+from xml.etree import ElementTree
+
+from hierarchy.errors import RobotError
+from hierarchy.robots.found import Coupled
+
+Element = ElementTree.Element
+
+_KINDS = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar", "spherical")
+_WITH_AXIS = ("revolute", "continuous", "prismatic", "planar")
+_WITH_LIMIT = ("revolute", "prismatic")
+_MOST = 5  # complaints that are told
+
+
+def read_xml(path: Path) -> Element:
+    """Return the root of an XML file; raises RobotError with the line of a fault in it."""
+    try:
+        return ElementTree.parse(path).getroot()
+    except (ElementTree.ParseError, ValueError, LookupError) as error:
+        raise RobotError(f"robot file {str(path)!r} is not valid XML: {error}") from error
+
+
+def checked(path: Path) -> Element:
+    """Return the root of a URDF; raises RobotError that names the joints or links at fault."""
+    root = read_xml(path)
+    if root.tag != "robot":
+        raise RobotError(f"robot file {str(path)!r} is no URDF: it starts with <{root.tag}>, "
+                         "not with <robot>")
+    if wrong := list(_complaints(root)):
+        more = f"; and {len(wrong) - _MOST} more" if len(wrong) > _MOST else ""
+        raise RobotError(f"robot file {str(path)!r}: {'; '.join(wrong[:_MOST])}{more}")
+    return root
+
+
+def coupled(root: Element) -> tuple[Coupled, ...]:
+    """Return the joints that follow another one (`mimic`)."""
+    return tuple(Coupled(_name(joint), str(mimic.get("joint")),
+                         float(mimic.get("multiplier", 1.0)), float(mimic.get("offset", 0.0)))
+                 for joint in root.findall("joint")
+                 for mimic in joint.findall("mimic") if joint.get("type") != "fixed")
+
+
+def _complaints(root: Element) -> Iterator[str]:
+    links, joints = ([_name(one) for one in root.findall(tag)] for tag in ("link", "joint"))
+    for tag, names in (("link", links), ("joint", joints)):
+        yield from (f"{tag} {name!r} occurs {count} times"
+                    for name, count in Counter(names).items() if count > 1)
+    if not links:
+        yield "it has no link"
+    for joint in root.findall("joint"):
+        name = f"joint {_name(joint)!r}"
+        yield from (f"{name}: {said}" for said in _of_joint(joint, links, joints))
+    for link in root.findall("link"):
+        yield from (f"link {_name(link)!r}: {said}" for said in _of_link(link))
+    yield from _of_tree(root, links)
+
+
+def _of_joint(joint: Element, links: list[str], joints: list[str]) -> Iterator[str]:
+    kind = joint.get("type")
+    if kind not in _KINDS:
+        yield f"its type is {kind!r}; expected one of {', '.join(_KINDS)}"
+    for end in ("parent", "child"):
+        link = _attribute(joint, end, "link")
+        if link not in links:
+            yield f"its {end} link {link!r} does not exist"
+    axis = joint.find("axis")
+    if axis is not None and kind in _WITH_AXIS:
+        numbers = _numbers(axis.get("xyz", ""), 3)
+        if numbers is None:
+            yield f"its axis {axis.get('xyz')!r} is not three finite numbers"
+        elif not any(numbers):
+            yield f"its axis is zero: {axis.get('xyz')!r}"
+    yield from _of_origin(joint)
+    yield from _of_limit(joint, kind)
+    mimic = joint.find("mimic")
+    if mimic is not None:
+        if mimic.get("joint") not in joints:
+            yield f"it is to follow joint {mimic.get('joint')!r}, which does not exist"
+        for key in ("multiplier", "offset"):
+            if _numbers(mimic.get(key, "0"), 1) is None:
+                yield f"its mimic {key} {mimic.get(key)!r} is not a finite number"
+
+
+def _of_limit(joint: Element, kind: str | None) -> Iterator[str]:
+    limit = joint.find("limit")
+    if limit is None:
+        if kind in _WITH_LIMIT:
+            yield f"it is {kind} and has no <limit>; without limits it is of type continuous"
+        return
+    found = {}
+    for key in ("lower", "upper", "velocity", "effort"):
+        numbers = _numbers(limit.get(key, "0"), 1)
+        if numbers is None:
+            yield f"its limit {key} = {limit.get(key)!r} is not a finite number"
+        else:
+            found[key] = numbers[0]
+    if kind in _WITH_LIMIT and found.get("lower", 0.0) > found.get("upper", 0.0):
+        yield f"its lower limit {found['lower']:g} is above its upper limit {found['upper']:g}"
+    yield from (f"its limit {key} = {found[key]:g} is negative" for key in ("velocity", "effort")
+                if found.get(key, 0.0) < 0.0)
+
+
+def _of_link(link: Element) -> Iterator[str]:
+    mass = _attribute(link, "inertial/mass", "value")
+    number = None if mass is None else _numbers(mass, 1)
+    if mass is not None and (number is None or number[0] < 0.0):
+        yield f"its mass {mass!r} is not a number from 0 on"
+    for collision in link.findall("collision"):
+        yield from _of_origin(collision)
+        for shape in collision.findall("geometry/*"):
+            yield from (f"its {shape.tag} has {key} = {shape.get(key)!r}"
+                        for key in ("radius", "length") if shape.get(key) is not None
+                        and not (_numbers(str(shape.get(key)), 1) or (-1.0,))[0] >= 0.0)
+
+
+def _of_origin(element: Element) -> Iterator[str]:
+    origin = element.find("origin")
+    for key in ("xyz", "rpy") if origin is not None else ():
+        if origin is not None and _numbers(origin.get(key, "0 0 0"), 3) is None:
+            yield f"its origin {key} = {origin.get(key)!r} is not three finite numbers"
+
+
+def _of_tree(root: Element, links: list[str]) -> Iterator[str]:
+    """Yield why the links are no tree: two parents, several roots, or a loop."""
+    above: dict[str, tuple[str, str]] = {}
+    for joint in root.findall("joint"):
+        child, parent = (str(_attribute(joint, end, "link")) for end in ("child", "parent"))
+        if child in above:
+            yield (f"link {child!r} is the child of joint {above[child][0]!r} and of joint "
+                   f"{_name(joint)!r}; a URDF is a tree: close a loop with a task")
+        above[child] = _name(joint), parent
+    roots = [link for link in links if link not in above]
+    if len(roots) > 1:
+        yield f"links {', '.join(map(repr, roots))} have no parent; a URDF has one root"
+    for link in links:
+        around = [link]
+        while around[-1] in above and len(around) <= len(links):
+            around.append(above[around[-1]][1])
+            if around[-1] == link:
+                by = ", ".join(repr(above[child][0]) for child, _ in pairwise(around))
+                yield f"joints {by} are a loop: a URDF is a tree"
+                return
+
+
+def _numbers(text: str, count: int) -> list[float] | None:
+    try:
+        numbers = [float(part) for part in text.split()]
+    except ValueError:
+        return None
+    return numbers if len(numbers) == count and all(map(isfinite, numbers)) else None
+
+
+def _attribute(element: Element, path: str, key: str) -> str | None:
+    found = element.find(path)
+    return None if found is None else found.get(key)
+
+
+def _name(element: Element) -> str:
+    return element.get("name", "")
