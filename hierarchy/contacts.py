@@ -172,10 +172,9 @@ class Contacts:
 
     def torques(self, state: State, x: ArrayLike) -> Array:
         """Torques M a + h - J_c^T f (n,) [N m or N] of the actuated joints that an x takes."""
-        M, h = state.dynamics
-        pushed = self.jacobian(state).T @ self.forces(x).ravel()
-        efforts: Array = M @ self.accelerations(x) + h - pushed
-        return efforts[self.robot.actuated:]
+        torques = np.empty(self.robot.n - self.robot.actuated)
+        _write_torques(*state.dynamics, state.kinematics, self.points, self._checked(x), torques)
+        return torques
 
     def jacobian(self, state: State) -> Array:
         """Jacobian J_c (3 p, n) of all contact points [m], world axes."""
@@ -227,6 +226,29 @@ def write_dynamics(M, kinematics, points, A, row, first, count):
                 A[row + i, f + 2] = J[4, c] * x - J[3, c] * y - J[2, c]
             else:
                 A[row + i, f], A[row + i, f + 1], A[row + i, f + 2] = 0.0, 0.0, 0.0
+
+
+@compiled
+def _write_torques(M, h, kinematics, points, x, torques):
+    J, placements, supports = kinematics.J, kinematics.placements, kinematics.supports
+    n = M.shape[0]
+    first = n - len(torques)
+    for i in range(len(torques)):
+        torque = h[first + i]
+        for c in range(n):
+            torque += M[first + i, c] * x[c]
+        torques[i] = torque
+    for k in range(len(points.joints)):
+        joint, o, f = points.joints[k], points.offsets[k], n + 3 * k
+        px, py, pz = place(placements[joint], o[0], o[1], o[2])
+        # The wrench of the force about the world's origin.
+        mx, my, mz = (py * x[f + 2] - pz * x[f + 1], pz * x[f] - px * x[f + 2],
+                      px * x[f + 1] - py * x[f])
+        for i in range(len(torques)):
+            c = first + i
+            if supports[joint, c]:
+                torques[i] -= (J[0, c] * x[f] + J[1, c] * x[f + 1] + J[2, c] * x[f + 2]
+                               + J[3, c] * mx + J[4, c] * my + J[5, c] * mz)
 
 
 @compiled

@@ -25,13 +25,14 @@ Call = Callable[[], Any]
 class Candidate:
     """One to be timed.
 
-    prepare : makes of a hierarchy the call that is timed; what it does itself is not.
+    prepare : makes of a hierarchy, and of that of the tick before or None, the call that is timed;
+        what it does itself is not.
     read : what the call returned, as a Resolution.
     """
 
     label: str
     inequalities: bool
-    prepare: Callable[[Hierarchy], Call]
+    prepare: Callable[[Hierarchy, Hierarchy | None], Call]
     read: Callable[[Any], Resolution] = lambda answer: answer
 
 
@@ -46,7 +47,7 @@ def candidates(wanted: Sequence[str] | None = None) -> tuple[list[Candidate], di
             raise UnknownNameError("resolver", name, names())
     missing = {f"hqp {name}": "pip install 'task-hierarchy[qp]'"
                for name in BACKENDS if not installed(name) and (wanted is None or "hqp" in wanted)}
-    field = [Candidate(NUMPY, False, lambda h: lambda: plain_numpy(h))]
+    field = [Candidate(NUMPY, False, lambda h, _: lambda: plain_numpy(h))]
     if installed("daqp"):
         field.append(Candidate(DAQP, True, _daqp, _read_daqp))
     else:
@@ -85,19 +86,19 @@ def _starts(resolver: Resolver) -> bool:
     return resolver.solve(h).memory is not None
 
 
-def _cold(resolver: Resolver) -> Callable[[Hierarchy], Call]:
-    return lambda h: lambda: resolver.solve(h)
+def _cold(resolver: Resolver) -> Callable[[Hierarchy, Hierarchy | None], Call]:
+    return lambda h, _: lambda: resolver.solve(h)
 
 
-def _warm(resolver: Resolver) -> Callable[[Hierarchy], Call]:
-    def prepare(h: Hierarchy) -> Call:
-        memory = resolver.solve(moved(h)).memory
+def _warm(resolver: Resolver) -> Callable[[Hierarchy, Hierarchy | None], Call]:
+    def prepare(h: Hierarchy, before: Hierarchy | None) -> Call:
+        memory = resolver.solve(moved(h) if before is None else before).memory
         return lambda: resolver.solve(h, memory)
 
     return prepare
 
 
-def _daqp(h: Hierarchy) -> Call:
+def _daqp(h: Hierarchy, before: Hierarchy | None = None) -> Call:
     """Convert h for DAQP: leading identity rows as bounds, large numbers for missing sides."""
     import daqp
 

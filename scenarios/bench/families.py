@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array, Hierarchy
@@ -14,7 +16,8 @@ from solvers.problems import family as make_problem
 
 EQUALITIES = ("EQ7", "EQ7over", "EQ7sing", "EQ30L8", "EQ30L10")
 INEQUALITIES = ("INEQ7", "HUM38", "DEGEN7")
-FAMILIES = EQUALITIES + INEQUALITIES
+RECORDED = ("DYN60",)
+FAMILIES = EQUALITIES + INEQUALITIES + RECORDED
 DATA = Path(__file__).parents[2] / "tests" / "data" / "hlsp"
 CHECKED = 5      # fresh problems of a family with violations from hqp
 _MISSING = 1e9  # marks a missing side in the data
@@ -22,11 +25,15 @@ _MISSING = 1e9  # marks a missing side in the data
 
 @dataclass(frozen=True)
 class Problem:
-    """A hierarchy with its certified answer x (n,) and violations, norms (L,); NaN if unknown."""
+    """A hierarchy with its certified answer x (n,) and violations, norms (L,); NaN if unknown.
+
+    `before` is the problem of the tick before, of a recorded sequence, or None.
+    """
 
     h: Hierarchy
     x: Array
     norms: Array
+    before: Hierarchy | None = None
 
     @property
     def known(self) -> bool:
@@ -47,7 +54,15 @@ def family(name: str, folder: Path = DATA) -> list[Problem]:
                              "source checkout, and another folder can be given")
     with np.load(file) as opened:
         data = dict(opened)
-    return [_problem(data, p) for p in range(len(data["x"]))]
+    return _in_sequence([_problem(data, p) for p in range(len(data["x"]))], data.get("sequence"))
+
+
+def _in_sequence(problems: list[Problem], sequence: NDArray[Any] | None) -> list[Problem]:
+    """Return problems with those before them, where neighbours are of one sequence."""
+    if sequence is None:
+        return problems
+    return [replace(one, before=problems[p - 1].h) if p and sequence[p] == sequence[p - 1] else one
+            for p, one in enumerate(problems)]
 
 
 def _problem(data: dict[str, Array], p: int) -> Problem:
@@ -62,10 +77,26 @@ def _problem(data: dict[str, Array], p: int) -> Problem:
 def fresh(name: str, seed: int, count: int, checked: int = CHECKED) -> list[Problem]:
     """Generate problems of a family with seeds `seed`, `seed` + 1, ..., not used for tuning.
 
-    checked : number of problems, the first ones, with norms from hqp if its answer is certified.
+    Those of DYN60 are recorded from runs sampled with `seed`, which needs the extra `sim`.
+
+    checked : number of problems, the first ones, with norms from hqp if its answer is certified;
+        recorded problems have the answers with which they were kept.
     """
+    if name in RECORDED:
+        return _in_sequence(*_recorded(seed, count))
     made, hqp = [make_problem(name, seed + i) for i in range(count)], make("hqp")
     return [_answered(hqp, h) if i < checked else _unanswered(h) for i, h in enumerate(made)]
+
+
+def _recorded(seed: int, count: int) -> tuple[list[Problem], NDArray[Any]]:
+    from scenarios.bench.recorded import TOGETHER, sequences
+
+    problems: list[Problem] = []
+    for some in sequences(seed):
+        problems += [Problem(h, x, h.violations(x)) for h, x in some]
+        if len(problems) >= count:
+            break
+    return problems[:count], np.arange(count) // TOGETHER
 
 
 def _answered(hqp: Resolver, h: Hierarchy) -> Problem:

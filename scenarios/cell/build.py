@@ -7,10 +7,12 @@ from dataclasses import dataclass
 from hierarchy import Robot, Stack, State, Task
 from hierarchy.activation import Activation
 from hierarchy.avoidance import Obstacles, SurveillanceAreas
+from hierarchy.contacts import Contacts
 from hierarchy.jit import announce_compilation
 from hierarchy.problem import Array
 from hierarchy.tasks import JointLimits, Pointing, Position, Separation
 from scenarios.cell.avoidance import areas_of, avoidance_tasks
+from scenarios.cell.forces import contacts_of, force_task, physics_of
 from scenarios.cell.order import Order, order_of
 from scenarios.cell.plant import plant_of
 from scenarios.cell.plants import Plant
@@ -27,6 +29,7 @@ from scenarios.cell.tasks import (
     task_of,
 )
 from scenarios.config import Scenario
+from scenarios.config.listed import ListedForce, ListedLeastForce, ListedTask
 
 
 @dataclass(frozen=True)
@@ -37,6 +40,7 @@ class Cell:
     the cone error. `position`, `pointing`, `limits` are the tasks of these names or None, `listed`
     those of `[[tasks]]`; `areas` are those of Algorithm 1. `activation` is that of the stack's rows
     with control.stack = "smooth", else None.
+    `contacts` are those at level "torque", else None.
     """
 
     scenario: Scenario
@@ -53,6 +57,7 @@ class Cell:
     order: Order
     listed: tuple[Task, ...] = ()
     activation: Activation | None = None
+    contacts: Contacts | None = None
 
 
 def build(scenario: Scenario, kept: Cell | None = None) -> Cell:
@@ -66,6 +71,7 @@ def build(scenario: Scenario, kept: Cell | None = None) -> Cell:
     robot = kept.robot if kept else make_robot(scenario.robot)
     sensor = _kept_sensor(scenario, kept) if kept else sensor_of(scenario, robot)
     start = kept.start if kept else start_of(robot, scenario.start)
+    contacts = kept.contacts if kept else contacts_of(scenario, robot)
     here = State.at(robot, *start)
     if kept:
         state, plant = kept.state, kept.plant
@@ -74,11 +80,15 @@ def build(scenario: Scenario, kept: Cell | None = None) -> Cell:
         state = State(robot, control.period if differences else None)
         if sensor is not None:
             sensor.check_start(here)
-        plant = plant_of(scenario, robot, start, sensor.obstacles if sensor else Obstacles())
+        plant = plant_of(scenario, robot, start, sensor.obstacles if sensor else Obstacles(),
+                         contacts)
     areas = areas_of(scenario)
     limits, first = limits_of(scenario, robot)
+    if contacts is not None:
+        first = [*physics_of(scenario, contacts), *first]
     position, pointing = position_of(scenario, here), pointing_of(scenario, here)
-    listed = [task_of(section, here) for section in scenario.tasks if section.kind != "collision"]
+    listed = [_listed(section, here, contacts) for section in scenario.tasks
+              if section.kind != "collision"]
     last = posture_of(scenario, here, "task")
     avoiding = avoidance_tasks(scenario, robot)
     always = first if areas else [*first, *avoiding]  # repulsion is placed by Algorithm 1
@@ -86,10 +96,17 @@ def build(scenario: Scenario, kept: Cell | None = None) -> Cell:
         task for task in (position, pointing, *listed, last) if task)])
     rows, activation = stacked(scenario, tasks, state)
     return Cell(scenario, robot, start, state, plant,
-                Stack(rows, control.level, reference_of(scenario, here),
-                      metric="mass" if control.metric == "mass" else None), sensor, areas,
+                Stack(rows, control.level, reference_of(scenario, here), contacts,
+                      "mass" if control.metric == "mass" else None), sensor, areas,
                 position, pointing, limits, order_of(scenario, areas, always, tasks), tuple(listed),
-                activation)
+                activation, contacts)
+
+
+def _listed(section: ListedTask, start: State, contacts: Contacts | None) -> Task:
+    if isinstance(section, ListedForce | ListedLeastForce):
+        assert contacts is not None, "the level of the scenario was checked"
+        return force_task(section, contacts)
+    return task_of(section, start)
 
 
 def _in_order(scenario: Scenario, tasks: list[Task]) -> list[Task]:

@@ -6,29 +6,39 @@ from typing import cast
 
 from hierarchy import Robot
 from hierarchy.avoidance import Obstacles
+from hierarchy.contacts import Contacts
 from hierarchy.problem import Array
 from scenarios.cell.own import make_own
-from scenarios.cell.plants import Apart, Commanded, JointSensor, KinematicArm, PhysicsArm, Plant
+from scenarios.cell.plants import (
+    Apart,
+    Commanded,
+    JointSensor,
+    KinematicArm,
+    PhysicsArm,
+    Plant,
+    TorqueRobot,
+)
 from scenarios.cell.plants.plant import Driven
 from scenarios.config import Scenario, ScenarioError
-from scenarios.config.plant import OwnPlant
+from scenarios.config.plant import OwnPlant, TorqueSection
 
 
 def plant_of(scenario: Scenario, robot: Robot, start: tuple[Array, Array],
-             obstacles: Obstacles) -> Plant:
-    """Return the plant of a robot that starts at q (nq,) and v (n,).
+             obstacles: Obstacles, contacts: Contacts | None = None) -> Plant:
+    """Return the plant of a robot that starts at q (nq,) and v (n,); `contacts` as in a Cell.
 
     Raises ScenarioError if the requested measurement is not possible for the robot's joints.
     """
     section, control, (q, v) = scenario.plant, scenario.control, start
-    if not section.measurement.ideal and robot.nq != robot.n:
-        raise ScenarioError(f"plant.measurement: robot {robot.name!r} has joints with more "
-                            "coordinates than velocities, which support no noise, steps or delay")
-    sensor = JointSensor(section.measurement, control.period)
+    sensor = JointSensor(section.measurement, control.period, robot)
     if isinstance(section, OwnPlant):
         own = make_own(section, robot, q=q, v=v, period=control.period, level=control.level,
                        obstacles=obstacles)
         return own if _unmeasured(section) else Apart(own, _feedback(section, own, sensor))
+    if isinstance(section, TorqueSection):
+        assert contacts is not None, "the level of the scenario was checked"
+        body = TorqueRobot(robot, contacts, q, v, control.period, section)
+        return body if section.measurement.ideal else Apart(body, sensor)
     if section.kind == "mujoco":
         arm = PhysicsArm(robot, q, v, control.period, control.level, obstacles, section.servo,
                          section.joints)

@@ -8,7 +8,14 @@ from typing import Any
 from hierarchy import HierarchyError, State, Task
 from hierarchy.avoidance import Barrier
 from hierarchy.errors import UnknownNameError, brief
-from hierarchy.tasks import JointCoupling, LookAt, Manipulability, RelativePose, SelfSeparation
+from hierarchy.tasks import (
+    JointCoupling,
+    LookAt,
+    Manipulability,
+    Momentum,
+    RelativePose,
+    SelfSeparation,
+)
 from scenarios.cell.avoidance import separable_pairs
 from scenarios.cell.own import make_own
 from scenarios.config import ScenarioError
@@ -17,6 +24,7 @@ from scenarios.config.listed import (
     ListedCoupling,
     ListedLookAt,
     ListedManipulability,
+    ListedMomentum,
     ListedRelative,
     ListedSelfCollision,
     OwnTask,
@@ -64,6 +72,10 @@ def _manipulability(section: ListedManipulability, start: State) -> Task:
     return replace(task, stiffness=section.stiffness, damping=section.damping, gain=section.gain)
 
 
+def _momentum(section: ListedMomentum, start: State) -> Task:
+    return Momentum(section.part, damping=section.damping, name=section.title)
+
+
 def _self_collision(section: ListedSelfCollision, start: State) -> Task:
     robot = start.robot
     pairs = separable_pairs(robot)
@@ -87,4 +99,5 @@ def _own(section: OwnTask, start: State) -> Task:
 
 _MAKERS: dict[type[Listed], Any] = {
     ListedRelative: _relative, ListedCoupling: _coupling, ListedLookAt: _look_at,
-    ListedManipulability: _manipulability, ListedSelfCollision: _self_collision, OwnTask: _own}
+    ListedManipulability: _manipulability, ListedMomentum: _momentum,
+    ListedSelfCollision: _self_collision, OwnTask: _own}

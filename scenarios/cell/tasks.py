@@ -53,7 +53,8 @@ def limits_of(scenario: Scenario, robot: Robot) -> tuple[JointLimits | None, lis
             limits, sensed_points(robot), section.danger_reach, name=limits.name)
         if not scenario.limits_in_stack:
             return limits, []
-        torque = [] if section.torque is None else [TorqueLimits(robot, section.torque)]
+        torque = [] if section.torque is None or scenario.control.level == "torque" else [
+            TorqueLimits(robot, section.torque)]  # with contact forces: scenarios.cell.forces
     except HierarchyError as error:
         raise ScenarioError(f"limits: {error}") from error
     return limits, [box, *torque]

@@ -20,7 +20,9 @@ class PolicySection(Section):
     "brake": decelerate to rest. "hold": repeat the last good command for at most `patience`
     consecutive ticks, then brake. "stop": decelerate as fast as the limits allow and end the run
     with a fault. "use": send the answer, if there is one. If a tick has several problems, the most
-    cautious action wins, in the order use, hold, brake, stop.
+    cautious action wins, in the order use, hold, brake, stop. At level "torque" braking sends the
+    last good torques and a damping, the effort limit of a joint at its velocity limit; "stop" ends
+    the run at once.
 
     The first four kinds are statuses of a resolver, see solvers.Status. not_finite: a measured
     joint state is NaN or infinite, or a distance is NaN. stale: no new measurement for more than
@@ -60,6 +62,10 @@ class ControlSection(Section):
     `[control.options.tpm]`, applies to that resolver only, so that changing `resolver` is enough to
     swap it. Plain settings override those from such a table.
 
+    `level` = "torque": accelerations and contact forces are resolved together, and the command is
+    the joint torques that they take. The stack has the dynamics and [[contacts]] first, then torque
+    limits and [forces], then the joint limits.
+
     `metric` = "mass": of the commands that serve the tasks equally well, the one nearest to the
     null-space term in the robot's inertia M(q), at acceleration level that of operational-space
     control. "identity": in the plain sum of squares over the joints.
@@ -69,7 +75,7 @@ class ControlSection(Section):
     task has its full effect only after that time. "none": it changes at once.
     """
 
-    level: Literal["velocity", "acceleration"] = "acceleration"
+    level: Literal["velocity", "acceleration", "torque"] = "acceleration"
     stack: StackKind = "switched"
     strictness: Flag = False
     period: Annotated[float, Field(strict=True, gt=0.0, le=1.0)] = 0.001

@@ -148,6 +148,38 @@ class ListedManipulability(Listed, TaskSection):
         return self.rows == "inequality"
 
 
+class ListedMomentum(Listed):
+    """The linear or angular momentum of the whole robot to zero, with `damping` [1/s]."""
+
+    kind: Literal["momentum"]
+    part: Literal["linear", "angular"] = "angular"
+    damping: NotNegative = 10.0
+
+    @property
+    def unit(self) -> str:
+        """That of its error."""
+        return "N s" if self.part == "linear" else "N m s"
+
+
+class ListedForce(Listed):
+    """The force of a contact at `target`: its normal force, its force, or its wrench [N, N m].
+
+    One, three or six numbers, see hierarchy.tasks.ContactForce; at level "torque".
+    """
+
+    unit: ClassVar[str] = "N"
+    kind: Literal["contact-force"]
+    contact: str
+    target: tuple[Finite, ...]
+
+
+class ListedLeastForce(Listed):
+    """The smallest contact forces, as a last level; at level "torque"."""
+
+    unit: ClassVar[str] = "N"
+    kind: Literal["least-force"]
+
+
 class _Apart(Listed):
     """A task with one-sided rows between bodies."""
 
@@ -192,13 +224,17 @@ class OwnTask(Listed, OwnSection):
 
 
 KINDS = ("position", "pose", "com", "pointing", "posture", "relative", "coupling", "look-at",
-         "manipulability", "self-collision", "collision")
+         "manipulability", "momentum", "contact-force", "least-force", "self-collision",
+         "collision")
+OF_FORCES = ("contact-force", "least-force")
 ListedTask = Annotated[
     Annotated[ListedPosition, Tag("position")] | Annotated[ListedPose, Tag("pose")]
     | Annotated[ListedCentreOfMass, Tag("com")] | Annotated[ListedPointing, Tag("pointing")]
     | Annotated[ListedPosture, Tag("posture")] | Annotated[ListedRelative, Tag("relative")]
     | Annotated[ListedCoupling, Tag("coupling")] | Annotated[ListedLookAt, Tag("look-at")]
     | Annotated[ListedManipulability, Tag("manipulability")]
+    | Annotated[ListedMomentum, Tag("momentum")] | Annotated[ListedForce, Tag("contact-force")]
+    | Annotated[ListedLeastForce, Tag("least-force")]
     | Annotated[ListedSelfCollision, Tag("self-collision")]
     | Annotated[ListedCollision, Tag("collision")] | Annotated[OwnTask, Tag(PLUGIN)],
     Discriminator(kind_or(None, "tasks", KINDS))]

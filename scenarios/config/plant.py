@@ -11,6 +11,7 @@ from scenarios.config.own import OwnSection
 from scenarios.config.sections import (
     PLUGIN,
     Count,
+    Finite,
     Flag,
     NotNegative,
     Positive,
@@ -106,6 +107,39 @@ class PhysicsSection(_Plant):
     joints: JointsSection = JointsSection()
 
 
+class PushSection(Section):
+    """A force on the body of `joint`, at its centre of mass, from `at` for `duration` [s].
+
+    `force` [N] is horizontal, in the `direction` [deg] from the world's x axis toward its y axis.
+    """
+
+    joint: str
+    force: NotNegative
+    direction: Finite = 0.0
+    at: NotNegative = 0.0
+    duration: Positive = 0.1
+
+
+class TorqueSection(_Plant):
+    """A robot with torque motors in a physics simulation (extra `sim`), on a floor at z = 0.
+
+    The soles of [[contacts]] touch the floor, whose coefficient is `friction`; `softness` [s] is
+    the time constant of a contact. `joint_friction` [N m] is Coulomb's friction and `armature`
+    [kg m^2] the inertia of the drive of every joint, `delay` [s], a whole number of periods, the
+    time by which torques arrive late; the controller knows of none of them. `pushes` disturb it. A
+    robot whose centre of mass is `fall` [m] below its start has fallen, which ends the run.
+    """
+
+    kind: Literal["torque"]
+    friction: Positive = 0.7
+    softness: Positive = 0.005
+    joint_friction: NotNegative = 0.0
+    armature: NotNegative = 0.0
+    delay: NotNegative = 0.0
+    fall: Positive = 0.2
+    pushes: tuple[PushSection, ...] = ()
+
+
 class OwnPlant(_Plant, OwnSection):
     """A plant of a plugin; further keys are those of the plugin."""
 
@@ -114,5 +148,5 @@ class OwnPlant(_Plant, OwnSection):
 
 PlantKind = Annotated[
     Annotated[KinematicSection, Tag("kinematic")] | Annotated[PhysicsSection, Tag("mujoco")]
-    | Annotated[OwnPlant, Tag(PLUGIN)],
-    Discriminator(kind_or("kinematic", "plants", ("kinematic", "mujoco")))]
+    | Annotated[TorqueSection, Tag("torque")] | Annotated[OwnPlant, Tag(PLUGIN)],
+    Discriminator(kind_or("kinematic", "plants", ("kinematic", "mujoco", "torque")))]

@@ -14,10 +14,11 @@ from pydantic import Field, field_validator, model_validator
 from hierarchy import plugins
 from scenarios.config.avoidance import AvoidanceKind
 from scenarios.config.changes import Tag, change_all, parse_changes, without_none
+from scenarios.config.contacts import ContactSection, ForcesSection
 from scenarios.config.control import ControlSection
 from scenarios.config.distributions import Parameters
 from scenarios.config.faults import FaultSection
-from scenarios.config.listed import ListedTask
+from scenarios.config.listed import OF_FORCES, ListedTask
 from scenarios.config.plant import KinematicSection, PlantKind
 from scenarios.config.robot import RobotSection, StartSection
 from scenarios.config.sections import Section
@@ -68,6 +69,8 @@ class Scenario(Section):
     damping: DampingSection | None = None
     posture: PostureSection | None = None
     tasks: tuple[ListedTask, ...] = ()
+    contacts: tuple[ContactSection, ...] = ()
+    forces: ForcesSection = ForcesSection()
     faults: tuple[FaultSection, ...] = ()
     variation: Parameters = Field(default_factory=dict)
 
@@ -76,6 +79,21 @@ class Scenario(Section):
     def _are_allowed(cls, modules: tuple[str, ...] | None) -> tuple[str, ...] | None:
         plugins.require(modules or ())  # before the sections below, which have their kinds
         return modules
+
+    @model_validator(mode="after")
+    def _has_the_level_of_its_forces(self) -> Self:
+        torque, plant = self.control.level == "torque", self.plant.kind
+        forces = next((task.title for task in self.tasks if task.kind in OF_FORCES), None)
+        if not torque and (self.contacts or forces):
+            what = "[[contacts]]" if self.contacts else f"task {forces!r}"
+            raise ValueError(f'{what} needs control.level = "torque"')
+        if torque and self.control.stack != "hierarchical":
+            raise ValueError('control.level = "torque" goes with control.stack = "hierarchical", '
+                             f'got "{self.control.stack}"')
+        if torque != (plant == "torque") and plant in ("kinematic", "mujoco", "torque"):
+            raise ValueError('control.level = "torque" and plant.kind = "torque" go together, got '
+                             f'"{self.control.level}" and "{plant}"')
+        return self
 
     @model_validator(mode="after")
     def _asks_for_something(self) -> Self:
@@ -96,8 +114,9 @@ class Scenario(Section):
             raise ValueError("[avoidance] needs [position]: Algorithm 1 orders one by the other")
         if self.limits and self.limits.danger_reach and not self.avoidance:
             raise ValueError("limits.danger_reach needs the obstacles of [avoidance]")
+        clipped = self.control.level == "torque"  # torques that are not limited in the stack
         if self.limits and self.limits.place != "stack" and (
-                self.limits.torque or self.limits.danger_reach):
+                (self.limits.torque and not clipped) or self.limits.danger_reach):
             raise ValueError('limits.torque and limits.danger_reach need limits.place = "stack"')
         if self.limits and self.limits.torque and self.control.level == "velocity":
             raise ValueError("limits.torque needs control.level = \"acceleration\"")
@@ -159,7 +178,13 @@ class Scenario(Section):
         """Whether the joint limits are a level of the stack under its resolver."""
         if self.limits is None or self.limits.place == "guard" or self.control.stack in RIVALS:
             return False
-        return self.limits.place == "stack" or self.make_resolver().handles != "equalities"
+        return self.limits.place == "stack" or self.make_resolver().can_resolve(
+            "bounds" if self.control.level != "torque" else "inequalities")
+
+    @property
+    def forces_in_stack(self) -> bool:
+        """Whether the limits of contact forces and torques are a level of the stack."""
+        return self.control.level == "torque" and (self.limits is None or self.limits_in_stack)
 
     @property
     def asks(self) -> Handles:
@@ -172,6 +197,8 @@ class Scenario(Section):
         one_sided = self.avoidance is not None and self.avoidance.kind == "separation"
         inequalities = one_sided or (self.control.stack == "hierarchical" and any(
             task.one_sided for task in (self.pointing, *self.tasks) if task))
+        if self.forces_in_stack and (self.contacts or self.limits):
+            return "inequalities"
         limits = self.limits if self.limits_in_stack else None
         bounds = self.control.metric == "identity" and not (limits and limits.torque)
         if inequalities or (limits and not bounds):

@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 from scenarios.config import Scenario
 from scenarios.loop.facts import Facts
 
-CONSTANTS = ("joint_lower", "joint_upper", "velocity_limit")
+CONSTANTS = ("joint_lower", "joint_upper", "velocity_limit", "torque_limit")
 _METRES = ("ee_position", "desired_position", "position_error", "true_ee_position",
            "control_point_distance", "minimal_distance", "ee_distance",
            "true_control_point_distance", "true_minimal_distance", "true_ee_distance",
-           "contact_depth", "obstacle_offset")
+           "contact_depth", "obstacle_offset", "com", "slip", "pressure_margin")
+_NEWTONS = ("contact_force", "planned_force", "floor_force", "push")
 
 
 class Recorded(Protocol):
@@ -89,9 +90,10 @@ def signal_units(recording: Recorded) -> dict[str, tuple[str, ...]]:
                         recording.facts.robot.velocity_units)
     velocities = tuple(f"{unit}/s" for unit in rates)
     accelerations = tuple(f"{unit}/s^2" for unit in rates)
-    commands = (accelerations if recording.scenario.control.level == "acceleration"
-                else velocities)
+    level = recording.scenario.control.level
+    commands = {"velocity": velocities, "acceleration": accelerations, "torque": ("N m",)}[level]
     return {"t": ("s",), "q": positions, "true_q": positions, "v": velocities,
             "true_v": velocities, "a": accelerations, "command": commands,
-            "contact_force": ("N",), **dict.fromkeys(_METRES, ("m",)),
+            "planned_acceleration": accelerations, **dict.fromkeys(_NEWTONS, ("N",)),
+            **dict.fromkeys(_METRES, ("m",)),
             **{name: ("s",) for name in recording.signals if name.startswith("time_")}}

@@ -45,15 +45,15 @@ class Controller:
                          else resolver)
         control = scenario.control
         self.level, self.clock = control.level, clock
-        clamp = partial(cell.limits.clamp, cell.state, control.level) if cell.limits else None
-        self.policy = Policy(control.policy, control.level, control.period, clamp)
+        self.policy = _policy(scenario, cell)
         self.blend = Blend(control.transition_time) if control.transition == "blend" else None
         self.cone_error = nan
         self._measure_cone = cell.pointing.follow_cone_error(cell.state) if cell.pointing else None
         if cell.sensor is not None:
             self._nearest = bind(smallest, cell.sensor.measurement.distance)
         self.allocation = Allocation((), repulsion=False)
-        self.resolution = self._unanswered = Resolution(np.zeros(cell.robot.n),
+        unknowns = cell.robot.n if cell.contacts is None else cell.contacts.unknowns
+        self.resolution = self._unanswered = Resolution(np.zeros(unknowns),
                                                         Status.NUMERICAL_FAILURE, 0)
         self.stamps = (0.0, 0.0, 0.0, 0.0)
         self._memory: Any = None
@@ -62,7 +62,8 @@ class Controller:
         self._stale_after, self._measured_at = control.policy.stale_after, -inf
         # A first tick without a measurement continues from this state.
         cell.state.move(0.0, cell.plant.q, cell.plant.v)
-        self.sent = cell.plant.v.copy() if self.level == "velocity" else np.zeros(cell.robot.n)
+        self.sent = cell.plant.v.copy() if self.level == "velocity" else np.zeros(
+            cell.robot.n - (0 if cell.contacts is None else cell.robot.actuated))
         cell.state.commanded = self.sent if self.level == "velocity" else None
         if cell.sensor is not None:
             cell.state.measurement = cell.sensor.measurement
@@ -76,12 +77,13 @@ class Controller:
         return self.resolution is not self._unanswered
 
     def command(self, t: float, q: Array, v: Array, measured_at: float | None = None) -> Array:
-        """Return the velocity or acceleration (n,) to send at time t [s] with the joints at q, v.
+        """Return the command to send at time t [s] with the joints at q, v.
 
+        That is a velocity or acceleration (n,), or the torques of the actuated joints [N m].
         `measured_at` [s] is the time of q and v, None for t. The command is finite whatever was
         measured; `control.policy` decides it in a tick with trouble.
         """
-        clock, state = self.clock, self.cell.state
+        clock, state, cell_contacts = self.clock, self.cell.state, self.cell.contacts
         troubles: list[str] = []
         begin = clock()
         if measured_at is not None or not state.move(t, q, v):
@@ -91,6 +93,8 @@ class Controller:
         if self._outside > 0.0:
             begin, moved = begin + self._outside, moved + self._outside
         x = self._answer(troubles)
+        if cell_contacts is not None:
+            x = cell_contacts.torques(state, x)
         resolved = clock()
         self.stamps = (begin, moved, self._written, resolved)
         if resolved - begin > self._deadline:
@@ -109,7 +113,7 @@ class Controller:
         self.command(0.0, plant.q, plant.v)
         for _ in range(_REHEARSALS):
             self.resolver.solve(self.cell.stack.hierarchy(self.cell.state, tasks), self._memory)
-        plant.act(np.zeros_like(plant.v))
+        plant.act(np.zeros_like(self.sent))
 
     def _move(self, t: float, q: Array, v: Array, measured_at: float | None,
               troubles: list[str]) -> None:
@@ -128,6 +132,8 @@ class Controller:
     def _carried_on(self, dt: float) -> tuple[Array, Array]:
         """Return q (nq,), v (n,) after `dt` [s] under the last command sent."""
         state, x = self.cell.state, self.sent
+        if self.level == "torque":
+            x = self.resolution.x[:state.n]
         if self.level == "velocity":
             return state.robot.integrate(state.q, x * dt), x
         return state.robot.integrate(state.q, state.v * dt + x * (dt * dt / 2)), state.v + x * dt
@@ -146,7 +152,7 @@ class Controller:
                 troubles.append("inside" if nearest <= 0.0 else "not_finite")
 
     def _answer(self, troubles: list[str]) -> Array:
-        """Return the resolver's answer (n,), or zero if the measurement is unusable."""
+        """Return the resolver's answer, or zero if the measurement is unusable."""
         if troubles and troubles != ["inside"]:
             self.resolution, self._written = self._unanswered, self.clock()
             return self.resolution.x
@@ -166,3 +172,15 @@ class Controller:
         if resolution.status is not Status.SOLVED:
             troubles.append(resolution.status.name.lower())
         return x
+
+
+def _policy(scenario: Scenario, cell: Cell) -> Policy:
+    control, robot = scenario.control, cell.robot
+    if control.level != "torque":
+        clamp = partial(cell.limits.clamp, cell.state, control.level) if cell.limits else None
+        return Policy(control.policy, control.level, control.period, clamp)
+    share = scenario.limits.torque if scenario.limits else None
+    limit = robot.effort_limit[robot.actuated:] * (share or 1.0)
+    damping = np.where(np.isfinite(limit), limit, 0.0) / robot.velocity_limit[robot.actuated:]
+    return Policy(control.policy, control.level, control.period,
+                  partial(np.clip, a_min=-limit, a_max=limit), damping)

@@ -41,13 +41,15 @@ class Judged(NamedTuple):
 def judged(cell: Cell, h: Hierarchy, x: Array, accuracy: float) -> Judged:
     """Judge a command x (n,) by the rows of its tick; `accuracy` is the resolver's."""
     near, levels = tolerance(accuracy, x), len(h.sizes)
-    found = Judged(np.zeros(levels, np.int8), np.zeros(levels), np.zeros(len(x), np.int8))
+    n = cell.robot.n
+    found = Judged(np.zeros(levels, np.int8), np.zeros(levels), np.zeros(n, np.int8))
     lower = h.lower if cell.activation is None else cell.activation.demanded(h)
     _judge_levels(h.A, lower, h.upper, h.offsets, x, near, found.fate, found.violation)
     if (limits := cell.limits) is not None:
-        lower, upper = (limits.box(cell.state, cell.stack.level) if limits.name not in h.names
+        lower, upper = (limits.box(cell.state, "velocity" if cell.stack.level == "velocity"
+                                   else "acceleration") if limits.name not in h.names
                         else _sides(h, limits.name))
-        _find_saturated(x, lower, upper, near, found.saturated)
+        _find_saturated(x[:n], lower, upper, near, found.saturated)
     return found
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from hierarchy.avoidance import Measurement
 from hierarchy.jit import compiled
-from hierarchy.problem import Hierarchy
+from hierarchy.problem import Array, Hierarchy
 from scenarios.cell.build import Cell
 from scenarios.loop.depth_image import depth_view
 from scenarios.loop.fate import Fates
@@ -37,14 +37,22 @@ def judge(recording: Recording, cell: Cell) -> None:
     """
     orders, rows = recording.order_names, Rows(recording, cell)
     fates = Fates(recording.task_names, recording.ticks, cell.robot.n)
-    accuracy, commands = recording.facts.resolver.accuracy, recording["command"]
+    accuracy, commands = recording.facts.resolver.accuracy, _meant(recording)
     changed = recording.signals.get("changed", np.zeros(recording.ticks, bool))
     for k, index in enumerate(recording["order"].tolist()):
         order = orders[index]
         h = rows.hierarchy(k, order) if order and not changed[k] else None
-        if h is not None:
+        if h is not None and not np.isnan(commands[k, 0]):
             fates.judge(k, cell, h, commands[k], accuracy)
     recording.signals.update(fates.signals(recording))
+
+
+def _meant(recording: Recording) -> Array:
+    """Return what the commands stand for in the rows: at level "torque" the answers."""
+    if recording.scenario.control.level != "torque":
+        return recording["command"]
+    forces = recording["planned_force"].reshape(recording.ticks, -1)
+    return np.hstack([recording["planned_acceleration"], forces])
 
 
 class Rows:

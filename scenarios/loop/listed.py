@@ -31,7 +31,8 @@ def signals(robot: Robot, tasks: Iterable[Task], t: Array, q: Array, v: Array) -
 
     Rows of a state that is not finite are NaN.
     """
-    tasks, state = tuple(tasks), State(robot)
+    tasks = tuple(task for task in tasks if not task.of_forces)  # what x is, not where the robot is
+    state = State(robot)
     found = {error_of(task.name): np.full((len(t), task.dimension), np.nan) for task in tasks}
     found |= {position_of(task.name): np.full((len(t), 3), np.nan)
               for task in tasks if _position(task, state) is not None}

@@ -25,18 +25,20 @@ class Policy:
     """Chooses the command of each tick.
 
     `clamp` moves a command (n,) to the nearest one that the robot's limits allow in this tick; None
-    for a robot without limits. After `choose`: `events` are the (kind, action) pairs of the tick;
-    `fault` is the reason for ending the run, once a "stop" was requested, and `stopped` is whether
-    the robot has come to rest since then.
+    for a robot without limits. `damping` [N m s/rad] of each joint brakes at level "torque". After
+    `choose`: `events` are the (kind, action) pairs of the tick; `fault` is the reason for ending
+    the run, once a "stop" was requested, and `stopped` is whether the robot has come to rest since
+    then, or at level "torque" is to be left to itself.
     """
 
     def __init__(self, section: PolicySection, level: Level, period: float,
-                 clamp: Callable[[Array], Array] | None = None) -> None:
+                 clamp: Callable[[Array], Array] | None = None,
+                 damping: Array | None = None) -> None:
         self.events: Sequence[tuple[str, str]] = ()
         self.fault: str | None = None
         self.stopped = False
         self._section, self._clamp, self._period = section, clamp, period
-        self._acceleration = level == "acceleration"
+        self._acceleration, self._damping = level == "acceleration", damping
         self._good: Array | None = None
         self._held = 0
 
@@ -54,7 +56,7 @@ class Policy:
 
     def _otherwise(self, t: float, troubles: Sequence[str], x: Array, v: Array) -> Array:
         if not finite(x):  # no resolver should
-            troubles, x = [*troubles, "numerical_failure"], np.zeros_like(v)
+            troubles, x = [*troubles, "numerical_failure"], np.zeros_like(x)
         action = self._action(troubles)
         self.events = [(kind, action) for kind in troubles]
         if action == "use":
@@ -64,7 +66,8 @@ class Policy:
             return self._within_limits(self._good)
         if action == "stop" and self.fault is None:
             self.fault = f"stopped by its policy at t = {t:.3f} s: {', '.join(troubles)}"
-        return self._slower(action, v)
+        return self._slower(action, v) if self._damping is None else self._damped(
+            action, v, self._damping)
 
     def _action(self, troubles: Sequence[str]) -> str:
         if self.fault is not None:
@@ -85,6 +88,12 @@ class Policy:
             after = v + command * self._period if self._acceleration else command
             self.stopped = bool(np.abs(after).max() <= _AT_REST)
         return command
+
+    def _damped(self, action: str, v: Array, damping: Array) -> Array:
+        """Return the last good torques and a damping of the joints; "stop" ends the run."""
+        good = np.zeros_like(damping) if self._good is None else self._good
+        self.stopped = action == "stop"
+        return self._within_limits(good - damping * v[len(v) - len(damping):])
 
     def _within_limits(self, x: Array) -> Array:
         """Return x moved within the limits; a change is an event."""

@@ -57,8 +57,12 @@ class Recorder:
         distances = len(cell.sensor.measurement.distance) if cell.sensor else 0
         self._orders: dict[tuple[str, ...], int] = {}
         # One row: t, q, v, a, command, end effector, target, cone error, distances.
+        self._commanded = len(controller.sent)
         # All rows are written once here: the system maps memory when it is first touched.
-        self._log = np.full((ticks, 8 + robot.nq + 3 * robot.n + distances), np.nan)
+        width = 8 + robot.nq + 2 * robot.n + self._commanded + distances
+        self._log = np.full((ticks, width), np.nan)
+        self._answers = np.full((ticks if cell.contacts else 0, len(controller.resolution.x)),
+                                np.nan)
         self._choices = np.full((ticks, 5), -1, dtype=np.int16)
         self._times, self._over = np.full((ticks, len(_TIMES)), np.nan), np.full(ticks, np.nan)
         self._given = 1 + robot.nq + robot.n  # column of a
@@ -81,7 +85,8 @@ class Recorder:
         self._write_rest = bind(
             _write, _Tables(self._log, self._choices, self._times),
             _Seen(state.q, state.v, state.placements, self._target, self._distance),
-            self._frame.joint, self._frame.offset, then=(0, (0,) * 5, (0.0,) * 6))
+            self._frame.joint, self._frame.offset, self._commanded,
+            then=(0, (0,) * 5, (0.0,) * 6))
         self._blend, self._policy = controller.blend, controller.policy
 
     def write(self) -> bool:
@@ -103,6 +108,8 @@ class Recorder:
         if self._extra:
             for name, value in plant.extra.items():
                 self._extra[name][k] = value
+        if cell.contacts is not None and controller.answered:
+            self._answers[k] = resolution.x
         if self._blend is not None:
             self._weights[k] = self._blend.weight
         if self._policy.events:
@@ -130,7 +137,7 @@ class Recorder:
         """Return the run as recorded so far."""
         robot, rows = self._cell.robot, slice(0, self.ticks)
         n, log = robot.n, self._log[rows]
-        widths = [1, robot.nq, n, n, n, 3, 3, 1, max(len(self._distance) - 1, 0)]
+        widths = [1, robot.nq, n, n, self._commanded, 3, 3, 1, max(len(self._distance) - 1, 0)]
         ends = np.cumsum(widths)
         t, q, v, a, command, actual, desired, cone, body = (
             log[:, end - width:end].copy() for end, width in zip(ends, widths, strict=True))
@@ -146,6 +153,10 @@ class Recorder:
             signals |= {"pointing_error": cone[:, 0], "pointing_active": asked[order]}
         if self._cell.listed:
             signals |= listed.signals(robot, self._cell.listed, t[:, 0], q, v)
+        if self._cell.contacts is not None:
+            answers = self._answers[rows].copy()
+            signals |= {"planned_acceleration": answers[:, :n],
+                        "planned_force": answers[:, n:].reshape(len(answers), -1, 3)}
         if self._blend is not None:
             signals["transition"] = self._weights[rows].copy()
         signals |= {name: values[rows].copy() for name, values in self._extra.items()}
@@ -163,6 +174,8 @@ class Recorder:
         signals |= dict(zip(_TIMES, times.T.copy(), strict=True))
         signals |= {"joint_lower": robot.lower, "joint_upper": robot.upper,
                     "velocity_limit": robot.velocity_limit}
+        if self._cell.contacts is not None:
+            signals["torque_limit"] = robot.effort_limit[robot.actuated:]
         return Recording(signals, tuple(" > ".join(names) for names in orders), scenario,
                          self.facts, fault, tuple(self._events))
 
@@ -183,13 +196,14 @@ def _write_given(log, k, first, a, command):
     row, n, finite = log[k], len(a), True
     for j in range(n):
         row[first + j] = a[j]
-        row[first + n + j] = command[j]
         finite &= np.isfinite(a[j])
+    for j in range(len(command)):
+        row[first + n + j] = command[j]
     return finite
 
 
 @compiled
-def _write(tables, seen, joint, offset, k, chosen, measured):
+def _write(tables, seen, joint, offset, commanded, k, chosen, measured):
     """Write the rest of tick k; return whether q is finite and v within FASTEST.
 
     chosen: order, active point, repulsion, status, iterations. measured: t, the error of the cone,
@@ -206,7 +220,7 @@ def _write(tables, seen, joint, offset, k, chosen, measured):
     for j in range(len(seen.v)):
         row[i + j] = seen.v[j]
         finite &= abs(seen.v[j]) <= FASTEST
-    i += 3 * len(seen.v)
+    i += 2 * len(seen.v) + commanded
     for j in range(3):
         row[i + j] = point_at(seen.placements, joint, offset, j)
         row[i + 3 + j] = seen.target[0, j]

@@ -50,7 +50,14 @@ class Recording:
     Signals
     -------
     t (T,) [s] · q, v, a (T, n) [rad, rad/s, rad/s^2], q and v as the controller knew them
-    command (T, n) as sent: a velocity or an acceleration, depending on `scenario.control.level`
+    command as sent: a velocity or an acceleration (T, n), or the torques of the actuated joints
+    (T, n - 6 with a floating base) [N m], depending on `scenario.control.level`
+    planned_acceleration (T, n), planned_force (T, P, 3) [N] on each of P contact points, in world
+    axes: the answer at level "torque", NaN where there was none
+    com (T, 3) [m] the true centre of mass; floor_force (T, C, 3) [N] on each contact, slip (T, C)
+    [m] along the floor since it touched down, pressure_margin (T, C) [m] of the centre of pressure
+    from the nearest edge of the sole, NaN without load; push (T, 3) [N]: of the last step of the
+    simulation in tick k, from a plant with torque motors
     true_q, true_v (T, n) the true state where measurement or physics make it differ from q and v;
     true_ee_position (T, 3) [m] from true_q
     contacts (T,) largest number of contacts between arm and obstacles at once in the period of
@@ -77,7 +84,8 @@ class Recording:
     joint is at the lower or upper side of its limits' box of commands, else 0
     time_kinematics, time_rows, time_resolve, time_tick (T,) [s] of computation; time_resolve
     includes the rows of former stacks where stacks are blended, time_tick the plant's step
-    joint_lower, joint_upper, velocity_limit (n,) of the robot, infinite where it has none
+    joint_lower, joint_upper, velocity_limit (n,) of the robot, infinite where it has none, and at
+    level "torque" torque_limit of the actuated joints [N m]
     obstacle_offset (T, H, 3) [m] by which obstacles were dragged off their places, changed (T,)
     bool, whether obstacles or settings differ from the scenario, in a live run
 

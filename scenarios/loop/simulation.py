@@ -9,6 +9,7 @@ import numpy as np
 
 from hierarchy.errors import expect
 from hierarchy.problem import Array
+from scenarios.cell.plants.plant import fault_of
 from scenarios.config import Scenario, load
 from scenarios.loop.audit import Audit, Certified, Judging, Strictness
 from scenarios.loop.controller import Controller
@@ -25,13 +26,14 @@ def simulate(scenario: Scenario | str | Path, progress: Callable[[int, int], Non
     """Run a scenario, or the one of a name or a file, from its start to its end.
 
     `progress(done, total)` is called every 500 ticks. A run ends early if it is interrupted
-    (Ctrl-C), if its policy stops it, if its state is no longer finite, or if a joint is faster than
-    `recorder.FASTEST`: the Recording then has all ticks so far and says why in `fault`. With
-    `certified`, `solvers.certify` judges every answer after its tick was timed, and the Recording
-    has the verdicts as its signal `certified`; with `control.strictness` it has `moved_by_lower`,
-    see scenarios.loop.audit.Strictness; `audits` are further checks of that kind. What became of
-    each level is judged after the last tick, or, with a camera, after each tick. Raises
-    HierarchyError where the scenario does not fit its robot or resolver.
+    (Ctrl-C), if its policy stops it, if its plant cannot go on, such as a robot that has fallen, if
+    its state is no longer finite, or if a joint is faster than `recorder.FASTEST`: the Recording
+    then has all ticks so far and says why in `fault`. With `certified`, `solvers.certify` judges
+    every answer after its tick was timed, and the Recording has the verdicts as its signal
+    `certified`; with `control.strictness` it has `moved_by_lower`, see
+    scenarios.loop.audit.Strictness; `audits` are further checks of that kind. What became of each
+    level is judged after the last tick, or, with a camera, after each tick. Raises HierarchyError
+    where the scenario does not fit its robot or resolver.
     """
     if isinstance(scenario, (str, Path)):
         scenario = load(scenario)
@@ -97,7 +99,7 @@ def tick(controller: Controller, recorder: Recorder, t: float,
     recorder.look()
     if not sound or (controller.policy.events and not _finite(plant.q, plant.v)):
         return _unsound(controller)
-    return None
+    return fault_of(plant)
 
 
 def _unsound(controller: Controller) -> str:

@@ -20,7 +20,9 @@ _NOTHING = 1e-9  # errors of listed tasks below this are rounding and count as z
 _SHOWN = {"m": (1e3, "mm", 3), "s": (1e6, "µs", 2), "deg": (1.0, "°", 3), "share": (100.0, "%", 2),
           "rad": (1.0, "rad", 3), "rad/s": (1.0, "rad/s", 3), "rad/s^2": (1.0, "rad/s²", 2),
           "rad/s^3": (1.0, "rad/s³", 0),
-          "N": (1.0, "N", 1), "": (1.0, "", 0)}
+          "N": (1.0, "N", 1), "N m": (1.0, "N m", 2), "N s": (1.0, "N s", 3),
+          "N m s": (1.0, "N m s", 3),
+          "rows": (1.0, "", 3), "": (1.0, "", 0)}  # "rows": in the units of a level's rows
 
 
 @dataclass(frozen=True)
@@ -78,7 +80,8 @@ def measure(recording: Recording, settle: float = 2.0,
         return {}
     found = (*_tracking(recording, settle), *_pointing(recording, cone_tolerance_deg),
              *_listed(recording, settle), *_strictness(recording),
-             *_distances(recording), *_contacts(recording), *_motion(recording),
+             *_distances(recording), *_contacts(recording), *_forces(recording),
+             *_motion(recording),
              *_returning(recording),
              *_switching(recording), *_troubles(recording), *_time(recording))
     return {metric.name: metric for metric in found}
@@ -206,6 +209,15 @@ def _contacts(recording: Recording) -> Iterator[Metric]:
                          _largest(recording[f"contact_{key}"]), unit, group="Safety")
 
 
+def _forces(recording: Recording) -> Iterator[Metric]:
+    from scenarios.measure import forces
+
+    for group, numbers in (("Contacts", forces.of_contacts), ("Torques", forces.of_torques),
+                           ("Levels", forces.of_levels)):
+        for number in numbers(recording):
+            yield Metric(*number, group=group)
+
+
 def _true(recording: Recording, signal: str) -> Array:
     """Return a signal as it was, where that is known apart from what was measured."""
     return recording[f"true_{signal}" if f"true_{signal}" in recording else signal]
@@ -234,6 +246,8 @@ def _motion(recording: Recording) -> Iterator[Metric]:
 def _command_step(recording: Recording) -> float | None:
     """Return the largest change of a joint's commanded speed in one tick [rad/s]."""
     control, command = recording.scenario.control, recording["command"]
+    if control.level == "torque":
+        return None
     return _largest(np.diff(command, axis=0) if control.level == "velocity"
                     else command * control.period)
 

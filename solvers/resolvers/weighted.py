@@ -52,7 +52,9 @@ class Weighted(Resolver):
     docs/theory/resolver-notes.md. The memory is the state of each row.
 
     ratio : weight of a level over that of the level below; the lowest level has weight 1.
-    weights : weight of each level, in place of `ratio`; ignored for a hard level.
+    weights : weight of each level, in place of `ratio`; ignored for a hard or strict level.
+    strict_levels : number of top levels that keep strict priority; those below become one level of
+        weighted rows, and `hcod` resolves this. `regularisation` and what follows are then unused.
     regularisation : mu; pink and mink call mu^2 damping, 1e-12 by default.
     hard_levels : largest number of top levels that are constraints (inequalities only).
     backend : method after the guesses: "own", an active-set method, or a backend of qpsolvers
@@ -68,6 +70,7 @@ class Weighted(Resolver):
     damps_with_bounds: ClassVar[str] = damps
     ratio: float = 100.0
     weights: Sequence[float] | None = None
+    strict_levels: int = 0
     regularisation: float = 1e-6
     hard_levels: int = 1
     backend: str = OWN
@@ -80,6 +83,7 @@ class Weighted(Resolver):
         self._number("ratio", 1.0, np.inf)
         self._number("regularisation", 0.0, np.inf, open_below=True)
         self._number("tolerance", 0.0, 1e-3, open_below=True)
+        self._whole_number("strict_levels", 0)
         self._whole_number("hard_levels", 0)
         self._whole_number("guesses", 1)
         self._whole_number("max_iterations", 1)
@@ -100,7 +104,8 @@ class Weighted(Resolver):
         ratio = "" if self.ratio == 100.0 else f" {self.ratio:g}"
         if self.weights is not None:
             ratio = " " + "/".join(f"{w:g}" for w in self.weights)
-        return self.name + ratio + (f" {self.backend}" if self.backend != OWN else "")
+        strict = f" below {self.strict_levels} strict" if self.strict_levels else ""
+        return self.name + ratio + strict + (f" {self.backend}" if self.backend != OWN else "")
 
     @cached_property
     def _known(self) -> dict[int, Array]:
@@ -118,6 +123,9 @@ class Weighted(Resolver):
 
     def solve(self, h: Hierarchy, memory: Array | None = None) -> Resolution:
         """Resolve h, starting from the row states of an earlier resolution if given."""
+        if self.strict_levels:
+            return Hcod(rank_tolerance=self.rank_tolerance, damping=self.damping,
+                        threshold=self.threshold).solve(self.merged(h), memory)
         x = h.reference.copy()
         record, _ = warm_record(memory, 2 * len(h.lower) + 1, True)
         settings = self._settings_for(len(h.sizes))
@@ -129,6 +137,16 @@ class Weighted(Resolver):
         if code == UNPROVED:
             return self._continued(h, settings, record)
         return WeightedResolution(x, Status(code), int(record[-1]), record)
+
+    def merged(self, h: Hierarchy) -> Hierarchy:
+        """Return h with its levels below `strict_levels` as one, rows times their weights."""
+        above = min(self.strict_levels, len(h.sizes))
+        weight = self._weights(len(h.sizes))
+        weight[:above] = 1.0
+        rows = np.repeat(weight, h.sizes)
+        sizes = np.array([*h.sizes[:above], h.sizes[above:].sum()])
+        return Hierarchy(h.A * rows[:, None], h.lower * rows, h.upper * rows, sizes, h.reference,
+                         (*h.names[:above], "weighted"))
 
     def _weights(self, levels: int) -> Array:
         if self.weights is None:

@@ -104,7 +104,7 @@ def test_the_call_made_by_hand_solves_what_it_is_timed_on():
     """Where no rows conflict, and to what its finite weight allows."""
     daqp = next(one for one in candidates.candidates()[0] if one.label == candidates.DAQP)
     for problem in family("INEQ7")[:10]:
-        call = daqp.prepare(problem.h)
+        call = daqp.prepare(problem.h, None)
         call()
         res = daqp.read(call())
         assert res.status is Status.SOLVED

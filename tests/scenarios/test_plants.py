@@ -265,7 +265,7 @@ def test_the_reference_of_an_arm_held_back_does_not_run_away(mujoco):
 def told(section, count, level="velocity", command=STILL, q=START):
     """q, v as told and as they are, (count, 7) each, of an arm that follows exactly."""
     plant = Apart(KinematicArm(ROBOT, q.copy(), STILL, PERIOD, level),
-                  JointSensor(MeasurementSection(**section), PERIOD))
+                  JointSensor(MeasurementSection(**section), PERIOD, ROBOT))
     rows = []
     for _ in range(count):
         q, v = plant.q.copy(), plant.v.copy()

@@ -3,19 +3,21 @@
 import numpy as np
 import pinocchio as pin
 import pytest
-from stand_push import CONTENDERS, in_words, main, pushes, run, weighted
 from standing import ROBOT, WEIGHT, feet, standing_stack
 
-from hierarchy import Robot, State
-from hierarchy.contacts import Contact, Contacts
-from scenarios.cell.plants.ground import Floor
+from hierarchy import State
 from scenarios.cell.plants.torque import TorqueRobot
 from scenarios.config import ScenarioError
+from scenarios.config.plant import PushSection, TorqueSection
 from solvers import certify, make
 
 pytestmark = pytest.mark.slow
 
 CONTACTS = feet()
+
+
+def plant_with(**section):
+    return TorqueSection(kind="torque", **section)
 
 
 @pytest.fixture(autouse=True)
@@ -53,25 +55,37 @@ def test_a_period_moves_it_by_its_accelerations():
 
 def test_torques_arrive_late_by_the_delay_and_are_cut_off_at_their_limits():
     q, v, _ = in_the_air(8)
-    plant = TorqueRobot(ROBOT, CONTACTS, q, v, delay=2)
+    plant = TorqueRobot(ROBOT, CONTACTS, q, v, section=plant_with(delay=0.002))
+    holding = State.at(ROBOT, q).bias_effort()[6:]
     asked = np.full(30, 1e4)
     sent = []
     for _ in range(4):
         plant.act(asked)
         sent.append(plant.data.actuator_force.copy())
-    np.testing.assert_array_equal(sent[0], 0.0)
-    np.testing.assert_array_equal(sent[1], 0.0)
+    np.testing.assert_allclose(sent[0], np.clip(holding, -ROBOT.effort_limit[6:],
+                                                ROBOT.effort_limit[6:]))
+    np.testing.assert_array_equal(sent[0], sent[1])
     np.testing.assert_allclose(sent[2], ROBOT.effort_limit[6:])
+    with pytest.raises(ScenarioError, match=r"plant.delay = 0.0015 s is not a whole number"):
+        TorqueRobot(ROBOT, CONTACTS, q, section=plant_with(delay=0.0015))
 
 
 def test_a_push_gives_the_whole_robot_its_momentum():
     q, _, _ = in_the_air(9)
-    pushed, free = (TorqueRobot(ROBOT, CONTACTS, q) for _ in range(2))
-    for _ in range(10):
-        pushed.act(np.zeros(30), ("trunk_pitch", np.array([100.0, 0.0, 0.0])))
+    push = PushSection(joint="trunk_pitch", force=100.0, direction=90.0, at=0.005, duration=0.01)
+    pushed, free = (TorqueRobot(ROBOT, CONTACTS, q, section=plant_with(pushes=pushes))
+                    for pushes in ((push,), ()))
+    seen = []
+    for _ in range(20):
+        pushed.act(np.zeros(30))
         free.act(np.zeros(30))
+        seen.append(pushed.extra["push"].copy())
     moved, fallen = (State.at(ROBOT, one.q, one.v).momentum.A @ one.v for one in (pushed, free))
-    np.testing.assert_allclose((moved - fallen)[:3], [1.0, 0.0, 0.0], atol=0.02)
+    np.testing.assert_allclose((moved - fallen)[:3], [0.0, 1.0, 0.0], atol=0.02)
+    np.testing.assert_allclose(np.sum(seen, axis=0), [0.0, 1000.0, 0.0], atol=1e-9)
+    with pytest.raises(ScenarioError, match=r"plant.pushes: .*trunk_pich"):
+        TorqueRobot(ROBOT, CONTACTS, q, section=plant_with(pushes=(
+            PushSection(joint="trunk_pich", force=1.0),)))
 
 
 def test_it_stands_with_the_accelerations_and_forces_that_the_stack_predicts():
@@ -102,7 +116,7 @@ def test_soles_slide_on_a_floor_without_friction():
     torques[[1, 7]] = 8.0, -8.0
     slid = []
     for friction in (0.01, 1.0):
-        plant = TorqueRobot(ROBOT, CONTACTS, ROBOT.rest, floor=Floor(friction))
+        plant = TorqueRobot(ROBOT, CONTACTS, ROBOT.rest, section=plant_with(friction=friction))
         for _ in range(60):
             plant.act(torques)
         state = State.at(ROBOT, plant.q)
@@ -111,37 +125,36 @@ def test_soles_slide_on_a_floor_without_friction():
     assert slid[0] > slid[1] + 1e-3
 
 
-def test_what_it_cannot_simulate_is_named():
-    arm = Robot.named("kuka_lwr")
-    with pytest.raises(ScenarioError, match="'kuka_lwr': a robot on a floor has a floating base"):
-        TorqueRobot(arm, Contacts(arm, [Contact(arm.frame("end_effector"))]), np.zeros(7))
+def test_it_says_where_the_soles_slip_and_how_near_the_edge_the_pressure_is():
+    """A push from behind brings the centre of pressure to the toes; the robot then tips over."""
+    push = PushSection(joint="trunk_pitch", force=60.0, duration=0.5)
+    plant = TorqueRobot(ROBOT, CONTACTS, ROBOT.rest, section=plant_with(pushes=(push,)))
+    stack, state = standing_stack(State.at(ROBOT, ROBOT.rest), CONTACTS), State(ROBOT)
+    resolver, memory, margins = make("hcod"), None, []
+    for tick in range(300):
+        state.move(tick * 1e-3, plant.q, plant.v)
+        res = resolver.solve(stack.hierarchy(state), memory)
+        memory = res.memory
+        plant.act(CONTACTS.torques(state, res.x))
+        margins.append(plant.extra["pressure_margin"].min())
+    assert 0.02 < margins[0] <= 0.04   # half the width of a sole is 0.04 m
+    assert min(margins) < 0.005
+    assert plant.extra["slip"].max() < 0.01
+    before = com_of(pin.integrate(ROBOT.model, plant.q, -1e-3 * plant.v))  # the step began there
+    np.testing.assert_allclose(plant.extra["com"], before, atol=1e-6)
 
 
-# The study
+def com_of(q):
+    return pin.centerOfMass(ROBOT.model, ROBOT.model.createData(), q)
 
 
-def test_weighted_tasks_are_one_level_below_physics_and_limits():
-    state = State.at(ROBOT, ROBOT.rest)
-    h = standing_stack(state, CONTACTS, (0.01, 0.0, 0.0)).hierarchy(state)
-    merged = weighted(h)
-    assert merged.names == ("physics", "limits", "tasks")
-    assert merged.sizes.tolist() == [*h.sizes[:2], h.sizes[2:].sum()]
-    x = make("hcod").solve(merged).x
-    assert h.violations(x)[:2].max() < 1e-9 < h.violations(x)[2]
+def test_a_robot_without_torques_falls_and_says_so():
+    plant = TorqueRobot(ROBOT, CONTACTS, ROBOT.rest, section=plant_with(fall=0.1))
+    assert plant.fault is None
+    for _ in range(400):
+        plant.act(np.zeros(30))
+    assert plant.fault == f"the robot has fallen by {start_height() - plant.extra['com'][2]:.2g} m"
 
 
-def test_a_small_push_is_stood_and_a_large_one_is_not():
-    strict = CONTENDERS[0]
-    assert not run(strict, np.array([30.0, 0.0, 0.0]), 0.7, Floor()).fell
-    assert run(strict, np.array([-600.0, 0.0, 0.0]), 0.7, Floor()).fell
-
-
-def test_the_study_prints_what_became_of_each_contender(monkeypatch, capsys):
-    monkeypatch.setattr("stand_push.DURATION", 0.02)
-    monkeypatch.setattr("sys.argv", ["stand_push.py", "--count", "3"])
-    main()
-    printed = capsys.readouterr().out
-    assert printed.count("stands after 3 of 3 (44 to 100 %)") == 4
-    assert in_words(0, 3) == "0 of 3 (0 to 56 %)"
-    size = np.linalg.norm(pushes(50, 1), axis=1)
-    assert ((size >= 40.0) & (size <= 280.0)).all()
+def start_height():
+    return com_of(ROBOT.rest)[2]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from xml.etree import ElementTree
 
 import numpy as np
@@ -13,31 +12,19 @@ from hierarchy.problem import Array
 from hierarchy.robot import Body
 from scenarios.cell.plants.mjcf import GRAVITY, text
 from scenarios.config import ScenarioError
+from scenarios.config.plant import TorqueSection
 
 _LEAST_MASS, _LEAST_INERTIA = 1e-6, 1e-9  # [kg], [kg m^2] of a body that only joins two joints
 _THICKNESS = 0.01                         # [m] half of that of a sole
+_BALL = 0.001                             # [m] radius of a point that touches
 Element = ElementTree.Element
 
 
-@dataclass(frozen=True)
-class Floor:
-    """What the controller's model leaves out.
+def on_floor(robot: Robot, contacts: Contacts, floor: TorqueSection, timestep: float) -> str:
+    """Return the scene of a robot whose `contacts` touch a floor at z = 0.
 
-    `friction` is the coefficient between sole and floor, `softness` [s] the time constant of a
-    contact, `joint_friction` [N m] Coulomb's friction and `armature` [kg m^2] the inertia of the
-    drive of every joint.
-    """
-
-    friction: float = 0.7
-    softness: float = 0.005
-    joint_friction: float = 0.0
-    armature: float = 0.0
-
-
-def on_floor(robot: Robot, contacts: Contacts, floor: Floor, timestep: float) -> str:
-    """Return the scene of a robot whose soles, the surfaces of `contacts`, touch a floor at z = 0.
-
-    A sole is a box in the place of its four corners; nothing else touches anything. Actuators are
+    A sole is a box in the place of its corners, a point a small ball; nothing else touches
+    anything. Bodies are named "body JOINT", geometries by their contacts. Actuators are
     the torques of the actuated joints. Raises ScenarioError unless each joint, but for that of a
     floating base, turns about one axis.
     """
@@ -53,8 +40,9 @@ def on_floor(robot: Robot, contacts: Contacts, floor: Floor, timestep: float) ->
     ElementTree.SubElement(world, "geom", {"type": "plane", "size": "20 20 1"} | touching)
     elements = _bodies(world, robot, floor)
     for contact in contacts.contacts:
-        if contact.is_surface:
-            _sole(elements[contact.frame.joint], contact, touching)
+        shape = _sole(contact) if contact.is_surface else _ball(contact)
+        ElementTree.SubElement(elements[contact.frame.joint], "geom",
+                               {"name": contact.name} | shape | touching)
     actuator = ElementTree.SubElement(root, "actuator")
     for name, limit in zip(robot.velocity_names[robot.actuated:],
                            robot.effort_limit[robot.actuated:], strict=True):
@@ -65,7 +53,7 @@ def on_floor(robot: Robot, contacts: Contacts, floor: Floor, timestep: float) ->
     return ElementTree.tostring(root, encoding="unicode")
 
 
-def _bodies(world: Element, robot: Robot, floor: Floor) -> list[Element]:
+def _bodies(world: Element, robot: Robot, floor: TorqueSection) -> list[Element]:
     axes, elements = _axes(robot), [world]
     for i, body in enumerate(robot.bodies()):
         element = _body(elements[body.parent], body)
@@ -90,16 +78,21 @@ def _body(parent: Element, body: Body) -> Element:
     return element
 
 
-def _sole(parent: Element, contact: Contact, touching: dict[str, str]) -> None:
+def _sole(contact: Contact) -> dict[str, str]:
     corners = np.array(contact.points, dtype=float)
     low, high = corners.min(axis=0), corners.max(axis=0)
     frame = contact.frame
     middle = frame.offset + frame.rotation @ ((low + high) / 2 + [0.0, 0.0, _THICKNESS])
     R = frame.rotation
-    ElementTree.SubElement(parent, "geom", {
-        "name": contact.name, "type": "box", "pos": text(*middle),
-        "xyaxes": text(*R[:, 0], *R[:, 1]),
-        "size": text(*(high - low)[:2] / 2, _THICKNESS)} | touching)
+    return {"type": "box", "pos": text(*middle), "xyaxes": text(*R[:, 0], *R[:, 1]),
+            "size": text(*(high - low)[:2] / 2, _THICKNESS)}
+
+
+def _ball(contact: Contact) -> dict[str, str]:
+    """Return a ball whose lowest point in the start's posture need not be the contact's point."""
+    frame = contact.frame
+    point = frame.offset + frame.rotation @ np.array(contact.points[0], dtype=float)
+    return {"type": "sphere", "pos": text(*point), "size": text(_BALL)}
 
 
 def _axes(robot: Robot) -> dict[int, Array]:

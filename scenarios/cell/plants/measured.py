@@ -9,8 +9,9 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from hierarchy import Robot
 from hierarchy.problem import Array
-from scenarios.cell.plants.plant import Driven, Plant
+from scenarios.cell.plants.plant import Driven, Plant, fault_of
 from scenarios.config import ScenarioError
 from scenarios.config.plant import MeasurementSection
 
@@ -41,6 +42,11 @@ class Apart:
         """The acceleration (n,) [rad/s^2] of the last command."""
         return self._plant.a
 
+    @property
+    def fault(self) -> str | None:
+        """Why the plant cannot go on, or None."""
+        return fault_of(self._plant)
+
     def act(self, command: Array) -> None:
         """Apply a command (n,) for one period, then measure."""
         plant = self._plant
@@ -60,23 +66,35 @@ class Commanded:
         return self._plant.reference_q.copy(), self._plant.reference_v.copy()
 
 
+def whole_periods(delay: float, period: float, key: str) -> int:
+    """Return a delay [s] in periods; ScenarioError, naming its key, if it is not a whole number."""
+    behind = delay / period
+    if abs(behind - round(behind)) > _WHOLE:
+        raise ScenarioError(f"{key} = {delay:g} s is not a whole number of periods of {period:g} s")
+    return round(behind)
+
+
 class JointSensor:
     """Joint sensors with noise, quantisation and delay, read every `period` [s]; seeded.
 
     Noise is added to a position, then it is rounded to the nearest step. With velocity =
     "differenced" the velocity is the backward difference of these positions after a first-order
     low-pass filter; the first one is the true velocity. Values arrive `delay` later, until then
-    those of the start. Raises ScenarioError if the delay is not a whole number of periods.
+    those of the start. Noise of a joint with more coordinates than velocities is a small motion
+    from its true position, of which the base of a robot takes part. Raises ScenarioError if the
+    delay is not a whole number of periods, or for steps or differences of such joints.
     """
 
-    def __init__(self, section: MeasurementSection, period: float) -> None:
-        behind = section.delay / period
-        if abs(behind - round(behind)) > _WHOLE:
-            raise ScenarioError(f"plant.measurement.delay = {section.delay:g} s is not a whole "
-                                f"number of periods of {period:g} s")
+    def __init__(self, section: MeasurementSection, period: float, robot: Robot) -> None:
+        if robot.nq != robot.n and (section.quantisation or section.velocity == "differenced"):
+            raise ScenarioError(f"plant.measurement: robot {robot.name!r} has joints with more "
+                                "coordinates than velocities, which support no quantisation and no "
+                                "differenced velocity")
+        self._robot = robot
+        behind = whole_periods(section.delay, period, "plant.measurement.delay")
         self._section, self._period = section, period
         self._random = np.random.default_rng(section.seed)
-        self._behind: deque[tuple[Array, Array]] = deque(maxlen=round(behind) + 1)
+        self._behind: deque[tuple[Array, Array]] = deque(maxlen=behind + 1)
         self._last: tuple[Array, Array] | None = None  # position and filtered velocity
 
     def __call__(self, q: Array, v: Array) -> tuple[Array, Array]:
@@ -89,6 +107,9 @@ class JointSensor:
         return self._behind[0]
 
     def _position(self, q: Array) -> Array:
+        if self._robot.nq != self._robot.n:
+            moved = self._noise(self._section.position_noise, self._robot.n)
+            return self._robot.integrate(q, moved)
         noisy = q + self._noise(self._section.position_noise, len(q))
         step = self._section.quantisation
         return noisy if step == 0.0 else np.round(noisy / step) * step

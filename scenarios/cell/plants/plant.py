@@ -15,7 +15,8 @@ class Plant(Protocol):
 
     `q` (nq,) [rad] and `v` (n,) [rad/s] are measured values; `a` (n,) [rad/s^2] is the acceleration
     of the last command. `extra` has further signals of the last period to record, by name; its
-    arrays stay the same objects.
+    arrays stay the same objects. A plant may have a `fault`, which says why it cannot go on, such
+    as a fall, and is None before.
     """
 
     @property
@@ -31,7 +32,13 @@ class Plant(Protocol):
     def extra(self) -> Mapping[str, NDArray[Any]]: ...  # noqa: D102
 
     def act(self, command: Array) -> None:
-        """Apply a command (n,), a velocity or an acceleration, for one period."""
+        """Apply a command for one period: velocities or accelerations (n,), or joint torques."""
+
+
+def fault_of(plant: Plant) -> str | None:
+    """Return why a plant cannot go on, None if it can."""
+    fault: str | None = getattr(plant, "fault", None)
+    return fault
 
 
 class Driven(Plant, Protocol):

@@ -3,78 +3,115 @@
 from __future__ import annotations
 
 from collections import deque
+from math import ceil
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from hierarchy import Robot
+from hierarchy import Robot, State
 from hierarchy.contacts import Contacts
+from hierarchy.errors import UnknownNameError
 from hierarchy.problem import Array
-from scenarios.cell.plants.ground import Floor, on_floor
+from scenarios.cell.plants.ground import on_floor
+from scenarios.cell.plants.measured import whole_periods
 from scenarios.cell.plants.physics import mujoco_module
+from scenarios.cell.plants.touch import Touch
 from scenarios.config import ScenarioError
+from scenarios.config.plant import PushSection, TorqueSection
+
+_STEP = 0.001      # [s] of the simulation, at most
+_ROUNDING = 1e-9   # [s] of times, and of a number of steps
 
 
 class TorqueRobot:
-    """A floating-base robot with torque motors, whose soles touch a floor with friction.
+    """A robot with torque motors, whose contacts touch a floor with friction.
 
-    `q` (nq,) and `v` (n,) are the true state in the robot's own convention [m, rad], from the
-    start at `q`, `v` on moved by `act`, once per `period` [s]. `delay` is the number of periods by
-    which torques arrive late; before the first they are zero. The floor's options are in `Floor`.
+    `q` (nq,) and `v` (n,) are the true state in the robot's own convention [m, rad], `a` (n,) its
+    mean acceleration over the last period, from the start at `q`, `v` on moved by `act`, once per
+    `period` [s]. Until the first torques arrive, if they are late, the motors carry the gravity of
+    the start. `fault` says why the robot cannot go on, or is None. `extra` has, of the last step of
+    the simulation, `com` (3,) [m], `push` (3,) [N], and of each contact `floor_force` (C, 3) [N] in
+    world axes, `slip` (C,) [m] and `pressure_margin` (C,) [m], see `Touch`.
 
-    Raises ScenarioError if mujoco is not installed, or the base of the robot is fixed.
+    Raises ScenarioError if mujoco is not installed, a joint does not turn about one axis, a push is
+    on an unknown joint, or the delay is not a whole number of periods.
     """
 
     def __init__(self, robot: Robot, contacts: Contacts, q: Array, v: Array | None = None,
-                 period: float = 0.001, floor: Floor | None = None, delay: int = 0) -> None:
-        if robot.base != "floating":
-            raise ScenarioError(f"robot {robot.name!r}: a robot on a floor has a floating base")
-        mujoco = mujoco_module()
+                 period: float = 0.001, section: TorqueSection | None = None) -> None:
+        self._mujoco = mujoco = mujoco_module()
+        self._section = section = section or TorqueSection(kind="torque")
+        self._period, self._steps = period, ceil(period / _STEP - _ROUNDING)
         self.model = mujoco.MjModel.from_xml_string(
-            on_floor(robot, contacts, floor or Floor(), period))
+            on_floor(robot, contacts, section, period / self._steps))
         self.data = mujoco.MjData(self.model)
-        self._mujoco = mujoco
-        self._soles = {contact.name: self.model.geom(contact.name).id
-                       for contact in contacts.contacts if contact.is_surface}
+        self._floating = robot.base == "floating"
         self.q, self.v = q.copy(), np.zeros(robot.n) if v is None else v.copy()
-        self._waiting = deque(np.zeros((delay, robot.n - robot.actuated)))
-        self.data.qpos[:] = q
-        self.data.qpos[3:7] = q[[6, 3, 4, 5]]
+        self.a = np.zeros(robot.n)
+        self.data.qpos[:] = _quaternion_first(q) if self._floating else q
         self.data.qvel[:] = self.v
-        self.data.qvel[:3] = self._rotation() @ self.v[:3]
+        if self._floating:
+            self.data.qvel[:3] = self._rotation() @ self.v[:3]
         mujoco.mj_forward(self.model, self.data)
+        delay = whole_periods(section.delay, period, "plant.delay")
+        self._waiting = deque([State.at(robot, q).bias_effort()[robot.actuated:]] * delay)
+        self._pushes = [(push, self._body(push), _force(push)) for push in section.pushes]
+        self._time, self._height = 0.0, float(self.data.subtree_com[0][2])
+        self._touch = Touch(mujoco, self.model, contacts)
+        self._push = np.zeros(3)
+        self._com = np.array(self.data.subtree_com[0])
+        self.extra: dict[str, NDArray[Any]] = {
+            "com": self._com, "push": self._push, **self._touch.signals}
+        self._touch.look(self.data)
 
-    def act(self, torques: Array, push: tuple[str, Array] | None = None) -> None:
-        """Apply torques (n - 6,) [N m], and a force (3,) [N] on a joint's body, for one period.
+    def act(self, command: Array) -> None:
+        """Apply torques (n,), those of the actuated joints [N m], for one period.
 
-        The force acts at the body's centre of mass, in world axes; motors cut torques off at their
-        limits.
+        Motors cut them off at their limits.
         """
-        self._waiting.append(np.array(torques))
+        self._waiting.append(np.array(command))
         self.data.ctrl[:] = self._waiting.popleft()
+        before = self.v.copy()
         self.data.xfrc_applied[:] = 0.0
-        if push is not None:
-            self.data.body(f"body {push[0]}").xfrc_applied[:3] = push[1]
-        self._mujoco.mj_step(self.model, self.data)
+        self._push[:] = 0.0
+        for push, body, force in self._pushes:
+            if push.at - _ROUNDING <= self._time < push.at + push.duration - _ROUNDING:
+                self.data.xfrc_applied[body, :3] += force
+                self._push += force
+        for _ in range(self._steps):
+            self._mujoco.mj_step(self.model, self.data)
+        self._time += self._period
         self._read()
+        self.a[:] = (self.v - before) / self._period
+        self._com[:] = self.data.subtree_com[0]
+        self._touch.look(self.data)
+
+    @property
+    def fault(self) -> str | None:
+        """Why the robot cannot go on: it has fallen; or None."""
+        fallen = self._height - float(self._com[2])
+        return f"the robot has fallen by {fallen:.2g} m" if fallen > self._section.fall else None
 
     def forces(self) -> dict[str, Array]:
-        """Force (3,) [N] of the floor on each sole, world axes, in the last period."""
-        wrench, found = np.zeros(6), {name: np.zeros(3) for name in self._soles}
-        for i, contact in enumerate(self.data.contact):
-            self._mujoco.mj_contactForce(self.model, self.data, i, wrench)
-            force = contact.frame.reshape(3, 3).T @ wrench[:3]
-            for name, geom in self._soles.items():
-                if geom in (contact.geom1, contact.geom2):
-                    found[name] += force if geom == contact.geom2 else -force
-        return found
+        """Force (3,) [N] of the floor on each contact by name, world axes, in the last period."""
+        return dict(zip(self._touch.names, self._touch.force.copy(), strict=True))
 
     def accelerations(self, torques: Array) -> Array:
         """Accelerations (n,) that torques cause at the present state, in the robot's convention."""
         self.data.ctrl[:] = torques
         self._mujoco.mj_forward(self.model, self.data)
-        R, a = self._rotation(), np.array(self.data.qacc)
-        a[:3] = R.T @ a[:3] - np.cross(self.v[3:6], self.v[:3])  # d(R^T p')/dt
+        a = np.array(self.data.qacc)
+        if self._floating:  # d(R^T p')/dt
+            a[:3] = self._rotation().T @ a[:3] - np.cross(self.v[3:6], self.v[:3])
         return a
+
+    def _body(self, push: PushSection) -> int:
+        names = {self.model.body(i).name.removeprefix("body "): i
+                 for i in range(1, self.model.nbody)}
+        if push.joint not in names:
+            raise ScenarioError(f"plant.pushes: {UnknownNameError('joint', push.joint, names)}")
+        return names[push.joint]
 
     def _rotation(self) -> Array:
         R = np.zeros(9)
@@ -83,8 +120,16 @@ class TorqueRobot:
 
     def _read(self) -> None:
         """Take over the state: a free joint of MuJoCo has w first, and a velocity in the world."""
-        self.q[:] = self.data.qpos
-        self.q[3:7] = self.data.qpos[[4, 5, 6, 3]]
-        self.v[:] = self.data.qvel
-        self.v[:3] = self._rotation().T @ self.data.qvel[:3]
+        self.q[:], self.v[:] = self.data.qpos, self.data.qvel
+        if self._floating:
+            self.q[3:7] = self.data.qpos[[4, 5, 6, 3]]
+            self.v[:3] = self._rotation().T @ self.data.qvel[:3]
 
+
+def _quaternion_first(q: Array) -> Array:
+    return np.concatenate([q[:3], q[[6, 3, 4, 5]], q[7:]])
+
+
+def _force(push: PushSection) -> Array:
+    angle = np.radians(push.direction)
+    return push.force * np.array([np.cos(angle), np.sin(angle), 0.0])

@@ -1,0 +1,54 @@
+"""The keys of [[contacts]] and [forces]: what touches, and which forces it may transmit."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from scenarios.config.sections import Finite, NotNegative, Positive, Section, Vector3
+from scenarios.config.tasks import TaskName
+
+
+class ContactSection(Section):
+    """Points of `frame` that push on a rigid surface, see hierarchy.contacts.Contact.
+
+    `x` and `y` [m] are the sides of a sole in the frame's xy plane; without them it is the point
+    `offset` [m]. `friction` is what the controller believes, `normal` the direction in which the
+    surface pushes. In each interval of `open` [s] the contact is lifted; its load ramps down for
+    `ramp` [s] before and up after it. The name defaults to the frame's.
+    """
+
+    frame: str
+    name: TaskName | None = None
+    x: tuple[Finite, Finite] | None = None
+    y: tuple[Finite, Finite] | None = None
+    offset: Vector3 = (0.0, 0.0, 0.0)
+    friction: Positive = 0.7
+    normal: Vector3 = (0.0, 0.0, 1.0)
+    open: tuple[tuple[NotNegative, NotNegative], ...] = ()
+    ramp: NotNegative = 0.1
+
+    @model_validator(mode="after")
+    def _is_a_sole_or_a_point(self) -> Self:
+        if (self.x is None) != (self.y is None):
+            raise ValueError("a sole has x and y, a point neither")
+        if self.x is not None and any(self.offset):
+            raise ValueError("a sole has x and y in place of an offset")
+        return self
+
+
+class ForcesSection(Section):
+    """The contact forces that the stack allows, as one level with the torque limits.
+
+    Of each point: a friction pyramid with `faces`, and a normal force from `least` to `largest`
+    [N], needed where a contact opens. The centre of pressure of a sole stays `edge` [m] inside it,
+    None for just inside. What velocity a contact has is damped by `damping` [1/s]. Like the rows
+    of [limits], these are in the stack if `limits.place` says so.
+    """
+
+    faces: Literal[4, 8] = 4
+    least: NotNegative = 0.0
+    largest: Positive | None = None
+    edge: Annotated[float, Field(strict=True, gt=0.0)] | None = None
+    damping: NotNegative = 20.0

@@ -1,0 +1,52 @@
+"""The recorded family DYN60: certified answers, sequences, and a recorder that repeats it."""
+
+import numpy as np
+import pytest
+
+from scenarios.bench import candidates, recorded
+from scenarios.bench.families import family, fresh
+from solvers import certify, make
+
+
+def test_its_stored_answers_are_certified_and_half_of_its_ticks_meet_no_limit():
+    problems = family("DYN60")
+    assert len(problems) == recorded.COUNT
+    free = 0
+    for problem in problems:
+        assert problem.h.n == 60
+        assert certify(problem.h, problem.x).certified
+        np.testing.assert_allclose(problem.h.violations(problem.x), problem.norms, atol=1e-9)
+        limits = problem.h.A[18:88] @ problem.x
+        room = np.minimum(limits - problem.h.lower[18:88], problem.h.upper[18:88] - limits)
+        free += bool(room.min() > 1e-6)
+    assert 30 <= free <= 70
+
+
+def test_problems_of_a_sequence_know_the_tick_before_from_which_a_warm_start_goes_on():
+    problems = family("DYN60")
+    firsts = [p for p, problem in enumerate(problems) if problem.before is None]
+    assert firsts == list(range(0, recorded.COUNT, recorded.TOGETHER))
+    second = problems[1]
+    assert second.before is problems[0].h
+    resolver = make("hcod")
+    warm = next(one for one in candidates.candidates(["hcod"])[0] if one.label == "hcod warm")
+    after = warm.prepare(second.h, second.before)()
+    memory = resolver.solve(second.before).memory
+    assert after.iterations == resolver.solve(second.h, memory).iterations
+    np.testing.assert_allclose(after.x, second.x, atol=1e-6)
+
+
+@pytest.mark.slow
+def test_the_recorder_writes_what_is_stored(tmp_path, monkeypatch):
+    pytest.importorskip("mujoco")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("sys.argv", ["recorded", "--count", "10", "--out", str(tmp_path / "a.npz")])
+    recorded.main()
+    with np.load(tmp_path / "a.npz") as made, np.load(recorded.STORED) as stored:
+        assert set(made.files) == set(stored.files)
+        for name in ("A0", "ub2", "x"):
+            np.testing.assert_allclose(made[name], stored[name][:10], rtol=1e-6, atol=1e-4)
+    again = fresh("DYN60", recorded.SEED, 10)
+    assert again[0].before is None
+    assert again[9].before is again[8].h
+    np.testing.assert_allclose(again[9].x, family("DYN60")[9].x, atol=1e-4)

@@ -1,0 +1,171 @@
+"""The scenario `stand-push`: torques for a humanoid that is pushed, from a file to metrics."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from hierarchy import HierarchyError
+from scenarios import load, simulate
+from scenarios.cell.build import build
+from scenarios.config import ScenarioError
+from scenarios.loop.controller import Controller
+from scenarios.loop.recorder import Recorder
+from scenarios.loop.simulation import tick
+from scenarios.measure.metrics import measure
+from solvers import Resolution, Status, make
+
+STANDING = load("stand-push")
+SHORT = STANDING.with_changes({"control.duration": 0.02, "plant.pushes.0.at": 0.005,
+                               "plant.pushes.0.duration": 0.01})
+LEVELS = ("physics", "limits", "joint limits", "centre of mass", "left hand", "right hand",
+          "posture", "least force")
+
+
+def changed(**keys):
+    return STANDING.with_changes({key.replace("__", "."): value for key, value in keys.items()})
+
+
+# What is asked.
+
+
+@pytest.mark.parametrize(("keys", "said"), [
+    ({"control__level": "acceleration"}, r"\[\[contacts\]\] needs control.level = \"torque\""),
+    ({"control__level": "acceleration", "contacts": []},
+     "task 'least force' needs control.level = \"torque\""),
+    ({"plant__kind": "kinematic"}, "\"torque\" and plant.kind = \"torque\" go together, got "
+                                   "\"torque\" and \"kinematic\""),
+    ({"control__stack": "switched"}, "goes with control.stack = \"hierarchical\", got"),
+    ({"contacts__0__y": None}, "a sole has x and y, a point neither"),
+    ({"contacts__0__friction": 0.0}, "contacts.0.friction: .* greater than 0"),
+    ({"plant__friction": 0.0}, "plant.friction: .* greater than 0"),
+])
+def test_what_does_not_fit_together_is_refused_by_its_key(keys, said):
+    with pytest.raises(ScenarioError, match=said):
+        changed(**keys)
+
+
+@pytest.mark.parametrize(("keys", "said"), [
+    ({"contacts__0__frame": "left_fot"}, "left_fot.*left_foot"),
+    ({"contacts__1__frame": "left_foot"}, "contacts: contact 'left_foot': two contacts"),
+    ({"contacts__0__open": [[1.0, 2.0]]}, "forces: .*'left_foot' opens; give a finite largest"),
+    ({"forces__edge": 0.2}, "forces: .*margin 0.2 m of contact 'left_foot'"),
+    ({"plant__pushes__0__joint": "trunk"}, "plant.pushes: .*'trunk'"),
+    ({"plant__delay": 0.0004}, "plant.delay = 0.0004 s is not a whole number of periods"),
+])
+def test_what_the_robot_does_not_have_is_named(keys, said):
+    pytest.importorskip("mujoco")
+    with pytest.raises(HierarchyError, match=said):
+        build(changed(**keys))
+
+
+def test_a_resolver_for_equalities_gets_the_stack_without_limits():
+    pytest.importorskip("mujoco")
+    assert (STANDING.asks, STANDING.forces_in_stack) == ("inequalities", True)
+    assert build(STANDING).stack.names == LEVELS
+    plain = STANDING.with_resolver("tpm")
+    assert (plain.asks, plain.forces_in_stack) == ("equalities", False)
+    assert build(plain).stack.names == ("physics", *LEVELS[3:])
+
+
+# What it does.
+
+
+@pytest.fixture(scope="module")
+def short():
+    pytest.importorskip("mujoco")
+    return simulate(SHORT, certified=True)
+
+
+def test_a_run_records_torques_plans_and_what_the_floor_does(short):
+    assert short.fault is None
+    assert short["certified"].all()
+    robot = build(SHORT).robot
+    assert short["command"].shape == (20, 30)
+    assert short["planned_acceleration"].shape == (20, 36)
+    assert short["planned_force"].shape == (20, 8, 3)
+    np.testing.assert_array_equal(short["torque_limit"], robot.effort_limit[6:])
+    weight = 9.81 * robot.masses.sum()
+    assert short["planned_force"][0, :, 2].sum() == pytest.approx(weight, rel=1e-6)
+    assert short["floor_force"][-1, :, 2].sum() == pytest.approx(weight, rel=0.3)
+    pushed = np.flatnonzero(short["push"].any(axis=1))
+    np.testing.assert_array_equal(pushed, np.arange(5, 15))
+    np.testing.assert_allclose(short["push"][5], [120.0, 0.0, 0.0])
+
+
+def test_its_metrics_have_units_and_say_what_the_signals_do(short):
+    found = measure(short)
+    assert found["slip_max"].value == short["slip"].max()
+    step = np.abs(np.diff(short["command"], axis=0)).max()
+    assert (found["torque_step_max"].value, found["torque_step_max"].unit) == (step, "N m")
+    assert found["torque_limit_share"].value == 0.0
+    assert 0.0 < found["pressure_margin_min"].value < 0.04
+    assert 0.0 < found["friction_margin_min"].value < 1.0
+    missed = short["level_violation"][:, short.task_names.index("posture")].mean()
+    assert found["miss_posture"].value == missed
+    assert found["miss_limits"].value < 1e-9
+    assert found["command_step_max"].value is None
+
+
+def test_a_fall_ends_the_run_and_is_its_fault():
+    pytest.importorskip("mujoco")
+    recording = simulate(changed(plant__pushes__0__force=300.0, plant__pushes__0__at=0.0,
+                                 plant__fall=0.002))
+    assert 50 < recording.ticks < 2500
+    assert recording.fault.startswith("the robot has fallen by 0.002 m from tick")
+
+
+def test_noise_turns_and_moves_the_base_that_the_controller_sees():
+    pytest.importorskip("mujoco")
+    noisy = simulate(SHORT.with_changes({"plant.measurement.position_noise": 1e-3,
+                                         "plant.measurement.velocity_noise": 1e-2}))
+    error = noisy["q"] - noisy["true_q"]
+    assert 5e-4 < error[:, :3].std() < 2e-3
+    assert 5e-4 < error[:, 7:].std() < 2e-3
+    turns = Rotation.from_quat(noisy["q"][:, 3:7]) * Rotation.from_quat(
+        noisy["true_q"][:, 3:7]).inv()
+    assert 5e-4 < turns.as_rotvec().std() < 2e-3
+    np.testing.assert_allclose(np.linalg.norm(noisy["q"][:, 3:7], axis=1), 1.0)
+    with pytest.raises(ScenarioError, match="no quantisation"):
+        build(changed(plant__measurement__quantisation=1e-3))
+
+
+# What is sent without an answer.
+
+
+class Failing:
+    """hcod, whose answers from some tick on have another status."""
+
+    def __init__(self, status, after):
+        self.inner, self.status, self.left = make("hcod"), status, after
+        self.accuracy = self.inner.accuracy
+
+    def solve(self, h, memory=None):
+        res, self.left = self.inner.solve(h, memory), self.left - 1
+        return res if self.left >= 0 else Resolution(res.x, self.status)
+
+
+@pytest.mark.parametrize(("action", "patience"), [("hold", 10), ("brake", 0)])
+def test_without_an_answer_the_last_torques_are_held_or_damped(action, patience):
+    pytest.importorskip("mujoco")
+    scenario = SHORT.with_changes({"control.policy.backend_failure": action})
+    controller = Controller(scenario, resolver=Failing(Status.BACKEND_FAILURE, 8))
+    recorder = Recorder(controller, 10)
+    for k in range(10):
+        assert tick(controller, recorder, k * 1e-3) is None
+    run = recorder.finish(scenario, None)
+    limit, fastest = run["torque_limit"], run["velocity_limit"][6:]
+    damping = np.zeros(30) if action == "hold" else limit / fastest
+    expected = np.clip(run["command"][7] - damping * run["v"][9, 6:], -limit, limit)
+    np.testing.assert_allclose(run["command"][9], expected)
+    assert run.events[-1] == (9, "backend_failure", action)
+
+
+def test_a_stop_ends_the_run_at_once():
+    pytest.importorskip("mujoco")
+    scenario = SHORT.with_changes({"control.policy.not_finite": "stop", "faults": [
+        {"kind": "nan_velocity", "at": 0.01, "duration": 0.002}]})
+    run = simulate(scenario)
+    assert run.ticks == 11
+    assert run.fault == "stopped by its policy at t = 0.010 s: not_finite"
+    assert np.isfinite(run["command"]).all()
+    assert np.isnan(run["planned_force"][10]).all()
