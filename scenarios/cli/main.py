@@ -30,6 +30,7 @@ from scenarios.cli.options import (
     Workers,
     output,
 )
+from scenarios.cli.problems import problems
 from scenarios.cli.terminal import (
     certified,
     first_line,
@@ -47,6 +48,7 @@ if TYPE_CHECKING:
 
 app = typer.Typer(rich_markup_mode=None, pretty_exceptions_enable=False)
 app.add_typer(bench, name="bench")
+app.add_typer(problems, name="problems")
 
 
 def main() -> None:
