@@ -172,6 +172,50 @@ def peers(install: Annotated[bool, typer.Option(
     return 0
 
 
+@bench.command("open")
+def open_(families: Annotated[list[str] | None, typer.Option(
+              "--family", metavar="NAME", help="Only this family. May be repeated.")] = None,
+          entrants: Annotated[list[str] | None, typer.Option(
+              "--entrant", metavar="LABEL", help="Only this entrant of the table, or FILE.py:CLASS "
+              "for yours. May be repeated.")] = None,
+          fresh: Annotated[list[int] | None, typer.Option(
+              "--fresh", metavar="SEED", min=1, help="Seed of fresh problems. May be repeated. "
+              "Default: 1.")] = None,
+          count: Annotated[int | None, typer.Option(
+              "--count", min=1, metavar="N", help="Problems of a half. Default: 50, or 200 "
+              "consecutive ones.")] = None,
+          limit: Annotated[float, typer.Option("--limit", min=0.1, metavar="S",
+                                               help="Time for one problem.")] = 10.0,
+          python: Annotated[str, typer.Option(
+              "--python", metavar="PATH", help="Interpreter that has your entrant's package.")
+              ] = "",
+          soth: Annotated[Path | None, typer.Option(
+              "--soth", metavar="DIR", help="Your checkout of soth, compiled here.")] = None,
+          lexls: Annotated[Path | None, typer.Option(
+              "--lexls", metavar="DIR", help="Your checkout of LexLS, compiled here.")] = None,
+          check: Annotated[bool, typer.Option(
+              "--check", help="Try the entrants on a few problems of each kind, in a minute, and "
+              "keep nothing.")] = False,
+          install: Annotated[bool, typer.Option(
+              "--install", help="Make an environment for each package, and measure nothing.")
+              ] = False,
+          out: Annotated[Path, output("Folder to begin or to continue.")] = Path("runs/open")
+          ) -> int:
+    """Compare solvers on public and fresh problems with proved answers.
+
+    The same command continues what was interrupted.
+    """
+    from scenarios.cli.open_benchmark import check_command, install_command, open_command
+
+    if install:
+        return install_command()
+    built = {"soth": soth, "lexls": lexls}
+    if check:
+        return check_command(entrants or [], python, built)
+    return open_command(families or [], entrants or [], fresh or [1], count, limit, python, built,
+                        out)
+
+
 @bench.command()
 def stress(count: Annotated[int, typer.Option("--count", min=1, metavar="N",
                                               help="Number of problems.")] = 1_000_000,

@@ -28,6 +28,7 @@ from scenarios.cli.options import (
     Workers,
     output,
 )
+from scenarios.cli.problems import problems
 from scenarios.cli.terminal import first_line, print_json, print_list, shown
 
 if TYPE_CHECKING:
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
 
 app = typer.Typer(rich_markup_mode=None, pretty_exceptions_enable=False)
 app.add_typer(bench, name="bench")
+app.add_typer(problems, name="problems")
 
 
 def main() -> None:

@@ -1,0 +1,1 @@
+"""The open benchmark of prioritized control: problems as files, entrants, judged answers."""

@@ -1,0 +1,78 @@
+// soth (LGPL-3.0, https://github.com/stack-of-tasks/soth) behind the functions of `compiled.py`.
+// Compiled with the user's compiler against the user's copy, of which no line is here.
+#include <soth/HCOD.hpp>
+
+#include <cmath>
+#include <memory>
+#include <vector>
+
+namespace {
+using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+soth::Bound bound(double lower, double upper) {
+  if (lower == upper) return soth::Bound(lower);
+  if (std::isinf(lower)) return soth::Bound(upper, soth::Bound::BOUND_SUP);
+  if (std::isinf(upper)) return soth::Bound(lower, soth::Bound::BOUND_INF);
+  return soth::Bound(lower, upper);
+}
+
+struct Prepared {
+  std::unique_ptr<soth::HCOD> solver;
+  Eigen::VectorXd x;
+  std::vector<soth::cstref_vector_t> active;  // of the answer
+};
+
+int search(Prepared* p) {
+  try {
+    p->solver->activeSearch(p->x);
+  } catch (int) {  // too many iterations
+    return 0;
+  }
+  p->active = p->solver->getOptimalActiveSet();
+  return p->x.allFinite();
+}
+}  // namespace
+
+extern "C" {
+void* prepare(int n, int levels, const long* sizes, const double* A, const double* lower,
+              const double* upper, const double* reference) {
+  auto* p = new Prepared{std::unique_ptr<soth::HCOD>(new soth::HCOD(n, 0)),
+                         Eigen::VectorXd::Zero(n), {}};
+  for (int k = 0; k < levels; A += sizes[k] * n, lower += sizes[k], upper += sizes[k], ++k) {
+    if (sizes[k] == 0) continue;
+    soth::VectorBound b(sizes[k]);
+    for (long i = 0; i < sizes[k]; ++i) b[i] = bound(lower[i], upper[i]);
+    p->solver->pushBackStage(Eigen::MatrixXd(Eigen::Map<const RowMajor>(A, sizes[k], n)), b);
+  }
+  if (reference != nullptr) {  // the shortest x by itself, so zero needs no level
+    soth::VectorBound b(n);
+    for (int i = 0; i < n; ++i) b[i] = soth::Bound(reference[i]);
+    p->solver->pushBackStage(Eigen::MatrixXd(Eigen::MatrixXd::Identity(n, n)), b);
+  }
+  p->solver->setNameByOrder("level");
+  p->solver->setDamping(0.0);
+  return p;
+}
+
+int solve(void* handle) {
+  auto* p = static_cast<Prepared*>(handle);
+  p->solver->reset();
+  p->solver->setInitialActiveSet();
+  return search(p);
+}
+
+int solve_from(void* handle, void* before) {
+  auto* p = static_cast<Prepared*>(handle);
+  p->solver->reset();
+  p->solver->setInitialActiveSet(static_cast<Prepared*>(before)->active);
+  return search(p);
+}
+
+void read(void* handle, double* x, int* iterations) {
+  auto* p = static_cast<Prepared*>(handle);
+  Eigen::Map<Eigen::VectorXd>(x, p->x.size()) = p->x;
+  *iterations = -1;
+}
+
+void release(void* handle) { delete static_cast<Prepared*>(handle); }
+}

@@ -1,0 +1,100 @@
+"""The results as one HTML page, in the style of a comparison's report."""
+
+from __future__ import annotations
+
+from math import isnan
+from typing import Any, NamedTuple
+
+from markupsafe import Markup
+
+from scenarios.bench.open import figures
+from scenarios.bench.open.judge import RIGHT, SOLVED
+from scenarios.bench.open.printing import counted, digits, power
+from scenarios.bench.open.results import Half, Results
+from scenarios.bench.open.summary import Summary
+from scenarios.report.templates import drawn, render, resource
+
+ANSWERS = ("asked", "right", "called solved, wrong", "right, not called so", "failed", "ended",
+           "largest miss", "relative", "last level moves upper", "same bits", "roughness", "MB")
+TIMES = ("median", "p95", "p99.9", "largest", "warm median", "warm p99.9", "iterations",
+         "warm iterations", "warm right")
+
+
+class Shown(NamedTuple):
+    """The content of the page for one half."""
+
+    title: str
+    counted: str
+    looks: dict[str, Any]
+    profiles: Markup
+    time_miss: Markup
+    heat: Markup
+    answers: list[tuple[str, list[str]]]
+    families: list[tuple[str, str, list[tuple[str, list[str]]]]]
+
+
+def page(found: Results, command: str) -> str:
+    """Return the page; it needs no other file."""
+    labels = dict.fromkeys(label for half in found.halves for label in half.entrants)
+    return str(render(
+        "bench/open/page.html", style=resource("report/style.css"), right=f"{RIGHT:g}",
+        halves=[_shown(half) for half in found.halves], heads=ANSWERS, time_heads=TIMES,
+        lead=lead(found.halves[0]), command=command, missing=found.missing,
+        machine=found.machine,
+        entrants=[(label, found.version(label), found.limits(label)) for label in labels]))
+
+
+def lead(half: Half) -> list[str]:
+    """Return what one half shows, in sentences: who is right most often, and who is fastest."""
+    asked = max(one.asked for one in half.whole.values())
+    widely = {label: one for label, one in half.whole.items() if one.asked >= 0.95 * asked}
+    ranked = sorted(widely, key=lambda label: (-widely[label].right,
+                                               sum(widely[label].counts.values())))
+    best = [label for label in ranked if widely[label].right == widely[ranked[0]].right]
+    said = [f"{half.title}: of the entrants that can be asked at least 95 % of the problems, "
+            f"{' and '.join(best)} solve{'s' if len(best) == 1 else ''} the most, "
+            f"{100.0 * widely[best[0]].right:.2f} %."]
+    fastest: dict[str, list[str]] = {}
+    for family in half.families:
+        right = {label: half.cells[label, family].cold.median for label in half.entrants
+                 if (label, family) in half.cells and half.cells[label, family].right == 1.0}
+        if right:
+            fastest.setdefault(min(right, key=right.__getitem__), []).append(family)
+    for label, families in sorted(fastest.items(), key=lambda one: -len(one[1])):
+        said.append(f"{label} is the fastest of those without a mistake in {len(families)} of "
+                    f"{len(half.families)} families: {', '.join(families)}.")
+    return said
+
+
+def _shown(half: Half) -> Shown:
+    count = sum(len(half.collections[name].problems) for name in half.families)
+    return Shown(
+        half.title, f"{count} problems of {len(half.families)} families", figures.drawn_as(half),
+        drawn(figures.profiles(half), f"{half.title}: performance profiles"),
+        drawn(figures.time_against_miss(half), f"{half.title}: time against miss"),
+        drawn(figures.heat(half), f"{half.title}: share right, families and entrants"),
+        [(label, _answers(half.whole[label])) for label in half.entrants],
+        [(name, half.collections[name].head.what, _times(half, name)) for name in half.families])
+
+
+def _answers(one: Summary) -> list[str]:
+    return [*counted(one), power(one.absolute), power(one.relative), power(one.moved),
+            "yes" if one.same else "no", digits(one.rough), f"{one.memory / 1024:.0f}"]
+
+
+def _times(half: Half, family: str) -> list[tuple[str, list[str]]]:
+    found = []
+    for label in half.entrants:
+        one = half.cells.get((label, family))
+        if one is not None and one.counts[SOLVED]:
+            whole = [one.cold.median, one.cold.p95, one.cold.p999, one.cold.largest,
+                     one.warm.median, one.warm.p999]
+            found.append((f"{label}", [*map(digits, whole), _whole(one.iterations),
+                                       _whole(one.warm_iterations),
+                                       "–" if isnan(one.warm_right)
+                                       else f"{100.0 * one.warm_right:.0f}%"]))
+    return found
+
+
+def _whole(value: float) -> str:
+    return "–" if isnan(value) else f"{value:.0f}"

@@ -1,0 +1,99 @@
+"""The results as text."""
+
+from __future__ import annotations
+
+from math import isnan
+
+from rich.console import Console
+from rich.table import Table
+
+from scenarios.bench.open.judge import CRASHED, FAILED, HUNG, MODEST, RAISED, RIGHT, SOLVED, WRONG
+from scenarios.bench.open.results import Half, Results
+from scenarios.bench.open.summary import Summary
+
+NOTES = f"""\
+right: share of the problems asked that are solved, and called so: every level missed by no more \
+than {RIGHT:g} |a| (1 + |x|). wrong: called solved, but missed by more. modest: right, but not \
+called so. failed: neither. ended: raised, crashed, or took too long. miss: largest of those \
+called solved, in the rows' unit, and relative to |a| (1 + |x|). moved: how far the last level \
+moved one above, relative likewise. same: the same bits twice. rough: largest step between two \
+ticks, beside that of the proved answers. MB: growth of the process. Times in microseconds, of one \
+call from Python."""
+CHOSEN = ("EQ7", "INEQ7", "HUM38", "ellipse-hqp", "humanoid-reach")
+"""Families whose times are printed."""
+
+
+def say(console: Console, found: Results) -> None:
+    """Print the tables of every half, the fresh ones first."""
+    for half in found.halves:
+        console.print(_answers(half), "", sep="\n")
+        console.print(_times(half), "", sep="\n")
+    console.print(NOTES, "", sep="\n")
+    for label, why in found.missing.items():
+        console.print(f"skipped: {label} ({why})")
+
+
+def _answers(half: Half) -> Table:
+    count = sum(len(half.collections[name].problems) for name in half.families)
+    table = _table(f"{half.title}: {count} problems of {len(half.families)} families",
+                   ("asked", "right", "wrong", "modest", "failed", "ended", "miss", "relative",
+                    "moved", "same", "rough", "MB"))
+    for label in half.entrants:
+        one = half.whole[label]
+        table.add_row(label, *counted(one), power(one.absolute), power(one.relative),
+                      power(one.moved), "yes" if one.same else "no", digits(one.rough),
+                      f"{one.memory / 1024:.0f}")
+    return table
+
+
+def counted(one: Summary) -> tuple[str, ...]:
+    """Return problems asked, share right, and the other verdicts."""
+    ended = sum(one.counts[verdict] for verdict in (RAISED, CRASHED, HUNG))
+    return (str(one.asked), share(one.right), *(str(one.counts[verdict]) for verdict in
+                                                (WRONG, MODEST, FAILED)), str(ended))
+
+
+def _times(half: Half) -> Table:
+    chosen = [name for name in CHOSEN if name in half.families]
+    heads = [head for name in chosen for head in (f"{name}\nmedian", "\np99.9", "\nwarm", "\niter")]
+    table = _table(f"{half.title}: times", heads)
+    for label in half.entrants:
+        cells = [half.cells.get((label, name)) for name in chosen]
+        if any(one is not None and one.counts[SOLVED] for one in cells):
+            table.add_row(label, *(text for one in cells for text in _timed(one)))
+    return table
+
+
+def _timed(one: Summary | None) -> tuple[str, ...]:
+    if one is None or not one.counts[SOLVED]:
+        return ("–",) * 4
+    return (digits(one.cold.median), digits(one.cold.p999), digits(one.warm.median),
+            "–" if isnan(one.iterations) else f"{one.iterations:.0f}")
+
+
+def _table(title: str, heads: tuple[str, ...] | list[str]) -> Table:
+    table = Table(title=title, title_justify="left", box=None, padding=(0, 1, 0, 0),
+                  pad_edge=False)
+    table.add_column("", no_wrap=True)
+    for head in heads:
+        table.add_column(head, justify="right", no_wrap=True)
+    return table
+
+
+def share(value: float) -> str:
+    """Return a share in percent; 100 only if it is all."""
+    if isnan(value):
+        return "–"
+    return "100%" if value == 1.0 else f"{min(100.0 * value, 99.9):.1f}%"
+
+
+def digits(value: float) -> str:
+    """Return a number with three digits, or all digits before the decimal point."""
+    if isnan(value):
+        return "–"
+    return f"{value:.0f}" if value >= 100.0 else f"{value:.1f}" if value >= 10.0 else f"{value:.2f}"
+
+
+def power(value: float) -> str:
+    """Return a size as 1e-09."""
+    return "–" if isnan(value) else "0" if value == 0.0 else f"{value:.0e}"

@@ -1,0 +1,66 @@
+"""`hierarchy bench open`: choose families and entrants, run, print, write the page."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from rich.console import Console
+
+from scenarios.bench.open.families import available, family
+from scenarios.bench.open.table import ENTRANTS, PACKAGES, Row, chosen
+from scenarios.cli.terminal import shown
+
+
+def open_command(families: Sequence[str], entrants: Sequence[str], seeds: Sequence[int],
+                 count: int | None, limit: float, python: str, built: dict[str, Path | None],
+                 out: Path) -> int:
+    """Run the benchmark, or what is left of it; print its tables and write its page."""
+    from scenarios.bench.open.page import page
+    from scenarios.bench.open.printing import say
+    from scenarios.bench.open.results import results
+    from scenarios.bench.open.run import run
+    from scenarios.files import write_text
+
+    table = _table(entrants, python, built)
+    named = [family(name) for name in families] or available()
+    run(out, named, table, [0, *dict.fromkeys(seeds)], count, limit,
+        lambda text: print(text, file=sys.stderr, flush=True))
+    found = results(out, [*ENTRANTS, *(row for row in table if row not in ENTRANTS)])
+    say(Console(highlight=False, markup=False), found)
+    write_text(out / "index.html", page(found, shlex.join(["hierarchy", *sys.argv[1:]])))
+    print(f"\nPage: {shown(out / 'index.html')}")
+    return 0
+
+
+def check_command(entrants: Sequence[str], python: str, built: dict[str, Path | None]) -> int:
+    """Try entrants on a few problems; exit code 1 if one of them ends or contradicts itself."""
+    from scenarios.bench.open.check import check
+
+    well = True
+    for row in _table(entrants, python, built):
+        found = check(row)
+        well = well and found.well
+        print(found)
+    return int(not well)
+
+
+def install_command() -> int:
+    """Make the environments of the packages."""
+    from scenarios.bench.peers.environments import install
+
+    said = install(PACKAGES)
+    for name, why in said.items():
+        print(f"{name}: {why or 'installed'}")
+    return int(any(said.values()))
+
+
+def _table(entrants: Sequence[str], python: str, built: dict[str, Path | None]) -> list[Row]:
+    """Return the rows that are asked for, those built from a checkout among them."""
+    from scenarios.bench.open.built import rows_of
+
+    more = [row for name, folder in built.items() if folder is not None
+            for row in rows_of(name, folder)]
+    return chosen(entrants, python, more)

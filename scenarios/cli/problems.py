@@ -1,0 +1,143 @@
+"""`hierarchy problems`: the problems of the open benchmark, as files."""
+
+from __future__ import annotations
+
+import sys
+from collections import Counter
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from scenarios.cli.options import AsJson, output
+from scenarios.cli.terminal import print_json, print_list, shown
+
+if TYPE_CHECKING:
+    from solvers.problems.files import Collection
+
+problems = typer.Typer(rich_markup_mode=None, invoke_without_command=True)
+
+Seed = Annotated[int, typer.Option("--seed", min=0, metavar="S",
+                                   help="0: the public half. Any other: fresh problems.")]
+Count = Annotated[int | None, typer.Option("--count", min=1, metavar="N",
+                                           help="Number of problems. Default: that of the family.")]
+
+
+@problems.callback()
+def main(ctx: typer.Context) -> None:
+    """List, show, export and check problems of the open benchmark."""
+    if ctx.invoked_subcommand is None:
+        print(ctx.get_help())
+
+
+@problems.command("list")
+def list_(as_json: AsJson = False) -> None:
+    """List the families of problems."""
+    from scenarios.bench.open.families import FAMILIES
+
+    groups: dict[str, dict[str, str]] = {}
+    for one in FAMILIES.values():
+        groups.setdefault(one.group, {})[one.name] = one.what
+    if as_json:
+        return print_json(groups)
+    for group, entries in groups.items():
+        print_list(group, entries)
+
+
+@problems.command()
+def show(problem: Annotated[str, typer.Argument(metavar="FAMILY_OR_FILE",
+                                                help="Name of a family, or a file.")],
+         seed: Seed = 0, count: Count = None, as_json: AsJson = False) -> None:
+    """Describe a family or a file: sizes, rows, answers."""
+    said = _about(_named(problem, seed, count))
+    if as_json:
+        return print_json(said)
+    width = max(map(len, said))
+    for key, value in said.items():
+        print(f"{key:{width}}  {value}")
+
+
+@problems.command()
+def export(family: Annotated[list[str], typer.Argument(
+               metavar="FAMILY...", help="Names of families; `all` for all of them.")],
+           seed: Seed = 0, count: Count = None, answers: Annotated[bool, typer.Option(
+               "--answers/--no-answers", help="Prove the answers too, which takes 0.02 to 2 s for "
+               "each problem.")] = True,
+           out: Annotated[Path, output("Folder of the files FAMILY-public.npz or "
+                                       "FAMILY-fresh-S.npz.")] = Path("problems"),
+           as_json: AsJson = False) -> None:
+    """Write problems as files, with proved answers."""
+    from scenarios.bench.open.exported import export as write
+    from scenarios.bench.open.families import available
+    from scenarios.bench.open.families import family as named
+    from scenarios.cli.progress import bar
+
+    chosen = available() if family == ["all"] else [named(name) for name in family]
+    files = []
+    for one in chosen:
+        with bar("problems") as told:
+            files.append(write(one, seed, count, answers, out, partial(told, one.name)))
+    if as_json:
+        return print_json({"files": [shown(file) for file in files]})
+    print(*map(shown, files), sep="\n")
+
+
+@problems.command()
+def check(file: Annotated[Path, typer.Argument(metavar="FILE", help="A file of problems.")],
+          as_json: AsJson = False) -> int:
+    """Read a file, prove its answers anew, and compare.
+
+    Exit code 1 if an answer in the file is another.
+    """
+    from scenarios.bench.open.exported import check as compare
+    from solvers.problems.files import read
+
+    collection = read(file)
+    wrong = compare(collection)
+    if as_json:
+        print_json({**_about(collection), "wrong": wrong})
+    else:
+        known = len(collection.answers or ())
+        print(f"{shown(file)}: {len(collection.problems)} problems, {known} answers",
+              *(f"problem {p}: {why}" for p, why in wrong.items()), sep="\n")
+    for p in wrong if as_json else ():
+        print(f"problem {p}: {wrong[p]}", file=sys.stderr)
+    return int(bool(wrong))
+
+
+def _named(name: str, seed: int, count: int | None) -> Collection:
+    from scenarios.bench.open.families import family
+    from solvers.problems.files import read
+
+    return read(name) if name.endswith(".npz") else family(name).half(seed, count)
+
+
+def _about(collection: Collection) -> dict[str, Any]:
+    """Return what there is to say of problems, by heading."""
+    head, found = collection.head, collection.problems
+    sizes = Counter(tuple(h.sizes.tolist()) for h in found)
+    equal = sum(int((h.lower == h.upper).sum()) for h in found)
+    rows = sum(h.m for h in found)
+    usual = " or ".join(", ".join(map(str, one)) for one, _ in sizes.most_common(2))
+    said = {"family": head.family, "what": head.what,
+            "half": head.half + (f", seed {head.seed}" if head.seed else ""),
+            "problems": len(found),
+            "sequence": f"ticks of {1e3 * head.period:g} ms" if head.sequence else "no",
+            "unknowns": _range([h.n for h in found]), "rows": _range([h.m for h in found]),
+            "levels": _range([len(h.sizes) for h in found]),
+            "usual sizes": usual + (", and others" if len(sizes) > 2 else ""),
+            "equalities": f"{100.0 * equal / max(rows, 1):.0f} % of the rows",
+            "sha256": collection.digest}
+    if collection.answers is not None:
+        answers = collection.answers
+        said |= {"proved": f"{sum(one.complete for one in answers)} completely",
+                 "ill-posed": sum(one.posed < len(h.sizes)
+                                  for one, h in zip(answers, found, strict=True)),
+                 "largest shift, turn": f"{max(one.shift for one in answers):.1e}, "
+                                        f"{max(one.turn for one in answers):.1e}"}
+    return said
+
+
+def _range(values: list[int]) -> str:
+    return str(values[0]) if len(set(values)) == 1 else f"{min(values)} to {max(values)}"

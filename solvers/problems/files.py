@@ -1,0 +1,217 @@
+"""Problems as files that any language can read: docs/problem-files.md describes the format.
+
+A file is an .npz archive: a zip of .npy arrays, not compressed, and of `head.json`. `numpy.load`
+reads it; examples/problems has readers in C++ and Octave. The problems of a file may have
+different sizes, so each array holds those of all problems, one after the other.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+import zipfile
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hierarchy.errors import HierarchyError
+from hierarchy.problem import Hierarchy, check_rows
+from solvers.proof import Proof
+
+FORMAT, VERSION = "hierarchical least-squares problems", 1
+PUBLIC, FRESH = "public", "fresh"
+HALVES = (PUBLIC, FRESH)
+_HEAD = "head.json"
+_DATA = {"n": "i8", "levels": "i8", "sizes": "i8", "A": "f8", "lower": "f8", "upper": "f8",
+         "reference": "f8"}
+_ANSWERS = {"x": "f8", "least": "f8", "proved": "i8", "posed": "i8", "complete": "i8",
+            "shift": "f8", "turn": "f8"}
+_STAMP = (1980, 1, 1, 0, 0, 0)  # of every member, so that equal content makes equal files
+
+Arrays = dict[str, NDArray[Any]]
+
+
+class ProblemFileError(HierarchyError):
+    """A file that is not one of problems, or is damaged; names the file and what is wrong."""
+
+
+@final
+@dataclass(frozen=True)
+class Head:
+    """What a file says of its problems.
+
+    Attributes
+    ----------
+    family, what : name, and one sentence.
+    half : PUBLIC or FRESH.
+    seed : from which they were made; 0 for the public half.
+    sequence : whether they are consecutive ticks of a closed loop.
+    period : [s] between two ticks; 0 without a sequence.
+    source : where they come from, or what made them.
+    """
+
+    family: str
+    what: str
+    half: str
+    seed: int
+    sequence: bool = False
+    period: float = 0.0
+    source: str = ""
+
+
+@final
+@dataclass(frozen=True)
+class Collection:
+    """Problems of one family, with what is proved of each, or without."""
+
+    head: Head
+    problems: tuple[Hierarchy, ...]
+    answers: tuple[Proof, ...] | None = None
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 of the problems, in hexadecimal; answers and head have no part in it."""
+        return _digest(_packed_problems(self.problems))
+
+    def save(self, path: str | Path) -> None:
+        """Write a file; the same content makes the same bytes."""
+        arrays = _packed_problems(self.problems)
+        head = {"format": FORMAT, "version": VERSION, **asdict(self.head),
+                "count": len(self.problems), "answers": self.answers is not None,
+                "sha256": _digest(arrays)}
+        if self.answers is not None:
+            arrays |= _packed_answers(self.answers)
+        with zipfile.ZipFile(path, "w", zipfile.ZIP_STORED) as archive:
+            _add(archive, _HEAD, json.dumps(head, indent=1).encode())
+            for name, values in arrays.items():
+                stream = io.BytesIO()
+                np.lib.format.write_array(stream, values, version=(1, 0), allow_pickle=False)
+                _add(archive, f"{name}.npy", stream.getvalue())
+
+
+def read(path: str | Path) -> Collection:
+    """Read a file of problems.
+
+    Raises
+    ------
+    ProblemFileError : it does not exist, has another format or version, lacks an array, or has one
+        of a wrong type or length; its problems are not those that were written, or not valid.
+    """
+    head, arrays = _opened(Path(path))
+    try:
+        problems = tuple(_unpacked(arrays))
+        answers = tuple(_answers(arrays, problems)) if head["answers"] else None
+        said = Head(**{key: head[key] for key in Head.__dataclass_fields__})
+    except (KeyError, ValueError, TypeError) as error:
+        raise ProblemFileError(f"{path}: {_reason(error)}") from error
+    if _digest({name: arrays[name] for name in _DATA}) != head.get("sha256"):
+        raise ProblemFileError(f"{path}: the problems are not those that were written: their "
+                               "SHA-256 is another")
+    return Collection(said, problems, answers)
+
+
+def _opened(path: Path) -> tuple[dict[str, Any], Arrays]:
+    """Return head and arrays of a file of the right format."""
+    try:
+        with np.load(path, allow_pickle=False) as archive:
+            head = json.loads(archive[_HEAD])
+            if head.get("format") != FORMAT or head.get("version") != VERSION:
+                raise ProblemFileError(f"{path}: {head.get('format')!r}, version "
+                                       f"{head.get('version')!r}; expected {FORMAT!r}, {VERSION}")
+            names = {**_DATA, **(_ANSWERS if head["answers"] else {})}
+            arrays = {name: archive[name] for name in names}
+    except FileNotFoundError as error:
+        raise ProblemFileError(f"{path} does not exist") from error
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, EOFError,
+            zipfile.BadZipFile) as error:
+        raise ProblemFileError(f"{path} is not a file of problems: {_reason(error)}") from error
+    for name, kind in names.items():
+        if arrays[name].ndim != 1 or arrays[name].dtype != np.dtype(f"<{kind}"):
+            raise ProblemFileError(f"{path}: {name} is {arrays[name].dtype} {arrays[name].shape}; "
+                                   f"expected one dimension of <{kind}")
+    return head, arrays
+
+
+def _reason(error: Exception) -> str:
+    return f"{error.args[0]} is missing" if isinstance(error, KeyError) else str(error)
+
+
+def _add(archive: zipfile.ZipFile, name: str, content: bytes) -> None:
+    archive.writestr(zipfile.ZipInfo(name, _STAMP), content)
+
+
+def _packed_problems(problems: Sequence[Hierarchy]) -> Arrays:
+    for p, h in enumerate(problems):
+        if h.metric is not None:
+            raise HierarchyError(f"problem {p} has a metric, which version {VERSION} of the format "
+                                 "does not know")
+    columns: dict[str, list[Any]] = {
+        "n": [[h.n] for h in problems], "levels": [[len(h.sizes)] for h in problems],
+         "sizes": [h.sizes for h in problems], "A": [h.A.ravel() for h in problems],
+        "lower": [h.lower for h in problems], "upper": [h.upper for h in problems],
+        "reference": [h.reference for h in problems]}
+    return _joined(columns, _DATA)
+
+
+def _packed_answers(answers: Sequence[Proof]) -> Arrays:
+    columns = {name: [np.atleast_1d(getattr(one, name)) for one in answers] for name in _ANSWERS}
+    return _joined(columns, _ANSWERS)
+
+
+def _joined(columns: dict[str, list[Any]], kinds: dict[str, str]) -> Arrays:
+    return {name: np.concatenate([np.empty(0), *parts]).astype(f"<{kinds[name]}")
+            for name, parts in columns.items()}
+
+
+def _unpacked(arrays: Arrays) -> Iterable[Hierarchy]:
+    """Yield the problems; raises ValueError where lengths do not fit or a row is not valid."""
+    rest = {name: values for name, values in arrays.items() if name in _DATA}
+    for p, (n, count) in enumerate(zip(rest["n"].tolist(), rest["levels"].tolist(), strict=True)):
+        sizes = _taken(rest, "sizes", count, p)
+        m = int(sizes.sum())
+        if n < 1 or (sizes < 0).any():
+            raise ValueError(f"problem {p}: n = {n}, sizes = {sizes.tolist()}")
+        A = _taken(rest, "A", m * n, p).reshape(m, n)
+        lower, upper = _taken(rest, "lower", m, p), _taken(rest, "upper", m, p)
+        check_rows(f"problem {p}", A, lower, upper)
+        yield Hierarchy(A, lower, upper, sizes, _taken(rest, "reference", n, p),
+                        tuple(f"level {k + 1}" for k in range(count)))
+    _all_taken(rest, ("sizes", "A", "lower", "upper", "reference"))
+
+
+def _answers(arrays: Arrays, problems: Sequence[Hierarchy]) -> Iterable[Proof]:
+    rest = {name: values for name, values in arrays.items() if name in _ANSWERS}
+    for p, h in enumerate(problems):
+        x, least = _taken(rest, "x", h.n, p), _taken(rest, "least", len(h.sizes), p)
+        proved, posed, complete = (int(_taken(rest, name, 1, p)[0])
+                                   for name in ("proved", "posed", "complete"))
+        shift, turn = (float(_taken(rest, name, 1, p)[0]) for name in ("shift", "turn"))
+        yield Proof(x, least, proved, posed, bool(complete), shift, turn)
+    _all_taken(rest, tuple(_ANSWERS))
+
+
+def _taken(rest: Arrays, name: str, count: int, p: int) -> NDArray[Any]:
+    """Return the next numbers of an array and leave the others."""
+    if not 0 <= count <= len(rest[name]):
+        raise ValueError(f"{name} is too short: problem {p} needs {count} more numbers, there are "
+                         f"{len(rest[name])}")
+    taken, rest[name] = rest[name][:count].copy(), rest[name][count:]
+    return taken
+
+
+def _all_taken(rest: Arrays, names: Sequence[str]) -> None:
+    for name in names:
+        if len(rest[name]):
+            raise ValueError(f"{name} has {len(rest[name])} numbers more than the problems need")
+
+
+def _digest(arrays: Arrays) -> str:
+    made = hashlib.sha256()
+    for name in _DATA:
+        made.update(arrays[name].tobytes())
+    return made.hexdigest()

@@ -1,0 +1,86 @@
+"""`hierarchy problems`: families listed, halves exported, files checked."""
+
+import json
+
+import numpy as np
+import pytest
+
+from scenarios.bench.open.exported import export, save
+from scenarios.bench.open.families import FAMILIES, available, family
+from scenarios.cli.main import run_command
+from solvers import problems
+from solvers.problems.files import read
+
+QUICK = ("EQ7", "INEQ7", "DEGEN7", *problems.KINDS, "recipe")
+
+
+def test_every_family_of_the_generators_has_a_place():
+    assert set(problems.FAMILIES) | set(problems.KINDS) < set(FAMILIES)
+    assert {one.name for one in available()} <= set(FAMILIES)
+
+
+@pytest.mark.parametrize("name", QUICK)
+def test_halves_are_reproducible_and_never_the_same(name):
+    one = family(name)
+    assert one.half(3, 2).digest == one.half(3, 2).digest
+    assert len({one.half(seed, 2).digest for seed in (0, 1, 2)}) == 3
+
+
+@pytest.mark.parametrize("name", ["singular-lwr", "singular-dual-arm", "singular-humanoid"])
+def test_postures_are_singular_or_close_to_it_or_neither(name):
+    kept = [smallest(h) for h in family(name).half(1, 12).problems]
+    singular, near, other = (np.array(kept[kind::3]) for kind in range(3))
+    assert (singular < 1e-12).all()
+    assert (near > 1e-12).all()
+    assert np.median(near) < 0.1 * np.median(other)
+
+
+def smallest(h):
+    """The smallest singular value of the tasks between the limits and the posture."""
+    between = slice(int(h.offsets[1]), int(h.offsets[-2]))
+    return np.linalg.svd(h.A[between], compute_uv=False)[-1]
+
+
+@pytest.mark.slow
+def test_a_recorded_sequence_is_that_of_the_closed_loop():
+    from scenarios.config import load
+    from scenarios.loop.simulation import simulate
+
+    found = family("ellipse-limits").half(0, 3).problems
+    scenario = load("ellipse-limits")
+    resolver, first = scenario.make_resolver(), int(0.4 * scenario.control.ticks)
+    run = simulate(load("ellipse-limits", [f"control.duration={(first + 3) * 0.001!r}"]))
+    for k, h in enumerate(found):
+        np.testing.assert_allclose(resolver.solve(h).x, run["a"][first + k], atol=1e-9)
+
+
+def test_list_names_every_family(capsys):
+    assert run_command(["problems", "list", "--json"]) == 0
+    groups = json.loads(capsys.readouterr().out)
+    assert {name for group in groups.values() for name in group} == set(FAMILIES)
+
+
+def test_export_show_and_check(capsys, tmp_path):
+    out = ["--seed", "4", "--count", "3"]
+    assert run_command(["problems", "export", "integers", *out, "--out", str(tmp_path)]) == 0
+    file = tmp_path / "integers-fresh-4.npz"
+    assert file.is_file()
+    assert run_command(["problems", "show", str(file)]) == 0
+    assert "3 completely" in capsys.readouterr().out
+    assert run_command(["problems", "show", "integers", *out, "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["sha256"] == read(file).digest
+    assert run_command(["problems", "check", str(file)]) == 0
+
+
+def test_check_finds_an_answer_that_is_not_proved(capsys, tmp_path):
+    file = export(family("integers"), 5, 2, True, tmp_path)
+    found = read(file)
+    found.answers[1].least[0] += 1.0
+    save(found, tmp_path)
+    assert run_command(["problems", "check", str(file)]) == 1
+    assert "problem 1: level 1: least violation" in capsys.readouterr().out
+
+
+def test_an_unknown_family_is_refused_with_the_nearest_name(capsys):
+    assert run_command(["problems", "show", "HUM39"]) == 2
+    assert "did you mean 'HUM38'" in capsys.readouterr().err
