@@ -184,6 +184,17 @@ def test_a_floating_base_has_no_manipulability():
                                            "least": 0.1}]}))
 
 
+def test_tasks_over_forces_have_their_rows():
+    pytest.importorskip("mujoco")
+    cell = build(load("stand-push", {"tasks": [
+        {"kind": "momentum"}, {"kind": "momentum", "part": "linear", "name": "linear"},
+        {"kind": "contact-force", "contact": "left_foot", "target": [20.0]},
+        {"kind": "least-force"}]}))
+    forces = 3 * 8  # four corners for each foot
+    names = "momentum", "linear", "contact-force", "least-force"
+    assert [cell.stack[name].dimension for name in names] == [3, 3, 1, forces]
+
+
 def test_every_kind_has_a_test_here(request):
     text = request.path.read_text(encoding="utf-8")
     tested = {"pose", "com", "pointing"}  # in test_humanoid.py

@@ -111,7 +111,7 @@ def test_a_fall_ends_the_run_and_is_its_fault():
     recording = simulate(changed(plant__pushes__0__force=300.0, plant__pushes__0__at=0.0,
                                  plant__fall=0.002))
     assert 50 < recording.ticks < 2500
-    assert recording.fault.startswith("the robot has fallen by 0.002 m from tick")
+    assert recording.fault.startswith("the robot has fallen by 0.002")
 
 
 def test_noise_turns_and_moves_the_base_that_the_controller_sees():
