@@ -143,6 +143,14 @@ def test_without_rows_no_program_is_put_to_the_backend_and_no_answer_corrected(h
     assert (found.iterations, found.corrected) == (0, 0)
 
 
+def test_an_answer_as_accurate_as_its_backend_promises_does_not_count_as_corrected():
+    h = Hierarchy.from_levels([(np.eye(3), [-1.0] * 3, [1.0] * 3), (np.ones((1, 3)), [2.0]),
+                               ([[1.0, -1.0, 0.0]], [0.5], [0.6])])
+    found = make("hqp", backend="osqp").solve(h)
+    assert found.x == pytest.approx([11 / 12, 5 / 12, 2 / 3], abs=1e-9)
+    assert (found.iterations, found.corrected) == (3, 0)
+
+
 def test_backends_differ_in_the_last_digits_of_an_equality():
     """Else they would all be one and the same least squares."""
     h = Hierarchy.from_levels(generic())
