@@ -40,12 +40,13 @@ def html(recordings: Mapping[str, Recording], title: str, *, rate: float = 30.0,
             for label, recording in recordings.items()]
     data = {"runs": runs, "fates": fates(), "phrases": phrases(), "joints": JOINTS,
             "embedded": embedded}
-    return render(
+    document = render(
         f"{_FOLDER}/replay.html", title=title, style=resource(f"{_FOLDER}/replay.css"),
         script=Markup("\n").join(resource(f"{_FOLDER}/{name}") for name in _SCRIPTS),
         kind="embedded" if embedded else "whole",
         data=Markup(json.dumps(data, separators=(",", ":"), allow_nan=False).replace(
             "<", "\\u003c")))
+    return str(document)  # not markup: a page that embeds it has to escape it
 
 
 def _about(recording: Recording) -> dict[str, Any]:

@@ -22,13 +22,13 @@ def stack_html(label: str, colour: str, now: Moment, tasks: Iterable[str] = (),
                note: str = "") -> str:
     """Return the list at a moment: the stack in its order, then the other `tasks` in grey."""
     became = [now.became[name] for name in now.order]
-    return render(
+    return str(render(
         "draw/viewer/stack_list.html", label=label, colour=colour, note=note,
         stack=[(name, phrase(one.fate, one.violation), _COLOURS[one.fate])
                for name, one in zip(now.order, became, strict=True)],
         absent=[name for name in tasks if name not in now.order],
         not_in_stack=(PHRASES[Fate.ABSENT], _COLOURS[Fate.ABSENT]),
-        joints=_at_limits(now), saturated=_SATURATED)
+        joints=_at_limits(now), saturated=_SATURATED))
 
 
 def _at_limits(now: Moment) -> list[str]:
