@@ -261,10 +261,12 @@ def _other(value: bool | int | float) -> bool | int | float:
 
 def tests_of(mutant: Mutant) -> tuple[str, ...]:
     """Return the test files of a mutant, relative to the root."""
-    if "frozen=" in (ROOT / mutant.module).read_text().splitlines()[mutant.line - 1]:
-        return ("tests/project/test_records.py",)
+    line = (ROOT / mutant.module).read_text().splitlines()[mutant.line - 1]
+    records = ("tests/project/test_records.py",)
+    if "frozen=" in line:
+        return records
     path = max((path for path in TESTS if mutant.module.startswith(path)), key=len)
-    return tuple(f"tests/{name}.py" for name in TESTS[path].split())
+    return ("field(" in line) * records + tuple(f"tests/{name}.py" for name in TESTS[path].split())
 
 
 class Runner:
