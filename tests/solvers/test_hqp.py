@@ -10,7 +10,7 @@ from rank_cases import family, generic
 from hierarchy import Hierarchy, HierarchyError
 from hierarchy.errors import UnknownNameError
 from solvers import Status, certify, make, problems
-from solvers.qp import backends, programs
+from solvers.qp import backends, programs, refinement
 
 BACKENDS = [make("hqp", backend=name, form=form)
             for name in backends.BACKENDS for form in ("null-space", "slack")]
@@ -241,3 +241,19 @@ def test_a_backend_that_raises_is_a_status_and_no_exception(monkeypatch):
 def test_qpsolvers_is_not_asked_for_a_bad_setting():
     with pytest.raises(HierarchyError, match="hqp: slack = -1"):
         make("hqp", slack=-1.0)
+
+
+def test_multipliers_that_cannot_be_searched_for_balance_nothing(monkeypatch):
+    def stuck(A, b):
+        raise RuntimeError("its iteration limit")
+
+    assert_none_found(refinement._non_negative(np.full((2, 3), 10.0 * refinement.LARGEST),
+                                               np.ones(2)))
+    monkeypatch.setattr("scipy.optimize.nnls", stuck)
+    assert_none_found(refinement._non_negative(np.ones((2, 3)), np.ones(2)))
+
+
+def assert_none_found(multipliers):
+    u, rest = multipliers
+    assert (u == np.zeros(3)).all()
+    assert rest == np.inf
