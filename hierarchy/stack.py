@@ -31,9 +31,7 @@ class _Prepared(NamedTuple):
 class Stack:
     """Tasks by name, most important first.
 
-    Parameters
-    ----------
-    tasks : the tasks; their names must differ.
+    tasks : with different names.
     level : "velocity", "acceleration" or "torque", the meaning of x in the hierarchy: joint
         velocities, joint accelerations, or accelerations and contact forces, see `Contacts`.
     reference : a joint task (posture, damping) whose value is the hierarchy's reference, the
@@ -42,10 +40,8 @@ class Stack:
     metric : W of the hierarchy, see `Hierarchy`: (n, n), or "mass" for M(q) of each state; None for
         the identity.
 
-    Raises
-    ------
-    HierarchyError : an unknown level or metric, contacts missing or not needed, a task of contact
-        forces at another level or of other contacts than the stack's.
+    Raises HierarchyError for an unknown level or metric, contacts missing or not needed, or a task
+    of contact forces at another level or of other contacts than the stack's.
     """
 
     def __init__(self, tasks: Iterable[Task] = (), level: Level = "acceleration",

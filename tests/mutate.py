@@ -111,18 +111,15 @@ TESTS = {
     "solvers/problems/kinds": "solvers/test_problem_kinds solvers/test_problems",
     "solvers/qp/": "solvers/test_hqp solvers/test_failures solvers/test_contract",
     "solvers/qp/programs": "solvers/test_adapters solvers/test_hqp solvers/test_contract",
-    "solvers/resolvers/hcod": "solvers/test_hcod solvers/test_contract",
-    "solvers/resolvers/hqp": "solvers/test_hqp solvers/test_failures solvers/test_contract",
-    "solvers/resolvers/recursive": "solvers/test_recursive solvers/test_dampings_of_recursive "
-                                   "solvers/test_contract",
-    "solvers/resolvers/reverse": "solvers/test_reverse solvers/test_contract",
-    "solvers/resolvers/sns": "solvers/test_sns solvers/test_contract",
-    "solvers/resolvers/saturation": "solvers/test_sns solvers/test_contract",
-    "solvers/resolvers/set_based": "solvers/test_set_based solvers/test_contract",
-    "solvers/resolvers/smooth": "solvers/test_smooth solvers/test_contract",
-    "solvers/resolvers/tpm": "solvers/test_tpm solvers/test_tpm_limits solvers/test_contract",
-    "solvers/resolvers/augmented": "solvers/test_contract",
-    "solvers/resolvers/weighted": "solvers/test_weighted solvers/test_contract",
+    **{f"solvers/resolvers/{name}": f"solvers/test_resolver {own} solvers/test_contract"
+       for name, own in {
+           "augmented": "", "hcod": "solvers/test_hcod",
+           "hqp": "solvers/test_hqp solvers/test_failures",
+           "recursive": "solvers/test_recursive solvers/test_dampings_of_recursive",
+           "reverse": "solvers/test_reverse", "saturation": "solvers/test_sns",
+           "set_based": "solvers/test_set_based", "smooth": "solvers/test_smooth",
+           "sns": "solvers/test_sns", "tpm": "solvers/test_tpm solvers/test_tpm_limits",
+           "weighted": "solvers/test_weighted"}.items()},
     "solvers/workspace": "solvers/test_workspace",
 }
 
@@ -261,10 +258,12 @@ def _other(value: bool | int | float) -> bool | int | float:
 
 def tests_of(mutant: Mutant) -> tuple[str, ...]:
     """Return the test files of a mutant, relative to the root."""
-    if "frozen=" in (ROOT / mutant.module).read_text().splitlines()[mutant.line - 1]:
-        return ("tests/project/test_records.py",)
+    line = (ROOT / mutant.module).read_text().splitlines()[mutant.line - 1]
+    records = ("tests/project/test_records.py",)
+    if "frozen=" in line:
+        return records
     path = max((path for path in TESTS if mutant.module.startswith(path)), key=len)
-    return tuple(f"tests/{name}.py" for name in TESTS[path].split())
+    return ("field(" in line) * records + tuple(f"tests/{name}.py" for name in TESTS[path].split())
 
 
 class Runner:

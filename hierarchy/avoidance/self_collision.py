@@ -75,7 +75,7 @@ def pack_capsules(capsules: Sequence[Capsule]) -> tuple[NDArray[np.int64], Array
     """Joints (K,), and start, end - start, radius (K, 7) [m] of capsules, for the kernels."""
     joints = np.array([capsule.joint for capsule in capsules], dtype=np.int64)
     rows = [[*c.start, *np.subtract(c.end, c.start), c.radius] for c in capsules]
-    return joints, np.array(rows, dtype=float).reshape(-1, 7)
+    return joints, np.array(rows, dtype=float).reshape(len(rows), 7)
 
 
 def measure_capsules(placements: Array, joints: NDArray[np.int64], capsules: Array,

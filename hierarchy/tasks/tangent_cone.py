@@ -33,8 +33,8 @@ class TangentCone(Task):
     """
 
     task: Task
-    name: str = field(init=False)
-    kind: Kind = field(init=False, default="inequality")
+    name: str = field(init=False, repr=False, compare=False)
+    kind: Kind = field(init=False, repr=False, compare=False, default="inequality")
 
     def __post_init__(self) -> None:
         if self.task.kind != "inequality":

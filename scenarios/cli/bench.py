@@ -118,7 +118,7 @@ def accuracy(arms: Arms = 10_000, checked: Checked = 1_000, out: Out = None) -> 
 
 @bench.command()
 def growth(seconds: Seconds = 60.0, out: Out = None) -> None:
-    """Time a solve over the number of tasks and joints."""
+    """Time a solve as the numbers of tasks and joints grow."""
     from scenarios.bench.first_paper import times
 
     folder = _claimed(out)
@@ -141,7 +141,7 @@ def first_paper(arms: Arms = 10_000, checked: Checked = 1_000, seconds: Seconds 
 def batch(count: Annotated[list[int] | None, typer.Option(
               "--count", min=1, metavar="N", help="Problems in a batch. May be repeated.")] = None,
           seconds: Seconds = 1.0, out: Out = None) -> None:
-    """Measure the problems per second of batch solves."""
+    """Measure how many problems per second batches solve."""
     from scenarios.bench.batch import COUNTS, run
 
     folder = _claimed(out)
@@ -151,11 +151,11 @@ def batch(count: Annotated[list[int] | None, typer.Option(
 
 @bench.command()
 def peers(install: Annotated[bool, typer.Option(
-              "--install", help="Make an environment for each package, and measure nothing.")
+              "--install", help="Create an environment for each package and measure nothing.")
               ] = False, out: Out = None) -> int:
     """Compare with pink, mink, placo and tsid.
 
-    Run it with --install once before.
+    Run it once with --install first.
     """
     if install:
         from scenarios.bench.peers.environments import install as install_all

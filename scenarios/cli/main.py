@@ -117,7 +117,7 @@ def run(scenario: Annotated[str, typer.Argument(
             "--certify", help="Certify the answer of every tick; not part of the measured times.")
             ] = False,
         figures: Annotated[bool, typer.Option(
-            "--figures", help="Draw the figures of the run too, as `hierarchy figures` does.")
+            "--figures", help="Also draw the run's figures, like `hierarchy figures`.")
             ] = False, as_json: AsJson = False,
         live: Annotated[bool, typer.Option(
             "--live", help="Show the run in the browser and change it interactively; needs the "
@@ -169,8 +169,8 @@ def compare(scenarios: Annotated[list[str], typer.Argument(
             as_json: AsJson = False) -> int:
     """Run scenarios under several resolvers and report.
 
-    With --starts every resolver gets the same sampled starts, and the report gives statistics. An
-    interrupted comparison over starts is continued by the same command.
+    With --starts every resolver gets the same sampled starts, and the report gives statistics; run
+    the same command again to resume an interrupted comparison.
     """
     if starts is None and (seed or workers or scheduler):
         raise typer.BadParameter("needs --starts", param_hint="--seed, --workers, --scheduler")
@@ -196,12 +196,12 @@ def compare(scenarios: Annotated[list[str], typer.Argument(
 def sweep(file: Annotated[str, typer.Argument(help="Name of a sweep, or a sweep file.",
                                               autocompletion=completion.sweeps)],
           out: Annotated[Path | None, output(
-              "Output folder, new or to be continued. Default: runs/sweep-NAME.")] = None,
+              "Output folder, new or of a sweep to resume. Default: runs/sweep-NAME.")] = None,
           plugin: Plugins = None, workers: Workers = None, scheduler: Scheduler = None,
           as_json: AsJson = False) -> int:
     """Run scenarios with sampled parameters.
 
-    An interrupted sweep is continued by the same command.
+    Run the same command again to resume an interrupted sweep.
     """
     from scenarios.cli.sweep import sweep_command
 
@@ -221,9 +221,10 @@ def reproduce(names: Annotated[list[str] | None, typer.Argument(
                   "--fill", help="Run nothing; write the pages from what docs/results keeps.")
                   ] = False,
               workers: Workers = None, as_json: AsJson = False) -> int:
-    """Make the numbers of the documents anew, and write them into a checkout's pages.
+    """Regenerate the numbers in the documentation.
 
-    An interrupted command continues where it was. While timings are made nothing else should run.
+    They are written into the pages of a checkout. Run the same command again to resume an
+    interrupted one. While timings are made nothing else should run.
     """
     from scenarios.cli.reproduce import fill_command, reproduce_command
 
@@ -336,7 +337,10 @@ def library(out: Annotated[Path, output("Folder of the library: new or empty, or
 def check(file: Annotated[str, typer.Argument(help="A scenario or a robot: file or name.",
                                               autocompletion=completion.scenarios)],
           changes: Changes = None, plugin: Plugins = None, as_json: AsJson = False) -> None:
-    """Validate a scenario or robot file: build it, run the first tick, and summarize it."""
+    """Validate and summarize a scenario or robot file.
+
+    Builds it and, for a scenario, runs the first tick.
+    """
     from scenarios.cli import robot_check, scenario_check
     from scenarios.loop.first_tick import first_tick
 

@@ -31,8 +31,8 @@ def _allow(modules: list[str] | None) -> list[str] | None:
 
 Plugins = Annotated[list[str] | None, typer.Option(
     "--plugin", metavar="MODULE", callback=_allow, is_eager=True,
-    help="Import a module of yours with tasks, resolvers, robots, plants or sensors. May be "
-         "repeated.")]
+    help="Import a module of your own that defines tasks, resolvers, robots, plants or sensors. "
+         "May be repeated.")]
 Changes = Annotated[list[str] | None, typer.Option(
     "--set", metavar="KEY=VALUE",
     help="Change a scenario value: dotted key and TOML value. May be repeated.")]

@@ -45,47 +45,40 @@ class PolicySection(Section):
 
 
 class ControlSection(Section):
-    """How the tasks are resolved, and how often.
+    """How the tasks are resolved, and how often."""
 
-    `stack` = "switched": Algorithm 1 selects the tasks in the stack, all as equalities. With
+    level: Literal["velocity", "acceleration", "torque"] = "acceleration"
+    """"torque": accelerations and contact forces are resolved together, and the command is the
+    joint torques that they take. The stack has the dynamics and [[contacts]] first, then torque
+    limits and [forces], then the joint limits."""
+    stack: StackKind = "switched"
+    """"switched": Algorithm 1 selects the tasks in the stack, all as equalities. With
     avoidance.kind = "separation" only the cone is left to select: limits and avoidance are first.
     "hierarchical": limits, avoidance, position and pointing are always in it, in this order, and
     inequalities stay inequalities. "set-based" and "smooth", at velocity level only, have the same
     tasks in the same order: inequalities are frozen at their bounds, see
     solvers.resolvers.set_based, or act gradually within a `buffer`, see solvers.resolvers.smooth,
-    which needs `resolver` = "smooth".
-
-    With `strictness` every tick is also resolved without the levels below the position, to measure
-    whether they move the end effector; this is not part of the measured times.
-
-    `options` are settings of the resolver. A table in it with a resolver's name, such as
-    `[control.options.tpm]`, applies to that resolver only, so that changing `resolver` is enough to
-    swap it. Plain settings override those from such a table.
-
-    `level` = "torque": accelerations and contact forces are resolved together, and the command is
-    the joint torques that they take. The stack has the dynamics and [[contacts]] first, then torque
-    limits and [forces], then the joint limits.
-
-    `metric` = "mass": of the commands that serve the tasks equally well, the one nearest to the
-    null-space term in the robot's inertia M(q), at acceleration level that of operational-space
-    control. "identity": in the plain sum of squares over the joints.
-
-    `transition` = "blend": when the order of the stack or the active control point changes, the
-    command moves from the old stack's to the new one's within `transition_time` [s], and a new
-    task has its full effect only after that time. "none": it changes at once.
-    """
-
-    level: Literal["velocity", "acceleration", "torque"] = "acceleration"
-    stack: StackKind = "switched"
+    which needs `resolver` = "smooth"."""
     strictness: Flag = False
+    """Whether every tick is also resolved without the levels below the position, to measure
+    whether they move the end effector; this is not part of the measured times."""
     period: Annotated[float, Field(strict=True, gt=0.0, le=1.0)] = 0.001
     duration: Positive
     jacobian_derivative: Literal["exact", "difference"] = "exact"
     resolver: str
     options: dict[str, Any] = Field(default_factory=dict)
+    """Settings of the resolver. A table in it with a resolver's name, such as
+    `[control.options.tpm]`, applies to that resolver only, so that changing `resolver` is enough to
+    swap it. Plain settings override those from such a table."""
     metric: Literal["identity", "mass"] = "identity"
+    """"mass": of the commands that serve the tasks equally well, the one nearest to the null-space
+    term in the robot's inertia M(q), at acceleration level that of operational-space control.
+    "identity": in the plain sum of squares over the joints."""
     policy: PolicySection = PolicySection()
     transition: Literal["none", "blend"] = "none"
+    """"blend": when the order of the stack or the active control point changes, the command moves
+    from the old stack's to the new one's within `transition_time` [s], and a new task has its full
+    effect only after that time. "none": it changes at once."""
     transition_time: Positive = 0.02
 
     @model_validator(mode="after")

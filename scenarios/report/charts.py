@@ -9,12 +9,13 @@ from markupsafe import Markup
 
 from hierarchy.words import listed
 from scenarios.draw.figures import drawing, panels
+from scenarios.draw.figures.drawing import svg
 from scenarios.draw.figures.palette import Look, task_colours
 from scenarios.draw.figures.timeline import tasks, timeline
 from scenarios.measure.motions import ALIKE, Motion, motions
 from scenarios.report import figures
 from scenarios.report.tables import events
-from scenarios.report.templates import drawn, render
+from scenarios.templates import render
 
 if TYPE_CHECKING:
     from scenarios.loop.recording import Recording
@@ -34,8 +35,8 @@ def stack(name: str, runs: Sequence[Run], looks: Mapping[str, Look]) -> Markup:
     found = motions(runs, also=_events)
     beside = [one.recording for one in found]
     colours = task_colours(tasks(beside))
-    bands = [(one, drawn(timeline(one.recording, beside),
-                         f"{name}, {one.label}: the stack over time"), _changes(one.recording))
+    bands = [(one, svg(timeline(one.recording, beside),
+                       f"{name}, {one.label}: the stack over time"), _changes(one.recording))
              for one in found if colours]
     return render("report/stack.html", looks=looks, colours=colours, drawn=bands,
                   events=events(runs))
@@ -62,7 +63,7 @@ def multiples(name: str, found: Sequence[Motion], looks: Mapping[str, Look]) -> 
         small = figures.side_by_side(panel, recordings, looks)
         if any(panel.shows(recordings[label]) for label in small):
             cards.append((panel, _key(panel.name, recordings), [
-                (one, drawn(small[one.label], f"{name}, {one.label}: {panel.title}"))
+                (one, svg(small[one.label], f"{name}, {one.label}: {panel.title}"))
                 for one in found if one.label in small]))
     said = f"Over time [s], on equal axes. {same_motion(found)}".strip()
     return render("report/panels.html", cards=cards, beside=min(len(found), 5), looks=looks,
@@ -98,5 +99,5 @@ def overlays(name: str, runs: Sequence[Run], found: Sequence[Motion],
         timed, marks = figures.computing_time(recordings, looks)
         figs.append((f"Time per tick: {marks}", timed))
     return render("report/overlays.html", looks={label: looks[label] for label in recordings},
-                  drawn=[(title, drawn(fig, f"{name}: {title}")) for title, fig in figs]
+                  drawn=[(title, svg(fig, f"{name}: {title}")) for title, fig in figs]
                   ) if figs else Markup()

@@ -10,7 +10,7 @@ from markupsafe import Markup
 from hierarchy.errors import HierarchyError
 from hierarchy.words import in_words, listed
 from scenarios.measure.motions import Motion
-from scenarios.report.templates import render
+from scenarios.templates import render
 
 if TYPE_CHECKING:
     from scenarios.loop.recording import Recording

@@ -10,6 +10,7 @@ from markupsafe import Markup
 from hierarchy.words import in_words
 from scenarios.config.scenario import OWN
 from scenarios.draw.figures import drawing
+from scenarios.draw.figures.drawing import svg
 from scenarios.draw.figures.palette import Look, looks
 from scenarios.draw.figures.picture import picture
 from scenarios.measure.motions import Motion, motions
@@ -17,7 +18,7 @@ from scenarios.measure.verdict import verdict
 from scenarios.report import charts, tables
 from scenarios.report.commands import commands
 from scenarios.report.embedded import replay
-from scenarios.report.templates import drawn, render, resource
+from scenarios.templates import render, resource
 
 if TYPE_CHECKING:
     from scenarios.measure.comparison import Comparison
@@ -81,4 +82,4 @@ def _picture(name: str, found: Sequence[Motion], look: Mapping[str, Look]) -> di
         caption += (" Red: obstacles with ε₁ and ε₂ around them, and control points; the robot is "
                     "solid at its closest approach to an obstacle.")
     fig = picture(moved, {label: look[label].colour for label in moved})
-    return {"picture": drawn(fig, f"{name}: the paths taken"), "caption": caption}
+    return {"picture": svg(fig, f"{name}: the paths taken"), "caption": caption}

@@ -10,7 +10,7 @@ from markupsafe import Markup
 
 from scenarios.draw.figures.palette import Look
 from scenarios.measure.partings import BOUND, partings
-from scenarios.report.templates import render
+from scenarios.templates import render
 
 if TYPE_CHECKING:
     from scenarios.measure.runs import Row, Run

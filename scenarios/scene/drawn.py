@@ -80,22 +80,18 @@ class Moved:
 class Scene:
     """What is drawn of a run in F frames; J joints, P points, H obstacles. Metres, seconds.
 
-    stage : what does not change.
-    t (F,) and ticks (F,) : time and tick of each frame.
-    placements (F, J + 1, 12) : of the joints' frames, rotation column by column, then translation;
-        of the true joints if recorded. `ends` turns them into the links.
+    t, ticks (F,) : time and tick of each frame.
+    placements (F, J + 1, 12) : of the joints' frames (of the true joints if recorded), rotation
+        column by column, then translation; `ends` turns them into the links.
     points (F, P, 3) : control points, then the end effector.
-    nearest (F, P, 3), distance (F, P) : the nearest obstacle point to each and the distance to it,
-        from the scenario's geometry even if the controller used a camera; NaN and infinite without
-        obstacles.
-    active (F,) : the point that the stack keeps away from an obstacle, or -1. Under the task
-        `separation` it is the nearest point, in ticks in which one of its rows acts.
-    centres (F, H, 3) : of the obstacles; shape, size and rotation are in `stage.obstacles`.
+    nearest (F, P, 3), distance (F, P) : the nearest obstacle point to each, and how far it is, from
+        the scenario's geometry even with a camera; NaN and infinite without obstacles.
+    active (F,) : the point that the stack keeps away from an obstacle, or -1; under the task
+        `separation` the nearest point, in ticks in which one of its rows acts.
+    centres (F, H, 3) : of `stage.obstacles`, which has shape, size and rotation.
     axis (F, 3) : the end effector's z axis. desired (F, 3) : its path, or None.
-    order (F,) : index into `orders`, whose entries name tasks, most important first.
-    paths : of the points that the scenario's listed tasks move.
-    levels : the fate of each task; see scenarios.scene.levels.
-    series : curves. switches (S,) : times of changes of the order.
+    order (F,) : index into `orders`, which name tasks. switches (S,) : times of changes of it.
+    paths : of the points that listed tasks move. levels : see scenarios.scene.levels.
     """
 
     stage: Stage

@@ -14,15 +14,16 @@ from markupsafe import Markup
 
 from hierarchy.words import in_words, listed
 from scenarios.config.distributions import Distribution
+from scenarios.draw.figures.drawing import svg
 from scenarios.draw.figures.palette import Look, looks
 from scenarios.files import slug
 from scenarios.measure.metrics import Metric
 from scenarios.measure.verdict import Verdict
-from scenarios.report.templates import drawn, render, resource
 from scenarios.sweep import figures
 from scenarios.sweep.planning import Plan, Planned
 from scenarios.sweep.results import Failure, Results, Worst, compared, summary
 from scenarios.sweep.verdict import verdict
+from scenarios.templates import render, resource
 
 _FAILURES = 20  # reasons listed
 
@@ -106,7 +107,7 @@ class Page:
         failures = results.failures()
         return Shown(
             name, *self._about(name), verdict=verdict(results),
-            shares=drawn(figures.shares(results), f"{results.runs[0].scenario}: shares of runs"),
+            shares=svg(figures.shares(results), f"{results.runs[0].scenario}: shares of runs"),
             failures=[(one, self._again(one.run)) for one in failures[:_FAILURES]],
             more_failures=max(0, len(failures) - _FAILURES), spreads=_spreads(name, results),
             worst=self._worst(results), numbers=_numbers(results), looks=looks(results.labels))
@@ -140,7 +141,7 @@ def name_of(run: Planned) -> str:
 
 def _spreads(name: str, results: Results) -> list[tuple[Metric, str, Markup]]:
     return [(metric, _direction(metric),
-             drawn(figures.spread(results, metric), f"{name}: {metric.label}"))
+             svg(figures.spread(results, metric), f"{name}: {metric.label}"))
             for metric in results.shown()
             if np.nanmin(results.values[metric.name]) < np.nanmax(results.values[metric.name])]
 

@@ -41,16 +41,10 @@ class ModeResolution(Resolution):
 class SetBased(Resolver):
     """The modes of set-based tasks over the equality stacks that `inner` resolves.
 
-    A hierarchy has equalities, and rows with one side or none. A row with a side is the extended
-    tangent cone of a task that is at the bound of its set or beyond (`hierarchy.tasks.TangentCone`
-    writes such rows): its rate must not pass the side. A mode freezes some of these rows, which
-    become equalities at their side, and ignores the others. The answer is that of the first mode
-    that leaves the rates of all ignored rows in their cones, from the least restrictive mode (no
-    row frozen) to the most restrictive one (all frozen), which is taken untested.
-
-    Differences from the source: a row without a side, of a task inside its set, is frozen in no
-    mode; frozen rows of one level have equal priority; and after `most` modes, the source having no
-    limit, the most restrictive one is taken.
+    A row with one side is the extended tangent cone of a task at the bound of its set or beyond
+    (`hierarchy.tasks.TangentCone`): its rate must not pass the side. A mode freezes some of these
+    rows as equalities and ignores the others; docs/theory/set-based.md says which mode is taken,
+    and where this differs from the source.
 
     tolerance : of a rate beyond its side, relative to 1 + |x|.
     most : modes resolved before the most restrictive one.

@@ -1,4 +1,21 @@
-"""Smooth activation: the recursion of Simetti and Casalino, with a weight for every row."""
+"""Smooth activation: the recursion of Simetti and Casalino, with a weight for every row.
+
+Level k has rows J, references (its lower sides) and the diagonal activation matrix A. With the
+pseudoinverse
+
+    X^(#,A,Q) = (X^T A X + eta (I - Q)^T (I - Q) + V^T P V)^# X^T A A                           (a)
+
+the answer is rho after the last level, starting from rho = 0 and Q = I:
+
+    W   = J Q (J Q)^(#,A,Q)                                                                     (b)
+    T   = I - Q (J Q)^(#,A,I) W J                                                               (c)
+    rho <- T rho + Q (J Q)^(#,A,I) W dx/dt                                                      (d)
+    Q   <- Q (I - (J Q)^(#,A,I) J Q)                                                            (e)
+
+The last level is the identity, fully active, with the hierarchy's reference. In (a), V are the
+right singular vectors of the two terms before, and P falls from `damping` for a singular value of 0
+to 0 at `threshold`, as a half wave of the cosine.
+"""
 
 from __future__ import annotations
 
@@ -20,24 +37,10 @@ from solvers.status import Status
 class Smooth(Resolver):
     """Task priority with activations between 0 and 1, which come and go without a jump of x.
 
-    Level k has rows J, references (its lower sides) and the diagonal activation matrix A. With the
-    pseudoinverse
-
-        X^(#,A,Q) = (X^T A X + eta (I - Q)^T (I - Q) + V^T P V)^# X^T A A                       (a)
-
-    the answer is rho after the last level, starting from rho = 0 and Q = I:
-
-        W   = J Q (J Q)^(#,A,Q)                                                                 (b)
-        T   = I - Q (J Q)^(#,A,I) W J                                                           (c)
-        rho <- T rho + Q (J Q)^(#,A,I) W dx/dt                                                  (d)
-        Q   <- Q (I - (J Q)^(#,A,I) J Q)                                                        (e)
-
-    The last level is the identity, fully active, with the hierarchy's reference. In (a), V are the
-    right singular vectors of the two terms before, and P falls from `damping` for a singular value
-    of 0 to 0 at `threshold`, as a half wave of the cosine. Singular values there are those of
-    X^T A X: squares of those of the rows, so damping means something else than in other resolvers.
-    With all activations 0 or 1 the answer is that of `recursive` wherever P is zero; otherwise it
-    is not strict: what a row in transition does not use is left to the levels below.
+    With all activations 0 or 1 the answer is that of `recursive` where no singular value is below
+    `threshold`; otherwise it is not strict: what a row in transition does not use is left to the
+    levels below. Singular values are those of X^T A X, squares of those of the rows, so damping
+    means something else than in other resolvers.
 
     eta : weight of what keeps a level off the directions that levels above use in part.
 

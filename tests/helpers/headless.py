@@ -18,7 +18,7 @@ _NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable
 _FLAGS = ("--headless", "--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader",
           "--enable-unsafe-swiftshader", "--disable-background-networking", "--no-first-run",
           "--disable-sync", "--hide-scrollbars", "--remote-debugging-port=0")
-_PATIENCE = 20.0  # [s]
+_PATIENCE = 180.0  # [s], which only a browser that hangs takes, on a loaded machine too
 
 
 class Page:

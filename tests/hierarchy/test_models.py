@@ -10,6 +10,7 @@ import pytest
 from hierarchy import HierarchyError, Robot, State
 from hierarchy.avoidance.self_collision import pairs_of_tree
 from hierarchy.errors import RobotError, UnknownNameError
+from hierarchy.robots.points import points_along_chain
 from hierarchy.robots.shapes import bounding_capsule
 from hierarchy.tasks import DangerBounds, JointLimits, Posture, TorqueLimits
 from scenarios.cell.avoidance import separable_pairs
@@ -211,6 +212,17 @@ def test_control_points_are_spread_evenly_over_the_chain(arm):
     np.testing.assert_allclose(steps, steps[0])
     assert len(robot.control_points) == 8
     assert {p.joint for p in robot.control_points} == {3}, "from the third joint on"
+
+
+def test_a_control_point_belongs_to_the_link_that_it_lies_on(arm):
+    robot = Robot.from_file(arm())
+    points = points_along_chain(robot.model, "tool0", count=5, first=1)
+    tip = robot.frame("tool0").offset
+    links = np.linalg.norm([*(robot.model.jointPlacements[k].translation for k in (2, 3)), tip],
+                           axis=1)
+    along = [links[:point.joint - 1].sum() + np.linalg.norm(point.offset) for point in points]
+    np.testing.assert_allclose(along, links.sum() * np.arange(1, 6) / 6)
+    assert {point.joint for point in points} == {1, 2}
 
 
 def test_a_base_floats_where_it_is_asked_to(arm, body):

@@ -6,6 +6,8 @@ from pinned import leaves, read, robot_facts
 from hierarchy import HierarchyError, Robot, State
 from hierarchy.errors import RobotError, UnknownNameError
 from hierarchy.robots import TABLES
+from hierarchy.robots.from_table import from_table
+from hierarchy.robots.table import Link, TreeJoint, TreeTable
 
 ROBOT = Robot.named("kuka_lwr")
 
@@ -15,6 +17,17 @@ MJCF = """<mujoco><worldbody><body name="arm"><joint name="hinge" type="hinge" a
 
 D = [0, 0, 0.4, 0, 0.39, 0, 0.078]
 ALPHA = np.deg2rad([90, -90, -90, 90, 90, -90, 0])
+
+
+def test_a_link_of_a_table_is_what_is_given_of_it():
+    """Without anything it has no shape and no mass; with a radius alone it is a ball."""
+    bare, ball = (from_table(TreeTable("one joint", (
+        TreeJoint("one", "", (0.0, 0.0, 0.0), "z", (-90, 90), 1.0, 1.0, link),), (), "one"))
+        for link in (Link(), Link(radius=0.1)))
+    assert bare.capsules == ()
+    assert bare.model.inertias[1].mass == 0.0
+    found = [(capsule.start, capsule.end, capsule.radius) for capsule in ball.capsules]
+    assert found == [((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.1)]
 
 
 def from_dh_table(q, joints=7):

@@ -141,6 +141,15 @@ def test_functions_are_short(functions):
     assert lengths[len(lengths) * 9 // 10] <= 20
 
 
+def test_the_text_of_a_class_is_a_reference_of_at_most_fifteen_lines():
+    texts = {f"{file.relative_to(ROOT)}: {node.name}": ast.get_docstring(node) or ""
+             for package in ("hierarchy", "solvers", "scenarios")
+             for file in (ROOT / package).rglob("*.py")
+             for node in ast.walk(ast.parse(file.read_text(encoding="utf-8")))
+             if isinstance(node, ast.ClassDef)}
+    assert [where for where, text in texts.items() if len(text.splitlines()) > 15] == []
+
+
 def test_no_function_has_more_than_eight_positional_arguments(functions):
     """Those of commands are options of a command line; `solve_ik` has those of pink."""
     many = [where for where, node in functions

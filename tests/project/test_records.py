@@ -1,6 +1,6 @@
 """Records are frozen: what was handed over cannot be changed behind the back of who holds it."""
 
-from dataclasses import is_dataclass
+from dataclasses import fields, is_dataclass
 from importlib import import_module
 from pkgutil import walk_packages
 
@@ -30,3 +30,11 @@ def test_every_record_is_frozen_but_those_named_here(package):
     loose = {f"{one.__module__}.{one.__qualname__}" for one in records(package)
              if not one.__dataclass_params__.frozen}
     assert loose == {name for name in CHANGED_IN_PLACE if name.startswith(package.__name__)}
+
+
+@pytest.mark.parametrize("package", PACKAGES, ids=lambda package: package.__name__)
+def test_what_a_record_computes_from_its_fields_is_neither_shown_nor_compared(package):
+    computed = [(f"{one.__qualname__}.{field.name}", field) for one in records(package)
+                if f"{one.__module__}.{one.__qualname__}" not in CHANGED_IN_PLACE
+                for field in fields(one) if not field.init]
+    assert [name for name, field in computed if field.repr or field.compare] == []

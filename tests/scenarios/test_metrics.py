@@ -1,10 +1,12 @@
 import dataclasses
+from types import SimpleNamespace
 
 import hand_made
 import numpy as np
 import pytest
-from hand_made import recording
+from hand_made import HandMadeScenario, recording
 
+from scenarios.loop import listed
 from scenarios.measure.metrics import as_plain_data, measure
 
 
@@ -36,6 +38,18 @@ def test_cone_violation_is_an_angle_beyond_the_cone_and_a_share_of_ticks():
     found = measure(recording(pointing_error=error))
     assert found["cone_violation_max"].value == pytest.approx(3.0)
     assert found["cone_violation_share"].value == pytest.approx(2 / 5)  # 0.001 degrees is on it
+
+
+def test_an_error_of_a_listed_task_that_only_rounding_makes_is_none(monkeypatch):
+    """Below 1e-9 [m, deg, rad]; 1e-9 itself counts."""
+    hand, elbow = (SimpleNamespace(kind="position", title=title) for title in ("hand", "elbow"))
+    monkeypatch.setattr(listed, "errors", lambda run: [
+        (hand, "m", np.array([0.0, 9e-10, 1e-12, 5e-10, 9e-10])),
+        (elbow, "m", np.array([0.0, 0.0, 0.0, 0.0, 1e-9]))])
+    found = measure(recording(HandMadeScenario(tasks=(hand, elbow))))
+    for key in ("rms", "max_settled", "end"):
+        assert found[f"task_hand_{key}"].value == 0.0
+        assert found[f"task_elbow_{key}"].value > 0.0
 
 
 def test_inside_the_cone_nothing_is_violated():

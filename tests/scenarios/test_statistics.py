@@ -33,6 +33,11 @@ def test_pairs_are_counted_by_their_direction():
     assert str(found) == "not distinguishable"
 
 
+def test_the_middle_half_of_the_differences_lies_between_the_quartiles():
+    found = paired(np.zeros(9), np.arange(1.0, 10.0)[::-1])
+    assert (found.median, found.quartiles) == (5.0, (3.0, 7.0))
+
+
 def test_rounding_in_every_pair_is_no_difference():
     first = np.linspace(1.0, 2.0, 20)
     found = paired(first, first * (1.0 + 1e-12))

@@ -349,6 +349,13 @@ def test_least_squares_of_no_columns_leave_everything():
     assert np.array_equal(left, b)
 
 
+@pytest.mark.parametrize(("reference", "known"), [(0.6, True), (-0.6, False)])
+def test_an_x_too_far_from_the_reference_to_be_judged_is_not_certified(reference, known):
+    largest = certificate._LARGEST
+    h = Hierarchy.from_levels([(np.zeros((1, 1)), [0.0])], reference=[reference * largest])
+    assert np.isfinite(certify(h, [0.6 * largest]).nearest) == known
+
+
 def least_of_all_subsets(C, b):
     """Residual of min |C z - b| over z >= 0, by trying every set of positive entries."""
     residuals = [np.linalg.norm(b)]

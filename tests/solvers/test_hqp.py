@@ -10,7 +10,7 @@ from rank_cases import family, generic
 from hierarchy import Hierarchy, HierarchyError
 from hierarchy.errors import UnknownNameError
 from solvers import Status, certify, make, problems
-from solvers.qp import backends, programs
+from solvers.qp import backends, programs, refinement
 
 BACKENDS = [make("hqp", backend=name, form=form)
             for name in backends.BACKENDS for form in ("null-space", "slack")]
@@ -143,6 +143,14 @@ def test_without_rows_no_program_is_put_to_the_backend_and_no_answer_corrected(h
     assert (found.iterations, found.corrected) == (0, 0)
 
 
+def test_an_answer_as_accurate_as_its_backend_promises_does_not_count_as_corrected():
+    h = Hierarchy.from_levels([(np.eye(3), [-1.0] * 3, [1.0] * 3), (np.ones((1, 3)), [2.0]),
+                               ([[1.0, -1.0, 0.0]], [0.5], [0.6])])
+    found = make("hqp", backend="osqp").solve(h)
+    assert found.x == pytest.approx([11 / 12, 5 / 12, 2 / 3], abs=1e-9)
+    assert (found.iterations, found.corrected) == (3, 0)
+
+
 def test_backends_differ_in_the_last_digits_of_an_equality():
     """Else they would all be one and the same least squares."""
     h = Hierarchy.from_levels(generic())
@@ -233,3 +241,19 @@ def test_a_backend_that_raises_is_a_status_and_no_exception(monkeypatch):
 def test_qpsolvers_is_not_asked_for_a_bad_setting():
     with pytest.raises(HierarchyError, match="hqp: slack = -1"):
         make("hqp", slack=-1.0)
+
+
+def test_multipliers_that_cannot_be_searched_for_balance_nothing(monkeypatch):
+    def stuck(A, b):
+        raise RuntimeError("its iteration limit")
+
+    assert_none_found(refinement._non_negative(np.full((2, 3), 10.0 * refinement.LARGEST),
+                                               np.ones(2)))
+    monkeypatch.setattr("scipy.optimize.nnls", stuck)
+    assert_none_found(refinement._non_negative(np.ones((2, 3)), np.ones(2)))
+
+
+def assert_none_found(multipliers):
+    u, rest = multipliers
+    assert (u == np.zeros(3)).all()
+    assert rest == np.inf

@@ -9,6 +9,7 @@ import pytest
 from hierarchy import Hierarchy
 from scenarios.bench.families import family
 from solvers import make, problems
+from solvers.library.folder import _link
 
 if not sys.platform.startswith("linux"):
     pytest.skip("the C library is made on Linux", allow_module_level=True)
@@ -18,6 +19,15 @@ def box():
     """Bounds, a task and a posture of three unknowns, in fresh arrays."""
     return Hierarchy.from_levels([(np.eye(3), -np.ones(3), np.ones(3)), (np.ones((1, 3)), [5.0]),
                                   (np.eye(3), np.zeros(3))])
+
+
+@pytest.mark.parametrize(("said", "told"), [("'in a.o:' 'no symbol x'", "no symbol x"), ("", "")])
+def test_the_last_line_of_a_linker_that_fails_is_told(tmp_path, monkeypatch, said, told):
+    compiler = tmp_path / "cc"
+    compiler.write_text(f"#!/bin/sh\nfor line in {said}; do echo \"$line\" >&2; done\nexit 1\n")
+    compiler.chmod(0o755)
+    monkeypatch.setenv("PATH", str(tmp_path))
+    assert _link(tmp_path, "native") == f"{compiler} failed: {told}"
 
 
 @pytest.mark.slow

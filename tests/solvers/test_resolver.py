@@ -1,6 +1,7 @@
 """The registry, the status, the resolution; what importing costs."""
 
 import ast
+import dataclasses
 import subprocess
 import sys
 from pathlib import Path
@@ -18,6 +19,25 @@ def test_names_are_sorted_and_each_makes_its_resolver():
     assert list(names()) == sorted(names())
     assert {"recursive", "tpm", "hqp", "augmented"} <= set(names())
     assert all(make(name).name == name for name in names())
+
+
+EVERY = {"damping": 0.0, "threshold": 0.1, "rank_tolerance": 1e-8}
+STEPS = {"tolerance": 1e-10, "max_iterations": 1000}
+DEFAULTS = {
+    "augmented": {}, "hcod": {**STEPS, "guesses": 3},
+    "hqp": {"backend": "proxqp", "form": "null-space", "slack": 1e-7},
+    "recursive": {"method": "level", "isotropic": 0.0, "largest": None},
+    "reverse": {"form": "published"}, "sns": {"form": "basic", "scales": "target"},
+    "tpm": {"form": "staircase"},
+    "weighted": {**STEPS, "guesses": 10, "ratio": 100.0, "weights": None, "regularisation": 1e-6,
+                 "hard_levels": 1, "backend": "own"}}
+
+
+@pytest.mark.parametrize("name", names())
+def test_the_defaults_are_those_that_recorded_results_were_made_with(name):
+    resolver = make(name)
+    assert {field.name: getattr(resolver, field.name) for field in dataclasses.fields(resolver)
+            if field.init} == {**EVERY, **DEFAULTS[name]}
 
 
 @pytest.mark.parametrize("status", list(Status))

@@ -11,7 +11,7 @@ from rank_cases import CASES, build, family, generic, more_rows_than_joints
 from hierarchy import Hierarchy, HierarchyError
 from solvers import Status, certify, make, problems
 from solvers.qp.backends import BACKENDS
-from solvers.resolvers.weighted import lexicographic_weights
+from solvers.resolvers.weighted import _acting, lexicographic_weights
 from solvers.workspace import WORKSPACE
 
 EXACT = 1e-9
@@ -438,3 +438,12 @@ def test_the_work_space_grows_and_what_was_left_in_it_does_not_matter(name, monk
     np.testing.assert_array_equal(weighted.solve(h).x, before)
     monkeypatch.setattr(WORKSPACE, "array", np.full(50_000, np.nan))
     np.testing.assert_array_equal(weighted.solve(h).x, before)
+
+
+def test_a_row_acts_within_a_distance_of_x_whatever_its_length():
+    """1e-6 of 1 + |x| = 2 from a side: half as far acts, twice as far does not."""
+    for length in (1e-3, 1e3):
+        A = np.array([[length]])
+        for off, acts in ((1e-6, 1.0), (4e-6, 0.0)):
+            h = Hierarchy.from_levels([(A, [-np.inf], [length * (1.0 + off)])])
+            assert _acting(h, np.array([True]), np.ones(1)) == acts

@@ -12,7 +12,8 @@ from scenarios.bench.open.judge import RIGHT, SOLVED
 from scenarios.bench.open.printing import counted, digits, power
 from scenarios.bench.open.results import Half, Results
 from scenarios.bench.open.summary import Summary
-from scenarios.report.templates import drawn, render, resource
+from scenarios.draw.figures.drawing import svg
+from scenarios.templates import render, resource
 
 ANSWERS = ("asked", "right", "called solved, wrong", "right, not called so", "failed", "ended",
            "largest miss", "relative", "last level moves upper", "same bits", "roughness", "MB")
@@ -70,9 +71,9 @@ def _shown(half: Half) -> Shown:
     count = sum(len(half.collections[name].problems) for name in half.families)
     return Shown(
         half.title, f"{count} problems of {len(half.families)} families", figures.drawn_as(half),
-        drawn(figures.profiles(half), f"{half.title}: performance profiles"),
-        drawn(figures.time_against_miss(half), f"{half.title}: time against miss"),
-        drawn(figures.heat(half), f"{half.title}: share right, families and entrants"),
+        svg(figures.profiles(half), f"{half.title}: performance profiles"),
+        svg(figures.time_against_miss(half), f"{half.title}: time against miss"),
+        svg(figures.heat(half), f"{half.title}: share right, families and entrants"),
         [(label, _answers(half.whole[label])) for label in half.entrants],
         [(name, half.collections[name].head.what, _times(half, name)) for name in half.families])
 

@@ -13,6 +13,7 @@ from typing import Any, Literal
 
 import matplotlib
 import numpy as np
+from markupsafe import Markup, escape
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogFormatter
@@ -193,7 +194,7 @@ def shared_limits(ranges: Sequence[tuple[float, float]], factor: float = 4.0
     return low - margin, high + margin
 
 
-def svg(fig: Figure, title: str) -> str:
+def svg(fig: Figure, title: str) -> Markup:
     """Return a figure as a scalable inline `<svg>` with a title, in the colours of the page."""
     text = io.StringIO()
     with matplotlib.rc_context({**style(), "svg.hashsalt": title}):
@@ -204,8 +205,8 @@ def svg(fig: Figure, title: str) -> str:
     body = re.sub(r"<!--.*?-->\s*|\s*\n\s*", lambda m: "" if m[0][0] == "<" else " ", body)
     body = re.sub(r' d="[^"]*"', _rounded, body)
     body = body.replace(INK, "currentColor").replace("'DejaVu Sans'", "inherit")
-    head = f'<svg role="img" aria-label="{_escape(title)}" viewBox="'
-    return re.sub(r'<svg [^>]*?viewBox="', lambda _: head, body, count=1)
+    head = f'<svg role="img" aria-label="{escape(title)}" viewBox="'
+    return Markup(re.sub(r'<svg [^>]*?viewBox="', lambda _: head, body, count=1))
 
 
 def write(fig: Figure, stem: str) -> None:
@@ -224,7 +225,3 @@ def write(fig: Figure, stem: str) -> None:
 def _rounded(path: re.Match[str]) -> str:
     """Round a path's coordinates to a tenth of a point, which cannot be seen."""
     return re.sub(r"(\.\d)\d+", r"\1", path[0])
-
-
-def _escape(text: str) -> str:
-    return text.replace("&", "&amp;").replace('"', "&quot;").replace("<", "&lt;")

@@ -4,20 +4,20 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from functools import cache
-from html import escape
-from importlib.resources import files
-from string import Template
 from typing import TYPE_CHECKING, Any
+
+from markupsafe import Markup
 
 from hierarchy.errors import HierarchyError
 from scenarios.draw.figures.palette import looks
 from scenarios.draw.replay.data import fates, phrases, run_data
 from scenarios.scene import scene
+from scenarios.templates import render, resource
 
 if TYPE_CHECKING:
     from scenarios.loop.recording import Recording
 
+_FOLDER = "draw/replay"
 _SCRIPTS = ("data.js", "space.js", "painter.js", "sketch.js", "stage.js", "curves.js",
             "stack.js", "player.js")
 
@@ -40,11 +40,13 @@ def html(recordings: Mapping[str, Recording], title: str, *, rate: float = 30.0,
             for label, recording in recordings.items()]
     data = {"runs": runs, "fates": fates(), "phrases": phrases(), "joints": JOINTS,
             "embedded": embedded}
-    return Template(_resource("replay.html")).substitute(
-        title=escape(title), style=_resource("replay.css"),
-        script="\n".join(_resource(name) for name in _SCRIPTS),
+    document = render(
+        f"{_FOLDER}/replay.html", title=title, style=resource(f"{_FOLDER}/replay.css"),
+        script=Markup("\n").join(resource(f"{_FOLDER}/{name}") for name in _SCRIPTS),
         kind="embedded" if embedded else "whole",
-        data=json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c"))
+        data=Markup(json.dumps(data, separators=(",", ":"), allow_nan=False).replace(
+            "<", "\\u003c")))
+    return str(document)  # not markup: a page that embeds it has to escape it
 
 
 def _about(recording: Recording) -> dict[str, Any]:
@@ -52,8 +54,3 @@ def _about(recording: Recording) -> dict[str, Any]:
     limits = getattr(scenario, "limits", None)
     return {"scenario": scenario.name, "title": scenario.title, "fault": recording.fault,
             "level": scenario.control.level, "limited": limits is not None}
-
-
-@cache
-def _resource(name: str) -> str:
-    return files("scenarios.draw.replay").joinpath(name).read_text(encoding="utf-8")

@@ -9,10 +9,8 @@ from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
-from matplotlib.figure import Figure
 
 from hierarchy.words import listed
-from scenarios.draw.figures import drawing
 from scenarios.files import slug
 
 _CODE = re.compile(r"`([^`]+)`")
@@ -27,11 +25,6 @@ def render(template: str, **values: Any) -> Markup:
 def resource(name: str) -> Markup:
     """Return a style sheet or a script, by its path in this package, as it is."""
     return Markup(files("scenarios").joinpath(name).read_text(encoding="utf-8"))
-
-
-def drawn(fig: Figure, title: str) -> Markup:
-    """Return a matplotlib figure as an inline SVG with a title."""
-    return Markup(drawing.svg(fig, title))
 
 
 def unbroken(text: str) -> Markup:
