@@ -85,8 +85,9 @@ def table(runs: Sequence[Run], details: bool = True) -> list[Row]:
     competes = [one_scenario and run.fault is None for run in runs]
     known = {name: metric for run in runs for name, metric in run.metrics.items()
              if details or not metric.detail}
+    groups = list(dict.fromkeys(metric.group for metric in known.values()))
     return [_row(metric, [run.metrics.get(name) for run in runs], competes)
-            for name, metric in known.items()]
+            for name, metric in sorted(known.items(), key=lambda one: groups.index(one[1].group))]
 
 
 def _row(metric: Metric, found: Sequence[Metric | None], competes: Sequence[bool]) -> Row:

@@ -19,7 +19,7 @@ from scenarios.cli.main import run_command
 from scenarios.config import load
 from scenarios.config.listed import ListedPosition
 from scenarios.draw.figures import drawing, letter, palette, panels
-from scenarios.draw.figures.picture import picture
+from scenarios.draw.figures.picture import once, picture
 from scenarios.draw.figures.timeline import timeline
 from scenarios.loop.recording import Event
 from scenarios.loop.simulation import simulate
@@ -447,3 +447,12 @@ def test_a_stack_that_changes_at_every_tick_is_still_a_small_figure():
     ticks = 20_000
     run = recording(t=np.arange(ticks) * 1e-3, order=np.arange(ticks) % 2)
     assert len(drawing.svg(timeline(run), "stack")) < 300_000
+
+
+def test_the_desired_path_is_drawn_for_one_turn():
+    t = np.linspace(0.0, 6 * np.pi, 601)
+    ellipse = np.stack([0.2 * np.cos(t), 0.1 * np.sin(t), 0.0 * t], axis=1)
+    assert len(once(ellipse)) == pytest.approx(201, abs=1)
+    np.testing.assert_allclose(once(ellipse)[-1], ellipse[0], atol=0.01)
+    for path in (ellipse[:150], np.zeros((50, 3)), ellipse[:1]):
+        assert len(once(path)) == len(path)

@@ -200,6 +200,13 @@ def test_a_page_is_whole_and_needs_nothing_outside_itself(runs):
 
 
 @pytest.mark.slow
+def test_rows_of_a_group_stand_together_where_the_first_run_lacks_some():
+    runs = [made(LETTER, scenario=HandMadeScenario(pointing=None)), made("tpm")]
+    groups = [row.group for row in table(runs)]
+    assert "Beyond the cone, max" in [row.label for row in table(runs)]
+    assert len([group for group, _ in itertools.groupby(groups)]) == len(set(groups))
+
+
 def test_one_resolver_in_several_scenarios_is_one_table_and_nothing_is_best():
     asked = [HandMadeScenario(name=name) for name in ("slow", "jumpy")]
     runs = [dataclasses.replace(made(LETTER, scenario=one, v=speed * np.eye(5, 7)), label=one.name)

@@ -45,10 +45,19 @@ def picture(recordings: Mapping[str, Recording], colours: Mapping[str, str] | No
     for label, colour in reversed(list(chosen.items())):
         _line(ax, recordings[label]["ee_position"], color=colour, linewidth=1.8)
     if "desired_position" in first:
-        _line(ax, first["desired_position"], color=INK, linewidth=0.9, linestyle=(0, (3, 3)))
+        _line(ax, once(first["desired_position"]), color=INK, linewidth=0.9, linestyle=(0, (3, 3)))
     ax.set_aspect("equal")
     ax.set_axis_off()
     return fig
+
+
+def once(path: Array) -> Array:
+    """Return a path (T, 3) up to where it is back at its start: a second turn fills the dashes."""
+    step = np.linalg.norm(np.diff(path, axis=0), axis=1).max(initial=0.0)
+    away = np.linalg.norm(path - path[0], axis=1)
+    left = int((away > away.max() / 2).argmax())
+    back = np.flatnonzero(away[left:] <= step)
+    return path[:left + back[0] + 1] if left and back.size else path
 
 
 def _line(ax: Axes, path: Array, **style: object) -> None:

@@ -1,0 +1,34 @@
+"""Pictures of runs in the documents, drawn again: python docs/studies/pictures.py.
+
+The gallery has a command of its own, `python -m scenarios.report.gallery`.
+"""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from pathlib import Path
+
+from scenarios import load, simulate
+from scenarios.draw.figures.letter import write_all
+
+IMAGES = Path(__file__).parents[1] / "images"
+PICTURES = {
+    "ellipse": {"picture": "ellipse", "figure-4b-joint-velocities": "speeds-ellipse"},
+    "ellipse-hqp": {"joint-velocities": "speeds-ellipse-hqp"},
+    "human": {"figure-8-depth-image": "human-depth",
+              "figure-10-errors-and-distances": "human-errors"}}
+
+
+def main() -> None:
+    """Run each scenario and copy its figures into the documents."""
+    for name, pictures in PICTURES.items():
+        with tempfile.TemporaryDirectory() as folder:
+            write_all(simulate(load(name)), Path(folder))
+            for stem, image in pictures.items():
+                shutil.copyfile(Path(folder, f"{stem}.png"), IMAGES / f"{image}.png")
+                print(f"{name}: {image}.png", flush=True)
+
+
+if __name__ == "__main__":
+    main()
