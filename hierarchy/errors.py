@@ -17,10 +17,17 @@ class UnknownNameError(HierarchyError):
 
     def __init__(self, what: str, name: str, known: Iterable[str], more: str = "") -> None:
         known = sorted(known)
-        near = difflib.get_close_matches(str(name), known, n=1, cutoff=_NEAR)
+        near = [*_containing(str(name), known),
+                *difflib.get_close_matches(str(name), known, n=1, cutoff=_NEAR)]
         hint = f"; did you mean {near[0]!r}?" if near else "."
         super().__init__(f"unknown {what} {name!r}{hint} Known: {', '.join(known) or 'none'}."
                          + (f" {more}" if more else ""))
+
+
+def _containing(name: str, known: Iterable[str]) -> list[str]:
+    """Return the names that contain a part of at least three letters, the shortest first."""
+    return sorted((one for one in known if name.lower() in one.lower()), key=len) \
+        if len(name) > 2 else []
 
 
 def expect(what: str, value: object, kind: type, remedy: str) -> None:

@@ -13,6 +13,7 @@ from solvers.resolver import Resolution
 from solvers.resolvers.hcod import ActiveSetResolution
 from solvers.status import EQUAL
 
+_NAMED, _SMALL = 3, 0.1  # missed rows that are named, and the share of the largest that counts
 _MATTERS = 1e-6  # smallest share of a level's pull for which a level above is named
 
 
@@ -22,11 +23,12 @@ def explain(h: Hierarchy, resolution: Resolution, tolerance: float = 1e-9,
 
     Returns one line per level, under its name in `h.names`. A level counts as met if its violation
     is at most `tolerance` times the size of its terms. `rows` are names of the m rows, such as
-    `Stack.row_names`; without them rows are numbered within their level. Raises a HierarchyError
-    unless the resolution is from `hcod`, the only resolver that reports the state of each row, and
-    if the names are not m.
+    `Stack.row_names`; without them rows are numbered within their level, with them the largest
+    missed inequalities of a level are named too. Raises a HierarchyError unless the resolution is
+    from `hcod`, the only resolver that reports the state of each row, and if the names are not m.
     """
     expect("explain: h", h, Hierarchy, "make one with Hierarchy.from_levels([(A, b), ...])")
+    named = rows is not None
     if rows is None:
         rows = [f"row {i}" for size in h.sizes for i in range(size)]
     if len(rows) != h.m:
@@ -34,7 +36,7 @@ def explain(h: Hierarchy, resolution: Resolution, tolerance: float = 1e-9,
     if not isinstance(resolution, ActiveSetResolution):
         raise HierarchyError("explain needs a resolution of hcod: other resolvers do not report "
                              "which rows are active")
-    lines = [_level(h, resolution, k, tolerance, rows) for k in range(len(h.sizes))]
+    lines = [_level(h, resolution, k, tolerance, rows, named) for k in range(len(h.sizes))]
     if resolution.unfinished is not None:
         lines.append(f"The iteration limit was reached at {h.names[resolution.unfinished]!r}: it "
                      "and the levels below may not be optimal.")
@@ -42,7 +44,7 @@ def explain(h: Hierarchy, resolution: Resolution, tolerance: float = 1e-9,
 
 
 def _level(h: Hierarchy, resolution: ActiveSetResolution, k: int, tolerance: float,
-           names: Sequence[str]) -> str:
+           names: Sequence[str], named: bool) -> str:
     rows = slice(h.offsets[k], h.offsets[k + 1])
     w = h.slacks(resolution.x)[rows]
     if not len(w):
@@ -51,11 +53,22 @@ def _level(h: Hierarchy, resolution: ActiveSetResolution, k: int, tolerance: flo
     missed = float(np.linalg.norm(w))
     if missed <= tolerance * size:
         return f"{h.names[k]} is met."
-    blocking = held_back_by(h, resolution, k, names)
+    blocking, at = held_back_by(h, resolution, k, names), ""
+    if named and (most := most_missed(h, resolution.x, k, names)):
+        at = f", at {listed(most)}"
     if not blocking:
-        return f"{h.names[k]} is missed by {missed:.3g}: its own rows disagree."
+        return f"{h.names[k]} is missed by {missed:.3g}{at}: its own rows disagree."
     by = listed(_said_once(blocking, h.names))
-    return f"{h.names[k]} is missed by {missed:.3g}: held back by {by}."
+    return f"{h.names[k]} is missed by {missed:.3g}{at}: held back by {by}."
+
+
+def most_missed(h: Hierarchy, x: Array, k: int, names: Sequence[str]) -> list[str]:
+    """Return the names of up to three inequalities of level k that are missed by most at x."""
+    rows = np.arange(h.offsets[k], h.offsets[k + 1])
+    w = np.abs(h.slacks(x)[rows]) * (h.lower[rows] != h.upper[rows])
+    chosen = [i for i in np.argsort(-w, kind="stable")[:_NAMED].tolist()
+              if w[i] > _SMALL * w.max()]
+    return [names[rows[i]] for i in chosen] if len(rows) > 1 else []
 
 
 def held_back_by(h: Hierarchy, resolution: ActiveSetResolution, k: int,

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from hierarchy import Robot, State, Task
 from hierarchy.avoidance import Barrier, Repulsion, SurveillanceAreas
 from hierarchy.avoidance.self_collision import measure_capsules, pack_capsules, pairs_of_tree
+from hierarchy.problem import Array
 from hierarchy.tasks import Avoidance, Separation
 from hierarchy.tasks.self_separation import SelfSeparation
 from scenarios.cell.published import PublishedAvoidance
 from scenarios.cell.robot import sensed_points
 from scenarios.config import Scenario, ScenarioError
 from scenarios.config.avoidance import AvoidanceSection, RepulsionSection, SeparationSection
+
+_POSTURES = 200
 
 
 def areas_of(scenario: Scenario) -> SurveillanceAreas | None:
@@ -49,7 +54,7 @@ def _separation(section: SeparationSection, robot: Robot, exact: bool) -> list[T
         tasks.append(Separation(sensed_points(robot), barrier,
                                 len(section.obstacles) if exact else None))
     if section.self_collision is not None:
-        pairs = separable_pairs(robot)
+        pairs = separable_pairs(robot, section.self_collision)
         if not pairs:
             raise ScenarioError(f"avoidance.self_collision: robot {robot.name!r} has no capsules "
                                 "that could be kept apart; list them in robot.capsules")
@@ -59,15 +64,35 @@ def _separation(section: SeparationSection, robot: Robot, exact: bool) -> list[T
     return tasks
 
 
-def separable_pairs(robot: Robot) -> list[tuple[int, int]]:
-    """Return the pairs of capsules that can be kept apart, as indices.
+def separable_pairs(robot: Robot, distance: float) -> list[tuple[int, int]]:
+    """Return the pairs of capsules that can be kept at a distance [m], as indices.
 
-    Neighbours in the tree share a joint and are excluded. For capsules proposed from a file, pairs
-    that overlap in the robot's own posture are excluded too, since they may be too large.
+    Neighbours in the tree share a joint and are excluded. Capsules proposed from a file may be too
+    large: of them, pairs that overlap in the robot's own posture are excluded too, and those that
+    are nearer than `distance` in every one of 200 sampled postures.
     """
     pairs = pairs_of_tree(robot.capsules, robot.parents)
     if robot.table is not None or not pairs:
         return pairs
-    distances = measure_capsules(State.at(robot, robot.rest).placements,
-                                 *pack_capsules(robot.capsules), np.array(pairs))[:, 0]
-    return [pair for pair, distance in zip(pairs, distances, strict=True) if distance > 0.0]
+    packed, at = pack_capsules(robot.capsules), State(robot)
+    postures = (robot.rest, *_postures(robot))
+    seen = np.array([measure_capsules(at.placements, *packed, np.array(pairs))[:, 0]
+                     for q in postures if at.move(0.0, q, np.zeros(robot.n))])
+    apart = (seen[0] > 0.0) & (seen.max(axis=0) >= distance)
+    return [pair for pair, kept in zip(pairs, apart.tolist(), strict=True) if kept]
+
+
+def inseparable_pairs(robot: Robot, distance: float) -> list[str]:
+    """Return the names of the pairs that `separable_pairs` excludes for their proposed capsules."""
+    kept = set(separable_pairs(robot, distance))
+    return [f"{robot.capsules[i].name} to {robot.capsules[j].name}"
+            for i, j in pairs_of_tree(robot.capsules, robot.parents) if (i, j) not in kept]
+
+
+def _postures(robot: Robot) -> Iterator[Array]:
+    """Yield postures (nq,) spread evenly within the limits, a turn where there are none."""
+    generator, start = np.random.default_rng(0), robot.rest[robot.coordinates]
+    lower, upper = (np.where(np.isfinite(side), side, turn) for side, turn in
+                    zip(robot.position_limits(), (-np.pi, np.pi), strict=True))
+    for _ in range(_POSTURES):
+        yield robot.integrate(robot.rest, generator.uniform(lower, upper) - start)

@@ -78,7 +78,7 @@ def _momentum(section: ListedMomentum, start: State) -> Task:
 
 def _self_collision(section: ListedSelfCollision, start: State) -> Task:
     robot = start.robot
-    pairs = separable_pairs(robot)
+    pairs = separable_pairs(robot, section.distance)
     if not pairs:
         raise ScenarioError(f"robot {robot.name!r} has no capsules that could be kept apart; list "
                             "them in robot.capsules")

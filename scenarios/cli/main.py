@@ -348,6 +348,7 @@ def check(file: Annotated[str, typer.Argument(help="A scenario or a robot: file 
         robot = robot_check.look_at(file, changes or [])
         return print_json(robot_check.as_plain_data(*robot)) if as_json else print(
             robot_check.say(*robot))
+    robot_check.check_known(file)
     scenario = _load(file, changes, None)
     found = first_tick(scenario)
     return print_json(scenario_check.as_plain_data(scenario, found)) if as_json else print(

@@ -10,9 +10,10 @@ import numpy as np
 from pydantic import ValidationError
 
 from hierarchy import Robot, plugins
+from hierarchy.errors import UnknownNameError
 from hierarchy.robots import TABLES
-from hierarchy.robots.names import file_of, in_package
-from scenarios.config import ScenarioError, shipped
+from hierarchy.robots.names import elsewhere, file_of, in_package
+from scenarios.config import ScenarioError, shipped, shipped_groups
 from scenarios.config.changes import change, parse_changes
 from scenarios.config.robot import RobotSection
 
@@ -27,6 +28,12 @@ def is_robot(text: str) -> bool:
     of_file = in_package(text) or text.endswith((".urdf", ".xml", ".mjcf"))
     named = text in TABLES or (not text.endswith(".toml") and text in plugins.own("robots"))
     return of_file or (named and text not in shipped())
+
+
+def check_known(text: str) -> None:
+    """Raise UnknownNameError for a name that is neither a scenario's nor a robot's."""
+    if not text.endswith(".toml") and not {text} & {*shipped(), *shipped_groups()}:
+        raise UnknownNameError("scenario or robot", text, {*shipped(), *TABLES}, elsewhere(text))
 
 
 def look_at(model: str, changes: Sequence[str] = ()) -> tuple[RobotSection, Robot]:

@@ -24,7 +24,7 @@ def as_plain_data(scenario: Scenario, found: FirstTick) -> dict[str, Any]:
 def say(scenario: Scenario, found: FirstTick) -> str:
     """Return the summary of a scenario and its first tick as text."""
     lines = [f"{scenario.name}: {scenario.title}", *_sections(scenario), *_first(found)]
-    lines += [f"Warning: {text}." for text in found.warnings]
+    lines += [fill(f"Warning: {text}.", _WIDTH, subsequent_indent="  ") for text in found.warnings]
     return "\n".join([*lines, "Valid."])
 
 

@@ -7,11 +7,16 @@ from dataclasses import dataclass
 from math import isfinite, tau
 
 from hierarchy import Robot
+from hierarchy.tasks.self_separation import SelfSeparation
+from scenarios.cell.avoidance import inseparable_pairs
+from scenarios.cell.build import Cell
 from scenarios.config import Scenario
 from scenarios.config.listed import ListedCoupling
 from scenarios.loop.controller import Controller
+from scenarios.words import listed
 from solvers import Status, explain, make
 
+_NAMED = 3        # pairs of capsules named at most
 _ROUNDING = 1e-6  # [m] below a distance that is not said
 _NARROW = 1.0     # [deg] a cone this narrow may have been meant in radians
 _MET = 1e-6       # violation of a level relative to its terms, below which it is met
@@ -43,7 +48,8 @@ def first_tick(scenario: Scenario) -> FirstTick:
     plant = controller.cell.plant
     controller.command(0.0, plant.q, plant.v)
     distances = _distances(controller)
-    warnings = (*_warnings(scenario, distances), *_loose(scenario, controller.cell.robot))
+    warnings = (*_warnings(scenario, distances), *_loose(scenario, controller.cell.robot),
+                *_itself(controller.cell))
     if not controller.answered:
         return FirstTick(None, (), (), distances, warnings)
     return FirstTick(controller.resolution.status, controller.hierarchy.names,
@@ -64,6 +70,23 @@ def _distances(controller: Controller) -> dict[str, float]:
     seen = controller.cell.sensor.measurement
     both = {"body": seen.minimal_distance, "end effector": seen.end_effector_distance}
     return {name: distance for name, distance in both.items() if isfinite(distance)}
+
+
+def _itself(cell: Cell) -> Iterator[str]:
+    """Yield what self-collision leaves out, and pairs that are too near at the start."""
+    for task in map(cell.stack.__getitem__, cell.stack.names):
+        if not isinstance(task, SelfSeparation):
+            continue
+        least = task.barrier.distance
+        if out := inseparable_pairs(cell.robot, least):
+            more = [f"{len(out) - _NAMED} more pairs"] if len(out) > _NAMED else []
+            yield (f"{task.name} leaves out {listed([*out[:_NAMED], *more])}: their "
+                   f"capsules overlap, or are nearer than {1e3 * least:g} mm in every posture; "
+                   "slimmer robot.capsules keep them")
+        for name, apart in zip(task.row_names, task.distances(cell.state).tolist(), strict=True):
+            if apart < least - _ROUNDING:
+                yield (f"{task.name}: {name} are {1e3 * apart:.0f} mm apart at the start, less "
+                       f"than the {1e3 * least:g} mm to be kept")
 
 
 def _loose(scenario: Scenario, robot: Robot) -> Iterator[str]:

@@ -12,7 +12,7 @@ from scenarios.cell.build import build
 from scenarios.loop.fate import Fate
 from scenarios.loop.judging import Rows
 from scenarios.loop.recording import Recording
-from solvers.explain import held_back_by
+from solvers.explain import held_back_by, most_missed
 from solvers.resolvers.hcod import Hcod
 
 _LOOKED_AT = 20   # ticks of a level, spread over those in which it was missed
@@ -22,17 +22,23 @@ _OFTEN = 0.25     # share of the ticks looked at: what holds back less often is 
 
 @dataclass(frozen=True)
 class GivenUp:
-    """A level that was missed: the share of its ticks, seconds, and what held it back, by share."""
+    """A level that was missed: the share of its ticks, seconds, its rows, and what held it back.
+
+    Rows are inequalities. They and what held the level back have shares of the ticks looked at.
+    """
 
     level: str
     share: float
     seconds: float
     held_by: tuple[tuple[str, float], ...]
+    rows: tuple[tuple[str, float], ...] = ()
 
     def __str__(self) -> str:
-        held = ", ".join(f"{name} ({100.0 * share:.0f} %)" for name, share in self.held_by)
+        held, at = (", ".join(f"{name} ({100.0 * share:.0f} %)" for name, share in named)
+                    for named in (self.held_by, self.rows))
         return (f"{self.level} was missed in {100.0 * self.share:.0f} % of its ticks "
-                f"({self.seconds:.3g} s)" + (f"; held back by {held}" if held else ""))
+                f"({self.seconds:.3g} s)" + (f", at {at}" if at else "")
+                + (f"; held back by {held}" if held else ""))
 
 
 def given_up(recording: Recording) -> tuple[GivenUp, ...]:
@@ -52,12 +58,16 @@ def given_up(recording: Recording) -> tuple[GivenUp, ...]:
             found.append((name, float(missed.sum() / known.sum()), np.flatnonzero(missed)))
     period = recording.scenario.control.period
     blocked = _blocked(recording, {name: ticks for name, _, ticks in found})
-    return tuple(GivenUp(name, share, len(ticks) * period, blocked.get(name, ()))
+    return tuple(GivenUp(name, share, len(ticks) * period, *blocked.get(name, ((), ())))
                  for name, share, ticks in found)
 
 
+Shares = tuple[tuple[str, float], ...]
+
+
 def _blocked(recording: Recording, missed: dict[str, NDArray[np.int64]]
-             ) -> dict[str, tuple[tuple[str, float], ...]]:
+             ) -> dict[str, tuple[Shares, Shares]]:
+    """Return what held each level back, and which of its inequalities were missed."""
     scenario = recording.scenario
     if not missed or scenario.sensor.kind != "exact" or scenario.control.stack == "smooth":
         return {}
@@ -65,13 +75,19 @@ def _blocked(recording: Recording, missed: dict[str, NDArray[np.int64]]
     rows, exact, orders = Rows(recording, cell), Hcod(), recording.order_names
     found = {}
     for name, ticks in missed.items():
-        count, looked = Counter[str](), 0
+        held, at, looked = Counter[str](), Counter[str](), 0
         for tick in ticks[np.unique(np.linspace(0, len(ticks) - 1, _LOOKED_AT).astype(int))]:
             h = rows.hierarchy(int(tick), orders[recording["order"][tick]])
             if h is not None and name in h.names:
                 names = cell.stack.row_names(h.names)
-                count.update(held_back_by(h, exact.solve(h), h.names.index(name), names))
+                level, solved = h.names.index(name), exact.solve(h)
+                held.update(held_back_by(h, solved, level, names))
+                at.update(most_missed(h, solved.x, level, names))
                 looked += 1
-        found[name] = tuple((what, times / looked) for what, times in count.most_common(4)
-                            if times >= _OFTEN * looked)
+        found[name] = _shares(held, looked), _shares(at, looked)
     return found
+
+
+def _shares(count: Counter[str], looked: int) -> Shares:
+    return tuple((what, times / looked) for what, times in count.most_common(4)
+                 if times >= _OFTEN * looked)

@@ -300,7 +300,7 @@ def test_a_file_with_the_name_of_a_table_is_not_that_table(arm):
     robot = Robot.load(str(arm().rename(arm().with_name("humanoid.urdf"))))
     assert (robot.name, robot.table) == ("humanoid", None)
     assert Robot.load("humanoid").table is not None
-    assert separable_pairs(robot) == [(0, 2)]
+    assert separable_pairs(robot, 0.01) == [(0, 2)]
 
 
 def test_locked_joints_are_no_joints(arm):
@@ -331,9 +331,9 @@ def test_neighbours_of_the_tree_are_not_kept_apart(arm):
     robot = Robot.from_file(arm())
     assert pairs_of_tree(robot.capsules, robot.parents) == [(0, 2)]
     kuka = Robot.named("kuka_lwr")
-    assert separable_pairs(kuka) == [(0, 2)], "as in a chain"
+    assert separable_pairs(kuka, 0.01) == [(0, 2)], "as in a chain"
     humanoid = Robot.named("humanoid")
-    for i, j in separable_pairs(humanoid):
+    for i, j in separable_pairs(humanoid, 0.01):
         assert humanoid.capsules[i].joint != humanoid.parents[humanoid.capsules[j].joint]
 
 
