@@ -8,12 +8,12 @@ from math import isfinite, tau
 
 from hierarchy import Robot
 from hierarchy.tasks.self_separation import SelfSeparation
+from hierarchy.words import listed
 from scenarios.cell.avoidance import inseparable_pairs
 from scenarios.cell.build import Cell
 from scenarios.config import Scenario
 from scenarios.config.listed import ListedCoupling
 from scenarios.loop.controller import Controller
-from scenarios.words import listed
 from solvers import Status, explain, make
 
 _NAMED = 3        # pairs of capsules named at most
