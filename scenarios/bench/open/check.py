@@ -21,7 +21,6 @@ from scenarios.bench.open.judge import (
 )
 from scenarios.bench.open.process import run_entrant
 from scenarios.bench.open.run import rows_of
-from scenarios.bench.open.store import COLUMNS
 from scenarios.bench.open.summary import Times
 from scenarios.bench.open.table import Row
 from scenarios.bench.peers.environments import MissingError
@@ -63,21 +62,17 @@ class Check:
 
 def check(row: Row) -> Check:
     """Run an entrant on a few public problems of each kind, and judge it."""
-    found: dict[str, list[Judged]] = {}
-    version = ""
     with tempfile.TemporaryDirectory() as temporary:
-        for name in FAMILIES:
-            file = export(family(name), 0, COUNT, True, Path(temporary))
-            collection = read(file)
-            try:
-                about, answers = run_entrant(row, file, len(collection.problems), LIMIT)
-            except MissingError as reason:
-                return Check(row.label, "", {}, str(reason))
-            version = about["version"]
-            raw = [{**dict.fromkeys(COLUMNS), **one}
-                   for one in rows_of(row, collection, about, answers)]
-            found[name] = judge(raw, {collection.digest: collection})
-    return Check(row.label, version, found)
+        files = [export(family(name), 0, COUNT, True, Path(temporary)) for name in FAMILIES]
+        collections = [read(file) for file in files]
+        try:
+            said = list(run_entrant(row, files, [len(one.problems) for one in collections],
+                                    LIMIT))
+        except MissingError as reason:
+            return Check(row.label, "", {}, str(reason))
+    found = {one.head.family: judge(rows_of(row, one, about, answers), {one.digest: one})
+             for one, (about, answers) in zip(collections, said, strict=True)}
+    return Check(row.label, said[0][0]["version"], found)
 
 
 def _line(rows: list[Judged]) -> str:

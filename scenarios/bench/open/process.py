@@ -1,4 +1,4 @@
-"""One entrant on one file, in processes of its own: a crash or a hang costs one problem."""
+"""One entrant on files of problems; a crash or a hang costs one problem, never another entrant."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from threading import Timer
@@ -27,32 +27,64 @@ _HERE = Path(__file__).parent
 Said = dict[str, Any]
 
 
-def run_entrant(row: Row, file: Path, count: int, limit: float = LIMIT) -> tuple[Said, list[Said]]:
-    """Return what an entrant says of itself, and of each of the `count` problems of a file.
+def run_entrant(row: Row, files: Sequence[Path], counts: Sequence[int], limit: float = LIMIT
+                ) -> Iterator[tuple[Said, list[Said]]]:
+    """Yield, file by file, what an entrant says of itself and of each of the file's problems.
 
-    limit : [s] for one problem. Raises MissingError if the entrant cannot be started at all.
+    counts : number of problems of each file. limit : [s] for one problem. Raises MissingError if
+    the entrant cannot be started at all.
     """
-    about: Said = {}
-    answers: list[Said] = []
-    ends = 0
     with _staged() as folder:
-        while len(answers) < count:
-            if ends == MOST_ENDS:
-                answers += [{"problem": p, "ended": LEFT_OUT} for p in range(len(answers), count)]
+        crew = _Crew(row, folder, limit)
+        try:
+            for k, count in enumerate(counts):
+                yield crew.ask(list(files[k:]), count)
+        finally:
+            crew.dismiss()
+
+
+@final
+class _Crew:
+    """The process of an entrant, and the ones that replace it."""
+
+    def __init__(self, row: Row, folder: Path, limit: float) -> None:
+        self.row, self.folder, self.limit = row, folder, limit
+        self.about: Said = {}
+        self.worker: _Worker | None = None
+
+    def ask(self, files: list[Path], count: int) -> tuple[Said, list[Said]]:
+        """Return about and answers of the first file; the process goes on with the next."""
+        answers: list[Said] = []
+        ready: Said = {}
+        for _ in range(MOST_ENDS):
+            patience = self._begin(files, len(answers))
+            assert self.worker is not None
+            said = self.worker.next(patience)
+            if said is not None:
+                ready = ready or said
+                answers += self.worker.answers(count - len(answers), self.limit)
+            if len(answers) == count:
                 break
-            worker = _Worker(row, file, len(answers), folder)
-            try:
-                about = about or worker.line(START_LIMIT)
-                if ends:
-                    worker.line(START_LIMIT)
-                answers += worker.answers(count - len(answers), limit)
-            finally:
-                why = worker.stop()
-            if len(answers) < count:
-                ends += 1
-                answers.append({"problem": len(answers), "ended": HUNG if worker.hung else CRASHED,
-                                "why": why})
-    return about, answers
+            kind = HUNG if self.worker.hung else CRASHED
+            answers.append({"problem": len(answers), "ended": kind, "why": self.dismiss()})
+            if len(answers) == count:
+                break
+        answers += [{"problem": p, "ended": LEFT_OUT} for p in range(len(answers), count)]
+        return {**self.about, **ready}, answers
+
+    def _begin(self, files: list[Path], first: int) -> float:
+        """Start a process if none runs; return how long its first word may take [s]."""
+        if self.worker is not None:
+            return START_LIMIT  # it may compile for problems of another form
+        known = bool(self.about)
+        self.worker = _Worker(self.row, files, first, self.folder)
+        self.about = self.worker.introduction()
+        return 2.0 * self.limit if known else START_LIMIT
+
+    def dismiss(self) -> str:
+        """End the process and return its last words."""
+        worker, self.worker = self.worker, None
+        return "" if worker is None else worker.stop()
 
 
 @contextmanager
@@ -71,7 +103,7 @@ def _staged() -> Iterator[Path]:
 class _Worker:
     """A process of `scenarios.bench.open.worker`; `hung` once it was killed for its time."""
 
-    def __init__(self, row: Row, file: Path, first: int, folder: Path) -> None:
+    def __init__(self, row: Row, files: Sequence[Path], first: int, folder: Path) -> None:
         self.hung = False
         python = row.python or python_of(row.package)
         own = dict(os.environ, **dict.fromkeys(_THREADS, "1"))
@@ -82,24 +114,26 @@ class _Worker:
         try:
             self._process = subprocess.Popen(
                 [python, "-m", "scenarios.bench.open.worker", row.adapter,
-                 json.dumps(dict(row.options)), str(file.resolve()), str(first), core],
+                 json.dumps(dict(row.options)), core, str(first),
+                 *(str(file.resolve()) for file in files)],
                 stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=self._log, text=True,
                 cwd=folder, env=own)
         except OSError as error:
             self._log.close()
             raise MissingError(f"{python}: {error.strerror}") from error
 
-    def line(self, limit: float) -> Said:
-        """Return the next line; raises MissingError if there is none within the limit [s]."""
-        said = self._next(limit)
+    def introduction(self) -> Said:
+        """Return what the entrant says of itself; raises MissingError if it cannot."""
+        said = self.next(START_LIMIT)
         if said is None:
-            raise MissingError(f"no answer within {limit:g} s" if self.hung else self._last_words())
+            raise MissingError(f"no word within {START_LIMIT:g} s" if self.hung
+                               else self._last_words())
         return said
 
     def answers(self, most: int, limit: float) -> list[Said]:
         """Return the answers until one takes too long, or the process ends."""
         found: list[Said] = []
-        while len(found) < most and (said := self._next(limit)) is not None:
+        while len(found) < most and (said := self.next(limit)) is not None:
             found.append(said)
         return found
 
@@ -111,7 +145,8 @@ class _Worker:
         self._log.close()
         return said
 
-    def _next(self, limit: float) -> Said | None:
+    def next(self, limit: float) -> Said | None:
+        """Return the next line, or None if there is none within the limit [s]."""
         assert self._process.stdout is not None
         timer = Timer(limit, self._kill)
         timer.start()

@@ -10,7 +10,7 @@ from scenarios.bench.machine import machine
 from scenarios.bench.open.exported import export, file_of
 from scenarios.bench.open.families import Family
 from scenarios.bench.open.process import LIMIT, Said, run_entrant
-from scenarios.bench.open.store import RawRow, Store
+from scenarios.bench.open.store import COLUMNS, RawRow, Store
 from scenarios.bench.open.table import Row
 from scenarios.bench.peers.environments import MissingError
 from scenarios.files import write_json
@@ -30,22 +30,30 @@ def run(folder: Path, families: Sequence[Family], entrants: Sequence[Row], seeds
         number. limit : [s] for one problem. told : gets a line of text now and then.
     """
     store, missing = Store(folder), dict[str, str]()
-    for file in _problems(store, families, seeds, count, told):
-        collection = read(file)
-        for row in entrants:
-            target = store.file_of(row.label, file)
-            if target.is_file() or row.label in missing:
-                continue
-            told(f"{collection.head.family}, {collection.head.half}: {row.label}")
-            try:
-                about, answers = run_entrant(row, file, len(collection.problems), limit)
-            except MissingError as reason:
-                missing[row.label] = str(reason)
-                continue
-            store.add(rows_of(row, collection, about, answers), target)
+    files = _problems(store, families, seeds, count, told)
+    collections = [read(file) for file in files]
+    for row in entrants:
+        told(row.label)
+        try:
+            _add(store, row, files, collections, limit)
+        except MissingError as reason:
+            missing[row.label] = str(reason)
     write_json(folder / "machine.json", machine())
     write_json(folder / "missing.json", missing)
     return store
+
+
+def _add(store: Store, row: Row, files: Sequence[Path], collections: Sequence[Collection],
+         limit: float) -> None:
+    """Run an entrant on the files on which it has not run yet."""
+    left = [(file, one, store.file_of(row.label, file))
+            for file, one in zip(files, collections, strict=True)]
+    left = [(file, one, target) for file, one, target in left if not target.is_file()]
+    if left:
+        said = run_entrant(row, [file for file, _, _ in left],
+                           [len(one.problems) for _, one, _ in left], limit)
+        for (_, one, target), (about, answers) in zip(left, said, strict=True):
+            store.add(rows_of(row, one, about, answers), target)
 
 
 def _problems(store: Store, families: Sequence[Family], seeds: Sequence[int], count: int | None,
@@ -68,5 +76,5 @@ def rows_of(row: Row, collection: Collection, about: Said, answers: Sequence[Sai
     same: dict[str, Any] = {
         "entrant": row.label, "version": about["version"], "family": head.family,
         "half": head.half, "seed": head.seed, "sha256": collection.digest,
-        "yardstick_ns": about["yardstick_ns"], "start_kib": about["rss_kib"]}
-    return [{**same, **answer} for answer in answers]
+        "yardstick_ns": about.get("yardstick_ns"), "start_kib": about.get("start_kib")}
+    return [{**dict.fromkeys(COLUMNS), **same, **answer} for answer in answers]

@@ -1,9 +1,10 @@
-"""Run one entrant on one file, in its own process. Needs only numpy and the entrant.
+"""Run one entrant on files of problems, in its own process. Needs only numpy and the entrant.
 
-    python -m scenarios.bench.open.worker ADAPTER OPTIONS FILE FIRST CORE
+    python -m scenarios.bench.open.worker ADAPTER OPTIONS CORE FIRST FILE...
 
-ADAPTER is MODULE:CLASS or FILE.py:CLASS, OPTIONS its arguments in JSON, FIRST the problem to begin
-with. On stdout: one line of JSON about the entrant, then one for each problem, when it is done.
+ADAPTER is MODULE:CLASS or FILE.py:CLASS, OPTIONS its arguments in JSON, FIRST the problem of the
+first file to begin with. On stdout: a line of JSON about the entrant; then, for each file, one once
+it is ready and one for each problem.
 """
 
 from __future__ import annotations
@@ -30,24 +31,29 @@ Reply = Callable[[Any], None]
 
 def main() -> None:
     """Run from the command line; see the docstring of the module."""
-    adapter, options, file, first, core = sys.argv[1:]
+    adapter, options, core, first, *files = sys.argv[1:]
     lines = os.fdopen(os.dup(1), "w")
     os.dup2(2, 1)  # output of a package must not mix with the lines
     if hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(0, {int(core)})
     entrant = load(adapter)(**json.loads(options))
-    problems = read_problems(Path(file))
 
     def reply(value: Any) -> None:
         print(json.dumps(value), file=lines, flush=True)
 
-    begin = int(first)
-    rehearse(entrant, problems[:begin] or problems[:1])
-    reply({"version": entrant.version(), "warm": entrant.warm, "yardstick_ns": yardstick(),
-           "rss_kib": resident()})
+    reply({"version": entrant.version()})
+    for file, begin in zip(files, [int(first)] + [0] * len(files), strict=False):
+        run(entrant, Path(file), begin, reply)
+
+
+def run(entrant: Entrant, file: Path, begin: int, reply: Reply) -> None:
+    """Ask an entrant the problems of a file, from one on."""
+    problems, sequence = read_problems(file), consecutive(file)
+    rehearse(entrant, problems[begin])
+    reply({"start_kib": resident(), "yardstick_ns": yardstick()})
     before = None
     for p in range(begin, len(problems)):
-        said, before = asked(entrant, problems, p, before, consecutive(file))
+        said, before = asked(entrant, problems, p, before, sequence)
         reply({"problem": p, "rss_kib": resident(), **said})
 
 
@@ -65,22 +71,21 @@ def load(adapter: str) -> type[Entrant]:
     return getattr(module, name)  # type: ignore[no-any-return]
 
 
-def consecutive(file: str) -> bool:
+def consecutive(file: Path) -> bool:
     """Return whether the problems of a file are consecutive ticks."""
     with np.load(file, allow_pickle=False) as kept:
         return bool(json.loads(kept["head.json"])["sequence"])
 
 
-def rehearse(entrant: Entrant, problems: list[Problem]) -> None:
-    """Solve a few problems, so that nothing is loaded or compiled while it is timed."""
-    for problem in problems[:3]:
-        try:
-            if not entrant.refuses(problem):
-                raw = entrant.solve(entrant.prepare(problem))
-                if entrant.warm:
-                    entrant.solve_from(entrant.prepare(problem), raw)
-        except Exception:  # asked again, and told, as a problem of the file
-            continue
+def rehearse(entrant: Entrant, problem: Problem) -> None:
+    """Solve a problem, so that nothing is loaded or compiled while it is timed."""
+    try:
+        if not entrant.refuses(problem):
+            raw = entrant.solve(entrant.prepare(problem))
+            if entrant.warm:
+                entrant.solve_from(entrant.prepare(problem), raw)
+    except Exception:  # it is asked again, and what it raises is told
+        return
 
 
 def asked(entrant: Entrant, problems: list[Problem], p: int, before: Any, sequence: bool

@@ -4,7 +4,7 @@ void* prepare(int n, int levels, const long* sizes, const double* A, const doubl
 const double* upper, const double* reference);  // reference: null if zero
 int solve(void* prepared);                                    // 1 if it calls it solved
 int solve_from(void* prepared, void* before);                 // optional
-void read(void* prepared, double* x, int* iterations);        // iterations: -1 if unknown
+void answer(void* prepared, double* x, int* iterations);        // iterations: -1 if unknown
 void release(void* prepared);
 """
 
@@ -70,6 +70,6 @@ class Compiled(Entrant):
     def read(self, raw: Any) -> Answer:
         """Copy the answer."""
         x, iterations = np.zeros(raw.n), ctypes.c_int(-1)
-        self.library.read(raw.address, _VOID(x.ctypes.data), ctypes.byref(iterations))
+        self.library.answer(raw.address, _VOID(x.ctypes.data), ctypes.byref(iterations))
         known = iterations.value if iterations.value >= 0 else None
         return Answer(x, raw.solved, known)

@@ -84,7 +84,7 @@ int solve_from(void* handle, void* before) {
   return search(p);
 }
 
-void read(void* handle, double* x, int* iterations) {
+void answer(void* handle, double* x, int* iterations) {
   auto* p = static_cast<Prepared*>(handle);
   Eigen::Map<Eigen::VectorXd>(x, p->solver->get_x().size()) = p->solver->get_x();
   *iterations = p->solver->getFactorizationsCount();

@@ -46,7 +46,7 @@ int solve(void* handle) {
   return p->solver->get_x().allFinite();
 }
 
-void read(void* handle, double* x, int* iterations) {
+void answer(void* handle, double* x, int* iterations) {
   auto* p = static_cast<Prepared*>(handle);
   Eigen::Map<Eigen::VectorXd>(x, p->reference.size()) = p->solver->get_x() + p->reference;
   *iterations = -1;

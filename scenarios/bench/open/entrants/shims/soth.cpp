@@ -68,7 +68,7 @@ int solve_from(void* handle, void* before) {
   return search(p);
 }
 
-void read(void* handle, double* x, int* iterations) {
+void answer(void* handle, double* x, int* iterations) {
   auto* p = static_cast<Prepared*>(handle);
   Eigen::Map<Eigen::VectorXd>(x, p->x.size()) = p->x;
   *iterations = -1;
