@@ -48,20 +48,17 @@ class WeightedResolution(Resolution):
 class Weighted(Resolver):
     """Minimises sum_k w_k^2 ||violation of level k||^2 + mu^2 ||x - reference||^2.
 
-    Not strict; the top levels of inequalities are constraints. Status: docs/theory/weighted.md and
-    docs/theory/resolver-notes.md. The memory is the state of each row.
+    Not strict; the top levels of inequalities are constraints. The memory is the state of each row.
+    docs/theory/weighted.md and docs/theory/resolver-notes.md describe the settings and the status.
 
     ratio : weight of a level over that of the level below; the lowest level has weight 1.
     weights : weight of each level, in place of `ratio`; ignored for a hard or strict level.
     strict_levels : number of top levels that keep strict priority; those below become one level of
-        weighted rows, and `hcod` resolves this. `regularisation` and what follows are then unused.
+        weighted rows, and `hcod` resolves this. What follows is then unused.
     regularisation : mu; pink and mink call mu^2 damping, 1e-12 by default.
     hard_levels : largest number of top levels that are constraints (inequalities only).
-    backend : method after the guesses: "own", an active-set method, or a backend of qpsolvers
-        (proxqp, osqp, quadprog, daqp, piqp, clarabel).
-    tolerance : of hard rows and of sides, relative to |a| |x| + |side|.
-    guesses : active sets tried first, and to repair the set of a backend.
-    max_iterations : steps, then Status.ITERATION_LIMIT; x satisfies the constraints.
+    backend : after the guesses: "own", an active-set method, or a backend of qpsolvers.
+    tolerance, guesses, max_iterations : as in `hcod`, relative to |a| |x| + |side|.
     """
 
     name: ClassVar[str] = "weighted"

@@ -30,7 +30,7 @@ DEFAULTS = {
     "reverse": {"form": "published"}, "sns": {"form": "basic", "scales": "target"},
     "tpm": {"form": "staircase"},
     "weighted": {**STEPS, "guesses": 10, "ratio": 100.0, "weights": None, "regularisation": 1e-6,
-                 "hard_levels": 1, "backend": "own"}}
+                 "hard_levels": 1, "backend": "own", "strict_levels": 0}}
 
 
 @pytest.mark.parametrize("name", names())

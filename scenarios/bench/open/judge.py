@@ -26,24 +26,17 @@ VERDICTS = (SOLVED, MODEST, WRONG, FAILED, RAISED, CRASHED, HUNG, REFUSED)
 @final
 @dataclass(frozen=True)
 class Judged:
-    """One entrant on one problem.
+    """One entrant on one problem; the first six fields are those of the raw row.
 
-    Attributes
-    ----------
-    entrant, version, family, half, seed, problem : of the raw row.
     verdict : one of VERDICTS.
-    absolute : largest miss beyond the least of a level, in the unit of its rows; NaN without x.
-    relative : the largest relative to |a| (1 + |x|), with the largest row of the level.
-    level : the first level that is missed by more than RIGHT, the number of levels for the
-        distance to the reference, or -1.
-    moved : how far the last level moved the violation of one above, relative likewise; NaN if not
-        known.
-    cold, warm : times [ns].
-    iterations, warm_iterations : or None.
+    absolute, relative : largest miss beyond the least of a level, in the unit of its rows, and
+        relative to |a| (1 + |x|) with the largest row of the level; NaN without x.
+    level : the first missed by more than RIGHT; L for the distance to the reference, or -1.
+    moved : how far the last level moved the violation of one above, relative; NaN if not known.
+    cold, warm : times [ns]. iterations, warm_iterations : or None.
     warm_right : whether the warm answer is right and called solved; None without one.
     same : whether a second solve gave the same bits; None without one.
-    memory : growth of the process while it solved the file [KiB].
-    x : (n,) or None.
+    memory : growth of the process while it solved the file [KiB]. x : (n,) or None.
     """
 
     entrant: str
