@@ -98,6 +98,8 @@ def test_times_are_given_by_median_and_tails_for_each_part():
     assert found["time_resolve_p999"].value == pytest.approx(999e-6)
     assert found["time_kinematics_median"].shown() == "1.00"
     assert found["time_kinematics_median"].shown_unit == "µs"
+    shared = {f"time_{part}_{tail}" for part in ("kinematics", "rows") for tail in ("p95", "p999")}
+    assert {name for name in found if name.startswith("time_") and found[name].detail} == shared
 
 
 def test_ticks_that_were_not_solved_are_counted():

@@ -11,6 +11,7 @@ from hierarchy import Hierarchy, HierarchyError
 from hierarchy.errors import UnknownNameError
 from solvers import Status, certify, make, problems
 from solvers.qp import backends, programs, refinement
+from solvers.qp.refinement import Rows
 
 BACKENDS = [make("hqp", backend=name, form=form)
             for name in backends.BACKENDS for form in ("null-space", "slack")]
@@ -257,3 +258,15 @@ def assert_none_found(multipliers):
     u, rest = multipliers
     assert (u == np.zeros(3)).all()
     assert rest == np.inf
+
+
+@pytest.mark.parametrize(("z", "nearest"), [
+    ([0.5 + 1e-5, 0.5 + 1e-5], [0.5, 0.5]), ([0.2, -1e-4], [0.2, 0.0]),
+    ([1.0 + 2e-5, -1e-5], [1.0, 0.0]), ([0.3, 0.3], [0.3, 0.3]), ([1.0, 0.5], [1.0, 0.5])],
+    ids=["beyond a side", "below a side", "a corner", "inside", "too far"])
+def test_a_point_just_outside_moves_to_the_nearest_one_inside(z, nearest):
+    """The triangle x >= 0, y >= 0, x + y <= 1."""
+    rows = Rows(np.array([[1.0, 1.0], [1.0, 0.0], [0.0, 1.0]]), np.array([-np.inf, 0.0, 0.0]),
+                np.array([1.0, np.inf, np.inf]))
+    assert refinement._moved_inside(np.array(z), np.eye(2), rows) == pytest.approx(
+        nearest, abs=1e-12)
