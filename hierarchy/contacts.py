@@ -135,7 +135,7 @@ class Contacts:
                    for contact in contacts for point in contact.points]
         set_frozen(self, points=Points(
             np.array([frame.joint for frame in frames], dtype=np.int64),
-            np.array(offsets, dtype=float).reshape(-1, 3)))
+            np.array(offsets, dtype=float).reshape(len(offsets), 3)))
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -2,7 +2,7 @@
 
 import json
 import sys
-from types import ModuleType
+from types import ModuleType, SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ from hierarchy import HierarchyError, Robot, State
 from hierarchy.avoidance.self_collision import pairs_of_tree
 from hierarchy.errors import RobotError, UnknownNameError
 from hierarchy.robots.points import points_along_chain
-from hierarchy.robots.shapes import bounding_capsule
+from hierarchy.robots.shapes import _capsule_of, bounding_capsule
 from hierarchy.tasks import DangerBounds, JointLimits, Posture, TorqueLimits
 from scenarios.cell.avoidance import separable_pairs
 from scenarios.cell.robot import make_robot
@@ -158,6 +158,14 @@ def test_an_mjcf_with_its_mesh_has_a_capsule_for_it(body, tmp_path):
     robot = Robot.from_file(body())
     assert robot.missing == ()
     assert len(robot.capsules) == 3
+
+
+def test_the_capsule_of_a_cone_has_its_axis():
+    cone = SimpleNamespace(radius=0.1, halfLength=0.4)
+    start, end, radius = _capsule_of(cone, "Cone")
+    np.testing.assert_allclose([*start[:2], *end[:2]], 0.0, atol=1e-12)
+    assert radius == pytest.approx(0.1)
+    assert end[2] + radius == pytest.approx(0.4)
 
 
 @pytest.mark.parametrize("seed", range(5))

@@ -7,7 +7,7 @@ import pytest
 from hand_made import HandMadeScenario, recording
 
 from scenarios.loop import listed
-from scenarios.measure.metrics import as_plain_data, measure
+from scenarios.measure.metrics import Metric, as_plain_data, measure
 
 
 def value(name, **signals):
@@ -47,6 +47,7 @@ def test_an_error_of_a_listed_task_that_only_rounding_makes_is_none(monkeypatch)
         (hand, "m", np.array([0.0, 9e-10, 1e-12, 5e-10, 9e-10])),
         (elbow, "m", np.array([0.0, 0.0, 0.0, 0.0, 1e-9]))])
     found = measure(recording(HandMadeScenario(tasks=(hand, elbow))))
+    assert found["task_hand_rms"].label == "Hand: error, rms"
     for key in ("rms", "max_settled", "end"):
         assert found[f"task_hand_{key}"].value == 0.0
         assert found[f"task_elbow_{key}"].value > 0.0
@@ -89,6 +90,14 @@ def test_a_robot_without_limits_has_no_excess_rather_than_none_of_it():
 def test_changes_are_counted_between_ticks():
     assert value("stack_changes", order=[0, 1, 1, 0, 0]) == 2
     assert value("active_point_changes", active_control_point=[-1, 6, 6, 7, -1]) == 3
+
+
+@pytest.mark.parametrize(("unit", "shown"), [
+    ("m", "12345.679"), ("s", "1.2e+07"), ("deg", "12.346"), ("share", "1234.57"),
+    ("rad", "12.346"), ("rad/s", "12.346"), ("rad/s^2", "12.35"), ("rad/s^3", "12"),
+    ("N", "12.3"), ("", "12")])
+def test_each_unit_has_its_decimals(unit, shown):
+    assert Metric("some", "Some", 12.3456789, unit).shown() == shown
 
 
 def test_times_are_given_by_median_and_tails_for_each_part():

@@ -309,6 +309,11 @@ def test_the_page_has_the_commands_to_run_view_replay_and_draw():
         assert command in text
 
 
+def test_a_comparison_says_in_a_line_what_it_compares():
+    text = repr(comparison(made(LETTER), made("hqp", fault="diverged at tick 5")))
+    assert text == "Comparison(hand-made under tpm-published, hqp; 2 runs, 1 faults)"
+
+
 def test_the_numbers_as_data_hold_the_verdicts():
     both = comparison(made(LETTER), made("hqp"))
     assert both.as_plain_data()["verdicts"] == {"hand-made": list(verdict(both.runs).lines)}

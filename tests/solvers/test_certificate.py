@@ -392,6 +392,21 @@ def test_a_search_leaves_out_columns_of_zeros_and_of_what_is_not_finite(search):
     assert (search(C[:, ::2], np.ones(2), 0.0) == 0.0).all()
 
 
+@pytest.mark.parametrize("length", [1.0, 1e-9])
+def test_the_effect_of_a_row_is_proportional_to_its_length(length):
+    r = rng()
+    view = certificate._View.of(certified_units(r.normal(size=(3, 5))), np.ones(3), 1e-9)
+    row = r.normal(size=(2, 5))
+    effect, terms = view.weighted(length * row)
+    np.testing.assert_allclose(effect, length * view.weighted(row)[0], rtol=1e-9)
+    np.testing.assert_allclose(terms, length * view.weighted(row)[1], rtol=1e-9)
+    assert np.abs(effect).min() > 0.0
+
+
+def certified_units(rows):
+    return rows / np.linalg.norm(rows, axis=1, keepdims=True)
+
+
 def test_a_row_counts_as_parallel_to_another_where_only_rounding_tells_them_apart():
     """Three rows of two directions: the third is the first, but for 1e-13 along the second."""
     P = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 1e-13, 0.0]])

@@ -154,6 +154,12 @@ def test_explain_leaves_out_a_level_that_carries_next_to_nothing(share, blocking
         f"wrist is missed by 1: held back by {blocking}.")
 
 
+def test_rows_that_disagree_pull_at_nothing_above_them():
+    h = Hierarchy.from_levels([([[1.0, 0.0]], [0.0]), ([[0.0, 1.0], [0.0, 1.0]], [0.0, 2.0])])
+    assert explain(h, HCOD.solve(h)).splitlines()[1] == (
+        "level 2 is missed by 1.41: its own rows disagree.")
+
+
 def test_explain_needs_to_know_the_active_set():
     h = Hierarchy.from_levels([([[1.0]], [1.0])])
     with pytest.raises(HierarchyError, match="hcod"):

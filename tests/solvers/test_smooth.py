@@ -155,6 +155,10 @@ def test_what_has_no_answer_is_refused_or_has_a_status():
         SMOOTH.solve(h)
     with pytest.raises(HierarchyError, match=r"walls, row 0: activation 1\.5 is outside 0 \.\. 1"):
         SMOOTH.solve_activated(h, np.array([1.5]))
+    below = Hierarchy.from_levels([(np.eye(2), np.zeros(2)), (np.eye(2), np.zeros(2))],
+                                  names=["walls", "tip"])
+    with pytest.raises(HierarchyError, match=r"tip, row 1: activation -1\.0 is outside 0 \.\. 1"):
+        SMOOTH.solve_activated(below, np.array([1.0, 0.5, 0.0, -1.0]))
     with pytest.raises(HierarchyError, match=r"shape \(2,\), expected \(1,\)"):
         SMOOTH.solve_activated(h, np.ones(2))
     with pytest.raises(HierarchyError, match="eta = 0"):
