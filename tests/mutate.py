@@ -72,7 +72,8 @@ TESTS = {
     "hierarchy/robot": "hierarchy/test_robot hierarchy/test_models",
     "hierarchy/robots/": "hierarchy/test_robot hierarchy/test_models "
                          "hierarchy/test_self_collision scenarios/test_humanoid",
-    "hierarchy/stack": "hierarchy/test_stack hierarchy/test_tasks solvers/test_wrong_types",
+    "hierarchy/stack": "hierarchy/test_stack hierarchy/test_tasks solvers/test_wrong_types "
+                       "hierarchy/test_contacts",
     "hierarchy/state": "hierarchy/test_robot hierarchy/test_stack hierarchy/test_tasks "
                        "solvers/test_wrong_types hierarchy/test_contacts",
     "hierarchy/task": "hierarchy/test_stack hierarchy/test_tasks solvers/test_wrong_types",

@@ -163,10 +163,12 @@ def test_what_has_no_answer_is_refused_or_has_a_status():
         SMOOTH.solve_activated(h, np.ones(2))
     with pytest.raises(HierarchyError, match="eta = 0"):
         make("smooth", eta=0.0)
-    h.lower[0] = np.nan
-    found = SMOOTH.solve_activated(h, np.ones(1))
-    assert found.status is Status.NUMERICAL_FAILURE
-    assert (found.x == 0.0).all()
+    rows = Hierarchy.from_levels([([[1.0, 0.0]], [0.0])])
+    for spoilt, array in ((h, h.lower), (rows, rows.A)):
+        array[0] = np.nan
+        found = SMOOTH.solve_activated(spoilt, np.ones(1))
+        assert found.status is Status.NUMERICAL_FAILURE
+        assert (found.x == 0.0).all()
 
 
 def test_it_is_made_by_name_but_not_listed_since_a_hierarchy_is_not_enough():
