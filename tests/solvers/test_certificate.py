@@ -356,6 +356,17 @@ def test_an_x_too_far_from_the_reference_to_be_judged_is_not_certified(reference
     assert np.isfinite(certify(h, [0.6 * largest]).nearest) == known
 
 
+def test_least_squares_leave_out_a_column_that_only_rounding_tells_from_others():
+    r = rng()
+    for _ in range(20):
+        D, b = r.normal(size=(5, 3)), r.normal(size=5)
+        D[:, 2] = 0.3 * D[:, 0] + 0.7 * D[:, 1]
+        y, left = certificate._least_squares(D, b, np.ones(3, dtype=bool))
+        best = np.linalg.lstsq(D[:, :2], b, rcond=None)[0]
+        assert np.count_nonzero(y) == 2
+        np.testing.assert_allclose(np.abs(left), np.abs(b - D[:, :2] @ best), atol=1e-12)
+
+
 def least_of_all_subsets(C, b):
     """Residual of min |C z - b| over z >= 0, by trying every set of positive entries."""
     residuals = [np.linalg.norm(b)]
