@@ -28,48 +28,48 @@ from hierarchy.errors import HierarchyError, UnknownNameError
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
 
-Door = Literal["tasks", "resolvers", "robots", "plants", "sensors"]
-DOORS: tuple[Door, ...] = get_args(Door)
-_GROUP = "task_hierarchy"
+Group = Literal["tasks", "resolvers", "robots", "plants", "sensors"]
+GROUPS: tuple[Group, ...] = get_args(Group)
+_PREFIX = "task_hierarchy"
 _Thing = TypeVar("_Thing")
 
-_registered: dict[str, dict[str, Any]] = {door: {} for door in DOORS}
+_registered: dict[str, dict[str, Any]] = {group: {} for group in GROUPS}
 _loaded: dict[str, None] = {}   # names of the modules that were allowed, by whatever rule
 _flagged: dict[str, None] = {}  # those of `allow`
 
 
-def register(door: Door, name: str) -> Callable[[_Thing], _Thing]:
+def register(group: Group, name: str) -> Callable[[_Thing], _Thing]:
     """Return a decorator that makes a thing available under a name.
 
-    Raises UnknownNameError for an unknown door, HierarchyError if the name is taken.
+    Raises UnknownNameError for an unknown group, HierarchyError if the name is taken.
     """
-    if door not in DOORS:
-        raise UnknownNameError("door", door, DOORS)
+    if group not in GROUPS:
+        raise UnknownNameError("group", group, GROUPS)
 
     def keep(thing: _Thing) -> _Thing:
-        before = _registered[door].get(name, thing)
-        if _origin(before) != _origin(thing):  # a module that is imported anew is welcome
-            raise HierarchyError(f"{door}: {name!r} is already {_origin(before)}")
-        _registered[door][name] = thing
+        before = _registered[group].get(name, thing)
+        if _origin(before) != _origin(thing):  # a module may be imported again
+            raise HierarchyError(f"{group}: {name!r} is already {_origin(before)}")
+        _registered[group][name] = thing
         return thing
 
     return keep
 
 
-def own(door: Door) -> dict[str, Any]:
-    """Return what is registered at a door by name, and what installed packages offer there."""
-    for point in _points(door):
-        _load(point, door)
-    return dict(_registered[door])
+def own(group: Group) -> dict[str, Any]:
+    """Return what is registered in a group by name, and what installed packages offer in it."""
+    for point in _points(group):
+        _load(point, group)
+    return dict(_registered[group])
 
 
-def find(door: Door, name: str) -> Any | None:
-    """Return what has a name at a door, None if nothing has; loads an entry point of that name."""
-    if name not in _registered[door]:
-        for point in _points(door):
+def find(group: Group, name: str) -> Any | None:
+    """Return what has a name in a group, or None; loads an entry point of that name."""
+    if name not in _registered[group]:
+        for point in _points(group):
             if point.name == name:
-                _load(point, door)
-    return _registered[door].get(name)
+                _load(point, group)
+    return _registered[group].get(name)
 
 
 def allow(module: str) -> None:
@@ -105,11 +105,11 @@ def require(modules: Iterable[str]) -> None:
     """
     for module in modules:
         if module not in _loaded and module not in sys.modules:
-            if not any(point.module == module for door in DOORS for point in _points(door)):
+            if not any(point.module == module for group in GROUPS for point in _points(group)):
                 raise HierarchyError(
                     f"plugin {module!r} is not allowed: a file alone loads no code. If you trust "
                     f"it, add --plugin {module} to the command (in Python: import {module}), or "
-                    f"install a package with an entry point {_GROUP}.* into it")
+                    f"install a package with an entry point {_PREFIX}.* into it")
             _import(module, f"plugin {module!r}")
         _loaded.setdefault(module)
 
@@ -130,26 +130,26 @@ def _sources(file: Path) -> list[Path]:
     return sorted(file.parent.rglob("*.py")) if file.name == "__init__.py" else [file]
 
 
-def _load(point: EntryPoint, door: Door) -> None:
-    if point.name not in _registered[door]:
-        _import(point.module, f"entry point {point.name!r} of {_GROUP}.{door}")
-        if point.name not in _registered[door]:  # unless the module registers it itself
-            register(door, point.name)(_loaded_object(point, door))
+def _load(point: EntryPoint, group: Group) -> None:
+    if point.name not in _registered[group]:
+        _import(point.module, f"entry point {point.name!r} of {_PREFIX}.{group}")
+        if point.name not in _registered[group]:  # unless the module registers it itself
+            register(group, point.name)(_loaded_object(point, group))
     _loaded.setdefault(point.module)
 
 
-def _loaded_object(point: EntryPoint, door: Door) -> Any:
+def _loaded_object(point: EntryPoint, group: Group) -> Any:
     try:
         return point.load()
     except AttributeError as error:
-        raise HierarchyError(f"entry point {point.name!r} of {_GROUP}.{door}: {error}") from error
+        raise HierarchyError(f"entry point {point.name!r} of {_PREFIX}.{group}: {error}") from error
 
 
 @cache
-def _points(door: Door) -> tuple[EntryPoint, ...]:
+def _points(group: Group) -> tuple[EntryPoint, ...]:
     from importlib.metadata import entry_points
 
-    return tuple(entry_points(group=f"{_GROUP}.{door}"))
+    return tuple(entry_points(group=f"{_PREFIX}.{group}"))
 
 
 def _import(module: str, what: str) -> None:

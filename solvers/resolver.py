@@ -103,7 +103,7 @@ class Resolver(ABC):
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)
         if "solve" in vars(cls):
-            cls.solve = _at_the_door(cls.solve)  # type: ignore[assignment,method-assign]
+            cls.solve = _with_checks(cls.solve)  # type: ignore[assignment,method-assign]
 
     def __post_init__(self) -> None:
         self._number("damping", 0.0, math.inf)
@@ -179,7 +179,7 @@ Solve = Callable[[Any, Hierarchy, Array | None], Resolution]
 _ARRAY, _FLOAT = np.ndarray, np.dtype(np.float64)
 
 
-def _at_the_door(solve: Solve) -> Solve:
+def _with_checks(solve: Solve) -> Solve:
     """Return `solve` for hierarchies with a metric too, with errors for arguments of wrong types.
 
     The hierarchy is judged after a failure, which costs a correct call next to nothing.

@@ -31,7 +31,7 @@ def no_plugins(monkeypatch):
     from solvers.resolver import _REGISTRY
 
     monkeypatch.setattr(sys, "path", list(sys.path))
-    monkeypatch.setattr(plugins, "_registered", {door: {} for door in plugins.DOORS})
+    monkeypatch.setattr(plugins, "_registered", {group: {} for group in plugins.GROUPS})
     monkeypatch.setattr(plugins, "_loaded", {})
     monkeypatch.setattr(plugins, "_flagged", {})
     before = dict(_REGISTRY)

@@ -20,7 +20,7 @@ def make_own(section: OwnSection, robot: Robot, **given: Any) -> Any:
     """
     wanted = {"robot": robot, **given}
     maker = section.maker
-    what = f"{section.door[:-1]} of kind {section.kind!r}"
+    what = f"{section.group[:-1]} of kind {section.kind!r}"
     try:
         values = {key: _made(annotation, value, robot)
                   for key, (annotation, value) in section.settings().items()}

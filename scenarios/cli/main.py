@@ -96,9 +96,9 @@ def list_(plugin: Plugins = None, as_json: AsJson = False) -> None:
                              for one in [solvers.make(name)]},
                "tasks": {name: first_line(task) for name, task in TASKS.items()},
                "robots": {name: in_words(table) for name, table in ROBOTS.items()}}
-    for door in plugins.DOORS:
-        if own := plugins.own(door):
-            entries.setdefault(door, {}).update({
+    for group in plugins.GROUPS:
+        if own := plugins.own(group):
+            entries.setdefault(group, {}).update({
                 name: f"{first_line(thing)} (plugin)" for name, thing in own.items()})
     if as_json:
         return print_json(entries)

@@ -6,7 +6,7 @@ from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
-from hierarchy.plugins import Door
+from hierarchy.plugins import Group
 from scenarios.config.own import OwnSection
 from scenarios.config.sections import (
     PLUGIN,
@@ -214,7 +214,7 @@ class ListedCollision(_Apart):
 class OwnTask(Listed, OwnSection):
     """A task of a plugin; its keys are those of the plugin."""
 
-    door: ClassVar[Door] = "tasks"
+    group: ClassVar[Group] = "tasks"
     unit: ClassVar[str] = ""
 
     @property

@@ -16,10 +16,10 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 
 from hierarchy import plugins
 from hierarchy.errors import UnknownNameError
-from hierarchy.plugins import Door
+from hierarchy.plugins import Group
 from scenarios.config.sections import Finite, Flag, PathSection, Section, Whole
 
-GIVEN: dict[Door, tuple[str, ...]] = {
+GIVEN: dict[Group, tuple[str, ...]] = {
     "tasks": ("robot", "state", "name", "kind"),
     "plants": ("robot", "q", "v", "period", "level", "obstacles"),
     "sensors": ("robot", "exact", "body", "tip")}
@@ -30,7 +30,7 @@ class OwnSection(Section):
     """A section whose kind and keys are those of a plugin."""
 
     model_config = ConfigDict(extra="allow")
-    door: ClassVar[Door]
+    group: ClassVar[Group]
     kind: str
 
     @model_validator(mode="after")
@@ -41,14 +41,14 @@ class OwnSection(Section):
     @property
     def maker(self) -> Maker:
         """What the plugin registered under this kind."""
-        found = plugins.find(self.door, self.kind)
+        found = plugins.find(self.group, self.kind)
         assert found is not None, "the kind was found when the section was read"
         return cast(Maker, found)
 
     def settings(self) -> dict[str, tuple[Any, Any]]:
         """Return annotation and value of each key; raises ValueError for a wrong one."""
         given = dict(self.model_extra or {})
-        known = _parameters(self.maker, self.door)
+        known = _parameters(self.maker, self.group)
         try:
             values = _model(known).model_validate(given)
         except ValidationError as error:
@@ -64,7 +64,7 @@ def _said(kind: str, error: Any, known: dict[str, inspect.Parameter]) -> str:
     return f"{key}: {error['msg']}{value}"
 
 
-def _parameters(maker: Maker, door: Door) -> dict[str, inspect.Parameter]:
+def _parameters(maker: Maker, group: Group) -> dict[str, inspect.Parameter]:
     """Return the parameters of a maker that are keys, with annotations that are not text."""
     try:
         hints = get_type_hints(inspect.getattr_static(maker, "__init__")
@@ -73,7 +73,7 @@ def _parameters(maker: Maker, door: Door) -> dict[str, inspect.Parameter]:
         hints = {}
     return {name: parameter.replace(annotation=hints.get(name, Any))
             for name, parameter in inspect.signature(maker).parameters.items()
-            if name not in GIVEN[door] and parameter.kind not in (
+            if name not in GIVEN[group] and parameter.kind not in (
                 inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD)}
 
 

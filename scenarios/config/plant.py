@@ -6,7 +6,7 @@ from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
-from hierarchy.plugins import Door
+from hierarchy.plugins import Group
 from scenarios.config.own import OwnSection
 from scenarios.config.sections import (
     PLUGIN,
@@ -143,7 +143,7 @@ class TorqueSection(_Plant):
 class OwnPlant(_Plant, OwnSection):
     """A plant of a plugin; further keys are those of the plugin."""
 
-    door: ClassVar[Door] = "plants"
+    group: ClassVar[Group] = "plants"
 
 
 PlantKind = Annotated[

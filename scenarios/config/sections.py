@@ -9,7 +9,7 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from hierarchy import plugins
-from hierarchy.plugins import Door
+from hierarchy.plugins import Group
 
 # Strict: true is not 1.0, and "5" is not 5. A whole number may be given for a float.
 Finite = Annotated[float, Field(strict=True, allow_inf_nan=False)]
@@ -37,18 +37,18 @@ class Section(BaseModel):
 PLUGIN = "plugin"  # the tag of sections whose kind a plugin has registered
 
 
-def kind_or(default: str | None, door: Door | None = None, known: Collection[str] = ()
+def kind_or(default: str | None, group: Group | None = None, known: Collection[str] = ()
             ) -> Callable[[Any], str | None]:
     """Return a function that reads the kind of a table or section, `default` if it has none.
 
-    With a `door` the kind is PLUGIN for one that is not `known`, but registered there.
+    With a `group` the kind is PLUGIN for one that is not `known`, but registered there.
     """
     def kind(section: Any) -> str | None:
         found = (section.get("kind", default) if isinstance(section, dict)
                  else getattr(section, "kind", default))
         if not isinstance(found, str):
             return None if found is None else str(found)
-        own = door and found not in known and plugins.find(door, found) is not None
+        own = group and found not in known and plugins.find(group, found) is not None
         return PLUGIN if own else found
 
     return kind

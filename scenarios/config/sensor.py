@@ -6,7 +6,7 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import Discriminator, Field, Tag
 
-from hierarchy.plugins import Door
+from hierarchy.plugins import Group
 from scenarios.config.own import OwnSection
 from scenarios.config.sections import (
     PLUGIN,
@@ -108,7 +108,7 @@ class FramesSection(_ImageSection):
 class OwnSensor(OwnSection):
     """A sensor of a plugin; its keys are those of the plugin."""
 
-    door: ClassVar[Door] = "sensors"
+    group: ClassVar[Group] = "sensors"
     foot: ClassVar[float] = _FOOT
 
 

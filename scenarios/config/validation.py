@@ -60,8 +60,8 @@ def _say(root: type[Section], what: str, error: Any) -> str:
 
 def _with_own(root: type[Section], keys: list[str], tags: str | None) -> str | None:
     """Return the kinds that pydantic lists, with those of plugins in place of their tag."""
-    doors = [section.door for section in sections_at(root, keys) if hasattr(section, "door")]
-    own = "".join(f", {kind!r}" for door in doors[:1] for kind in plugins.own(door))
+    groups = [section.group for section in sections_at(root, keys) if hasattr(section, "group")]
+    own = "".join(f", {kind!r}" for group in groups[:1] for kind in plugins.own(group))
     return tags and tags.replace(f", {PLUGIN!r}", own)
 
 

@@ -361,7 +361,7 @@ def test_two_things_of_one_name_are_refused():
     plugins.register("tasks", "thing")(type("One", (), {}))
     with pytest.raises(HierarchyError, match="tasks: 'thing' is already"):
         plugins.register("tasks", "thing")(type("Two", (), {}))
-    with pytest.raises(HierarchyError, match="unknown door 'task'; did you mean 'tasks'"):
+    with pytest.raises(HierarchyError, match="unknown group 'task'; did you mean 'tasks'"):
         plugins.register("task", "thing")
 
 

@@ -1,4 +1,4 @@
-"""Arguments of a wrong type: each is answered at the door, with what was given and expected."""
+"""Arguments of a wrong type: each is refused with what was given and expected."""
 
 import numpy as np
 import pytest
