@@ -9,6 +9,7 @@ import qpsolvers
 from hierarchy import Hierarchy, HierarchyError, Robot, Stack, State
 from hierarchy.tasks import Position
 from solvers import make
+from solvers.adapters import displacements, from_pink
 from solvers.adapters.displacements import limit_level
 from solvers.adapters.for_pink import solve_ik
 from solvers.adapters.from_pink import PinkTask
@@ -221,6 +222,17 @@ def test_a_barrier_pulls_toward_its_safe_displacement_as_in_pink(configuration):
                                                    **settings), atol=1e-6)
     free = solve_ik(configuration, [[hand]], DT, limits=[])
     assert np.abs(ours - free).max() > 0.01
+
+
+@pytest.mark.parametrize(("own", "added", "centre"), [
+    (0.0, 0.5, [2.0, -4.0]), (0.5, 0.25, [4.0 / 3.0, -2.0 / 3.0]), (2.0, 0.0, [1.0, 1.0]),
+    (0.0, 0.0, [1.0, 1.0])])
+def test_two_pulls_meet_at_their_weighted_mean(own, added, centre):
+    """To (1, 1) with the weight `own`, and to (2, -4) [rad/s] = (0.2, -0.4) rad in 0.1 s."""
+    pull = from_pink._pulled(displacements.Pull(own, np.ones(2)), added * np.eye(2),
+                             -added * np.array([0.2, -0.4]), 0.1)
+    assert pull.weight == own + added
+    np.testing.assert_allclose(pull.centre, centre)
 
 
 def test_pinks_arguments_are_taken_in_pinks_order(configuration):
