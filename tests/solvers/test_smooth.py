@@ -164,8 +164,9 @@ def test_what_has_no_answer_is_refused_or_has_a_status():
     with pytest.raises(HierarchyError, match="eta = 0"):
         make("smooth", eta=0.0)
     rows = Hierarchy.from_levels([([[1.0, 0.0]], [0.0])])
-    for spoilt, array in ((h, h.lower), (rows, rows.A)):
-        array[0] = np.nan
+    for spoilt, array, value in ((h, h.lower, np.nan), (rows, rows.A, np.nan),
+                                 (rows, rows.A, np.inf)):
+        array[0] = value
         found = SMOOTH.solve_activated(spoilt, np.ones(1))
         assert found.status is Status.NUMERICAL_FAILURE
         assert (found.x == 0.0).all()
