@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 from time import perf_counter
 
+from scenarios.cli.options import INTERRUPTED
 from scenarios.cli.progress import bar
 from scenarios.cli.terminal import print_json, shown
 from scenarios.reproduce import rows
@@ -30,7 +31,7 @@ def reproduce_command(names: list[str], out: Path, quick: bool, workers: int | N
         return 1
     except KeyboardInterrupt:
         print("hierarchy: interrupted; the same command continues from here", file=sys.stderr)
-        return 1
+        return INTERRUPTED
     judged = [(claim, claim.judge(found[claim.study])) for claim in CLAIMS if claim.study in found]
     written = [shown(rows.write(one, out)) for one in found.values()]
     if root is not None:

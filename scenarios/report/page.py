@@ -78,7 +78,7 @@ def _picture(name: str, found: Sequence[Motion], look: Mapping[str, Look]) -> di
     if "desired_position" in first:
         caption += " Dashed: the desired path."
     if first.scenario.avoidance is not None:
-        caption += (" Red: obstacles, the distances of the avoidance around them, and control points; the "
-                    "robot is solid at its closest approach to an obstacle.")
+        caption += (" Red: obstacles, the distances of the avoidance around them, and control "
+                    "points; the robot is solid at its closest approach to an obstacle.")
     fig = picture(moved, {label: look[label].colour for label in moved})
     return {"picture": drawn(fig, f"{name}: the paths taken"), "caption": caption}
