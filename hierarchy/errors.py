@@ -3,7 +3,14 @@
 from __future__ import annotations
 
 import difflib
+import os
 from collections.abc import Iterable
+from math import inf, isfinite
+from numbers import Real
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
 
 _NEAR = 0.6  # similarity of two names, 0 to 1, from which one is suggested
 
@@ -33,9 +40,46 @@ def _containing(name: str, known: Iterable[str]) -> list[str]:
 def expect(what: str, value: object, kind: type, remedy: str) -> None:
     """Raise a HierarchyError that says what was given and what is expected, or return None."""
     if not isinstance(value, kind):
-        article = "an" if kind.__name__[0] in "AEIOU" else "a"
+        article = "an" if kind.__name__[0] in "AEIOUaeiou" else "a"
         raise HierarchyError(f"{what}: expected {article} {kind.__name__}, got {brief(value)}; "
                              f"{remedy}")
+
+
+def number(what: str, value: object, least: float = -inf, largest: float = inf) -> float:
+    """Return a finite number from `least` to `largest`; raise a HierarchyError for anything else.
+
+    True and False are no numbers here.
+    """
+    if isinstance(value, Real) and not isinstance(value, bool | np.bool_):
+        found = float(value)
+        if isfinite(found) and least <= found <= largest:
+            return found
+    between = (f" from {least:g} to {largest:g}" if isfinite(largest) else
+               f" from {least:g} on" if isfinite(least) else "")
+    raise HierarchyError(f"{what}: expected a finite number{between}, got {brief(value)}")
+
+
+def finite_numbers(what: str, values: object, size: int | None = None) -> NDArray[np.float64]:
+    """Return finite numbers (size,); raise a HierarchyError for anything else.
+
+    Without `size` there may be any number of them, but one.
+    """
+    try:
+        found = np.asarray(values)
+    except ValueError:
+        found = np.asarray(None)
+    count = "" if size is None else f"{size} "
+    if (found.dtype.kind not in "iuf" or found.ndim != 1 or not found.size
+            or size not in (None, found.size) or not np.isfinite(found).all()):
+        raise HierarchyError(f"{what}: expected {count}finite numbers, got {brief(values)}")
+    return found.astype(float)
+
+
+def file_path(what: str, value: object) -> Path:
+    """Return a path; raise a HierarchyError unless it is a text or a path."""
+    if not isinstance(value, str | os.PathLike) or not str(value).strip():
+        raise HierarchyError(f"{what}: expected a path, got {brief(value)}")
+    return Path(value)
 
 
 def brief(value: object) -> str:

@@ -213,7 +213,7 @@ def _array(what: str, value: Any) -> Array:
         given = np.asarray(value)
         if given.dtype.kind in _NUMBERS:
             return np.array(given, dtype=np.float64)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise HierarchyError(f"{what} is not an array of numbers: {brief(value)}") from error
     kind = "real numbers: it is complex," if given.dtype.kind == "c" else "numbers:"
     raise HierarchyError(f"{what} is not an array of {kind} {brief(value)}")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import pinocchio as pin
@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from hierarchy import plugins
 from hierarchy.avoidance.control_points import ControlPoint
 from hierarchy.avoidance.self_collision import Capsule
-from hierarchy.errors import RobotError, UnknownNameError, expect
+from hierarchy.errors import RobotError, UnknownNameError, expect, finite_numbers
 from hierarchy.problem import Array
 from hierarchy.robots import TABLES
 from hierarchy.robots.files import read_file
@@ -158,6 +158,9 @@ class Robot:
         download files. `locked` joints of a file are fixed at a position [rad or m] and are not
         joints of the robot. Raises RobotError and UnknownNameError.
         """
+        if base not in (None, *get_args(Base)):
+            raise RobotError(f"robot {str(model)!r}: base must be one of {get_args(Base)}, got "
+                             f"{base!r}")
         model = str(model)
         if in_package(model):
             robot = cls.from_file(file_of(model), end_effector, base, locked=locked)
@@ -230,13 +233,15 @@ class Robot:
     def control_point(self, joint: str, offset: ArrayLike,
                       name: str | None = None) -> ControlPoint:
         """Attach a point to the body that `joint` moves; offset (3,) [m] in that joint's frame."""
+        place = finite_numbers(f"control point on {joint!r}: offset", offset, 3)
         return ControlPoint(name or f"{joint} {np.asarray(offset).tolist()}", self.joint(joint),
-                            np.array(offset, dtype=float))
+                            place)
 
     def control_point_of_frame(self, frame: str, offset: ArrayLike) -> ControlPoint:
         """Attach a point to the body that carries `frame`; offset (3,) [m] in that frame."""
         held = self.frame(frame)
-        place = held.offset + held.rotation @ np.asarray(offset, dtype=float)
+        place = held.offset + held.rotation @ finite_numbers(
+            f"control point in {frame!r}: offset", offset, 3)
         return ControlPoint(f"{frame} {np.asarray(offset).tolist()}", held.joint, place)
 
     def bodies(self) -> tuple[Body, ...]:

@@ -54,6 +54,8 @@ class Stack:
             raise HierarchyError(
                 "level 'torque' needs contacts, Contacts(robot) for none" if contacts is None else
                 f"contacts need the level 'torque', not {level!r}")
+        if reference is not None:
+            expect("reference of a stack", reference, Task, "give a task such as Posture")
         self.level: Level = level
         self.reference, self.contacts = reference, contacts
         self._metric = _metric(metric, contacts)
@@ -87,6 +89,7 @@ class Stack:
             raise HierarchyError(f"the stack already has a task {task.name!r}")
         _check_forces(task, self.level, self.contacts)
         position = len(self._order) if index is None else index
+        expect(f"task {task.name!r}: index", position, int, "0 is the most important")
         if not 0 <= position <= len(self._order):
             raise HierarchyError(f"task {task.name!r}: index {index} is outside "
                                  f"0 .. {len(self._order)}")
@@ -143,6 +146,9 @@ class Stack:
         known = self._prepared.get(order)
         h = self._buffers(order, state.n) if known is None else known.hierarchy
         h.metric = state.dynamics.M if isinstance(self._metric, str) else self._metric
+        if h.metric is not None and len(h.metric) != h.n:
+            raise HierarchyError(f"metric of the stack: it has shape {h.metric.shape}, expected "
+                                 f"({h.n}, {h.n})")
         writers = [writer_in_stack(self[name], state, self.level, h.A, h.lower, h.upper, int(row))
                    for name, row in zip(order, h.offsets, strict=False)]
         if self.reference is not None:

@@ -13,7 +13,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from hierarchy.avoidance.measurement import Measurement
-from hierarchy.errors import RobotError, brief, expect
+from hierarchy.errors import RobotError, brief, expect, number
 from hierarchy.jit import compiled
 from hierarchy.kinematics import Kinematics
 from hierarchy.notebook import numbers
@@ -60,6 +60,9 @@ class State:
     """
 
     def __init__(self, robot: Robot, differences: float | None = None) -> None:
+        expect("State: robot", robot, Robot, "make one with Robot.load(name or file)")
+        if differences is not None:
+            number("State: differences [s]", differences, 0.0)
         self.robot = robot
         self.t = 0.0
         self.q, self.v = pin.neutral(robot.model), np.zeros(robot.n)
@@ -89,6 +92,7 @@ class State:
         RobotError where a shape is wrong or an entry is not finite.
         """
         expect("State.at: robot", robot, Robot, "make one with Robot.load(name or file)")
+        number("State.at: t", t)
         state = cls(robot, differences)
         state.move(t, _checked(robot, "q", q, robot.coordinate_names),
                    _checked(robot, "v", np.zeros(robot.n) if v is None else v,
@@ -158,14 +162,22 @@ class State:
         """Joint efforts h(q, v) (n,) [N m or N] of gravity, Coriolis and centrifugal forces."""
         return np.asarray(pin.nonLinearEffects(self._model, self._data, self.q, self.v))
 
-    def position(self, frame: Frame) -> Array:
-        """World position (3,) [m] of a frame's origin."""
-        rotation, translation = self._placement(frame.joint)
-        return translation + rotation @ frame.offset
+    def position(self, frame: Frame | str) -> Array:
+        """World position (3,) [m] of the origin of a frame, or of the frame of that name."""
+        known = self._frame(frame)
+        rotation, translation = self._placement(known.joint)
+        return translation + rotation @ known.offset
 
-    def rotation(self, frame: Frame) -> Array:
-        """World orientation (3, 3) of a frame."""
-        return self._placement(frame.joint)[0] @ frame.rotation
+    def rotation(self, frame: Frame | str) -> Array:
+        """World orientation (3, 3) of a frame, or of the frame of that name."""
+        known = self._frame(frame)
+        return self._placement(known.joint)[0] @ known.rotation
+
+    def _frame(self, frame: Frame | str) -> Frame:
+        if isinstance(frame, str):
+            return self.robot.frame(frame)
+        expect("frame", frame, Frame, "make one with robot.frame(name)")
+        return frame
 
     def _placement(self, joint: int) -> tuple[Array, Array]:
         row = self.placements[joint]
@@ -227,7 +239,7 @@ def _supports(model: Any) -> NDArray[np.bool_]:
 def _checked(robot: Robot, what: str, value: ArrayLike, names: Sequence[str]) -> Array:
     try:
         vector = np.array(value, dtype=float)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise RobotError(f"robot {robot.name!r}: {what} is not an array of numbers: "
                          f"{brief(value)}") from None
     if vector.shape != (len(names),):

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from typing import TYPE_CHECKING, ClassVar, Literal
+from dataclasses import MISSING, fields, is_dataclass
+from typing import TYPE_CHECKING, ClassVar, Literal, get_args
 
 import numpy as np
 
 from hierarchy.contacts import Contacts
-from hierarchy.errors import HierarchyError, brief
+from hierarchy.errors import HierarchyError, brief, expect
 from hierarchy.paths import Path
 from hierarchy.problem import Array, check_rows
+from hierarchy.robot import Frame, Robot
 
 if TYPE_CHECKING:
     from hierarchy.state import State
@@ -127,7 +129,8 @@ def check_gains(task: Task) -> None:
     for gain in ("stiffness", "damping", "gain"):
         value = getattr(task, gain)
         try:
-            sound = bool((np.asarray(value, dtype=float) >= 0.0).all())
+            sides = np.asarray(value)
+            sound = bool(sides.dtype.kind in "iuf" and ((sides >= 0.0) & (sides < np.inf)).all())
         except (TypeError, ValueError):
             sound = False
         if not sound:
@@ -139,14 +142,30 @@ def check_parts(task: Task) -> None:
 
     A task has no robot at hand in which it could look up a frame.
     """
-    for part, remedy in (("robot", "Robot.load({!r})"), ("frame", "robot.frame({!r})")):
-        if isinstance(value := getattr(task, part, None), str):
+    if not isinstance(task.name, str) or not task.name:
+        raise HierarchyError(f"{type(task).__name__}: name: expected a text, got "
+                             f"{brief(task.name)}")
+    for part, kind, remedy in (("robot", Robot, "Robot.load({!r})"),
+                               ("frame", Frame, "robot.frame({!r})")):
+        value = getattr(task, part, None)
+        if isinstance(value, str):
             raise HierarchyError(f"task {task.name!r}: {part} is the name {value!r}; give "
                                  f"{remedy.format(value)}")
+        if part in _needed(task):
+            expect(f"task {task.name!r}: {part}", value, kind, f"give {remedy.format('NAME')}")
+    if task.kind not in get_args(Kind):
+        raise HierarchyError(f"task {task.name!r}: kind must be 'equality' or 'inequality', got "
+                             f"{task.kind!r}")
     path = getattr(task, "path", None)
-    if path is not None and not isinstance(path, Path):
+    if (path is not None or "path" in _needed(task)) and not isinstance(path, Path):
         raise HierarchyError(f"task {task.name!r}: path is a {brief(path)}; give a path of "
                              "hierarchy.paths, such as Still([x, y, z])")
+
+
+def _needed(task: Task) -> set[str]:
+    """Return the names of a task's fields that have no default."""
+    return {part.name for part in fields(task) if part.default is MISSING} \
+        if is_dataclass(task) else set()
 
 
 def writer_in_stack(task: Task, state: State, level: Level, A: Array, lower: Array, upper: Array,
@@ -170,7 +189,11 @@ def along(path: Path, target: Array, state: State,
 
 
 def _shaped(task: Task, what: str, value: Array, shape: tuple[int, ...]) -> Array:
-    array = np.asarray(value, dtype=float)
+    try:
+        array = np.asarray(value, dtype=float)
+    except (TypeError, ValueError):
+        raise HierarchyError(f"task {task.name!r}: {what} is no array of numbers: {brief(value)}"
+                             ) from None
     if array.shape != shape:
         raise HierarchyError(f"task {task.name!r}: {what} has shape {array.shape}, "
                              f"expected {shape}")

@@ -38,7 +38,7 @@ import numpy as np
 from numpy.linalg import norm
 from numpy.typing import ArrayLike, NDArray
 
-from hierarchy.errors import expect
+from hierarchy.errors import expect, number
 from hierarchy.notebook import html_table
 from hierarchy.problem import Array, Hierarchy
 
@@ -150,6 +150,8 @@ def certify(h: Hierarchy, x: ArrayLike, tolerance: float = TOLERANCE,
     HierarchyError : x has the wrong shape.
     """
     expect("certify: h", h, Hierarchy, "make one with Hierarchy.from_levels([(A, b), ...])")
+    number("certify: tolerance", tolerance, 0.0)
+    number("certify: parallel [rad]", parallel, 0.0)
     with np.errstate(all="ignore"):
         slack = h.slacks(x)
         h, x = _euclidean(h, np.asarray(x, dtype=np.float64))

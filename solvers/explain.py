@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from hierarchy.errors import HierarchyError, expect
+from hierarchy.errors import HierarchyError, brief, expect, number
 from hierarchy.problem import Array, Hierarchy
 from hierarchy.words import listed
 from solvers.resolver import Resolution
@@ -31,6 +31,9 @@ def explain(h: Hierarchy, resolution: Resolution, tolerance: float = 1e-9,
     named = rows is not None
     if rows is None:
         rows = [f"row {i}" for size in h.sizes for i in range(size)]
+    number("explain: tolerance", tolerance, 0.0)
+    if isinstance(rows, str) or not isinstance(rows, Sequence):
+        raise HierarchyError(f"explain: rows: expected a list of names, got {brief(rows)}")
     if len(rows) != h.m:
         raise HierarchyError(f"explain: {len(rows)} names for {h.m} rows")
     if not isinstance(resolution, ActiveSetResolution):

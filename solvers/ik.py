@@ -13,7 +13,7 @@ from typing import NamedTuple, final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hierarchy.errors import HierarchyError, expect
+from hierarchy.errors import HierarchyError, brief, expect, number
 from hierarchy.notebook import numbers
 from hierarchy.problem import Array
 from hierarchy.robot import Robot
@@ -63,8 +63,13 @@ def solve_ik(robot: Robot, q: ArrayLike, tasks: Sequence[Task], *, dt: float = 0
     """
     expect("solve_ik: robot", robot, Robot, "make one with Robot.load(name or file)")
     expect("solve_ik: tasks", tasks, Sequence, "give a list of tasks")
-    if not 0.0 < dt < np.inf:
+    if number("solve_ik: dt [s]", dt) <= 0.0:
         raise HierarchyError(f"solve_ik: dt = {dt} s must be positive and finite")
+    if not isinstance(limits, bool | Task):
+        raise HierarchyError("solve_ik: limits: expected True, False or a task, got "
+                             f"{brief(limits)}")
+    if not isinstance(resolver, str):
+        expect("solve_ik: resolver", resolver, Resolver, "give a name of solvers.names()")
     first = [limits] if isinstance(limits, Task) else [StepLimits(robot, dt)] if limits else []
     h = Stack([*first, *tasks], "velocity").hierarchy(State.at(robot, q, t=t))
     found = (make(resolver) if isinstance(resolver, str) else resolver).solve(h, memory)

@@ -11,7 +11,7 @@ from math import cos, inf, sin
 
 import numpy as np
 
-from hierarchy.errors import HierarchyError
+from hierarchy.errors import HierarchyError, finite_numbers, number
 from hierarchy.jit import bind, compiled
 from hierarchy.problem import Array
 from hierarchy.records import set_frozen
@@ -65,8 +65,7 @@ class Ellipse(Path):
     def __post_init__(self) -> None:
         for name in ("centre", "cosine", "sine"):
             check_point(name, getattr(self, name))
-        if not abs(self.rate) < inf:
-            raise HierarchyError(f"ellipse: rate {self.rate} is not finite")
+        number("ellipse: rate", self.rate)
         set_frozen(self, _packed=np.array([self.centre, self.cosine, self.sine], dtype=float))
 
     def write(self, t: float, out: Array) -> None:
@@ -162,9 +161,11 @@ class Jittered(Path):
 
 def check_point(name: str, vector: Vector) -> None:
     """Raise a HierarchyError unless a vector is three finite numbers, or return None."""
-    array = np.asarray(vector, dtype=float)
-    if array.shape != (3,) or not np.isfinite(array).all():
-        raise HierarchyError(f"{name} must be three finite numbers [m], got {list(vector)}")
+    try:
+        finite_numbers(name, vector, 3)
+    except HierarchyError as error:
+        given = list(vector) if isinstance(vector, Sequence | np.ndarray) else vector
+        raise HierarchyError(f"{name} must be three finite numbers [m], got {given!r}") from error
 
 
 @compiled

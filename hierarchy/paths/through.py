@@ -10,7 +10,7 @@ from pathlib import Path as File
 
 import numpy as np
 
-from hierarchy.errors import HierarchyError
+from hierarchy.errors import HierarchyError, brief, number
 from hierarchy.paths.path import Path, Vector, check_point
 from hierarchy.problem import Array
 from hierarchy.records import set_frozen
@@ -124,15 +124,15 @@ class Recorded(Path):
         Raises HierarchyError, naming the file and the line, if it is not that.
         """
         rows: list[list[float]] = []
-        for number, line_ in enumerate(_lines(file), 1):
+        for count, line_ in enumerate(_lines(file), 1):
             try:
                 numbers = [float(part) for part in line_.split(",")]
             except ValueError:
-                if number == 1:  # names of columns
+                if count == 1:  # names of columns
                     continue
                 numbers = []
             if len(numbers) != 4:
-                raise HierarchyError(f"{file}, line {number}: expected t, x, y, z, got {line_!r}")
+                raise HierarchyError(f"{file}, line {count}: expected t, x, y, z, got {line_!r}")
             rows.append(numbers)
         try:
             return cls([row[0] for row in rows], [row[1:] for row in rows])
@@ -189,8 +189,13 @@ def _lines(file: str | File) -> list[str]:
 
 
 def _check_points(what: str, times: Sequence[float], points: Sequence[Vector]) -> None:
+    for name, given in (("times", times), ("points", points)):
+        if isinstance(given, str) or not isinstance(given, Sequence | np.ndarray):
+            raise HierarchyError(f"{what}: {name}: expected a list, got {brief(given)}")
     if len(times) != len(points) or not len(times):
         raise HierarchyError(f"{what}: {len(times)} times for {len(points)} points")
+    for i, time in enumerate(times):
+        number(f"{what}: times[{i}]", time)
     for a, b in pairwise(times):
         if not a < b < inf:
             raise HierarchyError(f"{what}: times must increase, got {a} and then {b}")

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from hierarchy.errors import HierarchyError
+from hierarchy.errors import HierarchyError, expect, number
 from hierarchy.problem import Array
 from hierarchy.records import set_frozen
 from hierarchy.robot import Robot
@@ -37,6 +37,10 @@ class JointCoupling(Task):
     def __post_init__(self) -> None:
         super().__post_init__()
         check_parts(self)
+        expect(f"task {self.name!r}: joints", self.joints, Mapping, "give {name: factor, ...}")
+        for name, factor in self.joints.items():
+            number(f"task {self.name!r}: joints.{name}", factor)
+        number(f"task {self.name!r}: value", self.value)
         if not any(self.joints.values()):
             raise HierarchyError(f"task {self.name!r}: joints {dict(self.joints)} have no factor "
                                  "other than zero")

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hierarchy.errors import HierarchyError
+from hierarchy.errors import HierarchyError, brief, number
 from hierarchy.jit import bind
 from hierarchy.kinematics import write_identity
 from hierarchy.limits import Limits, write_box
@@ -46,13 +46,12 @@ class JointLimits(JointRows):
     def __post_init__(self) -> None:
         super().__post_init__()
         check_parts(self)
-        robot, acceleration = self.robot, np.asarray(self.acceleration, dtype=float)
+        robot, acceleration = self.robot, _numbers(self.name, self.acceleration)
         n, of_joints = robot.n - robot.actuated, slice(robot.actuated, robot.n)
         if acceleration.shape not in ((), (n,)):
             raise HierarchyError(f"task {self.name!r}: acceleration has shape "
                                  f"{acceleration.shape}, expected a number or ({n},)")
-        if not 0.0 <= self.margin < np.inf:
-            raise HierarchyError(f"task {self.name!r}: margin {self.margin} must not be negative")
+        number(f"task {self.name!r}: margin", self.margin, 0.0)
         lower, upper = robot.position_limits()
         for i in np.flatnonzero(upper - lower < 2.0 * self.margin)[:1]:
             raise HierarchyError(f"task {self.name!r}: margin {self.margin:g} leaves "
@@ -121,3 +120,11 @@ class JointLimits(JointRows):
         rates: Array = state.v if commanded is None else commanded
         first = self.robot.actuated
         return rates[first:] if first else rates
+
+
+def _numbers(name: str, value: ArrayLike) -> Array:
+    try:
+        return np.asarray(value, dtype=float)
+    except (TypeError, ValueError):
+        raise HierarchyError(f"task {name!r}: acceleration: expected numbers, got {brief(value)}"
+                             ) from None

@@ -10,9 +10,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hierarchy.errors import HierarchyError
 from hierarchy.jit import bind, compiled
 from hierarchy.kinematics import row_times, write_equality
+from hierarchy.paths.path import check_point
 from hierarchy.problem import Array
 from hierarchy.records import set_frozen
 from hierarchy.robot import Frame
@@ -61,11 +61,8 @@ class LookAt(Geometric):
     def __post_init__(self) -> None:
         super().__post_init__()
         check_parts(self)
-        point = np.array(self.target, dtype=float)
-        if point.shape != (3,) or not np.isfinite(point).all():
-            raise HierarchyError(f"task {self.name!r}: target {list(self.target)} must be three "
-                                 "finite numbers [m]")
-        set_frozen(self, point=point)
+        check_point(f"task {self.name!r}: target", self.target)
+        set_frozen(self, point=np.array(self.target, dtype=float))
 
     @property
     def dimension(self) -> int:

@@ -15,7 +15,7 @@ from typing import Literal
 
 import numpy as np
 
-from hierarchy.errors import HierarchyError
+from hierarchy.errors import HierarchyError, number
 from hierarchy.jit import compiled
 from hierarchy.problem import Array
 from hierarchy.robot import Frame
@@ -48,8 +48,7 @@ class Manipulability(Geometric):
     def __post_init__(self) -> None:
         super().__post_init__()
         check_parts(self)
-        if not 0.0 <= self.least < np.inf:
-            raise HierarchyError(f"task {self.name!r}: least = {self.least} must not be negative")
+        number(f"task {self.name!r}: least", self.least, 0.0)
         if self.part not in ("position", "pose"):
             raise HierarchyError(f"task {self.name!r}: part must be 'position' or 'pose', got "
                                  f"{self.part!r}")

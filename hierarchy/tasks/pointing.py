@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hierarchy.errors import HierarchyError
+from hierarchy.errors import HierarchyError, finite_numbers, number
 from hierarchy.jit import bind, compiled, inlined
 from hierarchy.kinematics import axis_at, subtract_over_period, velocity_of_point
 from hierarchy.problem import Array
@@ -45,13 +45,11 @@ class Pointing(Task):
     def __post_init__(self) -> None:
         super().__post_init__()
         check_parts(self)
-        axis = np.array(self.axis, dtype=float)
+        axis = finite_numbers(f"task {self.name!r}: axis", self.axis)
         length = float(np.linalg.norm(axis))
         if axis.shape != (3,) or not 1e-9 < length < np.inf:
             raise HierarchyError(f"task {self.name!r}: axis {list(self.axis)} has no direction")
-        if not 0.0 <= self.half_angle <= np.pi:
-            raise HierarchyError(f"task {self.name!r}: half_angle {self.half_angle} rad is "
-                                 "outside 0 .. pi")
+        number(f"task {self.name!r}: half_angle [rad]", self.half_angle, 0.0, np.pi)
         set_frozen(self, z_d=axis / length, cos_alpha_d=cos(self.half_angle),
                    z_e=np.ascontiguousarray(self.frame.rotation[:, 2]))
 

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from hierarchy.errors import HierarchyError, brief
 from hierarchy.jit import bind, compiled
 from hierarchy.kinematics import (
     drift_of_point,
@@ -28,6 +29,19 @@ from hierarchy.problem import Array
 from hierarchy.robot import Frame
 from hierarchy.state import State
 from hierarchy.task import Level, Task, along, check_parts
+
+_TURNED = 1e-6  # of R R^T from the identity
+
+
+def check_rotation(what: str, rotation: ArrayLike) -> None:
+    """Raise a HierarchyError unless a matrix is a rotation (3, 3), or return None."""
+    try:
+        R = np.asarray(rotation, dtype=float)
+    except (TypeError, ValueError):
+        R = np.empty(0)
+    if R.shape != (3, 3) or not np.allclose(R @ R.T, np.eye(3), atol=_TURNED) or (
+            np.linalg.det(R) < 0.0):
+        raise HierarchyError(f"{what}: expected a rotation matrix (3, 3), got {brief(rotation)}")
 
 
 @dataclass(frozen=True)
@@ -49,6 +63,7 @@ class Pose(Task):
     def __post_init__(self) -> None:
         super().__post_init__()
         check_parts(self)
+        check_rotation(f"task {self.name!r}: rotation", self.rotation)
 
     @property
     def dimension(self) -> int:

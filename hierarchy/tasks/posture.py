@@ -10,7 +10,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from hierarchy.errors import HierarchyError
+from hierarchy.errors import HierarchyError, finite_numbers, number
 from hierarchy.jit import bind, compiled
 from hierarchy.kinematics import write_equality, write_identity
 from hierarchy.problem import Array
@@ -49,6 +49,10 @@ class Posture(JointTask):
     damping: float = 5.0
     gain: float = 1.0
     name: str = "posture"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        finite_numbers(f"task {self.name!r}: target", self.target)
 
     @property
     def joints(self) -> int:  # type: ignore[override]
@@ -104,8 +108,7 @@ class JointDamping(JointTask):
         if self.weight not in ("identity", "mass"):
             raise HierarchyError(f"task {self.name!r}: weight must be 'identity' or 'mass', got "
                                  f"{self.weight!r}")
-        if not 0.0 <= self.damping < np.inf:
-            raise HierarchyError(f"task {self.name!r}: damping {self.damping} must not be negative")
+        number(f"task {self.name!r}: damping", self.damping, 0.0)
 
     def error(self, state: State) -> Array:
         """Zero (n,), because there is no target position."""

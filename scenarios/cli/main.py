@@ -2,7 +2,7 @@
 
 Heavy imports happen only when needed, so that `--help` and completion are fast. With `--json` a
 command prints one JSON object on standard output and nothing else there. Exit codes: 0 done, 1 a
-run stopped with a reported fault, 2 the command line or a file is invalid.
+run stopped with a reported fault, 2 the command line or a file is invalid, 130 Ctrl-C.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ import typer
 from scenarios.cli import completion
 from scenarios.cli.bench import bench
 from scenarios.cli.options import (
+    INTERRUPTED,
     PORT,
     AsJson,
     Browser,
@@ -47,12 +48,12 @@ def main() -> None:
 def run_command(arguments: list[str]) -> int:
     """Run a command line and return its exit code; errors become one line on stderr."""
     try:
-        return int(app(arguments or ["--help"], prog_name="hierarchy", standalone_mode=False) or 0)
+        code = app(arguments or ["--help"], prog_name="hierarchy", standalone_mode=False)
+        return int(code or 0) if code != INTERRUPTED else _interrupted()
     except typer.TyperException as error:
         return _wrong(error.format_message())
     except (KeyboardInterrupt, typer.Abort):
-        print("hierarchy: interrupted", file=sys.stderr)
-        return 1
+        return _interrupted()
     except Exception as error:
         from hierarchy.errors import HierarchyError
 
@@ -375,6 +376,11 @@ def _split(specs: str) -> list[str]:
     if not all(named):
         raise typer.BadParameter(f"an empty name in {specs!r}", param_hint="--resolvers")
     return named
+
+
+def _interrupted() -> int:
+    print("hierarchy: interrupted", file=sys.stderr)
+    return INTERRUPTED
 
 
 def _wrong(text: str) -> int:

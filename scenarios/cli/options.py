@@ -46,6 +46,7 @@ Workers = Annotated[int | None, typer.Option(
 Scheduler = Annotated[str | None, typer.Option(
     "--scheduler", metavar="ADDRESS", help="Use the workers of this Dask scheduler instead.")]
 PORT = 8080
+INTERRUPTED = 130  # exit code of a command that Ctrl-C ended
 Port = Annotated[int, typer.Option("--port", metavar="N", min=0, max=65535,
                                    help="Port of the page on 127.0.0.1; 0 for any free port.")]
 Browser = Annotated[bool, typer.Option("--browser/--no-browser",

@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 from time import perf_counter
 
+from scenarios.cli.options import INTERRUPTED
 from scenarios.cli.progress import bar
 from scenarios.cli.terminal import print_json, shown
 from scenarios.reproduce import rows
@@ -34,7 +35,7 @@ def reproduce_command(names: list[str], out: Path, quick: bool, workers: int | N
         return 1
     except KeyboardInterrupt:
         _say("hierarchy: interrupted; the same command continues from here")
-        return 1
+        return INTERRUPTED
     written = [rows.write(one, out) for one in found.values()]
     if root:
         written += write_documents(found, printed, root)

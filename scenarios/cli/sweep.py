@@ -9,6 +9,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING
 
+from scenarios.cli.options import INTERRUPTED
 from scenarios.cli.progress import bar
 from scenarios.cli.terminal import print_json
 from scenarios.sweep.config import load_sweep
@@ -54,7 +55,7 @@ def _carried_out(folder: Path, as_json: bool, make: Callable[[Progress | None], 
         return 1
     except KeyboardInterrupt:
         print("hierarchy: interrupted; the same command continues from here", file=sys.stderr)
-        return 1
+        return INTERRUPTED
     if as_json:
         print_json({"folder": str(folder), "report": str(folder / "index.html"),
                     "table": str(folder / "runs.parquet"),

@@ -10,6 +10,7 @@ import tomllib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
+from hierarchy.errors import brief, expect
 from scenarios.config.errors import ScenarioError
 
 
@@ -27,7 +28,11 @@ TagAt = Callable[[Sequence[str]], Tag | None]
 def parse_changes(changes: Sequence[str], what: str) -> dict[str, Any]:
     """Return keys and values of "key=value" texts; a ScenarioError starts with `what`."""
     parsed = {}
+    if isinstance(changes, str) or not isinstance(changes, Sequence):
+        raise ScenarioError(f"{what}: expected a list of \"key=value\", got {brief(changes)}")
     for change in changes:
+        if not isinstance(change, str):
+            raise ScenarioError(f"{what}: expected \"key=value\", got {brief(change)}")
         key, equals, text = change.partition("=")
         if not equals or not key.strip():
             raise ScenarioError(f"{what}: expected key=value, got {change!r}")
@@ -109,6 +114,9 @@ def change_all(data: dict[str, Any], changes: Mapping[str, Any], tag_at: TagAt) 
 
     Raises ScenarioError like `change`.
     """
+    expect("changes", changes, Mapping, "give {\"section.key\": value, ...}")
+    for key in changes:
+        expect("changes: a key", key, str, "such as \"control.period\"")
     kinds = {key for key in changes if _says_kind(key, tag_at)}
     for key in sorted(changes, key=lambda key: key not in kinds):  # kinds first, else as given
         if key in kinds:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from hierarchy import plugins
-from hierarchy.errors import HierarchyError, UnknownNameError
+from hierarchy.errors import HierarchyError, UnknownNameError, file_path
 from hierarchy.robots.names import in_package
 from scenarios.config.avoidance import as_table
 from scenarios.config.changes import change_all, laid_over, parse_changes
@@ -36,7 +36,7 @@ def load(name_or_path: str | Path, changes: Sequence[str] | Mapping[str, Any] = 
     scenarios.config.changes. Raises ScenarioError, naming the file and the key, and
     UnknownNameError for an unknown name.
     """
-    path = Path(name_or_path)
+    path = file_path("load", name_or_path)
     if path.suffix != ".toml":
         _check_name(str(name_or_path))
         path = LIBRARY / f"{name_or_path}.toml"

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
-from hierarchy.errors import HierarchyError
+from hierarchy.errors import HierarchyError, brief
 from solvers.qp import backends
 from solvers.resolver import Handles
 
@@ -37,6 +37,8 @@ def usable(scenario: Scenario, specs: Sequence[str] | None
     `specs` None stands for the installed ones of DEFAULT_RESOLVERS.
     """
     wanted = default_resolvers(scenario.asks)[0] if specs is None else specs
+    if isinstance(wanted, str) or not isinstance(wanted, Iterable):
+        raise HierarchyError(f"resolvers: expected a list of names, got {brief(wanted)}")
     can, refused = {}, []
     for spec in dict.fromkeys(wanted):
         changed = scenario.with_resolver(spec)

@@ -12,6 +12,7 @@ import tomli_w
 from pydantic import Field, field_validator, model_validator
 
 from hierarchy import plugins
+from hierarchy.errors import expect
 from scenarios.config.avoidance import AvoidanceKind
 from scenarios.config.changes import Tag, change_all, parse_changes, without_none
 from scenarios.config.contacts import ContactSection, ForcesSection
@@ -219,6 +220,7 @@ class Scenario(Section):
         """
         from solvers import make
 
+        expect("with_resolver", spec, str, "give name or name:setting=value")
         if spec == OWN:
             return self
         name, *settings = spec.split(":")

@@ -61,7 +61,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import TypeAdapter
 
-from hierarchy.errors import HierarchyError, UnknownNameError
+from hierarchy.errors import HierarchyError, UnknownNameError, file_path
 from scenarios.files import write_json
 from scenarios.loop import notebook
 from scenarios.loop.depth_view import DepthView
@@ -190,7 +190,7 @@ def load_run(folder: str | Path) -> Recording:
     """
     from scenarios.config import load
 
-    path = Path(folder)
+    path = file_path("load_run", folder)
     if not path.is_dir():
         raise HierarchyError(f"run folder {path} does not exist")
     if not (path / "run.npz").exists():

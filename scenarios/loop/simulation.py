@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
 
-from hierarchy.errors import expect
+from hierarchy.errors import HierarchyError, brief, expect
 from hierarchy.problem import Array
 from scenarios.cell.plants.plant import fault_of
 from scenarios.config import Scenario, load
@@ -38,6 +38,9 @@ def simulate(scenario: Scenario | str | Path, progress: Callable[[int, int], Non
     if isinstance(scenario, (str, Path)):
         scenario = load(scenario)
     expect("simulate", scenario, Scenario, "give a name, a file, or what `load` returns")
+    if progress is not None and not callable(progress):
+        raise HierarchyError(f"simulate: progress: expected a function, got {brief(progress)}")
+    expect("simulate: audits", audits, Iterable, "give a list of audits")
     rehearsal = Controller(scenario)
     rehearsal.rehearse()
     Recorder(rehearsal, 1).write()

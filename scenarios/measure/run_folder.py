@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from hierarchy.errors import expect, file_path
 from scenarios.files import whole, write_json
 from scenarios.loop.recording import Recording, write
 from scenarios.measure import metrics
@@ -15,7 +16,8 @@ def save(recording: Recording, folder: str | Path) -> Path:
     It has the files of `scenarios.loop.recording.write` and `metrics.json`; `hierarchy figures`
     adds the figures. `folder` must be new or empty.
     """
-    with whole(folder) as partial:
+    expect("save", recording, Recording, "give what `simulate` returns")
+    with whole(file_path("save", folder)) as partial:
         write(recording, partial)
         write_json(partial / "metrics.json", metrics.as_plain_data(recording))
     return Path(folder)

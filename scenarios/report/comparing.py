@@ -9,7 +9,7 @@ from contextlib import nullcontext
 from functools import partial
 from pathlib import Path
 
-from hierarchy.errors import HierarchyError, expect
+from hierarchy.errors import HierarchyError, brief, expect, file_path
 from scenarios.cell.build import build
 from scenarios.config import Scenario, load, members, shipped_groups
 from scenarios.config.resolvers import check_names, usable
@@ -24,7 +24,8 @@ from scenarios.measure.runs import Run
 Progress = Callable[[str, int, int], None]
 
 
-def compare(scenarios: Iterable[str | Scenario] | str, resolvers: Sequence[str] | None = None,
+def compare(scenarios: Iterable[str | Scenario] | str | Scenario,
+            resolvers: Sequence[str] | None = None,
             out: str | Path | None = None, progress: Progress | None = None,
             command: str | None = None) -> Comparison:
     """Run every scenario under every resolver, one after the other, and compare.
@@ -49,7 +50,13 @@ def compare(scenarios: Iterable[str | Scenario] | str, resolvers: Sequence[str] 
     HierarchyError : before any run: an unknown scenario, resolver or setting, a scenario that does
         not fit its robot, no resolver that can resolve any scenario, or an output folder in use.
     """
-    planned, refused = _plan([scenarios] if isinstance(scenarios, str) else scenarios, resolvers)
+    if not isinstance(scenarios, str | Scenario | Iterable):
+        raise HierarchyError("compare: expected names, files, or what `load` returns, got "
+                             f"{brief(scenarios)}")
+    if out is not None:
+        out = file_path("compare: out", out)
+    asked = [scenarios] if isinstance(scenarios, str | Scenario) else scenarios
+    planned, refused = _plan(asked, resolvers)
     with nullcontext() if out is None else whole(claim(out)) as folder:
         runs: list[Run] = []
         for run in planned:

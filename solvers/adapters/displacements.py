@@ -14,8 +14,17 @@ from numpy.typing import NDArray
 
 from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array, Hierarchy, check_rows
-from solvers.adapters.packing import ODD, damp, narrow, write_bounds, write_several, write_task
+from solvers.adapters.packing import (
+    ODD,
+    damp,
+    narrow,
+    squared,
+    write_bounds,
+    write_several,
+    write_task,
+)
 
+_FLOAT = np.dtype(np.float64)
 _NO_DAMPING = 1e-12  # pink's default, a regularisation of its QP that ours does not need
 
 Limit = tuple[Array, Array]  # G (k, n), h (k,)
@@ -113,9 +122,9 @@ class _Packed:
         """
         weight = own + pull.weight
         if weight > _NO_DAMPING:
-            self.reference = pull.weight / weight * pull.centre
-            damp(self.A, self.lower, weight, self.reference, self.rows, last)
-            self.upper[self.rows:last] = self.lower[self.rows:last]
+            if pull.weight > 0.0:
+                self.reference = pull.weight / weight * pull.centre
+            damp(self.A, self.lower, self.upper, weight, self.reference, self.rows, last)
 
     def hierarchy(self) -> Hierarchy:
         """Return the levels; a level is named like another one with a number."""
@@ -138,8 +147,8 @@ class _Limits(NamedTuple):
     def of(cls, limits: Iterable[Limit], n: int, period: float) -> _Limits:
         """Sort rows; raises HierarchyError for numbers that are not finite."""
         pairs = [(_plain(G), _plain(h)) for G, h in limits]
-        lower, upper = np.full(n, -np.inf), np.full(n, np.inf)
-        several, left = [np.empty(len(h), dtype=np.bool_) for _, h in pairs], 0
+        lower, upper = _filled(n, -np.inf), _filled(n, np.inf)
+        several, left = [np.empty(len(h), np.bool_) for _, h in pairs], 0
         for (G, h), mark in zip(pairs, several, strict=True):
             found = narrow(G, h, period, lower, upper, mark)
             if found == ODD:
@@ -183,14 +192,15 @@ def _read(task: Task, configuration: object, damped: bool, weighted: bool = True
                              "own step, which a strict level cannot; set it to 0 and use the "
                              "damping of the resolver")
     J, e = _plain(task.compute_jacobian(configuration)), _plain(task.compute_error(configuration))
-    cost = costs(task, len(e)) if weighted else np.ones(len(e))
+    cost = costs(task, len(e)) if weighted else _filled(len(e), 1.0)
     gain = float(task.gain)
-    weighed = cost * e * gain if lm else e
-    return _Read(task, J, e, cost, gain, lm * float(weighed @ weighed) if lm else 0.0)
+    return _Read(task, J, e, cost, gain, lm * gain * gain * squared(cost, e) if lm else 0.0)
 
 
 def _plain(values: Any) -> Array:
     """Return numbers as an array that kernels take without being compiled anew."""
+    if type(values) is np.ndarray and values.dtype == _FLOAT and values.flags.carray:
+        return values
     return np.array(values, dtype=np.float64, order="C")
 
 
@@ -211,12 +221,21 @@ def residual(task: Task, configuration: object, weighted: bool = True) -> tuple[
 def costs(task: Task, rows: int) -> Array:
     """Return the cost of each row of a task: (rows,); ones for a task without a cost."""
     given = getattr(task, "cost", None)
-    cost = np.asarray(1.0 if given is None else given, dtype=np.float64)
+    if given is None or type(given) is float:
+        return _filled(rows, 1.0 if given is None else given)
+    cost = _plain(given)
     if cost.shape == (rows,):
-        return cost.copy()
+        return cost
     if cost.shape not in ((), (1,)):
         raise HierarchyError(f"{label(task)}: {cost.size} costs for {rows} rows")
-    return np.full(rows, float(cost.item()))
+    return _filled(rows, float(cost.item()))
+
+
+def _filled(size: int, value: float) -> Array:
+    """Return what `np.full` does, in a fifth of its time."""
+    filled = np.empty(size)
+    filled.fill(value)
+    return filled
 
 
 def limit_level(limits: Iterable[Limit], n: int, period: float) -> tuple[Array, Array, Array]:

@@ -114,8 +114,17 @@ def largest_violation(A, lower, upper, x, first, last):
 
 
 @compiled
-def damp(A, b, weight, centre, first, last):
-    """Replace b of the rows from first to last by A x of the x that minimises a damped cost.
+def squared(cost, e):
+    """|cost e|^2, row by row."""
+    total = 0.0
+    for i in range(len(e)):
+        total += (cost[i] * e[i]) ** 2
+    return total
+
+
+@compiled
+def damp(A, b, upper, weight, centre, first, last):
+    """Replace b and upper of the rows from first to last by A x, x the minimum of a damped cost.
 
     The cost is |A x - b|^2 + weight |x - centre|^2, and A x = b - weight y with
     (A A^T + weight 1) y = b - A centre.
@@ -143,3 +152,4 @@ def damp(A, b, weight, centre, first, last):
         y[i] /= L[i, i]
     for i in range(k):
         b[first + i] -= weight * y[i]
+        upper[first + i] = b[first + i]

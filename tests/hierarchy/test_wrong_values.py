@@ -1,0 +1,98 @@
+"""Wrong values given to robots, states, paths, tasks and stacks: each with what it says."""
+
+import numpy as np
+import pytest
+
+from hierarchy import HierarchyError, Robot, Stack, State, Task
+from hierarchy.paths import Ellipse, Still, Waypoints
+from hierarchy.tasks import (
+    JointCoupling,
+    JointLimits,
+    LookAt,
+    Manipulability,
+    Pointing,
+    Pose,
+    Position,
+    Posture,
+)
+
+NAN, INF = float("nan"), float("inf")
+ROBOT = Robot.load("kuka_lwr")
+STATE = State.at(ROBOT, [0.9, -0.85, 0.9, 1.2, 0.97, 1.8, 0.0])
+FRAME = ROBOT.frame("end_effector")
+THERE = Still([0.3, 0.5, 0.1])
+
+
+class Own(Task):
+    """A task whose methods return what they should not."""
+
+    name, dimension = "own", 2
+
+    def __init__(self, jacobian):
+        self._jacobian = jacobian
+
+    def error(self, state):
+        return np.zeros(2)
+
+    def jacobian(self, state):
+        return self._jacobian
+
+    def jacobian_derivative(self, state):
+        return np.zeros((2, 7))
+
+
+@pytest.mark.parametrize(("make", "said"), [
+    (lambda: Still("a"), "must be three finite numbers [m], got"),
+    (lambda: Still(None), "got None"),
+    (lambda: Ellipse("c", "a", "b"), "centre must be three finite numbers"),
+    (lambda: Ellipse([0] * 3, [1] * 3, [2] * 3, rate="x"), "ellipse: rate: expected a finite"),
+    (lambda: Ellipse([0] * 3, [1] * 3, [2] * 3, rate=NAN), "ellipse: rate"),
+    (lambda: Waypoints("ab", "cd"), "times: expected a list, got str 'ab'"),
+    (lambda: Waypoints([0, NAN], [[0, 0, 0]] * 2), "times[1]"),
+    (lambda: Position(3, THERE), "task 'position': frame: expected a Frame, got int 3"),
+    (lambda: Position(FRAME, None), "task 'position': path is a NoneType None"),
+    (lambda: Position(FRAME, THERE, name=3), "Position: name: expected a text, got int 3"),
+    (lambda: Position(FRAME, THERE, name=""), "Position: name"),
+    (lambda: Position(FRAME, THERE, gain=True), "gain = True, expected a number >= 0"),
+    (lambda: Position(FRAME, THERE, damping=INF), "damping = inf, expected a number >= 0"),
+    (lambda: Posture("abc"), "task 'posture': target: expected finite numbers, got str 'abc'"),
+    (lambda: Posture((NAN,) * 7), "task 'posture': target"),
+    (lambda: Posture(3), "target: expected finite numbers, got int 3"),
+    (lambda: Posture(()), "target: expected finite numbers"),
+    (lambda: Posture((1j,) * 7), "target: expected finite numbers"),
+    (lambda: JointLimits(ROBOT, "a", 0.01), "acceleration: expected numbers, got str 'a'"),
+    (lambda: JointLimits(ROBOT, 10.0, 0.01, margin="x"), "task 'joint limits': margin"),
+    (lambda: Pointing(FRAME, "x", half_angle=0.1), "task 'pointing': axis"),
+    (lambda: Pointing(FRAME, (1, 0, 0), half_angle="a"), "half_angle [rad]: expected a finite"),
+    (lambda: Pointing(FRAME, (1, 0, 0), half_angle=0.1, kind="no"), "kind must be 'equality'"),
+    (lambda: LookAt(FRAME, "a"), "target must be three finite numbers"),
+    (lambda: Manipulability(FRAME, "a"), "least: expected a finite number from 0 on"),
+    (lambda: JointCoupling(ROBOT, "joint_1", 0.0), "joints: expected a Mapping"),
+    (lambda: JointCoupling(ROBOT, {"joint_1": NAN}, 0.0), "joints.joint_1"),
+    (lambda: Pose(FRAME, THERE, np.zeros((3, 3))), "expected a rotation matrix (3, 3)"),
+    (lambda: Pose(FRAME, THERE, "x"), "expected a rotation matrix (3, 3), got str 'x'"),
+    (lambda: Pose(FRAME, THERE, -np.eye(3)), "expected a rotation matrix"),
+    (lambda: Stack([Own("J")]).hierarchy(STATE), "task 'own': jacobian is no array of numbers"),
+    (lambda: Stack([Own(np.full((2, 7), NAN))]).hierarchy(STATE), "own"),
+    (lambda: Stack([Position(FRAME, THERE)], reference="x"), "reference of a stack"),
+    (lambda: Stack([Position(FRAME, THERE)], metric=np.eye(3)).hierarchy(STATE),
+     "metric of the stack: it has shape (3, 3), expected (7, 7)"),
+    (lambda: Stack().insert(Posture((0.0,) * 7), "0"), "index: expected an int, got str '0'"),
+    (lambda: Robot.load("kuka_lwr", base="flying"), "base must be one of"),
+    (lambda: ROBOT.control_point("joint_1", "x"), "control point on 'joint_1': offset"),
+    (lambda: ROBOT.control_point("joint_1", [NAN, 0, 0]), "offset: expected 3 finite numbers"),
+    (lambda: State("kuka_lwr"), "State: robot: expected a Robot, got str 'kuka_lwr'"),
+    (lambda: State.at(ROBOT, [0.0] * 7, t="now"), "State.at: t: expected a finite number"),
+    (lambda: State.at(ROBOT, [10**400] * 7), "q"),
+    (lambda: STATE.position("nobody"), "unknown frame 'nobody'"),
+    (lambda: STATE.position(3), "frame: expected a Frame, got int 3"),
+])
+def test_a_wrong_value_is_refused_and_named(make, said):
+    with pytest.raises(HierarchyError) as error:
+        make()
+    assert said in str(error.value)
+
+
+def test_a_frame_may_be_given_by_its_name():
+    np.testing.assert_array_equal(STATE.position("end_effector"), STATE.position(FRAME))
+    np.testing.assert_array_equal(STATE.rotation("end_effector"), STATE.rotation(FRAME))
