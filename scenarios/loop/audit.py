@@ -36,7 +36,9 @@ class Certified:
 
     def look(self, tick: int, controller: Controller) -> None:
         """Judge the answer of a tick."""
-        self._values[tick] = certify(controller.hierarchy, controller.resolution.x).certified
+        self._values[tick] = certify(
+            controller.hierarchy, controller.resolution.x,
+            witnesses=controller.resolution.witnesses).certified
 
     def signals(self, recording: Recording) -> Mapping[str, NDArray[Any]]:
         """Return `certified` (T,)."""
