@@ -42,6 +42,6 @@ TASKS: dict[str, type[Task]] = {
 
 __all__ = ["TASKS", "Along", "Avoidance", "BaseDynamics", "CentreOfMass", "CentreOfPressure",
            "ContactForce", "ContactMotion", "CumulatedRepulsion", "DangerBounds", "Friction",
-           "JointCoupling", "JointDamping", "JointLimits", "LeastForce", "LookAt", "Manipulability", "Momentum",
-           "Pointing", "Pose", "Position", "Posture", "RelativePose", "SelfSeparation",
+           "JointCoupling", "JointDamping", "JointLimits", "LeastForce", "LookAt", "Manipulability",
+           "Momentum", "Pointing", "Pose", "Position", "Posture", "RelativePose", "SelfSeparation",
            "Separation", "Together", "TorqueLimits"]

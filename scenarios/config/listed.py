@@ -55,7 +55,7 @@ class Listed(Section):
 
 
 class ListedPosition(Listed, PositionTask):
-    """The origin of `frame` along a path, by default its initial position, in `axes` of the world."""
+    """The origin of `frame` along a path, by default its initial position, in some `axes`."""
 
     kind: Literal["position"]
     frame: str

@@ -16,8 +16,9 @@ class Touch:
     """Reads what the floor does to each of C contacts, in their order, after a step.
 
     `force` (C, 3) [N] in world axes; `slip` (C,) [m], how far a contact has moved along the floor
-    since it touched down, NaN if it is to slide; `margin` (C,) [m], of the centre of pressure from the nearest edge of the
-    sole, NaN for a point or without force. `signals` has these arrays by the names of signals.
+    since it touched down, NaN if it is to slide; `margin` (C,) [m], of the centre of pressure from
+    the nearest edge of the sole, NaN for a point or without force. `signals` has these arrays by
+    the names of signals.
     """
 
     def __init__(self, mujoco: Any, model: Any, contacts: Contacts) -> None:
