@@ -185,8 +185,8 @@ def _certify_giving(h: Hierarchy, x: ArrayLike, tolerance: float, parallel: floa
         least[:level + 1] = np.maximum(least[:level + 1], part.stationarity)
         room = room.relaxed(level, witness)
     last = certify(room, x, tolerance, parallel)
-    return Certificate(np.asarray([norm(slack) for slack in np.split(h.slacks(x), h.offsets[1:-1])]),
-                       np.maximum(least, last.stationarity), last.nearest, tolerance, h.names)
+    return Certificate(h.violations(x), np.maximum(least, last.stationarity), last.nearest,
+                       tolerance, h.names)
 
 
 def _euclidean(h: Hierarchy, x: Array) -> tuple[Hierarchy, Array]:

@@ -96,7 +96,8 @@ def friction_left(recording: Recording) -> Array:
     normal, along = force[:, :, 2], np.linalg.norm(force[:, :, :2], axis=2)
     mu = getattr(recording.scenario.plant, "friction", np.nan)
     sticks = np.array([not contact.slides for contact in recording.scenario.contacts])
-    return np.where(sticks & (normal > _LOAD), 1.0 - along / (mu * np.maximum(normal, _LOAD)), np.nan)
+    left = 1.0 - along / (mu * np.maximum(normal, _LOAD))
+    return np.where(sticks & (normal > _LOAD), left, np.nan)
 
 
 def force_error(recording: Recording) -> Array:

@@ -69,7 +69,7 @@ def test_what_cannot_slide_or_is_no_direction_is_refused():
         Contact(TIP, [(x, y, 0.0) for x in (0.0, 1.0) for y in (0.0, 1.0)], slides=True)
     with pytest.raises(ScenarioError, match="only a point slides"):
         load("wipe").with_changes({"contacts.0.x": [0.0, 0.1], "contacts.0.y": [0.0, 0.1]})
-    with pytest.raises(HierarchyError, match="'along': directions .* orthogonal"):
+    with pytest.raises(HierarchyError, match=r"'along': directions .* orthogonal"):
         Along(None, ((1.0, 0.0, 0.0), (1.0, 1.0, 0.0)))
 
 
