@@ -61,7 +61,7 @@ class Model:
         self._paths: list[Any] = []
         self._traces: list[Any] = []
         self._goals: list[Any] = []
-        self._pushes = [self._lines(f"/{name}", _segments(()), colour, width)
+        self._pushes = [self._lines(f"/contacts/{name}", _segments(()), colour, width)
                         for name, colour, width in (("force", rgb(ALERT), 4.0),
                                                     ("cone", rgb(INK), 1.0),
                                                     ("support", self._colour, 3.0))]
