@@ -48,10 +48,13 @@ class Contact:
     one line for a surface, such as the corners of a sole. `friction` is Coulomb's coefficient,
     `normal` (3,) the direction in the world in which the surface pushes the robot. `open` has the
     intervals (from, until) [s] of a contact that lifts off and touches down; its load ramps down
-    for `ramp` [s] before each and up after it. The name is that of the frame unless given.
+    for `ramp` [s] before each and up after it. A point that `slides` moves along its surface,
+    against which friction then acts with all its coefficient. The name is that of the frame unless
+    given.
 
     Raises HierarchyError, naming the contact, if the coefficient is not positive, the normal is
-    zero, a number is not finite, the points are on a line, or an interval ends before it begins.
+    zero, a number is not finite, the points are on a line, an interval ends before it begins, or a
+    surface slides.
     """
 
     frame: Frame
@@ -61,6 +64,7 @@ class Contact:
     name: str = ""
     open: Sequence[tuple[float, float]] = ()
     ramp: float = 0.1
+    slides: bool = False
     axes: Array = field(init=False, repr=False, compare=False)  # (3, 3) rows: two tangents, normal
 
     def __post_init__(self) -> None:
@@ -83,6 +87,9 @@ class Contact:
                                      f"until {end} s")
         if not 0.0 <= self.ramp < np.inf:
             raise HierarchyError(f"contact {self.name!r}: ramp {self.ramp} s must not be negative")
+        if self.slides and len(points) > 1:
+            raise HierarchyError(f"contact {self.name!r}: {len(points)} points that slide; only a "
+                                 "contact of one point does")
         set_frozen(self, axes=_axes(normal))
 
     @classmethod

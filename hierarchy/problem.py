@@ -13,6 +13,7 @@ from hierarchy.errors import HierarchyError, brief
 from hierarchy.notebook import html_table
 
 Array = NDArray[np.float64]
+_ROUNDING = 1e-10  # of a violation, relative to 1 + |a| |x|
 _NUMBERS = "biufO"  # kinds of numpy's types that are real numbers, or may be
 
 
@@ -21,7 +22,10 @@ class Hierarchy:
 
     Level k minimises the Euclidean norm of its violation without giving up any of the norms above
     it; among all such x the answer is the one nearest to `reference`, with the distance d^T W d of
-    a step d in the metric W. An equality row has `lower == upper`; a missing bound is infinite.
+    a step d in the metric W. Row by row, a level may `give`: for the sake of the levels below, and
+    of the reference, row i may be violated by up to |s_i| + give_i at either side, where s_i is its
+    violation at the least norm of its level. An equality row has `lower == upper`; a missing bound
+    is infinite.
 
     Attributes
     ----------
@@ -32,23 +36,26 @@ class Hierarchy:
     reference : (n,) the x preferred where the levels leave freedom.
     names : L level names, used in messages.
     metric : (n, n) W, symmetric and positive definite, or None for the identity.
+    give : (m,) in the unit of the rows, at least zero, or None for zero.
     """
 
-    __slots__ = ("A", "lower", "metric", "names", "offsets", "reference", "sizes", "upper")
+    __slots__ = ("A", "give", "lower", "metric", "names", "offsets", "reference", "sizes", "upper")
 
     def __init__(self, A: Array, lower: Array, upper: Array, sizes: NDArray[np.int64],
-                 reference: Array, names: tuple[str, ...], metric: Array | None = None) -> None:
+                 reference: Array, names: tuple[str, ...], metric: Array | None = None,
+                 give: Array | None = None) -> None:
         """Wrap arrays without copying or checking them; `from_levels` checks."""
         self.A, self.lower, self.upper = A, lower, upper
         self.sizes, self.reference, self.names = sizes, reference, names
-        self.metric = metric
+        self.metric, self.give = metric, give
         self.offsets = np.zeros(len(sizes) + 1, dtype=np.int64)
         np.cumsum(sizes, out=self.offsets[1:])
 
     @classmethod
     def from_levels(cls, levels: Sequence[Sequence[ArrayLike]], reference: ArrayLike | None = None,
                     names: Sequence[str] | None = None,
-                    metric: ArrayLike | None = None) -> Hierarchy:
+                    metric: ArrayLike | None = None,
+                    give: Sequence[ArrayLike] | None = None) -> Hierarchy:
         """Pack levels given as `(A, b)` or `(A, lower, upper)`.
 
         Parameters
@@ -57,12 +64,14 @@ class Hierarchy:
         reference : (n,) or None for zero.
         names : one name per level for messages, each different, or None for "level 1", ...
         metric : (n, n) symmetric and positive definite, or None for the identity.
+        give : for each level one number for all rows, or (m_k,); None for zero.
 
         Raises
         ------
         HierarchyError : a wrong type or shape, a NaN, an infinite entry of A or of an equality,
             lower > upper, n = 0, or no level and no reference; names level, row and value. A
-            metric that is not symmetric and positive definite.
+            metric that is not symmetric and positive definite; a give that is not finite and at
+            least zero.
         """
         if not isinstance(levels, Sequence) or isinstance(levels, str):
             raise HierarchyError("levels: expected a list of (A, b) or (A, lower, upper), got "
@@ -78,7 +87,9 @@ class Hierarchy:
                    np.concatenate([np.empty(0), *(low for _, low, _ in packed)]),
                    np.concatenate([np.empty(0), *(up for _, _, up in packed)]),
                    np.array([A.shape[0] for A, _, _ in packed], dtype=np.int64), ref, names,
-                   None if metric is None else checked_metric(metric, n))
+                   None if metric is None else checked_metric(metric, n),
+                   None if give is None else _checked_give(
+                       give, names, [len(lower) for _, lower, _ in packed]))
 
     @property
     def n(self) -> int:
@@ -99,6 +110,38 @@ class Hierarchy:
         """Yield `(A_k (m_k, n), lower_k (m_k,), upper_k (m_k,))` as views, top level first."""
         for first, last in zip(self.offsets[:-1], self.offsets[1:], strict=True):
             yield self.A[first:last], self.lower[first:last], self.upper[first:last]
+
+    @property
+    def giving(self) -> list[int]:
+        """The levels of which a row gives."""
+        if self.give is None:
+            return []
+        pairs = zip(self.offsets[:-1], self.offsets[1:], strict=True)
+        return [k for k, (i, j) in enumerate(pairs) if (self.give[i:j] > 0.0).any()]
+
+    def upper_part(self, count: int) -> Hierarchy:
+        """Return the first `count` levels, as views, of which none gives."""
+        m = self.offsets[count]
+        return Hierarchy(self.A[:m], self.lower[:m], self.upper[:m], self.sizes[:count],
+                         self.reference, self.names[:count], self.metric)
+
+    def relaxed(self, level: int, x: ArrayLike) -> Hierarchy:
+        """Return the hierarchy with room for what the rows of a level miss at x, and for its give.
+
+        x (n,) is optimal for the levels down to this one. The levels above do not give any more.
+        """
+        assert self.give is not None, "the hierarchy gives"
+        rows = slice(self.offsets[level], self.offsets[level + 1])
+        slack, lower, upper = self.slacks(x)[rows], self.lower.copy(), self.upper.copy()
+        reach = np.linalg.norm(self.A[rows], axis=1) * float(np.linalg.norm(x))
+        slack[np.abs(slack) <= _ROUNDING * (1.0 + reach)] = 0.0
+        room = np.abs(slack) + self.give[rows]
+        lower[rows] -= room
+        upper[rows] += room
+        give = self.give.copy()
+        give[:self.offsets[level + 1]] = 0.0
+        return Hierarchy(self.A, lower, upper, self.sizes, self.reference, self.names, self.metric,
+                         give)
 
     def slacks(self, x: ArrayLike) -> Array:
         """Signed violation of every row at x: (m,), positive above `upper`, zero inside."""
@@ -185,6 +228,29 @@ def checked_metric(metric: ArrayLike, n: int | None = None) -> Array:
         raise HierarchyError("metric is not positive definite: its smallest eigenvalue is "
                              f"{smallest:.3g}")
     return W
+
+
+def _checked_give(give: Sequence[ArrayLike], names: Sequence[str], sizes: list[int]) -> Array:
+    if len(give) != len(names):
+        raise HierarchyError(f"give has {len(give)} entries for {len(names)} levels")
+    return np.concatenate([np.empty(0), *(checked_give(name, one, size) for name, one, size in zip(
+        names, give, sizes, strict=True))])
+
+
+def checked_give(name: str, give: ArrayLike, size: int) -> Array:
+    """Return what the rows of a level give (size,), of one number or as many.
+
+    Raises HierarchyError, naming the level, for another shape or a number that is not finite and at
+    least zero.
+    """
+    rows = _array(f"{name}: give", give)
+    if rows.shape not in ((), (size,)):
+        raise HierarchyError(f"{name}: give has shape {rows.shape}, expected one number or "
+                             f"({size},)")
+    rows = np.broadcast_to(rows, (size,)).copy()
+    for i in np.flatnonzero(~(np.isfinite(rows) & (rows >= 0.0)))[:1]:
+        raise HierarchyError(f"{name}, row {i}: give is {rows[i]}, expected a number >= 0")
+    return rows
 
 
 def _columns(packed: list[tuple[Array, Array, Array]], names: tuple[str, ...],

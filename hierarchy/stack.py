@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Literal, NamedTuple, get_args
 
 import numpy as np
@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from hierarchy.avoidance.measurement import Measurement
 from hierarchy.contacts import Contacts
 from hierarchy.errors import HierarchyError, UnknownNameError, expect
-from hierarchy.problem import Array, Hierarchy, checked_metric
+from hierarchy.problem import Array, Hierarchy, checked_give, checked_metric
 from hierarchy.state import State
 from hierarchy.task import Level, Task, writer_in_stack
 
@@ -39,14 +39,16 @@ class Stack:
     contacts : at level "torque" only, where they are required; `Contacts(robot)` for none.
     metric : W of the hierarchy, see `Hierarchy`: (n, n), or "mass" for M(q) of each state; None for
         the identity.
+    give : by name of a task, how far its rows may give, see `Hierarchy`: one number or (m,).
 
-    Raises HierarchyError for an unknown level or metric, contacts missing or not needed, or a task
-    of contact forces at another level or of other contacts than the stack's.
+    Raises HierarchyError for an unknown level or metric, contacts missing or not needed, a task of
+    contact forces at another level or of other contacts than the stack's, or a give of no task.
     """
 
     def __init__(self, tasks: Iterable[Task] = (), level: Level = "acceleration",
                  reference: Task | None = None, contacts: Contacts | None = None,
-                 metric: ArrayLike | Literal["mass"] | None = None) -> None:
+                 metric: ArrayLike | Literal["mass"] | None = None,
+                 give: Mapping[str, ArrayLike] | None = None) -> None:
         if level not in get_args(Level):
             raise HierarchyError("level must be 'velocity', 'acceleration' or 'torque', got "
                                  f"{level!r}")
@@ -65,6 +67,8 @@ class Stack:
         expect("tasks of a stack", tasks, Iterable, "give a list of tasks")
         for task in tasks:
             self.insert(task)
+        self._give = {name: checked_give(f"task {name!r}", value, self[name].dimension)
+                      for name, value in (give or {}).items()}
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -164,7 +168,10 @@ class Stack:
         n = joints if self.contacts is None else self.contacts.unknowns
         sizes = np.array([self[name].dimension for name in order], dtype=np.int64)
         m = int(sizes.sum())
-        return Hierarchy(np.zeros((m, n)), np.zeros(m), np.zeros(m), sizes, np.zeros(n), order)
+        give = np.concatenate([np.empty(0), *(
+            self._give.get(name, np.zeros(self[name].dimension)) for name in order)])
+        return Hierarchy(np.zeros((m, n)), np.zeros(m), np.zeros(m), sizes, np.zeros(n), order,
+                         give=give if give.any() else None)
 
 
 def _check_forces(task: Task, level: Level, contacts: Contacts | None) -> None:

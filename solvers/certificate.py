@@ -38,7 +38,7 @@ import numpy as np
 from numpy.linalg import norm
 from numpy.typing import ArrayLike, NDArray
 
-from hierarchy.errors import expect, number
+from hierarchy.errors import HierarchyError, expect, number
 from hierarchy.notebook import html_table
 from hierarchy.problem import Array, Hierarchy
 
@@ -131,7 +131,7 @@ class Certificate:
 
 
 def certify(h: Hierarchy, x: ArrayLike, tolerance: float = TOLERANCE,
-            parallel: float = PARALLEL) -> Certificate:
+            parallel: float = PARALLEL, witnesses: ArrayLike | None = None) -> Certificate:
     """Judge level by level whether x (n,) is the answer of h; see the module's docstring.
 
     x counts as on a side within `tolerance` (1 + |x|) of its hyperplane, and the row as violated
@@ -142,16 +142,22 @@ def certify(h: Hierarchy, x: ArrayLike, tolerance: float = TOLERANCE,
     With a metric W all lengths and angles are those of W: in place of x it judges
     y = L^T (x - reference), with W = L L^T.
 
+    Of a hierarchy that gives, each of the `witnesses` (K, n), those of the resolution, must be
+    optimal for the levels down to one that gives, and so proves its least miss. x must be the
+    answer with the room that follows. The residual of such a level is the larger of the two.
+
     tolerance : largest residual, relative to 1 + |x|.
     parallel : angle [rad] up to which rows count as dependent.
 
     Raises
     ------
-    HierarchyError : x has the wrong shape.
+    HierarchyError : x has the wrong shape, or there is not one witness for each level that gives.
     """
     expect("certify: h", h, Hierarchy, "make one with Hierarchy.from_levels([(A, b), ...])")
     number("certify: tolerance", tolerance, 0.0)
     number("certify: parallel [rad]", parallel, 0.0)
+    if h.giving:
+        return _certify_giving(h, x, tolerance, parallel, witnesses)
     with np.errstate(all="ignore"):
         slack = h.slacks(x)
         h, x = _euclidean(h, np.asarray(x, dtype=np.float64))
@@ -167,6 +173,22 @@ def certify(h: Hierarchy, x: ArrayLike, tolerance: float = TOLERANCE,
                     for angle in (parallel, parallel / _EITHER, parallel * _EITHER))
         first = next(verdicts)
         return first if first.certified else next((v for v in verdicts if v.certified), first)
+
+
+def _certify_giving(h: Hierarchy, x: ArrayLike, tolerance: float, parallel: float,
+                    witnesses: ArrayLike | None) -> Certificate:
+    giving, found = h.giving, np.empty(0) if witnesses is None else np.asarray(witnesses, float)
+    if found.shape != (len(giving), h.n):
+        raise HierarchyError(f"certify: {len(giving)} levels give, so witnesses must be "
+                             f"({len(giving)}, {h.n}), those of the resolution; got {found.shape}")
+    least, room = np.zeros(len(h.sizes)), h
+    for level, witness in zip(giving, found, strict=True):
+        part = certify(room.upper_part(level + 1), witness, tolerance, parallel)
+        least[:level + 1] = np.maximum(least[:level + 1], part.stationarity)
+        room = room.relaxed(level, witness)
+    last = certify(room, x, tolerance, parallel)
+    return Certificate(h.violations(x), np.maximum(least, last.stationarity), last.nearest,
+                       tolerance, h.names)
 
 
 def _euclidean(h: Hierarchy, x: Array) -> tuple[Hierarchy, Array]:

@@ -19,6 +19,7 @@ from hierarchy.jit import announce_compilation
 from hierarchy.notebook import html_table, numbers
 from hierarchy.problem import Array, Hierarchy
 from hierarchy.records import set_frozen
+from solvers.give import giving
 from solvers.metric import in_metric
 from solvers.status import TOO_SMALL
 from solvers.status import Status as Status
@@ -41,9 +42,11 @@ class Resolution:
     status : how the solve ended.
     iterations : number of iterations, counted in the resolver's own way; 1 for a direct resolver.
     memory : warm start for the next solve, in the resolver's own layout; None if it keeps none.
+    witnesses : (K, n), for each level that gives an x of its least miss, see solvers.give; else
+        None.
     """
 
-    __slots__ = ("iterations", "memory", "status", "x")
+    __slots__ = ("iterations", "memory", "status", "witnesses", "x")
 
     def __init__(self, x: Array, status: Status = Status.SOLVED, iterations: int = 1,
                  memory: Array | None = None) -> None:
@@ -51,6 +54,7 @@ class Resolution:
         self.status = status
         self.iterations = iterations
         self.memory = memory
+        self.witnesses: Array | None = None
 
     @property
     def active(self) -> NDArray[np.int8] | None:
@@ -139,7 +143,7 @@ class Resolver(ABC):
         """Resolve h, warm-started with the memory of an earlier resolution if there is one.
 
         Implementations get hierarchies without a metric: those with one come in the variables of
-        `solvers.metric.in_metric`.
+        `solvers.metric.in_metric`. None gives: see `solvers.give.giving`.
 
         Raises
         ------
@@ -191,6 +195,9 @@ def _with_checks(solve: Solve) -> Solve:
             raise HierarchyError(f"{self.name}: memory: got {brief(memory)}; give the memory of an "
                                  "earlier resolution, res.memory, or None")
         try:
+            if h.give is not None and h.give.any():
+                refuse_give(self, h)
+                return giving(functools.partial(checked, self), h, memory)
             if h.metric is not None:
                 return in_metric(functools.partial(solve, self), h, memory)
             return solve(self, h, memory)
@@ -212,6 +219,19 @@ def refuse_inequality(resolver: Resolver, h: Hierarchy, row: int) -> None:
         f"{h.names[level]}, row {row - h.offsets[level]}: an inequality, {h.lower[row]:g} <= a x "
         f"<= {h.upper[row]:g}; {resolver.label} resolves {_RESOLVED[resolver.handles]}"
         f" (inequalities: {able['inequalities']}; bounds in a first level: {able['bounds']})")
+
+
+def refuse_give(resolver: Resolver, h: Hierarchy) -> None:
+    """Raise a HierarchyError, naming a level that gives, unless the resolver is strict with bounds.
+
+    What gives becomes an inequality, and how far it gives is counted from the least miss.
+    """
+    if resolver.strict and resolver.handles == "inequalities":
+        return
+    able = ", ".join(sorted(name for name, kind in _REGISTRY.items()
+                            if kind.handles == "inequalities" and kind().strict))
+    raise HierarchyError(f"{h.names[h.giving[0]]}: it gives, which needs strict levels of "
+                         f"inequalities; {resolver.label} has none ({able})")
 
 
 _REGISTRY: dict[str, type[Resolver]] = {}

@@ -1,6 +1,7 @@
 """The tasks that are shipped, one per file; `TASKS` lists them by name."""
 
 from hierarchy.task import Task
+from hierarchy.tasks.along import Along
 from hierarchy.tasks.avoidance import Avoidance
 from hierarchy.tasks.base_dynamics import BaseDynamics
 from hierarchy.tasks.centre_of_pressure import CentreOfPressure
@@ -27,7 +28,8 @@ from hierarchy.tasks.together import Together
 from hierarchy.tasks.torque_limits import TorqueLimits
 
 TASKS: dict[str, type[Task]] = {
-    "avoidance": Avoidance, "base dynamics": BaseDynamics, "centre of mass": CentreOfMass,
+    "along": Along, "avoidance": Avoidance, "base dynamics": BaseDynamics,
+    "centre of mass": CentreOfMass,
     "centre of pressure": CentreOfPressure, "contact force": ContactForce,
     "contact motion": ContactMotion, "coupling": JointCoupling,
     "cumulated repulsion": CumulatedRepulsion, "damping": JointDamping,
@@ -38,8 +40,8 @@ TASKS: dict[str, type[Task]] = {
     "separation": Separation, "together": Together, "torque limits": TorqueLimits,
 }
 
-__all__ = ["TASKS", "Avoidance", "BaseDynamics", "CentreOfMass", "CentreOfPressure", "ContactForce",
-           "ContactMotion", "CumulatedRepulsion", "DangerBounds", "Friction", "JointCoupling",
-           "JointDamping", "JointLimits", "LeastForce", "LookAt", "Manipulability", "Momentum",
-           "Pointing", "Pose", "Position", "Posture", "RelativePose", "SelfSeparation",
+__all__ = ["TASKS", "Along", "Avoidance", "BaseDynamics", "CentreOfMass", "CentreOfPressure",
+           "ContactForce", "ContactMotion", "CumulatedRepulsion", "DangerBounds", "Friction",
+           "JointCoupling", "JointDamping", "JointLimits", "LeastForce", "LookAt", "Manipulability",
+           "Momentum", "Pointing", "Pose", "Position", "Posture", "RelativePose", "SelfSeparation",
            "Separation", "Together", "TorqueLimits"]

@@ -15,6 +15,7 @@ from hierarchy.problem import Array
 from hierarchy.robot import Frame
 from hierarchy.state import State
 from hierarchy.task import Level, Task
+from hierarchy.tasks.along import Along
 from hierarchy.tasks.pose import Pose
 from hierarchy.tasks.position import Position
 from hierarchy.tasks.together import Together
@@ -24,7 +25,8 @@ from hierarchy.tasks.together import Together
 class ContactMotion(Task):
     """Keep contacts at rest: J_c a + dJ_c/dt v = -damping v_c + stiffness e [m/s^2, rad/s^2].
 
-    Three rows for a point, those of `Position`; six for a surface, those of `Pose`. With e = 0 and
+    Three rows for a point, those of `Position`, one of them along the normal for a point that
+    slides; six for a surface, those of `Pose`. With e = 0 and
     no damping the contact accelerates nowhere; damping [1/s] takes away what velocity it has, and
     stiffness [1/s^2] brings it back to its anchor. `anchors` are (4, 3) for each contact: where its
     point, or the frame of a surface, belongs [m], then the rotation of the frame;
@@ -68,15 +70,16 @@ class ContactMotion(Task):
 
     @property
     def dimension(self) -> int:
-        """Three rows per point contact, six per surface."""
-        return sum(6 if contact.is_surface else 3 for contact in self.of.contacts)
+        """Three rows per point contact, one if it slides, six per surface."""
+        return sum(_rows(contact) for contact in self.of.contacts)
 
     @property
     def row_names(self) -> tuple[str, ...]:
         """Contact, and axis of translation or turn, of each row."""
         axes = [f"{kind} {axis}" for kind in ("along", "about") for axis in "xyz"]
         return tuple(f"{contact.name} {axis}" for contact in self.of.contacts
-                     for axis in axes[:6 if contact.is_surface else 3])
+                     for axis in (("along its normal",) if contact.slides else
+                                  axes[:_rows(contact)]))
 
     def error(self, state: State) -> Array:
         """Distance of each contact from its anchor (m,) [m, rad]; zero without anchors."""
@@ -95,7 +98,7 @@ class ContactMotion(Task):
         """See `Task.writer`."""
         write_rows, opening = self._tasks.writer(state, level, A, lower, upper, row), []
         for contact in self.of.contacts:
-            rows = slice(row, row := row + (6 if contact.is_surface else 3))
+            rows = slice(row, row := row + _rows(contact))
             if contact.open:
                 opening.append((rows, contact))
 
@@ -116,11 +119,18 @@ class ContactMotion(Task):
         path, gain = Still(cast("list[float]", anchor[0].tolist())), self.gain
         if self.anchors is None:
             gain = 0.0
+        if contact.slides:
+            return Along(Position(_held(contact), path, self.stiffness, self.damping, gain),
+                         contact.axes[2:].tolist(), contact.name)
         if contact.is_surface:
             return Pose(_held(contact), path, anchor[1:], self.stiffness, self.damping, gain,
                         contact.name)
         return Position(_held(contact), path, self.stiffness, self.damping, gain,
                         name=contact.name)
+
+
+def _rows(contact: Contact) -> int:
+    return 1 if contact.slides else 6 if contact.is_surface else 3
 
 
 def _held(contact: Contact) -> Frame:

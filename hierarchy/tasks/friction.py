@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from math import cos, inf, pi, sin
 from typing import Literal
 
@@ -11,10 +12,13 @@ import numpy as np
 
 from hierarchy.contacts import Contact, Contacts
 from hierarchy.errors import HierarchyError
+from hierarchy.kinematics import write_point_jacobian
 from hierarchy.problem import Array
 from hierarchy.state import State
 from hierarchy.task import Level
 from hierarchy.tasks.forces import FixedRows, required
+
+_SLOW = 0.01  # [m/s] below which the friction of a sliding point falls to zero
 
 
 @dataclass(frozen=True)
@@ -25,7 +29,9 @@ class Friction(FixedRows):
     normal force [N]. Inside: of the cone's tangential force the faces' middles allow 71 % with 4
     faces and 92 % with 8, the edges all of it. `least` >= 0 [N] is per point, so a contact pushes
     and never pulls; `largest` [N] may be infinite. Both are scaled by the load of a contact that
-    opens, so its force is zero while it is open.
+    opens, so its force is zero while it is open. Of a point that slides, two equalities are in the
+    place of the faces: f_t = -mu f_n v_t / |v_t| with its velocity along the surface v_t, and less
+    in proportion below 1 cm/s.
 
     Raises HierarchyError for another number of faces, sides that leave no force, no contacts, or a
     contact that opens and has no finite `largest` to ramp.
@@ -82,20 +88,47 @@ class Friction(FixedRows):
     def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
                row: int) -> Callable[[], object]:
         """See `Task.writer`."""
-        write_rows = super().writer(state, level, A, lower, upper, row)
-        opening: list[tuple[Contact, Array, Array]] = []
-        for contact in self.contacts.contacts:
+        write_rows, n = super().writer(state, level, A, lower, upper, row), state.n
+        changing: list[Callable[[], object]] = []
+        for k, contact in enumerate(self.contacts.contacts):
             rows = slice(row, row := row + len(contact.points) * (self.faces + 1))
+            low, up = (side[rows].reshape(-1, self.faces + 1) for side in (lower, upper))
             if contact.open:
-                opening.append((contact, lower[rows].reshape(-1, self.faces + 1),
-                                upper[rows].reshape(-1, self.faces + 1)))
+                changing.append(partial(self._scale_with_time, contact, state, low, up))
+            if contact.slides:
+                point = self.contacts.blocks[contact.name].start - n
+                changing.append(partial(self._slide, k, state, A[rows, n + point:n + point + 3],
+                                        (low[0], up[0])))
 
         def write() -> None:
             write_rows()
-            for contact, low, up in opening:
-                self._scale(contact.load(state.t), low, up)
+            for change in changing:
+                change()
 
-        return write if opening else write_rows
+        return write if changing else write_rows
+
+    def _scale_with_time(self, contact: Contact, state: State, low: Array, up: Array) -> None:
+        self._scale(contact.load(state.t), low, up)
+
+    def _slide(self, number: int, state: State, A: Array, sides: tuple[Array, Array]) -> None:
+        """Write the rows (faces + 1, 3) of one point that slides, and their sides."""
+        contact, (low, up) = self.contacts.contacts[number], sides
+        along = contact.axes[:2] @ self._velocity(contact, state)
+        drag = contact.friction * along / max(float(np.linalg.norm(along)), _SLOW)
+        low[:-1], up[:-1], low[-1] = -inf, inf, max(low[-1], 0.0)
+        for row, tangent, share in zip((0, self.faces // 4), contact.axes[:2], drag, strict=True):
+            A[row] = tangent + share * contact.axes[2]
+            low[row] = up[row] = 0.0
+
+    def _velocity(self, contact: Contact, state: State) -> Array:
+        """Velocity (3,) [m/s] of the first point of a contact."""
+        block = self.contacts.blocks[contact.name]
+        joints, offsets = self.contacts.points
+        k = (block.start - state.n) // 3
+        J = np.empty((3, state.n))
+        write_point_jacobian(state.J, state.placements, state.supports, joints[k], offsets[k], J, 0)
+        velocity: Array = J @ state.v
+        return velocity
 
     def _scale(self, load: float, low: Array, up: Array) -> None:
         """Scale the sides (k, faces + 1) of k points; without load each force is zero.

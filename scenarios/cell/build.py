@@ -97,9 +97,14 @@ def build(scenario: Scenario, kept: Cell | None = None) -> Cell:
     rows, activation = stacked(scenario, tasks, state)
     return Cell(scenario, robot, start, state, plant,
                 Stack(rows, control.level, reference_of(scenario, here), contacts,
-                      "mass" if control.metric == "mass" else None), sensor, areas,
+                      "mass" if control.metric == "mass" else None, _give(scenario)), sensor, areas,
                 position, pointing, limits, order_of(scenario, areas, always, tasks), tuple(listed),
                 activation, contacts)
+
+
+def _give(scenario: Scenario) -> dict[str, float]:
+    """Return how far tasks of the scenario may give, by name."""
+    return {task.title: task.give for task in scenario.tasks if task.give}
 
 
 def _listed(section: ListedTask, start: State, contacts: Contacts | None) -> Task:

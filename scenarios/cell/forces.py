@@ -35,7 +35,7 @@ def _contact(section: ContactSection, robot: Robot) -> Contact:
     frame = robot.frame(section.frame)
     if section.x is None or section.y is None:
         return Contact(frame, (section.offset,), section.friction, section.normal,
-                       section.name or "", section.open, section.ramp)
+                       section.name or "", section.open, section.ramp, section.slides)
     (back, front), (right, left) = section.x, section.y
     corners = [(back, right, 0.0), (front, right, 0.0), (front, left, 0.0), (back, left, 0.0)]
     return Contact(frame, corners, section.friction, section.normal, section.name or "",

@@ -12,6 +12,7 @@ from hierarchy.errors import UnknownNameError
 from hierarchy.paths import Path, Shifted, Still
 from hierarchy.problem import Array
 from hierarchy.tasks import (
+    Along,
     CentreOfMass,
     CumulatedRepulsion,
     DangerBounds,
@@ -133,7 +134,10 @@ def _task(section: AnyTask, start: State) -> Task:
     if isinstance(section, ListedPose):
         rotation = start.rotation(frame) if section.rotation is None else section.rotation
         return Pose(frame, path, rotation, *gains, name=name)
-    return Position(frame, path, *gains, name=name)
+    task = Position(frame, path, *gains, name=name)
+    axes = getattr(section, "axes", "xyz")
+    return task if axes == "xyz" else Along(
+        task, np.eye(3)[["xyz".index(axis) for axis in axes]].tolist(), name)
 
 
 def _path(section: PositionTask | ListedPose | ListedCentreOfMass, here: Array) -> Path:

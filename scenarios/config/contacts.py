@@ -6,7 +6,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from scenarios.config.sections import Finite, NotNegative, Positive, Section, Vector3
+from scenarios.config.sections import Finite, Flag, NotNegative, Positive, Section, Vector3
 from scenarios.config.tasks import TaskName
 
 
@@ -16,7 +16,8 @@ class ContactSection(Section):
     `x` and `y` [m] are the sides of a sole in the frame's xy plane; without them it is the point
     `offset` [m]. `friction` is what the controller believes, `normal` the direction in which the
     surface pushes. In each interval of `open` [s] the contact is lifted; its load ramps down for
-    `ramp` [s] before and up after it. The name defaults to the frame's.
+    `ramp` [s] before and up after it. A point that `slides` moves along its surface. The name
+    defaults to the frame's.
     """
 
     frame: str
@@ -28,6 +29,7 @@ class ContactSection(Section):
     normal: Vector3 = (0.0, 0.0, 1.0)
     open: tuple[tuple[NotNegative, NotNegative], ...] = ()
     ramp: NotNegative = 0.1
+    slides: Flag = False
 
     @model_validator(mode="after")
     def _is_a_sole_or_a_point(self) -> Self:
@@ -35,6 +37,8 @@ class ContactSection(Section):
             raise ValueError("a sole has x and y, a point neither")
         if self.x is not None and any(self.offset):
             raise ValueError("a sole has x and y in place of an offset")
+        if self.x is not None and self.slides:
+            raise ValueError("only a point slides")
         return self
 
 

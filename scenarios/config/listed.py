@@ -34,9 +34,14 @@ from scenarios.config.tasks import (
 
 
 class Listed(Section):
-    """A task of `[[tasks]]`; its name defaults to its kind."""
+    """A task of `[[tasks]]`; its name defaults to its kind.
+
+    For the sake of the tasks below, each of its rows may `give` that much beyond its least miss, in
+    the unit of the rows: [1/s] or [1/s^2] times that of the task, or [N] of forces.
+    """
 
     name: TaskName | None = None
+    give: NotNegative = 0.0
 
     @property
     def one_sided(self) -> bool:
@@ -50,10 +55,11 @@ class Listed(Section):
 
 
 class ListedPosition(Listed, PositionTask):
-    """The origin of `frame` along a path (3 rows), by default its initial position."""
+    """The origin of `frame` along a path, by default its initial position, in some `axes`."""
 
     kind: Literal["position"]
     frame: str
+    axes: Literal["x", "y", "z", "xy", "xz", "yz", "xyz"] = "xyz"
 
 
 class ListedPose(Listed, AlongSection):

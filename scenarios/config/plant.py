@@ -121,16 +121,18 @@ class PushSection(Section):
 
 
 class TorqueSection(_Plant):
-    """A robot with torque motors in a physics simulation (extra `sim`), on a floor at z = 0.
+    """A robot with torque motors in a physics simulation (extra `sim`).
 
-    The soles of [[contacts]] touch the floor, whose coefficient is `friction`; `softness` [s] is
-    the time constant of a contact. `joint_friction` [N m] is Coulomb's friction and `armature`
-    [kg m^2] the inertia of the drive of every joint, `delay` [s], a whole number of periods, the
-    time by which torques arrive late; the controller knows of none of them. `pushes` disturb it. A
-    robot whose centre of mass is `fall` [m] below its start has fallen, which ends the run.
+    Its [[contacts]] touch a floor, or table, at `height` [m] whose coefficient is `friction`;
+    `softness` [s] is the time constant of a contact. `joint_friction` [N m] is Coulomb's friction
+    and `armature` [kg m^2] the inertia of the drive of every joint, `delay` [s], a whole number of
+    periods, the time by which torques arrive late; the controller knows of none of them. `pushes`
+    disturb it. A robot whose centre of mass is `fall` [m] below its start has fallen, which ends
+    the run.
     """
 
     kind: Literal["torque"]
+    height: Finite = 0.0
     friction: Positive = 0.7
     softness: Positive = 0.005
     joint_friction: NotNegative = 0.0

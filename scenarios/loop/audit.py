@@ -36,7 +36,9 @@ class Certified:
 
     def look(self, tick: int, controller: Controller) -> None:
         """Judge the answer of a tick."""
-        self._values[tick] = certify(controller.hierarchy, controller.resolution.x).certified
+        self._values[tick] = certify(
+            controller.hierarchy, controller.resolution.x,
+            witnesses=controller.resolution.witnesses).certified
 
     def signals(self, recording: Recording) -> Mapping[str, NDArray[Any]]:
         """Return `certified` (T,)."""
@@ -86,8 +88,7 @@ class Judging:
 
     def look(self, tick: int, controller: Controller) -> None:
         """Judge the command of a tick."""
-        meant = controller.sent if controller.cell.contacts is None else controller.resolution.x
-        self._fates.judge(tick, controller.cell, controller.hierarchy, meant,
+        self._fates.judge(tick, controller.cell, controller.hierarchy, controller.meant,
                           controller.resolver.accuracy)
 
     def signals(self, recording: Recording) -> Mapping[str, NDArray[Any]]:

@@ -76,6 +76,11 @@ class Controller:
         """Whether the resolver was called in the last tick."""
         return self.resolution is not self._unanswered
 
+    @property
+    def meant(self) -> Array:
+        """What the command stands for in the rows: itself, or at level "torque" the answer."""
+        return self.sent if self.cell.contacts is None else self.resolution.x
+
     def command(self, t: float, q: Array, v: Array, measured_at: float | None = None) -> Array:
         """Return the command to send at time t [s] with the joints at q, v.
 

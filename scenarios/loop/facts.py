@@ -14,6 +14,7 @@ from hierarchy.avoidance import Capsule
 from hierarchy.problem import Array
 from hierarchy.robots import DHTable
 from hierarchy.robots.table import Base
+from scenarios.cell.forces import contacts_of
 from scenarios.cell.robot import sensed_points
 from scenarios.config import Scenario
 from scenarios.loop.links import capsules, lowest
@@ -30,6 +31,20 @@ class Point:
     name: str
     joint: int
     offset: Vector
+
+
+@dataclass(frozen=True)
+class ContactPoint:
+    """A point of a contact: where it is, as of a Point, and its surface as the controller has it.
+
+    `normal` (3,) in the world has length one; `friction` is Coulomb's coefficient.
+    """
+
+    contact: str
+    joint: int
+    offset: Vector
+    normal: Vector
+    friction: float
 
 
 @dataclass(frozen=True)
@@ -89,18 +104,33 @@ class ResolverFacts:
 
 @dataclass(frozen=True)
 class Facts:
-    """What a run is about: robot, resolver, and what the scenario asked of that resolver."""
+    """What a run is about: robot, resolver, and what the scenario asked of that resolver.
+
+    `contacts` has the contact points at level "torque", in the order of their forces.
+    """
 
     robot: RobotFacts
     resolver: ResolverFacts
     asks: Handles
     limits_in_stack: bool
+    contacts: tuple[ContactPoint, ...] = ()
 
 
 def facts_of(scenario: Scenario, robot: Robot) -> Facts:
     """Return the facts of a scenario on its robot."""
     return Facts(robot_facts(robot, scenario.sensor.foot), resolver_facts(scenario), scenario.asks,
-                 scenario.limits_in_stack)
+                 scenario.limits_in_stack, contact_points(scenario, robot))
+
+
+def contact_points(scenario: Scenario, robot: Robot) -> tuple[ContactPoint, ...]:
+    """Return the contact points of a scenario on its robot, none but at level "torque"."""
+    contacts = contacts_of(scenario, robot)
+    if contacts is None:
+        return ()
+    of = [contact for contact in contacts.contacts for _ in contact.points]
+    return tuple(ContactPoint(contact.name, int(joint), _vector(offset), _vector(contact.axes[2]),
+                              contact.friction)
+                 for contact, joint, offset in zip(of, *contacts.points, strict=True))
 
 
 def robot_facts(robot: Robot, foot: float = 0.0) -> RobotFacts:

@@ -9,7 +9,7 @@ import numpy as np
 
 from hierarchy import HierarchyError, Robot, State, Task
 from hierarchy.problem import Array
-from hierarchy.tasks import CentreOfMass, Pose, Position
+from hierarchy.tasks import Along, CentreOfMass, Pose, Position
 
 if TYPE_CHECKING:
     from scenarios.config.listed import ListedTask
@@ -55,6 +55,8 @@ def _error(task: Task, state: State) -> Array | float:
 
 
 def _position(task: Task, state: State) -> Array | None:
+    if isinstance(task, Along):
+        task = task.task
     if isinstance(task, Position | Pose):
         return state.position(task.frame)
     return task.position(state) if isinstance(task, CentreOfMass) else None

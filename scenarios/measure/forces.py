@@ -30,15 +30,37 @@ def of_contacts(recording: Recording) -> Iterator[Number]:
     """Yield what the floor says: slip, margins of friction and of the centre of pressure."""
     if "floor_force" not in recording or not recording["floor_force"].size:
         return
-    yield Number("slip_max", "Slip of a contact, max", _largest(recording["slip"]), "m")
-    yield Number("friction_margin_min", "Friction left, min", _least(friction_left(recording)),
-                 "share", False)
+    if not all(contact.slides for contact in recording.scenario.contacts):
+        yield Number("slip_max", "Slip of a contact, max", _largest(recording["slip"]), "m")
+        yield Number("friction_margin_min", "Friction left, min", _least(friction_left(recording)),
+                     "share", False)
     if np.isfinite(recording["pressure_margin"]).any():
         yield Number("pressure_margin_min", "Centre of pressure from the edge, min",
                      _least(recording["pressure_margin"]), "m", False)
     error = force_error(recording)
     yield Number("force_error_p95", "Force of a contact against that planned, 95 %",
                  float(np.percentile(error, 95.0)) if error.size else None, "N")
+
+
+def of_wanted_forces(recording: Recording, settle: float) -> Iterator[Number]:
+    """Yield how well contacts push with the normal force that a task asks for, after `settle` [s].
+
+    The surface is horizontal, as in the plant.
+    """
+    if "floor_force" not in recording:
+        return
+    from scenarios.config.listed import ListedForce
+
+    names = [contact.name or contact.frame for contact in recording.scenario.contacts]
+    after = recording["t"] >= settle
+    for task in recording.scenario.tasks:
+        if isinstance(task, ListedForce) and len(task.target) == 1 and after.any():
+            force = recording["floor_force"][after, names.index(task.contact), 2]
+            key, title = task.title.replace(" ", "_"), f"{task.title[0].upper()}{task.title[1:]}"
+            yield Number(f"{key}_rms", f"{title}: error after {settle:g} s, rms",
+                         float(np.sqrt(np.mean((force - task.target[0])**2))), "N")
+            yield Number(f"{key}_touching_share", f"{title}: time in contact after {settle:g} s",
+                         float(np.mean(force > 0.0)), "share", False)
 
 
 def of_torques(recording: Recording) -> Iterator[Number]:
@@ -69,11 +91,13 @@ def of_levels(recording: Recording) -> Iterator[Number]:
 
 
 def friction_left(recording: Recording) -> Array:
-    """Return 1 - |f_t| / (mu f_n) of loaded contacts (T, C) on the floor; NaN without load."""
+    """Return 1 - |f_t| / (mu f_n) of loaded contacts (T, C) that do not slide; NaN elsewhere."""
     force = recording["floor_force"]
     normal, along = force[:, :, 2], np.linalg.norm(force[:, :, :2], axis=2)
     mu = getattr(recording.scenario.plant, "friction", np.nan)
-    return np.where(normal > _LOAD, 1.0 - along / (mu * np.maximum(normal, _LOAD)), np.nan)
+    sticks = np.array([not contact.slides for contact in recording.scenario.contacts])
+    left = 1.0 - along / (mu * np.maximum(normal, _LOAD))
+    return np.where(sticks & (normal > _LOAD), left, np.nan)
 
 
 def force_error(recording: Recording) -> Array:

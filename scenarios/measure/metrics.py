@@ -80,7 +80,7 @@ def measure(recording: Recording, settle: float = 2.0,
         return {}
     found = (*_tracking(recording, settle), *_pointing(recording, cone_tolerance_deg),
              *_listed(recording, settle), *_strictness(recording),
-             *_distances(recording), *_contacts(recording), *_forces(recording),
+             *_distances(recording), *_contacts(recording), *_forces(recording, settle),
              *_motion(recording),
              *_returning(recording),
              *_switching(recording), *_troubles(recording), *_time(recording))
@@ -209,9 +209,11 @@ def _contacts(recording: Recording) -> Iterator[Metric]:
                          _largest(recording[f"contact_{key}"]), unit, group="Safety")
 
 
-def _forces(recording: Recording) -> Iterator[Metric]:
+def _forces(recording: Recording, settle: float) -> Iterator[Metric]:
     from scenarios.measure import forces
 
+    for number in forces.of_wanted_forces(recording, settle):
+        yield Metric(*number, group="Contacts")
     for group, numbers in (("Contacts", forces.of_contacts), ("Torques", forces.of_torques),
                            ("Levels", forces.of_levels)):
         for number in numbers(recording):

@@ -124,8 +124,19 @@ HUMAN_CLAIMS: tuple[Claim, ...] = (
     Compares("The mean direction (25)-(26) changes the stack less often than the nearest obstacle",
              "human", "stack_changes", "human-nearest", "human", "lower"))
 
+STANDING_CLAIMS: tuple[Claim, ...] = (
+    Compares("Strict levels miss the centre of mass by less than weights do", "standing",
+             "miss_centre_of_mass", "weighted", "strict", "lower"),
+    Compares("For this strict levels miss the posture by more", "standing", "miss_posture",
+             "weighted", "strict", "higher"),
+    Compares("With give the posture is missed by less than without", "standing", "miss_posture",
+             "strict", "give", "lower"),
+    Compares("Torques jump more under strict levels than under weights", "standing",
+             "torque_step_max", "weighted", "strict", "higher"))
+
 CLAIMS = (*LETTER_CLAIMS, *JACOBIAN_CLAIMS, *STATE_CLAIMS, *RESOLVER_CLAIMS, *BLEND_CLAIMS,
-          *INERTIA_CLAIMS, *RIVAL_CLAIMS, *SINGULAR_CLAIMS, *HUMAN_CLAIMS)
+          *INERTIA_CLAIMS, *RIVAL_CLAIMS, *SINGULAR_CLAIMS, *HUMAN_CLAIMS,
+          *STANDING_CLAIMS)
 
 _LIMITS = ("joint_limit_excess", "speed_max", "acceleration_max", "body_distance_min",
            "cone_violation_max", "position_error_rms_settled", "stack_changes",
@@ -144,6 +155,8 @@ _HUMAN_RUNS = ("true_position_error_rms", "true_position_error_max", "body_dista
                "body_below_share", "ee_distance_min", "ee_below_share",
                "cone_violation_max", "speed_max", "command_step_max",
                "velocity_step_max", "stack_changes", "active_set_changes")
+_STANDING = ("miss_centre_of_mass", "miss_left_hand", "miss_posture", "torque_step_max",
+             "slip_max", "speed_max")
 _STATES = (MEDIAN, LARGEST)
 _THROTTLE = (DAMPED, LEFT)
 _BLEND = ("velocity_step_max", "acceleration_step_max", "body_distance_min")
@@ -158,14 +171,19 @@ def claims(rows: Mapping[str, Rows], listed: Sequence[Claim]) -> str:
     return "\n".join([*lines, "", _source(rows, dict.fromkeys(one.study for one in listed))])
 
 
-def table(rows: Mapping[str, Rows], study: str, metrics: Sequence[str]) -> str:
-    """Return a table of a study, its columns as rows: median and quartiles of metrics."""
+def table(rows: Mapping[str, Rows], study: str, metrics: Sequence[str],
+          interval: bool = False) -> str:
+    """Return a table of a study, its columns as rows: median and quartiles of metrics.
+
+    With `interval` the share of runs that reached their end has its 95 % interval.
+    """
     found = rows[study]
     known = [name for name in metrics if name in found.metrics]
     heads = [_head(found, name) for name in known]
     lines = [f"| | reached the end | {' | '.join(heads)} |",
              "|---" * (len(heads) + 2) + "|"]
-    lines += [f"| `{column}` | {found.ended[column]} of {found.starts} | "
+    ended = share if interval else "{} of {}".format
+    lines += [f"| `{column}` | {ended(found.ended[column], found.starts)} | "
               f"{' | '.join(_bare(found, column, name) for name in known)} |"
               for column in found.values]
     return "\n".join([*lines, "", _source(rows, [study])])
@@ -232,5 +250,7 @@ BLOCKS: dict[str, Block] = {
     "singular-claims": partial(claims, listed=SINGULAR_CLAIMS),
     "singular": partial(table, study="singular", metrics=_SINGULAR),
     "human-claims": partial(claims, listed=HUMAN_CLAIMS),
+    "standing": partial(table, study="standing", metrics=_STANDING, interval=True),
+    "standing-claims": partial(claims, listed=STANDING_CLAIMS),
     "human": partial(table, study="human", metrics=_HUMAN_RUNS),
     "findings": findings}

@@ -11,7 +11,8 @@ from scenarios.files import write_text
 from scenarios.reproduce import commands
 from scenarios.reproduce.rows import Rows
 
-PAGES = ("README.md", "docs/reproduction.md", "docs/ladder.md", "docs/experiment.md")
+PAGES = ("README.md", "docs/reproduction.md", "docs/ladder.md", "docs/experiment.md",
+         "docs/standing.md")
 RESULTS = "docs/results"
 _BLOCK = re.compile(r"(<!-- reproduce: (?P<name>[\w-]+) -->\n).*?(<!-- end of \w[\w-]* -->)",
                     re.DOTALL)

@@ -21,6 +21,7 @@ from scenarios.loop.fate import Fate
 from scenarios.loop.links import ends
 from scenarios.scene.curves import Areas, Series, marks_of, series
 from scenarios.scene.levels import Levels, levels_at
+from scenarios.scene.pushes import Pushes, pushes
 
 if TYPE_CHECKING:
     from scenarios.config import Scenario
@@ -91,7 +92,7 @@ class Scene:
     centres (F, H, 3) : of `stage.obstacles`, which has shape, size and rotation.
     axis (F, 3) : the end effector's z axis. desired (F, 3) : its path, or None.
     order (F,) : index into `orders`, which name tasks. switches (S,) : times of changes of it.
-    paths : of the points that listed tasks move. levels : see scenarios.scene.levels.
+    paths : of the points that listed tasks move. levels, pushes : see scenarios.scene.
     """
 
     stage: Stage
@@ -111,6 +112,7 @@ class Scene:
     levels: Levels
     series: tuple[Series, ...]
     switches: Array
+    pushes: Pushes | None = None
 
     @property
     def traced(self) -> Array:
@@ -157,7 +159,10 @@ def scene(recording: Recording, rate: float = 30.0) -> Scene:
                  order=order[ticks], orders=recording.order_names,
                  paths=tuple(_paths(recording, ticks)), levels=levels,
                  series=tuple(series(recording, ticks)),
-                 switches=recording["t"][recording.switches()])
+                 switches=recording["t"][recording.switches()],
+                 pushes=pushes(recording.facts.contacts, moved["placements"],
+                               recording["planned_force"][ticks])
+                 if recording.facts.contacts else None)
 
 
 def _frames(recording: Recording, rate: float) -> NDArray[np.int64]:

@@ -90,6 +90,8 @@ class Batch:
                 raise HierarchyError(f"problem {p} is {h}, where problem 0 is {first}")
             if h.metric is not None:
                 raise HierarchyError(f"problem {p} has a metric; a batch has none")
+            if h.giving:
+                raise HierarchyError(f"problem {p} gives; no problem of a batch does")
         stacked = (np.stack([getattr(h, name) for h in hierarchies])
                    for name in ("A", "lower", "upper", "reference"))
         A, lower, upper, reference = stacked

@@ -40,7 +40,7 @@ class ActiveSetResolution(Resolution):
     memory: Array
 
     def __init__(self, x: Array, status: Status, memory: Array) -> None:
-        self.x, self.status, self.memory = x, status, memory
+        self.x, self.status, self.memory, self.witnesses = x, status, memory, None
 
     @property
     def iterations(self) -> int:  # type: ignore[override]

@@ -8,6 +8,7 @@ from hierarchy import Robot, State, Task
 from hierarchy.avoidance import Obstacle, Obstacles, Repulsion
 from hierarchy.paths import Ellipse
 from hierarchy.tasks import (
+    Along,
     Avoidance,
     CentreOfMass,
     JointCoupling,
@@ -33,6 +34,7 @@ SENSOR = ExactDistances(ROBOT, OBSTACLES, BODY, TIP)
 
 TASKS = {
     "position": Position(FRAME, PATH, repulsion_within=0.5),
+    "along": Along(Position(FRAME, PATH), ((0.6, 0.0, 0.8), (0.0, 1.0, 0.0))),
     "pointing": Pointing(FRAME, (1.0, 0.2, 0.0), 0.3),
     "cone": Pointing(FRAME, (1.0, 0.2, 0.0), 0.3, "inequality"),
     "avoidance 1-D": Avoidance(ROBOT.control_points, 1),

@@ -16,17 +16,19 @@ from scenarios.config.plant import TorqueSection
 
 _LEAST_MASS, _LEAST_INERTIA = 1e-6, 1e-9  # [kg], [kg m^2] of a body that only joins two joints
 _THICKNESS = 0.01                         # [m] half of that of a sole
+_SLIDING = 0.15                           # [s] time constant of the friction of what slides
+_FLOOR = "the floor"
 _BALL = 0.001                             # [m] radius of a point that touches
 Element = ElementTree.Element
 
 
 def on_floor(robot: Robot, contacts: Contacts, floor: TorqueSection, timestep: float) -> str:
-    """Return the scene of a robot whose `contacts` touch a floor at z = 0.
+    """Return the scene of a robot whose `contacts` touch a horizontal floor.
 
     A sole is a box in the place of its corners, a point a small ball; nothing else touches
-    anything. Bodies are named "body JOINT", geometries by their contacts. Actuators are
-    the torques of the actuated joints. Raises ScenarioError unless each joint, but for that of a
-    floating base, turns about one axis.
+    anything. Bodies are named "body JOINT", geometries by their contacts. Actuators are the torques
+    of the actuated joints. Raises ScenarioError unless each joint, but for that of a floating base,
+    turns about one axis.
     """
     root = Element("mujoco", model=robot.name)
     ElementTree.SubElement(root, "compiler", angle="radian", inertiafromgeom="false")
@@ -35,14 +37,14 @@ def on_floor(robot: Robot, contacts: Contacts, floor: TorqueSection, timestep: f
                                     tolerance="1e-12", iterations="200")
     ElementTree.SubElement(option, "flag", autoreset="disable")
     world = ElementTree.SubElement(root, "worldbody")
-    touching = {"condim": "3", "solref": text(floor.softness, 1.0),
-                "friction": text(floor.friction, 0.0, 0.0)}
-    ElementTree.SubElement(world, "geom", {"type": "plane", "size": "20 20 1"} | touching)
-    elements = _bodies(world, robot, floor)
+    ElementTree.SubElement(world, "geom", type="plane", name=_FLOOR, size="20 20 1",
+                           pos=text(0.0, 0.0, floor.height))
+    elements, pairs = _bodies(world, robot, floor), ElementTree.SubElement(root, "contact")
     for contact in contacts.contacts:
         shape = _sole(contact) if contact.is_surface else _ball(contact)
-        ElementTree.SubElement(elements[contact.frame.joint], "geom",
-                               {"name": contact.name} | shape | touching)
+        ElementTree.SubElement(elements[contact.frame.joint], "geom", {
+            "name": contact.name, "contype": "0", "conaffinity": "0"} | shape)
+        ElementTree.SubElement(pairs, "pair", _touching(contact, floor))
     actuator = ElementTree.SubElement(root, "actuator")
     for name, limit in zip(robot.velocity_names[robot.actuated:],
                            robot.effort_limit[robot.actuated:], strict=True):
@@ -76,6 +78,18 @@ def _body(parent: Element, body: Body) -> Element:
         element, "inertial", mass=text(max(body.mass, _LEAST_MASS)), pos=text(*body.centre),
         fullinertia=text(I[0, 0], I[1, 1], I[2, 2], I[0, 1], I[0, 2], I[1, 2]))
     return element
+
+
+def _touching(contact: Contact, floor: TorqueSection) -> dict[str, str]:
+    """Return how a contact touches the floor.
+
+    MuJoCo raises the normal force of a sliding contact with the friction that it would take to stop
+    it at once, so that of a contact that is to slide is softer, and the hand does not hop.
+    """
+    along = _SLIDING if contact.slides else floor.softness
+    return {"geom1": _FLOOR, "geom2": contact.name, "condim": "3",
+            "friction": text(floor.friction, floor.friction, 0.0, 0.0, 0.0),
+            "solref": text(floor.softness, 1.0), "solreffriction": text(along, 1.0)}
 
 
 def _sole(contact: Contact) -> dict[str, str]:

@@ -16,8 +16,9 @@ class Touch:
     """Reads what the floor does to each of C contacts, in their order, after a step.
 
     `force` (C, 3) [N] in world axes; `slip` (C,) [m], how far a contact has moved along the floor
-    since it touched down; `margin` (C,) [m], of the centre of pressure from the nearest edge of the
-    sole, NaN for a point or without force. `signals` has these arrays by the names of signals.
+    since it touched down, NaN if it is to slide; `margin` (C,) [m], of the centre of pressure from
+    the nearest edge of the sole, NaN for a point or without force. `signals` has these arrays by
+    the names of signals.
     """
 
     def __init__(self, mujoco: Any, model: Any, contacts: Contacts) -> None:
@@ -25,6 +26,7 @@ class Touch:
         self._force_of, self._model = mujoco.mj_contactForce, model
         self._geoms = [model.geom(name).id for name in self.names]
         self._sole = [contact.is_surface for contact in contacts.contacts]
+        self._slides = [contact.slides for contact in contacts.contacts]
         self._of_geom = {geom: c for c, geom in enumerate(self._geoms)}
         count = len(self.names)
         self.force, self.slip = np.zeros((count, 3)), np.zeros(count)
@@ -58,7 +60,7 @@ class Touch:
         if anchor is None:
             self._anchor[c] = anchor = place[:2].copy()
         moved = place[:2] - anchor
-        self.slip[c] = np.sqrt(moved @ moved)
+        self.slip[c] = np.nan if self._slides[c] else np.sqrt(moved @ moved)
         if self._sole[c]:
             pressure = axes.T @ (self._moment[c] / load - place)
             half = self._model.geom_size[self._geoms[c]]

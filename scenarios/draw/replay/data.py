@@ -56,6 +56,8 @@ def run_data(scene: Scene, about: dict[str, Any]) -> dict[str, Any]:
               "centres": scene.centres[:1] if still else scene.centres}
     if scene.desired is not None:
         places["desired"] = scene.desired
+    if scene.pushes is not None:
+        places |= scene.pushes._asdict()
     others: dict[str, NDArray[Any]] = {
         "t": scene.t, "linked": scene.linked, "active": scene.active, "order": scene.order,
         "distance": scene.distance[frames, scene.linked], "fate": levels.fate,

@@ -146,6 +146,11 @@ class Stage {
       passing([[tip, add(tip, scale(run.wanted, AXIS_LENGTH))]], [...colours.ink, 0.6], 1.2,
               {dash: 0.02});
     }
+    const pushes = [["support", [...own, 1], 2], ["cone", [...colours.ink, 0.35], 0.8],
+                    ["force", [...colours.alert, 1], 3]];
+    for (const [name, colour, width] of pushes) {
+      if (run[name]) passing(existing(run.row(name, at.frame)), colour, width, {depth: false});
+    }
     const linked = run.linked.values[at.frame];
     const from = triple(points, linked), to = run.between("nearest", at);
     if (Number.isFinite(to[0])) {
@@ -154,6 +159,13 @@ class Stage {
               held ? 2.4 : 1.2, {depth: false});
     }
   }
+}
+
+// Pairs of points out of six numbers each, without those that are not finite.
+function existing(values) {
+  const pairs = Array.from({length: values.length / 6}, (_, k) =>
+    [triple(values, 2 * k), triple(values, 2 * k + 1)]);
+  return pairs.filter(pair => pair.flat().every(Number.isFinite));
 }
 
 // The bounding box of everything drawn.

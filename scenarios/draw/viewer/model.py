@@ -61,6 +61,10 @@ class Model:
         self._paths: list[Any] = []
         self._traces: list[Any] = []
         self._goals: list[Any] = []
+        self._pushes = [self._lines(f"/contacts/{name}", _segments(()), colour, width)
+                        for name, colour, width in (("force", rgb(ALERT), 4.0),
+                                                    ("cone", rgb(INK), 1.0),
+                                                    ("support", self._colour, 3.0))]
         self.set_paths(paths)
 
     def set_stage(self, stage: Stage) -> None:
@@ -117,6 +121,8 @@ class Model:
                 self._goals.append(self._ball(f"/goal{i}", 1.3 * _DOT, rgb(INK)))
             self._goals[i].position = goal
         self._show_nearest(now)
+        for lines, segments in zip(self._pushes, now.pushes or (), strict=False):
+            lines.points = segments.astype(np.float32) if len(segments) else _segments(())
         if self._stage.axis is not None:
             self._show_cone(now, self._stage.axis)
 

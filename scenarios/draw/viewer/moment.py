@@ -15,8 +15,10 @@ from hierarchy.avoidance import Obstacles
 from hierarchy.problem import Array
 from scenarios.cell.sensors import ExactDistances
 from scenarios.loop import listed
+from scenarios.loop.facts import contact_points
 from scenarios.loop.fate import Fate, Judged, judged
 from scenarios.scene import SEPARATION, Scene
+from scenarios.scene.pushes import Pushes, pushes
 
 if TYPE_CHECKING:
     from scenarios.loop.controller import Controller
@@ -38,7 +40,7 @@ class Moment:
     centres (H, 3); axis (3,); desired (3,) or None. `order` names the tasks in the stack, most
     important first, `became` has the fate of each; saturated (n,) is the side, -1 or 1, of its
     limits at which each joint is, else 0. `moved` has the point that each listed task moves and its
-    desired position or None.
+    desired position or None, `pushes` the segments (S, 2, 3) of contacts, or None.
     """
 
     t: float
@@ -54,6 +56,7 @@ class Moment:
     became: Mapping[str, Became]
     saturated: NDArray[np.int8]
     moved: tuple[tuple[Array, Array | None], ...] = ()
+    pushes: Pushes | None = None
 
     @property
     def goals(self) -> list[Array]:
@@ -79,7 +82,7 @@ def of_scene(scene: Scene, f: int) -> Moment:
         {name: Became(Fate(levels.fate[f, column]), float(levels.violation[f, column]))
          for name, column in zip(order, columns, strict=True)}, levels.saturated[f],
         tuple((path.actual[f], None if path.wanted is None else path.wanted[f])
-              for path in scene.paths))
+              for path in scene.paths), scene.pushes.at(f) if scene.pushes else None)
 
 
 class Watched:
@@ -97,6 +100,7 @@ class Watched:
         obstacles = cell.sensor.obstacles if cell.sensor else Obstacles()
         self._exact = ExactDistances(cell.robot, obstacles)
         self._tip = cell.robot.frame(cell.robot.end_effector)
+        self._points = contact_points(cell.scenario, cell.robot)
 
     def moment(self) -> Moment:
         """Return what is drawn after the last tick: the state at its start."""
@@ -116,7 +120,15 @@ class Watched:
             cell.state.t, self._state.placements.copy(), seen.points.copy(), nearest, linked,
             active, self._exact.obstacles.centres.copy(), self._state.rotation(self._tip)[:, 2],
             cell.position.path(cell.state.t)[0] if cell.position else None, order, became,
-            found.saturated, tuple(self._moved()))
+            found.saturated, tuple(self._moved()), self._pushes())
+
+    def _pushes(self) -> Pushes | None:
+        controller = self.controller
+        contacts = controller.cell.contacts
+        if contacts is None or not controller.answered or not self._points:
+            return None
+        forces = contacts.forces(controller.resolution.x)
+        return pushes(self._points, self._state.placements[None], forces[None]).at(0)
 
     def _active(self, became: Mapping[str, Became]) -> int:
         """Return the point that is kept away, as `active` of `scenarios.scene.Scene`."""
@@ -146,8 +158,8 @@ class Watched:
         if not controller.answered:
             levels = len(controller.allocation.order)
             return Judged(np.full(levels, Fate.UNKNOWN, np.int8), np.full(levels, np.nan),
-                          np.zeros(len(controller.sent), np.int8))
-        return judged(controller.cell, controller.hierarchy, controller.sent,
+                          np.zeros(controller.cell.robot.n, np.int8))
+        return judged(controller.cell, controller.hierarchy, controller.meant,
                       controller.resolver.accuracy)
 
 

@@ -1,0 +1,75 @@
+"""A position task in some directions only."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from hierarchy.errors import HierarchyError
+from hierarchy.problem import Array
+from hierarchy.state import State
+from hierarchy.task import Level, Task
+from hierarchy.tasks.position import Position
+
+
+@dataclass(frozen=True)
+class Along(Task):
+    """The rows of a position task along `directions` (m, 3) of the world, m = 1, 2 or 3 [m].
+
+    A hand that slides on a table is moved along two of them and pushes along the third. The gains
+    are those of `task`. Raises HierarchyError unless the directions are of length one and
+    orthogonal.
+    """
+
+    task: Position
+    directions: Sequence[Sequence[float]]
+    name: str = "along"
+    _D: Array = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        D = np.array(self.directions, dtype=float)
+        if D.ndim != 2 or D.shape[1:] != (3,) or not np.allclose(D @ D.T, np.eye(len(D))):
+            raise HierarchyError(f"task {self.name!r}: directions {self.directions!r} are not of "
+                                 "length one and orthogonal, (m, 3)")
+        object.__setattr__(self, "_D", D)
+
+    @property
+    def dimension(self) -> int:
+        """One row per direction."""
+        return len(self._D)
+
+    def error(self, state: State) -> Array:
+        """Distance to the path along the directions (m,) [m]."""
+        return np.asarray(self._D @ self.task.error(state))
+
+    def jacobian(self, state: State) -> Array:
+        """Those rows of the position's Jacobian (m, n) [m]."""
+        return np.asarray(self._D @ self.task.jacobian(state))
+
+    def jacobian_derivative(self, state: State) -> Array:
+        """Its time derivative (m, n) [m/s]."""
+        return np.asarray(self._D @ self.task.jacobian_derivative(state))
+
+    def reference_velocity(self, state: State) -> Array:
+        """See `Task.reference_velocity`."""
+        return np.asarray(self._D @ self.task.reference_velocity(state))
+
+    def reference_acceleration(self, state: State) -> Array:
+        """See `Task.reference_acceleration`."""
+        return np.asarray(self._D @ self.task.reference_acceleration(state))
+
+    def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
+               row: int) -> Callable[[], object]:
+        """See `Task.writer`."""
+        rows, b, above = np.zeros((3, A.shape[1])), np.zeros(3), np.zeros(3)
+        write_rows = self.task.writer(state, level, rows, b, above, 0)
+        own = slice(row, row + self.dimension)
+
+        def write() -> None:
+            write_rows()
+            A[own] = self._D @ rows
+            lower[own] = upper[own] = self._D @ b
+
+        return write

@@ -1,0 +1,31 @@
+"""The scenario `step`: a foot lifts off and touches down, without a jump of the torques."""
+
+import numpy as np
+import pytest
+
+from scenarios import load, simulate
+from scenarios.measure.metrics import measure
+
+BOUND = 5.0  # [N m] of a torque step, as the scenario says
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.mark.parametrize("ramp", [0.2, 0.0])
+def test_the_ramp_of_a_contact_keeps_torques_from_jumping(ramp):
+    pytest.importorskip("mujoco")
+    run = simulate(load("step").with_changes({"contacts.1.ramp": ramp, "control.duration": 2.3}))
+    assert run.fault is None
+    step = measure(run)["torque_step_max"].value
+    assert step < BOUND if ramp else step > 2.0 * BOUND
+    right = run["floor_force"][:, 1]
+    t = run["t"]
+    assert (right[(t > 1.21) & (t < 1.79)] == 0.0).all()          # in the air
+    assert right[t < 0.3, 2].min() > 1.0
+    assert right[(t > 2.05) & (t < 2.15), 2].min() > 1.0
+    height = run["task_position_right_foot"][:, 2]
+    assert height.max() == pytest.approx(0.04, abs=3e-3)
+    assert run["planned_force"][(t > 1.2) & (t < 1.8)][:, 4:].max() < 1e-6
+    if ramp:  # the load that is planned goes down with the ramp, at each corner
+        allowed = 300.0 * np.clip((1.2 - t) / ramp, 0.0, 1.0)[t < 1.2]
+        assert (run["planned_force"][t < 1.2, 4:, 2] <= allowed[:, None] + 1e-6).all()

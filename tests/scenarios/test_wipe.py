@@ -1,0 +1,94 @@
+"""The scenario `wipe`: a contact that slides, force along its normal and motion along the table."""
+
+import numpy as np
+import pytest
+
+from hierarchy import Robot, Stack, State
+from hierarchy.contacts import Contact, Contacts
+from hierarchy.errors import HierarchyError
+from hierarchy.tasks import Along, ContactMotion, Friction
+from scenarios import load, simulate
+from scenarios.config import ScenarioError
+from scenarios.measure.metrics import measure
+
+ARM = Robot.named("kuka_lwr")
+TIP = ARM.frame("end_effector")
+Q = np.array([0.0, -0.5, 0.0, 1.5, 0.0, -1.14, 0.0])
+
+
+def rows_at(v, friction=0.3, faces=4, least=0.0):
+    """Friction rows of a sliding tip with the joint velocity v: over the force, and their sides."""
+    contacts = Contacts(ARM, [Contact(TIP, friction=friction, slides=True)])
+    state = State.at(ARM, Q, v)
+    A, lower, upper = Friction(contacts, faces, least).rows(state)
+    J = contacts.jacobian(state)
+    return A[:, 7:], lower, upper, J @ v
+
+
+@pytest.mark.parametrize("faces", [4, 8])
+def test_the_force_on_a_sliding_point_is_friction_against_its_velocity(faces):
+    v = np.random.default_rng(3).normal(size=7)
+    A, lower, upper, moving = rows_at(v, faces=faces)
+    along = moving[:2]
+    force = np.array([*(-0.3 * 20.0 * along / np.linalg.norm(along)), 20.0])
+    equal = lower == upper
+    assert equal.sum() == 2
+    np.testing.assert_allclose((A @ force)[equal], 0.0, atol=1e-12)
+    assert np.linalg.matrix_rank(A[equal][:, :2]) == 2    # no other tangential force does
+    assert (lower[-1], upper[-1]) == (0.0, np.inf)        # and it pushes
+    assert np.isinf(lower[:-1][~equal[:-1]]).all()
+    assert np.isinf(upper[:-1][~equal[:-1]]).all()
+    assert rows_at(v, least=2.0)[1][-1] == 2.0
+
+
+def test_a_point_that_hardly_moves_has_hardly_any_friction():
+    v = np.random.default_rng(3).normal(size=7)
+    fast = np.linalg.norm(rows_at(v)[3][:2])
+    A, lower, upper, moving = rows_at(1e-3 / fast * v)    # 1 mm/s, a tenth of the full friction
+    speed = np.linalg.norm(moving[:2])
+    assert speed == pytest.approx(1e-3)
+    force = np.array([*(-0.03 * 20.0 * moving[:2] / speed), 20.0])
+    np.testing.assert_allclose((A @ force)[lower == upper], 0.0, atol=1e-12)
+
+
+def test_a_sliding_contact_is_held_along_its_normal_only():
+    normal = np.array([0.6, 0.0, 0.8])
+    contacts = Contacts(ARM, [Contact(TIP, normal=tuple(normal), slides=True)])
+    state = State.at(ARM, Q, np.ones(7))
+    motion = ContactMotion(contacts, damping=30.0)
+    h = Stack([motion], "torque", contacts=contacts).hierarchy(state)
+    J = contacts.jacobian(state)
+    np.testing.assert_allclose(h.A[:, :7], normal @ J[None], atol=1e-12)
+    expected = -30.0 * normal @ J @ state.v - normal @ contacts.drift(state)
+    np.testing.assert_allclose(h.lower, expected)
+    assert motion.row_names == ("end_effector along its normal",)
+
+
+def test_what_cannot_slide_or_is_no_direction_is_refused():
+    with pytest.raises(HierarchyError, match="4 points that slide; only a contact of one point"):
+        Contact(TIP, [(x, y, 0.0) for x in (0.0, 1.0) for y in (0.0, 1.0)], slides=True)
+    with pytest.raises(ScenarioError, match="only a point slides"):
+        load("wipe").with_changes({"contacts.0.x": [0.0, 0.1], "contacts.0.y": [0.0, 0.1]})
+    with pytest.raises(HierarchyError, match=r"'along': directions .* orthogonal"):
+        Along(None, ((1.0, 0.0, 0.0), (1.0, 1.0, 0.0)))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("height", [0.111, 0.09])
+def test_it_presses_and_wipes_on_a_table_of_unknown_height(height):
+    """Friction known: within 1 N of 20 N most of the time, and a few mm of its circle."""
+    pytest.importorskip("mujoco")
+    run = simulate(load("wipe").with_changes({"plant.height": height, "control.duration": 3.0}),
+                   certified=True)
+    assert run.fault is None
+    assert run["certified"].all()
+    after = run["t"] > 1.0
+    force = run["floor_force"][after, 0, 2]
+    assert np.median(np.abs(force - 20.0)) < 2.0
+    height_kept = run["true_ee_position" if "true_ee_position" in run else "ee_position"][after, 2]
+    np.testing.assert_allclose(height_kept, height, atol=3e-3)
+    found = measure(run)
+    assert found["force_touching_share"].value > 0.85
+    assert found["task_path_rms"].value < 6e-3
+    assert np.isnan(run["slip"]).any()
+    assert "slip_max" not in found

@@ -1,0 +1,157 @@
+"""Levels that give: how far they may be missed beyond their least for the sake of those below."""
+
+import numpy as np
+import pytest
+from scipy.linalg import null_space
+from scipy.optimize import minimize
+
+from hierarchy import Hierarchy, HierarchyError, Robot, Stack, State
+from hierarchy.paths import Still
+from hierarchy.tasks import Position, Posture
+from solvers import Status, certify, make, names
+from solvers.batch import Batch
+from solvers.problems import generate
+
+STRICT = [make("hcod"), *(make("hqp", backend=name) for name in ("proxqp", "daqp"))]
+each = pytest.mark.parametrize("resolver", STRICT, ids=lambda one: one.label)
+
+
+def problem(seed, give, n=6, half=0.5):
+    """Levels that cannot all be met: two equalities, a conflict with them, a box, a posture."""
+    rng = np.random.default_rng(seed)
+    A, B, C = rng.normal(size=(2, n)), rng.normal(size=(3, n)), rng.normal(size=(3, n))
+    B[2] = A[0] + A[1]  # which conflicts with the level above
+    return Hierarchy.from_levels(
+        [(A, rng.normal(size=2)), (B, rng.normal(size=3)), (C, np.full(3, -half), np.full(3, half)),
+         (np.eye(n), rng.normal(size=n))], give=[0.0, give, 0.0, 0.0])
+
+
+@each
+@pytest.mark.parametrize("seed", range(6))
+def test_a_level_gives_up_to_what_it_may_and_those_below_gain(resolver, seed):
+    strict, soft = problem(seed, 0.0), problem(seed, [0.3, 0.1, 0.2])
+    before, res = resolver.solve(strict), resolver.solve(soft)
+    assert (before.status, res.status) == (Status.SOLVED, Status.SOLVED)
+    assert before.witnesses is None
+    assert certify(soft, res.x, 1e-6, witnesses=res.witnesses).certified
+    rows = slice(2, 5)
+    least = np.abs(strict.slacks(before.x)[rows])
+    allowed = [*least, 0.3, 0.1, 0.2]
+    assert (np.abs(soft.slacks(res.x)[rows]) <= allowed + 1e-7).all()
+    assert np.abs(np.abs(soft.slacks(res.x)[rows]) - allowed).min() < 1e-7  # and a row uses it
+    np.testing.assert_allclose(soft.violations(res.x)[0], strict.violations(before.x)[0], atol=1e-8)
+    lower, were = soft.violations(res.x)[2:], strict.violations(before.x)[2:]
+    first = int(np.argmax(np.abs(lower - were) > 1e-6))
+    assert lower[first] < were[first] - 1e-3
+
+
+@each
+@pytest.mark.parametrize("seed", range(3))
+def test_its_answer_is_that_of_a_plain_convex_program(resolver, seed):
+    """The last level as a program with constraints, by another method that knows no levels."""
+    h = problem(seed, 0.2, half=4.0)
+    res = resolver.solve(h)
+    first, second, box = (slice(0, 2), slice(2, 5), slice(5, 8))
+    N = null_space(h.A[first])  # the first level is met
+    x0 = np.linalg.lstsq(h.A[first], h.lower[first], rcond=None)[0]
+    x0 = x0 + N @ np.linalg.lstsq(h.A[second] @ N, h.lower[second] - h.A[second] @ x0,
+                                  rcond=None)[0]
+    room = np.abs(h.A[second] @ x0 - h.lower[second]) + 0.2
+    rows = np.vstack([h.A[second], h.A[box]])
+    low = np.concatenate([h.lower[second] - room, h.lower[box]])
+    up = np.concatenate([h.upper[second] + room, h.upper[box]])
+    target = h.lower[8:]
+    found = minimize(lambda y: ((x0 + N @ y - target) ** 2).sum(), np.zeros(4), method="SLSQP",
+                     options={"ftol": 1e-11, "maxiter": 500}, constraints=[
+        {"type": "ineq", "fun": lambda y: up - rows @ (x0 + N @ y)},
+        {"type": "ineq", "fun": lambda y: rows @ (x0 + N @ y) - low}])
+    assert found.success  # here the box can be had too
+    np.testing.assert_allclose(res.x, x0 + N @ found.x, atol=1e-4)
+
+
+def test_a_give_of_zero_is_no_give_and_a_boundless_one_drops_the_level():
+    hcod, strict = make("hcod"), problem(1, 0.0)
+    plain = Hierarchy(strict.A, strict.lower, strict.upper, strict.sizes, strict.reference,
+                      strict.names)
+    np.testing.assert_array_equal(hcod.solve(strict).x, hcod.solve(plain).x)
+    soft = problem(1, 1e6)
+    kept = np.r_[0:2, 5:soft.m]
+    without = Hierarchy(soft.A[kept], soft.lower[kept], soft.upper[kept],
+                        np.delete(soft.sizes, 1), soft.reference, ("a", "b", "c"))
+    np.testing.assert_allclose(hcod.solve(soft).x, hcod.solve(without).x, atol=1e-9)
+
+
+def test_several_levels_give_one_after_the_other_and_warm_starts_agree():
+    h = problem(2, 0.0)
+    h.give = np.concatenate([[0.1, 0.0], np.full(3, 0.05), np.full(3, 0.02), np.zeros(6)])
+    assert h.giving == [0, 1, 2]
+    cold = make("hcod").solve(h)
+    assert cold.witnesses.shape == (3, 6)
+    assert certify(h, cold.x, witnesses=cold.witnesses).certified
+    warm = make("hcod").solve(h, cold.memory)
+    np.testing.assert_allclose(warm.x, cold.x, atol=1e-9)
+
+
+def test_generated_hierarchies_that_give_are_certified_by_hcod():
+    solved = 0
+    for seed in range(150):
+        h = generate(7_000_000 + seed)
+        h.give = 0.1 * np.random.default_rng(seed).random(h.m)
+        res = make("hcod").solve(h)
+        if res.status is Status.SOLVED:
+            assert certify(h, res.x, 1e-6, witnesses=res.witnesses).certified, seed
+            solved += 1
+    assert solved >= 140
+
+
+@pytest.mark.parametrize("wrong", ["x", "witness"])
+def test_the_certificate_rejects_another_x_and_a_witness_that_misses_more(wrong):
+    h = problem(3, 0.2)
+    res = make("hcod").solve(h)
+    x, witnesses = res.x.copy(), res.witnesses.copy()
+    target = x if wrong == "x" else witnesses[0]
+    target += 1e-3 * np.ones(h.n)
+    assert not certify(h, x, witnesses=witnesses).certified
+    strict = make("hcod").solve(problem(3, 0.0)).x
+    assert not certify(h, strict, witnesses=res.witnesses).certified
+    with pytest.raises(HierarchyError, match=r"1 levels give, so witnesses must be \(1, 6\)"):
+        certify(h, res.x)
+
+
+def test_what_cannot_give_refuses_by_name():
+    h = problem(1, 0.1)
+    for name in names():
+        resolver = make(name)
+        if resolver.strict and resolver.handles == "inequalities":
+            continue
+        with pytest.raises(HierarchyError, match=r"level 2: it gives, .* has none \(hcod, hqp\)"):
+            resolver.solve(h)
+    with pytest.raises(HierarchyError, match="problem 0 gives"):
+        Batch.of([h])
+
+
+@pytest.mark.parametrize(("give", "said"), [
+    ([0.1], "give has 1 entries for 2 levels"),
+    ([0.1, -1.0], r"level 2, row 0: give is -1.0, expected a number >= 0"),
+    ([0.1, np.inf], "level 2, row 0: give is inf"), ([np.nan, 0.0], "level 1, row 0: give is nan"),
+    ([[0.1, 0.2], 0.0], r"level 1: give has shape \(2,\), expected one number or \(3,\)")])
+def test_a_wrong_give_is_named(give, said):
+    with pytest.raises(HierarchyError, match=said):
+        Hierarchy.from_levels([(np.eye(3), np.ones(3)), (np.eye(3)[:2], np.ones(2))], give=give)
+
+
+def test_a_stack_takes_it_by_the_name_of_a_task_in_any_order():
+    robot = Robot.named("kuka_lwr")
+    state = State.at(robot, np.full(7, 0.3))
+    hand = Position(robot.frame("end_effector"), Still((0.3, 0.3, 0.6)))
+    stack = Stack([hand, Posture((0.1,) * 7)], "velocity", give={"position": [0.1, 0.0, 0.0]})
+    h = stack.hierarchy(state)
+    np.testing.assert_array_equal(h.give, [0.1, *np.zeros(9)])
+    swapped = stack.hierarchy(state, ("posture", "position"))
+    np.testing.assert_array_equal(swapped.give, [*np.zeros(7), 0.1, 0.0, 0.0])
+    assert stack.hierarchy(state, ("posture",)).give is None
+    assert np.abs(h.slacks(make("hcod").solve(h).x)[:3]).max() == pytest.approx(0.1)
+    with pytest.raises(HierarchyError, match="task 'position': give has shape"):
+        Stack([hand], "velocity", give={"position": [0.1, 0.2]})
+    with pytest.raises(HierarchyError, match="positon"):
+        Stack([hand], "velocity", give={"positon": 0.1})
