@@ -73,6 +73,11 @@ def sentences(found: Results) -> str:
                      for line in lead(fresh(found)))
 
 
+def short(found: Results) -> str:
+    """Return who is right most often, and where another is."""
+    return fill("- " + " ".join(lead(fresh(found))[:2]), WIDTH, subsequent_indent="  ")
+
+
 def text(table: Table) -> str:
     """Return a table as a block of code."""
     console = Console(file=io.StringIO(), width=WIDTH, highlight=False, markup=False)
@@ -116,15 +121,15 @@ def machine(found: Results) -> str:
                          if name not in ("processor", "cores", "system", "python"))
     work = np.array([row.yardstick for half in found.halves for row in half.rows
                      if row.yardstick]) / 1e3
-    said = (f"{found.machine['processor']}, {found.machine['cores']} cores, "
-            f"{found.machine['system']}, Python {found.machine['python']}, {packages}. The yardstick "
-            f"took a median of {np.median(work):.0f} us, in the slowest file of an entrant "
-            f"{work.max() / np.median(work):.1f} times that.")
+    about = [found.machine["processor"], f"{found.machine['cores']} cores",
+             found.machine["system"], f"Python {found.machine['python']}", packages]
+    said = (f"{', '.join(about)}. The yardstick took a median of {np.median(work):.0f} us, in the "
+            f"slowest file of an entrant {work.max() / np.median(work):.1f} times that.")
     return fill(said, WIDTH)
 
 
 PARTS: dict[str, Callable[[Results], str]] = {
-    "lead": sentences, "problems": problems, "entrants": entrants, "machine": machine,
+    "lead": sentences, "short": short, "problems": problems, "entrants": entrants, "machine": machine,
     "notes": lambda _: fill(NOTES, WIDTH),
     "fresh answers": lambda found: text(answers(fresh(found))),
     "fresh times": lambda found: text(times(fresh(found))),
