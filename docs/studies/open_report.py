@@ -129,7 +129,8 @@ def machine(found: Results) -> str:
 
 
 PARTS: dict[str, Callable[[Results], str]] = {
-    "lead": sentences, "short": short, "problems": problems, "entrants": entrants, "machine": machine,
+    "lead": sentences, "short": short, "problems": problems, "entrants": entrants,
+    "machine": machine,
     "notes": lambda _: fill(NOTES, WIDTH),
     "fresh answers": lambda found: text(answers(fresh(found))),
     "fresh times": lambda found: text(times(fresh(found))),
