@@ -36,13 +36,8 @@ class Judged:
     cold, warm : times [ns]. iterations, warm_iterations : or None.
     warm_right : whether the warm answer is right and called solved; None without one.
     same : whether a second solve gave the same bits; None without one.
-<<<<<<< HEAD
     memory : growth of the process while it solved the file [KiB]. x : (n,) or None.
-=======
-    memory : growth of the process while it solved the file [KiB].
     yardstick : time of a fixed piece of work before the file [ns], 0 if not known.
-    x : (n,) or None.
->>>>>>> 03d514a (Open benchmark: report from rows, shims for soth and LexLS, documents)
     """
 
     entrant: str

@@ -7,18 +7,14 @@ from typing import Any, NamedTuple
 
 from markupsafe import Markup
 
+from hierarchy.words import listed
 from scenarios.bench.open import figures
 from scenarios.bench.open.judge import RIGHT, SOLVED
 from scenarios.bench.open.printing import counted, digits, power
 from scenarios.bench.open.results import Half, Results
 from scenarios.bench.open.summary import Summary
-<<<<<<< HEAD
 from scenarios.draw.figures.drawing import svg
 from scenarios.templates import render, resource
-=======
-from scenarios.report.templates import drawn, render, resource
-from scenarios.words import listed
->>>>>>> 03d514a (Open benchmark: report from rows, shims for soth and LexLS, documents)
 
 ANSWERS = ("asked", "right", "called solved, wrong", "right, not called so", "failed", "ended",
            "largest miss", "relative", "last level moves upper", "same bits", "roughness", "MB")
@@ -97,16 +93,10 @@ def _shown(half: Half) -> Shown:
     heat = figures.heat(half)
     return Shown(
         half.title, f"{count} problems of {len(half.families)} families", figures.drawn_as(half),
-<<<<<<< HEAD
         svg(figures.profiles(half), f"{half.title}: performance profiles"),
         svg(figures.time_against_miss(half), f"{half.title}: time against miss"),
-        svg(figures.heat(half), f"{half.title}: share right, families and entrants"),
-=======
-        drawn(figures.profiles(half), f"{half.title}: performance profiles"),
-        drawn(figures.time_against_miss(half), f"{half.title}: time against miss"),
-        drawn(heat, f"{half.title}: share right, families and entrants"),
+        svg(heat, f"{half.title}: share right, families and entrants"),
         round(100.0 * heat.get_figwidth()),
->>>>>>> 03d514a (Open benchmark: report from rows, shims for soth and LexLS, documents)
         [(label, _answers(half.whole[label])) for label in half.entrants],
         [(name, half.collections[name].head.what, _times(half, name)) for name in half.families])
 
