@@ -50,11 +50,11 @@ class Proof:
 
     Attributes
     ----------
-    x : (n,) the answer, rounded once from DIGITS digits to doubles; NaN unless `complete`.
+    x : (n,) the answer, rounded once from DIGITS digits to doubles; NaN unless it is proved.
     least : (L,) least violation of each level, its Euclidean norm, likewise; NaN where not proved.
-    proved : number of levels, from the top, whose least violation is proved.
-    posed : number of levels, from the top, that have a least violation to speak of.
-    complete : whether all levels are proved, and x as the nearest to the reference.
+    proved : number of levels, from the top, whose least violation is proved; L + 1 if x is, too.
+    posed : number of levels, from the top, that have a least violation to speak of; L + 1 if also
+        the nearest to the reference has a meaning.
     shift : largest shift of a side, a length relative to 1 + |x|, for which the proof holds.
     turn : largest turn of a row [rad] for which it holds.
     """
@@ -63,13 +63,17 @@ class Proof:
     least: Array
     proved: int
     posed: int
-    complete: bool
     shift: float
     turn: float
 
     @property
+    def complete(self) -> bool:
+        """Whether all levels are proved, and x as the nearest to the reference."""
+        return self.proved > len(self.least)
+
+    @property
     def judged(self) -> int:
-        """Number of levels, from the top, whose least violation is proved and well posed."""
+        """Number of levels, from the top, that are proved and well posed; L + 1 if x is, too."""
         return min(self.proved, self.posed)
 
 
@@ -106,7 +110,7 @@ def prove(h: Hierarchy, candidates: Iterable[ArrayLike]) -> Proof:
                         return _Attempt(h, rows, None if complete else x, count).proof()
                     except _NoProofError:
                         continue
-    return Proof(np.full(h.n, np.nan), np.full(levels, np.nan), 0, levels, False, 0.0, 0.0)
+    return Proof(np.full(h.n, np.nan), np.full(levels, np.nan), 0, levels + 1, 0.0, 0.0)
 
 
 @final
@@ -152,7 +156,7 @@ class _Attempt:
         self.norm: Exact = np.array([_length(row) for row in self.A], dtype=object)
         self.side: Exact = np.where(self.above, self.upper, self.lower)
         self.level = np.repeat(np.arange(len(h.sizes)), h.sizes)
-        self.posed = len(h.sizes)
+        self.posed = len(h.sizes) + 1
         self.turn = self.shift = 0.0
 
     def proof(self) -> Proof:
@@ -170,8 +174,8 @@ class _Attempt:
     def _found(self) -> Proof:
         complete, rounding = self.near is None, ZERO * self.reach
         x = np.array([float(value) if abs(value) > rounding else 0.0 for value in self.x])
-        return Proof(x if complete else np.full(self.h.n, np.nan), self._least(), self.count,
-                     self.posed, complete, self.shift, self.turn)
+        return Proof(x if complete else np.full(self.h.n, np.nan), self._least(),
+                     self.count + complete, self.posed, self.shift, self.turn)
 
     def _turn_rows(self) -> None:
         """Make rows that agree with others to UNCLEAR exactly dependent on them."""

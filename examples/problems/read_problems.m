@@ -1,14 +1,14 @@
 % Read a file of problems (docs/problem-files.md) in MATLAB or Octave.
 %   [problems, head] = read_problems('FILE.npz')
 % problems(p) has n, sizes, A (m x n), lower, upper, reference, and, where the file has answers, x,
-% least, proved, posed, complete: level k is the next sizes(k) rows of A.
+% least, proved, posed: level k is the next sizes(k) rows of A.
 function [problems, head] = read_problems(file)
   folder = tempname();
   unzip(file, folder);
   head = jsondecode(fileread(fullfile(folder, 'head.json')));
   names = {'n', 'levels', 'sizes', 'A', 'lower', 'upper', 'reference'};
   if head.answers
-    names = [names, {'x', 'least', 'proved', 'posed', 'complete', 'shift', 'turn'}];
+    names = [names, {'x', 'least', 'proved', 'posed', 'shift', 'turn'}];
   end
   for i = 1:numel(names)
     all.(names{i}) = read_npy(fullfile(folder, [names{i} '.npy']));
@@ -28,7 +28,7 @@ function [problems, head] = read_problems(file)
     if head.answers
       one.x = all.x(at.n + (1:n));
       one.least = all.least(at.L + (1:L));
-      for name = {'proved', 'posed', 'complete', 'shift', 'turn'}
+      for name = {'proved', 'posed', 'shift', 'turn'}
         one.(name{1}) = all.(name{1})(p);
       end
     end

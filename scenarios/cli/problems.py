@@ -132,7 +132,7 @@ def _about(collection: Collection) -> dict[str, Any]:
     if collection.answers is not None:
         answers = collection.answers
         said |= {"proved": f"{sum(one.complete for one in answers)} completely",
-                 "ill-posed": sum(one.posed < len(h.sizes)
+                 "ill-posed": sum(one.posed <= len(h.sizes)
                                   for one, h in zip(answers, found, strict=True)),
                  "largest shift, turn": f"{max(one.shift for one in answers):.1e}, "
                                         f"{max(one.turn for one in answers):.1e}"}

@@ -29,8 +29,7 @@ HALVES = (PUBLIC, FRESH)
 _HEAD = "head.json"
 _DATA = {"n": "i8", "levels": "i8", "sizes": "i8", "A": "f8", "lower": "f8", "upper": "f8",
          "reference": "f8"}
-_ANSWERS = {"x": "f8", "least": "f8", "proved": "i8", "posed": "i8", "complete": "i8",
-            "shift": "f8", "turn": "f8"}
+_ANSWERS = {"x": "f8", "least": "f8", "proved": "i8", "posed": "i8", "shift": "f8", "turn": "f8"}
 _STAMP = (1980, 1, 1, 0, 0, 0)  # of every member, so that equal content makes equal files
 
 Arrays = dict[str, NDArray[Any]]
@@ -188,10 +187,9 @@ def _answers(arrays: Arrays, problems: Sequence[Hierarchy]) -> Iterable[Proof]:
     rest = {name: values for name, values in arrays.items() if name in _ANSWERS}
     for p, h in enumerate(problems):
         x, least = _taken(rest, "x", h.n, p), _taken(rest, "least", len(h.sizes), p)
-        proved, posed, complete = (int(_taken(rest, name, 1, p)[0])
-                                   for name in ("proved", "posed", "complete"))
+        proved, posed = (int(_taken(rest, name, 1, p)[0]) for name in ("proved", "posed"))
         shift, turn = (float(_taken(rest, name, 1, p)[0]) for name in ("shift", "turn"))
-        yield Proof(x, least, proved, posed, bool(complete), shift, turn)
+        yield Proof(x, least, proved, posed, shift, turn)
     _all_taken(rest, tuple(_ANSWERS))
 
 

@@ -245,6 +245,16 @@ def test_rows_come_back_as_they_were_stored(tmp_path):
     assert store.rows() == [row]
 
 
+def test_the_documents_ask_for_parts_that_the_report_can_make():
+    import open_report
+
+    root = Path(__file__).parents[2]
+    asked = {found["name"] for page in open_report.PAGES
+             for found in open_report.BLOCK.finditer((root / page).read_text(encoding="utf-8"))}
+    assert asked <= set(open_report.PARTS)
+    assert {"lead", "problems", "fresh answers", "public answers"} <= asked
+
+
 def test_an_unknown_entrant_and_a_missing_file_are_refused():
     with pytest.raises(HierarchyError, match="did you mean 'hcod'"):
         chosen(["hcodd"])

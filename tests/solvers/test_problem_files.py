@@ -74,12 +74,12 @@ def test_the_reader_in_cpp_finds_the_same_numbers(collection, file, tmp_path):
 def test_the_reader_in_octave_finds_the_same_numbers(collection, file):
     code = (f"addpath('{READERS}'); p = read_problems('{file}');"
             "for i = 1:numel(p), q = p(i); printf('%.17g ', q.A(end, 1), q.upper(1), q.x(end),"
-            " q.least(1), q.sizes(1), q.complete), end")
+            " q.least(1), q.sizes(1), q.proved), end")
     said = subprocess.run(["octave-cli", "--eval", code], text=True, capture_output=True,
                           check=False).stdout
     expected = [value for h, one in zip(collection.problems, collection.answers, strict=True)
                 for value in (h.A[-1, 0], h.upper[0], one.x[-1], one.least[0], h.sizes[0],
-                              one.complete)]
+                              one.proved)]
     np.testing.assert_array_equal(np.array(said.split(), dtype=float), expected)
 
 

@@ -37,6 +37,7 @@ class Judged:
     warm_right : whether the warm answer is right and called solved; None without one.
     same : whether a second solve gave the same bits; None without one.
     memory : growth of the process while it solved the file [KiB]. x : (n,) or None.
+    yardstick : time of a fixed piece of work before the file [ns], 0 if not known.
     """
 
     entrant: str
@@ -57,6 +58,7 @@ class Judged:
     warm_right: bool | None
     same: bool | None
     memory: int
+    yardstick: int
     x: Array | None
 
     @property
@@ -92,7 +94,8 @@ def _judged(row: RawRow, h: Hierarchy, proof: Proof) -> Judged:
         _verdict(row, relative), absolute, relative, level,
         _moved(h, proof, x, _vector(row["without"])), tuple(row["cold_ns"] or ()),
         tuple(row["warm_ns"] or ()), row["iterations"], row["warm_iterations"], warm_right,
-        row["same"], (row["rss_kib"] or 0) - (row["start_kib"] or 0), x)
+        row["same"], (row["rss_kib"] or 0) - (row["start_kib"] or 0),
+        row["yardstick_ns"] or 0, x)
 
 
 def _verdict(row: RawRow, relative: float) -> str:
@@ -111,7 +114,7 @@ def _verdict(row: RawRow, relative: float) -> str:
 def _miss(h: Hierarchy, proof: Proof, x: Array | None) -> tuple[float, float, int]:
     """Return the largest miss of the proved levels, absolute and relative, and the first missed.
 
-    The distance to the reference counts as one more level, where the answer is proved completely.
+    The distance to the reference counts as one more level.
     """
     if x is None:
         return np.nan, np.nan, -1
@@ -119,7 +122,7 @@ def _miss(h: Hierarchy, proof: Proof, x: Array | None) -> tuple[float, float, in
         return np.inf, np.inf, 0
     count = proof.judged
     beyond, sizes = h.violations(x)[:count] - proof.least[:count], _sizes(h, proof)[:count]
-    if proof.complete and count == len(h.sizes):
+    if count > len(h.sizes):
         least = np.linalg.norm(proof.x - h.reference)
         beyond = np.append(beyond, np.linalg.norm(x - h.reference) - least)
         sizes = np.append(sizes, 1.0 + np.linalg.norm(proof.x))

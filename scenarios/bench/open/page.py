@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 from markupsafe import Markup
 
+from hierarchy.words import listed
 from scenarios.bench.open import figures
 from scenarios.bench.open.judge import RIGHT, SOLVED
 from scenarios.bench.open.printing import counted, digits, power
@@ -21,6 +22,9 @@ TIMES = ("median", "p95", "p99.9", "largest", "warm median", "warm p99.9", "iter
          "warm iterations", "warm right")
 
 
+_WIDELY = 0.95  # share of the problems that an entrant of the first sentence can be asked
+
+
 class Shown(NamedTuple):
     """The content of the page for one half."""
 
@@ -30,6 +34,7 @@ class Shown(NamedTuple):
     profiles: Markup
     time_miss: Markup
     heat: Markup
+    heat_width: int  # [px]
     answers: list[tuple[str, list[str]]]
     families: list[tuple[str, str, list[tuple[str, list[str]]]]]
 
@@ -46,15 +51,17 @@ def page(found: Results, command: str) -> str:
 
 
 def lead(half: Half) -> list[str]:
-    """Return what one half shows, in sentences: who is right most often, and who is fastest."""
+    """Return what one half shows, in sentences: who is right most often, where not, who is fast."""
     asked = max(one.asked for one in half.whole.values())
-    widely = {label: one for label, one in half.whole.items() if one.asked >= 0.95 * asked}
-    ranked = sorted(widely, key=lambda label: (-widely[label].right,
-                                               sum(widely[label].counts.values())))
-    best = [label for label in ranked if widely[label].right == widely[ranked[0]].right]
-    said = [f"{half.title}: of the entrants that can be asked at least 95 % of the problems, "
-            f"{' and '.join(best)} solve{'s' if len(best) == 1 else ''} the most, "
-            f"{100.0 * widely[best[0]].right:.2f} %."]
+    widely = {label: one for label, one in half.whole.items() if one.asked >= _WIDELY * asked}
+    most = max(one.right for one in widely.values())
+    best = [label for label, one in widely.items() if one.right == most]
+    said = [f"{half.title}: of the entrants that can be asked at least {100.0 * _WIDELY:.0f} % of "
+            f"the problems, {listed(best)} solve{'s' if len(best) == 1 else ''} the most, "
+            f"{100.0 * most:.1f} %."]
+    better = _better(half, best[0], list(widely))
+    if better:
+        said.append(f"Another of them is right more often than {best[0]} in {listed(better)}.")
     fastest: dict[str, list[str]] = {}
     for family in half.families:
         right = {label: half.cells[label, family].cold.median for label in half.entrants
@@ -63,17 +70,33 @@ def lead(half: Half) -> list[str]:
             fastest.setdefault(min(right, key=right.__getitem__), []).append(family)
     for label, families in sorted(fastest.items(), key=lambda one: -len(one[1])):
         said.append(f"{label} is the fastest of those without a mistake in {len(families)} of "
-                    f"{len(half.families)} families: {', '.join(families)}.")
+                    f"{len(half.families)} families: {listed(families)}.")
     return said
+
+
+def _better(half: Half, best: str, labels: list[str]) -> list[str]:
+    """Return the families in which another is right more often, with who it is."""
+    found = []
+    for family in half.families:
+        own = half.cells[best, family].right
+        shares = {label: half.cells[label, family].right for label in labels
+                  if (label, family) in half.cells}
+        other = max(shares, key=lambda label: (shares[label], label == best))
+        if shares[other] > own:
+            found.append(f"{family} ({other}: {100.0 * shares[other]:.0f} % against "
+                         f"{100.0 * own:.0f} %)")
+    return found
 
 
 def _shown(half: Half) -> Shown:
     count = sum(len(half.collections[name].problems) for name in half.families)
+    heat = figures.heat(half)
     return Shown(
         half.title, f"{count} problems of {len(half.families)} families", figures.drawn_as(half),
         svg(figures.profiles(half), f"{half.title}: performance profiles"),
         svg(figures.time_against_miss(half), f"{half.title}: time against miss"),
-        svg(figures.heat(half), f"{half.title}: share right, families and entrants"),
+        svg(heat, f"{half.title}: share right, families and entrants"),
+        round(100.0 * heat.get_figwidth()),
         [(label, _answers(half.whole[label])) for label in half.entrants],
         [(name, half.collections[name].head.what, _times(half, name)) for name in half.families])
 

@@ -20,20 +20,23 @@ moved one above, relative likewise. same: the same bits twice. rough: largest st
 ticks, beside that of the proved answers. MB: growth of the process. Times in microseconds, of one \
 call from Python."""
 CHOSEN = ("EQ7", "INEQ7", "HUM38", "ellipse-hqp", "humanoid-reach")
+"""Families whose times are drawn."""
+TIMED = ("EQ7", "INEQ7", "HUM38", "human-hqp")
 """Families whose times are printed."""
 
 
 def say(console: Console, found: Results) -> None:
     """Print the tables of every half, the fresh ones first."""
     for half in found.halves:
-        console.print(_answers(half), "", sep="\n")
-        console.print(_times(half), "", sep="\n")
+        console.print(answers(half), "", sep="\n")
+        console.print(times(half), "", sep="\n")
     console.print(NOTES, "", sep="\n")
     for label, why in found.missing.items():
         console.print(f"skipped: {label} ({why})")
 
 
-def _answers(half: Half) -> Table:
+def answers(half: Half) -> Table:
+    """Return the table of what became of the problems of a half."""
     count = sum(len(half.collections[name].problems) for name in half.families)
     table = _table(f"{half.title}: {count} problems of {len(half.families)} families",
                    ("asked", "right", "wrong", "modest", "failed", "ended", "miss", "relative",
@@ -53,9 +56,10 @@ def counted(one: Summary) -> tuple[str, ...]:
                                                 (WRONG, MODEST, FAILED)), str(ended))
 
 
-def _times(half: Half) -> Table:
-    chosen = [name for name in CHOSEN if name in half.families]
-    heads = [head for name in chosen for head in (f"{name}\nmedian", "\np99.9", "\nwarm", "\niter")]
+def times(half: Half) -> Table:
+    """Return the table of times in a few families of a half."""
+    chosen = [name for name in TIMED if name in half.families]
+    heads = [head for name in chosen for head in (f"{name}\nmedian", "\np95", "\nwarm")]
     table = _table(f"{half.title}: times", heads)
     for label in half.entrants:
         cells = [half.cells.get((label, name)) for name in chosen]
@@ -66,9 +70,8 @@ def _times(half: Half) -> Table:
 
 def _timed(one: Summary | None) -> tuple[str, ...]:
     if one is None or not one.counts[SOLVED]:
-        return ("–",) * 4
-    return (digits(one.cold.median), digits(one.cold.p999), digits(one.warm.median),
-            "–" if isnan(one.iterations) else f"{one.iterations:.0f}")
+        return ("–",) * 3
+    return digits(one.cold.median), digits(one.cold.p95), digits(one.warm.median)
 
 
 def _table(title: str, heads: tuple[str, ...] | list[str]) -> Table:

@@ -31,6 +31,7 @@ def run(folder: Path, families: Sequence[Family], entrants: Sequence[Row], seeds
     """
     store, missing = Store(folder), dict[str, str]()
     files = _problems(store, families, seeds, count, told)
+    write_json(folder / "machine.json", machine())
     collections = [read(file) for file in files]
     for row in entrants:
         told(row.label)
@@ -38,7 +39,6 @@ def run(folder: Path, families: Sequence[Family], entrants: Sequence[Row], seeds
             _add(store, row, files, collections, limit)
         except MissingError as reason:
             missing[row.label] = str(reason)
-    write_json(folder / "machine.json", machine())
     write_json(folder / "missing.json", missing)
     return store
 

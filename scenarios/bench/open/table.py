@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, final
 
 from hierarchy.errors import HierarchyError, UnknownNameError
-from scenarios.bench.peers.entrants import Package
+from scenarios.bench.peers.entrants import DAQP, EMBODIK, Package
 from solvers import names
 from solvers.qp.backends import BACKENDS
 
@@ -39,8 +39,6 @@ class Row:
 
 
 OWN = Package("task-hierarchy", "hierarchy")
-DAQP = Package("daqp", "daqp")
-EMBODIK = Package("embodik", "embodik", ("embodik==0.23.2",))
 PACKAGES = (EMBODIK,)
 """Those that need an environment of their own."""
 

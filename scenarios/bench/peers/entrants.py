@@ -43,7 +43,8 @@ PLACO = Package("placo", "placo", ("placo==0.10.2",))
 # for this Python 1.7.1 is the newest, made for just these libraries, which it does not ask for.
 TSID = Package("tsid", "tsid", ("tsid==1.7.1", "pin==3.4.0", "cmeel-urdfdom<5",
                                 "cmeel-tinyxml2<11"))
-PACKAGES = (PINK, MINK, PLACO, TSID)
+EMBODIK = Package("embodik", "embodik", ("embodik==0.23.2",))
+PACKAGES = (PINK, MINK, PLACO, TSID, EMBODIK)
 
 ENTRANTS = (
     Entrant("tpm", OWN, f"{_HERE}.ours:Bounds", {"resolver": "tpm"}),
@@ -56,6 +57,7 @@ ENTRANTS = (
     Entrant("placo scaled", PLACO, f"{_HERE}.with_placo:PlacoScaled"),
     Entrant("tsid", TSID, f"{_HERE}.with_tsid:Tsid"),
     Entrant("tsid hard", TSID, f"{_HERE}.with_tsid:TsidHard"),
+    Entrant("embodiK", EMBODIK, f"{_HERE}.with_embodik:Embodik"),
     Entrant("mink", MINK, f"{_HERE}.with_mink:Mink"),
     Entrant("mink hard", MINK, f"{_HERE}.with_mink:MinkHard"),
     Entrant("pink", PINK, f"{_HERE}.with_pink:Pink"),

@@ -60,9 +60,14 @@ void* prepare(int n, int levels, const long* sizes, const double* A, const doubl
     p->types.push_back(simple ? LexLS::SIMPLE_BOUNDS_OBJECTIVE : LexLS::GENERAL_OBJECTIVE);
     p->data.push_back(data), p->rows.push_back(m);
   }
-  Eigen::MatrixXd last = Eigen::MatrixXd::Identity(n, n + 2);  // nearest to the reference
-  for (int i = 0; i < n; ++i) last(i, n) = last(i, n + 1) = reference ? reference[i] : 0.0;
-  p->data.push_back(last), p->rows.push_back(n), p->types.push_back(LexLS::GENERAL_OBJECTIVE);
+  const bool all = !p->data.empty() && p->rows.back() == n && p->data.back().cols() == n + 2 &&
+                   p->data.back().leftCols(n).isIdentity(0.0) &&
+                   p->data.back().col(n) == p->data.back().col(n + 1);
+  if (!all) {  // freedom may be left: the nearest to the reference, as a last level
+    Eigen::MatrixXd last = Eigen::MatrixXd::Identity(n, n + 2);
+    for (int i = 0; i < n; ++i) last(i, n) = last(i, n + 1) = reference ? reference[i] : 0.0;
+    p->data.push_back(last), p->rows.push_back(n), p->types.push_back(LexLS::GENERAL_OBJECTIVE);
+  }
   p->solver.reset(new LexLS::internal::LexLSI(n, p->data.size(), p->rows.data(), p->types.data()));
   return p;
 }

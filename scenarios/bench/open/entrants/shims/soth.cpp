@@ -3,6 +3,7 @@
 #include <soth/HCOD.hpp>
 
 #include <cmath>
+#include <list>
 #include <memory>
 #include <vector>
 
@@ -17,12 +18,20 @@ soth::Bound bound(double lower, double upper) {
 }
 
 struct Prepared {
+  std::list<Eigen::MatrixXd> rows;  // the solver keeps no copy
+  std::list<soth::VectorBound> bounds;
   std::unique_ptr<soth::HCOD> solver;
   Eigen::VectorXd x;
   std::vector<soth::cstref_vector_t> active;  // of the answer
 };
 
+void add(Prepared* p, const Eigen::MatrixXd& rows, const soth::VectorBound& bounds) {
+  p->rows.push_back(rows), p->bounds.push_back(bounds);
+  p->solver->pushBackStage(p->rows.back(), p->bounds.back());
+}
+
 int search(Prepared* p) {
+  p->active.clear();
   try {
     p->solver->activeSearch(p->x);
   } catch (int) {  // too many iterations
@@ -36,18 +45,19 @@ int search(Prepared* p) {
 extern "C" {
 void* prepare(int n, int levels, const long* sizes, const double* A, const double* lower,
               const double* upper, const double* reference) {
-  auto* p = new Prepared{std::unique_ptr<soth::HCOD>(new soth::HCOD(n, 0)),
-                         Eigen::VectorXd::Zero(n), {}};
+  auto* p = new Prepared;
+  p->solver.reset(new soth::HCOD(n, 0));
+  p->x = Eigen::VectorXd::Zero(n);
   for (int k = 0; k < levels; A += sizes[k] * n, lower += sizes[k], upper += sizes[k], ++k) {
     if (sizes[k] == 0) continue;
     soth::VectorBound b(sizes[k]);
     for (long i = 0; i < sizes[k]; ++i) b[i] = bound(lower[i], upper[i]);
-    p->solver->pushBackStage(Eigen::MatrixXd(Eigen::Map<const RowMajor>(A, sizes[k], n)), b);
+    add(p, Eigen::Map<const RowMajor>(A, sizes[k], n), b);
   }
   if (reference != nullptr) {  // the shortest x by itself, so zero needs no level
     soth::VectorBound b(n);
     for (int i = 0; i < n; ++i) b[i] = soth::Bound(reference[i]);
-    p->solver->pushBackStage(Eigen::MatrixXd(Eigen::MatrixXd::Identity(n, n)), b);
+    add(p, Eigen::MatrixXd::Identity(n, n), b);
   }
   p->solver->setNameByOrder("level");
   p->solver->setDamping(0.0);
@@ -63,8 +73,13 @@ int solve(void* handle) {
 
 int solve_from(void* handle, void* before) {
   auto* p = static_cast<Prepared*>(handle);
+  const auto& active = static_cast<Prepared*>(before)->active;
   p->solver->reset();
-  p->solver->setInitialActiveSet(static_cast<Prepared*>(before)->active);
+  if (active.size() == p->rows.size()) {
+    p->solver->setInitialActiveSet(active);
+  } else {  // there was no answer
+    p->solver->setInitialActiveSet();
+  }
   return search(p);
 }
 
