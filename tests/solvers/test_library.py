@@ -87,6 +87,16 @@ def test_warm_sequences_give_the_same_bits(library, name):
 
 
 @pytest.mark.slow
+def test_violations_are_those_of_python(library):
+    rng = np.random.default_rng(3)
+    for h in hierarchies(25):
+        x = rng.normal(size=h.n)
+        status, norms = library.violations(c.problem_of(h), x, len(h.sizes))
+        assert status == c.SOLVED
+        np.testing.assert_allclose(norms, h.violations(x), rtol=1e-12, atol=1e-12)
+
+
+@pytest.mark.slow
 @pytest.mark.usefixtures("unverified")
 def test_a_record_goes_on_with_another_kind_of_rows(library):
     """From inequalities to equalities alone, and back."""

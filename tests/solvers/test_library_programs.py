@@ -14,15 +14,18 @@ import c_library as c
 import c_speed
 import numpy as np
 import pytest
-from c_speed import record_sequence, sequence
+import stand_push
+from c_speed import sequence
 
 from hierarchy import HierarchyError, Robot, Stack, State
 from hierarchy.paths import Still
-from hierarchy.tasks import JointLimits, Position
+from hierarchy.tasks import JointLimits, Position, Posture, TorqueLimits
+from scenarios.bench.cpp import write_problems
 from scenarios.bench.families import family
+from scenarios.bench.peers.urdf import urdf
 from scenarios.cli.main import run_command
 from solvers import make
-from solvers.library import differs, entries, write
+from solvers.library import differs, entries
 from solvers.library.archive import archive
 from solvers.library.emission import RESOLVERS
 
@@ -35,6 +38,7 @@ EXAMPLES, PROGRAM = ROOT / "examples" / "c", ROOT / "docs" / "studies" / "c_spee
 STRICT = ["-Wall", "-Wextra", "-Werror", "-pedantic", "-O2"]
 COMPILER = next(filter(None, map(shutil.which, ("cc", "gcc", "clang"))), None)
 CXX = next(filter(None, map(shutil.which, ("c++", "g++", "clang++"))), None)
+CROSS, QEMU = shutil.which("aarch64-linux-gnu-gcc"), shutil.which("qemu-aarch64")
 needs_c = pytest.mark.skipif(COMPILER is None, reason="no compiler of C")
 LIBM = {"hypot", "memset", "memcpy"}  # all that the library asks for
 
@@ -48,8 +52,8 @@ def test_it_asks_for_nothing_but_libm_and_owns_no_variable(folder):
     assert {name for kind, name in kinds if kind == "U"} <= LIBM
     assert {kind for kind, _ in kinds} <= set("UTtr")  # code and constants
     assert {name for kind, name in kinds if kind == "T"} == {
-        *(f"th_solve_{name}" for name in c.NAMES), "th_work_size", "th_record_size", "th_version",
-        "th_digest"}
+        *(f"th_solve_{name}" for name in c.NAMES), "th_work_size", "th_record_size",
+        "th_violations", "th_version", "th_digest"}
 
 
 def built(out, source, folder, *flags, compiler=COMPILER):
@@ -79,6 +83,36 @@ def test_the_examples_compile_without_a_warning_and_run(folder, tmp_path):
     loop = built(tmp_path / "loop", EXAMPLES / "loop.c", folder, "-std=c99", *STRICT)
     assert re.match(r"6000 ticks, 0 braked, speeds at a bound [1-9]\d* times, error at most 0\.",
                     said(loop))
+
+
+@pytest.fixture(scope="module")
+def replay(folder, tmp_path_factory):
+    if COMPILER is None:
+        pytest.skip("no compiler of C")
+    return built(tmp_path_factory.mktemp("replay") / "replay", EXAMPLES / "replay.c", folder,
+                 "-std=c99", *STRICT)
+
+
+@pytest.mark.slow
+def test_recorded_problems_of_a_standing_humanoid_give_the_same_bits_in_c(replay, tmp_path,
+                                                                          monkeypatch):
+    pytest.importorskip("mujoco")
+    monkeypatch.setattr(stand_push, "DURATION", 0.02)
+    monkeypatch.setattr(stand_push, "RECORDED", range(5, 20))
+    monkeypatch.setattr("sys.argv", ["stand_push.py", "--record", str(tmp_path / "ticks")])
+    stand_push.main()
+    assert said(replay, tmp_path / "ticks").startswith(
+        "15 ticks of 60 unknowns and 184 rows: 15 with the bits of Python, others within 0e+00, "
+        "0 unsolved")
+
+
+@pytest.mark.slow
+def test_replaying_counts_the_answers_that_differ(replay, tmp_path):
+    ticks = sequence(family("INEQ7")[0].h, 5)
+    write_problems(tmp_path / "ticks", ticks, [np.zeros(7)] * 5)
+    done = subprocess.run([replay, tmp_path / "ticks"], capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert "0 with the bits of Python" in done.stdout
 
 
 @pytest.mark.slow
@@ -112,6 +146,46 @@ def test_the_controller_of_ros2_control_sends_what_python_sends(folder, tmp_path
     assert np.abs(np.diff(sent, axis=0)).max() <= 10.0 * period * (1.0 + 1e-9)
 
 
+def pinocchio():
+    """Options for a compiler: the headers and libraries that pinocchio's wheel has."""
+    module = pytest.importorskip("pinocchio")
+    prefix = next((path for path in Path(module.__file__).parents
+                   if (path / "include" / "pinocchio").is_dir()), None)
+    if prefix is None or not Path("/usr/include/urdf_model").exists():
+        pytest.skip("no headers of pinocchio or urdfdom")
+    limits = {"MPL_LIMIT_LIST_SIZE": 30, "MPL_LIMIT_VECTOR_SIZE": 30,
+              "FUSION_INVOKE_MAX_ARITY": 12, "MPL_CFG_NO_PREPROCESSED_HEADERS": 1}
+    return ["-isystem", prefix / "include", "-isystem", prefix / "include" / "urdfdom",
+            "-isystem", "/usr/include/eigen3", "-DPINOCCHIO_ENABLE_TEMPLATE_INSTANTIATION",
+            "-DPINOCCHIO_WITH_URDFDOM", *(f"-DBOOST_{name}={of}" for name, of in limits.items()),
+            f"-L{prefix / 'lib'}", f"-Wl,-rpath,{prefix / 'lib'}", "-Wl,--no-as-needed",
+            "-lpinocchio_default", "-lpinocchio_parsers"]
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(CXX is None or not Path("/usr/include/eigen3").exists(), reason="no Eigen")
+def test_the_controller_of_efforts_sends_what_python_sends(folder, tmp_path):
+    """Against stub headers, with the kinematics and dynamics of pinocchio in C++."""
+    program = built(tmp_path / "simulated", ROS2 / "simulated_effort.cpp", folder, "-std=c++17",
+                    "-Wall", "-Wextra", "-Werror", "-I", ROS2 / "stub", *pinocchio(), compiler=CXX)
+    robot, period = Robot.named("kuka_lwr"), 0.001
+    (tmp_path / "arm.urdf").write_text(urdf(robot))
+    sent = [line.split() for line in said(program, tmp_path / "arm.urdf").splitlines()]
+    q, v = np.array([0.0, 0.6, 0.0, -1.4, 0.0, 0.8, 0.0]), np.zeros(7)
+    state, hand = State.at(robot, q), robot.frame("end_effector")
+    goal = Still(state.position(hand) + np.array([0.0, 0.3, 0.2]))
+    stack = Stack([TorqueLimits(robot), JointLimits(robot, 10.0, period),
+                   Position(hand, goal, 100.0, 20.0), Posture(tuple(q))], "acceleration")
+    resolver, memory = make("hcod"), None
+    for tick, torque in enumerate(np.array(sent, dtype=float)):
+        state.move(period * tick, q, v)
+        res = resolver.solve(stack.hierarchy(state), memory)
+        expected = state.mass_matrix() @ res.x + state.bias_effort()
+        np.testing.assert_allclose(torque, expected, atol=1e-6)
+        q, v, memory = q + period * (v + period / 2 * res.x), v + period * res.x, res.memory
+    assert len(sent) == 500
+
+
 @pytest.mark.slow
 @pytest.mark.skipif(CXX is None or not Path("/usr/include/eigen3").exists(), reason="no Eigen")
 def test_the_example_with_eigen_compiles(folder, tmp_path):
@@ -140,7 +214,7 @@ def test_cmake_finds_it(folder, tmp_path, linked):
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "resolver"), [("INEQ7", "hcod"), ("EQ7", "tpm")])
 def test_a_million_solves_allocate_nothing_and_touch_no_new_page(folder, tmp_path, name, resolver):
-    record_sequence(tmp_path / "ticks", sequence(family(name)[0].h, 100))
+    write_problems(tmp_path / "ticks", sequence(family(name)[0].h, 100))
     program = built(tmp_path / "study", PROGRAM, folder, "-O2")
     solves, failed, allocated, faults, *_ = map(int, said(
         program, tmp_path / "ticks", resolver, "1000000").split())
@@ -162,17 +236,22 @@ def test_the_program_that_counts_allocations_sees_them(folder, tmp_path):
     source = tmp_path / "allocating.c"
     source.write_text(PROGRAM.read_text().replace(
         "double begin = now();", "double begin = now(); free(malloc(16));"))
-    record_sequence(tmp_path / "ticks", sequence(family("EQ7")[0].h, 2))
+    write_problems(tmp_path / "ticks", sequence(family("EQ7")[0].h, 2))
     program = built(tmp_path / "study", source, folder, "-O0")
     assert int(said(program, tmp_path / "ticks", "hcod", "10").split()[2]) == 10
 
 
 @needs_c
 @pytest.mark.slow
-def test_the_examples_pass_the_address_sanitizer(folder, tmp_path):
-    program = built(tmp_path / "loop", EXAMPLES / "loop.c", folder, "-g",
-                    "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
-    assert said(program).startswith("6000 ticks, 0 braked")
+@pytest.mark.parametrize(("name", "words"), [("loop.c", "6000 ticks, 0 braked"),
+                                             ("once.cpp", "status 0, x = 0.9 0.1")])
+def test_the_examples_pass_the_address_sanitizer(folder, tmp_path, name, words):
+    compiler = CXX if name.endswith("cpp") else COMPILER
+    if compiler is None:
+        pytest.skip("no compiler of C++")
+    program = built(tmp_path / "program", EXAMPLES / name, folder, "-g",
+                    "-fsanitize=address,undefined", "-fno-sanitize-recover=all", compiler=compiler)
+    assert said(program).startswith(words)
 
 
 @needs_c
@@ -187,13 +266,27 @@ def test_the_examples_pass_valgrind(generic, tmp_path):
 
 
 @pytest.mark.slow
-def test_code_for_aarch64_is_made_here(tmp_path):
-    written = write(tmp_path, ["recursive"], "aarch64")
-    content = (tmp_path / "lib" / "libtask_hierarchy.a").read_bytes()
+def test_code_for_aarch64_is_made_here(arm):
+    content = (arm / "lib" / "libtask_hierarchy.a").read_bytes()
     elf = content[content.index(b"\x7fELF"):]
     assert int.from_bytes(elf[18:20], "little") == 183  # EM_AARCH64
-    assert "aarch64" in written.shared
-    assert "th_solve_sns" not in (tmp_path / "include" / "task_hierarchy.h").read_text()
+    assert not (arm / "lib" / "libtask_hierarchy.so").exists()
+    assert "th_solve_sns" not in (arm / "include" / "task_hierarchy.h").read_text()
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(None in (CROSS, QEMU), reason="no compiler and no emulator for aarch64")
+@pytest.mark.parametrize("name", ["EQ7sing", "EQ30L8", "INEQ7", "HUM38"])
+def test_emulated_code_for_aarch64_agrees_to_rounding(arm, tmp_path, name):
+    problems, memory, answers = [problem.h for problem in family(name)[:20]], None, []
+    for h in problems:
+        res = make("hcod").solve(h, memory)
+        memory = res.memory
+        answers.append(res.x)
+    write_problems(tmp_path / "ticks", problems, answers)
+    program = built(tmp_path / "replay", EXAMPLES / "replay.c", arm, "-O2", "-static",
+                    compiler=CROSS)
+    assert "0 unsolved" in said(QEMU, program, tmp_path / "ticks")
 
 
 @pytest.mark.slow
