@@ -6,7 +6,8 @@ from concurrent.futures import ThreadPoolExecutor
 import c_library as c
 import numpy as np
 import pytest
-from c_speed import recorded, sequence
+from c_speed import sequence
+from recorded import recorded
 
 from hierarchy import Hierarchy
 from scenarios import load

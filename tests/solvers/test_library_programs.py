@@ -11,18 +11,18 @@ import sys
 from pathlib import Path
 
 import c_library as c
+import c_peers
 import c_speed
 import numpy as np
 import pytest
-import stand_push
+import recorded
 from c_speed import sequence
+from recorded import record_sequence
 
 from hierarchy import HierarchyError, Robot, Stack, State
 from hierarchy.paths import Still
-from hierarchy.tasks import JointLimits, Position, Posture, TorqueLimits
-from scenarios.bench.cpp import write_problems
+from hierarchy.tasks import JointLimits, Position
 from scenarios.bench.families import family
-from scenarios.bench.peers.urdf import urdf
 from scenarios.cli.main import run_command
 from solvers import make
 from solvers.library import differs, entries
@@ -97,19 +97,18 @@ def replay(folder, tmp_path_factory):
 def test_recorded_problems_of_a_standing_humanoid_give_the_same_bits_in_c(replay, tmp_path,
                                                                           monkeypatch):
     pytest.importorskip("mujoco")
-    monkeypatch.setattr(stand_push, "DURATION", 0.02)
-    monkeypatch.setattr(stand_push, "RECORDED", range(5, 20))
-    monkeypatch.setattr("sys.argv", ["stand_push.py", "--record", str(tmp_path / "ticks")])
-    stand_push.main()
+    file = tmp_path / "ticks"
+    monkeypatch.setattr("sys.argv", ["recorded.py", "stand-push", str(file), "--ticks", "15"])
+    recorded.main()
     assert said(replay, tmp_path / "ticks").startswith(
-        "15 ticks of 60 unknowns and 184 rows: 15 with the bits of Python, others within 0e+00, "
+        "15 ticks of 60 unknowns and 181 rows: 15 with the bits of Python, others within 0e+00, "
         "0 unsolved")
 
 
 @pytest.mark.slow
 def test_replaying_counts_the_answers_that_differ(replay, tmp_path):
     ticks = sequence(family("INEQ7")[0].h, 5)
-    write_problems(tmp_path / "ticks", ticks, [np.zeros(7)] * 5)
+    record_sequence(tmp_path / "ticks", ticks, [np.zeros(7)] * 5)
     done = subprocess.run([replay, tmp_path / "ticks"], capture_output=True, text=True, check=False)
     assert done.returncode == 1
     assert "0 with the bits of Python" in done.stdout
@@ -146,46 +145,6 @@ def test_the_controller_of_ros2_control_sends_what_python_sends(folder, tmp_path
     assert np.abs(np.diff(sent, axis=0)).max() <= 10.0 * period * (1.0 + 1e-9)
 
 
-def pinocchio():
-    """Options for a compiler: the headers and libraries that pinocchio's wheel has."""
-    module = pytest.importorskip("pinocchio")
-    prefix = next((path for path in Path(module.__file__).parents
-                   if (path / "include" / "pinocchio").is_dir()), None)
-    if prefix is None or not Path("/usr/include/urdf_model").exists():
-        pytest.skip("no headers of pinocchio or urdfdom")
-    limits = {"MPL_LIMIT_LIST_SIZE": 30, "MPL_LIMIT_VECTOR_SIZE": 30,
-              "FUSION_INVOKE_MAX_ARITY": 12, "MPL_CFG_NO_PREPROCESSED_HEADERS": 1}
-    return ["-isystem", prefix / "include", "-isystem", prefix / "include" / "urdfdom",
-            "-isystem", "/usr/include/eigen3", "-DPINOCCHIO_ENABLE_TEMPLATE_INSTANTIATION",
-            "-DPINOCCHIO_WITH_URDFDOM", *(f"-DBOOST_{name}={of}" for name, of in limits.items()),
-            f"-L{prefix / 'lib'}", f"-Wl,-rpath,{prefix / 'lib'}", "-Wl,--no-as-needed",
-            "-lpinocchio_default", "-lpinocchio_parsers"]
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(CXX is None or not Path("/usr/include/eigen3").exists(), reason="no Eigen")
-def test_the_controller_of_efforts_sends_what_python_sends(folder, tmp_path):
-    """Against stub headers, with the kinematics and dynamics of pinocchio in C++."""
-    program = built(tmp_path / "simulated", ROS2 / "simulated_effort.cpp", folder, "-std=c++17",
-                    "-Wall", "-Wextra", "-Werror", "-I", ROS2 / "stub", *pinocchio(), compiler=CXX)
-    robot, period = Robot.named("kuka_lwr"), 0.001
-    (tmp_path / "arm.urdf").write_text(urdf(robot))
-    sent = [line.split() for line in said(program, tmp_path / "arm.urdf").splitlines()]
-    q, v = np.array([0.0, 0.6, 0.0, -1.4, 0.0, 0.8, 0.0]), np.zeros(7)
-    state, hand = State.at(robot, q), robot.frame("end_effector")
-    goal = Still(state.position(hand) + np.array([0.0, 0.3, 0.2]))
-    stack = Stack([TorqueLimits(robot), JointLimits(robot, 10.0, period),
-                   Position(hand, goal, 100.0, 20.0), Posture(tuple(q))], "acceleration")
-    resolver, memory = make("hcod"), None
-    for tick, torque in enumerate(np.array(sent, dtype=float)):
-        state.move(period * tick, q, v)
-        res = resolver.solve(stack.hierarchy(state), memory)
-        expected = state.mass_matrix() @ res.x + state.bias_effort()
-        np.testing.assert_allclose(torque, expected, atol=1e-6)
-        q, v, memory = q + period * (v + period / 2 * res.x), v + period * res.x, res.memory
-    assert len(sent) == 500
-
-
 @pytest.mark.slow
 @pytest.mark.skipif(CXX is None or not Path("/usr/include/eigen3").exists(), reason="no Eigen")
 def test_the_example_with_eigen_compiles(folder, tmp_path):
@@ -214,11 +173,32 @@ def test_cmake_finds_it(folder, tmp_path, linked):
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "resolver"), [("INEQ7", "hcod"), ("EQ7", "tpm")])
 def test_a_million_solves_allocate_nothing_and_touch_no_new_page(folder, tmp_path, name, resolver):
-    write_problems(tmp_path / "ticks", sequence(family(name)[0].h, 100))
+    record_sequence(tmp_path / "ticks", sequence(family(name)[0].h, 100))
     program = built(tmp_path / "study", PROGRAM, folder, "-O2")
     solves, failed, allocated, faults, *_ = map(int, said(
         program, tmp_path / "ticks", resolver, "1000000").split())
     assert (solves, failed, allocated, faults) == (1_000_000, 0, 0, 0)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(CXX is None, reason="no compiler of C++")
+def test_the_study_of_peers_judges_ours_where_there_is_no_checkout(folder, tmp_path, capsys,
+                                                                   monkeypatch):
+    monkeypatch.setattr(c_peers, "PASSES", 2)
+    rows = c_peers.run(*c_peers.compiled(tmp_path, folder), seed=1, count=5, turns=1)
+    assert [row["solver"] for row in rows] == ["tpm", *["hcod"] * 5]
+    assert all(row["right"] == 1.0 and row["median"] > 0.0 for row in rows)
+    said = capsys.readouterr().out
+    assert all(of.title in said for of in c_peers.CLASSES)
+    assert "target" not in said
+
+
+def test_a_target_is_judged_by_the_fastest_peer_that_is_right():
+    def row(solver, median, right=1.0):
+        return {"problems": "INEQ7 warm", "solver": solver, "median": median, "right": right}
+
+    rows = [row("hcod", 2.0), row("LexLS", 1.0, right=0.5), row("LexLS bounds", 2.2)]
+    assert c_peers.verdicts(rows) == ["INEQ7 warm: hcod 0.91 x LexLS bounds, target 0.8: not met"]
 
 
 @needs_c
@@ -236,7 +216,7 @@ def test_the_program_that_counts_allocations_sees_them(folder, tmp_path):
     source = tmp_path / "allocating.c"
     source.write_text(PROGRAM.read_text().replace(
         "double begin = now();", "double begin = now(); free(malloc(16));"))
-    write_problems(tmp_path / "ticks", sequence(family("EQ7")[0].h, 2))
+    record_sequence(tmp_path / "ticks", sequence(family("EQ7")[0].h, 2))
     program = built(tmp_path / "study", source, folder, "-O0")
     assert int(said(program, tmp_path / "ticks", "hcod", "10").split()[2]) == 10
 
@@ -278,12 +258,8 @@ def test_code_for_aarch64_is_made_here(arm):
 @pytest.mark.skipif(None in (CROSS, QEMU), reason="no compiler and no emulator for aarch64")
 @pytest.mark.parametrize("name", ["EQ7sing", "EQ30L8", "INEQ7", "HUM38"])
 def test_emulated_code_for_aarch64_agrees_to_rounding(arm, tmp_path, name):
-    problems, memory, answers = [problem.h for problem in family(name)[:20]], None, []
-    for h in problems:
-        res = make("hcod").solve(h, memory)
-        memory = res.memory
-        answers.append(res.x)
-    write_problems(tmp_path / "ticks", problems, answers)
+    problems = [problem.h for problem in family(name)[:20]]
+    record_sequence(tmp_path / "ticks", problems, recorded.answers(problems))
     program = built(tmp_path / "replay", EXAMPLES / "replay.c", arm, "-O2", "-static",
                     compiler=CROSS)
     assert "0 unsolved" in said(QEMU, program, tmp_path / "ticks")
