@@ -3,7 +3,7 @@
  *
  *   c_speed FILE RESOLVER SOLVES
  *
- * FILE, written by c_speed.py: n, m, levels, count and the sizes as int64; then count times A,
+ * FILE, written by recorded.py: n, m, levels, count and the sizes as int64; then count times A,
  * lower, upper and the reference. One line of numbers is printed, in the order of `printf` below. */
 #define _GNU_SOURCE
 #include <stdio.h>

@@ -18,15 +18,14 @@ from time import perf_counter_ns
 from typing import Any, final
 
 import numpy as np
+from recorded import record_sequence, recorded
 from rich.console import Console
 from rich.table import Table
 
 from hierarchy.problem import Hierarchy
-from scenarios import load, simulate
 from scenarios.bench.families import FAMILIES, family
 from scenarios.bench.machine import one_core
 from scenarios.bench.rows import write_rows
-from scenarios.loop.controller import Controller
 from solvers import Resolver, make
 from solvers.library import write
 
@@ -61,10 +60,14 @@ class _Timed:
 
 
 def sequence(h: Hierarchy, count: int, seed: int = 0) -> list[Hierarchy]:
-    """Return a hierarchy as it changes a little from tick to tick, and back to its beginning."""
+    """Return a hierarchy as it changes a little from tick to tick, and back to its beginning.
+
+    Rows with one coefficient, such as bounds, keep it.
+    """
     rng = np.random.default_rng(seed)
     size = np.linalg.norm(h.A, axis=1)
     directions = rng.normal(size=(2, h.m)), rng.normal(size=(2, *h.A.shape))
+    directions[1][:, np.count_nonzero(h.A, axis=1) == 1] = 0.0
     ticks = []
     for phase in 2.0 * np.pi * np.arange(count) / count:
         turn = np.array([np.sin(phase), np.cos(phase)])
@@ -72,27 +75,6 @@ def sequence(h: Hierarchy, count: int, seed: int = 0) -> list[Hierarchy]:
         A = h.A * (1.0 + 0.02 * np.einsum("t,tij->ij", turn, directions[1]))
         ticks.append(Hierarchy(A, h.lower + shift, h.upper + shift, h.sizes, h.reference, h.names))
     return ticks
-
-
-def record_sequence(file: Path, ticks: list[Hierarchy]) -> None:
-    """Write a sequence for c_speed.c."""
-    h = ticks[0]
-    head = np.array([h.n, h.m, len(h.sizes), len(ticks), *h.sizes], dtype=np.int64)
-    parts = [part for h in ticks for part in (h.A.ravel(), h.lower, h.upper, h.reference)]
-    file.write_bytes(head.tobytes() + np.concatenate(parts).tobytes())
-
-
-def recorded(name: str, ticks: int) -> list[Hierarchy]:
-    """Return the problems of the first ticks of a scenario, which all have one shape."""
-    scenario = load(name)
-    run = simulate(scenario.with_changes({"control.duration": ticks * scenario.control.period}))
-    controller, problems = Controller(scenario), []
-    for t, q, v in zip(run["t"], run["q"], run["v"], strict=True):
-        controller.command(t, q, v)
-        h = controller.hierarchy
-        problems.append(Hierarchy(h.A.copy(), h.lower.copy(), h.upper.copy(), h.sizes.copy(),
-                                  h.reference.copy(), h.names))
-    return problems
 
 
 def linked(library: Path, program: Path) -> Path:

@@ -1,12 +1,12 @@
-// The arm: the hand of a KUKA LWR IV and its Jacobian, and the box of velocities from which every
-// joint can stop before its limits. Written out so that the example needs nothing but the library;
-// for your robot, pinocchio gives the first two.
+// The arm: the hand of a KUKA LWR IV and its Jacobian, and its limits. Written out so that the example
+// needs nothing but the library; effort_controller.cpp takes them from a URDF, through pinocchio.
 #ifndef ARM_HPP
 #define ARM_HPP
 
-#include <algorithm>
 #include <array>
 #include <cmath>
+
+#include "limits.hpp"
 
 namespace arm {
 
@@ -50,21 +50,10 @@ inline Vector hand(const Joints &q, double *J) {
   return p;
 }
 
-// The velocity from which a joint that loses A T per tick comes to rest after the distance s.
-inline double fastest(double s, double A, double T) {
-  const double distance = std::fabs(s);
-  const double k = std::floor((std::sqrt(1 + 8 * distance / (A * T * T)) - 1) / 2);
-  const double w = k * A * T + (distance - k * (k + 1) / 2 * A * T * T) / ((k + 1) * T);
-  return s >= 0 ? w : -w;
-}
-
 // Least and greatest velocity of joint i at angle q and velocity v, with acceleration A [rad/s^2]
-// and period T [s]; hierarchy/limits.py proves what this guarantees.
+// and period T [s].
 inline std::array<double, 2> box(int i, double q, double v, double A, double T) {
-  const double V = FASTEST[i] * DEGREE, limit = RANGE[i] * DEGREE;
-  const double low = std::clamp(fastest(-limit - q, A, T), -V, V);
-  const double up = std::clamp(fastest(limit - q, A, T), -V, V);
-  return {std::clamp(low, v - A * T, v + A * T), std::clamp(up, v - A * T, v + A * T)};
+  return limits::velocities({-RANGE[i] * DEGREE, RANGE[i] * DEGREE, FASTEST[i] * DEGREE, A, T}, q, v);
 }
 
 }  // namespace arm

@@ -76,7 +76,7 @@ class Call(NamedTuple):
 @compiled
 def judged(problem, settings, record, x, work, size):
     """Return SOLVED if a call can be opened, else INVALID or TOO_SMALL with x and record reset."""
-    code = _judged_problem(problem)
+    code = judged_problem(problem)
     if code == SOLVED and (record == 0 or x == 0 or work == 0 or not _in_range(settings)):
         code = INVALID
     if code == SOLVED:
@@ -92,7 +92,7 @@ def judged(problem, settings, record, x, work, size):
 
 
 @inlined
-def _judged_problem(problem):
+def judged_problem(problem):
     """Return SOLVED, or INVALID for sizes that do not add up or a missing array."""
     if problem == 0:
         return INVALID
@@ -189,3 +189,35 @@ def closed(call, code):
         for c in range(call.x.size):
             call.x[c] = 0.0
     return np.int32(code)
+
+
+@compiled
+def violations(problem, x, norms):
+    """Write the Euclidean norm of each level's violation at x; return whether all are finite."""
+    words, row, finite = integers_at(problem, PROBLEM), ZERO, True
+    n, m, levels = words[N], words[M], words[LEVELS]
+    rows, x = as_matrix(numbers_at(words[A], m * n), m, n), numbers_at(x, n)
+    lower, upper = numbers_at(words[LOWER], m), numbers_at(words[UPPER], m)
+    sizes, norms = integers_at(words[SIZES], levels), numbers_at(norms, levels)
+    for k in range(levels):
+        total = 0.0
+        for _ in range(sizes[k]):
+            total += squared_violation(rows[row], lower[row], upper[row], x)
+            row += 1
+        norms[k] = np.sqrt(total) if total < np.inf else np.inf
+        finite &= norms[k] < np.inf
+    return finite
+
+
+@inlined
+def squared_violation(a, lower, upper, x):
+    """Return the square of the violation of lower <= a x <= upper; NaN or inf for spoilt data."""
+    value = 0.0
+    for c in range(x.size):
+        value += a[c] * x[c]
+    over, under, squared = value - upper, lower - value, 0.0
+    if not over <= 0.0:  # NaN too
+        squared = over * over
+    if not under <= 0.0:
+        squared += under * under
+    return squared if lower <= upper else np.inf

@@ -97,7 +97,7 @@ def emit(resolvers: Sequence[str], target: str, version: str) -> Emitted:
         raise HierarchyError("kernels are not compiled: NUMBA_DISABLE_JIT is set")
     announce_compilation()
     functions = {f"th_solve_{name}": entries.RESOLVERS[name] for name in resolvers}
-    functions |= entries.SIZES
+    functions |= entries.ALWAYS
     module, found = lowered(functions), digest()
     module.link_in(llvm.parse_assembly(_texts(dict(zip(_TEXTS, (version, found), strict=True)))))
     symbols = (*functions, *_TEXTS)

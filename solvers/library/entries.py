@@ -21,6 +21,7 @@ from solvers.kernels.rows import ZERO
 from solvers.kernels.sns import sns
 from solvers.kernels.staircase import solve_by_staircase, solve_equalities
 from solvers.library.calls import (
+    INVALID,
     ITERATIONS,
     ROW,
     USED,
@@ -30,7 +31,9 @@ from solvers.library.calls import (
     closed,
     given,
     judged,
+    judged_problem,
     opened,
+    violations,
 )
 from solvers.library.sizes import in_range, record_size, work_size
 from solvers.status import (
@@ -99,6 +102,16 @@ def solve_sns(problem, settings, record, x, work, size):
     else:
         call.state[ITERATIONS] = last
     return closed(call, code)
+
+
+def violations_at(problem, x, norms):
+    """Write like `Hierarchy.violations`; infinity where that is not finite."""
+    code = judged_problem(problem)
+    if code == SOLVED and (x == 0 or norms == 0):
+        code = INVALID
+    if code == SOLVED and not violations(problem, x, norms):
+        code = NUMERICAL_FAILURE
+    return np.int32(code)
 
 
 def size_of_work(n, m, levels):
@@ -212,5 +225,6 @@ RESOLVERS = {
     "recursive": Entry(solve_recursive, 6, STATUS, NUMERICAL_FAILURE),
     "sns": Entry(solve_sns, 6, STATUS, NUMERICAL_FAILURE),
 }
-SIZES = {"th_work_size": Entry(size_of_work, 3, INTEGER, -1),
-         "th_record_size": Entry(size_of_record, 3, INTEGER, -1)}
+ALWAYS = {"th_work_size": Entry(size_of_work, 3, INTEGER, -1),
+          "th_record_size": Entry(size_of_record, 3, INTEGER, -1),
+          "th_violations": Entry(violations_at, 3, STATUS, NUMERICAL_FAILURE)}

@@ -127,6 +127,15 @@ class Library:
         solve = ctypes.CFUNCTYPE(ctypes.c_int, *[ctypes.c_void_p] * 5, ctypes.c_int64)
         return solve(self.address(f"th_solve_{name}"))(*given.values(), len(memory.work) - 1)
 
+    def violations(self, problem, x, count):
+        """Status and norms of th_violations; a canary behind the norms stays."""
+        norms = np.full(count + 1, CANARY)
+        call = ctypes.CFUNCTYPE(ctypes.c_int, *[ctypes.c_void_p] * 3)
+        status = call(self.address("th_violations"))(
+            ctypes.addressof(problem), None if x is None else x.ctypes.data, norms.ctypes.data)
+        assert norms[-1] == CANARY
+        return status, norms[:-1]
+
     def solve(self, name, h, settings=None, memory=None):
         """Solve a hierarchy; return the status and what the caller then has."""
         memory = memory or self.memory(h)

@@ -40,6 +40,12 @@ def generic(tmp_path_factory):
 
 
 @pytest.fixture(scope="session")
+def arm(tmp_path_factory):
+    """The library for aarch64, with one resolver."""
+    return made(tmp_path_factory, "aarch64", ("hcod",))
+
+
+@pytest.fixture(scope="session")
 def library(folder):
     return c.Library.of(folder)
 

@@ -6,7 +6,8 @@ from concurrent.futures import ThreadPoolExecutor
 import c_library as c
 import numpy as np
 import pytest
-from c_speed import recorded, sequence
+from c_speed import sequence
+from recorded import recorded
 
 from hierarchy import Hierarchy
 from scenarios import load
@@ -84,6 +85,16 @@ def test_warm_sequences_give_the_same_bits(library, name):
             res = c.check_same(library, (name, {}, {}), tick, memory, before)
             before = None if res is None else res.memory
     assert warm > 100
+
+
+@pytest.mark.slow
+def test_violations_are_those_of_python(library):
+    rng = np.random.default_rng(3)
+    for h in hierarchies(25):
+        x = rng.normal(size=h.n)
+        status, norms = library.violations(c.problem_of(h), x, len(h.sizes))
+        assert status == c.SOLVED
+        np.testing.assert_allclose(norms, h.violations(x), rtol=1e-12, atol=1e-12)
 
 
 @pytest.mark.slow

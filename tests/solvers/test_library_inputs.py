@@ -145,6 +145,29 @@ def test_without_a_reference_it_is_zero(library):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("array", ["A", "lower", "upper"])
+@pytest.mark.parametrize("value", [np.nan, 1e200])
+def test_violations_of_numbers_that_are_none_are_infinite(library, array, value):
+    h = box()
+    getattr(h, array).ravel()[0] = value
+    if array == "upper" and value == 1e200:
+        h.lower[0] = value
+    status, norms = library.violations(c.problem_of(h), np.ones(3), 3)
+    assert status == c.NUMERICAL_FAILURE
+    assert norms[0] == np.inf
+    assert np.isfinite(norms[1:]).all()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("wrong", [{"n": 0}, {"m": 6}, {"A": None}, {"sizes": None}], ids=str)
+def test_violations_of_a_wrong_problem_are_not_written(library, wrong):
+    problem = c.problem_of(box(), **wrong)
+    status, norms = library.violations(problem, np.ones(3), 3)
+    assert (status, set(norms)) == (c.INVALID, {c.CANARY})
+    assert library.violations(c.problem_of(box()), None, 3)[0] == c.INVALID
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("name", c.NAMES)
 @pytest.mark.parametrize("missing", [{"missing": 1}, {"missing": 10_000}, {"missing_values": 1}],
                          ids=str)

@@ -11,10 +11,13 @@ import sys
 from pathlib import Path
 
 import c_library as c
+import c_peers
 import c_speed
 import numpy as np
 import pytest
-from c_speed import record_sequence, sequence
+import recorded
+from c_speed import sequence
+from recorded import record_sequence
 
 from hierarchy import HierarchyError, Robot, Stack, State
 from hierarchy.paths import Still
@@ -22,7 +25,7 @@ from hierarchy.tasks import JointLimits, Position
 from scenarios.bench.families import family
 from scenarios.cli.main import run_command
 from solvers import make
-from solvers.library import differs, entries, write
+from solvers.library import differs, entries
 from solvers.library.archive import archive
 from solvers.library.emission import RESOLVERS
 
@@ -35,6 +38,7 @@ EXAMPLES, PROGRAM = ROOT / "examples" / "c", ROOT / "docs" / "studies" / "c_spee
 STRICT = ["-Wall", "-Wextra", "-Werror", "-pedantic", "-O2"]
 COMPILER = next(filter(None, map(shutil.which, ("cc", "gcc", "clang"))), None)
 CXX = next(filter(None, map(shutil.which, ("c++", "g++", "clang++"))), None)
+CROSS, QEMU = shutil.which("aarch64-linux-gnu-gcc"), shutil.which("qemu-aarch64")
 needs_c = pytest.mark.skipif(COMPILER is None, reason="no compiler of C")
 LIBM = {"hypot", "memset", "memcpy"}  # all that the library asks for
 
@@ -48,8 +52,8 @@ def test_it_asks_for_nothing_but_libm_and_owns_no_variable(folder):
     assert {name for kind, name in kinds if kind == "U"} <= LIBM
     assert {kind for kind, _ in kinds} <= set("UTtr")  # code and constants
     assert {name for kind, name in kinds if kind == "T"} == {
-        *(f"th_solve_{name}" for name in c.NAMES), "th_work_size", "th_record_size", "th_version",
-        "th_digest"}
+        *(f"th_solve_{name}" for name in c.NAMES), "th_work_size", "th_record_size",
+        "th_violations", "th_version", "th_digest"}
 
 
 def built(out, source, folder, *flags, compiler=COMPILER):
@@ -79,6 +83,35 @@ def test_the_examples_compile_without_a_warning_and_run(folder, tmp_path):
     loop = built(tmp_path / "loop", EXAMPLES / "loop.c", folder, "-std=c99", *STRICT)
     assert re.match(r"6000 ticks, 0 braked, speeds at a bound [1-9]\d* times, error at most 0\.",
                     said(loop))
+
+
+@pytest.fixture(scope="module")
+def replay(folder, tmp_path_factory):
+    if COMPILER is None:
+        pytest.skip("no compiler of C")
+    return built(tmp_path_factory.mktemp("replay") / "replay", EXAMPLES / "replay.c", folder,
+                 "-std=c99", *STRICT)
+
+
+@pytest.mark.slow
+def test_recorded_problems_of_a_standing_humanoid_give_the_same_bits_in_c(replay, tmp_path,
+                                                                          monkeypatch):
+    pytest.importorskip("mujoco")
+    file = tmp_path / "ticks"
+    monkeypatch.setattr("sys.argv", ["recorded.py", "stand-push", str(file), "--ticks", "15"])
+    recorded.main()
+    assert said(replay, tmp_path / "ticks").startswith(
+        "15 ticks of 60 unknowns and 181 rows: 15 with the bits of Python, others within 0e+00, "
+        "0 unsolved")
+
+
+@pytest.mark.slow
+def test_replaying_counts_the_answers_that_differ(replay, tmp_path):
+    ticks = sequence(family("INEQ7")[0].h, 5)
+    record_sequence(tmp_path / "ticks", ticks, [np.zeros(7)] * 5)
+    done = subprocess.run([replay, tmp_path / "ticks"], capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert "0 with the bits of Python" in done.stdout
 
 
 @pytest.mark.slow
@@ -147,6 +180,27 @@ def test_a_million_solves_allocate_nothing_and_touch_no_new_page(folder, tmp_pat
     assert (solves, failed, allocated, faults) == (1_000_000, 0, 0, 0)
 
 
+@pytest.mark.slow
+@pytest.mark.skipif(CXX is None, reason="no compiler of C++")
+def test_the_study_of_peers_judges_ours_where_there_is_no_checkout(folder, tmp_path, capsys,
+                                                                   monkeypatch):
+    monkeypatch.setattr(c_peers, "PASSES", 2)
+    rows = c_peers.run(*c_peers.compiled(tmp_path, folder), seed=1, count=5, turns=1)
+    assert [row["solver"] for row in rows] == ["tpm", *["hcod"] * 5]
+    assert all(row["right"] == 1.0 and row["median"] > 0.0 for row in rows)
+    said = capsys.readouterr().out
+    assert all(of.title in said for of in c_peers.CLASSES)
+    assert "target" not in said
+
+
+def test_a_target_is_judged_by_the_fastest_peer_that_is_right():
+    def row(solver, median, right=1.0):
+        return {"problems": "INEQ7 warm", "solver": solver, "median": median, "right": right}
+
+    rows = [row("hcod", 2.0), row("LexLS", 1.0, right=0.5), row("LexLS bounds", 2.2)]
+    assert c_peers.verdicts(rows) == ["INEQ7 warm: hcod 0.91 x LexLS bounds, target 0.8: not met"]
+
+
 @needs_c
 @pytest.mark.slow
 def test_the_study_of_speed_prints_a_row_for_every_sequence(folder, tmp_path, capsys):
@@ -169,10 +223,15 @@ def test_the_program_that_counts_allocations_sees_them(folder, tmp_path):
 
 @needs_c
 @pytest.mark.slow
-def test_the_examples_pass_the_address_sanitizer(folder, tmp_path):
-    program = built(tmp_path / "loop", EXAMPLES / "loop.c", folder, "-g",
-                    "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
-    assert said(program).startswith("6000 ticks, 0 braked")
+@pytest.mark.parametrize(("name", "words"), [("loop.c", "6000 ticks, 0 braked"),
+                                             ("once.cpp", "status 0, x = 0.9 0.1")])
+def test_the_examples_pass_the_address_sanitizer(folder, tmp_path, name, words):
+    compiler = CXX if name.endswith("cpp") else COMPILER
+    if compiler is None:
+        pytest.skip("no compiler of C++")
+    program = built(tmp_path / "program", EXAMPLES / name, folder, "-g",
+                    "-fsanitize=address,undefined", "-fno-sanitize-recover=all", compiler=compiler)
+    assert said(program).startswith(words)
 
 
 @needs_c
@@ -187,13 +246,23 @@ def test_the_examples_pass_valgrind(generic, tmp_path):
 
 
 @pytest.mark.slow
-def test_code_for_aarch64_is_made_here(tmp_path):
-    written = write(tmp_path, ["recursive"], "aarch64")
-    content = (tmp_path / "lib" / "libtask_hierarchy.a").read_bytes()
+def test_code_for_aarch64_is_made_here(arm):
+    content = (arm / "lib" / "libtask_hierarchy.a").read_bytes()
     elf = content[content.index(b"\x7fELF"):]
     assert int.from_bytes(elf[18:20], "little") == 183  # EM_AARCH64
-    assert "aarch64" in written.shared
-    assert "th_solve_sns" not in (tmp_path / "include" / "task_hierarchy.h").read_text()
+    assert not (arm / "lib" / "libtask_hierarchy.so").exists()
+    assert "th_solve_sns" not in (arm / "include" / "task_hierarchy.h").read_text()
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(None in (CROSS, QEMU), reason="no compiler and no emulator for aarch64")
+@pytest.mark.parametrize("name", ["EQ7sing", "EQ30L8", "INEQ7", "HUM38"])
+def test_emulated_code_for_aarch64_agrees_to_rounding(arm, tmp_path, name):
+    problems = [problem.h for problem in family(name)[:20]]
+    record_sequence(tmp_path / "ticks", problems, recorded.answers(problems))
+    program = built(tmp_path / "replay", EXAMPLES / "replay.c", arm, "-O2", "-static",
+                    compiler=CROSS)
+    assert "0 unsolved" in said(QEMU, program, tmp_path / "ticks")
 
 
 @pytest.mark.slow

@@ -41,7 +41,8 @@ typedef enum th_status {
   /* The data hold NaN, an infinite entry, lower > upper, or numbers whose squares overflow. */
   TH_NUMERICAL_FAILURE = 2,
   /* x is an answer in doubt: rows are nearly parallel or differ greatly in scale. In Python such an
-   * answer is judged by `certify`, which most often confirms it; here it is not verified. */
+   * answer is judged by `certify`, which most often confirms it; here it is not verified.
+   * th_violations says what each level still misses at x, not whether it could miss less. */
   TH_INACCURATE = 4,
   /* The work space or the record is smaller than th_work_size or th_record_size says. */
   TH_TOO_SMALL = 8,
@@ -107,6 +108,11 @@ int64_t th_work_size(int64_t n, int64_t m, int64_t levels);
 
 /* Doubles that a record needs, for any resolver; -1 if a size is out of range. */
 int64_t th_record_size(int64_t n, int64_t m, int64_t levels);
+
+/* Writes the Euclidean norm of each level's violation at x (n) to norms (levels), which is INFINITY
+ * where it is not finite or lower > upper. Returns TH_SOLVED, TH_NUMERICAL_FAILURE if a norm is
+ * INFINITY, or TH_INVALID. */
+int th_violations(const th_problem *problem, const double *x, double *norms);
 
 /* Version and digest of the library; th_matches says whether it belongs to this header. */
 const char *th_version(void);

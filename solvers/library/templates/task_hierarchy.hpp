@@ -1,8 +1,8 @@
 // A thin C++17 face of task_hierarchy.h: buffers with an owner, a problem filled level by level.
 //
 // Memory is allocated when a Solver is made, never while it solves; nothing here throws but what
-// std::vector throws when memory is short. Sizes out of range are TH_INVALID when it solves. With TASK_HIERARCHY_EIGEN defined before the include,
-// levels and answers may be Eigen objects.
+// std::vector throws when memory is short. Sizes out of range are TH_INVALID when it solves. With
+// TASK_HIERARCHY_EIGEN defined before the include, levels and answers may be Eigen objects.
 #ifndef TASK_HIERARCHY_HPP
 #define TASK_HIERARCHY_HPP
 
@@ -62,12 +62,16 @@ class Solver {
 
   // Solve, from the record of the solve before where there is one.
   th_status solve() noexcept {
-    const th_problem problem{n_, m_, static_cast<std::int64_t>(sizes_.size()), A_.data(),
-                             lower_.data(), upper_.data(), sizes_.data(), reference_.data()};
+    const th_problem problem = described();
     record_.values = values_.data();
     record_.size = static_cast<std::int64_t>(values_.size());
     return static_cast<th_status>(resolve_(&problem, &settings_, &record_, x_.data(), work_.data(),
                                            static_cast<std::int64_t>(work_.size())));
+  }
+  // What each level still misses at x: norms has one entry per level.
+  th_status violations(double *norms) const noexcept {
+    const th_problem problem = described();
+    return static_cast<th_status>(th_violations(&problem, x_.data(), norms));
   }
   // Let the next solve start cold.
   void forget() noexcept { record_.warm = 0; }
@@ -93,6 +97,11 @@ class Solver {
 #endif
 
  private:
+  th_problem described() const noexcept {
+    return {n_, m_, static_cast<std::int64_t>(sizes_.size()), A_.data(), lower_.data(),
+            upper_.data(), sizes_.data(), reference_.data()};
+  }
+
   Resolve resolve_;
   th_settings settings_;
   std::vector<std::int64_t> sizes_;

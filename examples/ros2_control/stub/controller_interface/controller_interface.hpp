@@ -57,6 +57,9 @@ class ControllerInterface {
   virtual CallbackReturn on_activate(const rclcpp_lifecycle::State &) = 0;
   virtual return_type update(const rclcpp::Time &, const rclcpp::Duration &) = 0;
 
+  const std::string &get_robot_description() const { return robot_description_; }
+
+  std::string robot_description_;
   std::vector<hardware_interface::LoanedStateInterface> state_interfaces_;
   std::vector<hardware_interface::LoanedCommandInterface> command_interfaces_;
 };

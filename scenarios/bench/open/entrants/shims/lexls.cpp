@@ -19,6 +19,14 @@ struct Prepared {
   std::vector<std::vector<LexLS::ConstraintActivationType>> active;  // of the answer
 };
 
+// Whether the last level leaves no freedom: equalities of rank n.
+bool decides(const Prepared& p, int n) {
+  if (p.data.empty() || p.types.back() != LexLS::GENERAL_OBJECTIVE) return false;
+  const Eigen::MatrixXd& last = p.data.back();
+  return last.col(n) == last.col(n + 1) &&
+         Eigen::ColPivHouseholderQR<Eigen::MatrixXd>(last.leftCols(n)).rank() == n;
+}
+
 void load(Prepared* p) {
   p->solver->reset();
   for (size_t k = 0; k < p->data.size(); ++k) {
@@ -60,10 +68,7 @@ void* prepare(int n, int levels, const long* sizes, const double* A, const doubl
     p->types.push_back(simple ? LexLS::SIMPLE_BOUNDS_OBJECTIVE : LexLS::GENERAL_OBJECTIVE);
     p->data.push_back(data), p->rows.push_back(m);
   }
-  const bool all = !p->data.empty() && p->rows.back() == n && p->data.back().cols() == n + 2 &&
-                   p->data.back().leftCols(n).isIdentity(0.0) &&
-                   p->data.back().col(n) == p->data.back().col(n + 1);
-  if (!all) {  // freedom may be left: the nearest to the reference, as a last level
+  if (!decides(*p, n)) {  // nearest to the reference
     Eigen::MatrixXd last = Eigen::MatrixXd::Identity(n, n + 2);
     for (int i = 0; i < n; ++i) last(i, n) = last(i, n + 1) = reference ? reference[i] : 0.0;
     p->data.push_back(last), p->rows.push_back(n), p->types.push_back(LexLS::GENERAL_OBJECTIVE);
