@@ -21,22 +21,17 @@ class Hierarchy:
     """Levels of rows `lower <= A x <= upper`, most important first.
 
     Level k minimises the Euclidean norm of its violation without giving up any of the norms above
-    it; among all such x the answer is the one nearest to `reference`, with the distance d^T W d of
-    a step d in the metric W. Row by row, a level may `give`: for the sake of the levels below, and
-    of the reference, row i may be violated by up to |s_i| + give_i at either side, where s_i is its
-    violation at the least norm of its level. An equality row has `lower == upper`; a missing bound
-    is infinite.
+    it; among all such x the answer is the one nearest to `reference`. A missing bound is infinite.
 
-    Attributes
-    ----------
     A : (m, n) the rows of all levels, stacked from the top level down, C-contiguous.
-    lower, upper : (m,) the bounds, in the unit of the rows.
-    sizes : (L,) rows of each level; zero is allowed.
-    offsets : (L + 1,) first row of each level, and m.
+    lower, upper : (m,) the bounds, in the unit of the rows; equal for an equality.
+    sizes, offsets : (L,) rows of each level, zero is allowed; (L + 1,) first row of each, and m.
     reference : (n,) the x preferred where the levels leave freedom.
     names : L level names, used in messages.
-    metric : (n, n) W, symmetric and positive definite, or None for the identity.
-    give : (m,) in the unit of the rows, at least zero, or None for zero.
+    metric : (n, n) W, symmetric and positive definite, in which a step d to the reference has the
+        squared length d^T W d, or None for the identity.
+    give : (m,) >= 0, in the unit of the rows, or None for zero: for the levels below and the
+        reference, row i may be violated by |s_i| + give_i, s_i as at the least norm of its level.
     """
 
     __slots__ = ("A", "give", "lower", "metric", "names", "offsets", "reference", "sizes", "upper")
