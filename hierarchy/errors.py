@@ -56,7 +56,8 @@ def number(what: str, value: object, least: float = -inf, largest: float = inf) 
             return found
     between = (f" from {least:g} to {largest:g}" if isfinite(largest) else
                f" from {least:g} on" if isfinite(least) else "")
-    raise HierarchyError(f"{what}: expected a finite number{between}, got {brief(value)}")
+    shown = f"{value:g}" if isinstance(value, Real) else repr(value)
+    raise HierarchyError(f"{what} = {shown}: expected a finite number{between}")
 
 
 def finite_numbers(what: str, values: object, size: int | None = None) -> NDArray[np.float64]:

@@ -164,7 +164,7 @@ def check_point(name: str, vector: Vector) -> None:
     try:
         finite_numbers(name, vector, 3)
     except HierarchyError as error:
-        given = list(vector) if isinstance(vector, Sequence | np.ndarray) else vector
+        given = list(vector) if isinstance(vector, list | tuple | np.ndarray) else vector
         raise HierarchyError(f"{name} must be three finite numbers [m], got {given!r}") from error
 
 

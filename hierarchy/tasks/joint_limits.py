@@ -51,7 +51,8 @@ class JointLimits(JointRows):
         if acceleration.shape not in ((), (n,)):
             raise HierarchyError(f"task {self.name!r}: acceleration has shape "
                                  f"{acceleration.shape}, expected a number or ({n},)")
-        number(f"task {self.name!r}: margin", self.margin, 0.0)
+        if number(f"task {self.name!r}: margin", self.margin) < 0.0:
+            raise HierarchyError(f"task {self.name!r}: margin {self.margin} must not be negative")
         lower, upper = robot.position_limits()
         for i in np.flatnonzero(upper - lower < 2.0 * self.margin)[:1]:
             raise HierarchyError(f"task {self.name!r}: margin {self.margin:g} leaves "

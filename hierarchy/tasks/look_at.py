@@ -61,7 +61,8 @@ class LookAt(Geometric):
     def __post_init__(self) -> None:
         super().__post_init__()
         check_parts(self)
-        check_point(f"task {self.name!r}: target", self.target)
+        given = list(self.target) if isinstance(self.target, tuple | list) else repr(self.target)
+        check_point(f"task {self.name!r}: target {given}", self.target)
         set_frozen(self, point=np.array(self.target, dtype=float))
 
     @property

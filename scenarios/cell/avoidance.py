@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from hierarchy import Robot, State, Task
+from hierarchy import HierarchyError, Robot, State, Task
 from hierarchy.avoidance import Barrier, Repulsion, SurveillanceAreas
 from hierarchy.avoidance.self_collision import measure_capsules, pack_capsules, pairs_of_tree
 from hierarchy.problem import Array
@@ -58,8 +58,11 @@ def _separation(section: SeparationSection, robot: Robot, exact: bool) -> list[T
         if not pairs:
             raise ScenarioError(f"avoidance.self_collision: robot {robot.name!r} has no capsules "
                                 "that could be kept apart; list them in robot.capsules")
-        barrier = Barrier(section.self_collision, section.rate, section.influence,
-                          section.recovery, section.limit)
+        try:
+            barrier = Barrier(section.self_collision, section.rate, section.influence,
+                              section.recovery, section.limit)
+        except HierarchyError as error:
+            raise ScenarioError(f"avoidance.self_collision: {error}") from error
         tasks.append(SelfSeparation(robot.capsules, barrier, pairs))
     return tasks
 

@@ -14,7 +14,7 @@ from scenarios.cli.terminal import shown
 
 _USUAL = ("resolvers", "tick", "first_paper", "strictness", "start")  # modules of scenarios.bench
 
-Seconds = Annotated[float, typer.Option("--seconds", min=0.0, metavar="S",
+Seconds = Annotated[float, typer.Option("--seconds", min=0.001, metavar="S",
                                         help="Time for all measurements together.")]
 
 
@@ -59,7 +59,7 @@ def resolvers(
             help="Only this resolver, with its variants and backends, beside the yardsticks. May "
                  "be repeated.")] = None,
         seconds: Annotated[float, typer.Option(
-            "--seconds", min=0.0, metavar="S",
+            "--seconds", min=0.001, metavar="S",
             help="Time for each resolver in each family.")] = 0.5,
         out: Out = None) -> None:
     """Time every resolver on the reference problems."""
@@ -235,7 +235,9 @@ def stress(count: Annotated[int, typer.Option("--count", min=1, metavar="N",
     """
     from hierarchy.errors import UnknownNameError
     from scenarios.bench.stress import ALL, KINDS, run
+    from solvers import make
 
+    make(resolver)
     if kind not in (ALL, *KINDS):
         raise UnknownNameError("kind", kind, (ALL, *KINDS))
     return int(not run(count, resolver, first, processes, out, kind).passed)

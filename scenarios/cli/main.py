@@ -8,6 +8,7 @@ run stopped with a reported fault, 2 the command line or a file is invalid, 130 
 from __future__ import annotations
 
 import sys
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -51,7 +52,7 @@ def run_command(arguments: list[str]) -> int:
         code = app(arguments or ["--help"], prog_name="hierarchy", standalone_mode=False)
         return int(code or 0) if code != INTERRUPTED else _interrupted()
     except typer.TyperException as error:
-        return _wrong(error.format_message())
+        return _wrong(f"{error.format_message()}{_given(error, arguments)}")
     except (KeyboardInterrupt, typer.Abort):
         return _interrupted()
     except Exception as error:
@@ -376,6 +377,13 @@ def _split(specs: str) -> list[str]:
     if not all(named):
         raise typer.BadParameter(f"an empty name in {specs!r}", param_hint="--resolvers")
     return named
+
+
+def _given(error: typer.TyperException, arguments: list[str]) -> str:
+    """Return the value of the option at fault, which the message leaves out."""
+    options = getattr(getattr(error, "param", None), "opts", ())
+    given = [value for option, value in pairwise(arguments) if option in options]
+    return f", got {given[-1]!r}" if given and repr(given[-1]) not in error.format_message() else ""
 
 
 def _interrupted() -> int:

@@ -54,7 +54,7 @@ class Scenario(Section):
     file, see hierarchy.plugins.
     """
 
-    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$")]
+    name: Annotated[str, Field(max_length=100, pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$")]
     title: str = ""
     description: str = ""
     plugins: tuple[str, ...] | None = None

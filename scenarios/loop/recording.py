@@ -215,7 +215,10 @@ def _arrays(path: Path) -> dict[str, NDArray[Any]]:
     try:
         with path.open("rb") as stream, np.load(stream, allow_pickle=False) as file:
             return {name: file[name] for name in file.files}
-    except (OSError, KeyError, ValueError, EOFError, NotImplementedError, zipfile.BadZipFile,
+    except ValueError as error:  # of numpy, for anything that is no archive of arrays
+        raise HierarchyError(f"{path} cannot be read: it is no file of arrays, or damaged"
+                             ) from error
+    except (OSError, KeyError, EOFError, NotImplementedError, zipfile.BadZipFile,
             zlib.error) as error:  # what reading a damaged archive raises
         raise HierarchyError(f"{path} cannot be read: {error}") from error
 

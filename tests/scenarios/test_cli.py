@@ -1,6 +1,7 @@
 import importlib
 import json
 import os
+import signal
 import subprocess
 import sys
 from importlib.metadata import version
@@ -338,3 +339,21 @@ def test_every_benchmark_is_a_command_and_listed(capsys):
 
 def test_a_benchmark_that_is_not_there_is_answered_with_the_nearest(capsys):
     assert "unknown benchmark 'tik'; did you mean 'tick'?" in fails(["bench", "tik"], capsys)
+
+
+def test_ctrl_c_while_it_is_starting_ends_the_command_quietly(tmp_path):
+    held = "import os, signal, sys; from scenarios.cli import start; " \
+        "sys.meta_path.insert(0, type('Held', (), {'find_spec': staticmethod(" \
+        "lambda *_: os.kill(os.getpid(), signal.SIGINT))})); start.main()"
+    done = subprocess.run([sys.executable, "-c", held, "list"], cwd=tmp_path,
+                          capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (-signal.SIGINT, "", "")
+
+
+def test_ctrl_c_in_a_command_is_130(monkeypatch, capsys):
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("scenarios.cli.doctor.doctor_command", interrupted)
+    assert run_command(["doctor"]) == 130
+    assert capsys.readouterr().err == "hierarchy: interrupted\n"

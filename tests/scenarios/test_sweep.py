@@ -384,3 +384,11 @@ def test_help_names_the_sweep_and_needs_nothing_of_it():
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert "sweep" in done.stdout
     assert done.stdout.endswith("set()\n")
+
+
+@pytest.mark.slow
+def test_the_processes_of_a_sweep_speak_tls():
+    pytest.importorskip("cryptography", reason="needs the extra sweep")
+    with connected(workers=1) as client:
+        assert client.scheduler.address.startswith("tls://127.0.0.1:")
+        assert client.submit(abs, -1).result() == 1

@@ -35,7 +35,7 @@ H = Hierarchy.from_levels([([[1.0, 0.0]], [-0.1], [0.1]), ([[1.0, 0.5]], [0.3])]
     (lambda: compare(SHORT, ["tpm"], out=3), "compare: out: expected a path, got int 3"),
     (lambda: load_run(3), "load_run: expected a path, got int 3"),
     (lambda: save("ellipse", "x"), "save: expected a Recording, got str 'ellipse'"),
-    (lambda: solve_ik(ROBOT, Q, [HAND], dt="a"), "solve_ik: dt [s]: expected a finite number"),
+    (lambda: solve_ik(ROBOT, Q, [HAND], dt="a"), "solve_ik: dt [s] = 'a'"),
     (lambda: solve_ik(ROBOT, Q, [HAND], limits="yes"), "limits: expected True, False or a task"),
     (lambda: solve_ik(ROBOT, Q, [HAND], resolver=3), "resolver: expected a Resolver, got int 3"),
     (lambda: certify(H, [0.0, 0.0], tolerance="a"), "certify: tolerance"),

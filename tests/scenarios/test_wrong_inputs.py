@@ -204,3 +204,23 @@ def test_check_warns_of_a_start_that_is_too_near(capsys):
     out = checked(capsys, "avoidance.near=0.2", "avoidance.far=0.3")
     assert "body: 112 mm from the nearest obstacle at the start, less than the 200 mm" in out
     assert "Warning" not in checked(capsys)
+
+
+# Command lines.
+
+@pytest.mark.parametrize(("line", "said"), [
+    ("run ellipse --duration x", "'--duration'"),
+    ("run ellipse --duration x", "got 'x'"),
+    ("run ellipse --resolver hcod:x", "resolver 'hcod:x': expected key=value, got 'x'"),
+    ("check ur5", "example_robot_data:ur5"),
+    ("check nope", "unknown scenario or robot 'nope'"),
+    ("check ellipse-hqp --set avoidance.self_collision=5.0", "avoidance.self_collision: barrier"),
+    ("bench stress --resolver nope", "unknown resolver 'nope'"),
+    ("bench resolvers --seconds 0", "got '0'"),
+    (f"check ellipse --set name={'n' * 101}", "at most 100 characters"),
+])
+def test_a_wrong_command_line_says_what_was_given(line, said, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert run_command(line.split()) == 2
+    assert said in capsys.readouterr().err
+    assert not list(tmp_path.rglob("*.npz"))
