@@ -21,14 +21,9 @@ class Hierarchy:
     """Levels of rows `lower <= A x <= upper`, most important first.
 
     Level k minimises the Euclidean norm of its violation without giving up any of the norms above
-    it; among all such x the answer is the one nearest to `reference`, with the distance d^T W d of
-    a step d in the metric W. Row by row, a level may `give`: for the sake of the levels below, and
-    of the reference, row i may be violated by up to |s_i| + give_i at either side, where s_i is its
-    violation at the least norm of its level. An equality row has `lower == upper`; a missing bound
-    is infinite.
+    it; among all such x the answer is the one nearest to `reference`, in the metric W. An equality
+    row has `lower == upper`; a missing bound is infinite. docs/theory/give.md defines `give`.
 
-    Attributes
-    ----------
     A : (m, n) the rows of all levels, stacked from the top level down, C-contiguous.
     lower, upper : (m,) the bounds, in the unit of the rows.
     sizes : (L,) rows of each level; zero is allowed.
