@@ -121,7 +121,7 @@ TESTS = {
            "set_based": "solvers/test_set_based", "smooth": "solvers/test_smooth",
            "sns": "solvers/test_sns", "tpm": "solvers/test_tpm solvers/test_tpm_limits",
            "weighted": "solvers/test_weighted"}.items()},
-    "solvers/workspace": "solvers/test_workspace solvers/test_resolver",
+    "solvers/workspace": "solvers/test_workspace solvers/test_tpm_limits",
 }
 
 IMPORTED_ONCE = ("numpy", "numba", "numba.np.arraymath", "scipy.optimize", "scipy.stats",
