@@ -5,9 +5,10 @@ The gallery has a command of its own, `python -m scenarios.report.gallery`.
 
 from __future__ import annotations
 
-import shutil
 import tempfile
 from pathlib import Path
+
+from PIL import Image
 
 from scenarios import load, simulate
 from scenarios.draw.figures.letter import write_all
@@ -26,7 +27,8 @@ def main() -> None:
         with tempfile.TemporaryDirectory() as folder:
             write_all(simulate(load(name)), Path(folder))
             for stem, image in pictures.items():
-                shutil.copyfile(Path(folder, f"{stem}.png"), IMAGES / f"{image}.png")
+                with Image.open(Path(folder, f"{stem}.png")) as drawn:
+                    drawn.convert("RGB").quantize(255).save(IMAGES / f"{image}.png", optimize=True)
                 print(f"{name}: {image}.png", flush=True)
 
 

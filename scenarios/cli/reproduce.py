@@ -11,7 +11,6 @@ from scenarios.cli.progress import bar
 from scenarios.cli.terminal import print_json, shown
 from scenarios.reproduce import rows
 from scenarios.reproduce.blocks import CLAIMS
-from scenarios.reproduce.commands import CommandError
 from scenarios.reproduce.pages import checkout
 from scenarios.reproduce.rows import Rows
 from scenarios.reproduce.whole import chosen, outputs, reproduce, write_documents
@@ -28,9 +27,8 @@ def reproduce_command(names: list[str], out: Path, quick: bool, workers: int | N
         with bar("runs") as progress:
             found = reproduce(asked.studies, out, quick, workers, progress, lambda study: _say(
                 f"{study.name}: {study.title}, {len(study.columns)} columns"))
-        printed = outputs(asked.pages, root, out / "output", lambda command: _say(
-            f"{command} ...")) if root else {}
-    except (FullError, EngineError, CommandError) as error:
+        printed = outputs(asked.pages, root, out / "output", _say) if root else {}
+    except (FullError, EngineError) as error:
         _say(f"hierarchy: fault: {error}")
         return 1
     except KeyboardInterrupt:

@@ -15,15 +15,14 @@ def caveats(resolvers: Mapping[str, ResolverFacts]) -> Iterator[str]:
 
     resolvers : label of a column to its resolver.
     """
-    loose = [label for label, one in resolvers.items() if not one.strict]
-    if loose:
-        yield f"{listed(loose)} {_verb(loose, 'is', 'are')} not strict at every rank"
     damped = {label: _SAME.get(one.damped, one.damped) for label, one in resolvers.items()}
     first = next(iter(damped), "")
-    other = [label for label, what in damped.items() if what != damped[first]]
-    if other:
-        yield f"{listed(other)} {_verb(other, 'damps', 'damp')} otherwise than {first}"
-
-
-def _verb(labels: list[str], one: str, many: str) -> str:
-    return one if len(labels) == 1 else many
+    said: dict[tuple[str, ...], list[str]] = {}
+    for labels, one, many in (
+            (tuple(label for label, one in resolvers.items() if not one.strict),
+             "is not strict at every rank", "are not strict at every rank"),
+            (tuple(label for label, what in damped.items() if what != damped[first]),
+             f"damps otherwise than {first}", f"damp otherwise than {first}")):
+        if labels:
+            said.setdefault(labels, []).append(one if len(labels) == 1 else many)
+    yield from (f"{listed(labels)} {listed(what)}" for labels, what in said.items())

@@ -66,17 +66,20 @@ def _run(study: AnyStudy, out: Path, workers: int | None, progress: Progress | N
 
 
 def outputs(asked: Sequence[str], root: Path, out: Path,
-            told: Callable[[str], object] = lambda command: None) -> dict[str, str]:
+            told: Callable[[str], object] = lambda line: None) -> dict[str, str]:
     """Run the commands of pages, one after the other, and return what they print.
 
-    Those whose output `out` has are not repeated. told : called with each before it starts.
-    Raises CommandError.
+    Those whose output `out` has are not repeated, and those that fail are left out. told : called
+    with each before it starts, and with the reason of a failure.
     """
     texts = [(root / page).read_text(encoding="utf-8") for page in asked]
     found = {}
     for command in dict.fromkeys(one for text in texts for one in commands.commands(text)):
-        told(command)
-        found[command] = commands.run(command, root, out)
+        told(f"{command} ...")
+        try:
+            found[command] = commands.run(command, root, out)
+        except commands.CommandError as error:
+            told(f"left as it is: {error}")
     return found
 
 

@@ -14,8 +14,9 @@ def test_nothing_is_said_of_strict_resolvers_that_damp_the_same():
 
 def test_who_is_not_strict_or_damps_otherwise_is_named():
     assert said("ellipse", "tpm", "hcod", "weighted", "augmented") == [
-        "weighted and augmented are not strict at every rank",
-        "weighted and augmented damp otherwise than tpm"]
+        "weighted and augmented are not strict at every rank and damp otherwise than tpm"]
+    assert said("ellipse-limits", "tpm", "sns", "weighted") == [
+        "weighted is not strict at every rank", "sns and weighted damp otherwise than tpm"]
 
 
 def test_pivots_are_damped_as_levels_are():

@@ -15,7 +15,7 @@ from scenarios.reproduce.claims import Compares, Ends, Keeps
 from scenarios.reproduce.rows import Rows, read, write
 from scenarios.reproduce.studies import STUDIES, Pair, Pivot, Study, Watched
 from scenarios.reproduce.watched import DAMPED, LARGEST, LEFT, jobs, measured, rows_of_watched
-from scenarios.reproduce.whole import chosen
+from scenarios.reproduce.whole import chosen, outputs
 from scenarios.sweep.run import digest, run_batch
 from scenarios.sweep.store import Store
 
@@ -196,6 +196,16 @@ def test_a_command_that_fails_is_named_and_keeps_nothing(tmp_path):
     with pytest.raises(commands.CommandError, match=r"python script\.py: exit code 3\nhalf"):
         commands.run("python script.py", tmp_path, tmp_path / "out")
     assert not list((tmp_path / "out").rglob("output.txt"))
+
+
+def test_a_command_that_fails_leaves_the_others(tmp_path):
+    (tmp_path / "good.py").write_text("print('good')\n")
+    (tmp_path / "bad.py").write_text("raise SystemExit(3)\n")
+    (tmp_path / "page.md").write_text(page("python bad.py") + page("python good.py"))
+    told = []
+    found = outputs(["page.md"], tmp_path, tmp_path / "out", told.append)
+    assert found == {"python good.py": "good\n"}
+    assert told[1].startswith("left as it is: python bad.py: exit code 3")
 
 
 def test_studies_and_pages_are_chosen_by_name():
