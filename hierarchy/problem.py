@@ -121,9 +121,11 @@ class Hierarchy:
                          self.reference, self.names[:count], self.metric)
 
     def relaxed(self, level: int, x: ArrayLike) -> Hierarchy:
-        """Return the hierarchy with room for what the rows of a level miss at x, and for its give.
+        """Return the hierarchy that has room for what the rows of a level miss at x, and give.
 
-        x (n,) is optimal for the levels down to this one. The levels above do not give any more.
+        For all levels below, and the reference, row i of the level may be violated by up to
+        |s_i| + give_i at either side, where s_i is its violation at the least norm of its level. x
+        (n,) is optimal for the levels down to this one, which do not give any more.
         """
         assert self.give is not None, "the hierarchy gives"
         rows = slice(self.offsets[level], self.offsets[level + 1])

@@ -28,13 +28,14 @@ STORED = Path(__file__).parents[2] / "tests" / "data" / "hlsp" / "DYN60.npz"
 _FIRST, _LAST = 0.3, 1.0             # [s] between which the ticks lie: the push begins at 0.3 s
 _MISSING = 1e9                       # marks a missing side in the data
 _NEAREST = 1e-9                      # tolerance of `certify`
+_AGREE = 1e-6                        # of answers, relative to 1 + |x|
 
 
 def sequences(seed: int) -> Iterator[list[tuple[Hierarchy, Array]]]:
     """Yield TOGETHER consecutive ticks of one sampled run after another, with certified answers.
 
-    A run that falls before its ticks, and ticks of which no resolver finds an answer that `certify`
-    accepts, are left out.
+    A run that falls before its ticks is left out, and one with a tick that has no certified answer,
+    or two.
     """
     base, run = load(SCENARIO), 0
     while True:
@@ -69,14 +70,18 @@ def _without(h: Hierarchy, name: str) -> Hierarchy:
 
 
 def answer(h: Hierarchy) -> Array | None:
-    """Return the first certified answer of hcod and the backends of hqp, None if there is none."""
+    """Return the certified answer of hcod and the backends of hqp, None without one they agree on.
+
+    Where rows are parallel up to the angle at which they count as dependent, there are two.
+    """
     tried = [make("hcod"), *(make("hqp", backend=name) for name in BACKENDS if installed(name))]
-    for resolver in tried:
-        res = resolver.solve(h)
-        if res.status in (Status.SOLVED, Status.INACCURATE) and certify(
-                h, res.x, _NEAREST).certified:
-            return res.x
-    return None
+    found = [res.x for res in (resolver.solve(h) for resolver in tried)
+             if res.status in (Status.SOLVED, Status.INACCURATE)
+             and certify(h, res.x, _NEAREST).certified]
+    if not found or any(np.abs(x - found[0]).max() > _AGREE * (1.0 + np.abs(x).max())
+                        for x in found):
+        return None
+    return found[0]
 
 
 def packed(problems: list[tuple[Hierarchy, Array]]) -> dict[str, Array]:

@@ -146,9 +146,10 @@ def _add(archive: zipfile.ZipFile, name: str, content: bytes) -> None:
 
 def _packed_problems(problems: Sequence[Hierarchy]) -> Arrays:
     for p, h in enumerate(problems):
-        if h.metric is not None:
-            raise HierarchyError(f"problem {p} has a metric, which version {VERSION} of the format "
-                                 "does not know")
+        if h.metric is not None or h.giving:
+            what = "has a metric" if h.metric is not None else "gives"
+            raise HierarchyError(f"problem {p} {what}, which version {VERSION} of the format does "
+                                 "not know")
     columns: dict[str, list[Any]] = {
         "n": [[h.n] for h in problems], "levels": [[len(h.sizes)] for h in problems],
          "sizes": [h.sizes for h in problems], "A": [h.A.ravel() for h in problems],

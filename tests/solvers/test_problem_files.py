@@ -124,9 +124,11 @@ def test_what_is_no_file_of_problems_is_refused(tmp_path):
         read(tmp_path / "text.npz")
 
 
-def test_a_metric_cannot_be_written(tmp_path):
+@pytest.mark.parametrize(("what", "said"), [({"metric": [[2.0]]}, "has a metric"),
+                                            ({"give": [0.1]}, "gives")])
+def test_a_metric_and_levels_that_give_cannot_be_written(tmp_path, what, said):
     from hierarchy import Hierarchy
 
-    h = Hierarchy.from_levels([([[1.0]], [1.0])], metric=[[2.0]])
-    with pytest.raises(HierarchyError, match="problem 0 has a metric"):
+    h = Hierarchy.from_levels([([[1.0]], [1.0])], **what)
+    with pytest.raises(HierarchyError, match=f"problem 0 {said}"):
         Collection(Head("one", "", "public", 0), (h,)).save(tmp_path / "one.npz")
