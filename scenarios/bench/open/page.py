@@ -72,8 +72,8 @@ def lead(half: Half) -> list[str]:
         if right:
             fastest.setdefault(min(right, key=right.__getitem__), []).append(family)
     for label, families in sorted(fastest.items(), key=lambda one: -len(one[1])):
-        said.append(f"{label} is the fastest of those that solve every problem in {len(families)} of "
-                    f"{len(half.families)} families: {listed(families)}.")
+        said.append(f"{label} is the fastest of those that solve every problem in "
+                    f"{len(families)} of {len(half.families)} families: {listed(families)}.")
     return said
 
 
