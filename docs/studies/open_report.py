@@ -45,9 +45,11 @@ def main() -> None:
         path = ROOT / page
         path.write_text(filled(path.read_text(encoding="utf-8"), found), encoding="utf-8")
     images = ROOT / "docs" / "images"
-    for name, drawn in (("profiles", figures.profiles), ("misses", figures.time_against_miss),
-                        ("heat", figures.heat)):
-        write(drawn(fresh(found)), str(images / f"open-{name}"))
+    half = fresh(found)
+    for name, drawn in (("profiles", figures.profiles(half, legend=True)),
+                        ("misses", figures.time_against_miss(half, legend=True)),
+                        ("heat", figures.heat(half))):
+        write(drawn, str(images / f"open-{name}"))
         (images / f"open-{name}.svg").unlink(missing_ok=True)
 
 

@@ -153,7 +153,7 @@ def batch(count: Annotated[list[int] | None, typer.Option(
 def peers(install: Annotated[bool, typer.Option(
               "--install", help="Create an environment for each package and measure nothing.")
               ] = False, out: Out = None) -> int:
-    """Compare with pink, mink, placo, tsid and embodiK.
+    """Compare with pink, mink, placo, tsid, embodiK and roboplan.
 
     Run it once with --install first.
     """

@@ -6,6 +6,7 @@ import matplotlib
 import numpy as np
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from scenarios.bench.open.judge import RIGHT, SOLVED, WRONG
 from scenarios.bench.open.printing import CHOSEN
@@ -24,7 +25,7 @@ def drawn_as(half: Half) -> dict[str, Look]:
     return looks(half.entrants)
 
 
-def profiles(half: Half) -> Figure:
+def profiles(half: Half, legend: bool = False) -> Figure:
     """Return the performance profile: share solved against time over that of the fastest."""
     ratios = np.geomspace(1.0, _LARGEST, 200)
     found, style = profile(half.rows, ratios), drawn_as(half)
@@ -37,10 +38,12 @@ def profiles(half: Half) -> Figure:
         drawing.make_logarithmic(ax, "x")
         ax.set(xlabel="median time of a problem, over that of the fastest entrant",
                ylabel="problems solved [%]", xlim=(1.0, _LARGEST), ylim=(0.0, 102.0))
+        if legend:
+            fig.legend(loc="outside right upper", fontsize=7.0)
     return fig
 
 
-def time_against_miss(half: Half) -> Figure:
+def time_against_miss(half: Half, legend: bool = False) -> Figure:
     """Return median time against the largest relative miss of those called solved, by family."""
     names = [name for name in CHOSEN if name in half.families] or half.families[:4]
     style, columns = drawn_as(half), min(3, len(names))
@@ -65,6 +68,11 @@ def time_against_miss(half: Half) -> Figure:
             ax.set_axis_off()
         fig.supxlabel("largest miss of an answer called solved, relative", fontsize=9.0)
         fig.supylabel("median time [µs]", fontsize=9.0)
+        if legend:
+            fig.legend(handles=[Line2D([], [], color=look.colour, marker="o", linestyle="",
+                                       markersize=5.0, label=label)
+                                for label, look in style.items()],
+                       loc="outside right upper", fontsize=7.0)
     return fig
 
 

@@ -64,13 +64,16 @@ def lead(half: Half) -> list[str]:
         said.append(f"Another of them is right more often than {best[0]} in {listed(better)}.")
     fastest: dict[str, list[str]] = {}
     for family in half.families:
-        right = {label: half.cells[label, family].cold.median for label in half.entrants
-                 if (label, family) in half.cells and half.cells[label, family].right == 1.0}
+        own = {label: half.cells[label, family] for label in half.entrants
+               if (label, family) in half.cells}
+        every = max(one.asked for one in own.values())
+        right = {label: one.cold.median for label, one in own.items()
+                 if one.right == 1.0 and one.asked == every}
         if right:
             fastest.setdefault(min(right, key=right.__getitem__), []).append(family)
     for label, families in sorted(fastest.items(), key=lambda one: -len(one[1])):
-        said.append(f"{label} is the fastest of those without a mistake in {len(families)} of "
-                    f"{len(half.families)} families: {listed(families)}.")
+        said.append(f"{label} is the fastest of those that solve every problem in "
+                    f"{len(families)} of {len(half.families)} families: {listed(families)}.")
     return said
 
 

@@ -44,7 +44,8 @@ PLACO = Package("placo", "placo", ("placo==0.10.2",))
 TSID = Package("tsid", "tsid", ("tsid==1.7.1", "pin==3.4.0", "cmeel-urdfdom<5",
                                 "cmeel-tinyxml2<11"))
 EMBODIK = Package("embodik", "embodik", ("embodik==0.23.2",))
-PACKAGES = (PINK, MINK, PLACO, TSID, EMBODIK)
+ROBOPLAN = Package("roboplan", "roboplan", ("roboplan==0.7.0",))
+PACKAGES = (PINK, MINK, PLACO, TSID, EMBODIK, ROBOPLAN)
 
 ENTRANTS = (
     Entrant("tpm", OWN, f"{_HERE}.ours:Bounds", {"resolver": "tpm"}),
@@ -58,6 +59,7 @@ ENTRANTS = (
     Entrant("tsid", TSID, f"{_HERE}.with_tsid:Tsid"),
     Entrant("tsid hard", TSID, f"{_HERE}.with_tsid:TsidHard"),
     Entrant("embodiK", EMBODIK, f"{_HERE}.with_embodik:Embodik"),
+    Entrant("OInK", ROBOPLAN, f"{_HERE}.with_roboplan:Oink"),
     Entrant("mink", MINK, f"{_HERE}.with_mink:Mink"),
     Entrant("mink hard", MINK, f"{_HERE}.with_mink:MinkHard"),
     Entrant("pink", PINK, f"{_HERE}.with_pink:Pink"),
