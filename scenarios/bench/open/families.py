@@ -22,6 +22,7 @@ from solvers.problems.files import FRESH, PUBLIC, Collection, Head
 
 COUNT = 50
 _CONSECUTIVE = 200
+_FEW = 20            # where a proof takes seconds
 _STRIDE = 1_000_000  # seeds of single problems between two seeds of halves
 
 Make = Callable[[int, int], Sequence[Hierarchy]]
@@ -68,6 +69,8 @@ def family(name: str) -> Family:
 
 def _reference(name: str, seed: int, count: int) -> list[Hierarchy]:
     """Return stored problems, or new ones of the same make."""
+    if seed and name in stored.RECORDED:
+        return [one.h for one in stored.fresh(name, seed, count, checked=0)]
     if seed:
         return [problems.family(name, seed * _STRIDE + i) for i in range(count)]
     return [one.h for one in stored.family(name)[:count]]
@@ -89,7 +92,8 @@ _REFERENCE = {
     "EQ30L10": "30 unknowns, 10 levels of 3",
     "INEQ7": "an arm: limits, avoidance, position, cone, posture",
     "HUM38": "38 unknowns: limits, four tasks, posture",
-    "DEGEN7": "INEQ7 with rows repeated, negated, zero, nearly parallel"}
+    "DEGEN7": "INEQ7 with rows repeated, negated, zero, nearly parallel",
+    "DYN60": "a humanoid with torque motors: dynamics, contacts, friction (fresh: extra `sim`)"}
 _KINDS = {
     "singular_arm": "random arms at multiples of 90 degrees",
     "dusty_arm": "the same, with the rounding of cosines kept",
@@ -117,7 +121,8 @@ _POSTURES = {
 
 
 def _all() -> dict[str, Family]:
-    made = [Family(name, "reference", what, partial(_reference, name))
+    made = [Family(name, "reference", what, partial(_reference, name),
+                   usual=_FEW if name in stored.RECORDED else COUNT)
             for name, what in _REFERENCE.items()]
     made += [Family(name, "recorded", what, partial(recorded.recorded, name),
                     recorded.PERIODS[name], _CONSECUTIVE)
@@ -137,5 +142,7 @@ _EXTRA = ("singular-panda", "singular-romeo")
 
 def available() -> list[Family]:
     """Return the families whose packages are installed."""
-    robots = find_spec("example_robot_data") is not None
-    return [one for name, one in FAMILIES.items() if robots or name not in _EXTRA]
+    needs = {**dict.fromkeys(_EXTRA, "example_robot_data"),
+             **dict.fromkeys(stored.RECORDED, "mujoco")}
+    return [one for name, one in FAMILIES.items()
+            if name not in needs or find_spec(needs[name]) is not None]
