@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from typing import ClassVar, final
 
 import numpy as np
@@ -188,24 +189,45 @@ Anew = Callable[[Hierarchy, Array, Array, Array], int]
 
 def settle_doubt(h: Hierarchy, x: Array, record: Array, settings: Array,
                  solve: Anew = solve_anew) -> bool:
-    """Return whether an answer in doubt is certified, if need be after rows are counted anew.
+    """Return whether an answer in doubt is certified, if need be after the rows are read anew.
 
     Where the angle between rows is close to rank_tolerance, rounding decides which of them count
-    as dependent, and an answer may mix both readings. So `solve` is called with a tolerance on
-    either side of that angle; the first answer that is certified replaces x (n,) and record.
+    as dependent, and an answer may mix both readings. A row of 1e-17 beside one of 1 may be
+    rounding, as in the Jacobian of an arm that is straight, or be meant. So `solve` is called for
+    the other readings; the first answer that is certified, for h, replaces x (n,) and record.
     """
     if certify(h, x).certified:
         return True
-    for factor in _READINGS:
-        other, again, changed = h.reference.copy(), np.zeros(len(record)), settings.copy()
-        changed[_RANK_TOLERANCE] = min(factor * settings[_RANK_TOLERANCE], _LARGEST)
-        code = solve(h, other, again, changed)
+    for read, changed in _readings(h, settings):
+        other, again = h.reference.copy(), np.zeros(len(record))
+        code = solve(read, other, again, changed)
         if code in (SOLVED, INACCURATE) and certify(h, other).certified:
             x[:], record[:] = other, again
             return True
     return False
 
 
-_READINGS = 10.0, 0.1  # times rank_tolerance
+def _readings(h: Hierarchy, settings: Array) -> Iterator[tuple[Hierarchy, Array]]:
+    """Yield h without dust, if it has any, and with tolerances on either side of its own."""
+    dust = _dust(h)
+    if dust.any():
+        yield Hierarchy(np.where(dust[:, None], 0.0, h.A), h.lower, h.upper, h.sizes, h.reference,
+                        h.names), settings
+    for factor in _FACTORS:
+        changed = settings.copy()
+        changed[_RANK_TOLERANCE] = min(factor * settings[_RANK_TOLERANCE], _LARGEST)
+        yield h, changed
+
+
+def _dust(h: Hierarchy) -> NDArray[np.bool_]:
+    """Return which rows (m,) are as small as rounding of another in their level."""
+    norms = np.linalg.norm(h.A, axis=1)
+    largest = [norms[i:j].max(initial=0.0) for i, j in pairwise(h.offsets.tolist())]
+    dust: NDArray[np.bool_] = norms < _DUST * np.repeat(largest, h.sizes)
+    return dust
+
+
+_DUST = 1e-13          # norm of a row over the largest of its level, as for `certify`
+_FACTORS = 10.0, 0.1   # times rank_tolerance
 _RANK_TOLERANCE, _LARGEST = 2, 0.1  # its place in the settings; at most
 _SOLVED = Status.SOLVED
