@@ -295,7 +295,7 @@ def test_json_of_a_check_is_the_whole_scenario_and_its_first_tick(capsys):
 
 
 def test_a_mistake_with_json_is_an_error_on_stderr_all_the_same(capsys):
-    assert "unknown scenario 'elipse'" in fails(["check", "elipse", "--json"], capsys)
+    assert "unknown scenario or robot 'elipse'" in fails(["check", "elipse", "--json"], capsys)
 
 
 def test_the_list_fits_80_columns(capsys):

@@ -323,7 +323,7 @@ def test_an_inline_svg_follows_the_page_and_brings_no_ids_that_could_clash():
     fig, (ax,) = drawing.figure()
     ax.plot([0.0, 1.0], [0.123456, 1.0])
     text = drawing.svg(fig, 'a "title" & more')
-    assert text.startswith('<svg role="img" aria-label="a &quot;title&quot; &amp; more"')
+    assert text.startswith('<svg role="img" aria-label="a &#34;title&#34; &amp; more"')
     assert "currentColor" in text
     assert drawing.INK not in text
     assert 'id="figure_1"' not in text

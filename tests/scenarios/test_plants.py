@@ -340,11 +340,11 @@ def test_a_measurement_that_makes_no_sense_is_refused(wrong):
         load("ellipse", [f"plant.measurement={wrong}"])
 
 
-def test_noise_is_refused_for_joints_with_more_coordinates_than_velocities(tmp_path):
+def test_steps_are_refused_for_joints_with_more_coordinates_than_velocities(tmp_path):
     scenario = on_file(tmp_path, "continuous")
     with pytest.raises(ScenarioError, match="more coordinates than velocities"):
-        build(load(scenario, ["plant.measurement.position_noise=1e-4"]))
-    build(load(scenario))
+        build(load(scenario, ["plant.measurement.quantisation=1e-4"]))
+    build(load(scenario, ["plant.measurement.position_noise=1e-4"]))
 
 
 # Runs.

@@ -7,12 +7,14 @@ import subprocess
 import sys
 import time
 from collections import Counter
+from contextlib import ExitStack
 
 import numpy as np
 import psutil
 import pyarrow.parquet as parquet
 import pytest
 from deadly import dies_of_one
+from distributed.security import Security
 
 from hierarchy import HierarchyError
 from scenarios import load, simulate
@@ -20,7 +22,7 @@ from scenarios.cli.main import run_command
 from scenarios.config.sampling import drawn
 from scenarios.measure import metrics
 from scenarios.measure.statistics import wilson
-from scenarios.sweep import load_sweep, sweep
+from scenarios.sweep import engine, load_sweep, sweep
 from scenarios.sweep.config import SweepError, shipped_sweeps
 from scenarios.sweep.engine import carry_out, connected
 from scenarios.sweep.planning import plan
@@ -50,8 +52,11 @@ def write(folder, parameters=PARAMETERS, **changed):
 
 @pytest.fixture(scope="module")
 def cluster():
-    """Two processes that stand for a cluster somewhere else."""
-    with connected(workers=2) as client:
+    """Two processes that stand for a cluster somewhere else, whose port anyone may use."""
+    with ExitStack() as stack:
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(engine, "_security", Security)
+            client = stack.enter_context(connected(workers=2))
         yield client.scheduler.address
 
 
