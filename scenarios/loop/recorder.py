@@ -207,7 +207,7 @@ def _write(tables, seen, joint, offset, commanded, k, chosen, measured):
     """Write the rest of tick k; return whether q is finite and v within FASTEST.
 
     chosen: order, active point, repulsion, status, iterations. measured: t, the error of the cone,
-    and the clock at the begin of the tick and after kinematics, rows and resolution.
+    and the clock at the start of the tick and after kinematics, rows and resolution.
     """
     row, finite = tables.log[k], True
     t, cone_error, begin, moved, written, resolved = measured
