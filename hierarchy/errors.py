@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from math import inf, isfinite
 from numbers import Real
 from pathlib import Path
@@ -43,6 +43,14 @@ def expect(what: str, value: object, kind: type, remedy: str) -> None:
         article = "an" if kind.__name__[0] in "AEIOUaeiou" else "a"
         raise HierarchyError(f"{what}: expected {article} {kind.__name__}, got {brief(value)}; "
                              f"{remedy}")
+
+
+def expect_each(what: str, values: object, kind: type, remedy: str) -> None:
+    """Raise a HierarchyError unless values are a sequence of one kind, or return None."""
+    expect(what, values, Sequence, remedy)
+    sequence: Sequence[object] = values  # type: ignore[assignment]
+    for i, value in enumerate(sequence):
+        expect(f"{what}[{i}]", value, kind, remedy)
 
 
 def number(what: str, value: object, least: float = -inf, largest: float = inf) -> float:

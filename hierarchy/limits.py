@@ -50,7 +50,7 @@ from math import sqrt
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hierarchy.errors import HierarchyError
+from hierarchy.errors import HierarchyError, brief, number
 from hierarchy.jit import compiled, inlined
 from hierarchy.problem import Array
 from hierarchy.records import set_frozen
@@ -78,8 +78,13 @@ class Limits:
     packed: Array = field(init=False, repr=False, compare=False)  # (4, n), for the kernels
 
     def __post_init__(self) -> None:
-        rows = [np.asarray(side, dtype=float).ravel()
-                for side in (self.lower, self.upper, self.velocity, self.acceleration)]
+        try:
+            rows = [np.asarray(side, dtype=float).ravel()
+                    for side in (self.lower, self.upper, self.velocity, self.acceleration)]
+        except (TypeError, ValueError):
+            raise HierarchyError("limits: lower, upper, velocity and acceleration must be numbers, "
+                                 f"got {brief([self.lower, self.upper])} and "
+                                 f"{brief([self.velocity, self.acceleration])}") from None
         if len({len(row) for row in rows}) != 1:
             raise HierarchyError("limits: lower, upper, velocity and acceleration have "
                                  f"{', '.join(str(len(row)) for row in rows)} entries")
@@ -89,7 +94,7 @@ class Limits:
         _refuse(~(velocity > 0.0), "velocity must be positive", velocity)
         _refuse(~((acceleration > 0.0) & (acceleration < np.inf)),
                 "acceleration must be positive and finite", acceleration)
-        if not 0.0 < self.period < np.inf:
+        if not 0.0 < number("limits: period [s]", self.period):
             raise HierarchyError(f"limits: period {self.period} s must be positive and finite")
         set_frozen(self, packed=np.array(rows))
 

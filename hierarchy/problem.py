@@ -14,6 +14,9 @@ from hierarchy.notebook import html_table
 
 Array = NDArray[np.float64]
 _ROUNDING = 1e-10  # of a violation, relative to 1 + |a| |x|
+# Dimensions and type of what kernels read without a look at it.
+_LAYOUT = {"A": (2, np.float64), "lower": (1, np.float64), "upper": (1, np.float64),
+           "sizes": (1, np.int64), "offsets": (1, np.int64), "reference": (1, np.float64)}
 _NUMBERS = "biufO"  # kinds of numpy's types that are real numbers, or may be
 
 
@@ -39,12 +42,22 @@ class Hierarchy:
     def __init__(self, A: Array, lower: Array, upper: Array, sizes: NDArray[np.int64],
                  reference: Array, names: tuple[str, ...], metric: Array | None = None,
                  give: Array | None = None) -> None:
-        """Wrap arrays without copying or checking them; `from_levels` checks."""
+        """Wrap arrays without checking their values; `from_levels` checks."""
         self.A, self.lower, self.upper = A, lower, upper
         self.sizes, self.reference, self.names = sizes, reference, names
         self.metric, self.give = metric, give
         self.offsets = np.zeros(len(sizes) + 1, dtype=np.int64)
         np.cumsum(sizes, out=self.offsets[1:])
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        """Keep an array as it is if kernels can read it: contiguous, of its type; else a copy."""
+        if name in _LAYOUT:
+            dimensions, kind = _LAYOUT[name]
+            value = np.ascontiguousarray(value, kind)
+            if value.ndim != dimensions:
+                raise HierarchyError(f"{name} has shape {value.shape}, expected {dimensions} "
+                                     f"dimension{'s' * (dimensions > 1)}")
+        object.__setattr__(self, name, value)
 
     @classmethod
     def from_levels(cls, levels: Sequence[Sequence[ArrayLike]], reference: ArrayLike | None = None,
@@ -141,12 +154,21 @@ class Hierarchy:
                          give)
 
     def slacks(self, x: ArrayLike) -> Array:
-        """Signed violation of every row at x: (m,), positive above `upper`, zero inside."""
+        """Signed violation of every row at x: (m,), positive above `upper`, zero inside.
+
+        Raises HierarchyError for another shape.
+        """
         value = self.A @ _vector("x", x, self.n)
         return np.maximum(value - self.upper, 0.0) - np.maximum(self.lower - value, 0.0)
 
     def violations(self, x: ArrayLike) -> Array:
-        """Euclidean norm of each level's violation at x: (L,)."""
+        """Euclidean norm of each level's violation at x: (L,).
+
+        Raises HierarchyError for another shape or an entry that is not finite.
+        """
+        x = _vector("x", x, self.n)
+        for (i,) in np.argwhere(~np.isfinite(x))[:1]:
+            raise HierarchyError(f"x, entry {i}: {x[i]} is not finite")
         slack = self.slacks(x)
         pairs = zip(self.offsets[:-1], self.offsets[1:], strict=True)
         return np.array([np.linalg.norm(slack[i:j]) for i, j in pairs])

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from hierarchy import plugins
 from hierarchy.avoidance.control_points import ControlPoint
 from hierarchy.avoidance.self_collision import Capsule
-from hierarchy.errors import RobotError, UnknownNameError, expect, finite_numbers
+from hierarchy.errors import RobotError, UnknownNameError, expect, file_path, finite_numbers
 from hierarchy.problem import Array
 from hierarchy.robots import TABLES
 from hierarchy.robots.files import read_file
@@ -74,6 +74,8 @@ class Robot:
                  control_points: tuple[ControlPoint, ...] = (),
                  capsules: tuple[Capsule, ...] = (), rest: Array | None = None,
                  missing: tuple[str, ...] = ()) -> None:
+        expect("Robot: model", model, pin.Model, "Robot.load makes a robot of a name or a file")
+        expect("Robot: name", name, str, "give a text")
         self.model, self.name = model, name
         self.n, self.nq = int(model.nv), int(model.nq)
         if self.n == 0:
@@ -107,6 +109,7 @@ class Robot:
 
         `base` "fixed" or "floating" overrides that of its table.
         """
+        expect("Robot.named: name", name, str, "give a name of ROBOTS")
         if name not in TABLES:
             return cls._of_plugin(name, base)
         robot = cls._of(from_table(TABLES[name], base), name)
@@ -146,6 +149,7 @@ class Robot:
         the chain to the end effector. `locked` joints are fixed at a position [rad or m] and are
         not joints of the robot.
         """
+        path = file_path("Robot.from_file: path", path)
         found = read_file(path, base, shapes, locked or {})
         return cls._of(found, Path(path).stem, end_effector)
 
@@ -273,8 +277,13 @@ class Robot:
                 upper[joint.idx_v:joint.idx_v + joint.nv] = np.inf
         return lower, upper
 
-    def integrate(self, q: Array, step: Array) -> Array:
-        """Return q (nq,) moved by `step` (n,) [rad or m] along the joints."""
+    def integrate(self, q: ArrayLike, step: ArrayLike) -> Array:
+        """Return q (nq,) moved by `step` (n,) [rad or m] along the joints.
+
+        Raises HierarchyError for another shape or a number that is not finite.
+        """
+        q = finite_numbers(f"robot {self.name!r}: q", q, self.nq)
+        step = finite_numbers(f"robot {self.name!r}: step", step, self.n)
         if self.nq == self.n:
             return q + step
         return np.asarray(pin.integrate(self.model, q, step))

@@ -82,7 +82,7 @@ class Stack:
         return f"Stack({' > '.join(self._order)}; {self.level} level)"
 
     def __getitem__(self, name: str) -> Task:
-        if name not in self._tasks:
+        if not isinstance(name, str) or name not in self._tasks:
             raise UnknownNameError("task", name, self._tasks)
         return self._tasks[name]
 
@@ -115,6 +115,7 @@ class Stack:
 
     def reorder(self, order: Sequence[str]) -> None:
         """Set the order of all tasks; HierarchyError unless each is named once."""
+        expect("order of a stack", order, Sequence, "give a list of names of tasks")
         for name in order:
             self[name]
         if sorted(order) != sorted(self._order):
@@ -122,18 +123,19 @@ class Stack:
                                  f"{list(order)}")
         self._order = tuple(order)
 
-    def row_names(self, order: tuple[str, ...] | None = None) -> tuple[str, ...]:
+    def row_names(self, order: Sequence[str] | None = None) -> tuple[str, ...]:
         """Return what each row of `hierarchy` is about, in its order; None for the stack's own."""
-        return tuple(name for task in (self._order if order is None else order)
-                     for name in self[task].row_names)
+        order = self._order if order is None else order
+        expect("order of a stack", order, Sequence, "give a list of names of tasks")
+        return tuple(name for task in order for name in self[task].row_names)
 
-    def hierarchy(self, state: State, order: tuple[str, ...] | None = None) -> Hierarchy:
+    def hierarchy(self, state: State, order: Sequence[str] | None = None) -> Hierarchy:
         """Write the tasks' rows at a state and return them as a Hierarchy.
 
         `order` names some or all of the tasks, most important first; None takes the stack's own.
         The arrays are buffers of this stack: the next call with the same order overwrites them.
         """
-        order = self._order if order is None else order
+        order = self._order if order is None else tuple(order)
         prepared = self._prepared.get(order)
         if (prepared is None or prepared.state is not state
                 or prepared.seen is not state.measurement):

@@ -55,8 +55,9 @@ class State:
 
     With `period` > 0 [s] derivatives are backward differences against previous_J and
     previous_placements, those of the previous `move`; with 0 they are exact. `measurement` is that
-    of this tick, or None. `commanded` (n,) is the last command if commands are velocities, which
-    differs from v on a robot that lags; None stands for v.
+    of this tick, or None. `commanded` is the last command: velocities (n,), which differ from v on
+    a robot that lags, or torques of the actuated joints; None before the first, and for
+    accelerations.
     """
 
     def __init__(self, robot: Robot, differences: float | None = None) -> None:
@@ -68,6 +69,7 @@ class State:
         self.q, self.v = pin.neutral(robot.model), np.zeros(robot.n)
         self.measurement: Measurement | None = None
         self.commanded: Array | None = None
+        self._shapes = self.q.shape, self.v.shape
         self._model, self._data = robot.model, robot.model.createData()
         self._compute = partial(pin.computeJointJacobiansTimeVariation, self._model, self._data,
                                 self.q, self.v)
@@ -110,8 +112,16 @@ class State:
     def move(self, t: float, q: Array, v: Array) -> bool:
         """Go to time t [s] at q (nq,), v (n,): the one place of a tick that calls pinocchio.
 
-        Shapes are not checked. Returns False and changes nothing if an entry is not finite.
+        Returns False and changes nothing if an entry is not finite. Raises RobotError unless q and
+        v are arrays of these shapes.
         """
+        try:
+            fits = (q.shape, v.shape) == self._shapes
+        except AttributeError:
+            fits = False
+        if not fits:
+            raise RobotError(f"robot {self.robot.name!r}: State.move: expected arrays q "
+                             f"{self.q.shape} and v {self.v.shape}, got {brief(q)} and {brief(v)}")
         if not _copy_if_finite(q, v, self.q, self.v):
             return False
         if self.period > 0.0 and self._started:

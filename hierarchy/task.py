@@ -4,22 +4,32 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from dataclasses import MISSING, fields, is_dataclass
-from typing import TYPE_CHECKING, ClassVar, Literal, get_args
+from dataclasses import Field, fields, is_dataclass
+from functools import wraps
+from typing import Any, ClassVar, Literal, get_args
 
 import numpy as np
 
+from hierarchy.avoidance.barrier import Barrier
 from hierarchy.contacts import Contacts
 from hierarchy.errors import HierarchyError, brief, expect
 from hierarchy.paths import Path
 from hierarchy.problem import Array, check_rows
 from hierarchy.robot import Frame, Robot
-
-if TYPE_CHECKING:
-    from hierarchy.state import State
+from hierarchy.state import State
 
 Level = Literal["velocity", "acceleration", "torque"]
 Kind = Literal["equality", "inequality"]
+
+_OF_STATE = ("error", "jacobian", "jacobian_derivative", "desired_velocity",
+             "desired_acceleration", "reference_velocity", "reference_acceleration", "repulsion",
+             "writer")
+# Parts of a task by the type of the field, and how to make one.
+_PARTS: dict[str, tuple[type, str]] = {
+    "Robot": (Robot, "Robot.load(NAME)"), "Frame": (Frame, "robot.frame(NAME)"),
+    "Path": (Path, "a path of hierarchy.paths, such as Still([x, y, z])"),
+    "Contacts": (Contacts, "Contacts(robot, ...) of hierarchy.contacts"),
+    "Barrier": (Barrier, "Barrier(distance) of hierarchy.avoidance")}
 
 
 class Task(ABC):
@@ -47,11 +57,19 @@ class Task(ABC):
     damping: float = 0.0
     gain: float = 0.0
 
+    def __init_subclass__(cls) -> None:
+        """Let the methods that take a state refuse anything else."""
+        super().__init_subclass__()
+        for name in _OF_STATE:
+            if name in vars(cls):
+                setattr(cls, name, _of_state(vars(cls)[name]))
+
     def __post_init__(self) -> None:
         """Check what the task was made with; raises HierarchyError.
 
         Dataclasses call it. An override calls it too.
         """
+        check_parts(self)
         check_gains(self)
 
     @property
@@ -138,34 +156,37 @@ def check_gains(task: Task) -> None:
 
 
 def check_parts(task: Task) -> None:
-    """Raise a HierarchyError where a name or a point stands for a robot, frame or path of a task.
+    """Raise a HierarchyError where a part of a task that is a dataclass has another type.
 
     A task has no robot at hand in which it could look up a frame.
     """
     if not isinstance(task.name, str) or not task.name:
         raise HierarchyError(f"{type(task).__name__}: name: expected a text, got "
                              f"{brief(task.name)}")
-    for part, kind, remedy in (("robot", Robot, "Robot.load({!r})"),
-                               ("frame", Frame, "robot.frame({!r})")):
-        value = getattr(task, part, None)
-        if isinstance(value, str):
-            raise HierarchyError(f"task {task.name!r}: {part} is the name {value!r}; give "
-                                 f"{remedy.format(value)}")
-        if part in _needed(task):
-            expect(f"task {task.name!r}: {part}", value, kind, f"give {remedy.format('NAME')}")
     if task.kind not in get_args(Kind):
         raise HierarchyError(f"task {task.name!r}: kind must be 'equality' or 'inequality', got "
                              f"{task.kind!r}")
-    path = getattr(task, "path", None)
-    if (path is not None or "path" in _needed(task)) and not isinstance(path, Path):
-        raise HierarchyError(f"task {task.name!r}: path is a {brief(path)}; give a path of "
-                             "hierarchy.paths, such as Still([x, y, z])")
+    parts: tuple[Field[Any], ...] = fields(task) if is_dataclass(task) else ()
+    for part in parts:
+        named = part.type if isinstance(part.type, str) else part.type.__name__
+        if part.init and named in _PARTS:
+            kind, remedy = _PARTS[named]
+            value = getattr(task, part.name)
+            if isinstance(value, str) and "NAME" in remedy:
+                raise HierarchyError(f"task {task.name!r}: {part.name} is the name {value!r}; "
+                                     f"give {remedy.replace('NAME', repr(value))}")
+            expect(f"task {task.name!r}: {part.name}", value, kind, f"give {remedy}")
 
 
-def _needed(task: Task) -> set[str]:
-    """Return the names of a task's fields that have no default."""
-    return {part.name for part in fields(task) if part.default is MISSING} \
-        if is_dataclass(task) else set()
+def _of_state(method: Callable[..., Any]) -> Callable[..., Any]:
+    """Return a method of a task that refuses anything but a State in place of one."""
+    @wraps(method)
+    def checked(self: Task, state: State, *rest: Any, **named: Any) -> Any:
+        if not isinstance(state, State):
+            expect(f"task {self.name!r}: state", state, State, "make one with State.at(robot, q)")
+        return method(self, state, *rest, **named)
+
+    return checked
 
 
 def writer_in_stack(task: Task, state: State, level: Level, A: Array, lower: Array, upper: Array,

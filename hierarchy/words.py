@@ -13,6 +13,11 @@ def listed(names: Sequence[str], last_by: str = "and") -> str:
     return f"{', '.join(first)} {last_by} {last}" if first else last
 
 
+def counted(count: int, what: str) -> str:
+    """Return a number of things: "1 column", "2 columns"."""
+    return f"{count} {what}{'' if count == 1 else 's'}"
+
+
 def in_words(count: int) -> str:
     """Return a small number as a word, a larger one in digits."""
     return _NUMBERS[count] if count < len(_NUMBERS) else str(count)

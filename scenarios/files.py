@@ -101,10 +101,10 @@ def whole(folder: str | Path) -> Iterator[Path]:
             yield partial
             partial.chmod(0o777 & ~_umask())
             partial.rename(path)
-    except BaseException:
-        shutil.rmtree(partial, ignore_errors=True)
-        raise
+    except OutputError as error:
+        raise OutputError(str(error).replace(str(partial), str(path))) from error
     finally:
+        shutil.rmtree(partial, ignore_errors=True)
         _mark(path).unlink(missing_ok=True)
 
 
@@ -144,7 +144,22 @@ def named(path: str | Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        raise OutputError(f"{path} cannot be written: {error.strerror}") from error
+        raise OutputError(f"{path} cannot be written: {reason(error)}") from error
+
+
+def reason(error: OSError) -> str:
+    """Return why a file or folder cannot be written, naming a file where a folder should be."""
+    if isinstance(error, FileExistsError | NotADirectoryError) and error.filename:
+        asked = Path(error.filename)
+        return f"{next((one for one in (asked, *asked.parents) if one.is_file()), asked)} is a file"
+    return error.strerror or str(error)
+
+
+def make_folder(folder: Path) -> Path:
+    """Make a folder unless it is there, and return it; raises OutputError."""
+    with named(f"output folder {folder}"):
+        folder.mkdir(parents=True, exist_ok=True)
+    return folder
 
 
 def write_text(path: Path, text: str) -> None:

@@ -13,10 +13,13 @@ that are equalities or violated, the u_j those that are on a side, and the c_l t
 that are on a side, all pointing outwards.
 
 The residual of a level is the smallest change of t for which (1) holds: the Euclidean norm over the
-rows of the level, relative to 1 + |x|. So x is accepted if it is exactly optimal once each side is
-shifted by no more than `tolerance` (1 + |x|) along its row, whatever the norm of the row, and
-rejected if no such shift explains it. The same test, with the rows of all levels above and
-x - reference for t, decides whether x is the nearest.
+rows of the level, relative to 1 + |x|. Or, if it is smaller, the smallest turn [rad] of the rows of
+the level for which (1) holds with t as it is. So x is accepted if it is exactly optimal once each
+side is shifted by no more than `tolerance` (1 + |x|) along its row, or each row is turned by no
+more than `tolerance`, whatever the norm of the row, and rejected if no such change explains it. A
+level whose rows had to be turned can still fall, by no more than the turn times the distance that x
+moves; the levels below are judged with the turned rows. The same test, with the rows of all levels
+above and x - reference for t, decides whether x is the nearest; it needs no turn.
 
 Double precision sets two limits. First, rows that agree up to an angle of `parallel` count as
 dependent: a direction that only their difference can see is free, and lower levels may use it.
@@ -31,7 +34,7 @@ first, so that rounding in rows of norm 1000 does not hide a row of norm 0.001.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import final
 
 import numpy as np
@@ -69,7 +72,8 @@ class Certificate:
     ----------
     violations : (L,) Euclidean norm of each level's violation.
     stationarity : (L,) residual of each level: the smallest shift of its sides for which x is
-        optimal, as a length (violation divided by the norm of the row), relative to 1 + |x|.
+        optimal, as a length (violation divided by the norm of the row), relative to 1 + |x|; or
+        the smallest turn of its rows [rad], if that is smaller.
     nearest : length of the remaining step towards the reference that changes no level, relative to
         1 + |x|.
     tolerance : largest residual that is accepted.
@@ -212,7 +216,8 @@ def _judged(levels: list[_Rows], gap: Array, reach: float, tolerance: float, par
     for k, level in enumerate(levels):
         if cone.Z.shape[1] == 0:
             break
-        stationarity[k] = _residual(cone, level, tolerance * reach) / reach
+        left, level = _residual(cone, level, tolerance * reach)
+        stationarity[k] = left / reach
         cone.add(level)
     return stationarity, _projected(gap, cone, tolerance * reach) / reach
 
@@ -222,9 +227,9 @@ def _judged(levels: list[_Rows], gap: Array, reach: float, tolerance: float, par
 class _Rows:
     """Unit rows and the position of x relative to them, as lengths.
 
-    unit (m, n); size (m,) logarithm of the norm; t (m,) signed distance beyond a side; fixed,
-    upper, lower (m,): the row must keep its value, is on its upper side, is on its lower side;
-    reach = 1 + |x|.
+    unit (m, n); size (m,) logarithm of the norm, -inf for a row of zeros; t (m,) signed distance
+    beyond a side; fixed, upper, lower (m,): the row must keep its value, is on its upper side, is
+    on its lower side; reach = 1 + |x|.
     """
 
     unit: Array
@@ -253,7 +258,8 @@ class _Rows:
             return None
         band = tolerance * reach
         fixed = (h.lower == h.upper) | (np.abs(t) > band)
-        return _Rows(unit, np.log(scale) + np.log(length), t, fixed & seen,
+        size = np.where(seen, np.log(scale) + np.log(length), -np.inf)
+        return _Rows(unit, size, t, fixed & seen,
                      ~fixed & (value >= up - band), ~fixed & (value <= low + band), reach)
 
     def part(self, rows: slice) -> _Rows:
@@ -303,19 +309,25 @@ def _complement(Z: Array, rows: Array, parallel: float) -> tuple[Array, float, f
             float(pivots[rank:].max(initial=0.0)))
 
 
-def _residual(cone: _NormalCone, level: _Rows, enough: float) -> float:
-    """Return the least change of t that balances the gradient of a level: a length."""
+def _residual(cone: _NormalCone, level: _Rows, enough: float) -> tuple[float, _Rows]:
+    """Return the least change of t that balances the gradient of a level: a length.
+
+    Or, if it is smaller, the least turn of its rows times 1 + |x|, and the level with turned rows.
+    """
     whole = _length(level.t)
     if whole <= enough:  # a change to no violation at all is small enough
-        return whole
-    largest = level.size[level.fixed | level.upper | level.lower].max()
-    size = np.exp(np.maximum(level.size - largest, np.log(_SMALLEST)))
+        return whole, level
+    size = np.exp(np.maximum(level.size - level.size.max(), np.log(_SMALLEST)))
     judged = level.fixed & (size > _DUST)
     dust = level.fixed & ~judged
     if not judged.any():  # here too: each row is on its side
-        return float(np.abs(level.t[~dust]).max(initial=0.0))
+        return float(np.abs(level.t[~dust]).max(initial=0.0)), level
     Z = _complement(cone.Z, level.unit[dust], cone.parallel)[0] if dust.any() else cone.Z
-    return min(_least_change(cone, level, Z, size, judged, enough), whole)
+    change = min(_least_change(cone, level, Z, size, judged, enough), whole)
+    if change <= enough:
+        return change, level
+    turn, turned = _least_turn(cone, level, Z, size, judged)
+    return (level.reach * turn, turned) if level.reach * turn < change else (change, level)
 
 
 def _least_change(cone: _NormalCone, level: _Rows, Z: Array, size: Array, judged: Mask,
@@ -336,6 +348,25 @@ def _least_change(cone: _NormalCone, level: _Rows, Z: Array, size: Array, judged
     unknown[unseen] = np.maximum(unknown[unseen], cone.parallel)
     return _balanced(np.vstack([C, held]), np.vstack([terms, held]), f, sizes, unknown,
                      1e-3 * enough)
+
+
+def _least_turn(cone: _NormalCone, level: _Rows, Z: Array, size: Array, judged: Mask
+                ) -> tuple[float, _Rows]:
+    """Return the turn [rad] of the judged rows with which (1) holds for t, and the rows turned.
+
+    It is measured as if all rows had the norm of the smallest: a heavy row excuses no light one.
+    """
+    force = np.where(judged, size**2 * level.t, 0.0)
+    own, own_size, _ = _on_sides(level, size)
+    C = np.hstack([(cone.rows @ (cone.Z.T @ Z)).T, ((own @ Z) * own_size[:, None]**2).T])
+    f = Z.T @ (level.unit.T @ force)
+    left = min((C @ search(C, -f, 0.0) + f for search in (_non_negative, _non_negative_by_scipy)),
+               key=_length)
+    least, square = float((size[judged]**2).min()) * _length(level.t[judged]), float(force @ force)
+    if not (least > 0.0 and square > 0.0):
+        return np.inf, level
+    return _length(left) / least, replace(
+        level, unit=level.unit - np.outer(force / square, Z @ left))
 
 
 def _on_sides(level: _Rows, size: Array) -> tuple[Array, Array, Array]:

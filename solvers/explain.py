@@ -14,32 +14,38 @@ from solvers.resolvers.hcod import ActiveSetResolution
 from solvers.status import EQUAL
 
 _NAMED, _SMALL = 3, 0.1  # missed rows that are named, and the share of the largest that counts
+_CALLED = {"rows": "names", "units": "units"}
 _MATTERS = 1e-6  # smallest share of a level's pull for which a level above is named
 
 
 def explain(h: Hierarchy, resolution: Resolution, tolerance: float = 1e-9,
-            rows: Sequence[str] | None = None) -> str:
-    """Say whether each level is met and, if not, which rows hold it back.
+            rows: Sequence[str] | None = None, units: Sequence[str] | None = None) -> str:
+    """Say whether each level is met and, if not, which rows hold it back or give way for whom.
 
     Returns one line per level, under its name in `h.names`. A level counts as met if its violation
     is at most `tolerance` times the size of its terms. `rows` are names of the m rows, such as
     `Stack.row_names`; without them rows are numbered within their level, with them the largest
-    missed inequalities of a level are named too. Raises a HierarchyError unless the resolution is
-    from `hcod`, the only resolver that reports the state of each row, and if the names are not m.
+    missed inequalities of a level are named too. `units` of the m rows are written behind what a
+    row gives. Raises a HierarchyError unless the resolution is from `hcod`, the only resolver that
+    reports the state of each row, and if names or units are not m.
     """
     expect("explain: h", h, Hierarchy, "make one with Hierarchy.from_levels([(A, b), ...])")
     named = rows is not None
     if rows is None:
         rows = [f"row {i}" for size in h.sizes for i in range(size)]
     number("explain: tolerance", tolerance, 0.0)
-    if isinstance(rows, str) or not isinstance(rows, Sequence):
-        raise HierarchyError(f"explain: rows: expected a list of names, got {brief(rows)}")
-    if len(rows) != h.m:
-        raise HierarchyError(f"explain: {len(rows)} names for {h.m} rows")
+    units = [""] * h.m if units is None else units
+    for what, given in (("rows", rows), ("units", units)):
+        if isinstance(given, str) or not isinstance(given, Sequence):
+            raise HierarchyError(f"explain: {what}: expected a list of names, got {brief(given)}")
+        if len(given) != h.m:
+            raise HierarchyError(f"explain: {len(given)} {_CALLED[what]} for {h.m} rows")
     if not isinstance(resolution, ActiveSetResolution):
         raise HierarchyError("explain needs a resolution of hcod: other resolvers do not report "
                              "which rows are active")
     lines = [_level(h, resolution, k, tolerance, rows, named) for k in range(len(h.sizes))]
+    for level, witness in zip(h.giving, _witnesses(resolution), strict=False):
+        lines[level] = _giving(h, resolution, level, witness, tolerance, (rows, units))
     if resolution.unfinished is not None:
         lines.append(f"The iteration limit was reached at {h.names[resolution.unfinished]!r}: it "
                      "and the levels below may not be optimal.")
@@ -63,6 +69,39 @@ def _level(h: Hierarchy, resolution: ActiveSetResolution, k: int, tolerance: flo
         return f"{h.names[k]} is missed by {missed:.3g}{at}: its own rows disagree."
     by = listed(_said_once(blocking, h.names))
     return f"{h.names[k]} is missed by {missed:.3g}{at}: held back by {by}."
+
+
+def _witnesses(resolution: Resolution) -> Array:
+    return np.empty((0, 0)) if resolution.witnesses is None else resolution.witnesses
+
+
+def _giving(h: Hierarchy, resolution: ActiveSetResolution, k: int, witness: Array,
+            tolerance: float, words: tuple[Sequence[str], Sequence[str]]) -> str:
+    """Say of a level that gives how much it is missed by, and for whom beyond its least."""
+    assert h.give is not None
+    rows = np.arange(h.offsets[k], h.offsets[k + 1])
+    w, least = h.slacks(resolution.x)[rows], h.slacks(witness)[rows]
+    size = tolerance * np.linalg.norm(h.A[rows]) * np.linalg.norm(resolution.x) + 1e-300
+    missed, needed = float(np.linalg.norm(w)), float(np.linalg.norm(least))
+    if missed <= size:
+        return f"{h.names[k]} is met."
+    more = np.abs(w) - np.abs(least)
+    given = [_given(h, resolution, i, by, words)
+             for i, by in zip(rows.tolist(), more.tolist(), strict=True) if by > size]
+    at_least = f", of which {needed:.3g} cannot be avoided" if needed > size else ""
+    gives = f": {listed(given)}" if given else ""
+    return f"{h.names[k]} is missed by {missed:.3g}{at_least}{gives}."
+
+
+def _given(h: Hierarchy, resolution: ActiveSetResolution, i: int, by: float,
+           words: tuple[Sequence[str], Sequence[str]]) -> str:
+    """Say how much row i gives; for the level that would take more, where it gives all it may."""
+    assert h.give is not None
+    (name, unit), level = (of[i] for of in words), int(resolution.holds_back[i])
+    whom = ("the levels below" if level < 0 else
+            h.names[level] if level < len(h.names) else "the reference")
+    unit = f" {unit}" if unit else ""
+    return f"{name} gives {by:.3g} of {h.give[i]:.3g}{unit} for {whom}"
 
 
 def most_missed(h: Hierarchy, x: Array, k: int, names: Sequence[str]) -> list[str]:
@@ -91,6 +130,8 @@ def _inequalities(h: Hierarchy, resolution: ActiveSetResolution, k: int,
 def _row(h: Hierarchy, resolution: ActiveSetResolution, i: int, name: str) -> str:
     level = int((h.offsets[1:] <= i).sum())
     of_level = f"{h.names[level]} {name}" if h.sizes[level] > 1 else h.names[level]
+    if h.give is not None and h.give[i] > 0.0:
+        return f"{of_level} (gives no more)"
     return f"{of_level} at its {'upper' if resolution.active[i] > 0 else 'lower'} side"
 
 

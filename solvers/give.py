@@ -3,23 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Protocol, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
 from hierarchy.problem import Array, Hierarchy
+from solvers.resolution import Resolution
 from solvers.status import Status
 
-
-class Answer(Protocol):
-    """As much of a `Resolution` as giving concerns."""
-
-    x: Array
-    status: Status
-    witnesses: Array | None
-
-
-_Kind = TypeVar("_Kind", bound=Answer)
+_Kind = TypeVar("_Kind", bound=Resolution)
 
 
 def giving(solve: Callable[[Hierarchy, Array | None], _Kind], h: Hierarchy,
@@ -36,7 +28,7 @@ def giving(solve: Callable[[Hierarchy, Array | None], _Kind], h: Hierarchy,
     for level in h.giving:
         found = solve(h.upper_part(level + 1), None)
         if found.status not in (Status.SOLVED, Status.INACCURATE):
-            found.memory = None  # type: ignore[attr-defined]
+            found.memory = None
             return found
         inaccurate |= found.status is Status.INACCURATE
         witnesses.append(found.x)

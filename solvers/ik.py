@@ -19,7 +19,7 @@ from hierarchy.problem import Array
 from hierarchy.robot import Robot
 from hierarchy.stack import Stack
 from hierarchy.state import State
-from hierarchy.task import Level, Task, check_parts
+from hierarchy.task import Level, Task
 from hierarchy.tasks.joint_rows import JointRows
 from solvers.resolver import Resolver, make
 from solvers.status import Status
@@ -90,10 +90,6 @@ class StepLimits(JointRows):
     name: str = "limits"
     kind = "inequality"
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        check_parts(self)
-
     def box(self, state: State) -> tuple[Array, Array]:
         """Least and largest velocity of each joint (m,), (m,) [rad/s or m/s]."""
         of = slice(self.robot.actuated, self.robot.n)
@@ -105,14 +101,6 @@ class StepLimits(JointRows):
     def error(self, state: State) -> Array:
         """How far each velocity would have to be raised from zero (m,) [rad/s or m/s]."""
         return np.maximum(self.box(state)[0], 0.0)
-
-    def jacobian(self, state: State) -> Array:
-        """The identity (m, n), right of zeros for a floating base."""
-        return np.eye(state.n)[self.robot.actuated:]
-
-    def jacobian_derivative(self, state: State) -> Array:
-        """Zero (m, n)."""
-        return np.zeros((self.dimension, state.n))
 
     def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
                row: int) -> Callable[[], object]:

@@ -3,24 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Protocol, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
 from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array, Hierarchy
 from solvers.kernels.metric import change_back, change_variables
+from solvers.resolution import Resolution
 from solvers.status import Status
 
-
-class Answer(Protocol):
-    """As much of a `Resolution` as a change of variables concerns."""
-
-    x: Array
-    status: Status
-
-
-_Kind = TypeVar("_Kind", bound=Answer)
+_Kind = TypeVar("_Kind", bound=Resolution)
 
 
 def in_metric(solve: Callable[[Hierarchy, Array | None], _Kind], h: Hierarchy,

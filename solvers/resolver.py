@@ -11,16 +11,15 @@ from functools import cached_property
 from typing import Any, ClassVar, Literal, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hierarchy import plugins
 from hierarchy.errors import HierarchyError, UnknownNameError, brief, expect
 from hierarchy.jit import announce_compilation
-from hierarchy.notebook import html_table, numbers
 from hierarchy.problem import Array, Hierarchy
 from hierarchy.records import set_frozen
 from solvers.give import giving
 from solvers.metric import in_metric
+from solvers.resolution import Resolution as Resolution
 from solvers.status import TOO_SMALL
 from solvers.status import Status as Status
 from solvers.workspace import WORKSPACE
@@ -31,44 +30,6 @@ _RESOLVED: dict[str, str] = {
     "equalities": "equalities only",
     "bounds": "equalities, and bounds on single unknowns in a first level of their own",
     "activations": "equalities, and rows that come with an activation"}
-
-
-class Resolution:
-    """The result of a solve.
-
-    Attributes
-    ----------
-    x : (n,) the answer, always finite.
-    status : how the solve ended.
-    iterations : number of iterations, counted in the resolver's own way; 1 for a direct resolver.
-    memory : warm start for the next solve, in the resolver's own layout; None if it keeps none.
-    witnesses : (K, n), for each level that gives an x of its least miss, see solvers.give; else
-        None.
-    """
-
-    __slots__ = ("iterations", "memory", "status", "witnesses", "x")
-
-    def __init__(self, x: Array, status: Status = Status.SOLVED, iterations: int = 1,
-                 memory: Array | None = None) -> None:
-        self.x = x
-        self.status = status
-        self.iterations = iterations
-        self.memory = memory
-        self.witnesses: Array | None = None
-
-    @property
-    def active(self) -> NDArray[np.int8] | None:
-        """State of each row (m,), values of `solvers.status.Row`; None if it is not reported."""
-        return None
-
-    def __repr__(self) -> str:
-        return (f"{type(self).__name__}({self.status.name}, x={numbers(self.x)}, "
-                f"iterations={self.iterations})")
-
-    def _repr_html_(self) -> str:
-        rows = [("status", self.status), ("x", numbers(self.x)), ("iterations", self.iterations),
-                ("memory", "none" if self.memory is None else f"{self.memory.size} numbers")]
-        return html_table(type(self).__name__, (), rows)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -114,8 +75,14 @@ class Resolver(ABC):
         self._number("threshold", 0.0, math.inf, open_below=True)
         self._number("rank_tolerance", 0.0, 1.0)
 
+    def __getstate__(self) -> dict[str, Any]:
+        """Everything but what is worked out again when it is needed, such as compiled code."""
+        return {name: value for name, value in vars(self).items() if not name.startswith("_")}
+
     def can_resolve(self, required: Handles) -> bool:
         """Whether the resolver accepts rows of the required kind."""
+        if required not in _KINDS:
+            raise UnknownNameError("kind of rows", required, _KINDS)
         return _KINDS.index(required) <= _KINDS.index(self.handles)
 
     @property

@@ -8,10 +8,12 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
+from functools import cache
 from typing import Any
 
 import numpy as np
 
+from hierarchy.jit import bind
 from hierarchy.problem import Array
 from solvers.status import TOO_SMALL
 
@@ -28,6 +30,18 @@ class _Workspace(threading.local):
 
 
 WORKSPACE = _Workspace()
+
+
+@cache
+def entry(kernel: Callable[..., int]) -> Callable[..., int]:
+    """Return a kernel over a hierarchy as a function that does not look at the types of arguments.
+
+    A call of it costs half (0.2 us less). The kernel takes A, lower, upper and sizes as a Hierarchy
+    keeps them, then arrays of one dimension and of floats, each contiguous.
+    """
+    numbers, sizes = np.empty(0), np.empty(0, dtype=np.int64)
+    further = getattr(kernel, "py_func", kernel).__code__.co_argcount - 4
+    return bind(kernel, then=(np.empty((0, 0)), numbers, numbers, sizes, *(numbers,) * further))
 
 
 def run(kernel: Callable[..., int], *arguments: Any) -> int:

@@ -68,12 +68,12 @@ TESTS = {
     "hierarchy/paths": "hierarchy/test_paths hierarchy/test_tasks scenarios/test_continuing",
     "hierarchy/plugins": "scenarios/test_plugins",
     "hierarchy/problem": "hierarchy/test_problem solvers/test_wrong_types solvers/test_resolver "
-                         "scenarios/test_notebooks",
+                         "solvers/test_give scenarios/test_notebooks",
     "hierarchy/robot": "hierarchy/test_robot hierarchy/test_models",
     "hierarchy/robots/": "hierarchy/test_robot hierarchy/test_models "
                          "hierarchy/test_self_collision scenarios/test_humanoid",
     "hierarchy/stack": "hierarchy/test_stack hierarchy/test_tasks solvers/test_wrong_types "
-                       "hierarchy/test_contacts",
+                       "solvers/test_give hierarchy/test_contacts",
     "hierarchy/state": "hierarchy/test_robot hierarchy/test_stack hierarchy/test_tasks "
                        "solvers/test_wrong_types hierarchy/test_contacts",
     "hierarchy/task": "hierarchy/test_stack hierarchy/test_tasks solvers/test_wrong_types",
@@ -104,6 +104,7 @@ TESTS = {
     "solvers/certificate": "solvers/test_certificate solvers/test_contract",
     "solvers/explain": "solvers/test_hcod",
     "solvers/factorization/": "solvers/test_factorization",
+    "solvers/give": "solvers/test_give",
     "solvers/ik": "solvers/test_ik solvers/test_wrong_types",
     "solvers/library/": "solvers/test_library solvers/test_library_inputs "
                         "solvers/test_library_programs",

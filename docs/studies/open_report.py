@@ -112,7 +112,8 @@ def between(values: list[int]) -> str:
 def entrants(found: Results) -> str:
     """Return the entrants with versions and limits."""
     labels = dict.fromkeys(label for half in found.halves for label in half.entrants)
-    rows = [f"| {label} | {found.version(label)} | {found.limits(label)} |" for label in labels]
+    rows = [f"| {label} | {found.version(label)} | {found.limits.get(label, '')} |"
+            for label in labels]
     missing = [f"| {label} | missing: {why} | |" for label, why in found.missing.items()]
     return "\n".join(["| entrant | version | known limits |", "|---|---|---|", *rows, *missing])
 

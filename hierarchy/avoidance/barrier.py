@@ -21,11 +21,10 @@ Ames et al., "Control barrier functions: theory and applications" (2019); Nguyen
 from __future__ import annotations
 
 from dataclasses import astuple, dataclass
-from math import inf
 
 import numpy as np
 
-from hierarchy.errors import HierarchyError
+from hierarchy.errors import HierarchyError, number
 from hierarchy.jit import compiled, inlined
 from hierarchy.problem import Array
 
@@ -52,11 +51,11 @@ class Barrier:
     limit: float = 50.0
 
     def __post_init__(self) -> None:
-        for name, least in (("distance", 0.0), ("rate", 0.0), ("recovery", 0.0), ("limit", 0.0)):
-            value = getattr(self, name)
-            if not least <= value < inf or (name in ("rate", "limit") and value == 0.0):
+        for name in ("distance", "rate", "recovery", "limit"):
+            value = number(f"barrier: {name}", getattr(self, name), 0.0)
+            if name in ("rate", "limit") and value == 0.0:
                 raise HierarchyError(f"barrier: {name} = {value} is out of range")
-        if not self.distance < self.influence:
+        if not self.distance < number("barrier: influence", self.influence):
             raise HierarchyError(f"barrier: influence = {self.influence} m must be more than the "
                                  f"distance to keep, {self.distance} m")
 

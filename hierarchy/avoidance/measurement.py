@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from hierarchy.avoidance.obstacles import distance_to_obstacle
 from hierarchy.avoidance.pairs import Pairs
 from hierarchy.avoidance.repulsion import repulsion
-from hierarchy.errors import HierarchyError
+from hierarchy.errors import HierarchyError, number
 from hierarchy.jit import bind, compiled
 from hierarchy.kinematics import Readings, point_at
 from hierarchy.problem import Array
@@ -29,10 +29,12 @@ class SurveillanceAreas:
     end_effector: float
 
     def __post_init__(self) -> None:
-        if not 0.0 <= self.near <= self.far < inf:
+        for name in ("near", "far", "end_effector"):
+            number(f"surveillance area {name}", getattr(self, name))
+        if not 0.0 <= self.near <= self.far:
             raise HierarchyError(f"surveillance areas need 0 <= near <= far, got near = "
                                  f"{self.near} m, far = {self.far} m")
-        if not 0.0 <= self.end_effector < inf:
+        if self.end_effector < 0.0:
             raise HierarchyError(f"surveillance area end_effector = {self.end_effector} m must "
                                  "not be negative")
 

@@ -11,7 +11,7 @@ from math import inf, sqrt
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hierarchy.errors import HierarchyError, UnknownNameError
+from hierarchy.errors import HierarchyError, UnknownNameError, expect_each
 from hierarchy.jit import compiled
 from hierarchy.paths import Path
 from hierarchy.problem import Array
@@ -64,6 +64,7 @@ class Obstacles:
     """
 
     def __init__(self, obstacles: Sequence[Obstacle] = ()) -> None:
+        expect_each("obstacles", obstacles, Obstacle, "make one with Obstacle(shape, centre)")
         self.obstacles = tuple(obstacles)
         self.table = np.array([o.packed() for o in obstacles]).reshape(-1, _WIDTH)
         self.motion, self.offset = np.zeros((len(self.table), 6)), np.zeros((len(self.table), 3))

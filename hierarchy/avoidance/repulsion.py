@@ -9,7 +9,7 @@ from math import exp
 
 import numpy as np
 
-from hierarchy.errors import HierarchyError
+from hierarchy.errors import HierarchyError, number
 from hierarchy.jit import compiled
 from hierarchy.problem import Array
 
@@ -31,8 +31,8 @@ class Repulsion:
 
     def __post_init__(self) -> None:
         for name in ("maximum", "reach", "shape", "scale"):
-            value = getattr(self, name)
-            if not 0.0 < value < float("inf"):
+            value = number(f"repulsion {name}", getattr(self, name))
+            if value <= 0.0:
                 raise HierarchyError(f"repulsion {name} must be positive, got {value}")
 
     def __call__(self, distance: float) -> float:

@@ -7,12 +7,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
-from math import inf, sqrt
+from math import sqrt
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hierarchy.errors import HierarchyError
+from hierarchy.errors import HierarchyError, expect_each, number
 from hierarchy.jit import compiled, inlined
 from hierarchy.kinematics import place
 from hierarchy.problem import Array
@@ -37,8 +37,7 @@ class Capsule:
     radius: float
 
     def __post_init__(self) -> None:
-        if not 0.0 <= self.radius < inf:
-            raise HierarchyError(f"capsule {self.name!r}: radius {self.radius} m is out of range")
+        number(f"capsule {self.name!r}: radius [m]", self.radius, 0.0)
         for name in ("start", "end"):
             point = np.asarray(getattr(self, name), dtype=float)
             if point.shape != (3,) or not np.isfinite(point).all():
@@ -73,6 +72,7 @@ def pairs_of_tree(capsules: Sequence[Capsule], parents: Sequence[int]) -> list[t
 
 def pack_capsules(capsules: Sequence[Capsule]) -> tuple[NDArray[np.int64], Array]:
     """Joints (K,), and start, end - start, radius (K, 7) [m] of capsules, for the kernels."""
+    expect_each("capsules", capsules, Capsule, "see robot.capsules")
     joints = np.array([capsule.joint for capsule in capsules], dtype=np.int64)
     rows = [[*c.start, *np.subtract(c.end, c.start), c.radius] for c in capsules]
     return joints, np.array(rows, dtype=float).reshape(len(rows), 7)

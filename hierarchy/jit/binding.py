@@ -25,7 +25,7 @@ def bind(kernel: Kernel, *arguments: Any, then: tuple[Any, ...] = ()) -> Callabl
     types = tuple(_type_of(value) for value in (*arguments, *then))
     known = dispatcher.overloads.get(types)
     entry = dispatcher.compile(types) if known is None else known.entry_point
-    return partial(entry, *arguments)
+    return partial(entry, *arguments) if arguments else entry
 
 
 _TYPES: dict[tuple[Any, ...], Any] = {}

@@ -11,7 +11,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from hierarchy.errors import HierarchyError, UnknownNameError
+from hierarchy.errors import HierarchyError, UnknownNameError, number
 from hierarchy.loop.log import Log
 from hierarchy.loop.watchdog import Once, Watchdog
 
@@ -41,9 +41,12 @@ class Loop:
                  sleep: Callable[[float], object] = time.sleep) -> None:
         if overrun not in OVERRUNS:
             raise UnknownNameError("overrun policy", overrun, OVERRUNS)
-        _require(0.0 < period < np.inf, f"period {period} s must be positive and finite")
+        for name, value in (("period", period), ("behind", behind), ("spin", spin),
+                            ("watchdog", period if watchdog is None else watchdog)):
+            number(f"loop: {name}", value)
+        _require(period > 0.0, f"period {period} s must be positive")
         _require(behind >= 1, f"behind = {behind}, expected 1 or more ticks")
-        _require(0.0 <= spin < np.inf, f"spin {spin} s must not be negative")
+        _require(spin >= 0.0, f"spin {spin} s must not be negative")
         _require(watchdog is None or watchdog > period,
                  f"watchdog {watchdog} s must be longer than the period {period} s")
         self.period, self.overrun, self.behind = period, overrun, behind
@@ -62,7 +65,8 @@ class Loop:
         it and a command may have been sent since. An exception in any of the functions, or Ctrl-C,
         then propagates to the caller.
         """
-        _require(0.0 < duration < np.inf, f"duration {duration} s must be positive and finite")
+        _require(number("loop: duration", duration) > 0.0,
+                 f"duration {duration} s must be positive")
         ticks = max(1, round(duration / self.period))
         self.log = log = Log(self.period, ticks, record)
         stop = Once(safe_stop)

@@ -11,7 +11,7 @@ from math import cos, inf, sin
 
 import numpy as np
 
-from hierarchy.errors import HierarchyError, finite_numbers, number
+from hierarchy.errors import HierarchyError, expect, finite_numbers, number
 from hierarchy.jit import bind, compiled
 from hierarchy.problem import Array
 from hierarchy.records import set_frozen
@@ -142,7 +142,10 @@ class Jittered(Path):
     _sines: Array = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        if not 0.0 <= self.amplitude < inf or not 0.0 < self.rate < inf or self.seed < 0:
+        for name in ("amplitude", "rate", "seed"):
+            number(f"jitter: {name}", getattr(self, name))
+        expect("jitter: path", self.path, Path, "see hierarchy.paths")
+        if not 0.0 <= self.amplitude or not 0.0 < self.rate or self.seed < 0:
             raise HierarchyError(f"jitter: amplitude {self.amplitude}, rate {self.rate}, seed "
                                  f"{self.seed}, expected numbers >= 0, > 0 and >= 0")
         random = np.random.default_rng(self.seed)

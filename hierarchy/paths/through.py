@@ -21,8 +21,9 @@ def line(start: Vector, end: Vector, duration: float, begin: float = 0.0) -> Way
 
     It is quintic in time and rests before and after.
     """
-    if not 0.0 < duration < inf:
+    if number("line: duration [s]", duration) <= 0.0:
         raise HierarchyError(f"line: duration {duration} s must be positive")
+    number("line: begin [s]", begin)
     return Waypoints((begin, begin + duration), (start, end))
 
 

@@ -8,9 +8,11 @@ from hierarchy.robots.capsules import link_capsules
 from hierarchy.robots.dual_arm import DUAL_ARM
 from hierarchy.robots.humanoid import HUMANOID
 from hierarchy.robots.kuka_lwr import KUKA_LWR
+from hierarchy.robots.quadruped import QUADRUPED
 from hierarchy.robots.table import DHTable, Link, Table, TreeFrame, TreeJoint, TreeTable
 
-TABLES: dict[str, Table] = {table.name: table for table in (KUKA_LWR, DUAL_ARM, HUMANOID)}
+TABLES: dict[str, Table] = {table.name: table
+                            for table in (KUKA_LWR, DUAL_ARM, HUMANOID, QUADRUPED)}
 
-__all__ = ["DUAL_ARM", "HUMANOID", "KUKA_LWR", "TABLES", "DHTable", "Link", "Table", "TreeFrame",
-           "TreeJoint", "TreeTable", "link_capsules"]
+__all__ = ["DUAL_ARM", "HUMANOID", "KUKA_LWR", "QUADRUPED", "TABLES", "DHTable", "Link", "Table",
+           "TreeFrame", "TreeJoint", "TreeTable", "link_capsules"]

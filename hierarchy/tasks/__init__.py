@@ -11,6 +11,7 @@ from hierarchy.tasks.contact_motion import ContactMotion
 from hierarchy.tasks.coupling import JointCoupling
 from hierarchy.tasks.cumulated_repulsion import CumulatedRepulsion
 from hierarchy.tasks.danger_bounds import DangerBounds
+from hierarchy.tasks.frame_log import FrameLog
 from hierarchy.tasks.friction import Friction
 from hierarchy.tasks.joint_limits import JointLimits
 from hierarchy.tasks.least_force import LeastForce
@@ -33,7 +34,8 @@ TASKS: dict[str, type[Task]] = {
     "centre of pressure": CentreOfPressure, "contact force": ContactForce,
     "contact motion": ContactMotion, "coupling": JointCoupling,
     "cumulated repulsion": CumulatedRepulsion, "damping": JointDamping,
-    "danger bounds": DangerBounds, "friction": Friction, "joint limits": JointLimits,
+    "danger bounds": DangerBounds, "frame": FrameLog, "friction": Friction,
+    "joint limits": JointLimits,
     "least force": LeastForce, "look-at": LookAt, "manipulability": Manipulability,
     "momentum": Momentum, "pointing": Pointing, "pose": Pose, "position": Position,
     "posture": Posture, "relative pose": RelativePose, "self-separation": SelfSeparation,
@@ -41,7 +43,7 @@ TASKS: dict[str, type[Task]] = {
 }
 
 __all__ = ["TASKS", "Along", "Avoidance", "BaseDynamics", "CentreOfMass", "CentreOfPressure",
-           "ContactForce", "ContactMotion", "CumulatedRepulsion", "DangerBounds", "Friction",
-           "JointCoupling", "JointDamping", "JointLimits", "LeastForce", "LookAt", "Manipulability",
-           "Momentum", "Pointing", "Pose", "Position", "Posture", "RelativePose", "SelfSeparation",
-           "Separation", "Together", "TorqueLimits"]
+           "ContactForce", "ContactMotion", "CumulatedRepulsion", "DangerBounds", "FrameLog",
+           "Friction", "JointCoupling", "JointDamping", "JointLimits", "LeastForce", "LookAt",
+           "Manipulability", "Momentum", "Pointing", "Pose", "Position", "Posture", "RelativePose",
+           "SelfSeparation", "Separation", "Together", "TorqueLimits"]

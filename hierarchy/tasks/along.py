@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from hierarchy.errors import HierarchyError
+from hierarchy.errors import HierarchyError, expect
 from hierarchy.problem import Array
 from hierarchy.state import State
 from hierarchy.task import Level, Task
@@ -29,7 +29,12 @@ class Along(Task):
     _D: Array = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        D = np.array(self.directions, dtype=float)
+        super().__post_init__()
+        expect(f"task {self.name!r}: task", self.task, Position, "give a position task")
+        try:
+            D = np.array(self.directions, dtype=float)
+        except (TypeError, ValueError):
+            D = np.empty(0)
         if D.ndim != 2 or D.shape[1:] != (3,) or not np.allclose(D @ D.T, np.eye(len(D))):
             raise HierarchyError(f"task {self.name!r}: directions {self.directions!r} are not of "
                                  "length one and orthogonal, (m, 3)")

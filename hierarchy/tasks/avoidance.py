@@ -50,6 +50,7 @@ class Avoidance(Task):
     offsets: Array = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if self.rows not in (1, 3):
             raise HierarchyError(f"task {self.name!r}: rows must be 1 or 3, got {self.rows}")
         if not self.points:

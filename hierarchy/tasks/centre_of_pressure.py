@@ -32,6 +32,7 @@ class CentreOfPressure(FixedRows):
     kind = "inequality"
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         surfaces = self._surfaces()
         if not surfaces:
             required(self.contacts, self.name)

@@ -26,7 +26,7 @@ from hierarchy.problem import Array
 from hierarchy.records import set_frozen
 from hierarchy.robot import Robot
 from hierarchy.state import State
-from hierarchy.task import Level, Task, along, check_parts
+from hierarchy.task import Level, Task, along
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,6 @@ class CentreOfMass(Task):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        check_parts(self)
         axes = tuple(self.axes)
         if not axes or any(axis not in (0, 1, 2) for axis in axes) or list(axes) != sorted(
                 set(axes)):

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hierarchy.contacts import Contacts, Points
-from hierarchy.errors import HierarchyError
+from hierarchy.errors import HierarchyError, finite_numbers
 from hierarchy.jit import bind, compiled
 from hierarchy.kinematics import place, write_equality
 from hierarchy.problem import Array
@@ -37,11 +37,11 @@ class ContactForce(ForceTask):
     name: str = "contact force"
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         self.contacts[self.contact]
-        target = np.array(self.target, dtype=float)
-        if target.shape not in ((1,), (3,), (6,)) or not np.isfinite(target).all():
+        if len(finite_numbers(f"task {self.name!r}: target", self.target)) not in (1, 3, 6):
             raise HierarchyError(f"task {self.name!r}: target {self.target!r} is not 1, 3 or 6 "
-                                 "finite numbers")
+                                 "numbers")
 
     @property
     def dimension(self) -> int:

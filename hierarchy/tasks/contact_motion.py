@@ -47,6 +47,7 @@ class ContactMotion(Task):
     name: str = "contact motion"
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if not self.of.contacts:
             raise HierarchyError(f"task {self.name!r}: there are no contacts")
         if self.anchors is None and self.stiffness:

@@ -13,7 +13,7 @@ from hierarchy.problem import Array
 from hierarchy.records import set_frozen
 from hierarchy.robot import Robot
 from hierarchy.state import State
-from hierarchy.task import Task, check_parts
+from hierarchy.task import Task
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,6 @@ class JointCoupling(Task):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        check_parts(self)
         expect(f"task {self.name!r}: joints", self.joints, Mapping, "give {name: factor, ...}")
         for name, factor in self.joints.items():
             number(f"task {self.name!r}: joints.{name}", factor)

@@ -55,6 +55,7 @@ class CumulatedRepulsion(JointTask):
     offsets: Array = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if not self.points:
             raise HierarchyError(f"task {self.name!r}: needs at least one control point")
         if not self.lever > 0.0:

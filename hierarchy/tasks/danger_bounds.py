@@ -37,7 +37,7 @@ from numpy.typing import NDArray
 from hierarchy.avoidance.control_points import ControlPoint, pack_points
 from hierarchy.avoidance.measurement import Measurement
 from hierarchy.avoidance.repulsion import Repulsion, repulsion
-from hierarchy.errors import HierarchyError
+from hierarchy.errors import HierarchyError, expect
 from hierarchy.jit import bind, compiled
 from hierarchy.kinematics import point_at
 from hierarchy.limits import clipped
@@ -78,6 +78,8 @@ class DangerBounds(Task):
     kind = "inequality"
 
     def __post_init__(self) -> None:
+        super().__post_init__()
+        expect(f"task {self.name!r}: limits", self.limits, JointLimits, "give a JointLimits task")
         if not self.points:
             raise HierarchyError(f"task {self.name!r}: needs at least one control point")
         if self.limits.robot.base == "floating":

@@ -47,6 +47,7 @@ class Friction(FixedRows):
     kind = "inequality"
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         required(self.contacts, self.name)
         if self.faces not in (4, 8):
             raise HierarchyError(f"task {self.name!r}: {self.faces!r} faces, expected 4 or 8")

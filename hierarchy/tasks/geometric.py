@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -98,7 +98,7 @@ def rates_of(state: State, frame: Frame, placed: Placed) -> Rates:
     return Rates(placed.J @ state.v, placed.W @ state.v, dJ, dW)
 
 
-def cross(a: Array) -> Array:
+def cross(a: NDArray[Any]) -> NDArray[Any]:
     """Return the matrix (3, 3) with which a x b is a product."""
     return np.array([[0.0, -a[2], a[1]], [a[2], 0.0, -a[0]], [-a[1], a[0], 0.0]])
 

@@ -16,7 +16,7 @@ from hierarchy.problem import Array
 from hierarchy.records import set_frozen
 from hierarchy.robot import Robot
 from hierarchy.state import State
-from hierarchy.task import Level, check_parts
+from hierarchy.task import Level
 from hierarchy.tasks.joint_rows import JointRows
 
 
@@ -45,7 +45,6 @@ class JointLimits(JointRows):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        check_parts(self)
         robot, acceleration = self.robot, _numbers(self.name, self.acceleration)
         n, of_joints = robot.n - robot.actuated, slice(robot.actuated, robot.n)
         if acceleration.shape not in ((), (n,)):
@@ -88,14 +87,6 @@ class JointLimits(JointRows):
         """Distance of each joint from its range (n,) [rad or m], zero inside it."""
         q = self._positions(state)
         return np.asarray(np.clip(q, *self.limits.packed[:2]) - q)
-
-    def jacobian(self, state: State) -> Array:
-        """The identity (n, n), to the right of zeros for the base."""
-        return np.eye(state.n)[self.robot.actuated:]
-
-    def jacobian_derivative(self, state: State) -> Array:
-        """Zero (n, n)."""
-        return np.zeros((self.dimension, state.n))
 
     def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
                row: int) -> Callable[[], object]:

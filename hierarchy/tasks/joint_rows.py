@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import numpy as np
+
+from hierarchy.problem import Array
 from hierarchy.robot import Robot
+from hierarchy.state import State
 from hierarchy.task import Task
 
 
@@ -20,3 +24,11 @@ class JointRows(Task):
     def row_names(self) -> tuple[str, ...]:
         """The joint of each row."""
         return tuple(self.robot.velocity_names[self.robot.actuated:])
+
+    def jacobian(self, state: State) -> Array:
+        """The identity (m, n), right of zeros for a floating base."""
+        return np.eye(state.n)[self.robot.actuated:]
+
+    def jacobian_derivative(self, state: State) -> Array:
+        """Zero (m, n)."""
+        return np.zeros((self.dimension, state.n))

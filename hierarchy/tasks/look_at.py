@@ -17,7 +17,7 @@ from hierarchy.problem import Array
 from hierarchy.records import set_frozen
 from hierarchy.robot import Frame
 from hierarchy.state import State
-from hierarchy.task import Level, check_parts
+from hierarchy.task import Level
 from hierarchy.tasks.geometric import (
     Geometric,
     Placed,
@@ -60,9 +60,7 @@ class LookAt(Geometric):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        check_parts(self)
-        given = list(self.target) if isinstance(self.target, tuple | list) else repr(self.target)
-        check_point(f"task {self.name!r}: target {given}", self.target)
+        check_point(f"task {self.name!r}: target", self.target)
         set_frozen(self, point=np.array(self.target, dtype=float))
 
     @property

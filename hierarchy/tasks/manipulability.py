@@ -20,7 +20,7 @@ from hierarchy.jit import compiled
 from hierarchy.problem import Array
 from hierarchy.robot import Frame
 from hierarchy.state import State
-from hierarchy.task import Kind, check_parts
+from hierarchy.task import Kind
 from hierarchy.tasks.geometric import Geometric, View, crossed, plus, rates_of, view_of
 
 _SINGULAR = 1e-12  # w below which it has no gradient
@@ -47,7 +47,6 @@ class Manipulability(Geometric):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        check_parts(self)
         number(f"task {self.name!r}: least", self.least, 0.0)
         if self.part not in ("position", "pose"):
             raise HierarchyError(f"task {self.name!r}: part must be 'position' or 'pose', got "

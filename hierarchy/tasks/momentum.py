@@ -39,7 +39,8 @@ class Momentum(Task):
     name: str = "momentum"
 
     def __post_init__(self) -> None:
-        if self.part not in _ROWS:
+        super().__post_init__()
+        if not isinstance(self.part, str) or self.part not in _ROWS:
             raise HierarchyError(f"task {self.name!r}: part {self.part!r} is not one of "
                                  f"{', '.join(_ROWS)}")
         if self.target is not None and (len(self.target) != self.dimension

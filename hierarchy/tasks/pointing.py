@@ -18,7 +18,7 @@ from hierarchy.problem import Array
 from hierarchy.records import set_frozen
 from hierarchy.robot import Frame
 from hierarchy.state import State
-from hierarchy.task import Kind, Level, Task, check_parts
+from hierarchy.task import Kind, Level, Task
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,6 @@ class Pointing(Task):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        check_parts(self)
         axis = finite_numbers(f"task {self.name!r}: axis", self.axis)
         length = float(np.linalg.norm(axis))
         if axis.shape != (3,) or not 1e-9 < length < np.inf:

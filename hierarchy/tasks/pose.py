@@ -28,7 +28,7 @@ from hierarchy.paths import Path
 from hierarchy.problem import Array
 from hierarchy.robot import Frame
 from hierarchy.state import State
-from hierarchy.task import Level, Task, along, check_parts
+from hierarchy.task import Level, Task, along
 
 _TURNED = 1e-6  # of R R^T from the identity
 
@@ -45,11 +45,10 @@ def check_rotation(what: str, rotation: ArrayLike) -> None:
 
 
 @dataclass(frozen=True)
-class Pose(Task):
+class PoseTask(Task):
     """Move `frame` along `path` with the constant orientation `rotation` (3, 3) (m = 6) [m, rad].
 
-    The orientation error is the rotation vector from the actual to the desired orientation, in
-    world axes; the last three rows are those of the angular velocity.
+    Abstract: its subclasses differ in the error.
     """
 
     frame: Frame
@@ -62,13 +61,21 @@ class Pose(Task):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        check_parts(self)
         check_rotation(f"task {self.name!r}: rotation", self.rotation)
 
     @property
     def dimension(self) -> int:
         """Six rows."""
         return 6
+
+
+@dataclass(frozen=True)
+class Pose(PoseTask):
+    """Move `frame` along `path` with the constant orientation `rotation` (3, 3) (m = 6) [m, rad].
+
+    The orientation error is the rotation vector from the actual to the desired orientation, in
+    world axes; the last three rows are those of the angular velocity.
+    """
 
     def error(self, state: State) -> Array:
         """p_d - p [m], followed by the rotation vector of R_d R^T [rad]: (6,)."""

@@ -23,7 +23,7 @@ from hierarchy.paths import Path
 from hierarchy.problem import Array
 from hierarchy.robot import Frame
 from hierarchy.state import State
-from hierarchy.task import Level, Task, along, check_parts
+from hierarchy.task import Level, Task, along
 
 
 @dataclass(frozen=True)
@@ -42,10 +42,6 @@ class Position(Task):
     gain: float = 10.0
     repulsion_within: float = -1.0
     name: str = "position"
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        check_parts(self)
 
     @property
     def dimension(self) -> int:

@@ -10,7 +10,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from hierarchy.errors import HierarchyError, finite_numbers, number
+from hierarchy.errors import HierarchyError, expect, finite_numbers
 from hierarchy.jit import bind, compiled
 from hierarchy.kinematics import write_equality, write_identity
 from hierarchy.problem import Array
@@ -105,10 +105,11 @@ class JointDamping(JointTask):
     name: str = "damping"
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if self.weight not in ("identity", "mass"):
             raise HierarchyError(f"task {self.name!r}: weight must be 'identity' or 'mass', got "
                                  f"{self.weight!r}")
-        number(f"task {self.name!r}: damping", self.damping, 0.0)
+        expect(f"task {self.name!r}: joints", self.joints, int, "give robot.n")
 
     def error(self, state: State) -> Array:
         """Zero (n,), because there is no target position."""

@@ -11,13 +11,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hierarchy.errors import HierarchyError
+from hierarchy.errors import finite_numbers
 from hierarchy.jit import bind, compiled
 from hierarchy.kinematics import row_times, write_equality
 from hierarchy.problem import Array
 from hierarchy.robot import Frame
 from hierarchy.state import State
-from hierarchy.task import Level, check_parts
+from hierarchy.task import Level
 from hierarchy.tasks.geometric import (
     Geometric,
     Spot,
@@ -34,7 +34,7 @@ from hierarchy.tasks.geometric import (
     turned_back,
     view_of,
 )
-from hierarchy.tasks.pose import rotation_vector
+from hierarchy.tasks.pose import check_rotation, rotation_vector
 
 
 @dataclass(frozen=True)
@@ -56,10 +56,9 @@ class RelativePose(Geometric):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        check_parts(self)
-        if isinstance(self.to, str):
-            raise HierarchyError(f"task {self.name!r}: to is the name {self.to!r}; give "
-                                 f"robot.frame({self.to!r})")
+        finite_numbers(f"task {self.name!r}: position", self.position, 3)
+        if self.rotation is not None:
+            check_rotation(f"task {self.name!r}: rotation", self.rotation)
 
     @property
     def dimension(self) -> int:

@@ -78,6 +78,7 @@ class SelfSeparation(Task):
     settings: Array = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         pairs = pairs_of_chain(self.capsules) if self.pairs is None else self.pairs
         count = len(self.capsules)
         if not pairs:

@@ -71,6 +71,7 @@ class Separation(Task):
     settings: Array = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if not self.points:
             raise HierarchyError(f"task {self.name!r}: needs at least one point")
         if self.kind != "inequality":

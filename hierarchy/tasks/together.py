@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hierarchy.contacts import Contacts
-from hierarchy.errors import HierarchyError
+from hierarchy.errors import HierarchyError, expect_each
 from hierarchy.problem import Array
 from hierarchy.state import State
 from hierarchy.task import Level, Task, writer_in_stack
@@ -27,6 +27,8 @@ class Together(Task):
     name: str = "together"
 
     def __post_init__(self) -> None:
+        super().__post_init__()
+        expect_each(f"task {self.name!r}: tasks", self.tasks, Task, "see hierarchy.tasks")
         if not self.tasks:
             raise HierarchyError(f"task {self.name!r}: there are no tasks in it")
         for task in self.tasks:

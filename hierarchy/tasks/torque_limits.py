@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from math import inf
 from typing import ClassVar
 
 import numpy as np
@@ -17,7 +18,7 @@ from hierarchy.problem import Array
 from hierarchy.records import set_frozen
 from hierarchy.robot import Robot
 from hierarchy.state import State
-from hierarchy.task import Level, check_parts
+from hierarchy.task import Level
 from hierarchy.tasks.joint_rows import JointRows
 
 
@@ -27,26 +28,30 @@ class TorqueLimits(JointRows):
 
     One row per actuated joint, n in number below, at acceleration level without contacts and at
     level "torque" with those of the stack. The limit is `fraction`, more than 0 and at most 1, of
-    the robot's `effort_limit` [N m or N]; rows of joints without one have infinite bounds. The
+    the robot's `effort_limit` [N m or N]; rows of joints without one have infinite bounds. At level
+    "torque" no torque differs by more than `step` [N m or N] from that in `State.commanded`. The
     torques are those of the robot's model: rigid bodies, no friction, no payload.
 
-    Raises HierarchyError for another fraction, or a floating base without contacts.
+    Raises HierarchyError for another fraction, a step that is not positive, or a floating base
+    without contacts.
     """
 
     robot: Robot
     fraction: float = 1.0
     name: str = "torque limits"
     contacts: Contacts | None = None
+    step: float = inf
     limit: Array = field(init=False, repr=False, compare=False)  # (n,) [N m or N]
     kind = "inequality"
     of_forces: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        check_parts(self)
         if not 0.0 < self.fraction <= 1.0:
             raise HierarchyError(f"task {self.name!r}: fraction {self.fraction} is not more than 0 "
                                  "and at most 1")
+        if not self.step > 0.0:
+            raise HierarchyError(f"task {self.name!r}: step {self.step} must be positive")
         if self.robot.base == "floating" and self.contacts is None:
             raise HierarchyError(f"task {self.name!r}: robot {self.robot.name!r} has a floating "
                                  "base; its torques depend on contact forces, so give the contacts")
@@ -79,7 +84,20 @@ class TorqueLimits(JointRows):
         M, h = state.dynamics
         contacts = Contacts(self.robot) if self.contacts is None else self.contacts
         parameters = M, h, state.kinematics, contacts.points, self.robot.actuated
-        return bind(_write, parameters, self.limit, A, lower, upper, row)
+        write_rows = bind(_write, parameters, self.limit, A, lower, upper, row)
+        if level != "torque" or self.step == inf:
+            return write_rows
+        rows, efforts = slice(row, row + self.dimension), h[self.robot.actuated:]
+        low, up = lower[rows], upper[rows]
+
+        def write() -> None:
+            write_rows()
+            if state.commanded is not None:
+                here = state.commanded - efforts
+                np.maximum(low, here - self.step, out=low)
+                np.minimum(up, here + self.step, out=up)
+
+        return write
 
 
 @compiled

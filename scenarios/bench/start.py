@@ -50,6 +50,12 @@ from scenarios.loop.controller import Controller
 controller = Controller(load("ellipse"))
 plant = controller.cell.plant
 controller.command(0.0, plant.q, plant.v)"""
+_COMMAND = """\
+import sys, tempfile
+from scenarios.cli.main import run_command
+with tempfile.TemporaryDirectory() as folder:
+    sys.exit(run_command([*sys.argv[1:], "--out", folder + "/run"]))"""
+_SHORT = ("run", "ellipse", "--duration", "0.02")
 _COMPILE = """\
 import json, sys
 from numba.core import event
@@ -119,7 +125,9 @@ def beginnings() -> list[Cost]:
              ("import hierarchy, solvers", ["-c", "import hierarchy, solvers"], None),
              ("hierarchy --help", ["-m", "scenarios.cli.main", "--help"], 0.5),
              ("first solve, kernels cached", ["-c", _SOLVE], 1.0),
-             ("first tick of ellipse, cached", ["-c", _TICK], None)]
+             ("first tick of ellipse, cached", ["-c", _TICK], None),
+             (f"hierarchy {' '.join(_SHORT)}", ["-c", _COMMAND, *_SHORT], 1.5),
+             ("the same with --figures", ["-c", _COMMAND, *_SHORT, "--figures"], None)]
     return [_least(what, arguments, most) for what, arguments, most in timed]
 
 
@@ -130,6 +138,7 @@ def first_compilation(cache: Path) -> tuple[list[Cost], dict[str, float]]:
     ------
     RuntimeError : the process failed.
     """
+    _say("ellipse, empty cache")
     done = _run(["-c", _COMPILE], NUMBA_CACHE_DIR=str(cache))
     own = own_seconds(json.loads(done.said.splitlines()[-1]))
     return [Cost("ellipse, empty cache", done.seconds, "s", None, done.processor),
@@ -153,6 +162,7 @@ def own_seconds(events: Sequence[Sequence[Any]]) -> dict[str, float]:
 
 def memory(folder: Path) -> list[Cost]:
     """Return the peak memory [MB] of processes."""
+    _say("memory")
     command = ["-m", "scenarios.cli.main", "run", "ellipse", "--duration", "2", "--out",
                str(folder / "run")]
     costs = [Cost("hierarchy run ellipse --duration 2", _run(command).memory, "MB", 300.0)]
@@ -183,6 +193,7 @@ class _Done:
 
 
 def _least(what: str, arguments: list[str], most: float | None) -> Cost:
+    _say(what)
     _run(arguments)  # fills the caches of files and kernels
     done = [_run(arguments) for _ in range(_REPEATED)]
     return Cost(what, min(one.seconds for one in done), "s", most,
@@ -200,6 +211,10 @@ def _run(arguments: list[str], **environment: str) -> _Done:
             raise RuntimeError(f"{arguments}: {done.stderr.strip()}")
         seconds, processor, memory = json.loads(measured.read_text())
     return _Done(done.stdout, seconds, processor, memory / _MB)
+
+
+def _say(what: str) -> None:
+    print(f"{what} ...", file=sys.stderr, flush=True)
 
 
 def _print(costs: Sequence[Cost], kernels: dict[str, float]) -> None:

@@ -12,7 +12,7 @@ from hierarchy.jit import announce_compilation
 from hierarchy.problem import Array
 from hierarchy.tasks import JointLimits, Pointing, Position, Separation
 from scenarios.cell.avoidance import areas_of, avoidance_tasks
-from scenarios.cell.forces import contacts_of, force_task, physics_of
+from scenarios.cell.forces import contacts_of, force_task, physics_of, standing_on
 from scenarios.cell.order import Order, order_of
 from scenarios.cell.plant import plant_of
 from scenarios.cell.plants import Plant
@@ -30,6 +30,7 @@ from scenarios.cell.tasks import (
 )
 from scenarios.config import Scenario
 from scenarios.config.listed import ListedForce, ListedLeastForce, ListedTask
+from scenarios.config.plant import TorqueSection
 
 
 @dataclass(frozen=True)
@@ -70,8 +71,8 @@ def build(scenario: Scenario, kept: Cell | None = None) -> Cell:
     control = scenario.control
     robot = kept.robot if kept else make_robot(scenario.robot)
     sensor = _kept_sensor(scenario, kept) if kept else sensor_of(scenario, robot)
-    start = kept.start if kept else start_of(robot, scenario.start)
     contacts = kept.contacts if kept else contacts_of(scenario, robot)
+    start = kept.start if kept else _start(scenario, robot, contacts)
     here = State.at(robot, *start)
     if kept:
         state, plant = kept.state, kept.plant
@@ -100,6 +101,14 @@ def build(scenario: Scenario, kept: Cell | None = None) -> Cell:
                       "mass" if control.metric == "mass" else None, _give(scenario)), sensor, areas,
                 position, pointing, limits, order_of(scenario, areas, always, tasks), tuple(listed),
                 activation, contacts)
+
+
+def _start(scenario: Scenario, robot: Robot, contacts: Contacts | None) -> tuple[Array, Array]:
+    q, v = start_of(robot, scenario.start)
+    if scenario.start.on_floor and contacts is not None:
+        floor = scenario.plant.height if isinstance(scenario.plant, TorqueSection) else 0.0
+        q = standing_on(floor, contacts, q)
+    return q, v
 
 
 def _give(scenario: Scenario) -> dict[str, float]:

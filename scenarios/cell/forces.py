@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from math import inf
 
-from hierarchy import HierarchyError, Robot, Task
+import numpy as np
+
+from hierarchy import HierarchyError, Robot, State, Task
 from hierarchy.contacts import Contact, Contacts
+from hierarchy.problem import Array
 from hierarchy.tasks import (
     BaseDynamics,
     CentreOfPressure,
@@ -16,6 +19,7 @@ from hierarchy.tasks import (
     Together,
     TorqueLimits,
 )
+from scenarios.cell.plants.ground import BALL
 from scenarios.config import Scenario, ScenarioError
 from scenarios.config.contacts import ContactSection
 from scenarios.config.listed import ListedForce, ListedLeastForce
@@ -36,8 +40,9 @@ def _contact(section: ContactSection, robot: Robot) -> Contact:
     if section.x is None or section.y is None:
         return Contact(frame, (section.offset,), section.friction, section.normal,
                        section.name or "", section.open, section.ramp, section.slides)
-    (back, front), (right, left) = section.x, section.y
-    corners = [(back, right, 0.0), (front, right, 0.0), (front, left, 0.0), (back, left, 0.0)]
+    (back, front), (right, left), (x, y, z) = section.x, section.y, section.offset
+    corners = [(x + along, y + across, z) for along, across in (
+        (back, right), (front, right), (front, left), (back, left))]
     return Contact(frame, corners, section.friction, section.normal, section.name or "",
                    section.open, section.ramp)
 
@@ -60,15 +65,32 @@ def physics_of(scenario: Scenario, contacts: Contacts) -> list[Task]:
 
 
 def _limits(scenario: Scenario, contacts: Contacts) -> list[Task]:
-    share, forces = scenario.limits.torque if scenario.limits else None, scenario.forces
+    limits, forces = scenario.limits, scenario.forces
     found: list[Task] = []
-    if share is not None:
-        found.append(TorqueLimits(contacts.robot, share, contacts=contacts))
+    if limits and (limits.torque or limits.torque_step):
+        found.append(TorqueLimits(contacts.robot, limits.torque or 1.0, contacts=contacts,
+                                  step=limits.torque_step or inf))
     if contacts.contacts:
         found.append(Friction(contacts, forces.faces, forces.least, forces.largest or inf))
     if forces.edge is not None:
         found.append(CentreOfPressure(contacts, forces.edge))
     return found
+
+
+def standing_on(floor: float, contacts: Contacts, q: Array) -> Array:
+    """Return q (nq,) with the base at the height that brings the lowest contact to `floor` [m].
+
+    Raises ScenarioError for a fixed base, or without contacts.
+    """
+    if contacts.robot.base != "floating" or not contacts.contacts:
+        raise ScenarioError("start.on_floor needs a floating base and [[contacts]]")
+    state, q = State.at(contacts.robot, q), q.copy()
+    lowest = min(
+        (state.position(contact.frame) + state.rotation(contact.frame) @ np.array(point))[2]
+        - (0.0 if contact.is_surface else BALL)
+        for contact in contacts.contacts for point in contact.points)
+    q[2] += floor - lowest
+    return q
 
 
 def force_task(section: ListedForce | ListedLeastForce, contacts: Contacts) -> Task:

@@ -16,6 +16,7 @@ from hierarchy.tasks import (
     CentreOfMass,
     CumulatedRepulsion,
     DangerBounds,
+    FrameLog,
     JointDamping,
     JointLimits,
     Pointing,
@@ -32,15 +33,22 @@ from scenarios.config.avoidance import AvoidanceSection
 from scenarios.config.listed import (
     AnyTask,
     ListedCentreOfMass,
+    ListedFrame,
     ListedPointing,
     ListedPose,
     ListedPosition,
     ListedPosture,
 )
-from scenarios.config.tasks import PointingSection, PositionSection, PositionTask, PostureSection
+from scenarios.config.tasks import (
+    AlongSection,
+    PointingSection,
+    PositionSection,
+    PositionTask,
+    PostureSection,
+)
 
 _OF_A_FRAME = (PositionSection, PointingSection, PostureSection, ListedPosition, ListedPose,
-               ListedCentreOfMass, ListedPointing, ListedPosture)
+               ListedFrame, ListedCentreOfMass, ListedPointing, ListedPosture)
 
 
 def limits_of(scenario: Scenario, robot: Robot) -> tuple[JointLimits | None, list[Task]]:
@@ -131,16 +139,17 @@ def _task(section: AnyTask, start: State) -> Task:
         half_angle = radians(section.alpha_d)
         return Pointing(frame, section.axis, half_angle, section.rows, *gains, name=name)
     path = _path(section, start.position(frame))
-    if isinstance(section, ListedPose):
+    if isinstance(section, ListedPose | ListedFrame):
         rotation = start.rotation(frame) if section.rotation is None else section.rotation
-        return Pose(frame, path, rotation, *gains, name=name)
+        kind = Pose if isinstance(section, ListedPose) else FrameLog
+        return kind(frame, path, rotation, *gains, name=name)
     task = Position(frame, path, *gains, name=name)
     axes = getattr(section, "axes", "xyz")
     return task if axes == "xyz" else Along(
         task, np.eye(3)[["xyz".index(axis) for axis in axes]].tolist(), name)
 
 
-def _path(section: PositionTask | ListedPose | ListedCentreOfMass, here: Array) -> Path:
+def _path(section: PositionTask | AlongSection, here: Array) -> Path:
     offset = np.array(section.offset)
     if section.path is None:
         return Still((here + offset).tolist())

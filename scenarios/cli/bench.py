@@ -152,11 +152,19 @@ def batch(count: Annotated[list[int] | None, typer.Option(
 @bench.command()
 def peers(install: Annotated[bool, typer.Option(
               "--install", help="Create an environment for each package and measure nothing.")
-              ] = False, out: Out = None) -> int:
-    """Compare with pink, mink, placo, tsid, embodiK and roboplan.
+              ] = False,
+          scene: Annotated[str | None, typer.Option(
+              "--scene", metavar="NAME", help="Only `ellipse`, inverse kinematics of an arm, or "
+              "`stand`, inverse dynamics of a humanoid on two feet.")] = None,
+          out: Out = None) -> int:
+    """Compare with pink, mink, placo, tsid, embodiK, roboplan and frax.
 
-    Run it once with --install first.
+    Run it once with --install first. Exit code 1 if a package of `--scene stand` is missing.
     """
+    from hierarchy.errors import UnknownNameError
+
+    if scene not in (None, *_SCENES):
+        raise UnknownNameError("scene", str(scene), _SCENES)
     if install:
         from scenarios.bench.peers.environments import install as install_all
 
@@ -165,11 +173,18 @@ def peers(install: Annotated[bool, typer.Option(
             print(f"{name}: {why or 'installed'}")
         return int(any(said.values()))
     from scenarios.bench.peers import run
+    from scenarios.bench.peers.stand.compare import ENTRANTS
+    from scenarios.bench.peers.stand.compare import run as run_stand
 
     folder = _claimed(out)
-    run(folder)
+    if scene != "stand":
+        run(folder)
+    rows = [] if scene == "ellipse" else run_stand(folder)
     _say(folder)
-    return 0
+    return int(scene == "stand" and len(rows) < len(ENTRANTS))
+
+
+_SCENES = ("ellipse", "stand")
 
 
 @bench.command("open")

@@ -60,6 +60,8 @@ def run_command(arguments: list[str]) -> int:
 
         if isinstance(error, HierarchyError):
             return _wrong(str(error))
+        if isinstance(error, OSError) and error.errno is not None:
+            return _fault(error)
         raise
 
 
@@ -217,16 +219,16 @@ def reproduce(names: Annotated[list[str] | None, typer.Argument(
                   "docs/first-paper.md for the commands in it. Default: all.")] = None,
               out: Annotated[Path, output("Where the runs are kept.")] = Path("runs/reproduce"),
               quick: Annotated[bool, typer.Option(
-                  "--quick", help="A tenth of the starts and no commands; leave the documents as "
-                  "they are.")] = False,
+                  "--quick", help="A tenth of the starts; leave the documents as they are. "
+                  "Commands, which have no starts, are not run but listed.")] = False,
               fill: Annotated[bool, typer.Option(
                   "--fill", help="Run nothing; write the pages from what docs/results keeps.")
                   ] = False,
               workers: Workers = None, as_json: AsJson = False) -> int:
     """Regenerate the numbers in the documentation.
 
-    They are written into the pages of a checkout. Run the same command again to resume an
-    interrupted one. While timings are made nothing else should run.
+    They are written into the pages of a checkout as each study or command ends. Run the same
+    command again to resume an interrupted one. While timings are made nothing else should run.
     """
     from scenarios.cli.reproduce import fill_command, reproduce_command
 
@@ -389,6 +391,13 @@ def _given(error: typer.TyperException, arguments: list[str]) -> str:
 def _interrupted() -> int:
     print("hierarchy: interrupted", file=sys.stderr)
     return INTERRUPTED
+
+
+def _fault(error: OSError) -> int:
+    """Say what the system refused: a full disk, a folder without permission, a lost device."""
+    where = f"{error.filename}: " if error.filename else ""
+    print(f"hierarchy: fault: {where}{error.strerror}", file=sys.stderr)
+    return 1
 
 
 def _wrong(text: str) -> int:

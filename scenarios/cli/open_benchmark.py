@@ -10,7 +10,7 @@ from pathlib import Path
 from rich.console import Console
 
 from scenarios.bench.open.families import available, family
-from scenarios.bench.open.table import ENTRANTS, PACKAGES, Row, chosen
+from scenarios.bench.open.table import PACKAGES, Row, chosen
 from scenarios.cli.terminal import shown
 
 
@@ -28,7 +28,7 @@ def open_command(families: Sequence[str], entrants: Sequence[str], seeds: Sequen
     named = [family(name) for name in families] or available()
     run(out, named, table, [0, *dict.fromkeys(seeds)], count, limit,
         lambda text: print(text, file=sys.stderr, flush=True))
-    found = results(out, [*ENTRANTS, *(row for row in table if row not in ENTRANTS)])
+    found = results(out)
     say(Console(highlight=False, markup=False), found)
     write_text(out / "index.html", page(found, shlex.join(["hierarchy", *sys.argv[1:]])))
     print(f"\nPage: {shown(out / 'index.html')}")
@@ -39,12 +39,12 @@ def check_command(entrants: Sequence[str], python: str, built: dict[str, Path | 
     """Try entrants on a few problems; exit code 1 if one of them ends or contradicts itself."""
     from scenarios.bench.open.check import check
 
-    well = True
+    passed = True
     for row in _table(entrants, python, built):
         found = check(row)
-        well = well and found.well
+        passed = passed and found.well
         print(found)
-    return int(not well)
+    return int(not passed)
 
 
 def install_command() -> int:

@@ -13,11 +13,11 @@ from scenarios.config.tasks import TaskName
 class ContactSection(Section):
     """Points of `frame` that push on a rigid surface, see hierarchy.contacts.Contact.
 
-    `x` and `y` [m] are the sides of a sole in the frame's xy plane; without them it is the point
-    `offset` [m]. `friction` is what the controller believes, `normal` the direction in which the
-    surface pushes. In each interval of `open` [s] the contact is lifted; its load ramps down for
-    `ramp` [s] before and up after it. A point that `slides` moves along its surface. The name
-    defaults to the frame's.
+    `x` and `y` [m] are the sides of a sole, parallel to the frame's xy plane, from `offset` [m] on;
+    without them it is that point. `friction` is what the controller believes, `normal` the
+    direction in which the surface pushes. In each interval of `open` [s] the contact is lifted; its
+    load ramps down for `ramp` [s] before and up after it. A point that `slides` moves along its
+    surface. The name defaults to the frame's.
     """
 
     frame: str
@@ -35,8 +35,6 @@ class ContactSection(Section):
     def _is_a_sole_or_a_point(self) -> Self:
         if (self.x is None) != (self.y is None):
             raise ValueError("a sole has x and y, a point neither")
-        if self.x is not None and any(self.offset):
-            raise ValueError("a sole has x and y in place of an offset")
         if self.x is not None and self.slides:
             raise ValueError("only a point slides")
         return self

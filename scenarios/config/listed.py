@@ -70,6 +70,14 @@ class ListedPose(Listed, AlongSection):
     rotation: Rows3 | None = None
 
 
+class ListedFrame(Listed, AlongSection):
+    """As `pose`, with the error log(T^-1 T_d) of SE(3) in the axes of `frame` (6 rows)."""
+
+    kind: Literal["frame"]
+    frame: str
+    rotation: Rows3 | None = None
+
+
 class ListedCentreOfMass(Listed, AlongSection):
     """The centre of mass along some of the axes "x", "y", "z" of the world."""
 
@@ -229,12 +237,13 @@ class OwnTask(Listed, OwnSection):
         return str(getattr(self.maker, "kind", "equality")) == "inequality"
 
 
-KINDS = ("position", "pose", "com", "pointing", "posture", "relative", "coupling", "look-at",
-         "manipulability", "momentum", "contact-force", "least-force", "self-collision",
+KINDS = ("position", "pose", "frame", "com", "pointing", "posture", "relative", "coupling",
+         "look-at", "manipulability", "momentum", "contact-force", "least-force", "self-collision",
          "collision")
 OF_FORCES = ("contact-force", "least-force")
 ListedTask = Annotated[
     Annotated[ListedPosition, Tag("position")] | Annotated[ListedPose, Tag("pose")]
+    | Annotated[ListedFrame, Tag("frame")]
     | Annotated[ListedCentreOfMass, Tag("com")] | Annotated[ListedPointing, Tag("pointing")]
     | Annotated[ListedPosture, Tag("posture")] | Annotated[ListedRelative, Tag("relative")]
     | Annotated[ListedCoupling, Tag("coupling")] | Annotated[ListedLookAt, Tag("look-at")]

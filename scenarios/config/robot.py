@@ -64,12 +64,14 @@ class StartSection(Section):
     """The start: positions `q` [rad or m] and velocities `v` [rad/s or m/s].
 
     `q` defaults to the robot's own posture, and `joints` override it by name. With `end_effector`
-    [m] the start is the posture, reached from q, that puts the end effector there. A joint beyond
-    its limits is an error unless `allow_outside_limits`.
+    [m] the start is the posture, reached from q, that puts the end effector there. With `on_floor`
+    a floating base is raised or lowered so that the lowest contact touches the floor. A joint
+    beyond its limits is an error unless `allow_outside_limits`.
     """
 
     q: tuple[Finite, ...] | None = None
     joints: dict[str, Finite] = Field(default_factory=dict)
     v: tuple[Finite, ...] | None = None
     end_effector: Vector3 | None = None
+    on_floor: Flag = False
     allow_outside_limits: Flag = False

@@ -88,6 +88,8 @@ class Scenario(Section):
         if not torque and (self.contacts or forces):
             what = "[[contacts]]" if self.contacts else f"task {forces!r}"
             raise ValueError(f'{what} needs control.level = "torque"')
+        if self.start.on_floor and not torque:
+            raise ValueError('start.on_floor needs control.level = "torque"')
         if torque and self.control.stack != "hierarchical":
             raise ValueError('control.level = "torque" goes with control.stack = "hierarchical", '
                              f'got "{self.control.stack}"')
@@ -121,6 +123,8 @@ class Scenario(Section):
             raise ValueError('limits.torque and limits.danger_reach need limits.place = "stack"')
         if self.limits and self.limits.torque and self.control.level == "velocity":
             raise ValueError("limits.torque needs control.level = \"acceleration\"")
+        if self.limits and self.limits.torque_step and not clipped:
+            raise ValueError("limits.torque_step needs control.level = \"torque\"")
         return self
 
     @model_validator(mode="after")

@@ -118,7 +118,8 @@ class LimitsSection(Section):
 
     Position and velocity limits are those of the robot; `acceleration` [rad/s^2] is one value for
     all joints or one each; `margin` [rad] shrinks the position limits; `torque` is the usable share
-    of the effort limits, at acceleration level, None for no torque limit. With `danger_reach` [m]
+    of the effort limits, None for no torque limit. At level "torque" no torque changes by more than
+    `torque_step` [N m] from one tick to the next. With `danger_reach` [m]
     joints that would move a control point toward an obstacle nearer than that are slowed down, see
     hierarchy.tasks.DangerBounds.
     """
@@ -128,6 +129,7 @@ class LimitsSection(Section):
     margin: NotNegative = 0.0
     danger_reach: Positive | None = None
     torque: Annotated[float, Field(strict=True, gt=0.0, le=1.0)] | None = None
+    torque_step: Positive | None = None
 
 
 class DampingSection(Section):

@@ -67,9 +67,14 @@ def _with_own(root: type[Section], keys: list[str], tags: str | None) -> str | N
 
 def _without_kinds(root: type[Section], loc: list[str]) -> list[str]:
     """Drop the kinds of sections that pydantic inserts into the location of an error."""
-    return [key for i, key in enumerate(loc)
-            if i == 0 or key not in _kinds_at(root, loc[:i])
-            or (i == len(loc) - 1 and key != PLUGIN)]
+    kept: list[str] = []
+    dropped = False  # the key before: a kind is followed by a key
+    for i, key in enumerate(loc):
+        last = i == len(loc) - 1 and key != PLUGIN
+        dropped = not (dropped or i == 0 or last) and key in _kinds_at(root, kept)
+        if not dropped:
+            kept.append(key)
+    return kept
 
 
 def _kinds_with(root: type[Section], keys: list[str]) -> list[str]:

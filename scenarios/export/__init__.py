@@ -52,7 +52,6 @@ def new_file(path: Path) -> Iterator[Path]:
         if path.exists():
             raise OutputError(f"{path} exists; choose another name, or remove it first")
         path.parent.mkdir(parents=True, exist_ok=True)
-    with written(path) as partial:
-        with named(path):
-            partial.touch()
+    with named(path), written(path) as partial:
+        partial.touch()
         yield partial

@@ -16,7 +16,8 @@ CONSTANTS = ("joint_lower", "joint_upper", "velocity_limit", "torque_limit")
 _METRES = ("ee_position", "desired_position", "position_error", "true_ee_position",
            "control_point_distance", "minimal_distance", "ee_distance",
            "true_control_point_distance", "true_minimal_distance", "true_ee_distance",
-           "contact_depth", "obstacle_offset", "com", "slip", "pressure_margin")
+           "contact_depth", "obstacle_offset", "com", "slip", "pressure_margin",
+           "support_margin")
 _NEWTONS = ("contact_force", "planned_force", "floor_force", "push")
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -17,6 +17,7 @@ from hierarchy.robots.table import Base
 from scenarios.cell.forces import contacts_of
 from scenarios.cell.robot import sensed_points
 from scenarios.config import Scenario
+from scenarios.config.plant import TorqueSection
 from scenarios.loop.links import capsules, lowest
 from scenarios.loop.tree import Joint, Matrix, Vector, joint_units, placements, tree_of
 from solvers.resolver import Handles, Resolver
@@ -118,8 +119,11 @@ class Facts:
 
 def facts_of(scenario: Scenario, robot: Robot) -> Facts:
     """Return the facts of a scenario on its robot."""
-    return Facts(robot_facts(robot, scenario.sensor.foot), resolver_facts(scenario), scenario.asks,
-                 scenario.limits_in_stack, contact_points(scenario, robot))
+    facts, plant = robot_facts(robot, scenario.sensor.foot), scenario.plant
+    if isinstance(plant, TorqueSection) and facts.base == "floating":
+        facts = replace(facts, floor=plant.height)
+    return Facts(facts, resolver_facts(scenario), scenario.asks, scenario.limits_in_stack,
+                 contact_points(scenario, robot))
 
 
 def contact_points(scenario: Scenario, robot: Robot) -> tuple[ContactPoint, ...]:

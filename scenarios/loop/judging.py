@@ -59,10 +59,12 @@ class Rows:
     """Moves a cell through the recorded ticks."""
 
     def __init__(self, recording: Recording, cell: Cell) -> None:
-        self._cell, self._recording = cell, recording
+        self._cell = cell
         self._t = recording["t"].tolist()
         self._q, self._v, self._command = (recording[name] for name in ("q", "v", "command"))
-        self._velocity = recording.scenario.control.level == "velocity"
+        level = recording.scenario.control.level
+        self._follows = level != "acceleration"  # whether rows depend on the last command
+        self._first = self._v[0] if level == "velocity" else None
         self._cone_error = cell.pointing.follow_cone_error(cell.state) if cell.pointing else None
         if "ee_distance" in recording:
             self._distance = np.column_stack([recording["control_point_distance"],
@@ -75,8 +77,8 @@ class Rows:
             cell.state.move(t[max(k - 1, 0)], q[max(k - 1, 0)], v[max(k - 1, 0)])
         if not cell.state.move(t[k], q[k], v[k]):
             return None
-        if self._velocity:
-            cell.state.commanded = self._command[k - 1] if k else v[0]
+        if self._follows:
+            cell.state.commanded = self._command[k - 1] if k else self._first
         cone = self._cone_error() if self._cone_error else float("nan")
         seen = cell.sensor.measure(cell.state) if cell.sensor else None
         if not self._is_as_recorded(k, seen) or cell.order(seen, cone).order != order:

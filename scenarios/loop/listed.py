@@ -9,7 +9,8 @@ import numpy as np
 
 from hierarchy import HierarchyError, Robot, State, Task
 from hierarchy.problem import Array
-from hierarchy.tasks import Along, CentreOfMass, Pose, Position
+from hierarchy.tasks import Along, CentreOfMass, Position
+from hierarchy.tasks.pose import PoseTask
 
 if TYPE_CHECKING:
     from scenarios.config.listed import ListedTask
@@ -57,7 +58,7 @@ def _error(task: Task, state: State) -> Array | float:
 def _position(task: Task, state: State) -> Array | None:
     if isinstance(task, Along):
         task = task.task
-    if isinstance(task, Position | Pose):
+    if isinstance(task, Position | PoseTask):
         return state.position(task.frame)
     return task.position(state) if isinstance(task, CentreOfMass) else None
 
@@ -65,8 +66,8 @@ def _position(task: Task, state: State) -> Array | None:
 def errors(recording: Recording) -> Iterator[tuple[ListedTask, str, Array]]:
     """Yield section, unit and size of the error (T,) of each listed task.
 
-    A pose comes twice, in [m] and [deg]; a pointing task in [deg], off its cone or outside it; a
-    task that looks at a point in [deg].
+    A pose or frame comes twice, in [m] and [deg]; a pointing task in [deg], off its cone or outside
+    it; a task that looks at a point in [deg].
     """
     from scenarios.config.listed import ListedPointing
 
@@ -74,7 +75,7 @@ def errors(recording: Recording) -> Iterator[tuple[ListedTask, str, Array]]:
         if error_of(section.title) not in recording:
             continue
         error = recording[error_of(section.title)]
-        if section.kind in ("pose", "relative") and error.shape[1] == 6:
+        if section.kind in ("pose", "frame", "relative") and error.shape[1] == 6:
             yield section, "m", np.linalg.norm(error[:, :3], axis=1)
             yield section, "deg", np.degrees(np.linalg.norm(error[:, 3:], axis=1))
         elif isinstance(section, ListedPointing):

@@ -36,12 +36,11 @@ class _Tables(NamedTuple):
 
 
 class _Seen(NamedTuple):
-    """What is read in each tick: the state, the end effector's target, the distances [m]."""
+    """What is read in each tick: the state, the distances [m]."""
 
     q: Array
     v: Array
     placements: Array
-    target: Array
     distance: Array
 
 
@@ -56,11 +55,12 @@ class Recorder:
         cell, robot = controller.cell, controller.cell.robot
         distances = len(cell.sensor.measurement.distance) if cell.sensor else 0
         self._orders: dict[tuple[str, ...], int] = {}
-        # One row: t, q, v, a, command, end effector, target, cone error, distances.
+        # One row: t, q, v, a, command, end effector, cone error, distances.
         self._commanded = len(controller.sent)
         # All rows are written once here: the system maps memory when it is first touched.
-        width = 8 + robot.nq + 2 * robot.n + self._commanded + distances
+        width = 5 + robot.nq + 2 * robot.n + self._commanded + distances
         self._log = np.full((ticks, width), np.nan)
+        self._desired = np.full((ticks if cell.position else 0, 3, 3), np.nan)
         self._answers = np.full((ticks if cell.contacts else 0, len(controller.resolution.x)),
                                 np.nan)
         self._choices = np.full((ticks, 5), -1, dtype=np.int16)
@@ -80,11 +80,9 @@ class Recorder:
         cell, state = controller.cell, controller.cell.state
         self._frame = cell.robot.frame(cell.robot.end_effector)
         self._distance = cell.sensor.measurement.distance if cell.sensor else np.empty(0)
-        self._target = np.full((3, 3), np.nan)
-        self._move_target = cell.position.path.writer(self._target) if cell.position else None
         self._write_rest = bind(
             _write, _Tables(self._log, self._choices, self._times),
-            _Seen(state.q, state.v, state.placements, self._target, self._distance),
+            _Seen(state.q, state.v, state.placements, self._distance),
             self._frame.joint, self._frame.offset, self._commanded,
             then=(0, (0,) * 5, (0.0,) * 6))
         self._blend, self._policy = controller.blend, controller.policy
@@ -99,8 +97,6 @@ class Recorder:
         index = self._orders.setdefault(order, len(self._orders))
         active = cell.sensor.measurement.active + 1 if AVOIDANCE in order and cell.sensor else -1
         resolution, plant = controller.resolution, cell.plant
-        if self._move_target is not None:
-            self._move_target(cell.state.t)
         finite = _write_given(self._log, k, self._given, plant.a, controller.sent)
         finite &= self._write_rest(
             k, (index, active, repulsion, resolution.status, resolution.iterations),
@@ -124,22 +120,24 @@ class Recorder:
     def look(self) -> None:
         """Note of the tick just written what only a simulation knows or nobody waits for.
 
-        That is not part of the tick's time: true distances, and which rows act.
+        That is not part of the tick's time: the desired position, true distances, and which rows
+        act.
         """
-        controller, k = self._controller, self.ticks - 1
+        controller, cell, k = self._controller, self._cell, self.ticks - 1
+        if cell.position is not None:
+            cell.position.path.write(cell.state.t, self._desired[k])
         if controller.answered:
             self._active.look(k, controller.hierarchy, controller.resolution)
         if self._truth is not None:
-            state = controller.cell.state
-            self._truth.look(k, state.t, self._cell.plant.extra.get("true_q", state.q))
+            self._truth.look(k, cell.state.t, cell.plant.extra.get("true_q", cell.state.q))
 
     def finish(self, scenario: Scenario, fault: str | None) -> Recording:
         """Return the run as recorded so far."""
         robot, rows = self._cell.robot, slice(0, self.ticks)
         n, log = robot.n, self._log[rows]
-        widths = [1, robot.nq, n, n, self._commanded, 3, 3, 1, max(len(self._distance) - 1, 0)]
+        widths = [1, robot.nq, n, n, self._commanded, 3, 1, max(len(self._distance) - 1, 0)]
         ends = np.cumsum(widths)
-        t, q, v, a, command, actual, desired, cone, body = (
+        t, q, v, a, command, actual, cone, body = (
             log[:, end - width:end].copy() for end, width in zip(ends, widths, strict=True))
         order, active, repulsion, status, iterations = self._choices[rows].T.copy()
         signals = {"t": t[:, 0], "q": q, "v": v, "a": a, "command": command,
@@ -147,6 +145,7 @@ class Recorder:
                    "iterations": iterations}
         orders = tuple(self._orders)
         if self._cell.position is not None:
+            desired = self._desired[rows, 0].copy()
             signals |= {"desired_position": desired, "position_error": desired - actual}
         if self._cell.pointing is not None:
             asked = np.array(["pointing" in names for names in orders])
@@ -175,7 +174,9 @@ class Recorder:
         signals |= {"joint_lower": robot.lower, "joint_upper": robot.upper,
                     "velocity_limit": robot.velocity_limit}
         if self._cell.contacts is not None:
-            signals["torque_limit"] = robot.effort_limit[robot.actuated:]
+            limits = scenario.limits
+            signals["torque_limit"] = robot.effort_limit[robot.actuated:] * (
+                (limits and limits.torque) or 1.0)
         return Recording(signals, tuple(" > ".join(names) for names in orders), scenario,
                          self.facts, fault, tuple(self._events))
 
@@ -223,9 +224,8 @@ def _write(tables, seen, joint, offset, commanded, k, chosen, measured):
     i += 2 * len(seen.v) + commanded
     for j in range(3):
         row[i + j] = point_at(seen.placements, joint, offset, j)
-        row[i + 3 + j] = seen.target[0, j]
-    row[i + 6] = cone_error
-    i += 7
+    row[i + 3] = cone_error
+    i += 4
     for j in range(len(seen.distance)):
         row[i + j] = seen.distance[j]
     for j in range(len(chosen)):

@@ -37,6 +37,9 @@ def of_contacts(recording: Recording) -> Iterator[Number]:
     if np.isfinite(recording["pressure_margin"]).any():
         yield Number("pressure_margin_min", "Centre of pressure from the edge, min",
                      _least(recording["pressure_margin"]), "m", False)
+    if np.isfinite(recording["support_margin"]).any():
+        yield Number("support_margin_min", "Centre of mass inside the support polygon, min",
+                     _least(recording["support_margin"]), "m", False)
     error = force_error(recording)
     yield Number("force_error_p95", "Force of a contact against that planned, 95 %",
                  float(np.percentile(error, 95.0)) if error.size else None, "N")
@@ -77,6 +80,8 @@ def of_torques(recording: Recording) -> Iterator[Number]:
         height = recording["com"][:, 2]
         yield Number("com_drop_max", "Centre of mass below its start, max",
                      float(height[0] - height.min()), "m")
+        moved = np.linalg.norm((recording["com"][-1] - recording["com"][0])[:2])
+        yield Number("com_travel", "Centre of mass from start to end", float(moved), "m", None)
 
 
 def of_levels(recording: Recording) -> Iterator[Number]:

@@ -146,7 +146,7 @@ def _listed(recording: Recording, settle: float) -> Iterator[Metric]:
     after = recording["t"] - recording["t"][0] >= settle
     for section, unit, exact in errors(recording):
         error = np.where(exact < _NOTHING, 0.0, exact)
-        turned = unit == "deg" and section.kind in ("pose", "relative")
+        turned = unit == "deg" and section.kind in ("pose", "frame", "relative")
         title = section.title[0].upper() + section.title[1:] + (", turned" if turned else "")
         key = f"task_{section.title}{' turned' if turned else ''}".replace(" ", "_")
         lower = None if section.kind == "posture" else True  # it gets what is left

@@ -104,13 +104,6 @@ def _signed_rank(apart: Array) -> float:
     return float(wilcoxon(apart).pvalue) if apart.size >= FEWEST else 1.0
 
 
-def sign_test(lower: int, higher: int) -> float:
-    """Return the two-sided p-value of the sign test of so many lower and higher pairs."""
-    from scipy.stats import binomtest
-
-    return float(binomtest(lower, lower + higher).pvalue) if lower + higher else 1.0
-
-
 def best(columns: Mapping[str, Array], lower_is_better: bool) -> tuple[str, ...]:
     """Return the columns that are better than all others, and equal among themselves.
 

@@ -157,6 +157,9 @@ _HUMAN_RUNS = ("true_position_error_rms", "true_position_error_max", "body_dista
                "velocity_step_max", "stack_changes", "active_set_changes")
 _STANDING = ("miss_centre_of_mass", "miss_left_hand", "miss_posture", "torque_step_max",
              "slip_max", "speed_max")
+_MISSED = tuple(f"miss_{level}" for level in (
+    "physics", "limits", "joint_limits", "centre_of_mass", "left_hand", "right_hand", "posture",
+    "least_force"))
 _STATES = (MEDIAN, LARGEST)
 _THROTTLE = (DAMPED, LEFT)
 _BLEND = ("velocity_step_max", "acceleration_step_max", "body_distance_min")
@@ -186,6 +189,25 @@ def table(rows: Mapping[str, Rows], study: str, metrics: Sequence[str],
     lines += [f"| `{column}` | {ended(found.ended[column], found.starts)} | "
               f"{' | '.join(_bare(found, column, name) for name in known)} |"
               for column in found.values]
+    return "\n".join([*lines, "", _source(rows, [study])])
+
+
+def by_metric(rows: Mapping[str, Rows], study: str, metrics: Sequence[str],
+              columns: Sequence[str]) -> str:
+    """Return a table with a row per metric: median and quartiles in some columns of a study.
+
+    Each column but the first is compared with the first, start by start.
+    """
+    found, first = rows[study], columns[0]
+    lines = [f"| | {' | '.join(f'`{column}`' for column in columns)} |",
+             "|---" * (len(columns) + 1) + "|"]
+    for metric in metrics:
+        cells = [_bare(found, first, metric)]
+        for column in columns[1:]:
+            pair = found.paired(metric, first, column)
+            cells.append(f"{_bare(found, column, metric)}; {pair}" if pair.count
+                         else _bare(found, column, metric))
+        lines.append(f"| {_head(found, metric)} | {' | '.join(cells)} |")
     return "\n".join([*lines, "", _source(rows, [study])])
 
 
@@ -251,6 +273,8 @@ BLOCKS: dict[str, Block] = {
     "singular": partial(table, study="singular", metrics=_SINGULAR),
     "human-claims": partial(claims, listed=HUMAN_CLAIMS),
     "standing": partial(table, study="standing", metrics=_STANDING, interval=True),
+    "standing-levels": partial(by_metric, study="standing", metrics=_MISSED,
+                               columns=("strict", "give", "weighted", "equalities")),
     "standing-claims": partial(claims, listed=STANDING_CLAIMS),
     "human": partial(table, study="human", metrics=_HUMAN_RUNS),
     "findings": findings}

@@ -25,7 +25,7 @@ def checkout() -> Path:
     root = Path(__file__).parents[2]
     if not (root / "docs" / "reproduction.md").is_file():
         raise HierarchyError("the documents are not part of the installed package; run this in a "
-                             "checkout, or with --out to keep the rows only")
+                             "checkout, or with --quick, which writes none")
     return root
 
 
@@ -46,14 +46,19 @@ def filled(text: str, blocks: Mapping[str, Block], rows: Mapping[str, Rows], pag
     return _BLOCK.sub(made, text)
 
 
-def write(root: Path, blocks: Mapping[str, Block], rows: Mapping[str, Rows]) -> list[Path]:
-    """Fill the pages of a checkout, and return those that changed."""
-    changed = []
+def write(root: Path, blocks: Mapping[str, Block], rows: Mapping[str, Rows]
+          ) -> tuple[list[Path], list[str]]:
+    """Fill the pages of a checkout; return those that changed, and why others cannot be filled."""
+    changed, lacking = [], []
     for name in dict.fromkeys((*PAGES, *commands.PAGES)):
         path = root / name
         text = path.read_text(encoding="utf-8")
-        made = commands.filled(filled(text, blocks, rows, name), root, name)
+        try:
+            made = commands.filled(filled(text, blocks, rows, name), root, name)
+        except HierarchyError as error:
+            lacking.append(str(error))
+            continue
         if made != text:
             write_text(path, made)
             changed.append(path)
-    return changed
+    return changed, lacking

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from hierarchy.errors import UnknownNameError
+from hierarchy.words import counted
 from scenarios.config.scenario import OWN
 from scenarios.reproduce import commands, pages, rows
 from scenarios.reproduce.blocks import BLOCKS
@@ -40,18 +41,17 @@ def chosen(names: Sequence[str]) -> Chosen:
 
 def reproduce(studies: Sequence[AnyStudy], out: Path, quick: bool = False,
               workers: int | None = None, progress: Progress | None = None,
-              told: Callable[[AnyStudy], object] = lambda study: None) -> dict[str, Rows]:
-    """Run studies and return their rows by name; runs that `out` has are not repeated.
+              told: Callable[[str], object] = lambda line: None) -> Iterator[Rows]:
+    """Run studies and yield the rows of each as it ends; runs that `out` has are not repeated.
 
-    quick : a tenth of the starts. told : called with each study before it starts.
+    quick : a tenth of the starts. told : called with a line about each study before it starts.
     Raises what `compare_starts` raises.
     """
-    found = {}
-    for study in studies:
-        told(study)
+    for count, study in enumerate(studies, 1):
         starts = max(2, study.starts // QUICK) if quick else study.starts
-        found[study.name] = _run(replace(study, starts=starts), out / study.name, workers, progress)
-    return found
+        told(f"{study.name} (study {count} of {len(studies)}): {study.title}, "
+             f"{counted(len(study.columns), 'column')} from {starts} starts")
+        yield _run(replace(study, starts=starts), out / study.name, workers, progress)
 
 
 def _run(study: AnyStudy, out: Path, workers: int | None, progress: Progress | None) -> Rows:
@@ -65,31 +65,38 @@ def _run(study: AnyStudy, out: Path, workers: int | None, progress: Progress | N
     return rows.rows_of(study.name, results, command, SEED)
 
 
+def of_pages(asked: Sequence[str], root: Path) -> dict[str, list[str]]:
+    """Return the commands in pages, each with the pages that its output stands in."""
+    found: dict[str, list[str]] = {}
+    for page in asked:
+        for command in commands.commands((root / page).read_text(encoding="utf-8")):
+            found.setdefault(command, []).append(page)
+    return found
+
+
 def outputs(asked: Sequence[str], root: Path, out: Path,
-            told: Callable[[str], object] = lambda line: None) -> dict[str, str]:
-    """Run the commands of pages, one after the other, and return what they print.
+            told: Callable[[str], object] = lambda line: None) -> Iterator[tuple[str, str]]:
+    """Run the commands of pages, one after the other; yield each with what it prints as it ends.
 
     Those whose output `out` has are not repeated, and those that fail are left out. told : called
     with each before it starts, and with the reason of a failure.
     """
-    texts = [(root / page).read_text(encoding="utf-8") for page in asked]
-    found = {}
-    for command in dict.fromkeys(one for text in texts for one in commands.commands(text)):
-        told(f"{command} ...")
+    found = of_pages(asked, root)
+    for count, command in enumerate(found, 1):
+        told(f"command {count} of {len(found)}: {command} ...")
         try:
-            found[command] = commands.run(command, root, out)
+            yield command, commands.run(command, root, out)
         except commands.CommandError as error:
             told(f"left as it is: {error}")
-    return found
 
 
 def write_documents(found: Mapping[str, Rows], printed: Mapping[str, str], root: Path
-                    ) -> list[Path]:
+                    ) -> tuple[list[Path], list[str]]:
     """Keep rows and outputs beside the documents of a checkout and fill its pages.
 
-    Returns what was written. Raises HierarchyError for a page that needs a study or an output that
-    is not there; the others are kept.
+    Returns what was written, and why some pages cannot be filled.
     """
     folder = root / pages.RESULTS
     kept = [rows.write(one, folder) for one in found.values()] + commands.keep(printed, root)
-    return kept + pages.write(root, BLOCKS, rows.read(folder))
+    changed, lacking = pages.write(root, BLOCKS, rows.read(folder))
+    return kept + changed, lacking

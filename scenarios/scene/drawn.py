@@ -35,15 +35,14 @@ _NO_LAWS = np.array([[0.0, 1.0, 1.0, 1.0]] * 2)  # no repulsion
 class Stage:
     """What does not change during a run.
 
-    robot: its tree, links, points and floor; areas and tip_areas: (symbol, radius [m]) of the
-    thresholds around an obstacle for control points and for the end effector; axis (3,) of the
-    cone of half_angle [rad] for the end effector's z axis, or None.
+    robot: its tree, links, points and floor; areas: (symbol, radius [m]) of the thresholds
+    around an obstacle for control points; axis (3,) of the cone of half_angle [rad] for the end
+    effector's z axis, or None.
     """
 
     robot: RobotFacts
     obstacles: Obstacles
     areas: Areas
-    tip_areas: Areas
     axis: Array | None
     half_angle: float
 
@@ -136,7 +135,6 @@ def stage(robot: RobotFacts, scenario: Scenario) -> Stage:
     axis = None if pointing is None else np.asarray(pointing.axis) / np.linalg.norm(pointing.axis)
     return Stage(robot, make_obstacles(avoidance.placed if avoidance else ()),
                  marks_of(avoidance.thresholds if avoidance else {}),
-                 marks_of(avoidance.tip_thresholds if avoidance else {}),
                  axis, radians(pointing.alpha_d) if pointing else 0.0)
 
 

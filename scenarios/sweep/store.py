@@ -52,13 +52,13 @@ class Store:
         Raises
         ------
         StoreError : it has other content, or another process writes into it.
-        FullError : it cannot be made.
+        OutputError : it cannot be made.
         """
-        if self.folder.exists() and not (self.folder.is_dir() and self._is_free()):
+        if self.folder.is_dir() and not self._is_free():
             raise StoreError(f"output folder {self.folder} is not empty and is not a sweep's; "
                              "choose another, or remove it first")
-        with _named(self.folder):
-            (self.folder / "parts").mkdir(parents=True, exist_ok=True)
+        files.make_folder(self.folder / "parts")
+        with files.named(self.folder):
             lock = (self.folder / ".lock").open("w")
         with lock:
             try:
@@ -144,5 +144,5 @@ def _named(path: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        raise FullError(f"{path} cannot be written: {error.strerror or error}; finished runs are "
+        raise FullError(f"{path} cannot be written: {files.reason(error)}; finished runs are "
                         "kept, and the same command continues from there") from error

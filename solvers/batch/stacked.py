@@ -18,7 +18,7 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hierarchy.errors import HierarchyError
+from hierarchy.errors import HierarchyError, expect
 from hierarchy.problem import Array, Hierarchy
 from hierarchy.records import set_frozen
 from solvers.kernels.batch import (
@@ -146,7 +146,9 @@ def solve(batch: Batch, resolver: Resolver | None = None, threads: int | None = 
     HierarchyError : another resolver; threads below 1; a row that the resolver cannot handle
         (names problem, level and row).
     """
+    expect("solve: batch", batch, Batch, "make one with Batch.of([h, ...])")
     resolver = make("tpm") if resolver is None else resolver
+    expect("solve: resolver", resolver, Resolver, "give make('tpm') or make('hcod')")
     if not isinstance(resolver, (Tpm, Hcod)) or not resolver.strict:
         raise HierarchyError(f"{resolver.label} resolves no batches; tpm and hcod do")
     if threads is not None and threads < 1:

@@ -8,7 +8,7 @@ from typing import final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hierarchy.errors import HierarchyError, UnknownNameError
+from hierarchy.errors import HierarchyError, UnknownNameError, expect
 from hierarchy.problem import Array, Hierarchy, check_rows
 from solvers.factorization.rows import FEWEST, FactoredRows, Held
 from solvers.resolver import Resolution
@@ -43,6 +43,7 @@ class Factorization:
         if self._settings.form != "staircase":
             raise HierarchyError("a factorization needs the staircase form of tpm, got form = "
                                  f"{self._settings.form!r}")
+        expect("levels", levels, Sequence, "give a list of matrices (m_k, n)")
         names = _distinct(names, len(levels))
         if n is None and not levels:
             raise HierarchyError("no levels and no n: the number of unknowns is not known")

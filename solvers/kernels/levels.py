@@ -61,6 +61,7 @@ from solvers.kernels.tableau import (
     OWNER,
     PULL,
     PULLED,
+    REACH,
     REFERENCE,
     REMOVED,
     REST,
@@ -286,7 +287,8 @@ def _factor(s, whole):
     for q in range(rows):
         i = s.index[LIST, q]
         s.number[VALUE, i] = value_of(s, s.x, i)
-        s.number[REST, q] = side_of(s.number, i) - s.number[VALUE, i]
+        s.number[REST, q] = rest = side_of(s.number, i) - s.number[VALUE, i]
+        s.scalar[SIZE] = max(s.scalar[SIZE], abs(rest) / s.number[NORM, i])
     return Part(ZERO, rows, begin, s.count[RANK])
 
 
@@ -294,11 +296,13 @@ def _factor(s, whole):
 def _head_for_goal(s, part):
     """Write the step towards the goal, in basis vectors."""
     goal, x, base = s.number[GOAL], s.x, s.count[BASE]
+    s.scalar[REACH] = 0.0
     for t in range(part.begin, x.size):
         total = 0.0
         for c in range(x.size):
             total += s.M[t, base + c] * (goal[c] - x[c])
         s.number[Z, t] = total
+        s.scalar[SIZE] = max(s.scalar[SIZE], abs(total))
 
 
 @inlined
@@ -317,12 +321,11 @@ def _damp(s, part):
 def _meet_rows(s, part):
     """Write the step of the soft rows, in basis vectors."""
     if s.scalar[DAMPED] == 0.0:
-        size = solve_part(s, part)
+        s.scalar[REACH] = solve_part(s, part)
     else:
         for t in range(part.begin, part.begin + part.rank):
             s.number[Z, t] = -_gone(s, t)
-        size = least_squares_part(s, part, s.scalar[DAMPED])
-    s.scalar[SIZE] = max(s.scalar[SIZE], size)
+        s.scalar[REACH] = least_squares_part(s, part, s.scalar[DAMPED])
 
 
 @inlined
@@ -342,7 +345,7 @@ def _advance(s, part, last):
     """
     x, p, value, speed = s.x, s.number[STEP], s.number[VALUE], s.number[SPEED]
     count, tolerance = s.count, s.settings.tolerance
-    _write_step(s, part)
+    scale = _write_step(s, part)
     bland = count[STILL] > BLAND_AFTER
     entering, side, length = -1, 0.0, 1.0
     for i in range(last):
@@ -351,7 +354,7 @@ def _advance(s, part, last):
         speed[i] = v = value_of(s, p, i)
         bound = s.number[UP, i] if v > 0.0 else s.number[LOW, i]
         over = value[i] + v - bound if v > 0.0 else bound - value[i] - v
-        least = tolerance * around(s.number[NORM, i], bound, s.scalar[SCALE])
+        least = tolerance * around(s.number[NORM, i], bound, scale)
         if v == 0.0 or over <= least or not np.isfinite(bound):
             continue
         t = max((bound - value[i]) / v, 0.0)
@@ -362,6 +365,8 @@ def _advance(s, part, last):
     for i in range(last):
         if s.index[STATE, i] == WATCHED:
             value[i] += length * speed[i]
+    s.scalar[SIZE] = max(s.scalar[SIZE], length * s.scalar[REACH])
+    s.scalar[SCALE] = max(s.scalar[SCALE], length * scale, FLOOR * s.scalar[SIZE])
     count[STILL] = count[STILL] + 1 if length < NO_STEP else 0
     if entering >= 0:
         s.number[ACTIVE, entering] = side
@@ -370,8 +375,12 @@ def _advance(s, part, last):
 
 @inlined
 def _write_step(s, part):
-    """Write the step in x, given the step in basis vectors."""
-    x, p, z, size, square = s.x, s.number[STEP], s.number[Z], s.scalar[SIZE], 0.0
+    """Write the step in x, given the step in basis vectors; return the scale at its end.
+
+    A step of a level that is nearly singular is long, and cut short by the first row in its way:
+    so its end sets no tolerance before it is reached.
+    """
+    x, p, z, size, square = s.x, s.number[STEP], s.number[Z], s.scalar[REACH], 0.0
     for c in range(x.size):
         p[c] = 0.0
     for t in range(part.begin, part.begin + part.rank):
@@ -380,8 +389,8 @@ def _write_step(s, part):
             p[c] += z[t] * s.M[t, s.count[BASE] + c]
     for c in range(x.size):
         square += (x[c] + p[c]) ** 2
-    s.scalar[SIZE] = max(size, np.sqrt(square))
-    s.scalar[SCALE] = max(s.scalar[SCALE], np.sqrt(square), FLOOR * s.scalar[SIZE])
+    s.scalar[REACH] = size = max(size, np.sqrt(square))
+    return max(s.scalar[SCALE], np.sqrt(square), FLOOR * max(size, s.scalar[SIZE]))
 
 
 @inlined

@@ -44,9 +44,10 @@ LEVELS, FIRST, BASE, REMOVED, DOUBT = range(5)
 COUNTS = 15
 # In `scalar`: the largest number so far, the scale of tolerances; a level's damping and weight; the
 # largest miss of its rows, the sum of their pulls, the part of that which may be rounding; guesses,
-# steps, the unfinished level.
+# steps, the unfinished level; the largest number of a whole step.
 (SIZE, SCALE, DAMPED, WEIGHT, WORST, PULLED, ROUNDING,
- GUESSES, STEPS, UNFINISHED) = range(10)
+ GUESSES, STEPS, UNFINISHED, REACH) = range(11)
+SCALARS = 11
 
 ALL, ACTING = np.int64(0), np.int64(1)  # the rows that a tableau holds
 
@@ -103,7 +104,7 @@ def carve(A, sizes, x, settings, work):
     number, at = matrix(work, ZERO, 21, w)
     numbers, at = integers(work, at, 9 * w)
     count, at = integers(work, at, COUNTS)
-    scalar, at = vector(work, at, 10)
+    scalar, at = vector(work, at, SCALARS)
     enough = at + n * (m + n) + (m + n) * (2 * n + 2) <= work.size
     room = work[at if enough else work.size:]
     exact = Exact(settings[0], settings[1], settings[2], settings[3], settings[4], settings[5])

@@ -10,7 +10,7 @@ so.
 from __future__ import annotations
 
 from hierarchy.jit import inlined
-from solvers.kernels.tableau import COUNTS
+from solvers.kernels.tableau import COUNTS, SCALARS
 
 MOST = 1 << 20  # unknowns, rows or levels: with more the sizes could overflow
 SETTINGS = 6    # of a kernel
@@ -38,7 +38,7 @@ def work_size(n, m, levels):
 def exact(n, m, levels):
     """Return what the kernels of `hcod` need, see `kernels.tableau.carve`."""
     w = max(m, n, levels + 1)
-    return 30 * w + COUNTS + 10 + n * (m + n) + (m + n) * (2 * n + 2)
+    return 30 * w + COUNTS + SCALARS + n * (m + n) + (m + n) * (2 * n + 2)
 
 
 @inlined

@@ -25,7 +25,6 @@ from solvers.proof import Proof
 
 FORMAT, VERSION = "hierarchical least-squares problems", 1
 PUBLIC, FRESH = "public", "fresh"
-HALVES = (PUBLIC, FRESH)
 _HEAD = "head.json"
 _DATA = {"n": "i8", "levels": "i8", "sizes": "i8", "A": "f8", "lower": "f8", "upper": "f8",
          "reference": "f8"}

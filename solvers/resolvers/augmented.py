@@ -9,7 +9,7 @@ from hierarchy.problem import Array, Hierarchy
 from solvers.kernels.staircase import solve_by_staircase
 from solvers.resolver import Resolution, Resolver, register
 from solvers.status import INACCURATE, SOLVED
-from solvers.workspace import WORKSPACE
+from solvers.workspace import WORKSPACE, entry
 
 
 @final
@@ -33,6 +33,6 @@ class Augmented(Resolver):
     def solve(self, h: Hierarchy, memory: Array | None = None) -> Resolution:
         """Resolve h; a direct method that ignores `memory`."""
         x, whole = h.reference.copy(), h.offsets[-1:]  # one level of m rows
-        code = solve_by_staircase(h.A, h.lower, h.upper, whole, x, self._settings,
-                                  WORKSPACE.array)
+        code = entry(solve_by_staircase)(h.A, h.lower, h.upper, whole, x, self._settings,
+                                         WORKSPACE.array)
         return Resolution(x) if code in (SOLVED, INACCURATE) else self._otherwise(h, x, code)

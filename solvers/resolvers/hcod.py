@@ -2,24 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
 from typing import ClassVar, final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hierarchy.problem import Array, Hierarchy
-from solvers.certificate import certify
+from solvers.certificate import TOLERANCE, certify
 from solvers.kernels.bounds import solve_without_bounds
 from solvers.kernels.guess import solve_by_guesses
 from solvers.kernels.levels import solve_by_levels
 from solvers.kernels.staircase import solve_equalities
 from solvers.resolver import Handles, Resolution, Resolver, register
 from solvers.status import EQUAL, INACCURATE, NO_LIMITS, SOLVED, TOO_SMALL, UNPROVED, Status
-from solvers.workspace import WORKSPACE, run
+from solvers.workspace import WORKSPACE, entry, run
 
 
 @final
@@ -130,7 +129,7 @@ def warm_record(memory: Array | None, size: int, usable: bool) -> tuple[Array, b
     """
     if memory is None or memory.size != size or not usable:
         return np.zeros(size), False
-    return memory.copy(), True
+    return memory.flatten(), True
 
 
 def solve_inside_bounds(h: Hierarchy, x: Array, record: Array, settings: Array) -> int:
@@ -165,13 +164,13 @@ def solve_exactly(h: Hierarchy, x: Array, record: Array, settings: Array, known:
     """
     work, code = WORKSPACE.array, UNPROVED
     if not known or record.item(0) == EQUAL:  # an index takes twice the time
-        code = solve_equalities(h.A, h.lower, h.upper, h.sizes, x, record, settings, work)
+        code = entry(solve_equalities)(h.A, h.lower, h.upper, h.sizes, x, record, settings, work)
     if known and code == UNPROVED:
-        code = solve_by_guesses(h.A, h.lower, h.upper, h.sizes, x, record, settings, work)
+        code = entry(solve_by_guesses)(h.A, h.lower, h.upper, h.sizes, x, record, settings, work)
     if code == SOLVED:
         return code
     if code == UNPROVED:
-        code = solve_by_levels(h.A, h.lower, h.upper, h.sizes, x, record, settings, work)
+        code = entry(solve_by_levels)(h.A, h.lower, h.upper, h.sizes, x, record, settings, work)
     if code == TOO_SMALL:
         WORKSPACE.double()
     if code in (TOO_SMALL, NO_LIMITS):
@@ -191,43 +190,88 @@ def settle_doubt(h: Hierarchy, x: Array, record: Array, settings: Array,
                  solve: Anew = solve_anew) -> bool:
     """Return whether an answer in doubt is certified, if need be after the rows are read anew.
 
-    Where the angle between rows is close to rank_tolerance, rounding decides which of them count
-    as dependent, and an answer may mix both readings. A row of 1e-17 beside one of 1 may be
-    rounding, as in the Jacobian of an arm that is straight, or be meant. So `solve` is called for
-    the other readings; the first answer that is certified, for h, replaces x (n,) and record.
+    A row of 1e-17 beside one of 1 may be rounding, as in the Jacobian of an arm that is straight,
+    and x is 1e17 if it is not: so the answer without such rows comes first. Where the angle between
+    rows is close to rank_tolerance, rounding decides which of them count as dependent, and an
+    answer may mix both readings: so `solve` is called with tolerances on either side. The first
+    answer that is certified, for h, replaces x (n,) and record.
+
+    If none is, x is as `solve` found it; or without the small rows, if it was large because of
+    them, for then it meets nothing else: rounding in x is more than the tolerance.
     """
+    dust = _dust(h)
+    if dust.any():
+        clean = _Reading.of(_without(h, dust), settings, len(record), solve)
+        if clean.certified_for(h):
+            clean.write(x, record)
+            return True
+        if clean.found and _rests_on(dust, h, x):
+            clean.write(x, record)
+            return False
     if certify(h, x).certified:
         return True
-    for read, changed in _readings(h, settings):
-        other, again = h.reference.copy(), np.zeros(len(record))
-        code = solve(read, other, again, changed)
-        if code in (SOLVED, INACCURATE) and certify(h, other).certified:
-            x[:], record[:] = other, again
+    for factor in _FACTORS:
+        changed = settings.copy()
+        changed[_RANK_TOLERANCE] = min(factor * settings[_RANK_TOLERANCE], _LARGEST)
+        again = _Reading.of(h, changed, len(record), solve)
+        if again.certified_for(h):
+            again.write(x, record)
             return True
     return False
 
 
-def _readings(h: Hierarchy, settings: Array) -> Iterator[tuple[Hierarchy, Array]]:
-    """Yield h without dust, if it has any, and with tolerances on either side of its own."""
-    dust = _dust(h)
-    if dust.any():
-        yield Hierarchy(np.where(dust[:, None], 0.0, h.A), h.lower, h.upper, h.sizes, h.reference,
-                        h.names), settings
-    for factor in _FACTORS:
-        changed = settings.copy()
-        changed[_RANK_TOLERANCE] = min(factor * settings[_RANK_TOLERANCE], _LARGEST)
-        yield h, changed
+@final
+@dataclass(frozen=True)
+class _Reading:
+    """What a resolver answers to rows that were read in another way: x, its record, its code."""
+
+    x: Array
+    record: Array
+    code: int
+
+    @classmethod
+    def of(cls, h: Hierarchy, settings: Array, size: int, solve: Anew) -> _Reading:
+        """Resolve h, with a record (size,)."""
+        x, record = h.reference.copy(), np.zeros(size)
+        return cls(x, record, solve(h, x, record, settings))
+
+    @property
+    def found(self) -> bool:
+        """Whether there is an answer."""
+        return self.code in (SOLVED, INACCURATE)
+
+    def certified_for(self, h: Hierarchy) -> bool:
+        """Whether it is the answer of h."""
+        return self.found and certify(h, self.x).certified
+
+    def write(self, x: Array, record: Array) -> None:
+        """Write it to x (n,) and record."""
+        x[:], record[:] = self.x, self.record
 
 
 def _dust(h: Hierarchy) -> NDArray[np.bool_]:
-    """Return which rows (m,) are as small as rounding of another in their level."""
+    """Return which rows (m,) are as small as rounding of another."""
     norms = np.linalg.norm(h.A, axis=1)
-    largest = [norms[i:j].max(initial=0.0) for i, j in pairwise(h.offsets.tolist())]
-    dust: NDArray[np.bool_] = norms < _DUST * np.repeat(largest, h.sizes)
+    dust: NDArray[np.bool_] = norms < _DUST * norms.max(initial=0.0)
     return dust
 
 
-_DUST = 1e-13          # norm of a row over the largest of its level, as for `certify`
-_FACTORS = 10.0, 0.1   # times rank_tolerance
+def _without(h: Hierarchy, dust: NDArray[np.bool_]) -> Hierarchy:
+    """Return h with zeros for these rows."""
+    return Hierarchy(np.where(dust[:, None], 0.0, h.A), h.lower, h.upper, h.sizes, h.reference,
+                     h.names)
+
+
+def _rests_on(dust: NDArray[np.bool_], h: Hierarchy, x: Array) -> bool:
+    """Whether x (n,) is so much larger than all other rows ask for that it rounds their values."""
+    sides = np.abs([h.lower, h.upper])[:, ~dust]
+    norms = np.linalg.norm(h.A[~dust], axis=1)
+    asked = np.where(np.isfinite(sides) & (norms > 0.0), sides, 0.0) / np.where(norms, norms, 1.0)
+    usual = 1.0 + float(np.linalg.norm(h.reference)) + float(asked.max(initial=0.0))
+    return float(np.finfo(float).eps * np.linalg.norm(x)) > TOLERANCE * usual
+
+
+_DUST = 1e-13          # norm of a row over the largest: smaller ones may be rounding
+_FACTORS = 10.0, 0.1, 3.0, 0.01   # times rank_tolerance
 _RANK_TOLERANCE, _LARGEST = 2, 0.1  # its place in the settings; at most
 _SOLVED = Status.SOLVED

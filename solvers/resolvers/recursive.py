@@ -15,7 +15,7 @@ from hierarchy.records import set_frozen
 from solvers.kernels.damped import CHIAVERINI, NAKAMURA, SELECTIVE, damped_recursion
 from solvers.kernels.recursion import recursion
 from solvers.resolver import Resolution, Resolver, register
-from solvers.workspace import WORKSPACE
+from solvers.workspace import WORKSPACE, entry
 
 _METHODS = {"level": 0.0, "nakamura": NAKAMURA, "chiaverini": CHIAVERINI, "selective": SELECTIVE}
 _DAMPS = {"nakamura": "each level by its manipulability",
@@ -71,5 +71,5 @@ class Recursive(Resolver):
         """Resolve h; a direct method that ignores `memory`."""
         x = h.reference.copy()
         kernel = recursion if self.method == "level" else damped_recursion
-        code = kernel(h.A, h.lower, h.upper, h.sizes, x, self._settings, WORKSPACE.array)
+        code = entry(kernel)(h.A, h.lower, h.upper, h.sizes, x, self._settings, WORKSPACE.array)
         return self._otherwise(h, x, code, memory) if code else Resolution(x)

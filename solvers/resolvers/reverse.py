@@ -11,7 +11,7 @@ import numpy as np
 from hierarchy.problem import Array, Hierarchy
 from solvers.kernels.reverse import reverse
 from solvers.resolver import Resolution, Resolver, register
-from solvers.workspace import WORKSPACE
+from solvers.workspace import WORKSPACE, entry
 
 FORMS = ("published", "in-order")
 
@@ -60,5 +60,5 @@ class Reverse(Resolver):
     def solve(self, h: Hierarchy, memory: Array | None = None) -> Resolution:
         """Resolve h; a direct method that ignores `memory`."""
         x = h.reference.copy()
-        code = reverse(h.A, h.lower, h.upper, h.sizes, x, self._settings, WORKSPACE.array)
+        code = entry(reverse)(h.A, h.lower, h.upper, h.sizes, x, self._settings, WORKSPACE.array)
         return self._otherwise(h, x, code) if code else Resolution(x)

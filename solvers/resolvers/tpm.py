@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, ClassVar, final
@@ -25,7 +26,7 @@ from solvers.resolver import (
 from solvers.resolvers.hcod import Hcod, settle_doubt, solve_anew, solve_exactly, warm_record
 from solvers.resolvers.saturation import SaturatedResolution
 from solvers.status import INACCURATE, NO_LIMITS, NUMERICAL_FAILURE, SOLVED, UNPROVED, Status
-from solvers.workspace import WORKSPACE, run
+from solvers.workspace import WORKSPACE, entry, run
 
 FORMS = ("staircase", "published")
 _OF_THE_ENGINE = Hcod.tolerance, Hcod.guesses, Hcod.max_iterations
@@ -78,17 +79,19 @@ class Tpm(Resolver):
         Without bounds a direct method that ignores `memory`; with them it returns a
         `SaturatedResolution`, which has a memory where an unknown is at a bound.
         """
-        staircased = self.form == "staircase"
-        if staircased and memory is not None:
+        if memory is not None and self.strict:
             return self._within_bounds(h, memory)
         x = h.reference.copy()
-        kernel = solve_by_staircase if staircased else solve_as_published
-        code = kernel(h.A, h.lower, h.upper, h.sizes, x, self._settings, WORKSPACE.array)
+        code = self._kernel(h.A, h.lower, h.upper, h.sizes, x, self._settings, WORKSPACE.array)
         if code == SOLVED or (code == INACCURATE and settle_doubt(
                 h, x, np.zeros(3 * h.m + 3), self._settings)):
             return Resolution(x)
-        return (self._within_bounds(h, None) if code < 0 and staircased
+        return (self._within_bounds(h, None) if code < 0 and self.strict
                 else self._otherwise(h, x, code, memory))
+
+    @cached_property
+    def _kernel(self) -> Callable[..., int]:
+        return entry(solve_by_staircase if self.strict else solve_as_published)
 
     @cached_property
     def _settings(self) -> Array:

@@ -6,11 +6,12 @@ import numpy as np
 
 from hierarchy import Robot, State, Task
 from hierarchy.avoidance import Obstacle, Obstacles, Repulsion
-from hierarchy.paths import Ellipse
+from hierarchy.paths import Ellipse, Still
 from hierarchy.tasks import (
     Along,
     Avoidance,
     CentreOfMass,
+    FrameLog,
     JointCoupling,
     JointDamping,
     LookAt,
@@ -40,6 +41,7 @@ TASKS = {
     "avoidance 1-D": Avoidance(ROBOT.control_points, 1),
     "avoidance 3-D": Avoidance(ROBOT.control_points, 3),
     "pose": Pose(FRAME, PATH, np.eye(3)),
+    "frame": FrameLog(FRAME, Still((0.1, 0.5, 0.1)), np.eye(3)[[1, 2, 0]]),
     "centre of mass": CentreOfMass(ROBOT, PATH),
     "centre of mass, x and z": CentreOfMass(ROBOT, PATH, (0, 2)),
     "posture": Posture((0.1,) * 7),

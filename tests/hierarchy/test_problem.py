@@ -13,6 +13,7 @@ def test_levels_are_packed_in_order():
     assert h.names == ("level 1", "level 2")
     assert not h.is_equality
     assert [A.shape for A, _, _ in h.levels()] == [(2, 2), (1, 2)]
+    assert Hierarchy.from_levels([(np.eye(2), [1, 2])]).is_equality
 
 
 def test_a_violation_is_the_distance_to_the_rows_interval():
@@ -27,6 +28,23 @@ def test_the_data_are_copied():
     h = Hierarchy.from_levels([(A, [1, 2])])
     A[:] = 7
     assert h.A[0, 0] == 1
+
+
+def test_arrays_that_kernels_can_read_are_kept_and_others_are_copied():
+    A, b, sizes = np.ones((2, 3)), np.ones(2), np.array([1, 1])
+    h = Hierarchy(A, b, b, sizes, np.zeros(3), ("a", "b"))
+    assert h.A is A
+    assert h.lower is b
+    assert h.sizes is sizes
+    h.A = np.asfortranarray([[1, 2, 3], [4, 5, 6]], dtype=np.float32)
+    assert h.A.flags.c_contiguous
+    assert h.A.dtype == np.float64
+    np.testing.assert_array_equal(h.A, [[1, 2, 3], [4, 5, 6]])
+    h.lower = np.arange(4)[::2]
+    assert h.lower.strides == (8,)
+    np.testing.assert_array_equal(h.lower, [0, 2])
+    with pytest.raises(HierarchyError, match=r"upper has shape \(1, 2\), expected 1 dimension$"):
+        h.upper = np.ones((1, 2))
 
 
 def test_levels_of_zero_rows_and_no_levels_are_hierarchies():

@@ -265,7 +265,7 @@ def test_capsules_of_a_table_are_its_links():
 
 
 @pytest.mark.parametrize(("make_it", "said"), [
-    (lambda: Capsule("x", 1, (0, 0, 0), (0, 0, 1), -1.0), "capsule 'x': radius -1.0 m"),
+    (lambda: Capsule("x", 1, (0, 0, 0), (0, 0, 1), -1.0), "capsule 'x': radius .m. = -1"),
     (lambda: Capsule("x", 1, (0, 0, np.nan), (0, 0, 1), 1.0), "capsule 'x': start"),
     (lambda: Capsule("x", 1, (0, 0, 0), (0, 1), 1.0), "capsule 'x': end"),
     (lambda: SelfSeparation(ARM[:2], EVERYWHERE), "'self-separation': no pair among 2"),

@@ -6,7 +6,7 @@ from scene import FRAME, PATH, ROBOT, SENSOR, TASKS, Elbow, state_at, states
 
 from hierarchy import HierarchyError, Stack, State
 from hierarchy.jit import bind, compiled
-from hierarchy.tasks import JointDamping, Position
+from hierarchy.tasks import JointDamping, LookAt, Position
 
 Q, V = states(1)[0]
 
@@ -29,6 +29,12 @@ def test_insert_remove_swap_and_reorder_by_name():
     s.reorder(["pointing", "position", "avoidance"])
     assert s.names == ("pointing", "position", "avoidance")
     assert len(s) == 3
+
+
+def test_rows_are_named_in_the_order_of_the_stack_or_in_another():
+    s = Stack([TASKS["position"], LookAt(FRAME, (0.3, 0.3, 0.6))])
+    assert s.row_names() == ("row 0", "row 1", "row 2", "x", "y")
+    assert s.row_names(("look-at",)) == ("x", "y")
 
 
 def test_rows_of_the_hierarchy_are_those_of_the_tasks_in_order():

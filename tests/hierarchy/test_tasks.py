@@ -15,20 +15,24 @@ from scene import (
     state_at,
     states,
 )
+from scipy.linalg import expm
 
 from hierarchy import HierarchyError, State
 from hierarchy.avoidance import Barrier
+from hierarchy.paths import Ellipse, Still
 from hierarchy.robots import TABLES as ROBOT_TABLES
 from hierarchy.robots import link_capsules
 from hierarchy.tasks import (
     Avoidance,
     DangerBounds,
+    FrameLog,
     JointCoupling,
     JointDamping,
     JointLimits,
     LookAt,
     Manipulability,
     Pointing,
+    Pose,
     Position,
     Posture,
     RelativePose,
@@ -36,9 +40,11 @@ from hierarchy.tasks import (
     Separation,
     TorqueLimits,
 )
+from hierarchy.tasks.geometric import cross
 from hierarchy.tasks.pose import rotation_vector
 from scenarios.config.listed import (
     ListedCentreOfMass,
+    ListedFrame,
     ListedPointing,
     ListedPose,
     ListedPosition,
@@ -58,8 +64,9 @@ def moved(q, v, step, task_state):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["position", "pointing", "cone", "posture", "centre of mass",
-                                  "centre of mass, x and z", "relative position", "coupling",
-                                  "look-at", "manipulability", "manipulability of the pose"])
+                                  "centre of mass, x and z", "frame", "relative position",
+                                  "coupling", "look-at", "manipulability",
+                                  "manipulability of the pose"])
 def test_jacobian_is_the_derivative_of_what_the_error_measures(name):
     task = TASKS[name]
     for q, v in STATES:
@@ -227,6 +234,56 @@ def test_pose_error_falls_when_its_velocity_is_followed():
     assert np.linalg.norm(task.error(State.at(ROBOT, q + 1e-3 * v))) < np.linalg.norm(error)
 
 
+def test_the_error_of_a_frame_is_the_logarithm_of_its_pose_to_the_target():
+    for q, _ in STATES:
+        state, task = State.at(ROBOT, q), TASKS["frame"]
+        twist = task.error(state)
+        ad = np.zeros((4, 4))
+        ad[:3, :3], ad[:3, 3] = cross(twist[3:]), twist[:3]
+        there = np.linalg.inv(pose(state)) @ as_pose(task.path(0.0)[0], task.rotation)
+        np.testing.assert_allclose(expm(ad), there, atol=1e-12)
+
+
+def test_close_to_its_target_a_frame_is_a_pose_in_its_own_axes():
+    q, v = STATES[3]
+    state = State.at(ROBOT, q, v)
+    near = Still((state.position(FRAME) + 1e-9).tolist())
+    here, world = (kind(FRAME, near, state.rotation(FRAME)) for kind in (FrameLog, Pose))
+    turn = np.kron(np.eye(2), state.rotation(FRAME))
+    np.testing.assert_allclose(turn @ here.jacobian(state), world.jacobian(state), atol=1e-8)
+    np.testing.assert_allclose(turn @ here.error(state), world.error(state), atol=1e-15)
+
+
+@pytest.mark.parametrize("angle", [1e-6, 0.0999, 0.1001, 1.0, 3.0])
+def test_rates_of_a_frame_that_follows_a_path_are_the_derivatives_of_its_error(angle):
+    h, (q, v) = 1e-4, STATES[4]
+    a = np.arange(7.0) - 3.0
+    start = State.at(ROBOT, q)
+    task = FrameLog(FRAME, Ellipse(start.position(FRAME), (0.2, 0.0, 0.1), (0.0, 0.2, 0.1)),
+                    start.rotation(FRAME) @ expm(angle * cross(np.array([0.6, 0.0, 0.8]))))
+
+    def error(t):
+        return task.error(State.at(ROBOT, q + v * t + a * t * t / 2, t=t))
+
+    state = State.at(ROBOT, q, v)
+    J, dJ = task.jacobian(state), task.jacobian_derivative(state)
+    rate = task.desired_velocity(state) - J @ v
+    bend = task.desired_acceleration(state) - J @ a - dJ @ v
+    np.testing.assert_allclose(rate, (error(h) - error(-h)) / (2 * h), rtol=1e-6, atol=1e-6)
+    np.testing.assert_allclose(bend, (error(h) - 2 * error(0.0) + error(-h)) / h**2,
+                               rtol=1e-5, atol=1e-5)
+
+
+def as_pose(position, rotation):
+    T = np.eye(4)
+    T[:3, :3], T[:3, 3] = rotation, position
+    return T
+
+
+def pose(state):
+    return as_pose(state.position(FRAME), state.rotation(FRAME))
+
+
 def test_a_task_in_plain_numpy_needs_three_methods():
     q, v = STATES[10]
     A, low, up = np.zeros((1, 7)), np.zeros(1), np.zeros(1)
@@ -284,6 +341,7 @@ def test_tasks_of_the_same_settings_are_equal_and_print_their_settings_alone(tas
 
 @pytest.mark.parametrize(("task", "section"), [
     (Position(FRAME, PATH), ListedPosition), (TASKS["pose"], ListedPose),
+    (TASKS["frame"], ListedFrame),
     (TASKS["centre of mass"], ListedCentreOfMass), (TASKS["pointing"], ListedPointing),
     (TASKS["posture"], ListedPosture)], ids=lambda one: getattr(one, "name", ""))
 def test_a_gain_that_is_left_out_is_the_same_in_python_and_in_a_file(task, section):
@@ -292,7 +350,7 @@ def test_a_gain_that_is_left_out_is_the_same_in_python_and_in_a_file(task, secti
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["relative pose", "look-at"])
+@pytest.mark.parametrize("name", ["relative pose", "look-at", "frame"])
 def test_the_error_falls_when_its_velocity_is_followed(name):
     task = TASKS[name]
     for q, v in STATES:
@@ -370,7 +428,7 @@ def test_a_gear_couples_two_joints():
     (lambda: JointCoupling(ROBOT, {"joint_9": 1.0}), "unknown joint 'joint_9'"),
     (lambda: JointCoupling(ROBOT, {"joint_1": 0.0}), "no factor other than zero"),
     (lambda: JointCoupling("kuka_lwr", {"joint_1": 1.0}), "robot is the name 'kuka_lwr'"),
-    (lambda: LookAt(FRAME, (0, 0)), "target [0, 0] must be three finite numbers"),
+    (lambda: LookAt(FRAME, (0, 0)), "target must be three finite numbers [m], got [0, 0]"),
     (lambda: LookAt(FRAME, (0, 0, 1), gain=-1), "gain = -1"),
     (lambda: Manipulability(FRAME, -0.1), "least = -0.1"),
     (lambda: Manipulability(FRAME, 0.1, "speed"), "part must be 'position' or 'pose'"),

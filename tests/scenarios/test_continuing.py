@@ -19,6 +19,7 @@ def drive(controller, recorder, first, ticks):
     for k in range(first, first + ticks):
         plant.act(controller.command(k * 0.001, plant.q, plant.v))
         recorder.write()
+        recorder.look()
 
 
 @pytest.mark.parametrize("path", [ELLIPSE, WAY], ids=["ellipse", "waypoints"])

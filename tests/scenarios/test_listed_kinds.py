@@ -16,6 +16,8 @@ BASE = {"name": "listed", "robot": {"model": "kuka_lwr"},
                     "duration": 1.5, "resolver": "hcod"}, "damping": {"value": 1.0}}
 COUPLING = {"kind": "coupling", "joints": {"joint_2": 1.0, "joint_5": -0.5}, "value": -1.0}
 LOOK = {"kind": "look-at", "frame": "end_effector", "target": [0.3, 0.9, 0.9]}
+FRAME = {"kind": "frame", "frame": "end_effector", "offset": [0.03, 0.05, 0.02],
+         "rotation": [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]}
 RELATIVE = {"kind": "relative", "frame": "end_effector", "to": "joint_3",
             "position": [0.405, -0.065, 0.521]}
 
@@ -36,7 +38,7 @@ def at_level(level):
 @pytest.mark.slow
 @pytest.mark.parametrize("level", ["velocity", "acceleration"])
 @pytest.mark.parametrize(("task", "metric"), [
-    (COUPLING, "task_coupling_end"), (LOOK, "task_look-at_end"),
+    (COUPLING, "task_coupling_end"), (FRAME, "task_frame_end"), (LOOK, "task_look-at_end"),
     ({**RELATIVE, "orientation": False}, "task_relative_end"),
     (RELATIVE | {"position": None, "name": "hold"}, "task_hold_end")])
 def test_a_task_reaches_its_target_at_both_levels(task, metric, level, tmp_path):
@@ -193,6 +195,19 @@ def test_tasks_over_forces_have_their_rows():
     forces = 3 * 8  # four corners for each foot
     names = "momentum", "linear", "contact-force", "least-force"
     assert [cell.stack[name].dimension for name in names] == [3, 3, 1, forces]
+
+
+@pytest.mark.parametrize(("change", "said"), [
+    ("radiuss=1", "unknown key 'tasks.0.path.radiuss'; did you mean 'tasks.0.path.radius'?"),
+    ("radius=\"a\"", "tasks.0.path.radius: Input should be a valid number, got 'a'"),
+    ("times=[1]", "tasks.0.path.times: only kind 'waypoints' has it; the kind here is 'circle'"),
+    ("kind=line", "tasks.0.path.start: Field required")])
+def test_a_key_of_a_path_in_the_list_is_named_as_it_is_written(change, said, tmp_path):
+    scenario_of(tmp_path, {"kind": "position", "frame": "end_effector", "path": {
+        "kind": "circle", "centre": [0.3, 0.5, 0.1], "radius": 0.05}})
+    with pytest.raises(HierarchyError) as error:
+        load(tmp_path / "listed.toml", [f"tasks.0.path.{change}"])
+    assert said in str(error.value)
 
 
 def test_every_kind_has_a_test_here(request):

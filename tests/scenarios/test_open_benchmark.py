@@ -1,5 +1,6 @@
 """The open benchmark: what it makes of entrants, how it judges, what it prints and draws."""
 
+import json
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -13,7 +14,9 @@ from scenarios.bench.open import entrants, process
 from scenarios.bench.open import judge as judging
 from scenarios.bench.open.entrant import Problem, read_problems
 from scenarios.bench.open.judge import judge
+from scenarios.bench.open.page import lead
 from scenarios.bench.open.process import CRASHED, HUNG, LEFT_OUT
+from scenarios.bench.open.results import Half
 from scenarios.bench.open.store import COLUMNS, Store
 from scenarios.bench.open.summary import Times, profile, summary
 from scenarios.bench.open.table import ENTRANTS, OWN, Row, chosen
@@ -238,6 +241,16 @@ def test_a_profile_counts_only_what_is_solved():
     np.testing.assert_array_equal(found["slow"], [0.5, 1.0, 1.0])
 
 
+def test_the_first_lines_name_a_solver_of_others_that_is_faster():
+    one = collection([simple(3.0)])
+    rows = judge([raw([3.0, 1.0], one, entrant="hcod", version="task-hierarchy 1", cold_ns=[4000]),
+                  raw([3.0, 1.0], one, entrant="tpm", version="task-hierarchy 1", cold_ns=[900]),
+                  raw([3.0, 1.0], one, entrant="other", cold_ns=[1000])], {one.digest: one})
+    half = Half("Fresh problems, seed 7", tuple(rows), {"simple": one})
+    assert ("A solver of others is right as often as hcod, and faster, in simple (other: 1.00 µs "
+            "against 4.00 µs).") in lead(half)
+
+
 def test_rows_come_back_as_they_were_stored(tmp_path):
     store, one = Store(tmp_path), collection([simple(3.0)])
     row = raw([3.0, 1.0], one, iterations=4)
@@ -278,7 +291,9 @@ def test_the_command_runs_continues_and_writes_its_page(tmp_path, capsys):
     assert run_command(line) == 0
     first = {file: file.stat().st_mtime_ns for file in out.glob("*/*")}
     assert len(first) == 8  # four files of problems, four of rows
+    (out / "missing.json").write_text('{"absent": "not installed", "Moody": "not installed"}')
     assert run_command([*line, "--entrant", mine]) == 0
+    assert json.loads((out / "missing.json").read_text()) == {"absent": "not installed"}
     assert first.items() <= {file: file.stat().st_mtime_ns for file in out.glob("*/*")}.items()
     said = capsys.readouterr()
     assert said.err.count("integers, seed 9") == 1

@@ -15,6 +15,11 @@ from scenarios.bench.peers.environments import MissingError, install, python_of
 from scenarios.bench.peers.figure import bars
 from scenarios.bench.peers.process import after_nan, stage
 from scenarios.bench.peers.scene import read_scenes, write_scenes
+from scenarios.bench.peers.stand import compare as stand
+from scenarios.bench.peers.stand.judge import Judge
+from scenarios.bench.peers.stand.ours import Ours
+from scenarios.bench.peers.stand.scene import read_stand
+from scenarios.bench.peers.stand.states import make_stand
 from scenarios.bench.peers.urdf import roll_pitch_yaw, urdf
 
 ROOT = Path(__file__).parents[2]
@@ -80,6 +85,26 @@ def test_angles_of_a_rotation_make_the_rotation(angles):
     np.testing.assert_allclose(turned(*roll_pitch_yaw(R)), R, atol=1e-12)
 
 
+def test_the_humanoid_read_from_its_urdf_weighs_as_ours(tmp_path):
+    ours, file = Robot.named("humanoid"), tmp_path / "humanoid.urdf"
+    feet = [ours.frame("left_foot"), ours.frame("right_foot")]
+    file.write_text(urdf(ours, feet))
+    read = Robot.from_file(file, "left_foot", base="floating")
+    order = [ours.velocity_names.index(name) for name in read.velocity_names]
+    np.testing.assert_array_equal(read.effort_limit[6:], ours.effort_limit[order][6:])
+    moved = [*range(7), *(i + 1 for i in order[6:])]
+    rng = np.random.default_rng(0)
+    for _ in range(10):
+        q, v = ours.integrate(ours.rest, rng.normal(size=ours.n)), rng.normal(size=ours.n)
+        a, b = State.at(ours, q, v), State.at(read, q[moved], v[order])
+        np.testing.assert_allclose(b.mass_matrix(), a.mass_matrix()[np.ix_(order, order)],
+                                   rtol=0.0, atol=1e-10)
+        np.testing.assert_allclose(b.bias_effort(), a.bias_effort()[order], rtol=0.0, atol=1e-10)
+        for foot in feet:
+            np.testing.assert_allclose(b.position(read.frame(foot.name)), a.position(foot),
+                                       rtol=0.0, atol=1e-12)
+
+
 def test_mujoco_is_told_to_keep_the_end_effector():
     compiler = ET.fromstring(urdf(Robot.named("kuka_lwr"))).find("mujoco/compiler")
     assert compiler.get("fusestatic") == "false"
@@ -101,7 +126,7 @@ def test_the_path_of_the_scene_is_the_path_of_our_stack(tmp_path):
 
 
 def test_every_entrant_has_its_adapter():
-    for entrant in ENTRANTS:
+    for entrant in (*ENTRANTS, *stand.ENTRANTS):
         module, _, name = entrant.adapter.partition(":")
         text = (ROOT / f"{module.replace('.', '/')}.py").read_text()
         assert f"\nclass {name}" in text
@@ -166,6 +191,41 @@ def test_everybody_is_judged_or_named_with_the_reason(tmp_path, capsys):
     said = capsys.readouterr().out
     assert "skipped: nobody (not installed" in said
     assert max(len(line) for line in said.splitlines() if not line.startswith("skipped")) <= 80
+
+
+@pytest.mark.slow
+def test_inverse_dynamics_of_ours_obeys_physics_and_limits_and_is_judged(tmp_path):
+    nobody = Entrant("nobody", Package("nobody", "no_such_module", ("nobody==1",)), "a:B")
+    (row,) = stand.run(tmp_path / "out", [stand.ENTRANTS[0], nobody], ticks=20)
+    assert row["failed"] == 0
+    assert row["median_us"] <= row["p95_us"]
+    for residual in ("dynamics", "contact", "torque"):
+        assert row[f"{residual} max"] < 1e-8
+    assert row["friction max"] < 1e-6
+    assert row["centre of mass max"] < 1e-8
+    missing = json.loads((tmp_path / "out" / "stand-missing.json").read_text())
+    assert "--install" in missing["nobody"]
+
+
+def test_wrong_answers_to_stand_are_found(tmp_path):
+    scene, states = make_stand(tmp_path, 2)
+    ours, judge = Ours(scene, "hcod"), Judge(scene, states)
+    ours.tick(0.0, states["q"][0], states["v"][0], None)
+    a, torques, wrenches = ours.answer()
+    good = judge.residuals(0, a, torques, wrenches)
+    assert max(good[key] for key in ("dynamics", "contact", "torque", "friction")) < 1e-6
+    assert judge.residuals(0, a, torques + 1.0, wrenches)["dynamics"] == pytest.approx(1.0)
+    assert judge.residuals(0, a, 100.0 * torques, wrenches)["torque"] > 100.0
+    sideways = wrenches + 1000.0 * np.eye(6)[0]
+    assert judge.residuals(0, a, torques, sideways)["friction"] > 100.0
+    twisted = wrenches + 100.0 * np.eye(6)[5]
+    assert judge.residuals(0, a, torques, twisted)["friction"] > 10.0
+    assert judge.residuals(0, 2.0 * a, torques, wrenches)["posture"] > good["posture"]
+
+
+def test_the_scene_stand_is_read_as_it_was_written(tmp_path):
+    scene, _ = make_stand(tmp_path, 1)
+    assert read_stand(tmp_path / "scene.json") == scene
 
 
 @pytest.mark.slow

@@ -245,6 +245,23 @@ def test_a_moving_obstacle_touches_when_it_arrives_and_pushes_the_arm(mujoco):
     assert np.abs(plant.q - START).max() > 1e-2
 
 
+def test_a_moving_obstacle_is_at_each_step_where_its_path_has_it(mujoco):
+    path = Waypoints((0.0, 1.0), ((1.0, -1.0, 0.0), (1.0, 1.0, 0.0)))
+    plant = arm(mujoco, obstacles=[sphere_at((0.0, 0.0, 0.0), path=path)])
+    step, seen = plant._step, []
+
+    def watched(model, data):
+        seen.append((data.time, data.mocap_pos[0].copy()))
+        step(model, data)
+
+    plant._step = watched
+    for _ in range(3):
+        plant.act(STILL)
+    assert len(seen) == 15
+    for t, centre in seen:
+        np.testing.assert_allclose(centre, path(t)[0], rtol=0, atol=1e-12)
+
+
 def test_the_reference_of_an_arm_held_back_does_not_run_away(mujoco):
     side = State.at(ROBOT, START).placements[5][0:3]
     # Joint 1 turns the arm about the vertical, with this sign toward the wall.

@@ -5,7 +5,8 @@ import pytest
 
 from hierarchy import HierarchyError
 from scenarios.bench import families
-from solvers import make
+from scenarios.bench.open.postures import posed
+from solvers import Status, make
 from solvers.problems import FAMILIES, family
 
 SEEDS = range(40)
@@ -84,3 +85,15 @@ def test_a_name_or_a_share_that_does_not_exist_is_refused():
         family("INEQ8", 0)
     with pytest.raises(HierarchyError, match="not a share"):
         family("INEQ7", 0, hard=1.5)
+
+
+@pytest.mark.parametrize(("name", "count"), [("singular-lwr", 24), ("singular-dual-arm", 24),
+                                             ("singular-humanoid", 12)])
+def test_at_singular_postures_no_limit_is_passed_and_answers_are_solved(name, count):
+    """The step to the target of a nearly singular level is 1e13 rad/s long, and cut by a limit."""
+    solved = 0
+    for h in posed(name, 26112301, count):
+        res = make("hcod").solve(h)
+        assert h.violations(res.x)[0] < 1e-12
+        solved += res.status is Status.SOLVED
+    assert solved >= count - 2

@@ -1,6 +1,7 @@
 """`hierarchy problems`: families listed, halves exported, files checked."""
 
 import json
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -52,6 +53,27 @@ def test_a_recorded_sequence_is_that_of_the_closed_loop():
     run = simulate(load("ellipse-limits", [f"control.duration={(first + 3) * 0.001!r}"]))
     for k, h in enumerate(found):
         np.testing.assert_allclose(resolver.solve(h).x, run["a"][first + k], atol=1e-9)
+
+
+@pytest.mark.slow
+def test_a_sequence_with_a_plant_is_as_long_as_asked_and_has_consecutive_ticks():
+    pytest.importorskip("mujoco")
+    made = family("stand-push").half(3, 4)
+    assert (len(made.problems), made.head.sequence, made.head.period) == (4, True, 0.001)
+    levels = [h.names for h in made.problems]
+    assert levels[0][0] == "physics"
+    assert levels == levels[:1] * 4
+    steps = [abs(after.A - before.A).max() for before, after in pairwise(made.problems)]
+    assert 0.0 < max(steps) < 0.1
+
+
+def test_a_run_that_ends_before_its_window_is_an_error(monkeypatch):
+    from scenarios.bench.open import recorded
+    from scenarios.config import ScenarioError
+
+    monkeypatch.setattr(recorded, "simulate", lambda *_, **__: None)
+    with pytest.raises(ScenarioError, match="ellipse-limits: no run with seed 3 has 2 problems"):
+        recorded.recorded("ellipse-limits", 3, 2)
 
 
 def test_list_names_every_family(capsys):

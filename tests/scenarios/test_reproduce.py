@@ -1,4 +1,7 @@
+import json
 import re
+import shutil
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -7,10 +10,11 @@ import pytest
 import typer
 
 from hierarchy.errors import HierarchyError
+from scenarios.cli import reproduce as command
 from scenarios.cli.main import app
 from scenarios.config import shipped
 from scenarios.reproduce import commands, pages
-from scenarios.reproduce.blocks import BLOCKS, CLAIMS
+from scenarios.reproduce.blocks import BLOCKS, CLAIMS, by_metric
 from scenarios.reproduce.claims import Compares, Ends, Keeps
 from scenarios.reproduce.rows import Rows, read, write
 from scenarios.reproduce.studies import STUDIES, Pair, Pivot, Study, Watched
@@ -72,6 +76,13 @@ def test_rows_are_read_as_they_were_written(tmp_path):
     path = write(kept, tmp_path)
     assert read(tmp_path) == {"study": kept}
     assert '    "speed_max": [1.0, null, 3.0]' in path.read_text().splitlines()
+
+
+def test_a_table_of_metrics_compares_each_column_with_the_first():
+    kept = {"study": rows(a=[1.0] * 16, b=[2.0] * 16)}
+    line = by_metric(kept, "study", ["speed_max"], ["a", "b"]).splitlines()[2]
+    assert line.count("|") == 4
+    assert "higher in 16 of 16, p < 0.001 |" in line
 
 
 def test_an_unknown_block_or_metric_is_named():
@@ -203,7 +214,7 @@ def test_a_command_that_fails_leaves_the_others(tmp_path):
     (tmp_path / "bad.py").write_text("raise SystemExit(3)\n")
     (tmp_path / "page.md").write_text(page("python bad.py") + page("python good.py"))
     told = []
-    found = outputs(["page.md"], tmp_path, tmp_path / "out", told.append)
+    found = dict(outputs(["page.md"], tmp_path, tmp_path / "out", told.append))
     assert found == {"python good.py": "good\n"}
     assert told[1].startswith("left as it is: python bad.py: exit code 3")
 
@@ -214,13 +225,83 @@ def test_studies_and_pages_are_chosen_by_name():
     some = chosen(["docs/batch.md", "letter"])
     assert [study.name for study in some.studies] == ["letter"]
     assert some.pages == ("docs/batch.md",)
-    with pytest.raises(HierarchyError, match=r"'docs/peers\.md'"):
-        chosen(["docs/peers.md"])
+    with pytest.raises(HierarchyError, match=r"'docs/view\.md'"):
+        chosen(["docs/view.md"])
 
 
 def test_the_help_names_every_study():
     found = typer.main.get_command(app).commands["reproduce"].params[0].help
     assert {study.name for study in STUDIES} <= set(re.findall(r"\w+", found))
+
+
+@pytest.fixture
+def documents(tmp_path):
+    """A checkout that has documents only."""
+    for name in {*pages.PAGES, *commands.PAGES}:
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        shutil.copy(ROOT / name, tmp_path / name)
+    shutil.copytree(ROOT / pages.RESULTS, tmp_path / pages.RESULTS)
+    return tmp_path
+
+
+def ending_with(error, *ended):
+    def run(*_):
+        yield from ended
+        raise error
+    return run
+
+
+@pytest.mark.parametrize(("error", "code", "said"), [
+    (KeyboardInterrupt(), 130, "the same command continues from here"),
+    (OSError(28, "No space left on device", "out/a"), 1, "out/a cannot be written: No space left")])
+def test_a_study_that_has_ended_is_kept_whatever_ends_the_command(
+        error, code, said, documents, monkeypatch, capsys):
+    old = read(documents / pages.RESULTS)["blend"]
+    new = replace(old, values={name: {metric: [9.0] * old.starts for metric in values}
+                               for name, values in old.values.items()})
+    monkeypatch.setattr(command, "checkout", lambda: documents)
+    monkeypatch.setattr(command, "reproduce", ending_with(error, new))
+    assert command.reproduce_command(["blend", "letter"], documents / "out", False, 1) == code
+    assert said in capsys.readouterr().err
+    assert read(documents / "out") == {"blend": new}
+    assert read(documents / pages.RESULTS)["blend"] == new
+    assert "9.000" in (documents / "docs/reproduction.md").read_text()
+
+
+def test_an_output_is_written_as_its_command_ends(documents, monkeypatch, capsys):
+    monkeypatch.setattr(command, "checkout", lambda: documents)
+    monkeypatch.setattr(command, "outputs", ending_with(
+        KeyboardInterrupt(), ("hierarchy bench tick", "ten ticks\n")))
+    assert command.reproduce_command(["docs/benchmarks.md"], documents / "out", False, 1) == 130
+    assert commands.file_of("hierarchy bench tick", documents).read_text() == "ten ticks\n"
+    assert "ten ticks" in (documents / "docs/benchmarks.md").read_text()
+
+
+def test_a_page_that_cannot_be_filled_does_not_keep_others_from_it(documents):
+    page = documents / "docs/reproduction.md"
+    page.write_text(page.read_text() + "<!-- reproduce: other -->\n<!-- end of other -->\n")
+    found = read(documents / pages.RESULTS)
+    found["human"] = replace(found["human"], seed=99)
+    changed, lacking = pages.write(documents, BLOCKS, found)
+    assert changed == [documents / "docs/experiment.md"]
+    assert lacking == ["docs/reproduction.md: there is no block 'other'"]
+
+
+def test_quick_lists_the_commands_that_it_does_not_run(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(command, "reproduce", lambda *_: iter([rows(a=[1.0])]))
+    assert command.reproduce_command([], tmp_path, True, 1, as_json=True) == 0
+    made = json.loads(capsys.readouterr().out)
+    assert made["not_made"]["hierarchy bench tick"] == ["docs/benchmarks.md"]
+    with pytest.raises(HierarchyError, match=r"--quick runs studies, and docs/batch\.md has"):
+        command.reproduce_command(["docs/batch.md"], tmp_path, True, 1)
+
+
+def test_a_file_in_place_of_the_folder_is_refused(tmp_path):
+    file = tmp_path / "file"
+    file.write_text("")
+    for out in (file, file / "below"):
+        with pytest.raises(HierarchyError, match=f"cannot be written: {file} is a file"):
+            command.reproduce_command(["letter"], out, True, 1)
 
 
 @pytest.mark.slow

@@ -14,6 +14,7 @@ from hierarchy.robots import TABLES, link_capsules
 from scenarios import load, simulate
 from scenarios.cell.build import build
 from scenarios.cell.plants import PhysicsArm
+from scenarios.cli.main import run_command
 
 pytestmark = pytest.mark.slow
 
@@ -384,3 +385,12 @@ def test_a_short_visit_in_physics_seen_by_the_camera(name, resolver):
     assert speed(found).max() > 0.1
     assert error(found)[-100:].max() < 1e-3
     assert not [event for event in found.events if event.kind != "beyond_limits"]
+
+
+def test_what_the_system_refuses_ends_without_a_traceback(monkeypatch, capsys):
+    def refused(*_):
+        raise OSError(28, "No space left on device", "a/file")
+
+    monkeypatch.setattr("scenarios.cli.doctor.doctor_command", refused)
+    assert run_command(["doctor"]) == 1
+    assert capsys.readouterr().err == "hierarchy: fault: a/file: No space left on device\n"

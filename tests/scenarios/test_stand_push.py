@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from hierarchy import HierarchyError
+from hierarchy import HierarchyError, Robot
 from scenarios import load, simulate
 from scenarios.cell.build import build
 from scenarios.config import ScenarioError
+from scenarios.config.reading import shipped
 from scenarios.loop.controller import Controller
 from scenarios.loop.recorder import Recorder
 from scenarios.loop.simulation import tick
@@ -17,6 +18,7 @@ from solvers import Resolution, Status, make
 STANDING = load("stand-push")
 SHORT = STANDING.with_changes({"control.duration": 0.02, "plant.pushes.0.at": 0.005,
                                "plant.pushes.0.duration": 0.01})
+STANDING_ROBOT = Robot.named("humanoid")
 LEVELS = ("physics", "limits", "joint limits", "centre of mass", "left hand", "right hand",
           "posture", "least force")
 
@@ -37,7 +39,12 @@ def changed(**keys):
     ({"control__stack": "switched"}, "goes with control.stack = \"hierarchical\", got"),
     ({"contacts__0__y": None}, "a sole has x and y, a point neither"),
     ({"contacts__0__friction": 0.0}, "contacts.0.friction: .* greater than 0"),
+    ({"contacts__0__friction": True}, "contacts.0.friction: .* valid number, got True"),
+    ({"contacts__0__frame": 3}, "contacts.0.frame: .* valid string, got 3"),
     ({"plant__friction": 0.0}, "plant.friction: .* greater than 0"),
+    ({"limits__torque": 0.0}, "limits.torque: .* greater than 0"),
+    ({"limits__torque_step": 0.0}, "limits.torque_step: .* greater than 0"),
+    ({"limits__torque_step": "big"}, "limits.torque_step: .* valid number, got 'big'"),
 ])
 def test_what_does_not_fit_together_is_refused_by_its_key(keys, said):
     with pytest.raises(ScenarioError, match=said):
@@ -48,6 +55,11 @@ def test_what_does_not_fit_together_is_refused_by_its_key(keys, said):
     ({"contacts__0__frame": "left_fot"}, "left_fot.*left_foot"),
     ({"contacts__1__frame": "left_foot"}, "contacts: contact 'left_foot': two contacts"),
     ({"contacts__0__open": [[1.0, 2.0]]}, "forces: .*'left_foot' opens; give a finite largest"),
+    ({"contacts__0__normal": [0.0, 0.0, 0.0]}, "contacts: contact 'left_foot': normal .* is no"),
+    ({"contacts__0__x": [0.16, 0.16]}, "contacts: contact 'left_foot': 4 points on one line"),
+    ({"forces__least": 400.0, "forces__largest": 300.0}, "forces: .* no normal force is pushing"),
+    ({"robot__model": "kuka_lwr"}, "contacts: unknown frame 'left_foot'. Known: end_effector"),
+    ({"start__on_floor": True, "contacts": []}, "start.on_floor needs a floating base and"),
     ({"forces__edge": 0.2}, "forces: .*margin 0.2 m of contact 'left_foot'"),
     ({"plant__pushes__0__joint": "trunk"}, "plant.pushes: .*'trunk'"),
     ({"plant__delay": 0.0004}, "plant.delay = 0.0004 s is not a whole number of periods"),
@@ -114,6 +126,40 @@ def test_a_fall_ends_the_run_and_is_its_fault():
     assert recording.fault.startswith("the robot has fallen by 0.002")
 
 
+@pytest.mark.parametrize("keys", [{"contacts": []}, {"limits__torque": 0.05}],
+                         ids=["no contact", "torques that cannot carry the weight"])
+def test_a_robot_that_nothing_holds_falls_with_torques_within_their_limits(keys):
+    pytest.importorskip("mujoco")
+    run = simulate(changed(control__duration=0.6, **keys))
+    assert run.fault.startswith("the robot has fallen by 0.2 m")
+    assert (np.abs(run["command"]) <= run["torque_limit"] + 1e-9).all()
+    if "contacts" not in keys:
+        assert measure(run)["torque_limit_share"].value > 0.5
+        missed = run["level_violation"][:, run.task_names.index("centre of mass")]
+        assert np.nanmax(missed) > 1.0
+
+
+@pytest.mark.parametrize("resolver", ["hcod", "tpm"])
+def test_no_torque_changes_by_more_than_its_step(resolver):
+    """Under a resolver without rows for it the torques are cut off."""
+    pytest.importorskip("mujoco")
+    run = simulate(SHORT.with_resolver(resolver).with_changes({
+        "limits.torque_step": 0.3, "control.duration": 0.05}))
+    steps = np.abs(np.diff(run["command"], axis=0))
+    assert steps.max() == pytest.approx(0.3, abs=1e-9)
+    free = simulate(SHORT.with_resolver(resolver).with_changes({"control.duration": 0.05}))
+    assert np.abs(np.diff(free["command"], axis=0)).max() > 0.5
+
+
+def test_a_floating_base_can_be_put_on_the_floor():
+    pytest.importorskip("mujoco")
+    high = [0.0, 0.0, 3.0, *STANDING_ROBOT.rest[3:]]
+    cell = build(changed(start__q=high, start__on_floor=True, plant__height=0.2))
+    left = cell.robot.frame("left_foot")
+    cell.state.move(0.0, *cell.start)
+    assert cell.state.position(left)[2] == pytest.approx(0.2, abs=1e-12)
+
+
 def test_noise_turns_and_moves_the_base_that_the_controller_sees():
     pytest.importorskip("mujoco")
     noisy = simulate(SHORT.with_changes({"plant.measurement.position_noise": 1e-3,
@@ -127,6 +173,30 @@ def test_noise_turns_and_moves_the_base_that_the_controller_sees():
     np.testing.assert_allclose(np.linalg.norm(noisy["q"][:, 3:7], axis=1), 1.0)
     with pytest.raises(ScenarioError, match="no quantisation"):
         build(changed(plant__measurement__quantisation=1e-3))
+
+
+def test_a_sole_may_lie_beside_its_frame():
+    pytest.importorskip("mujoco")
+    cell = build(changed(contacts__0__offset=[0.01, 0.02, -0.03]))
+    points = np.array(cell.contacts["left_foot"].points)
+    np.testing.assert_allclose(points.min(axis=0), [-0.04, -0.02, -0.03])
+    np.testing.assert_allclose(points.max(axis=0), [0.17, 0.06, -0.03])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["stand-go2", "stand-g1", "stand-talos"])
+def test_a_robot_of_a_package_stands_where_it_is_put(name):
+    from importlib.metadata import PackageNotFoundError, distribution
+    pytest.importorskip("mujoco")
+    try:
+        distribution("example-robot-data")
+    except PackageNotFoundError:
+        pytest.skip("example-robot-data is not installed")
+    run = simulate(load(name).with_changes({"control.duration": 0.2, "plant.pushes": []}))
+    assert run.fault is None
+    assert np.abs(run["com"] - run["com"][0]).max() < 1e-3
+    weight = 9.81 * build(run.scenario).robot.masses.sum()
+    assert run["floor_force"][-1, :, 2].sum() == pytest.approx(weight, rel=0.02)
 
 
 # What is sent without an answer.
@@ -169,3 +239,17 @@ def test_a_stop_ends_the_run_at_once():
     assert run.fault == "stopped by its policy at t = 0.010 s: not_finite"
     assert np.isfinite(run["command"]).all()
     assert np.isnan(run["planned_force"][10]).all()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", sorted(
+    name for name in shipped() if load(name).control.level == "torque"))
+def test_every_answer_of_a_shipped_scenario_of_torques_is_certified(name):
+    pytest.importorskip("mujoco")
+    scenario = load(name, {"control.duration": 0.15})
+    if scenario.robot.model.startswith("example_robot_data:"):
+        pytest.importorskip("example_robot_data")
+    if scenario.plant.pushes:  # early enough to be part of it
+        scenario = scenario.with_changes({"plant.pushes.0.at": 0.02})
+    run = simulate(scenario, certified=True)
+    assert run["certified"].all(), np.flatnonzero(~run["certified"])

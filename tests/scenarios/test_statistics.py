@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import rankdata
 
-from scenarios.measure.statistics import best, paired, sign_test, spread, wilson
+from scenarios.measure.statistics import best, paired, spread, wilson
 
 
 def enumerated(apart):
@@ -102,8 +102,6 @@ def test_the_spread_leaves_out_what_is_not_known():
     assert spread(np.array([np.nan])) is None
 
 
-def test_shares_and_signs_are_those_of_the_books():
+def test_shares_are_those_of_the_books():
     assert wilson(0, 0) == (0.0, 1.0)
     assert wilson(18, 24) == pytest.approx((0.551, 0.880), abs=5e-4)  # Wilson 1927, z = 1.96
-    assert sign_test(0, 10) == pytest.approx(2 / 2**10)
-    assert sign_test(0, 0) == 1.0

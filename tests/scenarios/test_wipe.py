@@ -6,7 +6,8 @@ import pytest
 from hierarchy import Robot, Stack, State
 from hierarchy.contacts import Contact, Contacts
 from hierarchy.errors import HierarchyError
-from hierarchy.tasks import Along, ContactMotion, Friction
+from hierarchy.paths import Still
+from hierarchy.tasks import Along, ContactMotion, Friction, Position
 from scenarios import load, simulate
 from scenarios.config import ScenarioError
 from scenarios.measure.metrics import measure
@@ -70,7 +71,7 @@ def test_what_cannot_slide_or_is_no_direction_is_refused():
     with pytest.raises(ScenarioError, match="only a point slides"):
         load("wipe").with_changes({"contacts.0.x": [0.0, 0.1], "contacts.0.y": [0.0, 0.1]})
     with pytest.raises(HierarchyError, match=r"'along': directions .* orthogonal"):
-        Along(None, ((1.0, 0.0, 0.0), (1.0, 1.0, 0.0)))
+        Along(Position(TIP, Still((0.0, 0.0, 0.0))), ((1.0, 0.0, 0.0), (1.0, 1.0, 0.0)))
 
 
 @pytest.mark.slow

@@ -1,7 +1,6 @@
 """The C library, made once by the first worker that needs it."""
 
 import os
-from types import SimpleNamespace
 
 import c_library as c
 import pytest
@@ -52,6 +51,6 @@ def library(folder):
 
 @pytest.fixture
 def unverified(monkeypatch):
-    """Let answers in doubt keep the status of the kernels in Python too."""
-    monkeypatch.setattr("solvers.resolvers.hcod.certify",
-                        lambda h, x: SimpleNamespace(certified=False))
+    """Let answers in doubt keep the x and status of the kernels in Python too."""
+    for module in ("resolvers.hcod", "resolvers.tpm", "batch.stacked"):
+        monkeypatch.setattr(f"solvers.{module}.settle_doubt", lambda *_: False)

@@ -12,7 +12,7 @@ from scenarios.bench import batch as bench
 from scenarios.bench.candidates import moved
 from solvers import Status, make
 from solvers.batch import Batch, solve, stacked
-from solvers.problems import Recipe, generate, load
+from solvers.problems import Recipe, generate, load, structured
 
 SLOW = os.environ.get("NUMBA_DISABLE_JIT") == "1"
 FEW = 12 if SLOW else 50
@@ -90,8 +90,7 @@ def test_answers_in_doubt_are_judged_as_they_are_alone(guesses):
 
 def test_an_answer_that_is_inaccurate_alone_is_so_in_a_batch():
     resolver, statuses = make("hcod"), []
-    for file in REGRESSIONS:
-        h = load(file)
+    for h in (*map(load, REGRESSIONS), *(structured(seed, ("tiny_rows",)) for seed in range(20))):
         hs = [h, moved(h), h]
         alone = [resolver.solve(h) for h in hs]
         assert_same(solve(Batch.of(hs), resolver), alone)

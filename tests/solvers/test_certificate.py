@@ -308,6 +308,24 @@ def test_rows_at_an_angle_near_1e_8_may_count_either_way():
     assert not certify(h, [1.0, 0.5]).certified
 
 
+@pytest.mark.parametrize(("turn", "counts"), [(1e-9, True), (5e-9, True), (1e-7, False)])
+def test_a_level_may_be_as_far_from_optimal_as_a_turn_of_its_rows_explains(turn, counts):
+    """Two rows that oppose each other see x2 with 1e-6 and x3 with `turn`."""
+    bounds = (np.eye(3), -np.ones(3), np.ones(3))
+    level = (np.array([[1.0, 0.0, 0.0], [1.0, 1e-6, turn]]), [1.0, -1.0])
+    h = Hierarchy.from_levels([bounds, level, ([[0.0, 0.0, 1.0]], [0.5])])
+    free, exact = [5e-7, -1.0, 0.5], [0.5 * (1e-6 + turn), -1.0, -1.0]
+    assert certify(h, free).certified == counts
+    assert certify(h, exact).certified
+
+
+def test_a_turn_of_a_heavy_row_excuses_no_light_one():
+    bounds = (np.eye(2), -np.ones(2), np.ones(2))
+    h = Hierarchy.from_levels([bounds, (np.diag([1e4, 1.0]), [2e4, 0.5])])
+    assert certify(h, [1.0, 0.5]).certified
+    assert certify(h, [1.0, 0.0]).level == 1
+
+
 def test_dust_beside_a_large_row_may_be_met_or_ignored():
     h = Hierarchy.from_levels([(np.diag([1.0, 1e-17]), [1.0, 1.0])])
     assert certify(h, [1.0, 1e17]).certified

@@ -8,7 +8,7 @@ from scipy.optimize import minimize
 from hierarchy import Hierarchy, HierarchyError, Robot, Stack, State
 from hierarchy.paths import Still
 from hierarchy.tasks import Position, Posture
-from solvers import Status, certify, make, names
+from solvers import Status, certify, explain, make, names
 from solvers.batch import Batch
 from solvers.problems import generate
 
@@ -92,6 +92,15 @@ def test_several_levels_give_one_after_the_other_and_warm_starts_agree():
     np.testing.assert_allclose(warm.x, cold.x, atol=1e-9)
 
 
+def test_without_an_answer_for_a_part_the_resolution_is_that_of_the_part():
+    h = problem(2, 0.1)
+    h.A[0, 0] = np.nan
+    res = make("hcod").solve(h)
+    assert res.status is Status.NUMERICAL_FAILURE
+    assert res.memory is None
+    np.testing.assert_array_equal(res.x, np.zeros(h.n))
+
+
 def test_generated_hierarchies_that_give_are_certified_by_hcod():
     solved = 0
     for seed in range(150):
@@ -149,9 +158,44 @@ def test_a_stack_takes_it_by_the_name_of_a_task_in_any_order():
     np.testing.assert_array_equal(h.give, [0.1, *np.zeros(9)])
     swapped = stack.hierarchy(state, ("posture", "position"))
     np.testing.assert_array_equal(swapped.give, [*np.zeros(7), 0.1, 0.0, 0.0])
-    assert stack.hierarchy(state, ("posture",)).give is None
+    without = stack.hierarchy(state, ("posture",))
+    assert without.give is None
+    assert without.giving == []
     assert np.abs(h.slacks(make("hcod").solve(h).x)[:3]).max() == pytest.approx(0.1)
     with pytest.raises(HierarchyError, match="task 'position': give has shape"):
         Stack([hand], "velocity", give={"position": [0.1, 0.2]})
     with pytest.raises(HierarchyError, match="positon"):
         Stack([hand], "velocity", give={"positon": 0.1})
+
+
+def test_explain_says_what_gives_how_much_and_for_whom():
+    levels = [(np.array([[1.0, 1.0]]), [1.0]), (np.array([[1.0, 0.9]]), [2.0]),
+              (np.eye(2), [0.0, 0.0])]
+    words = {"rows": ["x", "e", "joint 1", "joint 2"], "units": ["m/s^2"] * 2 + ["rad/s^2"] * 2}
+
+    def said(*give):
+        h = Hierarchy.from_levels(levels, give=give, names=["hand", "elbow", "posture"])
+        return explain(h, make("hcod").solve(h), **words).splitlines()
+
+    hand, elbow, posture = said(0.05, 0.5, 0.0)
+    assert hand == "hand is missed by 0.05: x gives 0.05 of 0.05 m/s^2 for posture."
+    assert elbow == "elbow is missed by 0.5: e gives 0.5 of 0.5 m/s^2 for posture."
+    assert posture.endswith("held back by hand (gives no more) and elbow (gives no more).")
+    hand, elbow, posture = said(0.05, 50.0, 0.0)  # more than the posture has a use for
+    assert elbow == "elbow is missed by 1.1: e gives 1.1 of 50 m/s^2 for the levels below."
+    assert posture.endswith("held back by hand (gives no more).")
+    assert said(0.0, 0.5, 0.0)[0] == "hand is met."
+
+
+def test_explain_tells_what_is_given_from_what_cannot_be_avoided():
+    h = Hierarchy.from_levels([([[1.0]], [0.0], [1.0]), ([[1.0]], [3.0]), ([[1.0]], [0.0])],
+                              names=["limit", "reach", "rest"], give=[0.0, 0.25, 0.0])
+    said = explain(h, make("hcod").solve(h)).splitlines()
+    assert said[1] == ("reach is missed by 2.25, of which 2 cannot be avoided: row 0 gives 0.25 of "
+                       "0.25 for rest.")
+
+
+def test_units_of_another_number_than_the_rows_are_refused():
+    h = problem(1, 0.1)
+    with pytest.raises(HierarchyError, match="explain: 1 units for 14 rows"):
+        explain(h, make("hcod").solve(h), units=["m"])

@@ -5,6 +5,7 @@ from scipy.optimize import lsq_linear
 
 from hierarchy import Hierarchy, HierarchyError
 from solvers import Status, certify, explain, make
+from solvers.problems import structured
 
 INF = np.inf
 HCOD = make("hcod")
@@ -260,3 +261,12 @@ def test_a_level_missed_where_every_number_met_is_zero():
     res = make("hcod").solve(h)
     assert res.status is Status.SOLVED
     assert certify(h, res.x).certified
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_rows_as_small_as_rounding_make_no_answer_large(seed):
+    h = structured(seed, ("tiny_rows",))
+    res = make("hcod").solve(h)
+    assert np.abs(res.x).max() < 1e6
+    if res.status is Status.SOLVED:
+        assert certify(h, res.x).certified

@@ -153,6 +153,7 @@ def test_the_commands_of_a_scenario_come_out_of_c_to_the_last_bit(library, name,
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("unverified")
 def test_the_library_for_any_x86_64_agrees_to_rounding(generic):
     library = c.Library.of(generic)
     for h in hierarchies(50):

@@ -2,6 +2,7 @@
 
 import ast
 import dataclasses
+import pickle
 import subprocess
 import sys
 from pathlib import Path
@@ -9,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hierarchy import HierarchyError
+from hierarchy import Hierarchy, HierarchyError
 from solvers import Resolution, Status, make, names
 
 ROOT = Path(__file__).parents[2]
@@ -19,6 +20,15 @@ def test_names_are_sorted_and_each_makes_its_resolver():
     assert list(names()) == sorted(names())
     assert {"recursive", "tpm", "hqp", "augmented"} <= set(names())
     assert all(make(name).name == name for name in names())
+
+
+@pytest.mark.parametrize("name", [*names(), "tpm-published"])
+def test_a_resolver_that_has_solved_can_be_pickled(name):
+    resolver, h = make(name), Hierarchy.from_levels([(np.eye(3)[:2], [1.0, 2.0])])
+    x = resolver.solve(h).x
+    copied = pickle.loads(pickle.dumps(resolver))
+    assert (copied, copied.handles) == (resolver, resolver.handles)
+    np.testing.assert_array_equal(copied.solve(h).x, x)
 
 
 EVERY = {"damping": 0.0, "threshold": 0.1, "rank_tolerance": 1e-8}

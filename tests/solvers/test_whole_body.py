@@ -156,6 +156,22 @@ def test_torques_that_cannot_hold_the_weight_stay_within_limits_and_the_knees_ar
     assert "torque limits left_knee at its" in said
 
 
+def test_a_falling_robot_gets_torques_within_limits_and_hears_what_blocks_what():
+    """It tips over its toes at 1.5 rad/s: no push of the soles brings the centre of mass back."""
+    tipping = np.zeros(ROBOT.n)
+    com = CentreOfMass(ROBOT, Still((0.0, 0.0, 0.0))).position(STANDING)
+    tipping[[0, 4]] = 1.5 * com[2], 1.5  # [m/s], [rad/s]
+    falling = State.at(ROBOT, ROBOT.rest, tipping)
+    stack = standing_stack(falling, CONTACTS)
+    h, res = solved(stack, falling)
+    assert_physical(h, res.x, falling, CONTACTS)
+    said = dict(line.split(" is ", 1) for line in
+                explain(h, res, rows=stack.row_names()).splitlines())
+    assert said["physics"] == said["limits"] == "met."
+    assert said["centre of mass"].startswith("missed by")
+    assert "friction" in said["centre of mass"]
+
+
 def test_a_hand_presses_with_the_force_it_is_given():
     contacts = soles_and_palm()
     stack = Stack([

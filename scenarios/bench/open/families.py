@@ -23,6 +23,7 @@ from solvers.problems.files import FRESH, PUBLIC, Collection, Head
 COUNT = 50
 _CONSECUTIVE = 200
 _FEW = 20            # where a proof takes seconds
+_SIMULATED = (*stored.RECORDED, "stand-push")
 _STRIDE = 1_000_000  # seeds of single problems between two seeds of halves
 
 Make = Callable[[int, int], Sequence[Hierarchy]]
@@ -122,10 +123,10 @@ _POSTURES = {
 
 def _all() -> dict[str, Family]:
     made = [Family(name, "reference", what, partial(_reference, name),
-                   usual=_FEW if name in stored.RECORDED else COUNT)
+                   usual=_FEW if name in _SIMULATED else COUNT)
             for name, what in _REFERENCE.items()]
     made += [Family(name, "recorded", what, partial(recorded.recorded, name),
-                    recorded.PERIODS[name], _CONSECUTIVE)
+                    recorded.PERIODS[name], _FEW if name in _SIMULATED else _CONSECUTIVE)
              for name, what in recorded.SCENARIOS.items()]
     made += [Family(name, "postures", what, partial(postures.posed, name))
              for name, what in _POSTURES.items()]
@@ -143,6 +144,6 @@ _EXTRA = ("singular-panda", "singular-romeo")
 def available() -> list[Family]:
     """Return the families whose packages are installed."""
     needs = {**dict.fromkeys(_EXTRA, "example_robot_data"),
-             **dict.fromkeys(stored.RECORDED, "mujoco")}
+             **dict.fromkeys(_SIMULATED, "mujoco")}
     return [one for name, one in FAMILIES.items()
             if name not in needs or find_spec(needs[name]) is not None]

@@ -19,8 +19,6 @@ RIGHT = 1e-6
 SOLVED, WRONG = "solved", "called solved, wrong"
 MODEST, FAILED = "called failed, right", "failed"
 REFUSED, RAISED, CRASHED, HUNG = "not asked", "raised", "crashed", "time limit"
-VERDICTS = (SOLVED, MODEST, WRONG, FAILED, RAISED, CRASHED, HUNG, REFUSED)
-"""What can become of a problem, best first."""
 
 
 @final
@@ -28,7 +26,7 @@ VERDICTS = (SOLVED, MODEST, WRONG, FAILED, RAISED, CRASHED, HUNG, REFUSED)
 class Judged:
     """One entrant on one problem; the first six fields are those of the raw row.
 
-    verdict : one of VERDICTS.
+    verdict : one of the eight texts above.
     absolute, relative : largest miss beyond the least of a level, in the unit of its rows, and
         relative to |a| (1 + |x|) with the largest row of the level; NaN without x.
     level : the first missed by more than RIGHT; L for the distance to the reference, or -1.

@@ -13,6 +13,7 @@ from scenarios.bench.open.judge import RIGHT, SOLVED
 from scenarios.bench.open.printing import counted, digits, power
 from scenarios.bench.open.results import Half, Results
 from scenarios.bench.open.summary import Summary
+from scenarios.bench.open.table import OWN
 from scenarios.draw.figures.drawing import svg
 from scenarios.templates import render, resource
 
@@ -47,11 +48,14 @@ def page(found: Results, command: str) -> str:
         halves=[_shown(half) for half in found.halves], heads=ANSWERS, time_heads=TIMES,
         lead=lead(found.halves[0]), command=command, missing=found.missing,
         machine=found.machine,
-        entrants=[(label, found.version(label), found.limits(label)) for label in labels]))
+        entrants=[(label, found.version(label), found.limits.get(label, "")) for label in labels]))
 
 
 def lead(half: Half) -> list[str]:
-    """Return what one half shows, in sentences: who is right most often, where not, who is fast."""
+    """Return what one half shows, in sentences.
+
+    Who is right most often; where another is; where a solver of others is faster; who is fastest.
+    """
     asked = max(one.asked for one in half.whole.values())
     widely = {label: one for label, one in half.whole.items() if one.asked >= _WIDELY * asked}
     most = max(one.right for one in widely.values())
@@ -59,9 +63,12 @@ def lead(half: Half) -> list[str]:
     said = [f"{half.title}: of the entrants that can be asked at least {100.0 * _WIDELY:.0f} % of "
             f"the problems, {listed(best)} solve{'s' if len(best) == 1 else ''} the most, "
             f"{100.0 * most:.1f} %."]
-    better = _better(half, best[0], list(widely))
+    better, faster = _better(half, best[0], list(widely)), _faster(half, best[0])
     if better:
         said.append(f"Another of them is right more often than {best[0]} in {listed(better)}.")
+    if faster:
+        said.append(f"A solver of others is right as often as {best[0]}, and faster, in "
+                    f"{listed(faster)}.")
     fastest: dict[str, list[str]] = {}
     for family in half.families:
         own = {label: half.cells[label, family] for label in half.entrants
@@ -88,6 +95,23 @@ def _better(half: Half, best: str, labels: list[str]) -> list[str]:
         if shares[other] > own:
             found.append(f"{family} ({other}: {100.0 * shares[other]:.0f} % against "
                          f"{100.0 * own:.0f} %)")
+    return found
+
+
+def _faster(half: Half, best: str) -> list[str]:
+    """Return the families in which a solver of others is right as often, and faster, with times."""
+    found = []
+    others = [row.entrant for row in half.rows if not row.version.startswith(OWN.name)]
+    for family in half.families:
+        own = half.cells[best, family]
+        times = {label: one.cold.median for label in dict.fromkeys(others)
+                 if (one := half.cells.get((label, family))) is not None
+                 and one.asked == own.asked and one.right >= own.right
+                 and one.cold.median < own.cold.median}
+        if times:
+            label = min(times, key=times.__getitem__)
+            found.append(f"{family} ({label}: {digits(times[label])} µs against "
+                         f"{digits(own.cold.median)} µs)")
     return found
 
 

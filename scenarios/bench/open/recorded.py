@@ -8,7 +8,7 @@ from typing import Any, final
 import numpy as np
 
 from hierarchy.problem import Hierarchy
-from scenarios.config import Scenario, load
+from scenarios.config import Scenario, ScenarioError, load
 from scenarios.config.sampling import changed, drawn
 from scenarios.loop.controller import Controller
 from scenarios.loop.recording import Recording
@@ -18,13 +18,15 @@ SCENARIOS = {
     "ellipse-hqp": "an arm on a path, with joint limits, distances and a cone as inequalities",
     "ellipse-limits": "an arm on a path inside its joint limits, with Algorithm 1",
     "human-hqp": "an arm beside a moving hand, seen by a camera",
-    "humanoid-reach": "a humanoid asked to reach farther than it can"}
+    "humanoid-reach": "a humanoid asked to reach farther than it can",
+    "stand-push": "a pushed humanoid, torque motors: dynamics, contacts, friction (extra `sim`)"}
 """Scenarios that are recorded, by name."""
 PERIODS = {"ellipse-hqp": 0.001, "ellipse-limits": 0.001, "human-hqp": 0.005,
-           "humanoid-reach": 0.005}
+           "humanoid-reach": 0.005, "stand-push": 0.001}
 """Time between two ticks [s]."""
 _WITHIN = (0.1, 0.7)  # share of a run at which a window begins
 _PUBLIC = 0.4         # the same for the public half
+_RUNS = 20            # sampled runs tried until one lasts to the end of its window
 
 
 def recorded(name: str, seed: int, count: int) -> list[Hierarchy]:
@@ -32,22 +34,30 @@ def recorded(name: str, seed: int, count: int) -> list[Hierarchy]:
 
     seed : 0 for the scenario as shipped; any other samples its start from its [variation], and the
         tick at which the window begins.
+
+    Raises
+    ------
+    ScenarioError : no run lasts to the end of its window.
     """
-    scenario, begin = load(name), _PUBLIC
+    shipped, begin = load(name), _PUBLIC
     if seed:
-        scenario = _varied(scenario, seed)
         begin = float(np.random.default_rng([seed, 3]).uniform(*_WITHIN))
-    first = int(begin * scenario.control.ticks)
-    longest = (first + count) * scenario.control.period
-    window = _Window(first)
-    simulate(changed(scenario, {"control.duration": longest}, name), audits=[window])
-    return window.problems[:count]
+    first = int(begin * shipped.control.ticks)
+    longest = (first + count) * shipped.control.period
+    for run in range(_RUNS if seed else 1):
+        window = _Window(first)
+        scenario = _varied(shipped, seed, run) if seed else shipped
+        simulate(changed(scenario, {"control.duration": longest}, name), audits=[window])
+        if len(window.problems) >= count:
+            return window.problems[:count]
+    raise ScenarioError(f"{name}: no run with seed {seed} has {count} problems from tick {first} "
+                        "on")
 
 
-def _varied(scenario: Scenario, seed: int) -> Scenario:
+def _varied(scenario: Scenario, seed: int, run: int) -> Scenario:
     if not scenario.variation:
         return scenario
-    return changed(scenario, drawn(scenario, scenario.variation, seed, 0), scenario.name)
+    return changed(scenario, drawn(scenario, scenario.variation, seed, run), scenario.name)
 
 
 @final

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -14,9 +12,10 @@ import numpy as np
 
 from hierarchy.errors import HierarchyError
 from scenarios.bench.open.judge import Judged, judge
+from scenarios.bench.open.run import LIMITS, MACHINE, MISSING, read_json
 from scenarios.bench.open.store import Store
 from scenarios.bench.open.summary import Summary, by, summary
-from scenarios.bench.open.table import ENTRANTS, Row
+from scenarios.bench.open.table import ENTRANTS
 from solvers.problems.files import FRESH, Collection, read
 
 
@@ -77,16 +76,15 @@ class Half:
 @final
 @dataclass(frozen=True)
 class Results:
-    """All halves of a folder, fresh ones first; why entrants are missing; the machine."""
+    """All halves of a folder, fresh ones first; why entrants are missing; the machine.
+
+    limits : what is known of each entrant's limits, by label.
+    """
 
     halves: tuple[Half, ...]
     missing: dict[str, str]
     machine: dict[str, str]
-    table: tuple[Row, ...] = ENTRANTS
-
-    def limits(self, label: str) -> str:
-        """Return what is known of an entrant's limits, "" if nothing."""
-        return next((row.limits for row in self.table if row.label == label), "")
+    limits: dict[str, str]
 
     def version(self, label: str) -> str:
         """Return the version of an entrant's package."""
@@ -94,7 +92,7 @@ class Results:
                     if row.entrant == label)
 
 
-def results(folder: Path, table: Sequence[Row] = ENTRANTS) -> Results:
+def results(folder: Path) -> Results:
     """Read and judge a benchmark's folder; raises HierarchyError if it has no rows."""
     store = Store(folder)
     collections = [read(file) for file in sorted(store.problems.glob("[!.]*.npz"))]
@@ -112,18 +110,13 @@ def results(folder: Path, table: Sequence[Row] = ENTRANTS) -> Results:
                            if one.head.family in names else len(names))
          if one.head.seed == seed and one.head.half == (FRESH if seed else "public")})
         for seed in seeds)
-    return Results(halves, _json(folder / "missing.json"), _json(folder / "machine.json"),
-                   tuple(table))
+    return Results(halves, *(read_json(folder / name) for name in (MISSING, MACHINE, LIMITS)))
 
 
 def _order() -> list[str]:
     from scenarios.bench.open.families import FAMILIES
 
     return list(FAMILIES)
-
-
-def _json(file: Path) -> dict[str, str]:
-    return json.loads(file.read_text(encoding="utf-8")) if file.is_file() else {}
 
 
 def _entrant(row: Judged) -> str:

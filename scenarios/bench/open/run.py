@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,8 @@ from scenarios.bench.peers.environments import MissingError
 from scenarios.files import write_json
 from solvers.problems.files import Collection, read
 
+MACHINE, MISSING, LIMITS = "machine.json", "missing.json", "limits.json"
+
 Told = Callable[[str], None]
 
 
@@ -29,18 +32,28 @@ def run(folder: Path, families: Sequence[Family], entrants: Sequence[Row], seeds
     seeds : of the halves; 0 is the public one. count : problems of a half, None for the usual
         number. limit : [s] for one problem. told : gets a line of text now and then.
     """
-    store, missing = Store(folder), dict[str, str]()
+    store = Store(folder)
+    missing, limits = read_json(folder / MISSING), read_json(folder / LIMITS)
     files = _problems(store, families, seeds, count, told)
-    write_json(folder / "machine.json", machine())
+    write_json(folder / MACHINE, machine())
     collections = [read(file) for file in files]
     for row in entrants:
         told(row.label)
+        limits[row.label] = row.limits
+        missing.pop(row.label, None)
         try:
             _add(store, row, files, collections, limit)
         except MissingError as reason:
             missing[row.label] = str(reason)
-    write_json(folder / "missing.json", missing)
+        write_json(folder / LIMITS, limits)
+        write_json(folder / MISSING, missing)
     return store
+
+
+def read_json(file: Path) -> dict[str, str]:
+    """Return what a file of the folder says, {} if there is none yet."""
+    found: dict[str, str] = json.loads(file.read_text("utf-8")) if file.is_file() else {}
+    return found
 
 
 def _add(store: Store, row: Row, files: Sequence[Path], collections: Sequence[Collection],

@@ -45,7 +45,9 @@ TSID = Package("tsid", "tsid", ("tsid==1.7.1", "pin==3.4.0", "cmeel-urdfdom<5",
                                 "cmeel-tinyxml2<11"))
 EMBODIK = Package("embodik", "embodik", ("embodik==0.23.2",))
 ROBOPLAN = Package("roboplan", "roboplan", ("roboplan==0.7.0",))
-PACKAGES = (PINK, MINK, PLACO, TSID, EMBODIK, ROBOPLAN)
+# jax as frax's own documents advise for processors.
+FRAX = Package("frax", "frax", ("frax==0.1.0", "jax==0.4.30", "jaxlib==0.4.30", "numpy<2.1"))
+PACKAGES = (PINK, MINK, PLACO, TSID, EMBODIK, ROBOPLAN, FRAX)
 
 ENTRANTS = (
     Entrant("tpm", OWN, f"{_HERE}.ours:Bounds", {"resolver": "tpm"}),
@@ -60,6 +62,7 @@ ENTRANTS = (
     Entrant("tsid hard", TSID, f"{_HERE}.with_tsid:TsidHard"),
     Entrant("embodiK", EMBODIK, f"{_HERE}.with_embodik:Embodik"),
     Entrant("OInK", ROBOPLAN, f"{_HERE}.with_roboplan:Oink"),
+    Entrant("frax", FRAX, f"{_HERE}.with_frax:Frax"),
     Entrant("mink", MINK, f"{_HERE}.with_mink:Mink"),
     Entrant("mink hard", MINK, f"{_HERE}.with_mink:MinkHard"),
     Entrant("pink", PINK, f"{_HERE}.with_pink:Pink"),

@@ -14,6 +14,7 @@ from typing import Any, final
 from scenarios.bench.peers.entrants import Entrant
 from scenarios.bench.peers.environments import MissingError, python_of
 
+WORKER = "scenarios.bench.peers.worker"
 START_LIMIT = 120.0  # [s] for imports, including compilation of kernels
 TURN_LIMIT = 300.0   # [s]
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
@@ -31,16 +32,18 @@ def stage(folder: Path) -> Path:
 class Process:
     """`scenarios.bench.peers.worker` for one entrant; MissingError where it cannot be had.
 
-    about : what it says of itself. seconds : how long its turns took.
+    about : what it says of itself. seconds : how long its turns took. `worker` is the module that
+    the process runs.
     """
 
-    def __init__(self, entrant: Entrant, scenes: Path, staged: Path, core: int) -> None:
+    def __init__(self, entrant: Entrant, scenes: Path, staged: Path, core: int,
+                 worker: str = WORKER) -> None:
         self.entrant, self.seconds = entrant, 0.0
         self.result = scenes.parent / f"{entrant.label.replace(' ', '-')}.npz"
         self._log = scenes.parent / f"{entrant.label.replace(' ', '-')}.log"
         with self._log.open("w") as log:
             self._process = subprocess.Popen(
-                _command(entrant, scenes, self.result, str(core)), stdin=subprocess.PIPE,
+                _command(entrant, scenes, self.result, str(core), worker), stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE, stderr=log, text=True, cwd=staged,
                 env=_environment(entrant))
         self.about: dict[str, str] = self._answer(START_LIMIT)
@@ -102,8 +105,9 @@ def after_nan(entrant: Entrant, scenes: Path, staged: Path) -> str:
     return str(json.loads(done.stdout))
 
 
-def _command(entrant: Entrant, scenes: Path, result: Path, core: str) -> list[str]:
-    return [python_of(entrant.package), "-m", "scenarios.bench.peers.worker", entrant.adapter,
+def _command(entrant: Entrant, scenes: Path, result: Path, core: str,
+             worker: str = WORKER) -> list[str]:
+    return [python_of(entrant.package), "-m", worker, entrant.adapter,
             json.dumps(dict(entrant.options)), str(scenes), str(result), core]
 
 

@@ -1,49 +1,65 @@
-"""A robot of ours as a URDF file, so that every package reads the same arm."""
+"""A robot of ours as a URDF file, so that every package reads the same robot."""
 
 from __future__ import annotations
 
 import warnings
 import xml.etree.ElementTree as ET
+from collections.abc import Sequence
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from hierarchy.errors import RobotError
 from hierarchy.problem import Array
-from hierarchy.robot import Body, Robot
+from hierarchy.robot import Body, Frame, Robot
 from hierarchy.robots import TABLES
+from hierarchy.robots.table import TreeTable
 
+_AXES = {"x": "1 0 0", "y": "0 1 0", "z": "0 0 1"}
 _FUSED = {"fusestatic": "false"}  # else MuJoCo drops the end effector's link
 
 
-def urdf(robot: Robot) -> str:
-    """Return the text of a URDF of the robot: joints, limits, inertias and its end effector.
+def urdf(robot: Robot, frames: Sequence[Frame] | None = None) -> str:
+    """Return the text of a URDF of the robot: joints, limits, inertias and some of its frames.
 
-    The link that a joint moves is called "link of" and the joint's name; the end effector is a
-    link without mass. RobotError unless the robot was made from a table: all of its joints
-    revolute, about their z axes.
+    The link that a joint moves is called "link of" and the joint's name; each of `frames`, the end
+    effector if None, is a link without mass. The first link of a robot on a floating base is that
+    base. RobotError unless the robot was made from a table.
     """
-    if robot.name not in TABLES or robot.nq != robot.n:
+    floating = robot.base == "floating"
+    if robot.name not in TABLES or robot.nq != robot.n + floating:
         raise RobotError(f"robot {robot.name!r} was not made from a table; its file is its URDF")
     root = ET.Element("robot", name=robot.name)
     ET.SubElement(ET.SubElement(root, "mujoco"), "compiler", _FUSED)
-    links = ["base", *(f"link of {name}" for name in robot.joint_names)]
-    ET.SubElement(root, "link", name=links[0])
-    for i, body in enumerate(robot.bodies()):
-        _add_link(root, links[i + 1], body)
-        joint = _add_joint(root, body.name, "revolute", links[body.parent], links[i + 1],
-                           body.position, body.rotation)
-        ET.SubElement(joint, "axis", xyz="0 0 1")
-        ET.SubElement(joint, "limit", lower=repr(float(robot.lower[i])),
-                      upper=repr(float(robot.upper[i])),
-                      velocity=repr(float(robot.velocity_limit[i])),
-                      effort=repr(float(robot.effort_limit[i])))
-    end = robot.frame(robot.end_effector)
-    ET.SubElement(root, "link", name=end.name)
-    _add_joint(root, f"to {end.name}", "fixed", links[end.joint], end.name, end.offset,
-               end.rotation)
+    table = TABLES[robot.name]
+    axes = [joint.axis for joint in table.joints] if isinstance(table, TreeTable) else (
+        ["z"] * len(robot.joint_names))
+    bodies, links = robot.bodies(), ["base", *(f"link of {name}" for name in robot.joint_names)]
+    if floating:
+        _add_link(root, links[1], bodies[0])
+    else:
+        ET.SubElement(root, "link", name=links[0])
+    for i in range(int(floating), len(bodies)):
+        _add_link(root, links[i + 1], bodies[i])
+        joint = _add_joint(root, bodies[i].name, "revolute", links[bodies[i].parent], links[i + 1],
+                           bodies[i].position, bodies[i].rotation)
+        ET.SubElement(joint, "axis", xyz=_AXES[axes[i - floating]])
+        _add_limits(joint, robot, i)
+    for frame in [robot.frame(robot.end_effector)] if frames is None else frames:
+        ET.SubElement(root, "link", name=frame.name)
+        _add_joint(root, f"to {frame.name}", "fixed", links[frame.joint], frame.name,
+                   frame.offset, frame.rotation)
     ET.indent(root)
     return '<?xml version="1.0"?>\n' + ET.tostring(root, encoding="unicode") + "\n"
+
+
+def _add_limits(joint: ET.Element, robot: Robot, i: int) -> None:
+    """Add the limits of joint i, counted with the floating base."""
+    q, v = robot.model.joints[i + 1].idx_q, robot.model.joints[i + 1].idx_v
+    ET.SubElement(joint, "limit", lower=repr(float(robot.lower[q])),
+                  upper=repr(float(robot.upper[q])),
+                  velocity=repr(float(robot.velocity_limit[v])),
+                  effort=repr(float(robot.effort_limit[v])))
 
 
 def roll_pitch_yaw(R: Array) -> Array:

@@ -10,17 +10,17 @@ With `nan` as CORE it only says, in JSON, what comes of a NaN among the joint po
 from __future__ import annotations
 
 import json
-import os
 import sys
 from collections.abc import Callable
 from importlib import import_module, metadata
 from pathlib import Path
-from time import perf_counter, perf_counter_ns
+from time import perf_counter_ns
 from typing import Any
 
 import numpy as np
 
 from scenarios.bench.peers.scene import Array, RefusedError, Scene, read_scenes
+from scenarios.bench.peers.turns import answers, nanoseconds, pin, reason, take_turns
 
 STEP_TICKS = 2000
 _BEFORE_NAN = 3  # ticks
@@ -48,11 +48,7 @@ class Ticks:
             begin = perf_counter_ns()
             v, failed = self._velocity(self.adapter, goal, rate)
             spent = perf_counter_ns() - begin
-            again = 0
-            if self.resolve is not None and not failed:
-                begin = perf_counter_ns()
-                self.resolve()
-                again = perf_counter_ns() - begin
+            again = 0 if failed else nanoseconds(self.resolve)
             other = v
             if self.other is not None:
                 other, also = self._velocity(self.other, goal, rate)
@@ -67,7 +63,7 @@ class Ticks:
         try:
             v = np.array(adapter.velocity(self.t, self.q, self.v, goal, rate))
         except Exception as error:
-            self.why = self.why or f"{type(error).__name__}: {error}".partition("\n")[0]
+            self.why = self.why or reason(error)
             return np.zeros(len(self.q)), True
         if np.isfinite(v).all():
             return v, False
@@ -97,8 +93,7 @@ def after_nan(scene: Scene, make: Make) -> str:
 def main() -> None:
     """Run from the command line; see the docstring of the module."""
     named, options, scenes_file, result, core = sys.argv[1:]
-    answers = os.fdopen(os.dup(1), "w")
-    os.dup2(2, 1)  # output of a package must not mix with answers
+    answer = answers()
     scenes = read_scenes(Path(scenes_file))
     module, _, name = named.partition(":")
     kind, settings = getattr(import_module(module), name), json.loads(options)
@@ -106,21 +101,14 @@ def main() -> None:
     def make(scene: Scene, posture: bool) -> Any:
         return kind(scene, posture, **settings)
 
-    def answer(value: Any) -> None:
-        print(json.dumps(value), file=answers, flush=True)
-
     if core == "nan":
         answer(after_nan(scenes["ellipse"], make))
         return
-    if hasattr(os, "sched_setaffinity"):
-        os.sched_setaffinity(0, {int(core)})
+    pin(core)
     ellipse = Ticks(scenes["ellipse"], make)
     answer({"version": metadata.version(kind.package), "priorities": kind.priorities,
             "rows": kind.rows})
-    for line in sys.stdin:
-        begin = perf_counter()
-        ellipse.go(*json.loads(line))
-        answer(perf_counter() - begin)
+    take_turns(ellipse.go, answer)
     step = Ticks(scenes["step"], make, beside=True)
     step.go(STEP_TICKS, 0)
     np.savez(result, why=ellipse.why, step_why=step.why, allow_pickle=False,

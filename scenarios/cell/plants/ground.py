@@ -18,7 +18,7 @@ _LEAST_MASS, _LEAST_INERTIA = 1e-6, 1e-9  # [kg], [kg m^2] of a body that only j
 _THICKNESS = 0.01                         # [m] half of that of a sole
 _SLIDING = 0.15                           # [s] time constant of the friction of what slides
 _FLOOR = "the floor"
-_BALL = 0.001                             # [m] radius of a point that touches
+BALL = 0.001                              # [m] radius of a point that touches
 Element = ElementTree.Element
 
 
@@ -106,7 +106,7 @@ def _ball(contact: Contact) -> dict[str, str]:
     """Return a ball whose lowest point in the start's posture need not be the contact's point."""
     frame = contact.frame
     point = frame.offset + frame.rotation @ np.array(contact.points[0], dtype=float)
-    return {"type": "sphere", "pos": text(*point), "size": text(_BALL)}
+    return {"type": "sphere", "pos": text(*point), "size": text(BALL)}
 
 
 def _axes(robot: Robot) -> dict[int, Array]:

@@ -32,7 +32,8 @@ class TorqueRobot:
     `period` [s]. Until the first torques arrive, if they are late, the motors carry the gravity of
     the start. `fault` says why the robot cannot go on, or is None. `extra` has, of the last step of
     the simulation, `com` (3,) [m], `push` (3,) [N], and of each contact `floor_force` (C, 3) [N] in
-    world axes, `slip` (C,) [m] and `pressure_margin` (C,) [m], see `Touch`.
+    world axes, `slip` (C,) [m] and `pressure_margin` (C,) [m]; and `support_margin` () [m], see
+    `Touch`.
 
     Raises ScenarioError if mujoco is not installed, a joint does not turn about one axis, a push is
     on an unknown joint, or the delay is not a whole number of periods.

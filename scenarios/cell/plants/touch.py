@@ -10,6 +10,9 @@ from numpy.typing import NDArray
 from hierarchy.contacts import Contacts
 from hierarchy.problem import Array
 
+_LOADED = 1.0  # [N] of normal force from which a point carries
+_SAME = 1e-6   # [m] between points that count as one
+
 
 @final
 class Touch:
@@ -17,8 +20,9 @@ class Touch:
 
     `force` (C, 3) [N] in world axes; `slip` (C,) [m], how far a contact has moved along the floor
     since it touched down, NaN if it is to slide; `margin` (C,) [m], of the centre of pressure from
-    the nearest edge of the sole, NaN for a point or without force. `signals` has these arrays by
-    the names of signals.
+    the nearest edge of the sole, NaN for a point or without force; `balance` () [m], how far inside
+    the polygon of the loaded points the centre of mass is from above, NaN below three such points.
+    `signals` has these arrays by the names of signals.
     """
 
     def __init__(self, mujoco: Any, model: Any, contacts: Contacts) -> None:
@@ -30,15 +34,17 @@ class Touch:
         self._of_geom = {geom: c for c, geom in enumerate(self._geoms)}
         count = len(self.names)
         self.force, self.slip = np.zeros((count, 3)), np.zeros(count)
-        self.margin = np.full(count, np.nan)
+        self.margin, self.balance = np.full(count, np.nan), np.full((), np.nan)
         self.signals: dict[str, NDArray[Any]] = {
-            "floor_force": self.force, "slip": self.slip, "pressure_margin": self.margin}
+            "floor_force": self.force, "slip": self.slip, "pressure_margin": self.margin,
+            "support_margin": self.balance}
         self._wrench, self._moment = np.zeros(6), np.zeros((count, 3))
         self._anchor: list[Array | None] = [None] * count
 
     def look(self, data: Any) -> None:
         """Read the contacts of the step just made."""
         self.force[:], self._moment[:] = 0.0, 0.0  # moment: sum of normal force times place
+        loaded = []
         for i in range(data.ncon):
             contact = data.contact[i]
             first = self._of_geom.get(contact.geom1)
@@ -47,6 +53,9 @@ class Touch:
             force = contact.frame.reshape(3, 3).T @ self._wrench[:3]
             self.force[c] += force if first is None else -force
             self._moment[c] += self._wrench[0] * contact.pos
+            if self._wrench[0] > _LOADED:
+                loaded.append(contact.pos[:2].copy())
+        self.balance[...] = inside(np.array(loaded), data.subtree_com[0][:2])
         for c, geom in enumerate(self._geoms):
             self._note(c, data.geom_xpos[geom], data.geom_xmat[geom].reshape(3, 3))
 
@@ -65,3 +74,21 @@ class Touch:
             pressure = axes.T @ (self._moment[c] / load - place)
             half = self._model.geom_size[self._geoms[c]]
             self.margin[c] = (half[:2] - np.abs(pressure[:2])).min()
+
+
+def inside(points: Array, place: Array) -> float:
+    """Return how far [m] `place` (2,) is inside the convex hull of points (k, 2), NaN for k < 3.
+
+    That is the distance from the nearest edge, negative outside.
+    """
+    if len(points) < 3:
+        return np.nan
+    along = points[None] - points[:, None]  # from each point to each other
+    length = np.hypot(along[..., 0], along[..., 1])
+    i, j = np.nonzero(length > _SAME)
+    normal = np.stack([-along[i, j, 1], along[i, j, 0]], axis=1) / length[i, j, None]
+    height = normal @ points.T - (normal * points[i]).sum(axis=1)[:, None]
+    edges = (height > -_SAME).all(axis=1)
+    if not edges.any():
+        return np.nan
+    return float((normal * (place - points[i])).sum(axis=1)[edges].min())

@@ -10,7 +10,8 @@ import numpy as np
 
 from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array
-from hierarchy.tasks import Pose, Position
+from hierarchy.tasks import Position
+from hierarchy.tasks.pose import PoseTask
 from scenarios.draw.figures.drawing import colours
 from scenarios.draw.viewer.curves import Lately
 from scenarios.draw.viewer.live import Live
@@ -190,7 +191,7 @@ class LivePage:
         cell = self.live.controller.cell
         times = np.linspace(0.0, self.live.scenario.control.duration, _TRACE)
         paths = [np.array([task.path(t)[0] for t in times])
-                 for task in (cell.position, *cell.listed) if isinstance(task, Position | Pose)]
+                 for task in (cell.position, *cell.listed) if isinstance(task, Position | PoseTask)]
         if cell.position is not None:
             self._middle = (paths[0].min(axis=0) + paths[0].max(axis=0)) / 2 - self._path_offset()
         return paths

@@ -1,0 +1,75 @@
+"""The scenario `crawl`: a quadruped walks one foot at a time, its weight over the other three."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from scenarios import load, simulate
+from scenarios.cell.build import build
+from scenarios.cell.plants.touch import inside
+from scenarios.measure.metrics import measure
+
+CRAWL = load("crawl")
+FEET = "left_front_foot", "right_front_foot", "left_hind_foot", "right_hind_foot"
+FIRST, LIFT, TOUCH = 3, 0.75, 1.15  # the first foot that steps, and when [s]
+
+
+@pytest.fixture(scope="module")
+def first_step():
+    pytest.importorskip("mujoco")
+    return simulate(CRAWL.with_changes({
+        "control.duration": 1.4, "plant.pushes.0.at": 0.3, "plant.pushes.0.force": 20.0}))
+
+
+def test_the_feet_of_the_quadruped_are_below_its_hips_at_the_start():
+    cell = build(CRAWL.with_changes({"start.on_floor": False}))
+    cell.state.move(0.0, *cell.start)
+    for name in FEET:
+        foot, hip = (cell.state.position(cell.robot.frame(frame))
+                     for frame in (name, name.replace("foot", "hip_pitch")))
+        np.testing.assert_allclose(foot, [*hip[:2], 0.0], atol=1e-12)
+    assert cell.robot.n == 18
+    assert cell.robot.masses.sum() == pytest.approx(15.0)
+
+
+def test_each_foot_steps_while_the_others_stand():
+    spans = sorted((*span, name) for name, contact in zip(FEET, CRAWL.contacts, strict=True)
+                   for span in contact.open)
+    assert [name for *_, name in spans] == 2 * [FEET[3], FEET[1], FEET[2], FEET[0]]
+    assert all(before[1] < after[0] for before, after in pairwise(spans))
+
+
+@pytest.mark.slow
+def test_a_foot_steps_with_the_weight_over_the_other_three(first_step):
+    assert first_step.fault is None
+    t, force = first_step["t"], first_step["floor_force"]
+    air = (t > LIFT + 0.01) & (t < TOUCH - 0.01)
+    assert (force[air, FIRST] == 0.0).all()
+    assert force[air][:, [0, 1, 2], 2].min() > 1.0
+    assert first_step["support_margin"][air].min() > 0.03
+    moved = first_step["task_position_right_hind_foot"]
+    np.testing.assert_allclose(moved[-1] - moved[0], [0.12, 0.0, 0.0], atol=5e-3)
+    assert moved[:, 2].max() == pytest.approx(0.06, abs=5e-3)
+    assert measure(first_step)["torque_step_max"].value <= CRAWL.limits.torque_step
+
+
+@pytest.mark.slow
+def test_physics_does_what_was_predicted_while_contacts_stick(first_step):
+    """Contacts of MuJoCo are soft: they give way where the planned forces change."""
+    t = first_step["t"]
+    quiet = (t > 0.6) & (t < 0.74) | (t > 0.85) & (t < 1.1)
+    planned, meant = first_step["planned_force"], first_step["planned_acceleration"]
+    assert np.abs(first_step["floor_force"] - planned)[quiet].max() < 0.5  # [N], of 147
+    happened = np.diff(first_step["v"], axis=0) / 1e-3
+    error = np.abs(happened - meant[:-1])[quiet[:-1]].max(axis=1)
+    assert np.abs(happened[quiet[:-1]]).max() > 50.0                    # [m/s^2, rad/s^2]
+    assert np.percentile(error, 95.0) < 1.0
+
+
+@pytest.mark.parametrize(("place", "found"), [
+    ((0.5, 0.5), 0.5), ((0.9, 0.4), 0.1), ((1.2, 0.5), -0.2), ((0.0, 0.3), 0.0)])
+def test_the_margin_of_support_is_that_from_the_nearest_edge(place, found):
+    corners = np.array([(0.0, 0.0), (1.0, 1.0), (1.0, 0.0), (0.0, 1.0), (0.5, 0.2), (0.0, 0.0)])
+    assert inside(corners, np.array(place)) == pytest.approx(found)
+    assert np.isnan(inside(corners[:2], np.array(place)))
