@@ -8,7 +8,7 @@ import signal
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from importlib.util import find_spec
 from typing import Any
 
@@ -35,6 +35,7 @@ LARGEST_BATCH = 16     # runs per worker that are lost if everything is killed
 _BATCHES_EACH = 4      # per worker at least, so that workers finish at about the same time
 _QUEUED_EACH = 3       # batches per worker that are submitted at a time
 _DEATHS = 1            # workers a batch may kill; after one more its jobs run one at a time
+_LOSSES = 3            # times in a row that a batch is submitted anew to a scheduler that was lost
 _PATIENCE = 30.0       # [s] for a scheduler to answer and to have a worker
 _RESTART = 600.0       # [s] for a worker that died to be started again, on a machine under load
 
@@ -88,13 +89,19 @@ def connected(workers: int | None = None, scheduler: str | None = None) -> Itera
                 # By default Dask gives up a worker that is not back after 15 s, and waits for ever.
                 "distributed.deploy.lost-worker-timeout": f"{_RESTART:.0f} s",
                 "distributed.worker.profile.enabled": False}  # its samples would fill the memory
-    with dask.config.set(settings), LocalCluster(
+    with dask.config.set(settings):
+        cluster = LocalCluster(
             n_workers=workers or processors(), threads_per_worker=1, processes=True,
             host="127.0.0.1", dashboard_address="127.0.0.1:0",  # any free port and no dashboard
             scheduler_kwargs={"dashboard": False}, security=_security(),
-            silence_logs=logging.CRITICAL) as cluster, Client(cluster) as client:
-        client.register_plugin(_LeaveInterrupts())
-        yield client
+            silence_logs=logging.CRITICAL)
+        try:
+            with Client(cluster) as client:
+                client.register_plugin(_LeaveInterrupts())
+                yield client
+        finally:
+            with suppress(AssertionError):  # it cannot end a worker that is just being started
+                cluster.close()
 
 
 def carry_out(jobs: Sequence[Job], client: Client, keep: Callable[[list[Outcome]], object],
@@ -134,24 +141,44 @@ def _results(client: Client, work: Work, batches: Sequence[Sequence[Job]], queue
              ) -> Iterator[tuple[Sequence[Job], list[Outcome] | None]]:
     """Yield each batch with its outcomes as it finishes, None if it killed its workers.
 
-    At most `queued` batches per worker are submitted at a time, one in all if that is 0.
+    At most `queued` batches per worker are submitted at a time, one in all if that is 0. Those that
+    a scheduler forgets when the connection breaks are submitted anew once it answers again.
     """
-    waiting = iter(batches)
+    waiting, forgotten = iter(batches), 0
     running: dict[str, Sequence[Job]] = {}
     done = as_completed()
 
+    def submit(part: Sequence[Job]) -> None:
+        future = client.submit(work, part, digest(), pure=False)
+        running[future.key] = part
+        done.add(future)
+
     def fill() -> None:
         while len(running) < max(1, queued * _threads(client)) and (part := next(waiting, None)):
-            future = client.submit(work, part, digest(), pure=False)
-            running[future.key] = part
-            done.add(future)
+            submit(part)
 
     fill()
     while running:
         future = _next(done, client)
-        yield running.pop(future.key), _outcomes(future)
+        part = running.pop(future.key)
+        if future.status == "cancelled" and forgotten < _LOSSES * (len(running) + 1):
+            _wait_for_scheduler(client)
+            forgotten += 1
+            submit(part)
+            continue
+        forgotten = 0
+        yield part, _outcomes(future)
         future.release()
         fill()
+
+
+def _wait_for_scheduler(client: Client) -> None:
+    """Wait until the connection is there again; EngineError if it is not."""
+    ends = time.monotonic() + _PATIENCE
+    while client.status != "running":
+        if client.status != "connecting" or time.monotonic() > ends:
+            raise EngineError("the scheduler is lost; finished runs are kept")
+        time.sleep(0.01)
 
 
 def _next(done: as_completed, client: Client) -> Future:

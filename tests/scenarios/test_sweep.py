@@ -265,6 +265,20 @@ def test_a_run_that_kills_its_workers_is_a_row_and_those_beside_it_are_made(tmp_
     assert "every worker that started this run died" in broken[0].error
 
 
+def test_a_connection_that_breaks_is_made_anew_and_loses_nothing(tmp_path, cluster):
+    jobs, found = [one.job for one in plan(load_sweep(write(tmp_path))).runs], []
+
+    def keep(outcomes):
+        if not found:
+            client.loop.add_callback(client.scheduler_comm.comm.abort)
+        found.extend(outcomes)
+
+    with connected(scheduler=cluster) as client:
+        carry_out(jobs, client, keep, batch=1)
+    assert sorted(one.key for one in found) == sorted(job.key for job in jobs)
+    assert not any(one.error for one in found)
+
+
 def test_a_sweep_that_is_killed_goes_on_where_it_stopped(tmp_path):
     path, out = write(tmp_path, samples="20", duration="0.5"), tmp_path / "out"
     command = [sys.executable, "-m", "scenarios.cli.main", "sweep", str(path), "--out", str(out),
