@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
+from numba.core.errors import NumbaError
 from numpy.typing import ArrayLike, NDArray
 
 from hierarchy.avoidance.measurement import Measurement
@@ -19,6 +20,8 @@ from hierarchy.kinematics import Kinematics
 from hierarchy.notebook import numbers
 from hierarchy.problem import Array
 from hierarchy.robot import Frame, Robot
+
+_MISFIT = -1  # arrays of other shapes
 
 
 class Dynamics(NamedTuple):
@@ -69,7 +72,6 @@ class State:
         self.q, self.v = pin.neutral(robot.model), np.zeros(robot.n)
         self.measurement: Measurement | None = None
         self.commanded: Array | None = None
-        self._shapes = self.q.shape, self.v.shape
         self._model, self._data = robot.model, robot.model.createData()
         self._compute = partial(pin.computeJointJacobiansTimeVariation, self._model, self._data,
                                 self.q, self.v)
@@ -116,13 +118,13 @@ class State:
         v are arrays of these shapes.
         """
         try:
-            fits = (q.shape, v.shape) == self._shapes
-        except AttributeError:
-            fits = False
-        if not fits:
+            copied = _copy_if_finite(q, v, self.q, self.v)
+        except (TypeError, AttributeError, NumbaError):  # no arrays of numbers
+            copied = _MISFIT
+        if copied == _MISFIT:
             raise RobotError(f"robot {self.robot.name!r}: State.move: expected arrays q "
                              f"{self.q.shape} and v {self.v.shape}, got {brief(q)} and {brief(v)}")
-        if not _copy_if_finite(q, v, self.q, self.v):
+        if not copied:
             return False
         if self.period > 0.0 and self._started:
             self._keep_kinematics()
@@ -196,17 +198,20 @@ class State:
 
 @compiled
 def _copy_if_finite(q, v, to_q, to_v):
+    """Return 1, or 0 if an entry is not finite, or _MISFIT for arrays of other shapes."""
+    if q.shape != to_q.shape or v.shape != to_v.shape:
+        return _MISFIT
     for i in range(len(q)):
         if not np.isfinite(q[i]):
-            return False
+            return 0
     for i in range(len(v)):
         if not np.isfinite(v[i]):
-            return False
+            return 0
     for i in range(len(q)):
         to_q[i] = q[i]
     for i in range(len(v)):
         to_v[i] = v[i]
-    return True
+    return 1
 
 
 @compiled
