@@ -56,6 +56,7 @@ _SMALLEST = 1e-30   # norm of a row relative to the largest of its level: lower 
 _CLEAR = 0.1        # relative pivot: smaller ones do not add to the uncertainty of parallel rows
 _SPAN = 4.0         # turn of a span over the angle of a dropped row, per smallest pivot, at most
 _UNSEEN = 1e4       # weight of directions that no row of a level sees, relative to the weakest seen
+_BLOCK = 32         # columns that LAPACK reflects at a time
 _LARGEST = 1e150    # length: its square stays finite
 _SMALL = 1e-15      # relative: smaller steps and pivots are rounding
 _ROUNDING = 64 * float(np.finfo(float).eps)
@@ -300,12 +301,10 @@ def _complement(Z: Array, rows: Array, parallel: float) -> tuple[Array, float, f
 
     The pivots are the smallest that counts and the largest that counts as zero.
     """
-    from scipy.linalg import qr
-
-    q, r, _ = qr((rows @ Z).T, pivoting=True, check_finite=False)
-    pivots = np.abs(np.diagonal(r))
+    qr = _QR.of((rows @ Z).T)
+    pivots = np.abs(qr.pivots)
     rank = int(np.count_nonzero(pivots > parallel))
-    return (Z @ q[:, rank:], float(pivots[:rank].min(initial=1.0)),
+    return (qr.from_the_right(Z)[:, rank:], float(pivots[:rank].min(initial=1.0)),
             float(pivots[rank:].max(initial=0.0)))
 
 
@@ -434,23 +433,19 @@ class _View:
     @staticmethod
     def of(P: Array, size: Array, parallel: float) -> _View:
         """Factorise rows P (m, p), projections of unit rows that represent rows of these sizes."""
-        from scipy.linalg import qr
-
         V, T, thinnest, angle, rank = _graded(P, size, parallel)
         by_size = np.argsort(-size, kind="stable")
-        q, R, order = qr((T[:rank] * size**2).T[by_size], mode="economic", pivoting=True,
-                         check_finite=False)
-        Q = np.empty_like(q)
-        Q[by_size] = q
-        return _View(Q, R, order, V[:, :rank], V[:, rank:], thinnest, angle, parallel)
+        qr = _QR.of((T[:rank] * size**2).T[by_size])
+        Q = np.empty((len(size), rank))
+        Q[by_size] = qr.from_the_left(np.eye(len(size), rank))
+        return _View(Q, qr.raw[:rank], qr.order, V[:, :rank], V[:, rank:], thinnest, angle,
+                     parallel)
 
     def weighted(self, rows: Array) -> tuple[Array, Array]:
         """Return the effect of rows (k, p) on a balance, as columns (p, k) in lengths of the level.
 
         Also returns the size of the terms summed in each entry, to which rounding is relative.
         """
-        from scipy.linalg import solve_triangular
-
         if not len(rows):
             return np.empty((len(self.directions), 0)), np.empty((len(self.directions), 0))
         outside, length = rows @ self.rest, norm(rows, axis=1)
@@ -459,7 +454,7 @@ class _View:
             return np.asarray(outside.T), np.tile(length, (outside.shape[1], 1))
         seen = rows @ self.directions
         seen[np.abs(seen) <= _ROUNDING * length[:, None]] = 0.0
-        inside = solve_triangular(self.R, seen[:, self.order].T, trans="T", check_finite=False)
+        inside = _solve_triangular(self.R, seen[:, self.order].T, trans=1)
         weight = _UNSEEN / float(np.abs(np.diagonal(self.R)).min())
         return (np.vstack([inside, weight * outside.T]),
                 np.vstack([np.abs(inside), np.tile(weight * length, (outside.shape[1], 1))]))
@@ -471,17 +466,16 @@ def _graded(P: Array, size: Array, parallel: float) -> tuple[Array, Array, float
     Pivots are chosen by the size of the remainder of a row. A row with a remainder of at most
     `parallel` of itself is not a pivot, and its remainder counts as zero.
     """
-    from scipy.linalg import qr
-
     candidate = norm(P, axis=1) > parallel
     while True:
         chosen = np.flatnonzero(candidate)
-        V, R, order = qr((P[chosen] * size[chosen, None]).T, pivoting=True, check_finite=False)
-        pivots = np.abs(np.diagonal(R)) / size[chosen[order]][:min(R.shape)]
+        qr = _QR.of((P[chosen] * size[chosen, None]).T)
+        pivots = np.abs(qr.pivots) / size[chosen[qr.order]][:len(qr.pivots)]
         lost = pivots <= parallel
         if not lost.any():
             break
-        candidate[chosen[order[int(np.argmax(lost))]]] = False
+        candidate[chosen[qr.order[int(np.argmax(lost))]]] = False
+    V = qr.from_the_left(np.eye(P.shape[1]))
     T = V.T @ P.T
     left = np.sqrt(np.cumsum(T[::-1]**2, axis=0)[::-1])
     out = left <= 0.5 * parallel  # half: the remainder of a pivot must survive rounding
@@ -593,22 +587,78 @@ def _least_squares(D: Array, b: Array, free: Mask) -> tuple[Array, Array]:
     Heavy rows come first. The residual comes from the reflections, not from a difference, so the
     small residual of a heavy row is as accurate as the rest (Cox, Higham 1998).
     """
-    from scipy.linalg import lapack, qr, solve_triangular
-
+    s = np.zeros(D.shape[1])
     if not free.any():
-        return np.zeros(D.shape[1]), b.copy()
-    (raw, tau), r, order = qr(D[:, free], mode="raw", pivoting=True, check_finite=False)
-    depth = min(r.shape)
-    raw = raw[:, :depth]
-    inside, s = lapack.dormqr("L", "T", raw, tau, b[:, None], 64)[0][:, 0], np.zeros(D.shape[1])
-    rounding = _SMALL * np.minimum(norm(r, axis=0)[:depth],  # of each column and row
-                                   np.abs(D[:, free]).max(axis=1)[:depth])
-    pivots = np.abs(np.diagonal(r)) > rounding
+        return s, b.copy()
+    chosen = D[:, free]
+    qr = _QR.of(chosen)
+    depth = len(qr.pivots)
+    inside = qr.from_the_left(b[:, None], "T")[:, 0]
+    rounding = _SMALL * np.minimum(norm(chosen, axis=0)[qr.order[:depth]],  # of columns and rows
+                                   np.abs(chosen).max(axis=1)[:depth])
+    pivots = np.abs(qr.pivots) > rounding
     rank = len(pivots) if pivots.all() else int(np.argmin(pivots))
-    solved = solve_triangular(r[:rank, :rank], inside[:rank], check_finite=False)
-    s[np.flatnonzero(free)[order[:rank]]] = solved
+    solved = _solve_triangular(qr.raw[:rank, :rank], inside[:rank, None])[:, 0]
+    s[np.flatnonzero(free)[qr.order[:rank]]] = solved
     inside[:rank] = 0.0
-    return s, lapack.dormqr("L", "N", raw, tau, inside[:, None], 64)[0][:, 0]
+    return s, qr.from_the_left(inside[:, None])[:, 0]
+
+
+@final
+@dataclass(frozen=True)
+class _QR:
+    """QR with pivoting of a matrix (m, n), as LAPACK keeps it: scipy's qr takes twice the time.
+
+    raw (m, n) : R above the diagonal, the reflections below it, with the factors tau.
+    order (n,) : the columns in the order of R.
+    """
+
+    raw: Array
+    tau: Array
+    order: NDArray[np.int64]
+
+    @staticmethod
+    def of(matrix: Array) -> _QR:
+        """Factorise a matrix."""
+        from scipy.linalg import lapack
+
+        m, n = matrix.shape
+        if not (m and n):
+            return _QR(np.empty((m, n)), np.empty(0), np.arange(n))
+        raw, order, tau, _, _ = lapack.dgeqp3(matrix, 2 * n + (n + 1) * _BLOCK)
+        return _QR(raw, tau, order - 1)
+
+    @property
+    def pivots(self) -> Array:
+        """The diagonal of R: (min(m, n),)."""
+        return np.diagonal(self.raw)
+
+    def from_the_left(self, matrix: Array, trans: str = "N") -> Array:
+        """Return Q or Q^T times a matrix (m, k)."""
+        return self._times("L", matrix, trans)
+
+    def from_the_right(self, matrix: Array) -> Array:
+        """Return a matrix (k, m) times Q."""
+        return self._times("R", matrix, "N")
+
+    def _times(self, side: str, matrix: Array, trans: str) -> Array:
+        from scipy.linalg import lapack
+
+        if not (len(self.tau) and matrix.size):
+            return matrix.copy()
+        found: Array = lapack.dormqr(side, trans, self.raw[:, :len(self.tau)], self.tau, matrix,
+                                     max(matrix.shape) * _BLOCK)[0]
+        return found
+
+
+def _solve_triangular(R: Array, b: Array, trans: int = 0) -> Array:
+    """Return R^-1 b, or R^-T b if trans is 1, for the upper triangle of R (k, k) and b (k, c)."""
+    from scipy.linalg import lapack
+
+    if not b.size:
+        return b.copy()
+    found: Array = lapack.dtrtrs(R, b, trans=trans)[0]
+    return found
 
 
 def _length(v: Array) -> float:
