@@ -61,7 +61,7 @@ class Rows:
 
 def rows_of(study: str, results: Results, command: str, seed: int) -> Rows:
     """Return the rows of a study from its results."""
-    shown = results.shown()
+    shown = sorted(results.shown(), key=lambda one: one.name)  # found in the order of the runs
     metrics: dict[str, dict[str, object]] = {
         one.name: {"label": one.label, "unit": one.unit} for one in shown}
     values = {label: {one.name: plain(results.column(one.name, label)) for one in shown}
