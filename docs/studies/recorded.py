@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from hierarchy.problem import Array, Hierarchy
-from scenarios import load, simulate
+from scenarios import Recording, Scenario, load, simulate
 from scenarios.loop.controller import Controller
 from solvers import make
 
@@ -22,12 +22,17 @@ def recorded(name: str, ticks: int) -> list[Hierarchy]:
     """Return the problems of the first ticks of a scenario, which all have one shape."""
     scenario = load(name)
     run = simulate(scenario.with_changes({"control.duration": ticks * scenario.control.period}))
+    return problems_at(run, scenario)
+
+
+def problems_at(run: Recording, scenario: Scenario) -> list[Hierarchy]:
+    """Return what a scenario asks of its resolver in the states of a run."""
     controller, problems = Controller(scenario), []
     for t, q, v in zip(run["t"], run["q"], run["v"], strict=True):
         controller.command(t, q, v)
         h = controller.hierarchy
         problems.append(Hierarchy(h.A.copy(), h.lower.copy(), h.upper.copy(), h.sizes.copy(),
-                                  h.reference.copy(), h.names))
+                                  h.reference.copy(), h.names, give=h.give))
     return problems
 
 

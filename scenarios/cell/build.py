@@ -86,7 +86,9 @@ def build(scenario: Scenario, kept: Cell | None = None) -> Cell:
     areas = areas_of(scenario)
     limits, first = limits_of(scenario, robot)
     if contacts is not None:
-        first = [*physics_of(scenario, contacts), *first]
+        bounded = scenario.limits is not None and scenario.limits.place == "bounds"
+        physics = physics_of(scenario, contacts)
+        first = [*first, *physics] if bounded else [*physics, *first]
     position, pointing = position_of(scenario, here), pointing_of(scenario, here)
     listed = [_listed(section, here, contacts) for section in scenario.tasks
               if section.kind != "collision"]

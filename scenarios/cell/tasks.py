@@ -62,7 +62,8 @@ def limits_of(scenario: Scenario, robot: Robot) -> tuple[JointLimits | None, lis
             limits, sensed_points(robot), section.danger_reach, name=limits.name)
         if not scenario.limits_in_stack:
             return limits, []
-        torque = [] if section.torque is None or scenario.control.level == "torque" else [
+        elsewhere = scenario.control.level == "torque" or section.place == "bounds"
+        torque = [] if section.torque is None or elsewhere else [
             TorqueLimits(robot, section.torque)]  # with contact forces: scenarios.cell.forces
     except HierarchyError as error:
         raise ScenarioError(f"limits: {error}") from error

@@ -183,13 +183,15 @@ class Scenario(Section):
         """Whether the joint limits are a level of the stack under its resolver."""
         if self.limits is None or self.limits.place == "guard" or self.control.stack in RIVALS:
             return False
-        return self.limits.place == "stack" or self.make_resolver().can_resolve(
+        return self.limits.place in ("stack", "bounds") or self.make_resolver().can_resolve(
             "bounds" if self.control.level != "torque" else "inequalities")
 
     @property
     def forces_in_stack(self) -> bool:
         """Whether the limits of contact forces and torques are a level of the stack."""
-        return self.control.level == "torque" and (self.limits is None or self.limits_in_stack)
+        limits = self.limits
+        return self.control.level == "torque" and (
+            limits is None or (self.limits_in_stack and limits.place != "bounds"))
 
     @property
     def asks(self) -> Handles:
@@ -205,7 +207,8 @@ class Scenario(Section):
         if self.forces_in_stack and (self.contacts or self.limits):
             return "inequalities"
         limits = self.limits if self.limits_in_stack else None
-        bounds = self.control.metric == "identity" and not (limits and limits.torque)
+        bounds = self.control.metric == "identity" and not (
+            limits and limits.torque and limits.place != "bounds")
         if inequalities or (limits and not bounds):
             return "inequalities"
         return "bounds" if limits else "equalities"

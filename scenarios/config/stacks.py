@@ -36,8 +36,8 @@ def _unfit_control(control: ControlSection, limits: LimitsSection | None) -> Ite
     if control.level != "velocity":
         yield (f'{kind} needs control.level = "velocity", got "{control.level}": the method '
                "commands rates that may change at once, which accelerations cannot")
-    if limits and limits.place == "stack":
-        yield f'{kind} needs limits.place = "guard", got "stack"'
+    if limits and limits.place in ("stack", "bounds"):
+        yield f'{kind} needs limits.place = "guard", got "{limits.place}"'
     if control.transition != "none":
         yield f'control.transition = "{control.transition}" does not go with {kind}'
     if control.strictness:

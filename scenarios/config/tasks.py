@@ -114,7 +114,8 @@ class LimitsSection(Section):
 
     With `place` = "guard" they are not in the stack: each command is clamped to them joint by
     joint, regardless of the tasks, which works with every resolver. "either": in the stack if the
-    resolver handles bounds, otherwise a guard.
+    resolver handles bounds, otherwise a guard. "bounds": in the stack, above all else, as far as
+    they bound single unknowns: without torque limits and the limits of contact forces.
 
     Position and velocity limits are those of the robot; `acceleration` [rad/s^2] is one value for
     all joints or one each; `margin` [rad] shrinks the position limits; `torque` is the usable share
@@ -125,7 +126,7 @@ class LimitsSection(Section):
     """
 
     acceleration: Positive | tuple[Positive, ...]
-    place: Literal["stack", "guard", "either"] = "stack"
+    place: Literal["stack", "guard", "either", "bounds"] = "stack"
     margin: NotNegative = 0.0
     danger_reach: Positive | None = None
     torque: Annotated[float, Field(strict=True, gt=0.0, le=1.0)] | None = None

@@ -274,7 +274,7 @@ BLOCKS: dict[str, Block] = {
     "human-claims": partial(claims, listed=HUMAN_CLAIMS),
     "standing": partial(table, study="standing", metrics=_STANDING, interval=True),
     "standing-levels": partial(by_metric, study="standing", metrics=_MISSED,
-                               columns=("strict", "give", "weighted", "equalities")),
+                               columns=("strict", "give", "weighted", "bounds", "equalities")),
     "standing-claims": partial(claims, listed=STANDING_CLAIMS),
     "human": partial(table, study="human", metrics=_HUMAN_RUNS),
     "findings": findings}

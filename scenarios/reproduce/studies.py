@@ -136,12 +136,13 @@ HUMAN = Study("human", "A hand, a depth camera, an arm under position control", 
 
 _PUSHED = {"control.duration": 1.5}
 _UNKNOWN = {**_PUSHED, "plant.joint_friction": 1.0, "plant.delay": 0.002}  # N m, s
-_GIVING = {"tasks.0.give": 0.2, "tasks.1.give": 5.0, "tasks.2.give": 5.0}  # m/s^2
+GIVING = {"tasks.0.give": 0.2, "tasks.1.give": 5.0, "tasks.2.give": 5.0}  # m/s^2
 
 STANDING = Study("standing", "A humanoid that is pushed", (
     Column("strict", "stand-push", "hcod", _PUSHED),
-    Column("give", "stand-push", "hcod", {**_GIVING, **_PUSHED}),
+    Column("give", "stand-push", "hcod", {**GIVING, **_PUSHED}),
     Column("weighted", "stand-push", "weighted", _PUSHED),
+    Column("bounds", "stand-push", "tpm", {"limits.place": "bounds", **_PUSHED}),
     Column("equalities", "stand-push", "tpm", _PUSHED),
     Column("strict-unknown", "stand-push", "hcod", _UNKNOWN),
     Column("weighted-unknown", "stand-push", "weighted", _UNKNOWN)))

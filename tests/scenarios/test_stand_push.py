@@ -51,6 +51,20 @@ def test_what_does_not_fit_together_is_refused_by_its_key(keys, said):
         changed(**keys)
 
 
+def test_a_resolver_with_bounds_alone_keeps_those_of_single_joints_above_all_else():
+    """Without torque limits and friction, which are no bounds."""
+    pytest.importorskip("mujoco")
+    scenario = SHORT.with_changes({"limits.place": "bounds"}).with_resolver("tpm")
+    assert scenario.asks == "bounds"
+    cell = build(scenario)
+    assert cell.stack.names == (LEVELS[2], LEVELS[0], *LEVELS[3:])
+    h = cell.stack.hierarchy(cell.state)
+    assert (np.count_nonzero(h.A[:h.sizes[0]], axis=1) == 1).all()
+    run = simulate(scenario)
+    assert run.fault is None
+    assert (run["status"] == Status.SOLVED).all()
+
+
 @pytest.mark.parametrize(("keys", "said"), [
     ({"contacts__0__frame": "left_fot"}, "left_fot.*left_foot"),
     ({"contacts__1__frame": "left_foot"}, "contacts: contact 'left_foot': two contacts"),
