@@ -42,7 +42,7 @@ def solve_ik(robot: Robot, q: ArrayLike, tasks: Sequence[Task], *, dt: float = 0
     """Return the joint velocity that serves `tasks` at q, most important first.
 
     Move on with `q = robot.integrate(q, step.v * dt)`. A loop at a fixed rate saves the set-up of
-    each call with a `Stack` and a `State` of its own, see docs/tutorial.md.
+    each call with a `Stack` and a `State` of its own, see docs/loop.md.
 
     Parameters
     ----------

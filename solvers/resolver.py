@@ -36,9 +36,10 @@ _RESOLVED: dict[str, str] = {
 class Resolver(ABC):
     """Abstract solver of a task hierarchy: an immutable record of its settings.
 
-    Without damping every strict resolver gives the same x. Damping has one meaning on equalities in
-    `tpm`, `recursive`, `hcod`, `hqp` and `sns`; `damps` and `damps_with_bounds` name it, and what
-    the others damp. docs/theory/resolver-notes.md has the exact definitions.
+    Without damping every strict resolver gives the same x, `sns` while no bound acts. Damping has
+    one meaning on equalities in `tpm`, `recursive`, `hcod`, `hqp` and `sns`; `damps` and
+    `damps_with_bounds` name it, and what the others damp. Definitions:
+    docs/theory/resolver-notes.md.
 
     damping : lambda_max of the variable damping near a singularity; 0 = off.
     threshold : singular value below which damping starts, in the unit of the rows.

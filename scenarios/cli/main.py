@@ -228,7 +228,7 @@ def reproduce(names: Annotated[list[str] | None, typer.Argument(
     """Regenerate the numbers in the documentation.
 
     They are written into the pages of a checkout as each study or command ends. Run the same
-    command again to resume an interrupted one. While timings are made nothing else should run.
+    command again to resume an interrupted one. Nothing else should run while timings are made.
     """
     from scenarios.cli.reproduce import fill_command, reproduce_command
 

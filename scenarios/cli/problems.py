@@ -86,9 +86,9 @@ def export(family: Annotated[list[str], typer.Argument(
 @problems.command()
 def check(file: Annotated[Path, typer.Argument(metavar="FILE", help="A file of problems.")],
           as_json: AsJson = False) -> int:
-    """Read a file, prove its answers anew, and compare.
+    """Read a file, prove its answers again, and compare.
 
-    Exit code 1 if an answer in the file is another.
+    Exit code 1 if an answer in the file differs.
     """
     from scenarios.bench.open.exported import check as compare
     from solvers.problems.files import read

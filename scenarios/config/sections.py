@@ -68,8 +68,8 @@ class JitterSection(Section):
 class _AnyPath(Section):
     """What every path may have.
 
-    `out_of_reach`: spans of time [s] in which the robot cannot be on the path. Nothing is done
-    with them in the loop; metrics tell how the robot comes back.
+    `out_of_reach`: spans of time [s] in which the robot cannot be on the path. The loop ignores
+    them; metrics say how the robot comes back.
     """
 
     jitter: JitterSection | None = None
@@ -104,8 +104,8 @@ class EllipseSection(_AnyPath):
 class WaypointsSection(_AnyPath):
     """Points [m] at increasing times [s], at rest at each point.
 
-    With `blend` [s] it passes each point in a curve of that time, without stopping, half of it
-    later: see hierarchy.paths.Blended.
+    With `blend` [s] it does not stop: it rounds each point in a curve of that duration and is
+    nearest to it half that time later, see hierarchy.paths.Blended.
     """
 
     kind: Literal["waypoints"]

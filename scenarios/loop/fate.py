@@ -1,4 +1,4 @@
-"""The fate of each level under the command that was sent: met, not acting, or given up."""
+"""The fate of each level under the command that was sent: met, inactive or missed."""
 
 # mypy: disable-error-code="no-untyped-def"
 
@@ -27,7 +27,7 @@ class Fate(IntEnum):
     UNKNOWN = 1  # in the stack; its rows are not known after the run
     FREE = 2     # one-sided rows, none of them at a side: it does not act
     MET = 3      # rows that act, and are met
-    MISSED = 4   # given up, as far as its violation says
+    MISSED = 4   # by the norm of its violation
 
 
 class Judged(NamedTuple):

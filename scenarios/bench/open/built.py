@@ -56,11 +56,11 @@ def _soth(checkout: Path) -> list[Row]:
 def _lexls(checkout: Path) -> list[Row]:
     _demand(checkout / "include" / "lexls" / "lexlsi.h", "LexLS")
     folder, include = _folder("lexls", checkout), f"-I{checkout / 'include'}"
-    limits = "BSD-2-Clause. Absolute tolerances; x from the level of a reference."
+    limits = "BSD-2-Clause. Absolute tolerances; the reference is one more level."
     return [_row("LexLS", checkout, _compiled(folder, "lexls", [include]), limits),
             _row("LexLS bounds", checkout,
                  _compiled(folder, "lexls", [include, "-DBOUNDS"], "bounds"),
-                 f"{limits} A first level of the identity as simple bounds."),
+                 f"{limits} Bounds in a first level are given as such."),
             _row("LexLSE", checkout, _compiled(folder, "lexlse", [include]),
                  "BSD-2-Clause. The kernel for equalities.", equalities=True)]
 

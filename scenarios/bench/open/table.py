@@ -48,8 +48,8 @@ _LIMITS = {
     "weighted": "Weights in place of levels, to a finite ratio.",
     "tpm-published": "Equalities; not strict where upper levels lose rank.",
     "recursive": "Equalities only.", "tpm": "Bounds of single unknowns in the first level only.",
-    "sns": "Bounds of single unknowns in the first level only.",
-    "smooth": "Softens on purpose near changes of the active set."}
+    "reverse": "Equalities; strict in the first level only.",
+    "sns": "Bounds of single unknowns in the first level only; scales what they do not allow."}
 _QP = "Levels above are kept to the backend's tolerance."
 _EMBODIK = ("Scales a task that limits do not allow, and damps near singularities; the first level "
             "holds as hard limits, the others are equalities.")
