@@ -86,16 +86,6 @@ def test_a_program_with_arrays_only_does_not_load_pinocchio(statement):
     assert done.stdout == "False\n"
 
 
-@pytest.mark.slow
-def test_a_hierarchy_is_resolved_without_pinocchio():
-    code = ("import sys; sys.modules['pinocchio'] = None\n"
-            "from hierarchy import Hierarchy; from solvers import make\n"
-            "h = Hierarchy.from_levels([([[1.0, 0.0]], [2.0])])\n"
-            "print(make('recursive').solve(h).x[0])")
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert float(done.stdout) == pytest.approx(2.0)
-
-
 @pytest.mark.parametrize("package", ["hierarchy", "solvers", "scenarios"])
 def test_what_a_package_says_it_exports_is_there(package):
     module = import_module(package)
