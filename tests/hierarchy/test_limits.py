@@ -138,9 +138,8 @@ def adversary(rng, joints, ticks):
     """Picks (ticks, joints): each joint has its own way to choose from the box."""
     up_and_down = (np.arange(ticks)[:, None] // rng.integers(1, 100, joints)) % 2
     uniform, ends = rng.random((ticks, joints)), rng.integers(0, 2, (ticks, joints))
-    ways = np.array([np.zeros((ticks, joints)), np.ones((ticks, joints)), uniform, ends,
-                     up_and_down])
-    return ways[rng.integers(0, len(ways), joints), :, np.arange(joints)].T
+    ways = (0.0, 1.0, uniform, ends, up_and_down)
+    return np.choose(rng.integers(0, len(ways), joints), ways)
 
 
 # ---- from a viable start ----------------------------------------------------------------------

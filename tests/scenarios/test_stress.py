@@ -1,4 +1,4 @@
-"""Three thousand generated problems, every answer certified; problems that once failed."""
+"""Two thousand generated problems, every answer certified; problems that once failed."""
 
 import os
 from collections import Counter
@@ -15,7 +15,7 @@ pytestmark = pytest.mark.slow
 
 REGRESSIONS = sorted((Path(__file__).parents[1] / "data" / "regressions").glob("*.npz"))
 JUDGED = [name for name in ("hcod", "tpm", "recursive") if name in names()]
-COUNT = 200 if os.environ.get("NUMBA_DISABLE_JIT") == "1" else 3_000
+COUNT = 200 if os.environ.get("NUMBA_DISABLE_JIT") == "1" else 2_000
 PARTS = 4  # so that cores can share them
 FIRST = 10_000_000  # seeds that nothing was tuned on
 
@@ -33,7 +33,7 @@ def test_generated_problems_are_solved_and_certified(name, part):
 @pytest.mark.parametrize("kind", problems.KINDS)
 @pytest.mark.parametrize("name", JUDGED[:2])
 def test_structured_problems_end_certified_or_with_a_status(name, kind):
-    found = stress.tally(name, range(FIRST, FIRST + min(COUNT, 200)), kind)
+    found = stress.tally(name, range(FIRST, FIRST + 100), kind)
     assert not found.failing
 
 
