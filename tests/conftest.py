@@ -1,5 +1,6 @@
 """What all tests share: one thread of linear algebra, figures without a screen, Ctrl-C."""
 
+import gc
 import os
 import signal
 import sys
@@ -14,6 +15,12 @@ os.environ.setdefault("MPLBACKEND", "Agg")
 settings.register_profile("any machine", deadline=None,
                           suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("any machine")
+
+
+def pytest_collection_finish():
+    """Spare the garbage collector the modules and the thousands of tests, which stay."""
+    gc.collect()
+    gc.freeze()
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -65,13 +65,11 @@ def compiles() -> bool:
 @global_compiler_lock  # type: ignore[untyped-decorator]
 def lowered(entries: Mapping[str, Entry]) -> Any:
     """Return one optimised LLVM module in which only the entries are visible, under their names."""
-    whole = llvm.parse_assembly("")
+    library = registry.cpu_target.target_context.codegen().create_library("entries")
     for name, entry in entries.items():
-        library = _compile(name, entry)
-        library.finalize()
-        module = llvm.parse_bitcode(library._get_module_for_linking().as_bitcode())
-        module.get_function(name).linkage = "external"  # what nobody uses is not linked otherwise
-        whole.link_in(module)
+        _add(library, name, entry)
+    library.finalize()  # all at once: most kernels are behind several entries
+    whole = llvm.parse_bitcode(library._get_module_for_linking().as_bitcode())
     hide(whole, set(entries))
     return whole
 
@@ -97,16 +95,16 @@ def source_digest(*functions: Kernel) -> str:
     return hashlib.sha256(content.encode()).hexdigest()[:16]
 
 
-def _compile(name: str, entry: Entry) -> Any:
-    """Return numba's library of a function with its C entry."""
+def _add(library: Any, name: str, entry: Entry) -> None:
+    """Add a function with its C entry to a library of numba's."""
     target, flags = registry.cpu_target, compiler.Flags()
     target.options.parse_as_flags(flags, _OPTIONS)
     flags.no_compile = True  # not yet: the entry is still to come
     compiled = compiler.compile_extra(
         target.typing_context, target.target_context, entry.function,
-        args=(INTEGER,) * entry.arguments, return_type=entry.result, flags=flags, locals={})
-    compiled.library.add_ir_module(_c_entry(name, compiled.fndesc, entry.failed))
-    return compiled.library
+        args=(INTEGER,) * entry.arguments, return_type=entry.result, flags=flags, locals={},
+        library=library)
+    library.add_ir_module(_c_entry(name, compiled.fndesc, entry.failed))
 
 
 def _c_entry(name: str, about: Any, failed: int) -> Any:

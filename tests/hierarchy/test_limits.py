@@ -60,16 +60,21 @@ def drive(q, v, limits, periods, acceleration, picks, low, up, seen, log):
             log[k, 0, j], log[k, 1, j] = q[j], v[j]
 
 
+def spread(values, *shape):
+    """An array of its own of this shape: kernels are compiled once for all that are alike."""
+    return np.array(np.broadcast_to(values, shape), dtype=float, order="C")
+
+
 class Ride:
     """What happened to joints driven through `picks`."""
 
     def __init__(self, q, v, limits, period, level, picks):
         joints = len(q)
-        picks = np.ascontiguousarray(np.broadcast_to(picks, (len(picks), joints)), dtype=float)
+        picks = spread(picks, len(picks), joints)
         seen = np.full((6, joints), -np.inf)
         seen[1], seen[5] = np.inf, 1.0
         log = np.empty((len(picks), 2, joints))
-        drive(q.copy(), v.copy(), limits, np.broadcast_to(period, joints).copy(),
+        drive(q.copy(), v.copy(), limits, spread(period, joints),
               level == "acceleration", picks, np.empty(joints), np.empty(joints), seen, log)
         self.high, self.low, self.speed, self.acceleration, empty, finite = seen
         self.q, self.v = log[:, 0], log[:, 1]
@@ -90,8 +95,7 @@ class Ride:
 def braking_way(v, A, T, level):
     """How far joints with v go until they rest at the end of a tick, (joints,)."""
     way = np.zeros(len(v))
-    brake(np.abs(v), np.broadcast_to(A, len(v)), np.broadcast_to(T, len(v)),
-          level == "acceleration", way)
+    brake(np.abs(v), spread(A, len(v)), spread(T, len(v)), level == "acceleration", way)
     return way
 
 
@@ -138,9 +142,8 @@ def adversary(rng, joints, ticks):
     """Picks (ticks, joints): each joint has its own way to choose from the box."""
     up_and_down = (np.arange(ticks)[:, None] // rng.integers(1, 100, joints)) % 2
     uniform, ends = rng.random((ticks, joints)), rng.integers(0, 2, (ticks, joints))
-    ways = np.array([np.zeros((ticks, joints)), np.ones((ticks, joints)), uniform, ends,
-                     up_and_down])
-    return ways[rng.integers(0, len(ways), joints), :, np.arange(joints)].T
+    ways = (0.0, 1.0, uniform, ends, up_and_down)
+    return np.choose(rng.integers(0, len(ways), joints), ways)
 
 
 # ---- from a viable start ----------------------------------------------------------------------

@@ -21,6 +21,14 @@ pytestmark = pytest.mark.slow
 PERIOD = 0.25  # with steps of eighths every time is exact
 
 
+@pytest.fixture(autouse=True)
+def _little_to_collect():
+    """A loop collects garbage before it runs, and unfreezes what was frozen: here, all modules."""
+    gc.freeze()
+    yield
+    gc.freeze()
+
+
 class Clock:
     """Time that passes only where it is told to, or by `per_look` where it is looked at."""
 

@@ -86,16 +86,6 @@ def test_a_program_with_arrays_only_does_not_load_pinocchio(statement):
     assert done.stdout == "False\n"
 
 
-@pytest.mark.slow
-def test_a_hierarchy_is_resolved_without_pinocchio():
-    code = ("import sys; sys.modules['pinocchio'] = None\n"
-            "from hierarchy import Hierarchy; from solvers import make\n"
-            "h = Hierarchy.from_levels([([[1.0, 0.0]], [2.0])])\n"
-            "print(make('recursive').solve(h).x[0])")
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert float(done.stdout) == pytest.approx(2.0)
-
-
 @pytest.mark.parametrize("package", ["hierarchy", "solvers", "scenarios"])
 def test_what_a_package_says_it_exports_is_there(package):
     module = import_module(package)
@@ -125,14 +115,20 @@ def test_the_map_names_every_part_of_a_package_in_the_order_of_the_layers(packag
 
 
 @pytest.fixture(scope="module")
-def functions():
-    """Return every function of the packages outside `solvers/kernels`, with where it is."""
-    return [(f"{file.relative_to(ROOT)}: {node.name}", node)
+def definitions():
+    """Return every class and function of the packages, with its file."""
+    return [(file.relative_to(ROOT), node)
             for package in ("hierarchy", "solvers", "scenarios")
             for file in sorted((ROOT / package).rglob("*.py"))
-            if "kernels" not in file.parts
             for node in ast.walk(ast.parse(file.read_text(encoding="utf-8")))
-            if isinstance(node, ast.FunctionDef)]
+            if isinstance(node, (ast.ClassDef, ast.FunctionDef))]
+
+
+@pytest.fixture(scope="module")
+def functions(definitions):
+    """Return every function of the packages outside `solvers/kernels`, with where it is."""
+    return [(f"{file}: {node.name}", node) for file, node in definitions
+            if isinstance(node, ast.FunctionDef) and "kernels" not in file.parts]
 
 
 def test_functions_are_short(functions):
@@ -141,12 +137,9 @@ def test_functions_are_short(functions):
     assert lengths[len(lengths) * 9 // 10] <= 20
 
 
-def test_the_text_of_a_class_is_a_reference_of_at_most_fifteen_lines():
-    texts = {f"{file.relative_to(ROOT)}: {node.name}": ast.get_docstring(node) or ""
-             for package in ("hierarchy", "solvers", "scenarios")
-             for file in (ROOT / package).rglob("*.py")
-             for node in ast.walk(ast.parse(file.read_text(encoding="utf-8")))
-             if isinstance(node, ast.ClassDef)}
+def test_the_text_of_a_class_is_a_reference_of_at_most_fifteen_lines(definitions):
+    texts = {f"{file}: {node.name}": ast.get_docstring(node) or ""
+             for file, node in definitions if isinstance(node, ast.ClassDef)}
     assert [where for where, text in texts.items() if len(text.splitlines()) > 15] == []
 
 

@@ -1,6 +1,5 @@
 import importlib
 import json
-import os
 import signal
 import subprocess
 import sys
@@ -11,7 +10,7 @@ import pytest
 from hand_made import recording
 
 from scenarios import compare
-from scenarios.cli.main import run_command
+from scenarios.cli.main import app, run_command
 
 SHORT = ["--duration", "0.02"]
 pytestmark = pytest.mark.slow
@@ -303,22 +302,21 @@ def test_the_list_fits_80_columns(capsys):
     assert max(map(len, capsys.readouterr().out.splitlines())) <= 80
 
 
-def completed(words):
-    """What bash would offer for the last of the words of a command line."""
-    done = subprocess.run(
-        [sys.executable, "-c", "from scenarios.cli.main import app; app(prog_name='hierarchy')"],
-        capture_output=True, text=True, check=False,
-        env={**os.environ, "_HIERARCHY_COMPLETE": "complete_bash", "COMP_WORDS": " ".join(words),
-             "COMP_CWORD": str(len(words) - 1)})
-    return done.stdout.split()
+def test_the_shell_completes_commands_scenarios_and_resolvers(monkeypatch, capsys):
+    def completed(*words):
+        """What bash would offer for the last of the words of a command line."""
+        monkeypatch.setenv("_HIERARCHY_COMPLETE", "complete_bash")
+        monkeypatch.setenv("COMP_WORDS", " ".join(words))
+        monkeypatch.setenv("COMP_CWORD", str(len(words) - 1))
+        with pytest.raises(SystemExit):
+            app(prog_name="hierarchy")
+        return capsys.readouterr().out.split()
 
-
-def test_the_shell_completes_commands_scenarios_and_resolvers():
-    assert completed(["hierarchy", "comp"]) == ["compare"]
-    assert completed(["hierarchy", "run", "human-h"]) == ["human-hqp"]
-    assert completed(["hierarchy", "compare", "ladder"])[-1] == "ladder"
-    assert completed(["hierarchy", "compare", "ellipse", "--resolvers", "tpm,hc"]) == ["tpm,hcod"]
-    assert completed(["hierarchy", "sweep", "ell"]) == ["ellipse-starts"]
+    assert completed("hierarchy", "comp") == ["compare"]
+    assert completed("hierarchy", "run", "human-h") == ["human-hqp"]
+    assert completed("hierarchy", "compare", "ladder")[-1] == "ladder"
+    assert completed("hierarchy", "compare", "ellipse", "--resolvers", "tpm,hc") == ["tpm,hcod"]
+    assert completed("hierarchy", "sweep", "ell") == ["ellipse-starts"]
 
 
 def test_the_version_is_printed(capsys):

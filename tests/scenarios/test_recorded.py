@@ -40,6 +40,8 @@ def test_problems_of_a_sequence_know_the_tick_before_from_which_a_warm_start_goe
 def test_the_recorder_writes_what_is_stored(tmp_path, monkeypatch):
     pytest.importorskip("mujoco")
     monkeypatch.chdir(tmp_path)
+    first = next(recorded.sequences(recorded.SEED))  # once: it takes seconds
+    monkeypatch.setattr(recorded, "sequences", {recorded.SEED: [first]}.__getitem__)
     monkeypatch.setattr("sys.argv", ["recorded", "--count", "10", "--out", str(tmp_path / "a.npz")])
     recorded.main()
     with np.load(tmp_path / "a.npz") as made, np.load(recorded.STORED) as stored:

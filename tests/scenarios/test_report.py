@@ -3,6 +3,7 @@ import html
 import itertools
 import re
 import shlex
+from functools import cache
 from html.parser import HTMLParser
 
 import hand_made
@@ -45,6 +46,11 @@ def with_events(run, *events):
 
 def words(runs):
     return str(verdict(runs))
+
+
+@cache
+def page_of_two():
+    return page(comparison(made(LETTER), made("hqp")))
 
 
 def row(runs, label):
@@ -226,7 +232,7 @@ def test_several_resolvers_in_several_scenarios_are_a_section_each():
 
 @pytest.mark.slow
 def test_the_page_shows_verdict_replay_table_stack_panels_commands_settings():
-    text = page(comparison(made(LETTER), made("hqp")))
+    text = page_of_two()
     places = [text.index(mark) for mark in (
         'class="verdict"', "<h2>Replay", "<h2>In numbers", "<h2>The stack over time",
         "<h2>Side by side", "<h2>How to reproduce this<", "<h2>Settings",
@@ -272,7 +278,7 @@ def test_the_page_shows_every_event_in_words_and_in_the_stack_over_time():
 
 @pytest.mark.slow
 def test_a_page_without_events_says_that_there_were_none():
-    assert "No run had unsolved ticks" in page(comparison(made(LETTER), made("hqp")))
+    assert "No run had unsolved ticks" in page_of_two()
 
 
 @pytest.mark.slow

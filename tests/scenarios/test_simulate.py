@@ -92,15 +92,6 @@ def test_the_same_scenario_gives_the_same_run(run):
         np.testing.assert_array_equal(again[name], run[name])
 
 
-@pytest.mark.parametrize("name", ["ellipse", "ellipse-velocity", "ellipse-35deg-equality"])
-def test_tpm_and_recursion_are_the_same_run(name):
-    """(7) equals (5) and (12) equals (13), also with the damping of singularities on."""
-    scenario = load(name)
-    runs = [simulate(scenario.with_resolver(spec)) for spec in ("tpm", "recursive")]
-    np.testing.assert_allclose(runs[0]["q"], runs[1]["q"], rtol=0, atol=1e-8)
-    np.testing.assert_array_equal(runs[0]["order"], runs[1]["order"])
-
-
 def test_a_scenario_may_have_any_of_its_tasks():
     base = load("ellipse", SHORT)
     only = base.model_copy(update={"avoidance": None, "pointing": None})

@@ -15,10 +15,10 @@ SHORT = {"control.duration": 0.03}
 
 
 @pytest.fixture(scope="module")
-def done(tmp_path_factory):
+def done(tmp_path_factory, cluster):
     folder = tmp_path_factory.mktemp("starts") / "out"
     found = compare_starts([load("ellipse", SHORT)], ["recursive", "hcod", "augmented"], 7, 3,
-                           folder, workers=1)
+                           folder, scheduler=cluster)
     return found, json.loads((folder / "results.json").read_text()), folder
 
 
@@ -98,17 +98,17 @@ def test_the_verdict_and_the_page_say_what_the_statistics_do(done):
 
 
 @pytest.mark.slow
-def test_more_starts_keep_the_finished_ones(done):
+def test_more_starts_keep_the_finished_ones(done, cluster):
     _, _, folder = done
     more = compare_starts([load("ellipse", SHORT)], ["recursive", "hcod", "augmented"], 8, 3,
-                          folder, workers=1)
+                          folder, scheduler=cluster)
     assert more.made == 3
 
 
 @pytest.mark.slow
-def test_scenarios_under_their_own_resolvers_are_columns(tmp_path):
+def test_scenarios_under_their_own_resolvers_are_columns(tmp_path, cluster):
     found = compare_starts([load(name, SHORT) for name in ("ellipse", "ellipse-hqp")], ["own"], 2,
-                           0, tmp_path / "out", workers=1)
+                           0, tmp_path / "out", scheduler=cluster)
     (results,) = found.found.values()
     assert results.labels == ("ellipse", "ellipse-hqp")
 

@@ -5,16 +5,14 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from collections import Counter
-from contextlib import ExitStack
+from contextlib import suppress
 
 import numpy as np
 import psutil
 import pyarrow.parquet as parquet
 import pytest
 from deadly import dies_of_one
-from distributed.security import Security
 
 from hierarchy import HierarchyError
 from scenarios import load, simulate
@@ -48,16 +46,6 @@ def write(folder, parameters=PARAMETERS, **changed):
     path = folder / "small.toml"
     path.write_text(f"{body}\n[parameters]\n{parameters}")
     return path
-
-
-@pytest.fixture(scope="module")
-def cluster():
-    """Two processes that stand for a cluster somewhere else, whose port anyone may use."""
-    with ExitStack() as stack:
-        with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(engine, "_security", Security)
-            client = stack.enter_context(connected(workers=2))
-        yield client.scheduler.address
 
 
 def rows(folder):
@@ -234,7 +222,7 @@ def test_a_sweep_makes_only_the_runs_that_are_not_there(tmp_path, cluster):
 
 
 def test_a_worker_that_is_killed_loses_nothing(tmp_path):
-    planned = plan(load_sweep(write(tmp_path, samples="24", duration="0.2")))
+    planned = plan(load_sweep(write(tmp_path, samples="8", duration="0.2")))
     store, killed = Store(tmp_path / "out"), []
 
     def keep(outcomes):
@@ -244,16 +232,18 @@ def test_a_worker_that_is_killed_loses_nothing(tmp_path):
             os.kill(killed[0], signal.SIGKILL)
 
     with store.opened(), connected(workers=2) as client:
-        carry_out([one.job for one in planned.runs], client, keep, batch=3)
+        carry_out([one.job for one in planned.runs], client, keep, batch=2)
         assert killed[0] not in client.run(os.getpid).values()
     kept = keys_kept(tmp_path / "out")
     assert kept == Counter(one.job.key for one in planned.runs)
     assert store.table()["error"].null_count == len(planned.runs)
 
 
-def test_a_run_that_kills_its_workers_is_a_row_and_those_beside_it_are_made(tmp_path):
+def test_a_run_that_kills_its_workers_is_a_row_and_those_beside_it_are_made(tmp_path, monkeypatch):
+    """With one death allowed less than usual, for a worker takes seconds to start again."""
     from dataclasses import replace
 
+    monkeypatch.setattr(engine, "_DEATHS", engine._DEATHS - 1)
     jobs = [one.job for one in plan(load_sweep(write(tmp_path))).runs]
     jobs[2] = replace(jobs[2], resolver="deadly")
     found = []
@@ -279,24 +269,46 @@ def test_a_connection_that_breaks_is_made_anew_and_loses_nothing(tmp_path, clust
     assert not any(one.error for one in found)
 
 
-def test_a_sweep_that_is_killed_goes_on_where_it_stopped(tmp_path):
-    path, out = write(tmp_path, samples="20", duration="0.5"), tmp_path / "out"
-    command = [sys.executable, "-m", "scenarios.cli.main", "sweep", str(path), "--out", str(out),
-               "--workers", "2"]
-    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE) as client:
-        while not Store(out).parts:
-            assert client.poll() is None, client.stderr.read()
-            time.sleep(0.01)
-        workers = psutil.Process(client.pid).children(recursive=True)
-        client.kill()
+KILLED_AFTER_THE_FIRST_PART = """
+import os, pathlib, signal
+import psutil
+from scenarios.sweep.store import Store
+
+add = Store.add
+
+def add_and_die(store, outcomes):
+    add(store, outcomes)
+    workers = psutil.Process().children(recursive=True)
+    pathlib.Path("workers").write_text(" ".join(str(one.pid) for one in workers))
+    os.kill(os.getpid(), signal.SIGKILL)
+
+Store.add = add_and_die
+from scenarios.cli.main import main
+main()
+"""
+
+
+def alive(pids):
+    """The processes of these numbers that have not ended."""
+    for pid in pids:
+        with suppress(psutil.NoSuchProcess):
+            yield psutil.Process(pid)
+
+
+def test_a_sweep_that_is_killed_goes_on_where_it_stopped(tmp_path, cluster):
+    path, out = write(tmp_path, samples="8"), tmp_path / "out"
+    died = subprocess.run([sys.executable, "-c", KILLED_AFTER_THE_FIRST_PART, "sweep", str(path),
+                           "--out", str(out), "--workers", "2"], cwd=tmp_path, check=False)
+    assert died.returncode == -signal.SIGKILL
+    workers = (tmp_path / "workers").read_text().split()
     assert len(workers) >= 2
-    assert psutil.wait_procs(workers, timeout=30.0)[1] == []
+    assert psutil.wait_procs(alive(map(int, workers)), timeout=300.0)[1] == []
     before = keys_kept(out)
-    assert 0 < len(before) < 40
+    assert 0 < len(before) < 16
     assert not (out / "index.html").exists()
-    assert sweep(path, out).made == 40 - len(before)
+    assert sweep(path, out, scheduler=cluster).made == 16 - len(before)
     assert keys_kept(out) == Counter(row["key"] for row in rows(out))
-    assert len(rows(out)) == 40
+    assert len(rows(out)) == 16
 
 
 # What is kept

@@ -22,7 +22,7 @@ def test_the_answer_of_equalities_is_that_of_rational_arithmetic(seed):
 
 @pytest.mark.parametrize("name", [name for name in FAMILIES if name not in ("HUM38", "DEGEN7")])
 def test_stored_answers_lead_to_proofs_that_agree_with_them(name):
-    for one in family(name)[:2]:
+    for one in family(name)[:1 if name == "DYN60" else 2]:  # of 60 unknowns, one takes seconds
         found = prove(one.h, [one.x])
         assert found.complete
         assert found.turn < 1e-15
