@@ -22,7 +22,7 @@ from rich.table import Table
 
 from scenarios.bench.open import figures
 from scenarios.bench.open.page import lead
-from scenarios.bench.open.printing import NOTES, answers, times
+from scenarios.bench.open.printing import NOTES, answers, sizes, times
 from scenarios.bench.open.results import Half, Results, results
 from scenarios.draw.figures.drawing import write
 
@@ -80,10 +80,10 @@ def short(found: Results) -> str:
     return fill("- " + " ".join(lead(fresh(found))[:2]), WIDTH, subsequent_indent="  ")
 
 
-def text(table: Table) -> str:
-    """Return a table as a block of code."""
+def text(*tables: Table | str) -> str:
+    """Return tables, and lines between them, as a block of code."""
     console = Console(file=io.StringIO(), width=WIDTH, highlight=False, markup=False)
-    console.print(table)
+    console.print(*tables, sep="\n")
     lines = console.file.getvalue().splitlines()  # type: ignore[attr-defined]
     return "\n".join(["```", *(line.rstrip() for line in lines), "```"])
 
@@ -135,10 +135,10 @@ PARTS: dict[str, Callable[[Results], str]] = {
     "lead": sentences, "short": short, "problems": problems, "entrants": entrants,
     "machine": machine,
     "notes": lambda _: fill(NOTES, WIDTH),
-    "fresh answers": lambda found: text(answers(fresh(found))),
-    "fresh times": lambda found: text(times(fresh(found))),
-    "public answers": lambda found: text(answers(public(found))),
-    "public times": lambda found: text(times(public(found)))}
+    "fresh answers": lambda found: text(answers(fresh(found)), "", sizes(fresh(found))),
+    "fresh times": lambda found: text(times(fresh(found), WIDTH)),
+    "public answers": lambda found: text(answers(public(found)), "", sizes(public(found))),
+    "public times": lambda found: text(times(public(found), WIDTH))}
 """Makers of the blocks by name."""
 
 

@@ -283,7 +283,8 @@ def test_a_checkout_without_the_package_is_refused(tmp_path, capsys):
 
 
 @pytest.mark.slow
-def test_the_command_runs_continues_and_writes_its_page(tmp_path, capsys):
+def test_the_command_runs_continues_and_writes_its_page(tmp_path, capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
     out = tmp_path / "open"
     line = ["bench", "open", "--family", "integers", "--family", "one_unknown", "--count", "3",
             "--fresh", "9", "--entrant", "hcod", "--out", str(out)]
@@ -297,6 +298,8 @@ def test_the_command_runs_continues_and_writes_its_page(tmp_path, capsys):
     assert first.items() <= {file: file.stat().st_mtime_ns for file in out.glob("*/*")}.items()
     said = capsys.readouterr()
     assert said.err.count("integers, seed 9") == 1
+    assert max(map(len, said.out.splitlines())) <= 80
+    assert "…" not in said.out
     fresh = said.out.index("Fresh problems, seed 9: 6 problems of 2 families")
     assert fresh < said.out.index("Public problems: 6 problems of 2 families")
     page = (out / "index.html").read_text()

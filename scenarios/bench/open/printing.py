@@ -23,13 +23,13 @@ CHOSEN = ("EQ7", "INEQ7", "HUM38", "ellipse-hqp", "humanoid-reach")
 """Families whose times are drawn."""
 TIMED = ("EQ7", "INEQ7", "HUM38", "human-hqp")
 """Families whose times are printed."""
+_LABEL, _FAMILY = 23, 19  # width of the entrants' column and of a family's three
 
 
 def say(console: Console, found: Results) -> None:
     """Print the tables of every half, the fresh ones first."""
     for half in found.halves:
-        console.print(answers(half), "", sep="\n")
-        console.print(times(half), "", sep="\n")
+        console.print(answers(half), "", sizes(half), "", times(half, console.width), "", sep="\n")
     console.print(NOTES, "", sep="\n")
     for label, why in found.missing.items():
         console.print(f"skipped: {label} ({why})")
@@ -39,13 +39,20 @@ def answers(half: Half) -> Table:
     """Return the table of what became of the problems of a half."""
     count = sum(len(half.collections[name].problems) for name in half.families)
     table = _table(f"{half.title}: {count} problems of {len(half.families)} families",
-                   ("asked", "right", "wrong", "modest", "failed", "ended", "miss", "relative",
-                    "moved", "same", "rough", "MB"))
+                   ("asked", "right", "wrong", "modest", "failed", "ended"))
+    for label in half.entrants:
+        table.add_row(label, *counted(half.whole[label]))
+    return table
+
+
+def sizes(half: Half) -> Table:
+    """Return the table of how well the problems of a half were solved."""
+    table = _table(f"{half.title}: quality",
+                   ("miss", "relative", "moved", "same", "rough", "MB"))
     for label in half.entrants:
         one = half.whole[label]
-        table.add_row(label, *counted(one), power(one.absolute), power(one.relative),
-                      power(one.moved), "yes" if one.same else "no", digits(one.rough),
-                      f"{one.memory / 1024:.0f}")
+        table.add_row(label, power(one.absolute), power(one.relative), power(one.moved),
+                      "yes" if one.same else "no", digits(one.rough), f"{one.memory / 1024:.0f}")
     return table
 
 
@@ -56,9 +63,10 @@ def counted(one: Summary) -> tuple[str, ...]:
                                                 (WRONG, MODEST, FAILED)), str(ended))
 
 
-def times(half: Half) -> Table:
-    """Return the table of times in a few families of a half."""
-    chosen = [name for name in TIMED if name in half.families]
+def times(half: Half, width: int) -> Table:
+    """Return the table of times in a few families of a half, as many as fit the width."""
+    room = max(1, (width - _LABEL) // _FAMILY)
+    chosen = [name for name in TIMED if name in half.families][:room]
     heads = [head for name in chosen for head in (f"{name}\nmedian", "\np95", "\nwarm")]
     table = _table(f"{half.title}: times", heads)
     for label in half.entrants:
