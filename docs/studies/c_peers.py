@@ -14,6 +14,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, final
@@ -176,9 +177,11 @@ def main() -> int:
     given = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         try:
-            peers = [row for name in ("lexls", "soth") if (checkout := getattr(given, name))
-                     for row in rows_of(name, checkout)]
-            write(Path(folder))
+            with ThreadPoolExecutor() as pool:  # a compiler works in a process of its own
+                builds = [pool.submit(rows_of, name, checkout) for name in ("lexls", "soth")
+                          if (checkout := getattr(given, name))]
+                write(Path(folder))
+                peers = [row for build in builds for row in build.result()]
             program, libraries = compiled(Path(folder), Path(folder))
         except BuildError as error:
             print(error, file=sys.stderr)

@@ -1,6 +1,6 @@
 """How near do resolvers come to the exact answer inside joint limits, and in what time?
 
-    python docs/studies/saturation.py --count 1000
+    python docs/studies/saturation.py
 
 Every resolver that takes bounds, on generated stacks behind a first level of bounds: mild ones,
 that few joints meet, and severe ones. The exact answer is that of `hcod`, kept only where `certify`
@@ -141,7 +141,7 @@ def resolvers() -> list[Resolver]:
     return [one for one in map(make, names()) if one.handles in ("bounds", "inequalities")]
 
 
-def run(out: Path | None = None, count: int = 1000, entrants: Sequence[Resolver] | None = None,
+def run(out: Path | None = None, count: int = 400, entrants: Sequence[Resolver] | None = None,
         families: Sequence[Family] = FAMILIES) -> list[dict[str, Any]]:
     """Judge and time the entrants on `count` stacks of each family; print a table each.
 
@@ -226,7 +226,7 @@ def main() -> int:
     """Run from the command line."""
     parser = argparse.ArgumentParser(prog="python docs/studies/saturation.py",
                                      description="Resolvers inside joint limits.")
-    parser.add_argument("--count", type=int, default=1000, help="problems of a family")
+    parser.add_argument("--count", type=int, default=400, help="problems of a family")
     parser.add_argument("--resolver", action="append", help="a name; may be repeated")
     parser.add_argument("--out", type=Path, default=None, help="folder for saturation.csv")
     given = parser.parse_args()

@@ -10,7 +10,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-ARMS, CHECKED, SECONDS = 10_000, 1_000, 60.0
+ARMS, CHECKED, SECONDS = 10_000, 300, 40.0
 Rows = list[dict[str, Any]]
 
 _ERRORS = """\
