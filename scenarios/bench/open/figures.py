@@ -16,6 +16,7 @@ from scenarios.draw.figures import drawing
 from scenarios.draw.figures.palette import Look, looks
 
 _LARGEST = 1e4       # ratio of times at the right edge
+_ENTRY = 0.155       # [in] height of an entrant in the legend
 _LEAST, _MOST = 1e-17, 1e-2  # misses beyond are drawn at the edge
 _SHADES = LinearSegmentedColormap.from_list("share", ["#b42318", "#f0c66b", "#e9f4ee", "#7cc4a0"])
 
@@ -30,7 +31,8 @@ def profiles(half: Half, legend: bool = False) -> Figure:
     ratios = np.geomspace(1.0, _LARGEST, 200)
     found, style = profile(half.rows, ratios), drawn_as(half)
     with matplotlib.rc_context(drawing.style()):
-        fig = Figure(figsize=(6.2, 4.2), layout="constrained")
+        height = max(4.2, _ENTRY * len(half.entrants) + 0.3) if legend else 4.2
+        fig = Figure(figsize=(6.2, height), layout="constrained")
         ax = fig.subplots()
         for label in half.entrants:
             ax.plot(ratios, 100.0 * found[label], color=style[label].colour,

@@ -53,19 +53,21 @@ def dash(label: str) -> Dash:
 def looks(labels: Iterable[str]) -> dict[str, Look]:
     """Return how to draw labels side by side, no two alike as long as dashes and colours last.
 
-    A resolver keeps its colour. Variants of it that would have the same dashes get others, and
-    labels that are no resolver get unused colours.
+    A resolver keeps its colour; any other first word of labels gets an unused one. Variants that
+    would have the same dashes get others.
     """
     labels = list(dict.fromkeys(labels))
     known = {_parts(label)[0] for label in labels} & set(COLOURS)
     free = [shade for name, shade in COLOURS.items() if name not in known]
     free = [*SPARE, *free] if known else [*free, *SPARE]
-    found: dict[str, Look] = {}
+    shades, found = dict(COLOURS), dict[str, Look]()
     for label in sorted(labels, key=lambda label: _parts(label)[1] not in _USUAL):
-        shade = COLOURS.get(_parts(label)[0]) or (free.pop(0) if free else SPARE[0])
+        name = _parts(label)[0]
+        if name not in shades:
+            shades[name] = free.pop(0) if free else SPARE[0]
         lines = (line for line in (dash(label), *_DASHES)
-                 if Look(shade, line) not in found.values())
-        found[label] = Look(shade, next(lines, SOLID))
+                 if Look(shades[name], line) not in found.values())
+        found[label] = Look(shades[name], next(lines, SOLID))
     return {label: found[label] for label in labels}
 
 
