@@ -23,6 +23,7 @@ CHOSEN = ("EQ7", "INEQ7", "HUM38", "ellipse-hqp", "humanoid-reach")
 """Families whose times are drawn."""
 TIMED = ("EQ7", "INEQ7", "HUM38", "human-hqp")
 """Families whose times are printed."""
+_NARROW = 80  # columns of a terminal
 _LABEL, _FAMILY = 23, 19  # width of the entrants' column and of a family's three
 
 
@@ -84,7 +85,7 @@ def _timed(one: Summary | None) -> tuple[str, ...]:
 
 def _table(title: str, heads: tuple[str, ...] | list[str]) -> Table:
     table = Table(title=title, title_justify="left", box=None, padding=(0, 1, 0, 0),
-                  pad_edge=False)
+                  pad_edge=False, min_width=min(len(title), _NARROW))
     table.add_column("", no_wrap=True)
     for head in heads:
         table.add_column(head, justify="right", no_wrap=True)
