@@ -195,8 +195,8 @@ def read_toml(path: Path, what: str, error: type[HierarchyError]) -> dict[str, A
         raise error(f"{what} {str(path)!r}: {cause}") from cause
     except RecursionError as cause:
         raise error(f"{what} {str(path)!r} is nested too deep") from cause
-    except ValueError as cause:  # an integer of thousands of digits
-        raise error(f"{what} {str(path)!r}: {cause}") from cause
+    except ValueError as cause:
+        raise error(f"{what} {str(path)!r} has an integer of thousands of digits") from cause
 
 
 def slug(text: str) -> str:

@@ -46,7 +46,8 @@ def _say(root: type[Section], what: str, error: Any) -> str:
             kinds = listed([repr(kind) for kind in having])
             return (f"{what}: {where}: only kind {kinds} has it; the kind here is "
                     f"{str(error['loc'][-2])!r}")
-        return f"{what}: {UnknownNameError('key', where, _keys_beside(root, keys))}"
+        beside = _keys_beside(root, keys, str(error["loc"][-2:][0]))
+        return f"{what}: {UnknownNameError('key', where, beside)}"
     if error["type"] in ("union_tag_invalid", "union_tag_not_found"):
         tag = error["ctx"].get("tag")
         found = sorted(_kinds_at(root, [key for key in keys if not key.isdigit()]) - {PLUGIN})
@@ -79,24 +80,30 @@ def _without_kinds(root: type[Section], loc: list[str]) -> list[str]:
 
 def _kinds_with(root: type[Section], keys: list[str]) -> list[str]:
     """Return the kinds of sections that have the last of `keys`."""
-    found = [section for section in dict.fromkeys(sections_at(root, keys[:-1]))
-             if keys[-1] in section.model_fields and "kind" in section.model_fields]
-    return [kind for section in found
-            for kind in getattr(section.model_fields["kind"].annotation, "__args__", ())]
+    return [kind for section in dict.fromkeys(sections_at(root, keys[:-1]))
+            if keys[-1] in section.model_fields for kind in _kinds_of(section)]
 
 
-def _keys_beside(root: type[Section], keys: list[str]) -> list[str]:
-    """Return the full names of the keys allowed in place of the last of `keys`."""
+def _kinds_of(section: type[Section]) -> tuple[str, ...]:
+    field = section.model_fields.get("kind")
+    kinds: tuple[str, ...] = getattr(field.annotation, "__args__", ()) if field else ()
+    return kinds
+
+
+def _keys_beside(root: type[Section], keys: list[str], kind: str) -> list[str]:
+    """Return the full names of the keys allowed in place of the last of `keys`.
+
+    Those of a section of this kind, if there is one, else of all that may stand there.
+    """
     beside = sections_at(root, keys[:-1])
+    beside = [section for section in beside if kind in _kinds_of(section)] or beside
     known = dict.fromkeys(field.alias or key for section in beside
                           for key, field in section.model_fields.items())
     return [".".join([*keys[:-1], key]) for key in known]
 
 
 def _kinds_at(root: type[Section], path: list[str]) -> set[str]:
-    found = (section.model_fields.get("kind") for section in sections_at(root, path))
-    named = {kind for field in found if field
-             for kind in getattr(field.annotation, "__args__", ())}
+    named = {kind for section in sections_at(root, path) for kind in _kinds_of(section)}
     return named | {PLUGIN} if named else named
 
 

@@ -160,6 +160,8 @@ def test_obstacles_are_reached_by_number_or_all_at_once():
     ('extends = "bad.toml"', "extends this file in turn"),
     ('extends = "ellipse"\nreplaces = "avoidance"', "expected a list of sections"),
     ('extends = "ellipse"\nreplaces = ["avoidence"]', "did you mean 'avoidance'"),
+    ('extends = "ellipse"\n[position]\npath = { kind = "still", point = [0.5, 0.0, 0.5] }',
+     "did you mean 'position.path.position'"),
     ('replaces = ["avoidance"]', "goes with extends"),
 ])
 def test_a_file_that_cannot_be_read_is_named(text, said, tmp_path):
