@@ -127,6 +127,13 @@ class Hierarchy:
         pairs = zip(self.offsets[:-1], self.offsets[1:], strict=True)
         return [k for k, (i, j) in enumerate(pairs) if (self.give[i:j] > 0.0).any()]
 
+    def copy(self) -> Hierarchy:
+        """Return one with arrays of its own: a stack writes the same ones again in each tick."""
+        metric = None if self.metric is None else self.metric.copy()
+        give = None if self.give is None else self.give.copy()
+        return Hierarchy(self.A.copy(), self.lower.copy(), self.upper.copy(), self.sizes.copy(),
+                         self.reference.copy(), self.names, metric, give)
+
     def upper_part(self, count: int) -> Hierarchy:
         """Return the first `count` levels, as views, of which none gives."""
         m = self.offsets[count]

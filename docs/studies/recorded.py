@@ -30,9 +30,7 @@ def problems_at(run: Recording, scenario: Scenario) -> list[Hierarchy]:
     controller, problems = Controller(scenario), []
     for t, q, v in zip(run["t"], run["q"], run["v"], strict=True):
         controller.command(t, q, v)
-        h = controller.hierarchy
-        problems.append(Hierarchy(h.A.copy(), h.lower.copy(), h.upper.copy(), h.sizes.copy(),
-                                  h.reference.copy(), h.names, give=h.give))
+        problems.append(controller.hierarchy.copy())
     return problems
 
 

@@ -30,6 +30,21 @@ def test_the_data_are_copied():
     assert h.A[0, 0] == 1
 
 
+def test_a_copy_keeps_everything_in_arrays_of_its_own():
+    h = Hierarchy.from_levels([([[1, 0]], [3]), ([[0, 1]], [4])], reference=[5, 6],
+                              names=["a", "b"], metric=2 * np.eye(2), give=[0.5, 0])
+    kept = h.copy()
+    for array in (h.A, h.lower, h.upper, h.sizes, h.reference, h.metric, h.give):
+        array[:] = 7
+    np.testing.assert_array_equal(kept.A, np.eye(2))
+    np.testing.assert_array_equal([kept.lower, kept.upper], [[3, 4], [3, 4]])
+    np.testing.assert_array_equal(kept.sizes, [1, 1])
+    np.testing.assert_array_equal(kept.reference, [5, 6])
+    np.testing.assert_array_equal(kept.metric, 2 * np.eye(2))
+    np.testing.assert_array_equal(kept.give, [0.5, 0])
+    assert kept.names == ("a", "b")
+
+
 def test_arrays_that_kernels_can_read_are_kept_and_others_are_copied():
     A, b, sizes = np.ones((2, 3)), np.ones(2), np.array([1, 1])
     h = Hierarchy(A, b, b, sizes, np.zeros(3), ("a", "b"))

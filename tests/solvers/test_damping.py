@@ -38,9 +38,7 @@ def recorded(scenario):
     with np.load(DATA) as run:
         for k in range(1, len(run["t"]), EVERY):
             controller.command(run["t"][k], run["q"][k], run["v"][k])
-            h = controller.hierarchy
-            found.append(Hierarchy(h.A.copy(), h.lower.copy(), h.upper.copy(), h.sizes.copy(),
-                                   h.reference.copy(), h.names))
+            found.append(controller.hierarchy.copy())
     return found
 
 

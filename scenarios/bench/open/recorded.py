@@ -69,12 +69,9 @@ class _Window:
         self.problems: list[Hierarchy] = []
 
     def look(self, tick: int, controller: Controller) -> None:
-        """Copy the problem of a tick, whose arrays the next one writes again."""
+        """Keep the problem of a tick."""
         if tick >= self.first:
-            h = controller.hierarchy
-            self.problems.append(Hierarchy(h.A.copy(), h.lower.copy(), h.upper.copy(),
-                                           h.sizes.copy(), h.reference.copy(), h.names,
-                                           None if h.metric is None else h.metric.copy()))
+            self.problems.append(controller.hierarchy.copy())
 
     def signals(self, recording: Recording) -> Mapping[str, Any]:
         """Return no signals."""
