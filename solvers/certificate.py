@@ -337,16 +337,31 @@ def _least_change(cone: _NormalCone, level: _Rows, Z: Array, size: Array, judged
     columns = [view.weighted(cone.rows @ (cone.Z.T @ Z)),
                view.weighted((own @ Z) * own_size[:, None]**2)]
     C, terms = (np.hstack(part) for part in zip(*columns, strict=True))
+    unseen = _independent(C[view.rank:], cone.parallel)
+    C, terms = np.vstack([C[:view.rank], unseen]), terms[:view.rank + len(unseen)]
     held = np.eye(len(own_t), C.shape[1], len(cone.rows))
     none, t = np.zeros(len(C) - view.rank), level.t[judged]
     f = np.concatenate([view.Q.T @ t, none, -np.maximum(own_t, 0.0)])
     sizes = np.concatenate([np.abs(view.Q).T @ np.abs(t), none, np.zeros(len(own_t))])
     unknown = np.full(len(f), _unknown(min(cone.thinnest, view.thinnest),
                                        max(cone.angle, view.angle)))
-    unseen = slice(view.rank, len(C))  # up to the angle at which rows count as dependent
-    unknown[unseen] = np.maximum(unknown[unseen], cone.parallel)
+    beyond = slice(view.rank, len(C))  # up to the angle at which rows count as dependent
+    unknown[beyond] = np.maximum(unknown[beyond], cone.parallel)
     return _balanced(np.vstack([C, held]), np.vstack([terms, held]), f, sizes, unknown,
                      1e-3 * enough)
+
+
+def _independent(heavy: Array, parallel: float) -> Array:
+    """Return as many rows as are independent, up to that angle, with the span of rows (q, k).
+
+    Of dependent rows only rounding would remain, and theirs is larger than a light row.
+    """
+    qr = _QR.of(heavy)
+    pivots = np.abs(qr.pivots)
+    rank = int(np.count_nonzero(pivots > parallel * pivots.max(initial=0.0)))
+    rows = np.empty((rank, heavy.shape[1]))
+    rows[:, qr.order] = np.triu(qr.raw)[:rank]
+    return rows
 
 
 def _least_turn(cone: _NormalCone, level: _Rows, Z: Array, size: Array, judged: Mask

@@ -215,7 +215,7 @@ class _Run:
         return saturated
 
     def by_hcod(self) -> BatchResolution:
-        """Resolve with the kernels of `hcod`; let `certify` judge answers in doubt."""
+        """Resolve with the kernels of `hcod`; let `certify` judge answers still in doubt."""
         everything = np.arange(len(self.batch))
         self._set_reference(everything)
         rest = everything if self.resolver.damping == 0.0 else self._outside_bounds(everything)

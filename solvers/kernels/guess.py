@@ -31,6 +31,7 @@ from solvers.kernels.level import (
     solve_part,
     weigh_rows,
 )
+from solvers.kernels.multipliers import settle
 from solvers.kernels.rows import ZERO, all_equal, finish
 from solvers.kernels.tableau import (
     ACTING,
@@ -85,12 +86,13 @@ from solvers.kernels.tolerances import CANCELLED, DOUBTFUL, LIGHT
 from solvers.status import (
     EQUAL,
     FREE,
+    INACCURATE,
     NO_LIMITS,
     SOLVED,
     UNPROVED,
 )
 
-RIGHT, WRONG, UNCLEAR = range(3)  # of a guess
+RIGHT, WRONG = range(2)  # of a guess
 
 
 @compiled
@@ -109,8 +111,9 @@ def solve_by_guesses(A, lower, upper, sizes, x, record, settings, work):
     s, code = prepare(A, lower, upper, sizes, x, record, settings, work)
     if code != SOLVED:
         return code
-    verdict = WRONG
-    while verdict == WRONG and s.scalar[GUESSES] < s.settings.guesses:
+    verdict, s.count[DOUBT] = WRONG, 0
+    while (verdict == WRONG and s.count[DOUBT] == 0
+           and s.scalar[GUESSES] < s.settings.guesses):
         s.scalar[GUESSES] += 1.0
         _remove_bounds(s)
         open_tableau(s, ACTING)
@@ -119,7 +122,10 @@ def solve_by_guesses(A, lower, upper, sizes, x, record, settings, work):
         verdict = _prove(s, whole)
     keep(s, record)
     if verdict == RIGHT:
-        return finish(x, SOLVED)
+        code = settle(s, lower, upper, sizes, record,
+                      ZERO + (SOLVED if s.count[DOUBT] == 0 else INACCURATE))
+        if code == SOLVED:
+            return finish(x, SOLVED)
     for c in range(x.size):
         x[c] = s.number[REFERENCE, c]
     return UNPROVED
@@ -242,25 +248,23 @@ def _write_x(s):
 def _prove(s, whole):
     """Judge a guess; if it is wrong, make the next: add violated rows, release those that pull.
 
-    A guess in which a row is nearly dependent on others is unclear.
+    A guess in which a row is nearly dependent on others is in doubt.
     """
     levels = s.count[LEVELS]
     verdict = _add_violated(s)
-    in_doubt = s.count[DOUBT] == 1 or has_outgrown(s) or has_dust(s)
-    if in_doubt or smallest_share(s, ZERO, s.index[RANKS, levels]) < DOUBTFUL:
-        return UNCLEAR
-    for k in range(levels + 1):
+    s.count[DOUBT] |= has_outgrown(s) or has_dust(s)
+    s.count[DOUBT] |= smallest_share(s, ZERO, s.index[RANKS, levels]) < DOUBTFUL
+    for k in range(levels + 1 if verdict == RIGHT or s.count[DOUBT] == 0 else 0):
         above = s.index[RANKS, k]
         at_goal = k in (whole, levels)
         if at_goal:
             goal = s.number[GOAL if k == whole else REFERENCE]
             weight = s.number[ENTRY, s.index[LIST, s.index[BEGIN, k]]] ** 2 if k == whole else 1.0
             missed = above > 0 and _pull_of_goal(s, goal, weight, above)
-        elif _is_unclear_level(s, k):
-            return UNCLEAR
         elif s.index[BEGIN, k + 1] - s.index[BEGIN, k] == s.index[RANKS, k + 1] - above:
             continue
         else:
+            s.count[DOUBT] |= _is_unclear_level(s, k)
             missed, said = _pull_of_level(s, k, above)
             verdict = max(verdict, said)
         if missed:
@@ -325,9 +329,9 @@ def _pull_of_level(s, k, above):
     weigh_rows(s, part)
     worst = s.scalar[WORST]
     if worst < DOUBTFUL:
-        return False, UNCLEAR if worst > s.settings.tolerance else RIGHT
-    if is_uneven(s, part, LIGHT):
-        return False, UNCLEAR
+        s.count[DOUBT] |= worst > s.settings.tolerance
+        return False, RIGHT
+    s.count[DOUBT] |= is_uneven(s, part, LIGHT)
     for q in range(part.q0, part.q1):
         i = s.index[LIST, q]
         push = active[i] * over[q]
@@ -353,7 +357,7 @@ def _check_forces(s, k, above, whole):
         if i < 0 or force == 0.0 or active[i] == EQUAL or active[i] == FREE or held[i] >= 0.0:
             continue
         if s.number[SHARE, t] <= small:
-            verdict = UNCLEAR
+            s.count[DOUBT] = 1
         elif active[i] * force > 0.0:
             held[i], s.number[MULTIPLIER, i] = k, force
         else:

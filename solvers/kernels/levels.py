@@ -36,6 +36,7 @@ from solvers.kernels.level import (
     solve_part,
     weigh_rows,
 )
+from solvers.kernels.multipliers import settle
 from solvers.kernels.rows import ZERO, finish
 from solvers.kernels.tableau import (
     ACTIVE,
@@ -138,7 +139,7 @@ def solve_by_levels(A, lower, upper, sizes, x, record, settings, work):
     record (3 m + 3,) and settings: as for `solve_by_guesses`; only the number of guesses is read
     from the record. At the iteration limit, x is optimal for all levels above the unfinished one,
     and the best found for that one. Returns SOLVED, ITERATION_LIMIT, NUMERICAL_FAILURE, TOO_SMALL,
-    or INACCURATE if rounding leaves a doubt.
+    or INACCURATE if rounding leaves a doubt and the multipliers are no proof.
     """
     s, code = prepare(A, lower, upper, sizes, x, record, settings, work)
     if code != SOLVED:
@@ -169,16 +170,17 @@ def solve_by_levels(A, lower, upper, sizes, x, record, settings, work):
             code, s.scalar[UNFINISHED] = ITERATION_LIMIT, k
             break
     keep(s, record)
-    return _verdict(s, code)
+    code = settle(s, lower, upper, sizes, record, _verdict(s, code))
+    return code if finish(x, SOLVED) == SOLVED else ZERO + NUMERICAL_FAILURE
 
 
 @inlined
 def _verdict(s, code):
-    """Return how the solve ended; x becomes zero if it is not finite."""
+    """Return how the solve ended."""
     doubt = s.count[DOUBT] == 1 or has_outgrown(s) or has_dust(s)
     if code == SOLVED and doubt and s.settings.damping == 0.0:
         code = ZERO + INACCURATE
-    return code if finish(s.x, SOLVED) == SOLVED else ZERO + NUMERICAL_FAILURE
+    return code
 
 
 @inlined

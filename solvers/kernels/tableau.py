@@ -20,7 +20,7 @@ import numpy as np
 
 from hierarchy.jit import as_matrix, compiled, inlined
 from solvers.kernels.rows import ZERO, finish, has_outlier
-from solvers.kernels.space import View, integers, matrix, vector
+from solvers.kernels.space import View, integers, matrix, proof_size, vector
 from solvers.kernels.tolerances import DOUBTFUL, DUST, FLOOR, OUTGROWN
 from solvers.status import EQUAL, FREE, NUMERICAL_FAILURE, SOLVED, TOO_SMALL
 
@@ -97,7 +97,7 @@ def prepare(A, lower, upper, sizes, x, record, settings, work):
 def carve(A, sizes, x, settings, work):
     """Return a Solve without data whose M has no columns yet, and whether everything fits.
 
-    Everything is M, a least squares problem of all rows, and its damping.
+    Everything is M, and a least squares problem of all rows with its damping or a proof.
     """
     m, n = A.shape
     w = max(m, n, sizes.size + 1)
@@ -105,7 +105,8 @@ def carve(A, sizes, x, settings, work):
     numbers, at = integers(work, at, 9 * w)
     count, at = integers(work, at, COUNTS)
     scalar, at = vector(work, at, SCALARS)
-    enough = at + n * (m + n) + (m + n) * (2 * n + 2) <= work.size
+    needed = max((m + n) * (2 * n + 2), proof_size(n, m, sizes.size))
+    enough = at + n * (m + n) + needed <= work.size
     room = work[at if enough else work.size:]
     exact = Exact(settings[0], settings[1], settings[2], settings[3], settings[4], settings[5])
     index = as_matrix(numbers, 9 if numbers.size > 0 else 0, w)

@@ -1,7 +1,8 @@
 """The functions of the C library: each does what the resolver of its name does in Python.
 
-They differ from Python in two points. An answer in doubt is not judged by `certify`: its status is
-INACCURATE. A work space that is too small is reported, not made larger.
+They differ from Python in two points. An answer in doubt that its multipliers do not prove is not
+judged by `certify`: its status is INACCURATE. A work space that is too small is reported, not made
+larger.
 """
 
 # mypy: disable-error-code="no-untyped-def"

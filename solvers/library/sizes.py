@@ -10,6 +10,7 @@ so.
 from __future__ import annotations
 
 from hierarchy.jit import inlined
+from solvers.kernels.space import proof_size
 from solvers.kernels.tableau import COUNTS, SCALARS
 
 MOST = 1 << 20  # unknowns, rows or levels: with more the sizes could overflow
@@ -38,7 +39,8 @@ def work_size(n, m, levels):
 def exact(n, m, levels):
     """Return what the kernels of `hcod` need, see `kernels.tableau.carve`."""
     w = max(m, n, levels + 1)
-    return 30 * w + COUNTS + SCALARS + n * (m + n) + (m + n) * (2 * n + 2)
+    room = max((m + n) * (2 * n + 2), proof_size(n, m, levels))
+    return 30 * w + COUNTS + SCALARS + n * (m + n) + room
 
 
 @inlined

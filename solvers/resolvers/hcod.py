@@ -83,7 +83,8 @@ class Hcod(Resolver):
     docs/theory/resolver-notes.md describes the method, its damping and its checks.
 
     Equalities alone give the answer of `tpm`, to the last digit. An answer in doubt after rounding
-    is checked by `certify` (without damping); one that fails the check has Status.INACCURATE.
+    (without damping) must be proved by its multipliers or accepted by `certify`; otherwise it has
+    Status.INACCURATE.
 
     tolerance : of violations, relative to the size of the terms in them.
     guesses : active sets tried from a memory before solving level by level; at least 1.

@@ -339,6 +339,18 @@ def test_dust_beside_a_large_row_may_be_met_or_ignored():
     assert not certify(h, [1.1, 0.0]).certified
 
 
+def test_two_rows_that_together_hold_back_a_heavy_one_are_found_beside_a_light_one():
+    third = 1e3 / np.sqrt(3.0)
+    h = Hierarchy.from_levels([
+        (np.array([[0, 0, third, third, third], [0, 0, 0, 1e3, 0], [0, 0, 0, 0, 1e-3]]),
+         [-2e3, -1e3, 1e-3], [-2e3, 0, 2e-3]),
+        (np.array([[0, 0, 1e3, 0, 0], [1e-3, 0, 0, 0, 0]]), [-1e3, 1e-3], [np.inf, 1e-3])])
+    answer = np.array([1.0, 0.0, -2.0 * np.sqrt(3.0), -1.0, 1.0])  # the largest x[2] there is
+    assert certify(h, answer).certified
+    aside = np.array([0.0, 0.0, -1e-5, 0.0, 1e-5])
+    assert not certify(h, answer + aside).certified
+
+
 def test_dust_in_a_level_of_its_own_is_a_row_like_any_other():
     h = Hierarchy.from_levels([(np.diag([1.0, 1.0])[:1], [1.0]), ([[0.0, 1e-17]], [1e-17])])
     assert certify(h, [1.0, 1.0]).certified
