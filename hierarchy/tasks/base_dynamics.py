@@ -21,7 +21,8 @@ class BaseDynamics(ForceTask):
     """Let the contact forces move the base: M_b(q) a + h_b(q, v) = J_cb^T f [N, N m].
 
     Six rows, those of the floating base; none for a fixed one. It belongs at the top of a stack: an
-    x that violates it cannot happen. Without contacts the rows say that the robot falls.
+    x that violates it cannot happen. A contact without load moves nothing; without contacts the rows
+    say that the robot falls.
 
     Source: A. Herzog et al., "Momentum control with hierarchical inverse dynamics on a
     torque-controlled humanoid", Autonomous Robots (2016), eq. (7).
@@ -46,7 +47,17 @@ class BaseDynamics(ForceTask):
         """See `Task.writer`."""
         M, h = state.dynamics
         parameters = M, h, state.kinematics, self.contacts.points
-        return bind(_write, parameters, A, lower, upper, row, self.dimension)
+        write_rows = bind(_write, parameters, A, lower, upper, row, self.dimension)
+        opening = [(A[row:row + self.dimension, self.contacts.blocks[contact.name]], contact)
+                   for contact in self.contacts.contacts if contact.open]
+
+        def write() -> None:
+            write_rows()
+            for forces, contact in opening:
+                if contact.load(state.t) == 0.0:
+                    forces[:] = 0.0
+
+        return write if opening else write_rows
 
 
 @compiled

@@ -107,7 +107,7 @@ class ContactMotion(Task):
             write_rows()
             for rows, contact in opening:
                 if contact.load(state.t) == 0.0:
-                    lower[rows], upper[rows] = -np.inf, np.inf
+                    A[rows] = lower[rows] = upper[rows] = 0.0
 
         return write if opening else write_rows
 

@@ -293,9 +293,26 @@ def test_an_open_contact_has_no_force_and_is_free_to_move(faces):
     closed = Friction(feet(), faces, largest=50.0).rows(state)
     for now, plain in zip((A, lower, upper), closed, strict=True):
         np.testing.assert_array_equal(now[:4 * (faces + 1)], plain[:4 * (faces + 1)])
-    motion = np.zeros((12, N)), np.zeros(12), np.zeros(12)
-    ContactMotion(contacts).writer(state, "acceleration", *motion, 0)()
-    assert np.isfinite(motion[1]).tolist() == [True] * 6 + [False] * 6
+    A, lower, upper = np.zeros((12, N)), np.zeros(12), np.zeros(12)
+    ContactMotion(contacts).writer(state, "acceleration", A, lower, upper, 0)()
+    assert A[:6].any(axis=1).all()
+    for rows in (A[6:], lower[6:], upper[6:]):
+        assert not rows.any()
+
+
+def test_an_open_contact_moves_no_base_until_it_is_closed_again():
+    contacts, state = opening(), State.at(ROBOT, ROBOT.rest)
+    right = contacts.blocks[contacts.contacts[1].name]
+    A, lower, upper = np.zeros((6, 60)), np.zeros(6), np.zeros(6)
+    write = BaseDynamics(contacts).writer(state, "torque", A, lower, upper, 0)
+    write()
+    closed = A.copy()
+    assert closed[:, right].any()
+    for t in (0.5, 1.5, 2.5):
+        state.move(t, state.q, state.v)
+        write()
+        assert A[:, right].any() == (t != 1.5)
+    np.testing.assert_array_equal(A, closed)
 
 
 def test_a_ramp_scales_the_normal_force_of_each_point_at_the_state_s_time():
