@@ -21,8 +21,8 @@ class BaseDynamics(ForceTask):
     """Let the contact forces move the base: M_b(q) a + h_b(q, v) = J_cb^T f [N, N m].
 
     Six rows, those of the floating base; none for a fixed one. It belongs at the top of a stack: an
-    x that violates it cannot happen. A contact without load moves nothing; without contacts the rows
-    say that the robot falls.
+    x that violates it cannot happen. A contact without load moves nothing; without contacts the
+    rows say that the robot falls.
 
     Source: A. Herzog et al., "Momentum control with hierarchical inverse dynamics on a
     torque-controlled humanoid", Autonomous Robots (2016), eq. (7).
