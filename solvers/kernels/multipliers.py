@@ -12,7 +12,8 @@ With x - reference in place of the first sum, (1) proves that x is the nearest.
 
 The multipliers come from a factorisation made here, and what remains of (1) is summed over the rows
 themselves, so the proof rests on the data alone. It needs every row to be clearly inside the span
-of others or clearly outside: `certify`, which takes twenty times as long, judges all else.
+of others or clearly outside, and no multiplier so large that together the rows are nearly
+dependent: `certify`, which takes twenty times as long, judges all else.
 """
 
 # mypy: disable-error-code="no-untyped-def"
@@ -43,6 +44,7 @@ BAND = 1e-8     # distance from a side of a row that is on it, relative to 1 + |
 ENOUGH = 1e-9   # what may remain of (1), relative to the weakest possible pull of the level
 CLEAR = 1e-7    # remainder of a unit row that gets a basis vector: at least
 NOTHING = 1e-9  # remainder of a unit row that gets none: at most
+LARGEST = 1e5   # multiplier over the pull that it balances: rows of no small angle need no more
 REFINEMENTS = 3
 TINY, HUGE = 1e-100, 1e100  # norms whose powers neither underflow nor overflow
 
@@ -239,6 +241,7 @@ def _balances(p, reference, k, reach):
     p.rest[k] = 0.0
     if enough == 0.0:
         return True
+    most = LARGEST * _length(p)
     for _ in range(REFINEMENTS):  # each sums anew what remains, so the last digits come right too
         _push(p, force, held)
     if _length(p) > 0.1 * enough:
@@ -246,8 +249,19 @@ def _balances(p, reference, k, reach):
         _push(p, force, own)
     _turn_back(p, force, _begin(p, OWN_RANK, k), held)
     p.rest[k] = _length(p)
+    if not _largest_of(force, held) <= most:  # together the rows are nearly dependent
+        return False
     return (_signs_hold(p, force, k) and p.rest[k] <= enough
             and _shift(p, force, held, own) <= ENOUGH * reach)
+
+
+@inlined
+def _largest_of(force, end):
+    """Return the largest of the first forces."""
+    largest = 0.0
+    for t in range(end):
+        largest = max(largest, abs(force[t]))
+    return largest
 
 
 @inlined

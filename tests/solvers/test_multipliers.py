@@ -81,6 +81,12 @@ def test_rows_that_are_nearly_parallel_are_left_to_the_certificate(angle):
     assert proved(h, [0, 0], claims(h)) == SOLVED
 
 
+def test_rows_that_only_together_are_nearly_dependent_are_left_to_the_certificate():
+    A = np.array([[0, 0, 1], [0, 5e-7, 1], [2e-7, 1, 0]])  # each at 2e-7 rad or more to those above
+    h = Hierarchy.from_levels([(A, [0, 0.3, 0.3])])
+    assert proved(h, np.linalg.solve(A, h.lower), claims(h)) == INACCURATE
+
+
 @pytest.mark.parametrize("norm", [1e-13, 1e-200, 1e200])
 def test_rows_of_unusual_norm_are_left_to_the_certificate(norm):
     h = Hierarchy.from_levels([([[1, 0]], [0]), ([[0, norm]], [0])])
