@@ -28,7 +28,7 @@ from hierarchy.jit import as_matrix, compiled, inlined
 from solvers.kernels.rows import ZERO, has_outlier
 from solvers.kernels.space import View, integers, matrix, proof_size, vector
 from solvers.kernels.tableau import REFERENCE, reflect
-from solvers.kernels.tolerances import DUST
+from solvers.kernels.tolerances import BAND, CLEAR, DUST, ENOUGH, LARGEST, NOTHING
 from solvers.status import INACCURATE, SOLVED, TOO_SMALL
 
 # Rows of `number`. Per row of A: its norm, its miss, +1 or -1 for the side it is claimed to be on;
@@ -40,11 +40,6 @@ NORM, MISS, SIDE, SQUARE, LEFT, Z = range(6)
 # column. Per level: where the columns of its two groups end, and the basis vectors of each.
 JOINS, ROW, OWNER, HELD, OWN, HELD_RANK, OWN_RANK = range(7)
 
-BAND = 1e-8     # distance from a side of a row that is on it, relative to 1 + |x|: of `certify`
-ENOUGH = 1e-9   # what may remain of (1), relative to the weakest possible pull of the level
-CLEAR = 1e-7    # remainder of a unit row that gets a basis vector: at least
-NOTHING = 1e-9  # remainder of a unit row that gets none: at most
-LARGEST = 1e5   # multiplier over the pull that it balances: rows of no small angle need no more
 REFINEMENTS = 3
 TINY, HUGE = 1e-100, 1e100  # norms whose powers neither underflow nor overflow
 

@@ -20,6 +20,13 @@ BORDER = 0.3        # of rank_tolerance: a dependent row with more left leaves t
 SLIGHT = 0.25       # of rank_tolerance: a smaller miss counts as zero, without doubt
 NO_STEP = 1e-12     # length of a step: smaller ones count as zero
 
+# Of a proof by multipliers:
+BAND = 1e-8         # distance of a row from the side that it is on, over 1 + |x|: as in `certify`
+ENOUGH = 1e-9       # what may remain of the conditions, over the weakest possible pull of the level
+CLEAR = 1e-7        # remainder of a unit row that counts as independent: at least
+NOTHING = 1e-9      # remainder of a unit row that counts as dependent: at most
+LARGEST = 1e5       # multiplier over the pull that it balances: at most
+
 STALLED = 5         # consecutive steps of zero length before the sides are moved apart
 RELAXATION = 1e-6   # amount by which they are moved, times 1 to 2
 RELAXATIONS = 3     # most times per level; then the rule of least index applies
