@@ -337,7 +337,7 @@ def _least_change(cone: _NormalCone, level: _Rows, Z: Array, size: Array, judged
     columns = [view.weighted(cone.rows @ (cone.Z.T @ Z)),
                view.weighted((own @ Z) * own_size[:, None]**2)]
     C, terms = (np.hstack(part) for part in zip(*columns, strict=True))
-    unseen = _independent(C[view.rank:], cone.parallel)
+    unseen = _independent(C[view.rank:], terms[view.rank:], cone.parallel)
     C, terms = np.vstack([C[:view.rank], unseen]), terms[:view.rank + len(unseen)]
     held = np.eye(len(own_t), C.shape[1], len(cone.rows))
     none, t = np.zeros(len(C) - view.rank), level.t[judged]
@@ -351,16 +351,18 @@ def _least_change(cone: _NormalCone, level: _Rows, Z: Array, size: Array, judged
                      1e-3 * enough)
 
 
-def _independent(heavy: Array, parallel: float) -> Array:
+def _independent(heavy: Array, terms: Array, parallel: float) -> Array:
     """Return as many rows as are independent, up to that angle, with the span of rows (q, k).
 
-    Of dependent rows only rounding would remain, and theirs is larger than a light row.
+    Of dependent rows only rounding would remain, and theirs is larger than a light row. For the
+    same reason entries that are rounding of `terms` (q, k), the same in each row, become zero.
     """
     qr = _QR.of(heavy)
     pivots = np.abs(qr.pivots)
     rank = int(np.count_nonzero(pivots > parallel * pivots.max(initial=0.0)))
     rows = np.empty((rank, heavy.shape[1]))
     rows[:, qr.order] = np.triu(qr.raw)[:rank]
+    rows[np.abs(rows) <= _ROUNDING * terms[:rank]] = 0.0
     return rows
 
 
