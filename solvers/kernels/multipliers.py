@@ -27,7 +27,7 @@ import numpy as np
 from hierarchy.jit import as_matrix, compiled, inlined
 from solvers.kernels.rows import ZERO, has_outlier
 from solvers.kernels.space import View, integers, matrix, proof_size, vector
-from solvers.kernels.tableau import REFERENCE, reflect
+from solvers.kernels.tableau import REFERENCE, length_of, reflect
 from solvers.kernels.tolerances import BAND, CLEAR, DUST, ENOUGH, LARGEST, NOTHING
 from solvers.status import INACCURATE, SOLVED, TOO_SMALL
 
@@ -123,10 +123,7 @@ def _begin(p, ends, k):
 @inlined
 def _place(p, lower, upper, sizes, record):
     """Write norms, misses and when each row joins; return 1 + |x|, inf if a norm is unusual."""
-    square, i = 0.0, ZERO
-    for c in range(p.x.size):
-        square += p.x[c] * p.x[c]
-    reach = 1.0 + np.sqrt(square)
+    reach, i = 1.0 + length_of(p.x), ZERO
     for k in range(sizes.size):
         for _ in range(sizes[k]):
             value = norm = largest = 0.0
@@ -303,10 +300,7 @@ def _pull_of_goal(p, reference, reach):
 @inlined
 def _length(p):
     """Return the length of what remains of (1)."""
-    square = 0.0
-    for c in range(p.x.size):
-        square += p.number[LEFT, c] * p.number[LEFT, c]
-    return np.sqrt(square)
+    return length_of(p.number[LEFT, :p.x.size])
 
 
 @inlined
