@@ -24,7 +24,7 @@ above and x - reference for t, decides whether x is the nearest; it needs no tur
 Double precision sets two limits. First, rows that agree up to an angle of `parallel` count as
 dependent: a direction that only their difference can see is free, and lower levels may use it.
 Their span is then known only up to that angle, so x may be right under either reading, with angles
-from a quarter of `parallel` to four times it. Second, a row smaller than 1e-13 of the largest row
+from a tenth of `parallel` to four times it. Second, a row smaller than 1e-13 of the largest row
 of its level is dust, which rounding in the large row could have produced: an x that meets it is
 accepted, and so is one that ignores it.
 
@@ -50,7 +50,7 @@ TOLERANCE = 1e-8
 to 1 + |x|."""
 PARALLEL = 1e-8
 """Angle [rad] up to which a row counts as dependent on others."""
-_EITHER = 4.0       # rows within this factor of `parallel` may count as dependent or not
+_EITHER = 0.25, 4.0, 0.1   # times `parallel`: up to these angles rows may count as dependent too
 _DUST = 1e-13       # norm of a row relative to the largest of its level: smaller ones are dust
 _SMALLEST = 1e-30   # norm of a row relative to the largest of its level: lower bound
 _CLEAR = 0.1        # relative pivot: smaller ones do not add to the uncertainty of parallel rows
@@ -60,6 +60,7 @@ _BLOCK = 32         # columns that LAPACK reflects at a time
 _LARGEST = 1e150    # length: its square stays finite
 _SMALL = 1e-15      # relative: smaller steps and pivots are rounding
 _ROUNDING = 64 * float(np.finfo(float).eps)
+_OF_BASIS = 0.125   # of the rounding of a term: that of a basis of the freedom, per smallest pivot
 
 Mask = NDArray[np.bool_]
 
@@ -175,7 +176,7 @@ def certify(h: Hierarchy, x: ArrayLike, tolerance: float = TOLERANCE,
         levels = [rows.part(slice(i, j)) for i, j in pairs]
         verdicts = (Certificate(violations, *_judged(levels, x - h.reference, rows.reach, tolerance,
                                                      angle), tolerance, h.names)
-                    for angle in (parallel, parallel / _EITHER, parallel * _EITHER))
+                    for angle in (parallel, *(factor * parallel for factor in _EITHER)))
         first = next(verdicts)
         return first if first.certified else next((v for v in verdicts if v.certified), first)
 
@@ -395,7 +396,7 @@ def _on_sides(level: _Rows, size: Array) -> tuple[Array, Array, Array]:
 def _projected(gap: Array, cone: _NormalCone, enough: float) -> float:
     """Return the length of the projection of -gap (n,) on the polar cone, in coordinates of Z."""
     C, f = cone.rows.T, cone.Z.T @ gap
-    size = norm(f if cone.angle == 0.0 else gap)
+    size = max(norm(f), norm(gap) * (_OF_BASIS if cone.angle == 0.0 else 1.0))
     return _balanced(C, np.ones_like(C), f, np.full(len(f), size),
                      _unknown(cone.thinnest, cone.angle), 1e-3 * enough)
 
@@ -428,11 +429,13 @@ def _balanced(C: Array, terms: Array, f: Array, size: Array, unknown: Array | fl
 class _View:
     """The part of p coordinates that the rows of a level see, large rows first.
 
+    size (m,) : of the rows.
     Q (m, rank) : orthonormal; |Q^T t| is the least change of t without help from the cone.
     directions (p, rank), rest (p, p - rank) : bases of the directions that the rows see, and of
         the others.
     """
 
+    size: Array
     Q: Array
     R: Array
     order: NDArray[np.int64]
@@ -455,7 +458,7 @@ class _View:
         qr = _QR.of((T[:rank] * size**2).T[by_size])
         Q = np.empty((len(size), rank))
         Q[by_size] = qr.from_the_left(np.eye(len(size), rank))
-        return _View(Q, qr.raw[:rank], qr.order, V[:, :rank], V[:, rank:], thinnest, angle,
+        return _View(size, Q, qr.raw[:rank], qr.order, V[:, :rank], V[:, rank:], thinnest, angle,
                      parallel)
 
     def weighted(self, rows: Array) -> tuple[Array, Array]:
@@ -466,12 +469,14 @@ class _View:
         if not len(rows):
             return np.empty((len(self.directions), 0)), np.empty((len(self.directions), 0))
         outside, length = rows @ self.rest, norm(rows, axis=1)
-        outside[norm(outside, axis=1) <= self.parallel * length] = 0.0
         if not self.rank:
+            outside[norm(outside, axis=1) <= self.parallel * length] = 0.0
             return np.asarray(outside.T), np.tile(length, (outside.shape[1], 1))
         seen = rows @ self.directions
         seen[np.abs(seen) <= _ROUNDING * length[:, None]] = 0.0
         inside = _solve_triangular(self.R, seen[:, self.order].T, trans=1)
+        turned = self.parallel * (length + np.abs(self.Q @ inside).T @ self.size**2)
+        outside[norm(outside, axis=1) <= turned] = 0.0  # in the span, if each row turns by so much
         weight = _UNSEEN / float(np.abs(np.diagonal(self.R)).min())
         return (np.vstack([inside, weight * outside.T]),
                 np.vstack([np.abs(inside), np.tile(weight * length, (outside.shape[1], 1))]))

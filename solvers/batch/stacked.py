@@ -28,8 +28,8 @@ from solvers.kernels.batch import (
     batch_without_bounds,
 )
 from solvers.resolver import Resolver, make, refuse_inequality
-from solvers.resolvers.hcod import Hcod, record_without_bounds, settle_doubt, solve_anew
-from solvers.resolvers.tpm import Tpm, solve_at_bounds
+from solvers.resolvers.hcod import Hcod, name_nothing, record_without_bounds, settle_doubt
+from solvers.resolvers.tpm import Tpm, name_bounds
 from solvers.status import INACCURATE, NUMERICAL_FAILURE, SOLVED, UNPROVED, Status
 from solvers.workspace import run
 
@@ -256,9 +256,9 @@ class _Run:
 
     def _settle(self, which: Indices) -> None:
         """Settle the answers in doubt of the problems `which`, as `resolver.solve` does."""
-        solve = solve_at_bounds if isinstance(self.resolver, Tpm) else solve_anew
+        name = name_bounds if isinstance(self.resolver, Tpm) else name_nothing
         for p in which[self.codes[which] == INACCURATE].tolist():
-            if settle_doubt(self.batch[p], self.x[p], self.record[p], self.settings, solve):
+            if settle_doubt(self.batch[p], self.x[p], self.record[p], self.settings, name):
                 self.codes[p] = SOLVED
 
 

@@ -82,7 +82,7 @@ from solvers.kernels.tableau import (
     side_of,
     value_of,
 )
-from solvers.kernels.tolerances import CANCELLED, DOUBTFUL, LIGHT
+from solvers.kernels.tolerances import CANCELLED, DOUBTFUL, DRIFT, LIGHT
 from solvers.status import (
     EQUAL,
     FREE,
@@ -93,6 +93,7 @@ from solvers.status import (
 )
 
 RIGHT, WRONG = range(2)  # of a guess
+CHANGED = 5  # in `count`: rows that the verdict on a guess activates or releases
 
 
 @compiled
@@ -111,15 +112,17 @@ def solve_by_guesses(A, lower, upper, sizes, x, record, settings, work):
     s, code = prepare(A, lower, upper, sizes, x, record, settings, work)
     if code != SOLVED:
         return code
-    verdict, s.count[DOUBT] = WRONG, 0
-    while (verdict == WRONG and s.count[DOUBT] == 0
+    verdict, fewer, s.count[DOUBT], s.count[CHANGED] = WRONG, True, 0, A.shape[0]
+    while (verdict == WRONG and fewer and s.count[DOUBT] == 0
            and s.scalar[GUESSES] < s.settings.guesses):
         s.scalar[GUESSES] += 1.0
+        before, s.count[CHANGED] = s.count[CHANGED], 0
         _remove_bounds(s)
         open_tableau(s, ACTING)
         whole = _solve(s)
         _write_x(s)
         verdict = _prove(s, whole)
+        fewer = s.count[CHANGED] <= before  # more changes than before seldom lead anywhere
     keep(s, record)
     if verdict == RIGHT:
         code = settle(s, lower, upper, sizes, record,
@@ -276,11 +279,15 @@ def _prove(s, whole):
 
 @inlined
 def _is_unclear_level(s, k):
-    """Whether a level has a row that is nearly, but not quite, dependent on the rows above."""
+    """Whether a row of a level is nearly dependent on those above, or moved by levels below."""
     begin, end, rank = s.index[BEGIN, k], s.index[BEGIN, k + 1], s.index[RANKS, k + 1]
     unclear = False
     for q in range(begin + rank - s.index[RANKS, k], end):
-        unclear |= is_unclear(s, s.index[LIST, q], s.index[RANKS, k])
+        i = s.index[LIST, q]
+        side = side_of(s.number, i)
+        gone = abs(value_of(s, s.x, i) - side - s.number[OVER, q])
+        unclear |= gone > DRIFT * around(s.number[NORM, i], side, s.scalar[SCALE])
+        unclear |= is_unclear(s, i, s.index[RANKS, k], rank)
     return unclear
 
 
@@ -295,6 +302,7 @@ def _add_violated(s):
             side = missed_side(number, i, value, s.scalar[SCALE], s.settings.tolerance)
             if side != 0.0:
                 number[ACTIVE, i], verdict = side, WRONG
+                s.count[CHANGED] += 1
     return verdict
 
 
@@ -338,6 +346,7 @@ def _pull_of_level(s, k, above):
         scale = around(s.number[NORM, i], side_of(s.number, i), s.scalar[SCALE])
         if active[i] != EQUAL and push < 0.0:
             active[i], verdict = FREE, WRONG
+            s.count[CHANGED] += 1
         elif active[i] != EQUAL and push > s.settings.tolerance * scale:
             s.number[HOLDS, i], s.number[MULTIPLIER, i] = k, over[q]
     for t in range(above):
@@ -356,10 +365,12 @@ def _check_forces(s, k, above, whole):
         i, force = s.index[OWNER, t], s.number[FORCE, t]
         if i < 0 or force == 0.0 or active[i] == EQUAL or active[i] == FREE or held[i] >= 0.0:
             continue
+        s.count[DOUBT] |= not whole and s.number[SHARE, t] < DOUBTFUL * s.scalar[PULLED]
         if s.number[SHARE, t] <= small:
             s.count[DOUBT] = 1
         elif active[i] * force > 0.0:
             held[i], s.number[MULTIPLIER, i] = k, force
         else:
             active[i], verdict = FREE, max(verdict, WRONG)
+            s.count[CHANGED] += 1
     return verdict

@@ -39,7 +39,7 @@ from solvers.kernels.tableau import (
     left_of,
     side_of,
 )
-from solvers.kernels.tolerances import CANCELLED, DOUBTFUL, EPSILON, SAME
+from solvers.kernels.tolerances import BRINK, CANCELLED, DOUBTFUL, EPSILON, SAME
 
 
 class Part(NamedTuple):
@@ -190,10 +190,16 @@ def is_uneven(s, part, share):
 
 
 @inlined
-def is_unclear(s, i, begin):
-    """Whether little, but more than nothing, is left of row i from this basis vector on."""
-    left, norm = np.sqrt(left_of(s, i, begin, s.x.size)), s.number[NORM, i]
-    return s.settings.rank_tolerance * norm < left < DOUBTFUL * norm
+def is_unclear(s, i, begin, end):
+    """Whether a dependent row is only nearly so.
+
+    Little, but more than nothing, is left of it from basis vector `begin` on, where its level
+    begins, or hardly less than counts as something from `end` on, where its level ends.
+    """
+    least = s.settings.rank_tolerance * s.number[NORM, i]
+    left, beyond = left_of(s, i, begin, s.x.size), left_of(s, i, end, s.x.size)
+    nearly = least * least < left < (DOUBTFUL * s.number[NORM, i]) ** 2
+    return nearly or beyond > (BRINK * least) ** 2
 
 
 @inlined

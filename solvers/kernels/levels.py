@@ -101,8 +101,10 @@ from solvers.kernels.tableau import (
 )
 from solvers.kernels.tolerances import (
     BLAND_AFTER,
+    BRINK,
     CANCELLED,
     DOUBTFUL,
+    DRIFT,
     FLOOR,
     LAST,
     LIGHT,
@@ -177,10 +179,27 @@ def solve_by_levels(A, lower, upper, sizes, x, record, settings, work):
 @inlined
 def _verdict(s, code):
     """Return how the solve ended."""
-    doubt = s.count[DOUBT] == 1 or has_outgrown(s) or has_dust(s)
+    doubt = s.count[DOUBT] == 1 or has_outgrown(s) or has_dust(s) or _has_drifted(s)
     if code == SOLVED and doubt and s.settings.damping == 0.0:
         code = ZERO + INACCURATE
     return code
+
+
+@inlined
+def _has_drifted(s):
+    """Whether the levels below moved a settled row that counted as dependent, or one past its side.
+
+    Little is left of such a row in the directions of those levels, but x can go far along them.
+    """
+    number, scale, drifted = s.number, s.scalar[SCALE], False
+    for i in range(s.A.shape[0]):
+        value = value_of(s, s.x, i)
+        if s.index[STATE, i] != FIXED:
+            drifted |= missed_side(number, i, value, scale, DRIFT) != 0.0
+        else:
+            drifted |= abs(value - number[VALUE, i]) > DRIFT * around(
+                number[NORM, i], side_of(number, i), scale)
+    return drifted
 
 
 @inlined
@@ -230,13 +249,18 @@ def _begin(s, k, first, last, whole):
         elif s.index[UNIT, i] < 0:
             count[EQUALITIES] += 1
         s.index[STATE, i] = WATCHED if number[ACTIVE, i] == FREE else FIXED
+        if whole:
+            number[VALUE, i] = np.nan  # the level itself moves its rows
         if s.index[STATE, i] == WATCHED or whole:
             continue
-        if left_of(s, i, count[FIX], n) > (least * number[NORM, i]) ** 2:
+        left = left_of(s, i, count[FIX], n)
+        if left > (least * number[NORM, i]) ** 2:
             s.index[STATE, i] = SOFT
             s.index[LIST, count[ROWS]] = i
             count[ROWS] += 1
-        elif number[ACTIVE, i] != EQUAL:
+            continue
+        count[DOUBT] |= left > (BRINK * least * number[NORM, i]) ** 2
+        if number[ACTIVE, i] != EQUAL:
             number[HOLDS, i], number[MULTIPLIER, i] = k, value - side_of(number, i)
     for c in range(n):
         number[START, c] = s.x[c]
@@ -619,15 +643,16 @@ def _settle(s, k, whole):
         count[DOUBT] |= clear and share < DOUBTFUL
         if clear and number[ACTIVE, i] * force > 0.0:
             state[i], number[HOLDS, i], number[MULTIPLIER, i] = FIXED, k, force
+            number[VALUE, i] = value_of(s, s.x, i)
     for q in range(count[ROWS]):
         i, over = s.index[LIST, q], number[OVER, q]
         scale = around(number[NORM, i], side_of(number, i), s.scalar[SCALE])
-        state[i] = FIXED
+        state[i], number[VALUE, i] = FIXED, value_of(s, s.x, i)
         if q < count[RANK]:
             left = left_of(s, i, end + q, end + q + 1)
             least = min(least, np.sqrt(left) / number[NORM, i])
         else:
-            count[DOUBT] |= is_unclear(s, i, end)
+            count[DOUBT] |= is_unclear(s, i, end, end + count[RANK])
         if number[ACTIVE, i] == EQUAL:
             continue
         if count[MISSED] == 1 and number[ACTIVE, i] * over > unclear * scale:
@@ -635,8 +660,7 @@ def _settle(s, k, whole):
             number[HOLDS, i], number[MULTIPLIER, i] = k, over
         else:
             state[i] = HELD
-    slight = not whole and count[MISSED] == 1 and (
-        SLIGHT * unclear < s.scalar[WORST] < DOUBTFUL)
+    slight = not whole and SLIGHT * unclear < s.scalar[WORST] < DOUBTFUL
     part = Part(ZERO, count[ROWS], end, ZERO)
     if least < DOUBTFUL or slight or (missed and is_uneven(s, part, LIGHT)):
         count[DOUBT] = 1

@@ -28,7 +28,7 @@ from hierarchy.jit import as_matrix, compiled, inlined
 from solvers.kernels.rows import ZERO, has_outlier
 from solvers.kernels.space import View, integers, matrix, proof_size, vector
 from solvers.kernels.tableau import REFERENCE, length_of, reflect
-from solvers.kernels.tolerances import BAND, CLEAR, DUST, ENOUGH, LARGEST, NOTHING
+from solvers.kernels.tolerances import BAND, CLEAR, DUST, ENOUGH, EPSILON, LARGEST, NOTHING
 from solvers.status import INACCURATE, SOLVED, TOO_SMALL
 
 # Rows of `number`. Per row of A: its norm, its miss, +1 or -1 for the side it is claimed to be on;
@@ -226,7 +226,7 @@ def _balances(p, reference, k, reach):
 
     What the rows above leave may also be balanced by small shifts of the sides of its own rows.
     """
-    force, levels, held, own = p.force[k], p.rest.size - 1, p.index[HELD_RANK, k], ZERO
+    force, levels, held = p.force[k], p.rest.size - 1, p.index[HELD_RANK, k]
     for t in range(p.x.size):
         force[t] = p.number[LEFT, t] = 0.0
     enough = _pull(p, k, reach) if k < levels else _pull_of_goal(p, reference, reach)
@@ -239,12 +239,13 @@ def _balances(p, reference, k, reach):
     if _length(p) > 0.1 * enough:
         own = p.index[OWN_RANK, k]
         _push(p, force, own)
+        if _shift(p, force, held, own) > ENOUGH * reach:
+            _drop(p, force, held, own)
     _turn_back(p, force, _begin(p, OWN_RANK, k), held)
     p.rest[k] = _length(p)
     if not _largest_of(force, held) <= most:  # together the rows are nearly dependent
         return False
-    return (_signs_hold(p, force, k) and p.rest[k] <= enough
-            and _shift(p, force, held, own) <= ENOUGH * reach)
+    return _signs_hold(p, force, k) and p.rest[k] <= enough
 
 
 @inlined
@@ -257,12 +258,19 @@ def _largest_of(force, end):
 
 
 @inlined
+def _drop(p, force, begin, end):
+    """Set forces to zero."""
+    for t in range(begin, end):
+        _add(p, t, -force[t])
+        force[t] = 0.0
+
+
+@inlined
 def _turn_back(p, force, begin, end):
     """Set forces to zero that point inward."""
     for t in range(begin, end):
         if force[t] * p.number[SIDE, _row(p, t)] < 0.0:
-            _add(p, t, -force[t])
-            force[t] = 0.0
+            _drop(p, force, t, t + 1)
 
 
 @inlined
@@ -286,7 +294,9 @@ def _pull(p, k, reach):
         for c in range(p.x.size if miss != 0.0 else 0):
             left[c] += norm * miss * p.A[i, c]
     length = np.sqrt(square)
-    return ENOUGH * least * least * length if length > 0.1 * BAND * reach else 0.0
+    if length <= 0.1 * BAND * reach:
+        return 0.0
+    return least * least * max(ENOUGH * length, 2.0 * EPSILON * reach)
 
 
 @inlined

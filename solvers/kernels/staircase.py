@@ -103,9 +103,10 @@ def climb(A, lower, upper, sizes, x, settings, work):
         rank = factor_level(rows, basis, first, last, rank)
         block = Block(first, last, above, rank)
         least = _smallest_pivot(rows, block, least)
+        thin = min(np.sqrt(least) * settings.rank_tolerance, 1.0)
         if rank - above < last - first and (
                 has_outlier(rows.zero[first:last], LIGHT * LIGHT)
-                or is_borderline(rows, first + rank - above, last, rank, BORDER)):
+                or is_borderline(rows, first + rank - above, last, rank, BORDER * thin)):
             least = 0.0  # rounding in heavy rows hides light ones; or a row is hardly dependent
         subtract(rows, y, first, last, above)  # p_i - J_i x_{i-1}, in (13)
         solve_level(rows.W, rows.miss, y, block, settings, of_block)

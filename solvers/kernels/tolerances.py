@@ -17,6 +17,8 @@ DOUBTFUL = 1e-5     # remainder or miss of a row: smaller ones leave the answer 
 DUST = 1e-12        # norm of a row over the largest: smaller ones leave a doubt
 LIGHT = 1e-5        # the same in a level that is missed, over the largest of the level
 BORDER = 0.3        # of rank_tolerance: a dependent row with more left leaves the answer in doubt
+BRINK = 0.8         # the same below a level with inequalities
+DRIFT = 4e-9        # change of a settled row by the levels below: larger ones leave a doubt
 SLIGHT = 0.25       # of rank_tolerance: a smaller miss counts as zero, without doubt
 NO_STEP = 1e-12     # length of a step: smaller ones count as zero
 

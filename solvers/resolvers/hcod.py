@@ -15,6 +15,7 @@ from solvers.certificate import TOLERANCE, certify
 from solvers.kernels.bounds import solve_without_bounds
 from solvers.kernels.guess import solve_by_guesses
 from solvers.kernels.levels import solve_by_levels
+from solvers.kernels.multipliers import prove_by_multipliers
 from solvers.kernels.staircase import solve_equalities
 from solvers.resolver import Handles, Resolution, Resolver, register
 from solvers.status import EQUAL, INACCURATE, NO_LIMITS, SOLVED, TOO_SMALL, UNPROVED, Status
@@ -179,30 +180,37 @@ def solve_exactly(h: Hierarchy, x: Array, record: Array, settings: Array, known:
     return code
 
 
-def solve_anew(h: Hierarchy, x: Array, record: Array, settings: Array) -> int:
-    """Call `solve_exactly` without a memory."""
-    return solve_exactly(h, x, record, settings, False)
+Name = Callable[[Hierarchy, Array, Array], None]
 
 
-Anew = Callable[[Hierarchy, Array, Array, Array], int]
+def name_nothing(h: Hierarchy, x: Array, record: Array) -> None:
+    """Leave the record as it is, because it is that of the exact resolver alone."""
 
 
 def settle_doubt(h: Hierarchy, x: Array, record: Array, settings: Array,
-                 solve: Anew = solve_anew) -> bool:
-    """Return whether an answer in doubt is certified, if need be after the rows are read anew.
+                 name: Name = name_nothing) -> bool:
+    """Return whether an answer in doubt is proved, if need be after it is solved anew.
 
-    A row of 1e-17 beside one of 1 may be rounding, as in the Jacobian of an arm that is straight,
-    and x is 1e17 if it is not: so the answer without such rows comes first. Where the angle between
-    rows is close to rank_tolerance, rounding decides which of them count as dependent, and an
-    answer may mix both readings: so `solve` is called with tolerances on either side. The first
-    answer that is certified, for h, replaces x (n,) and record.
+    - Level by level x may have been far off on the way, and dependent rows remember it: so the
+      active set is solved again in one pass, which must be proved.
+    - A row of 1e-17 beside one of 1 may be rounding, as in the Jacobian of an arm that is straight,
+      and x is 1e17 if it is not: so the answer without such rows comes next.
+    - Where the angle between rows is close to rank_tolerance, rounding decides which of them count
+      as dependent, and an answer may mix both readings: so tolerances on either side are tried.
 
-    If none is, x is as `solve` found it; or without the small rows, if it was large because of
-    them, for then it meets nothing else: rounding in x is more than the tolerance.
+    The last two must be certified, for h. The first answer that is replaces x (n,) and the record,
+    whose last 3 m + 3 numbers are those of the exact resolver; `name` writes what comes before. If
+    none is, x is as it was; or without the small rows, if it was large because of them, for then it
+    meets nothing else: rounding in x is more than the tolerance.
     """
+    reread = _Reader(h, settings, len(record), name)
+    again = reread.at_once(record)
+    if again.code == SOLVED:
+        again.write(x, record)
+        return True
     dust = _dust(h)
     if dust.any():
-        clean = _Reading.of(_without(h, dust), settings, len(record), solve)
+        clean = _Reader(_without(h, dust), settings, len(record), name).level_by_level()
         if clean.certified_for(h):
             clean.write(x, record)
             return True
@@ -212,9 +220,7 @@ def settle_doubt(h: Hierarchy, x: Array, record: Array, settings: Array,
     if certify(h, x).certified:
         return True
     for factor in _FACTORS:
-        changed = settings.copy()
-        changed[_RANK_TOLERANCE] = min(factor * settings[_RANK_TOLERANCE], _LARGEST)
-        again = _Reading.of(h, changed, len(record), solve)
+        again = reread.level_by_level(factor)
         if again.certified_for(h):
             again.write(x, record)
             return True
@@ -223,18 +229,49 @@ def settle_doubt(h: Hierarchy, x: Array, record: Array, settings: Array,
 
 @final
 @dataclass(frozen=True)
+class _Reader:
+    """Solves a hierarchy in other ways; size: that of its record. See `settle_doubt`."""
+
+    h: Hierarchy
+    settings: Array
+    size: int
+    name: Name
+
+    def level_by_level(self, factor: float = 1.0) -> _Reading:
+        """Solve without a memory, with another rank_tolerance."""
+        settings, x, record = self.settings.copy(), self.h.reference.copy(), np.zeros(self.size)
+        settings[_RANK_TOLERANCE] = min(factor * settings[_RANK_TOLERANCE], _LARGEST)
+        code = solve_exactly(self.h, x, self._inner(record), settings, False)
+        return self._named(_Reading(x, record, code))
+
+    def at_once(self, record: Array) -> _Reading:
+        """Solve the active rows of a record in one pass; SOLVED if that is proved."""
+        h, x, record = self.h, self.h.reference.copy(), record.copy()
+        inner = self._inner(record)
+        data, steps = (h.A, h.lower, h.upper, h.sizes, x), inner[-2]
+        code = entry(solve_by_guesses)(*data, inner, self.settings, WORKSPACE.array)
+        if code == SOLVED:
+            code = run(prove_by_multipliers, *data, h.reference, inner)
+        inner[-2] = steps
+        return self._named(_Reading(x, record, code))
+
+    def _inner(self, record: Array) -> Array:
+        return record[-3 * self.h.m - 3:]
+
+    def _named(self, reading: _Reading) -> _Reading:
+        if reading.found:
+            self.name(self.h, reading.x, reading.record)
+        return reading
+
+
+@final
+@dataclass(frozen=True)
 class _Reading:
-    """What a resolver answers to rows that were read in another way: x, its record, its code."""
+    """What the exact resolver answers to rows read in another way: x, its record, its code."""
 
     x: Array
     record: Array
     code: int
-
-    @classmethod
-    def of(cls, h: Hierarchy, settings: Array, size: int, solve: Anew) -> _Reading:
-        """Resolve h, with a record (size,)."""
-        x, record = h.reference.copy(), np.zeros(size)
-        return cls(x, record, solve(h, x, record, settings))
 
     @property
     def found(self) -> bool:

@@ -23,7 +23,7 @@ from solvers.resolver import (
     register,
     register_variant,
 )
-from solvers.resolvers.hcod import Hcod, settle_doubt, solve_anew, solve_exactly, warm_record
+from solvers.resolvers.hcod import Hcod, settle_doubt, solve_exactly, warm_record
 from solvers.resolvers.saturation import SaturatedResolution
 from solvers.status import INACCURATE, NO_LIMITS, NUMERICAL_FAILURE, SOLVED, UNPROVED, Status
 from solvers.workspace import WORKSPACE, entry, run
@@ -118,21 +118,18 @@ class Tpm(Resolver):
         named = name_saturation(h.A, h.lower, h.upper, h.sizes, x, record, WORKSPACE.array)
         if named != SOLVED and known:
             return self.solve(h)
-        if code == INACCURATE and settle_doubt(h, x, record, settings, solve_at_bounds):
+        if code == INACCURATE and settle_doubt(h, x, record, settings, name_bounds):
             code = SOLVED
         return SaturatedResolution(x, Status(code), int(inner.item(-3) + inner.item(-2)), record,
                                    levels, record if named == SOLVED else None)
 
 
-def solve_at_bounds(h: Hierarchy, x: Array, record: Array, settings: Array) -> int:
-    """Solve exactly, without a memory, and name the unknowns at a bound; return the first code.
+def name_bounds(h: Hierarchy, x: Array, record: Array) -> None:
+    """Write the first part of the record, about unknowns at a bound; clamps x (n,) to its bounds.
 
-    record : (n + L + 3 m + 3,); see `name_saturation`, which changes the last digits of x.
+    record : (n + L + 3 m + 3,); see `name_saturation`.
     """
-    code = solve_anew(h, x, record[len(x) + len(h.sizes):], settings)
-    if code in (SOLVED, INACCURATE):
-        name_saturation(h.A, h.lower, h.upper, h.sizes, x, record, WORKSPACE.array)
-    return code
+    name_saturation(h.A, h.lower, h.upper, h.sizes, x, record, WORKSPACE.array)
 
 
 register_variant("tpm-published", "tpm", form="published")
