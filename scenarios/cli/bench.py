@@ -9,6 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
+from scenarios.bench.first_paper import ARMS, CHECKED, SECONDS
 from scenarios.cli.options import Out, output
 from scenarios.cli.terminal import shown
 
@@ -107,7 +108,7 @@ Checked = Annotated[int, typer.Option("--checked", min=1, metavar="N",
 
 
 @bench.command()
-def accuracy(arms: Arms = 10_000, checked: Checked = 1_000, out: Out = None) -> None:
+def accuracy(arms: Arms = ARMS, checked: Checked = CHECKED, out: Out = None) -> None:
     """Measure errors on random arms against exact answers."""
     from scenarios.bench.first_paper import errors
 
@@ -117,7 +118,7 @@ def accuracy(arms: Arms = 10_000, checked: Checked = 1_000, out: Out = None) -> 
 
 
 @bench.command()
-def growth(seconds: Seconds = 60.0, out: Out = None) -> None:
+def growth(seconds: Seconds = SECONDS, out: Out = None) -> None:
     """Time a solve as the numbers of tasks and joints grow."""
     from scenarios.bench.first_paper import times
 
@@ -127,7 +128,7 @@ def growth(seconds: Seconds = 60.0, out: Out = None) -> None:
 
 
 @bench.command("first-paper")
-def first_paper(arms: Arms = 10_000, checked: Checked = 1_000, seconds: Seconds = 60.0,
+def first_paper(arms: Arms = ARMS, checked: Checked = CHECKED, seconds: Seconds = SECONDS,
                 out: Out = None) -> None:
     """Repeat the first TPM paper: accuracy and growth."""
     from scenarios.bench.first_paper import run
