@@ -2,9 +2,9 @@ from itertools import product
 
 import numpy as np
 import pytest
-from scipy.stats import rankdata
+from scipy.stats import rankdata, wilcoxon
 
-from scenarios.measure.statistics import best, paired, spread, wilson
+from scenarios.measure.statistics import EXACT, best, paired, spread, wilson
 
 
 def enumerated(apart):
@@ -22,6 +22,19 @@ def test_the_p_value_is_that_of_all_signs(seed):
     first = random.normal(size=9)
     second = first + 0.4 + random.normal(size=9)
     assert paired(first, second).p == pytest.approx(enumerated(second - first))
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_p_value_is_that_of_all_signs_with_ties(seed):
+    second = np.random.default_rng(seed).integers(-2, 5, 11).astype(float)
+    assert paired(np.zeros(11), second).p == pytest.approx(enumerated(second[second != 0.0]))
+
+
+@pytest.mark.parametrize("pairs", [12, 30, EXACT, EXACT + 1])
+def test_the_p_value_is_that_of_scipy(pairs):
+    random = np.random.default_rng(pairs)
+    second = 0.3 + random.normal(size=pairs)
+    assert paired(np.zeros(pairs), second).p == pytest.approx(wilcoxon(second).pvalue, rel=1e-9)
 
 
 def test_pairs_are_counted_by_their_direction():
