@@ -19,6 +19,7 @@ from scenarios.reproduce.rows import Rows
 from scenarios.reproduce.whole import (
     Chosen,
     chosen,
+    minutes,
     of_pages,
     outputs,
     reproduce,
@@ -64,7 +65,7 @@ def reproduce_command(names: list[str], out: Path, quick: bool, workers: int | N
         _say("hierarchy: interrupted; the same command continues from here")
         return INTERRUPTED
     _report(made, left, as_json)
-    _say(f"{perf_counter() - begun:.0f} s")
+    _say(f"{minutes(perf_counter() - begun)} in all")
     if made.lacking:
         raise HierarchyError("; ".join(made.lacking))
     return 0

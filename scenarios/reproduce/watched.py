@@ -103,14 +103,14 @@ class Outside:
 
 
 def rows_of_watched(study: Watched, command: str, seed: int, out: Path,
-                    workers: Workers | None = None, progress: Progress | None = None) -> Rows:
+                    workers: Workers, progress: Progress | None = None) -> Rows:
     """Run the scenario from each start, and return what the columns of the study measure.
 
     Runs that `out` has are not repeated. Raises what `compare_starts` raises.
     """
     asked, store = jobs(study, seed), Store(out)
     with store.opened():
-        complete(asked, store, workers or Workers(), study.name, progress,
+        complete(asked, store, workers, study.name, progress,
                  partial(run_batch, measured=partial(measured, study)))
         runs = {row["key"]: row for row in store.table().to_pylist()}
     found = [runs[job.key] for job in asked]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from time import perf_counter
 
 from hierarchy.errors import UnknownNameError
 from hierarchy.words import counted
@@ -44,20 +45,29 @@ def reproduce(studies: Sequence[AnyStudy], out: Path, quick: bool = False,
               told: Callable[[str], object] = lambda line: None) -> Iterator[Rows]:
     """Run studies and yield the rows of each as it ends; runs that `out` has are not repeated.
 
-    quick : a tenth of the starts. told : called with a line about each study before it starts.
-    Raises what `compare_starts` raises.
+    quick : a tenth of the starts. told : called with a line about each study before it starts, and
+    with its time after it. Raises what `compare_starts` raises.
     """
-    for count, study in enumerate(studies, 1):
-        starts = max(2, study.starts // QUICK) if quick else study.starts
-        told(f"{study.name} (study {count} of {len(studies)}): {study.title}, "
-             f"{counted(len(study.columns), 'column')} from {starts} starts")
-        yield _run(replace(study, starts=starts), out / study.name, workers, progress)
+    with Workers(workers) as some:
+        for count, study in enumerate(studies, 1):
+            starts = max(2, study.starts // QUICK) if quick else study.starts
+            told(f"{study.name} (study {count} of {len(studies)}): {study.title}, "
+                 f"{counted(len(study.columns), 'column')} from {starts} starts")
+            begun = perf_counter()
+            found = _run(replace(study, starts=starts), out / study.name, some, progress)
+            told(f"  {minutes(perf_counter() - begun)}")
+            yield found
 
 
-def _run(study: AnyStudy, out: Path, workers: int | None, progress: Progress | None) -> Rows:
+def minutes(seconds: float) -> str:
+    """Return a duration as minutes and seconds: "41:07 min"."""
+    return f"{round(seconds) // 60}:{round(seconds) % 60:02} min"
+
+
+def _run(study: AnyStudy, out: Path, workers: Workers, progress: Progress | None) -> Rows:
     command = f"hierarchy reproduce {study.name}"
     if isinstance(study, Watched):
-        return rows_of_watched(study, command, SEED, out, Workers(workers), progress)
+        return rows_of_watched(study, command, SEED, out, workers, progress)
     said = progress and (lambda name, done, total: progress(study.name, done, total))
     done = compare_starts([column.load() for column in study.columns], [OWN], study.starts, SEED,
                           out, workers=workers, progress=said, command=command)
@@ -79,15 +89,19 @@ def outputs(asked: Sequence[str], root: Path, out: Path,
     """Run the commands of pages, one after the other; yield each with what it prints as it ends.
 
     Those whose output `out` has are not repeated, and those that fail are left out. told : called
-    with each before it starts, and with the reason of a failure.
+    with each before it starts, and with its time or the reason of a failure after it.
     """
     found = of_pages(asked, root)
     for count, command in enumerate(found, 1):
         told(f"command {count} of {len(found)}: {command} ...")
+        begun = perf_counter()
         try:
-            yield command, commands.run(command, root, out)
+            printed = commands.run(command, root, out)
         except commands.CommandError as error:
             told(f"left as it is: {error}")
+            continue
+        told(f"  {minutes(perf_counter() - begun)}")
+        yield command, printed
 
 
 def write_documents(found: Mapping[str, Rows], printed: Mapping[str, str], root: Path

@@ -32,7 +32,7 @@ except ImportError as error:
                          "pip install 'task-hierarchy[sweep]'") from error
 
 LARGEST_BATCH = 16     # runs per worker that are lost if everything is killed
-_BATCHES_EACH = 4      # per worker at least, so that workers finish at about the same time
+_BATCHES_EACH = 16     # per worker at least, so that workers finish at about the same time
 _QUEUED_EACH = 3       # batches per worker that are submitted at a time
 _DEATHS = 1            # workers a batch may kill; after one more its jobs run one at a time
 _LOSSES = 3            # times in a row that a batch is submitted anew to a scheduler that was lost

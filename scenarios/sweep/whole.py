@@ -5,9 +5,10 @@ from __future__ import annotations
 import json
 import shlex
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, Self, final
 
 from hierarchy.words import listed
 from scenarios.config import Scenario, load
@@ -20,6 +21,9 @@ from scenarios.sweep.planning import Plan, Planned, plan
 from scenarios.sweep.results import Results, joined, results
 from scenarios.sweep.run import Job, run_batch
 from scenarios.sweep.store import Store, write_table, write_text
+
+if TYPE_CHECKING:
+    from distributed import Client
 
 Progress = Callable[[str, int, int], None]
 
@@ -63,12 +67,14 @@ def sweep(name_or_path: str | Path, out: str | Path, workers: int | None = None,
     """
     text = find(name_or_path).read_text(encoding="utf-8")
     said = command or shlex.join(["hierarchy", "sweep", str(name_or_path), "--out", str(out)])
-    return _made(plan(load_sweep(name_or_path)), Store(Path(out)), Source(said, text),
-                 Workers(workers, scheduler), progress)
+    with Workers(workers, scheduler) as some:
+        return _made(plan(load_sweep(name_or_path)), Store(Path(out)), Source(said, text), some,
+                     progress)
 
 
 def compare_starts(scenarios: Sequence[str | Scenario], resolvers: Sequence[str] | None,
-                   starts: int, seed: int, out: str | Path, *, workers: int | None = None,
+                   starts: int, seed: int, out: str | Path, *,
+                   workers: int | Workers | None = None,
                    scheduler: str | None = None, progress: Progress | None = None,
                    command: str | None = None) -> Finished:
     """Run every scenario under every resolver from the same sampled starts, and compare.
@@ -79,6 +85,7 @@ def compare_starts(scenarios: Sequence[str | Scenario], resolvers: Sequence[str]
     ----------
     resolvers : specs as for `compare`; by default those that a comparison takes.
     starts, seed : number of samples, and the seed from which they are drawn.
+    workers : as for `sweep`, or those of the caller, who ends them.
     """
     chosen = [load(one) if isinstance(one, str) else one for one in scenarios]
     asked = Sweep(name="-".join(one.name for one in chosen)[:80], samples=starts, seed=seed,
@@ -88,8 +95,10 @@ def compare_starts(scenarios: Sequence[str | Scenario], resolvers: Sequence[str]
     said = command or shlex.join(
         ["hierarchy", "compare", *asked.scenarios, "--resolvers", ",".join(asked.resolvers),
          "--starts", str(starts), "--seed", str(seed), "--out", str(out)])
-    return _made(plan(asked, chosen), Store(Path(out)), Source(said), Workers(workers, scheduler),
-                 progress)
+    with ExitStack() as own:
+        some = workers if isinstance(workers, Workers) else own.enter_context(
+            Workers(workers, scheduler))
+        return _made(plan(asked, chosen), Store(Path(out)), Source(said), some, progress)
 
 
 @dataclass(frozen=True)
@@ -100,12 +109,30 @@ class Source:
     file: str = ""
 
 
-@dataclass(frozen=True)
+@final
 class Workers:
-    """Number of processes on this machine, or the address of a Dask scheduler."""
+    """Processes on this machine, or those of the Dask scheduler at an address.
 
-    processes: int | None = None
-    scheduler: str | None = None
+    A context: they start when a sweep first needs them, and end with it.
+    """
+
+    def __init__(self, processes: int | None = None, scheduler: str | None = None) -> None:
+        self._processes, self._scheduler = processes, scheduler
+        self._opened, self._client = ExitStack(), None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *raised: object) -> None:
+        self._client = None
+        self._opened.close()
+
+    def client(self) -> Client:
+        """Return the client of the workers; raises what `connected` raises."""
+        if self._client is None:
+            self._client = self._opened.enter_context(
+                connected(self._processes, self._scheduler))
+        return self._client
 
 
 def _made(planned: Plan, store: Store, source: Source, workers: Workers,
@@ -134,9 +161,9 @@ def complete(jobs: Sequence[Job], store: Store, workers: Workers, name: str,
             progress(name, done, len(jobs))
 
     if missing:
-        with connected(workers.processes, workers.scheduler) as client:
-            told()
-            carry_out(missing, client, store.add, told, work=work)
+        client = workers.client()
+        told()
+        carry_out(missing, client, store.add, told, work=work)
     return len(missing)
 
 

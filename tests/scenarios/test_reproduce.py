@@ -22,6 +22,7 @@ from scenarios.reproduce.watched import DAMPED, LARGEST, LEFT, jobs, measured, r
 from scenarios.reproduce.whole import chosen, outputs
 from scenarios.sweep.run import digest, run_batch
 from scenarios.sweep.store import Store
+from scenarios.sweep.whole import Workers
 
 ROOT = Path(__file__).parents[2]
 
@@ -313,7 +314,7 @@ def test_what_is_measured_in_ticks_is_kept_for_each_start(tmp_path):
     store = Store(tmp_path / "out")
     with store.opened():
         store.add(run_batch(jobs(study, 1), digest(), partial(measured, study)))
-    found = rows_of_watched(study, "a command", 1, store.folder, progress=pytest.fail)
+    found = rows_of_watched(study, "a command", 1, store.folder, Workers(), progress=pytest.fail)
     assert found.ended == {"recursive": 2, "avoidance": 2}
     assert (found.column("recursive", LARGEST) < 1e-9).all()
     assert (found.column("avoidance", DAMPED) == 1.0).all()
