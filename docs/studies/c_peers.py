@@ -76,6 +76,10 @@ class _Timed:
     times: list[Array] = field(default_factory=list)
     right: list[bool] = field(default_factory=list)
 
+    def judge(self, problems: list[Hierarchy], xs: Array) -> None:
+        """Certify the answers xs (problems, n)."""
+        self.right += [certify(h, x, RIGHT).certified for h, x in zip(problems, xs, strict=True)]
+
     def row(self) -> dict[str, Any]:
         median, p95, p999 = np.percentile(np.concatenate(self.times) / 1e3, [50, 95, 99.9])
         return {"problems": self.of.title, "solver": self.name, "median": float(median),
@@ -114,16 +118,19 @@ def run(program: Path, libraries: Mapping[str, Path], seed: int = SEED, count: i
         for of in CLASSES:
             problems = problems_of(of, seed, count)
             solvers = [_Timed(of, name) for name in of.names if name in libraries]
-            for _ in range(turns):
+            for turn in range(turns):
                 for timed in solvers:
                     for some in problems:
-                        _take_turn(timed, program, libraries[timed.name], some)
+                        xs = _take_turn(timed, program, libraries[timed.name], some)
+                        if turn == 0:  # the other turns have the same answers
+                            timed.judge(some, xs)
             rows += [timed.row() for timed in solvers]
     _print(rows)
     return rows
 
 
-def _take_turn(timed: _Timed, program: Path, library: Path, problems: list[Hierarchy]) -> None:
+def _take_turn(timed: _Timed, program: Path, library: Path, problems: list[Hierarchy]) -> Array:
+    """Solve problems, keep the times, and return the answers (problems, n)."""
     with tempfile.TemporaryDirectory() as folder:
         given, answers = Path(folder) / "problems", Path(folder) / "answers"
         record_sequence(given, problems)
@@ -131,9 +138,8 @@ def _take_turn(timed: _Timed, program: Path, library: Path, problems: list[Hiera
                        check=True, timeout=600.0)
         found = np.fromfile(answers)
     size = len(problems) * problems[0].n
-    xs = found[:size].reshape(len(problems), -1)
-    timed.right += [certify(h, x, RIGHT).certified for h, x in zip(problems, xs, strict=True)]
     timed.times.append(found[size:])
+    return found[:size].reshape(len(problems), -1)
 
 
 def _print(rows: list[dict[str, Any]]) -> None:

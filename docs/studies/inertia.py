@@ -15,6 +15,7 @@ from hierarchy import Stack, State
 from hierarchy.problem import Array
 from hierarchy.tasks import JointDamping
 from scenarios import Scenario, load
+from scenarios.bench.machine import on_all_cores
 from scenarios.cell.build import build
 from scenarios.config.sampling import changed, drawn
 from scenarios.loop.controller import Controller
@@ -37,7 +38,7 @@ class PartlyInertia(JointDamping):
         return a
 
 
-def run(scenario: Any, damping: JointDamping | None = None) -> dict[str, Any]:
+def run(scenario: Scenario, damping: JointDamping | None) -> dict[str, Any]:
     """Run a scenario; return its largest speed and rates at which D = M damps [1/s]."""
     cell = build(scenario)
     if damping is not None:
@@ -71,9 +72,25 @@ def starts(scenario: Scenario) -> list[Scenario]:
             for index in range(STARTS)]
 
 
+def cases() -> dict[str, tuple[Scenario, JointDamping | None]]:
+    """Return scenarios with k M, each with the damping in its place, by name."""
+    found: dict[str, tuple[Scenario, JointDamping | None]] = {}
+    for k in (1.0, 5.0):
+        scenario = load("ellipse-inertia", {"damping.value": k})
+        found |= {f"k = {k:g}, k M": (scenario, None),
+                  f"k = {k:g}, k M, wrist 5 I": (scenario, PartlyInertia(7, k, "mass")),
+                  f"k = {k:g}, 5 I, wrist k M": (
+                      scenario, PartlyInertia(7, k, "mass", plain=(0, 1, 2, 3)))}
+    return found
+
+
 def main() -> None:
     """Print everything."""
-    plain = [run(scenario) for scenario in starts(load("ellipse"))]
+    asked = {"": (load("ellipse"), None), **cases()}
+    runs = on_all_cores(run, [(start, damping) for scenario, damping in asked.values()
+                              for start in starts(scenario)])
+    done = dict(zip(asked, (runs[i:i + STARTS] for i in range(0, len(runs), STARTS)), strict=True))
+    plain = done.pop("")
     inertia = np.concatenate([one["inertia"] for one in plain])
     low, high = np.concatenate([one["rates"] for one in plain]).T
     joints = ", ".join(f"{value:.2g}" for value in np.median(inertia, axis=0))
@@ -81,15 +98,10 @@ def main() -> None:
     print(f"k = 1: the freedom that is left is damped at {np.median(low):.2g} 1/s (slowest "
           f"direction, median) to {np.median(high):.2g} 1/s (fastest), at most {high.max():.2g}")
     print(f"largest joint speed [rad/s], median of {STARTS} starts, and how many end:")
-    for k in (1.0, 5.0):
-        cases = {"k M": None, "k M, wrist 5 I": PartlyInertia(7, k, "mass"),
-                 "5 I, wrist k M": PartlyInertia(7, k, "mass", plain=(0, 1, 2, 3))}
-        for name, damping in cases.items():
-            done = [run(one, damping) for one in
-                    starts(load("ellipse-inertia", {"damping.value": k}))]
-            speed = np.median([one["speed"] for one in done])
-            ended = sum(one["speed"] < FASTEST for one in done)
-            print(f"  k = {k:g}, {name:15} {speed:8.3g} {ended:4} of {STARTS}")
+    for name, some in done.items():
+        speed = np.median([one["speed"] for one in some])
+        ended = sum(one["speed"] < FASTEST for one in some)
+        print(f"  {name:22} {speed:8.3g} {ended:4} of {STARTS}")
 
 
 if __name__ == "__main__":

@@ -100,8 +100,9 @@ class Tally:
         res = self.resolver.solve(h)
         missed = h.violations(res.x)
         asked = np.array([np.linalg.norm(b) for _, b, _ in h.levels()][1:])
-        self.extra.append((missed - exact)[1:] / np.where(asked > 0.0, asked, 1.0))
-        self.near.append(certify(h, res.x, SAME).certified)
+        extra = (missed - exact)[1:] / np.where(asked > 0.0, asked, 1.0)
+        self.extra.append(extra)
+        self.near.append(bool((extra <= SAME).all()) and certify(h, res.x, SAME).certified)
         lower, upper = h.lower[:h.n], h.upper[:h.n]
         self.at_bound.append(int(((res.x <= lower) | (res.x >= upper)).sum()))
         self.beyond = max(self.beyond, float(missed[0]))

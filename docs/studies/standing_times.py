@@ -23,7 +23,7 @@ from scenarios.reproduce.studies import GIVING
 from solvers import Resolver, Status
 from solvers.qp.backends import BACKENDS, installed
 
-TICKS, TURNS = 500, 2
+TICKS, TURNS, WARM_UP = 500, 2, 50
 _REFERENCE = "weighted"
 
 
@@ -41,14 +41,19 @@ class Entrant:
     times: list[int] = field(default_factory=list)
     unsolved: int = 0
 
-    def solve_all(self, timed: bool) -> None:
+    def warm_up(self) -> None:
+        """Solve the first ticks untimed, which also compiles."""
+        memory = None
+        for h in self.ticks[:WARM_UP]:
+            memory = self.resolver.solve(h, memory).memory
+
+    def take_turn(self) -> None:
         """Solve all ticks in order."""
         memory, self.unsolved = None, 0
         for h in self.ticks:
             begin = perf_counter_ns()
             res = self.resolver.solve(h, memory)
-            if timed:
-                self.times.append(perf_counter_ns() - begin)
+            self.times.append(perf_counter_ns() - begin)
             memory = res.memory
             self.unsolved += res.status is not Status.SOLVED
 
@@ -67,9 +72,11 @@ def run(ticks: int = TICKS, turns: int = TURNS) -> list[Entrant]:
         for label, spec, changes in asked:
             other = load("stand-push", changes).with_resolver(spec)
             everybody.append(Entrant(label, other.make_resolver(), problems_at(states, other)))
-        for turn in range(turns + 1):
+        for one in everybody:
+            one.warm_up()
+        for _ in range(turns):
             for one in everybody:
-                one.solve_all(timed=turn > 0)  # the first turn compiles and warms up
+                one.take_turn()
     return everybody
 
 

@@ -22,7 +22,7 @@ from rich.table import Table
 from scenarios.bench.machine import machine
 from scenarios.files import write_json
 
-_REPEATED = 7        # repetitions of short processes; the minimum counts
+_REPEATED = 5        # repetitions of short processes; the minimum counts
 _KERNELS = 12        # slowest to compile, listed
 _MB = 1024.0 if sys.platform == "linux" else 1024.0**2  # units of ru_maxrss per MB
 

@@ -22,6 +22,7 @@ from hierarchy import Hierarchy, Robot, State
 from hierarchy.kinematics import write_point_jacobian
 from hierarchy.problem import Array
 from hierarchy.words import listed
+from scenarios.bench.machine import on_all_cores
 from scenarios.bench.rows import write_rows
 from solvers import Resolution, Resolver, Status, make, names
 from solvers.qp.backends import BACKENDS, installed
@@ -145,8 +146,8 @@ def run(out: Path | None = None, resolvers: Iterable[Resolver] | None = None,
 
     Writes strictness.csv into the folder `out` if given.
     """
-    chosen = [*able(), CutOff()] if resolvers is None else resolvers
-    found = [strictness(resolver, duration) for resolver in chosen]
+    chosen = [*able(), CutOff()] if resolvers is None else list(resolvers)
+    found = on_all_cores(strictness, [(resolver, duration) for resolver in chosen])
     _print(found)
     if out is not None:
         write_rows([asdict(one) for one in found], out / "strictness.csv")

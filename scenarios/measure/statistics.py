@@ -99,9 +99,9 @@ def paired(first: Array, second: Array, same: float = SAME) -> Paired:
 
 
 def _signed_rank(apart: Array) -> float:
-    """Return the two-sided p-value of the signed-rank test (Wilcoxon 1945), exact up to EXACT pairs.
+    """Return the two-sided p-value of the signed-rank test (Wilcoxon 1945).
 
-    scipy is exact without ties only, or by going through all signs, which takes a second.
+    Exact up to EXACT pairs; with ties, scipy is not, or tries all signs, which takes a second.
     """
     if apart.size < FEWEST:
         return 1.0
