@@ -121,12 +121,13 @@ _DAMPINGS = {
     "pivots": "tpm-published", "level": "tpm",
     "nakamura": "recursive:method=nakamura:threshold=0.05",
     "chiaverini": "recursive:method=chiaverini",
-    "selective": "recursive:method=selective:largest=2.0"}
+    "selective": "recursive:method=selective:largest=2.0"}  # rad/s
+_ACCELERATIONS = _DAMPINGS | {"selective": "recursive:method=selective:largest=10.0"}  # rad/s^2
 
 SINGULAR = Study("singular", "Through singularities and out of reach", (
     *_variants("singular", _DAMPINGS), Column("limits", "singular-limits", OWN),
-    Column("acceleration-pivots", "singular-acceleration", "tpm-published"),
-    Column("acceleration-level", "singular-acceleration", "tpm"),
+    *_variants("singular-acceleration", {
+        f"acceleration-{name}": spec for name, spec in _ACCELERATIONS.items()}),
     Column("acceleration-limits", "singular-acceleration-limits", OWN)))
 
 HUMAN = Study("human", "A hand, a depth camera, an arm under position control", (

@@ -62,7 +62,11 @@ def _who(results: Results, criterion: Criterion) -> str:
     if len({(share.met, share.of) for share in shares.values()}) == 1:
         each = " under each resolver" if len(shares) > 1 else ""
         return f"{next(iter(shares.values()))} runs{each}"
-    return listed([f"{share} runs under {label}" for label, share in shares.items()])
+    under: dict[str, list[str]] = {}
+    for label, share in shares.items():
+        under.setdefault(str(share), []).append(label)
+    return listed([f"{share} runs under {'each of ' * (len(labels) > 1)}{listed(labels)}"
+                   for share, labels in under.items()])
 
 
 def _sameness(results: Results) -> Iterator[str]:
