@@ -2,15 +2,18 @@
 
 import csv
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import oracle
 import pytest
 import rank_cases
+import typer
 
 from hierarchy import Hierarchy, Robot, State
 from hierarchy.robots import KUKA_LWR, TABLES
 from scenarios.bench import accuracy, arms, exact, first_paper, growth, growth_figure
+from scenarios.cli.main import app
 from solvers import Resolution, Status, make, names
 
 pytestmark = pytest.mark.slow
@@ -31,6 +34,18 @@ def claims():
     """Accuracy by label of those that claim to be strict."""
     return {resolver.label: resolver.accuracy for resolver in accuracy.resolvers()
             if resolver.strict}
+
+
+def test_the_commands_take_as_many_arms_as_the_page_says():
+    own = {"arms": first_paper.ARMS, "checked": first_paper.CHECKED,
+           "seconds": first_paper.SECONDS}
+    group = typer.main.get_command(app).commands["bench"]
+    for name in ("first-paper", "accuracy", "growth"):
+        given = {param.name: param.default for param in group.commands[name].params}
+        assert {key: given[key] for key in own if key in given} == {
+            key: own[key] for key in own if key in given}
+    page = (Path(__file__).parents[2] / "docs/first-paper.md").read_text(encoding="utf-8")
+    assert f"on the first {first_paper.CHECKED} arms of each kind" in page
 
 
 def test_the_jacobians_are_those_of_pinocchio(monkeypatch):

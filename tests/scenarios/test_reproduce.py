@@ -19,7 +19,7 @@ from scenarios.reproduce.claims import Compares, Ends, Keeps
 from scenarios.reproduce.rows import Rows, read, write
 from scenarios.reproduce.studies import STUDIES, Pair, Pivot, Study, Watched
 from scenarios.reproduce.watched import DAMPED, LARGEST, LEFT, jobs, measured, rows_of_watched
-from scenarios.reproduce.whole import chosen, outputs
+from scenarios.reproduce.whole import chosen, minutes, outputs
 from scenarios.sweep.run import digest, run_batch
 from scenarios.sweep.store import Store
 from scenarios.sweep.whole import Workers
@@ -218,6 +218,19 @@ def test_a_command_that_fails_leaves_the_others(tmp_path):
     found = dict(outputs(["page.md"], tmp_path, tmp_path / "out", told.append))
     assert found == {"python good.py": "good\n"}
     assert told[1].startswith("left as it is: python bad.py: exit code 3")
+
+
+def test_it_says_how_long_each_command_and_all_of_it_took(documents, monkeypatch, capsys):
+    (documents / "good.py").write_text("print('good')\n")
+    (documents / "page.md").write_text(page("python good.py"))
+    told = []
+    assert dict(outputs(["page.md"], documents, documents / "out", told.append))
+    assert re.fullmatch(r"  0:0\d min", told[1])
+    assert minutes(2467.4) == "41:07 min"
+    monkeypatch.setattr(command, "checkout", lambda: documents)
+    monkeypatch.setattr(command, "outputs", lambda *_: iter([]))
+    assert command.reproduce_command(["docs/batch.md"], documents / "out", False, 1) == 0
+    assert re.search(r"^0:0\d min in all$", capsys.readouterr().err, re.MULTILINE)
 
 
 def test_studies_and_pages_are_chosen_by_name():

@@ -9,7 +9,12 @@ from scenarios.config.sampling import changed, drawn
 
 pytest.importorskip("distributed")
 
-from scenarios.sweep.whole import compare_starts
+from scenarios.sweep import whole
+from scenarios.sweep.planning import Planned
+from scenarios.sweep.results import Results
+from scenarios.sweep.run import Job
+from scenarios.sweep.verdict import success
+from scenarios.sweep.whole import Workers, compare_starts
 
 SHORT = {"control.duration": 0.03}
 
@@ -111,6 +116,28 @@ def test_scenarios_under_their_own_resolvers_are_columns(tmp_path, cluster):
                            0, tmp_path / "out", scheduler=cluster)
     (results,) = found.found.values()
     assert results.labels == ("ellipse", "ellipse-hqp")
+
+
+def test_workers_start_once_for_several_comparisons_and_not_where_nothing_is_missing(
+        done, cluster, monkeypatch):
+    _, _, folder = done
+    started, connected = [], whole.connected
+    monkeypatch.setattr(whole, "connected",
+                        lambda *asked: started.append(asked) or connected(*asked))
+    with Workers(scheduler=cluster) as workers:
+        for starts, asked in ((7, 0), (9, 1), (10, 1)):
+            compare_starts([load("ellipse", SHORT)], ["recursive", "hcod", "augmented"], starts, 3,
+                           folder, workers=workers)
+            assert len(started) == asked
+
+
+def test_runs_of_the_same_share_are_named_together():
+    names = [Planned("a", "a", label, sample, {}, Job("", "", label))
+             for sample in range(4) for label in ("tpm", "hcod", "weighted")]
+    excess = np.array([0.0 if run.label != "weighted" and run.sample else 1.0 for run in names])
+    found = Results(tuple(names), (None,) * 12, {}, {"joint_limit_excess": excess})
+    said = "3 of 4 runs under each of tpm and hcod and 0 of 4 runs under weighted kept the joint"
+    assert said in success(found)
 
 
 def test_a_scenario_without_variation_is_refused(tmp_path):
