@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
@@ -158,7 +159,7 @@ class Recorded(Path):
 def _interval(times: Sequence[float], points: Sequence[Vector], t: float, out: Array
               ) -> int | None:
     """Return the point at which the interval around t ends; outside, write the rest and None."""
-    i = int(np.searchsorted(times, t, side="right"))
+    i = bisect_right(times, t)
     if 0 < i < len(times):
         return i
     out[0], out[1:] = points[min(i, len(times) - 1)], 0.0
