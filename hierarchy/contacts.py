@@ -129,8 +129,8 @@ class Contacts:
         contacts = tuple(self.contacts)
         set_frozen(self, contacts=contacts)
         if not self.robot.masses.sum() > 0.0:
-            raise HierarchyError(f"contacts: robot {self.robot.name!r} has no masses, so no torque "
-                                 "or force moves it")
+            raise HierarchyError(f"robot {self.robot.name!r} has no masses, so no torque or force "
+                                 "moves it")
         for i, contact in enumerate(contacts):
             if contact.name in self.names[:i]:
                 raise HierarchyError(f"contact {contact.name!r}: two contacts have this name")

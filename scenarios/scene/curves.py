@@ -16,7 +16,8 @@ from scenarios.measure.metrics import pointing_angle
 if TYPE_CHECKING:
     from scenarios.loop.recording import Recording
 
-_ERRORS = {"m": ", positions", "deg": ", directions", "rad": ", joints", "": ""}
+_ERRORS = {"m": ", positions", "deg": ", directions", "rad": ", joints", "": "",
+           "N s": ", linear momentum", "N m s": ", angular momentum"}
 _SYMBOLS = {r"$\epsilon_1$": "ε₁", r"$\epsilon_2$": "ε₂", r"$\epsilon_{ee}$": "ε_ee",
             r"$d_{min}$": "d_min"}
 

@@ -236,5 +236,4 @@ def _paths(recording: Recording, ticks: NDArray[np.int64]) -> Iterator[Moved]:
             continue
         actual = recording[listed.position_of(section.title)][ticks]
         error = recording[listed.error_of(section.title)][ticks]
-        at_a_point = section.kind in ("position", "pose")
-        yield Moved(section.title, actual, actual + error[:, :3] if at_a_point else None)
+        yield Moved(section.title, actual, listed.wanted(section, actual, error))

@@ -151,8 +151,7 @@ class Watched:
             here = self.listed.get(listed.position_of(section.title))
             if here is not None:
                 error = self.listed[listed.error_of(section.title)]
-                at_a_point = section.kind in ("position", "pose")
-                yield here[0], here[0] + error[0, :3] if at_a_point else None
+                yield here[0], listed.wanted(section, here[0], error[0])
 
     def _judged(self) -> Judged:
         controller = self.controller
