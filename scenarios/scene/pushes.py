@@ -19,11 +19,12 @@ _CONE = 0.05      # [m] height of a friction cone
 _EDGES = 8        # of a cone as it is drawn
 _LOADED = 1.0     # [N] of normal force from which a point or a contact counts as loaded
 _CROSS = 0.02     # [m] half of the cross under the centre of mass
+_TABLE = 0.25     # [m] half of the part of a table that is drawn
 _HEAD = 0.06      # [m] length of the head of an arrow
 
 _WORDS = {"force": "contact force, 2 mm per newton", "cone": "friction cone",
           "support": "support polygon", "centre": "below the centre of mass",
-          "push": "push from outside, 2 mm per newton"}
+          "push": "push from outside, 2 mm per newton", "table": "table"}
 
 
 class Pushes(NamedTuple):
@@ -34,6 +35,7 @@ class Pushes(NamedTuple):
     support : the support polygon, the convex hull of the points of all loaded contacts from above.
     centre : a cross on the floor below the centre of mass; none with a fixed base.
     push : an arrow to the middle of each body that is pushed from outside, 2 mm for each newton.
+    table : a grid of what a robot with a fixed base touches, around its first point; else none.
     """
 
     force: Array
@@ -41,6 +43,7 @@ class Pushes(NamedTuple):
     support: Array
     centre: Array
     push: Array
+    table: Array
 
     def at(self, frame: int) -> Pushes:
         """Return the segments (S, 2, 3) of a frame that exist."""
@@ -52,7 +55,8 @@ def key(facts: Facts, scenario: Scenario) -> dict[str, str]:
     if not facts.contacts:
         return {}
     drawn = {"force": True, "cone": True, "support": len(facts.contacts) > 2,
-             "centre": facts.robot.base == "floating", "push": bool(_shoves(scenario))}
+             "centre": facts.robot.base == "floating", "push": bool(_shoves(scenario)),
+             "table": facts.robot.base == "fixed"}
     return {name: _WORDS[name] for name, it_is in drawn.items() if it_is}
 
 
@@ -66,7 +70,8 @@ def pushes(facts: Facts, scenario: Scenario, t: Array, placements: Array, forces
     shoves = [_shove(facts.robot, push, t, placements) for push in _shoves(scenario)]
     return Pushes(*_contacts(facts.contacts, placements, forces),
                   _below(facts.robot, com, len(placements)),
-                  np.concatenate([np.empty((len(placements), 0, 2, 3)), *shoves], axis=1))
+                  np.concatenate([np.empty((len(placements), 0, 2, 3)), *shoves], axis=1),
+                  _table(facts, scenario, len(placements)))
 
 
 def _contacts(points: Sequence[ContactPoint], placements: Array,
@@ -96,6 +101,20 @@ def _below(robot: RobotFacts, com: Array | None, frames: int) -> Array:
                               [[0.0, -1.0, 0.0], [0.0, 1.0, 0.0]]])
     place = np.column_stack([com[:, :2], np.full(frames, robot.floor)])
     return np.asarray(place[:, None, None] + arms)
+
+
+def _table(facts: Facts, scenario: Scenario, frames: int) -> Array:
+    """Return a grid (F, S, 2, 3) at the height of the plant's floor, below where a robot starts."""
+    height = getattr(scenario.plant, "height", None)
+    if height is None or facts.robot.base == "floating":
+        return np.empty((frames, 0, 2, 3))
+    point = facts.contacts[0]
+    placed = facts.robot.placements(np.array(scenario.start.q or facts.robot.rest))[point.joint]
+    x, y, _ = np.array(point.offset) @ placed[:9].reshape(3, 3) + placed[9:]
+    at = np.linspace(-_TABLE, _TABLE, 9)
+    along = np.array([[[-_TABLE, one, 0.0], [_TABLE, one, 0.0]] for one in at])
+    lines = np.concatenate([along, along[..., [1, 0, 2]]])
+    return np.tile(lines + np.array([x, y, height]), (frames, 1, 1, 1))
 
 
 def _shoves(scenario: Scenario) -> tuple[PushSection, ...]:

@@ -80,7 +80,7 @@ def test_the_key_names_what_is_drawn_and_nothing_else():
     assert list(key(FACTS, STANDING)) == ["force", "cone", "support", "centre", "push"]
     assert list(key(FACTS, STEP)) == ["force", "cone", "support", "centre"]
     wipe = load("wipe")
-    assert list(key(facts_of(wipe, Robot.named("kuka_lwr")), wipe)) == ["force", "cone"]
+    assert list(key(facts_of(wipe, Robot.named("kuka_lwr")), wipe)) == ["force", "cone", "table"]
     assert key(replace(FACTS, contacts=()), STANDING) == {}
 
 
@@ -121,6 +121,8 @@ def test_every_shipped_scenario_of_torques_can_be_replayed(name):
     for (here, goal), path in zip(watched.moment().moved, scene(run).paths, strict=True):
         np.testing.assert_allclose(here, path.actual[0], atol=1e-9)
         assert (goal is None) == (path.wanted is None)
+        if name == "wipe":
+            assert (scene(run).pushes.table[..., 2] == load(name).plant.height).all()
         if goal is not None:
             np.testing.assert_allclose(goal, path.wanted[0], atol=1e-9)
 

@@ -147,7 +147,7 @@ class Stage {
       passing([[tip, add(tip, scale(run.wanted, AXIS_LENGTH))]], [...colours.ink, 0.6], 1.2,
               {dash: 0.02});
     }
-    const pushes = [["support", [...own, 1], 2], ["cone", [...colours.ink, 0.35], 0.8],
+    const pushes = [["table", [...colours.ink, 0.35], 1], ["support", [...own, 1], 2], ["cone", [...colours.ink, 0.35], 0.8],
                     ["centre", [...colours.ink, 1], 2], ["force", [...colours.alert, 1], 3],
                     ["push", [...colours.accent, 1], 4]];
     for (const [name, colour, width] of pushes) {

@@ -28,7 +28,8 @@ _AREA_OPACITIES = (0.20, 0.08)  # of the inner and the outer area
 _PATH_VERTICES = 400
 _PALE, _DARK, _AMBER, _GREEN = (214, 219, 226), (60, 66, 74), (214, 138, 0), (0, 158, 115)
 PUSHES = {"force": (ALERT, 4.0), "cone": (INK, 1.0), "support": ("", 3.0), "centre": (INK, 3.0),
-          "push": ("#0b62b8", 5.0)}  # colour, "" for that of the run, and width [px]
+          "push": ("#0b62b8", 5.0),
+          "table": ("#8a929c", 1.5)}  # colour, "" for that of the run, and width [px]
 
 
 def rgb(colour: str) -> Rgb:
