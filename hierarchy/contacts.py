@@ -14,7 +14,7 @@ Hierarchical Control of Behavioral Primitives", International Journal of Humanoi
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
@@ -129,8 +129,8 @@ class Contacts:
         contacts = tuple(self.contacts)
         set_frozen(self, contacts=contacts)
         if not self.robot.masses.sum() > 0.0:
-            raise HierarchyError(f"contacts: robot {self.robot.name!r} has no masses, so no torque "
-                                 "or force moves it")
+            raise HierarchyError(f"robot {self.robot.name!r} has no masses, so no torque or force "
+                                 "moves it")
         for i, contact in enumerate(contacts):
             if contact.name in self.names[:i]:
                 raise HierarchyError(f"contact {contact.name!r}: two contacts have this name")
@@ -203,6 +203,21 @@ class Contacts:
                                  f"{self.robot.n} accelerations and "
                                  f"{self.unknowns - self.robot.n} components of force")
         return x
+
+
+def zero_while_open(write: Callable[[], object], state: State, contacts: Contacts,
+                    parts: Sequence[Sequence[Array]]) -> Callable[[], object]:
+    """Return `write`, followed by zeros in the `parts` of each contact that is open at the time."""
+    opening = [pair for pair in zip(contacts.contacts, parts, strict=True) if pair[0].open]
+
+    def write_and_zero() -> None:
+        write()
+        for contact, arrays in opening:
+            if contact.load(state.t) == 0.0:
+                for array in arrays:
+                    array[:] = 0.0
+
+    return write_and_zero if opening else write
 
 
 def _axes(normal: Array) -> Array:

@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from hierarchy.contacts import Contacts, write_dynamics
+from hierarchy.contacts import Contacts, write_dynamics, zero_while_open
 from hierarchy.jit import bind, compiled
 from hierarchy.kinematics import write_equality
 from hierarchy.problem import Array
@@ -48,16 +48,9 @@ class BaseDynamics(ForceTask):
         M, h = state.dynamics
         parameters = M, h, state.kinematics, self.contacts.points
         write_rows = bind(_write, parameters, A, lower, upper, row, self.dimension)
-        opening = [(A[row:row + self.dimension, self.contacts.blocks[contact.name]], contact)
-                   for contact in self.contacts.contacts if contact.open]
-
-        def write() -> None:
-            write_rows()
-            for forces, contact in opening:
-                if contact.load(state.t) == 0.0:
-                    forces[:] = 0.0
-
-        return write if opening else write_rows
+        forces = [(A[row:row + self.dimension, self.contacts.blocks[contact.name]],)
+                  for contact in self.contacts.contacts]
+        return zero_while_open(write_rows, state, self.contacts, forces)
 
 
 @compiled

@@ -8,7 +8,7 @@ from typing import cast
 
 import numpy as np
 
-from hierarchy.contacts import Contact, Contacts
+from hierarchy.contacts import Contact, Contacts, zero_while_open
 from hierarchy.errors import HierarchyError
 from hierarchy.paths import Still
 from hierarchy.problem import Array
@@ -97,19 +97,11 @@ class ContactMotion(Task):
     def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
                row: int) -> Callable[[], object]:
         """See `Task.writer`."""
-        write_rows, opening = self._tasks.writer(state, level, A, lower, upper, row), []
+        write_rows, rows = self._tasks.writer(state, level, A, lower, upper, row), []
         for contact in self.of.contacts:
-            rows = slice(row, row := row + _rows(contact))
-            if contact.open:
-                opening.append((rows, contact))
-
-        def write() -> None:
-            write_rows()
-            for rows, contact in opening:
-                if contact.load(state.t) == 0.0:
-                    A[rows] = lower[rows] = upper[rows] = 0.0
-
-        return write if opening else write_rows
+            of = slice(row, row := row + _rows(contact))
+            rows.append((A[of], lower[of], upper[of]))
+        return zero_while_open(write_rows, state, self.of, rows)
 
     @property
     def _tasks(self) -> Together:

@@ -60,6 +60,13 @@ class Cell:
     activation: Activation | None = None
     contacts: Contacts | None = None
 
+    @property
+    def torque_limit(self) -> Array:
+        """Largest torques of the actuated joints [N m], the share of the limits in use."""
+        limits = self.scenario.limits
+        share = (limits and limits.torque) or 1.0
+        return self.robot.effort_limit[self.robot.actuated:] * share
+
 
 def build(scenario: Scenario, kept: Cell | None = None) -> Cell:
     """Build the parts; raises HierarchyError if the scenario does not fit its robot.

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import isfinite
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
 from pydantic import ValidationError
 
-from hierarchy import Robot, plugins
+from hierarchy import Robot, State, plugins
 from hierarchy.errors import UnknownNameError
 from hierarchy.robots import TABLES
 from hierarchy.robots.names import elsewhere, file_of, in_package
@@ -20,6 +21,7 @@ from scenarios.config.robot import RobotSection
 _FRAMES = 12   # names listed at most
 _ROUND = 4     # decimals of proposed positions [m]
 _TURNS = 50.0  # [rad] between limits of a joint beyond which they are taken for degrees
+_LEVEL = 0.02  # [m] between frames that are at the same height
 _UNITS = {"rad": "rad, rad/s, N m", "m": "m, m/s, N"}
 
 
@@ -61,7 +63,7 @@ def as_plain_data(section: RobotSection, robot: Robot) -> dict[str, Any]:
         "mass_kg": float(robot.masses.sum()), "joints": _joints(robot),
         "frames": [name for name in robot.frame_names
                    if name not in ("universe", *robot.joint_names)],
-        "end_effector": robot.end_effector,
+        "end_effector": robot.end_effector, "lowest_frames": _lowest(robot),
         "capsules": [{"joint": _carrier(robot, c.joint), "start": _rounded(c.start),
                       "end": _rounded(c.end), "radius": round(c.radius, _ROUND)}
                      for c in robot.capsules],
@@ -90,6 +92,7 @@ def say(section: RobotSection, robot: Robot) -> str:
              f"  frames          {_some(found['frames'])}",
              f"  end effector    {robot.end_effector}, {end}; "
              f"{_moved_by(robot)} joints move it",
+             *_said_of_feet(found["lowest_frames"]),
              f"  capsules        {capsules}",
              f"  control points  {len(robot.control_points)}, {points}"]
     lines += [f"  missing         {sentence}" for sentence in found["missing"]]
@@ -173,6 +176,27 @@ def _missing(robot: Robot) -> list[str]:
     if not robot.control_points:
         said.append("control points: no avoidance; list robot.control_points")
     return [*robot.missing, *said]
+
+
+def _lowest(robot: Robot) -> list[str]:
+    """Return where a floating robot may stand: the lowest frames, at most one of each body.
+
+    In its own posture, and within 2 cm of the lowest of all.
+    """
+    if robot.base == "fixed":
+        return []
+    state, lowest = State.at(robot, robot.rest), dict[int, tuple[float, str]]()
+    for name in robot.frame_names:
+        frame = robot.frame(name)
+        if name not in robot.joint_names and frame.joint > 1:
+            here = float(state.position(frame)[2]), name
+            lowest[frame.joint] = min(here, lowest.get(frame.joint, here), key=itemgetter(0))
+    floor = min((height for height, _ in lowest.values()), default=0.0)
+    return [name for height, name in lowest.values() if height < floor + _LEVEL]
+
+
+def _said_of_feet(names: list[str]) -> list[str]:
+    return [f"  lowest frames   {_some(names)}; [[contacts]] may be there"] if names else []
 
 
 def _moved_by(robot: Robot) -> int:

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from typing import Annotated, ClassVar, Literal, Self
 
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 from pydantic import Discriminator, Field, Tag, model_validator
 
 from hierarchy.plugins import Group
+from hierarchy.problem import Array
 from scenarios.config.own import OwnSection
 from scenarios.config.sections import (
     PLUGIN,
@@ -18,6 +21,8 @@ from scenarios.config.sections import (
     Section,
     kind_or,
 )
+
+_ROUNDING = 1e-9  # [s] of times
 
 
 class MeasurementSection(Section):
@@ -118,6 +123,17 @@ class PushSection(Section):
     direction: Finite = 0.0
     at: NotNegative = 0.0
     duration: Positive = 0.1
+
+    @property
+    def vector(self) -> Array:
+        """The force (3,) [N] in the world."""
+        angle = np.radians(self.direction)
+        return self.force * np.array([np.cos(angle), np.sin(angle), 0.0])
+
+    def acts(self, t: ArrayLike) -> NDArray[np.bool_]:
+        """Whether it pushes in the periods that begin at the times t (...) [s]."""
+        passed = np.asarray(t) - self.at + _ROUNDING
+        return (passed >= 0.0) & (passed < self.duration)
 
 
 class TorqueSection(_Plant):

@@ -186,8 +186,7 @@ def _policy(scenario: Scenario, cell: Cell) -> Policy:
     if control.level != "torque":
         clamp = partial(cell.limits.clamp, cell.state, control.level) if cell.limits else None
         return Policy(control.policy, control.level, control.period, clamp)
-    limits = scenario.limits
-    limit = robot.effort_limit[robot.actuated:] * ((limits and limits.torque) or 1.0)
+    limits, limit = scenario.limits, cell.torque_limit
     damping = np.where(np.isfinite(limit), limit, 0.0) / robot.velocity_limit[robot.actuated:]
     step = (limits and limits.torque_step) or inf
     return Policy(control.policy, control.level, control.period,

@@ -27,6 +27,18 @@ def position_of(name: str) -> str:
     return f"task_position_{name.replace(' ', '_')}"
 
 
+def wanted(section: ListedTask, position: Array, error: Array) -> Array | None:
+    """Return where a task wants the point (..., 3) [m] that it moves, or None if it does not say.
+
+    In axes that the task leaves free that is where the point is.
+    """
+    if section.kind not in ("position", "pose"):
+        return None
+    axes, goal = ["xyz".index(axis) for axis in getattr(section, "axes", "xyz")], position.copy()
+    goal[..., axes] += error[..., :len(axes)]
+    return goal
+
+
 def signals(robot: Robot, tasks: Iterable[Task], t: Array, q: Array, v: Array) -> dict[str, Array]:
     """Return error and position of listed tasks at t (T,) [s], q (T, nq), v (T, n).
 

@@ -174,9 +174,7 @@ class Recorder:
         signals |= {"joint_lower": robot.lower, "joint_upper": robot.upper,
                     "velocity_limit": robot.velocity_limit}
         if self._cell.contacts is not None:
-            limits = scenario.limits
-            signals["torque_limit"] = robot.effort_limit[robot.actuated:] * (
-                (limits and limits.torque) or 1.0)
+            signals["torque_limit"] = self._cell.torque_limit
         return Recording(signals, tuple(" > ".join(names) for names in orders), scenario,
                          self.facts, fault, tuple(self._events))
 

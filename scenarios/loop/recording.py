@@ -11,8 +11,8 @@ axes: the answer at level "torque", NaN where there was none
 com (T, 3) [m] the true centre of mass; floor_force (T, C, 3) [N] on each contact, slip (T, C)
 [m] along the floor since it touched down, pressure_margin (T, C) [m] of the centre of pressure
 from the nearest edge of the sole, NaN without load; support_margin (T,) [m] of com inside the
-polygon of the loaded points, from above; push (T, 3) [N]: of the last step of the simulation in
-tick k, from a plant with torque motors
+support polygon, the hull of the loaded contacts, from above; push (T, 3) [N]: of the last step of
+the simulation in tick k, from a plant with torque motors
 true_q, true_v (T, n) the true state where measurement or physics make it differ from q and v;
 true_ee_position (T, 3) [m] from true_q
 contacts (T,) largest number of contacts between arm and obstacles at once in the period of

@@ -237,8 +237,9 @@ def _motion(recording: Recording) -> Iterator[Metric]:
         yield Metric("velocity_step_max_measured", "Joint speed step measured, max",
                      _largest(np.diff(recording["v"], axis=0)), "rad/s", None, group, detail=True,
                      note="with the errors of the sensor")
-    yield Metric("command_step_max", "Commanded speed step, max", _command_step(recording),
-                 "rad/s", group=group, note="of the command, not of the joints")
+    if recording.scenario.control.level != "torque":
+        yield Metric("command_step_max", "Commanded speed step, max", _command_step(recording),
+                     "rad/s", group=group, note="of the command, not of the joints")
     yield Metric("acceleration_max", "Joint acceleration, max", _largest(recording["a"]),
                  "rad/s^2", group=group)
     yield Metric("acceleration_step_max", "Joint acceleration step, max",
@@ -248,8 +249,6 @@ def _motion(recording: Recording) -> Iterator[Metric]:
 def _command_step(recording: Recording) -> float | None:
     """Return the largest change of a joint's commanded speed in one tick [rad/s]."""
     control, command = recording.scenario.control, recording["command"]
-    if control.level == "torque":
-        return None
     return _largest(np.diff(command, axis=0) if control.level == "velocity"
                     else command * control.period)
 

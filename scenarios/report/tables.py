@@ -20,10 +20,11 @@ Cell = tuple[str, str, str]  # its kind, "" for none; a note; the text
 # The most important metrics; the others are folded away.
 _FIRST = ("position_error_median_settled", "position_error_max_settled", "cone_violation_max",
           "moved_by_lower_max", "body_distance_min", "body_below_share", "ee_distance_min",
-          "ee_below_share", "contact_ticks", "joint_limit_excess", "speed_max",
-          "velocity_step_max", "command_step_max", "acceleration_max", "stack_changes",
-          "active_set_changes", "ticks_not_solved", "ticks_brake", "ticks_stop", "ticks_late",
-          "time_resolve_median", "time_resolve_p999", "time_tick_median")
+          "ee_below_share", "contact_ticks", "slip_max", "friction_margin_min",
+          "support_margin_min", "torque_limit_share", "torque_step_max", "joint_limit_excess",
+          "speed_max", "velocity_step_max", "command_step_max", "acceleration_max",
+          "stack_changes", "active_set_changes", "ticks_not_solved", "ticks_brake", "ticks_stop",
+          "ticks_late", "time_resolve_median", "time_resolve_p999", "time_tick_median")
 
 
 def numbers(runs: Sequence[Run], looks: Mapping[str, Look]) -> Markup:

@@ -16,7 +16,8 @@ from scenarios.measure.metrics import pointing_angle
 if TYPE_CHECKING:
     from scenarios.loop.recording import Recording
 
-_ERRORS = {"m": ", positions", "deg": ", directions", "rad": ", joints", "": ""}
+_ERRORS = {"m": ", positions", "deg": ", directions", "rad": ", joints", "": "",
+           "N s": ", linear momentum", "N m s": ", angular momentum"}
 _SYMBOLS = {r"$\epsilon_1$": "ε₁", r"$\epsilon_2$": "ε₂", r"$\epsilon_{ee}$": "ε_ee",
             r"$d_{min}$": "d_min"}
 
@@ -64,6 +65,7 @@ def series(recording: Recording, ticks: NDArray[np.int64]) -> Iterator[Series]:
             yield _sampled(name, "m", (name.partition(" to ")[0].lower(),), recording[signal],
                            ticks, marks_of(at))
     yield from _task_errors(recording, ticks)
+    yield from _forces(recording, ticks)
     joints = tuple(f"joint {j + 1}" for j in range(recording["v"].shape[1]))
     yield _sampled("Joint speeds", "rad/s", joints, recording["v"], ticks)
 
@@ -78,6 +80,18 @@ def _task_errors(recording: Recording, ticks: NDArray[np.int64]) -> Iterator[Ser
     for unit, errors in found.items():
         yield _sampled(f"Errors of tasks{_ERRORS[unit]}", unit, tuple(errors),
                        np.column_stack(list(errors.values())), ticks)
+
+
+def _forces(recording: Recording, ticks: NDArray[np.int64]) -> Iterator[Series]:
+    """Yield the normal forces of contacts, and the largest torque as a share of its limit."""
+    if "floor_force" in recording:
+        contacts = recording.scenario.contacts
+        yield _sampled("Normal forces", "N", tuple(one.name or one.frame for one in contacts),
+                       recording["floor_force"][:, :, 2], ticks)
+    if "torque_limit" in recording:
+        share = 100.0 * np.abs(recording["command"]) / recording["torque_limit"]
+        yield _sampled("Largest torque, of its limit", "%", ("largest torque",),
+                       share.max(axis=1), ticks, (("limit", 100.0),))
 
 
 def _sampled(name: str, unit: str, labels: tuple[str, ...], values: Array,

@@ -158,9 +158,15 @@ def scene(recording: Recording, rate: float = 30.0) -> Scene:
                  paths=tuple(_paths(recording, ticks)), levels=levels,
                  series=tuple(series(recording, ticks)),
                  switches=recording["t"][recording.switches()],
-                 pushes=pushes(recording.facts.contacts, moved["placements"],
-                               recording["planned_force"][ticks])
-                 if recording.facts.contacts else None)
+                 pushes=_pushes(recording, ticks, moved["placements"]))
+
+
+def _pushes(recording: Recording, ticks: NDArray[np.int64], placements: Array) -> Pushes | None:
+    if not recording.facts.contacts:
+        return None
+    com = recording["com"][ticks] if "com" in recording else None
+    return pushes(recording.facts, recording.scenario, recording["t"][ticks], placements,
+                  recording["planned_force"][ticks], com)
 
 
 def _frames(recording: Recording, rate: float) -> NDArray[np.int64]:
@@ -230,5 +236,4 @@ def _paths(recording: Recording, ticks: NDArray[np.int64]) -> Iterator[Moved]:
             continue
         actual = recording[listed.position_of(section.title)][ticks]
         error = recording[listed.error_of(section.title)][ticks]
-        at_a_point = section.kind in ("position", "pose")
-        yield Moved(section.title, actual, actual + error[:, :3] if at_a_point else None)
+        yield Moved(section.title, actual, listed.wanted(section, actual, error))

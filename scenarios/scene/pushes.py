@@ -1,19 +1,30 @@
-"""Contact forces, friction cones and the support polygon of a robot, as segments."""
+"""What pushes on a robot, and what holds it up, as segments: forces, cones, support polygon."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from hierarchy.problem import Array
-from scenarios.loop.facts import ContactPoint
+from scenarios.config.plant import PushSection
+from scenarios.loop.facts import ContactPoint, Facts, RobotFacts
+
+if TYPE_CHECKING:
+    from scenarios.config import Scenario
 
 _LENGTH = 0.002   # [m] of an arrow per newton
 _CONE = 0.05      # [m] height of a friction cone
 _EDGES = 8        # of a cone as it is drawn
-_LOADED = 1.0     # [N] of normal force from which a point counts as loaded
+_LOADED = 1.0     # [N] of normal force from which a point or a contact counts as loaded
+_CROSS = 0.02     # [m] half of the cross under the centre of mass
+_TABLE = 0.25     # [m] half of the part of a table that is drawn
+_HEAD = 0.06      # [m] length of the head of an arrow
+
+_WORDS = {"force": "contact force, 2 mm per newton", "cone": "friction cone",
+          "support": "support polygon", "centre": "below the centre of mass",
+          "push": "push from outside, 2 mm per newton", "table": "table"}
 
 
 class Pushes(NamedTuple):
@@ -21,32 +32,117 @@ class Pushes(NamedTuple):
 
     force : from each contact point along its planned force, 2 mm for each newton.
     cone : the friction cone that the controller believes, of each loaded point.
-    support : the convex hull of the loaded points in the horizontal plane.
+    support : the support polygon, the convex hull of the points of all loaded contacts from above.
+    centre : a cross on the floor below the centre of mass; none with a fixed base.
+    push : an arrow to the middle of each body that is pushed from outside, 2 mm for each newton.
+    table : a grid of what a robot with a fixed base touches, around its first point; else none.
     """
 
     force: Array
     cone: Array
     support: Array
+    centre: Array
+    push: Array
+    table: Array
 
     def at(self, frame: int) -> Pushes:
         """Return the segments (S, 2, 3) of a frame that exist."""
         return Pushes(*(part[frame][np.isfinite(part[frame]).all(axis=(1, 2))] for part in self))
 
 
-def pushes(points: Sequence[ContactPoint], placements: Array, forces: Array) -> Pushes:
-    """Return what is drawn of forces (F, P, 3) [N] at contact points of joints at `placements`."""
+def key(facts: Facts, scenario: Scenario) -> dict[str, str]:
+    """Return in words what a run draws of contacts, by the fields of Pushes."""
+    if not facts.contacts:
+        return {}
+    drawn = {"force": True, "cone": True, "support": len(facts.contacts) > 2,
+             "centre": facts.robot.base == "floating", "push": bool(_shoves(scenario)),
+             "table": facts.robot.base == "fixed"}
+    return {name: _WORDS[name] for name, it_is in drawn.items() if it_is}
+
+
+def pushes(facts: Facts, scenario: Scenario, t: Array, placements: Array, forces: Array,
+           com: Array | None = None) -> Pushes:
+    """Return what is drawn of contacts at times t (F,) [s], with joints at `placements`.
+
+    `forces` (F, P, 3) [N] are those on the contact points of `facts`, `com` (F, 3) [m] is the
+    centre of mass.
+    """
+    shoves = [_shove(facts.robot, push, t, placements) for push in _shoves(scenario)]
+    return Pushes(*_contacts(facts.contacts, placements, forces),
+                  _below(facts.robot, com, len(placements)),
+                  np.concatenate([np.empty((len(placements), 0, 2, 3)), *shoves], axis=1),
+                  _table(facts, scenario, len(placements)))
+
+
+def _contacts(points: Sequence[ContactPoint], placements: Array,
+              forces: Array) -> tuple[Array, Array, Array]:
+    """Return forces, cones and the support polygon."""
     placed = placements[:, [point.joint for point in points]]
     rotation = placed[..., :9].reshape(*placed.shape[:-1], 3, 3).swapaxes(-1, -2)
     offsets = np.array([point.offset for point in points])[..., None]
     at = placed[..., 9:] + (rotation @ offsets)[..., 0]
     normals = np.array([point.normal for point in points])
-    loaded = (forces * normals).sum(axis=-1) > _LOADED
+    carried = (forces * normals).sum(axis=-1)
+    same = np.array([[one.contact == other.contact for one in points] for other in points])
+    loaded, stands = carried > _LOADED, carried @ same > _LOADED
     force = np.stack([at, at + _LENGTH * forces], axis=-2)
     force[~np.isfinite(forces).all(axis=-1)] = np.nan
     cone = at[:, :, None, None] + np.array([_cone(point) for point in points])
     cone[~loaded] = np.nan
-    support = np.array([_hull(p[on], len(points)) for p, on in zip(at, loaded, strict=True)])
-    return Pushes(force, cone.reshape(len(at), -1, 2, 3), support)
+    support = np.array([_hull(p[on], len(points)) for p, on in zip(at, stands, strict=True)])
+    return force, cone.reshape(len(at), -1, 2, 3), support
+
+
+def _below(robot: RobotFacts, com: Array | None, frames: int) -> Array:
+    """Return a cross (F, 2, 2, 3) on the floor below the centre of mass, or (F, 0, 2, 3)."""
+    if com is None or robot.base == "fixed":
+        return np.empty((frames, 0, 2, 3))
+    arms = _CROSS * np.array([[[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0]],
+                              [[0.0, -1.0, 0.0], [0.0, 1.0, 0.0]]])
+    place = np.column_stack([com[:, :2], np.full(frames, robot.floor)])
+    return np.asarray(place[:, None, None] + arms)
+
+
+def _table(facts: Facts, scenario: Scenario, frames: int) -> Array:
+    """Return a grid (F, S, 2, 3) at the height of the plant's floor, below where a robot starts."""
+    height = getattr(scenario.plant, "height", None)
+    if height is None or facts.robot.base == "floating":
+        return np.empty((frames, 0, 2, 3))
+    point = facts.contacts[0]
+    placed = facts.robot.placements(np.array(scenario.start.q or facts.robot.rest))[point.joint]
+    x, y, _ = np.array(point.offset) @ placed[:9].reshape(3, 3) + placed[9:]
+    at = np.linspace(-_TABLE, _TABLE, 9)
+    along = np.array([[[-_TABLE, one, 0.0], [_TABLE, one, 0.0]] for one in at])
+    lines = np.concatenate([along, along[..., [1, 0, 2]]])
+    return np.tile(lines + np.array([x, y, height]), (frames, 1, 1, 1))
+
+
+def _shoves(scenario: Scenario) -> tuple[PushSection, ...]:
+    """Return the pushes of the plant, none for one of a plugin."""
+    return getattr(scenario.plant, "pushes", ())
+
+
+def _shove(robot: RobotFacts, push: PushSection, t: Array, placements: Array) -> Array:
+    """Return the arrow (F, 5, 2, 3) of a push to its body, NaN when it does not push."""
+    joint = robot.joint_names.index(push.joint) + 1
+    body = [(np.array(one.start) + one.end) / 2 for one in robot.capsules if one.joint == joint]
+    middle = np.mean(body, axis=0) if body else np.zeros(3)
+    placed = placements[:, joint]
+    tip = middle @ placed[:, :9].reshape(-1, 3, 3) + placed[:, 9:]
+    arrow: Array = tip[:, None, None] + _arrow(_LENGTH * push.vector)
+    arrow[~push.acts(t)] = np.nan
+    return arrow
+
+
+def _arrow(way: Array) -> Array:
+    """Return shaft and head (5, 2, 3) of an arrow along `way` (3,) [m] to the origin."""
+    length = float(np.linalg.norm(way))
+    if length == 0.0:
+        return np.zeros((5, 2, 3))
+    along = way / length
+    across = 0.4 * np.linalg.svd(along[None])[2][1:]
+    barbs = min(_HEAD, length) * (np.concatenate([across, -across]) - along)
+    return np.stack([np.array([-way, *barbs]), np.zeros((5, 3))], axis=1)
 
 
 def _cone(point: ContactPoint) -> Array:

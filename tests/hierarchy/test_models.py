@@ -380,6 +380,17 @@ def test_check_of_a_robot_as_json(arm, capsys):
     assert [joint["name"] for joint in found["joints"]] == ["shoulder", "elbow", "turn"]
 
 
+@pytest.mark.parametrize(("name", "feet"), [
+    ("kuka_lwr", set()),
+    ("quadruped", {f"{side}_{end}_foot" for side in ("left", "right")
+                   for end in ("front", "hind")})])
+def test_check_names_the_frames_on_which_a_floating_robot_may_stand(name, feet, capsys):
+    assert run_command(["check", name, "--json"]) == 0
+    assert set(json.loads(capsys.readouterr().out)["lowest_frames"]) == feet
+    assert run_command(["check", name]) == 0
+    assert ("lowest frames" in capsys.readouterr().out) == bool(feet)
+
+
 def test_check_takes_changes_of_the_robot(arm):
     section, robot = look_at(str(arm()), ["robot.base=floating", "robot.end_effector=fore"])
     assert robot.base == "floating"

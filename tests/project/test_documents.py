@@ -27,7 +27,7 @@ TEXTS = {str(path.relative_to(ROOT)): path.read_text(encoding="utf-8")
 FENCE = re.compile(r"^(\s*)```(.*)$", re.MULTILINE)
 CHECKED = {"", "python", "toml", "sh", "console", "bash", "c"}  # c: test_library_programs.py
 OF_THE_SITE = {"{toctree}", "{eval-rst}"}
-FOLLOWED = "docs/tutorial.md"  # whose commands are run, not only read
+FOLLOWED = "docs/tutorial.md", "docs/urdf-to-standing.md"  # whose commands are run, not only read
 COMMANDS = typer.main.get_command(app).commands
 
 
@@ -67,13 +67,15 @@ def test_no_block_of_a_document_escapes_these_tests(name):
     assert not any(indent.strip("\n") for indent, _ in fences)
 
 
-@pytest.mark.parametrize("name", having(lambda name: name != FOLLOWED and blocks(name, "python")))
+@pytest.mark.parametrize("name", having(
+    lambda name: name not in FOLLOWED and blocks(name, "python")))
 def test_the_code_of_a_document_runs(name):
     """Later blocks go on from earlier ones."""
     exec(compile("\n".join(blocks(name, "python")), name, "exec"), {"__name__": "document"})
 
 
-@pytest.mark.parametrize("name", having(lambda name: blocks(name, "toml")))
+@pytest.mark.parametrize("name", having(
+    lambda name: name not in FOLLOWED and blocks(name, "toml")))
 def test_the_files_that_a_document_shows_can_be_read(name, tmp_path):
     (tmp_path / "my-scenario.toml").write_text('extends = "ellipse"\nname = "my-scenario"\n')
     for i, text in enumerate(blocks(name, "toml")):
@@ -137,15 +139,18 @@ def is_name(text):
     return bool(text) and not set("./:") & set(text) and not text.isupper()
 
 
-def test_the_tutorial_can_be_followed_from_top_to_bottom(tmp_path):
+@pytest.mark.parametrize("document", FOLLOWED)
+def test_a_tutorial_can_be_followed_from_top_to_bottom(document, tmp_path):
     """Files get the name in their first line, commands are run, Python goes on."""
+    if "standing" in document:
+        pytest.importorskip("mujoco")
     names, followed = {"__name__": "document"}, set()
-    for language, text in BLOCK.findall(TEXTS[FOLLOWED]):
+    for language, text in BLOCK.findall(TEXTS[document]):
         followed.add(language)
         if language == "toml":
             (tmp_path / text.splitlines()[0].removeprefix("# ")).write_text(text)
         elif language == "python":
-            exec(compile(text, FOLLOWED, "exec"), names)
+            exec(compile(text, document, "exec"), names)
         elif language == "sh":
             for line in text.splitlines():
                 if line.startswith("hierarchy "):

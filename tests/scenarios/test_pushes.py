@@ -1,51 +1,87 @@
-"""What is drawn of contacts: forces, friction cones and the support polygon."""
+"""What is drawn of contacts: forces, friction cones, support polygon, pushes."""
 
 import json
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from hierarchy import Robot
 from scenarios import load, simulate
 from scenarios.cell.build import build
 from scenarios.draw.replay.data import unpacked
 from scenarios.draw.replay.page import html
+from scenarios.draw.viewer.curves import Lately
 from scenarios.draw.viewer.moment import Watched, of_scene
 from scenarios.loop.controller import Controller
-from scenarios.loop.facts import ContactPoint
+from scenarios.loop.facts import ContactPoint, facts_of
 from scenarios.loop.recording import load_run, write
 from scenarios.scene import scene
-from scenarios.scene.pushes import pushes
+from scenarios.scene.pushes import key, pushes
+
+STANDING, STEP = load("stand-push"), load("step")
+FACTS = facts_of(STANDING, Robot.named("humanoid"))
+ORIGIN = np.concatenate([np.eye(3).ravel(), np.zeros(3)])
 
 
-def still(*points):
-    """Placements (1, 1, 12) of a base at the origin, and points there."""
-    row = np.concatenate([np.eye(3).ravel(), np.zeros(3)])
-    return row[None, None], [ContactPoint("sole", 0, tuple(map(float, p)), (0.0, 0.0, 1.0), 0.5)
-                             for p in points]
+def drawn(contacts, forces, com=None):
+    """What is drawn of points of contacts, by name, of a base at the origin."""
+    points = tuple(ContactPoint(name, 0, tuple(map(float, p)), (0.0, 0.0, 1.0), 0.5)
+                   for name, of in contacts.items() for p in of)
+    return pushes(replace(FACTS, contacts=points), STEP, np.zeros(1), ORIGIN[None, None],
+                  np.asarray(forces, dtype=float), com).at(0)
 
 
 def test_an_arrow_is_2_mm_for_each_newton_and_a_cone_as_wide_as_its_friction():
-    placements, points = still((0.1, 0.0, 0.0))
-    found = pushes(points, placements, np.array([[[10.0, 0.0, 50.0]]])).at(0)
+    found = drawn({"sole": [(0.1, 0.0, 0.0)]}, [[[10.0, 0.0, 50.0]]])
     np.testing.assert_allclose(found.force, [[[0.1, 0.0, 0.0], [0.12, 0.0, 0.1]]])
     rim = found.cone[:, 1] - [0.1, 0.0, 0.0]
     np.testing.assert_allclose(np.linalg.norm(rim[:, :2], axis=1) / rim[:, 2], 0.5)
     assert len(found.support) == 0  # one point spans nothing
 
 
-def test_the_support_is_the_hull_of_the_points_that_carry_something():
-    corners = [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (1.0, 1.0, 0.0), (0.0, 1.0, 0.0),
-               (0.4, 0.5, 0.0), (5.0, 5.0, 0.0)]
-    placements, points = still(*corners)
+def test_the_support_is_the_hull_of_the_contacts_that_carry_something():
+    """All of a sole supports, also while its load is at the toes."""
+    corners = [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (1.0, 1.0, 0.0), (0.0, 1.0, 0.0)]
+    contacts = {"sole": corners, "inside": [(0.4, 0.5, 0.0)], "in the air": [(5.0, 5.0, 0.0)]}
     forces = np.tile([0.0, 0.0, 10.0], (1, 6, 1))
-    forces[0, 5] = 0.0
-    found = pushes(points, placements, forces).at(0)
-    assert sorted(map(tuple, found.support[:, 0])) == sorted(corners[:4])
+    forces[0, [0, 3, 5]] = 0.0
+    found = drawn(contacts, forces)
+    assert sorted(map(tuple, found.support[:, 0])) == sorted(corners)
     np.testing.assert_array_equal(found.support[:, 1], np.roll(found.support[:, 0], -1, axis=0))
     assert len(found.force) == 6
-    forces[0, 0] = np.nan
-    assert len(pushes(points, placements, forces).at(0).force) == 5
+    assert len(found.cone) == 3 * 16  # where there is load
+    forces[0, 1] = np.nan
+    assert len(drawn(contacts, forces).force) == 5
+
+
+def test_a_cross_on_the_floor_is_below_the_centre_of_mass():
+    found = drawn({"sole": [(0.0, 0.0, 0.0)]}, np.zeros((1, 1, 3)), np.array([[0.1, 0.2, 0.8]]))
+    np.testing.assert_allclose(found.centre.mean(axis=1), [[0.1, 0.2, FACTS.robot.floor]] * 2)
+    assert drawn({"sole": [(0.0, 0.0, 0.0)]}, np.zeros((1, 1, 3))).centre.size == 0
+
+
+def test_an_arrow_goes_to_the_middle_of_a_pushed_body_while_it_is_pushed():
+    scenario = STANDING.with_changes({"plant.pushes.0": {
+        "joint": "trunk_pitch", "force": 100.0, "direction": 90.0, "at": 0.2, "duration": 0.1}})
+    t = np.array([0.199, 0.2, 0.299, 0.3])
+    rest = FACTS.robot.placements(np.array(FACTS.robot.rest))
+    found = pushes(FACTS, scenario, t, np.tile(rest, (4, 1, 1)), np.zeros((4, 8, 3)))
+    assert [len(found.at(f).push) for f in range(4)] == [0, 5, 5, 0]
+    shaft, *head = found.at(1).push
+    np.testing.assert_allclose(shaft[1] - shaft[0], [0.0, 0.2, 0.0], atol=1e-12)
+    assert all((barb[1] == shaft[1]).all() and barb[0, 1] < shaft[1, 1] for barb in head)
+    assert abs(shaft[1, 1]) < 1e-9
+    assert shaft[1, 2] > rest[:, 11].mean()  # in the trunk
+
+
+def test_the_key_names_what_is_drawn_and_nothing_else():
+    assert list(key(FACTS, STANDING)) == ["force", "cone", "support", "centre", "push"]
+    assert list(key(FACTS, STEP)) == ["force", "cone", "support", "centre"]
+    wipe = load("wipe")
+    assert list(key(facts_of(wipe, Robot.named("kuka_lwr")), wipe)) == ["force", "cone", "table"]
+    assert key(replace(FACTS, contacts=()), STANDING) == {}
 
 
 @pytest.fixture(scope="module")
@@ -58,14 +94,37 @@ def test_replay_and_kept_runs_have_them(run, tmp_path):
     write(run, tmp_path)
     again = load_run(tmp_path)
     assert again.facts.contacts == run.facts.contacts
-    drawn = scene(again).pushes
-    assert drawn.force.shape[1:] == (8, 2, 3)
-    np.testing.assert_allclose(drawn.force[0, :, 0, 2], 0.0, atol=1e-9)  # soles on the floor
-    sole = drawn.support[0][np.isfinite(drawn.support[0]).all(axis=(1, 2))]
+    found = scene(again).pushes
+    assert found.force.shape[1:] == (8, 2, 3)
+    np.testing.assert_allclose(found.force[0, :, 0, 2], 0.0, atol=1e-9)  # soles on the floor
+    sole = found.support[0][np.isfinite(found.support[0]).all(axis=(1, 2))]
     assert np.ptp(sole[..., 0]) == pytest.approx(0.21)
     data = re.search(r'id="data">(.*?)</script>', html({"a": run}, "title"), re.DOTALL)
     first = json.loads(data[1])["runs"][0]
-    np.testing.assert_allclose(unpacked(first["force"]), drawn.force, atol=1e-4)
+    np.testing.assert_allclose(unpacked(first["force"]), found.force, atol=1e-4)
+    assert [one["name"] for one in first["series"]][-3:] == [
+        "Normal forces", "Largest torque, of its limit", "Joint speeds"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["reach-torque", "stand-momentum", "wipe", "step", "crawl"])
+def test_every_shipped_scenario_of_torques_can_be_replayed(name):
+    """A level of momentum had no name for its curve; a position in two axes had three."""
+    pytest.importorskip("mujoco")
+    run = simulate(load(name).with_changes({"control.duration": 0.01}))
+    names = [one.name for one in scene(run).series]
+    assert len(set(names)) == len(names)
+    assert "</html>" in html({"a": run}, name)
+    watched = Watched(Controller(run.scenario, build(run.scenario)))
+    plant = watched.controller.cell.plant
+    watched.controller.command(0.0, plant.q, plant.v)
+    for (here, goal), path in zip(watched.moment().moved, scene(run).paths, strict=True):
+        np.testing.assert_allclose(here, path.actual[0], atol=1e-9)
+        assert (goal is None) == (path.wanted is None)
+        if name == "wipe":
+            assert (scene(run).pushes.table[..., 2] == load(name).plant.height).all()
+        if goal is not None:
+            np.testing.assert_allclose(goal, path.wanted[0], atol=1e-9)
 
 
 def test_the_viewers_show_the_same_live_and_afterwards(run):
@@ -75,5 +134,9 @@ def test_the_viewers_show_the_same_live_and_afterwards(run):
     plant = controller.cell.plant
     controller.command(0.0, plant.q, plant.v)
     live, kept = watched.moment().pushes, of_scene(scene(run), 0).pushes
+    lately = Lately(10, run.facts)
+    lately.add(watched)
+    assert [one.name for one in lately.curves(controller)[1]] == [
+        one.name for one in scene(run).series]
     for one, other in zip(live, kept, strict=True):
         np.testing.assert_allclose(one, other, atol=1e-9)

@@ -130,15 +130,18 @@ def test_it_says_where_the_soles_slip_and_how_near_the_edge_the_pressure_is():
     push = PushSection(joint="trunk_pitch", force=60.0, duration=0.5)
     plant = TorqueRobot(ROBOT, CONTACTS, ROBOT.rest, section=plant_with(pushes=(push,)))
     stack, state = standing_stack(State.at(ROBOT, ROBOT.rest), CONTACTS), State(ROBOT)
-    resolver, memory, margins = make("hcod"), None, []
+    resolver, memory, margins, supported = make("hcod"), None, [], []
     for tick in range(300):
         state.move(tick * 1e-3, plant.q, plant.v)
         res = resolver.solve(stack.hierarchy(state), memory)
         memory = res.memory
         plant.act(CONTACTS.torques(state, res.x))
         margins.append(plant.extra["pressure_margin"].min())
+        supported.append(float(plant.extra["support_margin"]))
     assert 0.02 < margins[0] <= 0.04   # half the width of a sole is 0.04 m
     assert min(margins) < 0.005
+    at_the_toes = next(k for k, margin in enumerate(margins) if margin < 0.005)
+    assert 0.05 < supported[at_the_toes] < 0.105 + 1e-9  # half the length of a sole is 0.105 m
     assert plant.extra["slip"].max() < 0.01
     before = com_of(pin.integrate(ROBOT.model, plant.q, -1e-3 * plant.v))  # the step began there
     np.testing.assert_allclose(plant.extra["com"], before, atol=1e-6)

@@ -21,7 +21,7 @@ from scenarios.config import ScenarioError
 from scenarios.config.plant import PushSection, TorqueSection
 
 _STEP = 0.001      # [s] of the simulation, at most
-_ROUNDING = 1e-9   # [s] of times, and of a number of steps
+_ROUNDING = 1e-9   # of a number of steps
 
 
 class TorqueRobot:
@@ -57,7 +57,7 @@ class TorqueRobot:
         mujoco.mj_forward(self.model, self.data)
         delay = whole_periods(section.delay, period, "plant.delay")
         self._waiting = deque([State.at(robot, q).bias_effort()[robot.actuated:]] * delay)
-        self._pushes = [(push, self._body(push), _force(push)) for push in section.pushes]
+        self._pushes = [(push, self._body(push), push.vector) for push in section.pushes]
         self._time, self._height = 0.0, float(self.data.subtree_com[0][2])
         self._touch = Touch(mujoco, self.model, contacts)
         self._push = np.zeros(3)
@@ -77,7 +77,7 @@ class TorqueRobot:
         self.data.xfrc_applied[:] = 0.0
         self._push[:] = 0.0
         for push, body, force in self._pushes:
-            if push.at - _ROUNDING <= self._time < push.at + push.duration - _ROUNDING:
+            if push.acts(self._time):
                 self.data.xfrc_applied[body, :3] += force
                 self._push += force
         for _ in range(self._steps):
@@ -129,8 +129,3 @@ class TorqueRobot:
 
 def _quaternion_first(q: Array) -> Array:
     return np.concatenate([q[:3], q[[6, 3, 4, 5]], q[7:]])
-
-
-def _force(push: PushSection) -> Array:
-    angle = np.radians(push.direction)
-    return push.force * np.array([np.cos(angle), np.sin(angle), 0.0])

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 from hierarchy.contacts import Contacts
 from hierarchy.problem import Array
 
-_LOADED = 1.0  # [N] of normal force from which a point carries
+_LOADED = 1.0  # [N] of normal force from which a contact carries
 _SAME = 1e-6   # [m] between points that count as one
+_CORNERS = np.array([(-1, -1, -1), (1, -1, -1), (1, 1, -1), (-1, 1, -1)])  # of a box, its bottom
 
 
 @final
@@ -21,7 +22,8 @@ class Touch:
     `force` (C, 3) [N] in world axes; `slip` (C,) [m], how far a contact has moved along the floor
     since it touched down, NaN if it is to slide; `margin` (C,) [m], of the centre of pressure from
     the nearest edge of the sole, NaN for a point or without force; `balance` () [m], how far inside
-    the polygon of the loaded points the centre of mass is from above, NaN below three such points.
+    the support polygon, the hull of all points of the loaded contacts, the centre of mass is from
+    above, NaN below three such points.
     `signals` has these arrays by the names of signals.
     """
 
@@ -40,11 +42,12 @@ class Touch:
             "support_margin": self.balance}
         self._wrench, self._moment = np.zeros(6), np.zeros((count, 3))
         self._anchor: list[Array | None] = [None] * count
+        self._points = [_CORNERS * model.geom_size[geom] if sole else np.zeros((1, 3))
+                        for geom, sole in zip(self._geoms, self._sole, strict=True)]
 
     def look(self, data: Any) -> None:
         """Read the contacts of the step just made."""
         self.force[:], self._moment[:] = 0.0, 0.0  # moment: sum of normal force times place
-        loaded = []
         for i in range(data.ncon):
             contact = data.contact[i]
             first = self._of_geom.get(contact.geom1)
@@ -53,11 +56,16 @@ class Touch:
             force = contact.frame.reshape(3, 3).T @ self._wrench[:3]
             self.force[c] += force if first is None else -force
             self._moment[c] += self._wrench[0] * contact.pos
-            if self._wrench[0] > _LOADED:
-                loaded.append(contact.pos[:2].copy())
-        self.balance[...] = inside(np.array(loaded), data.subtree_com[0][:2])
+        self.balance[...] = inside(self._support(data), data.subtree_com[0][:2])
         for c, geom in enumerate(self._geoms):
             self._note(c, data.geom_xpos[geom], data.geom_xmat[geom].reshape(3, 3))
+
+    def _support(self, data: Any) -> Array:
+        """Return the points (k, 2) of the loaded contacts from above."""
+        points = [data.geom_xpos[geom] + own @ data.geom_xmat[geom].reshape(3, 3).T
+                  for geom, own, force in zip(self._geoms, self._points, self.force, strict=True)
+                  if force[2] > _LOADED]
+        return np.concatenate([np.empty((0, 3)), *points])[:, :2]
 
     def _note(self, c: int, place: Array, axes: Array) -> None:
         """Note slip and margin of a contact whose geometry is at `place`, with these axes."""

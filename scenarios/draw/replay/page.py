@@ -12,6 +12,7 @@ from hierarchy.errors import HierarchyError
 from scenarios.draw.figures.palette import looks
 from scenarios.draw.replay.data import fates, phrases, run_data
 from scenarios.scene import scene
+from scenarios.scene.pushes import key
 from scenarios.templates import render, resource
 
 if TYPE_CHECKING:
@@ -39,7 +40,9 @@ def html(recordings: Mapping[str, Recording], title: str, *, rate: float = 30.0,
                                               **_about(recording)})
             for label, recording in recordings.items()]
     data = {"runs": runs, "fates": fates(), "phrases": phrases(), "joints": JOINTS,
-            "embedded": embedded}
+            "embedded": embedded,
+            "drawn": {name: words for one in recordings.values()
+                      for name, words in key(one.facts, one.scenario).items()}}
     document = render(
         f"{_FOLDER}/replay.html", title=title, style=resource(f"{_FOLDER}/replay.css"),
         script=Markup("\n").join(resource(f"{_FOLDER}/{name}") for name in _SCRIPTS),

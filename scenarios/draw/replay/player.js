@@ -10,13 +10,14 @@ class Player {
     Object.assign(this, {t: 0, playing: false, beside: false, embedded: data.embedded});
     const get = id => document.getElementById(id);
     this.parts = Object.fromEntries(["space", "scrub", "time", "play", "speed", "legend", "modes",
-      "names", "notice", "stacks", "curves", "marks"].map(id => [id, get(id)]));
+      "names", "notice", "drawn", "stacks", "curves", "marks"].map(id => [id, get(id)]));
     this.stacks = this.runs.map(run => new StackList(run, data, this.runs.length > 1));
     this.parts.stacks.append(...this.stacks.map(stack => stack.card));
     this.curves = new Curves(this.parts.curves, this.runs, data, t => this.seek(t));
     this.make_stage();
     this.make_controls();
     this.make_legend();
+    this.make_key(data.drawn);
     this.seek(+(/^#t=([\d.]+)$/.exec(location.hash) || [0, 0])[1]);
   }
 
@@ -66,6 +67,13 @@ class Player {
       button.addEventListener("click", () => this.arrange(i === 1));
       modes.append(button);
     });
+  }
+
+  // What the lines at contacts mean.
+  make_key(words) {
+    this.parts.drawn.append(...Object.entries(words).map(([name, text]) =>
+      element("span", {class: `drawn ${name}`}, text)));
+    this.parts.drawn.style.setProperty("--own", this.runs[0].colour);
   }
 
   arrange(beside) {

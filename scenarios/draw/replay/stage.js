@@ -38,6 +38,7 @@ function palette() {
   const named = name => rgb(style.getPropertyValue(`--${name}`).trim());
   const dark = named("ground")[0] < 0.5;
   return {sky: named("sky"), ink: named("ink"), alert: named("alert"), quiet: named("quiet"),
+          accent: named("accent"),
           link: dark ? [0.72, 0.75, 0.79] : [0.86, 0.88, 0.9],
           joint: dark ? [0.36, 0.4, 0.46] : [0.4, 0.44, 0.5], dark};
 }
@@ -109,7 +110,7 @@ class Stage {
     });
     if (surrounded) this.obstacles(moment, colours);
     const active = run.active.values[at.frame];
-    for (let k = 0; k <= last; k++) {
+    for (let k = run.obstacles.length ? 0 : last; k <= last; k++) {
       const colour = k === active ? colours.alert : k === last ? rgb(run.colour) : colours.ink;
       moment.dots.push(ball(triple(points, k), k === active ? 1.6 * DOT : DOT, [...colour, 1]));
     }
@@ -141,13 +142,14 @@ class Stage {
     for (const path of traced) painter.line(path, [...own, 1], 2.6 * ratio, {last: at.frame});
     const passing = (pairs, colour, width, options) =>
       painter.line(painter.segments(pairs, false), colour, width * ratio, options);
-    passing([[tip, add(tip, scale(axis, AXIS_LENGTH))]], [...own, 1], 2.4);
     if (run.wanted) {
+      passing([[tip, add(tip, scale(axis, AXIS_LENGTH))]], [...own, 1], 2.4);
       passing([[tip, add(tip, scale(run.wanted, AXIS_LENGTH))]], [...colours.ink, 0.6], 1.2,
               {dash: 0.02});
     }
-    const pushes = [["support", [...own, 1], 2], ["cone", [...colours.ink, 0.35], 0.8],
-                    ["force", [...colours.alert, 1], 3]];
+    const pushes = [["table", [...colours.ink, 0.35], 1], ["support", [...own, 1], 2], ["cone", [...colours.ink, 0.35], 0.8],
+                    ["centre", [...colours.ink, 1], 2], ["force", [...colours.alert, 1], 3],
+                    ["push", [...colours.accent, 1], 4]];
     for (const [name, colour, width] of pushes) {
       if (run[name]) passing(existing(run.row(name, at.frame)), colour, width, {depth: false});
     }

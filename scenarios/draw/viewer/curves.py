@@ -41,6 +41,10 @@ class Lately:
             seen = cell.sensor.measurement
             now |= {"minimal_distance": seen.minimal_distance,
                     "ee_distance": seen.end_effector_distance}
+        if "floor_force" in cell.plant.extra:
+            now["floor_force"] = cell.plant.extra["floor_force"].copy()
+        if controller.level == "torque":
+            now |= {"command": controller.sent.copy(), "torque_limit": cell.torque_limit}
         self._kept.append(now)
 
     def curves(self, controller: Controller) -> tuple[Array, tuple[Series, ...]]:

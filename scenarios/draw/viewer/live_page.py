@@ -20,8 +20,9 @@ from scenarios.draw.viewer.model import Model, Rgb, rgb
 from scenarios.draw.viewer.moment import Moment, Watched
 from scenarios.draw.viewer.playback import Requests
 from scenarios.draw.viewer.server import lay_floor, look_at_all
-from scenarios.draw.viewer.stack_list import stack_html
+from scenarios.draw.viewer.stack_list import key_html, stack_html
 from scenarios.scene import Stage, ends, stage
+from scenarios.scene.pushes import key
 
 FRAMES = 30.0   # frames per second
 _CURVES = 4.0   # updates of the curves per second
@@ -59,7 +60,8 @@ class LivePage:
         self._first_tick()
         self.panel = LivePanel(
             server, self.requests, live.scenario, list(self.specs),
-            self._lately.curves(live.controller), speed, len(self._stage.obstacles))
+            self._lately.curves(live.controller), speed, len(self._stage.obstacles),
+            key_html(key(live.recorder.facts, live.scenario), self._colour))
         self.draw()
 
     @property

@@ -20,11 +20,11 @@ class LivePanel:
 
     They request ("toggle", None), ("restart", None), ("speed", x), ("resolver", label), ("handles",
     shown), (dotted key, value), and what `Handles` does. The inputs are `choice` and `sliders` by
-    key.
+    key. `key` says in HTML what lines mean.
     """
 
     def __init__(self, server: Any, requests: Requests, scenario: Scenario, labels: Sequence[str],
-                 curves: Any, speed: float, obstacles: int) -> None:
+                 curves: Any, speed: float, obstacles: int, key: str = "") -> None:
         gui = server.gui
         with lay_out(server):
             self._plots = Plots(gui, {"run": curves}, {"run": INK}, rolling=True)
@@ -36,6 +36,8 @@ class LivePanel:
         requests.when_changed(self.choice, "resolver")
         gui.add_markdown("**Stack**, most important first")
         self._stack = gui.add_html("")
+        if key:
+            gui.add_html(key)
         with gui.add_folder("Settings"):
             shown = gui.add_checkbox("Handles to drag", initial_value=True)
             requests.when_changed(shown, "handles")

@@ -27,6 +27,9 @@ _AXIS_WIDTH = 0.003     # [m]
 _AREA_OPACITIES = (0.20, 0.08)  # of the inner and the outer area
 _PATH_VERTICES = 400
 _PALE, _DARK, _AMBER, _GREEN = (214, 219, 226), (60, 66, 74), (214, 138, 0), (0, 158, 115)
+PUSHES = {"force": (ALERT, 4.0), "cone": (INK, 1.0), "support": ("", 3.0), "centre": (INK, 3.0),
+          "push": ("#0b62b8", 5.0),
+          "table": ("#8a929c", 1.5)}  # colour, "" for that of the run, and width [px]
 
 
 def rgb(colour: str) -> Rgb:
@@ -61,10 +64,8 @@ class Model:
         self._paths: list[Any] = []
         self._traces: list[Any] = []
         self._goals: list[Any] = []
-        self._pushes = [self._lines(f"/contacts/{name}", _segments(()), colour, width)
-                        for name, colour, width in (("force", rgb(ALERT), 4.0),
-                                                    ("cone", rgb(INK), 1.0),
-                                                    ("support", self._colour, 3.0))]
+        self._pushes = [self._lines(f"/contacts/{name}", _segments(()), rgb(shade or colour), width)
+                        for name, (shade, width) in PUSHES.items()]
         self.set_paths(paths)
 
     def set_stage(self, stage: Stage) -> None:
@@ -168,6 +169,8 @@ class Model:
 
     def _control_points(self) -> list[Any]:
         """Draw control points as bands where they are on a link's axis, else as dots."""
+        if not len(self._stage.obstacles):
+            return []
         return [self._ball(f"/joint{point.joint}/point{k}", radius, _DARK, position=point.offset)
                 for k, (point, radius) in enumerate(zip(self._stage.points[:-1],
                                                         _widths(self._stage), strict=False))]

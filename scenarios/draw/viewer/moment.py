@@ -15,7 +15,7 @@ from hierarchy.avoidance import Obstacles
 from hierarchy.problem import Array
 from scenarios.cell.sensors import ExactDistances
 from scenarios.loop import listed
-from scenarios.loop.facts import contact_points
+from scenarios.loop.facts import facts_of
 from scenarios.loop.fate import Fate, Judged, judged
 from scenarios.scene import SEPARATION, Scene
 from scenarios.scene.pushes import Pushes, pushes
@@ -100,7 +100,7 @@ class Watched:
         obstacles = cell.sensor.obstacles if cell.sensor else Obstacles()
         self._exact = ExactDistances(cell.robot, obstacles)
         self._tip = cell.robot.frame(cell.robot.end_effector)
-        self._points = contact_points(cell.scenario, cell.robot)
+        self._facts = facts_of(cell.scenario, cell.robot)
 
     def moment(self) -> Moment:
         """Return what is drawn after the last tick: the state at its start."""
@@ -123,12 +123,13 @@ class Watched:
             found.saturated, tuple(self._moved()), self._pushes())
 
     def _pushes(self) -> Pushes | None:
-        controller = self.controller
-        contacts = controller.cell.contacts
-        if contacts is None or not controller.answered or not self._points:
+        controller, cell = self.controller, self.controller.cell
+        if cell.contacts is None or not controller.answered or not self._facts.contacts:
             return None
-        forces = contacts.forces(controller.resolution.x)
-        return pushes(self._points, self._state.placements[None], forces[None]).at(0)
+        forces, com = cell.contacts.forces(controller.resolution.x), cell.plant.extra.get("com")
+        return pushes(self._facts, cell.scenario, np.array([cell.state.t]),
+                      self._state.placements[None], forces[None],
+                      None if com is None else com[None]).at(0)
 
     def _active(self, became: Mapping[str, Became]) -> int:
         """Return the point that is kept away, as `active` of `scenarios.scene.Scene`."""
@@ -150,8 +151,7 @@ class Watched:
             here = self.listed.get(listed.position_of(section.title))
             if here is not None:
                 error = self.listed[listed.error_of(section.title)]
-                at_a_point = section.kind in ("position", "pose")
-                yield here[0], here[0] + error[0, :3] if at_a_point else None
+                yield here[0], listed.wanted(section, here[0], error[0])
 
     def _judged(self) -> Judged:
         controller = self.controller

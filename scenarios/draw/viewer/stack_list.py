@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 
+from scenarios.draw.viewer.model import PUSHES
 from scenarios.draw.viewer.moment import Moment
 from scenarios.loop.fate import Fate
 from scenarios.loop.phrases import PHRASES, phrase
@@ -29,6 +30,12 @@ def stack_html(label: str, colour: str, now: Moment, tasks: Iterable[str] = (),
         absent=[name for name in tasks if name not in now.order],
         not_in_stack=(PHRASES[Fate.ABSENT], _COLOURS[Fate.ABSENT]),
         joints=_at_limits(now), saturated=_SATURATED))
+
+
+def key_html(words: Mapping[str, str], colour: str) -> str:
+    """Return what the lines at contacts mean, `words` by the fields of Pushes."""
+    return str(render("draw/viewer/key.html", lines=[
+        (PUSHES[name][0] or colour, PUSHES[name][1], text) for name, text in words.items()]))
 
 
 def _at_limits(now: Moment) -> list[str]:

@@ -16,9 +16,10 @@ from scenarios.draw.viewer.moment import of_scene
 from scenarios.draw.viewer.playback import Playback, PlayButton, Requests, add_speed
 from scenarios.draw.viewer.plots import Plots
 from scenarios.draw.viewer.server import lay_floor, lay_out, look_at_all, right
-from scenarios.draw.viewer.stack_list import stack_html
+from scenarios.draw.viewer.stack_list import key_html, stack_html
 from scenarios.loop.recording import Recording
 from scenarios.scene import Scene, scene
+from scenarios.scene.pushes import key
 
 FRAMES = 30.0  # per second
 _CURSORS = 8.0  # moves of the plots' cursor per second during playback
@@ -50,6 +51,10 @@ class View:
         self._shown: dict[str, int] = {}
         self._cursor, self._cursor_at = np.nan, -np.inf
         self._panel(side_by_side)
+        for label, one in runs.items():
+            if words := key(one.facts, one.scenario):
+                server.gui.add_html(key_html(words, self.colours[label]))
+                break
         self._arrange(side_by_side)
         self.draw()
 
