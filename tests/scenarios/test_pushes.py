@@ -5,10 +5,10 @@ import re
 
 import numpy as np
 import pytest
+from packing import unpacked
 
 from scenarios import load, simulate
 from scenarios.cell.build import build
-from scenarios.draw.replay.data import unpacked
 from scenarios.draw.replay.page import html
 from scenarios.draw.viewer.moment import Watched, of_scene
 from scenarios.loop.controller import Controller
