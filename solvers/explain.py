@@ -52,16 +52,25 @@ def explain(h: Hierarchy, resolution: Resolution, tolerance: float = 1e-9,
     return "\n".join(lines)
 
 
+def is_missed(h: Hierarchy, x: Array, k: int, tolerance: float) -> bool:
+    """Whether x misses level k by more than `tolerance` times the size of its terms."""
+    w = h.slacks(x)[h.offsets[k]:h.offsets[k + 1]]
+    return bool(np.linalg.norm(w) > _least_miss(h, x, k, tolerance))
+
+
+def _least_miss(h: Hierarchy, x: Array, k: int, tolerance: float) -> float:
+    rows = h.A[h.offsets[k]:h.offsets[k + 1]]
+    return float(tolerance * np.linalg.norm(rows) * np.linalg.norm(x)) + 1e-300
+
+
 def _level(h: Hierarchy, resolution: ActiveSetResolution, k: int, tolerance: float,
            names: Sequence[str], named: bool) -> str:
     rows = slice(h.offsets[k], h.offsets[k + 1])
-    w = h.slacks(resolution.x)[rows]
-    if not len(w):
+    if not h.sizes[k]:
         return f"{h.names[k]} has no rows."
-    size = np.linalg.norm(h.A[rows]) * np.linalg.norm(resolution.x) + 1e-300
-    missed = float(np.linalg.norm(w))
-    if missed <= tolerance * size:
+    if not is_missed(h, resolution.x, k, tolerance):
         return f"{h.names[k]} is met."
+    missed = float(np.linalg.norm(h.slacks(resolution.x)[rows]))
     blocking, at = held_back_by(h, resolution, k, names), ""
     if named and (most := most_missed(h, resolution.x, k, names)):
         at = f", at {listed(most)}"
@@ -81,10 +90,10 @@ def _giving(h: Hierarchy, resolution: ActiveSetResolution, k: int, witness: Arra
     assert h.give is not None
     rows = np.arange(h.offsets[k], h.offsets[k + 1])
     w, least = h.slacks(resolution.x)[rows], h.slacks(witness)[rows]
-    size = tolerance * np.linalg.norm(h.A[rows]) * np.linalg.norm(resolution.x) + 1e-300
-    missed, needed = float(np.linalg.norm(w)), float(np.linalg.norm(least))
-    if missed <= size:
+    if not is_missed(h, resolution.x, k, tolerance):
         return f"{h.names[k]} is met."
+    size = _least_miss(h, resolution.x, k, tolerance)
+    missed, needed = float(np.linalg.norm(w)), float(np.linalg.norm(least))
     more = np.abs(w) - np.abs(least)
     given = [_given(h, resolution, i, by, words)
              for i, by in zip(rows.tolist(), more.tolist(), strict=True) if by > size]

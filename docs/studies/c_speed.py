@@ -20,12 +20,11 @@ from typing import Any, final
 import numpy as np
 from recorded import record_sequence, recorded
 from rich.console import Console
-from rich.table import Table
 
 from hierarchy.problem import Hierarchy
 from scenarios.bench.families import FAMILIES, family
 from scenarios.bench.machine import one_core
-from scenarios.bench.rows import write_rows
+from scenarios.bench.rows import table_of_numbers, write_rows
 from solvers import Resolver, make
 from solvers.library import write
 
@@ -144,11 +143,9 @@ def _in_python(resolver: Resolver, ticks: list[Hierarchy]) -> list[int]:
 
 
 def _print(rows: list[dict[str, Any]]) -> None:
-    console, table = Console(highlight=False, markup=False), Table(
-        box=None, padding=(0, 2, 0, 0), pad_edge=False)
-    table.add_column("time of a solve [us]", no_wrap=True)
-    for title in ("C median", "p99.9", "largest", "Python", "p99.9", "ratio"):
-        table.add_column(title, justify="right", no_wrap=True)
+    console = Console(highlight=False, markup=False)
+    table = table_of_numbers(("C median", "p99.9", "largest", "Python", "p99.9", "ratio"),
+                             first="time of a solve [us]")
     for row in rows:
         table.add_row(f"{row['problems']}, {row['resolver']}", *(f"{row[key]:.2f}" for key in (
             "c_median_us", "c_p99.9_us", "c_max_us", "python_median_us", "python_p99.9_us",

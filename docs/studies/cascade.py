@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 from rich.console import Console
-from rich.table import Table
 
 from scenarios.bench.families import FAMILIES, family
+from scenarios.bench.rows import table_of_numbers
 from solvers import Status, make
 from solvers.qp.backends import BACKENDS, installed
 from solvers.resolvers.hqp import FORMS, CascadeResolution
@@ -47,11 +47,7 @@ def _print(rows: list[dict[str, Any]], families: tuple[str, ...]) -> None:
                                ("answers of the backend that were corrected [%]", "corrected",
                                 "{:.0f}")):
         scale = 100.0 if "%" in title else 1.0
-        table = Table(title=title, title_justify="left", box=None, padding=(0, 1, 0, 0),
-                      pad_edge=False)
-        table.add_column("", no_wrap=True)
-        for name in families:
-            table.add_column(name, justify="right", no_wrap=True)
+        table = table_of_numbers(families, title)
         for backend, form in dict.fromkeys((row["backend"], row["form"]) for row in rows):
             table.add_row(f"{backend} {form}", *(
                 digits.format(scale * row[key]) for row in rows

@@ -16,11 +16,10 @@ from typing import Any, final
 
 import numpy as np
 from rich.console import Console
-from rich.table import Table
 
 from hierarchy.problem import Array
 from scenarios.bench.machine import one_core
-from scenarios.bench.rows import write_rows
+from scenarios.bench.rows import table_of_numbers, write_rows
 from solvers import make
 from solvers.factorization import Factorization
 
@@ -151,10 +150,7 @@ def _print(console: Console, rows: Sequence[dict[str, Any]]) -> None:
     of = {(row["what"], row["joints"]): row["median_us"] for row in rows}
     console.print(f"Median time [us] over the number of joints; {rows[0]['levels']} levels of "
                   f"{ROWS} rows")
-    table = Table(box=None, padding=(0, 2, 0, 0), pad_edge=False)
-    table.add_column("", no_wrap=True)
-    for n in joints:
-        table.add_column(str(n), justify="right", no_wrap=True)
+    table = table_of_numbers(map(str, joints))
     for what in dict.fromkeys(row["what"] for row in rows):
         table.add_row(what, *(f"{of[what, n]:.1f}" for n in joints))
     console.print(table)

@@ -20,12 +20,11 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import NDArray
 from rich.console import Console
-from rich.table import Table
 
 from hierarchy.problem import Array, Hierarchy
 from scenarios.bench.candidates import moved
 from scenarios.bench.machine import machine, one_core
-from scenarios.bench.rows import write_rows
+from scenarios.bench.rows import table_of_numbers, write_rows
 from solvers import Resolver, Status, certify, make, names
 from solvers.problems import Recipe, written
 
@@ -190,12 +189,9 @@ def _fastest(resolver: Resolver, h: Hierarchy, memory: Any) -> float:
 
 def _print_family(console: Console, family: Family, found: Sequence[Tally], count: int,
                   left_out: int) -> None:
-    table = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False)
-    table.add_column("", no_wrap=True)
     levels = range(1, len(family.sizes) + 1)
-    for head in (*(f"L {k}" for k in levels), "near", *(f"extra {k}" for k in levels), "off", "us",
-                 "p95", "warm"):
-        table.add_column(head, justify="right", no_wrap=True)
+    table = table_of_numbers((*(f"L {k}" for k in levels), "near", *(f"extra {k}" for k in levels),
+                              "off", "us", "p95", "warm"))
     for tally in found:
         row = tally.row(family)
         extra = (f"{_short(row[f'extra_{k}_p50'])}/{_short(row[f'extra_{k}_p95'])}" for k in levels)

@@ -70,22 +70,19 @@ def run(out: Path | None = None, seconds: float = SECONDS,
 
 
 def _print(console: Console, figure: str, rows: Sequence[dict[str, Any]]) -> None:
-    from rich.table import Table
     from scaling_figure import fixed
     from scaling_timed import PARTS
 
     from scenarios.bench.growth import exponents
+    from scenarios.bench.rows import table_of_numbers
 
     sizes = list(dict.fromkeys(row[figure] for row in rows))
     of = {(row["resolver"], row[figure]): row["median_us"] for row in rows}
     powers = exponents(rows, figure)
     console.print(f"Median time [us] over the number of {figure}; {fixed(figure, rows)}")
-    table = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False)
-    table.add_column("", no_wrap=True)
     heads = list(dict.fromkeys(f"{row['points']}x{row['obstacles']}" if figure == "pairs"
                                else str(row[figure]) for row in rows))
-    for head in (*heads, "power"):
-        table.add_column(head, justify="right", no_wrap=True)
+    table = table_of_numbers((*heads, "power"))
     for label in dict.fromkeys(row["resolver"] for row in rows):
         table.add_row(label, *(_digits(of[label, size]) for size in sizes), f"{powers[label]:.2f}")
     console.print(table)

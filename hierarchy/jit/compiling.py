@@ -22,9 +22,10 @@ from typing import Any
 import numba
 import numpy as np
 from numba.core import caching, cgutils, event, types
+from numba.core.compiler_lock import global_compiler_lock
 from numba.core.registry import CPUDispatcher
+from numba.core.runtime import rtsys
 from numba.extending import intrinsic
-from numba.np import arrayobj, linalg
 
 # What makes an array; a kernel that uses another way of numpy fails to compile, and belongs here.
 _MAKERS = {"empty", "empty_like", "zeros", "zeros_like", "ones", "full", "eye", "copy", "array"}
@@ -32,14 +33,17 @@ _DAMAGE = (pickle.UnpicklingError, EOFError, ValueError, AttributeError, ImportE
 _EVERY = 5.0  # [s] between two words on a compilation that goes on
 
 
-def _import_array_functions() -> None:
-    """Import numba's array functions without scipy, which takes half of a program's first solve.
+@cache
+def _prepare_compilation() -> None:
+    """Import numba's array functions without scipy, which takes as long as all other imports.
 
     numba looks there for a BLAS when these functions are imported, and again when a kernel that
     needs one is compiled; no kernel here does.
     """
     if "numba.np.arraymath" in sys.modules:
         return
+    from numba.np import linalg
+
     look, linalg.ensure_blas = linalg.ensure_blas, _expect_blas
     try:
         from numba.np import arraymath
@@ -52,8 +56,6 @@ def _expect_blas() -> None:
     if find_spec("scipy") is None:
         raise ImportError("scipy is not installed")
 
-
-_import_array_functions()
 
 # Kernels carry no annotations: their types are those of the first call.
 Kernel = Callable[..., Any]
@@ -79,13 +81,24 @@ def inlined(function: Kernel) -> Kernel:
     A call between compiled functions costs some 2 ns for each array handed over. Python cannot
     call it: the code for that takes longer to compile than most of these functions.
     """
-    kernel = _compiled(function, inline=True)
-    if not numba.config.DISABLE_JIT:
-        kernel.__class__ = _OnlyInlined
-    return kernel
+    return _compiled(function, inline=True)
 
 
-class _OnlyInlined(CPUDispatcher):  # type: ignore[misc]
+class _Cached(CPUDispatcher):  # type: ignore[misc]
+    """A kernel that looks for its files when it is first needed; most are only compiled in."""
+
+    cached_in: Path | None = None
+    allocates = True
+    _cache: Any
+
+    def compile(self, signature: Any) -> Any:
+        with global_compiler_lock:
+            if self.cached_in is not None and isinstance(self._cache, caching.NullCache):
+                self._cache = _cache(self.cached_in, self.py_func, self.allocates)
+            return super().compile(signature)
+
+
+class _OnlyInlined(_Cached):
     """A kernel without an entry for Python, where a call would end the process."""
 
     def __call__(self, *arguments: Any) -> Any:
@@ -98,6 +111,8 @@ def _as_matrix(context: Any, numbers: Any, rows: Any, columns: Any) -> Any:
 
     In kernels, where `reshape` costs a call of its own.
     """
+    from numba.np import arrayobj
+
     kind = types.Array(numbers.dtype, 2, "C")
 
     def write(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
@@ -116,6 +131,8 @@ def _as_matrix(context: Any, numbers: Any, rows: Any, columns: Any) -> Any:
 
 def _as_integers(context: Any, numbers: Any) -> Any:
     """Return the view of contiguous numbers as int64; `view` is a kernel of its own to compile."""
+    from numba.np import arrayobj
+
     kind = types.Array(types.int64, 1, "C")
 
     def write(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
@@ -146,16 +163,16 @@ else:
 
 
 def _compiled(function: Kernel, inline: bool = False, nogil: bool = False) -> Kernel:
-    files, constants = files_behind(function), constants_behind(function)
-    folder = cache_folder() / _digest((__file__, *sorted(files)), tuple(sorted(constants)))
     allocates = _allocates(function)
-    kernel: Kernel = _jit_into(folder, function, forceinline=inline, nogil=nogil, _nrt=allocates,
-                               no_cpython_wrapper=inline, no_cfunc_wrapper=True)
-    if not isinstance(kernel, type(function)):
-        kernel.source_files = files  # type: ignore[attr-defined]
-        kernel.constants = constants  # type: ignore[attr-defined]
-        kernel.allocates = allocates  # type: ignore[attr-defined]
-    return kernel
+    kernel: Any = numba.njit(error_model="numpy", forceinline=inline, nogil=nogil, _nrt=allocates,
+                             no_cpython_wrapper=inline, no_cfunc_wrapper=True)(function)
+    if isinstance(kernel, CPUDispatcher):  # not with NUMBA_DISABLE_JIT=1
+        files, constants = files_behind(function), constants_behind(function)
+        kernel.__class__ = _OnlyInlined if inline else _Cached
+        kernel.source_files, kernel.constants, kernel.allocates = files, constants, allocates
+        kernel.cached_in = cache_folder() / _digest((__file__, *sorted(files)),
+                                                    tuple(sorted(constants)))
+    return kernel  # type: ignore[no-any-return]
 
 
 def files_behind(function: Kernel) -> frozenset[str]:
@@ -198,6 +215,26 @@ def digest_of(file: str) -> str:
     return hashlib.sha256(Path(file).read_bytes()).hexdigest()
 
 
+class _Cache(caching.FunctionCache):  # type: ignore[misc]
+    """The files of a kernel. To load one, numba need not know how to compile."""
+
+    needs_runtime = True
+
+    def load_overload(self, signature: Any, context: Any) -> Any:
+        """Return what is kept, or None.
+
+        Without the refresh of numba's registries, which takes a third of a first solve; compiling
+        refreshes them itself.
+        """
+        if self.needs_runtime:  # kernels that allocate call it
+            rtsys.initialize(context)
+        with self._guard_against_spurious_io_errors():
+            kept = self._load_overload(signature, context)
+        if kept is None:
+            _prepare_compilation()
+        return kept
+
+
 class _Mending(caching.IndexDataCacheFile):  # type: ignore[misc]
     """Files of compiled kernels; one that is damaged, as by a full disk, counts as missing."""
 
@@ -223,7 +260,7 @@ def cache_folder() -> Path:
     return Path(base).expanduser() / "task-hierarchy"
 
 
-def _jit_into(folder: Path, function: Kernel, **options: bool) -> Any:
+def _cache(folder: Path, function: Kernel, needs_runtime: bool) -> _Cache:
     before = numba.config.CACHE_DIR
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -231,13 +268,12 @@ def _jit_into(folder: Path, function: Kernel, **options: bool) -> Any:
     except OSError:  # a home that cannot be written: numba's own choice of folder
         numba.config.CACHE_DIR = before
     try:
-        kernel = numba.njit(cache=True, error_model="numpy", **options)(function)
-        kept = getattr(kernel, "_cache", None)  # not with NUMBA_DISABLE_JIT=1
-        if isinstance(kept, caching.FunctionCache):
-            kept._cache_file.__class__ = _Mending
-        return kernel
+        kept = _Cache(function)
     finally:
         numba.config.CACHE_DIR = before
+    kept.needs_runtime = needs_runtime
+    kept._cache_file.__class__ = _Mending
+    return kept
 
 
 class _Compilations(event.Listener):  # type: ignore[misc]

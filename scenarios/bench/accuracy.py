@@ -8,13 +8,13 @@ from typing import Any, final
 
 import numpy as np
 from rich.console import Console
-from rich.table import Table
 
 from hierarchy.problem import Array, Hierarchy
 from hierarchy.words import listed
 from scenarios.bench.arms import near_singular, regular
 from scenarios.bench.candidates import NUMPY, plain_numpy
 from scenarios.bench.exact import damped, exact
+from scenarios.bench.rows import table_of_numbers
 from solvers import Resolution, Resolver, Status, certify, make, names
 
 DAMPING, THRESHOLD = 0.05, 0.1  # the letter's code
@@ -176,12 +176,9 @@ def _summary(errors: Sequence[float] | Array) -> dict[str, float]:
 
 def _print(console: Console, case: Case, rows: Sequence[dict[str, Any]]) -> None:
     console.print(f"{case.title}; {rows[0]['arms']} arms")
-    table = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False)
     keys = [(f"task_{k + 1}_{key}", f"{over}\n{key}") for k in range(len(case.tasks))
             for key, over in (("mean", f"task {k + 1}"), ("max", ""))] + [("x_max", "x\nmax")]
-    table.add_column("", no_wrap=True)
-    for _, head in [*keys, ("", "cert")]:
-        table.add_column(head, justify="right", no_wrap=True)
+    table = table_of_numbers([*(head for _, head in keys), "cert"])
     for row in rows:
         cells = ["–" if np.isnan(row[key]) else f"{row[key]:.0e}" for key, _ in keys]
         certified = "–" if row["certified"] is None else f"{100.0 * row['certified']:.0f}%"

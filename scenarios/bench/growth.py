@@ -9,11 +9,11 @@ from typing import Any, final
 
 import numpy as np
 from rich.console import Console
-from rich.table import Table
 
 from hierarchy.problem import Hierarchy
 from scenarios.bench.accuracy import entrants
 from scenarios.bench.machine import one_core
+from scenarios.bench.rows import table_of_numbers
 
 TASKS = tuple((30, count) for count in range(1, 11))              # (joints, tasks)
 JOINTS = tuple((n, 5) for n in (20, 30, 45, 70, 100, 150, 200, 300))
@@ -117,10 +117,7 @@ def _print(console: Console, figure: str, rows: Sequence[dict[str, Any]]) -> Non
     fixed = (f"{rows[0]['joints']} joints" if figure == "tasks" else f"{rows[0]['tasks']} tasks")
     console.print(f"Median time of a solve [us], {fixed}, {ROWS} rows a task, over the number of "
                   f"{figure}")
-    table = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False)
-    table.add_column("", no_wrap=True)
-    for head in (*map(str, sizes), "power"):
-        table.add_column(head, justify="right", no_wrap=True)
+    table = table_of_numbers((*map(str, sizes), "power"))
     for label in labels:
         table.add_row(label, *(_digits(medians[label, size]) for size in sizes),
                       f"{powers[label]:.2f}")

@@ -24,7 +24,6 @@ from solvers.qp.backends import BACKENDS, installed
 SCENARIO = "stand-push"
 SEED, COUNT, TOGETHER = 60, 100, 10  # of the stored half; ticks in a row of one run
 LEFT_OUT = "joint limits"            # a level of the scenario that the family lacks
-STORED = Path(__file__).parents[2] / "tests" / "data" / "hlsp" / "DYN60.npz"
 _FIRST, _LAST = 0.3, 1.0             # [s] between which the ticks lie: the push begins at 0.3 s
 _MISSING = 1e9                       # marks a missing side in the data
 _NEAREST = 1e-9                      # tolerance of `certify`

@@ -14,13 +14,12 @@ from typing import Any
 
 import numpy as np
 from rich.console import Console
-from rich.table import Table
 
 from hierarchy.errors import UnknownNameError
 from scenarios.bench.candidates import DAQP, NUMPY, Call, Candidate, candidates
 from scenarios.bench.families import DATA, FAMILIES, Problem, family, fresh
 from scenarios.bench.machine import machine, one_core
-from scenarios.bench.rows import write_rows
+from scenarios.bench.rows import table_of_numbers, write_rows
 from scenarios.files import write_json
 from solvers import Status, certify
 
@@ -178,11 +177,8 @@ def _row(runner: _Timed, count: int, medians: dict[str, float]) -> dict[str, Any
 
 def _print_family(console: Console, rows: list[dict[str, Any]], name: str, origin: str) -> None:
     title = name if origin == KNOWN else f"{name}, {origin}"
-    table = Table(title=title, title_justify="left", box=None, padding=(0, 1, 0, 0), pad_edge=False)
-    heads = ("median", "p95", "p99.9", "iter", "cert", "unso", "wrong", "error", "/DAQP", "/numpy")
-    table.add_column("", no_wrap=True)
-    for head in heads:
-        table.add_column(head, justify="right", no_wrap=True)
+    table = table_of_numbers(("median", "p95", "p99.9", "iter", "cert", "unso", "wrong", "error",
+                              "/DAQP", "/numpy"), title)
     for row in rows:
         if (row["family"], row["origin"]) == (name, origin):
             table.add_row(row["resolver"], *(_digits(row[key]) for key in (

@@ -124,7 +124,7 @@ def beginnings() -> list[Cost]:
              ("import scenarios", ["-c", "import scenarios"], None),
              ("import hierarchy, solvers", ["-c", "import hierarchy, solvers"], None),
              ("hierarchy --help", ["-m", "scenarios.cli.main", "--help"], 0.5),
-             ("first solve, kernels cached", ["-c", _SOLVE], 1.0),
+             ("first solve, kernels cached", ["-c", _SOLVE], 0.6),
              ("first tick of ellipse, cached", ["-c", _TICK], None),
              (f"hierarchy {' '.join(_SHORT)}", ["-c", _COMMAND, *_SHORT], 1.5),
              ("the same with --figures", ["-c", _COMMAND, *_SHORT, "--figures"], None)]

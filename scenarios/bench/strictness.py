@@ -16,14 +16,13 @@ from typing import Any, ClassVar, final
 
 import numpy as np
 from rich.console import Console
-from rich.table import Table
 
 from hierarchy import Hierarchy, Robot, State
 from hierarchy.kinematics import write_point_jacobian
 from hierarchy.problem import Array
 from hierarchy.words import listed
 from scenarios.bench.machine import on_all_cores
-from scenarios.bench.rows import write_rows
+from scenarios.bench.rows import table_of_numbers, write_rows
 from solvers import Resolution, Resolver, Status, make, names
 from solvers.qp.backends import BACKENDS, installed
 from solvers.resolver import Handles
@@ -200,11 +199,9 @@ class _Step:
 def _print(found: list[Strictness]) -> None:
     console = Console(highlight=False, markup=False)
     console.print("Motion of the end effector due to the posture, which has lower priority [m]")
-    table = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False)
-    table.add_column("", no_wrap=True)
-    for head in ("max per\ntick", "last\ntick", "limits\nprevent", "final\nerror",
-                 "without\nposture", "at\nlimit", "over\n[rad/s]", "fail", "strict"):
-        table.add_column(head, justify="right", no_wrap=True)
+    table = table_of_numbers((
+        "max per\ntick", "last\ntick", "limits\nprevent", "final\nerror", "without\nposture",
+        "at\nlimit", "over\n[rad/s]", "fail", "strict"))
     for one in found:
         lengths = (one.largest, one.final, one.missed, one.error, one.error_alone)
         table.add_row(one.label, *(f"{value:.0e}" for value in lengths), str(one.limited),

@@ -15,6 +15,7 @@ from scenarios.config import Scenario
 from scenarios.config.listed import ListedCoupling
 from scenarios.loop.controller import Controller
 from solvers import Status, explain, make
+from solvers.explain import is_missed
 
 _NAMED = 3        # pairs of capsules named at most
 _ROUNDING = 1e-6  # [m] below a distance that is not said
@@ -60,8 +61,8 @@ def _unmet(controller: Controller) -> Iterator[str]:
     """Yield what `explain` says of each level that the exact resolver cannot meet."""
     h = controller.hierarchy
     exact = make("hcod").solve(h)
-    words = explain(h, exact, _MET, controller.cell.stack.row_names(h.names)).splitlines()
-    yield from (line for line in words if " is missed by " in line)
+    lines = explain(h, exact, _MET, controller.cell.stack.row_names(h.names)).splitlines()
+    yield from (lines[k] for k in range(len(h.sizes)) if is_missed(h, exact.x, k, _MET))
 
 
 def _distances(controller: Controller) -> dict[str, float]:

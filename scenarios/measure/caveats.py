@@ -22,7 +22,7 @@ def caveats(resolvers: Mapping[str, ResolverFacts]) -> Iterator[str]:
             (tuple(label for label, one in resolvers.items() if not one.strict),
              "is not strict at every rank", "are not strict at every rank"),
             (tuple(label for label, what in damped.items() if what != damped[first]),
-             f"damps otherwise than {first}", f"damp otherwise than {first}")):
+             f"damps differently from {first}", f"damp differently from {first}")):
         if labels:
             said.setdefault(labels, []).append(one if len(labels) == 1 else many)
     yield from (f"{listed(labels)} {listed(what)}" for labels, what in said.items())

@@ -1,8 +1,11 @@
 """Compiled kernels are cached by all that they are made of."""
 
 import importlib
+import os
+import subprocess
 import sys
 
+import numba
 import pytest
 
 from hierarchy.jit import compiling
@@ -72,3 +75,47 @@ def test_a_kernel_knows_what_helpers_below_it_use(tmp_path, monkeypatch):
         assert (half(4.0), whole(4.0)) == (4.0, 10.0)
     finally:
         compiling.cache_folder.cache_clear()
+
+
+KEPT = """
+import sys
+sys.path.insert(0, sys.argv[1])
+from kept_of_test_jit import squares, halves
+from numba import njit
+import numpy as np
+print(squares(np.arange(3.0)).tolist())
+print(sum(squares._cache_misses.values()), "numba.np.npyimpl" in sys.modules)
+print(halves(np.arange(3.0)).tolist())
+print("scipy.linalg" in sys.modules)
+print(float(njit(lambda x: np.cumsum(x)[-1])(np.arange(3.0))))
+"""
+KEPT_KERNELS = """
+from hierarchy.jit import compiled
+import numpy as np
+
+@compiled
+def squares(x):
+    y = np.empty(x.size)
+    for i in range(x.size):
+        y[i] = x[i] * x[i]
+    return y
+
+@compiled
+def halves(x):
+    return squares(x / 2.0)
+"""
+
+
+@pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="nothing is compiled")
+def test_a_kept_kernel_loads_without_what_compiling_needs_and_others_compile_after_it(tmp_path):
+    (tmp_path / "kept_of_test_jit.py").write_text(KEPT_KERNELS)
+    said = []
+    for _ in range(2):
+        done = subprocess.run([sys.executable, "-c", KEPT, tmp_path], text=True, check=True,
+                              capture_output=True,
+                              env={**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache")})
+        said.append(done.stdout.splitlines())
+        for file in (tmp_path / "cache").rglob("*halves*"):
+            file.unlink()
+    assert [lines.pop(1) for lines in said] == ["1 True", "0 False"]
+    assert said[0] == said[1] == ["[0.0, 1.0, 4.0]", "[0.0, 0.25, 1.0]", "False", "3.0"]

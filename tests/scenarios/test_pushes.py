@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from packing import unpacked
 
 from hierarchy import Robot
 from scenarios import load, simulate
 from scenarios.cell.build import build
-from scenarios.draw.replay.data import unpacked
 from scenarios.draw.replay.page import html
 from scenarios.draw.viewer.curves import Lately
 from scenarios.draw.viewer.moment import Watched, of_scene

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from scenarios.bench import candidates, recorded
-from scenarios.bench.families import family, fresh
+from scenarios.bench.families import DATA, family, fresh
 from solvers import certify, make
 
 
@@ -44,7 +44,7 @@ def test_the_recorder_writes_what_is_stored(tmp_path, monkeypatch):
     monkeypatch.setattr(recorded, "sequences", {recorded.SEED: [first]}.__getitem__)
     monkeypatch.setattr("sys.argv", ["recorded", "--count", "10", "--out", str(tmp_path / "a.npz")])
     recorded.main()
-    with np.load(tmp_path / "a.npz") as made, np.load(recorded.STORED) as stored:
+    with np.load(tmp_path / "a.npz") as made, np.load(DATA / "DYN60.npz") as stored:
         assert set(made.files) == set(stored.files)
         for name in ("A0", "ub2", "x"):
             np.testing.assert_allclose(made[name], stored[name][:10], rtol=1e-6, atol=1e-4)

@@ -7,12 +7,13 @@ import numpy as np
 import pytest
 from hand_made import recording as hand_made
 from headless import chromium
+from packing import unpacked
 
 from hierarchy import HierarchyError
 from scenarios import load, save, simulate
 from scenarios.cli.main import run_command
 from scenarios.draw.replay import html
-from scenarios.draw.replay.data import packed, unpacked
+from scenarios.draw.replay.data import packed
 from scenarios.scene import scene
 
 VOID = {"meta", "input", "br", "link", "img"}

@@ -95,7 +95,7 @@ def test_the_verdict_and_the_page_say_what_the_statistics_do(done):
     assert lines[0].startswith("All 21 runs reached the end")
     assert lines[0].endswith("had every tick solved and kept the distance asked for.")
     assert "recursive and hcod behave the same on every sample" in lines[1]
-    assert lines[2].endswith("augmented is not strict at every rank and damps otherwise than "
+    assert lines[2].endswith("augmented is not strict at every rank and damps differently from "
                              "recursive.")
     page = (folder / "index.html").read_text()
     assert all(line in page for line in lines)

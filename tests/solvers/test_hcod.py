@@ -155,6 +155,14 @@ def test_explain_leaves_out_a_level_that_carries_next_to_nothing(share, blocking
         f"wrist is missed by 1: held back by {blocking}.")
 
 
+def test_explain_names_the_rows_that_are_missed_by_most_and_not_those_missed_by_a_little():
+    h = Hierarchy.from_levels([(np.eye(3), [-1.0] * 3, [1.0] * 3),
+                               (np.eye(3), [2.0, 1.5, 1.05], [np.inf] * 3)],
+                              names=["limits", "wish"])
+    said = explain(h, HCOD.solve(h), rows=["a", "b", "c"] * 2).splitlines()[1]
+    assert said.startswith("wish is missed by 1.12, at a and b: held back by limits a at")
+
+
 def test_rows_that_disagree_pull_at_nothing_above_them():
     h = Hierarchy.from_levels([([[1.0, 0.0]], [0.0]), ([[0.0, 1.0], [0.0, 1.0]], [0.0, 2.0])])
     assert explain(h, HCOD.solve(h)).splitlines()[1] == (

@@ -22,7 +22,7 @@ from scenarios.bench.peers.environments import MissingError
 from scenarios.bench.peers.process import Process, after_nan, stage
 from scenarios.bench.peers.scene import Scene, write_scenes
 from scenarios.bench.peers.urdf import urdf
-from scenarios.bench.rows import write_rows
+from scenarios.bench.rows import table_of_numbers, write_rows
 from scenarios.files import write_json
 
 TURN = 1000        # ticks per turn
@@ -187,12 +187,9 @@ def _moved(log: dict[str, Array], scene: Scene) -> float | None:
 
 
 def _print(console: Console, rows: list[dict[str, Any]]) -> None:
-    times = Table(title="One tick of inverse kinematics of a KUKA LWR, and its quality",
-                  title_justify="left", box=None, padding=(0, 1, 0, 0), pad_edge=False)
-    times.add_column("", no_wrap=True)
-    for head in ("tick\nmedian", "\np95", "\np99.9", "solve\nmedian", "at\nlimit", "path", "moved",
-                 "over", "fail"):
-        times.add_column(head, justify="right", no_wrap=True)
+    times = table_of_numbers(
+        ("tick\nmedian", "\np95", "\np99.9", "solve\nmedian", "at\nlimit", "path", "moved", "over",
+         "fail"), "One tick of inverse kinematics of a KUKA LWR, and its quality")
     for row in rows:
         times.add_row(row["entrant"], *(_digits(row[key]) for key in (
             "median_us", "p95_us", "p99.9_us", "solve_us", "at_limit_us")),

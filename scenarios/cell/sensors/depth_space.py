@@ -92,18 +92,3 @@ class DepthSpace:
                                  self._pairs.table)
         seen.active = self._measure()
         return seen
-
-    def overestimate(self, point: Array, error: float) -> float:
-        """Return the largest overestimate [m] of the distance to a surface at `point` (3,) [m].
-
-        It holds for visible surfaces: inside the image and range, less than about 70 deg from
-        facing the camera, and not removed as robot or for lack of support. A missing pixel adds
-        one pixel. There is no bound on underestimates: hidden space counts as occupied, and the
-        nearest of many noisy pixels is too near on average.
-
-        `error` [m] is that of its reading, see `DepthErrors.bound`.
-        """
-        depth = float(self.pinhole.project(point)[2])
-        along = np.linalg.norm(point - np.asarray(self.pinhole.position, dtype=float)) / depth
-        pixel = depth * float(np.hypot(1.0 / self.pinhole.fx, 1.0 / self.pinhole.fy))
-        return float(along * (error + pixel))

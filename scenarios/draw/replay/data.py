@@ -12,12 +12,12 @@ from scenarios.loop.fate import Fate
 from scenarios.loop.phrases import PHRASES
 from scenarios.scene import Scene, Series
 
-_NOTHING = 65535  # NaN or infinite
+NOTHING = 65535  # NaN or infinite
 _STEPS = 65534
 
 
 def packed(values: NDArray[Any], steps: bool = False) -> dict[str, Any]:
-    """Return an array as shape, kind and base64; `unpacked` and the page read it.
+    """Return an array as shape, kind and base64, as the page reads it.
 
     Integers become int16 or, if they are small, int8; others float32 or, with `steps`, 65535 even
     steps from the smallest to the largest value.
@@ -33,18 +33,9 @@ def _in_steps(values: NDArray[Any]) -> dict[str, Any]:
     known = np.isfinite(values)
     low, high = (values[known].min(), values[known].max()) if known.any() else (0.0, 0.0)
     step = float(high - low) / _STEPS or 1.0
-    at = np.where(known, np.round((np.where(known, values, low) - low) / step), _NOTHING)
+    at = np.where(known, np.round((np.where(known, values, low) - low) / step), NOTHING)
     return {"shape": list(values.shape), "kind": "u2", "low": float(low), "step": step,
             "data": _base64(at.astype("<u2"))}
-
-
-def unpacked(array: dict[str, Any]) -> NDArray[Any]:
-    """Return the array given to `packed`, to its precision; with steps, infinite becomes NaN."""
-    kind = {"f4": "<f4", "i2": "<i2", "u2": "<u2", "i1": "|i1"}[array["kind"]]
-    values = np.frombuffer(base64.b64decode(array["data"]), kind).reshape(array["shape"])
-    if "step" not in array:
-        return values
-    return np.where(values == _NOTHING, np.nan, array["low"] + values * array["step"])
 
 
 def run_data(scene: Scene, about: dict[str, Any]) -> dict[str, Any]:

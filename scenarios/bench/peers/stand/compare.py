@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 from rich.console import Console
-from rich.table import Table
 
 from scenarios.bench.machine import machine
 from scenarios.bench.peers.entrants import OWN, PLACO, TSID, Entrant
@@ -18,7 +17,7 @@ from scenarios.bench.peers.process import Process, stage
 from scenarios.bench.peers.stand.judge import Judge, judge, read_log
 from scenarios.bench.peers.stand.ours import TASKS
 from scenarios.bench.peers.stand.states import TICKS, make_stand
-from scenarios.bench.rows import write_rows
+from scenarios.bench.rows import table_of_numbers, write_rows
 from scenarios.files import write_json
 
 WORKER = "scenarios.bench.peers.stand.worker"
@@ -109,30 +108,22 @@ def _in_turns(processes: dict[str, Process], turns: Sequence[tuple[int, int]]) -
 
 
 def _print(console: Console, rows: list[dict[str, Any]]) -> None:
-    table = _table("One tick of inverse dynamics of a humanoid on two feet", (
+    table = table_of_numbers((
         "tick\nmedian", "\np95", "\np99.9", "solve\nmedian", "dynamics", "contact", "torque",
-        "friction", "fail"))
+        "friction", "fail"), "One tick of inverse dynamics of a humanoid on two feet")
     for row in rows:
         table.add_row(row["entrant"], *(_digits(row[key]) for key in (
             "median_us", "p95_us", "p99.9_us", "solve_us")), *(_power(row.get(f"{key} max"))
             for key in ("dynamics", "contact", "torque", "friction")), str(row["failed"]))
     console.print(table)
     console.print(NOTES, "", sep="\n")
-    missed = _table("Missed by each task, median / largest", (*TASKS, "priorities", "version"))
+    missed = table_of_numbers((*TASKS, "priorities", "version"),
+                              "Missed by each task, median / largest")
     for row in rows:
         missed.add_row(row["entrant"], *(
             f"{_short(row.get(f'{task} median'))} / {_short(row.get(f'{task} max'))}"
             for task in TASKS), row["priorities"], row["version"])
     console.print(missed)
-
-
-def _table(title: str, heads: Sequence[str]) -> Table:
-    table = Table(title=title, title_justify="left", box=None, padding=(0, 1, 0, 0),
-                  pad_edge=False)
-    table.add_column("", no_wrap=True)
-    for head in heads:
-        table.add_column(head, justify="right")
-    return table
 
 
 def _digits(value: float | None) -> str:
