@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import groupby, pairwise
+from operator import attrgetter
 from typing import final
 
 import numpy as np
@@ -46,7 +47,8 @@ class Summary:
     ----------
     counts : of the verdicts, by name.
     absolute, relative, moved : largest of those called solved; see `Judged`.
-    cold, warm : times of all solves of problems that were answered.
+    cold, warm : times of all solves of problems that were answered, from Python; cold_inside,
+        warm_inside : those that a compiled package took itself.
     iterations, warm_iterations : medians, NaN if not known.
     warm_right : share of the warm answers that are right, NaN without any.
     same : whether all second solves gave the same bits.
@@ -62,6 +64,8 @@ class Summary:
     moved: float
     cold: Times
     warm: Times
+    cold_inside: Times
+    warm_inside: Times
     iterations: float
     warm_iterations: float
     warm_right: float
@@ -91,8 +95,9 @@ def summary(rows: Sequence[Judged], steps: dict[str, float]) -> Summary:
     return Summary(
         rows[0].entrant, counts, _largest(row.absolute for row in claimed),
         _largest(row.relative for row in claimed), _largest(row.moved for row in claimed),
-        Times.of([time for row in rows for time in row.cold]),
-        Times.of([time for row in rows for time in row.warm]),
+        *(Times.of([time for row in rows for time in times(row)])
+          for times in (attrgetter("cold"), attrgetter("warm"), attrgetter("cold_inside"),
+                        attrgetter("warm_inside"))),
         _median(row.iterations for row in rows), _median(row.warm_iterations for row in rows),
         float(np.mean(warm)) if warm else np.nan, all(row.same is not False for row in rows),
         max(row.memory for row in rows), _largest(

@@ -4,6 +4,10 @@ void* prepare(int n, int levels, const long* sizes, const double* A, const doubl
 const double* upper, const double* reference);  // reference: null if zero
 int solve(void* prepared);                                    // 1 if it calls it solved
 int solve_from(void* prepared, void* before);                 // optional
+// Optional: writes times of repeated solves [ns], as shims/timed.h takes them; returns how many.
+int solve_timed(void* prepared, int least, int most, long long turn, long long* times);
+int solve_from_timed(void* prepared, void* before, int least, int most, long long turn,
+                     long long* times);
 void answer(void* prepared, double* x, int* iterations);        // iterations: -1 if unknown
 void release(void* prepared);
 """
@@ -15,7 +19,7 @@ from typing import Any, final
 
 import numpy as np
 
-from scenarios.bench.open.entrant import Answer, Entrant, Problem
+from scenarios.bench.open.entrant import Answer, Entrant, Problem, Repeats
 
 _VOID = ctypes.c_void_p
 
@@ -66,6 +70,18 @@ class Compiled(Entrant):
         """Solve from the active set of an earlier answer."""
         prepared.solved = bool(self.library.solve_from(prepared.address, before.address))
         return prepared
+
+    def inside(self, prepared: _Handle, before: _Handle | None, limits: Repeats) -> list[int]:
+        """Let the library take the times, where it can."""
+        name = "solve_timed" if before is None else "solve_from_timed"
+        if not hasattr(self.library, name):
+            return []
+        times = np.zeros(limits.most, dtype=np.int64)
+        start = [] if before is None else [before.address]
+        count = getattr(self.library, name)(
+            prepared.address, *start, limits.least, limits.most,
+            ctypes.c_longlong(limits.turn), _VOID(times.ctypes.data))
+        return times[:count].tolist()
 
     def read(self, raw: Any) -> Answer:
         """Copy the answer."""

@@ -7,6 +7,8 @@
 #include <memory>
 #include <vector>
 
+#include "timed.h"
+
 namespace {
 using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
@@ -81,6 +83,15 @@ int solve_from(void* handle, void* before) {
     p->solver->setInitialActiveSet();
   }
   return search(p);
+}
+
+int solve_timed(void* handle, int least, int most, long long turn, long long* times) {
+  return timed([=] { solve(handle); }, least, most, turn, times);
+}
+
+int solve_from_timed(void* handle, void* before, int least, int most, long long turn,
+                     long long* times) {
+  return timed([=] { solve_from(handle, before); }, least, most, turn, times);
 }
 
 void answer(void* handle, double* x, int* iterations) {
