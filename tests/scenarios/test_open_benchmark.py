@@ -17,8 +17,8 @@ from scenarios.bench.open import judge as judging
 from scenarios.bench.open.entrant import Problem, read_problems
 from scenarios.bench.open.judge import judge
 from scenarios.bench.open.page import lead
-from scenarios.bench.open.process import CRASHED, HUNG, LEFT_OUT
 from scenarios.bench.open.printing import insides
+from scenarios.bench.open.process import CRASHED, HUNG, LEFT_OUT
 from scenarios.bench.open.results import Half
 from scenarios.bench.open.store import COLUMNS, Store, read_rows
 from scenarios.bench.open.summary import Times, profile, summary
