@@ -102,7 +102,8 @@ def changed(file, name, content):
 @pytest.mark.parametrize(("name", "content", "said"), [
     ("head.json", lambda _: b"{", "head.json is not JSON"),
     ("head.json", lambda _: b"[]", 'does not say "format"'),
-    ("head.json", lambda head: head.replace(b'"version": 1', b'"version": 9'), "version 9 of the format; known is 1$"),
+    ("head.json", lambda head: head.replace(b'"version": 1', b'"version": 9'),
+     "version 9 of the format; known is 1$"),
     ("head.json", lambda head: head.replace(b'"count": ', b'"count": 1'), "says 1"),
     ("head.json", lambda head: head.replace(b'"seed": ', b'"seed": -0.'), "seed is -0"),
     ("head.json", lambda head: head.replace(b'"family"', b'"famile"'), "family is missing"),
@@ -123,7 +124,7 @@ def test_what_is_no_file_of_problems_is_refused(tmp_path):
     with pytest.raises(ProblemFileError, match="does not exist"):
         read(tmp_path / "none.npz")
     (tmp_path / "text.npz").write_text("text")
-    with pytest.raises(ProblemFileError, match="not a file of problems: File is not a zip file$"):
+    with pytest.raises(ProblemFileError, match=r"not a file of problems: File is not a zip file$"):
         read(tmp_path / "text.npz")
 
 
