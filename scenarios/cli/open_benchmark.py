@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shlex
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from rich.console import Console
@@ -14,9 +14,9 @@ from scenarios.bench.open.table import PACKAGES, Row, chosen
 from scenarios.cli.terminal import shown
 
 
-def open_command(families: Sequence[str], entrants: Sequence[str], seeds: Sequence[int],
-                 count: int | None, limit: float, python: str, built: dict[str, Path | None],
-                 out: Path) -> int:
+def open_command(families: Sequence[str], entrants: Sequence[str],
+                 counts: Mapping[int, int | None], limit: float, python: str,
+                 built: dict[str, Path | None], out: Path) -> int:
     """Run the benchmark, or what is left of it; print its tables and write its page."""
     from scenarios.bench.open.page import page
     from scenarios.bench.open.printing import say
@@ -28,7 +28,7 @@ def open_command(families: Sequence[str], entrants: Sequence[str], seeds: Sequen
     named = [family(name) for name in families] or available()
     for name, why in ({} if families else unavailable()).items():
         print(f"left out: {name}, which {why}", file=sys.stderr)
-    run(out, named, table, [0, *dict.fromkeys(seeds)], count, limit,
+    run(out, named, table, counts, limit,
         lambda text: print(text, file=sys.stderr, flush=True))
     found = results(out)
     say(Console(highlight=False, markup=False), found)

@@ -140,13 +140,9 @@ void* prepare(int n, int, const long*, const double*, const double* lower, const
   x[0] = lower[0], x[1] = lower[1];
   return n == 2 ? x : nullptr;
 }
-int solve(void*) {
-  const auto begin = std::chrono::steady_clock::now();
-  while (since(begin) < 100000) {}
-  return 1;
-}
-int solve_timed(void* handle, int least, int most, long long turn, long long* times) {
-  return timed([=] { solve(handle); }, least, most, turn, times);
+int solve(void*) { return 1; }
+int solve_timed(void* handle, const repeats* limits, long long* times) {
+  return timed([=] { solve(handle); }, limits, times);
 }
 void answer(void* handle, double* x, int* iterations) {
   x[0] = static_cast<double*>(handle)[0], x[1] = static_cast<double*>(handle)[1], *iterations = 7;
@@ -154,7 +150,7 @@ void answer(void* handle, double* x, int* iterations) {
 void release(void* handle) { delete[] static_cast<double*>(handle); }
 }
 """
-"""Solves levels of the identity in 100 us."""
+"""Solves levels of the identity."""
 
 
 @pytest.mark.slow
@@ -169,8 +165,8 @@ def test_a_compiled_entrant_is_timed_from_python_and_inside(tmp_path, equalities
     _, answers = run_entrant(row, equalities, 5)
     assert [answer["x"] for answer in answers] == [[float(side), 1.0] for side in range(5)]
     for answer in answers:
-        assert 3 <= len(answer["cold_inside_ns"]) <= REPEATS.most
-        assert 90_000 < min(answer["cold_inside_ns"]) < min(answer["cold_ns"])
+        assert REPEATS.least <= len(answer["cold_inside_ns"]) <= REPEATS.most
+        assert 0 <= min(answer["cold_inside_ns"]) < min(answer["cold_ns"])
         assert "warm_ns" not in answer
 
 
@@ -380,7 +376,7 @@ def test_the_command_runs_continues_and_writes_its_page(tmp_path, capsys, monkey
     monkeypatch.setenv("COLUMNS", "80")
     out = tmp_path / "open"
     line = ["bench", "open", "--family", "integers", "--family", "one_unknown", "--count", "3",
-            "--fresh", "9", "--entrant", "hcod", "--out", str(out)]
+            "--public", "2", "--fresh", "9", "--entrant", "hcod", "--out", str(out)]
     mine = f"{HELPERS / 'fake_entrants.py'}:Moody"
     assert run_command(line) == 0
     first = {file: file.stat().st_mtime_ns for file in out.glob("*/*")}
@@ -394,7 +390,7 @@ def test_the_command_runs_continues_and_writes_its_page(tmp_path, capsys, monkey
     assert all(len(line) <= 80 or line.startswith("Page: ") for line in said.out.splitlines())
     assert "…" not in said.out
     fresh = said.out.index("Fresh problems, seed 9: 6 problems of 2 families")
-    assert fresh < said.out.index("Public problems: 6 problems of 2 families")
+    assert fresh < said.out.index("Public problems: 4 problems of 2 families")
     page = (out / "index.html").read_text()
     assert page.count("<svg") >= 6
     for text in ("Fresh problems, seed 9", "Moody", "fake 1", "hierarchy"):

@@ -66,11 +66,15 @@ class Answer(NamedTuple):
 
 
 class Repeats(NamedTuple):
-    """How often a solve is timed: `least` to `most` times, no more after `turn` [ns]."""
+    """How often a solve is timed: `least` to `most` times, no more once they took `turn` [ns].
+
+    Of solves that are slow fewer than `least` are enough, once they took `enough` [ns].
+    """
 
     least: int
     most: int
     turn: int
+    enough: int
 
 
 class Entrant:

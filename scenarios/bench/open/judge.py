@@ -90,13 +90,12 @@ def _judged(row: RawRow, h: Hierarchy, proof: Proof) -> Judged:
     absolute, relative, level = _miss(h, proof, x)
     warm_right = (None if warm_x is None
                   else bool(row["warm_solved"]) and _miss(h, proof, warm_x)[1] <= RIGHT)
-    times = (tuple(row[name] or ()) for name in ("cold_ns", "warm_ns", "cold_inside_ns",
-                                                 "warm_inside_ns"))
     return Judged(
         row["entrant"], row["version"], row["family"], row["half"], row["seed"], row["problem"],
         _verdict(row, relative), absolute, relative, level,
-        _moved(h, proof, x, _vector(row["without"])), *times, row["iterations"],
-        row["warm_iterations"], warm_right, row["same"],
+        _moved(h, proof, x, _vector(row["without"])), _times(row["cold_ns"]),
+        _times(row["warm_ns"]), _times(row["cold_inside_ns"]), _times(row["warm_inside_ns"]),
+        row["iterations"], row["warm_iterations"], warm_right, row["same"],
         (row["rss_kib"] or 0) - (row["start_kib"] or 0), row["yardstick_ns"] or 0, x)
 
 
@@ -151,6 +150,10 @@ def _sizes(h: Hierarchy, proof: Proof) -> Array:
                         for first, last in zip(h.offsets[:-1], h.offsets[1:], strict=True)])
     reach = 1.0 + (float(np.linalg.norm(proof.x)) if proof.complete else 0.0)
     return np.where(largest > 0.0, largest, 1.0) * reach
+
+
+def _times(values: list[int] | None) -> tuple[int, ...]:
+    return tuple(values or ())
 
 
 def _vector(values: list[float] | None) -> Array | None:

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from itertools import groupby, pairwise
-from operator import attrgetter
 from typing import final
 
 import numpy as np
@@ -95,9 +94,8 @@ def summary(rows: Sequence[Judged], steps: dict[str, float]) -> Summary:
     return Summary(
         rows[0].entrant, counts, _largest(row.absolute for row in claimed),
         _largest(row.relative for row in claimed), _largest(row.moved for row in claimed),
-        *(Times.of([time for row in rows for time in times(row)])
-          for times in (attrgetter("cold"), attrgetter("warm"), attrgetter("cold_inside"),
-                        attrgetter("warm_inside"))),
+        _together(row.cold for row in rows), _together(row.warm for row in rows),
+        _together(row.cold_inside for row in rows), _together(row.warm_inside for row in rows),
         _median(row.iterations for row in rows), _median(row.warm_iterations for row in rows),
         float(np.mean(warm)) if warm else np.nan, all(row.same is not False for row in rows),
         max(row.memory for row in rows), _largest(
@@ -110,6 +108,10 @@ def by(rows: Sequence[Judged], key: Callable[[Judged], str]) -> list[tuple[str, 
     order = list(dict.fromkeys(map(key, rows)))
     grouped = groupby(sorted(rows, key=lambda row: order.index(key(row))), key)
     return [(name, list(own)) for name, own in grouped]
+
+
+def _together(times: Iterable[tuple[int, ...]]) -> Times:
+    return Times.of([time for own in times for time in own])
 
 
 def _step(points: Sequence[Array | None]) -> float:

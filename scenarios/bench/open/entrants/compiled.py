@@ -5,9 +5,8 @@ const double* upper, const double* reference);  // reference: null if zero
 int solve(void* prepared);                                    // 1 if it calls it solved
 int solve_from(void* prepared, void* before);                 // optional
 // Optional: writes times of repeated solves [ns], as shims/timed.h takes them; returns how many.
-int solve_timed(void* prepared, int least, int most, long long turn, long long* times);
-int solve_from_timed(void* prepared, void* before, int least, int most, long long turn,
-                     long long* times);
+int solve_timed(void* prepared, const repeats* limits, long long* times);
+int solve_from_timed(void* prepared, void* before, const repeats* limits, long long* times);
 void answer(void* prepared, double* x, int* iterations);        // iterations: -1 if unknown
 void release(void* prepared);
 """
@@ -22,6 +21,12 @@ import numpy as np
 from scenarios.bench.open.entrant import Answer, Entrant, Problem, Repeats
 
 _VOID = ctypes.c_void_p
+
+
+@final
+class _Repeats(ctypes.Structure):
+    _fields_ = (("least", ctypes.c_int), ("most", ctypes.c_int),
+                ("turn", ctypes.c_longlong), ("enough", ctypes.c_longlong))
 
 
 @final
@@ -79,9 +84,8 @@ class Compiled(Entrant):
         times = np.zeros(limits.most, dtype=np.int64)
         start = [] if before is None else [before.address]
         count = getattr(self.library, name)(
-            prepared.address, *start, limits.least, limits.most,
-            ctypes.c_longlong(limits.turn), _VOID(times.ctypes.data))
-        return times[:count].tolist()
+            prepared.address, *start, ctypes.byref(_Repeats(*limits)), _VOID(times.ctypes.data))
+        return [int(time) for time in times[:count]]
 
     def read(self, raw: Any) -> Answer:
         """Copy the answer."""

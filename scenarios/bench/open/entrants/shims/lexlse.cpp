@@ -48,8 +48,8 @@ int solve(void* handle) {
   return p->solver->get_x().allFinite();
 }
 
-int solve_timed(void* handle, int least, int most, long long turn, long long* times) {
-  return timed([=] { solve(handle); }, least, most, turn, times);
+int solve_timed(void* handle, const repeats* limits, long long* times) {
+  return timed([=] { solve(handle); }, limits, times);
 }
 
 void answer(void* handle, double* x, int* iterations) {

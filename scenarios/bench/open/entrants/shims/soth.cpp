@@ -85,13 +85,12 @@ int solve_from(void* handle, void* before) {
   return search(p);
 }
 
-int solve_timed(void* handle, int least, int most, long long turn, long long* times) {
-  return timed([=] { solve(handle); }, least, most, turn, times);
+int solve_timed(void* handle, const repeats* limits, long long* times) {
+  return timed([=] { solve(handle); }, limits, times);
 }
 
-int solve_from_timed(void* handle, void* before, int least, int most, long long turn,
-                     long long* times) {
-  return timed([=] { solve_from(handle, before); }, least, most, turn, times);
+int solve_from_timed(void* handle, void* before, const repeats* limits, long long* times) {
+  return timed([=] { solve_from(handle, before); }, limits, times);
 }
 
 void answer(void* handle, double* x, int* iterations) {

@@ -15,13 +15,18 @@ long long since(std::chrono::steady_clock::time_point begin) {
   return std::chrono::nanoseconds(std::chrono::steady_clock::now() - begin).count();
 }
 
-// Writes times [ns] of solves, at least `least`, at most `most`, no more after `turn` [ns]; returns
-// how many.
+struct repeats {  // see Repeats in entrant.py
+  int least, most;
+  long long turn, enough;
+};
+
+// Writes times [ns] of solves and returns how many.
 template <class Solve>
-int timed(Solve solve, int least, int most, long long turn, long long* times) {
+int timed(Solve solve, const repeats* limits, long long* times) {
   int count = 0;
   const auto begin = std::chrono::steady_clock::now();
-  while (count < least || (count < most && since(begin) < turn)) {
+  while (!count || (count < limits->most &&
+                    since(begin) < (count < limits->least ? limits->enough : limits->turn))) {
     const long long busy = processor();
     const auto start = std::chrono::steady_clock::now();
     solve();
