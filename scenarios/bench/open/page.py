@@ -60,7 +60,8 @@ def lead(half: Half) -> list[str]:
     inside compiled code; who is fastest.
     """
     asked = max(one.asked for one in half.whole.values())
-    widely = {label: one for label, one in half.whole.items() if one.asked >= _WIDELY * asked}
+    widely = {label: half.whole[label] for label in half.entrants
+              if half.whole[label].asked >= _WIDELY * asked}
     most = max(one.right for one in widely.values())
     best = [label for label, one in widely.items() if one.right == most]
     said = [f"{half.title}: of the entrants that can be asked at least {100.0 * _WIDELY:.0f} % of "
