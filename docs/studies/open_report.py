@@ -23,13 +23,13 @@ from rich.table import Table
 from hierarchy.words import listed
 from scenarios.bench.open import figures
 from scenarios.bench.open.families import FAMILIES
-from scenarios.bench.open.page import lead
+from scenarios.bench.open.page import first_lines, lead
 from scenarios.bench.open.printing import NOTES, answers, insides, sizes, times
 from scenarios.bench.open.results import Half, Results, results
 from scenarios.draw.figures.drawing import write
 
 ROOT = Path(__file__).parents[2]
-PAGES = ("README.md", "docs/benchmarks.md", "docs/benchmark-report.md")
+PAGES = ("README.md", "CHANGELOG.md", "docs/benchmarks.md", "docs/benchmark-report.md")
 WIDTH = 100
 BLOCK = re.compile(r"(?P<mark><!-- open benchmark: (?P<name>[a-z ]+) -->\n).*?"
                    r"(?P<end><!-- end of open benchmark -->)", re.DOTALL)
@@ -78,8 +78,8 @@ def sentences(found: Results) -> str:
 
 
 def short(found: Results) -> str:
-    """Return who is right most often, and where another is."""
-    return fill("- " + " ".join(lead(fresh(found))[:2]), WIDTH, subsequent_indent="  ")
+    """Return who is right most often, and where others are better, as one item of a list."""
+    return fill("- " + " ".join(first_lines(fresh(found))), WIDTH, subsequent_indent="  ")
 
 
 def text(*tables: Table) -> str:

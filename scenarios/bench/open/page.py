@@ -54,10 +54,15 @@ def page(found: Results, command: str) -> str:
 
 
 def lead(half: Half) -> list[str]:
-    """Return what one half shows, in sentences.
+    """Return what one half shows, in sentences: the `first_lines`, then who is fastest where."""
+    return [*first_lines(half), *_fastest(half)]
 
-    Who is right most often; where another is; where a solver of others is faster, from Python and
-    inside compiled code; who is fastest.
+
+def first_lines(half: Half) -> list[str]:
+    """Return who is right most often, and where others are better, in sentences.
+
+    Where another is right more often; where a solver of others is faster, from Python and inside
+    compiled code.
     """
     asked = max(one.asked for one in half.whole.values())
     widely = {label: half.whole[label] for label in half.entrants
@@ -78,6 +83,10 @@ def lead(half: Half) -> list[str]:
         said.append("Without the call from Python, inside compiled code, "
                     + (f"one is right as often as {IN_C}, and faster, in {listed(inside)}."
                        if inside else f"none is right as often as {IN_C} and faster."))
+    return said
+
+
+def _fastest(half: Half) -> list[str]:
     fastest: dict[str, list[str]] = {}
     for family in half.families:
         own = {label: half.cells[label, family] for label in half.entrants
@@ -87,10 +96,9 @@ def lead(half: Half) -> list[str]:
                  if one.right == 1.0 and one.asked == every}
         if right:
             fastest.setdefault(min(right, key=right.__getitem__), []).append(family)
-    for label, families in sorted(fastest.items(), key=lambda one: -len(one[1])):
-        said.append(f"{label} is the fastest of those that solve every problem in "
-                    f"{len(families)} of {len(half.families)} families: {listed(families)}.")
-    return said
+    return [f"{label} is the fastest of those that solve every problem in {len(families)} of "
+            f"{len(half.families)} families: {listed(families)}."
+            for label, families in sorted(fastest.items(), key=lambda one: -len(one[1]))]
 
 
 def _better(half: Half, best: str, labels: list[str]) -> list[str]:
@@ -118,7 +126,7 @@ def _faster(half: Half, best: str, inside: bool = False) -> list[str]:
     for family in half.families:
         cells = {label: one for label in (best, *others)
                  if (one := half.cells.get((label, family))) is not None}
-        if best not in cells:
+        if best not in cells or isnan(cells[best].right):
             continue
         times = {label: (one.cold_inside if inside else one.cold).median
                  for label, one in cells.items()
