@@ -20,8 +20,8 @@ from scenarios.templates import render, resource
 
 ANSWERS = ("asked", "right", "called solved, wrong", "right, not called so", "failed", "ended",
            "largest miss", "relative", "last level moves upper", "same bits", "roughness", "MB")
-TIMES = ("median", "p95", "p99.9", "largest", "inside, median", "warm median", "warm p99.9",
-         "inside, warm median", "iterations", "warm iterations", "warm right")
+TIMES = ("median", "p95", "p99.9", "largest", "inside", "warm median", "warm p99.9",
+         "warm inside", "iterations", "warm iterations", "warm right")
 
 
 IN_C = "hcod in C"
