@@ -85,8 +85,9 @@ def short(found: Results) -> str:
 def text(*tables: Table) -> str:
     """Return tables as a block of code."""
     console = Console(file=io.StringIO(), width=WIDTH, highlight=False, markup=False)
-    console.print(*tables, sep="\n\n")
-    lines = console.file.getvalue().splitlines()  # type: ignore[attr-defined]
+    for table in tables:
+        console.print(table, "", sep="\n")
+    lines = console.file.getvalue().rstrip().splitlines()  # type: ignore[attr-defined]
     return "\n".join(["```", *(line.rstrip() for line in lines), "```"])
 
 
