@@ -13,7 +13,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -28,7 +28,8 @@ from rich.table import Table
 from hierarchy.problem import Array, Hierarchy
 from scenarios.bench.families import fresh
 from scenarios.bench.machine import one_core
-from scenarios.bench.open.built import BuildError, rows_of
+from scenarios.bench.open.built import BuildError, rows_from, rows_of
+from scenarios.bench.open.table import Row
 from solvers import certify
 from solvers.library import write
 
@@ -99,15 +100,14 @@ def compiled(folder: Path, library: Path) -> tuple[Path, dict[str, Path]]:
     compiler = next(filter(None, map(shutil.which, ("c++", "g++", "clang++"))), None)
     if compiler is None:
         raise BuildError("no compiler of C++: c++, g++ or clang++")
-    program, ours = folder / "c_peers", {}
+    program = folder / "c_peers"
     subprocess.run([compiler, *_OPTIONS, _HERE / "c_peers.cpp", "-ldl", "-o", program], check=True)
-    for name in ("tpm", "hcod"):
-        ours[name] = folder / f"{name}.so"
-        subprocess.run([compiler, *_OPTIONS, "-shared", "-fPIC", f"-DSOLVE=th_solve_{name}",
-                        _HERE / "c_ours.cpp", "-I", library / "include",
-                        library / "lib" / "libtask_hierarchy.a", "-lm", "-o", ours[name]],
-                       check=True)
-    return program, ours
+    return program, libraries_of(rows_from(library))
+
+
+def libraries_of(rows: Sequence[Row]) -> dict[str, Path]:
+    """Return the shared library of each entrant, by its label."""
+    return {row.label.removesuffix(" in C"): Path(row.options["library"]) for row in rows}
 
 
 def run(program: Path, libraries: Mapping[str, Path], seed: int = SEED, count: int = COUNT,
@@ -192,7 +192,7 @@ def main() -> int:
         except BuildError as error:
             print(error, file=sys.stderr)
             return 2
-        run(program, {**libraries, **{row.label: Path(row.options["library"]) for row in peers}})
+        run(program, {**libraries, **libraries_of(peers)})
     return 0
 
 

@@ -20,14 +20,16 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+from hierarchy.words import listed
 from scenarios.bench.open import figures
-from scenarios.bench.open.page import lead
-from scenarios.bench.open.printing import NOTES, answers, sizes, times
+from scenarios.bench.open.families import FAMILIES
+from scenarios.bench.open.page import first_lines, lead
+from scenarios.bench.open.printing import NOTES, answers, insides, sizes, times
 from scenarios.bench.open.results import Half, Results, results
 from scenarios.draw.figures.drawing import write
 
 ROOT = Path(__file__).parents[2]
-PAGES = ("README.md", "docs/benchmarks.md", "docs/benchmark-report.md")
+PAGES = ("README.md", "CHANGELOG.md", "docs/benchmarks.md", "docs/benchmark-report.md")
 WIDTH = 100
 BLOCK = re.compile(r"(?P<mark><!-- open benchmark: (?P<name>[a-z ]+) -->\n).*?"
                    r"(?P<end><!-- end of open benchmark -->)", re.DOTALL)
@@ -76,15 +78,16 @@ def sentences(found: Results) -> str:
 
 
 def short(found: Results) -> str:
-    """Return who is right most often, and where another is."""
-    return fill("- " + " ".join(lead(fresh(found))[:2]), WIDTH, subsequent_indent="  ")
+    """Return who is right most often, and where others are better, as one item of a list."""
+    return fill("- " + " ".join(first_lines(fresh(found))), WIDTH, subsequent_indent="  ")
 
 
-def text(*tables: Table | str) -> str:
-    """Return tables, and lines between them, as a block of code."""
+def text(*tables: Table) -> str:
+    """Return tables as a block of code."""
     console = Console(file=io.StringIO(), width=WIDTH, highlight=False, markup=False)
-    console.print(*tables, sep="\n")
-    lines = console.file.getvalue().splitlines()  # type: ignore[attr-defined]
+    for table in tables:
+        console.print(table, "", sep="\n")
+    lines = console.file.getvalue().rstrip().splitlines()  # type: ignore[attr-defined]
     return "\n".join(["```", *(line.rstrip() for line in lines), "```"])
 
 
@@ -101,7 +104,8 @@ def problems(found: Results) -> str:
                     f"| {between([h.n for h in every])} | {between([h.m for h in every])} "
                     f"| {sum(proof.complete for proof in proofs)} | {posed} "
                     f"| {halves[0].head.what} |")
-    return "\n".join(rows)
+    absent = [name for name in FAMILIES if name not in fresh(found).families]
+    return "\n".join([*rows, *(["", f"Not in this run: {listed(absent)}."] if absent else [])])
 
 
 def between(values: list[int]) -> str:
@@ -135,9 +139,10 @@ PARTS: dict[str, Callable[[Results], str]] = {
     "lead": sentences, "short": short, "problems": problems, "entrants": entrants,
     "machine": machine,
     "notes": lambda _: fill(NOTES, WIDTH),
-    "fresh answers": lambda found: text(answers(fresh(found)), "", sizes(fresh(found))),
+    "fresh answers": lambda found: text(answers(fresh(found)), sizes(fresh(found))),
     "fresh times": lambda found: text(times(fresh(found), WIDTH)),
-    "public answers": lambda found: text(answers(public(found)), "", sizes(public(found))),
+    "fresh inside": lambda found: text(*insides(fresh(found), WIDTH)),
+    "public answers": lambda found: text(answers(public(found)), sizes(public(found))),
     "public times": lambda found: text(times(public(found), WIDTH))}
 """Makers of the blocks by name."""
 

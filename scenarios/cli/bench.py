@@ -200,6 +200,9 @@ def open_(families: Annotated[list[str] | None, typer.Option(
           count: Annotated[int | None, typer.Option(
               "--count", min=1, metavar="N", help="Problems of a half. Default: 50, or 200 "
               "consecutive ones.")] = None,
+          public: Annotated[int | None, typer.Option(
+              "--public", min=1, metavar="N", help="Problems of the public half. Default: that of "
+              "--count.")] = None,
           limit: Annotated[float, typer.Option("--limit", min=0.1, metavar="S",
                                                help="Time for one problem.")] = 10.0,
           python: Annotated[str, typer.Option(
@@ -228,8 +231,8 @@ def open_(families: Annotated[list[str] | None, typer.Option(
     built = {"soth": soth, "lexls": lexls}
     if check:
         return check_command(entrants or [], python, built)
-    return open_command(families or [], entrants or [], fresh or [1], count, limit, python, built,
-                        out)
+    counts = {0: public or count, **dict.fromkeys(fresh or [1], count)}
+    return open_command(families or [], entrants or [], counts, limit, python, built, out)
 
 
 @bench.command()

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import shlex
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from rich.console import Console
 
-from scenarios.bench.open.families import available, family
+from scenarios.bench.open.families import available, family, unavailable
 from scenarios.bench.open.table import PACKAGES, Row, chosen
 from scenarios.cli.terminal import shown
 
 
-def open_command(families: Sequence[str], entrants: Sequence[str], seeds: Sequence[int],
-                 count: int | None, limit: float, python: str, built: dict[str, Path | None],
-                 out: Path) -> int:
+def open_command(families: Sequence[str], entrants: Sequence[str],
+                 counts: Mapping[int, int | None], limit: float, python: str,
+                 built: dict[str, Path | None], out: Path) -> int:
     """Run the benchmark, or what is left of it; print its tables and write its page."""
     from scenarios.bench.open.page import page
     from scenarios.bench.open.printing import say
@@ -26,7 +26,9 @@ def open_command(families: Sequence[str], entrants: Sequence[str], seeds: Sequen
 
     table = _table(entrants, python, built)
     named = [family(name) for name in families] or available()
-    run(out, named, table, [0, *dict.fromkeys(seeds)], count, limit,
+    for name, why in ({} if families else unavailable()).items():
+        print(f"left out: {name}, which {why}", file=sys.stderr)
+    run(out, named, table, counts, limit,
         lambda text: print(text, file=sys.stderr, flush=True))
     found = results(out)
     say(Console(highlight=False, markup=False), found)
@@ -58,9 +60,9 @@ def install_command() -> int:
 
 
 def _table(entrants: Sequence[str], python: str, built: dict[str, Path | None]) -> list[Row]:
-    """Return the rows that are asked for, those built from a checkout among them."""
-    from scenarios.bench.open.built import rows_of
+    """Return the rows that are asked for, among them those built from checkouts, and ours in C."""
+    from scenarios.bench.open.built import ours, rows_of
 
     more = [row for name, folder in built.items() if folder is not None
             for row in rows_of(name, folder)]
-    return chosen(entrants, python, more)
+    return chosen(entrants, python, [*ours(), *more] if more else [])

@@ -69,11 +69,13 @@ def export(family: Annotated[list[str], typer.Argument(
            as_json: AsJson = False) -> None:
     """Write problems as files, with proved answers."""
     from scenarios.bench.open.exported import export as write
-    from scenarios.bench.open.families import available
+    from scenarios.bench.open.families import available, unavailable
     from scenarios.bench.open.families import family as named
     from scenarios.cli.progress import bar
 
     chosen = available() if family == ["all"] else [named(name) for name in family]
+    for name, why in (unavailable() if family == ["all"] else {}).items():
+        print(f"left out: {name}, which {why}", file=sys.stderr)
     files = []
     for one in chosen:
         with bar("problems") as told:

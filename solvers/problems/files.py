@@ -104,29 +104,28 @@ def read(path: str | Path) -> Collection:
     try:
         problems = tuple(_unpacked(arrays))
         answers = tuple(_answers(arrays, problems)) if head["answers"] else None
-        said = Head(**{key: head[key] for key in Head.__dataclass_fields__})
-    except (KeyError, ValueError, TypeError) as error:
-        raise ProblemFileError(f"{path}: {_reason(error)}") from error
+    except ValueError as error:
+        raise ProblemFileError(f"{path}: {error}") from error
+    if len(problems) != head["count"]:
+        raise ProblemFileError(f"{path}: {len(problems)} problems where its {_HEAD} says "
+                               f"{head['count']}")
     if _digest({name: arrays[name] for name in _DATA}) != head.get("sha256"):
         raise ProblemFileError(f"{path}: the problems are not those that were written: their "
                                "SHA-256 is another")
-    return Collection(said, problems, answers)
+    return Collection(Head(**{key: head[key] for key in Head.__dataclass_fields__}), problems,
+                      answers)
 
 
 def _opened(path: Path) -> tuple[dict[str, Any], Arrays]:
     """Return head and arrays of a file of the right format."""
+    if not path.exists():
+        raise ProblemFileError(f"{path} does not exist")
     try:
-        with np.load(path, allow_pickle=False) as archive:
-            head = json.loads(archive[_HEAD])
-            if head.get("format") != FORMAT or head.get("version") != VERSION:
-                raise ProblemFileError(f"{path}: {head.get('format')!r}, version "
-                                       f"{head.get('version')!r}; expected {FORMAT!r}, {VERSION}")
+        with zipfile.ZipFile(path) as archive:
+            head = _head(json.loads(archive.read(_HEAD)))
             names = {**_DATA, **(_ANSWERS if head["answers"] else {})}
-            arrays = {name: archive[name] for name in names}
-    except FileNotFoundError as error:
-        raise ProblemFileError(f"{path} does not exist") from error
-    except (OSError, ValueError, KeyError, TypeError, AttributeError, EOFError,
-            zipfile.BadZipFile) as error:
+            arrays = {name: _array(archive.read(f"{name}.npy")) for name in names}
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
         raise ProblemFileError(f"{path} is not a file of problems: {_reason(error)}") from error
     for name, kind in names.items():
         if arrays[name].ndim != 1 or arrays[name].dtype != np.dtype(f"<{kind}"):
@@ -135,8 +134,31 @@ def _opened(path: Path) -> tuple[dict[str, Any], Arrays]:
     return head, arrays
 
 
+def _head(said: Any) -> dict[str, Any]:
+    """Return the head; raises ValueError unless it is of this format and version."""
+    head: dict[str, Any] = said if isinstance(said, dict) else {}
+    if head.get("format") != FORMAT:
+        raise ValueError(f"its {_HEAD} does not say \"format\": {FORMAT!r}")
+    if head.get("version") != VERSION:
+        raise ValueError(f"version {head.get('version')!r} of the format; known is {VERSION}")
+    kinds = {key: type(value) for key, value in asdict(Head("", "", "", 0)).items()}
+    for key, kind in {**kinds, "count": int, "answers": bool}.items():
+        if key not in head:
+            raise ValueError(f"{key} is missing in its {_HEAD}")
+        if not isinstance(head[key], (int, float) if kind is float else kind):
+            raise ValueError(f"{key} is {head[key]!r} in its {_HEAD}; expected {kind.__name__}")
+    return head
+
+
+def _array(content: bytes) -> NDArray[Any]:
+    return np.lib.format.read_array(io.BytesIO(content), allow_pickle=False)
+
+
 def _reason(error: Exception) -> str:
-    return f"{error.args[0]} is missing" if isinstance(error, KeyError) else str(error)
+    if isinstance(error, json.JSONDecodeError):
+        return f"its {_HEAD} is not JSON: {error}"
+    return (f"{str(error.args[0]).split(chr(39))[1]} is missing" if isinstance(error, KeyError)
+            else str(error))
 
 
 def _add(archive: zipfile.ZipFile, name: str, content: bytes) -> None:

@@ -2,6 +2,8 @@
 
 import json
 import re
+import shutil
+import subprocess
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,11 +17,13 @@ from scenarios.bench.open import judge as judging
 from scenarios.bench.open.entrant import Problem, read_problems
 from scenarios.bench.open.judge import judge
 from scenarios.bench.open.page import lead
+from scenarios.bench.open.printing import insides
 from scenarios.bench.open.process import CRASHED, HUNG, LEFT_OUT
 from scenarios.bench.open.results import Half
-from scenarios.bench.open.store import COLUMNS, Store
+from scenarios.bench.open.store import COLUMNS, Store, read_rows
 from scenarios.bench.open.summary import Times, profile, summary
 from scenarios.bench.open.table import ENTRANTS, OWN, Row, chosen
+from scenarios.bench.open.worker import REPEATS
 from scenarios.cli.main import run_command
 from solvers.problems.files import Collection, Head
 from solvers.proof import prove
@@ -123,6 +127,53 @@ def test_an_entrant_that_crashes_for_ever_is_left_out_in_the_end(monkeypatch, eq
     _, answers = run_entrant(fake("Doomed"), equalities, 5)
     assert ends(answers) == [CRASHED, CRASHED, LEFT_OUT, LEFT_OUT, LEFT_OUT]
     assert "code 3" in answers[0]["why"]
+
+
+CXX = next(filter(None, map(shutil.which, ("c++", "g++", "clang++"))), None)
+LIBRARY = """
+#include "timed.h"
+
+extern "C" {
+void* prepare(int n, int, const long*, const double*, const double* lower, const double*,
+              const double*) {
+  auto* x = new double[2];
+  x[0] = lower[0], x[1] = lower[1];
+  return n == 2 ? x : nullptr;
+}
+int solve(void*) { return 1; }
+int solve_timed(void* handle, const repeats* limits, long long* times) {
+  return timed([=] { solve(handle); }, limits, times);
+}
+void answer(void* handle, double* x, int* iterations) {
+  x[0] = static_cast<double*>(handle)[0], x[1] = static_cast<double*>(handle)[1], *iterations = 7;
+}
+void release(void* handle) { delete[] static_cast<double*>(handle); }
+}
+"""
+"""Solves levels of the identity."""
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(CXX is None, reason="no compiler of C++")
+def test_a_compiled_entrant_is_timed_from_python_and_inside(tmp_path, equalities):
+    (tmp_path / "one.cpp").write_text(LIBRARY)
+    shims = Path(entrants.__file__).with_name("shims")
+    subprocess.run([CXX, "-std=c++14", "-O2", "-fPIC", "-shared", f"-I{shims}",
+                    tmp_path / "one.cpp", "-o", tmp_path / "one.so"], check=True)
+    row = Row("one", OWN, "scenarios.bench.open.entrants.compiled:Compiled",
+              options={"library": str(tmp_path / "one.so"), "name": "one 1"})
+    _, answers = run_entrant(row, equalities, 5)
+    assert [answer["x"] for answer in answers] == [[float(side), 1.0] for side in range(5)]
+    for answer in answers:
+        assert REPEATS.least <= len(answer["cold_inside_ns"]) <= REPEATS.most
+        assert 0 <= min(answer["cold_inside_ns"]) < min(answer["cold_ns"])
+        assert "warm_ns" not in answer
+
+
+@pytest.mark.slow
+def test_an_entrant_in_python_has_no_times_inside(equalities):
+    _, answers = run_entrant(fake("Starting"), equalities, 5)
+    assert all(answer["cold_inside_ns"] == answer["warm_inside_ns"] == [] for answer in answers)
 
 
 def test_the_worker_reads_the_problems_that_were_written(tmp_path):
@@ -248,7 +299,46 @@ def test_the_first_lines_name_a_solver_of_others_that_is_faster():
                   raw([3.0, 1.0], one, entrant="other", cold_ns=[1000])], {one.digest: one})
     half = Half("Fresh problems, seed 7", tuple(rows), {"simple": one})
     assert ("A solver of others is right as often as hcod, and faster, in simple (other: 1.00 µs "
-            "against 4.00 µs).") in lead(half)
+            "against 4.00 µs), each called from Python.") in lead(half)
+
+
+def test_inside_compiled_code_ours_is_compared_with_that_of_others():
+    one = collection([simple(3.0)])
+
+    def row(entrant, version, python, inside):
+        return raw([3.0, 1.0], one, entrant=entrant, version=version, cold_ns=[python],
+                   cold_inside_ns=[inside] if inside else None)
+
+    rows = [row("hcod in C", "task-hierarchy 1, C library", 1500, 800),
+            row("hcod", "task-hierarchy 1", 2000, 0),
+            row("other", "1", 1400, 700), row("in Python", "1", 9000, 0)]
+    half = Half("Fresh problems, seed 7", tuple(judge(rows, {one.digest: one})), {"simple": one})
+    said = " ".join(lead(half))
+    assert "faster, in simple (other: 1.40 µs against 2.00 µs), each called from Python" in said
+    assert "faster, in simple (other: 0.70 µs against 0.80 µs)." in said
+    assert "the problems, hcod, hcod in C, other and in Python solve the most" in said
+    rows[2]["cold_inside_ns"] = [900]  # of "other"
+    half = replace(half, rows=tuple(judge(rows, {one.digest: one})))
+    assert "none is right as often as hcod in C and faster" in " ".join(lead(half))
+
+
+def test_times_inside_stand_beside_those_from_python():
+    one = collection([simple(3.0)])
+    rows = judge([raw([3.0, 1.0], one, cold_inside_ns=[1500], warm_x=[3.0, 1.0], warm_solved=True,
+                      warm_ns=[1000], warm_inside_ns=[500]),
+                  raw([3.0, 1.0], one, entrant="in Python")], {one.digest: one})
+    cold, warm = insides(Half("Fresh", tuple(rows), {"simple": one}), 80)
+    assert [list(column.cells) for column in cold.columns] == [["simple"], ["2.00"], ["1.50"]]
+    assert [list(column.cells) for column in warm.columns] == [["simple"], ["1.00"], ["0.50"]]
+
+
+def test_rows_of_another_version_are_refused(tmp_path):
+    import pyarrow
+    from pyarrow import parquet
+
+    parquet.write_table(pyarrow.table({"entrant": ["one"]}), tmp_path / "old.parquet")
+    with pytest.raises(HierarchyError, match="columns of another version; remove it"):
+        read_rows(tmp_path / "old.parquet")
 
 
 def test_rows_come_back_as_they_were_stored(tmp_path):
@@ -287,7 +377,7 @@ def test_the_command_runs_continues_and_writes_its_page(tmp_path, capsys, monkey
     monkeypatch.setenv("COLUMNS", "80")
     out = tmp_path / "open"
     line = ["bench", "open", "--family", "integers", "--family", "one_unknown", "--count", "3",
-            "--fresh", "9", "--entrant", "hcod", "--out", str(out)]
+            "--public", "2", "--fresh", "9", "--entrant", "hcod", "--out", str(out)]
     mine = f"{HELPERS / 'fake_entrants.py'}:Moody"
     assert run_command(line) == 0
     first = {file: file.stat().st_mtime_ns for file in out.glob("*/*")}
@@ -301,7 +391,7 @@ def test_the_command_runs_continues_and_writes_its_page(tmp_path, capsys, monkey
     assert all(len(line) <= 80 or line.startswith("Page: ") for line in said.out.splitlines())
     assert "…" not in said.out
     fresh = said.out.index("Fresh problems, seed 9: 6 problems of 2 families")
-    assert fresh < said.out.index("Public problems: 6 problems of 2 families")
+    assert fresh < said.out.index("Public problems: 4 problems of 2 families")
     page = (out / "index.html").read_text()
     assert page.count("<svg") >= 6
     for text in ("Fresh problems, seed 9", "Moody", "fake 1", "hierarchy"):

@@ -15,6 +15,24 @@ from solvers.problems.files import read
 QUICK = ("EQ7", "INEQ7", "DEGEN7", *problems.KINDS, "recipe")
 
 
+def test_a_family_without_its_package_is_left_out_and_said(monkeypatch, capsys, tmp_path):
+    from scenarios.bench.open import families
+
+    def distribution(name):
+        if name == "example-robot-data":
+            raise families.PackageNotFoundError(name)
+
+    monkeypatch.setattr(families, "distribution", distribution)
+    absent = {"singular-panda", "singular-romeo"}
+    assert {one.name for one in available()} == set(FAMILIES) - absent
+    assert set(families.unavailable()) == absent
+    monkeypatch.setattr(families, "FAMILIES", {name: FAMILIES[name] for name in ("integers",)})
+    assert run_command(["problems", "export", "all", "--count", "1", "--no-answers",
+                        "--out", str(tmp_path)]) == 0
+    assert ("left out: singular-panda, which needs example-robot-data: pip install "
+            "'task-hierarchy[robots]'") in capsys.readouterr().err
+
+
 def test_every_family_of_the_generators_has_a_place():
     assert set(problems.FAMILIES) | set(problems.KINDS) < set(FAMILIES)
     assert {one.name for one in available()} <= set(FAMILIES)

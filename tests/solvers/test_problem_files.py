@@ -100,11 +100,15 @@ def changed(file, name, content):
 
 
 @pytest.mark.parametrize(("name", "content", "said"), [
-    ("head.json", lambda _: b"{", "not a file of problems"),
-    ("head.json", lambda _: b"[]", "not a file of problems"),
-    ("head.json", lambda head: head.replace(b'"version": 1', b'"version": 9'), "version 9"),
+    ("head.json", lambda _: b"{", "head.json is not JSON"),
+    ("head.json", lambda _: b"[]", 'does not say "format"'),
+    ("head.json", lambda head: head.replace(b'"version": 1', b'"version": 9'),
+     "version 9 of the format; known is 1$"),
+    ("head.json", lambda head: head.replace(b'"count": ', b'"count": 1'), "says 1"),
+    ("head.json", lambda head: head.replace(b'"seed": ', b'"seed": -0.'), "seed is -0"),
     ("head.json", lambda head: head.replace(b'"family"', b'"famile"'), "family is missing"),
-    ("A.npy", lambda _: None, "not a file of problems"),
+    ("A.npy", lambda _: None, "not a file of problems: A.npy is missing$"),
+    ("head.json", lambda _: None, "not a file of problems: head.json is missing$"),
     ("A.npy", lambda data: data[:-8] + b"\0\0\0\0\0\0\1\0", "SHA-256"),
     ("n.npy", lambda data: data[:-8] + b"\xff" * 8, "n = -1"),
     ("sizes.npy", lambda data: data[:-8] + b"\x7f" + b"\0" * 7, "too short"),
@@ -120,8 +124,16 @@ def test_what_is_no_file_of_problems_is_refused(tmp_path):
     with pytest.raises(ProblemFileError, match="does not exist"):
         read(tmp_path / "none.npz")
     (tmp_path / "text.npz").write_text("text")
-    with pytest.raises(ProblemFileError, match="not a file of problems"):
+    with pytest.raises(ProblemFileError, match=r"not a file of problems: File is not a zip file$"):
         read(tmp_path / "text.npz")
+
+
+def test_a_byte_that_changed_is_noticed(file):
+    content = bytearray(file.read_bytes())
+    content[len(content) // 2] ^= 1
+    file.write_bytes(content)
+    with pytest.raises(ProblemFileError, match="CRC"):
+        read(file)
 
 
 @pytest.mark.parametrize(("what", "said"), [({"metric": [[2.0]]}, "has a metric"),

@@ -1,6 +1,6 @@
-"""Entrants compiled from a checkout that the user names: soth and LexLS.
+"""Entrants compiled here: soth and LexLS from checkouts that the user names, and our C library.
 
-Nothing of theirs is in this project. A shim of ours is compiled with the user's compiler against
+Nothing of others is in this project. A shim of ours is compiled with the user's compiler against
 the user's copy, into the cache folder.
 """
 
@@ -13,12 +13,16 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Sequence
+from importlib.metadata import version
 from pathlib import Path
 
 from hierarchy.errors import HierarchyError
 from scenarios.bench.open.table import OWN, Row
+from solvers.library import differs, write
 
 _SHIMS = Path(__file__).parent / "entrants" / "shims"
+_TIMED = _SHIMS / "timed.h"
+_IN_C = "Answers in doubt are not certified."
 _COMPILED = "scenarios.bench.open.entrants.compiled:Compiled"
 _OPTIONS = ("-std=c++14", "-O3", "-march=native", "-DNDEBUG", "-fPIC", "-shared", "-w",
             "-fpermissive")
@@ -31,6 +35,32 @@ _DEBUG = re.compile(r"^\s*#\s*define SOTH_(TEMPLATE_)?DEBUG.*$", re.MULTILINE)
 
 class BuildError(HierarchyError):
     """A checkout without the expected files, or what the compiler said."""
+
+
+def ours() -> list[Row]:
+    """Write our C library and return its resolvers as entrants; raises BuildError."""
+    folder = _cache("library")
+    try:
+        stale = differs(folder)
+    except HierarchyError:
+        stale = "not written yet"
+    if stale:
+        print("compiling our C library ...", file=sys.stderr, flush=True)
+        write(folder)
+    return rows_from(folder)
+
+
+def rows_from(library: Path) -> list[Row]:
+    """Compile entrants from the folder of our C library and return them; raises BuildError."""
+    return [_own(library, "hcod"), _own(library, "tpm", equalities=True)]
+
+
+def _own(library: Path, resolver: str, equalities: bool = False) -> Row:
+    more = [f"-I{library / 'include'}", f"-DSOLVE=th_solve_{resolver}"]
+    code = library / "lib" / "libtask_hierarchy.a"
+    return Row(f"{resolver} in C", OWN, _COMPILED, _IN_C + equalities * " Asked equalities only.", {
+        "library": str(_compiled(library, "ours", more, resolver, code)),
+        "equalities": equalities, "name": f"{OWN.name} {version(OWN.name)}, C library"})
 
 
 def rows_of(name: str, checkout: Path) -> list[Row]:
@@ -76,28 +106,39 @@ def _demand(file: Path, name: str) -> None:
 
 
 def _folder(name: str, checkout: Path) -> Path:
-    root = Path(os.environ.get("XDG_CACHE_HOME", "~/.cache")).expanduser()
     mark = hashlib.sha256(str(checkout.resolve()).encode()).hexdigest()[:8]
-    folder = root / "task-hierarchy" / "open" / f"{name}-{mark}"
+    return _cache(f"{name}-{mark}")
+
+
+def _cache(name: str) -> Path:
+    root = Path(os.environ.get("XDG_CACHE_HOME", "~/.cache")).expanduser()
+    folder = root / "task-hierarchy" / "open" / name
     folder.mkdir(parents=True, exist_ok=True)
     return folder
 
 
-def _compiled(folder: Path, shim: str, more: Sequence[str], variant: str = "") -> Path:
-    """Return the shared library of a shim, compiled anew if its text or command has changed."""
+def _compiled(folder: Path, shim: str, more: Sequence[str], variant: str = "",
+              archive: Path | None = None) -> Path:
+    """Return the shared library of a shim, compiled anew if its text or command has changed.
+
+    archive : a static library that it is linked with, which counts as part of its text.
+    """
     compiler = os.environ.get("CXX", "c++")
     source = _SHIMS / f"{shim}.cpp"
     command = [compiler, *_OPTIONS, *(f"-I{path}" for path in _EIGEN if Path(path).is_dir()), *more]
-    key = hashlib.sha256((" ".join(command) + source.read_text()).encode()).hexdigest()[:8]
+    text = b"".join([" ".join(command).encode(), source.read_bytes(), _TIMED.read_bytes(),
+                     archive.read_bytes() if archive else b""])
+    key = hashlib.sha256(text).hexdigest()[:8]
     library = folder / f"{shim}{variant}-{key}.so"
     if not library.is_file():
         if shutil.which(compiler) is None:
             raise BuildError(f"no C++ compiler {compiler!r}; install one, or name yours in CXX")
-        print(f"compiling {shim} {variant}...", file=sys.stderr, flush=True)
+        print(f"compiling {shim}{variant and f' {variant}'} ...", file=sys.stderr, flush=True)
         partial = library.with_suffix(".partial")
         try:
-            done = subprocess.run([*command, str(source), "-o", str(partial)], capture_output=True,
-                                  text=True, timeout=_LIMIT, check=False)
+            done = subprocess.run([*command, str(source), *([str(archive)] if archive else []),
+                                   "-o", str(partial)],
+                                  capture_output=True, text=True, timeout=_LIMIT, check=False)
         except subprocess.TimeoutExpired as error:
             raise BuildError(f"{shim} was not compiled within {_LIMIT:g} s") from error
         if done.returncode:

@@ -65,6 +65,18 @@ class Answer(NamedTuple):
     iterations: int | None = None
 
 
+class Repeats(NamedTuple):
+    """How often a solve is timed: `least` to `most` times, no more once they took `turn` [ns].
+
+    Of solves that are slow fewer than `least` are enough, once they took `enough` [ns].
+    """
+
+    least: int
+    most: int
+    turn: int
+    enough: int
+
+
 class Entrant:
     """A solver. Only `solve` and `solve_from` are timed.
 
@@ -92,6 +104,13 @@ class Entrant:
     def solve_from(self, prepared: Any, before: Any) -> Any:
         """Return the same, started from the solver's own answer to the problem before."""
         raise NotImplementedError
+
+    def inside(self, prepared: Any, before: Any, limits: Repeats) -> list[int]:
+        """Return times [ns] of solves taken inside a compiled package, [] if it cannot take them.
+
+        before : None for a cold start, or else what `solve_from` is given.
+        """
+        return []
 
     def read(self, raw: Any) -> Answer:
         """Return the solver's own answer as an Answer."""

@@ -9,8 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from importlib.metadata import version
-from importlib.util import find_spec
+from importlib.metadata import PackageNotFoundError, distribution, version
 from typing import final
 
 from hierarchy.errors import HierarchyError, UnknownNameError
@@ -138,12 +137,26 @@ def _all() -> dict[str, Family]:
 
 FAMILIES = _all()
 """The families by name."""
-_EXTRA = ("singular-panda", "singular-romeo")
+_NEEDS = {**dict.fromkeys(("singular-panda", "singular-romeo"), ("example-robot-data", "robots")),
+          **dict.fromkeys(_SIMULATED, ("mujoco", "sim"))}
+"""Distribution and extra of this project that a family needs."""
 
 
 def available() -> list[Family]:
     """Return the families whose packages are installed."""
-    needs = {**dict.fromkeys(_EXTRA, "example_robot_data"),
-             **dict.fromkeys(_SIMULATED, "mujoco")}
-    return [one for name, one in FAMILIES.items()
-            if name not in needs or find_spec(needs[name]) is not None]
+    left = unavailable()
+    return [one for name, one in FAMILIES.items() if name not in left]
+
+
+def unavailable() -> dict[str, str]:
+    """Return what to install for each of the other families, by name."""
+    return {name: f"needs {package}: pip install 'task-hierarchy[{extra}]'"
+            for name, (package, extra) in _NEEDS.items() if not _installed(package)}
+
+
+def _installed(package: str) -> bool:
+    try:  # a wheel of example-robot-data has no module of Python
+        distribution(package)
+    except PackageNotFoundError:
+        return False
+    return True

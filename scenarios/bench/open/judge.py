@@ -31,7 +31,8 @@ class Judged:
         relative to |a| (1 + |x|) with the largest row of the level; NaN without x.
     level : the first missed by more than RIGHT; L for the distance to the reference, or -1.
     moved : how far the last level moved the violation of one above, relative; NaN if not known.
-    cold, warm : times [ns]. iterations, warm_iterations : or None.
+    cold, warm : times of calls from Python [ns]; cold_inside, warm_inside : those that a compiled
+        package took itself. iterations, warm_iterations : or None.
     warm_right : whether the warm answer is right and called solved; None without one.
     same : whether a second solve gave the same bits; None without one.
     memory : growth of the process while it solved the file [KiB]. x : (n,) or None.
@@ -51,6 +52,8 @@ class Judged:
     moved: float
     cold: tuple[int, ...]
     warm: tuple[int, ...]
+    cold_inside: tuple[int, ...]
+    warm_inside: tuple[int, ...]
     iterations: int | None
     warm_iterations: int | None
     warm_right: bool | None
@@ -90,10 +93,10 @@ def _judged(row: RawRow, h: Hierarchy, proof: Proof) -> Judged:
     return Judged(
         row["entrant"], row["version"], row["family"], row["half"], row["seed"], row["problem"],
         _verdict(row, relative), absolute, relative, level,
-        _moved(h, proof, x, _vector(row["without"])), tuple(row["cold_ns"] or ()),
-        tuple(row["warm_ns"] or ()), row["iterations"], row["warm_iterations"], warm_right,
-        row["same"], (row["rss_kib"] or 0) - (row["start_kib"] or 0),
-        row["yardstick_ns"] or 0, x)
+        _moved(h, proof, x, _vector(row["without"])), _times(row["cold_ns"]),
+        _times(row["warm_ns"]), _times(row["cold_inside_ns"]), _times(row["warm_inside_ns"]),
+        row["iterations"], row["warm_iterations"], warm_right, row["same"],
+        (row["rss_kib"] or 0) - (row["start_kib"] or 0), row["yardstick_ns"] or 0, x)
 
 
 def _verdict(row: RawRow, relative: float) -> str:
@@ -147,6 +150,10 @@ def _sizes(h: Hierarchy, proof: Proof) -> Array:
                         for first, last in zip(h.offsets[:-1], h.offsets[1:], strict=True)])
     reach = 1.0 + (float(np.linalg.norm(proof.x)) if proof.complete else 0.0)
     return np.where(largest > 0.0, largest, 1.0) * reach
+
+
+def _times(values: list[int] | None) -> tuple[int, ...]:
+    return tuple(values or ())
 
 
 def _vector(values: list[float] | None) -> Array | None:

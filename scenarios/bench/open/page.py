@@ -5,6 +5,7 @@ from __future__ import annotations
 from math import isnan
 from typing import Any, NamedTuple
 
+import numpy as np
 from markupsafe import Markup
 
 from hierarchy.words import listed
@@ -19,10 +20,11 @@ from scenarios.templates import render, resource
 
 ANSWERS = ("asked", "right", "called solved, wrong", "right, not called so", "failed", "ended",
            "largest miss", "relative", "last level moves upper", "same bits", "roughness", "MB")
-TIMES = ("median", "p95", "p99.9", "largest", "warm median", "warm p99.9", "iterations",
-         "warm iterations", "warm right")
+TIMES = ("median", "p95", "p99.9", "largest", "inside", "warm median", "warm p99.9",
+         "warm inside", "iterations", "warm iterations", "warm right")
 
 
+IN_C = "hcod in C"
 _WIDELY = 0.95  # share of the problems that an entrant of the first sentence can be asked
 
 
@@ -52,12 +54,19 @@ def page(found: Results, command: str) -> str:
 
 
 def lead(half: Half) -> list[str]:
-    """Return what one half shows, in sentences.
+    """Return what one half shows, in sentences: the `first_lines`, then who is fastest where."""
+    return [*first_lines(half), *_fastest(half)]
 
-    Who is right most often; where another is; where a solver of others is faster; who is fastest.
+
+def first_lines(half: Half) -> list[str]:
+    """Return who is right most often, and where others are better, in sentences.
+
+    Where another is right more often; where a solver of others is faster, from Python and inside
+    compiled code.
     """
     asked = max(one.asked for one in half.whole.values())
-    widely = {label: one for label, one in half.whole.items() if one.asked >= _WIDELY * asked}
+    widely = {label: half.whole[label] for label in half.entrants
+              if half.whole[label].asked >= _WIDELY * asked}
     most = max(one.right for one in widely.values())
     best = [label for label, one in widely.items() if one.right == most]
     said = [f"{half.title}: of the entrants that can be asked at least {100.0 * _WIDELY:.0f} % of "
@@ -68,7 +77,16 @@ def lead(half: Half) -> list[str]:
         said.append(f"Another of them is right more often than {best[0]} in {listed(better)}.")
     if faster:
         said.append(f"A solver of others is right as often as {best[0]}, and faster, in "
-                    f"{listed(faster)}.")
+                    f"{listed(faster)}, each called from Python.")
+    if IN_C in half.whole:
+        inside = _faster(half, IN_C, inside=True)
+        said.append("Without the call from Python, inside compiled code, "
+                    + (f"one is right as often as {IN_C}, and faster, in {listed(inside)}."
+                       if inside else f"none is right as often as {IN_C} and faster."))
+    return said
+
+
+def _fastest(half: Half) -> list[str]:
     fastest: dict[str, list[str]] = {}
     for family in half.families:
         own = {label: half.cells[label, family] for label in half.entrants
@@ -78,10 +96,9 @@ def lead(half: Half) -> list[str]:
                  if one.right == 1.0 and one.asked == every}
         if right:
             fastest.setdefault(min(right, key=right.__getitem__), []).append(family)
-    for label, families in sorted(fastest.items(), key=lambda one: -len(one[1])):
-        said.append(f"{label} is the fastest of those that solve every problem in "
-                    f"{len(families)} of {len(half.families)} families: {listed(families)}.")
-    return said
+    return [f"{label} is the fastest of those that solve every problem in {len(families)} of "
+            f"{len(half.families)} families: {listed(families)}."
+            for label, families in sorted(fastest.items(), key=lambda one: -len(one[1]))]
 
 
 def _better(half: Half, best: str, labels: list[str]) -> list[str]:
@@ -98,20 +115,26 @@ def _better(half: Half, best: str, labels: list[str]) -> list[str]:
     return found
 
 
-def _faster(half: Half, best: str) -> list[str]:
-    """Return the families in which a solver of others is right as often, and faster, with times."""
+def _faster(half: Half, best: str, inside: bool = False) -> list[str]:
+    """Return the families in which a solver of others is right as often, and faster, with times.
+
+    inside : compare times taken inside compiled packages.
+    """
     found = []
-    others = [row.entrant for row in half.rows if not row.version.startswith(OWN.name)]
+    others = dict.fromkeys(row.entrant for row in half.rows
+                           if not row.version.startswith(OWN.name))
     for family in half.families:
-        own = half.cells[best, family]
-        times = {label: one.cold.median for label in dict.fromkeys(others)
-                 if (one := half.cells.get((label, family))) is not None
-                 and one.asked == own.asked and one.right >= own.right
-                 and one.cold.median < own.cold.median}
-        if times:
-            label = min(times, key=times.__getitem__)
+        cells = {label: one for label in (best, *others)
+                 if (one := half.cells.get((label, family))) is not None}
+        if best not in cells or isnan(cells[best].right):
+            continue
+        times = {label: (one.cold_inside if inside else one.cold).median
+                 for label, one in cells.items()
+                 if one.asked == cells[best].asked and one.right >= cells[best].right}
+        label = min(times, key=lambda label: np.nan_to_num(times[label], nan=np.inf))
+        if times[label] < times[best]:
             found.append(f"{family} ({label}: {digits(times[label])} µs against "
-                         f"{digits(own.cold.median)} µs)")
+                         f"{digits(times[best])} µs)")
     return found
 
 
@@ -139,7 +162,8 @@ def _times(half: Half, family: str) -> list[tuple[str, list[str]]]:
         one = half.cells.get((label, family))
         if one is not None and one.counts[SOLVED]:
             whole = [one.cold.median, one.cold.p95, one.cold.p999, one.cold.largest,
-                     one.warm.median, one.warm.p999]
+                     one.cold_inside.median, one.warm.median, one.warm.p999,
+                     one.warm_inside.median]
             found.append((f"{label}", [*map(digits, whole), _whole(one.iterations),
                                        _whole(one.warm_iterations),
                                        "–" if isnan(one.warm_right)

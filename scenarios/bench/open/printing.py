@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import isnan
+from math import isnan, nan
 
 from rich.console import Console
 from rich.table import Table
@@ -18,19 +18,22 @@ called so. failed: neither. ended: raised, crashed, or took too long. miss: larg
 called solved, in the rows' unit, and relative to |a| (1 + |x|). moved: how far the last level \
 moved one above, relative likewise. same: the same bits twice. rough: largest step between two \
 ticks, beside that of the proved answers. MB: growth of the process. Times in microseconds, of one \
-call from Python."""
+call from Python; C++: of the solve alone, taken inside the compiled package."""
 CHOSEN = ("EQ7", "INEQ7", "HUM38", "ellipse-hqp", "humanoid-reach")
 """Families whose times are drawn."""
 TIMED = ("EQ7", "INEQ7", "HUM38", "human-hqp")
 """Families whose times are printed."""
 _NARROW = 80  # columns of a terminal
 _LABEL, _FAMILY = 23, 19  # width of the entrants' column and of a family's three
+_NAME, _PAIR = 18, 13     # width of the families' column, and of an entrant's two
 
 
 def say(console: Console, found: Results) -> None:
     """Print the tables of every half, the fresh ones first."""
     for half in found.halves:
-        console.print(answers(half), "", sizes(half), "", times(half, console.width), "", sep="\n")
+        tables = (answers(half), sizes(half), times(half, console.width),
+                  *insides(half, console.width))
+        console.print(*(part for table in tables for part in (table, "")), sep="\n")
     console.print(NOTES, "", sep="\n")
     for label, why in found.missing.items():
         console.print(f"skipped: {label} ({why})")
@@ -75,6 +78,38 @@ def times(half: Half, width: int) -> Table:
         if any(one is not None and one.counts[SOLVED] for one in cells):
             table.add_row(label, *(text for one in cells for text in _timed(one)))
     return table
+
+
+def insides(half: Half, width: int) -> list[Table]:
+    """Return tables of times from Python and inside C++, of as many entrants as fit the width.
+
+    One for cold and one for warm starts, each with the families that an entrant has solved.
+    """
+    return [table for warm in (False, True) if (table := _inside(half, warm, width)).row_count]
+
+
+def _inside(half: Half, warm: bool, width: int) -> Table:
+    chosen = [label for label in half.entrants
+              if not isnan(_pair(half.whole[label], warm)[1])][:(width - _NAME) // _PAIR]
+    heads = [head for label in chosen
+             for head in ("\n".join([*label.split(" ", 1), "Python"]), "C++")]
+    kind = "warm" if warm else "cold"
+    table = _table(f"{half.title}: median of {kind} starts, compiled entrants", heads)
+    for column in table.columns[1:]:
+        column.header_style, column.vertical = "", "bottom"
+    for family in half.families:
+        pairs = [_pair(half.cells.get((label, family)), warm) for label in chosen]
+        if not all(isnan(inside) for _, inside in pairs):
+            table.add_row(family, *(digits(time) for pair in pairs for time in pair))
+    return table
+
+
+def _pair(one: Summary | None, warm: bool) -> tuple[float, float]:
+    """Return the median from Python and inside, NaN without an answer that is solved."""
+    if one is None or not one.counts[SOLVED]:
+        return nan, nan
+    return ((one.warm.median, one.warm_inside.median) if warm
+            else (one.cold.median, one.cold_inside.median))
 
 
 def _timed(one: Summary | None) -> tuple[str, ...]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -22,19 +22,19 @@ MACHINE, MISSING, LIMITS = "machine.json", "missing.json", "limits.json"
 Told = Callable[[str], None]
 
 
-def run(folder: Path, families: Sequence[Family], entrants: Sequence[Row], seeds: Sequence[int],
-        count: int | None = None, limit: float = LIMIT, told: Told = print) -> Store:
+def run(folder: Path, families: Sequence[Family], entrants: Sequence[Row],
+        counts: Mapping[int, int | None], limit: float = LIMIT, told: Told = print) -> Store:
     """Write the problems, run every entrant on them, and keep the raw rows.
 
     What is in the folder already stays as it is: an interrupted benchmark goes on, and an entrant
     that is added later meets the same problems.
 
-    seeds : of the halves; 0 is the public one. count : problems of a half, None for the usual
-        number. limit : [s] for one problem. told : gets a line of text now and then.
+    counts : problems of each half, by its seed, None for the usual number; 0 is the public half.
+    limit : [s] for one problem. told : gets a line of text now and then.
     """
     store = Store(folder)
     missing, limits = read_json(folder / MISSING), read_json(folder / LIMITS)
-    files = _problems(store, families, seeds, count, told)
+    files = _problems(store, families, counts, told)
     write_json(folder / MACHINE, machine())
     collections = [read(file) for file in files]
     for row in entrants:
@@ -69,11 +69,11 @@ def _add(store: Store, row: Row, files: Sequence[Path], collections: Sequence[Co
             store.add(rows_of(row, one, about, answers), target)
 
 
-def _problems(store: Store, families: Sequence[Family], seeds: Sequence[int], count: int | None,
+def _problems(store: Store, families: Sequence[Family], counts: Mapping[int, int | None],
               told: Told) -> list[Path]:
     files = []
     for family in families:
-        for seed in seeds:
+        for seed, count in counts.items():
             file = file_of(store.problems, family.name, seed)
             if not file.is_file():
                 told(f"{family.name}, seed {seed}: problems and their proofs")

@@ -14,7 +14,8 @@ _TEXT = ("entrant", "version", "family", "half", "sha256", "refused", "raised", 
 _WHOLE = ("seed", "problem", "iterations", "warm_iterations", "rss_kib", "start_kib",
           "yardstick_ns")
 _TRUE = ("solved", "warm_solved", "same")
-_LISTS = {"x": "f", "warm_x": "f", "without": "f", "cold_ns": "i", "warm_ns": "i"}
+_LISTS = {"x": "f", "warm_x": "f", "without": "f", "cold_ns": "i", "warm_ns": "i",
+          "cold_inside_ns": "i", "warm_inside_ns": "i"}
 COLUMNS = (*_TEXT, *_WHOLE, *_TRUE, *_LISTS)
 """The columns of a row; docs/open-benchmark.md describes them."""
 
@@ -69,6 +70,9 @@ def read_rows(file: Path) -> list[RawRow]:
     except (OSError, arrow.ArrowException) as error:
         raise StoreError(f"{file} cannot be read ({error}); remove it to run its entrant again"
                          ) from error
+    if rows and rows[0].keys() != set(COLUMNS):
+        raise StoreError(f"{file} has the columns of another version; remove it to run its entrant "
+                         "again")
     return rows
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from itertools import groupby, pairwise
 from typing import final
@@ -46,7 +46,8 @@ class Summary:
     ----------
     counts : of the verdicts, by name.
     absolute, relative, moved : largest of those called solved; see `Judged`.
-    cold, warm : times of all solves of problems that were answered.
+    cold, warm : times of all solves of problems that were answered, from Python; cold_inside,
+        warm_inside : those that a compiled package took itself.
     iterations, warm_iterations : medians, NaN if not known.
     warm_right : share of the warm answers that are right, NaN without any.
     same : whether all second solves gave the same bits.
@@ -62,6 +63,8 @@ class Summary:
     moved: float
     cold: Times
     warm: Times
+    cold_inside: Times
+    warm_inside: Times
     iterations: float
     warm_iterations: float
     warm_right: float
@@ -91,8 +94,8 @@ def summary(rows: Sequence[Judged], steps: dict[str, float]) -> Summary:
     return Summary(
         rows[0].entrant, counts, _largest(row.absolute for row in claimed),
         _largest(row.relative for row in claimed), _largest(row.moved for row in claimed),
-        Times.of([time for row in rows for time in row.cold]),
-        Times.of([time for row in rows for time in row.warm]),
+        _together(row.cold for row in rows), _together(row.warm for row in rows),
+        _together(row.cold_inside for row in rows), _together(row.warm_inside for row in rows),
         _median(row.iterations for row in rows), _median(row.warm_iterations for row in rows),
         float(np.mean(warm)) if warm else np.nan, all(row.same is not False for row in rows),
         max(row.memory for row in rows), _largest(
@@ -105,6 +108,10 @@ def by(rows: Sequence[Judged], key: Callable[[Judged], str]) -> list[tuple[str, 
     order = list(dict.fromkeys(map(key, rows)))
     grouped = groupby(sorted(rows, key=lambda row: order.index(key(row))), key)
     return [(name, list(own)) for name, own in grouped]
+
+
+def _together(times: Iterable[tuple[int, ...]]) -> Times:
+    return Times.of([time for own in times for time in own])
 
 
 def _step(points: Sequence[Array | None]) -> float:

@@ -21,10 +21,10 @@ from typing import Any
 
 import numpy as np
 
-from scenarios.bench.open.entrant import Answer, Entrant, Problem, read_problems
+from scenarios.bench.open.entrant import Answer, Entrant, Problem, Repeats, read_problems
 
-LEAST, MOST = 3, 20    # timed solves of a problem
-TURN = 2_000_000       # [ns] after which a problem is timed no longer
+REPEATS = Repeats(least=3, most=20, turn=2_000_000, enough=20_000_000)
+"""Timed solves of a problem."""
 
 _FINE = get_clock_info("process_time").resolution < 1e-6  # coarse on some systems
 
@@ -117,7 +117,8 @@ def cold(entrant: Entrant, problem: Problem) -> tuple[dict[str, Any], Any]:
     prepared = entrant.prepare(problem)
     raw = entrant.solve(prepared)
     first = entrant.read(raw)
-    said = {**plain(first), "cold_ns": timed(lambda: entrant.solve(prepared))}
+    said = {**plain(first), "cold_ns": timed(lambda: entrant.solve(prepared)),
+            "cold_inside_ns": entrant.inside(prepared, None, REPEATS)}
     again = entrant.read(entrant.solve(entrant.prepare(problem)))
     said["same"] = bool(np.array_equal(first.x, again.x, equal_nan=True))
     shorter = problem.without_last()
@@ -134,7 +135,8 @@ def warm(entrant: Entrant, problem: Problem, before: Any) -> tuple[dict[str, Any
     said = plain(entrant.read(raw))
     return {"warm_solved": said["solved"], "warm_x": said["x"],
             "warm_iterations": said["iterations"],
-            "warm_ns": timed(lambda: entrant.solve_from(prepared, before))}, raw
+            "warm_ns": timed(lambda: entrant.solve_from(prepared, before)),
+            "warm_inside_ns": entrant.inside(prepared, before, REPEATS)}, raw
 
 
 def plain(answer: Answer) -> dict[str, Any]:
@@ -144,14 +146,15 @@ def plain(answer: Answer) -> dict[str, Any]:
 
 
 def timed(call: Callable[[], Any]) -> list[int]:
-    """Return times of calls [ns]: at least LEAST, at most MOST, and no more after TURN.
+    """Return times of calls [ns], as many as REPEATS says.
 
     Each is the time that passed, or the processor time of this process if that is less, which is so
     where other work interrupted it.
     """
     times: list[int] = []
     begin = perf_counter_ns()
-    while len(times) < LEAST or (len(times) < MOST and perf_counter_ns() - begin < TURN):
+    while not times or (len(times) < REPEATS.most and perf_counter_ns() - begin < (
+            REPEATS.enough if len(times) < REPEATS.least else REPEATS.turn)):
         busy = process_time_ns()
         start = perf_counter_ns()
         call()

@@ -4,6 +4,9 @@ void* prepare(int n, int levels, const long* sizes, const double* A, const doubl
 const double* upper, const double* reference);  // reference: null if zero
 int solve(void* prepared);                                    // 1 if it calls it solved
 int solve_from(void* prepared, void* before);                 // optional
+// Optional: writes times of repeated solves [ns], as shims/timed.h takes them; returns how many.
+int solve_timed(void* prepared, const repeats* limits, long long* times);
+int solve_from_timed(void* prepared, void* before, const repeats* limits, long long* times);
 void answer(void* prepared, double* x, int* iterations);        // iterations: -1 if unknown
 void release(void* prepared);
 """
@@ -15,9 +18,15 @@ from typing import Any, final
 
 import numpy as np
 
-from scenarios.bench.open.entrant import Answer, Entrant, Problem
+from scenarios.bench.open.entrant import Answer, Entrant, Problem, Repeats
 
 _VOID = ctypes.c_void_p
+
+
+@final
+class _Repeats(ctypes.Structure):
+    _fields_ = (("least", ctypes.c_int), ("most", ctypes.c_int),
+                ("turn", ctypes.c_longlong), ("enough", ctypes.c_longlong))
 
 
 @final
@@ -66,6 +75,17 @@ class Compiled(Entrant):
         """Solve from the active set of an earlier answer."""
         prepared.solved = bool(self.library.solve_from(prepared.address, before.address))
         return prepared
+
+    def inside(self, prepared: _Handle, before: _Handle | None, limits: Repeats) -> list[int]:
+        """Let the library take the times, where it can."""
+        name = "solve_timed" if before is None else "solve_from_timed"
+        if not hasattr(self.library, name):
+            return []
+        times = np.zeros(limits.most, dtype=np.int64)
+        start = [] if before is None else [before.address]
+        count = getattr(self.library, name)(
+            prepared.address, *start, ctypes.byref(_Repeats(*limits)), _VOID(times.ctypes.data))
+        return [int(time) for time in times[:count]]
 
     def read(self, raw: Any) -> Answer:
         """Copy the answer."""

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from hierarchy.errors import HierarchyError
 from hierarchy.problem import Hierarchy
 from scenarios.bench.open.entrant import Answer, Entrant, Problem
 from solvers import Resolution, Status, make
@@ -26,8 +27,8 @@ class Ours(Entrant):
 
     def refuses(self, problem: Problem) -> str:
         """Return what the resolver says of rows that it cannot handle, or ""."""
-        from hierarchy.errors import HierarchyError
-
+        if self.resolver.can_resolve("inequalities"):
+            return ""
         try:
             self.resolver.solve(self.prepare(problem))
         except HierarchyError as refusal:

@@ -7,6 +7,8 @@
 #include <memory>
 #include <vector>
 
+#include "timed.h"
+
 namespace {
 using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 const double UNBOUNDED = 1e10;  // how a missing side is written
@@ -92,6 +94,14 @@ int solve_from(void* handle, void* before) {
       if (active[k][i] == LexLS::CTR_ACTIVE_LB || active[k][i] == LexLS::CTR_ACTIVE_UB)
         p->solver->api_activate(k, i, active[k][i]);
   return search(p);
+}
+
+int solve_timed(void* handle, const repeats* limits, long long* times) {
+  return timed([=] { solve(handle); }, limits, times);
+}
+
+int solve_from_timed(void* handle, void* before, const repeats* limits, long long* times) {
+  return timed([=] { solve_from(handle, before); }, limits, times);
 }
 
 void answer(void* handle, double* x, int* iterations) {

@@ -4,6 +4,8 @@
 #include <memory>
 #include <vector>
 
+#include "timed.h"
+
 namespace {
 using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
@@ -44,6 +46,10 @@ int solve(void* handle) {
   p->solver->factorize();
   p->solver->solveLeastNorm_1();
   return p->solver->get_x().allFinite();
+}
+
+int solve_timed(void* handle, const repeats* limits, long long* times) {
+  return timed([=] { solve(handle); }, limits, times);
 }
 
 void answer(void* handle, double* x, int* iterations) {

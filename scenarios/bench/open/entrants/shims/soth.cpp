@@ -7,6 +7,8 @@
 #include <memory>
 #include <vector>
 
+#include "timed.h"
+
 namespace {
 using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
@@ -81,6 +83,14 @@ int solve_from(void* handle, void* before) {
     p->solver->setInitialActiveSet();
   }
   return search(p);
+}
+
+int solve_timed(void* handle, const repeats* limits, long long* times) {
+  return timed([=] { solve(handle); }, limits, times);
+}
+
+int solve_from_timed(void* handle, void* before, const repeats* limits, long long* times) {
+  return timed([=] { solve_from(handle, before); }, limits, times);
 }
 
 void answer(void* handle, double* x, int* iterations) {
