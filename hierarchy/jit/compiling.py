@@ -14,6 +14,7 @@ import pickle
 import sys
 from collections.abc import Callable
 from functools import cache
+from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 from time import monotonic
@@ -88,13 +89,12 @@ class _Cached(CPUDispatcher):  # type: ignore[misc]
     """A kernel that looks for its files when it is first needed; most are only compiled in."""
 
     cached_in: Path | None = None
-    allocates = True
     _cache: Any
 
     def compile(self, signature: Any) -> Any:
         with global_compiler_lock:
             if self.cached_in is not None and isinstance(self._cache, caching.NullCache):
-                self._cache = _cache(self.cached_in, self.py_func, self.allocates)
+                self._cache = _cache(self.cached_in, self.py_func)
             return super().compile(signature)
 
 
@@ -218,16 +218,15 @@ def digest_of(file: str) -> str:
 class _Cache(caching.FunctionCache):  # type: ignore[misc]
     """The files of a kernel. To load one, numba need not know how to compile."""
 
-    needs_runtime = True
-
     def load_overload(self, signature: Any, context: Any) -> Any:
         """Return what is kept, or None.
 
         Without the refresh of numba's registries, which takes a third of a first solve; compiling
-        refreshes them itself.
+        refreshes them itself. Loaded code may use the symbols that a refresh registers, though, and
+        calls address 0 if one is missing: those of the runtime and of the hash of strings.
         """
-        if self.needs_runtime:  # kernels that allocate call it
-            rtsys.initialize(context)
+        import_module("numba.cpython.hashing")
+        rtsys.initialize(context)
         with self._guard_against_spurious_io_errors():
             kept = self._load_overload(signature, context)
         if kept is None:
@@ -260,7 +259,7 @@ def cache_folder() -> Path:
     return Path(base).expanduser() / "task-hierarchy"
 
 
-def _cache(folder: Path, function: Kernel, needs_runtime: bool) -> _Cache:
+def _cache(folder: Path, function: Kernel) -> _Cache:
     before = numba.config.CACHE_DIR
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -271,7 +270,6 @@ def _cache(folder: Path, function: Kernel, needs_runtime: bool) -> _Cache:
         kept = _Cache(function)
     finally:
         numba.config.CACHE_DIR = before
-    kept.needs_runtime = needs_runtime
     kept._cache_file.__class__ = _Mending
     return kept
 

@@ -80,9 +80,10 @@ def test_a_kernel_knows_what_helpers_below_it_use(tmp_path, monkeypatch):
 KEPT = """
 import sys
 sys.path.insert(0, sys.argv[1])
-from kept_of_test_jit import squares, halves
+from kept_of_test_jit import Two, halves, hashed, last, squares
 from numba import njit
 import numpy as np
+print(hashed("kept") == hash("kept"), last(Two(np.arange(3.0), np.ones(3))))
 print(squares(np.arange(3.0)).tolist())
 print(sum(squares._cache_misses.values()), "numba.np.npyimpl" in sys.modules)
 print(halves(np.arange(3.0)).tolist())
@@ -90,8 +91,22 @@ print("scipy.linalg" in sys.modules)
 print(float(njit(lambda x: np.cumsum(x)[-1])(np.arange(3.0))))
 """
 KEPT_KERNELS = """
+from typing import NamedTuple
+
 from hierarchy.jit import compiled
 import numpy as np
+
+class Two(NamedTuple):
+    first: np.ndarray
+    second: np.ndarray
+
+@compiled
+def hashed(text):
+    return hash(text) + np.zeros(1, np.int64)[0]
+
+@compiled
+def last(two):
+    return two.first[1:][-1] + two.second[:2][-1]
 
 @compiled
 def squares(x):
@@ -117,5 +132,5 @@ def test_a_kept_kernel_loads_without_what_compiling_needs_and_others_compile_aft
         said.append(done.stdout.splitlines())
         for file in (tmp_path / "cache").rglob("*halves*"):
             file.unlink()
-    assert [lines.pop(1) for lines in said] == ["1 True", "0 False"]
-    assert said[0] == said[1] == ["[0.0, 1.0, 4.0]", "[0.0, 0.25, 1.0]", "False", "3.0"]
+    assert [lines.pop(2) for lines in said] == ["1 True", "0 False"]
+    assert said[0] == said[1] == ["True 3.0", "[0.0, 1.0, 4.0]", "[0.0, 0.25, 1.0]", "False", "3.0"]
