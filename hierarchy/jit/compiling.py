@@ -22,10 +22,11 @@ from typing import Any
 
 import numba
 import numpy as np
+from llvmlite import binding
 from numba.core import caching, cgutils, event, types
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.registry import CPUDispatcher
-from numba.core.runtime import rtsys
+from numba.core.runtime import _nrt_python
 from numba.extending import intrinsic
 
 # What makes an array; a kernel that uses another way of numpy fails to compile, and belongs here.
@@ -215,6 +216,17 @@ def digest_of(file: str) -> str:
     return hashlib.sha256(Path(file).read_bytes()).hexdigest()
 
 
+@cache
+def _register_symbols() -> None:
+    """Let loaded code find numba's runtime and hash of strings; it calls address 0 if it cannot.
+
+    numba registers them when it refreshes its registries, all others when it makes its context.
+    """
+    import_module("numba.cpython.hashing")
+    for name, address in _nrt_python.c_helpers.items():
+        binding.add_symbol(name if name.startswith("_") else f"NRT_{name}", address)
+
+
 class _Cache(caching.FunctionCache):  # type: ignore[misc]
     """The files of a kernel. To load one, numba need not know how to compile."""
 
@@ -222,11 +234,9 @@ class _Cache(caching.FunctionCache):  # type: ignore[misc]
         """Return what is kept, or None.
 
         Without the refresh of numba's registries, which takes a third of a first solve; compiling
-        refreshes them itself. Loaded code may use the symbols that a refresh registers, though, and
-        calls address 0 if one is missing: those of the runtime and of the hash of strings.
+        refreshes them itself.
         """
-        import_module("numba.cpython.hashing")
-        rtsys.initialize(context)
+        _register_symbols()
         with self._guard_against_spurious_io_errors():
             kept = self._load_overload(signature, context)
         if kept is None:
