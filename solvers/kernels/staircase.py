@@ -103,17 +103,23 @@ def climb(A, lower, upper, sizes, x, settings, work):
         rank = factor_level(rows, basis, first, last, rank)
         block = Block(first, last, above, rank)
         least = _smallest_pivot(rows, block, least)
-        thin = min(np.sqrt(least) * settings.rank_tolerance, 1.0)
-        if rank - above < last - first and (
-                has_outlier(rows.zero[first:last], LIGHT * LIGHT)
-                or is_borderline(rows, first + rank - above, last, rank, BORDER * thin)):
-            least = 0.0  # rounding in heavy rows hides light ones; or a row is hardly dependent
+        if rank - above < last - first and _is_doubtful(rows, block, settings, least):
+            least = 0.0
         subtract(rows, y, first, last, above)  # p_i - J_i x_{i-1}, in (13)
         solve_level(rows.W, rows.miss, y, block, settings, of_block)
         first = last
     _to_unknowns(basis, y, rank, x, of_x)
     least = 0.0 if has_outlier(rows.zero, DUST * DUST) else least
     return finish(x, SOLVED), np.sqrt(least) * settings.rank_tolerance
+
+
+@inlined
+def _is_doubtful(rows, block, settings, least):
+    """Whether rounding in heavy rows of a level hides light ones, or a row is hardly dependent."""
+    thin = min(np.sqrt(least) * settings.rank_tolerance, 1.0)  # the smallest pivot
+    return (has_outlier(rows.zero[block.i0:block.i1], LIGHT * LIGHT)
+            or is_borderline(rows, block.i0 + block.k1 - block.k0, block.i1, block.k1,
+                             BORDER * thin))
 
 
 @inlined
