@@ -411,17 +411,40 @@ def _balanced(C: Array, terms: Array, f: Array, size: Array, unknown: Array | fl
     """Return the least |C z + f| for z >= 0, ignoring entries within the unknown share of terms.
 
     Any z proves what it reaches. A search that rounding ends early on dependent columns is repeated
-    by scipy's, which chooses otherwise.
+    by scipy's, which chooses otherwise, and then without the rows that only repeat heavier ones.
     """
     least = np.inf
-    for search in (_non_negative, _non_negative_by_scipy):
-        z = search(C, -f, enough)
+    for search, rows in ((_non_negative, _as_given), (_non_negative_by_scipy, _as_given),
+                         (_non_negative, _unrepeated)):
+        z = search(rows(C, terms), -f, enough)
         left = C @ z + f
         noise = unknown * (size + terms @ z)
         least = min(least, _length(left[np.abs(left) > noise]))
         if least <= enough:
             break
     return least
+
+
+def _as_given(C: Array, terms: Array) -> Array:
+    return C
+
+
+def _unrepeated(C: Array, terms: Array) -> Array:
+    """Return C with zeros for the rows of which heavier ones leave only rounding of `terms`.
+
+    Beside rows of 1e15 that rounding would be larger than a row of 1.
+    """
+    C, basis = C.copy(), np.empty((0, C.shape[1]))
+    for i in np.argsort(-np.abs(C).max(axis=1, initial=0.0), kind="stable"):
+        size = _length(C[i])
+        left = C[i] / size if size > 0.0 else C[i]
+        for _ in range(2):  # once more: of a row nearly in the span, rounding remains
+            left = left - (basis @ left) @ basis
+        if size * _length(left) <= _ROUNDING * _length(terms[i]):
+            C[i] = 0.0
+        else:
+            basis = np.vstack([basis, left / _length(left)])
+    return C
 
 
 @final

@@ -35,8 +35,8 @@ RESOLVERS = ("hcod", "tpm", "hqp")
 STRESS = sorted(path.stem for path in (FOLDER.parent / "stress").glob("*.npz"))
 CERTAIN = ["contacts-50000500", "contacts-50067440", "contacts-50081046",
            "cycle-mixed_units-50103472", "cycle-tiny_rows-50015365", "cycle-tiny_rows-50031629",
-           "mixed_units-262311872", "mixed_units-50076333", "shifted-50025253",
-           "sixty_unknowns-50043814"]
+           "mixed_units-262311872", "mixed_units-281029597", "mixed_units-50076333",
+           "shifted-50025253", "sixty_unknowns-50043814"]
 WRONG = {("hcod_wrong_min_2007743_order", "hqp")}  # a level is divided by its largest entry
 
 
