@@ -86,15 +86,15 @@ def prove_by_multipliers(A, lower, upper, sizes, x, reference, record, work):
     if not reach < HUGE or has_outlier(p.number[NORM, :A.shape[0]], DUST):
         return ZERO + INACCURATE
     p = _with_columns(p, sizes.size)
-    rank = ZERO
+    rank, thin = ZERO, 1.0
     for k in range(sizes.size + 1):
         begin, held, own = _begin(p, OWN, k), p.index[HELD, k], p.index[OWN, k]
-        independent, left = _join(p, begin, held, rank)
+        independent, left, thin = _join(p, begin, held, rank, thin)
         p.index[HELD_RANK, k] = rank = rank + independent
         proved = independent == held - begin
-        independent, left = _join(p, held, own, rank)
+        independent, left, thin = _join(p, held, own, rank, thin)
         p.index[OWN_RANK, k] = rank = rank + independent
-        if not proved or left > NOTHING or not _balances(p, reference, k, reach):
+        if not proved or left > NOTHING * thin or not _balances(p, reference, k, reach):
             return ZERO + INACCURATE
     return ZERO + SOLVED
 
@@ -178,10 +178,11 @@ def _with_columns(p, levels):
 
 
 @compiled
-def _join(p, begin, end, rank):
+def _join(p, begin, end, rank, thin):
     """Give the columns begin .. end - 1 basis vectors from `rank` on, the largest remainder first.
 
-    Returns how many got one, and the largest remainder of the others.
+    Returns how many got one, the largest remainder of the others, and the smallest of those that
+    got one, if it is below `thin`.
     """
     n, at, left = p.x.size, begin, 0.0
     while at < end and rank < n:
@@ -192,8 +193,8 @@ def _join(p, begin, end, rank):
         _swap(p, at, best)
         reflect(p.M, rank, n, at, at, p.room)
         p.index[OWNER, rank] = at
-        rank, at, left = rank + 1, at + 1, 0.0
-    return at - begin, left
+        rank, at, left, thin = rank + 1, at + 1, 0.0, min(thin, left)
+    return at - begin, left, thin
 
 
 @inlined
