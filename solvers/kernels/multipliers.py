@@ -25,22 +25,41 @@ from typing import NamedTuple
 import numpy as np
 
 from hierarchy.jit import as_matrix, compiled, inlined
-from solvers.kernels.rows import ZERO, has_outlier
-from solvers.kernels.space import View, integers, matrix, proof_size, vector
-from solvers.kernels.tableau import REFERENCE, length_of, reflect
-from solvers.kernels.tolerances import BAND, CLEAR, DUST, ENOUGH, EPSILON, LARGEST, NOTHING
+from solvers.kernels.rows import ZERO, add_multiple, has_outlier, reflect
+from solvers.kernels.space import (
+    Basis,
+    View,
+    carve_basis,
+    integers,
+    matrix,
+    proof_size,
+    vector,
+)
+from solvers.kernels.tableau import REFERENCE, length_of
+from solvers.kernels.tolerances import (
+    BAND,
+    CLEAR,
+    DUST,
+    ENOUGH,
+    EPSILON,
+    LARGEST,
+    NOTHING,
+    SAME,
+)
 from solvers.status import INACCURATE, SOLVED, TOO_SMALL
 
-# Rows of `number`. Per row of A: its norm, its miss, +1 or -1 for the side it is claimed to be on;
-# the squared remainder of each column of M. Per unknown: what remains of (1), in x and in the
-# basis.
+# Rows of `number`. Per row of A: its norm, its miss, +1 or -1 for the side of an inequality that it
+# is on; the squared remainder of each column of M. Per unknown: what remains of (1), in x and in
+# the basis.
 NORM, MISS, SIDE, SQUARE, LEFT, Z = range(6)
 # Rows of `index`. Per row of A: when it joins, 2 k if it holds level k back, 2 k + 1 if it is an
 # equality or missed in level k, -1 for never. Per column of M: its row. Per basis vector: its
 # column. Per level: where the columns of its two groups end, and the basis vectors of each.
 JOINS, ROW, OWNER, HELD, OWN, HELD_RANK, OWN_RANK = range(7)
 
+HOLDS, LACKS, EXCEEDS, UNCLEAR = range(4)  # what is found of (1)
 REFINEMENTS = 3
+CHANGES = 6  # of what a record claims, at most
 TINY, HUGE = 1e-100, 1e100  # norms whose powers neither underflow nor overflow
 
 
@@ -49,8 +68,8 @@ class Proof(NamedTuple):
 
     A (m, n), x (n,). number, index (.., w), w the largest of m, n, L + 1: see above. force
     (L + 1, n): the multipliers of each level, by basis vector. rest (L + 1,): what remains of (1).
-    M (n, g + n): the g unit rows that join, as columns in that order, and the basis vectors, both
-    in the basis. room: scratch.
+    basis: reflectors. M (n, g): the g unit rows that join, as columns in that order, in the basis.
+    room: scratch.
     """
 
     A: View
@@ -59,6 +78,7 @@ class Proof(NamedTuple):
     index: View
     force: View
     rest: View
+    basis: Basis
     M: View
     room: View
 
@@ -77,7 +97,8 @@ def prove_by_multipliers(A, lower, upper, sizes, x, reference, record, work):
     """Return SOLVED if x (n,) is proved to be the answer, INACCURATE if not, or TOO_SMALL.
 
     reference (n,). record (3 m + 3,): that of an exact solve, of which the state of each row and
-    the level that it holds back are read.
+    the level that it holds back are read. A solver mistakes weak multipliers: a few rows are
+    added to its claims where a level lacks one, or removed where they point inward.
     """
     p, enough = _carve(A, sizes, x, work)
     if not enough:
@@ -85,18 +106,53 @@ def prove_by_multipliers(A, lower, upper, sizes, x, reference, record, work):
     reach = _place(p, lower, upper, sizes, record)
     if not reach < HUGE or has_outlier(p.number[NORM, :A.shape[0]], DUST):
         return ZERO + INACCURATE
-    p = _with_columns(p, sizes.size)
+    for _ in range(CHANGES + 1):
+        lacking, found = _first_unproved(_with_columns(p, sizes.size), reference, reach)
+        if found == HOLDS:
+            return ZERO + SOLVED
+        if found == UNCLEAR or (found == LACKS and not _claim(p, sizes, lacking)):
+            break
+    return ZERO + INACCURATE
+
+
+@compiled
+def _first_unproved(p, reference, reach):
+    """Return the first level that is not proved and what is found of it; HOLDS if there is none."""
     rank, thin = ZERO, 1.0
-    for k in range(sizes.size + 1):
+    for k in range(p.rest.size):
         begin, held, own = _begin(p, OWN, k), p.index[HELD, k], p.index[OWN, k]
         independent, left, thin = _join(p, begin, held, rank, thin)
         p.index[HELD_RANK, k] = rank = rank + independent
         proved = independent == held - begin
         independent, left, thin = _join(p, held, own, rank, thin)
         p.index[OWN_RANK, k] = rank = rank + independent
-        if not proved or left > NOTHING * thin or not _balances(p, reference, k, reach):
-            return ZERO + INACCURATE
-    return ZERO + SOLVED
+        if not proved or left > max(NOTHING * thin, SAME):
+            return ZERO + k, UNCLEAR
+        found = _balance(p, reference, k, reach)
+        if found != HOLDS:
+            return ZERO + k, found
+    return p.rest.size, HOLDS
+
+
+@inlined
+def _claim(p, sizes, k):
+    """Claim that one more row on its side holds level k back, that along what remains of (1)."""
+    end, best, most = ZERO, -1, 0.0
+    for level in range(min(k, sizes.size)):
+        end += sizes[level]
+    for i in range(end):
+        if p.number[SIDE, i] == 0.0 or 0 <= p.index[JOINS, i] <= 2 * k + 1:
+            continue
+        push = 0.0
+        for c in range(p.x.size):
+            push -= p.A[i, c] * p.number[LEFT, c]
+        push *= p.number[SIDE, i] / p.number[NORM, i]
+        if push > most:
+            best, most = i, push
+    if best < 0:
+        return False
+    p.index[JOINS, best] = 2 * k
+    return True
 
 
 @inlined
@@ -109,9 +165,10 @@ def _carve(A, sizes, x, work):
     numbers, at = integers(work, at, 7 * w)
     force, at = matrix(work, at, levels, n)
     rest, at = vector(work, at, levels)
+    basis, at = carve_basis(work, at, n, n)
     room = work[at if enough else work.size:]
     return Proof(A, x, number, as_matrix(numbers, 7 if numbers.size > 0 else 0, w), force, rest,
-                 as_matrix(room[:0], n, 0), room), enough
+                 basis, as_matrix(room[:0], n, 0), room), enough
 
 
 @inlined
@@ -136,6 +193,7 @@ def _place(p, lower, upper, sizes, record):
             if largest > 0.0 and not TINY < norm < HUGE:
                 reach = np.inf
             p.number[NORM, i], p.index[JOINS, i] = norm, -1
+            p.number[SIDE, i] = 0.0
             if largest > 0.0:
                 _place_row(p, i, k, value, (lower[i], upper[i], BAND * reach * norm), record)
             i += 1
@@ -147,12 +205,14 @@ def _place_row(p, i, k, value, sides, record):
     """Write the miss of row i of level k and when it joins; sides: both, and the width at each."""
     low, up, band = sides
     miss = max(value - up, 0.0) - max(low - value, 0.0)
-    p.number[MISS, i], p.number[SIDE, i] = miss / p.number[NORM, i], record[i]
-    level = np.int64(record[p.A.shape[0] + i])
+    claimed, level = abs(record[i]) == 1.0, np.int64(record[p.A.shape[0] + i])
+    side = 1.0 if abs(value - up) <= band else -1.0 if abs(value - low) <= band else 0.0
+    if claimed and abs(value - (up if record[i] > 0.0 else low)) <= band:
+        side = record[i]
+    p.number[MISS, i], p.number[SIDE, i] = miss / p.number[NORM, i], side
     if low == up or abs(miss) > band:
-        p.index[JOINS, i] = 2 * k + 1
-    elif (level > k and abs(record[i]) == 1.0
-          and abs(value - (up if record[i] > 0.0 else low)) <= band):
+        p.index[JOINS, i], p.number[SIDE, i] = 2 * k + 1, 0.0
+    elif claimed and level > k and side == record[i]:
         p.index[JOINS, i] = 2 * level
 
 
@@ -167,14 +227,13 @@ def _with_columns(p, levels):
                 p.index[ROW, at] = i
                 at += 1
         p.index[HELD if group % 2 == 0 else OWN, group // 2] = at
-    M, end = matrix(p.room, ZERO, n, at + n)
-    for c in range(n):
-        for q in range(at):
-            i = p.index[ROW, q]
-            M[c, q] = p.A[i, c] / p.number[NORM, i]
-        for q in range(n):
-            M[c, at + q] = 1.0 if q == c else 0.0
-    return Proof(p.A, p.x, p.number, p.index, p.force, p.rest, M, p.room[end:])
+    M, end = matrix(p.room, ZERO, n, at)
+    for q in range(at):
+        i = p.index[ROW, q]
+        a, share = p.A[i], 1.0 / p.number[NORM, i]
+        for c in range(a.size):
+            M[c, q] = share * a[c]
+    return Proof(p.A, p.x, p.number, p.index, p.force, p.rest, p.basis, M, p.room[end:])
 
 
 @compiled
@@ -191,7 +250,7 @@ def _join(p, begin, end, rank, thin):
         if not left >= CLEAR:
             break
         _swap(p, at, best)
-        reflect(p.M, rank, n, at, at, p.room)
+        _eliminate(p, rank, at)
         p.index[OWNER, rank] = at
         rank, at, left, thin = rank + 1, at + 1, 0.0, min(thin, left)
     return at - begin, left, thin
@@ -200,17 +259,17 @@ def _join(p, begin, end, rank, thin):
 @inlined
 def _largest(p, begin, end, rank):
     """Return which of the columns begin .. end - 1 has the largest remainder; write the squares."""
-    square, best = p.number[SQUARE], begin
-    for q in range(begin, end):
+    square, best = p.number[SQUARE, begin:end], 0
+    for q in range(square.size):
         square[q] = 0.0
     for t in range(rank, p.x.size):
-        row = p.M[t]
-        for q in range(begin, end):
+        row = p.M[t, begin:end]
+        for q in range(square.size):
             square[q] += row[q] * row[q]
-    for q in range(begin, end):
+    for q in range(square.size):
         if square[q] > square[best]:
             best = q
-    return best
+    return begin + best
 
 
 @inlined
@@ -222,31 +281,63 @@ def _swap(p, q, r):
 
 
 @inlined
-def _balances(p, reference, k, reach):
-    """Whether the rows of level k are met or (1) holds for it; writes its multipliers.
+def _eliminate(p, k, q):
+    """Make reflector k, which leaves column q nothing below row k; apply it to the columns after q.
 
-    What the rows above leave may also be balanced by small shifts of the sides of its own rows.
+    By rows of M, so that all columns are summed at once.
+    """
+    M, v, after, square = p.M, p.basis.V[k], q + 1, 0.0
+    for t in range(k, p.x.size):
+        v[t] = M[t, q]
+        square += v[t] * v[t]
+    norm = -np.sqrt(square) if v[k] > 0.0 else np.sqrt(square)
+    v[k] -= norm
+    M[k, q], p.basis.beta[k] = norm, 1.0 / abs(norm * v[k])
+    sums = p.room[:M.shape[1] - after]
+    for c in range(sums.size):
+        sums[c] = 0.0
+    for t in range(k, p.x.size):
+        add_multiple(sums, v[t], M[t, after:])
+    for t in range(k, p.x.size):
+        add_multiple(M[t, after:], -p.basis.beta[k] * v[t], sums)
+
+
+@inlined
+def _balance(p, reference, k, reach):
+    """Return HOLDS if the rows of level k are met or (1) holds for it; writes its multipliers.
+
+    Else LACKS if a row may be missing, EXCEEDS if one pointed inward and is no longer claimed, or
+    UNCLEAR. What the rows above leave may also be balanced by small shifts of the level's sides.
     """
     force, levels, held = p.force[k], p.rest.size - 1, p.index[HELD_RANK, k]
     for t in range(p.x.size):
         force[t] = p.number[LEFT, t] = 0.0
-    enough = _pull(p, k, reach) if k < levels else _pull_of_goal(p, reference, reach)
+    enough, rounding = _pull(p, k, reach) if k < levels else _pull_of_goal(p, reference, reach)
     p.rest[k] = 0.0
     if enough == 0.0:
-        return True
-    most = LARGEST * _length(p)
+        return HOLDS
+    pull = _length(p)
     for _ in range(REFINEMENTS):  # each sums anew what remains, so the last digits come right too
         _push(p, force, held)
+        if _length(p) <= EPSILON * pull:
+            break
     if _length(p) > 0.1 * enough:
         own = p.index[OWN_RANK, k]
         _push(p, force, own)
         if _shift(p, force, held, own) > ENOUGH * reach:
             _drop(p, force, held, own)
-    _turn_back(p, force, _begin(p, OWN_RANK, k), held)
-    p.rest[k] = _length(p)
+            _push(p, force, held)  # those above were changed together with them
+        else:
+            enough = max(enough, rounding)
+    inward = _turn_back(p, force, _begin(p, OWN_RANK, k), held, enough)
+    rest, most = _length(p), LARGEST * pull
+    lost = rest <= EPSILON * (pull + _sum_of(force))
+    p.rest[k] = 0.0 if lost else rest  # it is nothing if the rows differ by their rounding
     if not _largest_of(force, held) <= most:  # together the rows are nearly dependent
-        return False
-    return _signs_hold(p, force, k) and p.rest[k] <= enough
+        return UNCLEAR
+    if rest > enough:
+        return EXCEEDS if inward else LACKS
+    return HOLDS if _signs_hold(p, force, k) and p.rest[k] <= enough else UNCLEAR
 
 
 @inlined
@@ -259,6 +350,15 @@ def _largest_of(force, end):
 
 
 @inlined
+def _sum_of(force):
+    """Return the sum of the absolute forces."""
+    total = 0.0
+    for t in range(force.size):
+        total += abs(force[t])
+    return total
+
+
+@inlined
 def _drop(p, force, begin, end):
     """Set forces to zero."""
     for t in range(begin, end):
@@ -267,11 +367,18 @@ def _drop(p, force, begin, end):
 
 
 @inlined
-def _turn_back(p, force, begin, end):
-    """Set forces to zero that point inward."""
+def _turn_back(p, force, begin, end, enough):
+    """Set forces to zero that point inward; whether one did, by more than enough.
+
+    Such a row is no longer claimed.
+    """
+    inward = False
     for t in range(begin, end):
         if force[t] * p.number[SIDE, _row(p, t)] < 0.0:
+            if abs(force[t]) > enough:
+                p.index[JOINS, _row(p, t)], inward = -1, True
             _drop(p, force, t, t + 1)
+    return inward
 
 
 @inlined
@@ -285,7 +392,10 @@ def _shift(p, force, begin, end):
 
 @inlined
 def _pull(p, k, reach):
-    """Write the first sum of (1) for level k; return what may remain of it, 0 if rows are met."""
+    """Write the first sum of (1) for level k; return what may remain of it, 0 if rows are met.
+
+    Also returns what may remain once it is balanced by shifts: rounding.
+    """
     left, square, least = p.number[LEFT], 0.0, np.inf
     for q in range(p.index[HELD, k], p.index[OWN, k]):
         i = p.index[ROW, q]
@@ -296,16 +406,16 @@ def _pull(p, k, reach):
             left[c] += norm * miss * p.A[i, c]
     length = np.sqrt(square)
     if length <= 0.1 * BAND * reach:
-        return 0.0
-    return least * least * max(ENOUGH * length, 2.0 * EPSILON * reach)
+        return 0.0, 0.0
+    return least * least * ENOUGH * length, 2.0 * least * least * EPSILON * reach
 
 
 @inlined
 def _pull_of_goal(p, reference, reach):
-    """Write x - reference; return what may remain of it."""
+    """Write x - reference; return the same as `_pull`."""
     for c in range(p.x.size):
         p.number[LEFT, c] = p.x[c] - reference[c]
-    return ENOUGH * reach
+    return ENOUGH * reach, 0.0
 
 
 @inlined
@@ -332,12 +442,10 @@ def _add(p, t, force):
 @compiled
 def _push(p, force, rank):
     """Change the forces of the first `rank` basis vectors so that nothing remains in their span."""
-    M, z, base = p.M, p.number[Z], p.M.shape[1] - p.x.size
-    for t in range(rank):
-        total = 0.0
-        for c in range(p.x.size):
-            total += M[t, base + c] * p.number[LEFT, c]
-        z[t] = total
+    M, z = p.M, p.number[Z]
+    for c in range(p.x.size):
+        z[c] = p.number[LEFT, c]
+    reflect(p.basis, ZERO, rank, p.number, Z, Z + 1)
     for t in range(rank - 1, -1, -1):
         q = p.index[OWNER, t]
         change = -z[t] / M[t, q]
@@ -355,11 +463,11 @@ def _signs_hold(p, force, k):
     """
     for above in range(k - 1, -1, -1):
         begin, end = _begin(p, OWN_RANK, above), p.index[HELD_RANK, above]
-        share = 0.0
+        share, least = 0.0, SAME * _largest_of(p.force[above], end)
         for t in range(begin, end):
             side, given = p.number[SIDE, _row(p, t)], p.force[above, t]
             if force[t] * side < 0.0:
-                share = max(share, -force[t] / given) if given * side > 0.0 else np.inf
+                share = max(share, -force[t] / given) if given * side > least else np.inf
         if share == np.inf:
             return False
         for t in range(end if share > 0.0 else 0):

@@ -25,7 +25,7 @@ NO_STEP = 1e-12     # length of a step: smaller ones count as zero
 # Of a proof by multipliers:
 BAND = 1e-8         # distance of a row from the side that it is on, over 1 + |x|: as in `certify`
 ENOUGH = 1e-9       # what may remain of the conditions, over the weakest possible pull of the level
-CLEAR = 1e-7        # remainder of a unit row that counts as independent: at least
+CLEAR = 4e-9        # remainder of a unit row that counts as independent: at least
 NOTHING = 1e-9      # remainder of a unit row that counts as dependent, over the least: at most
 LARGEST = 1e5       # multiplier over the pull that it balances: at most
 
