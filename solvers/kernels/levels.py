@@ -37,7 +37,7 @@ from solvers.kernels.level import (
     weigh_rows,
 )
 from solvers.kernels.multipliers import settle
-from solvers.kernels.rows import ZERO, finish
+from solvers.kernels.rows import ZERO, add_multiple, finish
 from solvers.kernels.tableau import (
     ACTIVE,
     ALL,
@@ -371,13 +371,13 @@ def _advance(s, part, last):
     """
     x, p, value, speed = s.x, s.number[STEP], s.number[VALUE], s.number[SPEED]
     count, tolerance = s.count, s.settings.tolerance
-    scale = _write_step(s, part)
+    scale, rates, first = _write_step(s, part), s.room, count[FIRST]
     bland = count[STILL] > BLAND_AFTER
     entering, side, length = -1, 0.0, 1.0
     for i in range(last):
         if s.index[STATE, i] != WATCHED:
             continue
-        speed[i] = v = value_of(s, p, i)
+        speed[i] = v = s.number[ENTRY, i] * rates[s.index[COLUMN, i] - first]
         bound = s.number[UP, i] if v > 0.0 else s.number[LOW, i]
         over = value[i] + v - bound if v > 0.0 else bound - value[i] - v
         least = tolerance * around(s.number[NORM, i], bound, scale)
@@ -403,17 +403,20 @@ def _advance(s, part, last):
 def _write_step(s, part):
     """Write the step in x, given the step in basis vectors; return the scale at its end.
 
-    A step of a level that is nearly singular is long, and cut short by the first row in its way:
-    so its end sets no tolerance before it is reached.
+    Writes the rates of all columns from FIRST on into the room. A step of a level that is nearly
+    singular is long, and cut short by the first row in its way: so its end sets no tolerance before
+    it is reached.
     """
     x, p, z, size, square = s.x, s.number[STEP], s.number[Z], s.scalar[REACH], 0.0
-    for c in range(x.size):
-        p[c] = 0.0
+    first, base = s.count[FIRST], s.count[BASE]
+    rates = s.room[:s.M.shape[1] - first]
+    for c in range(rates.size):
+        rates[c] = 0.0
     for t in range(part.begin, part.begin + part.rank):
         size = max(size, abs(z[t]))
-        for c in range(x.size):
-            p[c] += z[t] * s.M[t, s.count[BASE] + c]
+        add_multiple(rates, z[t], s.M[t, first:])
     for c in range(x.size):
+        p[c] = rates[base - first + c]
         square += (x[c] + p[c]) ** 2
     s.scalar[REACH] = size = max(size, np.sqrt(square))
     return max(s.scalar[SCALE], np.sqrt(square), FLOOR * max(size, s.scalar[SIZE]))
