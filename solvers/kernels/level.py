@@ -15,8 +15,8 @@ import numpy as np
 
 from hierarchy.jit import as_matrix, compiled, inlined
 from solvers.kernels.block import level_damping
-from solvers.kernels.rows import ZERO
-from solvers.kernels.space import Block, Settings, View
+from solvers.kernels.rows import ZERO, reflect, reflect_back
+from solvers.kernels.space import Basis, Block, Settings, View
 from solvers.kernels.tableau import (
     COLUMN,
     ENTRY,
@@ -98,25 +98,25 @@ def least_squares_part(s, part, damped):
 
 
 @compiled
-def least_squares(T, y, diagonal):
+def least_squares(T, y, work):
     """Write into y[:r] the minimiser of |T y - b|, for T (r + 1, s) by columns with b the last.
 
     b is the residual on return. It comes from the reflections, not from a difference, so the small
     residual of a heavy row is as accurate as the rest (Cox, Higham 1998). The rows are in pivot
-    order, the heaviest first. diagonal (r,) is scratch.
+    order, the heaviest first. work (2 r,) is scratch.
     """
     r = T.shape[0] - 1
-    b = T[r]
+    basis, diagonal, b = Basis(T, work[:r]), work[r:], T[r]
     for k in range(r):
         v = T[k, k:]
-        norm = 0.0
+        square = 0.0
         for i in range(v.size):
-            norm += v[i] * v[i]
-        norm = -np.sqrt(norm) if v[0] > 0.0 else np.sqrt(norm)
+            square += v[i] * v[i]
+        norm = -np.sqrt(square) if v[0] > 0.0 else np.sqrt(square)
         diagonal[k] = norm
         v[0] -= norm
-        for j in range(k + 1, r + 1):
-            _reflect(v, T[j, k:], norm)
+        basis.beta[k] = -1.0 / (norm * v[0])
+        reflect(basis, k, k + 1, T, k + 1, r + 1)
     for k in range(r - 1, -1, -1):
         rest = b[k]
         for j in range(k + 1, r):
@@ -124,19 +124,7 @@ def least_squares(T, y, diagonal):
         y[k] = rest / diagonal[k]
     for k in range(r):
         b[k] = 0.0
-    for k in range(r - 1, -1, -1):
-        _reflect(T[k, k:], b[k:], diagonal[k])
-
-
-@inlined
-def _reflect(v, b, norm):
-    """Apply the reflector of v, which maps a column onto `norm` times the first unit vector."""
-    total = 0.0
-    for i in range(v.size):
-        total += v[i] * b[i]
-    total /= norm * v[0]
-    for i in range(v.size):
-        b[i] += total * v[i]
+    reflect_back(basis, r, T, r, r + 1)
 
 
 @inlined
