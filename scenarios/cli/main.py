@@ -215,7 +215,7 @@ def sweep(file: Annotated[str, typer.Argument(help="Name of a sweep, or a sweep 
 @app.command()
 def reproduce(names: Annotated[list[str] | None, typer.Argument(
                   metavar="[NAME]...", help="states, throttle, letter, resolvers, blend, ladder, "
-                  "inertia, rivals, singular, human, standing, or a page such as "
+                  "inertia, rivals, singular, human, standing, reaching, or a page such as "
                   "docs/first-paper.md for the commands in it. Default: all.")] = None,
               out: Annotated[Path, output("Where the runs are kept.")] = Path("runs/reproduce"),
               quick: Annotated[bool, typer.Option(

@@ -134,9 +134,23 @@ STANDING_CLAIMS: tuple[Claim, ...] = (
     Compares("Torques jump more under strict levels than under weights", "standing",
              "torque_step_max", "weighted", "strict", "higher"))
 
+REACHING_CLAIMS: tuple[Claim, ...] = (
+    Ends("With the centre of mass first the robot stands", "reaching", "strict"),
+    Ends("With weights it stands", "reaching", "weighted"),
+    Ends("With the hand first it stands", "reaching", "hand-first"),
+    Ends("Without friction and limits in the stack it stands", "reaching", "equalities"),
+    Compares("Strict levels hold the centre of mass, weights give some of it up", "reaching",
+             "task_centre_of_mass_end", "weighted", "strict", "lower"),
+    Compares("Strict levels bring the hand nearer to its target as well", "reaching",
+             "task_left_hand_end", "weighted", "strict", "lower"),
+    Compares("For this their soles slip more", "reaching", "slip_max", "weighted", "strict",
+             "higher"),
+    Compares("For this their torques jump more", "reaching", "torque_step_max", "weighted",
+             "strict", "higher"))
+
 CLAIMS = (*LETTER_CLAIMS, *JACOBIAN_CLAIMS, *STATE_CLAIMS, *RESOLVER_CLAIMS, *BLEND_CLAIMS,
           *INERTIA_CLAIMS, *RIVAL_CLAIMS, *SINGULAR_CLAIMS, *HUMAN_CLAIMS,
-          *STANDING_CLAIMS)
+          *STANDING_CLAIMS, *REACHING_CLAIMS)
 
 _LIMITS = ("joint_limit_excess", "speed_max", "acceleration_max", "body_distance_min",
            "cone_violation_max", "position_error_rms_settled", "stack_changes",
@@ -157,6 +171,9 @@ _HUMAN_RUNS = ("true_position_error_rms", "true_position_error_max", "body_dista
                "velocity_step_max", "stack_changes", "active_set_changes")
 _STANDING = ("miss_centre_of_mass", "miss_left_hand", "miss_posture", "torque_step_max",
              "slip_max", "speed_max")
+_REACHING = ("task_centre_of_mass_end", "task_left_hand_end", "miss_centre_of_mass",
+             "miss_left_hand", "slip_max", "friction_margin_min", "support_margin_min",
+             "torque_step_max")
 _MISSED = tuple(f"miss_{level}" for level in (
     "physics", "limits", "joint_limits", "centre_of_mass", "left_hand", "right_hand", "posture",
     "least_force"))
@@ -276,5 +293,7 @@ BLOCKS: dict[str, Block] = {
     "standing-levels": partial(by_metric, study="standing", metrics=_MISSED,
                                columns=("strict", "give", "weighted", "bounds", "equalities")),
     "standing-claims": partial(claims, listed=STANDING_CLAIMS),
+    "reaching": partial(table, study="reaching", metrics=_REACHING, interval=True),
+    "reaching-claims": partial(claims, listed=REACHING_CLAIMS),
     "human": partial(table, study="human", metrics=_HUMAN_RUNS),
     "findings": findings}

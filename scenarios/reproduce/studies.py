@@ -148,6 +148,12 @@ STANDING = Study("standing", "A humanoid that is pushed", (
     Column("strict-unknown", "stand-push", "hcod", _UNKNOWN),
     Column("weighted-unknown", "stand-push", "weighted", _UNKNOWN)))
 
+REACHING = Study("reaching", "A humanoid that is asked to reach too far", (
+    Column("strict", "reach-torque", "hcod"),
+    Column("weighted", "reach-torque", "weighted"),
+    Column("hand-first", "reach-torque-hand-first", "hcod"),
+    Column("equalities", "reach-torque", "tpm")))
+
 STATES = Watched("states", "Resolvers in the same states", "ellipse", "tpm", (
     *(Pair(name, "tpm", name) for name in ("recursive", "hcod", "weighted", "augmented")),
     Pair("published", "tpm", "tpm-published"),
@@ -162,4 +168,4 @@ AnyStudy = Study | Watched
 
 STUDIES: tuple[AnyStudy, ...] = (
     STATES, THROTTLE, LETTER, RESOLVERS, BLEND, LADDER, INERTIA, RIVALS, SINGULAR, HUMAN,
-    STANDING)
+    STANDING, REACHING)
