@@ -60,6 +60,7 @@ JOINS, ROW, OWNER, HELD, OWN, HELD_RANK, OWN_RANK = range(7)
 HOLDS, LACKS, EXCEEDS, UNCLEAR = range(4)  # what is found of (1)
 REFINEMENTS = 3
 CHANGES = 6  # of what a record claims, at most
+ALONE = 0.01  # share that a row leaves if it alone is missing: at most
 TINY, HUGE = 1e-100, 1e100  # norms whose powers neither underflow nor overflow
 
 
@@ -107,10 +108,11 @@ def prove_by_multipliers(A, lower, upper, sizes, x, reference, record, work):
     if not reach < HUGE or has_outlier(p.number[NORM, :A.shape[0]], DUST):
         return ZERO + INACCURATE
     for _ in range(CHANGES + 1):
-        lacking, found = _first_unproved(_with_columns(p, sizes.size), reference, reach)
+        whole = _with_columns(p, sizes.size)
+        k, found = _first_unproved(whole, reference, reach)
         if found == HOLDS:
             return ZERO + SOLVED
-        if found == UNCLEAR or (found == LACKS and not _claim(p, sizes, lacking)):
+        if found == UNCLEAR or (found == LACKS and not _claim(whole, sizes, k)):
             break
     return ZERO + INACCURATE
 
@@ -121,12 +123,11 @@ def _first_unproved(p, reference, reach):
     rank, thin = ZERO, 1.0
     for k in range(p.rest.size):
         begin, held, own = _begin(p, OWN, k), p.index[HELD, k], p.index[OWN, k]
-        independent, left, thin = _join(p, begin, held, rank, thin)
+        independent, _, thin = _join(p, begin, held, rank, thin)  # the others are not needed
         p.index[HELD_RANK, k] = rank = rank + independent
-        proved = independent == held - begin
         independent, left, thin = _join(p, held, own, rank, thin)
         p.index[OWN_RANK, k] = rank = rank + independent
-        if not proved or left > max(NOTHING * thin, SAME):
+        if left > max(NOTHING * thin, SAME):
             return ZERO + k, UNCLEAR
         found = _balance(p, reference, k, reach)
         if found != HOLDS:
@@ -136,11 +137,32 @@ def _first_unproved(p, reference, reach):
 
 @inlined
 def _claim(p, sizes, k):
-    """Claim that one more row on its side holds level k back, that along what remains of (1)."""
-    end, best, most = ZERO, -1, 0.0
+    """Claim that a row on its side holds level k back, or two; return whether there is one.
+
+    The first is that along what remains of (1), the second that along what remains then.
+    """
+    above, before = ZERO, _length(p)
     for level in range(min(k, sizes.size)):
-        end += sizes[level]
-    for i in range(end):
+        above += sizes[level]
+    for count in range(2):
+        i, push = _most_outward(p, k, above)
+        square = _square_outside(p, i, p.index[HELD_RANK, k]) if i >= 0 else 0.0
+        if square < CLEAR * CLEAR:
+            return count > 0
+        p.index[JOINS, i] = 2 * k
+        share = p.number[SIDE, i] * push / (square * p.number[NORM, i])
+        add_multiple(p.number[LEFT, :p.x.size], share, p.A[i])
+        _push(p, p.force[k], p.index[HELD_RANK, k])
+        if _length(p) < ALONE * before:
+            break
+    return True
+
+
+@inlined
+def _most_outward(p, k, above):
+    """Return the row along what remains of (1) that may be claimed, -1 if none, and its push."""
+    best, most = -1, 0.0
+    for i in range(above):
         if p.number[SIDE, i] == 0.0 or 0 <= p.index[JOINS, i] <= 2 * k + 1:
             continue
         push = 0.0
@@ -149,10 +171,19 @@ def _claim(p, sizes, k):
         push *= p.number[SIDE, i] / p.number[NORM, i]
         if push > most:
             best, most = i, push
-    if best < 0:
-        return False
-    p.index[JOINS, best] = 2 * k
-    return True
+    return best, most
+
+
+@inlined
+def _square_outside(p, i, rank):
+    """Return the square of what is left of a unit row outside the first `rank` basis vectors."""
+    z, square = p.number[Z], 0.0
+    for c in range(p.x.size):
+        z[c] = p.A[i, c] / p.number[NORM, i]
+    reflect(p.basis, ZERO, rank, p.number, Z, Z + 1)
+    for c in range(rank, p.x.size):
+        square += z[c] * z[c]
+    return square
 
 
 @inlined
