@@ -256,8 +256,7 @@ def _prove(s, whole):
     levels = s.count[LEVELS]
     verdict = _add_violated(s)
     s.count[DOUBT] |= has_outgrown(s) or has_dust(s)
-    thin = smallest_share(s, ZERO, s.index[RANKS, levels])
-    s.count[DOUBT] |= thin < DOUBTFUL
+    s.count[DOUBT] |= smallest_share(s, ZERO, s.index[RANKS, levels]) < DOUBTFUL
     for k in range(levels + 1 if verdict == RIGHT or s.count[DOUBT] == 0 else 0):
         above = s.index[RANKS, k]
         at_goal = k in (whole, levels)
@@ -268,7 +267,7 @@ def _prove(s, whole):
         elif s.index[BEGIN, k + 1] - s.index[BEGIN, k] == s.index[RANKS, k + 1] - above:
             continue
         else:
-            s.count[DOUBT] |= _is_unclear_level(s, k, thin)
+            s.count[DOUBT] |= _is_unclear_level(s, k)
             missed, said = _pull_of_level(s, k, above)
             verdict = max(verdict, said)
         if missed:
@@ -279,7 +278,7 @@ def _prove(s, whole):
 
 
 @inlined
-def _is_unclear_level(s, k, thin):
+def _is_unclear_level(s, k):
     """Whether a row of a level is nearly dependent on those above, or moved by levels below."""
     begin, end, rank = s.index[BEGIN, k], s.index[BEGIN, k + 1], s.index[RANKS, k + 1]
     unclear = False
@@ -288,7 +287,7 @@ def _is_unclear_level(s, k, thin):
         side = side_of(s.number, i)
         gone = abs(value_of(s, s.x, i) - side - s.number[OVER, q])
         unclear |= gone > DRIFT * around(s.number[NORM, i], side, s.scalar[SCALE])
-        unclear |= is_unclear(s, i, s.index[RANKS, k], rank, thin)
+        unclear |= is_unclear(s, i, s.index[RANKS, k], rank)
     return unclear
 
 

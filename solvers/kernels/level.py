@@ -178,17 +178,16 @@ def is_uneven(s, part, share):
 
 
 @inlined
-def is_unclear(s, i, begin, end, thin):
+def is_unclear(s, i, begin, end):
     """Whether a dependent row is only nearly so.
 
     Little, but more than nothing, is left of it from basis vector `begin` on, where its level
-    begins, or what is left from `end` on, where its level ends, would turn the freedom by hardly
-    less than counts as something. thin: the smallest pivot, which amplifies that.
+    begins, or hardly less than counts as something from `end` on, where its level ends.
     """
     least = s.settings.rank_tolerance * s.number[NORM, i]
     left, beyond = left_of(s, i, begin, s.x.size), left_of(s, i, end, s.x.size)
     nearly = least * least < left < (DOUBTFUL * s.number[NORM, i]) ** 2
-    return nearly or beyond > (BRINK * least * thin) ** 2
+    return nearly or beyond > (BRINK * least) ** 2
 
 
 @inlined

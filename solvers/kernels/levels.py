@@ -655,7 +655,7 @@ def _settle(s, k, whole):
             left = left_of(s, i, end + q, end + q + 1)
             least = min(least, np.sqrt(left) / number[NORM, i])
         else:
-            count[DOUBT] |= is_unclear(s, i, end, end + count[RANK], least)
+            count[DOUBT] |= is_unclear(s, i, end, end + count[RANK])
         if number[ACTIVE, i] == EQUAL:
             continue
         if count[MISSED] == 1 and number[ACTIVE, i] * over > unclear * scale:
@@ -675,7 +675,7 @@ def _order(s, whole):
     count, owner, soft, state = s.count, s.index[OWNER], s.index[LIST], s.index[STATE]
     fixed, hard, rows, held = count[FIX], count[HARD], count[ROWS], s.number[SPEED]
     end = s.x.size if whole else fixed + hard + count[RANK]
-    at, least, open_rows, thin = fixed, s.settings.rank_tolerance, 0, 1.0
+    at, least, open_rows = fixed, s.settings.rank_tolerance, 0
     for q in range(0 if whole else hard + rows):  # all of x is settled: no row is open
         i = owner[fixed + q] if q < hard else soft[q - hard]
         if state[i] == HELD:
@@ -685,12 +685,11 @@ def _order(s, whole):
         i = owner[fixed + q] if q < hard else soft[q - hard]
         left = np.sqrt(left_of(s, i, at, end)) / s.number[NORM, i]
         if state[i] == FIXED and left > least:
-            thin = min(thin, left)
             count[DOUBT] |= left < DOUBTFUL
             reflect(s.M, at, end, s.index[COLUMN, i], count[FIRST], s.room)
             at += 1
         elif state[i] == FIXED:
-            count[DOUBT] |= left > BRINK * least * thin
+            count[DOUBT] |= left > BRINK * least
     count[FIX] = at if open_rows > 0 else end
     for q in range(open_rows):
         i = np.int64(held[q])

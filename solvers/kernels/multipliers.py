@@ -42,6 +42,7 @@ from solvers.kernels.tolerances import (
     DUST,
     ENOUGH,
     EPSILON,
+    EXCHANGED,
     LARGEST,
     NOTHING,
     SAME,
@@ -120,16 +121,17 @@ def prove_by_multipliers(A, lower, upper, sizes, x, reference, record, work):
 @compiled
 def _first_unproved(p, reference, reach):
     """Return the first level that is not proved and what is found of it; HOLDS if there is none."""
-    rank, thin = ZERO, 1.0
+    rank, left = ZERO, 0.0
     for k in range(p.rest.size):
         begin, held, own = _begin(p, OWN, k), p.index[HELD, k], p.index[OWN, k]
-        independent, _, thin = _join(p, begin, held, rank, thin)  # the others are not needed
-        p.index[HELD_RANK, k] = rank = rank + independent
-        independent, left, thin = _join(p, held, own, rank, thin)
+        rank += _join(p, begin, held, rank)[0]  # the others are not needed
+        p.index[HELD_RANK, k] = rank
+        independent, beyond = _join(p, held, own, rank)
         p.index[OWN_RANK, k] = rank = rank + independent
-        if left > max(NOTHING * thin, SAME):
+        if beyond > NOTHING:
             return ZERO + k, UNCLEAR
-        found = _balance(p, reference, k, reach)
+        found = _balance(p, reference, k, left, reach)
+        left = max(left, beyond)
         if found != HOLDS:
             return ZERO + k, found
     return p.rest.size, HOLDS
@@ -268,11 +270,10 @@ def _with_columns(p, levels):
 
 
 @compiled
-def _join(p, begin, end, rank, thin):
+def _join(p, begin, end, rank):
     """Give the columns begin .. end - 1 basis vectors from `rank` on, the largest remainder first.
 
-    Returns how many got one, the largest remainder of the others, and the smallest of those that
-    got one, if it is below `thin`.
+    Returns how many got one, and the largest remainder of the others.
     """
     n, at, left = p.x.size, begin, 0.0
     while at < end and rank < n:
@@ -283,8 +284,8 @@ def _join(p, begin, end, rank, thin):
         _swap(p, at, best)
         _eliminate(p, rank, at)
         p.index[OWNER, rank] = at
-        rank, at, left, thin = rank + 1, at + 1, 0.0, min(thin, left)
-    return at - begin, left, thin
+        rank, at, left = rank + 1, at + 1, 0.0
+    return at - begin, left
 
 
 @inlined
@@ -334,11 +335,13 @@ def _eliminate(p, k, q):
 
 
 @inlined
-def _balance(p, reference, k, reach):
+def _balance(p, reference, k, left, reach):
     """Return HOLDS if the rows of level k are met or (1) holds for it; writes its multipliers.
 
     Else LACKS if a row may be missing, EXCEEDS if one pointed inward and is no longer claimed, or
     UNCLEAR. What the rows above leave may also be balanced by small shifts of the level's sides.
+    left: the largest remainder of a dependent row above, which such a row would leave of (1), times
+    its multiplier, in place of one that it depends on.
     """
     force, levels, held = p.force[k], p.rest.size - 1, p.index[HELD_RANK, k]
     for t in range(p.x.size):
@@ -365,6 +368,8 @@ def _balance(p, reference, k, reach):
     lost = rest <= EPSILON * (pull + _sum_of(force))
     p.rest[k] = 0.0 if lost else rest  # it is nothing if the rows differ by their rounding
     if not _largest_of(force, held) <= most:  # together the rows are nearly dependent
+        return UNCLEAR
+    if left * _largest_of(force, held) > EXCHANGED * enough:
         return UNCLEAR
     if rest > enough:
         return EXCEEDS if inward else LACKS

@@ -26,7 +26,8 @@ NO_STEP = 1e-12     # length of a step: smaller ones count as zero
 BAND = 1e-8         # distance of a row from the side that it is on, over 1 + |x|: as in `certify`
 ENOUGH = 1e-9       # what may remain of the conditions, over the weakest possible pull of the level
 CLEAR = 4e-9        # remainder of a unit row that counts as independent: at least
-NOTHING = 1e-9      # remainder of a unit row that counts as dependent, over the least: at most
+NOTHING = 1e-9      # remainder of a unit row that counts as dependent: at most
+EXCHANGED = 4.0     # times ENOUGH: what may remain if such a row replaces one that it depends on
 LARGEST = 1e5       # multiplier over the pull that it balances: at most
 
 STALLED = 5         # consecutive steps of zero length before the sides are moved apart
