@@ -62,6 +62,8 @@ HOLDS, LACKS, EXCEEDS, UNCLEAR = range(4)  # what is found of (1)
 REFINEMENTS = 3
 CHANGES = 6  # of what a record claims, at most
 ALONE = 0.01  # share that a row leaves if it alone is missing: at most
+UNIT = 2.0**-53  # rounding of a sum, over the sizes of its terms
+FORGIVEN = 0.1   # of what remains of (1) where that is rounding: counts in levels below
 TINY, HUGE = 1e-100, 1e100  # norms whose powers neither underflow nor overflow
 
 
@@ -365,8 +367,8 @@ def _balance(p, reference, k, left, reach):
             enough = max(enough, rounding)
     inward = _turn_back(p, force, _begin(p, OWN_RANK, k), held, enough)
     rest, most = _length(p), LARGEST * pull
-    lost = rest <= EPSILON * (pull + _sum_of(force))
-    p.rest[k] = 0.0 if lost else rest  # it is nothing if the rows differ by their rounding
+    lost = rest <= UNIT * (pull + _sum_of(force))  # to rounding, which multiples amplify
+    p.rest[k] = FORGIVEN * rest if lost else rest
     if not _largest_of(force, held) <= most:  # together the rows are nearly dependent
         return UNCLEAR
     if left * _largest_of(force, held) > EXCHANGED * enough:
