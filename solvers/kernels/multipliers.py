@@ -348,7 +348,7 @@ def _balance(p, reference, k, left, reach):
     force, levels, held = p.force[k], p.rest.size - 1, p.index[HELD_RANK, k]
     for t in range(p.x.size):
         force[t] = p.number[LEFT, t] = 0.0
-    enough, rounding = _pull(p, k, reach) if k < levels else _pull_of_goal(p, reference, reach)
+    enough = _pull(p, k, reach) if k < levels else _pull_of_goal(p, reference, reach)
     p.rest[k] = 0.0
     if enough == 0.0:
         return HOLDS
@@ -363,8 +363,6 @@ def _balance(p, reference, k, left, reach):
         if _shift(p, force, held, own) > ENOUGH * reach:
             _drop(p, force, held, own)
             _push(p, force, held)  # those above were changed together with them
-        else:
-            enough = max(enough, rounding)
     inward = _turn_back(p, force, _begin(p, OWN_RANK, k), held, enough)
     rest, most = _length(p), LARGEST * pull
     lost = rest <= UNIT * (pull + _sum_of(force))  # to rounding, which multiples amplify
@@ -430,10 +428,7 @@ def _shift(p, force, begin, end):
 
 @inlined
 def _pull(p, k, reach):
-    """Write the first sum of (1) for level k; return what may remain of it, 0 if rows are met.
-
-    Also returns what may remain once it is balanced by shifts: rounding.
-    """
+    """Write the first sum of (1) for level k; return what may remain of it, 0 if rows are met."""
     left, square, least = p.number[LEFT], 0.0, np.inf
     for q in range(p.index[HELD, k], p.index[OWN, k]):
         i = p.index[ROW, q]
@@ -444,8 +439,8 @@ def _pull(p, k, reach):
             left[c] += norm * miss * p.A[i, c]
     length = np.sqrt(square)
     if length <= 0.1 * BAND * reach:
-        return 0.0, 0.0
-    return least * least * ENOUGH * length, 2.0 * least * least * EPSILON * reach
+        return 0.0
+    return least * least * ENOUGH * length
 
 
 @inlined
@@ -453,7 +448,7 @@ def _pull_of_goal(p, reference, reach):
     """Write x - reference; return the same as `_pull`."""
     for c in range(p.x.size):
         p.number[LEFT, c] = p.x[c] - reference[c]
-    return ENOUGH * reach, 0.0
+    return ENOUGH * reach
 
 
 @inlined
