@@ -414,19 +414,15 @@ def _balanced(C: Array, terms: Array, f: Array, size: Array, unknown: Array | fl
     by scipy's, which chooses otherwise, and then without the rows that only repeat heavier ones.
     """
     least = np.inf
-    for search, rows in ((_non_negative, _as_given), (_non_negative_by_scipy, _as_given),
-                         (_non_negative, _unrepeated)):
-        z = search(rows(C, terms), -f, enough)
+    for search in (_non_negative, _non_negative_by_scipy,
+                   lambda C, b, enough: _non_negative(_unrepeated(C, terms), b, enough)):
+        z = search(C, -f, enough)
         left = C @ z + f
         noise = unknown * (size + terms @ z)
         least = min(least, _length(left[np.abs(left) > noise]))
         if least <= enough:
             break
     return least
-
-
-def _as_given(C: Array, terms: Array) -> Array:
-    return C
 
 
 def _unrepeated(C: Array, terms: Array) -> Array:

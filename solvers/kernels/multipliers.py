@@ -1,7 +1,7 @@
 """Proof of an answer by its multipliers: the conditions of Karush, Kuhn and Tucker, from the data.
 
-A resolver claims x, and which rows on their sides hold which level back. With u = a / |a| and the
-misses t as lengths, level k is optimal if
+A resolver claims x, and which rows on their sides hold which level back; where it is mistaken about
+the rows, they are changed. With u = a / |a| and the misses t as lengths, level k is optimal if
 
     sum_i |a_i|^2 t_i u_i + sum_j lambda_j u_j = 0                                              (1)
 
@@ -11,9 +11,9 @@ back a level above may have any sign as well, because a multiple of that level's
 With x - reference in place of the first sum, (1) proves that x is the nearest.
 
 The multipliers come from a factorisation made here, and what remains of (1) is summed over the rows
-themselves, so the proof rests on the data alone. It needs every row to be clearly inside the span
-of others or clearly outside, and no multiplier so large that together the rows are nearly
-dependent: `certify`, which takes twenty times as long, judges all else.
+themselves, so the proof rests on the data alone. It needs every equality and missed row to be
+clearly inside the span of others or clearly outside, and no multiplier so large that together the
+rows are nearly dependent: `certify`, which takes fifty times as long, judges all else.
 """
 
 # mypy: disable-error-code="no-untyped-def"
@@ -25,7 +25,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hierarchy.jit import as_matrix, compiled, inlined
-from solvers.kernels.rows import ZERO, add_multiple, has_outlier, reflect
+from solvers.kernels.rows import ZERO, add_multiple, has_outlier, make_reflector, reflect
 from solvers.kernels.space import (
     Basis,
     View,
@@ -37,15 +37,18 @@ from solvers.kernels.space import (
 )
 from solvers.kernels.tableau import REFERENCE, length_of
 from solvers.kernels.tolerances import (
+    ALONE,
     BAND,
     CLEAR,
     DUST,
     ENOUGH,
     EPSILON,
     EXCHANGED,
+    FORGIVEN,
     LARGEST,
     NOTHING,
     SAME,
+    UNIT,
 )
 from solvers.status import INACCURATE, SOLVED, TOO_SMALL
 
@@ -61,9 +64,6 @@ JOINS, ROW, OWNER, HELD, OWN, HELD_RANK, OWN_RANK = range(7)
 HOLDS, LACKS, EXCEEDS, UNCLEAR = range(4)  # what is found of (1)
 REFINEMENTS = 3
 CHANGES = 6  # of what a record claims, at most
-ALONE = 0.01  # share that a row leaves if it alone is missing: at most
-UNIT = 2.0**-53  # rounding of a sum, over the sizes of its terms
-FORGIVEN = 0.1   # of what remains of (1) where that is rounding: counts in levels below
 TINY, HUGE = 1e-100, 1e100  # norms whose powers neither underflow nor overflow
 
 
@@ -284,7 +284,7 @@ def _join(p, begin, end, rank):
         if not left >= CLEAR:
             break
         _swap(p, at, best)
-        _eliminate(p, rank, at)
+        _eliminate(p, rank, at, p.number[SQUARE, best])
         p.index[OWNER, rank] = at
         rank, at, left = rank + 1, at + 1, 0.0
     return at - begin, left
@@ -315,18 +315,14 @@ def _swap(p, q, r):
 
 
 @inlined
-def _eliminate(p, k, q):
+def _eliminate(p, k, q, square):
     """Make reflector k, which leaves column q nothing below row k; apply it to the columns after q.
 
-    By rows of M, so that all columns are summed at once.
+    By rows of M, so that all columns are summed at once. square: that of column q from row k on.
     """
-    M, v, after, square = p.M, p.basis.V[k], q + 1, 0.0
-    for t in range(k, p.x.size):
-        v[t] = M[t, q]
-        square += v[t] * v[t]
-    norm = -np.sqrt(square) if v[k] > 0.0 else np.sqrt(square)
-    v[k] -= norm
-    M[k, q], p.basis.beta[k] = norm, 1.0 / abs(norm * v[k])
+    M, v, after = p.M, p.basis.V[k], q + 1
+    make_reflector(p.basis, k, M[:, q], square)
+    M[k, q] = -np.sqrt(square) if M[k, q] >= 0.0 else np.sqrt(square)
     sums = p.room[:M.shape[1] - after]
     for c in range(sums.size):
         sums[c] = 0.0
@@ -364,13 +360,11 @@ def _balance(p, reference, k, left, reach):
             _drop(p, force, held, own)
             _push(p, force, held)  # those above were changed together with them
     inward = _turn_back(p, force, _begin(p, OWN_RANK, k), held, enough)
-    rest, most = _length(p), LARGEST * pull
+    rest, largest = _length(p), _largest_of(force, held)
     lost = rest <= UNIT * (pull + _sum_of(force))  # to rounding, which multiples amplify
     p.rest[k] = FORGIVEN * rest if lost else rest
-    if not _largest_of(force, held) <= most:  # together the rows are nearly dependent
-        return UNCLEAR
-    if left * _largest_of(force, held) > EXCHANGED * enough:
-        return UNCLEAR
+    if not largest <= LARGEST * pull or left * largest > EXCHANGED * enough:
+        return UNCLEAR  # together the rows are nearly dependent
     if rest > enough:
         return EXCEEDS if inward else LACKS
     return HOLDS if _signs_hold(p, force, k) and p.rest[k] <= enough else UNCLEAR

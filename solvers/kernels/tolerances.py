@@ -29,6 +29,9 @@ CLEAR = 4e-9        # remainder of a unit row that counts as independent: at lea
 NOTHING = 1e-9      # remainder of a unit row that counts as dependent: at most
 EXCHANGED = 4.0     # times ENOUGH: what may remain if such a row replaces one that it depends on
 LARGEST = 1e5       # multiplier over the pull that it balances: at most
+ALONE = 0.01        # share of what remains that is left where one row alone is missing: at most
+UNIT = 2.0**-53     # rounding of a sum, over the sizes of its terms
+FORGIVEN = 0.1      # share of what remains that counts in levels below, where it is that rounding
 
 STALLED = 5         # consecutive steps of zero length before the sides are moved apart
 RELAXATION = 1e-6   # amount by which they are moved, times 1 to 2
