@@ -18,7 +18,7 @@ from hierarchy.errors import RobotError, UnknownNameError, expect, file_path, fi
 from hierarchy.problem import Array
 from hierarchy.robots import TABLES
 from hierarchy.robots.files import read_file
-from hierarchy.robots.found import Coupled, Found, is_floating
+from hierarchy.robots.found import Coupled, Found, Loop, is_floating
 from hierarchy.robots.from_table import from_table
 from hierarchy.robots.names import elsewhere, file_of, in_package
 from hierarchy.robots.points import points_along_chain
@@ -66,8 +66,9 @@ class Robot:
     of each velocity. `parents` (joints + 1) has the joint that carries each joint, `masses`
     (joints + 1) [kg] and `centres` (joints + 1, 3) [m] the body that each moves. `rest` (nq,) is
     the default initial configuration. `missing` has sentences about files that are named but
-    missing; `coupled` joints follow another one in the file, and move on their own here; `table`
-    is the table that the robot was made from, or None.
+    missing; `coupled` joints follow another one in the file, `loops` are chains that it closes,
+    `starts` the configurations (nq,) that it names, `apart` pairs of joints whose bodies it lets
+    touch. `table` is the table that the robot was made from, or None.
     """
 
     def __init__(self, model: Any, name: str, end_effector: str | None = None,
@@ -101,6 +102,9 @@ class Robot:
         self.rest = np.array(pin.neutral(model)) if rest is None else rest
         self.missing = missing
         self.coupled: tuple[Coupled, ...] = ()
+        self.loops: tuple[Loop, ...] = ()
+        self.starts: Mapping[str, Array] = {}
+        self.apart: tuple[tuple[str, str], ...] = ()
         self.table: Table | None = None
 
     @classmethod
@@ -183,7 +187,8 @@ class Robot:
     def _of(cls, found: Found, name: str, end_effector: str | None = None) -> Robot:
         robot = cls(found.model, name, end_effector or found.end_effector,
                     found.control_points or (), found.capsules, found.rest, found.missing)
-        robot.coupled = found.coupled
+        robot.coupled, robot.loops = found.coupled, found.loops
+        robot.starts, robot.apart = found.starts, found.apart
         if found.control_points is None:
             robot.control_points = points_along_chain(found.model, robot.end_effector)
         return robot

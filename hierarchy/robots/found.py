@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -14,16 +16,29 @@ from hierarchy.problem import Array
 
 @dataclass(frozen=True)
 class Coupled:
-    """A joint that the file couples to another one: q = factor q_other + offset [rad or m]."""
+    """A joint that the file couples to another one: q = sum of coefficients[i] q_other^i [rad or m].
+
+    An MJCF may couple a joint to none: then `other` is "" and q is a constant.
+    """
 
     joint: str
     other: str
-    factor: float
-    offset: float
+    coefficients: tuple[float, ...]
 
     def __str__(self) -> str:
-        rest = f" {'-' if self.offset < 0 else '+'} {abs(self.offset):g}" if self.offset else ""
-        return f"{self.joint} = {self.factor:g} {self.other}{rest} in the file"
+        powers = ["", f" {self.other}", *(f" {self.other}^{i}" for i in range(2, 5))]
+        terms = [f"{value:g}{power}" for value, power in zip(self.coefficients, powers,
+                                                             strict=False) if value != 0.0]
+        return f"{self.joint} = {' + '.join(reversed(terms)) or '0'} in the file"
+
+
+@dataclass(frozen=True)
+class Loop:
+    """A chain that the file closes: the origins of two frames coincide, and their axes if `rigid`."""
+
+    name: str
+    frames: tuple[str, str]
+    rigid: bool
 
 
 @dataclass(frozen=True)
@@ -32,7 +47,8 @@ class Found:
 
     `end_effector` is a frame's name; `rest` (nq,) the default initial configuration, or None;
     `missing` are sentences. `control_points` is None if they are to be proposed. `coupled` joints
-    move on their own here.
+    follow others, `loops` are closed chains; `starts` are configurations (nq,) that the file names,
+    and `apart` pairs of bodies, by the joints that move them, whose distance it does not watch.
     """
 
     model: Any
@@ -42,6 +58,9 @@ class Found:
     rest: Array | None = None
     missing: tuple[str, ...] = ()
     coupled: tuple[Coupled, ...] = ()
+    loops: tuple[Loop, ...] = ()
+    starts: Mapping[str, Array] = MappingProxyType({})
+    apart: tuple[tuple[str, str], ...] = ()
 
 
 def is_floating(model: Any) -> bool:

@@ -46,8 +46,7 @@ def coupled(root: Element) -> tuple[Coupled, ...]:
 
 
 def _of_equality(one: Element) -> Coupled:
-    offset, factor, *_ = _coefficients(one)
-    return Coupled(str(one.get("joint1")), str(one.get("joint2")), factor, offset)
+    return Coupled(str(one.get("joint1")), str(one.get("joint2")), tuple(_coefficients(one)[:2]))
 
 
 def _coefficients(one: Element) -> list[float]:

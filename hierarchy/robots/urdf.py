@@ -43,7 +43,7 @@ def checked(path: Path) -> Element:
 def coupled(root: Element) -> tuple[Coupled, ...]:
     """Return the joints that follow another one (`mimic`)."""
     return tuple(Coupled(_name(joint), str(mimic.get("joint")),
-                         float(mimic.get("multiplier", 1.0)), float(mimic.get("offset", 0.0)))
+                         (float(mimic.get("offset", 0.0)), float(mimic.get("multiplier", 1.0))))
                  for joint in root.findall("joint")
                  for mimic in joint.findall("mimic") if joint.get("type") != "fixed")
 

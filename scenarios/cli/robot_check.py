@@ -70,8 +70,7 @@ def as_plain_data(section: RobotSection, robot: Robot) -> dict[str, Any]:
         "control_points": [{"joint": _carrier(robot, p.joint), "offset": _rounded(p.offset)}
                            for p in robot.control_points],
         "missing": list(_missing(robot)),
-        "coupled": [{"joint": one.joint, "other": one.other, "factor": one.factor,
-                     "offset": one.offset} for one in robot.coupled]}
+        "coupled": [{"joint": one.joint, "other": one.other, "coefficients": list(one.coefficients)} for one in robot.coupled]}
 
 
 def say(section: RobotSection, robot: Robot) -> str:
@@ -118,9 +117,9 @@ def paste(section: RobotSection, robot: Robot) -> str:
                 for row in found[key]]
         lines += [f"{key} = [", *rows, "]"] if rows else []
     for one in robot.coupled:
-        joints = f"{{ {_quoted(one.joint)} = 1.0, {_quoted(one.other)} = {-one.factor} }}"
+        joints = f"{{ {_quoted(one.joint)} = 1.0, {_quoted(one.other)} = {-one.coefficients[1]} }}"
         lines += ["", "[[tasks]]", 'kind = "coupling"', f"joints = {joints}",
-                  f"value = {one.offset}"]
+                  f"value = {one.coefficients[0]}"]
     return "\n".join(lines)
 
 
