@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from types import MappingProxyType
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -16,7 +15,7 @@ from hierarchy.problem import Array
 
 @dataclass(frozen=True)
 class Coupled:
-    """A joint that the file couples to another one: q = sum of coefficients[i] q_other^i [rad or m].
+    """A joint that the file couples to another: q = sum of coefficients[i] q_other^i [rad or m].
 
     An MJCF may couple a joint to none: then `other` is "" and q is a constant.
     """
@@ -27,14 +26,15 @@ class Coupled:
 
     def __str__(self) -> str:
         powers = ["", f" {self.other}", *(f" {self.other}^{i}" for i in range(2, 5))]
-        terms = [f"{value:g}{power}" for value, power in zip(self.coefficients, powers,
-                                                             strict=False) if value != 0.0]
-        return f"{self.joint} = {' + '.join(reversed(terms)) or '0'} in the file"
+        terms = [f"{value:g}{power}" for value, power
+                 in zip(self.coefficients[::-1], powers[len(self.coefficients) - 1::-1],
+                        strict=True) if value != 0.0]
+        return f"{self.joint} = {' + '.join(terms) or '0'} in the file".replace("+ -", "- ")
 
 
 @dataclass(frozen=True)
 class Loop:
-    """A chain that the file closes: the origins of two frames coincide, and their axes if `rigid`."""
+    """A chain that the file closes: two frames have one origin, and the same axes if `rigid`."""
 
     name: str
     frames: tuple[str, str]
@@ -59,7 +59,7 @@ class Found:
     missing: tuple[str, ...] = ()
     coupled: tuple[Coupled, ...] = ()
     loops: tuple[Loop, ...] = ()
-    starts: Mapping[str, Array] = MappingProxyType({})
+    starts: Mapping[str, Array] = field(default_factory=dict)
     apart: tuple[tuple[str, str], ...] = ()
 
 

@@ -70,7 +70,8 @@ def as_plain_data(section: RobotSection, robot: Robot) -> dict[str, Any]:
         "control_points": [{"joint": _carrier(robot, p.joint), "offset": _rounded(p.offset)}
                            for p in robot.control_points],
         "missing": list(_missing(robot)),
-        "coupled": [{"joint": one.joint, "other": one.other, "coefficients": list(one.coefficients)} for one in robot.coupled]}
+        "coupled": [{"joint": one.joint, "other": one.other,
+                     "coefficients": list(one.coefficients)} for one in robot.coupled]}
 
 
 def say(section: RobotSection, robot: Robot) -> str:
