@@ -19,8 +19,9 @@ from hierarchy.problem import Array
 from hierarchy.robots import TABLES
 from hierarchy.robots.files import read_file
 from hierarchy.robots.found import Coupled, Found, Loop, is_floating
+from hierarchy.robots.frames import ambiguous, frames_called, in_words
 from hierarchy.robots.from_table import from_table
-from hierarchy.robots.names import elsewhere, file_of, in_package
+from hierarchy.robots.names import elsewhere, file_of, in_package, is_file_name
 from hierarchy.robots.points import points_along_chain
 from hierarchy.robots.table import Base, Table
 
@@ -65,10 +66,10 @@ class Robot:
     infinite where the model has none. `coordinates` (n,) is the index in q of the (first) position
     of each velocity. `parents` (joints + 1) has the joint that carries each joint, `masses`
     (joints + 1) [kg] and `centres` (joints + 1, 3) [m] the body that each moves. `rest` (nq,) is
-    the default initial configuration. `missing` has sentences about files that are named but
-    missing; `coupled` joints follow another one in the file, `loops` are chains that it closes,
-    `starts` the configurations (nq,) that it names, `apart` pairs of joints whose bodies it lets
-    touch. `table` is the table that the robot was made from, or None.
+    the default initial configuration. `missing` has sentences about what the file does not give, or
+    gives and the robot is without; `coupled` joints follow another one in the file, `loops` are
+    chains that it closes, `starts` the configurations (nq,) that it names, `apart` pairs of joints
+    whose bodies it lets touch. `table` is the table that the robot was made from, or None.
     """
 
     def __init__(self, model: Any, name: str, end_effector: str | None = None,
@@ -96,7 +97,7 @@ class Robot:
         inertias = list(model.inertias)
         self.masses = np.array([0.0, *(float(inertia.mass) for inertia in inertias[1:])])
         self.centres = np.array([np.zeros(3), *(inertia.lever for inertia in inertias[1:])])
-        self.end_effector = end_effector or tuple(model.frames)[-1].name
+        self.end_effector = end_effector or self.frame_names[-1]
         self.frame(self.end_effector)
         self.control_points, self.capsules = control_points, capsules
         self.rest = np.array(pin.neutral(model)) if rest is None else rest
@@ -145,10 +146,10 @@ class Robot:
     def from_file(cls, path: str | Path, end_effector: str | None = None,
                   base: Base | None = None, shapes: bool = True,
                   locked: Mapping[str, float] | None = None) -> Robot:
-        """Read a URDF (.urdf) or MJCF (.xml, .mjcf) file; RobotError if it cannot be read.
+        """Read a URDF or MJCF file, which its root element tells; RobotError if it cannot be.
 
         `end_effector` names a frame; without it one is proposed, see `hierarchy.robots.points`.
-        `base` None is that of the file: fixed, or floating for an MJCF with a free joint. Capsules
+        `base` None is that of the file: floating if its first joint is free, else fixed. Capsules
         are proposed from the collision geometry, unless `shapes` is False, and control points along
         the chain to the end effector. `locked` joints are fixed at a position [rad or m] and are
         not joints of the robot.
@@ -174,7 +175,7 @@ class Robot:
             robot = cls.from_file(file_of(model), end_effector, base, locked=locked)
             robot.name = model.partition(":")[2]
             return robot
-        if model.endswith((".urdf", ".xml", ".mjcf")):
+        if is_file_name(model):
             return cls.from_file(model, end_effector, base, locked=locked)
         if locked:
             raise RobotError(f"robot {model!r} is a table; its joints cannot be locked")
@@ -195,8 +196,10 @@ class Robot:
 
     @property
     def frame_names(self) -> list[str]:
-        """Names of all frames, including those of joints and links."""
-        return [str(frame.name) for frame in self.model.frames]
+        """Names of the frames that `frame` finds, including those of joints and links."""
+        unclear = set(ambiguous(self.model))
+        names = dict.fromkeys(str(frame.name) for frame in self.model.frames)
+        return [name for name in names if name not in unclear]
 
     @property
     def velocity_names(self) -> list[str]:
@@ -231,11 +234,17 @@ class Robot:
         return int(joint.idx_q)
 
     def frame(self, name: str) -> Frame:
-        """Find the frame called `name`; UnknownNameError if there is none."""
-        names = self.frame_names
-        if name not in names:
-            raise UnknownNameError("frame", name, names)
-        frame = self.model.frames[names.index(name)]
+        """Find the frame called `name`.
+
+        Raises UnknownNameError if there is none, and RobotError if two places have that name.
+        """
+        found = frames_called(self.model, name)
+        if not found:
+            raise UnknownNameError("frame", name, self.frame_names)
+        if len(found) > 1:
+            raise RobotError(f"robot {self.name!r}: {len(found)} frames are called {name!r}, "
+                             f"{in_words(self.model, found)}; give one another name in the file")
+        frame = found[0]
         return Frame(name, int(frame.parentJoint), frame.placement.translation.copy(),
                      np.ascontiguousarray(frame.placement.rotation))
 

@@ -21,3 +21,9 @@ def counted(count: int, what: str) -> str:
 def in_words(count: int) -> str:
     """Return a small number as a word, a larger one in digits."""
     return _NUMBERS[count] if count < len(_NUMBERS) else str(count)
+
+
+def some(names: Sequence[str], most: int = 12) -> str:
+    """Return the first names of many, and how many more there are: "a, b and 3 more"."""
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    return ", ".join(names[:most]) + more

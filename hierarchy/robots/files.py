@@ -19,52 +19,66 @@ import numpy as np
 import pinocchio as pin
 
 from hierarchy.errors import RobotError, UnknownNameError
-from hierarchy.robots import mjcf, urdf
-from hierarchy.robots.found import Coupled, Found, is_floating, neutral_within_limits
+from hierarchy.robots import mjcf, urdf, urdf_model
+from hierarchy.robots.found import Coupled, Found, is_floating, neutral_within_limits, remarks
 from hierarchy.robots.points import proposed_end_effector
 from hierarchy.robots.shapes import capsules_of
 from hierarchy.robots.table import Base
+from hierarchy.words import some
 
-SUFFIXES = (".urdf", ".xml", ".mjcf")
 Element = ElementTree.Element
 
 
 def read_file(path: str | Path, base: Base | None = None, shapes: bool = True,
               locked: Mapping[str, float] = MappingProxyType({})) -> Found:
-    """Read a robot from a URDF (.urdf) or MJCF (.xml, .mjcf) file.
+    """Read a robot from a URDF or MJCF file; its root element says which.
 
-    `base` None takes that of the file: fixed for a URDF, floating for an MJCF whose first body has
-    a free joint. Without `shapes` no collision geometry is read. `locked` joints are fixed at a
-    position [rad or m]. Raises RobotError if the file cannot be read.
+    `base` None takes that of the file: floating if its first joint is free, else fixed. Without
+    `shapes` no collision geometry is read. `locked` joints are fixed at a position [rad or m].
+    Raises RobotError if the file cannot be read.
     """
     path = Path(path)
-    if not path.is_file():
-        raise RobotError(f"robot file {str(path)!r} does not exist")
-    if path.suffix not in SUFFIXES:
-        raise RobotError(f"robot file {str(path)!r}: expected .urdf, .xml or .mjcf")
-    is_urdf = path.suffix == ".urdf"
-    root = urdf.checked(path) if is_urdf else mjcf.expanded(path)
+    root = urdf.root_of(path)
+    if is_urdf := root.tag == "robot":
+        urdf.check(root, path)
+    else:
+        root = mjcf.expanded(path)
     with _printed() as lines:
         try:
-            model = _urdf_model(root, base) if is_urdf else _mjcf_model(root, base)
+            model = urdf_model.model_of(root, base) if is_urdf else _mjcf_model(root, base)
+            said = tuple(urdf_model.not_read(lines())) if is_urdf else ()
         except Exception as error:  # the parsers raise many types; all mean an invalid file
             raise RobotError(f"robot file {str(path)!r} cannot be read: "
                              f"{'; '.join([*lines(), _in_one_line(error)])}") from error
         model = _without(model, locked, str(path))
-        found = _found(model, (urdf if is_urdf else mjcf).coupled(root))
+        found = _found(model, (urdf if is_urdf else mjcf).coupled(root), locked)
+        if is_urdf:
+            found = replace(found, missing=(*said, *urdf.remarks(root), *remarks(model)))
         if not shapes:
             return found
         geometries, missing = _geometry(path, root, model,
                                         _urdf_shapes if is_urdf else _mjcf_shapes)
         capsules, left_out = capsules_of(geometries)
-    return replace(found, capsules=_held_by(model, capsules), missing=(*missing, *left_out))
+    kept, of_world = _held_by(model, capsules)
+    return replace(found, capsules=kept,
+                   missing=(*missing, *left_out, *of_world, *found.missing))
 
 
-def _found(model: Any, coupled: tuple[Coupled, ...]) -> Found:
+def _found(model: Any, coupled: tuple[Coupled, ...], locked: Mapping[str, float]) -> Found:
+    rest = neutral_within_limits(model, pin.neutral(model))
+    if is_floating(model):  # its position in q is that in the world
+        rest[:7] = pin.SE3ToXYZQUAT(model.jointPlacements[1])
+        model.jointPlacements[1] = pin.SE3.Identity()
     names = set(model.names)
-    return Found(model, proposed_end_effector(model),
-                 rest=neutral_within_limits(model, pin.neutral(model)),
-                 coupled=tuple(one for one in coupled if {one.joint, one.other} <= names))
+    return Found(model, proposed_end_effector(model), rest=rest, coupled=tuple(
+        one if one.other in names else _held(one, locked) for one in coupled
+        if one.joint in names))
+
+
+def _held(one: Coupled, locked: Mapping[str, float]) -> Coupled:
+    """Return the coupling to a joint that is locked, or fixed in the file."""
+    at = locked.get(one.other, 0.0)
+    return Coupled(one.joint, "", (sum(c * at**i for i, c in enumerate(one.coefficients)),))
 
 
 @contextmanager
@@ -93,22 +107,17 @@ def _without(model: Any, locked: Mapping[str, float], file: str) -> Any:
     """Return the model without the locked joints."""
     if not locked:
         return model
-    q, indices = np.array(pin.neutral(model)), []
+    step, indices = np.zeros(model.nv), []
     for name, value in locked.items():
         if name not in list(model.names)[1:]:
             raise UnknownNameError("joint", name, list(model.names)[1:])
         joint = model.joints[model.getJointId(name)]
-        if joint.nq != 1:
-            raise RobotError(f"robot file {file!r}: joint {name!r} has {joint.nq} coordinates and "
-                             "cannot be locked")
-        q[joint.idx_q] = value
+        if joint.nv != 1 and value != 0.0:
+            raise RobotError(f"robot file {file!r}: joint {name!r} has {joint.nv} velocities and "
+                             "can only be locked where the file has it, at 0.0")
+        step[joint.idx_v:joint.idx_v + joint.nv] = value
         indices.append(int(joint.id))
-    return pin.buildReducedModel(model, indices, q)
-
-
-def _urdf_model(root: Element, base: Base | None) -> Any:
-    free = (pin.JointModelFreeFlyer(),) if base == "floating" else ()
-    return pin.buildModelFromXML(ElementTree.tostring(root, encoding="unicode"), *free)
+    return pin.buildReducedModel(model, indices, pin.integrate(model, pin.neutral(model), step))
 
 
 def _mjcf_model(root: Element, base: Base | None) -> Any:
@@ -211,7 +220,13 @@ def _mjcf_shapes(path: Path, root: Element, model: Any, meshes: bool) -> tuple[A
     return geometry.geometryObjects, missing
 
 
-def _held_by(model: Any, capsules: tuple[Any, ...]) -> tuple[Any, ...]:
-    """Omit capsules that belong to no joint of the model or have no size."""
-    return tuple(c for c in capsules if 0 <= c.joint < model.njoints
-                 and (c.radius > 0.0 or not np.array_equal(c.start, c.end)))
+def _held_by(model: Any, capsules: tuple[Any, ...]) -> tuple[tuple[Any, ...], tuple[str, ...]]:
+    """Omit capsules that belong to no joint of the model or have no size.
+
+    Those beside a free base are named, for the world is no part of the robot.
+    """
+    of_world = [c.name for c in capsules if c.joint == 0 and is_floating(model)]
+    said = (f"collision geometry {some(of_world)} is fixed to the world, not to the robot; a "
+            "scenario may list it as an obstacle",) if of_world else ()
+    return tuple(c for c in capsules if 0 <= c.joint < model.njoints and c.name not in of_world
+                 and (c.radius > 0.0 or not np.array_equal(c.start, c.end))), said

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -11,6 +11,10 @@ import numpy as np
 from hierarchy.avoidance.control_points import ControlPoint
 from hierarchy.avoidance.self_collision import Capsule
 from hierarchy.problem import Array
+from hierarchy.robots.frames import ambiguous
+from hierarchy.words import some
+
+_HUGE = 1e300  # a limit of pinocchio beyond this is none
 
 
 @dataclass(frozen=True)
@@ -68,6 +72,20 @@ def is_floating(model: Any) -> bool:
     return model.njoints > 1 and "freeflyer" in str(model.joints[1].shortname()).lower()
 
 
+def remarks(model: Any) -> Iterator[str]:
+    """Yield a sentence on each kind of limit that joints are without, and on ambiguous frames."""
+    joints = [joint for joint in model.joints[1 + is_floating(model):] if joint.nv > 0]
+    for kind, limit in (("velocity", model.upperVelocityLimit), ("effort", model.effortLimit)):
+        without = [str(model.names[joint.id]) for joint in joints
+                   if not all(0.0 < value < _HUGE
+                              for value in limit[joint.idx_v:joint.idx_v + joint.nv])]
+        if without:
+            yield f"{kind} limits of {some(without)}: none, or 0, which is no limit"
+    if names := ambiguous(model):
+        yield (f"the frames called {some(names)}: each name is at two places, such as a joint and "
+               "a link, and is refused where it is asked for")
+
+
 def neutral_within_limits(model: Any, neutral: Array) -> Array:
     """Return `neutral` (nq,) with each coordinate of one-coordinate joints moved inside its limits.
 
@@ -82,5 +100,3 @@ def neutral_within_limits(model: Any, neutral: Array) -> Array:
                 q[i] = (lower + upper) / 2 if np.isfinite([lower, upper]).all() else (
                     min(max(q[i], lower), upper))
     return q
-
-

@@ -18,6 +18,12 @@ def in_package(model: str) -> bool:
     return model.partition(":")[0] in PACKAGES and ":" in model
 
 
+def is_file_name(model: str) -> bool:
+    """Whether `model` is meant as a file: it has a suffix, or a folder in front."""
+    path = Path(model)
+    return path.suffix[1:2].isalpha() or len(path.parts) > 1
+
+
 def elsewhere(name: str) -> str:
     """Return where a robot that the package does not ship may be found, as a sentence."""
     found = [f"{package}:{known}" for package, names in _installed().items() for known in names

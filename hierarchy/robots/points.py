@@ -10,6 +10,7 @@ import numpy as np
 
 from hierarchy.avoidance.control_points import ControlPoint
 from hierarchy.problem import Array
+from hierarchy.robots.frames import ambiguous
 
 COUNT = 8            # number of proposed control points
 FIRST_MOVED_BY = 3   # they start at the origin of this joint of the chain, counted from 1
@@ -21,9 +22,10 @@ def proposed_end_effector(model: Any) -> str:
     """Return the last frame with a common name of a tool, or the last that most joints move.
 
     Common names are tcp, tool, ee, eef, end_effector, gripper and flange, between underscores;
-    frames that no joint moves do not count, nor do the frames of joints.
+    frames that no joint moves do not count, nor do the frames of joints and names at two places.
     """
-    frames = list(model.frames)
+    unclear = set(ambiguous(model))
+    frames = [frame for frame in model.frames if frame.name not in unclear]
     joints = set(model.names)
     named = [frame.name for frame in frames if frame.parentJoint > 0
              and frame.name not in joints and _NAMED_SO.search(frame.name)]

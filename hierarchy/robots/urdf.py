@@ -8,36 +8,129 @@ from itertools import pairwise
 from math import isfinite
 from pathlib import Path
 from xml.etree import ElementTree
+from xml.parsers import expat
+
+import numpy as np
 
 from hierarchy.errors import RobotError
 from hierarchy.robots.found import Coupled
+from hierarchy.words import some
 
 Element = ElementTree.Element
 
-_KINDS = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar", "spherical")
+_KINDS = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
 _WITH_AXIS = ("revolute", "continuous", "prismatic", "planar")
 _WITH_LIMIT = ("revolute", "prismatic")
+_INERTIA = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 _MOST = 5  # complaints that are told
+_ROUNDING = 1e-12  # of a principal moment relative to the largest
+
+
+_EXPAND = "expand its macros first: xacro in.xacro > out.urdf"
+_EXPECTED = "expected a URDF (<robot>) or an MJCF (<mujoco>)"
+_OTHERS = {  # by root element, in small letters
+    "sdf": "is an SDF (Gazebo), which is not read; give the URDF that it was made from",
+    "mujocoinclude": "is a part of an MJCF; give the file that includes it",
+    "collada": "is a mesh; give the URDF or MJCF that names it"}
 
 
 def read_xml(path: Path) -> Element:
-    """Return the root of an XML file; raises RobotError with the line of a fault in it."""
+    """Return the root of an XML file; raises RobotError with the line of a fault in it.
+
+    As in pinocchio a prefix is a part of a name, whether or not a namespace is bound to it, and
+    space in front of the file does not count.
+    """
+    tree, parser = ElementTree.TreeBuilder(), expat.ParserCreate()
+    parser.StartElementHandler, parser.EndElementHandler = tree.start, tree.end
+    parser.CharacterDataHandler = tree.data
     try:
-        return ElementTree.parse(path).getroot()
-    except (ElementTree.ParseError, ValueError, LookupError) as error:
-        raise RobotError(f"robot file {str(path)!r} is not valid XML: {error}") from error
+        parser.Parse(path.read_bytes().lstrip(), True)
+    except (expat.ExpatError, ValueError, LookupError) as error:
+        if path.suffix == ".toml":
+            raise RobotError(f"robot file {str(path)!r} is a TOML file; {_EXPECTED}. A scenario "
+                             "is read by scenarios.load or `hierarchy run`") from error
+        raise RobotError(f"robot file {str(path)!r} is not valid XML: {error}; {_EXPECTED}"
+                         ) from error
+    return tree.close()
 
 
-def checked(path: Path) -> Element:
-    """Return the root of a URDF; raises RobotError that names the joints or links at fault."""
+def root_of(path: Path) -> Element:
+    """Return the root of a URDF or MJCF file, whatever its suffix.
+
+    Raises RobotError that says what another file is, and what to give instead.
+    """
+    if path.is_dir():
+        raise RobotError(f"robot file {str(path)!r} is a folder; give the URDF or MJCF in it")
+    if not path.is_file():
+        raise RobotError(f"robot file {str(path)!r} does not exist")
     root = read_xml(path)
-    if root.tag != "robot":
-        raise RobotError(f"robot file {str(path)!r} is no URDF: it starts with <{root.tag}>, "
-                         "not with <robot>")
+    if root.tag not in ("robot", "mujoco"):
+        what = _OTHERS.get(root.tag.lower(), "is no robot")
+        raise RobotError(f"robot file {str(path)!r} {what}: it starts with <{root.tag}>; "
+                         f"{_EXPECTED}")
+    return root
+
+
+def check(root: Element, path: Path) -> None:
+    """Raise a RobotError that names the joints or links at fault, and macros left in."""
+    macros = left_over(root)
+    if macros and path.suffix == ".xacro":
+        raise RobotError(f"robot file {str(path)!r} has macros, such as {macros[0]}; {_EXPAND}")
     if wrong := list(_complaints(root)):
         more = f"; and {len(wrong) - _MOST} more" if len(wrong) > _MOST else ""
-        raise RobotError(f"robot file {str(path)!r}: {'; '.join(wrong[:_MOST])}{more}")
-    return root
+        remedy = f". It has macros, such as {macros[0]}; {_EXPAND}" if macros else ""
+        raise RobotError(f"robot file {str(path)!r}: {'; '.join(wrong[:_MOST])}{more}{remedy}")
+
+
+def left_over(root: Element) -> list[str]:
+    """Return the macros of xacro that were not expanded: elements, and values of links and joints.
+
+    Definitions of arguments and properties stand for nothing and do not count.
+    """
+    prefixes = {"xacro", *(key.removeprefix("xmlns:") for key, value in root.attrib.items()
+                           if key.startswith("xmlns:") and value.rstrip("/").endswith("xacro"))}
+    tags = [element.tag for element in root.iter()]
+    elements = [f"<{tag}>" for tag in tags if tag.partition(":")[0] in prefixes and ":" in tag
+                and tag.partition(":")[2] not in ("property", "arg")]
+    values = [value for part in (*root.findall("link"), *root.findall("joint"))
+              for element in part.iter() for value in element.attrib.values()
+              if "${" in value or "$(" in value]
+    return list(dict.fromkeys([*elements, *values]))
+
+
+def remarks(root: Element) -> Iterator[str]:
+    """Yield a sentence for each thing that a URDF says and the robot made from it is without."""
+    if macros := left_over(root):
+        yield (f"what the macros {some(macros, _MOST)} stand for is not in the robot; {_EXPAND}")
+    ignored = [_name(joint) for joint in root.findall("joint") if joint.find("limit") is not None
+               and joint.get("type") in ("floating", "planar")]
+    if ignored:
+        yield f"limits of {some(ignored)}: a floating or planar joint has none"
+    plain = [_name(joint) for joint in root.findall("joint")
+             if joint.get("type") == "planar" and joint.find("axis") is None]
+    if plain:
+        yield f"axes of the planar joints {some(plain)}: their planes are normal to x by default"
+    moments = {_name(link): _least_moment(link) for link in root.findall("link")}
+    for sign, what in ((-1.0, "negative, which no body has"),
+                       (0.0, "zero, though the link has a mass")):
+        if names := [name for name, found in moments.items() if found == sign]:
+            yield f"inertias of {some(names)}: a principal moment is {what}"
+
+
+def _least_moment(link: Element) -> float:
+    """Return the sign of the least principal moment of a link; 1 without an inertia or a mass."""
+    inertia = link.find("inertial/inertia")
+    numbers = None if inertia is None else _numbers(
+        " ".join(inertia.get(key, "") for key in _INERTIA), len(_INERTIA))
+    if numbers is None:
+        return 1.0  # the parser says so
+    xx, xy, xz, yy, yz, zz = numbers
+    moments = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    mass = _numbers(_attribute(link, "inertial/mass", "value") or "", 1) or [0.0]
+    rounding = _ROUNDING * float(np.abs(moments).max())
+    if abs(moments[0]) <= rounding:
+        return 0.0 if mass[0] > 0.0 else 1.0
+    return float(np.sign(moments[0]))
 
 
 def coupled(root: Element) -> tuple[Coupled, ...]:
@@ -53,6 +146,8 @@ def _complaints(root: Element) -> Iterator[str]:
     for tag, names in (("link", links), ("joint", joints)):
         yield from (f"{tag} {name!r} occurs {count} times"
                     for name, count in Counter(names).items() if count > 1)
+    if root.get("name") is None:
+        yield "its <robot> has no name"
     if not links:
         yield "it has no link"
     for joint in root.findall("joint"):
@@ -82,6 +177,8 @@ def _of_joint(joint: Element, links: list[str], joints: list[str]) -> Iterator[s
     yield from _of_limit(joint, kind)
     mimic = joint.find("mimic")
     if mimic is not None:
+        if mimic.get("joint") == _name(joint):
+            yield "it is to follow itself"
         if mimic.get("joint") not in joints:
             yield f"it is to follow joint {mimic.get('joint')!r}, which does not exist"
         for key in ("multiplier", "offset"):

@@ -8,17 +8,19 @@ from operator import itemgetter
 from typing import Any
 
 import numpy as np
+import tomli_w
 from pydantic import ValidationError
 
 from hierarchy import Robot, State, plugins
 from hierarchy.errors import UnknownNameError
 from hierarchy.robots import TABLES
-from hierarchy.robots.names import elsewhere, file_of, in_package
+from hierarchy.robots.found import remarks
+from hierarchy.robots.names import elsewhere, file_of, in_package, is_file_name
+from hierarchy.words import some
 from scenarios.config import ScenarioError, shipped, shipped_groups
 from scenarios.config.changes import change, parse_changes
 from scenarios.config.robot import RobotSection
 
-_FRAMES = 12   # names listed at most
 _ROUND = 4     # decimals of proposed positions [m]
 _TURNS = 50.0  # [rad] between limits of a joint beyond which they are taken for degrees
 _LEVEL = 0.02  # [m] between frames that are at the same height
@@ -27,9 +29,10 @@ _UNITS = {"rad": "rad, rad/s, N m", "m": "m, m/s, N"}
 
 def is_robot(text: str) -> bool:
     """Whether the text names a robot; a name that is also a scenario's means the scenario."""
-    of_file = in_package(text) or text.endswith((".urdf", ".xml", ".mjcf"))
-    named = text in TABLES or (not text.endswith(".toml") and text in plugins.own("robots"))
-    return of_file or (named and text not in shipped())
+    if text.endswith(".toml") or text in shipped():
+        return False
+    return (in_package(text) or is_file_name(text) or text in TABLES
+            or text in plugins.own("robots"))
 
 
 def check_known(text: str) -> None:
@@ -89,15 +92,14 @@ def say(section: RobotSection, robot: Robot) -> str:
              f"  mass            {found['mass_kg']:.3g} kg of moving links",
              f"  joints          {len(found['joints'])} actuated",
              *_joint_table(found["joints"]),
-             f"  frames          {_some(found['frames'])}",
+             f"  frames          {some(found['frames'])}",
              f"  end effector    {robot.end_effector}, {end}; "
              f"{_moved_by(robot)} joints move it",
              *_said_of_feet(found["lowest_frames"]),
              f"  capsules        {capsules}",
              f"  control points  {len(robot.control_points)}, {points}"]
     lines += [f"  missing         {sentence}" for sentence in found["missing"]]
-    lines += [f"  coupled         {one}, and moves on its own here: lock it, or add the task below"
-              for one in robot.coupled]
+    lines += [f"  follows         {one} (kept by every scenario)" for one in robot.coupled]
     lines += _suspicious(found["joints"])
     return "\n".join([*lines, "", "For a scenario file:", "", paste(section, robot)])
 
@@ -117,10 +119,6 @@ def paste(section: RobotSection, robot: Robot) -> str:
                                      for k, v in row.items() if v is not None) + " },"
                 for row in found[key]]
         lines += [f"{key} = [", *rows, "]"] if rows else []
-    for one in robot.coupled:
-        joints = f"{{ {_quoted(one.joint)} = 1.0, {_quoted(one.other)} = {-one.coefficients[1]} }}"
-        lines += ["", "[[tasks]]", 'kind = "coupling"', f"joints = {joints}",
-                  f"value = {one.coefficients[0]}"]
     return "\n".join(lines)
 
 
@@ -162,12 +160,10 @@ def _missing(robot: Robot) -> list[str]:
     joints = _joints(robot)
     kinds = {"position limits": [j["name"] for j in joints if j["lower"] is None
                                  and j["upper"] is None],
-             "velocity limits": [j["name"] for j in joints if j["velocity"] is None],
-             "effort limits": [j["name"] for j in joints if j["effort"] is None],
              "range between the position limits": [
                  j["name"] for j in joints if j["lower"] is not None
                  and j["lower"] == j["upper"]]}
-    said = [f"{kind} of {_some(names)}" for kind, names in kinds.items() if names]
+    said = [f"{kind} of {some(names)}" for kind, names in kinds.items() if names]
     if not robot.masses.any():
         said.append("masses: centre-of-mass tasks and torque limits are not possible")
     if not robot.capsules:
@@ -175,7 +171,7 @@ def _missing(robot: Robot) -> list[str]:
                     "robot.capsules")
     if not robot.control_points:
         said.append("control points: no avoidance; list robot.control_points")
-    return [*robot.missing, *said]
+    return list(dict.fromkeys([*robot.missing, *remarks(robot.model), *said]))
 
 
 def _lowest(robot: Robot) -> list[str]:
@@ -196,7 +192,7 @@ def _lowest(robot: Robot) -> list[str]:
 
 
 def _said_of_feet(names: list[str]) -> list[str]:
-    return [f"  lowest frames   {_some(names)}; [[contacts]] may be there"] if names else []
+    return [f"  lowest frames   {some(names)}; [[contacts]] may be there"] if names else []
 
 
 def _moved_by(robot: Robot) -> int:
@@ -215,11 +211,6 @@ def _rounded(place: Any) -> list[float]:
     return [float(value) + 0.0 for value in np.round(place, _ROUND)]
 
 
-def _some(names: Sequence[str]) -> str:
-    more = f" and {len(names) - _FRAMES} more" if len(names) > _FRAMES else ""
-    return ", ".join(names[:_FRAMES]) + more
-
-
 def _or_none(value: float) -> float | None:
     return float(value) if isfinite(value) else None
 
@@ -229,4 +220,4 @@ def _shown(value: float | None) -> str:
 
 
 def _quoted(text: str) -> str:
-    return '"' + text.replace("\\", "\\\\").replace('"', '\\"') + '"'
+    return tomli_w.dumps({"_": text}).removeprefix("_ = ").rstrip("\n")

@@ -8,7 +8,7 @@ from typing import Any
 
 from hierarchy import plugins
 from hierarchy.errors import HierarchyError, UnknownNameError, file_path
-from hierarchy.robots.names import in_package
+from hierarchy.robots.names import in_package, is_file_name
 from scenarios.config.avoidance import as_table
 from scenarios.config.changes import change_all, laid_over, parse_changes
 from scenarios.config.errors import ScenarioError
@@ -55,7 +55,7 @@ def _make_files_absolute(data: dict[str, Any], here: Path) -> None:
     """Put the folder `here` in front of the files that a scenario names."""
     robot = data.get("robot")
     if isinstance(robot, dict) and not in_package(model := str(robot.get("model", ""))) and (
-            model.endswith((".urdf", ".xml", ".mjcf"))):
+            is_file_name(model)):
         robot["model"] = str(here / robot["model"])
     sensor = data.get("sensor")
     folder = sensor.get("folder") if isinstance(sensor, dict) else None

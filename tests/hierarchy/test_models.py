@@ -518,7 +518,9 @@ LOOP = '<joint name="back" type="fixed"><parent link="fore"/><child link="upper"
     ({"more": LOOP}, "joints 'back', 'elbow' are a loop"),
     ({"more": '<link name="alone"/>'}, "links 'base', 'alone' have no parent"),
     ({"more": '<link name="base"/>'}, "link 'base' occurs 2 times"),
-    ({"more": '<xacro:include/>'}, "not valid XML"),
+    ({"more": "<xacro:include>"}, "not valid XML"),
+    ({"mimic": '<mimic joint="elbow"/>'}, "joint 'elbow': it is to follow itself"),
+    ({"kind": "spherical"}, "joint 'shoulder': its type is 'spherical'; expected one of"),
 ])
 def test_a_wrong_urdf_is_refused_with_the_name_of_its_joint(changed, said, tmp_path, capfd):
     path = tmp_path / "arm.urdf"
@@ -562,7 +564,6 @@ def test_an_mjcf_includes_files(tmp_path):
     ('<mujoco><include file="no.xml"/></mujoco>', "the file 'no.xml', which it includes"),
     ('<mujoco><include file="it.xml"/></mujoco>', "'it.xml' is included more than once"),
     ("<mujoco/>", "it has no body"),
-    ("<robot/>", "is no MJCF: it starts with <robot>"),
     (f"<mujoco><worldbody>{ONE_BODY.format('a', ONE_BODY.format('a', ''))}</worldbody></mujoco>",
      "joint 'a' occurs 2 times"),
     (f"<mujoco><worldbody>{ONE_BODY.format('a', '')}</worldbody></mujoco>".replace("1", "0"),

@@ -155,7 +155,7 @@ def test_bad_robot_files_are_named(tmp_path, pendulum):
     (tmp_path / "broken.urdf").write_text("<robot")
     (tmp_path / "arm.stl").write_text("solid")
     for path, said in [("none.urdf", "does not exist"), ("broken.urdf", "not valid XML"),
-                       ("arm.stl", "expected .urdf")]:
+                       ("arm.stl", "expected a URDF")]:
         with pytest.raises(HierarchyError, match=said):
             Robot.from_file(tmp_path / path)
     with pytest.raises(HierarchyError, match="unknown frame 'tool'"):
