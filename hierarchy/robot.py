@@ -81,7 +81,8 @@ class Robot:
         self.model, self.name = model, name
         self.n, self.nq = int(model.nv), int(model.nq)
         if self.n == 0:
-            raise RobotError(f"robot {name!r} has no joint that moves")
+            raise RobotError(f"robot {name!r} has no joint that moves; with base = 'floating' it "
+                             "moves as a whole")
         self.base: Base = "floating" if is_floating(model) else "fixed"
         self.actuated = 6 if self.base == "floating" else 0
         self.joint_names: tuple[str, ...] = tuple(model.names)[1:]

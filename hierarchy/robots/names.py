@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from contextlib import suppress
 from importlib import import_module
 from importlib.metadata import PackageNotFoundError, PackagePath, distribution
@@ -20,8 +21,7 @@ def in_package(model: str) -> bool:
 
 def is_file_name(model: str) -> bool:
     """Whether `model` is meant as a file: it has a suffix, or a folder in front."""
-    path = Path(model)
-    return path.suffix[1:2].isalpha() or len(path.parts) > 1
+    return Path(model).suffix[1:2].isalpha() or "/" in model or os.sep in model
 
 
 def elsewhere(name: str) -> str:

@@ -1,0 +1,274 @@
+"""URDF files as users have them: what they mean is read, and what is lost is said."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from hierarchy import Robot, State
+from hierarchy.errors import RobotError
+
+LIMIT = '<limit lower="-1" upper="1" velocity="2" effort="3"/>'
+INERTIAL = """<inertial><origin xyz="0.1 0.2 0.3"/><mass value="2"/>
+  <inertia ixx="0.3" iyy="0.4" izz="0.5" ixy="0.01" ixz="0.02" iyz="0.03"/></inertial>"""
+CENTRE = np.array([0.1, 0.2, 0.3])
+INERTIA = np.array([[0.3, 0.01, 0.02], [0.01, 0.4, 0.03], [0.02, 0.03, 0.5]])
+ORIGIN = np.array([1.0, 2.0, 3.0]), Rotation.from_euler("xyz", [0.3, -0.4, 0.5])
+
+
+def joint(name, kind, parent, child, inside=LIMIT, axis="0 1 0", origin=""):
+    axis = f'<axis xyz="{axis}"/>' if axis else ""
+    return (f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>'
+            f"{origin}{axis}{inside}</joint>")
+
+
+def link(name, inside=INERTIAL):
+    return f'<link name="{name}">{inside}</link>'
+
+
+PLACED = '<origin xyz="1 2 3" rpy="0.3 -0.4 0.5"/>'
+BALL = ('<collision><origin xyz="0.1 0.2 0.3"/><geometry><sphere radius="0.1"/></geometry>'
+        "</collision>")
+
+
+@pytest.fixture
+def load(tmp_path):
+    def write(*parts, name="r.urdf", root='<robot name="r">', **options):
+        path = tmp_path / name
+        path.write_text(root + "".join(parts) + "</robot>")
+        return Robot.load(path, **options)
+    return write
+
+
+def two_joints(kind, axis="0 1 0", inside=LIMIT, world=""):
+    """A world, a base on a joint of this kind, and an arm on the base."""
+    return (link("world", world), link("base", INERTIAL + BALL), link("arm"),
+            joint("first", kind, "world", "base", inside, axis, PLACED),
+            joint("second", "revolute", "base", "arm", origin='<origin xyz="0 0 0.5"/>'))
+
+
+def placement(robot, q, name):
+    state, frame = State.at(robot, q), robot.frame(name)
+    return state.position(frame), state.rotation(frame)
+
+
+# A free base
+
+
+@pytest.mark.parametrize("base", [None, "floating"])
+def test_a_floating_first_joint_is_the_free_base(load, base):
+    robot = load(*two_joints("floating"), base=base)
+    assert (robot.base, robot.n, robot.joint_names) == ("floating", 7, ("first", "second"))
+    p, R = placement(robot, robot.rest, "base")
+    np.testing.assert_allclose(p, ORIGIN[0])
+    np.testing.assert_allclose(R, ORIGIN[1].as_matrix(), atol=1e-12)
+
+
+def test_the_position_of_a_free_base_is_that_in_the_world(load):
+    robot = load(*two_joints("floating"))
+    turned = Rotation.from_euler("xyz", [0.1, 0.2, 0.3])
+    p, R = placement(robot, [5.0, 6.0, 7.0, *turned.as_quat(), 0.0], "base")
+    np.testing.assert_allclose(p, [5.0, 6.0, 7.0])
+    np.testing.assert_allclose(R, turned.as_matrix(), atol=1e-12)
+
+
+def test_a_floating_first_joint_is_fixed_at_its_place(load):
+    robot = load(*two_joints("floating"), base="fixed")
+    assert (robot.base, robot.joint_names) == ("fixed", ("second",))
+    p, R = placement(robot, [0.0], "arm")
+    np.testing.assert_allclose(p, ORIGIN[0] + ORIGIN[1].apply([0.0, 0.0, 0.5]))
+    np.testing.assert_allclose(R, ORIGIN[1].as_matrix(), atol=1e-12)
+
+
+def test_shapes_of_the_world_are_no_part_of_a_robot_on_a_free_base(load):
+    robot = load(*two_joints("floating", world=BALL))
+    assert [capsule.joint for capsule in robot.capsules] == [1]
+    assert "collision geometry world_0 is fixed to the world" in " ".join(robot.missing)
+
+
+def test_a_second_joint_with_the_name_of_a_free_base_is_refused(load):
+    parts = link("a"), link("b"), joint("root_joint", "revolute", "a", "b")
+    assert load(*parts).n == 1
+    with pytest.raises(RobotError, match="root_joint"):
+        load(*parts, base="floating")
+
+
+# Planar joints
+
+
+def motion_of(robot, q, along):
+    """Pose of the base in the frame of the planar joint's origin, with axes `along` of q 1, 2."""
+    turned = Rotation.from_rotvec(np.arctan2(q[3], q[2]) * np.cross(*along))
+    return along.T @ q[:2], turned
+
+
+@pytest.mark.parametrize("axis", ["1 0 0", "0 1 0", "0 0 1", "0 0 -1", "1 -2 3", ""])
+def test_a_planar_joint_moves_in_the_plane_normal_to_its_axis(load, axis):
+    robot = load(*two_joints("planar", axis, ""))
+    normal = np.array((axis or "1 0 0").split(), dtype=float)
+    normal /= np.linalg.norm(normal)
+    home = placement(robot, [0.0, 0.0, 1.0, 0.0, 0.0], "base")
+    np.testing.assert_allclose(home[0], ORIGIN[0])
+    np.testing.assert_allclose(home[1], ORIGIN[1].as_matrix(), atol=1e-12)
+    along = np.array([ORIGIN[1].inv().apply(placement(robot, [*e, 1, 0, 0], "base")[0] - ORIGIN[0])
+                      for e in np.eye(2)])
+    np.testing.assert_allclose(along @ along.T, np.eye(2), atol=1e-12)
+    np.testing.assert_allclose(np.cross(*along), normal, atol=1e-12)
+    q = np.array([0.4, -0.7, np.cos(0.6), np.sin(0.6), 0.2])
+    p, turned = motion_of(robot, q, along)
+    second = turned * Rotation.from_rotvec([0.0, 0.2, 0.0])
+    for name, place, R in (("base", p, turned), ("first", p, turned),
+                           ("arm", p + turned.apply([0.0, 0.0, 0.5]), second)):
+        found = placement(robot, q, name)
+        np.testing.assert_allclose(found[0], ORIGIN[0] + ORIGIN[1].apply(place), atol=1e-12)
+        np.testing.assert_allclose(found[1], (ORIGIN[1] * R).as_matrix(), atol=1e-12)
+
+
+def test_masses_and_shapes_on_a_planar_joint_are_where_the_file_has_them(load):
+    robot, h = load(*two_joints("planar", "1 -2 3", "")), 1e-6
+    along = np.array([ORIGIN[1].inv().apply(placement(robot, [*e, 1, 0, 0], "base")[0] - ORIGIN[0])
+                      for e in np.eye(2)])
+    q, v = robot.integrate([0, 0, 1, 0, 0], [0.4, -0.7, 0.6, 0.2]), np.array([0.3, 0.5, -0.8, 0.9])
+
+    def bodies(q):
+        p, R = motion_of(robot, q, along)
+        arm = R * Rotation.from_rotvec([0.0, q[4], 0.0])
+        return ((p + R.apply(CENTRE), R),
+                (p + R.apply([0.0, 0.0, 0.5]) + arm.apply(CENTRE), arm))
+
+    energy = 0.0
+    for (later, R2), (before, R1) in zip(bodies(robot.integrate(q, h * v)),
+                                         bodies(robot.integrate(q, -h * v)), strict=True):
+        speed, turning = (later - before) / (2 * h), (R1.inv() * R2).as_rotvec() / (2 * h)
+        energy += speed @ speed + turning @ INERTIA @ turning / 2  # of 2 kg
+    state = State.at(robot, q, v)
+    assert v @ state.dynamics.M @ v / 2 == pytest.approx(energy, rel=1e-8)
+    ball = robot.capsules[0]
+    R, p = state._placement(ball.joint)
+    np.testing.assert_allclose(p + R @ ball.start,
+                               ORIGIN[0] + ORIGIN[1].apply(bodies(q)[0][0]), atol=1e-12)
+
+
+# What is lost is said
+
+
+@pytest.mark.parametrize(("changed", "said"), [
+    ({"arm": INERTIAL.replace("0.4", "-0.4")}, "inertias of arm: a principal moment is negative"),
+    ({"arm": INERTIAL.replace("0.01", "0.9")}, "inertias of arm: a principal moment is negative"),
+    ({"arm": '<inertial><mass value="1"/><inertia ixx="0" iyy="0" izz="0" ixy="0" ixz="0" iyz="0"/>'
+             "</inertial>"}, "inertias of arm: a principal moment is zero, though"),
+    ({"arm": INERTIAL.replace("0.4", "${x}")}, "inertial of arm cannot be read: Inertial: inertia"),
+    ({"arm": '<inertial><mass value="3"/></inertial>'}, "inertial of arm cannot be read: Inertial"),
+    ({"arm": '<collision><geometry><box size="1 2"/></geometry></collision>'},
+     "collision of arm cannot be read: Parser found 2 elements"),
+    ({"arm": '<collision><geometry><pyramid/></geometry></collision>'}, "type 'pyramid'"),
+    ({"arm": "<visual/>"}, "visual of arm cannot be read"),
+    ({"arm": INERTIAL.replace("0.4", "${x}")}, "what the macros ${x} stand for is not in the robot"),
+    ({"more": '<xacro:gripper side="left"/>'}, "the macros <xacro:gripper> stand for"),
+    ({"more": '<x:gripper xmlns:y="" side="left"/>', "root": ' xmlns:x="http://wiki.ros.org/xacro"'},
+     "the macros <x:gripper> stand for"),
+    ({"limit": '<limit lower="-1" upper="1" velocity="0" effort="3"/>'},
+     "velocity limits of only: none, or 0, which is no limit"),
+    ({"limit": '<limit lower="-1" upper="1" velocity="2" effort="0"/>'}, "effort limits of only:"),
+    ({"kind": "planar"}, "limits of only: a floating or planar joint has none"),
+    ({"kind": "planar", "axis": ""}, "axes of the planar joints only: their planes are normal to x"),
+    ({"more": link("only") + joint("x", "fixed", "base", "only", "", "")}, "frames called only:"),
+])
+def test_what_a_robot_is_without_is_said(load, changed, said):
+    given = {"arm": INERTIAL, "more": "", "root": "", "limit": LIMIT, "kind": "revolute",
+             "axis": "0 1 0", **changed}
+    robot = load(link("base"), link("arm", given["arm"]),
+                 joint("only", given["kind"], "base", "arm", given["limit"], given["axis"]),
+                 given["more"], root=f'<robot name="r"{given["root"]}>')
+    assert [sentence for sentence in robot.missing if said in sentence], robot.missing
+
+
+def test_of_a_whole_file_nothing_is_missing(load, capfd):
+    assert load(link("a"), link("b"), joint("j", "revolute", "a", "b")).missing == ()
+    assert capfd.readouterr() == ("", "")
+
+
+def test_links_with_the_same_fault_share_a_sentence(load):
+    broken = INERTIAL.replace("0.4", "x")
+    robot = load(link("a", broken), link("b", broken), joint("j", "revolute", "a", "b"))
+    assert robot.missing == ("inertial of a, b cannot be read: Inertial: inertia element iyy is "
+                             "not a valid double",)
+
+
+@pytest.mark.parametrize("more", ['<sensor:camera name="eye"/>', '<gazebo xi:include="more"/>',
+                                  '<xacro:property name="width" value="0.1"/>'])
+def test_prefixes_need_no_namespace(load, more):
+    assert load(link("a"), link("b"), joint("j", "revolute", "a", "b"), more).missing == ()
+
+
+def test_a_joint_that_follows_a_locked_one_stays_where_that_holds_it(load):
+    mimic = '<mimic joint="lead" multiplier="2" offset="0.1"/>'
+    parts = (*map(link, "abc"), joint("lead", "continuous", "a", "b", ""),
+             joint("led", "revolute", "b", "c", LIMIT + mimic))
+    robot = load(*parts, locked={"lead": 0.4})
+    assert [(one.joint, one.other, one.coefficients) for one in robot.coupled] == [
+        ("led", "", (pytest.approx(0.9),))]
+    np.testing.assert_allclose(placement(robot, [0.0], "b")[1],
+                               Rotation.from_rotvec([0, 0.4, 0]).as_matrix(), atol=1e-12)
+
+
+def test_a_joint_of_several_velocities_is_locked_where_the_file_has_it(load):
+    robot = load(*two_joints("planar"), locked={"first": 0.0})
+    assert robot.joint_names == ("second",)
+    np.testing.assert_allclose(placement(robot, [0.0], "base")[0], ORIGIN[0])
+    with pytest.raises(RobotError, match="'first' has 3 velocities and can only be locked where"):
+        load(*two_joints("planar"), locked={"first": 0.2})
+
+
+# Two frames of one name
+
+
+def test_a_name_at_two_places_is_refused_where_it_is_asked_for(load):
+    parts = (*map(link, ("base", "wrist", "tool")), joint("tool", "revolute", "base", "wrist"),
+             joint("mount", "fixed", "wrist", "tool", "", "", PLACED))
+    robot = load(*parts)
+    with pytest.raises(RobotError, match="2 frames are called 'tool', a joint on the body of joint "
+                                         "'tool' and a link on the body of joint 'tool'"):
+        robot.frame("tool")
+    assert "tool" not in robot.frame_names
+    assert robot.end_effector == "mount", "not the tool, which is two"
+
+
+def test_a_joint_and_a_link_of_one_name_at_one_place_are_one_frame(load):
+    robot = load(link("base"), link("wrist"), joint("wrist", "revolute", "base", "wrist"))
+    assert robot.missing == ()
+    assert robot.frame("wrist").joint == 1
+
+
+# Which file it is
+
+
+@pytest.mark.parametrize("name", ["r.URDF", "r.xml", "r.xacro", "r.txt"])
+def test_the_root_element_says_what_a_file_is(load, name):
+    assert load(link("a"), link("b"), joint("j", "revolute", "a", "b"), name=name).n == 1
+
+
+@pytest.mark.parametrize(("name", "text", "said"), [
+    ("a.sdf", "<sdf/>", r"is an SDF \(Gazebo\), which is not read; give the URDF"),
+    ("a.world", '<sdf version="1.6"><world name="w"/></sdf>', "is an SDF"),
+    ("a.urdf", "<sdf/>", "is an SDF"),
+    ("a.xacro", "<robot name='r'><xacro:include filename='b'/></robot>",
+     r"has macros, such as <xacro:include>; .*xacro in\.xacro > out\.urdf"),
+    ("a.urdf", "<robot name='r'><xacro:include filename='b'/></robot>", r"no link.*out\.urdf"),
+    ("a.urdf", "<launch/>", r"starts with <launch>; expected a URDF \(<robot>\) or an MJCF"),
+    ("a.xml", "<mujocoinclude/>", "give the file that includes it"),
+    ("a.dae", "<COLLADA/>", "is a mesh"),
+    ("a.toml", "name = 'a'", r"A scenario is read by scenarios\.load"),
+    ("a.urdf", "<robot/>", "its <robot> has no name"),
+    ("a.urdf", "<robot name='r'><link name='table'/></robot>", "with base = 'floating'"),
+])
+def test_another_file_is_refused_with_what_to_give(tmp_path, name, text, said):
+    (tmp_path / name).write_text(text)
+    with pytest.raises(RobotError, match=said):
+        Robot.load(tmp_path / name)
+
+
+def test_a_folder_and_a_missing_file_are_no_unknown_robots(tmp_path):
+    with pytest.raises(RobotError, match="is a folder"):
+        Robot.load(tmp_path)
+    with pytest.raises(RobotError, match="does not exist"):
+        Robot.load("nowhere.SDF")
