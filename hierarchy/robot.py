@@ -147,7 +147,7 @@ class Robot:
     def from_file(cls, path: str | Path, end_effector: str | None = None,
                   base: Base | None = None, shapes: bool = True,
                   locked: Mapping[str, float] | None = None) -> Robot:
-        """Read a URDF or MJCF file, which its root element tells; RobotError if it cannot be.
+        """Read a URDF or MJCF file (its root element says which); RobotError if it cannot.
 
         `end_effector` names a frame; without it one is proposed, see `hierarchy.robots.points`.
         `base` None is that of the file: floating if its first joint is free, else fixed. Capsules

@@ -19,7 +19,7 @@ import numpy as np
 import pinocchio as pin
 
 from hierarchy.errors import RobotError, UnknownNameError
-from hierarchy.robots import mjcf, urdf, urdf_model
+from hierarchy.robots import mjcf, urdf, urdf_model, urdf_remarks
 from hierarchy.robots.found import Coupled, Found, is_floating, neutral_within_limits, remarks
 from hierarchy.robots.points import proposed_end_effector
 from hierarchy.robots.shapes import capsules_of
@@ -46,14 +46,14 @@ def read_file(path: str | Path, base: Base | None = None, shapes: bool = True,
     with _printed() as lines:
         try:
             model = urdf_model.model_of(root, base) if is_urdf else _mjcf_model(root, base)
-            said = tuple(urdf_model.not_read(lines())) if is_urdf else ()
+            said = tuple(urdf_remarks.not_read(lines())) if is_urdf else ()
         except Exception as error:  # the parsers raise many types; all mean an invalid file
             raise RobotError(f"robot file {str(path)!r} cannot be read: "
                              f"{'; '.join([*lines(), _in_one_line(error)])}") from error
         model = _without(model, locked, str(path))
         found = _found(model, (urdf if is_urdf else mjcf).coupled(root), locked)
         if is_urdf:
-            found = replace(found, missing=(*said, *urdf.remarks(root), *remarks(model)))
+            found = replace(found, missing=(*said, *urdf_remarks.remarks(root), *remarks(model)))
         if not shapes:
             return found
         geometries, missing = _geometry(path, root, model,

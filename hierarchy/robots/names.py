@@ -8,9 +8,12 @@ from importlib import import_module
 from importlib.metadata import PackageNotFoundError, PackagePath, distribution
 from pathlib import Path
 
+from hierarchy import plugins
 from hierarchy.errors import RobotError, UnknownNameError
 
 PACKAGES = ("example_robot_data", "robot_descriptions")
+_SUFFIXES = (".urdf", ".xml", ".mjcf",  # and those that are refused with what to give instead
+             ".xacro", ".sdf", ".world", ".toml", ".dae", ".stl", ".obj", ".mjb", ".usd", ".usda")
 _REMEDY = "pip install 'task-hierarchy[robots]'"
 
 
@@ -20,8 +23,9 @@ def in_package(model: str) -> bool:
 
 
 def is_file_name(model: str) -> bool:
-    """Whether `model` is meant as a file: it has a suffix, or a folder in front."""
-    return Path(model).suffix[1:2].isalpha() or "/" in model or os.sep in model
+    """Whether `model` is meant as a file: by its suffix, or since it has a folder in front."""
+    return model not in plugins.own("robots") and (
+        model.lower().endswith(_SUFFIXES) or "/" in model or os.sep in model)
 
 
 def elsewhere(name: str) -> str:

@@ -10,23 +10,16 @@ from pathlib import Path
 from xml.etree import ElementTree
 from xml.parsers import expat
 
-import numpy as np
-
 from hierarchy.errors import RobotError
 from hierarchy.robots.found import Coupled
-from hierarchy.words import some
 
 Element = ElementTree.Element
 
 _KINDS = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
 _WITH_AXIS = ("revolute", "continuous", "prismatic", "planar")
 _WITH_LIMIT = ("revolute", "prismatic")
-_INERTIA = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 _MOST = 5  # complaints that are told
-_ROUNDING = 1e-12  # of a principal moment relative to the largest
-
-
-_EXPAND = "expand its macros first: xacro in.xacro > out.urdf"
+EXPAND = "expand macros first: xacro in.xacro > out.urdf"
 _EXPECTED = "expected a URDF (<robot>) or an MJCF (<mujoco>)"
 _OTHERS = {  # by root element, in small letters
     "sdf": "is an SDF (Gazebo), which is not read; give the URDF that it was made from",
@@ -75,10 +68,10 @@ def check(root: Element, path: Path) -> None:
     """Raise a RobotError that names the joints or links at fault, and macros left in."""
     macros = left_over(root)
     if macros and path.suffix == ".xacro":
-        raise RobotError(f"robot file {str(path)!r} has macros, such as {macros[0]}; {_EXPAND}")
+        raise RobotError(f"robot file {str(path)!r} has macros, such as {macros[0]}; {EXPAND}")
     if wrong := list(_complaints(root)):
         more = f"; and {len(wrong) - _MOST} more" if len(wrong) > _MOST else ""
-        remedy = f". It has macros, such as {macros[0]}; {_EXPAND}" if macros else ""
+        remedy = f". It has macros, such as {macros[0]}; {EXPAND}" if macros else ""
         raise RobotError(f"robot file {str(path)!r}: {'; '.join(wrong[:_MOST])}{more}{remedy}")
 
 
@@ -98,51 +91,16 @@ def left_over(root: Element) -> list[str]:
     return list(dict.fromkeys([*elements, *values]))
 
 
-def remarks(root: Element) -> Iterator[str]:
-    """Yield a sentence for each thing that a URDF says and the robot made from it is without."""
-    if macros := left_over(root):
-        yield (f"what the macros {some(macros, _MOST)} stand for is not in the robot; {_EXPAND}")
-    ignored = [_name(joint) for joint in root.findall("joint") if joint.find("limit") is not None
-               and joint.get("type") in ("floating", "planar")]
-    if ignored:
-        yield f"limits of {some(ignored)}: a floating or planar joint has none"
-    plain = [_name(joint) for joint in root.findall("joint")
-             if joint.get("type") == "planar" and joint.find("axis") is None]
-    if plain:
-        yield f"axes of the planar joints {some(plain)}: their planes are normal to x by default"
-    moments = {_name(link): _least_moment(link) for link in root.findall("link")}
-    for sign, what in ((-1.0, "negative, which no body has"),
-                       (0.0, "zero, though the link has a mass")):
-        if names := [name for name, found in moments.items() if found == sign]:
-            yield f"inertias of {some(names)}: a principal moment is {what}"
-
-
-def _least_moment(link: Element) -> float:
-    """Return the sign of the least principal moment of a link; 1 without an inertia or a mass."""
-    inertia = link.find("inertial/inertia")
-    numbers = None if inertia is None else _numbers(
-        " ".join(inertia.get(key, "") for key in _INERTIA), len(_INERTIA))
-    if numbers is None:
-        return 1.0  # the parser says so
-    xx, xy, xz, yy, yz, zz = numbers
-    moments = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    mass = _numbers(_attribute(link, "inertial/mass", "value") or "", 1) or [0.0]
-    rounding = _ROUNDING * float(np.abs(moments).max())
-    if abs(moments[0]) <= rounding:
-        return 0.0 if mass[0] > 0.0 else 1.0
-    return float(np.sign(moments[0]))
-
-
 def coupled(root: Element) -> tuple[Coupled, ...]:
     """Return the joints that follow another one (`mimic`)."""
-    return tuple(Coupled(_name(joint), str(mimic.get("joint")),
+    return tuple(Coupled(name_of(joint), str(mimic.get("joint")),
                          (float(mimic.get("offset", 0.0)), float(mimic.get("multiplier", 1.0))))
                  for joint in root.findall("joint")
                  for mimic in joint.findall("mimic") if joint.get("type") != "fixed")
 
 
 def _complaints(root: Element) -> Iterator[str]:
-    links, joints = ([_name(one) for one in root.findall(tag)] for tag in ("link", "joint"))
+    links, joints = ([name_of(one) for one in root.findall(tag)] for tag in ("link", "joint"))
     for tag, names in (("link", links), ("joint", joints)):
         yield from (f"{tag} {name!r} occurs {count} times"
                     for name, count in Counter(names).items() if count > 1)
@@ -151,10 +109,10 @@ def _complaints(root: Element) -> Iterator[str]:
     if not links:
         yield "it has no link"
     for joint in root.findall("joint"):
-        name = f"joint {_name(joint)!r}"
+        name = f"joint {name_of(joint)!r}"
         yield from (f"{name}: {said}" for said in _of_joint(joint, links, joints))
     for link in root.findall("link"):
-        yield from (f"link {_name(link)!r}: {said}" for said in _of_link(link))
+        yield from (f"link {name_of(link)!r}: {said}" for said in _of_link(link))
     yield from _of_tree(root, links)
 
 
@@ -163,12 +121,12 @@ def _of_joint(joint: Element, links: list[str], joints: list[str]) -> Iterator[s
     if kind not in _KINDS:
         yield f"its type is {kind!r}; expected one of {', '.join(_KINDS)}"
     for end in ("parent", "child"):
-        link = _attribute(joint, end, "link")
+        link = attribute_of(joint, end, "link")
         if link not in links:
             yield f"its {end} link {link!r} does not exist"
     axis = joint.find("axis")
     if axis is not None and kind in _WITH_AXIS:
-        numbers = _numbers(axis.get("xyz", ""), 3)
+        numbers = numbers_in(axis.get("xyz", ""), 3)
         if numbers is None:
             yield f"its axis {axis.get('xyz')!r} is not three finite numbers"
         elif not any(numbers):
@@ -177,12 +135,12 @@ def _of_joint(joint: Element, links: list[str], joints: list[str]) -> Iterator[s
     yield from _of_limit(joint, kind)
     mimic = joint.find("mimic")
     if mimic is not None:
-        if mimic.get("joint") == _name(joint):
+        if mimic.get("joint") == name_of(joint):
             yield "it is to follow itself"
         if mimic.get("joint") not in joints:
             yield f"it is to follow joint {mimic.get('joint')!r}, which does not exist"
         for key in ("multiplier", "offset"):
-            if _numbers(mimic.get(key, "0"), 1) is None:
+            if numbers_in(mimic.get(key, "0"), 1) is None:
                 yield f"its mimic {key} {mimic.get(key)!r} is not a finite number"
 
 
@@ -194,7 +152,7 @@ def _of_limit(joint: Element, kind: str | None) -> Iterator[str]:
         return
     found = {}
     for key in ("lower", "upper", "velocity", "effort"):
-        numbers = _numbers(limit.get(key, "0"), 1)
+        numbers = numbers_in(limit.get(key, "0"), 1)
         if numbers is None:
             yield f"its limit {key} = {limit.get(key)!r} is not a finite number"
         else:
@@ -206,8 +164,8 @@ def _of_limit(joint: Element, kind: str | None) -> Iterator[str]:
 
 
 def _of_link(link: Element) -> Iterator[str]:
-    mass = _attribute(link, "inertial/mass", "value")
-    number = None if mass is None else _numbers(mass, 1)
+    mass = attribute_of(link, "inertial/mass", "value")
+    number = None if mass is None else numbers_in(mass, 1)
     if mass is not None and (number is None or number[0] < 0.0):
         yield f"its mass {mass!r} is not a number from 0 on"
     for collision in link.findall("collision"):
@@ -215,13 +173,13 @@ def _of_link(link: Element) -> Iterator[str]:
         for shape in collision.findall("geometry/*"):
             yield from (f"its {shape.tag} has {key} = {shape.get(key)!r}"
                         for key in ("radius", "length") if shape.get(key) is not None
-                        and not (_numbers(str(shape.get(key)), 1) or (-1.0,))[0] >= 0.0)
+                        and not (numbers_in(str(shape.get(key)), 1) or (-1.0,))[0] >= 0.0)
 
 
 def _of_origin(element: Element) -> Iterator[str]:
     origin = element.find("origin")
     for key in ("xyz", "rpy") if origin is not None else ():
-        if origin is not None and _numbers(origin.get(key, "0 0 0"), 3) is None:
+        if origin is not None and numbers_in(origin.get(key, "0 0 0"), 3) is None:
             yield f"its origin {key} = {origin.get(key)!r} is not three finite numbers"
 
 
@@ -229,11 +187,11 @@ def _of_tree(root: Element, links: list[str]) -> Iterator[str]:
     """Yield why the links are no tree: two parents, several roots, or a loop."""
     above: dict[str, tuple[str, str]] = {}
     for joint in root.findall("joint"):
-        child, parent = (str(_attribute(joint, end, "link")) for end in ("child", "parent"))
+        child, parent = (str(attribute_of(joint, end, "link")) for end in ("child", "parent"))
         if child in above:
             yield (f"link {child!r} is the child of joint {above[child][0]!r} and of joint "
-                   f"{_name(joint)!r}; a URDF is a tree: close a loop with a task")
-        above[child] = _name(joint), parent
+                   f"{name_of(joint)!r}; a URDF is a tree: close a loop with a task")
+        above[child] = name_of(joint), parent
     roots = [link for link in links if link not in above]
     if len(roots) > 1:
         yield f"links {', '.join(map(repr, roots))} have no parent; a URDF has one root"
@@ -247,7 +205,8 @@ def _of_tree(root: Element, links: list[str]) -> Iterator[str]:
                 return
 
 
-def _numbers(text: str, count: int) -> list[float] | None:
+def numbers_in(text: str, count: int) -> list[float] | None:
+    """Return `count` finite numbers of a text, None if it has others."""
     try:
         numbers = [float(part) for part in text.split()]
     except ValueError:
@@ -255,10 +214,12 @@ def _numbers(text: str, count: int) -> list[float] | None:
     return numbers if len(numbers) == count and all(map(isfinite, numbers)) else None
 
 
-def _attribute(element: Element, path: str, key: str) -> str | None:
+def attribute_of(element: Element, path: str, key: str) -> str | None:
+    """Return an attribute of the element at a path, None if one of the two is not there."""
     found = element.find(path)
     return None if found is None else found.get(key)
 
 
-def _name(element: Element) -> str:
+def name_of(element: Element) -> str:
+    """Return the name of a link or joint, "" if it has none."""
     return element.get("name", "")

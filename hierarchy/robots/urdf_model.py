@@ -1,10 +1,7 @@
-"""The pinocchio model of a URDF, and in sentences what is lost between the file and the robot."""
+"""The pinocchio model of a URDF, with what pinocchio leaves out: bases and planes."""
 
 from __future__ import annotations
 
-import re
-from collections import defaultdict
-from collections.abc import Iterable, Iterator
 from typing import Any
 from xml.etree import ElementTree
 
@@ -15,11 +12,8 @@ from hierarchy.errors import RobotError
 from hierarchy.robots.found import is_floating
 from hierarchy.robots.from_table import ROOT
 from hierarchy.robots.table import Base
-from hierarchy.words import some
 
 Element = ElementTree.Element
-
-_NOT_READ = re.compile(r"Could not parse (\w+) element for Link \[(.*)\]")
 
 
 def model_of(root: Element, base: Base | None) -> Any:
@@ -57,19 +51,3 @@ def _turn(model: Any, joint: int, axis: Any) -> None:
     for frame in model.frames:
         if frame.parentJoint == joint:
             frame.placement = back * frame.placement
-
-
-def not_read(lines: Iterable[str]) -> Iterator[str]:
-    """Yield what the parser printed, one sentence for all links with the same fault."""
-    links: dict[tuple[str, str], list[str]] = defaultdict(list)
-    why: list[str] = []
-    for line in lines:
-        if (found := _NOT_READ.match(line)) is None:
-            why.append(line)
-            continue
-        links[found[1], "; ".join(why)].append(found[2])
-        why = []
-    for (part, reason), names in links.items():
-        told = f": {reason}" if reason else ""
-        yield f"{part} of {some(list(dict.fromkeys(names)))} cannot be read{told}"
-    yield from dict.fromkeys(why)

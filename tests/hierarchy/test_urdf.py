@@ -162,7 +162,7 @@ def test_masses_and_shapes_on_a_planar_joint_are_where_the_file_has_them(load):
      "collision of arm cannot be read: Parser found 2 elements"),
     ({"arm": '<collision><geometry><pyramid/></geometry></collision>'}, "type 'pyramid'"),
     ({"arm": "<visual/>"}, "visual of arm cannot be read"),
-    ({"arm": INERTIAL.replace("0.4", "${x}")}, "what the macros ${x} stand for is not in the robot"),
+    ({"arm": INERTIAL.replace("0.4", "${x}")}, "the macros ${x} stand for is not in the robot"),
     ({"more": '<xacro:gripper side="left"/>'}, "the macros <xacro:gripper> stand for"),
     ({"more": '<x:gripper xmlns:y="" side="left"/>', "root": ' xmlns:x="http://wiki.ros.org/xacro"'},
      "the macros <x:gripper> stand for"),
@@ -170,7 +170,7 @@ def test_masses_and_shapes_on_a_planar_joint_are_where_the_file_has_them(load):
      "velocity limits of only: none, or 0, which is no limit"),
     ({"limit": '<limit lower="-1" upper="1" velocity="2" effort="0"/>'}, "effort limits of only:"),
     ({"kind": "planar"}, "limits of only: a floating or planar joint has none"),
-    ({"kind": "planar", "axis": ""}, "axes of the planar joints only: their planes are normal to x"),
+    ({"kind": "planar", "axis": ""}, "planar joints only: their planes are normal to x"),
     ({"more": link("only") + joint("x", "fixed", "base", "only", "", "")}, "frames called only:"),
 ])
 def test_what_a_robot_is_without_is_said(load, changed, said):
@@ -198,6 +198,18 @@ def test_links_with_the_same_fault_share_a_sentence(load):
                                   '<xacro:property name="width" value="0.1"/>'])
 def test_prefixes_need_no_namespace(load, more):
     assert load(link("a"), link("b"), joint("j", "revolute", "a", "b"), more).missing == ()
+
+
+def test_space_in_front_of_a_file_does_not_count(load):
+    declared = '\n  <?xml version="1.0"?><robot name="r">'
+    assert load(link("a"), link("b"), joint("j", "revolute", "a", "b"), root=declared).n == 1
+
+
+def test_a_link_without_mass_needs_no_inertia(load):
+    empty = INERTIAL.replace('"2"', '"0"')
+    for number in ("0.3", "0.4", "0.5", "0.01", "0.02", "0.03"):
+        empty = empty.replace(f'"{number}"', '"0"')
+    assert load(link("a"), link("b", empty), joint("j", "revolute", "a", "b")).missing == ()
 
 
 def test_a_joint_that_follows_a_locked_one_stays_where_that_holds_it(load):

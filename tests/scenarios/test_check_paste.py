@@ -48,7 +48,7 @@ ROBOTS = {
                       ("hip", "revolute", "trunk", "leg", LIMIT)),
     "turning.urdf": urdf(("pan", "continuous", "base", "head", ""),
                          ("tilt", "continuous", "head", "eye", "")),
-    "odd.urdf": urdf(("a &quot;joint&quot; \\ é&#9;#1", "revolute", "base", "tool 'x' = [1]", LIMIT),
+    "odd.urdf": urdf(("a &quot;joint&quot; \\ é&#9;", "revolute", "base", "tool 'x' = [1]", LIMIT),
                      ("left/wrist.pitch", "prismatic", "tool 'x' = [1]", "ns::tool0", LIMIT)),
     "UPPER.URDF": urdf(("hip", "revolute", "trunk", "leg", LIMIT)),
     "scene.xml": """<mujoco><worldbody><geom type="plane" size="1 1 1"/><light pos="0 0 1"/>
@@ -65,7 +65,8 @@ def pasted(model, folder, capsys):
     said = capsys.readouterr().out
     section, path = said[said.index("[robot]\n"):], folder / "pasted.toml"
     end = next(line for line in section.splitlines() if line.startswith("end_effector = "))
-    path.write_text('name = "pasted"\n' + section + CONTROL + end.replace("end_effector", "frame"))
+    path.write_text('name = "pasted"\n' + section + CONTROL
+                    + end.replace("end_effector", "frame", 1))
     assert run_command(["check", str(path)]) == 0, capsys.readouterr().err
     assert run_command(["run", str(path), "--out", str(folder / "run")]) == 0
     return Robot.load(model), make_robot(load(path).robot)
