@@ -28,7 +28,7 @@ from scenarios.cell.tasks import (
     reference_of,
     task_of,
 )
-from scenarios.config import Scenario
+from scenarios.config import Scenario, ScenarioError
 from scenarios.config.listed import ListedForce, ListedLeastForce, ListedTask
 from scenarios.config.plant import TorqueSection
 
@@ -77,6 +77,7 @@ def build(scenario: Scenario, kept: Cell | None = None) -> Cell:
     announce_compilation()
     control = scenario.control
     robot = kept.robot if kept else make_robot(scenario.robot)
+    _check_there_are_tasks(scenario, robot)
     sensor = _kept_sensor(scenario, kept) if kept else sensor_of(scenario, robot)
     contacts = kept.contacts if kept else contacts_of(scenario, robot)
     start = kept.start if kept else _start(scenario, robot, contacts)
@@ -110,6 +111,14 @@ def build(scenario: Scenario, kept: Cell | None = None) -> Cell:
                       "mass" if control.metric == "mass" else None, _give(scenario)), sensor, areas,
                 position, pointing, limits, order_of(scenario, areas, always, tasks), tuple(listed),
                 activation, contacts)
+
+
+def _check_there_are_tasks(scenario: Scenario, robot: Robot) -> None:
+    """Raise a ScenarioError unless the scenario asks for something, or the robot's file does."""
+    asked = scenario.position or scenario.pointing or scenario.avoidance or scenario.tasks
+    if not (asked or robot.coupled or robot.loops):
+        raise ScenarioError(f"scenario {scenario.name!r}: the stack is empty: give at least one of "
+                            "[position], [pointing], [avoidance], [[tasks]]")
 
 
 def _start(scenario: Scenario, robot: Robot, contacts: Contacts | None) -> tuple[Array, Array]:

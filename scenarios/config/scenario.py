@@ -99,10 +99,7 @@ class Scenario(Section):
         return self
 
     @model_validator(mode="after")
-    def _asks_for_something(self) -> Self:
-        if not (self.position or self.pointing or self.avoidance or self.tasks):
-            raise ValueError("the stack is empty: give at least one of [position], [pointing], "
-                             "[avoidance], [[tasks]]")
+    def _sections_go_together(self) -> Self:
         if self.damping and self.posture and self.posture.role == "null-space":
             raise ValueError("give [damping] or [posture], not both: each is the null-space term")
         if self.posture and self.posture.role == "task" and self.control.stack == "switched":

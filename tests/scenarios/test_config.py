@@ -3,6 +3,7 @@ import pytest
 
 from hierarchy import HierarchyError
 from hierarchy.errors import UnknownNameError
+from scenarios.cell.build import build
 from scenarios.config import ScenarioError, load, shipped
 
 
@@ -144,8 +145,8 @@ def test_a_stack_that_asks_for_nothing_is_refused(tmp_path):
     path = tmp_path / "idle.toml"
     path.write_text('name = "idle"\n[robot]\nmodel = "kuka_lwr"\n'
                     '[control]\nresolver = "tpm"\nduration = 1.0\n')
-    with pytest.raises(ScenarioError, match="stack is empty"):
-        load(path)
+    with pytest.raises(ScenarioError, match="scenario 'idle': the stack is empty"):
+        build(load(path))
 
 
 def test_config_files_are_data_and_not_executed():
