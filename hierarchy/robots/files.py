@@ -51,7 +51,7 @@ def read_file(path: str | Path, base: Base | None = None, shapes: bool = True,
             raise RobotError(f"robot file {str(path)!r} cannot be read: "
                              f"{'; '.join([*lines(), _in_one_line(error)])}") from error
         model = _without(model, locked, str(path))
-        found = _found(model, (urdf if is_urdf else mjcf).coupled(root), locked)
+        found = _found(model, (urdf if is_urdf else mjcf).coupled(root))
         if is_urdf:
             found = replace(found, missing=(*said, *urdf_remarks.remarks(root), *remarks(model)))
         if not shapes:
@@ -64,21 +64,14 @@ def read_file(path: str | Path, base: Base | None = None, shapes: bool = True,
                    missing=(*missing, *left_out, *of_world, *found.missing))
 
 
-def _found(model: Any, coupled: tuple[Coupled, ...], locked: Mapping[str, float]) -> Found:
+def _found(model: Any, coupled: tuple[Coupled, ...]) -> Found:
     rest = neutral_within_limits(model, pin.neutral(model))
     if is_floating(model):  # its position in q is that in the world
         rest[:7] = pin.SE3ToXYZQUAT(model.jointPlacements[1])
         model.jointPlacements[1] = pin.SE3.Identity()
     names = set(model.names)
     return Found(model, proposed_end_effector(model), rest=rest, coupled=tuple(
-        one if one.other in names else _held(one, locked) for one in coupled
-        if one.joint in names))
-
-
-def _held(one: Coupled, locked: Mapping[str, float]) -> Coupled:
-    """Return the coupling to a joint that is locked, or fixed in the file."""
-    at = locked.get(one.other, 0.0)
-    return Coupled(one.joint, "", (sum(c * at**i for i, c in enumerate(one.coefficients)),))
+        one for one in coupled if {one.joint, one.other} <= {*names, ""}))
 
 
 @contextmanager
@@ -107,17 +100,17 @@ def _without(model: Any, locked: Mapping[str, float], file: str) -> Any:
     """Return the model without the locked joints."""
     if not locked:
         return model
-    step, indices = np.zeros(model.nv), []
+    q, indices = np.array(pin.neutral(model)), []
     for name, value in locked.items():
         if name not in list(model.names)[1:]:
             raise UnknownNameError("joint", name, list(model.names)[1:])
         joint = model.joints[model.getJointId(name)]
-        if joint.nv != 1 and value != 0.0:
-            raise RobotError(f"robot file {file!r}: joint {name!r} has {joint.nv} velocities and "
-                             "can only be locked where the file has it, at 0.0")
-        step[joint.idx_v:joint.idx_v + joint.nv] = value
+        if joint.nq != 1:
+            raise RobotError(f"robot file {file!r}: joint {name!r} has {joint.nq} coordinates and "
+                             "cannot be locked")
+        q[joint.idx_q] = value
         indices.append(int(joint.id))
-    return pin.buildReducedModel(model, indices, pin.integrate(model, pin.neutral(model), step))
+    return pin.buildReducedModel(model, indices, q)
 
 
 def _mjcf_model(root: Element, base: Base | None) -> Any:

@@ -92,11 +92,17 @@ def left_over(root: Element) -> list[str]:
 
 
 def coupled(root: Element) -> tuple[Coupled, ...]:
-    """Return the joints that follow another one (`mimic`)."""
-    return tuple(Coupled(name_of(joint), str(mimic.get("joint")),
-                         (float(mimic.get("offset", 0.0)), float(mimic.get("multiplier", 1.0))))
-                 for joint in root.findall("joint")
-                 for mimic in joint.findall("mimic") if joint.get("type") != "fixed")
+    """Return the joints that follow another one (`mimic`); one that is fixed leaves a constant."""
+    fixed = {name_of(joint) for joint in root.findall("joint") if joint.get("type") == "fixed"}
+    found = []
+    for joint in root.findall("joint"):
+        mimic = joint.find("mimic")
+        if mimic is not None and name_of(joint) not in fixed:
+            other, offset = str(mimic.get("joint")), float(mimic.get("offset", 0.0))
+            slope = float(mimic.get("multiplier", 1.0))
+            found.append(Coupled(name_of(joint), "", (offset,)) if other in fixed
+                         else Coupled(name_of(joint), other, (offset, slope)))
+    return tuple(found)
 
 
 def _complaints(root: Element) -> Iterator[str]:

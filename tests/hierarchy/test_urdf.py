@@ -212,23 +212,11 @@ def test_a_link_without_mass_needs_no_inertia(load):
     assert load(link("a"), link("b", empty), joint("j", "revolute", "a", "b")).missing == ()
 
 
-def test_a_joint_that_follows_a_locked_one_stays_where_that_holds_it(load):
+def test_a_joint_that_follows_a_fixed_one_is_held(load):
     mimic = '<mimic joint="lead" multiplier="2" offset="0.1"/>'
-    parts = (*map(link, "abc"), joint("lead", "continuous", "a", "b", ""),
-             joint("led", "revolute", "b", "c", LIMIT + mimic))
-    robot = load(*parts, locked={"lead": 0.4})
-    assert [(one.joint, one.other, one.coefficients) for one in robot.coupled] == [
-        ("led", "", (pytest.approx(0.9),))]
-    np.testing.assert_allclose(placement(robot, [0.0], "b")[1],
-                               Rotation.from_rotvec([0, 0.4, 0]).as_matrix(), atol=1e-12)
-
-
-def test_a_joint_of_several_velocities_is_locked_where_the_file_has_it(load):
-    robot = load(*two_joints("planar"), locked={"first": 0.0})
-    assert robot.joint_names == ("second",)
-    np.testing.assert_allclose(placement(robot, [0.0], "base")[0], ORIGIN[0])
-    with pytest.raises(RobotError, match="'first' has 3 velocities and can only be locked where"):
-        load(*two_joints("planar"), locked={"first": 0.2})
+    robot = load(*map(link, "abc"), joint("lead", "fixed", "a", "b", "", ""),
+                 joint("led", "revolute", "b", "c", LIMIT + mimic))
+    assert list(map(str, robot.coupled)) == ["led = 0.1 in the file"]
 
 
 # Two frames of one name
