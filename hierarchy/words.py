@@ -13,6 +13,12 @@ def listed(names: Sequence[str], last_by: str = "and") -> str:
     return f"{', '.join(first)} {last_by} {last}" if first else last
 
 
+def some(names: Sequence[str], most: int = 12) -> str:
+    """Return the first names, and how many more there are."""
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    return ", ".join(names[:most]) + more
+
+
 def counted(count: int, what: str) -> str:
     """Return a number of things: "1 column", "2 columns"."""
     return f"{count} {what}{'' if count == 1 else 's'}"

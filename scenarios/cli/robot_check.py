@@ -14,11 +14,11 @@ from hierarchy import Robot, State, plugins
 from hierarchy.errors import UnknownNameError
 from hierarchy.robots import TABLES
 from hierarchy.robots.names import elsewhere, file_of, in_package
+from hierarchy.words import some
 from scenarios.config import ScenarioError, shipped, shipped_groups
 from scenarios.config.changes import change, parse_changes
 from scenarios.config.robot import RobotSection
 
-_FRAMES = 12   # names listed at most
 _ROUND = 4     # decimals of proposed positions [m]
 _TURNS = 50.0  # [rad] between limits of a joint beyond which they are taken for degrees
 _LEVEL = 0.02  # [m] between frames that are at the same height
@@ -89,7 +89,7 @@ def say(section: RobotSection, robot: Robot) -> str:
              f"  mass            {found['mass_kg']:.3g} kg of moving links",
              f"  joints          {len(found['joints'])} actuated",
              *_joint_table(found["joints"]),
-             f"  frames          {_some(found['frames'])}",
+             f"  frames          {some(found['frames'])}",
              f"  end effector    {robot.end_effector}, {end}; "
              f"{_moved_by(robot)} joints move it",
              *_said_of_feet(found["lowest_frames"]),
@@ -167,7 +167,7 @@ def _missing(robot: Robot) -> list[str]:
              "range between the position limits": [
                  j["name"] for j in joints if j["lower"] is not None
                  and j["lower"] == j["upper"]]}
-    said = [f"{kind} of {_some(names)}" for kind, names in kinds.items() if names]
+    said = [f"{kind} of {some(names)}" for kind, names in kinds.items() if names]
     if not robot.masses.any():
         said.append("masses: centre-of-mass tasks and torque limits are not possible")
     if not robot.capsules:
@@ -196,7 +196,7 @@ def _lowest(robot: Robot) -> list[str]:
 
 
 def _said_of_feet(names: list[str]) -> list[str]:
-    return [f"  lowest frames   {_some(names)}; [[contacts]] may be there"] if names else []
+    return [f"  lowest frames   {some(names)}; [[contacts]] may be there"] if names else []
 
 
 def _moved_by(robot: Robot) -> int:
@@ -213,11 +213,6 @@ def _carrier(robot: Robot, joint: int) -> str | None:
 
 def _rounded(place: Any) -> list[float]:
     return [float(value) + 0.0 for value in np.round(place, _ROUND)]
-
-
-def _some(names: Sequence[str]) -> str:
-    more = f" and {len(names) - _FRAMES} more" if len(names) > _FRAMES else ""
-    return ", ".join(names[:_FRAMES]) + more
 
 
 def _or_none(value: float) -> float | None:
