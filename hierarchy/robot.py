@@ -221,6 +221,12 @@ class Robot:
         return [f"{name} {i + 1}" if size > 1 else name
                 for name, size in zip(self.joint_names, sizes, strict=True) for i in range(size)]
 
+    def start(self, name: str) -> Array:
+        """Return a copy of the configuration (nq,) that the file calls `name`; UnknownNameError."""
+        if name not in self.starts:
+            raise UnknownNameError("keyframe", name, self.starts)
+        return self.starts[name].copy()
+
     def joint(self, name: str) -> int:
         """Index of the joint called `name`, as used by frames and control points."""
         if name not in self.joint_names:

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from hierarchy.errors import RobotError
 from hierarchy.problem import Array
 from hierarchy.robots.mjcf.model import Built, configuration, to_mujoco
 

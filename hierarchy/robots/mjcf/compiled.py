@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+import warnings
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -9,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 from hierarchy.errors import RobotError
-from hierarchy.robots.urdf import read_xml
 
 KINDS = ("free", "ball", "slide", "hinge")  # as MuJoCo numbers the types of joints
 WORLD = 0                                   # index of the body that does not move
@@ -29,7 +30,7 @@ class Compiled:
     bodies: tuple[str, ...]
     sites: tuple[str, ...]
     keys: tuple[str, ...]
-    missing: tuple[str, ...] = ()
+    missing: tuple[str, ...]
 
     def kind(self, joint: int) -> str:
         """Return "free", "ball", "slide" or "hinge"."""
@@ -41,37 +42,49 @@ class Compiled:
 
 
 def compiled(path: Path) -> Compiled:
-    """Let MuJoCo compile a file; raises RobotError if it is not installed or refuses the file.
-
-    If it refuses a file, it is asked again without what is only seen: a missing mesh or picture
-    that nothing else needs is then no error.
-    """
+    """Let MuJoCo compile a file; raises RobotError if it is not installed or refuses the file."""
     file = str(path)
-    if (tag := read_xml(path).tag) != "mujoco":
-        raise RobotError(f"robot file {file!r} is no MJCF: it starts with <{tag}>, not with "
-                         "<mujoco>")
+    text = re.sub(r"<!--.*?-->", "", path.read_text(encoding="utf-8", errors="replace"), flags=re.S)
+    root = re.search(r"<([A-Za-z][\w:.-]*)", text)
+    if root is None or root[1] != "mujoco":
+        raise RobotError(f"robot file {file!r} is no MJCF: it has to start with <mujoco>, and "
+                         f"starts with {f'<{root[1]}>' if root else 'no element'}")
     try:
         import mujoco
     except ImportError as error:
         raise RobotError(f"robot file {file!r}: an MJCF is compiled by MuJoCo, which is not "
                          f"installed: {_REMEDY}") from error
-    missing: tuple[str, ...] = ()
-    try:
-        model = mujoco.MjModel.from_xml_path(file)
-    except ValueError as error:
-        said = " ".join(str(error).removeprefix("Error: ").split())
+    with warnings.catch_warnings(record=True) as warned:
+        warnings.simplefilter("always")
         try:
-            spec = mujoco.MjSpec.from_file(file)
-            spec.compiler.discardvisual = True
-            model = spec.compile()
-        except ValueError:
+            model = _compiled(mujoco.MjSpec.from_file(file))
+        except ValueError as error:
+            said = _in_one_line(str(error))
             raise RobotError(f"robot file {file!r} cannot be read: {said}") from error
-        missing = (f"what is only seen is left out: {said}",)
+    missing = tuple(dict.fromkeys(f"MuJoCo warns: {_in_one_line(str(one.message))}"
+                                  for one in warned))
     bodies = _names(model, "body", model.nbody)
     of_body = [f"{bodies[body]} {KINDS[kind]}"
                for body, kind in zip(model.jnt_bodyid, model.jnt_type, strict=True)]
     return Compiled(file, model, _names(model, "joint", model.njnt, of_body), bodies,
                     _names(model, "site", model.nsite), _names(model, "key", model.nkey), missing)
+
+
+def _compiled(spec: Any) -> Any:
+    """Compile without what is only seen: its meshes take most of the time, and may be missing.
+
+    MuJoCo refuses that where it would change a mass; then with it.
+    """
+    spec.compiler.discardvisual, asked = True, spec.compiler.discardvisual
+    try:
+        return spec.compile()
+    except ValueError:
+        spec.compiler.discardvisual = asked
+        return spec.compile()
+
+
+def _in_one_line(text: str) -> str:
+    return " ".join(text.removeprefix("Error: ").split())
 
 
 def name_of(model: Any, kind: str, index: int) -> str:

@@ -10,7 +10,7 @@ from numpy.polynomial import Polynomial
 
 from hierarchy.problem import Array
 from hierarchy.robots.found import Coupled, Loop
-from hierarchy.robots.mjcf.compiled import WORLD, name_of
+from hierarchy.robots.mjcf.compiled import WORLD
 from hierarchy.robots.mjcf.model import Built, add_frame, pose
 from hierarchy.robots.mjcf.part import Part
 from hierarchy.words import some
@@ -30,8 +30,8 @@ def couplings(part: Part) -> tuple[tuple[Coupled, ...], list[str]]:
     for name, i in _active(mj, _JOINT):
         one, other = (int(j) for j in (mj.eq_obj1id[i], mj.eq_obj2id[i]))
         if one not in part.joints:
-            said += [f"coupling {name!r} is left out: joint {file.joints[one]!r} does not move"] if (
-                other in part.joints) else []
+            if other in part.joints:
+                said.append(f"{name!r} is left out: joint {file.joints[one]!r} does not move")
             continue
         own = mj.qpos0[mj.jnt_qposadr[one]]
         if other < 0:
@@ -82,7 +82,8 @@ def _active(mj: Any, kind: int) -> Iterator[tuple[str, int]]:
 
 
 def _name(mj: Any, i: int) -> str:
-    return name_of(mj, "equality", i)
+    kinds = {_CONNECT: "connect", _WELD: "weld", _JOINT: "coupling"}
+    return str(mj.equality(i).name or f"{kinds.get(int(mj.eq_type[i]), 'equality')} {i}")
 
 
 def _bodies(mj: Any, i: int) -> list[int]:

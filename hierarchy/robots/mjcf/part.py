@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +11,7 @@ from hierarchy.errors import RobotError, UnknownNameError
 from hierarchy.problem import Array
 from hierarchy.robots.mjcf.compiled import WORLD, Compiled
 from hierarchy.robots.table import Base
+from hierarchy.words import some
 
 
 @dataclass(frozen=True)
@@ -68,7 +69,18 @@ def _from(file: Compiled, root: Sequence[str]) -> tuple[set[int], tuple[str, ...
         if parents[body] in bodies:
             bodies.add(body)
     others = [file.bodies[top] for top in _tops(file) if not bodies & set(_below(file, top))]
-    return bodies, (f"left out, since it is not under root: {', '.join(others)}",) if others else ()
+    above = {body for body in _above(parents, bodies) if body not in bodies}
+    held = [name for j, name in enumerate(file.joints) if file.model.jnt_bodyid[j] in above]
+    return bodies, tuple(f"{what}: {some(names)}" for what, names in (
+        ("left out, since it is not under root", others),
+        ("held at the reference, since it is above root", held)) if names)
+
+
+def _above(parents: Array, bodies: Iterable[int]) -> Iterator[int]:
+    for body in bodies:
+        while body != WORLD:
+            body = int(parents[body])
+            yield body
 
 
 def _scene(file: Compiled) -> tuple[set[int], tuple[str, ...]]:
@@ -86,7 +98,7 @@ def _scene(file: Compiled) -> tuple[set[int], tuple[str, ...]]:
             (targets, "mocap bodies are left out"),
             (sorted({*mocap} - {*targets}), "mocap bodies stay where the file has them")):
         if tops:
-            said.append(f"{what}: {', '.join(file.bodies[top] for top in tops)}")
+            said.append(f"{what}: {some([file.bodies[top] for top in tops])}")
     gone = {body for top in (*loose, *targets) for body in _below(file, top)}
     return set(range(model.nbody)) - gone, tuple(said)
 
