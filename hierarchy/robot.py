@@ -156,7 +156,8 @@ class Robot:
         begins; without it everything is the robot but bodies that only float beside it.
         """
         path = file_path("Robot.from_file: path", path)
-        found = read_file(path, base, shapes, locked or {}, [root] if isinstance(root, str) else root)
+        roots = [root] if isinstance(root, str) else root
+        found = read_file(path, base, shapes, locked or {}, roots)
         return cls._of(found, Path(path).stem, end_effector)
 
     @classmethod

@@ -89,7 +89,10 @@ def _in_one_line(text: str) -> str:
 
 def name_of(model: Any, kind: str, index: int) -> str:
     """Return the name of a thing of a model, of a kind such as "body"; else kind and index."""
-    return getattr(model, kind)(int(index)).name or f"{kind} {index}"
+    import mujoco
+
+    named = mujoco.mj_id2name(model, getattr(mujoco.mjtObj, f"mjOBJ_{kind.upper()}"), int(index))
+    return named or f"{kind} {index}"
 
 
 def _names(model: Any, kind: str, count: int, instead: Iterable[str] = ()) -> tuple[str, ...]:
