@@ -1,8 +1,8 @@
 """Robots of public packages against MuJoCo and pinocchio: `python docs/studies/public_robots.py`.
 
-Of each package that is installed, every MJCF is compared with MuJoCo and every URDF with
-pinocchio's own parser: joints, masses and limits, and in three configurations the places of all
-bodies, sites or frames and the mass matrix.
+Of each package that is installed, or of the folders given instead, every MJCF is compared with
+MuJoCo and every URDF with pinocchio's own parser: joints, masses and limits, and in three
+configurations the places of all bodies, sites or frames and the mass matrix.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from collections.abc import Iterator
 from importlib.metadata import PackageNotFoundError, distribution, version
 from importlib.util import find_spec
 from pathlib import Path
+from textwrap import shorten
 
 import mujoco
 import numpy as np
@@ -25,6 +26,7 @@ MJCF = ("mujoco", "gymnasium", "gymnasium-robotics", "dm_control", "robosuite", 
 URDF = ("example-robot-data",)
 _SAME = 1e-9
 _CONFIGURATIONS = 3
+_WIDTH = 200
 _FREE, _SINGLE = 0, (2, 3)  # mjtJoint: hinges and slides have one coordinate
 
 
@@ -33,7 +35,9 @@ class DiffersError(Exception):
 
 
 def files_of(package: str, suffix: str) -> list[Path]:
-    """Return the files with a suffix of a package, none if it is not installed."""
+    """Return the files with a suffix of a folder or a package, none if it is not installed."""
+    if "/" in package:
+        return sorted(Path(package).rglob(f"*{suffix}"))
     try:
         listed = distribution(package).files or ()
     except PackageNotFoundError:
@@ -181,9 +185,9 @@ def tried(package: str) -> Iterator[tuple[Path, str, str]]:
         try:
             yield file, (of_urdf if urdf else of_mjcf)(file), ""
         except HierarchyError as error:
-            yield file, "refused", str(error).replace(str(file.parent) + "/", "")
+            yield file, "refused", str(error).replace(f"{file.parent}/", "")
         except DiffersError as error:
-            yield file, "differs", str(error)
+            yield file, "differs", f"{file.name}: {error}"
 
 
 def main() -> None:
@@ -192,15 +196,16 @@ def main() -> None:
     print(f"{'package':26} {'compared with':14} {'files':>6} {'equal':>6} {'differ':>7} "
           f"{'refused':>8} {'no robot':>9}")
     said = []
-    for package in (*MJCF, *URDF):
+    for package in sys.argv[1:] or (*MJCF, *URDF):
         counts = Counter[str]()
-        for file, verdict, why in tried(package):
+        for _, verdict, why in tried(package):
             counts[verdict] += 1
-            said += [f"{package}: {file.name} {verdict}: {why}"] if why else []
+            said += [shorten(f"{package}: {verdict}: {why}", _WIDTH)] if why else []
         if not counts:
             print(f"{package:26} not installed")
             continue
-        print(f"{package + ' ' + version(package):26} "
+        named = package if "/" in package else f"{package} {version(package)}"
+        print(f"{named:26} "
               f"{'pinocchio' if package in URDF else 'MuJoCo':14} {counts.total():6} "
               f"{counts['equal']:6} {counts['differs']:7} {counts['refused']:8} "
               f"{counts['no model'] + counts['no joint']:9}", flush=True)

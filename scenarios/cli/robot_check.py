@@ -131,6 +131,8 @@ def paste(section: RobotSection, robot: Robot) -> str:
                 for row in found[key]]
         lines += [f"{key} = [", *rows, "]"] if rows else []
     for one in robot.coupled:
+        if not one.other or len(one.coefficients) != 2:  # no line: there is no such task
+            continue
         joints = f"{{ {_quoted(one.joint)} = 1.0, {_quoted(one.other)} = {-one.coefficients[1]} }}"
         lines += ["", "[[tasks]]", 'kind = "coupling"', f"joints = {joints}",
                   f"value = {one.coefficients[0]}"]

@@ -171,6 +171,17 @@ def test_a_free_base_rests_where_the_file_puts_it(written):
     np.testing.assert_allclose(*tip, atol=1e-12)
 
 
+def test_a_base_floats_where_it_is_asked_to(written):
+    path = written(world(link("a")))
+    robot, held = Robot.load(path, base="floating"), Robot.load(path)
+    assert (robot.base, robot.n, robot.masses.sum()) == ("floating", 7, held.masses.sum())
+    np.testing.assert_allclose(State.at(robot, robot.rest).position("a_tip"),
+                               State.at(held, held.rest).position("a_tip"), atol=1e-12)
+    assert Robot.load(written(world(TABLE)), base="floating").n == 6
+    with pytest.raises(RobotError, match="it has no joint that moves"):
+        Robot.load(path.with_name("robot.xml"))
+
+
 def test_a_locked_joint_stays_where_it_is_put(written):
     path = written(world(link("a", 'ref="30"', link("b"))))
     whole, part = Robot.load(path), Robot.load(path, locked={"a_joint": 0.3})
@@ -192,12 +203,13 @@ def test_a_locked_joint_stays_where_it_is_put(written):
     ('<motor joint="a_joint" ctrlrange="0 3"/>', "", np.inf),
     ('<motor joint="a_joint"/>', "", np.inf),
     ('<position joint="a_joint" kp="9" ctrlrange="-1 1"/>', "", np.inf),
+    ('<orientation joint="b_joint"/><motor joint="a_joint" gear="3" ctrlrange="-2 2"/>', "", 6.0),
     ("", "", np.inf)])
 def test_effort_limits_are_what_actuators_can_do(actuator, joint, effort, written):
-    robot = Robot.load(written(world(link("a", f'{joint} axis="0 1 0"'),
-                                     f"<actuator>{actuator}</actuator>")))
-    np.testing.assert_allclose(robot.effort_limit, [effort])
-    assert robot.velocity_limit == [np.inf]
+    arm = link("a", f'{joint} axis="0 1 0"', link("b", 'type="ball"'))
+    robot = Robot.load(written(world(arm, f"<actuator>{actuator}</actuator>")))
+    np.testing.assert_allclose(robot.effort_limit, [effort, *[np.inf] * 3])
+    assert (robot.velocity_limit == np.inf).all()
     assert "velocity limits: an MJCF has none" in robot.missing
 
 
@@ -217,6 +229,7 @@ def test_what_is_left_out_is_said(written):
                  "a_joint", "stiffness and damping of joints", "'floor' is a plane"):
         assert name in said, name
     assert robot.loops == ()
+    assert "drag 2" not in robot.frame_names
 
 
 def test_inertia_of_a_tendon_is_refused_by_name(written):

@@ -71,7 +71,7 @@ def _compare_inertia(built: Built, q: Array, M: Array, data: Any, times: Any) ->
         times(file.model, data, product, row)
     both = columns.any(axis=1)
     off = np.abs(np.triu(M - products @ columns.T)[np.ix_(both, both)])
-    if not off.max() <= _SAME * np.abs(M).max():
+    if not off.max(initial=0.0) <= _SAME * np.abs(M).max():
         v = int(np.flatnonzero(both)[np.argmax(off.max(axis=0))])
         j = next(j for j, joint in built.pairs() if joint.idx_v <= v < joint.idx_v + joint.nv)
         raise file.error(f"the inertia at body {file.bodies[file.model.jnt_bodyid[j]]!r} is "

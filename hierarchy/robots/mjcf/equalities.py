@@ -62,10 +62,13 @@ def loops(built: Built) -> tuple[tuple[Loop, ...], list[str]]:
     mj, found, said = built.part.compiled.model, [], []
     for kind in (_CONNECT, _WELD):
         for name, i in _active(mj, kind):
-            ends = [_anchor(built, i, end, name) for end in (0, 1)]
-            if all(ends):
-                found.append(Loop(name, (ends[0], ends[1]), kind == _WELD))
-            elif any(built.placed[b][0] for b in _bodies(mj, i)):
+            one, other = _bodies(mj, i)
+            joints = {built.placed[body][0] for body in (one, other)}
+            if all(_is_of_robot(built, body) for body in (one, other)):
+                if len(joints) == 2:  # else nothing moves between its ends
+                    ends = (_anchor(built, i, 0, name), _anchor(built, i, 1, name))
+                    found.append(Loop(name, ends, kind == _WELD))
+            elif any(joints):
                 said.append(f"equality {name!r} is left out: a body of it is not of the robot")
     idle = [_name(mj, i) for i in range(mj.neq) if not mj.eq_active0[i]]
     others = [name for kind in set(mj.eq_type.tolist()) - {_CONNECT, _WELD, _JOINT}
@@ -91,13 +94,17 @@ def _bodies(mj: Any, i: int) -> list[int]:
     return [int(mj.site_bodyid[one]) for one in ids] if mj.eq_objtype[i] == _SITE else ids
 
 
+def _is_of_robot(built: Built, body: int) -> bool:
+    """Whether a body is of the robot or the world, and no mocap places it."""
+    mj = built.part.compiled.model
+    return bool(mj.body_mocapid[mj.body_rootid[body]] < 0) and (
+        body == WORLD or body in built.part.bodies)
+
+
 def _anchor(built: Built, i: int, end: int, name: str) -> str:
-    """Return the frame of an end of a loop, "" if its body is not of the robot or is a mocap's."""
+    """Return the frame of an end of a loop."""
     mj = built.part.compiled.model
     body = _bodies(mj, i)[end]
-    mocap = mj.body_mocapid[mj.body_rootid[body]] >= 0
-    if mocap or body not in {WORLD, *built.part.bodies}:
-        return ""
     if mj.eq_objtype[i] == _SITE:
         return built.sites[int((mj.eq_obj1id, mj.eq_obj2id)[end][i])]
     joint, place = built.placed[body]

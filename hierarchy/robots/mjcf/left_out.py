@@ -35,11 +35,12 @@ def left_out(part: Part) -> Iterator[str]:
 def refuse(file: Compiled) -> None:
     """Raise RobotError for inertia that no body or joint has: that of a tendon, or of its drive."""
     mj = file.model
+    drives = armature(mj, "actuator", len(mj.actuator_trnid))
     on_joint = {i for i, _, _ in joint_actuators(mj)}
     heavy = [f"tendon {name_of(mj, 'tendon', i)!r}" for i in range(mj.ntendon)
              if armature(mj, "tendon", mj.ntendon)[i]]
-    heavy += [f"actuator {name_of(mj, 'actuator', i)!r}" for i in range(mj.nu)
-              if i not in on_joint and armature(mj, "actuator", mj.nu)[i]]
+    heavy += [f"actuator {name_of(mj, 'actuator', i)!r}" for i in range(len(drives))
+              if i not in on_joint and drives[i]]
     if heavy:
         raise file.error("an armature acts on several joints, which a robot here cannot have: "
                          f"{some(heavy)}; give it to the joints")

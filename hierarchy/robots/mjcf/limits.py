@@ -10,7 +10,7 @@ import numpy as np
 
 from hierarchy.problem import Array
 from hierarchy.robots.mjcf.compiled import Compiled, name_of
-from hierarchy.robots.mjcf.model import Built, joint_actuators
+from hierarchy.robots.mjcf.model import Built, address, joint_actuators
 from hierarchy.words import some
 
 _FREE: Array = np.array([-np.inf, np.inf])
@@ -73,8 +73,9 @@ def _force(mj: Any, i: int) -> Array:
     """Return the least and the most force (2,) of an actuator, before its gear."""
     force = np.array(mj.actuator_forcerange[i]) if mj.actuator_forcelimited[i] else _FREE
     motor = not mj.actuator_gaintype[i] and not mj.actuator_biastype[i]  # fixed gain, no bias
-    if motor and mj.actuator_dyntype[i] != _INTEGRATOR and mj.actuator_ctrllimited[i]:
-        control = np.sort(mj.actuator_gainprm[i, 0] * mj.actuator_ctrlrange[i])
+    k = address(mj, "ctrl", i)
+    if motor and mj.actuator_dyntype[i] != _INTEGRATOR and mj.actuator_ctrllimited[k]:
+        control = np.sort(mj.actuator_gainprm[i, 0] * mj.actuator_ctrlrange[k])
         force = np.clip(control, *force)
     return force
 
@@ -86,6 +87,6 @@ def _elsewhere(file: Compiled) -> Iterator[str]:
     """Yield what acts on something else than one hinge or slide."""
     mj = file.model
     known = {i for i, _, _ in joint_actuators(mj)}
-    if others := [name_of(mj, "actuator", i) for i in range(mj.nu) if i not in known]:
+    if others := [name_of(mj, "actuator", i) for i in range(len(mj.actuator_trnid)) if i not in known]:
         yield ("actuators that act on a tendon, a site, a body, a crank or a joint of several "
                f"velocities are left out: {some(others)}")

@@ -158,7 +158,7 @@ def _set_armature(built: Built) -> None:
     mj = built.part.compiled.model
     inertia = np.array(mj.dof_armature)
     for i, j, gear in joint_actuators(mj):
-        inertia[mj.jnt_dofadr[j]] += gear**2 * armature(mj, "actuator", mj.nu)[i]
+        inertia[mj.jnt_dofadr[j]] += gear**2 * armature(mj, "actuator", len(mj.actuator_trnid))[i]
     total = np.array(built.model.armature)
     for j, joint in built.pairs():
         here = mj.jnt_dofadr[j]
@@ -173,10 +173,16 @@ def armature(mj: Any, kind: str, count: int) -> Array:
 
 def joint_actuators(mj: Any) -> Iterator[tuple[int, int, float]]:
     """Yield the index, the joint and the gear of each actuator that moves one hinge or slide."""
-    for i in range(mj.nu):
+    for i in range(len(mj.actuator_trnid)):
         j = int(mj.actuator_trnid[i, 0])
         if mj.actuator_trntype[i] in _ON_JOINT and mj.jnt_type[j] in _SCALAR:
-            yield i, j, float(mj.actuator_gear[i, 0])
+            yield i, j, float(mj.actuator_gear[address(mj, "out", i), 0])
+
+
+def address(mj: Any, what: str, i: int) -> int:
+    """Return the index of the first "ctrl" or "out" of an actuator; in older MuJoCo it has one."""
+    addresses = getattr(mj, f"actuator_{what}adr", None)
+    return i if addresses is None else int(addresses[i])
 
 
 _ON_JOINT = (0, 1)  # mjTRN_JOINT, mjTRN_JOINTINPARENT

@@ -42,7 +42,7 @@ def part_of(file: Compiled, base: Base | None, locked: Mapping[str, float],
     bodies, said = _from(file, root) if root else _scene(file)
     model, held = file.model, np.array(file.model.qpos0)
     joints = [j for j in range(model.njnt) if model.jnt_bodyid[j] in bodies]
-    if not joints:
+    if not joints and base != "floating":
         moving = sorted({file.bodies[model.jnt_bodyid[j]] for j in range(model.njnt)})
         raise file.error("it has no joint that moves"
                          + (f" from {', '.join(root)} on; there are some on the bodies "
