@@ -61,6 +61,8 @@ def arm(tmp_path):
 
 @pytest.fixture
 def body(tmp_path):
+    pytest.importorskip("mujoco")
+
     def write(joint="<freejoint/>"):
         path = tmp_path / "body.xml"
         path.write_text(MJCF.format(joint=joint))
@@ -549,6 +551,7 @@ ONE_BODY = """<body name="{0}"><joint name="{0}" axis="0 0 1" range="-90 90"/><g
 
 
 def test_an_mjcf_includes_files(tmp_path):
+    pytest.importorskip("mujoco")
     (tmp_path / "hand.xml").write_text(
         f"<mujocoinclude>{ONE_BODY.format('hand', '')}</mujocoinclude>")
     include = '<include file="hand.xml"/>'
@@ -573,6 +576,7 @@ def test_an_mjcf_includes_files(tmp_path):
      "axis too small in joint Element name 'a'"),
 ])
 def test_a_wrong_mjcf_is_refused(text, said, tmp_path):
+    pytest.importorskip("mujoco")
     path = tmp_path / "it.xml"
     path.write_text(text)
     with pytest.raises(RobotError, match=said):

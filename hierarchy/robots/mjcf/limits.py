@@ -87,6 +87,7 @@ def _elsewhere(file: Compiled) -> Iterator[str]:
     """Yield what acts on something else than one hinge or slide."""
     mj = file.model
     known = {i for i, _, _ in joint_actuators(mj)}
-    if others := [name_of(mj, "actuator", i) for i in range(len(mj.actuator_trnid)) if i not in known]:
+    others = [name_of(mj, "actuator", i) for i in range(len(mj.actuator_trnid)) if i not in known]
+    if others:
         yield ("actuators that act on a tendon, a site, a body, a crank or a joint of several "
                f"velocities are left out: {some(others)}")
