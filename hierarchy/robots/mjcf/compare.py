@@ -11,9 +11,10 @@ import pinocchio as pin
 from hierarchy.problem import Array
 from hierarchy.robots.mjcf.model import Built, configuration, to_mujoco
 
-_SAME = 1e-9    # of positions relative to the robot's size, and of M relative to its largest entry
-_SAMPLES = 2    # besides the reference configuration
-_REACH = 1.0    # [rad or m] where a joint has no range
+_SAME = 1e-9       # relative to the robot's size, and to the inertias of the two joints of an entry
+_ROUNDING = 1e-13  # of M, relative to its largest entry
+_SAMPLES = 2       # besides the reference configuration
+_REACH = 1.0       # [rad or m] from it
 
 
 def compare(built: Built) -> None:
@@ -71,8 +72,10 @@ def _compare_inertia(built: Built, q: Array, M: Array, data: Any, times: Any) ->
         times(file.model, data, product, row)
     both = columns.any(axis=1)
     off = np.abs(np.triu(M - products @ columns.T)[np.ix_(both, both)])
-    if not off.max(initial=0.0) <= _SAME * np.abs(M).max():
-        v = int(np.flatnonzero(both)[np.argmax(off.max(axis=0))])
+    own = np.sqrt(np.diag(M)[both])
+    allowed = _SAME * np.outer(own, own) + _ROUNDING * np.abs(M).max()
+    for row, column in np.argwhere(~(off <= allowed)):
+        v = np.flatnonzero(both)[column]
         j = next(j for j, joint in built.pairs() if joint.idx_v <= v < joint.idx_v + joint.nv)
         raise file.error(f"the inertia at body {file.bodies[file.model.jnt_bodyid[j]]!r} is "
-                         f"{off.max():.2g} from what MuJoCo has")
+                         f"{off[row, column]:.2g} from what MuJoCo has")
