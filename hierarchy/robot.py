@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, get_args
@@ -146,40 +146,45 @@ class Robot:
     @classmethod
     def from_file(cls, path: str | Path, end_effector: str | None = None,
                   base: Base | None = None, shapes: bool = True,
-                  locked: Mapping[str, float] | None = None) -> Robot:
+                  locked: Mapping[str, float] | None = None,
+                  root: str | Sequence[str] = ()) -> Robot:
         """Read a URDF or MJCF file (its root element says which); RobotError if it cannot.
 
         `end_effector` names a frame; without it one is proposed, see `hierarchy.robots.points`.
         `base` None is that of the file: floating if its first joint is free, else fixed. Capsules
         are proposed from the collision geometry, unless `shapes` is False, and control points along
         the chain to the end effector. `locked` joints are fixed at a position [rad or m] and are
-        not joints of the robot.
+        not joints of the robot. `root` names the body, or bodies, of an MJCF at which the robot
+        begins; without it everything is the robot but bodies that only float beside it.
         """
         path = file_path("Robot.from_file: path", path)
-        found = read_file(path, base, shapes, locked or {})
+        roots = [root] if isinstance(root, str) else root
+        found = read_file(path, base, shapes, locked or {}, roots)
         return cls._of(found, Path(path).stem, end_effector)
 
     @classmethod
     def load(cls, model: str | Path, end_effector: str | None = None, base: Base | None = None,
-             locked: Mapping[str, float] | None = None) -> Robot:
+             locked: Mapping[str, float] | None = None,
+             root: str | Sequence[str] = ()) -> Robot:
         """Make a robot by a name of `ROBOTS`, a file, or "package:name".
 
         Packages are example_robot_data and robot_descriptions (extra `robots`); the latter may
-        download files. `locked` joints of a file are fixed at a position [rad or m] and are not
-        joints of the robot. Raises RobotError and UnknownNameError.
+        download files. `locked` and `root` are those of `from_file`. Raises RobotError and
+        UnknownNameError.
         """
         if base not in (None, *get_args(Base)):
             raise RobotError(f"robot {str(model)!r}: base must be one of {get_args(Base)}, got "
                              f"{base!r}")
         model = str(model)
         if in_package(model):
-            robot = cls.from_file(file_of(model), end_effector, base, locked=locked)
+            robot = cls.from_file(file_of(model), end_effector, base, locked=locked, root=root)
             robot.name = model.partition(":")[2]
             return robot
         if is_file_name(model):
-            return cls.from_file(model, end_effector, base, locked=locked)
-        if locked:
-            raise RobotError(f"robot {model!r} is a table; its joints cannot be locked")
+            return cls.from_file(model, end_effector, base, locked=locked, root=root)
+        if locked or root:
+            raise RobotError(f"robot {model!r} is a table; its joints cannot be locked, and it has "
+                             "no other root")
         robot = cls.named(model, base)
         if end_effector is not None:
             robot.end_effector = robot.frame(end_effector).name
@@ -220,6 +225,12 @@ class Robot:
     def _numbered(self, sizes: Iterable[int]) -> list[str]:
         return [f"{name} {i + 1}" if size > 1 else name
                 for name, size in zip(self.joint_names, sizes, strict=True) for i in range(size)]
+
+    def start(self, name: str) -> Array:
+        """Return a copy of the configuration (nq,) that the file calls `name`; UnknownNameError."""
+        if name not in self.starts:
+            raise UnknownNameError("keyframe", name, self.starts)
+        return self.starts[name].copy()
 
     def joint(self, name: str) -> int:
         """Index of the joint called `name`, as used by frames and control points."""

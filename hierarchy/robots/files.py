@@ -5,12 +5,12 @@ from __future__ import annotations
 import os
 import re
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from copy import deepcopy
 from dataclasses import replace
 from pathlib import Path
-from tempfile import TemporaryDirectory, TemporaryFile
+from tempfile import TemporaryFile
 from types import MappingProxyType
 from typing import Any
 from xml.etree import ElementTree
@@ -30,34 +30,40 @@ Element = ElementTree.Element
 
 
 def read_file(path: str | Path, base: Base | None = None, shapes: bool = True,
-              locked: Mapping[str, float] = MappingProxyType({})) -> Found:
+              locked: Mapping[str, float] = MappingProxyType({}),
+              root: Sequence[str] = ()) -> Found:
     """Read a robot from a URDF or MJCF file; its root element says which.
 
     `base` None takes that of the file: floating if its first joint is free, else fixed. Without
     `shapes` no collision geometry is read. `locked` joints are fixed at a position [rad or m].
-    Raises RobotError if the file cannot be read.
+    `root` are the bodies of an MJCF at which the robot begins. Raises RobotError if the file cannot
+    be read.
     """
     path = Path(path)
-    root = urdf.root_of(path)
-    if is_urdf := root.tag == "robot":
-        urdf.check(root, path)
-    else:
-        root = mjcf.expanded(path)
+    element = urdf.root_of(path)
+    if element.tag != "robot":
+        return mjcf.read(path, base, shapes, locked, root)
+    if root:
+        raise RobotError(f"robot file {str(path)!r}: root is for an MJCF; a URDF is one robot")
+    urdf.check(element, path)
+    return _read_urdf(path, element, base, shapes, locked)
+
+
+def _read_urdf(path: Path, root: Element, base: Base | None, shapes: bool,
+               locked: Mapping[str, float]) -> Found:
     with _printed() as lines:
         try:
-            model = urdf_model.model_of(root, base) if is_urdf else _mjcf_model(root, base)
-            said = tuple(urdf_remarks.not_read(lines())) if is_urdf else ()
+            model = urdf_model.model_of(root, base)
+            said = tuple(urdf_remarks.not_read(lines()))
         except Exception as error:  # the parsers raise many types; all mean an invalid file
             raise RobotError(f"robot file {str(path)!r} cannot be read: "
                              f"{'; '.join([*lines(), _in_one_line(error)])}") from error
         model = _without(model, locked, str(path))
-        found = _found(model, (urdf if is_urdf else mjcf).coupled(root))
-        if is_urdf:
-            found = replace(found, missing=(*said, *urdf_remarks.remarks(root), *remarks(model)))
+        found = replace(_found(model, urdf.coupled(root)),
+                        missing=(*said, *urdf_remarks.remarks(root), *remarks(model)))
         if not shapes:
             return found
-        geometries, missing = _geometry(path, root, model,
-                                        _urdf_shapes if is_urdf else _mjcf_shapes)
+        geometries, missing = _geometry(path, root, model)
         capsules, left_out = capsules_of(geometries)
     kept, of_world = _held_by(model, capsules)
     return replace(found, capsules=kept,
@@ -113,34 +119,12 @@ def _without(model: Any, locked: Mapping[str, float], file: str) -> Any:
     return pin.buildReducedModel(model, indices, q)
 
 
-def _mjcf_model(root: Element, base: Base | None) -> Any:
-    with _copied(root) as path:
-        model = pin.buildModelFromMJCF(path)
-        if base == "floating" and not is_floating(model):
-            return pin.buildModelFromMJCF(path, pin.JointModelFreeFlyer())
-    if base == "fixed" and is_floating(model):
-        return pin.buildReducedModel(model, [1], pin.neutral(model))
-    return model
-
-
-@contextmanager
-def _copied(root: Element) -> Iterator[str]:
-    """Yield the path of a temporary file with the text of an MJCF."""
-    with TemporaryDirectory() as copies:
-        copy = Path(copies) / "model.xml"
-        copy.write_text(ElementTree.tostring(root, encoding="unicode"), encoding="utf-8")
-        yield str(copy)
-
-
-Shapes = Callable[[Path, Element, Any, bool], tuple[Any, list[str]]]
-
-
-def _geometry(path: Path, root: Element, model: Any, read: Shapes) -> tuple[Any, list[str]]:
+def _geometry(path: Path, root: Element, model: Any) -> tuple[Any, list[str]]:
     """Return collision geometries; without meshes, or none at all, if they cannot be read."""
     said: list[str] = []
     for meshes in (True, False):
         try:
-            geometries, missing = read(path, deepcopy(root), model, meshes)
+            geometries, missing = _urdf_shapes(path, deepcopy(root), model, meshes)
         except Exception as error:  # coal and assimp raise many types
             what = "meshes" if meshes else "collision geometry"
             said.append(f"the {what} cannot be read: {_in_one_line(error)}")
@@ -192,25 +176,6 @@ def _mesh_file(name: str, path: Path) -> Path | None:
             if at.is_file():
                 return at
     return None
-
-
-def _mjcf_shapes(path: Path, root: Element, model: Any, meshes: bool) -> tuple[Any, list[str]]:
-    """Read a copy without the missing meshes."""
-    compiler, missing, absent = root.find("compiler"), [], set()
-    folder = Path("" if compiler is None else compiler.get("meshdir", ""))
-    for mesh in root.iter("mesh"):
-        file = mesh.get("file")
-        if file is not None and not (folder / file).is_file():
-            absent.add(mesh.get("name") or Path(file).stem)
-            missing.append(f"mesh {file!r} is not there")
-    for parent in list(root.iter()):
-        for geom in parent.findall("geom"):
-            name = geom.get("mesh")
-            if name is not None and (name in absent or not meshes):
-                parent.remove(geom)
-    with _copied(root) as copy:
-        geometry = pin.buildGeomFromMJCF(model, copy, pin.GeometryType.COLLISION)
-    return geometry.geometryObjects, missing
 
 
 def _held_by(model: Any, capsules: tuple[Any, ...]) -> tuple[tuple[Any, ...], tuple[str, ...]]:

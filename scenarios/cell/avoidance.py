@@ -70,11 +70,12 @@ def _separation(section: SeparationSection, robot: Robot, exact: bool) -> list[T
 def separable_pairs(robot: Robot, distance: float) -> list[tuple[int, int]]:
     """Return the pairs of capsules that can be kept at a distance [m], as indices.
 
-    Neighbours in the tree share a joint and are excluded. Capsules proposed from a file may be too
-    large: of them, pairs that overlap in the robot's own posture are excluded too, and those that
-    are nearer than `distance` in every one of 200 sampled postures.
+    Neighbours in the tree share a joint and are excluded, and so are pairs that the file excludes.
+    Capsules proposed from a file may be too large: of them, pairs that overlap in the robot's own
+    posture are excluded too, and those that are nearer than `distance` in every one of 200 sampled
+    postures.
     """
-    pairs = pairs_of_tree(robot.capsules, robot.parents)
+    pairs = _watched(robot)
     if robot.table is not None or not pairs:
         return pairs
     packed, at = pack_capsules(robot.capsules), State(robot)
@@ -89,7 +90,15 @@ def inseparable_pairs(robot: Robot, distance: float) -> list[str]:
     """Return the names of the pairs that `separable_pairs` excludes for their proposed capsules."""
     kept = set(separable_pairs(robot, distance))
     return [f"{robot.capsules[i].name} to {robot.capsules[j].name}"
-            for i, j in pairs_of_tree(robot.capsules, robot.parents) if (i, j) not in kept]
+            for i, j in _watched(robot) if (i, j) not in kept]
+
+
+def _watched(robot: Robot) -> list[tuple[int, int]]:
+    """Return the pairs of capsules on joints that are no neighbours and may not touch."""
+    names = ("", *robot.joint_names)
+    apart = {frozenset(pair) for pair in robot.apart}
+    return [(i, j) for i, j in pairs_of_tree(robot.capsules, robot.parents)
+            if frozenset(names[robot.capsules[k].joint] for k in (i, j)) not in apart]
 
 
 def _postures(robot: Robot) -> Iterator[Array]:

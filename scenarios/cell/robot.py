@@ -21,7 +21,8 @@ _LONGEST_STEP = 0.3  # [rad] of any joint
 
 def make_robot(section: RobotSection) -> Robot:
     """Make the robot of a scenario, with the control points and capsules of the section."""
-    robot = Robot.load(section.model, section.end_effector, section.base, section.locked)
+    robot = Robot.load(section.model, section.end_effector, section.base, section.locked,
+                       section.root)
     if section.control_points is not None:
         robot.control_points = tuple(
             robot.control_point(point.joint, point.offset) if point.joint is not None
@@ -70,6 +71,8 @@ def _check_limits(robot: Robot, q: Array) -> None:
 def _state(robot: Robot, section: StartSection) -> State:
     q = robot.rest.copy() if section.q is None else np.array(section.q)
     try:
+        if section.keyframe is not None:
+            q = robot.start(section.keyframe)
         if q.shape == (robot.nq,):
             for name, value in section.joints.items():
                 q[robot.coordinate(name)] = value

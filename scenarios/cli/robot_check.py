@@ -74,7 +74,10 @@ def as_plain_data(section: RobotSection, robot: Robot) -> dict[str, Any]:
                            for p in robot.control_points],
         "missing": list(_missing(robot)),
         "coupled": [{"joint": one.joint, "other": one.other,
-                     "coefficients": list(one.coefficients)} for one in robot.coupled]}
+                     "coefficients": list(one.coefficients)} for one in robot.coupled],
+        "loops": [{"name": one.name, "frames": list(one.frames), "rigid": one.rigid}
+                  for one in robot.loops],
+        "starts": list(robot.starts), "may_touch": [list(pair) for pair in robot.apart]}
 
 
 def say(section: RobotSection, robot: Robot) -> str:
@@ -100,6 +103,13 @@ def say(section: RobotSection, robot: Robot) -> str:
              f"  control points  {len(robot.control_points)}, {points}"]
     lines += [f"  missing         {sentence}" for sentence in found["missing"]]
     lines += [f"  follows         {one} (kept by every scenario)" for one in robot.coupled]
+    lines += [f"  closed chain    {one.name}: {' and '.join(one.frames)} have one "
+              f"{'pose' if one.rigid else 'origin'}" for one in robot.loops]
+    if robot.starts:
+        lines.append(f"  keyframes       {some(list(robot.starts))}; start.keyframe takes one")
+    if robot.apart:
+        pairs = some([f"{one or 'base'} to {other or 'base'}" for one, other in robot.apart])
+        lines.append(f"  may touch       {pairs}")
     lines += _suspicious(found["joints"])
     return "\n".join([*lines, "", "For a scenario file:", "", paste(section, robot)])
 
@@ -108,6 +118,9 @@ def paste(section: RobotSection, robot: Robot) -> str:
     """Return the [robot] section for this robot, with all proposed values."""
     lines = ["[robot]", f"model = {_quoted(section.model)}", f"base = {_quoted(robot.base)}",
              f"end_effector = {_quoted(robot.end_effector)}"]
+    if section.root:
+        lines.append(f"root = {_quoted(section.root)}" if isinstance(section.root, str)
+                     else f"root = [{', '.join(map(_quoted, section.root))}]")
     if section.locked:
         locked = ", ".join(f"{_quoted(name)} = {value}" for name, value in section.locked.items())
         lines.append(f"locked = {{ {locked} }}")

@@ -49,7 +49,8 @@ class RobotSection(Section):
     Packages are example_robot_data and robot_descriptions (extra `robots`). `base` defaults to that
     of the model. `end_effector`, `control_points` and `capsules` default to the robot's table, or
     for a file to the proposals of `hierarchy check FILE`. `locked` joints of a file are fixed at a
-    position [rad or m] and removed.
+    position [rad or m] and removed. `root` is the body, or bodies, of an MJCF at which the robot
+    begins, by default each that has joints, except those that only float.
     """
 
     model: str
@@ -58,20 +59,29 @@ class RobotSection(Section):
     control_points: tuple[RobotPointSection, ...] | None = None
     capsules: tuple[CapsuleSection, ...] | None = None
     locked: dict[str, Finite] = Field(default_factory=dict)
+    root: str | tuple[str, ...] = ()
 
 
 class StartSection(Section):
     """The start: positions `q` [rad or m] and velocities `v` [rad/s or m/s].
 
-    `q` defaults to the robot's own posture, and `joints` override it by name. With `end_effector`
+    `q` defaults to that of the `keyframe` of an MJCF, or to the robot's own posture; `joints`
+    override it by name. With `end_effector`
     [m] the start is the posture, reached from q, that puts the end effector there. With `on_floor`
     a floating base is raised or lowered so that the lowest contact touches the floor. A joint
     beyond its limits is an error unless `allow_outside_limits`.
     """
 
     q: tuple[Finite, ...] | None = None
+    keyframe: str | None = None
     joints: dict[str, Finite] = Field(default_factory=dict)
     v: tuple[Finite, ...] | None = None
     end_effector: Vector3 | None = None
     on_floor: Flag = False
     allow_outside_limits: Flag = False
+
+    @model_validator(mode="after")
+    def _is_one_posture(self) -> Self:
+        if self.q is not None and self.keyframe is not None:
+            raise ValueError("give either q or a keyframe")
+        return self

@@ -146,6 +146,7 @@ def test_a_continuous_joint_keeps_its_own_coordinates(pendulum):
 
 
 def test_an_mjcf_file_is_read(tmp_path):
+    pytest.importorskip("mujoco")
     path = tmp_path / "arm.xml"
     path.write_text(MJCF)
     assert Robot.from_file(path).joint_names == ("hinge",)

@@ -1,0 +1,138 @@
+"""Constraints of an MJCF: couplings of joints, closed chains, pairs of bodies that may touch."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from numpy.polynomial import Polynomial
+
+from hierarchy.problem import Array
+from hierarchy.robots.found import Coupled, Loop
+from hierarchy.robots.mjcf.compiled import WORLD
+from hierarchy.robots.mjcf.model import Built, add_frame, pose
+from hierarchy.robots.mjcf.part import Part
+from hierarchy.words import some
+
+_CONNECT, _WELD, _JOINT = 0, 1, 2  # mjtEq
+_SITE = 6                          # mjOBJ_SITE
+
+
+def couplings(part: Part) -> tuple[tuple[Coupled, ...], list[str]]:
+    """Return the joints that are polynomials of others, and sentences on those left out.
+
+    MuJoCo's polynomial is one of differences from the reference positions: here it is expanded. A
+    joint that follows one that is held is a constant; one that is held itself follows no longer.
+    """
+    file, found = part.compiled, []
+    mj, said = file.model, []
+    for name, i in _active(mj, _JOINT):
+        one, other = (int(j) for j in (mj.eq_obj1id[i], mj.eq_obj2id[i]))
+        if one not in part.joints:
+            if other in part.joints:
+                said.append(f"{name!r} is left out: joint {file.joints[one]!r} does not move")
+            continue
+        own = mj.qpos0[mj.jnt_qposadr[one]]
+        if other < 0:
+            found.append(Coupled(file.joints[one], "", (float(own + mj.eq_data[i, 0]),)))
+            continue
+        here = mj.jnt_qposadr[other]
+        line = Polynomial([-mj.qpos0[here], 1.0])
+        q = Polynomial(mj.eq_data[i, :5])(line) + own
+        if other in part.joints:
+            found.append(Coupled(file.joints[one], file.joints[other], _trimmed(q)))
+        else:
+            found.append(Coupled(file.joints[one], "", (float(q(part.held[here])),)))
+    return tuple(found), said
+
+
+def _trimmed(polynomial: Any) -> tuple[float, ...]:
+    coefficients = [float(value) for value in polynomial.coef]
+    while len(coefficients) > 2 and coefficients[-1] == 0.0:
+        coefficients.pop()
+    return tuple(coefficients)
+
+
+def loops(built: Built) -> tuple[tuple[Loop, ...], list[str]]:
+    """Return the chains that the file closes, and sentences on equalities left out.
+
+    Frames are added to the model where an anchor is a place on a body and not a site.
+    """
+    mj, found, said = built.part.compiled.model, [], []
+    for kind in (_CONNECT, _WELD):
+        for name, i in _active(mj, kind):
+            one, other = _bodies(mj, i)
+            joints = {built.placed[body][0] for body in (one, other)}
+            if all(_is_of_robot(built, body) for body in (one, other)):
+                if len(joints) == 2:  # else nothing moves between its ends
+                    ends = (_anchor(built, i, 0, name), _anchor(built, i, 1, name))
+                    found.append(Loop(name, ends, kind == _WELD))
+            elif any(joints):
+                said.append(f"equality {name!r} is left out: a body of it is not of the robot")
+    idle = [_name(mj, i) for i in range(mj.neq) if not mj.eq_active0[i]]
+    others = [name for kind in set(mj.eq_type.tolist()) - {_CONNECT, _WELD, _JOINT}
+              for name, _ in _active(mj, kind)]
+    said += [f"equalities that are not active are left out: {some(idle)}"] if idle else []
+    said += [f"equalities of tendons, flexes and distances are left out: {some(others)}"] if (
+        others) else []
+    return tuple(found), said
+
+
+def _active(mj: Any, kind: int) -> Iterator[tuple[str, int]]:
+    yield from ((_name(mj, i), i) for i in range(mj.neq)
+                if mj.eq_type[i] == kind and mj.eq_active0[i])
+
+
+def _name(mj: Any, i: int) -> str:
+    kinds = {_CONNECT: "connect", _WELD: "weld", _JOINT: "coupling"}
+    return str(mj.equality(i).name or f"{kinds.get(int(mj.eq_type[i]), 'equality')} {i}")
+
+
+def _bodies(mj: Any, i: int) -> list[int]:
+    ids = [int(mj.eq_obj1id[i]), int(mj.eq_obj2id[i])]
+    return [int(mj.site_bodyid[one]) for one in ids] if mj.eq_objtype[i] == _SITE else ids
+
+
+def _is_of_robot(built: Built, body: int) -> bool:
+    """Whether a body is of the robot or the world, and no mocap places it."""
+    mj = built.part.compiled.model
+    return bool(mj.body_mocapid[mj.body_rootid[body]] < 0) and (
+        body == WORLD or body in built.part.bodies)
+
+
+def _anchor(built: Built, i: int, end: int, name: str) -> str:
+    """Return the frame of an end of a loop."""
+    mj = built.part.compiled.model
+    body = _bodies(mj, i)[end]
+    if mj.eq_objtype[i] == _SITE:
+        return built.sites[int((mj.eq_obj1id, mj.eq_obj2id)[end][i])]
+    joint, place = built.placed[body]
+    return add_frame(built.model, f"{name} {end + 1}", joint, place * _place_of(
+        int(mj.eq_type[i]), mj.eq_data[i], end), "anchor")
+
+
+def _place_of(kind: int, data: Array, end: int) -> Any:
+    """Return where on its body an end is: MuJoCo stores the anchors of a weld in reverse."""
+    if kind == _CONNECT:
+        return pose(data[3 * end:3 * end + 3], _UPRIGHT)
+    return pose(data[3:6], data[6:10]) if end == 0 else pose(data[:3], _UPRIGHT)
+
+
+_UPRIGHT: Array = np.array([1.0, 0.0, 0.0, 0.0])
+
+
+def pairs_apart(built: Built) -> tuple[tuple[str, str], ...]:
+    """Return pairs of joints, "" for the base, none of whose bodies the file lets collide."""
+    mj, of_joint = built.part.compiled.model, dict[int, set[int]]()
+    for body in sorted(built.part.bodies | {WORLD}):
+        if mj.body_geomnum[body]:
+            of_joint.setdefault(built.placed[body][0], set()).add(body)
+    excluded = {frozenset((int(pair) >> 16, int(pair) & 0xFFFF)) for pair in mj.exclude_signature}
+    names = ["", *list(built.model.names)[1:]]
+    joints = dict.fromkeys(
+        tuple(sorted(built.placed[body][0] for body in pair)) for pair in excluded
+        if len(pair) == 2)
+    return tuple((names[a], names[b]) for a, b in joints if a != b and all(
+        frozenset((one, other)) in excluded for one in of_joint.get(a, ())
+        for other in of_joint.get(b, ())))

@@ -1,0 +1,135 @@
+"""Which part of a compiled scene is the robot: its bodies, the joints that move, those held."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from hierarchy.errors import RobotError, UnknownNameError
+from hierarchy.problem import Array
+from hierarchy.robots.mjcf.compiled import WORLD, Compiled
+from hierarchy.robots.table import Base
+from hierarchy.words import some
+
+
+@dataclass(frozen=True)
+class Part:
+    """The robot in a compiled file.
+
+    `bodies` and `joints` are indices, those of joints that move, in MuJoCo's order. All others stay
+    at `held` (nq,) of MuJoCo. `on_base` says whether a free joint is put under the whole robot.
+    `said` are sentences on what is left out.
+    """
+
+    compiled: Compiled
+    bodies: frozenset[int]
+    joints: tuple[int, ...]
+    held: Array
+    on_base: bool
+    said: tuple[str, ...]
+
+
+def part_of(file: Compiled, base: Base | None, locked: Mapping[str, float],
+            root: Sequence[str]) -> Part:
+    """Choose the robot: everything from the bodies `root` on, or each tree that has joints.
+
+    Without `root`, bodies that only float are left out if there is another tree with joints.
+    Raises RobotError if no joint moves, or a body floats that is not the first to move;
+    UnknownNameError for a name.
+    """
+    bodies, said = _from(file, root) if root else _scene(file)
+    model, held = file.model, np.array(file.model.qpos0)
+    joints = [j for j in range(model.njnt) if model.jnt_bodyid[j] in bodies]
+    if not joints and base != "floating":
+        moving = sorted({file.bodies[model.jnt_bodyid[j]] for j in range(model.njnt)})
+        raise file.error("it has no joint that moves"
+                         + (f" from {', '.join(root)} on; there are some on the bodies "
+                            f"{', '.join(moving)}" if root and moving else ""))
+    for name, value in locked.items():
+        j = _lockable(file, joints, name)
+        held[model.jnt_qposadr[j]] = value
+        joints.remove(j)
+    if base == "fixed":
+        joints = [j for j in joints if file.kind(j) != "free"]
+    _check_floating(file, joints)
+    floats = bool(joints) and file.kind(joints[0]) == "free"
+    return Part(file, frozenset(bodies), tuple(joints), held,
+                base == "floating" and not floats, said)
+
+
+def _from(file: Compiled, root: Sequence[str]) -> tuple[set[int], tuple[str, ...]]:
+    parents = file.model.body_parentid
+    for name in root:
+        if name not in file.bodies[1:]:
+            raise UnknownNameError("body", name, file.bodies[1:])
+    bodies = {file.bodies.index(name) for name in root}
+    for body in range(1, file.model.nbody):  # parents come first
+        if parents[body] in bodies:
+            bodies.add(body)
+    others = [file.bodies[top] for top in _tops(file) if not bodies & set(_below(file, top))]
+    above = {body for body in _above(parents, bodies) if body not in bodies}
+    held = [name for j, name in enumerate(file.joints) if file.model.jnt_bodyid[j] in above]
+    return bodies, tuple(f"{what}: {some(names)}" for what, names in (
+        ("left out, since it is not under root", others),
+        ("held at the reference, since it is above root", held)) if names)
+
+
+def _above(parents: Array, bodies: Iterable[int]) -> Iterator[int]:
+    for body in bodies:
+        while body != WORLD:
+            body = int(parents[body])
+            yield body
+
+
+def _scene(file: Compiled) -> tuple[set[int], tuple[str, ...]]:
+    """Return all bodies, without those that only float beside a robot, and those of a mocap."""
+    model, said = file.model, []
+    moves = {top: [j for j in range(model.njnt) if model.body_rootid[model.jnt_bodyid[j]] == top]
+             for top in _tops(file)}
+    loose = [top for top, joints in moves.items() if [file.kind(j) for j in joints] == ["free"]]
+    if len(loose) == sum(map(bool, moves.values())):
+        loose = []
+    mocap = [top for top in moves if model.body_mocapid[top] >= 0]
+    targets = [top for top in mocap if not moves[top]]
+    for tops, what in (
+            (loose, "bodies that only float are left out (root = \"NAME\" takes one as the robot)"),
+            (targets, "mocap bodies are left out"),
+            (sorted({*mocap} - {*targets}), "mocap bodies stay where the file has them")):
+        if tops:
+            said.append(f"{what}: {some([file.bodies[top] for top in tops])}")
+    gone = {body for top in (*loose, *targets) for body in _below(file, top)}
+    return set(range(model.nbody)) - gone, tuple(said)
+
+
+def _tops(file: Compiled) -> Iterator[int]:
+    yield from (body for body in range(1, file.model.nbody)
+                if file.model.body_parentid[body] == WORLD)
+
+
+def _below(file: Compiled, top: int) -> list[int]:
+    return np.flatnonzero(file.model.body_rootid == top).tolist()
+
+
+def _lockable(file: Compiled, joints: Sequence[int], name: str) -> int:
+    names = [file.joints[j] for j in joints]
+    if name not in names:
+        raise UnknownNameError("joint", name, names)
+    j = joints[names.index(name)]
+    if file.kind(j) in ("free", "ball"):
+        raise file.error(f"joint {name!r} is a {file.kind(j)} joint and cannot be locked")
+    return j
+
+
+def _check_floating(file: Compiled, joints: Sequence[int]) -> None:
+    """Raise RobotError if another joint than the first is free: a robot floats as a whole."""
+    model = file.model
+    for j in joints[1:]:
+        if file.kind(j) == "free":
+            trees = [file.bodies[top] for top in dict.fromkeys(
+                int(model.body_rootid[model.jnt_bodyid[i]]) for i in joints)]
+            raise RobotError(
+                f"robot file {file.file!r}: body {file.bodies[model.jnt_bodyid[j]]!r} floats, and "
+                "is not the first body with joints; only one robot can float. Choose with root = "
+                f"one of {', '.join(trees)}, or hold it with base = \"fixed\"")

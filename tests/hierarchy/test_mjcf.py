@@ -1,0 +1,325 @@
+"""Robots of MJCF files are what MuJoCo says they are; MuJoCo itself is asked."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hierarchy import Robot, State
+from hierarchy.errors import RobotError, UnknownNameError
+from scenarios.cell.avoidance import separable_pairs
+from scenarios.cell.robot import start_of
+from scenarios.cli.main import run_command
+from scenarios.config.robot import StartSection
+
+mujoco = pytest.importorskip("mujoco")
+public_robots = pytest.importorskip("public_robots")
+
+GEOM = '<geom type="capsule" fromto="0 0 0 .3 0.1 0" size=".03"/>'
+
+
+def link(name, joint='axis="0 1 0"', more="", place='pos=".3 0 0"'):
+    return (f'<body name="{name}" {place}><joint name="{name}_joint" {joint}/>{GEOM}'
+            f'<site name="{name}_tip" pos=".3 0 .1" euler="10 20 30"/>{more}</body>')
+
+
+def world(inside, sections=""):
+    return f"<worldbody>{inside}</worldbody>{sections}"
+
+
+CUBE = '<body name="cube" pos="0 1 1"><freejoint/><geom type="box" size=".1 .1 .1"/></body>'
+TABLE = '<body name="table"><geom type="box" size=".5 .5 .1"/></body>'
+TARGET = '<body name="target" mocap="true"><geom size=".02"/></body>'
+WALKER = (f'<body name="trunk" pos="0 0 .5" quat=".8 .6 0 0"><freejoint name="root"/>{GEOM}'
+          f'{link("leg")}</body>')
+KINDS = {
+    "a fixed root has a pose": world(
+        f'<body name="mount" pos="0 0 .5" quat="1 0 0 1">{GEOM}{link("a")}</body>'),
+    "a slide of the default angle": world(link("a", 'type="slide" range="0 .04"')),
+    "radians said after the bodies": world(link("a", 'range="-1 1"'), '<compiler angle="radian"/>'),
+    "defaults after the bodies": world(
+        link("a", 'class="k"'), '<default><default class="k"><joint axis="0 1 1" range="-1 1" '
+        'armature=".3"/><geom density="300"/></default></default>'),
+    "limited or not": world(link("a", 'range="-9 9" limited="false"', link(
+        "b", 'range="-9 9" limited="true"'))),
+    "references": world(link("a", 'axis="1 2 3" ref="40" pos=".1 .2 .3"', link(
+        "b", 'type="slide" axis="1 1 0" ref=".2"'))),
+    "orders of Euler angles": world(link("a", place='pos="0 0 1" euler="10 20 30"'),
+                                    '<compiler eulerseq="zyx"/>'),
+    "an axis of another length": world(link("a", place='axisangle="0 3 4 50"')),
+    "several joints of one body": world(
+        '<body name="base"><joint name="x" type="slide" axis="1 0 0"/><joint name="yaw" '
+        f'axis="0 0 1" pos=".1 .2 0"/><joint name="tilt" axis="1 0 0" pos="0 .1 .1"/>{GEOM}'
+        f'{link("a")}</body>'),
+    "nameless bodies and joints": world(
+        f"<body><joint/>{GEOM}<body><joint/>{GEOM}<joint type='slide'/></body>"
+        f"<body><joint/>{GEOM}</body></body>"),
+    "names in common": world(
+        f'<body name="a"><joint name="a" pos=".1 0 0"/>{GEOM}<site name="a" pos="0 0 .2"/></body>'),
+    "a frame around": world(f'<frame pos="0 .1 0" euler="0 0 20">{link("a")}</frame>'),
+    "copies": world(link("a", more=f'<replicate count="3" offset="0 .2 0" euler="0 0 30">'
+                                   f"{link('b')}</replicate>")),
+    "two arms on a table": world(f'<body name="table" pos="0 0 1">{GEOM}{link("a")}{link("b")}'
+                                 "</body>"),
+    "a table first": world(TABLE + link("a")),
+    "a target first": world(TARGET + link("a")),
+    "a loose cube first": world(CUBE + link("a")),
+    "a drone": world(CUBE),
+    "a walker": world(WALKER + TABLE),
+    "a ball joint": world(link("a", 'type="ball" pos=".1 0 0" armature=".2"', link("b"))),
+    "a geared drive": world(link("a", more=link("b")), '<actuator><motor joint="b_joint" '
+                            'gear="-7" armature=".1"/></actuator>'),
+    "masses of classes and meshes": world(
+        link("a", more='<geom type="mesh" mesh="m" density="500"/>'),
+        '<asset><mesh name="m" vertex="0 0 0 .2 0 0 0 .3 0 0 0 .4"/></asset>'),
+    "a cloth": world(link("a") + '<flexcomp name="cloth" type="grid" count="2 2 1" '
+                     'spacing=".1 .1 .1" radius=".01" mass="1" dim="2"/>'),
+}
+
+
+@pytest.fixture
+def written(tmp_path):
+    def write(inside):
+        path = tmp_path / "robot.xml"
+        path.write_text(f"<mujoco>{inside}</mujoco>")
+        return path
+    return write
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_robot_is_what_mujoco_has(kind, written):
+    assert public_robots.of_mjcf(written(KINDS[kind])) == "equal"
+
+
+def test_an_attached_model_is_part_of_the_robot(written, tmp_path):
+    (tmp_path / "hand.xml").write_text(f"<mujoco>{world(link('hand'))}</mujoco>")
+    path = written('<asset><model name="hand" file="hand.xml"/></asset>' + world(
+        link("a", more='<attach model="hand" body="hand" prefix="left_"/>')))
+    assert public_robots.of_mjcf(path) == "equal"
+    assert Robot.load(path).joint_names == ("a_joint", "left_hand_joint")
+
+
+def test_the_mjcf_in_the_documents_has_its_three_joints(written):
+    page = Path(__file__).parents[2] / "docs/adapters.md"
+    text = page.read_text().partition("<mujoco>")[2].partition("</mujoco>")[0]
+    robot = Robot.load(written(text))
+    assert robot.joint_names == ("a", "b", "c")
+    assert set(robot.frame_names) == {"universe", *"abc", "body 1", "body 2", "wrist", "tip"}
+
+
+PACKAGES = public_robots.MJCF + public_robots.URDF
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("package", PACKAGES)
+def test_robots_of_public_packages_are_what_mujoco_and_pinocchio_have(package):
+    judged = [(str(file), verdict, why) for file, verdict, why in public_robots.tried(package)]
+    if not judged:
+        pytest.skip(f"{package} is not installed")
+    assert [one for one in judged if one[1] == "differs"] == []
+    assert "equal" in {verdict for _, verdict, _ in judged}
+
+
+def test_a_difference_from_mujoco_names_the_body(written, monkeypatch):
+    from hierarchy.robots.mjcf import model
+
+    path, exact = written(world(link("a", more=link("b")))), model.pose
+    monkeypatch.setattr(model, "pose", lambda place, turn: exact(place * (1.0 + 1e-8), turn))
+    with pytest.raises(RobotError, match=r"body 'a' is 3e-09 from where MuJoCo has it"):
+        Robot.load(path)
+    monkeypatch.setattr(model, "pose", exact)
+    monkeypatch.setattr(model, "_turned", lambda _, diagonal: np.diag(diagonal * (1.0 + 1e-6)))
+    with pytest.raises(RobotError, match=r"the inertia at body '[ab]' is "):
+        Robot.load(path)
+
+
+def test_without_mujoco_the_extra_is_named(written, monkeypatch):
+    monkeypatch.setitem(sys.modules, "mujoco", None)
+    with pytest.raises(RobotError, match=r"pip install 'task-hierarchy\[sim\]'"):
+        Robot.load(written(world(link("a"))))
+
+
+def test_a_scene_is_one_robot_unless_a_root_is_named(written):
+    path = written(world(link("a", more=link("fore")) + link("b")))
+    assert Robot.load(path).n == 3
+    assert Robot.load(path, root=["a", "b"]).joint_names == ("a_joint", "fore_joint", "b_joint")
+    only = Robot.load(path, root="fore")
+    assert only.joint_names == ("fore_joint",)
+    assert set(only.missing) >= {"left out, since it is not under root: b",
+                                 "held at the reference, since it is above root: a_joint"}
+    with pytest.raises(UnknownNameError, match="unknown body 'c'"):
+        Robot.load(path, root="c")
+
+
+@pytest.mark.parametrize("scene", [link("a") + WALKER, WALKER + WALKER.replace('="', '="other_', 1)
+                                   .replace('"root"', '"other"').replace('"leg', '"other_leg')])
+def test_a_second_body_that_floats_is_refused_by_name(scene, written):
+    path = written(world(scene))
+    with pytest.raises(RobotError, match=r"body '\w*trunk' floats, .* root = one of"):
+        Robot.load(path)
+    assert Robot.load(path, root="trunk").base == "floating"
+    assert Robot.load(path, base="fixed").base == "fixed"
+
+
+def test_a_free_base_rests_where_the_file_puts_it(written):
+    path = written(world(WALKER))
+    robot = Robot.load(path)
+    np.testing.assert_allclose(robot.rest, [0, 0, 0.5, 0.6, 0, 0, 0.8, 0], atol=1e-12)
+    held = Robot.load(path, base="fixed")
+    tip = [State.at(one, one.rest).position("leg_tip") for one in (robot, held)]
+    np.testing.assert_allclose(*tip, atol=1e-12)
+
+
+def test_a_base_floats_where_it_is_asked_to(written):
+    path = written(world(link("a")))
+    robot, held = Robot.load(path, base="floating"), Robot.load(path)
+    assert (robot.base, robot.n, robot.masses.sum()) == ("floating", 7, held.masses.sum())
+    np.testing.assert_allclose(State.at(robot, robot.rest).position("a_tip"),
+                               State.at(held, held.rest).position("a_tip"), atol=1e-12)
+    assert Robot.load(written(world(TABLE)), base="floating").n == 6
+    with pytest.raises(RobotError, match="it has no joint that moves"):
+        Robot.load(path.with_name("robot.xml"))
+
+
+def test_a_locked_joint_stays_where_it_is_put(written):
+    path = written(world(link("a", 'ref="30"', link("b"))))
+    whole, part = Robot.load(path), Robot.load(path, locked={"a_joint": 0.3})
+    assert part.joint_names == ("b_joint",)
+    np.testing.assert_allclose(State.at(part, [0.2]).position("b_tip"),
+                               State.at(whole, [0.3, 0.2]).position("b_tip"), atol=1e-12)
+    with pytest.raises(RobotError, match="'root' is a free joint and cannot be locked"):
+        Robot.load(written(world(WALKER)), locked={"root": 0.0})
+
+
+@pytest.mark.parametrize(("actuator", "joint", "effort"), [
+    ('<motor joint="a_joint" gear="3" ctrlrange="-2 2"/>', "", 6.0),
+    ('<motor joint="a_joint" gear="-3" ctrlrange="-2 2" forcerange="-1 1"/>', "", 3.0),
+    ('<position joint="a_joint" gear="2" kp="9" ctrlrange="-1 1" forcerange="-5 5"/>', "", 10.0),
+    ('<general joint="a_joint" gainprm="4" ctrlrange="-1 1"/>', "", 4.0),
+    ('<motor joint="a_joint" ctrlrange="-2 2"/><motor joint="a_joint" ctrlrange="-1 1"/>', "", 3.0),
+    ('<motor joint="a_joint" ctrlrange="-2 2"/>', 'actuatorfrcrange="-1.5 1.5"', 1.5),
+    ('<motor joint="a_joint" ctrlrange="-2 3"/>', "", 2.0),
+    ('<motor joint="a_joint" ctrlrange="0 3"/>', "", np.inf),
+    ('<motor joint="a_joint"/>', "", np.inf),
+    ('<position joint="a_joint" kp="9" ctrlrange="-1 1"/>', "", np.inf),
+    ('<orientation joint="b_joint"/><motor joint="a_joint" gear="3" ctrlrange="-2 2"/>', "", 6.0),
+    ("", "", np.inf)])
+def test_effort_limits_are_what_actuators_can_do(actuator, joint, effort, written):
+    arm = link("a", f'{joint} axis="0 1 0"', link("b", 'type="ball"'))
+    robot = Robot.load(written(world(arm, f"<actuator>{actuator}</actuator>")))
+    np.testing.assert_allclose(robot.effort_limit, [effort, *[np.inf] * 3])
+    assert (robot.velocity_limit == np.inf).all()
+    assert "velocity limits: an MJCF has none" in robot.missing
+
+
+def test_what_is_left_out_is_said(written):
+    robot = Robot.load(written(world(
+        link("a", 'stiffness="1" damping="1"', link("b", 'type="ball" range="0 50"')) + TARGET
+        + CUBE + '<geom name="floor" type="plane" size="1 1 1"/>',
+        '<tendon><fixed name="tie"><joint joint="a_joint" coef="1"/></fixed></tendon>'
+        '<actuator><motor name="pull" tendon="tie"/></actuator>'
+        '<equality><tendon name="hold" tendon1="tie"/><weld name="off" body1="a" active="false"/>'
+        '<weld name="drag" body1="target" body2="a"/></equality>')))
+    said = " | ".join(robot.missing)
+    for name in ("mocap bodies are left out: target", "left out (root = \"NAME\" takes one as the "
+                 "robot): cube", "tendons are left out: tie", "left out: pull", "left out: hold",
+                 "not active are left out: off", "'drag' is left out", "ball joints are not kept: "
+                 "b_joint", "no actuator moves the joint, and nothing limits its effort here: "
+                 "a_joint", "stiffness and damping of joints", "'floor' is a plane"):
+        assert name in said, name
+    assert robot.loops == ()
+    assert "drag 2" not in robot.frame_names
+
+
+def test_inertia_of_a_tendon_is_refused_by_name(written):
+    path = written(world(link("a", more=link("b")), '<tendon><fixed name="tie" armature=".1">'
+                         '<joint joint="a_joint" coef="1"/><joint joint="b_joint" coef="1"/>'
+                         "</fixed></tendon>"))
+    with pytest.raises(RobotError, match=r"armature acts on several joints.*tendon 'tie'"):
+        Robot.load(path)
+
+
+def residual(path, robot, q):
+    """What MuJoCo has left of the equalities at q, of joints with one coordinate."""
+    model = mujoco.MjModel.from_xml_path(str(path))
+    data = mujoco.MjData(model)
+    data.qpos[:] = q
+    mujoco.mj_forward(model, data)
+    return data.efc_pos[data.efc_type == int(mujoco.mjtConstraint.mjCNSTR_EQUALITY)]
+
+
+def test_couplings_are_polynomials_of_positions(written):
+    path = written(world(
+        link("a", 'ref="20"', link("b", 'ref="-30"', link("c"))),
+        '<equality><joint joint1="a_joint" joint2="b_joint" polycoef=".1 .2 .3 .4 .5"/>'
+        '<joint joint1="c_joint" polycoef=".2 0 0 0 0"/></equality>'))
+    robot = Robot.load(path)
+    one, other = robot.coupled
+    assert (one.joint, one.other, other.joint, other.other) == ("a_joint", "b_joint", "c_joint", "")
+    for b in (-1.0, 0.3, 0.9):
+        q = [np.polyval(one.coefficients[::-1], b), b, other.coefficients[0]]
+        np.testing.assert_allclose(residual(path, robot, q), 0.0, atol=1e-12)
+    held = Robot.load(path, locked={"b_joint": 0.3}).coupled[0]
+    np.testing.assert_allclose(held.coefficients, [np.polyval(one.coefficients[::-1], 0.3)])
+
+
+@pytest.mark.parametrize(("equality", "rigid"), [
+    ('<connect name="close" body1="a" body2="c" anchor=".1 .2 .3"/>', False),
+    ('<connect name="close" body1="c" anchor=".1 .2 .3"/>', False),
+    ('<connect name="close" site1="a_tip" site2="c_tip"/>', False),
+    ('<weld name="close" body1="a" body2="c"/>', True),
+    ('<weld name="close" body1="a" body2="c" anchor=".1 .2 .3" relpose=".1 .3 .2 .5 .5 .5 .5"/>',
+     True),
+    ('<weld name="close" site1="a_tip" site2="c_tip"/>', True)])
+def test_closed_chains_join_the_frames_that_mujoco_joins(equality, rigid, written):
+    path = written(world(link("a", 'axis="0 0 1"', link("b", more=link("c", 'axis="1 1 0"'))),
+                         f"<equality>{equality}</equality>"))
+    robot = Robot.load(path)
+    loop, = robot.loops
+    assert (loop.name, loop.rigid) == ("close", rigid)
+    assert robot.end_effector not in loop.frames or "site" in equality
+    for q in np.random.default_rng(2).uniform(-1.0, 1.0, (3, 3)):
+        state, expected = State.at(robot, q), residual(path, robot, q)
+        one, other = (robot.frame(name) for name in loop.frames)
+        np.testing.assert_allclose(state.position(one) - state.position(other), expected[:3],
+                                   atol=1e-12)
+        if rigid:
+            cosine = (np.trace(state.rotation(one).T @ state.rotation(other)) - 1.0) / 2.0
+            half = np.sqrt((1.0 - cosine) / 2.0)  # sine of half the angle between them
+            np.testing.assert_allclose(half, np.linalg.norm(expected[3:]), atol=1e-9)
+
+
+def test_keyframes_are_starts(written):
+    path = written(world(WALKER, '<keyframe><key name="home" qpos="0 0 1 .6 0 .8 0 .3"/><key '
+                         'qpos="0 0 2 1 0 0 0 .4"/></keyframe>'))
+    robot = Robot.load(path)
+    assert list(robot.starts) == ["home", "key 1"]
+    np.testing.assert_allclose(robot.starts["home"], [0, 0, 1, 0, 0.8, 0, 0.6, 0.3], atol=1e-12)
+    held = Robot.load(path, base="fixed")
+    np.testing.assert_allclose(start_of(held, StartSection(keyframe="home"))[0], [0.3])
+    moved = StartSection(keyframe="key 1", joints={"leg_joint": 0.1})
+    np.testing.assert_allclose(start_of(held, moved)[0], [0.1])
+    with pytest.raises(UnknownNameError, match="unknown keyframe 'hom'"):
+        robot.start("hom")
+
+
+def test_pairs_that_the_file_lets_touch_are_not_kept_apart(written):
+    chain = link("a", more=link("b", 'axis="0 0 1"', link("c", more=link("d"))))
+    exclude = '<contact><exclude body1="a" body2="c"/></contact>'
+    free, apart = (Robot.load(written(world(chain, more))) for more in ("", exclude))
+    assert apart.apart == (("a_joint", "c_joint"),)
+    assert set(separable_pairs(free, 0.01)) - set(separable_pairs(apart, 0.01)) == {(0, 2)}
+
+
+def test_check_shows_what_the_file_has_besides_joints(written, capsys):
+    path = written(world(
+        link("a", more=link("b", more=link("c"))) + TABLE,
+        '<contact><exclude body1="a" body2="c"/></contact><keyframe><key name="home"/></keyframe>'
+        '<equality><connect name="close" body1="a" body2="c" anchor="0 0 0"/></equality>'))
+    assert run_command(["check", str(path), "--set", "robot.root=a"]) == 0
+    said = capsys.readouterr().out
+    for part in ("closed chain    close: close 1 and close 2 have one origin",
+                 "keyframes       home", "may touch       a_joint to c_joint",
+                 "missing         left out, since it is not under root: table", 'root = "a"'):
+        assert part in said, part
