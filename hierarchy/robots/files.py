@@ -17,10 +17,13 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import ArrayLike
 
-from hierarchy.errors import RobotError, UnknownNameError
+from hierarchy.errors import HierarchyError, RobotError, UnknownNameError
+from hierarchy.problem import Array
 from hierarchy.robots import mjcf, urdf
 from hierarchy.robots.found import Coupled, Found, is_floating, neutral_within_limits
+from hierarchy.robots.joints import parts_of, set_joint, values_of
 from hierarchy.robots.points import proposed_end_effector
 from hierarchy.robots.shapes import capsules_of
 from hierarchy.robots.table import Base
@@ -30,12 +33,12 @@ Element = ElementTree.Element
 
 
 def read_file(path: str | Path, base: Base | None = None, shapes: bool = True,
-              locked: Mapping[str, float] = MappingProxyType({})) -> Found:
+              locked: Mapping[str, ArrayLike] = MappingProxyType({})) -> Found:
     """Read a robot from a URDF (.urdf) or MJCF (.xml, .mjcf) file.
 
     `base` None takes that of the file: fixed for a URDF, floating for an MJCF whose first body has
     a free joint. Without `shapes` no collision geometry is read. `locked` joints are fixed at a
-    position [rad or m]. Raises RobotError if the file cannot be read.
+    value [rad or m], see `hierarchy.robots.joints`. Raises RobotError if the file cannot be read.
     """
     path = Path(path)
     if not path.is_file():
@@ -50,8 +53,12 @@ def read_file(path: str | Path, base: Base | None = None, shapes: bool = True,
         except Exception as error:  # the parsers raise many types; all mean an invalid file
             raise RobotError(f"robot file {str(path)!r} cannot be read: "
                              f"{'; '.join([*lines(), _in_one_line(error)])}") from error
-        model = _without(model, locked, str(path))
-        found = _found(model, (urdf if is_urdf else mjcf).coupled(root))
+        coupled = (urdf if is_urdf else mjcf).coupled(root)
+        if locked:
+            q = _locked_at(model, locked, str(path))
+            coupled = _held(coupled, model, q, locked)
+            model = pin.buildReducedModel(model, [model.getJointId(name) for name in locked], q)
+        found = _found(model, coupled)
         if not shapes:
             return found
         geometries, missing = _geometry(path, root, model,
@@ -64,7 +71,7 @@ def _found(model: Any, coupled: tuple[Coupled, ...]) -> Found:
     names = set(model.names)
     return Found(model, proposed_end_effector(model),
                  rest=neutral_within_limits(model, pin.neutral(model)),
-                 coupled=tuple(one for one in coupled if {one.joint, one.other} <= names))
+                 coupled=tuple(one for one in coupled if {one.joint, one.other} <= {*names, ""}))
 
 
 @contextmanager
@@ -89,21 +96,30 @@ def _printed() -> Iterator[Callable[[], list[str]]]:
             os.close(kept)
 
 
-def _without(model: Any, locked: Mapping[str, float], file: str) -> Any:
-    """Return the model without the locked joints."""
-    if not locked:
-        return model
-    q, indices = np.array(pin.neutral(model)), []
+def _locked_at(model: Any, locked: Mapping[str, ArrayLike], file: str) -> Array:
+    """Return a configuration (nq,) with locked joints where they are to be; raises RobotError."""
+    q, parts, names = np.array(pin.neutral(model)), parts_of(model), list(model.names)
     for name, value in locked.items():
-        if name not in list(model.names)[1:]:
-            raise UnknownNameError("joint", name, list(model.names)[1:])
-        joint = model.joints[model.getJointId(name)]
-        if joint.nq != 1:
-            raise RobotError(f"robot file {file!r}: joint {name!r} has {joint.nq} coordinates and "
-                             "cannot be locked")
-        q[joint.idx_q] = value
-        indices.append(int(joint.id))
-    return pin.buildReducedModel(model, indices, q)
+        if name not in names[1:]:
+            raise UnknownNameError("joint", name, names[1:])
+        try:
+            set_joint(parts, q, names.index(name), name, value)
+        except HierarchyError as error:
+            raise RobotError(f"robot file {file!r}: locked: {error}") from error
+    return q
+
+
+def _held(coupled: tuple[Coupled, ...], model: Any, q: Array,
+          locked: Mapping[str, ArrayLike]) -> tuple[Coupled, ...]:
+    """Return what is left of couplings: a joint that followed a locked one is held where it was."""
+    values, found = values_of(parts_of(model), q), []
+    for one in coupled:
+        if one.other in locked:
+            x = values[model.joints[model.getJointId(one.other)].idx_v]
+            at = float(np.polyval(one.coefficients[::-1], x))
+            one = replace(one, other="", coefficients=(at,))
+        found.append(one)
+    return tuple(found)
 
 
 def _urdf_model(root: Element, base: Base | None) -> Any:
