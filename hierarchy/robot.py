@@ -340,10 +340,14 @@ class Robot:
 
         That is a number for a joint of one velocity, else one for each of its velocities.
         """
-        found = values_of(self.parts, self.normalised(q))
+        found = self.vector(q)
         spans = [(joint.idx_v, joint.nv) for joint in self.model.joints[1:]]
         return {name: float(found[first]) if count == 1 else found[first:first + count]
                 for name, (first, count) in zip(self.joint_names, spans, strict=True)}
+
+    def vector(self, q: ArrayLike) -> Array:
+        """Return the values of all joints at q (nq,) one after the other (n,), see `values`."""
+        return values_of(self.parts, self.normalised(q))
 
     def normalised(self, q: ArrayLike) -> Array:
         """Return q (nq,) with quaternions and (cos, sin) of length one.

@@ -85,7 +85,8 @@ class StepLimits(JointRows):
     """Keep each joint within its position limits after a step of `period` [s], and its speed.
 
     One row per velocity, those of a floating base too. Accelerations are not limited, so that a
-    step does not depend on the one before; see `hierarchy.tasks.JointLimits` for limits that a robot can obey.
+    step does not depend on the one before; see `hierarchy.tasks.JointLimits` for limits that a
+    robot can obey.
     """
 
     robot: Robot

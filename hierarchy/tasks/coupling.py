@@ -130,7 +130,7 @@ class FollowedJoints(_Coupling):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        terms = []
+        terms: list[tuple[int, str, tuple[float, ...]]] = []
         for row, one in enumerate(self.coupled):
             constant, *others = one.coefficients
             terms.append((row, one.joint, (-constant, 1.0)))
@@ -158,10 +158,10 @@ def _terms(robot: Robot, rows: int,
         if continuous and coefficients[1] and not any(coefficients[2:]):
             turns[row] = min(turns[row], 2.0 * np.pi * abs(coefficients[1]))
         found.append((row, own[0].q, own[0].v, continuous, coefficients))
-    rows_of, positions, velocities, continuous, polynomials = zip(*found, strict=True)
+    rows_of, positions, velocities, around, polynomials = zip(*found, strict=True)
     padded = np.array(list(zip_longest(*polynomials, fillvalue=0.0))).T
     return Terms(np.array(rows_of, dtype=np.int64), np.array(positions, dtype=np.int64),
-                 np.array(velocities, dtype=np.int64), np.array(continuous, dtype=np.bool_),
+                 np.array(velocities, dtype=np.int64), np.array(around, dtype=np.bool_),
                  np.ascontiguousarray(padded), turns)
 
 

@@ -6,7 +6,8 @@ these rows stand at the top of a stack.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from typing import final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -22,7 +23,7 @@ from hierarchy.tasks.together import Together
 MECHANISM = "mechanism"  # the name of the rows in a stack
 _FASTEST = 50.0          # [1/s] at which an error dies away
 _PER_PERIOD = 0.25       # share of it in a period, at most
-_TURNS_BACK = 20         # Newton steps of `closed`; five take 1 mm to rounding
+_MOST_STEPS = 20         # of Newton's method; four take 1 mm to rounding
 _INDEPENDENT = 1e-5      # singular value, relative to the largest, of a row that is one
 
 
@@ -55,40 +56,56 @@ def above(rows: Sequence[Task], limits: Sequence[Task], anywhere: bool) -> list[
     return [*rows, *limits] if anywhere else [*limits, *rows]
 
 
-def closed(robot: Robot, q: ArrayLike) -> Array:
-    """Return the configuration (nq,) near q that the mechanism allows, or q itself without one.
+@final
+class Mechanism:
+    """The mechanism of a robot, to close it at a configuration; for one without it does nothing."""
 
-    It is found by Newton's method, in steps of the least norm. Where the mechanism cannot be
-    closed, it is closed as far as 20 steps take it, see `gap`.
-    """
-    here = robot.normalised(q)
-    for task in model_rows(robot):
-        least, best = np.inf, here
-        for _ in range(_TURNS_BACK):
-            state = State.at(robot, here)
-            error = task.error(state)
+    def __init__(self, robot: Robot) -> None:
+        self._robot, self._tasks, self._state = robot, model_rows(robot), State(robot)
+
+    def __bool__(self) -> bool:
+        return bool(self._tasks)
+
+    def closed(self, q: ArrayLike, held: Iterable[str] = ()) -> Array:
+        """Return the configuration (nq,) near q that the mechanism allows.
+
+        Joints of the names in `held` stay where they are. It is found by Newton's method in steps
+        of the least norm. One that cannot be closed is closed as far as that takes it, see `gap`.
+        """
+        best = here = self._robot.normalised(q)
+        moved = np.ones(self._robot.n)
+        for joint in map(self._robot.joint, held):
+            moved[[part.v + i for part in self._robot.parts if part.joint == joint
+                   for i in range(part.velocities)]] = 0.0
+        least = np.inf
+        for _ in range(_MOST_STEPS if self else 0):
+            J, error = self._rows(here)
             missed = float(np.abs(error).max())
             if not missed < least:
                 break
             least, best = missed, here
-            here = robot.integrate(here, np.linalg.lstsq(task.jacobian(state), error,
-                                                         rcond=_INDEPENDENT)[0])
-        here = best
-    return here
+            here = self._robot.integrate(here, _solved(J * moved, error))
+        return best
+
+    def gap(self, q: ArrayLike) -> tuple[float, str]:
+        """Return by how much it is open at q at most [m or rad], and in which row."""
+        if not self:
+            return 0.0, ""
+        error = np.abs(self._rows(self._robot.normalised(q))[1])
+        return float(error.max()), self._tasks[0].row_names[int(error.argmax())]
+
+    def moving(self, q: ArrayLike, v: Array) -> Array:
+        """Return the velocity (n,) nearest to v that it allows at q."""
+        if not self:
+            return v
+        J = self._rows(self._robot.normalised(q))[0]
+        return v - _solved(J, J @ v)
+
+    def _rows(self, q: Array) -> tuple[Array, Array]:
+        """Jacobian (m, n) and error (m,) at q."""
+        self._state.move(0.0, q, self._state.v)
+        return self._tasks[0].jacobian(self._state), self._tasks[0].error(self._state)
 
 
-def gap(robot: Robot, q: ArrayLike) -> tuple[float, str]:
-    """Return by how much the mechanism is open at q, at most, and where [m or rad]; 0.0 and ""."""
-    for task in model_rows(robot):
-        error = np.abs(task.error(State.at(robot, q)))
-        worst = int(error.argmax())
-        return float(error[worst]), task.row_names[worst]
-    return 0.0, ""
-
-
-def moving_with(robot: Robot, q: ArrayLike, v: Array) -> Array:
-    """Return the velocity (n,) nearest to v that the mechanism allows at q."""
-    for task in model_rows(robot):
-        J = task.jacobian(State.at(robot, q))
-        v = v - np.linalg.lstsq(J, J @ v, rcond=_INDEPENDENT)[0]
-    return v
+def _solved(J: Array, b: Array) -> Array:
+    return np.asarray(np.linalg.lstsq(J, b, rcond=_INDEPENDENT)[0])

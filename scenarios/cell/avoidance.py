@@ -94,7 +94,7 @@ def inseparable_pairs(robot: Robot, distance: float) -> list[str]:
 
 def _postures(robot: Robot) -> Iterator[Array]:
     """Yield postures (nq,) spread evenly within the limits, a turn where there are none."""
-    generator, start = np.random.default_rng(0), robot.rest[robot.coordinates]
+    generator, start = np.random.default_rng(0), robot.vector(robot.rest)
     lower, upper = (np.where(np.isfinite(side), side, turn) for side, turn in
                     zip(robot.position_limits(), (-np.pi, np.pi), strict=True))
     for _ in range(_POSTURES):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from math import ceil
+from math import ceil, cos, sin
 from typing import Any
 
 import numpy as np
@@ -35,8 +35,8 @@ class TorqueRobot:
     world axes, `slip` (C,) [m] and `pressure_margin` (C,) [m]; and `support_margin` () [m], see
     `Touch`.
 
-    Raises ScenarioError if mujoco is not installed, a joint does not turn about one axis, a push is
-    on an unknown joint, or the delay is not a whole number of periods.
+    Raises ScenarioError if mujoco is not installed, a joint has several axes, a push is on an
+    unknown joint, or the delay is not a whole number of periods.
     """
 
     def __init__(self, robot: Robot, contacts: Contacts, q: Array, v: Array | None = None,
@@ -50,7 +50,9 @@ class TorqueRobot:
         self._floating = robot.base == "floating"
         self.q, self.v = q.copy(), np.zeros(robot.n) if v is None else v.copy()
         self.a = np.zeros(robot.n)
-        self.data.qpos[:] = _quaternion_first(q) if self._floating else q
+        self._parts = [part for part in robot.parts if part.v >= robot.actuated]
+        joints = np.append(q[:7 * self._floating], robot.vector(q)[robot.actuated:])
+        self.data.qpos[:] = _quaternion_first(joints) if self._floating else joints
         self.data.qvel[:] = self.v
         if self._floating:
             self.data.qvel[:3] = self._rotation() @ self.v[:3]
@@ -121,8 +123,11 @@ class TorqueRobot:
 
     def _read(self) -> None:
         """Take over the state: a free joint of MuJoCo has w first, and a velocity in the world."""
-        self.q[:], self.v[:] = self.data.qpos, self.data.qvel
+        for part, x in zip(self._parts, self.data.qpos[7 * self._floating:].tolist(), strict=True):
+            self.q[part.q:part.q + part.size] = x if part.size == 1 else (cos(x), sin(x))
+        self.v[:] = self.data.qvel
         if self._floating:
+            self.q[:3] = self.data.qpos[:3]
             self.q[3:7] = self.data.qpos[[4, 5, 6, 3]]
             self.v[:3] = self._rotation().T @ self.data.qvel[:3]
 
