@@ -329,8 +329,9 @@ class Robot:
         if len(given) == self.nq:
             return self.normalised(given)
         if len(given) != joints:
-            raise RobotError(f"{len(given)} targets for {joints} joint positions or {self.nq} "
-                             f"coordinates of robot {self.name!r}")
+            full = f" or {self.nq} coordinates" if self.nq != joints else ""
+            raise RobotError(f"{len(given)} values for {joints} joint positions{full} of robot "
+                             f"{self.name!r}")
         own = [part for part in self.parts if part.v >= self.actuated]
         q[own[0].q:] = coordinates_of(own, given)
         return q

@@ -23,7 +23,9 @@ from hierarchy.tasks.together import Together
 MECHANISM = "mechanism"  # the name of the rows in a stack
 _FASTEST = 50.0          # [1/s] at which an error dies away
 _PER_PERIOD = 0.25       # share of it in a period, at most
-_MOST_STEPS = 20         # of Newton's method; four take 1 mm to rounding
+_MOST_STEPS = 100        # to close a mechanism; three take 1 mm to rounding
+_CLOSED = 1e-9           # [m or rad] from where on a step that gains nothing is rounding
+_LEAST_DAMPING = 1e-4
 _INDEPENDENT = 1e-5      # singular value, relative to the largest, of a row that is one
 
 
@@ -69,23 +71,32 @@ class Mechanism:
     def closed(self, q: ArrayLike, held: Iterable[str] = ()) -> Array:
         """Return the configuration (nq,) near q that the mechanism allows.
 
-        Joints of the names in `held` stay where they are. It is found by Newton's method in steps
-        of the least norm. One that cannot be closed is closed as far as that takes it, see `gap`.
+        Joints of the names in `held` stay where they are. It is found by the method of Levenberg
+        and Marquardt. One that cannot be closed is closed as far as that takes it, see `gap`.
         """
-        best = here = self._robot.normalised(q)
-        moved = np.ones(self._robot.n)
-        for joint in map(self._robot.joint, held):
-            moved[[part.v + i for part in self._robot.parts if part.joint == joint
-                   for i in range(part.velocities)]] = 0.0
-        least = np.inf
-        for _ in range(_MOST_STEPS if self else 0):
-            J, error = self._rows(here)
-            missed = float(np.abs(error).max())
-            if not missed < least:
+        here = self._robot.normalised(q)
+        if not self:
+            return here
+        moved, damping = self._free(held), 0.0
+        J, error = self._rows(here)
+        for _ in range(_MOST_STEPS):
+            there = self._robot.integrate(here, _solved(J * moved, error, damping))
+            J_there, error_there = self._rows(there)
+            if error_there @ error_there < error @ error:
+                here, J, error, damping = there, J_there, error_there, damping / 10.0
+            elif np.abs(error).max() < _CLOSED:
                 break
-            least, best = missed, here
-            here = self._robot.integrate(here, _solved(J * moved, error))
-        return best
+            else:
+                damping = max(10.0 * damping, _LEAST_DAMPING)
+        return here
+
+    def _free(self, held: Iterable[str]) -> Array:
+        """Return 1 for each velocity (n,), 0 for those of joints that stay where they are."""
+        free, fixed = np.ones(self._robot.n), {self._robot.joint(name) for name in held}
+        for part in self._robot.parts:
+            if part.joint in fixed:
+                free[part.v:part.v + part.velocities] = 0.0
+        return free
 
     def gap(self, q: ArrayLike) -> tuple[float, str]:
         """Return by how much it is open at q at most [m or rad], and in which row."""
@@ -107,5 +118,8 @@ class Mechanism:
         return self._tasks[0].jacobian(self._state), self._tasks[0].error(self._state)
 
 
-def _solved(J: Array, b: Array) -> Array:
-    return np.asarray(np.linalg.lstsq(J, b, rcond=_INDEPENDENT)[0])
+def _solved(J: Array, b: Array, damping: float = 0.0) -> Array:
+    """Return the x (n,) of least norm that makes |J x - b|^2 + damping |x|^2 least."""
+    U, s, V = np.linalg.svd(J, full_matrices=False)
+    kept = s > _INDEPENDENT * s[0]
+    return np.asarray(((U.T @ b)[kept] * s[kept] / (s[kept]**2 + damping)) @ V[kept])
