@@ -25,6 +25,7 @@ _FASTEST = 50.0          # [1/s] at which an error dies away
 _PER_PERIOD = 0.25       # share of it in a period, at most
 _MOST_STEPS = 100        # to close a mechanism; three take 1 mm to rounding
 _CLOSED = 1e-9           # [m or rad] from where on a step that gains nothing is rounding
+_EXACT = 1e-13           # [m, rad or their rates] what nothing is done about
 _LEAST_DAMPING = 1e-4
 _INDEPENDENT = 1e-5      # singular value, relative to the largest, of a row that is one
 
@@ -79,7 +80,7 @@ class Mechanism:
             return here
         moved, damping = self._free(held), 0.0
         J, error = self._rows(here)
-        for _ in range(_MOST_STEPS):
+        for _ in range(_MOST_STEPS if np.abs(error).max() > _EXACT else 0):
             there = self._robot.integrate(here, _solved(J * moved, error, damping))
             J_there, error_there = self._rows(there)
             if error_there @ error_there < error @ error:
@@ -110,7 +111,8 @@ class Mechanism:
         if not self:
             return v
         J = self._rows(self._robot.normalised(q))[0]
-        return v - _solved(J, J @ v)
+        beside = J @ v
+        return v - _solved(J, beside) if np.abs(beside).max() > _EXACT else v
 
     def _rows(self, q: Array) -> tuple[Array, Array]:
         """Jacobian (m, n) and error (m,) at q."""
