@@ -60,20 +60,18 @@ class Body:
 class Robot:
     """A robot: its model, base, limits, frames, control points and capsules of its links.
 
-    `n` is the number of velocities, `nq` that of coordinates: two (cos, sin) for the one velocity
-    of a continuous joint, a quaternion (x, y, z, w) for a ball, (x, y, cos, sin) for a planar
-    joint, location and quaternion for a free one. `parts` are what joints are made of, see
-    hierarchy.robots.joints. A floating `base` has the first six velocities, in its own frame [m/s,
-    rad/s]; `actuated` is the index of the first actuated velocity: 6 or 0. `lower`, `upper`
-    (nq,) [rad or m], `velocity_limit` (n,) [rad/s or m/s] and `effort_limit` (n,) [N m or N] are
-    infinite where the model has none, but for the speed of a floating base, see `limit_base`.
-    `coordinates` (n,) is the index in q of the (first) position
-    of each velocity. `parents` (joints + 1) has the joint that carries each joint, `masses`
-    (joints + 1) [kg] and `centres` (joints + 1, 3) [m] the body that each moves. `rest` (nq,) is
-    the default initial configuration. `missing` has sentences about files that are named but
-    missing; `coupled` joints follow another one in the file, `loops` are chains that it closes,
-    `starts` the configurations (nq,) that it names, `apart` pairs of joints whose bodies it lets
-    touch. `table` is the table that the robot was made from, or None.
+    `n` is the number of velocities, `nq` of coordinates: a continuous joint has (cos, sin), a ball
+    a quaternion (x, y, z, w), a planar joint (x, y, cos, sin), a free one location and quaternion;
+    `parts` are these. A floating `base` has the first six velocities, in its own frame [m/s,
+    rad/s]; `actuated` is the index of the first actuated velocity: 6 or 0. `lower`, `upper` (nq,)
+    [rad or m], `velocity_limit` (n,) [rad/s or m/s] and `effort_limit` (n,) [N m or N] are infinite
+    where the model has none, but for the speed of the base, see `limit_base`. `coordinates` (n,) is
+    the index in q of the (first) position of each velocity. `parents`, `masses` [kg] and `centres`
+    (joints + 1, 3) [m] have the joint that carries each joint, and the body that it moves. `rest`
+    (nq,) is the default initial configuration. `missing` has sentences about missing files;
+    `coupled` joints follow another one in the file, `loops` are chains that it closes, `starts` the
+    configurations (nq,) that it names, `apart` pairs of joints whose bodies it lets touch. `table`
+    is the table that the robot was made from, or None.
     """
 
     def __init__(self, model: Any, name: str, end_effector: str | None = None,

@@ -67,10 +67,10 @@ class StartSection(Section):
     robot's own posture; `joints` override it by name. A value is a number, the angle of a
     continuous joint too, [x, y, angle] of a planar one, a rotation vector or quaternion [x, y, z,
     w] of a ball, location and either of a free one. Joints that follow others, and those of closed
-    chains, are moved to where the named ones let them be. With `end_effector`
-    [m] the start is the posture, reached from q, that puts the end effector there. With `on_floor`
-    a floating base is raised or lowered so that the lowest contact touches the floor. A joint
-    beyond its limits is an error unless `allow_outside_limits`.
+    chains, are moved to where the named ones let them be. With `end_effector` [m] the start is the
+    posture, reached from q, that puts the end effector there. With `on_floor` a floating base is
+    raised or lowered so that the lowest contact touches the floor. A joint beyond its limits is an
+    error unless `allow_outside_limits`.
     """
 
     q: tuple[Finite, ...] | None = None
