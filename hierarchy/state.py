@@ -294,8 +294,10 @@ def _checked(robot: Robot, what: str, value: ArrayLike, names: Sequence[str]) ->
         raise RobotError(f"robot {robot.name!r}: {what} is not an array of numbers: "
                          f"{brief(value)}") from None
     if vector.shape != (len(names),):
+        more = ("; robot.configuration makes one of the values of joints"
+                if what == "q" and robot.nq != robot.n else "")
         raise RobotError(f"robot {robot.name!r}: {what} has shape {vector.shape}, "
-                         f"expected ({len(names)},)")
+                         f"expected ({len(names)},){more}")
     for (i,) in np.argwhere(~np.isfinite(vector))[:1]:
         raise RobotError(f"robot {robot.name!r}: {what}[{i}] ({names[i]}) is {vector[i]}")
     return vector

@@ -18,7 +18,7 @@ _REACHED = 1e-6      # [m]
 _REACH_STEPS = 500   # damped Newton steps; a reachable point takes about ten
 _ON_LIMIT = 1e-9     # [rad or m] beyond a limit that is rounding
 _LONGEST_STEP = 0.3  # [rad] of any joint
-_CLOSED = 1e-6       # [m or rad] to which a mechanism is closed at the start
+_CLOSED = 1e-3       # [m or rad] by which rounding in a file may leave a mechanism open
 
 
 def make_robot(section: RobotSection) -> Robot:

@@ -111,6 +111,51 @@ def test_a_four_bar_closes_from_a_millimetre_off_and_goes_to_its_posture(level, 
     assert np.abs(ROBOT.values(q)["finger"] - ROBOT.values(start())["finger"]) > 0.05, "it moved"
 
 
+def planar_bar(rigid, rounding):
+    """Four bars whose axes are parallel but for rounding, in a plane that is none of the world."""
+    model, rng = pin.Model(), np.random.default_rng(0)
+    chain = [("crank", 0, 0.0), ("coupler", 1, 0.2), *[("knee", 2, 0.4)] * rigid, ("rocker", 0, 0.5)]
+    for name, parent, x in chain:
+        tilt = np.eye(3) if parent else TILT
+        joint = model.addJoint(parent, pin.JointModelRY(), pin.SE3(
+            tilt @ pin.exp3(rounding * rng.normal(size=3)),
+            tilt @ np.array([x, 0, 0]) + rounding * rng.normal(size=3)), name)
+    ends = [("end", len(chain) - 1, 0.15 if rigid else 0.4, 0.0),
+            ("tip", joint, 0.15 if rigid else 0.3, np.pi * rigid)]
+    for name, joint, x, turn in ends:
+        place = pin.SE3(pin.exp3(np.array([0, turn, 0])), np.array([x, 0, 0]))
+        model.addFrame(pin.Frame(name, joint, 0, place, pin.FrameType.OP_FRAME))
+    robot = Robot(model, "planar")
+    robot.loops = (Loop("pin", ("end", "tip"), rigid),)
+    return robot
+
+
+@pytest.mark.parametrize("rigid", [False, True])
+@pytest.mark.parametrize("rounding", [0.0, 1e-9, 1e-6, 1e-4])
+def test_a_chain_in_a_plane_moves_although_its_file_is_rounded(rigid, rounding):
+    """What rounding opens across the plane no motion closes: once the joints were thrown after it.
+
+    The answer depends on neither the resolver nor, much, on the rounding.
+    """
+    robot, ends = planar_bar(rigid, rounding), []
+    begin = Mechanism(robot).closed(robot.configuration({"crank": -0.8}), ["crank"])
+    for resolver in ("hcod", "recursive"):
+        stack = Stack([*model_rows(robot, PERIOD), Posture({"crank": -0.4}, gain=10.0)],
+                      "velocity")
+        q, state, solver = begin, State(robot), make(resolver)
+        for _ in range(500):
+            state.move(0.0, q, np.zeros(robot.n))
+            x = solver.solve(stack.hierarchy(state)).x
+            assert np.abs(x).max() < 20.0
+            q = q + PERIOD * x
+        assert Mechanism(robot).gap(q)[0] < 1e-9 + 5.0 * rounding
+        ends.append(q)
+    exact = planar_bar(rigid, 0.0)
+    np.testing.assert_allclose(ends[0], ends[1], atol=1e-9)
+    assert np.abs(ends[0] - begin).max() > 0.1, "it moved"
+    assert Mechanism(exact).gap(ends[0])[0] < 1e-8 + 20.0 * rounding
+
+
 GRIPPER = """<robot name="g"><link name="base"/>{0}</robot>"""
 JOINT = """<link name="{0}"/><joint name="{0}" type="{2}"><parent link="{1}"/><child link="{0}"/>
 <origin xyz="0.05 0 0"/><axis xyz="0 1 0"/><limit lower="-1" upper="1" velocity="3" effort="9"/>{3}
