@@ -250,7 +250,7 @@ class Robot:
         if self.base != "floating":
             raise RobotError(f"robot {self.name!r}: its base is fixed and has no speed")
         for what, speed in (("linear", linear), ("angular", angular)):
-            if not speed > 0.0:
+            if not isinstance(speed, int | float) or not speed > 0.0:
                 raise RobotError(f"robot {self.name!r}: {what} speed of the base = {speed}, "
                                  "expected a number > 0")
         self.velocity_limit[:6] = np.repeat([linear, angular], 3)

@@ -19,11 +19,10 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from hierarchy.errors import HierarchyError, RobotError, UnknownNameError
-from hierarchy.problem import Array
+from hierarchy.errors import RobotError
 from hierarchy.robots import mjcf, urdf
 from hierarchy.robots.found import Coupled, Found, is_floating, neutral_within_limits
-from hierarchy.robots.joints import parts_of, set_joint, values_of
+from hierarchy.robots.joints import without
 from hierarchy.robots.points import proposed_end_effector
 from hierarchy.robots.shapes import capsules_of
 from hierarchy.robots.table import Base
@@ -54,11 +53,7 @@ def read_file(path: str | Path, base: Base | None = None, shapes: bool = True,
             raise RobotError(f"robot file {str(path)!r} cannot be read: "
                              f"{'; '.join([*lines(), _in_one_line(error)])}") from error
         coupled = (urdf if is_urdf else mjcf).coupled(root)
-        if locked:
-            q = _locked_at(model, locked, str(path))
-            coupled = _held(coupled, model, q, locked)
-            model = pin.buildReducedModel(model, [model.getJointId(name) for name in locked], q)
-        found = _found(model, coupled)
+        found = _found(*without(model, coupled, locked, str(path)))
         if not shapes:
             return found
         geometries, missing = _geometry(path, root, model,
@@ -94,32 +89,6 @@ def _printed() -> Iterator[Callable[[], list[str]]]:
         finally:
             os.dup2(kept, 2)
             os.close(kept)
-
-
-def _locked_at(model: Any, locked: Mapping[str, ArrayLike], file: str) -> Array:
-    """Return a configuration (nq,) with locked joints where they are to be; raises RobotError."""
-    q, parts, names = np.array(pin.neutral(model)), parts_of(model), list(model.names)
-    for name, value in locked.items():
-        if name not in names[1:]:
-            raise UnknownNameError("joint", name, names[1:])
-        try:
-            set_joint(parts, q, names.index(name), name, value)
-        except HierarchyError as error:
-            raise RobotError(f"robot file {file!r}: locked: {error}") from error
-    return q
-
-
-def _held(coupled: tuple[Coupled, ...], model: Any, q: Array,
-          locked: Mapping[str, ArrayLike]) -> tuple[Coupled, ...]:
-    """Return what is left of couplings: a joint that followed a locked one is held where it was."""
-    values, found = values_of(parts_of(model), q), []
-    for one in coupled:
-        if one.other in locked:
-            x = values[model.joints[model.getJointId(one.other)].idx_v]
-            at = float(np.polyval(one.coefficients[::-1], x))
-            one = replace(one, other="", coefficients=(at,))
-        found.append(one)
-    return tuple(found)
 
 
 def _urdf_model(root: Element, base: Base | None) -> Any:

@@ -8,15 +8,16 @@ rotation vector.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from hierarchy.errors import RobotError, finite_numbers
+from hierarchy.errors import HierarchyError, RobotError, UnknownNameError, finite_numbers
 from hierarchy.problem import Array
+from hierarchy.robots.found import Coupled
 
 UNIT = 1e-6     # off one to which the length of a quaternion or (cos, sin) may be given
 _EXACT = 1e-14  # off one by rounding, which is left
@@ -130,3 +131,27 @@ def normalise(parts: Iterable[Part], q: Array, names: Any, tolerance: float = UN
                              f"{length:.9g}, not 1")
         if abs(length - 1.0) > _EXACT:
             own /= length
+
+
+def without(model: Any, coupled: tuple[Coupled, ...], locked: Mapping[str, ArrayLike],
+            file: str) -> tuple[Any, tuple[Coupled, ...]]:
+    """Return a model without its locked joints, and its couplings.
+
+    `locked` has their values. What follows a locked joint is held where that puts it. Raises
+    UnknownNameError, and RobotError, naming file and joint, for a value that is none.
+    """
+    if not locked:
+        return model, coupled
+    q, parts, names = np.array(pin.neutral(model)), parts_of(model), list(model.names)
+    for name, value in locked.items():
+        if name not in names[1:]:
+            raise UnknownNameError("joint", name, names[1:])
+        try:
+            set_joint(parts, q, names.index(name), name, value)
+        except HierarchyError as error:
+            raise RobotError(f"robot file {file!r}: locked: {error}") from error
+    values = values_of(parts, q)
+    left = tuple(one if one.other not in locked else Coupled(one.joint, "", (float(np.polyval(
+        one.coefficients[::-1], values[model.joints[names.index(one.other)].idx_v])),))
+        for one in coupled)
+    return pin.buildReducedModel(model, [names.index(name) for name in locked], q), left

@@ -155,8 +155,9 @@ def _terms(robot: Robot, rows: int,
                                  f"{sum(part.velocities for part in own)} velocities and cannot be "
                                  "coupled")
         continuous = own[0].size == 2
-        if continuous and coefficients[1] and not any(coefficients[2:]):
-            turns[row] = min(turns[row], 2.0 * np.pi * abs(coefficients[1]))
+        slope, *bends = (*coefficients[1:], 0.0)
+        if continuous and slope and not any(bends):
+            turns[row] = min(turns[row], 2.0 * np.pi * abs(slope))
         found.append((row, own[0].q, own[0].v, continuous, coefficients))
     rows_of, positions, velocities, around, polynomials = zip(*found, strict=True)
     padded = np.array(list(zip_longest(*polynomials, fillvalue=0.0))).T

@@ -114,7 +114,8 @@ def test_a_four_bar_closes_from_a_millimetre_off_and_goes_to_its_posture(level, 
 def planar_bar(rigid, rounding):
     """Four bars whose axes are parallel but for rounding, in a plane that is none of the world."""
     model, rng = pin.Model(), np.random.default_rng(0)
-    chain = [("crank", 0, 0.0), ("coupler", 1, 0.2), *[("knee", 2, 0.4)] * rigid, ("rocker", 0, 0.5)]
+    chain = [("crank", 0, 0.0), ("coupler", 1, 0.2), *[("knee", 2, 0.4)] * rigid,
+             ("rocker", 0, 0.5)]
     for name, parent, x in chain:
         tilt = np.eye(3) if parent else TILT
         joint = model.addJoint(parent, pin.JointModelRY(), pin.SE3(
