@@ -21,12 +21,12 @@ from std_msgs.msg import Float64MultiArray
 
 from hierarchy import Robot, Stack, State
 from hierarchy.paths import Still
-from hierarchy.tasks import JointLimits, Position, Posture
+from hierarchy.tasks import JointLimits, Position, Posture, model_rows
 from solvers import Status, make
 
 
 class TaskHierarchyNode(Node):
-    """Joint limits first, then the end effector's position, then the posture at the start."""
+    """Mechanism, joint limits, the end effector's position, the posture at the start."""
 
     def __init__(self) -> None:
         super().__init__("task_hierarchy")
@@ -36,8 +36,6 @@ class TaskHierarchyNode(Node):
         self.stale = float(self.declare_parameter("stale", 0.05).value)
         self.acceleration = float(self.declare_parameter("acceleration", 5.0).value)
         self.robot = Robot.from_file(urdf, end_effector)
-        if self.robot.nq != self.robot.n:
-            raise ValueError("continuous joints need their cosine and sine filled in here")
         self.resolver, self.memory = make("hcod"), None
         self.hand = self.robot.frame(self.robot.end_effector)
         self.state = self.stack = self.q = self.read_at = None
@@ -57,7 +55,9 @@ class TaskHierarchyNode(Node):
             self.get_logger().warning(f"joint states without {', '.join(missing)}",
                                       throttle_duration_sec=5.0)
             return
-        self.q = np.array([known[name] for name in self.robot.joint_names])
+        read = np.array([known[name] for name in self.robot.joint_names])
+        self.q = (self.robot.configuration(read) if np.isfinite(read).all()
+                  else np.full(self.robot.nq, np.nan))  # which `move` refuses
         self.read_at = self.get_clock().now()
         if self.state is None:
             self.state = State.at(self.robot, self.q)
@@ -71,7 +71,8 @@ class TaskHierarchyNode(Node):
     def go_to(self, point: np.ndarray) -> None:
         """Make a stack whose hand goes to a point [m]."""
         posture = self.q if self.stack is None else self.stack["posture"].target
-        self.stack = Stack([JointLimits(self.robot, self.acceleration, self.period),
+        self.stack = Stack([*model_rows(self.robot, self.period),
+                            JointLimits(self.robot, self.acceleration, self.period),
                             Position(self.hand, Still(point.tolist()), gain=2.0),
                             Posture(tuple(posture))], "velocity")
 

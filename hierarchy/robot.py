@@ -9,7 +9,7 @@ from typing import Any, get_args
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from hierarchy import plugins
 from hierarchy.avoidance.control_points import ControlPoint
@@ -21,11 +21,13 @@ from hierarchy.robots.files import read_file
 from hierarchy.robots.found import Coupled, Found, Loop, is_floating
 from hierarchy.robots.frames import ambiguous, frames_called, in_words
 from hierarchy.robots.from_table import from_table
+from hierarchy.robots.joints import coordinates_of, normalise, parts_of, set_joint, values_of
 from hierarchy.robots.names import elsewhere, file_of, in_package, is_file_name
 from hierarchy.robots.points import points_along_chain
 from hierarchy.robots.table import Base, Table
 
 ROBOTS = TABLES
+BASE_SPEED = (2.0, 3.0)  # [m/s], [rad/s] of a floating base in inverse kinematics
 
 
 @dataclass(frozen=True)
@@ -59,17 +61,19 @@ class Body:
 class Robot:
     """A robot: its model, base, limits, frames, control points and capsules of its links.
 
-    `n` is the number of velocities, `nq` that of positions (more than n if a joint is continuous or
-    the base floats). A floating `base` has the first six velocities, in its own frame [m/s, rad/s],
-    and no limits; `actuated` is the index of the first actuated velocity: 6 or 0. `lower`, `upper`
-    (nq,) [rad or m], `velocity_limit` (n,) [rad/s or m/s] and `effort_limit` (n,) [N m or N] are
-    infinite where the model has none. `coordinates` (n,) is the index in q of the (first) position
-    of each velocity. `parents` (joints + 1) has the joint that carries each joint, `masses`
-    (joints + 1) [kg] and `centres` (joints + 1, 3) [m] the body that each moves. `rest` (nq,) is
-    the default initial configuration. `missing` has sentences about what the file does not give, or
-    gives and the robot is without; `coupled` joints follow another one in the file, `loops` are
-    chains that it closes, `starts` the configurations (nq,) that it names, `apart` pairs of joints
-    whose bodies it lets touch. `table` is the table that the robot was made from, or None.
+    `n` is the number of velocities, `nq` of coordinates: a continuous joint has (cos, sin), a ball
+    a quaternion (x, y, z, w), a planar joint (x, y, cos, sin), a free one location and quaternion;
+    `parts` are these. A floating `base` has the first six velocities, in its own frame [m/s,
+    rad/s]; `actuated` is the index of the first actuated velocity: 6 or 0. `lower`, `upper` (nq,)
+    [rad or m], `velocity_limit` (n,) [rad/s or m/s] and `effort_limit` (n,) [N m or N] are infinite
+    where the model has none, but for the speed of the base, see `limit_base`. `coordinates` (n,) is
+    the index in q of the (first) position of each velocity. `parents`, `masses` [kg] and `centres`
+    (joints + 1, 3) [m] have the joint that carries each joint, and the body that it moves. `rest`
+    (nq,) is the default initial configuration. `missing` has sentences about what the file does not
+    give, or gives and the robot is without; `coupled` joints follow another one in the file,
+    `loops` are chains that it closes, `starts` the configurations (nq,) that it names, `apart`
+    pairs of joints whose bodies it lets touch. `table` is the table that the robot was made from,
+    or None.
     """
 
     def __init__(self, model: Any, name: str, end_effector: str | None = None,
@@ -93,8 +97,11 @@ class Robot:
         self.effort_limit = _positive_or_inf(model.effortLimit)
         if self.base == "floating":
             self.lower[:7], self.upper[:7] = -np.inf, np.inf
-            self.velocity_limit[:6] = self.effort_limit[:6] = np.inf
-        self.coordinates = _coordinates(model)
+            self.effort_limit[:6] = np.inf
+            self.limit_base(*BASE_SPEED)
+        self.parts = parts_of(model)
+        self.coordinates = np.array([part.q for part in self.parts
+                                     for _ in range(part.velocities)])
         inertias = list(model.inertias)
         self.masses = np.array([0.0, *(float(inertia.mass) for inertia in inertias[1:])])
         self.centres = np.array([np.zeros(3), *(inertia.lever for inertia in inertias[1:])])
@@ -146,16 +153,17 @@ class Robot:
     @classmethod
     def from_file(cls, path: str | Path, end_effector: str | None = None,
                   base: Base | None = None, shapes: bool = True,
-                  locked: Mapping[str, float] | None = None,
+                  locked: Mapping[str, ArrayLike] | None = None,
                   root: str | Sequence[str] = ()) -> Robot:
         """Read a URDF or MJCF file (its root element says which); RobotError if it cannot.
 
         `end_effector` names a frame; without it one is proposed, see `hierarchy.robots.points`.
         `base` None is that of the file: floating if its first joint is free, else fixed. Capsules
         are proposed from the collision geometry, unless `shapes` is False, and control points along
-        the chain to the end effector. `locked` joints are fixed at a position [rad or m] and are
-        not joints of the robot. `root` names the body, or bodies, of an MJCF at which the robot
-        begins; without it everything is the robot but bodies that only float beside it.
+        the chain to the end effector. `locked` joints are fixed at a value [rad or m], see
+        `configuration`, and are not joints of the robot; what follows one of them is held too.
+        `root` names the body, or bodies, of an MJCF at which the robot begins; without it
+        everything is the robot but bodies that only float beside it.
         """
         path = file_path("Robot.from_file: path", path)
         roots = [root] if isinstance(root, str) else root
@@ -164,7 +172,7 @@ class Robot:
 
     @classmethod
     def load(cls, model: str | Path, end_effector: str | None = None, base: Base | None = None,
-             locked: Mapping[str, float] | None = None,
+             locked: Mapping[str, ArrayLike] | None = None,
              root: str | Sequence[str] = ()) -> Robot:
         """Make a robot by a name of `ROBOTS`, a file, or "package:name".
 
@@ -239,11 +247,30 @@ class Robot:
         return self.joint_names.index(name) + 1
 
     def coordinate(self, name: str) -> int:
-        """Index in q of the position of the joint called `name`; RobotError if it has several."""
+        """Index in q of the position of the joint called `name`; RobotError if it has several.
+
+        `configuration` and `values` set and read every joint by name.
+        """
         joint = self.model.joints[self.joint(name)]
         if joint.nq != 1:
-            raise RobotError(f"robot {self.name!r}: joint {name!r} has {joint.nq} coordinates")
+            raise RobotError(f"robot {self.name!r}: joint {name!r} has {joint.nq} coordinates; "
+                             f"robot.configuration({{{name!r}: value}}) sets them, "
+                             "robot.values(q) reads them")
         return int(joint.idx_q)
+
+    def limit_base(self, linear: float, angular: float) -> None:
+        """Limit the speed of a floating base [m/s, rad/s], inf for none; RobotError if fixed.
+
+        Each of its first six velocities is limited by itself. `solve_ik` and limits of joints that
+        include the base keep to it; by default `BASE_SPEED`, which no file says.
+        """
+        if self.base != "floating":
+            raise RobotError(f"robot {self.name!r}: its base is fixed and has no speed")
+        for what, speed in (("linear", linear), ("angular", angular)):
+            if not isinstance(speed, int | float) or not speed > 0.0:
+                raise RobotError(f"robot {self.name!r}: {what} speed of the base = {speed}, "
+                                 "expected a number > 0")
+        self.velocity_limit[:6] = np.repeat([linear, angular], 3)
 
     def frame(self, name: str) -> Frame:
         """Find the frame called `name`.
@@ -303,16 +330,75 @@ class Robot:
                 upper[joint.idx_v:joint.idx_v + joint.nv] = np.inf
         return lower, upper
 
+    def configuration(self, values: ArrayLike | Mapping[str, ArrayLike],
+                      q: ArrayLike | None = None) -> Array:
+        """Return q (nq,), by default `rest`, with some joints set by name, or all [rad or m].
+
+        A value has a number for each velocity of the joint: an angle for a continuous one, a
+        rotation vector for a ball, (x, y, angle) for a planar one, location and rotation vector for
+        a free one. Or it has the joint's coordinates, with quaternions as (x, y, z, w). Without
+        names `values` are those of all joints but a floating base, or all coordinates (nq,).
+        Raises UnknownNameError, and RobotError, naming the joint, for anything else.
+        """
+        q = self.rest.copy() if q is None else self.normalised(q)
+        if isinstance(values, Mapping):
+            for name, value in values.items():
+                set_joint(self.parts, q, self.joint(name), name, value)
+            return q
+        given = finite_numbers(f"robot {self.name!r}: configuration", values)
+        joints = self.n - self.actuated
+        if len(given) == self.nq:
+            return self.normalised(given)
+        if len(given) != joints:
+            full = f" or {self.nq} coordinates" if self.nq != joints else ""
+            raise RobotError(f"{len(given)} values for {joints} joint positions{full} of robot "
+                             f"{self.name!r}")
+        own = [part for part in self.parts if part.v >= self.actuated]
+        q[own[0].q:] = coordinates_of(own, given)
+        return q
+
+    def values(self, q: ArrayLike) -> dict[str, float | Array]:
+        """Return the value of each joint at q (nq,) by name, as `configuration` takes them.
+
+        That is a number for a joint of one velocity, else one for each of its velocities.
+        """
+        found = self.vector(q)
+        spans = [(joint.idx_v, joint.nv) for joint in self.model.joints[1:]]
+        return {name: float(found[first]) if count == 1 else found[first:first + count]
+                for name, (first, count) in zip(self.joint_names, spans, strict=True)}
+
+    def vector(self, q: ArrayLike) -> Array:
+        """Return the values of all joints at q (nq,) one after the other (n,), see `values`."""
+        return values_of(self.parts, self.normalised(q))
+
+    def normalised(self, q: ArrayLike) -> Array:
+        """Return q (nq,) with quaternions and (cos, sin) of length one.
+
+        Raises HierarchyError for another shape or a number that is not finite, and RobotError,
+        naming the joint, where a length differs from one by more than 1e-6.
+        """
+        q = finite_numbers(f"robot {self.name!r}: q", q, self.nq)
+        if self.nq != self.n:
+            normalise(self.parts, q, ("", *self.joint_names))
+        return q
+
     def integrate(self, q: ArrayLike, step: ArrayLike) -> Array:
         """Return q (nq,) moved by `step` (n,) [rad or m] along the joints.
 
-        Raises HierarchyError for another shape or a number that is not finite.
+        Raises what `normalised` raises.
         """
-        q = finite_numbers(f"robot {self.name!r}: q", q, self.nq)
+        q = self.normalised(q)
         step = finite_numbers(f"robot {self.name!r}: step", step, self.n)
         if self.nq == self.n:
             return q + step
         return np.asarray(pin.integrate(self.model, q, step))
+
+    def difference(self, q: Array, to: Array) -> Array:
+        """Return the step (n,) with which `integrate` moves q (nq,) to another configuration.
+
+        The shortest way around: angles are at most pi.
+        """
+        return to - q if self.nq == self.n else np.asarray(pin.difference(self.model, q, to))
 
     def __repr__(self) -> str:
         return f"Robot({self.name!r}, n={self.n})"
@@ -327,14 +413,6 @@ def _units(joint: Any) -> tuple[str, ...]:
         return ("m", "m", "rad")
     slides = kind.startswith(("FreeFlyer", "Translation", "P"))
     return tuple("m" if slides and i < 3 else "rad" for i in range(joint.nv))
-
-
-def _coordinates(model: Any) -> NDArray[np.int64]:
-    coordinates = np.zeros(model.nv, dtype=np.int64)
-    for joint in model.joints[1:]:
-        for i in range(joint.nv):
-            coordinates[joint.idx_v + i] = joint.idx_q + (i if joint.nq == joint.nv else 0)
-    return coordinates
 
 
 def _finite_or_inf(lower: Array, upper: Array) -> tuple[Array, Array]:

@@ -149,6 +149,9 @@ class Stack:
         expect("Stack.hierarchy: state", state, State, "make one with State.at(robot, q)")
         if not self._tasks:
             raise HierarchyError("the stack is empty: there are no tasks")
+        self._tasks = {name: task.on(state.robot) for name, task in self._tasks.items()}
+        if self.reference is not None:
+            self.reference = self.reference.on(state.robot)
         known = self._prepared.get(order)
         h = self._buffers(order, state.n) if known is None else known.hierarchy
         h.metric = state.dynamics.M if isinstance(self._metric, str) else self._metric

@@ -15,13 +15,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from hierarchy.avoidance.measurement import Measurement
 from hierarchy.errors import RobotError, brief, expect, number
-from hierarchy.jit import compiled
+from hierarchy.jit import compiled, inlined
 from hierarchy.kinematics import Kinematics
 from hierarchy.notebook import numbers
 from hierarchy.problem import Array
 from hierarchy.robot import Frame, Robot
 
 _MISFIT = -1  # arrays of other shapes
+_OFF, _EXACT = 2e-3, 1e-14  # of the squared length of a quaternion: too much, and rounding
 
 
 class Dynamics(NamedTuple):
@@ -50,11 +51,11 @@ class Momentum(NamedTuple):
 class State:
     """Time, joint state and kinematics of one tick: everything that a task may read.
 
-    t [s], q (nq,), v (n,); J, dJ (6, n) world-frame spatial Jacobian of every joint and its time
-    derivative, linear part at the world origin; placements (joints + 1, 12): rotation (column by
-    column) and translation of each joint's frame; supports (joints + 1, n) whether a column moves
-    a body. `kinematics` has all arrays that kernels read. J, dJ and placements are views of the
-    results of the last `move`.
+    t [s], q (nq,), quaternions as (x, y, z, w), v (n,); J, dJ (6, n) world-frame spatial Jacobian
+    of every joint and its time derivative, linear part at the world origin; placements (joints + 1,
+    12): rotation (column by column) and translation of each joint's frame; supports (joints + 1, n)
+    whether a column moves a body. `kinematics` has all arrays that kernels read. J, dJ and
+    placements are views of the results of the last `move`.
 
     With `period` > 0 [s] derivatives are backward differences against previous_J and
     previous_placements, those of the previous `move`; with 0 they are exact. `measurement` is that
@@ -75,6 +76,10 @@ class State:
         self._model, self._data = robot.model, robot.model.createData()
         self._compute = partial(pin.computeJointJacobiansTimeVariation, self._model, self._data,
                                 self.q, self.v)
+        self._copy = _copy_if_finite
+        if robot.nq != robot.n:
+            units = np.array([[part.q, part.size] for part in robot.parts if part.size > 1])
+            self._copy = partial(_copy_if_unit, units)
         self._further: tuple[Callable[[], object], ...] = ()
         self._compute()
         self.J, self.dJ = _columns(self._data.J, 6), _columns(self._data.dJ, 6)
@@ -93,12 +98,13 @@ class State:
         """Make a State at joint positions q (nq,) [rad or m] and velocities v (n,), zero if None.
 
         `differences` is the period [s] of backward differences, None for exact derivatives.
-        RobotError where a shape is wrong or an entry is not finite.
+        RobotError where a shape is wrong, an entry is not finite, or a quaternion or (cos, sin) has
+        another length than one, see `Robot.normalised`.
         """
         expect("State.at: robot", robot, Robot, "make one with Robot.load(name or file)")
         number("State.at: t", t)
         state = cls(robot, differences)
-        state.move(t, _checked(robot, "q", q, robot.coordinate_names),
+        state.move(t, robot.normalised(_checked(robot, "q", q, robot.coordinate_names)),
                    _checked(robot, "v", np.zeros(robot.n) if v is None else v,
                             robot.velocity_names))
         return state
@@ -114,11 +120,12 @@ class State:
     def move(self, t: float, q: Array, v: Array) -> bool:
         """Go to time t [s] at q (nq,), v (n,): the one place of a tick that calls pinocchio.
 
-        Returns False and changes nothing if an entry is not finite. Raises RobotError unless q and
-        v are arrays of these shapes.
+        Returns False and changes nothing if an entry is not finite, or a quaternion or (cos, sin)
+        as a sensor reads it has a length more than 1e-3 off one; a smaller difference is taken out.
+        Raises RobotError unless q and v are arrays of these shapes.
         """
         try:
-            copied = _copy_if_finite(q, v, self.q, self.v)
+            copied = self._copy(q, v, self.q, self.v)
         except (TypeError, AttributeError, NumbaError):  # no arrays of numbers
             copied = _MISFIT
         if copied == _MISFIT:
@@ -215,6 +222,35 @@ def _copy_if_finite(q, v, to_q, to_v):
 
 
 @compiled
+def _copy_if_unit(units, q, v, to_q, to_v):
+    """As `_copy_if_finite`, 0 also if a span of `units` (start, size) is not nearly of length one.
+
+    The copy has length one, and the same bits where q has it to rounding.
+    """
+    if q.shape != to_q.shape:
+        return _MISFIT
+    for k in range(len(units)):
+        if not abs(_square(q, units[k, 0], units[k, 1]) - 1.0) <= _OFF:
+            return 0
+    copied = _copy_if_finite(q, v, to_q, to_v)
+    if copied == 1:
+        for k in range(len(units)):
+            square = _square(q, units[k, 0], units[k, 1])
+            for i in range(units[k, 0], units[k, 0] + units[k, 1]):
+                to_q[i] /= np.sqrt(square) if abs(square - 1.0) > _EXACT else 1.0
+    return copied
+
+
+@inlined
+def _square(q, start, size):
+    """Squared length of a span of q."""
+    total = 0.0
+    for i in range(start, start + size):
+        total += q[i] * q[i]
+    return total
+
+
+@compiled
 def _copy_kinematics(J, placements, previous_J, previous_placements):
     for c in range(J.shape[1]):
         for i in range(6):
@@ -258,8 +294,10 @@ def _checked(robot: Robot, what: str, value: ArrayLike, names: Sequence[str]) ->
         raise RobotError(f"robot {robot.name!r}: {what} is not an array of numbers: "
                          f"{brief(value)}") from None
     if vector.shape != (len(names),):
+        more = ("; robot.configuration makes one of the values of joints"
+                if what == "q" and robot.nq != robot.n else "")
         raise RobotError(f"robot {robot.name!r}: {what} has shape {vector.shape}, "
-                         f"expected ({len(names)},)")
+                         f"expected ({len(names)},){more}")
     for (i,) in np.argwhere(~np.isfinite(vector))[:1]:
         raise RobotError(f"robot {robot.name!r}: {what}[{i}] ({names[i]}) is {vector[i]}")
     return vector

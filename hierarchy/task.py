@@ -82,6 +82,13 @@ class Task(ABC):
         """What each row is about, m names for messages; by default "row 0", "row 1", ..."""
         return tuple(f"row {i}" for i in range(self.dimension))
 
+    def on(self, robot: Robot) -> Task:
+        """Return the task for a robot, whose rows a stack asks for; by default the task itself.
+
+        A task whose number of rows depends on the robot returns one that knows it.
+        """
+        return self
+
     @abstractmethod
     def error(self, state: State) -> Array:
         """Error p_d - p at a state: (m,), in the task's unit."""

@@ -21,6 +21,7 @@ from hierarchy.stack import Stack
 from hierarchy.state import State
 from hierarchy.task import Level, Task
 from hierarchy.tasks.joint_rows import JointRows
+from hierarchy.tasks.mechanism import above, model_rows
 from solvers.resolver import Resolver, make
 from solvers.status import Status
 
@@ -49,9 +50,9 @@ def solve_ik(robot: Robot, q: ArrayLike, tasks: Sequence[Task], *, dt: float = 0
     q : (nq,) joint positions [rad or m].
     tasks : tasks of `hierarchy.tasks`, plugins or your own, at velocity level.
     dt : period [s] for which the velocity will be held.
-    limits : above all tasks: True for the position and velocity limits of the robot, False for
-        none, or a task such as `JointLimits`, which also limits accelerations. Beyond a limit the
-        joint moves back, as fast as its velocity limit allows.
+    limits : above all tasks, below the robot's mechanism: True for the position and velocity limits
+        of the robot, False for none, or a task such as `JointLimits`, which also limits
+        accelerations. Beyond a limit the joint moves back, as fast as its velocity limit allows.
     resolver : a name of `solvers.names()`, or a resolver; with limits it must take bounds.
     memory : that of the last call with the same tasks, to start from.
     t : time [s], for tasks that follow a path.
@@ -70,9 +71,11 @@ def solve_ik(robot: Robot, q: ArrayLike, tasks: Sequence[Task], *, dt: float = 0
                              f"{brief(limits)}")
     if not isinstance(resolver, str):
         expect("solve_ik: resolver", resolver, Resolver, "give a name of solvers.names()")
-    first = [limits] if isinstance(limits, Task) else [StepLimits(robot, dt)] if limits else []
+    solver = make(resolver) if isinstance(resolver, str) else resolver
+    box = [limits] if isinstance(limits, Task) else [StepLimits(robot, dt)] if limits else []
+    first = above(model_rows(robot, dt), box, solver.can_resolve("inequalities"))
     h = Stack([*first, *tasks], "velocity").hierarchy(State.at(robot, q, t=t))
-    found = (make(resolver) if isinstance(resolver, str) else resolver).solve(h, memory)
+    found = solver.solve(h, memory)
     return Step(found.x, found.status, found.memory)
 
 
@@ -81,20 +84,21 @@ def solve_ik(robot: Robot, q: ArrayLike, tasks: Sequence[Task], *, dt: float = 0
 class StepLimits(JointRows):
     """Keep each joint within its position limits after a step of `period` [s], and its speed.
 
-    One row per actuated joint. Accelerations are not limited, so that a step does not depend on
-    the one before; see `hierarchy.tasks.JointLimits` for limits that a robot can obey.
+    One row per velocity, those of a floating base too. Accelerations are not limited, so that a
+    step does not depend on the one before; see `hierarchy.tasks.JointLimits` for limits that a
+    robot can obey.
     """
 
     robot: Robot
     period: float
     name: str = "limits"
     kind = "inequality"
+    first = 0
 
     def box(self, state: State) -> tuple[Array, Array]:
-        """Least and largest velocity of each joint (m,), (m,) [rad/s or m/s]."""
-        of = slice(self.robot.actuated, self.robot.n)
-        lower, upper = (side[of] for side in self.robot.position_limits())
-        q, fastest = state.q[self.robot.coordinates[of]], self.robot.velocity_limit[of]
+        """Least and largest velocities (n,), (n,) [rad/s or m/s]."""
+        lower, upper = self.robot.position_limits()
+        q, fastest = state.q[self.robot.coordinates], self.robot.velocity_limit
         return (np.clip((lower - q) / self.period, -fastest, fastest),
                 np.clip((upper - q) / self.period, -fastest, fastest))
 

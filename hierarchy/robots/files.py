@@ -17,10 +17,12 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import ArrayLike
 
-from hierarchy.errors import RobotError, UnknownNameError
+from hierarchy.errors import RobotError
 from hierarchy.robots import mjcf, urdf, urdf_model, urdf_remarks
 from hierarchy.robots.found import Coupled, Found, is_floating, neutral_within_limits, remarks
+from hierarchy.robots.joints import without
 from hierarchy.robots.points import proposed_end_effector
 from hierarchy.robots.shapes import capsules_of
 from hierarchy.robots.table import Base
@@ -30,14 +32,14 @@ Element = ElementTree.Element
 
 
 def read_file(path: str | Path, base: Base | None = None, shapes: bool = True,
-              locked: Mapping[str, float] = MappingProxyType({}),
+              locked: Mapping[str, ArrayLike] = MappingProxyType({}),
               root: Sequence[str] = ()) -> Found:
     """Read a robot from a URDF or MJCF file; its root element says which.
 
     `base` None takes that of the file: floating if its first joint is free, else fixed. Without
-    `shapes` no collision geometry is read. `locked` joints are fixed at a position [rad or m].
-    `root` are the bodies of an MJCF at which the robot begins. Raises RobotError if the file cannot
-    be read.
+    `shapes` no collision geometry is read. `locked` joints are fixed at a value [rad or m], see
+    `hierarchy.robots.joints`. `root` are the bodies of an MJCF at which the robot begins. Raises
+    RobotError if the file cannot be read.
     """
     path = Path(path)
     element = urdf.root_of(path)
@@ -50,7 +52,7 @@ def read_file(path: str | Path, base: Base | None = None, shapes: bool = True,
 
 
 def _read_urdf(path: Path, root: Element, base: Base | None, shapes: bool,
-               locked: Mapping[str, float]) -> Found:
+               locked: Mapping[str, ArrayLike]) -> Found:
     with _printed() as lines:
         try:
             model = urdf_model.model_of(root, base)
@@ -58,8 +60,8 @@ def _read_urdf(path: Path, root: Element, base: Base | None, shapes: bool,
         except Exception as error:  # the parsers raise many types; all mean an invalid file
             raise RobotError(f"robot file {str(path)!r} cannot be read: "
                              f"{'; '.join([*lines(), _in_one_line(error)])}") from error
-        model = _without(model, locked, str(path))
-        found = replace(_found(model, urdf.coupled(root)),
+        model, coupled = without(model, urdf.coupled(root), locked, str(path))
+        found = replace(_found(model, coupled),
                         missing=(*said, *urdf_remarks.remarks(root), *remarks(model)))
         if not shapes:
             return found
@@ -100,23 +102,6 @@ def _printed() -> Iterator[Callable[[], list[str]]]:
         finally:
             os.dup2(kept, 2)
             os.close(kept)
-
-
-def _without(model: Any, locked: Mapping[str, float], file: str) -> Any:
-    """Return the model without the locked joints."""
-    if not locked:
-        return model
-    q, indices = np.array(pin.neutral(model)), []
-    for name, value in locked.items():
-        if name not in list(model.names)[1:]:
-            raise UnknownNameError("joint", name, list(model.names)[1:])
-        joint = model.joints[model.getJointId(name)]
-        if joint.nq != 1:
-            raise RobotError(f"robot file {file!r}: joint {name!r} has {joint.nq} coordinates and "
-                             "cannot be locked")
-        q[joint.idx_q] = value
-        indices.append(int(joint.id))
-    return pin.buildReducedModel(model, indices, q)
 
 
 def _geometry(path: Path, root: Element, model: Any) -> tuple[Any, list[str]]:

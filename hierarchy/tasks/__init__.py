@@ -17,6 +17,7 @@ from hierarchy.tasks.joint_limits import JointLimits
 from hierarchy.tasks.least_force import LeastForce
 from hierarchy.tasks.look_at import LookAt
 from hierarchy.tasks.manipulability import Manipulability
+from hierarchy.tasks.mechanism import Mechanism, model_rows
 from hierarchy.tasks.momentum import Momentum
 from hierarchy.tasks.pointing import Pointing
 from hierarchy.tasks.pose import Pose
@@ -45,5 +46,6 @@ TASKS: dict[str, type[Task]] = {
 __all__ = ["TASKS", "Along", "Avoidance", "BaseDynamics", "CentreOfMass", "CentreOfPressure",
            "ContactForce", "ContactMotion", "CumulatedRepulsion", "DangerBounds", "FrameLog",
            "Friction", "JointCoupling", "JointDamping", "JointLimits", "LeastForce", "LookAt",
-           "Manipulability", "Momentum", "Pointing", "Pose", "Position", "Posture", "RelativePose",
-           "SelfSeparation", "Separation", "Together", "TorqueLimits"]
+           "Manipulability", "Mechanism", "Momentum", "Pointing", "Pose", "Position", "Posture",
+           "RelativePose", "SelfSeparation", "Separation", "Together", "TorqueLimits",
+           "model_rows"]

@@ -1,27 +1,90 @@
-"""Linear coupling of joints: gears, mimic joints, fingers that close together."""
+"""Couplings of joints: gears, mimic joints, fingers that close together."""
+
+# mypy: disable-error-code="no-untyped-def"
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
+from itertools import zip_longest
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hierarchy.errors import HierarchyError, expect, number
+from hierarchy.jit import bind, compiled
+from hierarchy.kinematics import write_equality
 from hierarchy.problem import Array
 from hierarchy.records import set_frozen
 from hierarchy.robot import Robot
+from hierarchy.robots.found import Coupled
 from hierarchy.state import State
-from hierarchy.task import Task
+from hierarchy.task import Level, Task
+
+
+class Terms(NamedTuple):
+    """Row i of a coupling is the sum of polynomials of joints, over the terms with `rows` i.
+
+    For each term: its row, the index of the joint in q and in v, whether the joint is continuous,
+    and coefficients (t, k), the constant first. `turns` (m,) is what a row may be off by without
+    being missed, because a joint has turned once around [rad]; infinite where none is continuous.
+    """
+
+    rows: NDArray[np.int64]
+    positions: NDArray[np.int64]
+    velocities: NDArray[np.int64]
+    continuous: NDArray[np.bool_]
+    coefficients: Array
+    turns: Array
+
+
+class _Coupling(Task):
+    """Rows in which polynomials of joints add up to zero. Abstract: needs `terms`."""
+
+    terms: Terms
+
+    @property
+    def dimension(self) -> int:
+        """One row per coupling."""
+        return len(self.terms.turns)
+
+    def error(self, state: State) -> Array:
+        """What the sums lack to zero, or to a whole turn of a continuous joint (m,) [rad or m]."""
+        return self._rows(state)[1]
+
+    def jacobian(self, state: State) -> Array:
+        """The derivatives of the polynomials (m, n)."""
+        return self._rows(state)[0]
+
+    def jacobian_derivative(self, state: State) -> Array:
+        """Their second derivatives, times the velocities of the joints (m, n)."""
+        found = np.zeros((self.dimension, state.n))
+        for row, at, of, continuous, c in zip(*self.terms[:5], strict=True):
+            found[row, of] = _polynomial(c, _position(state.q, at, continuous))[2] * state.v[of]
+        return found
+
+    def _rows(self, state: State) -> tuple[Array, Array]:
+        A, error = np.zeros((self.dimension, state.n)), np.zeros(self.dimension)
+        _write(state.q, state.v, self.terms, _Gains(0.0, 0.0, 1.0, False), A, error, error.copy(),
+               0)
+        return A, error
+
+    def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
+               row: int) -> Callable[[], object]:
+        """See `Task.writer`."""
+        gains = _Gains(self.stiffness, self.damping, self.gain, level == "acceleration")
+        return bind(_write, state.q, state.v, self.terms, gains, A, lower, upper, row)
 
 
 @dataclass(frozen=True)
-class JointCoupling(Task):
+class JointCoupling(_Coupling):
     """Keep the sum of factor times position over `joints` at `value` (m = 1) [rad or m].
 
     `joints` has a factor for each joint by name: {"motor": 1.0, "wheel": -50.0} is a gear of ratio
-    50. Raises HierarchyError for an unknown joint, one with several coordinates, or no factor.
+    50. The position of a continuous joint is its angle; of two angles that are a turn apart, times
+    the smallest factor of such joints, the nearer one counts. Raises HierarchyError for an unknown
+    joint, one with several velocities, or no factor.
     """
 
     robot: Robot
@@ -31,8 +94,7 @@ class JointCoupling(Task):
     damping: float = 20.0
     gain: float = 10.0
     name: str = "coupling"
-    positions: NDArray[np.int64] = field(init=False, repr=False, compare=False)
-    row: Array = field(init=False, repr=False, compare=False)  # (1, n)
+    terms: Terms = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -43,31 +105,109 @@ class JointCoupling(Task):
         if not any(self.joints.values()):
             raise HierarchyError(f"task {self.name!r}: joints {dict(self.joints)} have no factor "
                                  "other than zero")
-        positions = np.array([self.robot.coordinate(name) for name in self.joints])
-        row = np.zeros((1, self.robot.n))
-        for place, factor in zip(positions, self.joints.values(), strict=True):
-            row[0, self.robot.coordinates == place] = factor
-        set_frozen(self, positions=positions, row=row)
-
-    @property
-    def dimension(self) -> int:
-        """One row."""
-        return 1
+        constants = [-self.value, *[0.0] * (len(self.joints) - 1)]
+        terms = [(0, name, (constant, factor)) for constant, (name, factor)
+                 in zip(constants, self.joints.items(), strict=True)]
+        set_frozen(self, terms=_terms(self.robot, 1, terms))
 
     @property
     def row_names(self) -> tuple[str, ...]:
         """The joints."""
         return (" and ".join(self.joints),)
 
-    def error(self, state: State) -> Array:
-        """The value less the sum (1,) [rad or m]."""
-        factors = np.array(list(self.joints.values()))
-        return np.array([self.value - float(factors @ state.q[self.positions])])
 
-    def jacobian(self, state: State) -> Array:
-        """The factors (1, n)."""
-        return self.row
+@dataclass(frozen=True)
+class FollowedJoints(_Coupling):
+    """Keep joints on polynomials of others, such as those of `Robot.coupled` (a row for each)."""
 
-    def jacobian_derivative(self, state: State) -> Array:
-        """Zero (1, n)."""
-        return np.zeros_like(self.row)
+    robot: Robot
+    coupled: tuple[Coupled, ...]
+    stiffness: float = 100.0
+    damping: float = 20.0
+    gain: float = 10.0
+    name: str = "couplings"
+    terms: Terms = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        terms: list[tuple[int, str, tuple[float, ...]]] = []
+        for row, one in enumerate(self.coupled):
+            constant, *others = one.coefficients
+            terms.append((row, one.joint, (-constant, 1.0)))
+            if one.other:
+                terms.append((row, one.other, (0.0, *(-c for c in others))))
+        set_frozen(self, terms=_terms(self.robot, len(self.coupled), terms))
+
+    @property
+    def row_names(self) -> tuple[str, ...]:
+        """The couplings."""
+        return tuple(str(one) for one in self.coupled)
+
+
+def _terms(robot: Robot, rows: int,
+           terms: Iterable[tuple[int, str, tuple[float, ...]]]) -> Terms:
+    """Return terms given by row, joint and coefficients; RobotError for several velocities."""
+    found, turns = [], np.full(rows, np.inf)
+    for row, name, coefficients in terms:
+        own = [part for part in robot.parts if part.joint == robot.joint(name)]
+        if len(own) != 1 or own[0].size == 4:
+            raise HierarchyError(f"robot {robot.name!r}: joint {name!r} has "
+                                 f"{sum(part.velocities for part in own)} velocities and cannot be "
+                                 "coupled")
+        continuous = own[0].size == 2
+        slope, *bends = (*coefficients[1:], 0.0)
+        if continuous and slope and not any(bends):
+            turns[row] = min(turns[row], 2.0 * np.pi * abs(slope))
+        found.append((row, own[0].q, own[0].v, continuous, coefficients))
+    rows_of, positions, velocities, around, polynomials = zip(*found, strict=True)
+    padded = np.array(list(zip_longest(*polynomials, fillvalue=0.0))).T
+    return Terms(np.array(rows_of, dtype=np.int64), np.array(positions, dtype=np.int64),
+                 np.array(velocities, dtype=np.int64), np.array(around, dtype=np.bool_),
+                 np.ascontiguousarray(padded), turns)
+
+
+class _Gains(NamedTuple):
+    stiffness: float
+    damping: float
+    gain: float
+    acceleration: bool
+
+
+@compiled
+def _position(q, at, continuous):
+    """Position or angle of a joint."""
+    return np.arctan2(q[at + 1], q[at]) if continuous else q[at]
+
+
+@compiled
+def _polynomial(c, x):
+    """Value, derivative and second derivative of sum_i c_i x^i."""
+    value, slope, bend = 0.0, 0.0, 0.0
+    for i in range(len(c) - 1, -1, -1):
+        bend = bend * x + 2.0 * slope
+        slope = slope * x + value
+        value = value * x + c[i]
+    return value, slope, bend
+
+
+@compiled
+def _write(q, v, terms, gains, A, lower, upper, row):
+    m = len(terms.turns)
+    total, rate, drift = np.zeros(m), np.zeros(m), np.zeros(m)
+    A[row:row + m] = 0.0
+    for t in range(len(terms.rows)):
+        i, of = terms.rows[t], terms.velocities[t]
+        x = _position(q, terms.positions[t], terms.continuous[t])
+        value, slope, bend = _polynomial(terms.coefficients[t], x)
+        A[row + i, of] += slope
+        total[i] += value
+        rate[i] += slope * v[of]
+        drift[i] += bend * v[of] * v[of]
+    for i in range(m):
+        error = -total[i]
+        if terms.turns[i] < np.inf:
+            error -= terms.turns[i] * np.round(error / terms.turns[i])
+        b = gains.gain * error
+        if gains.acceleration:
+            b = gains.stiffness * error - gains.damping * rate[i] - drift[i]
+        write_equality(lower, upper, row + i, b)

@@ -88,7 +88,7 @@ class DangerBounds(Task):
         if not 0.0 <= self.lever < np.inf:
             raise HierarchyError(f"task {self.name!r}: lever {self.lever} m must not be negative")
         for (i,) in np.argwhere(~np.isfinite(self.limits.robot.velocity_limit))[:1]:
-            raise HierarchyError(f"task {self.name!r}: joint {self.limits.robot.joint_names[i]} "
+            raise HierarchyError(f"task {self.name!r}: joint {self.limits.robot.velocity_names[i]} "
                                  "has no velocity limit to scale")
         try:
             danger = Repulsion(1.0, self.reach, self.shape)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hierarchy.errors import HierarchyError, brief, number
+from hierarchy.errors import HierarchyError, brief, finite_numbers, number
 from hierarchy.jit import bind
 from hierarchy.kinematics import write_identity
 from hierarchy.limits import Limits, write_box
@@ -25,14 +25,18 @@ class JointLimits(JointRows):
     """Keep every joint within its limits and able to stop before them: lower <= x <= upper.
 
     One row of the identity per actuated joint, at both levels: n rows, or n - 6 with a floating
-    base, which has no limits; below, n stands for that number. Positions and velocities are limited
-    by the limits of `robot`, `margin` [rad or m] is kept from each position limit, `acceleration`
-    [rad/s^2 or m/s^2] is one number or (n,), `period` [s] is that of the control loop. For what is
-    guaranteed from which initial state see `hierarchy.limits`. A continuous joint has no position
-    limits. At velocity level the acceleration is that of the commands: a step from
-    `State.commanded`.
+    base; below, n stands for that number. Positions and velocities are limited by the limits of
+    `robot`, `margin` [rad or m] is kept from each position limit, `acceleration` [rad/s^2 or m/s^2]
+    is one number or (n,), `period` [s] is that of the control loop. For what is guaranteed from
+    which initial state see `hierarchy.limits`. A continuous joint has no position limits. At
+    velocity level the acceleration is that of the commands: a step from `State.commanded`.
 
-    Raises HierarchyError if a limit is invalid or the margin leaves no room.
+    With `base_speed` or `base_acceleration`, (linear, angular) in [m, rad, s], a floating base has
+    rows too, the first six. What is not given is then the speed limit of the robot, or the largest
+    `acceleration`. Leave them out for a base that only contact forces move.
+
+    Raises HierarchyError if a limit is invalid, the margin leaves no room, or a fixed base has a
+    speed.
     """
 
     robot: Robot
@@ -40,13 +44,15 @@ class JointLimits(JointRows):
     period: float
     margin: float = 0.0
     name: str = "joint limits"
+    base_speed: tuple[float, float] | None = None
+    base_acceleration: tuple[float, float] | None = None
     limits: Limits = field(init=False, repr=False, compare=False)
     kind = "inequality"
 
     def __post_init__(self) -> None:
         super().__post_init__()
         robot, acceleration = self.robot, _numbers(self.name, self.acceleration)
-        n, of_joints = robot.n - robot.actuated, slice(robot.actuated, robot.n)
+        n = robot.n - robot.actuated
         if acceleration.shape not in ((), (n,)):
             raise HierarchyError(f"task {self.name!r}: acceleration has shape "
                                  f"{acceleration.shape}, expected a number or ({n},)")
@@ -57,13 +63,36 @@ class JointLimits(JointRows):
             raise HierarchyError(f"task {self.name!r}: margin {self.margin:g} leaves "
                                  f"{robot.velocity_names[i]} no room between {lower[i]:.4g} and "
                                  f"{upper[i]:.4g}")
+        speed = robot.velocity_limit.copy()
+        rate = np.append(np.zeros(robot.actuated), np.broadcast_to(acceleration, n))
+        if self._limits_base and robot.base == "fixed":
+            raise HierarchyError(f"task {self.name!r}: robot {robot.name!r} has a fixed base, "
+                                 "which has no speed to limit")
+        if self.first < robot.actuated:
+            speed[:6] = self._of_base("base_speed", speed[:6])
+            rate[:6] = self._of_base("base_acceleration", np.full(6, acceleration.max()))
+        of = slice(self.first, robot.n)
         try:
-            limits = Limits(lower[of_joints] + self.margin, upper[of_joints] - self.margin,
-                            robot.velocity_limit[of_joints], np.broadcast_to(acceleration, n),
+            limits = Limits(lower[of] + self.margin, upper[of] - self.margin, speed[of], rate[of],
                             self.period)
         except HierarchyError as error:
             raise HierarchyError(f"task {self.name!r}: {error}") from error
         set_frozen(self, limits=limits)
+
+    @property
+    def first(self) -> int:
+        """The velocity of the first row: 0, or that of the first joint behind a floating base."""
+        return 0 if self._limits_base else self.robot.actuated
+
+    @property
+    def _limits_base(self) -> bool:
+        return self.base_speed is not None or self.base_acceleration is not None
+
+    def _of_base(self, what: str, otherwise: Array) -> Array:
+        """Return a limit of the base (6,)."""
+        value = getattr(self, what)
+        return otherwise if value is None else np.repeat(
+            finite_numbers(f"task {self.name!r}: {what}", value, 2), 3)
 
     def box(self, state: State, level: Level) -> tuple[Array, Array]:
         """Return the least and greatest command (n,), (n,) at a state; the box is never empty."""
@@ -72,10 +101,10 @@ class JointLimits(JointRows):
     def clamp(self, state: State, level: Level, x: ArrayLike) -> Array:
         """Return the command x, including the base, clamped to the box; finite even if x is not.
 
-        NaN becomes the command in the box that comes nearest to a standstill; for the base, zero.
+        NaN becomes the command in the box that comes nearest to a standstill; zero for a base
+        without limits.
         """
-        first, positions, rates = self.robot.actuated, self._positions(state), self._rates(
-            state, level)
+        first, positions, rates = self.first, self._positions(state), self._rates(state, level)
         if first == 0:
             return self.limits.clamp(positions, rates, level, x)
         command = np.array(x, dtype=float)
@@ -104,14 +133,13 @@ class JointLimits(JointRows):
     def _positions(self, state: State) -> Array:
         robot = self.robot
         q: Array = state.q
-        return q if robot.nq == robot.n else q[robot.coordinates[robot.actuated:]]
+        return q if robot.nq == robot.n else q[robot.coordinates[self.first:]]
 
     def _rates(self, state: State, level: Level) -> Array:
         """The velocities (n,) that limit the next ones."""
         commanded = state.commanded if level == "velocity" else None
         rates: Array = state.v if commanded is None else commanded
-        first = self.robot.actuated
-        return rates[first:] if first else rates
+        return rates[self.first:] if self.first else rates
 
 
 def _numbers(name: str, value: ArrayLike) -> Array:

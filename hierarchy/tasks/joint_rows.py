@@ -11,23 +11,28 @@ from hierarchy.task import Task
 
 
 class JointRows(Task):
-    """A task with one row per actuated joint of `robot`."""
+    """A task with one row per actuated joint of `robot`, or per velocity from `first` on."""
 
     robot: Robot
 
     @property
+    def first(self) -> int:
+        """The velocity of the first row: the first that is actuated."""
+        return self.robot.actuated
+
+    @property
     def dimension(self) -> int:
-        """One row per actuated joint."""
-        return self.robot.n - self.robot.actuated
+        """One row per velocity from `first` on."""
+        return self.robot.n - self.first
 
     @property
     def row_names(self) -> tuple[str, ...]:
         """The joint of each row."""
-        return tuple(self.robot.velocity_names[self.robot.actuated:])
+        return tuple(self.robot.velocity_names[self.first:])
 
     def jacobian(self, state: State) -> Array:
         """The identity (m, n), right of zeros for a floating base."""
-        return np.eye(state.n)[self.robot.actuated:]
+        return np.eye(state.n)[self.first:]
 
     def jacobian_derivative(self, state: State) -> Array:
         """Zero (m, n)."""

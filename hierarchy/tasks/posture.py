@@ -4,16 +4,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from typing import Literal, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from hierarchy.errors import HierarchyError, expect, finite_numbers
 from hierarchy.jit import bind, compiled
 from hierarchy.kinematics import write_equality, write_identity
 from hierarchy.problem import Array
+from hierarchy.records import set_frozen
+from hierarchy.robot import Robot
 from hierarchy.state import State
 from hierarchy.task import Level, Task
 
@@ -38,58 +41,93 @@ class JointTask(Task):
 
 
 @dataclass(frozen=True)
-class Posture(JointTask):
-    """Move every joint to `target` (n,) [rad or m]; gains as in `Task`.
+class Posture(Task):
+    """Move every joint to `target` [rad or m]; gains as in `Task`.
 
-    A floating base does not count as a joint: the rows are those of the other joints.
+    The target has the values of all joints, or is a configuration (nq,), or {joint: value, ...}
+    with the other joints at rest; see `Robot.configuration` for values, such as the angle of a
+    continuous joint. A floating base does not count as a joint: the rows are those of the other
+    joints, one for each velocity. The error is the shortest way there, `Robot.difference`, and the
+    rows are the identity. For balls, planar and free joints that is the derivative of the error
+    along that way, so that at velocity level they go straight to the target; in other directions it
+    is the derivative only near it.
+
+    `robot` is that of the stack unless given. Raises HierarchyError for a target that fits none of
+    its forms.
     """
 
-    target: tuple[float, ...]
+    target: ArrayLike | Mapping[str, ArrayLike]
     stiffness: float = 10.0
     damping: float = 5.0
     gain: float = 1.0
     name: str = "posture"
+    robot: Robot | None = None
+    goal: Array = field(init=False, repr=False, compare=False)  # (nq,)
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        finite_numbers(f"task {self.name!r}: target", self.target)
+        if not isinstance(self.target, Mapping):
+            finite_numbers(f"task {self.name!r}: target", self.target)
+        if self.robot is not None:
+            expect(f"task {self.name!r}: robot", self.robot, Robot, "give Robot.load(NAME)")
+            try:
+                set_frozen(self, goal=self.robot.configuration(self.target))
+            except HierarchyError as error:
+                raise HierarchyError(f"task {self.name!r}: {error}") from error
+
+    def on(self, robot: Robot) -> Posture:
+        """Return the posture of a robot."""
+        return self if self.robot is robot else replace(self, robot=robot)
 
     @property
-    def joints(self) -> int:  # type: ignore[override]
-        """Number of joints n."""
-        return len(self.target)
+    def dimension(self) -> int:
+        """One row for each velocity but those of a floating base."""
+        if self.robot is not None:
+            return self.robot.n - self.robot.actuated
+        if isinstance(self.target, Mapping):
+            raise HierarchyError(f"task {self.name!r}: a target by name has rows once the robot is "
+                                 "known; give Posture(..., robot=robot)")
+        return len(np.asarray(self.target))
+
+    @property
+    def row_names(self) -> tuple[str, ...]:
+        """The joint of each row, if the robot is known."""
+        robot = self.robot
+        return super().row_names if robot is None else tuple(robot.velocity_names[robot.actuated:])
 
     def error(self, state: State) -> Array:
-        """q_d - q (n,) [rad or m]."""
-        return np.asarray(self.target - self._positions(state))
+        """The step from q to the target (m,) [rad or m]."""
+        robot = state.robot
+        return robot.difference(state.q, self.on(robot).goal)[robot.actuated:]
 
     def jacobian(self, state: State) -> Array:
-        """The identity (n, n), to the right of zeros for a floating base."""
-        return np.eye(state.n)[state.n - self.joints:]
+        """The identity (m, m), to the right of zeros for a floating base."""
+        return np.eye(state.n)[state.robot.actuated:]
 
     def jacobian_derivative(self, state: State) -> Array:
         """Zero, of the same shape."""
-        return np.zeros((self.joints, state.n))
-
-    def _positions(self, state: State) -> Array:
-        """A view of the joints' positions (n,)."""
-        robot = state.robot
-        joints = robot.nq - (7 if robot.base == "floating" else 0)
-        if joints != robot.n - robot.actuated or joints != self.joints:
-            raise HierarchyError(f"task {self.name!r}: {self.joints} targets for "
-                                 f"{joints} joint positions")
-        return np.asarray(state.q[robot.nq - joints:])
+        return np.zeros((state.n - state.robot.actuated, state.n))
 
     def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
                row: int) -> Callable[[], object]:
         """See `Task.writer`."""
-        positions, rates = self._positions(state), state.v[state.n - self.joints:]
-        target = np.array(self.target, dtype=float)
-        for (i,) in np.argwhere(~np.isfinite(target))[:1]:
-            raise HierarchyError(f"task {self.name!r}: target {i} is {target[i]}")
+        robot, goal = state.robot, self.on(state.robot).goal
+        m = robot.n - robot.actuated
+        plain = robot.nq - robot.n == (1 if robot.actuated else 0)
+        positions, target = (state.q[robot.nq - m:], goal[robot.nq - m:]) if plain else np.zeros(
+            (2, m))
         parameters = _Parameters(target, self.stiffness, self.damping, self.gain,
                                  level == "acceleration")
-        return bind(_write, positions, rates, parameters, A, lower, upper, row)
+        write_rows = bind(_write, positions, state.v[robot.actuated:], parameters, A, lower, upper,
+                          row)
+        if plain:
+            return write_rows
+
+        def write() -> None:
+            target[:] = robot.difference(state.q, goal)[robot.actuated:]
+            write_rows()
+
+        return write
 
 
 @dataclass(frozen=True)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from hierarchy.contacts import Contacts
 from hierarchy.errors import HierarchyError, expect_each
 from hierarchy.problem import Array
+from hierarchy.robot import Robot
 from hierarchy.state import State
 from hierarchy.task import Level, Task, writer_in_stack
 
@@ -35,6 +36,10 @@ class Together(Task):
             if task.of_forces and task.contacts is not self.contacts:
                 raise HierarchyError(f"task {self.name!r}: its tasks have different contacts; give "
                                      "all of them the same object")
+
+    def on(self, robot: Robot) -> Task:
+        """Return the task with its tasks for a robot."""
+        return replace(self, tasks=[task.on(robot) for task in self.tasks])
 
     @property
     def of_forces(self) -> bool:  # type: ignore[override]

@@ -103,7 +103,7 @@ def _watched(robot: Robot) -> list[tuple[int, int]]:
 
 def _postures(robot: Robot) -> Iterator[Array]:
     """Yield postures (nq,) spread evenly within the limits, a turn where there are none."""
-    generator, start = np.random.default_rng(0), robot.rest[robot.coordinates]
+    generator, start = np.random.default_rng(0), robot.vector(robot.rest)
     lower, upper = (np.where(np.isfinite(side), side, turn) for side, turn in
                     zip(robot.position_limits(), (-np.pi, np.pi), strict=True))
     for _ in range(_POSTURES):

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from hierarchy import Robot, Stack, State, Task
 from hierarchy.activation import Activation
 from hierarchy.avoidance import Obstacles, SurveillanceAreas
@@ -11,6 +13,7 @@ from hierarchy.contacts import Contacts
 from hierarchy.jit import announce_compilation
 from hierarchy.problem import Array
 from hierarchy.tasks import JointLimits, Pointing, Position, Separation
+from hierarchy.tasks.mechanism import above, model_rows
 from scenarios.cell.avoidance import areas_of, avoidance_tasks
 from scenarios.cell.forces import contacts_of, force_task, physics_of, standing_on
 from scenarios.cell.order import Order, order_of
@@ -61,6 +64,15 @@ class Cell:
     contacts: Contacts | None = None
 
     @property
+    def velocity_limit(self) -> Array:
+        """Largest velocities (n,) [rad/s or m/s], infinite for a base that has none in use."""
+        limit = self.robot.velocity_limit.copy()
+        limit[:self.robot.actuated] = np.inf
+        if self.limits is not None:
+            limit[self.limits.first:] = self.limits.limits.velocity
+        return limit
+
+    @property
     def torque_limit(self) -> Array:
         """Largest torques of the actuated joints [N m], the share of the limits in use."""
         limits = self.scenario.limits
@@ -93,10 +105,12 @@ def build(scenario: Scenario, kept: Cell | None = None) -> Cell:
                          contacts)
     areas = areas_of(scenario)
     limits, first = limits_of(scenario, robot)
+    bounded = scenario.limits is not None and scenario.limits.place == "bounds"
     if contacts is not None:
-        bounded = scenario.limits is not None and scenario.limits.place == "bounds"
         physics = physics_of(scenario, contacts)
         first = [*first, *physics] if bounded else [*physics, *first]
+    first = above(model_rows(robot, control.period), first,
+                  not bounded and scenario.make_resolver().can_resolve("inequalities"))
     position, pointing = position_of(scenario, here), pointing_of(scenario, here)
     listed = [_listed(section, here, contacts) for section in scenario.tasks
               if section.kind != "collision"]

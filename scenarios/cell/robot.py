@@ -9,6 +9,7 @@ from hierarchy.avoidance import Capsule, ControlPoint
 from hierarchy.paths import Still
 from hierarchy.problem import Array
 from hierarchy.tasks import Position
+from hierarchy.tasks.mechanism import Mechanism, model_rows
 from scenarios.config import ScenarioError
 from scenarios.config.robot import RobotSection, StartSection
 from solvers import make
@@ -17,6 +18,7 @@ _REACHED = 1e-6      # [m]
 _REACH_STEPS = 500   # damped Newton steps; a reachable point takes about ten
 _ON_LIMIT = 1e-9     # [rad or m] beyond a limit that is rounding
 _LONGEST_STEP = 0.3  # [rad] of any joint
+_CLOSED = 1e-3       # [m or rad] by which rounding in a file may leave a mechanism open
 
 
 def make_robot(section: RobotSection) -> Robot:
@@ -69,22 +71,27 @@ def _check_limits(robot: Robot, q: Array) -> None:
 
 
 def _state(robot: Robot, section: StartSection) -> State:
-    q = robot.rest.copy() if section.q is None else np.array(section.q)
+    mechanism = Mechanism(robot)
     try:
-        if section.keyframe is not None:
-            q = robot.start(section.keyframe)
-        if q.shape == (robot.nq,):
-            for name, value in section.joints.items():
-                q[robot.coordinate(name)] = value
-        return State.at(robot, q, section.v)
+        q = (robot.configuration(section.q) if section.q is not None else robot.rest
+             if section.keyframe is None else robot.start(section.keyframe))
+        q = mechanism.closed(robot.configuration(section.joints, q), section.joints)
+        state = State.at(robot, q, section.v)
     except HierarchyError as error:
         raise ScenarioError(f"start: {error}") from error
+    gap, where = mechanism.gap(q)
+    if gap > _CLOSED:
+        raise ScenarioError(f"start: {where}: the robot's mechanism stays open by {gap:.3g} (m or "
+                            "rad) there; give other start.joints")
+    return state
 
 
 def _reach(robot: Robot, q: Array, point: Array) -> Array:
     """Return a posture near q with the end effector at a point [m]; raises ScenarioError."""
     frame, resolver = robot.frame(robot.end_effector), make("tpm", damping=0.05)
-    stack = Stack([Position(frame, Still(point.tolist()), gain=1.0)], "velocity")
+    mechanism = Mechanism(robot)
+    stack = Stack([*model_rows(robot), Position(frame, Still(point.tolist()), gain=1.0)],
+                  "velocity")
     nearest = np.inf
     for _ in range(_REACH_STEPS):
         state = State.at(robot, q)
@@ -94,6 +101,6 @@ def _reach(robot: Robot, q: Array, point: Array) -> Array:
             return q
         step = resolver.solve(stack.hierarchy(state)).x
         step = step * min(1.0, _LONGEST_STEP / max(float(np.abs(step).max()), 1e-12))
-        q = robot.integrate(q, step)
+        q = mechanism.closed(robot.integrate(q, step))
     raise ScenarioError(f"start.end_effector {point.tolist()} m cannot be reached: robot "
                         f"{robot.name!r} came no nearer than {nearest:.3g} m")

@@ -30,6 +30,7 @@ from scenarios.cell.robot import sensed_points
 from scenarios.cell.special import special_task
 from scenarios.config import Scenario, ScenarioError
 from scenarios.config.avoidance import AvoidanceSection
+from scenarios.config.control import ControlSection
 from scenarios.config.listed import (
     AnyTask,
     ListedCentreOfMass,
@@ -41,6 +42,7 @@ from scenarios.config.listed import (
 )
 from scenarios.config.tasks import (
     AlongSection,
+    LimitsSection,
     PointingSection,
     PositionSection,
     PositionTask,
@@ -57,7 +59,7 @@ def limits_of(scenario: Scenario, robot: Robot) -> tuple[JointLimits | None, lis
     if section is None:
         return None, []
     try:
-        limits = JointLimits(robot, section.acceleration, scenario.control.period, section.margin)
+        limits = _joint_limits(section, scenario.control, robot)
         box = limits if section.danger_reach is None else DangerBounds(
             limits, sensed_points(robot), section.danger_reach, name=limits.name)
         if not scenario.limits_in_stack:
@@ -68,6 +70,15 @@ def limits_of(scenario: Scenario, robot: Robot) -> tuple[JointLimits | None, lis
     except HierarchyError as error:
         raise ScenarioError(f"limits: {error}") from error
     return limits, [box, *torque]
+
+
+def _joint_limits(section: LimitsSection, control: ControlSection, robot: Robot) -> JointLimits:
+    """Return the limits of the joints, and of a floating base unless only forces move it."""
+    speed = section.base_speed
+    if speed is None and robot.base == "floating" and control.level != "torque":
+        speed = float(robot.velocity_limit[0]), float(robot.velocity_limit[3])
+    return JointLimits(robot, section.acceleration, control.period, section.margin,
+                       base_speed=speed, base_acceleration=section.base_acceleration)
 
 
 def position_of(scenario: Scenario, start: State) -> Position | None:
@@ -130,7 +141,7 @@ def _task(section: AnyTask, start: State) -> Task:
     gains = (section.stiffness, section.damping, section.gain)
     name = section.title
     if isinstance(section, PostureSection | ListedPosture):
-        return Posture(_target(section, start), *gains, name=name)
+        return Posture(_target(section, start), *gains, name=name, robot=robot)
     if isinstance(section, ListedCentreOfMass):
         anywhere = CentreOfMass(robot, Still((0.0, 0.0, 0.0)))
         return CentreOfMass(robot, _path(section, anywhere.position(start)),
@@ -158,14 +169,12 @@ def _path(section: PositionTask | AlongSection, here: Array) -> Path:
     return Shifted(path, shift.tolist()) if shift.any() else path
 
 
-def _target(section: PostureSection | ListedPosture, start: State) -> tuple[float, ...]:
+def _target(section: PostureSection | ListedPosture, start: State) -> Array:
     robot = start.robot
-    joints = robot.nq - (7 if robot.base == "floating" else 0)
-    target = start.q[robot.nq - joints:].copy() if section.target is None else np.array(
-        section.target)
-    if len(target) != joints:
-        raise ScenarioError(f"task {section.title!r}: target has {len(target)} entries, robot "
-                            f"{robot.name!r} has {joints} joints")
-    for name, value in section.joints.items():
-        target[robot.coordinate(name) - (robot.nq - joints)] = value
-    return tuple(float(value) for value in target)
+    try:
+        q = start.q if section.target is None else robot.configuration(section.target)
+        return robot.configuration(section.joints, q)
+    except UnknownNameError:
+        raise
+    except HierarchyError as error:
+        raise ScenarioError(f"task {section.title!r}: {error}") from error

@@ -25,10 +25,10 @@ class PolicySection(Section):
     the run at once.
 
     The first four kinds are statuses of a resolver, see solvers.Status. not_finite: a measured
-    joint state is NaN or infinite, or a distance is NaN. stale: no new measurement for more than
-    `stale_after` [s]; before that, the last one is extrapolated from the commands sent. overrun:
-    the command is not ready `deadline` [s] after the start of the tick; None for no deadline.
-    inside: a point of the robot is on or inside an obstacle.
+    joint state is NaN or infinite or has a quaternion that is none, or a distance is NaN. stale: no
+    new measurement for more than `stale_after` [s]; before that, the last one is extrapolated from
+    the commands sent. overrun: the command is not ready `deadline` [s] after the start of the tick;
+    None for no deadline. inside: a point of the robot is on or inside an obstacle.
     """
 
     iteration_limit: AnswerPolicy = "brake"

@@ -7,7 +7,7 @@ from typing import Self
 from pydantic import Field, model_validator
 
 from hierarchy.robots.table import Base
-from scenarios.config.sections import Finite, Flag, NotNegative, Section, Vector3
+from scenarios.config.sections import Finite, Flag, JointValue, NotNegative, Section, Vector3
 
 
 class ControlPointSection(Section):
@@ -49,8 +49,8 @@ class RobotSection(Section):
     Packages are example_robot_data and robot_descriptions (extra `robots`). `base` defaults to that
     of the model. `end_effector`, `control_points` and `capsules` default to the robot's table, or
     for a file to the proposals of `hierarchy check FILE`. `locked` joints of a file are fixed at a
-    position [rad or m] and removed. `root` is the body, or bodies, of an MJCF at which the robot
-    begins, by default each that has joints, except those that only float.
+    value [rad or m], as in [start], and removed. `root` is the body, or bodies, of an MJCF at which
+    the robot begins, by default each that has joints, except those that only float.
     """
 
     model: str
@@ -58,23 +58,26 @@ class RobotSection(Section):
     end_effector: str | None = None
     control_points: tuple[RobotPointSection, ...] | None = None
     capsules: tuple[CapsuleSection, ...] | None = None
-    locked: dict[str, Finite] = Field(default_factory=dict)
+    locked: dict[str, JointValue] = Field(default_factory=dict)
     root: str | tuple[str, ...] = ()
 
 
 class StartSection(Section):
     """The start: positions `q` [rad or m] and velocities `v` [rad/s or m/s].
 
-    `q` defaults to that of the `keyframe` of an MJCF, or to the robot's own posture; `joints`
-    override it by name. With `end_effector`
-    [m] the start is the posture, reached from q, that puts the end effector there. With `on_floor`
-    a floating base is raised or lowered so that the lowest contact touches the floor. A joint
-    beyond its limits is an error unless `allow_outside_limits`.
+    `q` has the values of all joints but a floating base, or all coordinates, and defaults to that
+    of the `keyframe` of an MJCF, or to the robot's own posture; `joints` override it by name. A
+    value is a number, the angle of a continuous joint too, [x, y, angle] of a planar one, a
+    rotation vector or quaternion [x, y, z, w] of a ball, location and either of a free one. Joints
+    that follow others, and those of closed chains, are moved to where the named ones let them be.
+    With `end_effector` [m] the start is the posture, reached from q, that puts the end effector
+    there. With `on_floor` a floating base is raised or lowered so that the lowest contact touches
+    the floor. A joint beyond its limits is an error unless `allow_outside_limits`.
     """
 
     q: tuple[Finite, ...] | None = None
     keyframe: str | None = None
-    joints: dict[str, Finite] = Field(default_factory=dict)
+    joints: dict[str, JointValue] = Field(default_factory=dict)
     v: tuple[Finite, ...] | None = None
     end_effector: Vector3 | None = None
     on_floor: Flag = False

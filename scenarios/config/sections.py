@@ -19,6 +19,7 @@ Share = Annotated[float, Field(strict=True, ge=0.0, le=1.0)]
 Count = Annotated[int, Field(strict=True, ge=0)]
 Whole = Annotated[int, Field(strict=True)]
 Flag = Annotated[bool, Field(strict=True)]
+JointValue = Finite | tuple[Finite, ...]  # see hierarchy.Robot.configuration
 Vector3 = tuple[Finite, Finite, Finite]
 Rows3 = tuple[Vector3, Vector3, Vector3]
 

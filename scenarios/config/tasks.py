@@ -12,6 +12,7 @@ from pydantic import Field, model_validator
 from scenarios.config.sections import (
     Finite,
     Flag,
+    JointValue,
     NotNegative,
     PathSection,
     Positive,
@@ -77,11 +78,11 @@ class PointingTask(TaskSection):
 
 
 class PostureTask(TaskSection):
-    """All joints to a posture."""
+    """All joints to a posture: the values of all joints, or all coordinates, as in `start.q`."""
 
     unit: ClassVar[str] = "rad"
     target: tuple[Finite, ...] | None = None
-    joints: dict[str, Finite] = Field(default_factory=dict)
+    joints: dict[str, JointValue] = Field(default_factory=dict)
     stiffness: NotNegative = 10.0
     damping: NotNegative = 5.0
     gain: NotNegative = 1.0
@@ -120,9 +121,11 @@ class LimitsSection(Section):
     Position and velocity limits are those of the robot; `acceleration` [rad/s^2] is one value for
     all joints or one each; `margin` [rad] shrinks the position limits; `torque` is the usable share
     of the effort limits, None for no torque limit. At level "torque" no torque changes by more than
-    `torque_step` [N m] from one tick to the next. With `danger_reach` [m]
-    joints that would move a control point toward an obstacle nearer than that are slowed down, see
-    hierarchy.tasks.DangerBounds.
+    `torque_step` [N m] from one tick to the next. `base_speed` and `base_acceleration`, each
+    [linear, angular] in m, rad and s, limit a floating base; by default to 2 m/s and 3 rad/s, and
+    the largest `acceleration`; at level "torque", where only forces move it, not at all. With
+    `danger_reach` [m] joints that would move a control point toward an obstacle nearer than that
+    are slowed down, see hierarchy.tasks.DangerBounds.
     """
 
     acceleration: Positive | tuple[Positive, ...]
@@ -131,6 +134,8 @@ class LimitsSection(Section):
     danger_reach: Positive | None = None
     torque: Annotated[float, Field(strict=True, gt=0.0, le=1.0)] | None = None
     torque_step: Positive | None = None
+    base_speed: tuple[Positive, Positive] | None = None
+    base_acceleration: tuple[Positive, Positive] | None = None
 
 
 class DampingSection(Section):

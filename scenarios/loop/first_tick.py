@@ -6,13 +6,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from math import isfinite, tau
 
-from hierarchy import Robot
 from hierarchy.tasks.self_separation import SelfSeparation
 from hierarchy.words import listed
 from scenarios.cell.avoidance import inseparable_pairs
 from scenarios.cell.build import Cell
 from scenarios.config import Scenario
-from scenarios.config.listed import ListedCoupling
 from scenarios.loop.controller import Controller
 from solvers import Status, explain, make
 from solvers.explain import is_missed
@@ -49,8 +47,7 @@ def first_tick(scenario: Scenario) -> FirstTick:
     plant = controller.cell.plant
     controller.command(0.0, plant.q, plant.v)
     distances = _distances(controller)
-    warnings = (*_warnings(scenario, distances), *_loose(scenario, controller.cell.robot),
-                *_itself(controller.cell))
+    warnings = (*_warnings(scenario, distances), *_itself(controller.cell))
     if not controller.answered:
         return FirstTick(None, (), (), distances, warnings)
     return FirstTick(controller.resolution.status, controller.hierarchy.names,
@@ -88,15 +85,6 @@ def _itself(cell: Cell) -> Iterator[str]:
             if apart < least - _ROUNDING:
                 yield (f"{task.name}: {name} are {1e3 * apart:.0f} mm apart at the start, less "
                        f"than the {1e3 * least:g} mm to be kept")
-
-
-def _loose(scenario: Scenario, robot: Robot) -> Iterator[str]:
-    """Yield the joints that the robot's file couples and the scenario lets move on their own."""
-    held = [set(task.joints) for task in scenario.tasks if isinstance(task, ListedCoupling)]
-    for one in robot.coupled:
-        if not any({one.joint, one.other} <= joints for joints in held):
-            yield (f"{one}, and moves on its own here: put it into robot.locked, or couple it in "
-                   "[[tasks]]")
 
 
 def _warnings(scenario: Scenario, distances: dict[str, float]) -> Iterator[str]:

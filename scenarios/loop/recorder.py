@@ -172,7 +172,7 @@ class Recorder:
         times[:, 3] = self._over[rows] - times[:, 3]
         signals |= dict(zip(_TIMES, times.T.copy(), strict=True))
         signals |= {"joint_lower": robot.lower, "joint_upper": robot.upper,
-                    "velocity_limit": robot.velocity_limit}
+                    "velocity_limit": self._cell.velocity_limit}
         if self._cell.contacts is not None:
             signals["torque_limit"] = self._cell.torque_limit
         return Recording(signals, tuple(" > ".join(names) for names in orders), scenario,

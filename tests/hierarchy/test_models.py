@@ -306,7 +306,7 @@ def test_a_posture_is_that_of_the_joints_behind_a_floating_base(arm):
     task, state = Posture((1.0, 1.0, 1.0)), State.at(robot, robot.rest)
     np.testing.assert_allclose(task.error(state), [-0.25] * 3)
     np.testing.assert_array_equal(task.jacobian(state), np.eye(9)[6:])
-    with pytest.raises(HierarchyError, match="2 targets for 3 joint positions"):
+    with pytest.raises(HierarchyError, match="2 values for 3 joint positions"):
         Posture((0.0, 0.0)).error(state)
 
 

@@ -293,7 +293,7 @@ def test_a_wrong_list_of_tasks_is_refused(entries, control, said):
 @pytest.mark.parametrize(("entry", "said"), [
     ({**HAND, "frame": "left_hnad"}, "task 'position': unknown frame 'left_hnad'; did you mean "
                                      "'left_hand'"),
-    ({"kind": "posture", "target": [0.0]}, "target has 1 entries, robot 'dual_arm' has 15 joints"),
+    ({"kind": "posture", "target": [0.0]}, "1 values for 15 joint positions of robot 'dual_arm'"),
     ({"kind": "posture", "joints": {"elbow": 0.0}}, "task 'posture': unknown joint 'elbow'"),
 ])
 def test_a_task_that_does_not_fit_its_robot_is_named(entry, said):

@@ -357,11 +357,12 @@ def test_a_measurement_that_makes_no_sense_is_refused(wrong):
         load("ellipse", [f"plant.measurement={wrong}"])
 
 
-def test_steps_are_refused_for_joints_with_more_coordinates_than_velocities(tmp_path):
-    scenario = on_file(tmp_path, "continuous")
-    with pytest.raises(ScenarioError, match="more coordinates than velocities"):
-        build(load(scenario, ["plant.measurement.quantisation=1e-4"]))
-    build(load(scenario, ["plant.measurement.position_noise=1e-4"]))
+def test_steps_of_a_continuous_joint_are_those_of_its_angle(tmp_path):
+    scenario = load(on_file(tmp_path, "continuous"), ["plant.measurement.quantisation=0.01"])
+    q = simulate(scenario)["q"]
+    steps = np.arctan2(q[:, 1::2], q[:, ::2]) / 0.01
+    np.testing.assert_allclose(steps, np.round(steps), atol=1e-9)
+    assert len(np.unique(np.round(steps))) > 2
 
 
 # Runs.

@@ -196,8 +196,14 @@ def test_noise_turns_and_moves_the_base_that_the_controller_sees():
         noisy["true_q"][:, 3:7]).inv()
     assert 5e-4 < turns.as_rotvec().std() < 2e-3
     np.testing.assert_allclose(np.linalg.norm(noisy["q"][:, 3:7], axis=1), 1.0)
-    with pytest.raises(ScenarioError, match="no quantisation"):
-        build(changed(plant__measurement__quantisation=1e-3))
+
+
+def test_steps_of_measured_positions_are_those_of_joints_only():
+    pytest.importorskip("mujoco")
+    read = simulate(SHORT.with_changes({"plant.measurement.quantisation": 1e-4}))
+    np.testing.assert_allclose(read["q"][:, :7], read["true_q"][:, :7], atol=1e-12)
+    steps = read["q"][:, 7:] / 1e-4
+    np.testing.assert_allclose(steps, np.round(steps), atol=1e-6)
 
 
 def test_a_sole_may_lie_beside_its_frame():

@@ -79,7 +79,7 @@ def test_a_value_that_is_wrong_is_named_with_its_key(change, said):
 
 
 @pytest.mark.parametrize(("changes", "said"), [
-    (["start.q=[0, 0, 0]"], "q has shape (3,)"),
+    (["start.q=[0, 0, 0]"], "start: 3 values for 7 joint positions"),
     (["start.q=[0, 0, 0, 90, 0, 0, 0]"], "joint_4 at 90 is beyond its limits, -2.094 to 2.094 (rad "
                                          "or m). Are these degrees?"),
     (["start.q=[0, 0, 0, 2.2, 0, 0, 0]"], "joint_4 at 2.2 is beyond its limits"),

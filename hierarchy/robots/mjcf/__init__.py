@@ -6,6 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from numpy.typing import ArrayLike
+
 from hierarchy.robots.found import Found, neutral_within_limits
 from hierarchy.robots.mjcf.compare import compare
 from hierarchy.robots.mjcf.compiled import compiled
@@ -20,7 +22,7 @@ from hierarchy.robots.shapes import capsules_of
 from hierarchy.robots.table import Base
 
 
-def read(path: Path, base: Base | None, shapes: bool, locked: Mapping[str, float],
+def read(path: Path, base: Base | None, shapes: bool, locked: Mapping[str, ArrayLike],
          root: Sequence[str]) -> Found:
     """Read a robot as `read_file` does; `root` names the bodies that it begins at, () for all.
 

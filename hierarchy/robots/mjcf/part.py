@@ -6,8 +6,9 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from hierarchy.errors import RobotError, UnknownNameError
+from hierarchy.errors import RobotError, UnknownNameError, finite_numbers
 from hierarchy.problem import Array
 from hierarchy.robots.mjcf.compiled import WORLD, Compiled
 from hierarchy.robots.table import Base
@@ -31,7 +32,7 @@ class Part:
     said: tuple[str, ...]
 
 
-def part_of(file: Compiled, base: Base | None, locked: Mapping[str, float],
+def part_of(file: Compiled, base: Base | None, locked: Mapping[str, ArrayLike],
             root: Sequence[str]) -> Part:
     """Choose the robot: everything from the bodies `root` on, or each tree that has joints.
 
@@ -49,7 +50,8 @@ def part_of(file: Compiled, base: Base | None, locked: Mapping[str, float],
                             f"{', '.join(moving)}" if root and moving else ""))
     for name, value in locked.items():
         j = _lockable(file, joints, name)
-        held[model.jnt_qposadr[j]] = value
+        held[model.jnt_qposadr[j]] = finite_numbers(
+            f"robot file {file.file!r}: locked: joint {name!r}", np.atleast_1d(value), 1)[0]
         joints.remove(j)
     if base == "fixed":
         joints = [j for j in joints if file.kind(j) != "free"]

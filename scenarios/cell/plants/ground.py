@@ -27,8 +27,8 @@ def on_floor(robot: Robot, contacts: Contacts, floor: TorqueSection, timestep: f
 
     A sole is a box in the place of its corners, a point a small ball; nothing else touches
     anything. Bodies are named "body JOINT", geometries by their contacts. Actuators are the torques
-    of the actuated joints. Raises ScenarioError unless each joint, but for that of a floating base,
-    turns about one axis.
+    of the actuated joints. What the robot couples or closes are equalities. Raises ScenarioError
+    unless each joint, but for that of a floating base, turns about or slides along one axis.
     """
     root = Element("mujoco", model=robot.name)
     ElementTree.SubElement(root, "compiler", angle="radian", inertiafromgeom="false")
@@ -45,6 +45,7 @@ def on_floor(robot: Robot, contacts: Contacts, floor: TorqueSection, timestep: f
         ElementTree.SubElement(elements[contact.frame.joint], "geom", {
             "name": contact.name, "contype": "0", "conaffinity": "0"} | shape)
         ElementTree.SubElement(pairs, "pair", _touching(contact, floor))
+    _equalities(root, robot, elements, timestep)
     actuator = ElementTree.SubElement(root, "actuator")
     for name, limit in zip(robot.velocity_names[robot.actuated:],
                            robot.effort_limit[robot.actuated:], strict=True):
@@ -63,8 +64,9 @@ def _bodies(world: Element, robot: Robot, floor: TorqueSection) -> list[Element]
         if i == 0 and robot.base == "floating":
             ElementTree.SubElement(element, "freejoint")
             continue
-        ElementTree.SubElement(element, "joint", name=body.name, type="hinge",
-                               axis=text(*axes[i + 1]), armature=text(floor.armature),
+        kind, axis = axes[i + 1]
+        ElementTree.SubElement(element, "joint", name=body.name, type=kind,
+                               axis=text(*axis), armature=text(floor.armature),
                                frictionloss=text(floor.joint_friction))
     return elements
 
@@ -109,14 +111,33 @@ def _ball(contact: Contact) -> dict[str, str]:
     return {"type": "sphere", "pos": text(*point), "size": text(BALL)}
 
 
-def _axes(robot: Robot) -> dict[int, Array]:
-    """Return the axis (3,) of each joint with one velocity, in its own frame."""
+def _equalities(root: Element, robot: Robot, elements: list[Element], timestep: float) -> None:
+    """Add what the robot couples and closes, as stiff as the time step allows."""
+    equality = ElementTree.SubElement(root, "equality")
+    stiff = {"solref": text(2.0 * timestep, 1.0), "solimp": text(0.9999, 0.9999, 0.001)}
+    for one in robot.coupled:
+        joints = {"joint1": one.joint} | ({"joint2": one.other} if one.other else {})
+        coefficients = (*one.coefficients, *[0.0] * 5)[:5]
+        ElementTree.SubElement(equality, "joint",
+                               joints | {"polycoef": text(*coefficients)} | stiff)
+    for loop in robot.loops:
+        sites = {f"site{i}": f"{loop.name} {i}" for i in (1, 2)}
+        for name, frame in zip(sites.values(), map(robot.frame, loop.frames), strict=True):
+            R = frame.rotation
+            ElementTree.SubElement(elements[frame.joint], "site", name=name,
+                                   pos=text(*frame.offset), xyaxes=text(*R[:, 0], *R[:, 1]))
+        ElementTree.SubElement(equality, "weld" if loop.rigid else "connect", sites | stiff)
+
+
+def _axes(robot: Robot) -> dict[int, tuple[str, Array]]:
+    """Return kind and axis (3,) of each joint with one velocity, in its own frame."""
     state, axes = State(robot), {}
     for joint in range(2 if robot.base == "floating" else 1, len(robot.parents)):
         own = np.flatnonzero(state.supports[joint] & ~state.supports[robot.parents[joint]])
-        turn = state.J[3:, own].sum(axis=1)
-        if len(own) != 1 or abs(np.linalg.norm(turn) - 1.0) > 1e-9:
-            raise ScenarioError(f"joint {robot.joint_names[joint - 1]!r} does not turn about one "
-                                "axis")
-        axes[joint] = state.placements[joint, :9].reshape(3, 3) @ turn
+        slide, turn = state.J[:3, own].sum(axis=1), state.J[3:, own].sum(axis=1)
+        kind, axis = ("hinge", turn) if turn.any() else ("slide", slide)
+        if len(own) != 1 or abs(np.linalg.norm(axis) - 1.0) > 1e-9:
+            raise ScenarioError(f"joint {robot.joint_names[joint - 1]!r} does not turn about or "
+                                "slide along one axis")
+        axes[joint] = kind, state.placements[joint, :9].reshape(3, 3) @ axis
     return axes

@@ -12,13 +12,15 @@ from hierarchy import Robot
 from hierarchy.jit import compiled
 from hierarchy.problem import Array
 from hierarchy.task import Level
+from hierarchy.tasks.mechanism import Mechanism
 
 
 class KinematicArm:
     """Integrator: q += v T + a T^2 / 2, v += a T, or at velocity level q += x T, v = x.
 
-    `q` (nq,), `v` (n,) hold the state, `a` (n,) the acceleration of the last step [rad, s];
-    `extra` is empty.
+    Joints that follow others, and closed chains, stay so: after a step q and v are moved back onto
+    the robot's mechanism. `q` (nq,), `v` (n,) hold the state, `a` (n,) the acceleration of the last
+    step [rad, s]; `extra` is empty.
     """
 
     def __init__(self, robot: Robot, q: Array, v: Array, period: float, level: Level) -> None:
@@ -29,6 +31,7 @@ class KinematicArm:
         self._step = np.zeros(robot.n)
         self._turning = robot.nq != robot.n  # joints with more coordinates than velocities
         self._q = np.zeros(robot.n) if self._turning else self.q
+        self._mechanism = Mechanism(robot)
 
     def act(self, command: Array) -> None:
         """Apply a command (n,) for one period."""
@@ -36,6 +39,9 @@ class KinematicArm:
                    self._q)
         if self._turning:
             self.q = self._robot.integrate(self.q, self._step)
+        if self._mechanism:
+            self.q[:] = self._mechanism.closed(self.q)
+            self.v[:] = self._mechanism.moving(self.q, self.v)
 
 
 @compiled

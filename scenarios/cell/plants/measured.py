@@ -80,16 +80,12 @@ class JointSensor:
     Noise is added to a position, then it is rounded to the nearest step. With velocity =
     "differenced" the velocity is the backward difference of these positions after a first-order
     low-pass filter; the first one is the true velocity. Values arrive `delay` later, until then
-    those of the start. Noise of a joint with more coordinates than velocities is a small motion
-    from its true position, of which the base of a robot takes part. Raises ScenarioError if the
-    delay is not a whole number of periods, or for steps or differences of such joints.
+    those of the start. Noise is a small motion from the true position, of which the base of a robot
+    takes part; steps are those of joints only. Raises ScenarioError if the delay is not a whole
+    number of periods.
     """
 
     def __init__(self, section: MeasurementSection, period: float, robot: Robot) -> None:
-        if robot.nq != robot.n and (section.quantisation or section.velocity == "differenced"):
-            raise ScenarioError(f"plant.measurement: robot {robot.name!r} has joints with more "
-                                "coordinates than velocities, which support no quantisation and no "
-                                "differenced velocity")
         self._robot = robot
         behind = whole_periods(section.delay, period, "plant.measurement.delay")
         self._section, self._period = section, period
@@ -107,12 +103,15 @@ class JointSensor:
         return self._behind[0]
 
     def _position(self, q: Array) -> Array:
-        if self._robot.nq != self._robot.n:
-            moved = self._noise(self._section.position_noise, self._robot.n)
-            return self._robot.integrate(q, moved)
-        noisy = q + self._noise(self._section.position_noise, len(q))
-        step = self._section.quantisation
-        return noisy if step == 0.0 else np.round(noisy / step) * step
+        robot, step = self._robot, self._section.quantisation
+        moved = self._noise(self._section.position_noise, robot.n)
+        noisy = q + moved if robot.nq == robot.n else robot.integrate(q, moved)
+        if step == 0.0:
+            return noisy
+        if robot.nq == robot.n:
+            return np.round(noisy / step) * step
+        joints = robot.vector(noisy)[robot.actuated:]
+        return robot.configuration(np.round(joints / step) * step, noisy)
 
     def _noise(self, deviation: float, n: int) -> Array:
         return deviation * self._random.standard_normal(n)
@@ -122,4 +121,5 @@ class JointSensor:
             return v.copy()
         before, velocity = self._last
         share = self._period / (self._period + self._section.filter_time)
-        return velocity + share * ((position - before) / self._period - velocity)
+        return velocity + share * (
+            self._robot.difference(before, position) / self._period - velocity)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from math import ceil
+from math import ceil, cos, sin
 from typing import Any
 
 import numpy as np
@@ -35,8 +35,8 @@ class TorqueRobot:
     world axes, `slip` (C,) [m] and `pressure_margin` (C,) [m]; and `support_margin` () [m], see
     `Touch`.
 
-    Raises ScenarioError if mujoco is not installed, a joint does not turn about one axis, a push is
-    on an unknown joint, or the delay is not a whole number of periods.
+    Raises ScenarioError if mujoco is not installed, a joint has several axes, a push is on an
+    unknown joint, or the delay is not a whole number of periods.
     """
 
     def __init__(self, robot: Robot, contacts: Contacts, q: Array, v: Array | None = None,
@@ -50,9 +50,14 @@ class TorqueRobot:
         self._floating = robot.base == "floating"
         self.q, self.v = q.copy(), np.zeros(robot.n) if v is None else v.copy()
         self.a = np.zeros(robot.n)
-        self.data.qpos[:] = _quaternion_first(q) if self._floating else q
-        self.data.qvel[:] = self.v
+        self._parts = [part for part in robot.parts if part.v >= robot.actuated]
+        joints = [self.model.joint(name) for name in robot.joint_names[int(self._floating):]]
+        self._places = [int(joint.qposadr[0]) for joint in joints]
+        self._rates = [*range(robot.actuated), *(int(joint.dofadr[0]) for joint in joints)]
+        self.data.qpos[self._places] = robot.vector(q)[robot.actuated:]
+        self.data.qvel[self._rates] = self.v
         if self._floating:
+            self.data.qpos[:7] = q[[0, 1, 2, 6, 3, 4, 5]]
             self.data.qvel[:3] = self._rotation() @ self.v[:3]
         mujoco.mj_forward(self.model, self.data)
         delay = whole_periods(section.delay, period, "plant.delay")
@@ -102,7 +107,7 @@ class TorqueRobot:
         """Accelerations (n,) that torques cause at the present state, in the robot's convention."""
         self.data.ctrl[:] = torques
         self._mujoco.mj_forward(self.model, self.data)
-        a = np.array(self.data.qacc)
+        a = np.array(self.data.qacc[self._rates])
         if self._floating:  # d(R^T p')/dt
             a[:3] = self._rotation().T @ a[:3] - np.cross(self.v[3:6], self.v[:3])
         return a
@@ -121,11 +126,9 @@ class TorqueRobot:
 
     def _read(self) -> None:
         """Take over the state: a free joint of MuJoCo has w first, and a velocity in the world."""
-        self.q[:], self.v[:] = self.data.qpos, self.data.qvel
+        for part, x in zip(self._parts, self.data.qpos[self._places].tolist(), strict=True):
+            self.q[part.q:part.q + part.size] = x if part.size == 1 else (cos(x), sin(x))
+        self.v[:] = self.data.qvel[self._rates]
         if self._floating:
-            self.q[3:7] = self.data.qpos[[4, 5, 6, 3]]
+            self.q[:7] = self.data.qpos[[0, 1, 2, 4, 5, 6, 3]]
             self.v[:3] = self._rotation().T @ self.data.qvel[:3]
-
-
-def _quaternion_first(q: Array) -> Array:
-    return np.concatenate([q[:3], q[[6, 3, 4, 5]], q[7:]])

@@ -1,0 +1,157 @@
+"""Coordinates of joints, and their values: as many numbers as a joint has velocities.
+
+A value is the position of a joint of one coordinate, the angle of a continuous one, whose
+coordinates are (cos, sin), and the rotation vector of a ball, whose coordinates are a quaternion
+(x, y, z, w). Planar and free joints are made of these: (x, y, angle), and a position followed by a
+rotation vector.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike
+
+from hierarchy.errors import HierarchyError, RobotError, UnknownNameError, finite_numbers
+from hierarchy.problem import Array
+from hierarchy.robots.found import Coupled
+
+UNIT = 1e-6     # off one to which the length of a quaternion or (cos, sin) may be given
+_EXACT = 1e-14  # off one by rounding, which is left
+
+
+class Part(NamedTuple):
+    """A part of joint number `joint`: its coordinates begin at `q`, its velocities at `v`.
+
+    It has `size` coordinates: 1, 2 (cos, sin; one velocity) or 4 (a quaternion; three velocities).
+    """
+
+    joint: int
+    q: int
+    v: int
+    size: int
+
+    @property
+    def velocities(self) -> int:
+        """Number of velocities."""
+        return 3 if self.size == 4 else 1
+
+
+def parts_of(model: Any) -> tuple[Part, ...]:
+    """Return the parts of all joints of a pinocchio model, in the order of its coordinates."""
+    parts: list[Part] = []
+    for number, joint in enumerate(model.joints):
+        q, v = joint.idx_q, joint.idx_v
+        for size in _sizes(joint) if number else ():
+            parts.append(Part(number, q, v, size))
+            q, v = q + size, v + parts[-1].velocities
+    return tuple(parts)
+
+
+def _sizes(joint: Any) -> Sequence[int]:
+    """Return how many coordinates each part of a joint has."""
+    kind = joint.shortname().removeprefix("JointModel")
+    if kind == "Composite":
+        return [size for inner in joint.extract().joints for size in _sizes(inner)]
+    if joint.nq == joint.nv:
+        return [1] * joint.nq
+    if (joint.nq, joint.nv) == (2, 1):
+        return [2]
+    known = {"Spherical": [4], "Planar": [1, 1, 2], "FreeFlyer": [1, 1, 1, 4]}
+    if kind not in known:
+        raise RobotError(f"joint {joint.id}: a joint of {joint.nq} coordinates and {joint.nv} "
+                         f"velocities of the kind {kind} is not known")
+    return known[kind]
+
+
+def values_of(parts: Iterable[Part], q: Array) -> Array:
+    """Return the values (n,) [rad or m] of a configuration q (nq,)."""
+    found: list[float] = []
+    for part in parts:
+        own = q[part.q:part.q + part.size]
+        if part.size == 1:
+            found.append(float(own[0]))
+        elif part.size == 2:
+            found.append(float(np.arctan2(own[1], own[0])))
+        else:
+            found += pin.log3(pin.Quaternion(own.copy()).toRotationMatrix()).tolist()
+    return np.array(found)
+
+
+def coordinates_of(parts: Iterable[Part], values: Array) -> Array:
+    """Return the coordinates (nq,) of the parts that have these values, one after the other."""
+    found: list[float] = []
+    at = 0
+    for part in parts:
+        own = values[at:at + part.velocities]
+        at += part.velocities
+        if part.size == 1:
+            found.append(float(own[0]))
+        elif part.size == 2:
+            found += [float(np.cos(own[0])), float(np.sin(own[0]))]
+        else:
+            found += pin.Quaternion(pin.exp3(own)).coeffs().tolist()
+    return np.array(found)
+
+
+def set_joint(parts: Sequence[Part], q: Array, joint: int, name: str, value: ArrayLike) -> None:
+    """Set the coordinates of one joint in q (nq,) in place.
+
+    `value` is its value, one number for each velocity, or its coordinates. RobotError, naming the
+    joint, for another count, a number that is not finite, or a length other than one.
+    """
+    own = [part for part in parts if part.joint == joint]
+    given = finite_numbers(f"joint {name!r}", np.atleast_1d(np.asarray(value)))
+    counts = sum(part.velocities for part in own), sum(part.size for part in own)
+    if len(given) not in counts:
+        either = " or ".join(map(str, dict.fromkeys(counts)))
+        raise RobotError(f"joint {name!r}: {len(given)} numbers, expected {either}")
+    first = own[0].q
+    q[first:first + counts[1]] = (given if len(given) == counts[1]
+                                  else coordinates_of(own, given))
+    normalise(own, q, {joint: name})
+
+
+def normalise(parts: Iterable[Part], q: Array, names: Any, tolerance: float = UNIT) -> None:
+    """Give each quaternion and (cos, sin) in q (nq,) the length one, in place.
+
+    RobotError, naming the joint by `names`, if a length differs from one by more than `tolerance`.
+    """
+    for part in parts:
+        if part.size == 1:
+            continue
+        own = q[part.q:part.q + part.size]
+        length = float(np.linalg.norm(own))
+        if not abs(length - 1.0) <= tolerance:
+            what = "(cos, sin)" if part.size == 2 else "quaternion (x, y, z, w)"
+            raise RobotError(f"joint {names[part.joint]!r}: its {what} {own.tolist()} has length "
+                             f"{length:.9g}, not 1")
+        if abs(length - 1.0) > _EXACT:
+            own /= length
+
+
+def without(model: Any, coupled: tuple[Coupled, ...], locked: Mapping[str, ArrayLike],
+            file: str) -> tuple[Any, tuple[Coupled, ...]]:
+    """Return a model without its locked joints, and its couplings.
+
+    `locked` has their values. What follows a locked joint is held where that puts it. Raises
+    UnknownNameError, and RobotError, naming file and joint, for a value that is none.
+    """
+    if not locked:
+        return model, coupled
+    q, parts, names = np.array(pin.neutral(model)), parts_of(model), list(model.names)
+    for name, value in locked.items():
+        if name not in names[1:]:
+            raise UnknownNameError("joint", name, names[1:])
+        try:
+            set_joint(parts, q, names.index(name), name, value)
+        except HierarchyError as error:
+            raise RobotError(f"robot file {file!r}: locked: {error}") from error
+    values = values_of(parts, q)
+    left = tuple(one if one.other not in locked else Coupled(one.joint, "", (float(np.polyval(
+        one.coefficients[::-1], values[model.joints[names.index(one.other)].idx_v])),))
+        for one in coupled)
+    return pin.buildReducedModel(model, [names.index(name) for name in locked], q), left

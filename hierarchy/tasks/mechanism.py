@@ -1,0 +1,209 @@
+"""The mechanism of a robot: joints that follow others, and chains that are closed.
+
+A model of a robot is a tree. What its file says beyond that holds whatever the tasks ask for, so
+these rows stand at the top of a stack.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple, final
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from hierarchy.problem import Array
+from hierarchy.robot import Robot
+from hierarchy.state import State
+from hierarchy.task import Level, Task
+from hierarchy.tasks.coupling import FollowedJoints
+from hierarchy.tasks.relative import RelativePose
+from hierarchy.tasks.together import Together
+
+MECHANISM = "mechanism"  # the name of the rows in a stack
+_FASTEST = 50.0          # [1/s] at which an error dies away
+_PER_PERIOD = 0.25       # share of it in a period, at most
+_INDEPENDENT = 1e-3      # singular value, relative to the largest, of rows that are no rounding
+_MOST_STEPS = 100        # to close a mechanism; three take 1 mm to rounding
+_EXACT = 1e-13           # [m, rad or their rates] what nothing is done about
+_SHORTEST = 1e-12        # [rad or m] step that ends the closing
+_LEAST_DAMPING = 1e-4
+
+
+def model_rows(robot: Robot, period: float = 0.001) -> list[Task]:
+    """Return the rows of `robot.coupled` and `robot.loops` as one task, or an empty list.
+
+    A joint that is coupled has one row, a loop the three of a common origin, or six if it is rigid.
+    They come first in a stack with commands every `period` [s], whose errors then die away at a
+    rate of 50 / s, or a quarter of an error per period if that is slower. At level "torque" the
+    accelerations keep the mechanism, and torques of all joints make them: the mechanism itself then
+    transmits no force, and every joint needs a motor.
+    """
+    rate = min(_FASTEST, _PER_PERIOD / period)
+    gains = rate**2, 2.0 * rate, rate
+    parts: list[Task] = []
+    if robot.coupled:
+        parts.append(FollowedJoints(robot, robot.coupled, *gains))
+    for loop in robot.loops:
+        frame, to = map(robot.frame, loop.frames)
+        parts.append(RelativePose(frame, to, (0.0, 0.0, 0.0), np.eye(3) if loop.rigid else None,
+                                  *gains, loop.name))
+    whole = Together(parts, MECHANISM) if parts else None
+    return [] if whole is None else [ClosedChains(whole) if robot.loops else whole]
+
+
+def above(rows: Sequence[Task], limits: Sequence[Task], anywhere: bool) -> list[Task]:
+    """Return the rows of a mechanism above limits, or below them for a resolver of bounds alone.
+
+    Such a one takes bounds in the first level only; `anywhere` says that bounds may be lower.
+    """
+    return [*rows, *limits] if anywhere else [*limits, *rows]
+
+
+class _Parts(NamedTuple):
+    """Independent rows V x = side / sizes of a mechanism: V (r, n) is orthonormal."""
+
+    V: Array
+    sizes: Array
+    side: Array
+
+
+@final
+@dataclass(frozen=True)
+class ClosedChains(Task):
+    """The rows of `whole` that are independent of each other.
+
+    A chain in a plane closes out of it by itself, but for the rounding of its file. So of all rows,
+    each kind of them at a common scale, only singular directions count whose singular value is more
+    than 1e-3 of the largest; the other rows are zero. Error and Jacobians are those of `whole`.
+    """
+
+    whole: Together
+    name: str = MECHANISM
+
+    @property
+    def dimension(self) -> int:
+        """As many as `whole` has."""
+        return self.whole.dimension
+
+    @property
+    def row_names(self) -> tuple[str, ...]:
+        """Numbers: a row is a mixture of those of `whole`."""
+        return tuple(f"constraint {i + 1}" for i in range(self.dimension))
+
+    def error(self, state: State) -> Array:
+        """How far the mechanism is from closed (m,) [m or rad]."""
+        return self.whole.error(state)
+
+    def jacobian(self, state: State) -> Array:
+        """The derivatives of what is to be closed (m, n)."""
+        return self.whole.jacobian(state)
+
+    def jacobian_derivative(self, state: State) -> Array:
+        """Their time derivative (m, n)."""
+        return self.whole.jacobian_derivative(state)
+
+    def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
+               row: int) -> Callable[[], object]:
+        """See `Task.writer`."""
+        m = self.dimension
+        J, side, rows = np.zeros((m, state.n)), np.zeros(m), slice(row, row + m)
+        write_whole = self.whole.writer(state, level, J, side, side.copy(), 0)
+
+        def write() -> None:
+            write_whole()
+            V, sizes, c = self.parts(J, side)
+            A[rows], lower[rows] = 0.0, 0.0
+            A[row:row + len(V)], lower[row:row + len(V)] = V, c / sizes
+            upper[rows] = lower[rows]
+
+        return write
+
+    def parts(self, J: Array, side: Array) -> _Parts:
+        """Return the independent part of rows J x = side, (m, n) and (m,)."""
+        scale = np.ones(len(J))
+        for rows in self._kinds():
+            largest = np.sqrt((J[rows]**2).sum(axis=1).max())
+            scale[rows] = 1.0 / largest if largest > _EXACT else 1.0
+        U, sizes, V = np.linalg.svd(J * scale[:, None], full_matrices=False)
+        kept = sizes > _INDEPENDENT * sizes[0]
+        return _Parts(V[kept], sizes[kept], (U.T @ (scale * side))[kept])
+
+    def _kinds(self) -> Iterator[slice]:
+        """Yield rows of one unit: a coupling, or the places or the turns of a loop."""
+        at = 0
+        for task in self.whole.tasks:
+            size = 3 if isinstance(task, RelativePose) else 1
+            for first in range(at, at + task.dimension, size):
+                yield slice(first, first + size)
+            at += task.dimension
+
+
+@final
+class Mechanism:
+    """The mechanism of a robot, to close it at a configuration; for one without it does nothing."""
+
+    def __init__(self, robot: Robot) -> None:
+        self._robot, self._state = robot, State(robot)
+        self._tasks = [task if isinstance(task, ClosedChains) else ClosedChains(task)
+                       for task in model_rows(robot) if isinstance(task, ClosedChains | Together)]
+
+    def __bool__(self) -> bool:
+        return bool(self._tasks)
+
+    def closed(self, q: ArrayLike, held: Iterable[str] = ()) -> Array:
+        """Return the configuration (nq,) near q that the mechanism allows.
+
+        Joints of the names in `held` stay where they are. It is found by the method of Levenberg
+        and Marquardt. One that cannot be closed is closed as far as that takes it, see `gap`.
+        """
+        here = self._robot.normalised(q)
+        if not self:
+            return here
+        moved, damping = self._free(held), 0.0
+        J, error = self._rows(here)
+        for _ in range(_MOST_STEPS if np.abs(error).max() > _EXACT else 0):
+            step = self._solved(J * moved, error, damping)
+            if np.abs(step).max() < _SHORTEST:
+                break
+            there = self._robot.integrate(here, step)
+            J_there, error_there = self._rows(there)
+            if error_there @ error_there < error @ error:
+                here, J, error, damping = there, J_there, error_there, damping / 10.0
+            else:
+                damping = max(10.0 * damping, _LEAST_DAMPING)
+        return here
+
+    def gap(self, q: ArrayLike) -> tuple[float, str]:
+        """Return by how much it is open at q at most [m or rad], and in which row."""
+        if not self:
+            return 0.0, ""
+        error = np.abs(self._rows(self._robot.normalised(q))[1])
+        return float(error.max()), self._tasks[0].whole.row_names[int(error.argmax())]
+
+    def moving(self, q: ArrayLike, v: Array) -> Array:
+        """Return the velocity (n,) nearest to v that it allows at q."""
+        if not self:
+            return v
+        J = self._rows(self._robot.normalised(q))[0]
+        beside = J @ v
+        return v - self._solved(J, beside, 0.0) if np.abs(beside).max() > _EXACT else v
+
+    def _free(self, held: Iterable[str]) -> Array:
+        """Return 1 for each velocity (n,), 0 for those of joints that stay where they are."""
+        free, fixed = np.ones(self._robot.n), {self._robot.joint(name) for name in held}
+        for part in self._robot.parts:
+            if part.joint in fixed:
+                free[part.v:part.v + part.velocities] = 0.0
+        return free
+
+    def _rows(self, q: Array) -> tuple[Array, Array]:
+        """Jacobian (m, n) and error (m,) at q."""
+        self._state.move(0.0, q, self._state.v)
+        return self._tasks[0].jacobian(self._state), self._tasks[0].error(self._state)
+
+    def _solved(self, J: Array, side: Array, damping: float) -> Array:
+        """Return the x (n,) that makes |J x - side|^2 + damping |x|^2 least, at the scales of J."""
+        V, sizes, c = self._tasks[0].parts(J, side)
+        return np.asarray((c * sizes / (sizes**2 + damping)) @ V)

@@ -1,0 +1,225 @@
+"""Joints with more coordinates than velocities: continuous, balls, planar and free ones."""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from hierarchy import HierarchyError, Robot, Stack, State
+from hierarchy.errors import RobotError, UnknownNameError
+from hierarchy.paths import Still
+from hierarchy.tasks import JointCoupling, JointLimits, Position, Posture
+from solvers import make, solve_ik
+
+T = 0.01  # [s]
+KINDS = {"drive": pin.JointModelPlanar, "wheel": pin.JointModelRUBZ,
+         "neck": pin.JointModelSpherical, "arm": pin.JointModelRY, "lift": pin.JointModelPZ}
+OF = {"drive": (0, 1, 2), "wheel": 3, "neck": (4, 5, 6), "arm": 7, "lift": 8}  # velocities
+THERE = {"drive": (0.5, -0.3, 2.5), "wheel": -3.0, "neck": (0.3, -0.2, 0.9), "arm": 0.7,
+         "lift": 0.2}
+
+
+def mobile(floating=False):
+    """A robot with a joint of each kind, one on the other."""
+    model, rng = pin.Model(), np.random.default_rng(3)
+    free = {"root": pin.JointModelFreeFlyer} if floating else {}
+    for parent, (name, kind) in enumerate((free | KINDS).items()):
+        place = pin.SE3(pin.exp3(rng.normal(size=3)), rng.normal(size=3))
+        joint = model.addJoint(parent, kind(), place, name)
+        model.appendBodyToJoint(joint, pin.Inertia.Random(), pin.SE3.Identity())
+    model.addFrame(pin.Frame("tip", joint, 0, pin.SE3(np.eye(3), np.ones(3)),
+                             pin.FrameType.OP_FRAME))
+    return Robot(model, "mobile")
+
+
+ROBOT = mobile()
+ANYWHERE = {"drive": (1.0, 2.0, 0.4), "wheel": 2.0, "neck": (0.1, 0.2, -0.3), "arm": -0.4}
+
+
+def test_values_of_joints_are_set_and_read_by_name():
+    q = ROBOT.configuration(ANYWHERE)
+    found = ROBOT.values(q)
+    for name, value in {**ANYWHERE, "lift": 0.0}.items():
+        np.testing.assert_allclose(found[name], value, atol=1e-12)
+    np.testing.assert_allclose(q[:6], [1.0, 2.0, np.cos(0.4), np.sin(0.4), np.cos(2), np.sin(2)])
+    turn = pin.Quaternion(q[6:10].copy()).toRotationMatrix()  # x, y, z, w
+    np.testing.assert_allclose(turn, pin.exp3(np.array(ANYWHERE["neck"])), atol=1e-12)
+    np.testing.assert_array_equal(ROBOT.configuration(q), q)
+    np.testing.assert_allclose(ROBOT.configuration(ROBOT.vector(q)), q, atol=1e-15)
+
+
+def test_a_joint_takes_its_coordinates_too():
+    q = ROBOT.configuration({"wheel": (0.0, 1.0), "neck": (0.0, 0.0, 1.0, 0.0)})
+    np.testing.assert_allclose(q[4:10], [0, 1, 0, 0, 1, 0])
+    standing = mobile(floating=True).configuration({"root": (1, 2, 3, 0, 1, 0, 0)})
+    np.testing.assert_array_equal(standing[:7], [1, 2, 3, 0, 1, 0, 0])
+
+
+@pytest.mark.parametrize(("values", "said"), [
+    ({"neck": (0, 0, 0, 2)}, "joint 'neck': its quaternion (x, y, z, w)"),
+    ({"wheel": (1.0, 1.0)}, "joint 'wheel': its (cos, sin) [1.0, 1.0] has length 1.414"),
+    ({"neck": 1.0}, "joint 'neck': 1 numbers, expected 3 or 4"),
+    ({"arm": np.nan}, "joint 'arm'"), ({"leg": 1.0}, "unknown joint 'leg'"),
+    ((0.0, 0.0), "2 values for 9 joint positions or 12 coordinates"),
+])
+def test_what_is_no_value_of_a_joint_is_refused_by_name(values, said):
+    with pytest.raises(HierarchyError) as error:
+        ROBOT.configuration(values)
+    assert said in str(error.value)
+
+
+@pytest.mark.parametrize(("span", "name"), [(slice(2, 4), "drive"), (slice(4, 6), "wheel"),
+                                            (slice(6, 10), "neck")])
+def test_a_configuration_of_another_length_is_refused_by_the_name_of_its_joint(span, name):
+    q = ROBOT.configuration(ANYWHERE)
+    state = State.at(ROBOT, q)
+    tip = state.position("tip")
+    nearly, bad = q.copy(), q.copy()
+    nearly[span] *= 1.0 + 5e-4  # as a sensor reads it
+    assert state.move(0.0, nearly, state.v)
+    np.testing.assert_allclose(state.position("tip"), tip, atol=1e-12)
+    bad[span] *= 2.0
+    assert not state.move(0.0, bad, state.v)
+    np.testing.assert_allclose(state.q, q, atol=1e-15)
+    for wrong in (nearly, bad):
+        for refuse in (lambda q: State.at(ROBOT, q), lambda q: ROBOT.integrate(q, np.zeros(9)),
+                       ROBOT.values, lambda q: solve_ik(ROBOT, q, [Posture(ANYWHERE)])):
+            with pytest.raises(RobotError, match=f"joint '{name}': its .* not 1"):
+                refuse(wrong)
+
+
+@pytest.mark.parametrize("floating", [False, True])
+def test_a_posture_takes_values_coordinates_or_names_and_goes_the_short_way(floating):
+    robot = mobile(floating)
+    state = State.at(robot, robot.configuration(ANYWHERE))
+    goal = robot.configuration(THERE)
+    named = Posture(THERE).error(state)
+    assert named.shape == (9,)
+    assert named[3] == pytest.approx(-3.0 - 2.0 + 2.0 * np.pi), "not five radians back"
+    for target in (goal, tuple(robot.vector(goal)[robot.actuated:])):
+        np.testing.assert_allclose(Posture(target).error(state), named, atol=1e-12)
+    arrived = pin.integrate(robot.model, state.q, np.append(np.zeros(robot.actuated), named))
+    for name in KINDS:
+        np.testing.assert_allclose(robot.values(arrived)[name], robot.values(goal)[name],
+                                   atol=1e-9)
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_the_rows_of_a_posture_are_the_derivative_of_its_error(name):
+    """Everywhere for a joint of one axis, for others along the way to the target."""
+    h, task = 1e-6, Posture(THERE, robot=ROBOT)
+    state = State.at(ROBOT, ROBOT.configuration(ANYWHERE))
+    error = task.error(state)
+    along = np.where(np.isin(np.arange(9), OF[name]), error, 0.0)
+    ahead, behind = (task.error(State.at(ROBOT, ROBOT.integrate(state.q, s * h * along)))
+                     for s in (1, -1))
+    np.testing.assert_allclose((behind - ahead) / (2 * h), task.jacobian(state) @ along, atol=1e-8)
+
+
+@pytest.mark.parametrize("level", ["velocity", "acceleration"])
+@pytest.mark.parametrize("floating", [False, True])
+def test_compiled_rows_of_a_posture_are_those_of_its_methods(level, floating):
+    robot = mobile(floating)
+    v = np.random.default_rng(1).normal(size=robot.n)
+    state = State(robot)
+    task = Posture(THERE, 3.0, 2.0, 4.0)
+    stack = Stack([task], level)
+    for values in (ANYWHERE, THERE, {}):
+        state.move(0.0, robot.configuration(values), v)
+        h = stack.hierarchy(state)
+        np.testing.assert_array_equal(h.A, task.jacobian(state))
+        asked = 4.0 * task.error(state) if level == "velocity" else (
+            3.0 * task.error(state) - 2.0 * v[robot.actuated:])
+        np.testing.assert_allclose(h.lower, asked, atol=1e-12)
+        np.testing.assert_array_equal(h.lower, h.upper)
+
+
+@pytest.mark.parametrize("level", ["velocity", "acceleration"])
+def test_a_mobile_robot_arrives_at_its_posture(level):
+    stack, state, solver = Stack([Posture(THERE, 100.0, 20.0, 10.0)], level), State(ROBOT), make(
+        "hcod")
+    q, v = ROBOT.configuration(ANYWHERE), np.zeros(9)
+    for _ in range(500):
+        state.move(0.0, q, v)
+        x = solver.solve(stack.hierarchy(state)).x
+        q = ROBOT.integrate(q, x * T if level == "velocity" else v * T + x * T * T / 2)
+        v = v + x * T if level == "acceleration" else v
+    np.testing.assert_allclose(ROBOT.vector(q), ROBOT.vector(ROBOT.configuration(THERE)),
+                               atol=1e-9)
+
+
+def test_a_posture_that_fits_no_form_is_refused():
+    with pytest.raises(HierarchyError, match="'posture': 4 values for 9 joint positions or 12"):
+        Posture((0.0,) * 4).error(State(ROBOT))
+    with pytest.raises(HierarchyError, match="'posture': unknown joint 'leg'"):
+        Posture({"leg": 0.0}, robot=ROBOT)
+    with pytest.raises(HierarchyError, match=r"give Posture\(\.\.\., robot=robot\)"):
+        _ = Posture({"arm": 0.0}).dimension
+
+
+def test_continuous_joints_are_coupled_by_their_angles():
+    task, h = JointCoupling(ROBOT, {"wheel": 1.0, "arm": -1.0}, 3.0), 1e-6
+    state = State.at(ROBOT, ROBOT.configuration({"wheel": -3.0, "arm": 0.2}))
+    np.testing.assert_allclose(task.error(state), 3.2 - (-3.0) - 2 * np.pi, atol=1e-12)
+    ahead, behind = ([task.error(State.at(ROBOT, ROBOT.integrate(state.q, s * h * e)))[0]
+                      for e in np.eye(9)] for s in (1, -1))
+    np.testing.assert_allclose(np.subtract(behind, ahead) / (2 * h), task.jacobian(state)[0],
+                               atol=1e-8)
+    with pytest.raises(HierarchyError, match="'neck' has 3 velocities and cannot be coupled"):
+        JointCoupling(ROBOT, {"neck": 1.0})
+
+
+URDF = """<robot name="c"><link name="l0"/><link name="l1"/><link name="l2"/><link name="l3"/>
+<joint name="a" type="continuous"><parent link="l0"/><child link="l1"/><axis xyz="0 0 1"/></joint>
+<joint name="b" type="revolute"><parent link="l1"/><child link="l2"/><origin xyz=".3 0 0"/>
+<axis xyz="0 0 1"/><limit lower="-2" upper="2" velocity="1" effort="1"/></joint>
+<joint name="c" type="continuous"><parent link="l1"/><child link="l3"/><axis xyz="0 0 1"/>
+<mimic joint="a" multiplier="-2" offset="0.5"/></joint></robot>"""
+
+
+def test_a_continuous_joint_is_locked_at_an_angle_and_holds_what_follows_it(tmp_path):
+    path = tmp_path / "c.urdf"
+    path.write_text(URDF)
+    free = Robot.load(path)
+    locked = Robot.load(path, locked={"a": 1.2})
+    assert locked.joint_names == ("b", "c")
+    q = locked.configuration({"b": 0.3})
+    np.testing.assert_allclose(
+        State.at(locked, q).position("l2"),
+        State.at(free, free.configuration({"a": 1.2, "b": 0.3})).position("l2"), atol=1e-12)
+    (held,) = locked.coupled
+    assert (held.joint, held.other, held.coefficients) == ("c", "", (0.5 - 2.4,))
+    assert Robot.load(path, locked={"c": 0.1}).coupled == ()
+    with pytest.raises(RobotError, match="locked: joint 'a'"):
+        Robot.load(path, locked={"a": (1.0, 1.0)})
+    with pytest.raises(RobotError, match=r"robot.configuration\(\{'a': value\}\)"):
+        free.coordinate("a")
+    with pytest.raises(UnknownNameError):
+        free.configuration({"d": 0.0})
+
+
+def test_inverse_kinematics_limits_the_speed_of_a_floating_base():
+    robot = Robot.load("humanoid")
+    far = Position(robot.frame("left_hand"), Still((5.0, 0.0, 1.0)))
+    v = solve_ik(robot, robot.rest, [far]).v
+    assert (np.abs(v[:6]) <= np.repeat([2.0, 3.0], 3) + 1e-9).all()
+    robot.limit_base(0.5, np.inf)
+    v = solve_ik(robot, robot.rest, [far]).v
+    assert np.abs(v[:3]).max() == pytest.approx(0.5)
+    with pytest.raises(RobotError, match="linear speed of the base = 0"):
+        robot.limit_base(0.0, 1.0)
+    with pytest.raises(RobotError, match="its base is fixed"):
+        ROBOT.limit_base(1.0, 1.0)
+
+
+def test_joint_limits_cover_a_floating_base_where_it_has_limits():
+    robot = Robot.load("humanoid")
+    joints, both = JointLimits(robot, 5.0, T), JointLimits(robot, 5.0, T, base_speed=(0.1, 0.2))
+    assert (joints.dimension, both.dimension) == (30, 36)
+    state = State.at(robot, robot.rest, np.append([0.09, 0, 0, 0, 0, -0.19], np.zeros(30)))
+    low, up = both.box(state, "acceleration")
+    np.testing.assert_allclose([up[0], low[0], low[5]], [1.0, -5.0, -1.0])
+    np.testing.assert_array_equal(low[6:], joints.box(state, "acceleration")[0])
+    sent = both.clamp(state, "acceleration", np.append([9.0, np.nan], np.zeros(34)))
+    np.testing.assert_allclose(sent[:2], [1.0, 0.0])
+    with pytest.raises(HierarchyError, match="has a fixed base"):
+        JointLimits(ROBOT, 5.0, T, base_acceleration=(1.0, 1.0))

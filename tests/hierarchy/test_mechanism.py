@@ -1,0 +1,185 @@
+"""Joints that follow others, and closed chains: rows at the top of every stack."""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from hierarchy import Robot, Stack, State
+from hierarchy.contacts import Contacts
+from hierarchy.robots.found import Coupled, Loop
+from hierarchy.tasks import Posture
+from hierarchy.tasks.mechanism import Mechanism, model_rows
+from solvers import make, solve_ik
+
+PERIOD = 0.001  # [s]
+TILT = pin.exp3(np.array([0.4, -0.3, 0.2]))
+
+
+def four_bar(rigid=False):
+    """A crank that turns on, a coupler and a rocker, and two fingers on the coupler.
+
+    The rocker turns in a ball where it meets the ground, so that the chain is not planar.
+    """
+    model, offsets = pin.Model(), {"crank": 0.0, "coupler": 0.2, "finger": 0.1, "thumb": 0.2,
+                                   "rocker": 0.5}
+    kinds = {"crank": pin.JointModelRUBY(), "rocker": pin.JointModelSpherical()}
+    numbers = {}
+    for name, x in offsets.items():
+        parent = numbers.get({"coupler": "crank", "finger": "coupler", "thumb": "coupler"}.get(
+            name), 0)
+        place = pin.SE3(np.eye(3) if parent else TILT, (np.eye(3) if parent else TILT) @ [x, 0, 0])
+        numbers[name] = model.addJoint(parent, kinds.get(name, pin.JointModelRY()), place, name)
+        model.appendBodyToJoint(numbers[name], pin.Inertia(1.0, np.array([0.1, 0, 0]),
+                                                           0.01 * np.eye(3)), pin.SE3.Identity())
+    for name, joint, x in (("end", "coupler", 0.4), ("tip", "rocker", 0.3)):
+        model.addFrame(pin.Frame(name, numbers[joint], 0, pin.SE3(np.eye(3), np.array([x, 0, 0])),
+                                 pin.FrameType.OP_FRAME))
+    robot = Robot(model, "four-bar")
+    robot.loops = (Loop("pin", ("end", "tip"), rigid),)
+    robot.coupled = (Coupled("thumb", "finger", (0.1, -1.0, 0.5)),)
+    return robot
+
+
+ROBOT = four_bar()
+GOAL = {"crank": -0.4, "finger": 0.5}
+
+
+def distance(robot, q):
+    """How far the pin is open [m] and the thumb from its polynomial [rad], by pinocchio alone."""
+    data = robot.model.createData()
+    pin.framesForwardKinematics(robot.model, data, q)
+    end, tip = (data.oMf[robot.model.getFrameId(name)].translation for name in ("end", "tip"))
+    finger, thumb = (q[robot.coordinate(name)] for name in ("finger", "thumb"))
+    return max(np.linalg.norm(end - tip), abs(thumb - (0.1 - finger + 0.5 * finger**2)))
+
+
+def start(robot=ROBOT):
+    return Mechanism(robot).closed(robot.configuration({"crank": -0.8, "finger": 0.3}),
+                                   ["crank", "finger"])
+
+
+def test_a_mechanism_is_closed_and_named_joints_stay():
+    q = start()
+    assert distance(ROBOT, q) < 1e-14
+    assert ROBOT.values(q)["crank"] == pytest.approx(-0.8, abs=1e-15)
+    away = ROBOT.integrate(q, 0.05 * np.sin(np.arange(ROBOT.n)))
+    assert distance(ROBOT, away) > 1e-3
+    assert Mechanism(ROBOT).gap(away)[0] > 1e-3
+    assert distance(ROBOT, Mechanism(ROBOT).closed(away)) < 1e-14
+
+
+@pytest.mark.parametrize("rigid", [False, True])
+def test_rows_of_a_mechanism_are_derivatives_of_its_error(rigid):
+    robot, h, rng = four_bar(rigid), 1e-6, np.random.default_rng(2)
+    (task,) = model_rows(robot)
+    assert task.dimension == (7 if rigid else 4)
+    q = robot.integrate(start(), 0.05 * rng.normal(size=robot.n))
+    v = rng.normal(size=robot.n)
+
+    def at(step):
+        return State.at(robot, robot.integrate(q, step), v)
+
+    rows = slice(0, 4)  # the error of a turn is linear only near zero
+    columns = [(task.error(at(-h * e)) - task.error(at(h * e))) / (2 * h) for e in np.eye(robot.n)]
+    np.testing.assert_allclose(np.transpose(columns)[rows], task.jacobian(at(0 * v))[rows],
+                               atol=1e-8)
+    np.testing.assert_allclose(
+        task.jacobian_derivative(at(0 * v)),
+        (task.jacobian(at(h * v)) - task.jacobian(at(-h * v))) / (2 * h), atol=1e-8)
+
+
+@pytest.mark.parametrize("resolver", ["hcod", "tpm", "recursive"])
+@pytest.mark.parametrize("level", ["velocity", "acceleration", "torque"])
+def test_a_four_bar_closes_from_a_millimetre_off_and_goes_to_its_posture(level, resolver):
+    """The torque is that of the answer, and the motion is what pinocchio says that it causes."""
+    crank = Posture({**ROBOT.values(start()), **GOAL}, 100.0, 20.0, 10.0)
+    contacts = Contacts(ROBOT) if level == "torque" else None
+    stack = Stack([*model_rows(ROBOT, PERIOD), crank], level, contacts=contacts)
+    off = np.zeros(ROBOT.n)
+    off[1], off[3] = 3e-3, 1e-3
+    q, v, state, solver = ROBOT.integrate(start(), off), np.zeros(ROBOT.n), State(ROBOT), make(
+        resolver)
+    assert 1e-3 < distance(ROBOT, q) < 2e-3
+    for _ in range(3000):
+        assert state.move(0.0, q, v)
+        x = solver.solve(stack.hierarchy(state)).x
+        if level == "torque":
+            x = pin.aba(ROBOT.model, ROBOT.model.createData(), q, v, contacts.torques(state, x))
+        step = x * PERIOD if level == "velocity" else v * PERIOD + x * PERIOD**2 / 2
+        q, v = ROBOT.integrate(q, step), v if level == "velocity" else v + x * PERIOD
+    assert distance(ROBOT, q) < 1e-9
+    assert np.abs(ROBOT.values(q)["finger"] - ROBOT.values(start())["finger"]) > 0.05, "it moved"
+
+
+def planar_bar(rigid, rounding):
+    """Four bars whose axes are parallel but for rounding, in a plane that is none of the world."""
+    model, rng = pin.Model(), np.random.default_rng(0)
+    chain = [("crank", 0, 0.0), ("coupler", 1, 0.2), *[("knee", 2, 0.4)] * rigid,
+             ("rocker", 0, 0.5)]
+    for name, parent, x in chain:
+        tilt = np.eye(3) if parent else TILT
+        joint = model.addJoint(parent, pin.JointModelRY(), pin.SE3(
+            tilt @ pin.exp3(rounding * rng.normal(size=3)),
+            tilt @ np.array([x, 0, 0]) + rounding * rng.normal(size=3)), name)
+    ends = [("end", len(chain) - 1, 0.15 if rigid else 0.4, 0.0),
+            ("tip", joint, 0.15 if rigid else 0.3, np.pi * rigid)]
+    for name, joint, x, turn in ends:
+        place = pin.SE3(pin.exp3(np.array([0, turn, 0])), np.array([x, 0, 0]))
+        model.addFrame(pin.Frame(name, joint, 0, place, pin.FrameType.OP_FRAME))
+    robot = Robot(model, "planar")
+    robot.loops = (Loop("pin", ("end", "tip"), rigid),)
+    return robot
+
+
+@pytest.mark.parametrize("rigid", [False, True])
+@pytest.mark.parametrize("rounding", [0.0, 1e-9, 1e-6, 1e-4])
+def test_a_chain_in_a_plane_moves_although_its_file_is_rounded(rigid, rounding):
+    """What rounding opens across the plane no motion closes: once the joints were thrown after it.
+
+    The answer depends on neither the resolver nor, much, on the rounding.
+    """
+    robot, ends = planar_bar(rigid, rounding), []
+    begin = Mechanism(robot).closed(robot.configuration({"crank": -0.8}), ["crank"])
+    for resolver in ("hcod", "recursive"):
+        stack = Stack([*model_rows(robot, PERIOD), Posture({"crank": -0.4}, gain=10.0)],
+                      "velocity")
+        q, state, solver = begin, State(robot), make(resolver)
+        for _ in range(500):
+            state.move(0.0, q, np.zeros(robot.n))
+            x = solver.solve(stack.hierarchy(state)).x
+            assert np.abs(x).max() < 20.0
+            q = q + PERIOD * x
+        assert Mechanism(robot).gap(q)[0] < 1e-9 + 5.0 * rounding
+        ends.append(q)
+    exact = planar_bar(rigid, 0.0)
+    np.testing.assert_allclose(ends[0], ends[1], atol=1e-9)
+    assert np.abs(ends[0] - begin).max() > 0.1, "it moved"
+    assert Mechanism(exact).gap(ends[0])[0] < 1e-8 + 20.0 * rounding
+
+
+GRIPPER = """<robot name="g"><link name="base"/>{0}</robot>"""
+JOINT = """<link name="{0}"/><joint name="{0}" type="{2}"><parent link="{1}"/><child link="{0}"/>
+<origin xyz="0.05 0 0"/><axis xyz="0 1 0"/><limit lower="-1" upper="1" velocity="3" effort="9"/>{3}
+</joint>"""
+
+
+@pytest.mark.parametrize("kind", ["revolute", "continuous"])
+@pytest.mark.parametrize("resolver", ["hcod", "tpm"])
+def test_a_gripper_with_mimic_joints_stays_one_in_inverse_kinematics(kind, resolver, tmp_path):
+    follow = '<mimic joint="driver" multiplier="{}" offset="{}"/>'
+    joints = [("driver", "base", ""), ("knuckle", "driver", follow.format(-1, 0)),
+              ("left", "base", follow.format(1, 0.1)), ("right", "base", follow.format(-0.5, 0))]
+    path = tmp_path / "g.urdf"
+    path.write_text(GRIPPER.format("".join(JOINT.format(name, parent, kind, mimic)
+                                           for name, parent, mimic in joints)))
+    robot = Robot.load(path)
+    q = Mechanism(robot).closed(robot.rest)
+    for _ in range(300):
+        step = solve_ik(robot, q, [Posture({"driver": 0.6, "left": -0.5}, gain=5.0)],
+                        resolver=resolver)
+        q = robot.integrate(q, 0.01 * step.v)
+        found = robot.values(q)
+        expected = [-found["driver"], found["driver"] + 0.1, -0.5 * found["driver"]]
+        np.testing.assert_allclose([found[name] for name in ("knuckle", "left", "right")],
+                                   expected, atol=1e-9)
+    assert np.abs(robot.vector(q)).max() > 0.05, "it moved"

@@ -1,0 +1,153 @@
+"""Scenarios with joints of every kind, mimic joints, closed chains and floating bases."""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from hierarchy import Robot, plugins
+from hierarchy.robots.found import Coupled, Loop
+from scenarios import simulate
+from scenarios.cell.build import build
+from scenarios.config import Scenario, ScenarioError
+from scenarios.loop.first_tick import first_tick
+
+
+def four_bar():
+    """A crank that turns on, a coupler with two fingers and a rocker that are pinned together."""
+    model, numbers = pin.Model(), {"base": 0}
+    for name, parent, x in (("crank", "base", 0.0), ("coupler", "crank", 0.2),
+                            ("finger", "coupler", 0.1), ("thumb", "coupler", 0.2),
+                            ("rocker", "base", 0.5)):
+        kind = pin.JointModelRUBY() if name == "crank" else pin.JointModelRY()
+        joint = numbers[name] = model.addJoint(
+            numbers[parent], kind, pin.SE3(np.eye(3), np.array([x, 0.0, 0.0])), name)
+        model.appendBodyToJoint(joint, pin.Inertia(1.0, np.array([0.1, 0.0, 0.0]),
+                                                   0.01 * np.eye(3)), pin.SE3.Identity())
+    model.effortLimit[:], model.upperVelocityLimit[:] = 100.0, 5.0
+    for name, joint, x in (("end", "coupler", 0.4), ("tip", "rocker", 0.3)):
+        model.addFrame(pin.Frame(name, numbers[joint], 0, pin.SE3(np.eye(3), np.array([x, 0, 0])),
+                                 pin.FrameType.OP_FRAME))
+    robot = Robot(model, "four-bar", "end")
+    robot.loops = (Loop("pin", ("end", "tip"), False),)
+    robot.coupled = (Coupled("thumb", "finger", (0.1, -1.0, 0.5)),)
+    return robot
+
+
+@pytest.fixture(autouse=True)
+def _four_bar(monkeypatch, tmp_path):
+    known = plugins.find
+    monkeypatch.setattr(plugins, "find", lambda group, name: four_bar if (
+        group, name) == ("robots", "four_bar") else known(group, name))
+    monkeypatch.chdir(tmp_path)  # MuJoCo writes its log there
+
+
+def scenario(level="velocity", resolver="hcod", stack="hierarchical", **more):
+    plant = "torque" if level == "torque" else "kinematic"
+    posture = {"kind": "posture", "joints": {"crank": -0.3, "finger": 0.5}, "stiffness": 100.0,
+               "damping": 20.0, "gain": 10.0}
+    asks = {"position": {"offset": [0.05, 0.0, 0.05]}} if stack == "switched" else {
+        "tasks": [posture]}
+    return Scenario.model_validate({
+        "name": "bar", "robot": {"model": "four_bar"}, "damping": {"value": 5.0},
+        "start": {"joints": {"crank": -0.8, "finger": 0.3}}, "plant": {"kind": plant},
+        "control": {"level": level, "stack": stack, "resolver": resolver, "duration": 0.5,
+                    "period": 0.002}} | asks | more)
+
+
+def largest_gap(q):
+    """How far the pin is open [m], and the thumb from its polynomial [rad], by pinocchio alone."""
+    robot, worst = four_bar(), 0.0
+    data = robot.model.createData()
+    for row in q:
+        pin.framesForwardKinematics(robot.model, data, row)
+        end, tip = (data.oMf[robot.model.getFrameId(name)].translation for name in ("end", "tip"))
+        finger, thumb = row[robot.coordinate("finger")], row[robot.coordinate("thumb")]
+        worst = max(worst, np.linalg.norm(end - tip),
+                    abs(thumb - (0.1 - finger + 0.5 * finger**2)))
+    return worst
+
+
+LIMITS = {"limits": {"acceleration": 50.0, "place": "either"}}
+
+
+@pytest.mark.parametrize(("settings", "most"), [
+    ({"level": "velocity"}, 1e-12), ({"level": "velocity", "resolver": "tpm", **LIMITS}, 1e-12),
+    ({"level": "velocity", "resolver": "tpm", "stack": "set-based"}, 1e-12),
+    ({"level": "acceleration", **LIMITS}, 1e-12),
+    ({"level": "acceleration", "resolver": "recursive"}, 1e-12),
+    ({"level": "acceleration", "resolver": "tpm", "stack": "switched", **LIMITS}, 1e-12),
+    pytest.param({"level": "torque", **LIMITS}, 5e-6, marks=pytest.mark.slow)])
+def test_a_mechanism_stays_closed_in_every_stack_and_plant(settings, most):
+    if settings["level"] == "torque":
+        pytest.importorskip("mujoco")
+    run = simulate(scenario(**settings))
+    assert run.fault is None
+    assert largest_gap(run["q"]) < most
+    assert np.ptp(run["q"], axis=0).max() > 0.05, "it moved"
+
+
+def test_the_mechanism_is_the_first_level_and_bounds_of_a_resolver_of_bounds_come_before():
+    assert first_tick(scenario(**LIMITS)).levels == ("mechanism", "joint limits", "posture")
+    assert first_tick(scenario(resolver="tpm", **LIMITS)).levels == (
+        "joint limits", "mechanism", "posture")
+    assert first_tick(scenario(stack="switched", level="acceleration")).levels == (
+        "mechanism", "position")
+
+
+def test_a_start_is_closed_where_it_names_no_joint_and_refused_where_it_cannot_be():
+    cell = build(scenario())
+    assert largest_gap(cell.start[0][None]) < 1e-12
+    assert cell.robot.values(cell.start[0])["crank"] == pytest.approx(-0.8, abs=1e-15)
+    with pytest.raises(ScenarioError, match=r"start: pin .*: the robot's mechanism stays open by"):
+        build(scenario(start={"joints": {"crank": 0.0, "rocker": 2.0}}))
+    with pytest.raises(ScenarioError, match=r"start: joint 'crank': its \(cos, sin\)"):
+        build(scenario(start={"q": [2.0, 0.0, 0.0, 0.0, 0.0, 0.0]}))
+
+
+MOBILE = """<robot name="m"><link name="world"/><link name="body"/><link name="a"/><link name="b"/>
+<joint name="base" type="planar"><parent link="world"/><child link="body"/><axis xyz="0 0 1"/>
+</joint><joint name="turn" type="continuous"><parent link="body"/><child link="a"/>
+<axis xyz="0 0 1"/></joint><joint name="tilt" type="revolute"><parent link="a"/><child link="b"/>
+<axis xyz="0 1 0"/><limit lower="-1" upper="1" velocity="3" effort="9"/></joint></robot>"""
+
+
+@pytest.mark.parametrize("level", ["velocity", "acceleration"])
+@pytest.mark.parametrize("measurement", [{}, {"quantisation": 1e-5, "velocity": "differenced"}])
+def test_a_mobile_base_goes_to_a_posture_by_values(level, measurement, tmp_path):
+    (tmp_path / "m.urdf").write_text(MOBILE)
+    goal = {"base": [0.4, -0.2, 2.8], "turn": -3.0, "tilt": 0.5}
+    data = {"name": "m", "robot": {"model": "m.urdf"}, "plant": {"measurement": measurement},
+            "start": {"joints": {"base": [0.1, 0.2, 0.3], "turn": 2.0}},
+            "control": {"level": level, "stack": "hierarchical", "resolver": "hcod",
+                        "duration": 2.0, "period": 0.002},
+            "tasks": [{"kind": "posture", "joints": goal, "stiffness": 100.0, "damping": 20.0,
+                       "gain": 10.0}]}
+    run = simulate(Scenario.model_validate(data))
+    found = Robot.load("m.urdf").values(run["q"][-1])
+    for name, value in goal.items():
+        np.testing.assert_allclose(found[name], value, atol=1e-4)
+    turned = np.unwrap(np.arctan2(run["q"][:, 5], run["q"][:, 4]))
+    assert np.ptp(turned) == pytest.approx(2 * np.pi - 5.0, abs=1e-2), "the short way"
+    data["start"]["joints"]["turn"] = [1.0, 1.0]
+    with pytest.raises(ScenarioError, match="start: joint 'turn'"):
+        build(Scenario.model_validate(data))
+
+
+@pytest.mark.parametrize("level", ["velocity", "acceleration"])
+def test_limits_hold_for_a_floating_base(level):
+    data = {"name": "h", "robot": {"model": "humanoid"},
+            "control": {"level": level, "stack": "hierarchical", "resolver": "hcod",
+                        "duration": 0.5, "period": 0.005},
+            "limits": {"acceleration": 50.0, "base_speed": [0.3, 0.5]},
+            "tasks": [{"kind": "position", "frame": "left_hand", "stiffness": 400.0,
+                       "path": {"kind": "still", "position": [5.0, 0.0, 1.0]}}]}
+    run = simulate(Scenario.model_validate(data))
+    fastest = np.abs(run["v"][:, :6]).max(axis=0)
+    assert fastest[:3].max() == pytest.approx(0.3)
+    assert (fastest <= np.repeat([0.3, 0.5], 3) + 1e-9).all()
+    np.testing.assert_array_equal(run["velocity_limit"][:6], np.repeat([0.3, 0.5], 3))
+    del data["limits"]["base_speed"]
+    run = simulate(Scenario.model_validate(data))
+    assert np.abs(run["v"][:, :3]).max() == pytest.approx(2.0)
+    with pytest.raises(ScenarioError, match="has a fixed base"):
+        build(scenario(limits={"acceleration": 5.0, "base_speed": [1.0, 1.0]}))
