@@ -15,6 +15,8 @@ from solvers.status import EQUAL
 
 _NAMED, _SMALL = 3, 0.1  # missed rows that are named, and the share of the largest that counts
 _CALLED = {"rows": "names", "units": "units"}
+_AXES = ("x", "y", "z")
+_SINGULAR = 1e-3  # share of |A| |w| below which A^T w counts as nothing
 _MATTERS = 1e-6  # smallest share of a level's pull for which a level above is named
 
 
@@ -75,7 +77,8 @@ def _level(h: Hierarchy, resolution: ActiveSetResolution, k: int, tolerance: flo
     if named and (most := most_missed(h, resolution.x, k, names)):
         at = f", at {listed(most)}"
     if not blocking:
-        return f"{h.names[k]} is missed by {missed:.3g}{at}: its own rows disagree."
+        why = nowhere(h, k, names[rows], resolution.x) or "its own rows disagree"
+        return f"{h.names[k]} is missed by {missed:.3g}{at}: {why}."
     by = listed(_said_once(blocking, h.names))
     return f"{h.names[k]} is missed by {missed:.3g}{at}: held back by {by}."
 
@@ -120,6 +123,26 @@ def most_missed(h: Hierarchy, x: Array, k: int, names: Sequence[str]) -> list[st
     chosen = [i for i in np.argsort(-w, kind="stable")[:_NAMED].tolist()
               if w[i] > _SMALL * w.max()]
     return [names[rows[i]] for i in chosen] if len(rows) > 1 else []
+
+
+def nowhere(h: Hierarchy, k: int, names: Sequence[str], x: Array) -> str:
+    """Say along which rows no joint moves level k where that is why it is missed at x, or "".
+
+    Rows that are missed together are a direction if they are axes, by the last letter of their
+    names; of others only a row of zeros is one, since the data of two rows that contradict each
+    other are the same.
+    """
+    rows = slice(h.offsets[k], h.offsets[k + 1])
+    A, w = h.A[rows], h.slacks(x)[rows]
+    size = float(np.linalg.norm(A)) * float(np.linalg.norm(w))
+    if not w.any() or np.linalg.norm(A.T @ w) > _SINGULAR * size:
+        return ""
+    shares = w / w[np.argmax(np.abs(w))]
+    along = [f"{'' if share == 1.0 else f'{share:.2g} '}{name}"
+             for name, share in zip(names, shares, strict=True) if abs(share) > _SMALL]
+    if len(along) > 1 and not all(name[-1:] in _AXES for name in along):
+        return ""
+    return f"singular here: no joint moves {h.names[k]} along {listed(along)}"
 
 
 def held_back_by(h: Hierarchy, resolution: ActiveSetResolution, k: int,

@@ -33,6 +33,7 @@ class JointCoupling(Task):
     name: str = "coupling"
     positions: NDArray[np.int64] = field(init=False, repr=False, compare=False)
     row: Array = field(init=False, repr=False, compare=False)  # (1, n)
+    straight = True
 
     def __post_init__(self) -> None:
         super().__post_init__()

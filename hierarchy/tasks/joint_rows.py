@@ -14,6 +14,7 @@ class JointRows(Task):
     """A task with one row per actuated joint of `robot`."""
 
     robot: Robot
+    straight = True
 
     @property
     def dimension(self) -> int:

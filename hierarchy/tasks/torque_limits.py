@@ -44,6 +44,7 @@ class TorqueLimits(JointRows):
     limit: Array = field(init=False, repr=False, compare=False)  # (n,) [N m or N]
     kind = "inequality"
     of_forces: ClassVar[bool] = True
+    straight = False
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -33,7 +33,7 @@ def test_insert_remove_swap_and_reorder_by_name():
 
 def test_rows_are_named_in_the_order_of_the_stack_or_in_another():
     s = Stack([TASKS["position"], LookAt(FRAME, (0.3, 0.3, 0.6))])
-    assert s.row_names() == ("row 0", "row 1", "row 2", "x", "y")
+    assert s.row_names() == ("x", "y", "z", "x", "y")
     assert s.row_names(("look-at",)) == ("x", "y")
 
 

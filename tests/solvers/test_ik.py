@@ -63,7 +63,7 @@ def test_beyond_a_limit_a_joint_comes_back_as_fast_as_it_may():
 
 def test_limits_may_be_a_task_of_their_own():
     slow = JointLimits(ROBOT, acceleration=5.0, period=0.01)
-    v = solve_ik(ROBOT, Q, [hand([0.5, 0.0, 0.0])], limits=slow, dt=0.01).v
+    v = solve_ik(ROBOT, Q, [hand([0.5, 0.0, 0.0])], limits=slow, dt=0.01, v=np.zeros(7)).v
     assert np.abs(v).max() == pytest.approx(0.05)
 
 
@@ -97,7 +97,8 @@ def test_a_floating_base_has_no_limits_of_its_own():
     (lambda: solve_ik(ROBOT, Q, [hand([0, 0, 0])], dt=0.0), "dt = 0.0 s must be positive"),
     (lambda: solve_ik(ROBOT, Q, [hand([0, 0, 0])], resolver="hcodd"), "did you mean 'hcod'"),
     (lambda: solve_ik(ROBOT, Q, [], limits=False), "the stack is empty"),
-    (lambda: solve_ik(ROBOT, Q, [hand([0, 0, 0])], memory="last"), "hcod: memory: got str 'last'"),
+    (lambda: solve_ik(ROBOT, Q, [hand([0, 0, 0])], memory="last"),
+     "solve_ik: memory: expected a Memory, got str 'last'"),
 ])
 def test_wrong_arguments_are_named(call, said):
     with pytest.raises(HierarchyError) as error:
