@@ -17,7 +17,8 @@ although they keep A x: joint j may leave its speed by
 
     |x - x0| (|b0| / |b - A x| - 1) max_i |A_i| / |A_j|, b0 = b - A x0                       (b)
 
-which falls to zero at rest and is infinite for joints that the level does not use.
+with the columns A_i of what the levels above leave of A. It falls to zero at rest and is infinite
+for joints that the level does not use.
 """
 
 from __future__ import annotations
@@ -36,6 +37,7 @@ from solvers.status import Status
 _LEAST = 1e-6     # of |A|^2: the least mu; of |A|: the least singular value that is kept
 _CLOSE = 1e-3     # accuracy of alpha at which the search for mu ends
 _MOST = 12        # its steps
+_NONE = 1e-9      # of the largest column of A: a joint that a level does not use
 _PACE = 1e-5      # [rad/s or m/s] by which levels below may always change the speed of a joint
 
 
@@ -151,9 +153,10 @@ class _Above:
 
     def _pace(self, A: Array, x: Array, most: float) -> None:
         """Let levels below change the speeds x by (b) and no more."""
-        columns = np.linalg.norm(A, axis=0)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            room = np.where(columns > 0.0, _PACE + most * columns.max() / columns, np.inf)
+        columns = np.linalg.norm(A - (A @ self.held.T) @ self.held, axis=0)
+        room = np.full(len(x), np.inf)
+        used = columns > _NONE * columns.max(initial=0.0)
+        room[used] = _PACE + most * columns.max() / columns[used]
         self.box = np.maximum(self.box[0], x - room), np.minimum(self.box[1], x + room)
 
     def _probe(self, A: Array, b: Array, mu: float) -> _Reached:
