@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from hierarchy.avoidance.measurement import Measurement
 from hierarchy.contacts import Contacts
-from hierarchy.errors import HierarchyError, UnknownNameError, expect
+from hierarchy.errors import HierarchyError, ReadingError, UnknownNameError, expect
 from hierarchy.problem import Array, Hierarchy, checked_give, checked_metric
 from hierarchy.state import State
 from hierarchy.task import Level, Task, writer_in_stack
@@ -134,12 +134,16 @@ class Stack:
 
         `order` names some or all of the tasks, most important first; None takes the stack's own.
         The arrays are buffers of this stack: the next call with the same order overwrites them.
+        Raises ReadingError if the last `move` of the state was to positions that are not finite.
         """
         order = self._order if order is None else tuple(order)
         prepared = self._prepared.get(order)
         if (prepared is None or prepared.state is not state
                 or prepared.seen is not state.measurement):
             prepared = self.prepare(state, order)
+        if not state.sound:
+            raise ReadingError(f"robot {state.robot.name!r}: a joint position or velocity that was "
+                               f"read after t = {state.t:g} s is not finite; stop the robot")
         for write in prepared.writers:
             write()
         return prepared.hierarchy
