@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from hierarchy.avoidance.measurement import Measurement
 from hierarchy.contacts import Contacts
 from hierarchy.errors import HierarchyError, ReadingError, UnknownNameError, expect
+from hierarchy.jit import bind, compiled
 from hierarchy.problem import Array, Hierarchy, checked_give, checked_metric
 from hierarchy.state import State
 from hierarchy.task import Level, Task, writer_in_stack
@@ -134,7 +135,8 @@ class Stack:
 
         `order` names some or all of the tasks, most important first; None takes the stack's own.
         The arrays are buffers of this stack: the next call with the same order overwrites them.
-        Raises ReadingError if the last `move` of the state was to positions that are not finite.
+        Raises ReadingError if the last `move` of the state was to positions that are not finite, and
+        HierarchyError where the sides of a row cross.
         """
         order = self._order if order is None else tuple(order)
         prepared = self._prepared.get(order)
@@ -166,9 +168,23 @@ class Stack:
             joints = h.reference[state.n - m:state.n]  # without those of a floating base
             writers.append(writer_in_stack(self.reference, state, self.level,
                                            np.empty((m, state.n)), joints, joints, 0))
+        writers.append(self._sides_checked(h, order))
         prepared = _Prepared(h, state, state.measurement, tuple(writers))
         self._prepared[order] = prepared
         return prepared
+
+    def _sides_checked(self, h: Hierarchy, order: tuple[str, ...]) -> Callable[[], object]:
+        """Return a function that raises a HierarchyError where the sides of a row cross."""
+        first_crossed = bind(_crossed, h.lower, h.upper)
+
+        def check() -> None:
+            if (i := first_crossed()) >= 0:
+                level = int((h.offsets[1:] <= i).sum())
+                row = self[order[level]].row_names[i - h.offsets[level]]
+                raise HierarchyError(f"task {order[level]!r}, {row}: no value lies between lower "
+                                     f"{h.lower[i]:g} and upper {h.upper[i]:g}")
+
+        return check
 
     def _buffers(self, order: tuple[str, ...], joints: int) -> Hierarchy:
         n = joints if self.contacts is None else self.contacts.unknowns
@@ -178,6 +194,15 @@ class Stack:
             self._give.get(name, np.zeros(self[name].dimension)) for name in order)])
         return Hierarchy(np.zeros((m, n)), np.zeros(m), np.zeros(m), sizes, np.zeros(n), order,
                          give=give if give.any() else None)
+
+
+@compiled
+def _crossed(lower, upper):  # type: ignore[no-untyped-def]
+    """Return the first row whose lower side is above its upper one, or -1."""
+    for i in range(len(lower)):
+        if lower[i] > upper[i]:
+            return i
+    return -1
 
 
 def _check_forces(task: Task, level: Level, contacts: Contacts | None) -> None:

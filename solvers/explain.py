@@ -45,6 +45,8 @@ def explain(h: Hierarchy, resolution: Resolution, tolerance: float = 1e-9,
     if not isinstance(resolution, ActiveSetResolution):
         raise HierarchyError("explain needs a resolution of hcod: other resolvers do not report "
                              "which rows are active")
+    if crossed := _crossed(h, rows):
+        return crossed
     lines = [_level(h, resolution, k, tolerance, rows, named) for k in range(len(h.sizes))]
     for level, witness in zip(h.giving, _witnesses(resolution), strict=False):
         lines[level] = _giving(h, resolution, level, witness, tolerance, (rows, units))
@@ -52,6 +54,15 @@ def explain(h: Hierarchy, resolution: Resolution, tolerance: float = 1e-9,
         lines.append(f"The iteration limit was reached at {h.names[resolution.unfinished]!r}: it "
                      "and the levels below may not be optimal.")
     return "\n".join(lines)
+
+
+def _crossed(h: Hierarchy, names: Sequence[str]) -> str:
+    """Name the first row whose sides cross, or are no numbers; such a hierarchy has no answer."""
+    for i in np.flatnonzero(~(h.lower <= h.upper))[:1].tolist():
+        level = int((h.offsets[1:] <= i).sum())
+        return (f"{h.names[level]} {names[i]}: no value lies between lower {h.lower[i]:g} and "
+                f"upper {h.upper[i]:g}")
+    return ""
 
 
 def is_missed(h: Hierarchy, x: Array, k: int, tolerance: float) -> bool:
