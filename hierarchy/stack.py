@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
 from typing import Literal, NamedTuple, get_args
 
 import numpy as np
@@ -135,8 +136,8 @@ class Stack:
 
         `order` names some or all of the tasks, most important first; None takes the stack's own.
         The arrays are buffers of this stack: the next call with the same order overwrites them.
-        Raises ReadingError if the last `move` of the state was to positions that are not finite, and
-        HierarchyError where the sides of a row cross.
+        Raises ReadingError if the last `move` of the state was to positions that are not finite,
+        and HierarchyError where the sides of a row cross.
         """
         order = self._order if order is None else tuple(order)
         prepared = self._prepared.get(order)
@@ -192,8 +193,10 @@ class Stack:
         m = int(sizes.sum())
         give = np.concatenate([np.empty(0), *(
             self._give.get(name, np.zeros(self[name].dimension)) for name in order)])
-        return Hierarchy(np.zeros((m, n)), np.zeros(m), np.zeros(m), sizes, np.zeros(n), order,
-                         give=give if give.any() else None)
+        h = Hierarchy(np.zeros((m, n)), np.zeros(m), np.zeros(m), sizes, np.zeros(n), order,
+                      give=give if give.any() else None)
+        h.named = partial(self.row_names, order)
+        return h
 
 
 @compiled

@@ -25,13 +25,16 @@ def explain(h: Hierarchy, resolution: Resolution, tolerance: float = 1e-9,
     """Say whether each level is met and, if not, which rows hold it back or give way for whom.
 
     Returns one line per level, under its name in `h.names`. A level counts as met if its violation
-    is at most `tolerance` times the size of its terms. `rows` are names of the m rows, such as
-    `Stack.row_names`; without them rows are numbered within their level, with them the largest
-    missed inequalities of a level are named too. `units` of the m rows are written behind what a
-    row gives. Raises a HierarchyError unless the resolution is from `hcod`, the only resolver that
+    is at most `tolerance` times the size of its terms. `rows` are names of the m rows, None for
+    those of h, which a stack and the adapters give; without any rows are numbered within their
+    level, with them the largest missed inequalities of a level are named too. `units` of the m rows
+    are written behind what a row gives. Rows whose sides cross are all that is said of such a
+    hierarchy. Raises a HierarchyError unless the resolution is from `hcod`, the only resolver that
     reports the state of each row, and if names or units are not m.
     """
     expect("explain: h", h, Hierarchy, "make one with Hierarchy.from_levels([(A, b), ...])")
+    if rows is None and h.named is not None:
+        rows = h.named()
     named = rows is not None
     if rows is None:
         rows = [f"row {i}" for size in h.sizes for i in range(size)]

@@ -30,7 +30,8 @@ class TorqueLimits(JointRows):
     level "torque" with those of the stack. The limit is `fraction`, more than 0 and at most 1, of
     the robot's `effort_limit` [N m or N]; rows of joints without one have infinite bounds. At level
     "torque" no torque differs by more than `step` [N m or N] from that in `State.commanded`; one
-    beyond its limit comes back by `step`. The torques are those of the robot's model: rigid bodies, no friction, no payload.
+    beyond its limit comes back by `step`. The torques are those of the robot's model: rigid bodies,
+    no friction, no payload.
 
     Raises HierarchyError for another fraction, a step that is not positive, or a floating base
     without contacts.

@@ -10,6 +10,7 @@ from hierarchy.avoidance import Obstacles, SurveillanceAreas
 from hierarchy.contacts import Contacts
 from hierarchy.jit import announce_compilation
 from hierarchy.problem import Array
+from hierarchy.task import check_period
 from hierarchy.tasks import JointLimits, Pointing, Position, Separation
 from scenarios.cell.avoidance import areas_of, avoidance_tasks
 from scenarios.cell.forces import contacts_of, force_task, physics_of, standing_on
@@ -104,6 +105,9 @@ def build(scenario: Scenario, kept: Cell | None = None) -> Cell:
     always = first if areas else [*first, *avoiding]  # repulsion is placed by Algorithm 1
     tasks = _in_order(scenario, [*first, *avoiding, *(
         task for task in (position, pointing, *listed, last) if task)])
+    if control.level == "velocity":
+        for task in tasks:
+            check_period(task, control.period)
     rows, activation = stacked(scenario, tasks, state)
     return Cell(scenario, robot, start, state, plant,
                 Stack(rows, control.level, reference_of(scenario, here), contacts,

@@ -43,7 +43,7 @@ class Controller:
                  resolver: Resolver | None = None,
                  clock: Callable[[], float] = perf_counter) -> None:
         self.cell = cell = build(scenario) if cell is None else cell
-        self.resolver = (stack_resolver(scenario, cell.activation) if resolver is None
+        self.resolver = (stack_resolver(scenario, cell.stack, cell.activation) if resolver is None
                          else resolver)
         control = scenario.control
         self.level, self.clock = control.level, clock

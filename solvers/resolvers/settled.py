@@ -50,7 +50,7 @@ class Settled(Resolver):
     softness : factor of the estimate of the curvature; 0 leaves every level as it is.
     curved : names of levels of equalities whose Jacobians change with the configuration.
 
-    Theory: the module's docstring. Levels that give, and a metric, are left to `inner`.
+    Theory: the module's docstring.
     """
 
     inner: Resolver

@@ -376,15 +376,17 @@ def test_feet_and_centre_of_mass_of_a_floating_base_are_what_pink_finds():
         np.testing.assert_allclose(given, asked, atol=1e-9)
 
 
-def test_rows_on_one_joint_become_a_box_unless_they_contradict_each_other():
+def test_rows_on_one_joint_become_a_box():
     rows = (np.array([[2.0, 0.0], [-1.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]),
             np.array([4.0, 1.0, 1.0, 3.0, np.inf]))
     A, lower, upper = limit_level([rows], 2, 0.5)
     np.testing.assert_array_equal(A, [[1.0, 0.0], [1.0, 1.0]])
     np.testing.assert_array_equal(np.column_stack([lower, upper]), [[-2.0, 2.0], [-np.inf, 6.0]])
-    A, lower, upper = limit_level([(np.array([[1.0], [-1.0]]), np.array([-1.0, -1.0]))], 1, 1.0)
-    np.testing.assert_array_equal(A, [[1.0], [1.0]])
-    np.testing.assert_array_equal(np.column_stack([lower, upper]), [[1.0, np.inf], [-np.inf, -1.0]])
+
+
+def test_limits_of_a_joint_that_contradict_each_other_are_an_error():
+    with pytest.raises(HierarchyError, match="joint 0 must move by at least 1 and at most -1"):
+        limit_level([(np.array([[1.0], [-1.0]]), np.array([-1.0, -1.0]))], 1, 1.0)
 
 
 # --- MuJoCo and mink ----------------------------------------------------------------------------
