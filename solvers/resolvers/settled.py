@@ -30,6 +30,7 @@ from typing import ClassVar, NamedTuple, final
 import numpy as np
 
 from hierarchy.problem import Array, Hierarchy
+from solvers.kernels.met import plainly_met
 from solvers.resolver import Handles, Resolution, Resolver
 from solvers.resolvers.hcod import ActiveSetResolution
 from solvers.status import Status
@@ -81,17 +82,16 @@ class Settled(Resolver):
         return self.inner.accuracy
 
     def solve(self, h: Hierarchy, memory: Array | None = None) -> Resolution:
-        """Resolve h; one problem of the levels down to it for each curved level, if it is met."""
-        upper = _Above(self.inner, h)
-        for k, name in enumerate(h.names):
-            rows = slice(h.offsets[k], h.offsets[k + 1])
-            level = h.A[rows], h.lower[rows], h.upper[rows]
-            if (name in self.curved and len(level[1]) and self.softness > 0.0
-                    and (level[1] == level[2]).all()):
-                level = upper.calm(level[0], level[1],
-                                   0.5 * self.softness * self.period)
-            upper.add(*level)
-        return upper.resolve(h, memory)
+        """Resolve h; where a curved level is not plainly met, some problems of the levels to it."""
+        half = 0.5 * self.softness * self.period
+        least = np.array([half if name in self.curved else -1.0 for name in h.names])
+        if half == 0.0 or plainly_met(h.A, h.lower, h.upper, h.offsets, least):
+            return self.inner.solve(h, memory)
+        above = _Above(self.inner, h)
+        for k, (A, lower, upper) in enumerate(h.levels()):
+            calm = least[k] > 0.0 and len(lower) and (lower == upper).all()
+            above.add(*(above.calm(A, lower, half) if calm else (A, lower, upper)))
+        return above.resolve(h, memory)
 
 
 class _Reached(NamedTuple):
