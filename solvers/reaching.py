@@ -24,6 +24,7 @@ from solvers.status import Status
 
 _STEP = 0.3       # [rad or m] the largest change of a joint in one iteration
 _STILL = 1e-3     # relative decrease of the errors in `_PATIENCE` iterations that goes on
+_AT_REST = 1e-9   # the same at the end
 _PATIENCE = 10
 _AT = 1e-6        # [rad or m] from a limit that counts as on it
 _WIDE = np.pi     # [rad or m] range around q from which a joint without limits starts again
@@ -56,8 +57,9 @@ def reach(robot: Robot, q: ArrayLike, tasks: Sequence[Task], until: float, *, li
     """Return the configuration near q in which the tasks are met, in strict order, at time t.
 
     Gauss-Newton steps of the same problem as `solve_ik`, each at most 0.3 rad or m, with a gain of
-    1 for the fastest task. Where they come to rest without a solution, they start again from a
-    random configuration within the limits; `seed` makes that repeatable. Joint tasks such as a
+    1 for the fastest task. Where the errors stop falling, they start again from a random
+    configuration within the limits; `seed` makes that repeatable. These steps are undamped, which
+    finds more; from the best of all starts damped ones go on to the nearest. Joint tasks such as a
     posture are preferences: they do not decide whether the others are met, but where.
 
     until : largest norm of the error of each task that decides, in its unit.
@@ -69,13 +71,15 @@ def reach(robot: Robot, q: ArrayLike, tasks: Sequence[Task], until: float, *, li
         raise HierarchyError(f"solve_ik: until = {until:g} must be positive")
     search = _Search(robot, tasks, until, limits, resolver, damping, t)
     rng, start = np.random.default_rng(seed), State.at(robot, q, t=t).q.copy()
-    best = search.descend(start, most)
+    best = search.descend(start, most, resolver)
     iterations, count = best[2], 1
     while max(best[0]) > until and count < starts:
-        found = search.descend(_drawn(robot, start, rng), most)
+        found = search.descend(_drawn(robot, start, rng), most, resolver)
         iterations, count = iterations + found[2], count + 1
         best = min(best, found, key=lambda one: one[0])
-    return search.answer(best[1], iterations, count)
+    if max(best[0]) > until:
+        best = search.descend(best[1], most, search.settled, _AT_REST)
+    return search.answer(best[1], iterations + best[2], count)
 
 
 class _Search:
@@ -96,11 +100,12 @@ class _Search:
             raise HierarchyError("solve_ik: until: only joint tasks are given, which are "
                                  "preferences; give a task of a frame too")
         curved = frozenset(task.name for task in self.deciding)
-        self.resolver = Settled(inner=resolver, period=self.period, softness=damping,
-                                curved=curved)
+        self.settled = Settled(inner=resolver, period=self.period, softness=damping,
+                               curved=curved)
         self.state, self.status = State(robot), Status.SOLVED
 
-    def descend(self, q: Array, most: int) -> tuple[list[float], Array, int]:
+    def descend(self, q: Array, most: int, resolver: Resolver,
+                still: float = _STILL) -> tuple[list[float], Array, int]:
         """Return the errors of the deciding tasks, where they are least, and the iterations."""
         best, memory, history = ([np.inf], q), None, list[float]()
         for k in range(most):
@@ -110,9 +115,9 @@ class _Search:
             history.append(sum(errors))
             done = max(errors) <= self.until
             if done or (k >= _PATIENCE and min(history[-_PATIENCE:])
-                        > (1.0 - _STILL) * min(history[:-_PATIENCE])):
+                        > (1.0 - still) * min(history[:-_PATIENCE])):
                 return (errors, q, k) if done else (*best, k)
-            found = self.resolver.solve(self.stack.hierarchy(self.state), memory)
+            found = resolver.solve(self.stack.hierarchy(self.state), memory)
             self.status, memory = found.status, found.memory
             step = found.x * self.period
             q = self.robot.integrate(q, step * min(1.0, _STEP / max(abs(step).max(), 1e-300)))
