@@ -35,7 +35,8 @@ from solvers.resolver import Handles, Resolution, Resolver
 from solvers.resolvers.hcod import ActiveSetResolution
 from solvers.status import Status
 
-_LEAST = 1e-6     # of |A|^2: the least mu; of |A|: the least singular value that is kept
+_LEAST = 1e-6     # of |A|^2: the least mu
+_FAINT = 1e-10    # of |A|: singular values up to it are rounding
 _CLOSE = 1e-3     # accuracy of alpha at which the search for mu ends
 _MOST = 12        # its steps
 _NONE = 1e-9      # of the largest column of A: a joint that a level does not use
@@ -109,15 +110,18 @@ class _Above:
         n = h.n
         self.inner, self.calmed, self.status, self.names = inner, False, Status.SOLVED, h.names
         self.levels: list[tuple[Array, Array, Array]] = []
-        self.x, self.held, self.reference = np.zeros(n), np.empty((0, n)), h.reference
+        self.x, self.held = np.zeros(n), np.empty((0, n))
         self.box = np.full(n, -np.inf), np.full(n, np.inf)
-        self.paced = inner.can_resolve("inequalities")
+        self.paced = inner.can_resolve("bounds")
+        # One that resolves bounds in a first level only needs all of them there.
+        self.joined = (self.paced and not inner.can_resolve("inequalities") and bool(h.sizes[:1])
+                       and bool((h.lower < h.upper)[:h.sizes[0]].any()))
 
     def add(self, A: Array, lower: Array, upper: Array) -> None:
         """Add a level."""
         self.levels.append((A, lower, upper))
         if (lower == upper).all():
-            self.held = np.vstack([self.held, self._directions(A, 1e-8)[0]])
+            self.held = np.vstack([self.held, self._directions(A, _FAINT)])
 
     def calm(self, A: Array, b: Array, half: float) -> tuple[Array, Array, Array]:
         """Return the rows of a level A x = b that minimises (a), unchanged where it is met.
@@ -136,8 +140,7 @@ class _Above:
         step = float(np.linalg.norm(found.x - self.x))
         self._pace(A, found.x, step * max(out / found.missed - 1.0, 0.0))
         self.calmed, self.x = True, found.x
-        kept, lost = self._directions(A, _LEAST)
-        self.reference = self.reference + lost.T @ (lost @ (found.x - self.reference))
+        kept = self._directions(A, _FAINT)
         rows = np.zeros_like(A)
         rows[:len(kept)] = kept
         return rows, rows @ found.x, rows @ found.x
@@ -146,10 +149,10 @@ class _Above:
         """Resolve all levels, those that were calmed in their new form."""
         if not self.calmed:
             return self.inner.solve(h, memory)
-        found = self.inner.solve(self._stacked(self.levels, self.reference))
+        found = self.inner.solve(self._stacked(self.levels, h.reference))
         if found.status is Status.SOLVED:
             found.status = self.status
-        return _without_pace(found, h.n) if self.paced else found
+        return _without_pace(found, h.n, not self.joined) if self.paced else found
 
     def _pace(self, A: Array, x: Array, most: float) -> None:
         """Let levels below change the speeds x by (b) and no more."""
@@ -172,21 +175,24 @@ class _Above:
     def _stacked(self, levels: list[tuple[Array, Array, Array]], reference: Array) -> Hierarchy:
         names = self.names[:len(levels)]
         if self.calmed and self.paced:
-            levels, names = [(np.eye(len(self.x)), *self.box), *levels], ("pace", *names)
+            pace = np.eye(len(self.x)), *self.box
+            if self.joined:
+                A, lower, upper = map(np.concatenate, zip(pace, levels[0], strict=True))
+                levels = [(A, lower, upper), *levels[1:]]
+            else:
+                levels, names = [pace, *levels], ("pace", *names)
         sizes = np.array([len(lower) for _, lower, _ in levels], dtype=np.int64)
         A, lower, upper = (np.concatenate(parts) for parts in zip(*levels, strict=True))
         return Hierarchy(A, lower, upper, sizes, reference, names)
 
-    def _directions(self, A: Array, least: float) -> tuple[Array, Array]:
-        """Return the directions (k, n) that the rows A take beyond those held, and the faint ones.
+    def _directions(self, A: Array, least: float) -> Array:
+        """Return the directions (k, n) that the rows A take beyond those held.
 
-        Faint ones have a singular value of at most `least` times |A|.
+        Their singular values are above `least` times |A|.
         """
         free = A - (A @ self.held.T) @ self.held
         _, values, directions = np.linalg.svd(free, full_matrices=False)
-        size = np.linalg.norm(A)
-        clear = values > least * size
-        return directions[clear], directions[~clear & (values > 1e-13 * size)]
+        return np.asarray(directions[values > least * np.linalg.norm(A)])
 
 
 def _search(probe: Callable[[float], _Reached], low: _Reached, alpha: float,
@@ -212,11 +218,11 @@ def _search(probe: Callable[[float], _Reached], low: _Reached, alpha: float,
     return best
 
 
-def _without_pace(found: Resolution, n: int) -> Resolution:
-    """Return a resolution as one of the hierarchy without its first level of n rows."""
+def _without_pace(found: Resolution, n: int, level: bool) -> Resolution:
+    """Return a resolution without its first n rows, which are a level of their own or not."""
     if not isinstance(found, ActiveSetResolution):
         return Resolution(found.x, found.status, found.iterations)
     parts = found.memory[:-3].reshape(3, -1)[:, n:].copy()
-    parts[1] -= parts[1] >= 0.0
-    last = found.memory[-3:] - [0.0, 0.0, found.memory[-1] > 0.0]  # the unfinished level
+    parts[1] -= level & (parts[1] >= 0.0)
+    last = found.memory[-3:] - [0.0, 0.0, level and found.memory[-1] > 0.0]  # unfinished
     return ActiveSetResolution(found.x, found.status, np.concatenate([parts.ravel(), last]))
