@@ -16,7 +16,7 @@ from hierarchy import Robot, Stack, State
 from hierarchy.loop import Loop
 from hierarchy.paths import Ellipse
 from hierarchy.tasks import JointLimits, Position, Posture
-from solvers import make
+from solvers import Resolution, make
 
 PERIOD = 0.002
 START = np.array([0.0, 0.6, 0.0, -1.4, 0.0, 0.8, 0.0])
@@ -55,14 +55,14 @@ class Control:
                             Position(self.hand, self.path, gain=10.0), Posture(tuple(START))],
                            "velocity")
 
-    def step(self, t: float) -> np.ndarray:
-        """Return the joints' velocities [rad/s] for time t [s]."""
+    def step(self, t: float) -> Resolution:
+        """Return the joints' velocities [rad/s] for time t [s], with a status."""
         state, arm = self.state, self.arm
         state.move(t, arm.read(), arm.v)
         state.commanded = arm.v
         resolution = self.resolver.solve(self.stack.hierarchy(state), self.memory)
         self.memory = resolution.memory
-        return resolution.x
+        return resolution
 
     def error(self) -> float:
         """How far the hand is from its path [m]."""
@@ -74,7 +74,7 @@ def main(duration: float) -> None:
     """Rehearse, then run the loop and say how it went."""
     rehearsal = Control(Arm(START))  # loads or compiles what the ticks will call
     for k in range(500):
-        rehearsal.arm.send(rehearsal.step(k * PERIOD))
+        rehearsal.arm.send(rehearsal.step(k * PERIOD).x)
     arm = Arm(START)
     control = Control(arm)
     loop = Loop(PERIOD, overrun="skip", watchdog=0.5, spin=200e-6)

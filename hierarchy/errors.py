@@ -99,3 +99,7 @@ def brief(value: object) -> str:
 
 class RobotError(HierarchyError):
     """A robot model that cannot be read, or a state that does not fit the robot."""
+
+
+class ReadingError(RobotError):
+    """Joint positions or velocities that were read are not finite; a `Loop` then stops."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -35,9 +35,11 @@ class Hierarchy:
         squared length d^T W d, or None for the identity.
     give : (m,) >= 0, in the unit of the rows, or None for zero: for the levels below and the
         reference, row i may be violated by |s_i| + give_i, s_i as at the least norm of its level.
+    named : a function that returns the names of the m rows, for messages; None if they have none.
     """
 
-    __slots__ = ("A", "give", "lower", "metric", "names", "offsets", "reference", "sizes", "upper")
+    __slots__ = ("A", "give", "lower", "metric", "named", "names", "offsets", "reference", "sizes",
+                 "upper")
 
     def __init__(self, A: Array, lower: Array, upper: Array, sizes: NDArray[np.int64],
                  reference: Array, names: tuple[str, ...], metric: Array | None = None,
@@ -46,6 +48,7 @@ class Hierarchy:
         self.A, self.lower, self.upper = A, lower, upper
         self.sizes, self.reference, self.names = sizes, reference, names
         self.metric, self.give = metric, give
+        self.named: Callable[[], tuple[str, ...]] | None = None
         self.offsets = np.zeros(len(sizes) + 1, dtype=np.int64)
         np.cumsum(sizes, out=self.offsets[1:])
 
@@ -131,8 +134,10 @@ class Hierarchy:
         """Return one with arrays of its own: a stack writes the same ones again in each tick."""
         metric = None if self.metric is None else self.metric.copy()
         give = None if self.give is None else self.give.copy()
-        return Hierarchy(self.A.copy(), self.lower.copy(), self.upper.copy(), self.sizes.copy(),
-                         self.reference.copy(), self.names, metric, give)
+        copied = Hierarchy(self.A.copy(), self.lower.copy(), self.upper.copy(), self.sizes.copy(),
+                           self.reference.copy(), self.names, metric, give)
+        copied.named = self.named
+        return copied
 
     def upper_part(self, count: int) -> Hierarchy:
         """Return the first `count` levels, as views, of which none gives."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
 from typing import Literal, NamedTuple, get_args
 
 import numpy as np
@@ -10,7 +11,8 @@ from numpy.typing import ArrayLike
 
 from hierarchy.avoidance.measurement import Measurement
 from hierarchy.contacts import Contacts
-from hierarchy.errors import HierarchyError, UnknownNameError, expect
+from hierarchy.errors import HierarchyError, ReadingError, UnknownNameError, expect
+from hierarchy.jit import bind, compiled
 from hierarchy.problem import Array, Hierarchy, checked_give, checked_metric
 from hierarchy.state import State
 from hierarchy.task import Level, Task, writer_in_stack
@@ -134,12 +136,17 @@ class Stack:
 
         `order` names some or all of the tasks, most important first; None takes the stack's own.
         The arrays are buffers of this stack: the next call with the same order overwrites them.
+        Raises ReadingError if the last `move` of the state was to positions that are not finite,
+        and HierarchyError where the sides of a row cross.
         """
         order = self._order if order is None else tuple(order)
         prepared = self._prepared.get(order)
         if (prepared is None or prepared.state is not state
                 or prepared.seen is not state.measurement):
             prepared = self.prepare(state, order)
+        if not state.sound:
+            raise ReadingError(f"robot {state.robot.name!r}: a joint position or velocity that was "
+                               f"read after t = {state.t:g} s is not finite; stop the robot")
         for write in prepared.writers:
             write()
         return prepared.hierarchy
@@ -165,9 +172,23 @@ class Stack:
             joints = h.reference[state.n - m:state.n]  # without those of a floating base
             writers.append(writer_in_stack(self.reference, state, self.level,
                                            np.empty((m, state.n)), joints, joints, 0))
+        writers.append(self._sides_checked(h, order))
         prepared = _Prepared(h, state, state.measurement, tuple(writers))
         self._prepared[order] = prepared
         return prepared
+
+    def _sides_checked(self, h: Hierarchy, order: tuple[str, ...]) -> Callable[[], object]:
+        """Return a function that raises a HierarchyError where the sides of a row cross."""
+        first_crossed = bind(_crossed, h.lower, h.upper)
+
+        def check() -> None:
+            if (i := first_crossed()) >= 0:
+                level = int((h.offsets[1:] <= i).sum())
+                row = self[order[level]].row_names[i - h.offsets[level]]
+                raise HierarchyError(f"task {order[level]!r}, {row}: no value lies between lower "
+                                     f"{h.lower[i]:g} and upper {h.upper[i]:g}")
+
+        return check
 
     def _buffers(self, order: tuple[str, ...], joints: int) -> Hierarchy:
         n = joints if self.contacts is None else self.contacts.unknowns
@@ -175,8 +196,19 @@ class Stack:
         m = int(sizes.sum())
         give = np.concatenate([np.empty(0), *(
             self._give.get(name, np.zeros(self[name].dimension)) for name in order)])
-        return Hierarchy(np.zeros((m, n)), np.zeros(m), np.zeros(m), sizes, np.zeros(n), order,
-                         give=give if give.any() else None)
+        h = Hierarchy(np.zeros((m, n)), np.zeros(m), np.zeros(m), sizes, np.zeros(n), order,
+                      give=give if give.any() else None)
+        h.named = partial(self.row_names, order)
+        return h
+
+
+@compiled
+def _crossed(lower, upper):  # type: ignore[no-untyped-def]
+    """Return the first row whose lower side is above its upper one, or -1."""
+    for i in range(len(lower)):
+        if lower[i] > upper[i]:
+            return i
+    return -1
 
 
 def _check_forces(task: Task, level: Level, contacts: Contacts | None) -> None:

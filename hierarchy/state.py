@@ -61,7 +61,7 @@ class State:
     previous_placements, those of the previous `move`; with 0 they are exact. `measurement` is that
     of this tick, or None. `commanded` is the last command: velocities (n,), which differ from v on
     a robot that lags, or torques of the actuated joints; None before the first, and for
-    accelerations.
+    accelerations. `sound` is whether the last `move` was to finite positions and velocities.
     """
 
     def __init__(self, robot: Robot, differences: float | None = None) -> None:
@@ -88,7 +88,7 @@ class State:
         self.period = differences or 0.0
         self.previous_J = self.J.copy(order="F")
         self.previous_placements = self.placements.copy()
-        self._started = False
+        self._started, self.sound = False, True
         self.kinematics = Kinematics(self.v, self.J, self.dJ, self.placements, self.supports,
                                      self.previous_J, self.previous_placements, self.period)
 
@@ -120,9 +120,10 @@ class State:
     def move(self, t: float, q: Array, v: Array) -> bool:
         """Go to time t [s] at q (nq,), v (n,): the one place of a tick that calls pinocchio.
 
-        Returns False and changes nothing if an entry is not finite, or a quaternion or (cos, sin)
-        as a sensor reads it has a length more than 1e-3 off one; a smaller difference is taken out.
-        Raises RobotError unless q and v are arrays of these shapes.
+        If an entry is not finite, or a quaternion or (cos, sin) as a sensor reads it has a length
+        more than 1e-3 off one (a smaller difference is taken out), it returns False and changes
+        nothing, and until the next `move` a stack refuses the state with a ReadingError. Raises
+        RobotError unless q and v are arrays of these shapes.
         """
         try:
             copied = self._copy(q, v, self.q, self.v)
@@ -131,6 +132,7 @@ class State:
         if copied == _MISFIT:
             raise RobotError(f"robot {self.robot.name!r}: State.move: expected arrays q "
                              f"{self.q.shape} and v {self.v.shape}, got {brief(q)} and {brief(v)}")
+        self.sound = bool(copied)
         if not copied:
             return False
         if self.period > 0.0 and self._started:

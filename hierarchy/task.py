@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import Field, fields, is_dataclass
 from functools import wraps
 from typing import Any, ClassVar, Literal, get_args
@@ -21,6 +21,7 @@ from hierarchy.state import State
 Level = Literal["velocity", "acceleration", "torque"]
 Kind = Literal["equality", "inequality"]
 
+_ROUNDING = 1e-9  # of a period, relative
 _OF_STATE = ("error", "jacobian", "jacobian_derivative", "desired_velocity",
              "desired_acceleration", "reference_velocity", "reference_acceleration", "repulsion",
              "writer")
@@ -52,6 +53,7 @@ class Task(ABC):
     name: str
     kind: Kind = "equality"
     of_forces: ClassVar[bool] = False  # whether contact forces enter the rows
+    straight: bool = False  # whether the Jacobian is the same at every configuration
     contacts: Contacts | None  # whose forces these are; only then
     stiffness: float = 0.0
     damping: float = 0.0
@@ -160,6 +162,33 @@ def check_gains(task: Task) -> None:
             sound = False
         if not sound:
             raise HierarchyError(f"task {task.name!r}: {gain} = {value!r}, expected a number >= 0")
+
+
+def check_period(task: Task, period: float) -> None:
+    """Raise a HierarchyError unless a task suits a velocity that is held for `period` [s].
+
+    A period of the task, or of one in it, is that one, and its error must not grow by itself: after
+    a tick it is 1 - gain period times what it was, so gain period is at most 2.
+    """
+    for part in (task, *parts(task)):
+        own = getattr(part, "period", period)
+        if abs(own - period) > _ROUNDING * period:
+            raise HierarchyError(f"task {part.name!r}: its period is {own:g} s, that of the "
+                                 f"velocity {period:g} s; give both the same")
+        gain = np.max(np.asarray(part.gain, dtype=float), initial=0.0)
+        if gain * period > 2.0 * (1.0 + _ROUNDING):
+            raise HierarchyError(f"task {part.name!r}: gain = {gain:g} 1/s times the period of "
+                                 f"{period:g} s is {gain * period:g}; above 2 its error grows from "
+                                 f"tick to tick, so give at most {2.0 / period:g} 1/s")
+
+
+def parts(task: Task) -> Iterator[Task]:
+    """Yield the tasks that are fields of a task, and the tasks in these."""
+    for value in vars(task).values():
+        for part in value if isinstance(value, list | tuple) else (value,):
+            if isinstance(part, Task):
+                yield part
+                yield from parts(part)
 
 
 def check_parts(task: Task) -> None:

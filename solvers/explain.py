@@ -15,6 +15,8 @@ from solvers.status import EQUAL
 
 _NAMED, _SMALL = 3, 0.1  # missed rows that are named, and the share of the largest that counts
 _CALLED = {"rows": "names", "units": "units"}
+_AXES = ("x", "y", "z")
+_SINGULAR = 1e-3  # share of |A| |w| below which A^T w counts as nothing
 _MATTERS = 1e-6  # smallest share of a level's pull for which a level above is named
 
 
@@ -23,13 +25,16 @@ def explain(h: Hierarchy, resolution: Resolution, tolerance: float = 1e-9,
     """Say whether each level is met and, if not, which rows hold it back or give way for whom.
 
     Returns one line per level, under its name in `h.names`. A level counts as met if its violation
-    is at most `tolerance` times the size of its terms. `rows` are names of the m rows, such as
-    `Stack.row_names`; without them rows are numbered within their level, with them the largest
-    missed inequalities of a level are named too. `units` of the m rows are written behind what a
-    row gives. Raises a HierarchyError unless the resolution is from `hcod`, the only resolver that
+    is at most `tolerance` times the size of its terms. `rows` are names of the m rows, None for
+    those of h, which a stack and the adapters give; without any rows are numbered within their
+    level, with them the largest missed inequalities of a level are named too. `units` of the m rows
+    are written behind what a row gives. Rows whose sides cross are all that is said of such a
+    hierarchy. Raises a HierarchyError unless the resolution is from `hcod`, the only resolver that
     reports the state of each row, and if names or units are not m.
     """
     expect("explain: h", h, Hierarchy, "make one with Hierarchy.from_levels([(A, b), ...])")
+    if rows is None and h.named is not None:
+        rows = h.named()
     named = rows is not None
     if rows is None:
         rows = [f"row {i}" for size in h.sizes for i in range(size)]
@@ -43,6 +48,8 @@ def explain(h: Hierarchy, resolution: Resolution, tolerance: float = 1e-9,
     if not isinstance(resolution, ActiveSetResolution):
         raise HierarchyError("explain needs a resolution of hcod: other resolvers do not report "
                              "which rows are active")
+    if crossed := _crossed(h, rows):
+        return crossed
     lines = [_level(h, resolution, k, tolerance, rows, named) for k in range(len(h.sizes))]
     for level, witness in zip(h.giving, _witnesses(resolution), strict=False):
         lines[level] = _giving(h, resolution, level, witness, tolerance, (rows, units))
@@ -50,6 +57,15 @@ def explain(h: Hierarchy, resolution: Resolution, tolerance: float = 1e-9,
         lines.append(f"The iteration limit was reached at {h.names[resolution.unfinished]!r}: it "
                      "and the levels below may not be optimal.")
     return "\n".join(lines)
+
+
+def _crossed(h: Hierarchy, names: Sequence[str]) -> str:
+    """Name the first row whose sides cross, or are no numbers; such a hierarchy has no answer."""
+    for i in np.flatnonzero(~(h.lower <= h.upper))[:1].tolist():
+        level = int((h.offsets[1:] <= i).sum())
+        return (f"{h.names[level]} {names[i]}: no value lies between lower {h.lower[i]:g} and "
+                f"upper {h.upper[i]:g}")
+    return ""
 
 
 def is_missed(h: Hierarchy, x: Array, k: int, tolerance: float) -> bool:
@@ -75,7 +91,8 @@ def _level(h: Hierarchy, resolution: ActiveSetResolution, k: int, tolerance: flo
     if named and (most := most_missed(h, resolution.x, k, names)):
         at = f", at {listed(most)}"
     if not blocking:
-        return f"{h.names[k]} is missed by {missed:.3g}{at}: its own rows disagree."
+        why = nowhere(h, k, names[rows], resolution.x) or "its own rows disagree"
+        return f"{h.names[k]} is missed by {missed:.3g}{at}: {why}."
     by = listed(_said_once(blocking, h.names))
     return f"{h.names[k]} is missed by {missed:.3g}{at}: held back by {by}."
 
@@ -120,6 +137,26 @@ def most_missed(h: Hierarchy, x: Array, k: int, names: Sequence[str]) -> list[st
     chosen = [i for i in np.argsort(-w, kind="stable")[:_NAMED].tolist()
               if w[i] > _SMALL * w.max()]
     return [names[rows[i]] for i in chosen] if len(rows) > 1 else []
+
+
+def nowhere(h: Hierarchy, k: int, names: Sequence[str], x: Array) -> str:
+    """Say along which rows no joint moves level k where that is why it is missed at x, or "".
+
+    Rows that are missed together are a direction if they are axes, by the last letter of their
+    names; of others only a row of zeros is one, since the data of two rows that contradict each
+    other are the same.
+    """
+    rows = slice(h.offsets[k], h.offsets[k + 1])
+    A, w = h.A[rows], h.slacks(x)[rows]
+    size = float(np.linalg.norm(A)) * float(np.linalg.norm(w))
+    if not w.any() or np.linalg.norm(A.T @ w) > _SINGULAR * size:
+        return ""
+    shares = w / w[np.argmax(np.abs(w))]
+    along = [f"{'' if share == 1.0 else f'{share:.2g} '}{name}"
+             for name, share in zip(names, shares, strict=True) if abs(share) > _SMALL]
+    if len(along) > 1 and not all(name[-1:] in _AXES for name in along):
+        return ""
+    return f"singular here: no joint moves {h.names[k]} along {listed(along)}"
 
 
 def held_back_by(h: Hierarchy, resolution: ActiveSetResolution, k: int,

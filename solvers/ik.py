@@ -6,9 +6,9 @@ resolver and needs nothing else. Like the adapters it meets pinocchio only throu
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import NamedTuple, final
+import warnings
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,11 +19,23 @@ from hierarchy.problem import Array
 from hierarchy.robot import Robot
 from hierarchy.stack import Stack
 from hierarchy.state import State
-from hierarchy.task import Level, Task
-from hierarchy.tasks.joint_rows import JointRows
+from hierarchy.task import Task, check_period
 from hierarchy.tasks.mechanism import above, model_rows
+from hierarchy.tasks.step_limits import StepLimits
+from hierarchy.words import listed
+from solvers.reaching import Reached, reach
 from solvers.resolver import Resolver, make
+from solvers.resolvers.settled import Settled
 from solvers.status import Status
+
+_warned: set[tuple[str, ...]] = set()  # joints without velocity limits that were named
+
+
+class Memory(NamedTuple):
+    """What the next call of `solve_ik` starts from: that of its resolver, and the last v (n,)."""
+
+    resolver: Array | None
+    v: Array
 
 
 class Step(NamedTuple):
@@ -31,15 +43,30 @@ class Step(NamedTuple):
 
     v: Array
     status: Status
-    memory: Array | None
+    memory: Memory
 
     def __repr__(self) -> str:
         return f"Step({self.status.name}, v={numbers(self.v)})"
 
 
+@overload
+def solve_ik(robot: Robot, q: ArrayLike, tasks: Sequence[Task], *, dt: float = ...,
+             limits: bool | Task = ..., resolver: str | Resolver = ...,
+             memory: Memory | None = ..., v: ArrayLike | None = ..., t: float = ...,
+             damping: float = ..., until: None = ...) -> Step: ...
+
+
+@overload
+def solve_ik(robot: Robot, q: ArrayLike, tasks: Sequence[Task], *, dt: float = ...,
+             limits: bool | Task = ..., resolver: str | Resolver = ...,
+             memory: Memory | None = ..., v: ArrayLike | None = ..., t: float = ...,
+             damping: float = ..., until: float) -> Reached: ...
+
+
 def solve_ik(robot: Robot, q: ArrayLike, tasks: Sequence[Task], *, dt: float = 0.01,
              limits: bool | Task = True, resolver: str | Resolver = "hcod",
-             memory: Array | None = None, t: float = 0.0) -> Step:
+             memory: Memory | None = None, v: ArrayLike | None = None, t: float = 0.0,
+             damping: float = 1.0, until: float | None = None) -> Step | Reached:
     """Return the joint velocity that serves `tasks` at q, most important first.
 
     Move on with `q = robot.integrate(q, step.v * dt)`. A loop at a fixed rate saves the set-up of
@@ -49,18 +76,25 @@ def solve_ik(robot: Robot, q: ArrayLike, tasks: Sequence[Task], *, dt: float = 0
     ----------
     q : (nq,) joint positions [rad or m].
     tasks : tasks of `hierarchy.tasks`, plugins or your own, at velocity level.
-    dt : period [s] for which the velocity will be held.
+    dt : period [s] for which the velocity will be held; that of all tasks which have one.
     limits : above all tasks, below the robot's mechanism: True for the position and velocity limits
-        of the robot, False for none, or a task such as `JointLimits`, which also limits
-        accelerations. Beyond a limit the joint moves back, as fast as its velocity limit allows.
+        of the robot, approached with a gain of 0.25 / dt (`hierarchy.tasks.step_limits`), False for
+        none, or a task such as `JointLimits`, which also limits accelerations, from v on.
     resolver : a name of `solvers.names()`, or a resolver; with limits it must take bounds.
-    memory : that of the last call with the same tasks, to start from.
+    memory : that of the last call with the same tasks, to start from; it has the last v too.
+    v : (n,) velocity of the tick before, for limits of accelerations; None for that of `memory`.
     t : time [s], for tasks that follow a path.
+    damping : of tasks where they cannot be met in time, near singularities and for targets out of
+        reach, which come to rest; 0 for none, above 1 for more than the curvature of the robot
+        asks. Elsewhere it changes nothing; see `solvers.resolvers.settled`.
+    until : if given, the configuration in which the errors are at most this is looked for instead
+        of a velocity, see `solvers.reaching.reach`; `limits` is then True or False.
 
     Raises
     ------
-    HierarchyError : q does not fit the robot, a task is none, dt is not positive, or the resolver
-        cannot handle a row. A numerical failure is a status, with a finite v.
+    HierarchyError : q does not fit the robot, a task is none, dt is not positive or not the period
+        of a task, a gain times dt is above 2, or the resolver cannot handle a row. A numerical
+        failure is a status, with a finite v.
     """
     expect("solve_ik: robot", robot, Robot, "make one with Robot.load(name or file)")
     expect("solve_ik: tasks", tasks, Sequence, "give a list of tasks")
@@ -71,50 +105,55 @@ def solve_ik(robot: Robot, q: ArrayLike, tasks: Sequence[Task], *, dt: float = 0
                              f"{brief(limits)}")
     if not isinstance(resolver, str):
         expect("solve_ik: resolver", resolver, Resolver, "give a name of solvers.names()")
-    solver = make(resolver) if isinstance(resolver, str) else resolver
+    number("solve_ik: damping", damping, 0.0)
+    inner = make(resolver) if isinstance(resolver, str) else resolver
+    if until is not None:
+        if isinstance(limits, Task):
+            raise HierarchyError(f"solve_ik: with until, limits are True or False, not the task "
+                                 f"{limits.name!r}: a configuration has no speed")
+        return reach(robot, q, tasks, until, limits=limits, resolver=inner, t=t, damping=damping)
+    begun, before = _before(memory, v, limits)
+    return _step(robot, State.at(robot, q, before, t), tasks, dt, limits,
+                 _settled(inner, tasks, dt, damping), begun)
+
+
+def _step(robot: Robot, state: State, tasks: Sequence[Task], dt: float, limits: bool | Task,
+          resolver: Settled, memory: Array | None) -> Step:
+    state.commanded = state.v.copy()
+    if limits is True:
+        _warn_of_speeds(robot)
     box = [limits] if isinstance(limits, Task) else [StepLimits(robot, dt)] if limits else []
-    first = above(model_rows(robot, dt), box, solver.can_resolve("inequalities"))
-    h = Stack([*first, *tasks], "velocity").hierarchy(State.at(robot, q, t=t))
-    found = solver.solve(h, memory)
-    return Step(found.x, found.status, found.memory)
+    first = above(model_rows(robot, dt), box, resolver.inner.can_resolve("inequalities"))
+    stack = Stack([*first, *tasks], "velocity")
+    for task in (*box, *tasks):
+        check_period(task, dt)
+    found = resolver.solve(stack.hierarchy(state), memory)
+    return Step(found.x, found.status, Memory(found.memory, found.x.copy()))
 
 
-@final
-@dataclass(frozen=True)
-class StepLimits(JointRows):
-    """Keep each joint within its position limits after a step of `period` [s], and its speed.
+def _settled(inner: Resolver, tasks: Iterable[Task], dt: float, damping: float) -> Settled:
+    curved = frozenset(task.name for task in tasks if isinstance(task, Task) and not task.straight)
+    return Settled(inner=inner, period=dt, softness=damping, curved=curved)
 
-    One row per velocity, those of a floating base too. Accelerations are not limited, so that a
-    step does not depend on the one before; see `hierarchy.tasks.JointLimits` for limits that a
-    robot can obey.
-    """
+def _before(memory: Memory | None, v: ArrayLike | None,
+            limits: bool | Task) -> tuple[Array | None, ArrayLike | None]:
+    """Return the resolver's part of a memory, and the velocity of the tick before if known."""
+    if memory is not None:
+        expect("solve_ik: memory", memory, Memory, "give the memory of the last step")
+        return memory.resolver, memory.v if v is None else v
+    if v is None and isinstance(limits, Task) and hasattr(limits, "acceleration"):
+        raise HierarchyError(f"solve_ik: limits: {limits.name!r} limits accelerations; give v, the "
+                             "velocity of the tick before (zeros at rest), or the memory of the "
+                             "last step, which has it")
+    return None, v
 
-    robot: Robot
-    period: float
-    name: str = "limits"
-    kind = "inequality"
-    first = 0
 
-    def box(self, state: State) -> tuple[Array, Array]:
-        """Least and largest velocities (n,), (n,) [rad/s or m/s]."""
-        lower, upper = self.robot.position_limits()
-        q, fastest = state.q[self.robot.coordinates], self.robot.velocity_limit
-        return (np.clip((lower - q) / self.period, -fastest, fastest),
-                np.clip((upper - q) / self.period, -fastest, fastest))
 
-    def error(self, state: State) -> Array:
-        """How far each velocity would have to be raised from zero (m,) [rad/s or m/s]."""
-        return np.maximum(self.box(state)[0], 0.0)
-
-    def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-               row: int) -> Callable[[], object]:
-        """See `Task.writer`; for velocity level."""
-        if level != "velocity":
-            raise HierarchyError(f"task {self.name!r}: for velocity level; see JointLimits")
-        rows = slice(row, row + self.dimension)
-
-        def write() -> None:
-            A[rows] = self.jacobian(state)
-            lower[rows], upper[rows] = self.box(state)
-
-        return write
+def _warn_of_speeds(robot: Robot) -> None:
+    """Warn, once for each robot, of joints whose speed `limits=True` does not limit."""
+    speeds = list(zip(robot.velocity_names, robot.velocity_limit, strict=True))[robot.actuated:]
+    free = [name for name, limit in speeds if not np.isfinite(limit)]
+    if free and (robot.name, *free) not in _warned:
+        _warned.add((robot.name, *free))
+        warnings.warn(f"robot {robot.name!r} has no velocity limit for {listed(free)}: limits=True "
+                      "does not limit their speed", stacklevel=4)

@@ -11,7 +11,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from hierarchy.errors import HierarchyError, UnknownNameError, number
+from hierarchy.errors import HierarchyError, ReadingError, UnknownNameError, brief, number
 from hierarchy.loop.log import Log
 from hierarchy.loop.watchdog import Once, Watchdog
 
@@ -58,8 +58,13 @@ class Loop:
             send: Callable[[Any], object] | None = None, record: int = 0) -> Log:
         """Call `send(step(t))` every period for `duration` [s], then `safe_stop()`.
 
-        t [s] is the planned time of the tick since the start of the loop. Without `send`, `step`
-        sends the command itself. `record` is the size of the commands to keep in the log.
+        t [s] is the planned time of the tick since the start of the loop. `step` returns the
+        command, or what has it with a status: a resolution or a step of `solve_ik`. Without `send`,
+        `step` sends the command itself. `record` is the size of the commands to keep in the log.
+
+        A tick without a command to send ends the loop, and `log.ended` says why: a status that is
+        not SOLVED, a command that is None or not finite, a reading that is not finite (a stack's
+        ReadingError).
 
         `safe_stop` is called however the loop ends: once, and a second time if the watchdog called
         it and a command may have been sent since. An exception in any of the functions, or Ctrl-C,
@@ -67,6 +72,9 @@ class Loop:
         """
         _require(number("loop: duration", duration) > 0.0,
                  f"duration {duration} s must be positive")
+        for name, function in (("step", step), ("safe_stop", safe_stop), ("send", send)):
+            _require(callable(function) or (name == "send" and function is None),
+                     f"{name}: expected a function, got {brief(function)}")
         ticks = max(1, round(duration / self.period))
         self.log = log = Log(self.period, ticks, record)
         stop = Once(safe_stop)
@@ -94,7 +102,9 @@ class Loop:
             planned = start + tick * self.period
             self._wait(planned)
             started = self.clock()
-            command = step(tick * self.period)
+            command, why = _command(step, tick * self.period, send is not None)
+            if why:
+                return f"tick {tick}: {why}"
             if send is not None:
                 if dog.fired:
                     return f"the watchdog fired in tick {tick}"
@@ -124,6 +134,26 @@ class Loop:
             self.sleep(left - self.spin)
         while self.clock() < until:
             pass
+
+
+def _command(step: Callable[[float], Any], t: float, needed: bool) -> tuple[Any, str]:
+    """Return the command of a step, and why there is none to send, or ""."""
+    try:
+        found = step(t)
+    except ReadingError as error:
+        return None, str(error)
+    status = getattr(found, "status", None)
+    if status is not None:
+        if int(status) != 0:
+            return None, str(status)
+        found = getattr(found, "x", getattr(found, "v", None))
+    if found is None:
+        return None, "the step returned no command" if needed else ""
+    try:
+        finite = bool(np.isfinite(np.asarray(found, dtype=float)).all())
+    except (TypeError, ValueError):  # a message of the robot's own
+        finite = True
+    return found, "" if finite else f"the command is not finite: {brief(found)}"
 
 
 def _stop_again(dog: Watchdog, safe_stop: Callable[[], object]) -> None:

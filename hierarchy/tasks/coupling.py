@@ -95,6 +95,7 @@ class JointCoupling(_Coupling):
     gain: float = 10.0
     name: str = "coupling"
     terms: Terms = field(init=False, repr=False, compare=False)
+    straight = True
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -14,6 +14,7 @@ class JointRows(Task):
     """A task with one row per actuated joint of `robot`, or per velocity from `first` on."""
 
     robot: Robot
+    straight = True
 
     @property
     def first(self) -> int:

@@ -68,6 +68,11 @@ class PoseTask(Task):
         """Six rows."""
         return 6
 
+    @property
+    def row_names(self) -> tuple[str, ...]:
+        """The axes of the world."""
+        return ("x", "y", "z", "about x", "about y", "about z")
+
 
 @dataclass(frozen=True)
 class Pose(PoseTask):

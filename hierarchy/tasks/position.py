@@ -48,6 +48,11 @@ class Position(Task):
         """Three rows."""
         return 3
 
+    @property
+    def row_names(self) -> tuple[str, ...]:
+        """The axes of the world."""
+        return ("x", "y", "z")
+
     def error(self, state: State) -> Array:
         """p_d - p (3,) [m]."""
         target: Array = self.path(state.t)[0]

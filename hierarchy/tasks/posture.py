@@ -25,6 +25,7 @@ class JointTask(Task):
     """A task with the identity as Jacobian: a last level or the null-space reference of a stack."""
 
     joints: int
+    straight = True
 
     @property
     def dimension(self) -> int:

@@ -42,6 +42,11 @@ class Together(Task):
         return replace(self, tasks=[task.on(robot) for task in self.tasks])
 
     @property
+    def straight(self) -> bool:  # type: ignore[override]
+        """Whether every task is."""
+        return all(task.straight for task in self.tasks)
+
+    @property
     def of_forces(self) -> bool:  # type: ignore[override]
         """Whether contact forces enter any row."""
         return any(task.of_forces for task in self.tasks)

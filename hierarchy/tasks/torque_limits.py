@@ -29,8 +29,9 @@ class TorqueLimits(JointRows):
     One row per actuated joint, n in number below, at acceleration level without contacts and at
     level "torque" with those of the stack. The limit is `fraction`, more than 0 and at most 1, of
     the robot's `effort_limit` [N m or N]; rows of joints without one have infinite bounds. At level
-    "torque" no torque differs by more than `step` [N m or N] from that in `State.commanded`. The
-    torques are those of the robot's model: rigid bodies, no friction, no payload.
+    "torque" no torque differs by more than `step` [N m or N] from that in `State.commanded`; one
+    beyond its limit comes back by `step`. The torques are those of the robot's model: rigid bodies,
+    no friction, no payload.
 
     Raises HierarchyError for another fraction, a step that is not positive, or a floating base
     without contacts.
@@ -44,6 +45,7 @@ class TorqueLimits(JointRows):
     limit: Array = field(init=False, repr=False, compare=False)  # (n,) [N m or N]
     kind = "inequality"
     of_forces: ClassVar[bool] = True
+    straight = False
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -94,8 +96,8 @@ class TorqueLimits(JointRows):
             write_rows()
             if state.commanded is not None:
                 here = state.commanded - efforts
-                np.maximum(low, here - self.step, out=low)
-                np.minimum(up, here + self.step, out=up)
+                np.clip(low, here - self.step, here + self.step, out=low)
+                np.clip(up, here - self.step, here + self.step, out=up)
 
         return write
 

@@ -12,6 +12,7 @@ from hierarchy.avoidance import Obstacles, SurveillanceAreas
 from hierarchy.contacts import Contacts
 from hierarchy.jit import announce_compilation
 from hierarchy.problem import Array
+from hierarchy.task import check_period
 from hierarchy.tasks import JointLimits, Pointing, Position, Separation
 from hierarchy.tasks.mechanism import above, model_rows
 from scenarios.cell.avoidance import areas_of, avoidance_tasks
@@ -119,6 +120,9 @@ def build(scenario: Scenario, kept: Cell | None = None) -> Cell:
     always = first if areas else [*first, *avoiding]  # repulsion is placed by Algorithm 1
     tasks = _in_order(scenario, [*first, *avoiding, *(
         task for task in (position, pointing, *listed, last) if task)])
+    if control.level == "velocity":
+        for task in tasks:
+            check_period(task, control.period)
     rows, activation = stacked(scenario, tasks, state)
     return Cell(scenario, robot, start, state, plant,
                 Stack(rows, control.level, reference_of(scenario, here), contacts,

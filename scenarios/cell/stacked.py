@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from math import cos, radians
 
-from hierarchy import State, Task
+from hierarchy import Stack, State, Task
 from hierarchy.activation import Activation
 from hierarchy.tasks import Pointing, Separation
 from hierarchy.tasks.self_separation import SelfSeparation
@@ -14,6 +14,7 @@ from hierarchy.tasks.tangent_cone import TangentCone
 from scenarios.config import Scenario, ScenarioError
 from solvers import Resolver
 from solvers.resolvers.set_based import SetBased
+from solvers.resolvers.settled import Settled
 from solvers.resolvers.smooth import Activated, Smooth
 
 
@@ -30,8 +31,8 @@ def stacked(scenario: Scenario, tasks: Sequence[Task],
     return found, Activation(state, found, buffers)
 
 
-def stack_resolver(scenario: Scenario, activation: Activation | None) -> Resolver:
-    """Return the scenario's resolver, as its kind of stack uses it; `activation` as in a Cell.
+def stack_resolver(scenario: Scenario, stack: Stack, activation: Activation | None) -> Resolver:
+    """Return the scenario's resolver, as its stack uses it; stack, activation as in a Cell.
 
     Raises ScenarioError if the stack has activations and the resolver does not take them.
     """
@@ -39,11 +40,20 @@ def stack_resolver(scenario: Scenario, activation: Activation | None) -> Resolve
     if scenario.control.stack == "set-based":
         return SetBased(inner=resolver)
     if activation is None:
-        return resolver
+        return _settled(resolver, scenario, stack)
     if not isinstance(resolver, Smooth):
         raise ScenarioError('control.stack = "smooth" needs control.resolver = "smooth", got '
                             f'"{resolver.name}"')
     return Activated(inner=resolver, activation=activation)
+
+
+def _settled(resolver: Resolver, scenario: Scenario, stack: Stack) -> Resolver:
+    """Return a resolver that lets tasks out of reach come to rest, where x is a velocity."""
+    control = scenario.control
+    if control.level != "velocity" or control.damping == 0.0:
+        return resolver
+    curved = frozenset(name for name in stack.names if not stack[name].straight)
+    return Settled(inner=resolver, period=control.period, softness=control.damping, curved=curved)
 
 
 def _widened(task: Task, scenario: Scenario) -> tuple[Task, float]:

@@ -188,6 +188,22 @@ def peers(install: Annotated[bool, typer.Option(
 _SCENES = ("ellipse", "stand")
 
 
+@bench.command()
+def ik(count: Annotated[int, typer.Option("--count", min=1, metavar="N",
+                                          help="Poses of each kind and robot.")] = 1000,
+       out: Out = None) -> None:
+    """Find configurations for poses beside pink, mink and placo.
+
+    Reachable and unreachable poses of UR5, Panda and both arms of G1, which need
+    example-robot-data; for placo run `hierarchy bench peers --install` first.
+    """
+    from scenarios.bench.ik import run
+
+    folder = _claimed(out)
+    run(folder, count)
+    _say(folder)
+
+
 @bench.command("open")
 def open_(families: Annotated[list[str] | None, typer.Option(
               "--family", metavar="NAME", help="Only this family. May be repeated.")] = None,

@@ -70,6 +70,10 @@ class ControlSection(Section):
     """Settings of the resolver. A table in it with a resolver's name, such as
     `[control.options.tpm]`, applies to that resolver only, so that changing `resolver` is enough to
     swap it. Plain settings override those from such a table."""
+    damping: NotNegative = 1.0
+    """At velocity level: of tasks where they cannot be met in time, near singularities and for
+    targets out of reach, which come to rest; 0 for none. Elsewhere it changes nothing. Not that of
+    a resolver, which is in `options`."""
     metric: Literal["identity", "mass"] = "identity"
     """"mass": of the commands that serve the tasks equally well, the one nearest to the null-space
     term in the robot's inertia M(q), at acceleration level that of operational-space control.

@@ -43,7 +43,7 @@ class Controller:
                  resolver: Resolver | None = None,
                  clock: Callable[[], float] = perf_counter) -> None:
         self.cell = cell = build(scenario) if cell is None else cell
-        self.resolver = (stack_resolver(scenario, cell.activation) if resolver is None
+        self.resolver = (stack_resolver(scenario, cell.stack, cell.activation) if resolver is None
                          else resolver)
         control = scenario.control
         self.level, self.clock = control.level, clock
@@ -197,5 +197,6 @@ def _clamped(state: State, limit: Array, step: float, torques: Array) -> Array:
     """Return torques moved within their limits, and at most `step` from those sent before."""
     low, up = -limit, limit
     if state.commanded is not None:
-        low, up = np.maximum(low, state.commanded - step), np.minimum(up, state.commanded + step)
+        low, up = (np.clip(side, state.commanded - step, state.commanded + step)
+                   for side in (low, up))
     return np.clip(torques, low, up)

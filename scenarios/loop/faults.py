@@ -45,7 +45,8 @@ class Faults:
         self._last = cell.plant.q.copy(), cell.plant.v.copy(), 0.0
         self._skipped, self._skipped_at = 0.0, -1.0
         self._standing: set[int] = set()
-        resolver = _FaultyResolver(inner=stack_resolver(scenario, cell.activation), faults=self)
+        inner = stack_resolver(scenario, cell.stack, cell.activation)
+        resolver = _FaultyResolver(inner=inner, faults=self)
         self.controller = Controller(scenario, cell, resolver, self.clock)
 
     def measure(self, t: float) -> tuple[Array, Array, float]:

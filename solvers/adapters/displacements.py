@@ -6,7 +6,8 @@ is the velocity, and priorities are strict.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from functools import partial
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 
 from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array, Hierarchy, check_rows
+from hierarchy.words import listed
 from solvers.adapters.packing import (
     ODD,
     damp,
@@ -25,8 +27,10 @@ from solvers.adapters.packing import (
 )
 
 _FLOAT = np.dtype(np.float64)
+_AXES = ("x", "y", "z", "about x", "about y", "about z")
 _NO_DAMPING = 1e-12  # pink's default, a regularisation of its QP that ours does not need
 
+Names = Callable[[], Sequence[str]]
 Limit = tuple[Array, Array]  # G (k, n), h (k,)
 
 
@@ -53,15 +57,18 @@ class Pull(NamedTuple):
     centre: Array
 
 
-def hierarchy(configuration: object, n: int, period: float, limits: Sequence[Limit],
-              constraints: Sequence[Task], tasks: Iterable[Task | Sequence[Task]],
-              pull: Pull | None = None) -> Hierarchy:
+def hierarchy(configuration: object, joints: Names, n: int, period: float,
+              limits: Sequence[Limit], constraints: Sequence[Task],
+              tasks: Iterable[Task | Sequence[Task]], pull: Pull | None = None) -> Hierarchy:
     """Pack limits, constraints and tasks into levels, without the empty ones.
 
-    n unknowns [rad/s or m/s]; period [s]. An entry of `tasks` is a task, or a sequence of tasks
-    that share a level, weighted by their costs. Constraints have no cost, as in pink and mink.
+    n unknowns [rad/s or m/s], and a function that returns their names; period [s]. An entry of
+    `tasks` is a task, or a sequence of tasks that share a level, weighted by their costs.
+    Constraints have no cost, as in pink and mink.
     Without `pull` a task's lm_damping is refused; with it, each level asks for no more than its
     own damped step would reach.
+
+    Raises ContradictionError for limits of a joint that contradict each other.
     """
     if not 0.0 < period < np.inf:
         raise HierarchyError(f"period {period} s must be positive and finite")
@@ -72,7 +79,7 @@ def hierarchy(configuration: object, n: int, period: float, limits: Sequence[Lim
     if constraints:
         held = [_read(task, configuration, damped, weighted=False) for task in constraints]
         levels.insert(0, ("constraints", held))
-    found = _Limits.of(limits, n, period)
+    found = _Limits.of(limits, n, period, joints)
     packed = _Packed(n, found.most + sum(len(one.e) for _, read in levels for one in read))
     packed.keep("limits", found.write(packed))
     for name, read in levels:
@@ -80,7 +87,34 @@ def hierarchy(configuration: object, n: int, period: float, limits: Sequence[Lim
         if pull is not None and name != "constraints":
             packed.damp(last, sum(one.damping for one in read), pull)
         packed.keep(name, last)
-    return packed.hierarchy()
+    h = packed.hierarchy()
+    h.named = partial(_row_names, h, joints, [one for _, read in levels for one in read])
+    return h
+
+
+class ContradictionError(HierarchyError):
+    """Limits of one joint that no velocity meets."""
+
+
+def _row_names(h: Hierarchy, joints: Names,
+               read: Sequence[_Read]) -> tuple[str, ...]:
+    """Name each row: by its joint if it is about a single one, else by what its task says."""
+    known = list(joints())
+    of_tasks = [name for one in read for name in _names_of(one)]
+    rows = [""] * (h.m - len(of_tasks)) + of_tasks
+    for i, (row, name) in enumerate(zip(h.A, rows, strict=True)):
+        of_row = [known[c] for c in np.flatnonzero(row)]
+        if not name or (len(of_row) == 1 and name.startswith("row ")):
+            rows[i] = listed(of_row) if of_row else "no joint"
+    return tuple(rows)
+
+
+def _names_of(one: _Read) -> list[str]:
+    """Name the rows of a task that cost something: axes of its frame, or their number."""
+    frame = _frame_of(one.task)
+    axes = _AXES[:len(one.e)] if frame and len(one.e) in (3, 6) else ()
+    names = [f"{frame} {axis}" for axis in axes] or [f"row {i}" for i in range(len(one.e))]
+    return [name for name, cost in zip(names, one.cost, strict=True) if cost != 0.0]
 
 
 class _Packed:
@@ -144,8 +178,9 @@ class _Limits(NamedTuple):
     period: float
 
     @classmethod
-    def of(cls, limits: Iterable[Limit], n: int, period: float) -> _Limits:
-        """Sort rows; raises HierarchyError for numbers that are not finite."""
+    def of(cls, limits: Iterable[Limit], n: int, period: float,
+           joints: Names) -> _Limits:
+        """Sort rows; raises HierarchyError for numbers that are not finite, or contradict."""
         pairs = [(_plain(G), _plain(h)) for G, h in limits]
         lower, upper = _filled(n, -np.inf), _filled(n, np.inf)
         several, left = [np.empty(len(h), np.bool_) for _, h in pairs], 0
@@ -154,6 +189,11 @@ class _Limits(NamedTuple):
             if found == ODD:
                 check_rows("limits", G, np.full(len(h), -np.inf), h)
             left += int(found)
+        for i in np.flatnonzero(lower > upper)[:1]:
+            raise ContradictionError(
+                f"limits cannot all hold: joint {joints()[i]} must move by at least "
+                f"{lower[i]:.4g} and at most {upper[i]:.4g} rad/s or m/s; a joint outside its "
+                "range needs a velocity limit that lets it come back within the period")
         return cls(lower, upper, pairs, several, left, period)
 
     @property
@@ -241,10 +281,10 @@ def _filled(size: int, value: float) -> Array:
 def limit_level(limits: Iterable[Limit], n: int, period: float) -> tuple[Array, Array, Array]:
     """Pack rows G x <= h / period into one level A (k, n), lower (k,), upper (k,).
 
-    Rows on a single joint become bounds of that joint, unless they contradict each other. Rows
-    with infinite h are left out.
+    Rows on a single joint become bounds of that joint; ContradictionError if no value meets them.
+    Rows with infinite h are left out.
     """
-    found = _Limits.of(limits, n, period)
+    found = _Limits.of(limits, n, period, lambda: [str(i) for i in range(n)])
     packed = _Packed(n, found.most)
     row = found.write(packed)
     return packed.A[:row], packed.lower[:row], packed.upper[:row]
@@ -252,5 +292,10 @@ def limit_level(limits: Iterable[Limit], n: int, period: float) -> tuple[Array, 
 
 def label(task: object) -> str:
     """Return the class and frame of a task, for messages."""
+    frame = _frame_of(task)
+    return f"{type(task).__name__}" + (f" of {frame}" if frame else "")
+
+
+def _frame_of(task: object) -> str:
     frame = getattr(task, "frame", None) or getattr(task, "frame_name", None)
-    return f"{type(task).__name__}" + (f" of {frame}" if isinstance(frame, str) else "")
+    return frame if isinstance(frame, str) else ""

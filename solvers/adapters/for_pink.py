@@ -12,7 +12,7 @@ import numpy as np
 
 from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array, Hierarchy
-from solvers.adapters.displacements import Task
+from solvers.adapters.displacements import ContradictionError, Task
 from solvers.adapters.from_pink import hierarchy
 from solvers.adapters.packing import largest_violation
 from solvers.resolver import Resolution, Resolver, make
@@ -59,7 +59,10 @@ def solve_ik(configuration: Configuration, tasks: Iterable[Task | Sequence[Task]
     configuration.check_limits(safety_break=safety_break)
     if not 0.0 <= damping < np.inf:
         raise HierarchyError(f"damping {damping} must not be negative")
-    h = hierarchy(configuration, tasks, dt, limits, barriers, constraints, damping)
+    try:
+        h = hierarchy(configuration, tasks, dt, limits, barriers, constraints, damping)
+    except ContradictionError as error:
+        raise _no_solution(None, None, str(error)) from error
     resolution = resolver.solve(h)
     if resolution.status is not Status.SOLVED:
         raise _no_solution(h, resolution, f"{resolver.name}: {resolution.status}")
@@ -106,7 +109,7 @@ def _check_held(h: Hierarchy, resolution: Resolution, tolerance: float) -> None:
         first += size
 
 
-def _no_solution(h: Hierarchy, resolution: Resolution, text: str) -> Exception:
+def _no_solution(h: Hierarchy | None, resolution: Resolution | None, text: str) -> Exception:
     from pink.exceptions import NoSolutionFound
 
     error: Exception = NoSolutionFound(h, resolution)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from functools import partial
 from typing import TYPE_CHECKING
 
 from hierarchy.problem import Hierarchy
@@ -11,6 +12,7 @@ from solvers.adapters.displacements import Task
 
 if TYPE_CHECKING:
     from mink import Configuration, Limit
+    from mujoco import MjModel
 
 
 def hierarchy(configuration: Configuration, tasks: Iterable[Task | Sequence[Task]], dt: float,
@@ -24,8 +26,10 @@ def hierarchy(configuration: Configuration, tasks: Iterable[Task | Sequence[Task
 
     Raises
     ------
-    HierarchyError : lm_damping, or a task without error and Jacobian (the kinetic-energy
-        regularisation): both are weights against all tasks, which a strict order has no place for.
+    HierarchyError : limits of a joint that contradict each other (ContradictionError), as when it
+        is further outside its range than its velocity limit makes good in dt; lm_damping, or a task
+        without error and Jacobian (the kinetic-energy regularisation): both are weights against all
+        tasks, which a strict order has no place for.
     """
     if limits is None:
         from mink import ConfigurationLimit
@@ -33,5 +37,14 @@ def hierarchy(configuration: Configuration, tasks: Iterable[Task | Sequence[Task
         limits = [ConfigurationLimit(configuration.model)]
     found = [limit.compute_qp_inequalities(configuration, dt) for limit in limits]
     pairs = [(one.G, one.h) for one in found if not one.inactive]
-    return displacements.hierarchy(configuration, configuration.model.nv, dt, pairs,
-                                   list(constraints or ()), tasks)
+    return displacements.hierarchy(configuration, partial(_joints, configuration.model),
+                                   configuration.model.nv, dt, pairs, list(constraints or ()),
+                                   tasks)
+
+
+def _joints(model: MjModel) -> list[str]:
+    """Return the joint of each velocity (nv,), numbered where it has several."""
+    joints = [int(model.dof_jntid[i]) for i in range(model.nv)]
+    return [f"{model.joint(j).name or f'joint {j}'}"
+            + (f" {i - int(model.jnt_dofadr[j]) + 1}" if joints.count(j) > 1 else "")
+            for i, j in enumerate(joints)]

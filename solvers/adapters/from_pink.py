@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from functools import partial
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -130,7 +131,8 @@ def hierarchy(configuration: Configuration,
 
     Raises
     ------
-    HierarchyError : without `damping`, for lm_damping and safe_displacement_gain: both are weights
+    HierarchyError : limits of a joint that contradict each other (ContradictionError); without
+        `damping`, for lm_damping and safe_displacement_gain: both are weights
         against all tasks, which exact levels have no place for.
     """
     found = [limit.compute_qp_inequalities(configuration, dt)
@@ -146,9 +148,16 @@ def hierarchy(configuration: Configuration,
         if barrier.safe_displacement_gain and pull is not None:
             H, c = barrier.compute_qp_objective(configuration)
             pull = _pulled(pull, H, c, dt)
-    return displacements.hierarchy(configuration, n, dt,
+    return displacements.hierarchy(configuration, partial(_joints, configuration.model), n, dt,
                                    [pair for pair in found if pair is not None],
                                    list(constraints or ()), tasks, pull)
+
+
+def _joints(model: Any) -> list[str]:
+    """Return the joint of each velocity (nv,), numbered where it has several."""
+    return [f"{name} {i + 1}" if joint.nv > 1 else str(name)
+            for name, joint in zip(list(model.names)[1:], list(model.joints)[1:], strict=True)
+            for i in range(joint.nv)]
 
 
 def _pulled(pull: displacements.Pull, H: Array, c: Array, dt: float) -> displacements.Pull:

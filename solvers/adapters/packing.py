@@ -49,22 +49,16 @@ def narrow(G, h, period, lower, upper, several):
 
 @compiled
 def write_bounds(lower, upper, A, low, up):
-    """Write the bounds that exist as rows of the identity from row 0 on; return how many.
-
-    Bounds of one unknown that contradict each other become a row for each side.
-    """
+    """Write the bounds that exist as rows of the identity from row 0 on; return how many."""
     row = 0
     for c in range(len(lower)):
         if lower[c] == -np.inf and upper[c] == np.inf:
             continue
-        for k in range(2 if lower[c] > upper[c] else 1):
-            apart = lower[c] > upper[c]
-            for j in range(A.shape[1]):
-                A[row, j] = 0.0
-            A[row, c] = 1.0
-            low[row] = -np.inf if apart and k == 1 else lower[c]
-            up[row] = np.inf if apart and k == 0 else upper[c]
-            row += 1
+        for j in range(A.shape[1]):
+            A[row, j] = 0.0
+        A[row, c] = 1.0
+        low[row], up[row] = lower[c], upper[c]
+        row += 1
     return row
 
 

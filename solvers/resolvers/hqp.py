@@ -19,6 +19,7 @@ from solvers.status import Status
 FORMS = ("null-space", "slack")
 
 _SHARE = 0.01  # of the declared accuracy: allowed error of one level, which lower levels magnify
+_BROKEN = 1e-4  # excess of a row that must hold, relative to 1 + its side
 _WIDER = (1.0, 100.0)  # multiples of `slack`, tried in turn
 
 
@@ -171,10 +172,18 @@ class _Cascade:
             for A, lower, upper in self.h.levels():
                 self._level(A, lower, upper)
             self._step(self._nearest())
+            self._check_kept()
         except _StopError as stop:
             status = stop.status
         memory = np.array(self.steps).reshape(-1, self.h.n)
         return CascadeResolution(self.x, status, self.programs, self.corrected, memory)
+
+    def _check_kept(self) -> None:
+        """Stop, with x = 0, if a row that must still hold does not: its numbers overflowed."""
+        side = np.minimum(abs(self.kept.lower), abs(self.kept.upper))
+        if (abs(self.kept.excess(self.x)) > _BROKEN * (1.0 + side) + EXACT * norm(self.x)).any():
+            self.x = np.zeros(self.h.n)
+            raise _StopError(Status.NUMERICAL_FAILURE)
 
     def _step(self, z: Array) -> None:
         x = self.x + self.N @ z

@@ -566,3 +566,17 @@ def test_a_robot_of_one_joint_has_matrices_of_one_column():
     held = [0.0, 0.0, 0.0, 0.5 * 0.5 * 9.81]  # half the weight at the end of a rod
     assert np.linalg.norm(contacts.torques(State.at(lever, [0.0]), held)) < 1e-9
     assert h.A.shape == (4, 4)
+
+
+def test_a_torque_beyond_its_limit_comes_back_by_its_step():
+    robot = Robot.named("quadruped")
+    state, contacts = State.at(robot, robot.rest), Contacts(robot)
+    limits = TorqueLimits(robot, 0.5, contacts=contacts, step=1.0)
+    state.commanded = np.linspace(-0.9, 0.9, 12) * robot.effort_limit[6:]
+    sides = np.zeros((12, contacts.unknowns)), np.empty(12), np.empty(12)
+    limits.writer(state, "torque", *sides, 0)()
+    low, up = (side + state.bias_effort()[6:] for side in sides[1:])
+    full, sent = 0.5 * robot.effort_limit[6:], state.commanded
+    np.testing.assert_allclose(low, np.clip(-full, sent - 1.0, sent + 1.0), atol=1e-9)
+    np.testing.assert_allclose(up, np.clip(full, sent - 1.0, sent + 1.0), atol=1e-9)
+    assert (low <= up).all()

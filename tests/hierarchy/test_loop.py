@@ -12,9 +12,12 @@ from threading import Event
 import numpy as np
 import pytest
 
-from hierarchy import HierarchyError
+from hierarchy import HierarchyError, Stack, State
+from hierarchy import Robot as Kuka
 from hierarchy.loop import Loop
 from hierarchy.loop.watchdog import Once, Watchdog
+from hierarchy.tasks import Posture
+from solvers import Resolution, Status
 
 pytestmark = pytest.mark.slow
 
@@ -325,3 +328,51 @@ def test_the_example_of_a_loop_runs():
 def test_the_node_for_ros_is_python_and_says_that_no_more_was_checked():
     tree = ast.parse((EXAMPLES / "ros2_node.py").read_text(encoding="utf-8"))
     assert "only checked for its syntax" in ast.get_docstring(tree)
+
+
+@pytest.mark.parametrize(("value", "said"), [
+    (np.array([0.0, np.nan]), "the command is not finite"),
+    (np.array([np.inf, 0.0]), "the command is not finite"),
+    (None, "the step returned no command"),
+    (Resolution(np.ones(2), Status.ITERATION_LIMIT), "iteration limit"),
+    (Resolution(np.full(2, np.nan)), "the command is not finite")])
+def test_a_tick_without_a_command_stops_the_robot_and_sends_nothing(value, said):
+    robot, clock = Robot(), Clock()
+    log = Loop(PERIOD, clock=clock, sleep=clock.sleep).run(
+        lambda t: value if t >= 2 * PERIOD else robot.step(t), robot.stop, 5.0, robot.send)
+    assert (len(robot.sent), robot.stops, log.count) == (2, 1, 2)
+    assert said in log.ended
+
+
+def test_a_resolution_is_sent_as_its_command():
+    robot, clock = Robot(), Clock()
+    Loop(PERIOD, clock=clock, sleep=clock.sleep).run(
+        lambda t: Resolution(np.ones(2)), robot.stop, PERIOD, robot.send)
+    np.testing.assert_array_equal(robot.sent, [[1.0, 1.0]])
+
+
+def test_readings_that_are_not_finite_stop_the_robot_even_if_nobody_looks_at_move():
+    arm = Kuka.named("kuka_lwr")
+    state, robot, clock = State.at(arm, np.full(7, 0.3)), Robot(), Clock()
+    stack = Stack([Posture(tuple(np.zeros(7)))], "velocity")
+
+    def step(t):
+        state.move(t, np.full(7, 0.3 if t < 2 * PERIOD else np.nan), np.zeros(7))
+        return stack.hierarchy(state).lower.copy()
+
+    log = Loop(PERIOD, clock=clock, sleep=clock.sleep).run(step, robot.stop, 5.0, robot.send)
+    assert (len(robot.sent), robot.stops) == (2, 1)
+    assert "is not finite" in log.ended
+    state.move(1.0, np.zeros(7), np.zeros(7))
+    assert (stack.hierarchy(state).lower == 0.0).all()
+
+
+@pytest.mark.parametrize(("arguments", "said"), [
+    ((lambda t: None, None, 1.0), "safe_stop: expected a function, got NoneType None"),
+    ((None, print, 1.0), "step: expected a function"),
+    ((lambda t: None, print, 1.0, 5), "send: expected a function, got int 5"),
+    ((lambda t: None, print, np.nan), "loop: duration")])
+def test_what_the_loop_is_given_is_checked_before_the_first_tick(arguments, said):
+    with pytest.raises(HierarchyError) as error:
+        Loop(PERIOD).run(*arguments)
+    assert said in str(error.value)

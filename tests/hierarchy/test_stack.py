@@ -5,8 +5,9 @@ import pytest
 from scene import FRAME, PATH, ROBOT, SENSOR, TASKS, Elbow, state_at, states
 
 from hierarchy import HierarchyError, Stack, State
+from hierarchy.errors import ReadingError
 from hierarchy.jit import bind, compiled
-from hierarchy.tasks import JointDamping, LookAt, Position
+from hierarchy.tasks import JointDamping, JointLimits, LookAt, Position
 
 Q, V = states(1)[0]
 
@@ -33,7 +34,7 @@ def test_insert_remove_swap_and_reorder_by_name():
 
 def test_rows_are_named_in_the_order_of_the_stack_or_in_another():
     s = Stack([TASKS["position"], LookAt(FRAME, (0.3, 0.3, 0.6))])
-    assert s.row_names() == ("row 0", "row 1", "row 2", "x", "y")
+    assert s.row_names() == ("x", "y", "z", "x", "y")
     assert s.row_names(("look-at",)) == ("x", "y")
 
 
@@ -219,3 +220,33 @@ def test_an_empty_stack_is_an_error_and_an_empty_order_is_not():
     with pytest.raises(HierarchyError, match="stack is empty"):
         Stack().hierarchy(State.at(ROBOT, Q))
     assert stack().hierarchy(state_at(Q, V), ()).m == 0
+
+
+@dataclass(frozen=True)
+class Crossed(JointLimits):
+    """Limits whose kernel writes sides that cross in the third row."""
+
+    def writer(self, state, level, A, lower, upper, row):
+        write = super().writer(state, level, A, lower, upper, row)
+
+        def crossed():
+            write()
+            lower[row + 2], upper[row + 2] = 3.0, 2.0
+
+        return crossed
+
+
+def test_a_task_whose_sides_cross_is_named_with_its_row():
+    stack = Stack([TASKS["position"], Crossed(ROBOT, 5.0, 0.01)], "velocity")
+    third = ROBOT.velocity_names[2]
+    with pytest.raises(HierarchyError, match=f"task 'joint limits', {third}: no value lies betw"):
+        stack.hierarchy(state_at(Q, V))
+
+
+def test_a_state_that_was_moved_to_what_is_not_finite_has_no_rows_until_the_next_move():
+    stack, state = Stack([TASKS["position"]]), state_at(Q, V)
+    assert not state.move(0.0, np.full(7, np.nan), V)
+    with pytest.raises(ReadingError, match="is not finite; stop the robot"):
+        stack.hierarchy(state)
+    assert state.move(0.0, Q, V)
+    stack.hierarchy(state)

@@ -278,3 +278,20 @@ def test_rows_as_small_as_rounding_make_no_answer_large(seed):
     assert np.abs(res.x).max() < 1e6
     if res.status is Status.SOLVED:
         assert certify(h, res.x).certified
+
+
+def test_a_direction_in_which_no_joint_moves_a_frame_is_called_singular():
+    J = np.array([[0.0, 0.0], [0.6, 0.3], [0.8, 0.4]])  # of a straight arm; rows x, y, z
+    h = Hierarchy.from_levels([(J, [-0.5, 0.6, 0.8])], names=["hand"])
+    said = explain(h, HCOD.solve(h), rows=["x", "y", "z"])
+    assert said == ("hand is missed by 0.5: singular here: no joint moves hand along x.")
+    h = Hierarchy.from_levels([([[1.0, 0.0], [1.0, 0.0]], [0.0, 1.0])], names=["two"])
+    assert "its own rows disagree" in explain(h, HCOD.solve(h), rows=["a", "b"])
+
+
+def test_rows_whose_sides_cross_are_all_that_is_said():
+    h = Hierarchy.from_levels([(np.eye(2), [0.0, 0.0], [1.0, 1.0])], names=["box"])
+    h.lower[1] = 2.0
+    res = HCOD.solve(h)
+    assert res.status is Status.NUMERICAL_FAILURE
+    assert explain(h, res) == "box row 1: no value lies between lower 2 and upper 1"

@@ -270,3 +270,13 @@ def test_a_point_just_outside_moves_to_the_nearest_one_inside(z, nearest):
                 np.array([1.0, np.inf, np.inf]))
     assert refinement._moved_inside(np.array(z), np.eye(2), rows) == pytest.approx(
         nearest, abs=1e-12)
+
+
+@pytest.mark.parametrize("size", [1e60, 1e100, 1e154])
+def test_targets_beyond_all_sense_break_no_bound(size):
+    rng = np.random.default_rng(2)
+    h = Hierarchy.from_levels([(np.eye(5), -np.ones(5), np.ones(5)),
+                               (rng.normal(size=(3, 5)), size * rng.normal(size=3))])
+    found = make("hqp").solve(h)
+    assert found.status is Status.NUMERICAL_FAILURE
+    assert not found.x.any()

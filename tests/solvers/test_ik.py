@@ -63,7 +63,7 @@ def test_beyond_a_limit_a_joint_comes_back_as_fast_as_it_may():
 
 def test_limits_may_be_a_task_of_their_own():
     slow = JointLimits(ROBOT, acceleration=5.0, period=0.01)
-    v = solve_ik(ROBOT, Q, [hand([0.5, 0.0, 0.0])], limits=slow, dt=0.01).v
+    v = solve_ik(ROBOT, Q, [hand([0.5, 0.0, 0.0])], limits=slow, dt=0.01, v=np.zeros(7)).v
     assert np.abs(v).max() == pytest.approx(0.05)
 
 
@@ -97,9 +97,153 @@ def test_a_floating_base_has_no_limits_of_its_own():
     (lambda: solve_ik(ROBOT, Q, [hand([0, 0, 0])], dt=0.0), "dt = 0.0 s must be positive"),
     (lambda: solve_ik(ROBOT, Q, [hand([0, 0, 0])], resolver="hcodd"), "did you mean 'hcod'"),
     (lambda: solve_ik(ROBOT, Q, [], limits=False), "the stack is empty"),
-    (lambda: solve_ik(ROBOT, Q, [hand([0, 0, 0])], memory="last"), "hcod: memory: got str 'last'"),
+    (lambda: solve_ik(ROBOT, Q, [hand([0, 0, 0])], memory="last"),
+     "solve_ik: memory: expected a Memory, got str 'last'"),
 ])
 def test_wrong_arguments_are_named(call, said):
     with pytest.raises(HierarchyError) as error:
         call()
     assert said in str(error.value)
+
+
+def rest(tasks, ticks=400, q=Q, **settings):
+    """Return q and velocities (ticks, n) of a robot that obeys at once."""
+    memory, v = None, []
+    for _ in range(ticks):
+        step = solve_ik(ROBOT, q, tasks, memory=memory, **settings)
+        assert step.status is Status.SOLVED
+        memory, q = step.memory, q + step.v * 0.01
+        v.append(step.v)
+    return q, np.array(v)
+
+
+@pytest.mark.parametrize("goal", [[0.9, 0.0, 0.35], [1.5, 0.0, 0.3], [0.0, 0.1, 5.0]])
+@pytest.mark.parametrize("below", [[], [Posture(tuple(Q), gain=2.0)]])
+@pytest.mark.parametrize("settings", [{}, {"limits": False}, {"resolver": "tpm"}])
+def test_an_arm_that_cannot_reach_its_target_comes_to_rest_stretched(goal, below, settings):
+    q, v = rest([Position(FRAME, Still(goal)), *below], **settings)
+    assert np.abs(np.diff(v[-100:], axis=0)).max() < 1e-3
+    missed = np.linalg.norm(goal - State.at(ROBOT, q).position(FRAME))
+    for near in q + np.random.default_rng(0).normal(scale=0.03, size=(200, 7)):
+        assert np.linalg.norm(goal - State.at(ROBOT, near).position(FRAME)) > missed - 1e-6
+
+
+def test_damping_changes_no_step_of_a_target_within_reach():
+    tasks, q = [hand([0.05, -0.03, 0.04]), Posture(tuple(Q + 0.3))], Q
+    for _ in range(50):
+        damped, plain = solve_ik(ROBOT, q, tasks), solve_ik(ROBOT, q, tasks, damping=0.0)
+        np.testing.assert_array_equal(damped.v, plain.v)
+        q = q + plain.v * 0.01
+
+
+def test_the_answer_near_a_singularity_is_continuous():
+    stretched = np.array([0.2, 0.7, 0.1, 0.0, 0.3, 0.0, 0.1])
+    task = [Position(FRAME, Still(1.3 * State.at(ROBOT, stretched).position(FRAME)))]
+    bends = np.linspace(-0.3, 0.3, 1201)
+    elbow = np.eye(7)[3]
+    v = np.array([solve_ik(ROBOT, stretched + bend * elbow, task).v for bend in bends])
+    assert np.abs(np.diff(v, axis=0)).max() < 0.1
+
+
+def test_a_robot_that_obeys_one_tick_late_rests_at_its_limits():
+    q, before, task = Q.copy(), np.zeros(7), [Posture(tuple(ROBOT.upper + 1.0), gain=50.0)]
+    for _ in range(300):
+        v = solve_ik(ROBOT, q, task).v
+        q, before = q + before * 0.01, v
+        assert (q < ROBOT.upper + 1e-9).all()
+    assert np.abs(v).max() < 1e-6
+
+
+def test_limits_of_acceleration_continue_from_the_tick_before():
+    limits, far = JointLimits(ROBOT, 10.0, 0.01), Position(FRAME, Still([0.3, 0.5, 0.1]))
+    q, v = Q, np.zeros(7)
+    for _ in range(100):
+        step = solve_ik(ROBOT, q, [far], limits=limits, v=v)
+        assert np.abs(step.v - v).max() <= 0.1 + 1e-9
+        q, v = q + step.v * 0.01, step.v
+    assert np.linalg.norm(far.error(State.at(ROBOT, q))) < 1e-2
+    with pytest.raises(HierarchyError, match="give v, the velocity of the tick before"):
+        solve_ik(ROBOT, Q, [far], limits=limits)
+
+
+def test_memory_has_the_velocity_of_the_tick_before():
+    limits = JointLimits(ROBOT, 10.0, 0.01)
+    first = solve_ik(ROBOT, Q, [hand([0.5, 0, 0])], limits=limits, v=np.zeros(7))
+    second = solve_ik(ROBOT, Q, [hand([0.5, 0, 0])], limits=limits, memory=first.memory)
+    assert np.abs(second.v).max() == pytest.approx(0.2)
+
+
+@pytest.mark.parametrize(("gain", "dt", "said"), [
+    (201.0, 0.01, "task 'position': gain = 201 1/s times the period of 0.01 s is 2.01"),
+    (21.0, 0.1, "give at most 20 1/s")])
+def test_gains_that_make_an_error_grow_are_refused(gain, dt, said):
+    solve_ik(ROBOT, Q, [hand([0.1, 0, 0], gain=2.0 / dt)], dt=dt)
+    with pytest.raises(HierarchyError) as error:
+        solve_ik(ROBOT, Q, [hand([0.1, 0, 0], gain=gain)], dt=dt)
+    assert said in str(error.value)
+
+
+def test_a_task_of_another_period_is_refused():
+    with pytest.raises(HierarchyError, match=r"'joint limits': its period is 0.01 s, that of the "):
+        solve_ik(ROBOT, Q, [hand([0, 0, 0])], dt=0.02, limits=JointLimits(ROBOT, 9.0, 0.01),
+                 v=np.zeros(7))
+
+
+def test_joints_without_a_velocity_limit_are_named_once(tmp_path):
+    (tmp_path / "bare.urdf").write_text(
+        '<robot name="bare"><link name="a"/><link name="b"/><joint name="turn" type="continuous">'
+        '<parent link="a"/><child link="b"/><axis xyz="0 0 1"/></joint></robot>')
+    robot = Robot.from_file(tmp_path / "bare.urdf")
+    task = [Position(robot.frame("b"), Still([0, 0, 0]))]
+    with pytest.warns(UserWarning, match="'bare' has no velocity limit for turn"):
+        solve_ik(robot, robot.rest, task)
+    solve_ik(robot, robot.rest, task)
+
+
+def test_poses_of_random_configurations_are_found_within_the_limits():
+    rng = np.random.default_rng(3)
+    for _ in range(10):
+        goal = State.at(ROBOT, rng.uniform(ROBOT.lower, ROBOT.upper))
+        pose = Pose(FRAME, Still(goal.position(FRAME)), goal.rotation(FRAME))
+        found = solve_ik(ROBOT, Q, [pose], until=1e-6)
+        assert found.met
+        assert found.verdict == "reached"
+        assert ((found.q >= ROBOT.lower - 1e-9) & (found.q <= ROBOT.upper + 1e-9)).all()
+        here = State.at(ROBOT, found.q)
+        np.testing.assert_allclose(here.position(FRAME), goal.position(FRAME), atol=1e-6)
+        np.testing.assert_allclose(here.rotation(FRAME), goal.rotation(FRAME), atol=2e-6)
+
+
+def test_the_same_search_finds_the_same_configuration():
+    far = [Position(FRAME, Still([1.0, 0.4, 0.9])), Posture(tuple(Q))]
+    one, two = (solve_ik(ROBOT, Q, far, until=1e-6) for _ in range(2))
+    np.testing.assert_array_equal(one.q, two.q)
+
+
+def test_what_holds_a_target_out_of_reach_back_is_said():
+    found = solve_ik(ROBOT, Q, [Position(FRAME, Still([0.0, 0.0, 3.0]))], until=1e-6)
+    assert not found.met
+    top = State.at(ROBOT, np.zeros(7)).position(FRAME)[2]
+    assert found.errors["position"] == pytest.approx(3.0 - top, abs=1e-6)
+    assert found.verdict.startswith("unreachable: nearest found, position is missed by")
+    assert "no joint moves position along z" in found.verdict
+    here = State.at(ROBOT, Q).position(FRAME)
+    both = [Position(FRAME, Still(here)), Position(FRAME, Still(here + 0.1), name="other")]
+    assert "other is missed by 0.173, held back by position" in solve_ik(
+        ROBOT, Q, both, until=1e-6).verdict
+
+
+def test_the_upper_of_two_tasks_is_met_where_both_cannot_be():
+    here = State.at(ROBOT, Q).position(FRAME)
+    found = solve_ik(ROBOT, Q, [Position(FRAME, Still(here)),
+                                Position(FRAME, Still(here + 0.1), name="other")], until=1e-6)
+    assert found.errors["position"] < 1e-6
+
+
+@pytest.mark.parametrize(("settings", "said"), [
+    ({"until": 0.0}, "until = 0 must be positive"),
+    ({"until": 1e-6, "limits": JointLimits(ROBOT, 9.0, 0.01)}, "with until, limits are True or"),
+    ({"damping": -1.0}, "solve_ik: damping")])
+def test_wrong_settings_of_a_search_are_named(settings, said):
+    with pytest.raises(HierarchyError, match=said):
+        solve_ik(ROBOT, Q, [hand([0, 0, 0])], **settings)

@@ -1,0 +1,196 @@
+"""The configuration that serves tasks best, with restarts, and a verdict where none meets them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from hierarchy.errors import HierarchyError, number
+from hierarchy.problem import Array, Hierarchy
+from hierarchy.robot import Robot
+from hierarchy.stack import Stack
+from hierarchy.state import State
+from hierarchy.task import Task, parts
+from hierarchy.tasks.mechanism import Mechanism, above, model_rows
+from hierarchy.tasks.step_limits import StepLimits
+from hierarchy.words import listed
+from solvers.explain import nowhere
+from solvers.resolver import Resolver
+from solvers.resolvers.settled import Settled
+from solvers.status import Status
+
+_STEP = 0.3       # [rad or m] the largest change of a joint in one iteration
+_STILL = 1e-3     # relative decrease of the errors in `_PATIENCE` iterations that goes on
+_AT_REST = 1e-9   # the same at the end
+_PATIENCE = 10
+_AT = 1e-6        # [rad or m] from a limit that counts as on it
+_WIDE = np.pi     # [rad or m] range around q from which a joint without limits starts again
+
+
+@final
+@dataclass(frozen=True)
+class Reached:
+    """The answer of `reach`, best of all starts.
+
+    q : (nq,) the configuration. met : whether the tasks that decide are met there.
+    errors : norm of the error of each task, by name; of an inequality, of what is missed.
+    verdict : "reached", or "unreachable: nearest found, held back by ..." with joint limits, tasks
+        above and singular directions by name.
+    iterations, starts : what it took. status : that of the last solve.
+    """
+
+    q: Array
+    met: bool
+    errors: dict[str, float]
+    verdict: str
+    iterations: int
+    starts: int
+    status: Status
+
+
+def reach(robot: Robot, q: ArrayLike, tasks: Sequence[Task], until: float, *, limits: bool = True,
+          resolver: Resolver, t: float = 0.0, damping: float = 1.0, starts: int = 20,
+          most: int = 200, seed: int = 0) -> Reached:
+    """Return the configuration near q in which the tasks are met, in strict order, at time t.
+
+    Gauss-Newton steps of the same problem as `solve_ik`, each at most 0.3 rad or m, with a gain of
+    1 for the fastest task. Where the errors stop falling, they start again from a random
+    configuration within the limits; `seed` makes that repeatable. These steps are undamped, which
+    finds more; from the best of all starts damped ones go on to the nearest. Joint tasks such as a
+    posture are preferences: they do not decide whether the others are met, but where.
+
+    until : largest norm of the error of each task that decides, in its unit.
+    starts : largest number of starts. most : iterations of each.
+
+    Raises HierarchyError as `solve_ik` does, and if no task decides.
+    """
+    if not number("solve_ik: until", until) > 0.0:
+        raise HierarchyError(f"solve_ik: until = {until:g} must be positive")
+    search = _Search(robot, tasks, until, limits, resolver, damping, t)
+    rng, start = np.random.default_rng(seed), State.at(robot, q, t=t).q.copy()
+    best = search.descend(start, most, resolver)
+    iterations, count = best[2], 1
+    while max(best[0]) > until and count < starts:
+        found = search.descend(_drawn(robot, start, rng), most, resolver)
+        iterations, count = iterations + found[2], count + 1
+        best = min(best, found, key=lambda one: one[0])
+    if max(best[0]) > until:
+        best = search.descend(best[1], most, search.settled, _AT_REST)
+    return search.answer(best[1], iterations + best[2], count)
+
+
+class _Search:
+    """A robot with a stack over one state, and the resolver of its steps."""
+
+    def __init__(self, robot: Robot, tasks: Sequence[Task], until: float, limits: bool,
+                 resolver: Resolver, damping: float, t: float) -> None:
+        gains = [np.max(np.asarray(part.gain, dtype=float), initial=0.0)
+                 for task in tasks for part in (task, *parts(task))]
+        rates = [part.barrier.rate for task in tasks for part in (task, *parts(task))
+                 if hasattr(part, "barrier")]
+        self.period = 1.0 / max([*gains, *rates, 1e-3])
+        self.robot, self.until, self.t, self.tasks = robot, until, t, list(tasks)
+        self.limits = [StepLimits(robot, self.period, 1.0 / self.period)] if limits else []
+        first = above(model_rows(robot, self.period), self.limits,
+                      resolver.can_resolve("inequalities"))
+        self.stack, self.mechanism = Stack([*first, *tasks], "velocity"), Mechanism(robot)
+        self.deciding = [task for task in tasks if not task.straight]
+        if not self.deciding:
+            raise HierarchyError("solve_ik: until: only joint tasks are given, which are "
+                                 "preferences; give a task of a frame too")
+        curved = frozenset(task.name for task in self.deciding)
+        self.settled = Settled(inner=resolver, period=self.period, softness=damping,
+                               curved=curved)
+        self.state, self.status = State(robot), Status.SOLVED
+
+    def descend(self, q: Array, most: int, resolver: Resolver,
+                still: float = _STILL) -> tuple[list[float], Array, int]:
+        """Return the errors of the deciding tasks, where they are least, and the iterations."""
+        best, memory, history = ([np.inf], q), None, list[float]()
+        for k in range(most):
+            errors = self._errors(q)
+            if errors < best[0]:
+                best = errors, q
+            history.append(sum(errors))
+            done = max(errors) <= self.until
+            if done or (k >= _PATIENCE and min(history[-_PATIENCE:])
+                        > (1.0 - still) * min(history[:-_PATIENCE])):
+                return (errors, q, k) if done else (*best, k)
+            found = resolver.solve(self.stack.hierarchy(self.state), memory)
+            self.status, memory = found.status, found.memory
+            step = found.x * self.period
+            q = self.mechanism.closed(self.robot.integrate(
+                q, step * min(1.0, _STEP / max(abs(step).max(), 1e-300))))
+        return (*best, most)
+
+    def _errors(self, q: Array) -> list[float]:
+        """Move to q and return the norm of the error of each deciding task."""
+        self.state.move(self.t, q, np.zeros(self.robot.n))
+        return [self._missed(task) for task in self.deciding]
+
+    def _missed(self, task: Task) -> float:
+        error = task.error(self.state)
+        return float(np.linalg.norm(np.maximum(error, 0.0) if task.kind == "inequality"
+                                    else error))
+
+    def answer(self, q: Array, iterations: int, starts: int) -> Reached:
+        """Return what is to be said of a configuration."""
+        self._errors(q)
+        errors = {task.name: self._missed(task) for task in self.tasks}
+        met = all(errors[task.name] <= self.until for task in self.deciding)
+        return Reached(q, met, errors, "reached" if met else self._verdict(errors), iterations,
+                       starts, self.status)
+
+    def _verdict(self, errors: dict[str, float]) -> str:
+        """Say what holds back the first task that is not met."""
+        task = next(one for one in self.deciding if errors[one.name] > self.until)
+        h = self.stack.hierarchy(self.state)
+        k = h.names.index(task.name)
+        pull = h.A[h.offsets[k]:h.offsets[k + 1]].T @ h.slacks(np.zeros(h.n))[
+            h.offsets[k]:h.offsets[k + 1]]
+        held = [*self._limits_at(-pull), *_above(h, k, pull, self.limits)]
+        said = nowhere(h, k, self.stack[task.name].row_names, np.zeros(h.n))
+        by = f", held back by {listed(held)}" if held else f": {said}" if said else (
+            ": it is as near as the robot comes")
+        return (f"unreachable: nearest found, {task.name} is missed by "
+                f"{errors[task.name]:.3g}{by}")
+
+    def _limits_at(self, wanted: Array) -> list[str]:
+        """Name the position limits against which a task pulls, `wanted` (n,) being its pull."""
+        if not self.limits:
+            return []
+        lower, upper = self.robot.position_limits()
+        q = self.state.q[self.robot.coordinates]
+        return [f"{name} at its {'upper' if pull > 0.0 else 'lower'} limit"
+                for name, low, up, here, pull in zip(self.robot.velocity_names, lower, upper, q,
+                                                     wanted, strict=True)
+                if (pull > 0.0 and here > up - _AT) or (pull < 0.0 and here < low + _AT)]
+
+
+def _above(h: Hierarchy, k: int, pull: Array, limits: Sequence[Task]) -> list[str]:
+    """Name the tasks above level k whose rows carry part of its pull (n,)."""
+    names = []
+    own = {task.name for task in limits}
+    for level in (one for one in range(k) if h.names[one] not in own):
+        rows = h.A[h.offsets[level]:h.offsets[level + 1]]
+        size = np.linalg.norm(rows) * np.linalg.norm(pull)
+        if np.linalg.norm(rows @ pull) > _AT * size > 0.0:
+            names.append(h.names[level])
+    return names
+
+
+def _drawn(robot: Robot, q: Array, rng: np.random.Generator) -> Array:
+    """Return q with its actuated joints drawn anew, within their limits."""
+    lower, upper = robot.position_limits()
+    lower, upper = np.where(np.isfinite(lower), lower, -_WIDE), np.where(np.isfinite(upper), upper,
+                                                                        _WIDE)
+    move = rng.uniform(lower, upper)
+    here = q[robot.coordinates]
+    bounded = np.isfinite(robot.position_limits()[0])
+    step = np.where(bounded, move - here, move)
+    step[:robot.actuated] = 0.0
+    return robot.integrate(q, step)

@@ -1,0 +1,228 @@
+"""Tasks out of reach come to rest: the speed that a level may ask for, at velocity level.
+
+A level A x = b of a task with the curvature kappa misses what its rows say by about
+T kappa |x|^2 / 2 over a period T. So it takes the x that, within the levels above, minimises
+
+    |b - A x| + alpha |x - x0|^2 / 2,    alpha = damping T |A| / 2                           (a)
+
+x0 being the x of the levels above and |A| (Frobenius) the estimate of kappa. The norm is not
+squared, so this is an exact penalty: as long as the multiplier y of A x = b has |y| <= 1 / alpha,
+the level is met exactly, to the last digit. Beyond, the minimum of (a) is that of
+|b - A x|^2 + mu |x - x0|^2 with mu = alpha |b - A x|, a damping in proportion to what stays out of
+reach, as Newton's method has it and as Sugihara's (T-RO 2011) has it for the square. It is unique,
+hence continuous in the data, with bounds too.
+
+What the level then reaches is its new right-hand side. To second order the levels below disturb it
+although they keep A x: joint j may leave its speed by
+
+    |x - x0| (|b0| / |b - A x| - 1) max_i |A_i| / |A_j|, b0 = b - A x0                       (b)
+
+with the columns A_i of what the levels above leave of A. It falls to zero at rest and is infinite
+for joints that the level does not use.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import ClassVar, NamedTuple, final
+
+import numpy as np
+
+from hierarchy.problem import Array, Hierarchy
+from solvers.kernels.met import plainly_met
+from solvers.resolver import Handles, Resolution, Resolver
+from solvers.resolvers.hcod import ActiveSetResolution
+from solvers.status import Status
+
+_LEAST = 1e-6     # of |A|^2: the least mu
+_FAINT = 1e-10    # of |A|: singular values up to it are rounding
+_CLOSE = 1e-3     # accuracy of alpha at which the search for mu ends
+_MOST = 12        # its steps
+_NONE = 1e-9      # of the largest column of A: a joint that a level does not use
+_PACE = 1e-5      # [rad/s or m/s] by which levels below may always change the speed of a joint
+
+
+@final
+@dataclass(frozen=True, kw_only=True)
+class Settled(Resolver):
+    """Resolves as `inner`, but the levels named in `curved` come to rest where they cannot be met.
+
+    period : T [s] for which x, a velocity, will be held.
+    softness : factor of the estimate of the curvature; 0 leaves every level as it is.
+    curved : names of levels of equalities whose Jacobians change with the configuration.
+
+    Theory: the module's docstring.
+    """
+
+    inner: Resolver
+    period: float
+    softness: float = 1.0
+    curved: frozenset[str] = frozenset()
+    name: ClassVar[str] = "settled"
+    handles: ClassVar[Handles] = "inequalities"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self._number("period", 0.0, np.inf, open_below=True)
+        self._number("softness", 0.0, np.inf)
+
+    @property
+    def label(self) -> str:
+        """The label of the inner resolver."""
+        return self.inner.label
+
+    @property
+    def strict(self) -> bool:
+        """Whether the inner resolver is."""
+        return self.inner.strict
+
+    @property
+    def accuracy(self) -> float:
+        """The accuracy of the inner resolver."""
+        return self.inner.accuracy
+
+    def solve(self, h: Hierarchy, memory: Array | None = None) -> Resolution:
+        """Resolve h; where a curved level is not plainly met, some problems of the levels to it."""
+        half = 0.5 * self.softness * self.period
+        least = np.array([half if name in self.curved else -1.0 for name in h.names])
+        if half == 0.0 or plainly_met(h.A, h.lower, h.upper, h.offsets, least):
+            return self.inner.solve(h, memory)
+        above = _Above(self.inner, h)
+        for k, (A, lower, upper) in enumerate(h.levels()):
+            calm = least[k] > 0.0 and len(lower) and (lower == upper).all()
+            above.add(*(above.calm(A, lower, half) if calm else (A, lower, upper)))
+        return above.resolve(h, memory)
+
+
+class _Reached(NamedTuple):
+    """The x for one mu, and what it misses: |b - A x|."""
+
+    mu: float
+    x: Array
+    missed: float
+
+
+class _Above:
+    """The levels written so far, x down to them, and by how much levels below may change it."""
+
+    def __init__(self, inner: Resolver, h: Hierarchy) -> None:
+        n = h.n
+        self.inner, self.calmed, self.status, self.names = inner, False, Status.SOLVED, h.names
+        self.levels: list[tuple[Array, Array, Array]] = []
+        self.x, self.held = np.zeros(n), np.empty((0, n))
+        self.box = np.full(n, -np.inf), np.full(n, np.inf)
+        self.paced = inner.can_resolve("bounds")
+        # One that resolves bounds in a first level only needs all of them there.
+        self.joined = (self.paced and not inner.can_resolve("inequalities") and bool(h.sizes[:1])
+                       and bool((h.lower < h.upper)[:h.sizes[0]].any()))
+
+    def add(self, A: Array, lower: Array, upper: Array) -> None:
+        """Add a level."""
+        self.levels.append((A, lower, upper))
+        if (lower == upper).all():
+            self.held = np.vstack([self.held, self._directions(A, _FAINT)])
+
+    def calm(self, A: Array, b: Array, half: float) -> tuple[Array, Array, Array]:
+        """Return the rows of a level A x = b that minimises (a), unchanged where it is met.
+
+        half : alpha / |A| [s].
+        """
+        size, out = float(np.linalg.norm(A)), float(np.linalg.norm(b - A @ self.x))
+        alpha = half * size
+        if not 0.0 < _LEAST * size * size < alpha * out < np.inf:
+            return A, b, b
+        first = self._probe(A, b, _LEAST * size * size)
+        if alpha * first.missed <= first.mu:
+            self.x = first.x
+            return A, b, b
+        found = _search(lambda mu: self._probe(A, b, mu), first, alpha, alpha * out)
+        step = float(np.linalg.norm(found.x - self.x))
+        self._pace(A, found.x, step * max(out / found.missed - 1.0, 0.0))
+        self.calmed, self.x = True, found.x
+        kept = self._directions(A, _FAINT)
+        rows = np.zeros_like(A)
+        rows[:len(kept)] = kept
+        return rows, rows @ found.x, rows @ found.x
+
+    def resolve(self, h: Hierarchy, memory: Array | None) -> Resolution:
+        """Resolve all levels, those that were calmed in their new form."""
+        if not self.calmed:
+            return self.inner.solve(h, memory)
+        found = self.inner.solve(self._stacked(self.levels, h.reference))
+        if found.status is Status.SOLVED:
+            found.status = self.status
+        return _without_pace(found, h.n, not self.joined) if self.paced else found
+
+    def _pace(self, A: Array, x: Array, most: float) -> None:
+        """Let levels below change the speeds x by (b) and no more."""
+        columns = np.linalg.norm(A - (A @ self.held.T) @ self.held, axis=0)
+        room = np.full(len(x), np.inf)
+        used = columns > _NONE * columns.max(initial=0.0)
+        room[used] = _PACE + most * columns.max() / columns[used]
+        self.box = np.maximum(self.box[0], x - room), np.minimum(self.box[1], x + room)
+
+    def _probe(self, A: Array, b: Array, mu: float) -> _Reached:
+        """Return the x within the levels above that minimises |A x - b|^2 + mu |x - x0|^2."""
+        weight = np.sqrt(mu) * np.eye(len(self.x))
+        target = np.concatenate([b, weight @ self.x])
+        level = np.vstack([A, weight]), target, target
+        found = self.inner.solve(self._stacked([*self.levels, level], np.zeros_like(self.x)))
+        if found.status is not Status.SOLVED:
+            self.status = found.status
+        return _Reached(mu, found.x, float(np.linalg.norm(b - A @ found.x)))
+
+    def _stacked(self, levels: list[tuple[Array, Array, Array]], reference: Array) -> Hierarchy:
+        names = self.names[:len(levels)]
+        if self.calmed and self.paced:
+            pace = np.eye(len(self.x)), *self.box
+            if self.joined:
+                A, lower, upper = map(np.concatenate, zip(pace, levels[0], strict=True))
+                levels = [(A, lower, upper), *levels[1:]]
+            else:
+                levels, names = [pace, *levels], ("pace", *names)
+        sizes = np.array([len(lower) for _, lower, _ in levels], dtype=np.int64)
+        A, lower, upper = (np.concatenate(parts) for parts in zip(*levels, strict=True))
+        return Hierarchy(A, lower, upper, sizes, reference, names)
+
+    def _directions(self, A: Array, least: float) -> Array:
+        """Return the directions (k, n) that the rows A take beyond those held.
+
+        Their singular values are above `least` times |A|.
+        """
+        free = A - (A @ self.held.T) @ self.held
+        _, values, directions = np.linalg.svd(free, full_matrices=False)
+        return np.asarray(directions[values > least * np.linalg.norm(A)])
+
+
+def _search(probe: Callable[[float], _Reached], low: _Reached, alpha: float,
+            most: float) -> _Reached:
+    """Return what is reached for mu = alpha |b - A x|, between `low` and mu = `most`.
+
+    By the Illinois variant of regula falsi on mu / |b - A x|, which grows with mu, nearly linearly.
+    """
+    def over(one: _Reached) -> float:
+        return one.mu / one.missed - alpha if one.missed > 0.0 else np.inf
+
+    high = best = probe(most)
+    low_over, high_over = over(low), over(high)
+    for _ in range(_MOST):
+        if not _CLOSE * alpha < abs(over(best)) or not 0.0 < high_over < np.inf:
+            break
+        mu = high.mu - high_over * (high.mu - low.mu) / (high_over - low_over)
+        best = probe(mu)
+        if over(best) > 0.0:
+            high, high_over, low_over = best, over(best), low_over / 2
+        else:
+            low, low_over, high_over = best, over(best), high_over / 2
+    return best
+
+
+def _without_pace(found: Resolution, n: int, level: bool) -> Resolution:
+    """Return a resolution without its first n rows, which are a level of their own or not."""
+    if not isinstance(found, ActiveSetResolution):
+        return Resolution(found.x, found.status, found.iterations)
+    parts = found.memory[:-3].reshape(3, -1)[:, n:].copy()
+    parts[1] -= level & (parts[1] >= 0.0)
+    last = found.memory[-3:] - [0.0, 0.0, level and found.memory[-1] > 0.0]  # unfinished
+    return ActiveSetResolution(found.x, found.status, np.concatenate([parts.ravel(), last]))
