@@ -63,6 +63,7 @@ class Posture(Task):
     gain: float = 1.0
     name: str = "posture"
     robot: Robot | None = None
+    straight = True
     goal: Array = field(init=False, repr=False, compare=False)  # (nq,)
 
     def __post_init__(self) -> None:
