@@ -81,9 +81,8 @@ class Contact:
         if not 0.0 < self.friction < np.inf:
             raise HierarchyError(f"contact {self.name!r}: friction {self.friction} must be "
                                  "positive and finite")
-        for key, direction in (("normal", self.normal), ("up", self.up)):
-            if np.shape(direction) != (3,) or not 0.0 < np.linalg.norm(direction) < np.inf:
-                raise HierarchyError(f"contact {self.name!r}: {key} {direction!r} is no direction")
+        axes, sole = (_axes(direction, f"contact {self.name!r}: {key}")
+                      for key, direction in (("normal", self.normal), ("up", self.up)))
         for start, end in self.open:
             if not start < end:
                 raise HierarchyError(f"contact {self.name!r}: it cannot be open from {start} s "
@@ -93,7 +92,7 @@ class Contact:
         if self.slides and len(points) > 1:
             raise HierarchyError(f"contact {self.name!r}: {len(points)} points that slide; only a "
                                  "contact of one point does")
-        set_frozen(self, axes=_axes(self.normal), sole=_axes(self.up))
+        set_frozen(self, axes=axes, sole=sole)
 
     @classmethod
     def rectangle(cls, frame: Frame, x: tuple[float, float], y: tuple[float, float],
@@ -101,7 +100,7 @@ class Contact:
                   ramp: float = 0.1, *, normal: Vector = (0.0, 0.0, 1.0),
                   up: Vector = (0.0, 0.0, 1.0)) -> Contact:
         """Return a sole across `up` through the origin of its frame: see `corners`."""
-        return cls(frame, corners(x, y, up), friction, normal, open=open, ramp=ramp, up=up)
+        return cls(frame, corners(x, y, up).tolist(), friction, normal, open=open, ramp=ramp, up=up)
 
     def load(self, t: float) -> float:
         """Share of its load that the contact may carry at t [s]: 0 while it is open."""
@@ -241,13 +240,16 @@ def corners(x: tuple[float, float], y: tuple[float, float], up: Vector = (0.0, 0
     """Return the corners (4, 3) [m] of a sole from its sides `x` and `y` (2,) [m] across `up` (3,).
 
     x is the frame's x axis as seen along `up`, its y axis for `up` along x, and y is across both.
+    Raises HierarchyError if `up` is no direction.
     """
     around = [(x[0], y[0]), (x[1], y[0]), (x[1], y[1]), (x[0], y[1])]
-    return np.asarray(np.array(around, dtype=float) @ _axes(up)[:2])
+    return np.asarray(np.array(around, dtype=float) @ _axes(up, "sole: up")[:2])
 
 
-def _axes(normal: Vector) -> Array:
+def _axes(normal: Vector, what: str) -> Array:
     """Return two tangents and the normal as rows (3, 3); x, y and z for normal z."""
+    if np.shape(normal) != (3,) or not 0.0 < np.linalg.norm(normal) < np.inf:
+        raise HierarchyError(f"{what} {normal!r} is no direction")
     n = np.array(normal, dtype=float) / np.linalg.norm(normal)
     x = np.eye(3)[0 if abs(n[0]) < 0.9 else 1]
     tangent = x - (x @ n) * n

@@ -5,6 +5,7 @@ from dataclasses import fields, replace
 import numpy as np
 import pinocchio as pin
 import pytest
+from scipy.spatial.transform import Rotation
 from standing import (
     ROBOT,
     WEIGHT,
@@ -12,12 +13,14 @@ from standing import (
     feet,
     moving_state,
     soles_and_palm,
+    standing_stack,
 )
 
 from hierarchy import HierarchyError, Robot, Stack, State
 from hierarchy.contacts import Contact, Contacts
 from hierarchy.errors import UnknownNameError
 from hierarchy.paths import Still
+from hierarchy.robot import Frame
 from hierarchy.robots.from_table import from_table
 from hierarchy.robots.table import Link, TreeFrame, TreeJoint, TreeTable
 from hierarchy.task import Task
@@ -227,6 +230,42 @@ def test_points_inside_a_sole_or_on_its_edge_make_no_edges_of_their_own():
     rows, more = (CentreOfPressure(Contacts(ROBOT, [one])).forces for one in (plain, dotted))
     assert len(rows) == len(more) == 4
     assert sorted(map(tuple, more[:, :12])) == sorted(map(tuple, rows))
+
+
+@pytest.mark.parametrize("turn", [(90.0, 0.0, 0.0), (0.0, 90.0, 0.0), (180.0, 0.0, 40.0)])
+def test_a_sole_in_another_plane_of_its_frame_has_the_same_rows(turn):
+    """The frame of a foot may lie on its side; `up` says in it which way is up."""
+    foot, rotation = ROBOT.frame("left_foot"), Rotation.from_euler("xyz", turn, degrees=True)
+    turned = Frame(foot.name, foot.joint, foot.offset, foot.rotation @ rotation.as_matrix())
+    up = rotation.inv().apply([0.0, 0.0, 1.0])
+    own = Contact.rectangle(turned, (-0.05, 0.16), (-0.04, 0.04), up=up)
+    places = turned.rotation @ np.transpose(own.points)
+    np.testing.assert_allclose(places[2], 0.0, atol=1e-15)
+    sides = np.linalg.norm(np.diff(own.points, axis=0), axis=1)
+    np.testing.assert_allclose(sides, [0.21, 0.08, 0.21])
+    plain = Contact(foot, places.T)  # the same points, in a frame that is level
+    rows, same = (CentreOfPressure(Contacts(ROBOT, [one])).forces for one in (own, plain))
+    value, other = (np.sort(one @ np.arange(12.0) ** 2) for one in (rows, same))
+    np.testing.assert_allclose(value, other, atol=1e-12)
+
+
+@pytest.mark.parametrize(("friction", "holds"), [(0.6, True), (0.3, False)])
+def test_soles_with_a_normal_of_their_own_stand_on_a_slope_as_steep_as_friction_allows(
+        friction, holds):
+    slope = Rotation.from_euler("xyz", [20.0, 0.0, 0.0], degrees=True)  # tan 20 deg = 0.36
+    q = ROBOT.rest.copy()
+    q[3:7] = (slope * Rotation.from_quat(q[3:7])).as_quat()
+    normal, state = slope.apply([0.0, 0.0, 1.0]), State.at(ROBOT, q)
+    contacts = Contacts(ROBOT, [Contact.rectangle(
+        ROBOT.frame(f"{side}_foot"), (-0.05, 0.16), (-0.04, 0.04), friction, normal=normal)
+        for side in ("left", "right")])
+    h = standing_stack(state, contacts).hierarchy(state)
+    x = make("hcod").solve(h).x
+    forces = contacts.forces(x)
+    along = forces - np.outer(forces @ normal, normal)
+    assert (np.linalg.norm(along, axis=1) <= friction * (forces @ normal) + 1e-6).all()
+    stands = np.abs(forces.sum(axis=0) - [0.0, 0.0, WEIGHT]).max() < 1e-6
+    assert stands == holds
 
 
 def test_a_plain_contact_pushes_up_with_one_point_in_the_middle_of_its_frame():
