@@ -73,8 +73,9 @@ def _wrong(contact: Contact, above: Array, rotation: Array) -> str | None:
     if contact.is_surface and angle > _ON_EDGE:
         up = ", ".join(f"{value:g}" for value in np.round(rotation[2], 3) + 0.0)
         turned = "turned on edge" if angle < _TURNED_OVER else "upside down"
-        return (f"the sole of {contact.name!r} is {turned}, {angle:.0f} deg from the floor. It is across `up` in its frame, where the vertical is [{up}] here: set `up`, or "
-                "take another frame")
+        return (f"the sole of {contact.name!r} is {turned}, {angle:.0f} deg from the floor. It is "
+                f"across `up` in its frame, where the vertical is [{up}] here: set `up`, or take "
+                "another frame")
     if contact.is_surface and (angle > _TILTED or np.ptp(above) > _OFF):
         corner = ", ".join(f"{value:g}" for value in contact.points[k])
         return (f"the sole of {contact.name!r} is not flat on the floor but tilted by {angle:.3g} "
