@@ -46,13 +46,13 @@ class Contact:
 
     `points` (k, 3) [m] are in the frame: one for a point contact, at least three that are not on
     one line for a surface, such as the corners of a sole. `friction` is Coulomb's coefficient,
-    `normal` (3,) the direction in the world in which the surface pushes the robot. `open` has the
-    intervals (from, until) [s] of a contact that lifts off and touches down; its load ramps down
-    for `ramp` [s] before each and up after it. A point that `slides` moves along its surface,
-    against which friction then acts with all its coefficient. The name is that of the frame unless
-    given.
+    `normal` (3,) the direction in the world in which the surface pushes the robot, `up` (3,) the
+    same direction as the frame has it, across a sole. `open` has the intervals (from, until) [s] of
+    a contact that lifts off and touches down, `ramp` [s] how long its load falls before each and
+    may rise after it. A point that `slides` moves along its surface, against which friction then
+    acts with all its coefficient. The name is that of the frame unless given.
 
-    Raises HierarchyError, naming the contact, if the coefficient is not positive, the normal is
+    Raises HierarchyError, naming the contact, if the coefficient is not positive, a direction is
     zero, a number is not finite, the points are on a line, an interval ends before it begins, or a
     surface slides.
     """
@@ -65,11 +65,13 @@ class Contact:
     open: Sequence[tuple[float, float]] = ()
     ramp: float = 0.1
     slides: bool = False
+    up: Vector = (0.0, 0.0, 1.0)
     axes: Array = field(init=False, repr=False, compare=False)  # (3, 3) rows: two tangents, normal
+    sole: Array = field(init=False, repr=False, compare=False)  # the same in the frame, of `up`
 
     def __post_init__(self) -> None:
         set_frozen(self, name=self.name or self.frame.name)
-        points, normal = np.array(self.points, dtype=float), np.array(self.normal, dtype=float)
+        points = np.array(self.points, dtype=float)
         if points.ndim != 2 or points.shape[1] != 3 or not np.isfinite(points).all():
             raise HierarchyError(f"contact {self.name!r}: points {self.points!r} are not (k, 3) "
                                  "numbers")
@@ -79,8 +81,8 @@ class Contact:
         if not 0.0 < self.friction < np.inf:
             raise HierarchyError(f"contact {self.name!r}: friction {self.friction} must be "
                                  "positive and finite")
-        if normal.shape != (3,) or not 0.0 < np.linalg.norm(normal) < np.inf:
-            raise HierarchyError(f"contact {self.name!r}: normal {self.normal!r} is no direction")
+        axes, sole = (_axes(direction, f"contact {self.name!r}: {key}")
+                      for key, direction in (("normal", self.normal), ("up", self.up)))
         for start, end in self.open:
             if not start < end:
                 raise HierarchyError(f"contact {self.name!r}: it cannot be open from {start} s "
@@ -90,18 +92,18 @@ class Contact:
         if self.slides and len(points) > 1:
             raise HierarchyError(f"contact {self.name!r}: {len(points)} points that slide; only a "
                                  "contact of one point does")
-        set_frozen(self, axes=_axes(normal))
+        set_frozen(self, axes=axes, sole=sole)
 
     @classmethod
     def rectangle(cls, frame: Frame, x: tuple[float, float], y: tuple[float, float],
                   friction: float = 0.7, open: Sequence[tuple[float, float]] = (),
-                  ramp: float = 0.1) -> Contact:
-        """Return a sole in the xy plane of its frame: its corners, from `x` and `y` (2,) [m]."""
-        corners = [(x[0], y[0], 0.0), (x[1], y[0], 0.0), (x[1], y[1], 0.0), (x[0], y[1], 0.0)]
-        return cls(frame, corners, friction, open=open, ramp=ramp)
+                  ramp: float = 0.1, *, normal: Vector = (0.0, 0.0, 1.0),
+                  up: Vector = (0.0, 0.0, 1.0)) -> Contact:
+        """Return a sole across `up` through the origin of its frame: see `corners`."""
+        return cls(frame, corners(x, y, up).tolist(), friction, normal, open=open, ramp=ramp, up=up)
 
     def load(self, t: float) -> float:
-        """Share of its largest force that the contact may carry at t [s]: 0 while it is open."""
+        """Share of its load that the contact may carry at t [s]: 0 while it is open."""
         away = min((max(start - t, t - end) for start, end in self.open), default=np.inf)
         return 0.0 if away <= 0.0 else min(1.0, away / self.ramp) if self.ramp else 1.0
 
@@ -177,6 +179,20 @@ class Contacts:
         part = slice(self.robot.n, None) if contact is None else self.blocks[self[contact].name]
         return x[part].reshape(-1, 3)
 
+    def carried(self, t: float, x: ArrayLike, before: Array | None) -> Array:
+        """Normal force (C,) [N] of each contact in an x at t [s]: `State.carried` of the next tick.
+
+        Of a contact in its ramp it is that of `before`, of an open one NaN.
+        """
+        carried = np.full(len(self.contacts), np.nan)
+        for k, contact in enumerate(self.contacts):
+            load = contact.load(t)
+            if load == 1.0:
+                carried[k] = (self.forces(x, contact.name) @ contact.axes[2]).sum()
+            elif load > 0.0 and before is not None:
+                carried[k] = before[k]
+        return carried
+
     def torques(self, state: State, x: ArrayLike) -> Array:
         """Torques M a + h - J_c^T f (n,) [N m or N] of the actuated joints that an x takes."""
         torques = np.empty(self.robot.n - self.robot.actuated)
@@ -220,9 +236,21 @@ def zero_while_open(write: Callable[[], object], state: State, contacts: Contact
     return write_and_zero if opening else write
 
 
-def _axes(normal: Array) -> Array:
-    """Return two tangents and the normal as rows (3, 3); x, y and z of the world for normal z."""
-    n = normal / np.linalg.norm(normal)
+def corners(x: tuple[float, float], y: tuple[float, float], up: Vector = (0.0, 0.0, 1.0)) -> Array:
+    """Return the corners (4, 3) [m] of a sole from its sides `x` and `y` (2,) [m] across `up` (3,).
+
+    x is the frame's x axis as seen along `up`, its y axis for `up` along x, and y is across both.
+    Raises HierarchyError if `up` is no direction.
+    """
+    around = [(x[0], y[0]), (x[1], y[0]), (x[1], y[1]), (x[0], y[1])]
+    return np.asarray(np.array(around, dtype=float) @ _axes(up, "sole: up")[:2])
+
+
+def _axes(normal: Vector, what: str) -> Array:
+    """Return two tangents and the normal as rows (3, 3); x, y and z for normal z."""
+    if np.shape(normal) != (3,) or not 0.0 < np.linalg.norm(normal) < np.inf:
+        raise HierarchyError(f"{what} {normal!r} is no direction")
+    n = np.array(normal, dtype=float) / np.linalg.norm(normal)
     x = np.eye(3)[0 if abs(n[0]) < 0.9 else 1]
     tangent = x - (x @ n) * n
     tangent /= np.linalg.norm(tangent)

@@ -62,6 +62,8 @@ class State:
     of this tick, or None. `commanded` is the last command: velocities (n,), which differ from v on
     a robot that lags, or torques of the actuated joints; None before the first, and for
     accelerations. `sound` is whether the last `move` was to finite positions and velocities.
+    `carried` (C,) [N] is what the contacts carried by the last answer, see `Contacts.carried`, or
+    None.
     """
 
     def __init__(self, robot: Robot, differences: float | None = None) -> None:
@@ -73,6 +75,7 @@ class State:
         self.q, self.v = pin.neutral(robot.model), np.zeros(robot.n)
         self.measurement: Measurement | None = None
         self.commanded: Array | None = None
+        self.carried: Array | None = None
         self._model, self._data = robot.model, robot.model.createData()
         self._compute = partial(pin.computeJointJacobiansTimeVariation, self._model, self._data,
                                 self.q, self.v)

@@ -19,7 +19,7 @@ class CentreOfPressure(FixedRows):
 
     One row per edge of the sole: sum_k f_nk (d_k - margin) >= 0 [N m], with the distance d_k of
     point k from the edge. Pushing forces at the corners keep it inside the sole without these rows;
-    they add the margin. The sole is the convex hull of the points in the xy plane of the frame.
+    they add the margin. The sole is the convex hull of the points as seen along `Contact.up`.
 
     Raises HierarchyError without a surface contact, or if the margin is negative or leaves no room.
     Source: P. Sardain, G. Bessonnet, "Forces acting on a biped robot. Center of pressure-zero
@@ -73,7 +73,7 @@ class CentreOfPressure(FixedRows):
 
 def _distances(contact: Contact) -> Array:
     """Distance (edges, k) [m] of each point from each edge of the hull, inward positive."""
-    points = np.array(contact.points, dtype=float)[:, :2]
+    points = np.array(contact.points, dtype=float) @ contact.sole[:2].T
     edges = _edges(np.unique(points, axis=0))
     return np.array([(points - start) @ inward for start, inward in edges])
 

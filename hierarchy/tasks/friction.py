@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from math import cos, inf, pi, sin
+from math import cos, inf, isnan, nan, pi, sin
 from typing import Literal
 
 import numpy as np
@@ -18,7 +18,8 @@ from hierarchy.state import State
 from hierarchy.task import Level
 from hierarchy.tasks.forces import FixedRows, required
 
-_SLOW = 0.01  # [m/s] below which the friction of a sliding point falls to zero
+_SLOW = 0.01      # [m/s] below which the friction of a sliding point falls to zero
+_NOTHING = 1e-6   # [N] of normal force that counts as none
 
 
 @dataclass(frozen=True)
@@ -28,13 +29,14 @@ class Friction(FixedRows):
     For each point `faces` (4 or 8) one-sided rows of a pyramid inside the cone, then one row of the
     normal force [N]. Inside: of the cone's tangential force the faces' middles allow 71 % with 4
     faces and 92 % with 8, the edges all of it. `least` >= 0 [N] is per point, so a contact pushes
-    and never pulls; `largest` [N] may be infinite. Both are scaled by the load of a contact that
-    opens, so its force is zero while it is open. Of a point that slides, two equalities are in the
+    and never pulls; `largest` [N] may be infinite. The force of a contact is zero while it is open.
+    In the ramp before, its normal force, summed over its points in a row of its own, falls from
+    `State.carried` to zero; where that is not known, as in the ramp after, it is bounded by the
+    share of the robot's weight. Of a point that slides, two equalities are in the
     place of the faces: f_t = -mu f_n v_t / |v_t| with its velocity along the surface v_t, and less
     in proportion below 1 cm/s.
 
-    Raises HierarchyError for another number of faces, sides that leave no force, no contacts, or a
-    contact that opens and has no finite `largest` to ramp.
+    Raises HierarchyError for another number of faces, sides that leave no force, or no contacts.
     Source: A. Herzog et al., "Momentum control with hierarchical inverse dynamics on a
     torque-controlled humanoid", Autonomous Robots (2016).
     """
@@ -54,26 +56,27 @@ class Friction(FixedRows):
         if not 0.0 <= self.least < self.largest:
             raise HierarchyError(f"task {self.name!r}: no normal force is pushing and lies between "
                                  f"least {self.least} N and largest {self.largest} N")
-        for contact in self.contacts.contacts:
-            if contact.open and self.largest == inf:
-                raise HierarchyError(f"task {self.name!r}: contact {contact.name!r} opens; give a "
-                                     "finite largest force, which ramps to zero")
 
     @property
     def row_names(self) -> tuple[str, ...]:
         """Contact, point and face of each row."""
-        rows = [*(f"face {i + 1}" for i in range(self.faces)), "normal force"]
-        return tuple(f"{contact.name} point {k + 1} {row}" for contact in self.contacts.contacts
-                     for k in range(len(contact.points)) for row in rows)
+        rows, names = [*(f"face {i + 1}" for i in range(self.faces)), "normal force"], list[str]()
+        for contact in self.contacts.contacts:
+            names += [f"{contact.name} point {k + 1} {row}" for k in range(len(contact.points))
+                      for row in rows]
+            names += [f"{contact.name} load"] * _summed(contact)
+        return tuple(names)
 
     @property
     def forces(self) -> Array:
         """The rows over the forces (m, 3 p)."""
-        contacts = [contact for contact in self.contacts.contacts for _ in contact.points]
-        rows = np.zeros((len(contacts), self.faces + 1, len(contacts), 3))
-        for k, contact in enumerate(contacts):
-            rows[k, :, k] = self._of(contact)
-        return rows.reshape(len(contacts) * (self.faces + 1), -1)
+        parts, n = [], self.contacts.robot.n
+        for contact in self.contacts.contacts:
+            own = self._of(contact)
+            part = np.zeros((len(own), self.contacts.unknowns))
+            part[:, self.contacts.blocks[contact.name]] = own
+            parts.append(part[:, n:])
+        return np.vstack(parts)
 
     @property
     def sides(self) -> tuple[Array, Array]:
@@ -82,9 +85,12 @@ class Friction(FixedRows):
         A `least` of zero has no side: opposite faces together already say that the point pushes,
         and a row that says it again is a tie at the tip of the pyramid.
         """
-        count = len(self.contacts.points.joints)
-        return (np.tile([*np.zeros(self.faces), self.least or -inf], count),
-                np.tile([*np.full(self.faces, inf), self.largest], count))
+        low, up = list[float](), list[float]()
+        for contact in self.contacts.contacts:
+            count, summed = len(contact.points), _summed(contact)
+            low += [*[0.0] * self.faces, self.least or -inf] * count + [-inf] * summed
+            up += [*[inf] * self.faces, self.largest] * count + [inf] * summed
+        return np.array(low), np.array(up)
 
     def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
                row: int) -> Callable[[], object]:
@@ -92,14 +98,14 @@ class Friction(FixedRows):
         write_rows, n = super().writer(state, level, A, lower, upper, row), state.n
         changing: list[Callable[[], object]] = []
         for k, contact in enumerate(self.contacts.contacts):
-            rows = slice(row, row := row + len(contact.points) * (self.faces + 1))
-            low, up = (side[rows].reshape(-1, self.faces + 1) for side in (lower, upper))
+            rows = slice(row, row := row + len(self._of(contact)))
+            low, up = lower[rows], upper[rows]
             if contact.open:
-                changing.append(partial(self._scale_with_time, contact, state, low, up))
+                changing.append(partial(self._ramp, k, state, low, up))
             if contact.slides:
                 point = self.contacts.blocks[contact.name].start - n
                 changing.append(partial(self._slide, k, state, A[rows, n + point:n + point + 3],
-                                        (low[0], up[0])))
+                                        (low, up)))
 
         def write() -> None:
             write_rows()
@@ -108,8 +114,20 @@ class Friction(FixedRows):
 
         return write if changing else write_rows
 
-    def _scale_with_time(self, contact: Contact, state: State, low: Array, up: Array) -> None:
-        self._scale(contact.load(state.t), low, up)
+    def _ramp(self, number: int, state: State, low: Array, up: Array) -> None:
+        """Write the sides (r,) of a contact that opens: its last row has all its normal force."""
+        contact = self.contacts.contacts[number]
+        share, count = contact.load(state.t), len(contact.points)
+        if share == 1.0:
+            return
+        before = nan if state.carried is None else state.carried[number]
+        allowed = share * (self._weight if isnan(before) else before)
+        each = slice(0, count * (self.faces + 1))
+        if allowed > _NOTHING:
+            low[each][self.faces::self.faces + 1] = share * self.least or -inf
+            up[-1] = min(up[-1], allowed)
+        else:
+            self._close(low[each].reshape(count, -1), up[each].reshape(count, -1))
 
     def _slide(self, number: int, state: State, A: Array, sides: tuple[Array, Array]) -> None:
         """Write the rows (faces + 1, 3) of one point that slides, and their sides."""
@@ -131,21 +149,31 @@ class Friction(FixedRows):
         velocity: Array = J @ state.v
         return velocity
 
-    def _scale(self, load: float, low: Array, up: Array) -> None:
-        """Scale the sides (k, faces + 1) of k points; without load each force is zero.
+    @property
+    def _weight(self) -> float:
+        robot = self.contacts.robot
+        return float(robot.masses.sum() * np.linalg.norm(robot.model.gravity.linear))
 
-        Then two faces and the normal force are equalities and the other faces are free, because at
-        the tip of the pyramid all faces would hold the force at once.
+    def _close(self, low: Array, up: Array) -> None:
+        """Write sides (k, faces + 1) of k points whose forces are zero.
+
+        Two faces and the normal force are equalities and the other faces are free, because at the
+        tip of the pyramid all faces would hold the force at once.
         """
-        low[:, -1], up[:, -1] = load * self.least or -inf, load * self.largest
-        if load == 0.0:
-            low[:, :-1] = -inf
-            for row in (0, self.faces // 4, -1):
-                low[:, row] = up[:, row] = 0.0
+        low[:, :-1] = -inf
+        for row in (0, self.faces // 4, -1):
+            low[:, row] = up[:, row] = 0.0
 
     def _of(self, contact: Contact) -> Array:
-        """Rows (faces + 1, 3) of one point; the first two tangents are normal to faces."""
+        """Rows (r, 3 k) of one contact; the first two tangents are normal to faces."""
         angles = [2.0 * pi * i / self.faces for i in range(self.faces)]
         slope = contact.friction * cos(pi / self.faces)
         local = [*([-cos(angle), -sin(angle), slope] for angle in angles), [0.0, 0.0, 1.0]]
-        return np.array(local) @ contact.axes
+        count, normal = len(contact.points), contact.axes[2]
+        rows = np.kron(np.eye(count), np.array(local) @ contact.axes)
+        return np.vstack([rows, np.tile(normal, (_summed(contact), count))])
+
+
+def _summed(contact: Contact) -> int:
+    """Return how many rows have the normal force of all points: one if several open together."""
+    return int(bool(contact.open) and contact.is_surface)

@@ -16,7 +16,7 @@ from hierarchy.task import check_period
 from hierarchy.tasks import JointLimits, Pointing, Position, Separation
 from hierarchy.tasks.mechanism import above, model_rows
 from scenarios.cell.avoidance import areas_of, avoidance_tasks
-from scenarios.cell.forces import contacts_of, force_task, physics_of, standing_on
+from scenarios.cell.forces import contacts_of, force_task, physics_of
 from scenarios.cell.order import Order, order_of
 from scenarios.cell.plant import plant_of
 from scenarios.cell.plants import Plant
@@ -24,6 +24,7 @@ from scenarios.cell.robot import make_robot, start_of
 from scenarios.cell.sensor import sensor_of
 from scenarios.cell.sensors import Sensor
 from scenarios.cell.stacked import stacked
+from scenarios.cell.standing import check_contacts, standing_on
 from scenarios.cell.tasks import (
     limits_of,
     pointing_of,
@@ -102,6 +103,8 @@ def build(scenario: Scenario, kept: Cell | None = None) -> Cell:
         state = State(robot, control.period if differences else None)
         if sensor is not None:
             sensor.check_start(here)
+        if contacts is not None:
+            check_contacts(scenario, contacts, here)
         plant = plant_of(scenario, robot, start, sensor.obstacles if sensor else Obstacles(),
                          contacts)
     areas = areas_of(scenario)

@@ -6,9 +6,8 @@ from math import inf
 
 import numpy as np
 
-from hierarchy import HierarchyError, Robot, State, Task
-from hierarchy.contacts import Contact, Contacts
-from hierarchy.problem import Array
+from hierarchy import HierarchyError, Robot, Task
+from hierarchy.contacts import Contact, Contacts, corners
 from hierarchy.tasks import (
     BaseDynamics,
     CentreOfPressure,
@@ -19,7 +18,6 @@ from hierarchy.tasks import (
     Together,
     TorqueLimits,
 )
-from scenarios.cell.plants.ground import BALL
 from scenarios.config import Scenario, ScenarioError
 from scenarios.config.contacts import ContactSection
 from scenarios.config.listed import ListedForce, ListedLeastForce
@@ -40,11 +38,9 @@ def _contact(section: ContactSection, robot: Robot) -> Contact:
     if section.x is None or section.y is None:
         return Contact(frame, (section.offset,), section.friction, section.normal,
                        section.name or "", section.open, section.ramp, section.slides)
-    (back, front), (right, left), (x, y, z) = section.x, section.y, section.offset
-    corners = [(x + along, y + across, z) for along, across in (
-        (back, right), (front, right), (front, left), (back, left))]
-    return Contact(frame, corners, section.friction, section.normal, section.name or "",
-                   section.open, section.ramp)
+    points = np.array(section.offset) + corners(section.x, section.y, section.up)
+    return Contact(frame, points.tolist(), section.friction, section.normal, section.name or "",
+                   section.open, section.ramp, up=section.up)
 
 
 def physics_of(scenario: Scenario, contacts: Contacts) -> list[Task]:
@@ -75,22 +71,6 @@ def _limits(scenario: Scenario, contacts: Contacts) -> list[Task]:
     if forces.edge is not None:
         found.append(CentreOfPressure(contacts, forces.edge))
     return found
-
-
-def standing_on(floor: float, contacts: Contacts, q: Array) -> Array:
-    """Return q (nq,) with the base at the height that brings the lowest contact to `floor` [m].
-
-    Raises ScenarioError for a fixed base, or without contacts.
-    """
-    if contacts.robot.base != "floating" or not contacts.contacts:
-        raise ScenarioError("start.on_floor needs a floating base and [[contacts]]")
-    state, q = State.at(contacts.robot, q), q.copy()
-    lowest = min(
-        (state.position(contact.frame) + state.rotation(contact.frame) @ np.array(point))[2]
-        - (0.0 if contact.is_surface else BALL)
-        for contact in contacts.contacts for point in contact.points)
-    q[2] += floor - lowest
-    return q
 
 
 def force_task(section: ListedForce | ListedLeastForce, contacts: Contacts) -> Task:

@@ -40,8 +40,7 @@ def plant_of(scenario: Scenario, robot: Robot, start: tuple[Array, Array],
         body = TorqueRobot(robot, contacts, q, v, control.period, section)
         return body if section.measurement.ideal else Apart(body, sensor)
     if section.kind == "mujoco":
-        arm = PhysicsArm(robot, q, v, control.period, control.level, obstacles, section.servo,
-                         section.joints)
+        arm = PhysicsArm(robot, q, v, control.period, control.level, obstacles, section)
         return Apart(arm, Commanded(arm) if section.feedback == "commanded" else sensor)
     exact = KinematicArm(robot, q, v, control.period, control.level)
     ideal = section.measurement.ideal or section.feedback == "commanded"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from functools import partial
 from pathlib import Path
 
@@ -17,6 +18,7 @@ from scenarios.cli.terminal import (
     troubles,
 )
 from scenarios.config import Scenario
+from scenarios.loop.first_tick import contact_warnings
 from scenarios.loop.recording import Recording
 from scenarios.loop.simulation import simulate
 from scenarios.measure.metrics import as_plain_data
@@ -27,6 +29,8 @@ from scenarios.measure.runs import Run
 def run_scenario(scenario: Scenario, folder: Path, certify: bool, figures: bool,
                  as_json: bool) -> int:
     """Run a scenario, save and print the run, and return the exit code."""
+    for text in contact_warnings(scenario):
+        print(f"hierarchy: warning: {text}", file=sys.stderr)
     with bar() as told:
         told_of_it = partial(told, str(scenario.make_resolver().label))
         recording = simulate(scenario, progress=told_of_it, certified=certify)

@@ -13,11 +13,13 @@ from scenarios.config.tasks import TaskName
 class ContactSection(Section):
     """Points of `frame` that push on a rigid surface, see hierarchy.contacts.Contact.
 
-    `x` and `y` [m] are the sides of a sole, parallel to the frame's xy plane, from `offset` [m] on;
-    without them it is that point. `friction` is what the controller believes, `normal` the
-    direction in which the surface pushes. In each interval of `open` [s] the contact is lifted; its
-    load ramps down for `ramp` [s] before and up after it. A point that `slides` moves along its
-    surface. The name defaults to the frame's.
+    `x` and `y` [m] are the sides of a sole from `offset` [m] on, without them it is that point. The
+    sole is across `up`, a direction in the frame: x is the frame's x axis as seen along `up`, or
+    its y axis if `up` is along x. `friction` is what the controller believes, `normal` the
+    direction in the world in which the surface pushes. In each interval of `open` [s] the contact
+    is lifted; for `ramp` [s] before, its load falls from what it carries, and after it, rises as
+    far as the robot's weight. A point that `slides` moves along its surface. The name defaults to
+    the frame's.
     """
 
     frame: str
@@ -27,6 +29,7 @@ class ContactSection(Section):
     offset: Vector3 = (0.0, 0.0, 0.0)
     friction: Positive = 0.7
     normal: Vector3 = (0.0, 0.0, 1.0)
+    up: Vector3 = (0.0, 0.0, 1.0)
     open: tuple[tuple[NotNegative, NotNegative], ...] = ()
     ramp: NotNegative = 0.1
     slides: Flag = False
@@ -44,7 +47,7 @@ class ForcesSection(Section):
     """The contact forces that the stack allows, as one level with the torque limits.
 
     Of each point: a friction pyramid with `faces`, and a normal force from `least` to `largest`
-    [N], needed where a contact opens. The centre of pressure of a sole stays `edge` [m] inside it,
+    [N], None for no upper bound. The centre of pressure of a sole stays `edge` [m] inside it,
     None for just inside. What velocity a contact has is damped by `damping` [1/s]. Like the rows
     of [limits], these are in the stack if `limits.place` says so.
     """

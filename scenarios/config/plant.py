@@ -105,9 +105,13 @@ class KinematicSection(_Plant):
 
 
 class PhysicsSection(_Plant):
-    """A robot in a physics simulation, under position servos (extra `sim`)."""
+    """A robot in a physics simulation, under position servos (extra `sim`).
+
+    A joint more than `beyond_stop` [rad] beyond its position limit ends the run with a fault.
+    """
 
     kind: Literal["mujoco"]
+    beyond_stop: Positive = 0.2
     servo: ServoSection = ServoSection()
     joints: JointsSection = JointsSection()
 
@@ -143,8 +147,9 @@ class TorqueSection(_Plant):
     `softness` [s] is the time constant of a contact. `joint_friction` [N m] is Coulomb's friction
     and `armature` [kg m^2] the inertia of the drive of every joint, `delay` [s], a whole number of
     periods, the time by which torques arrive late; the controller knows of none of them. `pushes`
-    disturb it. A robot whose centre of mass is `fall` [m] below its start has fallen, which ends
-    the run.
+    disturb it. A robot whose centre of mass is `fall` [m] below its start, or whose base has tilted
+    by `tilt` [rad] from it, has fallen, which ends the run with a fault. So does a joint more than
+    `beyond_stop` [rad] beyond its position limit: joints have no stops in the simulation.
     """
 
     kind: Literal["torque"]
@@ -155,6 +160,8 @@ class TorqueSection(_Plant):
     armature: NotNegative = 0.0
     delay: NotNegative = 0.0
     fall: Positive = 0.2
+    tilt: Positive = 1.0
+    beyond_stop: Positive = 0.2
     pushes: tuple[PushSection, ...] = ()
 
 

@@ -109,6 +109,8 @@ class Controller:
         self.sent = sent = self.policy.choose(t, troubles, x, state.v)
         if self.level != "acceleration":
             state.commanded = sent
+        if cell_contacts is not None and self.answered:
+            state.carried = cell_contacts.carried(t, self.resolution.x, state.carried)
         return sent
 
     def rehearse(self) -> None:

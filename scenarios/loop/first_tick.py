@@ -6,10 +6,13 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from math import isfinite, tau
 
+import numpy as np
+
 from hierarchy.tasks.self_separation import SelfSeparation
 from hierarchy.words import listed
 from scenarios.cell.avoidance import inseparable_pairs
 from scenarios.cell.build import Cell
+from scenarios.cell.standing import doubts
 from scenarios.config import Scenario
 from scenarios.loop.controller import Controller
 from solvers import Status, explain, make
@@ -18,6 +21,7 @@ from solvers.explain import is_missed
 _NAMED = 3        # pairs of capsules named at most
 _ROUNDING = 1e-6  # [m] below a distance that is not said
 _NARROW = 1.0     # [deg] a cone this narrow may have been meant in radians
+_FAR_BEYOND = 2.0  # times its limit: an acceleration that is said
 _MET = 1e-6       # violation of a level relative to its terms, below which it is met
 
 
@@ -47,11 +51,43 @@ def first_tick(scenario: Scenario) -> FirstTick:
     plant = controller.cell.plant
     controller.command(0.0, plant.q, plant.v)
     distances = _distances(controller)
-    warnings = (*_warnings(scenario, distances), *_itself(controller.cell))
+    warnings = (*_warnings(scenario, distances), *_itself(controller.cell),
+                *_of_contacts(controller))
     if not controller.answered:
         return FirstTick(None, (), (), distances, warnings)
     return FirstTick(controller.resolution.status, controller.hierarchy.names,
                      tuple(_unmet(controller)), distances, warnings)
+
+
+def contact_warnings(scenario: Scenario) -> tuple[str, ...]:
+    """Return what the first tick of a scenario with contacts says that its run may not stand.
+
+    Nothing but at level "torque". Raises HierarchyError where a run would.
+    """
+    if scenario.control.level != "torque":
+        return ()
+    controller = Controller(scenario)
+    plant = controller.cell.plant
+    controller.command(0.0, plant.q, plant.v)
+    return tuple(_of_contacts(controller))
+
+
+def _of_contacts(controller: Controller) -> Iterator[str]:
+    """Yield what is wrong with the floor, and the joint whose acceleration is too large."""
+    cell = controller.cell
+    if cell.contacts is None:
+        return
+    yield from doubts(cell.scenario, cell.contacts)
+    if cell.limits is None or not controller.answered:
+        return
+    robot, limit = cell.robot, cell.limits.limits.acceleration
+    asked = controller.resolution.x[robot.actuated:robot.n]
+    i = int((np.abs(asked) / limit).argmax())
+    if abs(asked[i]) > _FAR_BEYOND * limit[i]:
+        unit = robot.velocity_units[robot.actuated + i]
+        yield (f"the first tick asks joint {robot.velocity_names[robot.actuated + i]} for "
+               f"{asked[i]:.3g} {unit}/s^2, {abs(asked[i]) / limit[i]:.2g} times its limit of "
+               f"{limit[i]:g} (limits.acceleration)")
 
 
 def _unmet(controller: Controller) -> Iterator[str]:

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from hierarchy.avoidance import Measurement
+from hierarchy.contacts import Contacts
 from hierarchy.jit import compiled
 from hierarchy.problem import Array, Hierarchy
 from scenarios.cell.build import Cell
@@ -55,6 +56,14 @@ def _meant(recording: Recording) -> Array:
     return np.hstack([recording["planned_acceleration"], forces])
 
 
+def _carried(recording: Recording, contacts: Contacts) -> list[Array | None]:
+    """Return what the contacts carried before each tick, see `Contacts.carried`."""
+    found: list[Array | None] = [None]
+    for t, x in zip(recording["t"].tolist(), _meant(recording), strict=True):
+        found.append(found[-1] if np.isnan(x[0]) else contacts.carried(t, x, found[-1]))
+    return found
+
+
 class Rows:
     """Moves a cell through the recorded ticks."""
 
@@ -65,6 +74,7 @@ class Rows:
         level = recording.scenario.control.level
         self._follows = level != "acceleration"  # whether rows depend on the last command
         self._first = self._v[0] if level == "velocity" else None
+        self._carried = _carried(recording, cell.contacts) if cell.contacts else ()
         self._cone_error = cell.pointing.follow_cone_error(cell.state) if cell.pointing else None
         if "ee_distance" in recording:
             self._distance = np.column_stack([recording["control_point_distance"],
@@ -79,6 +89,8 @@ class Rows:
             return None
         if self._follows:
             cell.state.commanded = self._command[k - 1] if k else self._first
+        if self._carried:
+            cell.state.carried = self._carried[k]
         cone = self._cone_error() if self._cone_error else float("nan")
         seen = cell.sensor.measure(cell.state) if cell.sensor else None
         if not self._is_as_recorded(k, seen) or cell.order(seen, cone).order != order:

@@ -107,11 +107,11 @@ def tick(controller: Controller, recorder: Recorder, t: float,
 
 def _unsound(controller: Controller) -> str:
     state = controller.cell.state
-    joint = int(np.abs(state.v).argmax())
-    if not FASTEST < abs(state.v[joint]) < np.inf:
+    robot, i = state.robot, int(np.abs(state.v).argmax())
+    if not FASTEST < abs(state.v[i]) < np.inf:
         return "the state is not finite"
-    return (f"the motion has diverged: joint {joint} moves at {state.v[joint]:.3g} rad/s, "
-            f"more than {FASTEST:g},")
+    return (f"the motion has diverged: joint {robot.velocity_names[i]} moves at {state.v[i]:.3g} "
+            f"{robot.velocity_units[i]}/s, more than {FASTEST:g},")
 
 
 def _finite(*arrays: Array) -> bool:

@@ -96,6 +96,7 @@ def stepping(ramp, period=0.004, duration=2.6):
         res = resolver.solve(h, memory)
         memory = res.memory
         yield h, res, contacts, state
+        state.carried = contacts.carried(state.t, res.x, state.carried)
         a = contacts.accelerations(res.x)
         v = state.v + period * a
         state.move(state.t + period, ROBOT.integrate(state.q, period * (v - period * a / 2)), v)

@@ -5,6 +5,7 @@ from dataclasses import fields, replace
 import numpy as np
 import pinocchio as pin
 import pytest
+from scipy.spatial.transform import Rotation
 from standing import (
     ROBOT,
     WEIGHT,
@@ -12,17 +13,20 @@ from standing import (
     feet,
     moving_state,
     soles_and_palm,
+    standing_stack,
 )
 
 from hierarchy import HierarchyError, Robot, Stack, State
 from hierarchy.contacts import Contact, Contacts
 from hierarchy.errors import UnknownNameError
 from hierarchy.paths import Still
+from hierarchy.robot import Frame
 from hierarchy.robots.from_table import from_table
 from hierarchy.robots.table import Link, TreeFrame, TreeJoint, TreeTable
 from hierarchy.task import Task
 from hierarchy.tasks import (
     BaseDynamics,
+    CentreOfMass,
     CentreOfPressure,
     ContactForce,
     ContactMotion,
@@ -35,6 +39,7 @@ from hierarchy.tasks import (
     Together,
     TorqueLimits,
 )
+from solvers import make
 
 STEP = 1e-6
 CONTACTS = soles_and_palm()
@@ -227,6 +232,42 @@ def test_points_inside_a_sole_or_on_its_edge_make_no_edges_of_their_own():
     assert sorted(map(tuple, more[:, :12])) == sorted(map(tuple, rows))
 
 
+@pytest.mark.parametrize("turn", [(90.0, 0.0, 0.0), (0.0, 90.0, 0.0), (180.0, 0.0, 40.0)])
+def test_a_sole_in_another_plane_of_its_frame_has_the_same_rows(turn):
+    """The frame of a foot may lie on its side; `up` says in it which way is up."""
+    foot, rotation = ROBOT.frame("left_foot"), Rotation.from_euler("xyz", turn, degrees=True)
+    turned = Frame(foot.name, foot.joint, foot.offset, foot.rotation @ rotation.as_matrix())
+    up = rotation.inv().apply([0.0, 0.0, 1.0])
+    own = Contact.rectangle(turned, (-0.05, 0.16), (-0.04, 0.04), up=up)
+    places = turned.rotation @ np.transpose(own.points)
+    np.testing.assert_allclose(places[2], 0.0, atol=1e-15)
+    sides = np.linalg.norm(np.diff(own.points, axis=0), axis=1)
+    np.testing.assert_allclose(sides, [0.21, 0.08, 0.21])
+    plain = Contact(foot, places.T)  # the same points, in a frame that is level
+    rows, same = (CentreOfPressure(Contacts(ROBOT, [one])).forces for one in (own, plain))
+    value, other = (np.sort(one @ np.arange(12.0) ** 2) for one in (rows, same))
+    np.testing.assert_allclose(value, other, atol=1e-12)
+
+
+@pytest.mark.parametrize(("friction", "holds"), [(0.6, True), (0.3, False)])
+def test_soles_with_a_normal_of_their_own_stand_on_a_slope_as_steep_as_friction_allows(
+        friction, holds):
+    slope = Rotation.from_euler("xyz", [20.0, 0.0, 0.0], degrees=True)  # tan 20 deg = 0.36
+    q = ROBOT.rest.copy()
+    q[3:7] = (slope * Rotation.from_quat(q[3:7])).as_quat()
+    normal, state = slope.apply([0.0, 0.0, 1.0]), State.at(ROBOT, q)
+    contacts = Contacts(ROBOT, [Contact.rectangle(
+        ROBOT.frame(f"{side}_foot"), (-0.05, 0.16), (-0.04, 0.04), friction, normal=normal)
+        for side in ("left", "right")])
+    h = standing_stack(state, contacts).hierarchy(state)
+    x = make("hcod").solve(h).x
+    forces = contacts.forces(x)
+    along = forces - np.outer(forces @ normal, normal)
+    assert (np.linalg.norm(along, axis=1) <= friction * (forces @ normal) + 1e-6).all()
+    stands = np.abs(forces.sum(axis=0) - [0.0, 0.0, WEIGHT]).max() < 1e-6
+    assert stands == holds
+
+
 def test_a_plain_contact_pushes_up_with_one_point_in_the_middle_of_its_frame():
     contact = Contact(ROBOT.frame("left_foot"))
     np.testing.assert_array_equal(contact.axes, np.eye(3))
@@ -315,17 +356,103 @@ def test_an_open_contact_moves_no_base_until_it_is_closed_again():
     np.testing.assert_array_equal(A, closed)
 
 
-def test_a_ramp_scales_the_normal_force_of_each_point_at_the_state_s_time():
-    task = Friction(opening(), least=2.0, largest=50.0)
-    state = State.at(ROBOT, ROBOT.rest)
-    A, lower, upper = np.zeros((40, 60)), np.zeros(40), np.zeros(40)
-    write = task.writer(state, "torque", A, lower, upper, 0)
-    for t, load in ((0.0, 1.0), (0.9, 0.5), (1.5, 0.0), (2.1, 0.5), (3.0, 1.0)):
+def load_row(contacts, carried=None, **settings):
+    """A function of time: the sides of the row that has all the normal force of the right sole."""
+    task, state = Friction(contacts, **settings), State.at(ROBOT, ROBOT.rest)
+    rows = np.zeros((41, 60)), np.zeros(41), np.zeros(41)
+    write = task.writer(state, "torque", *rows, 0)
+    state.carried = None if carried is None else np.array([300.0, carried])
+
+    def at(t):
         state.move(t, state.q, state.v)
         write()
-        np.testing.assert_allclose(lower[4::5], [2.0] * 4 + [2.0 * load] * 4)
-        np.testing.assert_allclose(upper[4::5], [50.0] * 4 + [50.0 * load] * 4)
-        assert np.isinf(upper[20]) == (load > 0.0)
+        return rows[1][40], rows[2][40]
+
+    return at
+
+
+@pytest.mark.parametrize("largest", [100.0, 1e5, np.inf])
+def test_the_load_of_a_sole_falls_in_its_ramp_from_what_it_carried(largest):
+    at = load_row(opening(), 92.0, largest=largest)
+    assert [at(t) for t in (0.5, 0.79, 0.9, 0.99, 1.5)] == [
+        (-np.inf, pytest.approx(up)) for up in (np.inf, np.inf, 46.0, 4.6, np.inf)]
+
+
+@pytest.mark.parametrize("largest", [100.0, 1e5, np.inf])
+def test_where_that_is_not_known_the_load_ramps_with_the_weight(largest):
+    for carried in (None, np.nan):
+        at = load_row(opening(), carried, largest=largest)
+        assert [at(t)[1] for t in (0.9, 1.5, 2.05, 2.1, 2.21)] == pytest.approx(
+            [0.5 * WEIGHT, np.inf, 0.25 * WEIGHT, 0.5 * WEIGHT, np.inf])
+
+
+def test_a_contact_that_carried_nothing_has_no_force_in_its_ramp():
+    contacts = opening()
+    state = State.at(ROBOT, ROBOT.rest, t=0.9)
+    state.carried = np.array([392.0, 0.0])
+    _, lower, upper = Friction(contacts, largest=50.0).rows(state)
+    state.move(1.5, state.q, state.v)
+    for side, other in zip((lower, upper), Friction(contacts, largest=50.0).rows(state)[1:],
+                           strict=True):
+        np.testing.assert_array_equal(side, other)
+
+
+def test_the_least_force_of_each_point_falls_with_the_ramp():
+    task, state = Friction(opening(), least=2.0, largest=50.0), State.at(ROBOT, ROBOT.rest)
+    state.carried = np.array([300.0, 92.0])
+    for t, load in ((0.0, 1.0), (0.9, 0.5), (2.05, 0.25), (3.0, 1.0)):
+        state.move(t, state.q, state.v)
+        _, lower, upper = task.rows(state)
+        np.testing.assert_allclose(lower[4:40:5], [2.0] * 4 + [2.0 * load] * 4)
+        np.testing.assert_allclose(upper[4:40:5], 50.0)
+
+
+def test_a_point_that_opens_ramps_in_the_row_of_its_normal_force():
+    contacts = Contacts(ROBOT, [Contact(FRAME, open=((1.0, 2.0),), ramp=0.2)])
+    state, task = State.at(ROBOT, ROBOT.rest, t=0.9), Friction(contacts, largest=80.0)
+    assert task.dimension == 5
+    for carried, allowed in ((60.0, 30.0), (600.0, 80.0)):
+        state.carried = np.array([carried])
+        assert task.rows(state)[2][-1] == pytest.approx(allowed)
+
+
+def test_what_a_contact_carries_is_kept_while_it_ramps_and_forgotten_when_it_is_open():
+    contacts, x = opening(), np.zeros(60)
+    x[contacts.blocks["right_foot"]][2::3] = [10.0, 20.0, 30.0, 40.0]
+    before = contacts.carried(0.5, x, None)
+    assert before.tolist() == [0.0, 100.0]
+    assert contacts.carried(0.9, 2.0 * x, before).tolist() == [0.0, 100.0]
+    assert np.isnan(contacts.carried(0.9, x, None)[1])
+    after = contacts.carried(1.5, x, before)
+    assert np.isnan(after[1])
+    assert np.isnan(contacts.carried(2.1, x, after)[1])
+    assert contacts.carried(2.3, x, after)[1] == 100.0
+
+
+def test_lifting_a_loaded_foot_changes_torques_alike_whatever_the_largest_force():
+    """With 1e5 N for `largest` the ramp did nothing: the foot gave up 196 N in its last tick."""
+    standing = State.at(ROBOT, ROBOT.rest)
+    com = CentreOfMass(ROBOT, Still((0.0, 0.0, 0.0))).position(standing)
+    found = []
+    for largest in (400.0, 1e5):
+        contacts, state = opening(0.1), State.at(ROBOT, ROBOT.rest)
+        stack = Stack([
+            Together([BaseDynamics(contacts), ContactMotion(contacts)], "physics"),
+            Together([TorqueLimits(ROBOT, contacts=contacts),
+                      Friction(contacts, largest=largest)], "limits"),
+            CentreOfMass(ROBOT, Still(com)), Posture(tuple(ROBOT.rest[7:])),
+            LeastForce(contacts)], "torque", contacts=contacts)
+        loads = []
+        for t in np.arange(0.895, 1.0, 0.001):
+            state.move(t, ROBOT.rest, np.zeros(ROBOT.n))
+            x = make("hcod").solve(stack.hierarchy(state)).x
+            loads.append(contacts.forces(x, "right_foot")[:, 2].sum())
+            state.carried = contacts.carried(t, x, state.carried)
+        found.append(loads)
+    np.testing.assert_allclose(found[0], found[1], atol=1e-6)
+    assert found[0][0] == pytest.approx(WEIGHT / 2)
+    assert np.abs(np.diff(found[0])).max() < 1.01 * WEIGHT / 2 / 100
+
 
 
 @pytest.mark.parametrize("target", [(20.0,), (1.0, 2.0, 3.0), (1.0, 2.0, 3.0, 0.4, 0.5, 0.6)])
@@ -531,7 +658,7 @@ FRAME = ROBOT.frame("left_foot")
     (lambda: ContactMotion(CONTACTS, [np.eye(3)] * 3), "anchors are not (4, 3) for each of 3"),
     (lambda: Contact(FRAME, open=((2.0, 1.0),)), "it cannot be open from 2.0 s until 1.0 s"),
     (lambda: Contact(FRAME, ramp=-1.0), "ramp -1.0 s"),
-    (lambda: Friction(opening()), "'right_foot' opens; give a finite largest force"),
+    (lambda: Contact(FRAME, up=(0, 0, 0)), "contact 'left_foot': up (0, 0, 0) is no direction"),
     (lambda: ContactMotion(opening(), [np.eye(4, 3)] * 2, 9.0), "opens, so its stiffness must be"),
     (lambda: Momentum("all"), "part 'all' is not one of both, linear, angular"),
     (lambda: Momentum("linear", (1.0,)), "is not 3 finite numbers"),

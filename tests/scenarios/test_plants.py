@@ -13,7 +13,7 @@ from scenarios.cell.build import build
 from scenarios.cell.plants import Apart, JointSensor, KinematicArm, PhysicsArm
 from scenarios.cli.main import run_command
 from scenarios.config import ScenarioError
-from scenarios.config.plant import JointsSection, MeasurementSection, ServoSection
+from scenarios.config.plant import JointsSection, MeasurementSection, PhysicsSection
 from scenarios.loop.controller import Controller
 from scenarios.loop.recording import load_run
 from scenarios.measure.metrics import measure
@@ -37,8 +37,8 @@ def mujoco():
 
 def arm(mujoco, q=START, v=STILL, obstacles=(), level="velocity", period=PERIOD, servo=None,
         joints=None):
-    return PhysicsArm(ROBOT, np.array(q), np.array(v), period, level, Obstacles(obstacles),
-                      servo and ServoSection(**servo), joints and JointsSection(**joints))
+    section = PhysicsSection(kind="mujoco", servo=servo or {}, joints=joints or {})
+    return PhysicsArm(ROBOT, np.array(q), np.array(v), period, level, Obstacles(obstacles), section)
 
 
 def states(count=20):

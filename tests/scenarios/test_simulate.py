@@ -209,6 +209,6 @@ def test_a_run_that_diverges_ends_with_a_fault(monkeypatch):
 
     monkeypatch.setattr(scenarios.cell.plants.KinematicArm, "act", broken)
     run = simulate(load("ellipse", SHORT))
-    assert run.fault == ("the motion has diverged: joint 2 moves at 1.5e+03 rad/s, more than 1000, "
-                         "from tick 2 on (t = 0.002 s)")
+    assert run.fault == ("the motion has diverged: joint joint_3 moves at 1.5e+03 rad/s, more than "
+                         "1000, from tick 2 on (t = 0.002 s)")
     assert run.ticks == 3

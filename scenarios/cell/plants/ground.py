@@ -95,11 +95,10 @@ def _touching(contact: Contact, floor: TorqueSection) -> dict[str, str]:
 
 
 def _sole(contact: Contact) -> dict[str, str]:
-    corners = np.array(contact.points, dtype=float)
+    corners = np.array(contact.points, dtype=float) @ contact.sole.T
     low, high = corners.min(axis=0), corners.max(axis=0)
-    frame = contact.frame
-    middle = frame.offset + frame.rotation @ ((low + high) / 2 + [0.0, 0.0, _THICKNESS])
-    R = frame.rotation
+    frame, R = contact.frame, contact.frame.rotation @ contact.sole.T
+    middle = frame.offset + R @ ((low + high) / 2 + [0.0, 0.0, _THICKNESS])
     return {"type": "box", "pos": text(*middle), "xyaxes": text(*R[:, 0], *R[:, 1]),
             "size": text(*(high - low)[:2] / 2, _THICKNESS)}
 

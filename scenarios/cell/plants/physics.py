@@ -17,8 +17,9 @@ from hierarchy.problem import Array
 from hierarchy.robots import TABLES, DHTable
 from hierarchy.task import Level
 from scenarios.cell.plants.mjcf import each, scene
+from scenarios.cell.plants.stops import Stops
 from scenarios.config import ScenarioError
-from scenarios.config.plant import JointsSection, ServoSection
+from scenarios.config.plant import JointsSection, PhysicsSection, ServoSection
 
 _ROUNDING = 1e-9  # of a number of steps
 _ARMS = [name for name, table in TABLES.items() if isinstance(table, DHTable)]
@@ -57,10 +58,11 @@ class PhysicsArm:
     """
 
     def __init__(self, robot: Robot, q: Array, v: Array, period: float, level: Level,
-                 obstacles: Obstacles | None = None, servo: ServoSection | None = None,
-                 joints: JointsSection | None = None) -> None:
+                 obstacles: Obstacles | None = None, section: PhysicsSection | None = None
+                 ) -> None:
         mujoco = mujoco_module()
-        servo, joints = servo or ServoSection(), joints or JointsSection()
+        section = section or PhysicsSection(kind="mujoco")
+        servo, joints = section.servo, section.joints
         if not isinstance(robot.table, DHTable):
             raise ScenarioError(f'plant.kind = "mujoco": robot {robot.name!r} is not one of '
                                 f"{', '.join(_ARMS)}, the arms given as tables")
@@ -75,7 +77,7 @@ class PhysicsArm:
         self._step, self._force_of = mujoco.mj_step, mujoco.mj_contactForce
         self._servo = _Servo(period, level == "acceleration", robot.lower, robot.upper, servo.lead,
                              float(servo.feedforward))
-        self._placed = self._bodies(mujoco)
+        self._placed, self._stops = self._bodies(mujoco), Stops(robot, q, section.beyond_stop)
         self._start(mujoco, q, v)
 
     def _start(self, mujoco: Any, q: Array, v: Array) -> None:
@@ -113,6 +115,11 @@ class PhysicsArm:
                 self._look_at_contacts()
         self._time += self._period
         self.q[:], self.v[:] = self.data.qpos, self.data.qvel
+
+    @property
+    def fault(self) -> str | None:
+        """Why the arm cannot go on: a joint has passed its stop; or None."""
+        return self._stops.passed(self.q)
 
     def _bodies(self, mujoco: Any) -> list[tuple[int, int]]:
         """Return the index of each obstacle with a body, and the index of its mocap body."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from math import ceil, cos, sin
+from math import acos, ceil, cos, sin
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,7 @@ from hierarchy.problem import Array
 from scenarios.cell.plants.ground import on_floor
 from scenarios.cell.plants.measured import whole_periods
 from scenarios.cell.plants.physics import mujoco_module
+from scenarios.cell.plants.stops import Stops
 from scenarios.cell.plants.touch import Touch
 from scenarios.config import ScenarioError
 from scenarios.config.plant import PushSection, TorqueSection
@@ -64,6 +65,8 @@ class TorqueRobot:
         self._waiting = deque([State.at(robot, q).bias_effort()[robot.actuated:]] * delay)
         self._pushes = [(push, self._body(push), push.vector) for push in section.pushes]
         self._time, self._height = 0.0, float(self.data.subtree_com[0][2])
+        self._stops = Stops(robot, q, section.beyond_stop)
+        self._upright = self._vertical()
         self._touch = Touch(mujoco, self.model, contacts)
         self._push = np.zeros(3)
         self._com = np.array(self.data.subtree_com[0])
@@ -95,9 +98,15 @@ class TorqueRobot:
 
     @property
     def fault(self) -> str | None:
-        """Why the robot cannot go on: it has fallen; or None."""
+        """Why the robot cannot go on: it has fallen, or a joint has passed its stop; or None."""
         fallen = self._height - float(self._com[2])
-        return f"the robot has fallen by {fallen:.2g} m" if fallen > self._section.fall else None
+        if fallen > self._section.fall:
+            return f"the robot has fallen by {fallen:.2g} m"
+        tilt = acos(float(np.clip(self._vertical() @ self._upright, -1.0, 1.0)))
+        if tilt > self._section.tilt:
+            return (f"the robot has fallen: its base has tilted by {tilt:.2g} rad, more than "
+                    f"plant.tilt = {self._section.tilt:g},")
+        return self._stops.passed(self.q)
 
     def forces(self) -> dict[str, Array]:
         """Force (3,) [N] of the floor on each contact by name, world axes, in the last period."""
@@ -118,6 +127,10 @@ class TorqueRobot:
         if push.joint not in names:
             raise ScenarioError(f"plant.pushes: {UnknownNameError('joint', push.joint, names)}")
         return names[push.joint]
+
+    def _vertical(self) -> Array:
+        """Return the world's z axis (3,) in the base."""
+        return self._rotation()[2] if self._floating else np.array([0.0, 0.0, 1.0])
 
     def _rotation(self) -> Array:
         R = np.zeros(9)

@@ -1,0 +1,197 @@
+"""Contacts before they are trusted: what a start, a first tick and a fault say of them."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+from standing import ROBOT, feet
+
+from hierarchy import Robot, State
+from hierarchy.contacts import Contact, Contacts
+from hierarchy.robot import Frame
+from scenarios import load, simulate
+from scenarios.cell.build import build
+from scenarios.cell.plants.physics import PhysicsArm
+from scenarios.cell.plants.torque import TorqueRobot
+from scenarios.cli.main import run_command
+from scenarios.config import ScenarioError
+from scenarios.config.plant import TorqueSection
+from scenarios.config.reading import shipped
+from scenarios.loop.first_tick import contact_warnings, first_tick
+
+STANDING = load("stand-push")
+ANKLE = ROBOT.rest[ROBOT.coordinate("left_ankle_pitch")]
+
+
+@pytest.fixture(autouse=True)
+def _with_mujoco(tmp_path, monkeypatch):
+    pytest.importorskip("mujoco")
+    monkeypatch.chdir(tmp_path)
+
+
+def changed(**keys):
+    return STANDING.with_changes({key.replace("__", "."): value for key, value in keys.items()})
+
+
+def tilted(degrees):
+    """Both soles turned by their ankles from where they are flat."""
+    angle = float(ANKLE + np.radians(degrees))
+    return {"start__on_floor": True,
+            "start__joints": {"left_ankle_pitch": angle, "right_ankle_pitch": angle}}
+
+
+# At the start
+
+
+@pytest.mark.parametrize(("keys", "said"), [
+    (tilted(13.5), "'left_foot' is not flat on the floor but tilted by 13.5 deg; its corner "
+                   r"\(-0.05, -0.04, 0\) is 49 mm above the floor"),
+    (tilted(-3.4), "'left_foot' is not flat on the floor but tilted by 3.4 deg.* 12.5 mm above"),
+    (tilted(0.7), "tilted by 0.7 deg; .* 2.57 mm above"),
+    ({"start__on_floor": True, "start__joints": {"right_ankle_roll": 0.1}},
+     "'right_foot' is not flat .* 5.73 deg"),
+    ({"contacts__1__up": [1.0, 0.0, 0.0]},
+     r"'right_foot' is turned on edge, 90 deg .* \[0, 0, 1\] here: set `up`"),
+    ({"contacts__0__up": [0.0, 0.0, -1.0]}, "'left_foot' is upside down, 180 deg"),
+    ({"plant__height": -0.05}, "'left_foot' is 50 mm above the floor. start.on_floor"),
+    ({"plant__height": 0.02}, "'left_foot' is 20 mm below the floor"),
+    ({"contacts__0__x": None, "contacts__0__y": None, "contacts__0__offset": [0.0, 0.0, 0.01]},
+     "'left_foot' is 9 mm above the floor"),
+])
+def test_a_contact_that_does_not_stand_on_the_floor_is_refused(keys, said):
+    with pytest.raises(ScenarioError, match=f"contacts.*: at the start .*{said}"):
+        build(changed(**keys))
+
+
+@pytest.mark.parametrize("keys", [
+    tilted(0.4), {"plant__height": -0.0015},
+    {**tilted(8.0), "contacts__0__open": [[0.0, 1.0]], "contacts__1__open": [[0.0, 1.0]]},
+], ids=["a little", "a little above", "open at the start"])
+def test_what_comes_down_within_a_few_ticks_or_later_is_not_refused(keys):
+    build(changed(**keys))
+
+
+def test_check_and_run_refuse_it_as_an_error_of_the_file(capsys):
+    Path("tilted.toml").write_text(changed(**tilted(13.5)).to_toml(), encoding="utf-8")
+    for command in ("check", "run"):
+        assert run_command([command, "tilted.toml"]) == 2
+        assert "'left_foot' is not flat on the floor" in capsys.readouterr().err
+
+
+# In the first tick
+
+
+def test_a_floor_with_less_friction_than_the_controller_counts_on_is_named():
+    found = first_tick(changed(plant__friction=0.4, contacts__1__friction=0.3)).warnings
+    assert [line for line in found if "friction" in line] == [
+        "contact 'left_foot': the controller counts on a friction of 0.7, and the plant has 0.4 "
+        "(plant.friction): it may slip"]
+
+
+def test_a_normal_that_the_floor_does_not_have_is_named():
+    found = contact_warnings(changed(contacts__0__normal=[1.0, 0.0, 2.0]))
+    assert found == ("contact 'left_foot': its normal is 26.6 deg from vertical, and the plant's "
+                     "floor is horizontal",)
+
+
+def test_an_acceleration_far_beyond_its_limit_is_named():
+    """`tpm` has no limits in its stack: the hand is to stop from 40 rad/s within 1/20 s."""
+    v = np.zeros(ROBOT.n)
+    v[ROBOT.velocity_names.index("left_elbow")] = 40.0
+    found = contact_warnings(changed(start__v=v.tolist(), control__resolver="tpm"))
+    assert len(found) == 1
+    assert "the first tick asks joint left_shoulder_pitch for -" in found[0]
+    assert "times its limit of 300 (limits.acceleration)" in found[0]
+    assert contact_warnings(changed(start__v=v.tolist())) == ()
+
+
+@pytest.mark.parametrize("name", [name for name in shipped() if load(name).contacts
+                                  and "example_robot_data" not in load(name).robot.model])
+def test_the_contacts_of_shipped_scenarios_leave_no_doubt(name):
+    assert contact_warnings(load(name)) == ()
+
+
+def test_run_says_it_before_it_runs(capsys):
+    assert run_command(["run", "stand-push", "--set", "plant.friction=0.6", "--duration", "0.01",
+                        "--out", "slippery"]) == 0
+    out, err = capsys.readouterr()
+    assert err.startswith("hierarchy: warning: contact 'left_foot': the controller counts on")
+    assert "counts on" not in out
+
+
+# Faults
+
+
+def test_a_joint_that_passes_its_stop_ends_the_run_with_a_fault():
+    """No torque within the limits stops an elbow at 40 rad/s within the way that it has."""
+    v, name = np.zeros(ROBOT.n), "left_elbow"
+    v[ROBOT.velocity_names.index(name)] = 40.0
+    run = simulate(changed(start__v=v.tolist(), plant__beyond_stop=0.1, control__duration=0.5))
+    assert run.fault.startswith(f"joint {name} is 0.1")
+    assert "beyond its stop at" in run.fault
+    assert run.ticks < 300
+    column = ROBOT.coordinate(name)
+    upper = ROBOT.upper[column]
+    assert (run["q"][:, column] < upper + 0.1).all()
+
+
+def test_a_base_that_tilts_has_fallen():
+    q, v = ROBOT.rest.copy(), np.zeros(ROBOT.n)
+    q[2] += 100.0
+    v[3:6] = [1.0, -2.0, 0.5]
+    plant = TorqueRobot(ROBOT, feet(), q, v, section=TorqueSection(
+        kind="torque", tilt=0.5, fall=1e3, beyond_stop=1e3))
+    for _ in range(1000):
+        angle = Rotation.from_quat(plant.q[3:7]).apply([0.0, 0.0, 1.0])[2]
+        assert (plant.fault is not None) == (np.arccos(angle) > 0.5)
+        if plant.fault:
+            break
+        plant.act(np.zeros(ROBOT.n - 6))
+    assert plant.fault.startswith("the robot has fallen: its base has tilted by 0.5 rad, more than")
+
+
+def test_a_turn_about_the_vertical_is_no_tilt():
+    q = ROBOT.rest.copy()
+    q[3:7] = Rotation.from_euler("xyz", [0.0, 80.0, 0.0], degrees=True).as_quat()
+    plant = TorqueRobot(ROBOT, feet(), q, section=TorqueSection(kind="torque"))
+    turned = Rotation.from_euler("z", 170.0, degrees=True) * Rotation.from_quat(q[3:7])
+    plant.data.qpos[3:7] = turned.as_quat()[[3, 0, 1, 2]]
+    assert plant.fault is None
+
+
+def test_an_arm_under_servos_has_stops_too():
+    arm = Robot.named("kuka_lwr")
+    q = np.zeros(7)
+    q[3] = arm.upper[3] + 0.3
+    plant = PhysicsArm(arm, q, np.zeros(7), 0.005, "velocity")
+    assert plant.fault is None  # it starts there
+    plant.q[3] += 0.19
+    assert plant.fault is None
+    plant.q[3] += 0.02
+    assert plant.fault.startswith("joint joint_4 is 0.21 rad beyond its stop")
+    plant.q[:] = 0.0
+    plant.q[1] = arm.lower[1] - 0.25
+    assert "joint joint_2 is 0.25 rad beyond its stop at -" in plant.fault
+
+
+def test_a_sole_in_another_plane_of_its_frame_stands_like_a_level_one():
+    rotation = Rotation.from_euler("xyz", [0.0, 90.0, 30.0], degrees=True)
+
+    def turned(contact):
+        old = contact.frame
+        frame = Frame(old.name, old.joint, old.offset, old.rotation @ rotation.as_matrix())
+        points = rotation.inv().apply(contact.points)
+        return Contact(frame, points, up=rotation.inv().apply([0.0, 0.0, 1.0]))
+
+    state = State.at(ROBOT, ROBOT.rest)
+    found = []
+    for contacts in (feet(), Contacts(ROBOT, [turned(one) for one in feet().contacts])):
+        plant = TorqueRobot(ROBOT, contacts, ROBOT.rest)
+        geom = plant.model.geom("left_foot")
+        np.testing.assert_allclose(plant.data.geom_xpos[geom.id][2],
+                                   plant.model.geom_size[geom.id][2], atol=1e-9)
+        found.append([plant.data.geom_xpos[geom.id],
+                      np.abs(plant.data.geom_xmat[geom.id].reshape(3, 3)[2])])
+    np.testing.assert_allclose(found[0], found[1], atol=1e-9)
+    assert state.position(ROBOT.frame("left_foot"))[2] == pytest.approx(0.0, abs=1e-9)
