@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hierarchy.errors import HierarchyError
-from hierarchy.problem import Array, Hierarchy, check_rows
+from hierarchy.gate import check_rows
+from hierarchy.problem import Array, Hierarchy
 from solvers.adapters.packing import (
     ODD,
     damp,
@@ -129,8 +130,8 @@ class _Packed:
     def hierarchy(self) -> Hierarchy:
         """Return the levels; a level is named like another one with a number."""
         m = self.rows
-        return Hierarchy(self.A[:m], self.lower[:m], self.upper[:m],
-                         np.array(self.sizes, dtype=np.int64), self.reference, tuple(self.names))
+        return Hierarchy.trusted(self.A[:m], self.lower[:m], self.upper[:m], self.sizes,
+                                 self.reference, self.names)
 
 
 class _Limits(NamedTuple):

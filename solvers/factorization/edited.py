@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hierarchy.errors import HierarchyError, UnknownNameError, expect
-from hierarchy.problem import Array, Hierarchy, check_rows
+from hierarchy.gate import check_rows
+from hierarchy.problem import Array, Hierarchy
 from solvers.factorization.rows import FEWEST, FactoredRows, Held
 from solvers.resolver import Resolution
 from solvers.resolvers.tpm import Tpm
@@ -193,8 +194,7 @@ class Factorization:
     def hierarchy(self, targets: Targets, reference: ArrayLike | None = None) -> Hierarchy:
         """Return the problem in the current order, for `certify` or another resolver."""
         b = self._packed(targets)
-        return Hierarchy(self.rows, b, b.copy(), np.array(self.sizes, dtype=np.int64),
-                         self._reference(reference), self.names)
+        return Hierarchy(self.rows, b, b.copy(), self.sizes, self._reference(reference), self.names)
 
     # -- internals --------------------------------------------------------------------------------
 
