@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from typing import Any
 
@@ -44,6 +45,23 @@ def shaped(what: str, value: Any, shape: tuple[int, ...]) -> Array:
     if array.shape != shape:
         raise HierarchyError(f"{what} has shape {array.shape}, expected {shape}")
     return array
+
+
+def level_names(names: Sequence[str] | None, count: int) -> tuple[str, ...]:
+    """Return one name for each of so many levels; None for "level 1", "level 2", ...
+
+    Raises HierarchyError unless they are texts, as many, and all different.
+    """
+    if names is None:
+        return tuple(f"level {k + 1}" for k in range(count))
+    if isinstance(names, str) or not all(isinstance(name, str) for name in names):
+        raise HierarchyError(f"names: expected a list of texts, got {brief(names)}")
+    if len(names) != count:
+        raise HierarchyError(f"{len(names)} names for {count} levels")
+    for name, times in Counter(names).items():
+        if times > 1:
+            raise HierarchyError(f"{times} levels are named {name!r}; give each its own name")
+    return tuple(names)
 
 
 def checked_sizes(sizes: ArrayLike, rows: int) -> Sizes:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from itertools import accumulate, pairwise
 from operator import attrgetter
@@ -22,6 +21,7 @@ from hierarchy.gate import (
     checked_level,
     checked_metric,
     checked_sizes,
+    level_names,
     readable,
     shaped,
     sound_rows,
@@ -102,7 +102,7 @@ class Hierarchy:
                  metric: ArrayLike | None = None, give: ArrayLike | None = None) -> None:
         """Keep packed arrays, in the same memory if kernels can read it; else copies."""
         self._keep(A, lower, upper, sizes, reference, names, metric, give)
-        set_frozen(self, names=_level_names(names, len(self.names)))
+        set_frozen(self, names=level_names(names, len(self.names)))
         self._check_values()
 
     @classmethod
@@ -141,7 +141,7 @@ class Hierarchy:
         if not isinstance(levels, Sequence) or isinstance(levels, str):
             raise HierarchyError("levels: expected a list of (A, b) or (A, lower, upper), got "
                                  f"{brief(levels)}")
-        names = _level_names(names, len(levels))
+        names = level_names(names, len(levels))
         packed = [checked_level(name, level) for name, level in zip(names, levels, strict=True)]
         n, sizes = _columns(packed, names, reference), [len(lower) for _, lower, _ in packed]
         return cls(np.vstack([np.empty((0, n)), *(A for A, _, _ in packed)]),
@@ -189,7 +189,7 @@ class Hierarchy:
         lower, upper = shaped("lower", lower, (m,)), shaped("upper", upper, (m,))
         reference = shaped("reference", np.zeros(n) if reference is None else reference, (n,))
         sizes = checked_sizes(sizes, m)
-        names = _level_names(None, len(sizes)) if names is None else tuple(names)
+        names = level_names(None, len(sizes)) if names is None else tuple(names)
         if len(names) != len(sizes):
             raise HierarchyError(f"{len(names)} names for {len(sizes)} levels")
         offsets = np.fromiter(accumulate(sizes.tolist(), initial=0), np.int64)
@@ -285,19 +285,6 @@ class Hierarchy:
                 for name, (A, lower, upper) in zip(self.names, self.levels(), strict=True)]
         return html_table(f"Hierarchy: {self.n} unknowns, most important level first",
                           ("level", "rows", "equalities", "inequalities"), rows)
-
-
-def _level_names(names: Sequence[str] | None, count: int) -> tuple[str, ...]:
-    if names is None:
-        return tuple(f"level {k + 1}" for k in range(count))
-    if isinstance(names, str) or not all(isinstance(name, str) for name in names):
-        raise HierarchyError(f"names: expected a list of texts, got {brief(names)}")
-    if len(names) != count:
-        raise HierarchyError(f"{len(names)} names for {count} levels")
-    for name, times in Counter(names).items():
-        if times > 1:
-            raise HierarchyError(f"{times} levels are named {name!r}; give each its own name")
-    return tuple(names)
 
 
 def _checked_give(give: Sequence[ArrayLike], names: Sequence[str], sizes: list[int]) -> Array:

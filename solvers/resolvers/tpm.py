@@ -82,7 +82,8 @@ class Tpm(Resolver):
         if memory is not None and self.strict:
             return self._within_bounds(h, memory)
         x = h.start()
-        code = self._kernel(*h.rows, x, self._settings, WORKSPACE.array)
+        A, lower, upper, sizes = h.rows
+        code = self._kernel(A, lower, upper, sizes, x, self._settings, WORKSPACE.array)
         if code == SOLVED or (code == INACCURATE and settle_doubt(
                 h, x, np.zeros(3 * h.m + 3), self._settings)):
             return Resolution(x)
