@@ -2,22 +2,51 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any
+from itertools import accumulate, pairwise
+from operator import attrgetter
+from typing import Any, Generic, TypeVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from hierarchy.errors import HierarchyError, brief
+from hierarchy.gate import Array as Array
+from hierarchy.gate import (
+    Sizes,
+    array_of,
+    check_finite,
+    check_rows,
+    checked_give,
+    checked_level,
+    checked_metric,
+    checked_sizes,
+    level_names,
+    readable,
+    shaped,
+    sound_rows,
+    unchangeable,
+)
 from hierarchy.notebook import html_table
+from hierarchy.records import set_frozen
 
-Array = NDArray[np.float64]
 _ROUNDING = 1e-10  # of a violation, relative to 1 + |a| |x|
-# Dimensions and type of what kernels read without a look at it.
-_LAYOUT = {"A": (2, np.float64), "lower": (1, np.float64), "upper": (1, np.float64),
-           "sizes": (1, np.int64), "offsets": (1, np.int64), "reference": (1, np.float64)}
-_NUMBERS = "biufO"  # kinds of numpy's types that are real numbers, or may be
+_ARRAYS = ("A", "lower", "upper", "reference", "metric", "give")  # what can be set
+
+_Kind = TypeVar("_Kind")
+
+
+class _HandedOut(Generic[_Kind]):
+    """An array that a hierarchy hands out as a view: numpy lets its holder change its shape."""
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self._kept = attrgetter(f"_{name}")
+
+    def __get__(self, h: Hierarchy | None, owner: type) -> _Kind:
+        if h is None:
+            return self  # type: ignore[return-value]
+        array: Any = self._kept(h)
+        return None if array is None else array.view()  # type: ignore[return-value]
 
 
 class Hierarchy:
@@ -29,45 +58,72 @@ class Hierarchy:
     A : (m, n) the rows of all levels, stacked from the top level down, C-contiguous.
     lower, upper : (m,) the bounds, in the unit of the rows; equal for an equality.
     sizes, offsets : (L,) rows of each level, zero is allowed; (L + 1,) first row of each, and m.
-    reference : (n,) the x preferred where the levels leave freedom.
-    names : L level names, used in messages.
+    reference : (n,) the x preferred where the levels leave freedom; None for zero.
+    names : L level names, used in messages; None for "level 1", ...
     metric : (n, n) W, symmetric and positive definite, in which a step d to the reference has the
         squared length d^T W d, or None for the identity.
     give : (m,) >= 0, in the unit of the rows, or None for zero: for the levels below and the
         reference, row i may be violated by |s_i| + give_i, s_i as at the least norm of its level.
+
+    Numbers may be written in place, as a `Stack` does; they are then not looked at, and `solve` has
+    a status for NaN and the like. Shapes, types and sizes stay as they were checked: arrays are
+    handed out as views, sizes and offsets read-only. docs/arrays.md.
+
     named : a function that returns the names of the m rows, for messages; None if they have none.
+    n, m : numbers of unknowns and rows. plain : whether there is neither metric nor give.
+    rows, start() : A, lower, upper, sizes; a copy of the reference. For kernels, and nobody else.
+
+    Raises HierarchyError, naming level, row and value, as `from_levels` does.
     """
 
-    __slots__ = ("A", "give", "lower", "metric", "named", "names", "offsets", "reference", "sizes",
-                 "upper")
+    __slots__ = ("_A", "_give", "_lower", "_metric", "_offsets", "_reference", "_sizes", "_upper",
+                 "m", "n", "named", "names", "plain", "rows", "start")
 
-    def __init__(self, A: Array, lower: Array, upper: Array, sizes: NDArray[np.int64],
-                 reference: Array, names: tuple[str, ...], metric: Array | None = None,
-                 give: Array | None = None) -> None:
-        """Wrap arrays without checking their values; `from_levels` checks."""
-        self.A, self.lower, self.upper = A, lower, upper
-        self.sizes, self.reference, self.names = sizes, reference, names
-        self.metric, self.give = metric, give
-        self.named: Callable[[], tuple[str, ...]] | None = None
-        self.offsets = np.zeros(len(sizes) + 1, dtype=np.int64)
-        np.cumsum(sizes, out=self.offsets[1:])
+    A, lower, upper, reference = (_HandedOut[Array]() for _ in range(4))
+    sizes, offsets = _HandedOut[Sizes](), _HandedOut[Sizes]()
+    metric, give = _HandedOut[Array | None](), _HandedOut[Array | None]()
 
-    def __setattr__(self, name: str, value: Any) -> None:
-        """Keep an array as it is if kernels can read it: contiguous, of its type; else a copy."""
-        if name in _LAYOUT:
-            dimensions, kind = _LAYOUT[name]
-            value = np.ascontiguousarray(value, kind)
-            if value.ndim != dimensions:
-                raise HierarchyError(f"{name} has shape {value.shape}, expected {dimensions} "
-                                     f"dimension{'s' * (dimensions > 1)}")
-        object.__setattr__(self, name, value)
+    n: int
+    m: int
+    names: tuple[str, ...]
+    named: Callable[[], tuple[str, ...]] | None
+    plain: bool
+    rows: tuple[Array, Array, Array, Sizes]
+    start: Callable[[], Array]
+    _A: Array
+    _lower: Array
+    _upper: Array
+    _sizes: Sizes
+    _offsets: Sizes
+    _reference: Array
+    _metric: Array | None
+    _give: Array | None
+
+    def __init__(self, A: ArrayLike, lower: ArrayLike, upper: ArrayLike, sizes: ArrayLike,
+                 reference: ArrayLike | None = None, names: Sequence[str] | None = None,
+                 metric: ArrayLike | None = None, give: ArrayLike | None = None) -> None:
+        """Keep packed arrays, in the same memory if kernels can read it; else copies."""
+        self._keep(A, lower, upper, sizes, reference, names, metric, give)
+        set_frozen(self, names=level_names(names, len(self.names)))
+        self._check_values()
+
+    @classmethod
+    def trusted(cls, *parts: Any, **named: Any) -> Hierarchy:
+        """Return the hierarchy of these arguments of `Hierarchy`, whose values are not looked at.
+
+        For what a program works out, which may overflow: `solve` has a status for that. Shapes and
+        sizes are checked as ever.
+        """
+        made = object.__new__(cls)
+        made._keep(*parts, **named)
+        return made
 
     @classmethod
     def from_levels(cls, levels: Sequence[Sequence[ArrayLike]], reference: ArrayLike | None = None,
                     names: Sequence[str] | None = None,
                     metric: ArrayLike | None = None,
                     give: Sequence[ArrayLike] | None = None) -> Hierarchy:
-        """Pack levels given as `(A, b)` or `(A, lower, upper)`.
+        """Pack copies of levels given as `(A, b)` or `(A, lower, upper)`.
 
         Parameters
         ----------
@@ -87,63 +143,106 @@ class Hierarchy:
         if not isinstance(levels, Sequence) or isinstance(levels, str):
             raise HierarchyError("levels: expected a list of (A, b) or (A, lower, upper), got "
                                  f"{brief(levels)}")
-        names = _level_names(names, len(levels))
-        packed = [_checked_level(name, level) for name, level in zip(names, levels, strict=True)]
-        n = _columns(packed, names, reference)
-        ref = np.zeros(n) if reference is None else _vector("reference", reference, n)
-        if not np.isfinite(ref).all():
-            i = int(np.flatnonzero(~np.isfinite(ref))[0])
-            raise HierarchyError(f"reference, entry {i}: {ref[i]} is not finite")
-        return cls(np.ascontiguousarray(np.vstack([np.empty((0, n)), *(A for A, _, _ in packed)])),
+        names = level_names(names, len(levels))
+        packed = [checked_level(name, level) for name, level in zip(names, levels, strict=True)]
+        n, sizes = _columns(packed, names, reference), [len(lower) for _, lower, _ in packed]
+        return cls(np.vstack([np.empty((0, n)), *(A for A, _, _ in packed)]),
                    np.concatenate([np.empty(0), *(low for _, low, _ in packed)]),
-                   np.concatenate([np.empty(0), *(up for _, _, up in packed)]),
-                   np.array([A.shape[0] for A, _, _ in packed], dtype=np.int64), ref, names,
-                   None if metric is None else checked_metric(metric, n),
-                   None if give is None else _checked_give(
-                       give, names, [len(lower) for _, lower, _ in packed]))
+                   np.concatenate([np.empty(0), *(up for _, _, up in packed)]), sizes,
+                   None if reference is None else array_of("reference", reference), names,
+                   None if metric is None else array_of("metric", metric),
+                   None if give is None else _checked_give(give, names, sizes))
 
-    @property
-    def n(self) -> int:
-        """Number of unknowns."""
-        return int(self.A.shape[1])
+    def __setattr__(self, name: str, value: Any) -> None:
+        """Set an array, checked as when made; a side need not fit the other, yet to be set."""
+        if name not in _ARRAYS:
+            raise HierarchyError(f"{name} of a hierarchy cannot be set; make another hierarchy")
+        other = self.changed(**{name: value})
+        open_sides = {"lower": {"upper": np.full(self.m, np.inf)},
+                      "upper": {"lower": np.full(self.m, -np.inf)}}
+        other.changed(**open_sides.get(name, {}))._check_values()
+        set_frozen(self, **{slot: getattr(other, slot) for slot in self.__slots__})
 
-    @property
-    def m(self) -> int:
-        """Total number of rows of all levels."""
-        return int(self.A.shape[0])
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Hierarchy.trusted, tuple(self.changed(named=None)._parts().values())
+
+    def changed(self, **parts: Any) -> Hierarchy:
+        """Return one with other arguments of `Hierarchy`, `trusted`; all others are shared."""
+        return self.trusted(**self._parts() | parts)
+
+    def copy(self) -> Hierarchy:
+        """Return one with arrays of its own: a stack writes the same ones again in each tick."""
+        return self.trusted(*(part.copy() if isinstance(part, np.ndarray) else part
+                              for part in self._parts().values()))
+
+    def _parts(self) -> dict[str, Any]:
+        A, lower, upper, sizes = self.rows
+        return {"A": A, "lower": lower, "upper": upper, "sizes": sizes,
+                "reference": self._reference, "names": self.names, "metric": self._metric,
+                "give": self._give, "named": self.named}
+
+    def _keep(self, A: Any, lower: Any, upper: Any, sizes: Any, reference: Any = None,
+              names: Sequence[str] | None = None, metric: Any = None, give: Any = None,
+              named: Callable[[], tuple[str, ...]] | None = None) -> None:
+        """Let arrays that fit each other in, or raise a HierarchyError."""
+        A = readable("A", A)
+        if A.ndim != 2 or not A.shape[1]:
+            raise HierarchyError(f"A has shape {A.shape}, expected (rows, n) with n >= 1")
+        m, n = A.shape
+        lower, upper = shaped("lower", lower, (m,)), shaped("upper", upper, (m,))
+        reference = shaped("reference", np.zeros(n) if reference is None else reference, (n,))
+        sizes = checked_sizes(sizes, m)
+        names = level_names(None, len(sizes)) if names is None else tuple(names)
+        if len(names) != len(sizes):
+            raise HierarchyError(f"{len(names)} names for {len(sizes)} levels")
+        offsets = np.fromiter(accumulate(sizes.tolist(), initial=0), np.int64)
+        set_frozen(
+            self, rows=(A, lower, upper, sizes), start=reference.copy, m=m, n=n, names=names,
+            named=named, plain=metric is None and give is None, _A=A, _lower=lower, _upper=upper,
+            _reference=reference, _sizes=unchangeable(sizes), _offsets=unchangeable(offsets),
+            _metric=None if metric is None else shaped("metric", metric, (n, n)),
+            _give=None if give is None else shaped("give", give, (m,)))
+
+    def _check_values(self) -> None:
+        """Raise a HierarchyError that names the first bad value, or return None."""
+        if not sound_rows(self._A, self._lower, self._upper):
+            for name, level in zip(self.names, self.levels(), strict=True):
+                check_rows(name, *level)
+        check_finite("reference", self._reference)
+        if self._metric is not None:
+            checked_metric(self._metric, self.n)
+        for name, (first, last) in zip(self.names, self._bounds(), strict=True):
+            if self._give is not None:
+                checked_give(name, self._give[first:last], last - first)
 
     @property
     def is_equality(self) -> bool:
         """Whether every row is an equality."""
-        return bool((self.lower == self.upper).all())
+        return bool((self._lower == self._upper).all())
 
     def levels(self) -> Iterator[tuple[Array, Array, Array]]:
         """Yield `(A_k (m_k, n), lower_k (m_k,), upper_k (m_k,))` as views, top level first."""
-        for first, last in zip(self.offsets[:-1], self.offsets[1:], strict=True):
-            yield self.A[first:last], self.lower[first:last], self.upper[first:last]
+        for first, last in self._bounds():
+            yield self._A[first:last], self._lower[first:last], self._upper[first:last]
 
     @property
     def giving(self) -> list[int]:
         """The levels of which a row gives."""
-        if self.give is None:
+        give = self._give
+        if give is None:
             return []
-        pairs = zip(self.offsets[:-1], self.offsets[1:], strict=True)
-        return [k for k, (i, j) in enumerate(pairs) if (self.give[i:j] > 0.0).any()]
+        return [k for k, (i, j) in enumerate(self._bounds()) if (give[i:j] > 0.0).any()]
 
-    def copy(self) -> Hierarchy:
-        """Return one with arrays of its own: a stack writes the same ones again in each tick."""
-        metric = None if self.metric is None else self.metric.copy()
-        give = None if self.give is None else self.give.copy()
-        copied = Hierarchy(self.A.copy(), self.lower.copy(), self.upper.copy(), self.sizes.copy(),
-                           self.reference.copy(), self.names, metric, give)
-        copied.named = self.named
-        return copied
+    def _bounds(self) -> Iterator[tuple[int, int]]:
+        """Yield the first row of each level and the one after its last."""
+        return pairwise(self._offsets.tolist())
 
     def upper_part(self, count: int) -> Hierarchy:
         """Return the first `count` levels, as views, of which none gives."""
-        m = self.offsets[count]
-        return Hierarchy(self.A[:m], self.lower[:m], self.upper[:m], self.sizes[:count],
-                         self.reference, self.names[:count], self.metric)
+        m = self._offsets[count]
+        return self.changed(A=self._A[:m], lower=self._lower[:m], upper=self._upper[:m],
+                            sizes=self._sizes[:count], names=self.names[:count], give=None,
+                            named=None)
 
     def relaxed(self, level: int, x: ArrayLike) -> Hierarchy:
         """Return the hierarchy that has room for what the rows of a level miss at x, and give.
@@ -152,38 +251,35 @@ class Hierarchy:
         |s_i| + give_i at either side, where s_i is its violation at the least norm of its level. x
         (n,) is optimal for the levels down to this one, which do not give any more.
         """
-        assert self.give is not None, "the hierarchy gives"
-        rows = slice(self.offsets[level], self.offsets[level + 1])
-        slack, lower, upper = self.slacks(x)[rows], self.lower.copy(), self.upper.copy()
-        reach = np.linalg.norm(self.A[rows], axis=1) * float(np.linalg.norm(x))
+        assert self._give is not None, "the hierarchy gives"
+        rows = slice(*self._offsets[level:level + 2])
+        slack, lower, upper = self.slacks(x)[rows], self._lower.copy(), self._upper.copy()
+        reach = np.linalg.norm(self._A[rows], axis=1) * float(np.linalg.norm(x))
         slack[np.abs(slack) <= _ROUNDING * (1.0 + reach)] = 0.0
-        room = np.abs(slack) + self.give[rows]
+        room = np.abs(slack) + self._give[rows]
         lower[rows] -= room
         upper[rows] += room
-        give = self.give.copy()
-        give[:self.offsets[level + 1]] = 0.0
-        return Hierarchy(self.A, lower, upper, self.sizes, self.reference, self.names, self.metric,
-                         give)
+        give = self._give.copy()
+        give[:rows.stop] = 0.0
+        return self.changed(lower=lower, upper=upper, give=give)
 
     def slacks(self, x: ArrayLike) -> Array:
         """Signed violation of every row at x: (m,), positive above `upper`, zero inside.
 
         Raises HierarchyError for another shape.
         """
-        value = self.A @ _vector("x", x, self.n)
-        return np.maximum(value - self.upper, 0.0) - np.maximum(self.lower - value, 0.0)
+        value = self._A @ shaped("x", x, (self.n,))
+        return np.maximum(value - self._upper, 0.0) - np.maximum(self._lower - value, 0.0)
 
     def violations(self, x: ArrayLike) -> Array:
         """Euclidean norm of each level's violation at x: (L,).
 
         Raises HierarchyError for another shape or an entry that is not finite.
         """
-        x = _vector("x", x, self.n)
-        for (i,) in np.argwhere(~np.isfinite(x))[:1]:
-            raise HierarchyError(f"x, entry {i}: {x[i]} is not finite")
+        x = shaped("x", x, (self.n,))
+        check_finite("x", x)
         slack = self.slacks(x)
-        pairs = zip(self.offsets[:-1], self.offsets[1:], strict=True)
-        return np.array([np.linalg.norm(slack[i:j]) for i, j in pairs])
+        return np.array([np.linalg.norm(slack[i:j]) for i, j in self._bounds()])
 
     def __repr__(self) -> str:
         return f"Hierarchy(n={self.n}, sizes={self.sizes.tolist()})"
@@ -195,72 +291,6 @@ class Hierarchy:
                           ("level", "rows", "equalities", "inequalities"), rows)
 
 
-def _level_names(names: Sequence[str] | None, count: int) -> tuple[str, ...]:
-    if names is None:
-        return tuple(f"level {k + 1}" for k in range(count))
-    if isinstance(names, str) or not all(isinstance(name, str) for name in names):
-        raise HierarchyError(f"names: expected a list of texts, got {brief(names)}")
-    if len(names) != count:
-        raise HierarchyError(f"{len(names)} names for {count} levels")
-    for name, times in Counter(names).items():
-        if times > 1:
-            raise HierarchyError(f"{times} levels are named {name!r}; give each its own name")
-    return tuple(names)
-
-
-def _checked_level(name: str, level: Sequence[ArrayLike]) -> tuple[Array, Array, Array]:
-    if not isinstance(level, (tuple, list)) or len(level) not in (2, 3):
-        raise HierarchyError(f"{name}: expected (A, b) or (A, lower, upper), got {brief(level)}")
-    A = _array(f"{name}: A", level[0])
-    if A.ndim != 2:
-        raise HierarchyError(f"{name}: A has shape {A.shape}, expected (rows, n)")
-    lower = _vector(f"{name}: lower" if len(level) == 3 else f"{name}: b", level[1], A.shape[0])
-    upper = lower.copy() if len(level) == 2 else _vector(f"{name}: upper", level[2], A.shape[0])
-    check_rows(name, A, lower, upper)
-    return A, lower, upper
-
-
-def check_rows(name: str, A: Array, lower: Array, upper: Array) -> None:
-    """Raise a HierarchyError that names the first bad row of a level, or return None.
-
-    Shapes: A (m_k, n), lower and upper (m_k,).
-    """
-    if (np.isfinite(A).all() and (lower <= upper).all() and (lower < np.inf).all()
-            and (upper > -np.inf).all()):
-        return
-    for row, column in np.argwhere(~np.isfinite(A))[:1]:
-        raise HierarchyError(f"{name}, row {row}: A[{row}, {column}] is {A[row, column]}")
-    for side, values in (("lower", lower), ("upper", upper)):
-        for (row,) in np.argwhere(np.isnan(values))[:1]:
-            raise HierarchyError(f"{name}, row {row}: {side} is nan")
-    for (row,) in np.argwhere((lower > upper) | (lower == np.inf) | (upper == -np.inf))[:1]:
-        raise HierarchyError(
-            f"{name}, row {row}: no value lies between lower {lower[row]} and upper {upper[row]}")
-
-
-def checked_metric(metric: ArrayLike, n: int | None = None) -> Array:
-    """Return a metric (n, n), n being any number if None.
-
-    Raises HierarchyError if it has another shape, an entry that is not finite, or is not symmetric
-    or not positive definite, up to rounding.
-    """
-    W = _array("metric", metric)
-    size = W.shape[0] if n is None and W.ndim else n or 0
-    if W.shape != (size, size):
-        raise HierarchyError(f"metric has shape {W.shape}, expected ({size}, {size})")
-    for i, j in np.argwhere(~np.isfinite(W))[:1]:
-        raise HierarchyError(f"metric[{i}, {j}] is {W[i, j]}")
-    rounding = size * float(np.finfo(float).eps) * abs(W).max(initial=0.0)
-    for i, j in np.argwhere(abs(W - W.T) > rounding)[:1]:
-        raise HierarchyError(f"metric is not symmetric: [{i}, {j}] is {W[i, j]} and [{j}, {i}] is "
-                             f"{W[j, i]}")
-    smallest = np.linalg.eigvalsh(W).min(initial=np.inf)
-    if not smallest > rounding:
-        raise HierarchyError("metric is not positive definite: its smallest eigenvalue is "
-                             f"{smallest:.3g}")
-    return W
-
-
 def _checked_give(give: Sequence[ArrayLike], names: Sequence[str], sizes: list[int]) -> Array:
     if len(give) != len(names):
         raise HierarchyError(f"give has {len(give)} entries for {len(names)} levels")
@@ -268,27 +298,11 @@ def _checked_give(give: Sequence[ArrayLike], names: Sequence[str], sizes: list[i
         names, give, sizes, strict=True))])
 
 
-def checked_give(name: str, give: ArrayLike, size: int) -> Array:
-    """Return what the rows of a level give (size,), of one number or as many.
-
-    Raises HierarchyError, naming the level, for another shape or a number that is not finite and at
-    least zero.
-    """
-    rows = _array(f"{name}: give", give)
-    if rows.shape not in ((), (size,)):
-        raise HierarchyError(f"{name}: give has shape {rows.shape}, expected one number or "
-                             f"({size},)")
-    rows = np.broadcast_to(rows, (size,)).copy()
-    for i in np.flatnonzero(~(np.isfinite(rows) & (rows >= 0.0)))[:1]:
-        raise HierarchyError(f"{name}, row {i}: give is {rows[i]}, expected a number >= 0")
-    return rows
-
-
 def _columns(packed: list[tuple[Array, Array, Array]], names: tuple[str, ...],
              reference: ArrayLike | None) -> int:
     if not packed and reference is None:
         raise HierarchyError("no levels and no reference: the number of unknowns is not known")
-    n = packed[0][0].shape[1] if packed else _array("reference", reference).size
+    n = packed[0][0].shape[1] if packed else array_of("reference", reference).size
     for name, (A, _, _) in zip(names, packed, strict=True):
         if A.shape[1] != n:
             raise HierarchyError(
@@ -296,21 +310,3 @@ def _columns(packed: list[tuple[Array, Array, Array]], names: tuple[str, ...],
     if n == 0:
         raise HierarchyError("n = 0: a hierarchy needs at least one unknown")
     return n
-
-
-def _vector(what: str, value: ArrayLike, size: int) -> Array:
-    vector = _array(what, value)
-    if vector.shape != (size,):
-        raise HierarchyError(f"{what} has shape {vector.shape}, expected ({size},)")
-    return vector
-
-
-def _array(what: str, value: Any) -> Array:
-    try:
-        given = np.asarray(value)
-        if given.dtype.kind in _NUMBERS:
-            return np.array(given, dtype=np.float64)
-    except (TypeError, ValueError, OverflowError) as error:
-        raise HierarchyError(f"{what} is not an array of numbers: {brief(value)}") from error
-    kind = "real numbers: it is complex," if given.dtype.kind == "c" else "numbers:"
-    raise HierarchyError(f"{what} is not an array of {kind} {brief(value)}")

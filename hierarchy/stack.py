@@ -12,8 +12,9 @@ from numpy.typing import ArrayLike
 from hierarchy.avoidance.measurement import Measurement
 from hierarchy.contacts import Contacts
 from hierarchy.errors import HierarchyError, ReadingError, UnknownNameError, expect
+from hierarchy.gate import checked_give, checked_metric
 from hierarchy.jit import bind, compiled
-from hierarchy.problem import Array, Hierarchy, checked_give, checked_metric
+from hierarchy.problem import Array, Hierarchy
 from hierarchy.state import State
 from hierarchy.task import Level, Task, writer_in_stack
 
@@ -161,10 +162,9 @@ class Stack:
             self.reference = self.reference.on(state.robot)
         known = self._prepared.get(order)
         h = self._buffers(order, state.n) if known is None else known.hierarchy
-        h.metric = state.dynamics.M if isinstance(self._metric, str) else self._metric
-        if h.metric is not None and len(h.metric) != h.n:
-            raise HierarchyError(f"metric of the stack: it has shape {h.metric.shape}, expected "
-                                 f"({h.n}, {h.n})")
+        if self._metric is not None:  # M is symmetric, and its transpose is C-contiguous
+            metric = state.dynamics.M.T if isinstance(self._metric, str) else self._metric
+            h = h.changed(metric=metric)
         writers = [writer_in_stack(self[name], state, self.level, h.A, h.lower, h.upper, int(row))
                    for name, row in zip(order, h.offsets, strict=False)]
         if self.reference is not None:
@@ -192,14 +192,13 @@ class Stack:
 
     def _buffers(self, order: tuple[str, ...], joints: int) -> Hierarchy:
         n = joints if self.contacts is None else self.contacts.unknowns
-        sizes = np.array([self[name].dimension for name in order], dtype=np.int64)
-        m = int(sizes.sum())
+        sizes = [self[name].dimension for name in order]
+        m = sum(sizes)
         give = np.concatenate([np.empty(0), *(
             self._give.get(name, np.zeros(self[name].dimension)) for name in order)])
-        h = Hierarchy(np.zeros((m, n)), np.zeros(m), np.zeros(m), sizes, np.zeros(n), order,
-                      give=give if give.any() else None)
-        h.named = partial(self.row_names, order)
-        return h
+        return Hierarchy.trusted(np.zeros((m, n)), np.zeros(m), np.zeros(m), sizes, names=order,
+                                 give=give if give.any() else None,
+                                 named=partial(self.row_names, order))
 
 
 @compiled

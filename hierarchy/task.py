@@ -13,8 +13,9 @@ import numpy as np
 from hierarchy.avoidance.barrier import Barrier
 from hierarchy.contacts import Contacts
 from hierarchy.errors import HierarchyError, brief, expect
+from hierarchy.gate import check_rows
 from hierarchy.paths import Path
-from hierarchy.problem import Array, check_rows
+from hierarchy.problem import Array
 from hierarchy.robot import Frame, Robot
 from hierarchy.state import State
 

@@ -206,8 +206,8 @@ def _euclidean(h: Hierarchy, x: Array) -> tuple[Hierarchy, Array]:
     except np.linalg.LinAlgError:
         L = np.full_like(h.metric, np.nan)
     at = h.A @ h.reference
-    changed = Hierarchy(np.linalg.solve(L, h.A.T).T, h.lower - at, h.upper - at, h.sizes,
-                        np.zeros(h.n), h.names)
+    changed = h.changed(A=np.linalg.solve(L, h.A.T).T, lower=h.lower - at, upper=h.upper - at,
+                        reference=None, metric=None)
     return changed, L.T @ (x - h.reference)
 
 

@@ -27,10 +27,9 @@ def in_metric(solve: Callable[[Hierarchy, Array | None], _Kind], h: Hierarchy,
     Raises HierarchyError if `solve` does. A bound on one unknown is a row over several of y unless
     the metric is diagonal, so a resolver that takes only bounds refuses it.
     """
-    n, m, W = len(h.reference), len(h.lower), h.metric
-    L, B, sides = np.zeros((n, n)), np.empty((m, n)), np.empty((2, m))
-    change_variables(h.A, (h.lower, h.upper), h.reference, W, L, B, sides)
-    changed = Hierarchy(B, sides[0], sides[1], h.sizes, np.zeros(n), h.names)
+    L, B, sides = np.zeros((h.n, h.n)), np.empty((h.m, h.n)), np.empty((2, h.m))
+    change_variables(h.A, (h.lower, h.upper), h.reference, h.metric, L, B, sides)
+    changed = h.changed(A=B, lower=sides[0], upper=sides[1], reference=None, metric=None)
     try:
         found = solve(changed, memory)
     except HierarchyError as error:

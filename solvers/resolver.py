@@ -163,7 +163,9 @@ def _with_checks(solve: Solve) -> Solve:
             raise HierarchyError(f"{self.name}: memory: got {brief(memory)}; give the memory of an "
                                  "earlier resolution, res.memory, or None")
         try:
-            if h.give is not None and h.give.any():
+            if h.plain:
+                return solve(self, h, memory)
+            if h.giving:
                 refuse_give(self, h)
                 return giving(functools.partial(checked, self), h, memory)
             if h.metric is not None:

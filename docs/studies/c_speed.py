@@ -72,7 +72,7 @@ def sequence(h: Hierarchy, count: int, seed: int = 0) -> list[Hierarchy]:
         turn = np.array([np.sin(phase), np.cos(phase)])
         shift = 0.1 * size * (turn @ directions[0])
         A = h.A * (1.0 + 0.02 * np.einsum("t,tij->ij", turn, directions[1]))
-        ticks.append(Hierarchy(A, h.lower + shift, h.upper + shift, h.sizes, h.reference, h.names))
+        ticks.append(h.changed(A=A, lower=h.lower + shift, upper=h.upper + shift))
     return ticks
 
 

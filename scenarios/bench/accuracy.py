@@ -94,14 +94,13 @@ def hierarchies(case: Case, count: int, seed: int) -> tuple[list[Hierarchy], Arr
     by the difference of its targets.
     """
     order = [row for task in case.tasks for row in task]
-    sizes = np.array([len(task) for task in case.tasks], dtype=np.int64)
+    sizes = np.array([len(task) for task in case.tasks])
     A = np.ascontiguousarray(case.jacobians(count, seed)[:, order])
     b = np.random.default_rng(seed + 1).uniform(-_TARGETS, _TARGETS, (count, len(order)))
     off = b - b[:, [order.index(row) for row in order]]
     least = np.sqrt(np.add.reduceat(off**2, np.cumsum(sizes) - sizes, axis=1))
     level_names = tuple(f"task {k + 1}" for k in range(len(sizes)))
-    return [Hierarchy(A[i], b[i], b[i], sizes, np.zeros(6), level_names)
-            for i in range(count)], least
+    return [Hierarchy(A[i], b[i], b[i], sizes, names=level_names) for i in range(count)], least
 
 
 def said(case: Case, rows: Sequence[dict[str, Any]]) -> str:

@@ -96,7 +96,7 @@ def problems_like(name: str, count: int, seed: int = 0) -> Batch:
 
 def _like(h: Hierarchy, r: np.random.Generator) -> Hierarchy:
     factor = 1.0 + 0.01 * r.uniform(-1.0, 1.0, h.m)
-    return Hierarchy(h.A, h.lower * factor, h.upper * factor, h.sizes, r.normal(size=h.n), h.names)
+    return h.changed(lower=h.lower * factor, upper=h.upper * factor, reference=r.normal(size=h.n))
 
 
 def _timed(name: str, resolver: Resolver, count: int, seconds: float) -> Iterable[dict[str, Any]]:

@@ -75,7 +75,7 @@ def plain_numpy(h: Hierarchy) -> Resolution:
 def moved(h: Hierarchy, seed: int = 0) -> Hierarchy:
     """Return h with both sides of every row scaled by one factor within 1 % of 1."""
     factor = 1.0 + _MOVED * np.random.default_rng(seed).uniform(-1.0, 1.0, h.m)
-    return Hierarchy(h.A, h.lower * factor, h.upper * factor, h.sizes, h.reference, h.names)
+    return h.changed(lower=h.lower * factor, upper=h.upper * factor)
 
 
 def _starts(resolver: Resolver) -> bool:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hierarchy.archives import read_arrays
 from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array, Hierarchy
 from solvers import Resolver, Status, certify, make
@@ -52,8 +53,7 @@ def family(name: str, folder: Path = DATA) -> list[Problem]:
     if not file.is_file():
         raise HierarchyError(f"no reference problems at {file}; they are in tests/data/hlsp of a "
                              "source checkout, and another folder can be given")
-    with np.load(file) as opened:
-        data = dict(opened)
+    data = read_arrays(file)
     return _in_sequence([_problem(data, p) for p in range(len(data["x"]))], data.get("sequence"))
 
 

@@ -64,8 +64,8 @@ def _without(h: Hierarchy, name: str) -> Hierarchy:
     level = h.names.index(name)
     kept = np.delete(np.arange(h.m), np.arange(h.offsets[level], h.offsets[level + 1]))
     names = tuple(other for other in h.names if other != name)
-    return Hierarchy(h.A[kept], h.lower[kept], h.upper[kept], np.delete(h.sizes, level),
-                     h.reference.copy(), names)
+    return h.changed(A=h.A[kept], lower=h.lower[kept], upper=h.upper[kept],
+                     sizes=np.delete(h.sizes, level), reference=h.start(), names=names)
 
 
 def answer(h: Hierarchy) -> Array | None:

@@ -121,7 +121,8 @@ class CutOff(Resolver):
     def solve(self, h: Hierarchy, memory: Any = None) -> Resolution:
         """Resolve h, whose first level bounds every unknown."""
         n = h.n
-        rest = Hierarchy(h.A[n:], h.lower[n:], h.upper[n:], h.sizes[1:], h.reference, h.names[1:])
+        rest = h.changed(A=h.A[n:], lower=h.lower[n:], upper=h.upper[n:], sizes=h.sizes[1:],
+                         names=h.names[1:])
         res = make("tpm").solve(rest)
         return Resolution(np.clip(res.x, h.lower[:n], h.upper[:n]), res.status)
 

@@ -98,6 +98,4 @@ class Judging:
 
 def upper_levels(h: Hierarchy, count: int) -> Hierarchy:
     """Return the first `count` levels of h, with a zero reference."""
-    m = h.offsets[count]
-    return Hierarchy(h.A[:m], h.lower[:m], h.upper[:m], h.sizes[:count], np.zeros(h.n),
-                     h.names[:count])
+    return h.upper_part(count).changed(reference=None, metric=None)

@@ -51,8 +51,6 @@ import dataclasses
 import json
 import os
 import platform
-import zipfile
-import zlib
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -62,6 +60,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import TypeAdapter
 
+from hierarchy.archives import read_arrays
 from hierarchy.errors import HierarchyError, UnknownNameError, file_path
 from scenarios.files import write_json
 from scenarios.loop import notebook
@@ -214,20 +213,15 @@ def load_run(folder: str | Path) -> Recording:
 
 def _arrays(path: Path) -> dict[str, NDArray[Any]]:
     try:
-        with path.open("rb") as stream, np.load(stream, allow_pickle=False) as file:
-            return {name: file[name] for name in file.files}
-    except ValueError as error:  # of numpy, for anything that is no archive of arrays
-        raise HierarchyError(f"{path} cannot be read: it is no file of arrays, or damaged"
-                             ) from error
-    except (OSError, KeyError, EOFError, NotImplementedError, zipfile.BadZipFile,
-            zlib.error) as error:  # what reading a damaged archive raises
+        return read_arrays(path)
+    except HierarchyError as error:
         raise HierarchyError(f"{path} cannot be read: {error}") from error
 
 
 def _facts(path: Path) -> Facts:
     try:
         return TypeAdapter(Facts).validate_python(json.loads(path.read_text(encoding="utf-8")))
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise HierarchyError(f"{path} cannot be read: {error}") from error
 
 

@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hierarchy.errors import HierarchyError
-from hierarchy.problem import Array, Hierarchy, check_rows
+from hierarchy.gate import check_rows
+from hierarchy.problem import Array, Hierarchy
 from hierarchy.words import listed
 from solvers.adapters.packing import (
     ODD,
@@ -88,8 +89,8 @@ def hierarchy(configuration: object, joints: Names, n: int, period: float,
             packed.damp(last, sum(one.damping for one in read), pull)
         packed.keep(name, last)
     h = packed.hierarchy()
-    h.named = partial(_row_names, h, joints, [one for _, read in levels for one in read])
-    return h
+    return h.changed(named=partial(_row_names, h, joints, [one for _, read in levels
+                                                           for one in read]))
 
 
 class ContradictionError(HierarchyError):
@@ -163,8 +164,8 @@ class _Packed:
     def hierarchy(self) -> Hierarchy:
         """Return the levels; a level is named like another one with a number."""
         m = self.rows
-        return Hierarchy(self.A[:m], self.lower[:m], self.upper[:m],
-                         np.array(self.sizes, dtype=np.int64), self.reference, tuple(self.names))
+        return Hierarchy.trusted(self.A[:m], self.lower[:m], self.upper[:m], self.sizes,
+                                 self.reference, self.names)
 
 
 class _Limits(NamedTuple):

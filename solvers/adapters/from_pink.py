@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hierarchy.errors import HierarchyError
-from hierarchy.problem import Array, Hierarchy, check_rows
+from hierarchy.gate import check_rows
+from hierarchy.problem import Array, Hierarchy
 from hierarchy.records import set_frozen
 from hierarchy.state import State
 from hierarchy.task import Level, Task

@@ -10,6 +10,7 @@ least-squares problem (5), (13) in y, the coordinates along these directions.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -41,6 +42,7 @@ def solve(batch: Batch, resolver: Resolver | None = None) -> BatchResolution:
     resolver = make("tpm") if resolver is None else resolver
     if not isinstance(resolver, Tpm) or not resolver.strict:
         raise HierarchyError(f"{resolver.label} is not available in jax; tpm is")
+    batch = replace(batch)  # as `solvers.batch.solve` does
     for p, row in np.argwhere(batch.lower < batch.upper)[:1]:
         refuse_inequality(make("tpm-published"), batch[p], int(row))
     with jax.enable_x64(True):

@@ -11,14 +11,15 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, final
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from hierarchy.errors import HierarchyError, expect
+from hierarchy.gate import checked_sizes, readable, shaped
 from hierarchy.problem import Array, Hierarchy
 from hierarchy.records import set_frozen
 from solvers.kernels.batch import (
@@ -63,15 +64,15 @@ class Batch:
     reference: Array = None  # type: ignore[assignment]  # zeros of the shape of A
 
     def __post_init__(self) -> None:
-        A = _numbers("A", self.A)
+        A = readable("A", self.A)
         if A.ndim != 3 or A.shape[2] == 0:
             raise HierarchyError(f"A has shape {A.shape}, expected (problems, rows, unknowns)")
         sides = A.shape[:2]
         reference = (np.zeros(A.shape[::2]) if self.reference is None
-                     else _shaped("reference", self.reference, A.shape[::2]))
-        set_frozen(self, A=A, lower=_shaped("lower", self.lower, sides),
-                   upper=_shaped("upper", self.upper, sides), sizes=_sizes(self.sizes, A.shape[1]),
-                   reference=reference)
+                     else shaped("reference", self.reference, A.shape[::2]))
+        set_frozen(self, A=A, lower=shaped("lower", self.lower, sides),
+                   upper=shaped("upper", self.upper, sides),
+                   sizes=checked_sizes(self.sizes, A.shape[1]), reference=reference)
 
     @classmethod
     def of(cls, hierarchies: Sequence[Hierarchy]) -> Batch:
@@ -103,8 +104,8 @@ class Batch:
     def __getitem__(self, p: int) -> Hierarchy:
         """Return problem p as a `Hierarchy`, a view of these arrays."""
         names = tuple(f"problem {p}, level {k + 1}" for k in range(len(self.sizes)))
-        return Hierarchy(self.A[p], self.lower[p], self.upper[p], self.sizes, self.reference[p],
-                         names)
+        return Hierarchy.trusted(self.A[p], self.lower[p], self.upper[p], self.sizes,
+                                 self.reference[p], names)
 
 
 @final
@@ -153,6 +154,7 @@ def solve(batch: Batch, resolver: Resolver | None = None, threads: int | None = 
         raise HierarchyError(f"{resolver.label} resolves no batches; tpm and hcod do")
     if threads is not None and threads < 1:
         raise HierarchyError(f"threads = {threads}, expected at least 1")
+    batch = replace(batch)  # numpy lets its holder change the shape of an array: through the gate
     run = _Run(batch, resolver, cores() if threads is None else threads, memory)
     return run.by_tpm() if isinstance(resolver, Tpm) else run.by_hcod()
 
@@ -166,7 +168,7 @@ class _Run:
         count, rows, n = batch.A.shape
         bounds = 0 if isinstance(resolver, Hcod) else n + len(batch.sizes)
         shape = (count, bounds + 3 * rows + 3)
-        before = None if memory is None else _numbers("memory", memory)
+        before = None if memory is None else readable("memory", memory)
         self.before = before if before is not None and before.shape == shape else None
         self.warm: NDArray[np.bool_] = np.zeros(count, dtype=bool)
         if self.before is not None:
@@ -267,30 +269,3 @@ def cores() -> int:
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
-
-
-def _numbers(name: str, value: ArrayLike) -> Array:
-    """Return an array of float64 as kernels need it: C-contiguous and writeable."""
-    try:
-        if np.iscomplexobj(value):
-            raise TypeError
-        return np.require(value, np.float64, ["C", "W", "A"])
-    except (TypeError, ValueError) as error:
-        raise HierarchyError(f"{name} is not an array of numbers") from error
-
-
-def _shaped(name: str, value: ArrayLike, shape: tuple[int, ...]) -> Array:
-    array = _numbers(name, value)
-    if array.shape != shape:
-        raise HierarchyError(f"{name} has shape {array.shape}, expected {shape} for A's "
-                             "problems and " + ("unknowns" if name == "reference" else "rows"))
-    return array
-
-
-def _sizes(value: ArrayLike, rows: int) -> Indices:
-    sizes = np.asarray(value)
-    if sizes.ndim != 1 or (sizes.size and sizes.dtype.kind not in "iu") or (sizes < 0).any():
-        raise HierarchyError(f"sizes is {value!r}, expected a whole number of rows for each level")
-    if sizes.sum() != rows:
-        raise HierarchyError(f"sizes sum to {sizes.sum()}, but A has {rows} rows per problem")
-    return np.require(sizes, np.int64, ["C", "W", "A"])

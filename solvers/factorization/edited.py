@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from numbers import Integral
 from typing import final
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from hierarchy.errors import HierarchyError, UnknownNameError, expect
-from hierarchy.problem import Array, Hierarchy, check_rows
+from hierarchy.gate import check_rows, level_names, readable, shaped
+from hierarchy.problem import Array, Hierarchy
 from solvers.factorization.rows import FEWEST, FactoredRows, Held
 from solvers.resolver import Resolution
 from solvers.resolvers.tpm import Tpm
@@ -44,10 +46,15 @@ class Factorization:
             raise HierarchyError("a factorization needs the staircase form of tpm, got form = "
                                  f"{self._settings.form!r}")
         expect("levels", levels, Sequence, "give a list of matrices (m_k, n)")
-        names = _distinct(names, len(levels))
+        names = level_names(names, len(levels))
         if n is None and not levels:
             raise HierarchyError("no levels and no n: the number of unknowns is not known")
-        self._n = int(np.shape(levels[0])[-1] if np.ndim(levels[0]) == 2 else 0) if n is None else n
+        if n is None:
+            A = readable(f"{names[0]}: A", levels[0])
+            n = A.shape[1] if A.ndim == 2 else 0
+        elif not isinstance(n, Integral) or n < 1:
+            raise HierarchyError(f"n = {n!r}, expected a whole number >= 1")
+        self._n = int(n)
         self._levels: list[Held] = []
         blocks = [self._checked(*level) for level in zip(names, levels, strict=True)]
         self._factor_afresh(list(zip(names, blocks, strict=True)))
@@ -151,7 +158,7 @@ class Factorization:
         place = len(self._levels) if at is None else at
         if any(held.name == level for held in self._levels):
             raise HierarchyError(f"{level}: a level of this name exists")
-        if not 0 <= place <= len(self._levels):
+        if not isinstance(place, Integral) or not 0 <= place <= len(self._levels):
             raise HierarchyError(f"{level}: index {at} is outside 0 .. {len(self._levels)}")
         block = self._checked(level, A)
         used = self._data.used + len(block)
@@ -193,8 +200,7 @@ class Factorization:
     def hierarchy(self, targets: Targets, reference: ArrayLike | None = None) -> Hierarchy:
         """Return the problem in the current order, for `certify` or another resolver."""
         b = self._packed(targets)
-        return Hierarchy(self.rows, b, b.copy(), np.array(self.sizes, dtype=np.int64),
-                         self._reference(reference), self.names)
+        return Hierarchy(self.rows, b, b.copy(), self.sizes, self._reference(reference), self.names)
 
     # -- internals --------------------------------------------------------------------------------
 
@@ -204,7 +210,7 @@ class Factorization:
                 if held.name == level:
                     return k
             raise UnknownNameError("level", level, self.names)
-        if not 0 <= level < len(self._levels):
+        if not isinstance(level, Integral) or not 0 <= level < len(self._levels):
             raise HierarchyError(f"index {level} is outside 0 .. {len(self._levels) - 1}")
         return level
 
@@ -226,7 +232,7 @@ class Factorization:
         return self._data.units(self._m)
 
     def _checked(self, name: str, A: ArrayLike) -> Array:
-        block = _array(f"{name}: A", A)
+        block = readable(f"{name}: A", A)
         if block.ndim != 2 or block.shape[1] != self._n or self._n < 1:
             raise HierarchyError(f"{name}: A has shape {block.shape}, expected (rows, "
                                  f"{self._n if self._n > 0 else 'n'})")
@@ -235,23 +241,26 @@ class Factorization:
         return block
 
     def _reference(self, reference: ArrayLike | None) -> Array:
-        x = np.zeros(self._n) if reference is None else _array("reference", reference).copy()
-        if x.shape != (self._n,):
-            raise HierarchyError(f"reference has shape {x.shape}, expected ({self._n},)")
-        return x
+        if reference is None:
+            return np.zeros(self._n)
+        return shaped("reference", reference, (self._n,)).copy()
 
     def _packed(self, targets: Targets) -> Array:
         """Return b (m,) in the current order."""
-        if isinstance(targets, np.ndarray) and targets.ndim == 1:
+        if isinstance(targets, np.ndarray) and targets.ndim < 2:
             if targets.shape != (self._m,):
                 raise HierarchyError(f"targets have shape {targets.shape}, expected ({self._m},)")
-            return np.ascontiguousarray(targets, dtype=np.float64)
+            return readable("targets", targets)
         if isinstance(targets, Mapping):
             targets = self._in_order(targets)
+        elif isinstance(targets, np.ndarray):
+            targets = [*targets]
+        expect("targets", targets, Sequence, "give b (m,), or b_k (m_k,) of each level")
         if len(targets) != len(self._levels):
             raise HierarchyError(f"{len(targets)} targets for {len(self._levels)} levels")
-        parts = map(_target, self._levels, targets)
-        return np.concatenate([np.empty(0), *parts])
+        return np.concatenate([np.empty(0), *(
+            shaped(f"{level.name}: b", b, (level.rows,))
+            for level, b in zip(self._levels, targets, strict=True))])
 
     def _in_order(self, targets: Mapping[str, ArrayLike]) -> list[ArrayLike]:
         for name in targets:
@@ -270,28 +279,3 @@ class Factorization:
             if row < level.rows:
                 raise HierarchyError(f"{level.name}, row {row}: target is {b[i]}")
             row -= level.rows
-
-
-def _distinct(names: Sequence[str] | None, count: int) -> list[str]:
-    """Return one name per level, all different, or raise a HierarchyError."""
-    names = [f"level {k + 1}" for k in range(count)] if names is None else list(names)
-    if len(names) != count:
-        raise HierarchyError(f"{len(names)} names for {count} levels")
-    for name in names:
-        if names.count(name) > 1:
-            raise HierarchyError(f"{name}: two levels have this name")
-    return names
-
-
-def _target(level: Held, value: ArrayLike) -> Array:
-    b = _array(f"{level.name}: b", value)
-    if b.shape != (level.rows,):
-        raise HierarchyError(f"{level.name}: b has shape {b.shape}, expected ({level.rows},)")
-    return b
-
-
-def _array(what: str, value: ArrayLike) -> Array:
-    try:
-        return np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise HierarchyError(f"{what} is not an array of numbers") from error

@@ -19,8 +19,9 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import NDArray
 
+from hierarchy.archives import array_in, read_members
 from hierarchy.errors import HierarchyError
-from hierarchy.problem import Hierarchy, check_rows
+from hierarchy.problem import Hierarchy
 from solvers.proof import Proof
 
 FORMAT, VERSION = "hierarchical least-squares problems", 1
@@ -121,11 +122,11 @@ def _opened(path: Path) -> tuple[dict[str, Any], Arrays]:
     if not path.exists():
         raise ProblemFileError(f"{path} does not exist")
     try:
-        with zipfile.ZipFile(path) as archive:
-            head = _head(json.loads(archive.read(_HEAD)))
-            names = {**_DATA, **(_ANSWERS if head["answers"] else {})}
-            arrays = {name: _array(archive.read(f"{name}.npy")) for name in names}
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
+        members = read_members(path)
+        head = _head(json.loads(members[_HEAD]))
+        names = {**_DATA, **(_ANSWERS if head["answers"] else {})}
+        arrays = {name: array_in(name, members[f"{name}.npy"]) for name in names}
+    except (ValueError, KeyError, RecursionError) as error:
         raise ProblemFileError(f"{path} is not a file of problems: {_reason(error)}") from error
     for name, kind in names.items():
         if arrays[name].ndim != 1 or arrays[name].dtype != np.dtype(f"<{kind}"):
@@ -150,15 +151,12 @@ def _head(said: Any) -> dict[str, Any]:
     return head
 
 
-def _array(content: bytes) -> NDArray[Any]:
-    return np.lib.format.read_array(io.BytesIO(content), allow_pickle=False)
-
-
 def _reason(error: Exception) -> str:
     if isinstance(error, json.JSONDecodeError):
         return f"its {_HEAD} is not JSON: {error}"
-    return (f"{str(error.args[0]).split(chr(39))[1]} is missing" if isinstance(error, KeyError)
-            else str(error))
+    if isinstance(error, RecursionError):
+        return f"its {_HEAD} is nested too deep"
+    return f"{error.args[0]} is missing" if isinstance(error, KeyError) else str(error)
 
 
 def _add(archive: zipfile.ZipFile, name: str, content: bytes) -> None:
@@ -193,15 +191,16 @@ def _unpacked(arrays: Arrays) -> Iterable[Hierarchy]:
     """Yield the problems; raises ValueError where lengths do not fit or a row is not valid."""
     rest = {name: values for name, values in arrays.items() if name in _DATA}
     for p, (n, count) in enumerate(zip(rest["n"].tolist(), rest["levels"].tolist(), strict=True)):
-        sizes = _taken(rest, "sizes", count, p)
-        m = int(sizes.sum())
-        if n < 1 or (sizes < 0).any():
-            raise ValueError(f"problem {p}: n = {n}, sizes = {sizes.tolist()}")
-        A = _taken(rest, "A", m * n, p).reshape(m, n)
+        sizes = _taken(rest, "sizes", count, p).tolist()
+        m = sum(sizes)
+        if n < 1 or min(sizes, default=0) < 0:
+            raise ValueError(f"problem {p}: n = {n}, sizes = {sizes}")
+        reference, A = _taken(rest, "reference", n, p), _taken(rest, "A", m * n, p).reshape(m, n)
         lower, upper = _taken(rest, "lower", m, p), _taken(rest, "upper", m, p)
-        check_rows(f"problem {p}", A, lower, upper)
-        yield Hierarchy(A, lower, upper, sizes, _taken(rest, "reference", n, p),
-                        tuple(f"level {k + 1}" for k in range(count)))
+        try:
+            yield Hierarchy(A, lower, upper, sizes, reference)
+        except HierarchyError as error:
+            raise ValueError(f"problem {p}, {error}") from error
     _all_taken(rest, ("sizes", "A", "lower", "upper", "reference"))
 
 

@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING, final
 import numpy as np
 from numpy.linalg import norm
 
+from hierarchy.archives import read_arrays
 from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array, Hierarchy
 
@@ -133,12 +134,18 @@ def save(h: Hierarchy, path: str | Path) -> None:
 
 
 def load(path: str | Path) -> Hierarchy:
-    """Read a hierarchy written by `save`; names are optional in the file."""
-    with np.load(path, allow_pickle=False) as file:
-        sizes = file["sizes"]
-        names = (tuple(map(str, file["names"])) if "names" in file
-                 else tuple(f"level {k + 1}" for k in range(len(sizes))))
-        return Hierarchy(file["A"], file["lower"], file["upper"], sizes, file["reference"], names)
+    """Read a hierarchy written by `save`; names are optional in the file.
+
+    Raises HierarchyError, naming the file, if it is damaged or what it holds is no hierarchy.
+    """
+    try:
+        file = read_arrays(Path(path))
+        return Hierarchy(file["A"], file["lower"], file["upper"], file["sizes"], file["reference"],
+                         file["names"].tolist() if "names" in file else None)
+    except KeyError as error:
+        raise HierarchyError(f"{path} has no array {error}") from error
+    except HierarchyError as error:
+        raise HierarchyError(f"{path} cannot be read as a hierarchy: {error}") from error
 
 
 def _directions(rng: Random, size: int, above: Array, recipe: Recipe) -> Array:

@@ -32,7 +32,6 @@ class Augmented(Resolver):
 
     def solve(self, h: Hierarchy, memory: Array | None = None) -> Resolution:
         """Resolve h; a direct method that ignores `memory`."""
-        x, whole = h.reference.copy(), h.offsets[-1:]  # one level of m rows
-        code = entry(solve_by_staircase)(h.A, h.lower, h.upper, whole, x, self._settings,
-                                         WORKSPACE.array)
+        x, whole = h.start(), h.offsets[-1:]  # one level of m rows
+        code = entry(solve_by_staircase)(*h.rows[:3], whole, x, self._settings, WORKSPACE.array)
         return Resolution(x) if code in (SOLVED, INACCURATE) else self._otherwise(h, x, code)

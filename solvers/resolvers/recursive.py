@@ -69,7 +69,8 @@ class Recursive(Resolver):
 
     def solve(self, h: Hierarchy, memory: Array | None = None) -> Resolution:
         """Resolve h; a direct method that ignores `memory`."""
-        x = h.reference.copy()
+        x = h.start()
+        A, lower, upper, sizes = h.rows
         kernel = recursion if self.method == "level" else damped_recursion
-        code = entry(kernel)(h.A, h.lower, h.upper, h.sizes, x, self._settings, WORKSPACE.array)
+        code = entry(kernel)(A, lower, upper, sizes, x, self._settings, WORKSPACE.array)
         return self._otherwise(h, x, code, memory) if code else Resolution(x)

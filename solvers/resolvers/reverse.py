@@ -59,6 +59,6 @@ class Reverse(Resolver):
 
     def solve(self, h: Hierarchy, memory: Array | None = None) -> Resolution:
         """Resolve h; a direct method that ignores `memory`."""
-        x = h.reference.copy()
-        code = entry(reverse)(h.A, h.lower, h.upper, h.sizes, x, self._settings, WORKSPACE.array)
+        x = h.start()
+        code = entry(reverse)(*h.rows, x, self._settings, WORKSPACE.array)
         return self._otherwise(h, x, code) if code else Resolution(x)

@@ -128,8 +128,8 @@ def _mode(h: Hierarchy, active: NDArray[np.int8], ignored: NDArray[np.int64]) ->
     keep[ignored] = False
     if keep.all():
         b = np.where(active == UPPER, h.upper, h.lower)
-        return Hierarchy(h.A, b, b, h.sizes, h.reference, h.names)
+        return h.changed(lower=b, upper=b)
     level = np.repeat(np.arange(len(h.sizes)), h.sizes)[keep]
     b = np.where(active == UPPER, h.upper, h.lower)[keep]
     sizes = np.bincount(level, minlength=len(h.sizes)).astype(np.int64)
-    return Hierarchy(h.A[keep], b, b, sizes, h.reference, h.names)
+    return h.changed(A=h.A[keep], lower=b, upper=b, sizes=sizes, give=None)

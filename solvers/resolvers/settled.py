@@ -183,7 +183,7 @@ class _Above:
                 levels, names = [pace, *levels], ("pace", *names)
         sizes = np.array([len(lower) for _, lower, _ in levels], dtype=np.int64)
         A, lower, upper = (np.concatenate(parts) for parts in zip(*levels, strict=True))
-        return Hierarchy(A, lower, upper, sizes, reference, names)
+        return Hierarchy.trusted(A, lower, upper, sizes, reference, names)
 
     def _directions(self, A: Array, least: float) -> Array:
         """Return the directions (k, n) that the rows A take beyond those held.

@@ -64,14 +64,14 @@ class Sns(Resolver):
 
     def solve(self, h: Hierarchy, memory: Array | None = None) -> Resolution:
         """Resolve h and return a `SaturatedResolution`; `memory` is ignored."""
-        x = h.reference.copy()
-        record = np.empty(len(x) + len(h.sizes) + 1)
-        code = sns(h.A, h.lower, h.upper, h.sizes, x, record, self._settings, WORKSPACE.array)
+        x, levels = h.start(), len(h.names)
+        record = np.empty(len(x) + levels + 1)
+        code = sns(*h.rows, x, record, self._settings, WORKSPACE.array)
         if code == CONTRADICTION:
             _refuse_contradiction(h, int(record[-1]))
         if code < 0 or code == TOO_SMALL:
             return self._otherwise(h, x, code)
-        return SaturatedResolution(x, Status(code), int(record[-1]), record, len(h.sizes))
+        return SaturatedResolution(x, Status(code), int(record[-1]), record, levels)
 
 
 def _refuse_contradiction(h: Hierarchy, row: int) -> None:

@@ -81,8 +81,9 @@ class Tpm(Resolver):
         """
         if memory is not None and self.strict:
             return self._within_bounds(h, memory)
-        x = h.reference.copy()
-        code = self._kernel(h.A, h.lower, h.upper, h.sizes, x, self._settings, WORKSPACE.array)
+        x = h.start()
+        A, lower, upper, sizes = h.rows
+        code = self._kernel(A, lower, upper, sizes, x, self._settings, WORKSPACE.array)
         if code == SOLVED or (code == INACCURATE and settle_doubt(
                 h, x, np.zeros(3 * h.m + 3), self._settings)):
             return Resolution(x)
@@ -103,19 +104,19 @@ class Tpm(Resolver):
         With a memory, which only an answer at a bound leaves, the exact resolver starts from it;
         otherwise, or if no bound is active any more, the staircase is tried first.
         """
-        x, settings, levels = h.reference.copy(), self._settings, len(h.sizes)
+        x, settings, levels = h.start(), self._settings, len(h.names)
         first = len(x) + levels
-        record, known = warm_record(memory, first + 3 * len(h.lower) + 3, self.damping == 0.0)
+        record, known = warm_record(memory, first + 3 * h.m + 3, self.damping == 0.0)
         code, inner = UNPROVED, record[first:]
         if not known:
-            code = run(solve_without_bounds, h.A, h.lower, h.upper, h.sizes, x, record, settings)
+            code = run(solve_without_bounds, *h.rows, x, record, settings)
         if code == UNPROVED:
             code = solve_exactly(h, x, inner, settings, known)
         if code == NO_LIMITS:
             return self.solve(h)
         if code < 0 or code == NUMERICAL_FAILURE:
             return self._otherwise(h, x, code)
-        named = name_saturation(h.A, h.lower, h.upper, h.sizes, x, record, WORKSPACE.array)
+        named = name_saturation(*h.rows, x, record, WORKSPACE.array)
         if named != SOLVED and known:
             return self.solve(h)
         if code == INACCURATE and settle_doubt(h, x, record, settings, name_bounds):
@@ -129,7 +130,7 @@ def name_bounds(h: Hierarchy, x: Array, record: Array) -> None:
 
     record : (n + L + 3 m + 3,); see `name_saturation`.
     """
-    name_saturation(h.A, h.lower, h.upper, h.sizes, x, record, WORKSPACE.array)
+    name_saturation(*h.rows, x, record, WORKSPACE.array)
 
 
 register_variant("tpm-published", "tpm", form="published")
@@ -178,10 +179,10 @@ def task_priority_matrix(h: Hierarchy, **settings: Any) -> TaskPriorityMatrix:
 
 
 def _answer(resolver: Tpm, h: Hierarchy, b: Array, reference: Array) -> Array:
-    return resolver.solve(Hierarchy(h.A, b, b, h.sizes, reference, h.names)).x
+    return resolver.solve(h.changed(lower=b, upper=b, reference=reference, metric=None)).x
 
 
 def _published_matrix(h: Hierarchy, resolver: Tpm) -> Array:
     F = np.empty((h.m, h.m))
-    run(matrix_as_published, h.A, h.lower, h.upper, h.sizes, F, resolver._settings)
+    run(matrix_as_published, *h.rows, F, resolver._settings)
     return F.T.copy()  # (10)

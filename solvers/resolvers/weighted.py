@@ -123,10 +123,10 @@ class Weighted(Resolver):
         if self.strict_levels:
             return Hcod(rank_tolerance=self.rank_tolerance, damping=self.damping,
                         threshold=self.threshold).solve(self.merged(h), memory)
-        x = h.reference.copy()
-        record, _ = warm_record(memory, 2 * len(h.lower) + 1, True)
-        settings = self._settings_for(len(h.sizes))
-        code = weighted(h.A, h.lower, h.upper, h.sizes, x, record, settings, WORKSPACE.array)
+        x = h.start()
+        record, _ = warm_record(memory, 2 * h.m + 1, True)
+        settings = self._settings_for(len(h.names))
+        code = weighted(*h.rows, x, record, settings, WORKSPACE.array)
         if code == SOLVED:
             return WeightedResolution(x, Status.SOLVED, int(record[-1]), record)
         if code == TOO_SMALL:
@@ -141,9 +141,9 @@ class Weighted(Resolver):
         weight = self._weights(len(h.sizes))
         weight[:above] = 1.0
         rows = np.repeat(weight, h.sizes)
-        sizes = np.array([*h.sizes[:above], h.sizes[above:].sum()])
-        return Hierarchy(h.A * rows[:, None], h.lower * rows, h.upper * rows, sizes, h.reference,
-                         (*h.names[:above], "weighted"))
+        return h.changed(A=h.A * rows[:, None], lower=h.lower * rows, upper=h.upper * rows,
+                         sizes=[*h.sizes[:above], h.sizes[above:].sum()],
+                         names=(*h.names[:above], "weighted"))
 
     def _weights(self, levels: int) -> Array:
         if self.weights is None:
@@ -154,7 +154,7 @@ class Weighted(Resolver):
 
     def _continued(self, h: Hierarchy, settings: Array, record: Array) -> Resolution:
         """Continue after the guesses, from an x within the constraints or from a backend's x."""
-        hard, x = record[h.m:2 * h.m] == np.inf, h.reference.copy()
+        hard, x = record[h.m:2 * h.m] == np.inf, h.start()
         if hard.any():
             inside = self._within(h, hard)
             x = inside.x
@@ -163,13 +163,13 @@ class Weighted(Resolver):
         if self.backend != OWN:
             return self._by_backend(h, settings, record, hard, x)
         answer = np.array([x, h.reference])
-        code = run(weighted_steps, h.A, h.lower, h.upper, h.sizes, answer, record, settings)
+        code = run(weighted_steps, *h.rows, answer, record, settings)
         return WeightedResolution(answer[0].copy(), Status(code), int(record[-1]), record)
 
     def _within(self, h: Hierarchy, hard: Mask) -> Resolution:
         """Return the feasible x nearest to the reference; INACCURATE if there is none."""
-        limits = Hierarchy(h.A[hard], h.lower[hard], h.upper[hard],
-                           np.array([hard.sum()]), h.reference, ("constraints",))
+        limits = h.changed(A=h.A[hard], lower=h.lower[hard], upper=h.upper[hard],
+                           sizes=[hard.sum()], names=("constraints",), give=None)
         x, status = _nearest(limits, self.rank_tolerance)
         value, slack = limits.A @ x, limits.slacks(x)
         size = np.linalg.norm(limits.A, axis=1) * np.linalg.norm(x) + abs(value - slack)
@@ -182,8 +182,8 @@ class Weighted(Resolver):
         """Take the active rows from the backend's x, and verify or repair them."""
         found, vouched = self._backend_x(h, hard, record[h.m:2 * h.m])
         record[:h.m] = _acting(h, hard, found)
-        x, before = h.reference.copy(), record[-1]
-        code = run(weighted, h.A, h.lower, h.upper, h.sizes, x, record, settings)
+        x, before = h.start(), record[-1]
+        code = run(weighted, *h.rows, x, record, settings)
         record[-1] += before
         if code != UNPROVED:
             return WeightedResolution(x, Status(code), int(record[-1]), record)

@@ -161,7 +161,7 @@ def test_an_inequality_is_refused_by_problem_level_and_row():
 @pytest.mark.parametrize(("wrong", "says"), [
     ({"A": np.ones((4, 3))}, r"A has shape \(4, 3\), expected \(problems, rows, unknowns\)"),
     ({"A": np.ones((4, 3, 0))}, r"A has shape \(4, 3, 0\)"),
-    ({"A": 1j * np.ones((4, 3, 5))}, "A is not an array of numbers"),
+    ({"A": 1j * np.ones((4, 3, 5))}, "A is not an array of real numbers"),
     ({"lower": np.ones((4, 2))}, r"lower has shape \(4, 2\), expected \(4, 3\)"),
     ({"upper": np.ones(3)}, r"upper has shape \(3,\), expected \(4, 3\)"),
     ({"upper": "high"}, "upper is not an array of numbers"),

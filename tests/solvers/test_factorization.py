@@ -296,7 +296,7 @@ def test_what_is_given_and_what_is_returned_are_copies():
     (lambda f: f.solve(np.zeros(3), [0.0, 0.0]), r"reference has shape \(2,\)"),
     (lambda f: f.solve(np.zeros(3), [0.0, np.nan, 0.0]), "reference, entry 1: nan"),
     (lambda f: Factorization([np.eye(2)], names=["a", "b"]), "2 names for 1 levels"),
-    (lambda f: Factorization([np.eye(2)] * 2, names=["a", "a"]), "a: two levels have this name"),
+    (lambda f: Factorization([np.eye(2)] * 2, names=["a", "a"]), "2 levels are named 'a'"),
     (lambda f: Factorization([]), "no levels and no n"),
     (lambda f: Factorization([[1.0]]), r"level 1: A has shape \(1,\), expected \(rows, n\)"),
     (lambda f: Factorization([np.eye(2), np.eye(3)]), r"level 2: A has shape \(3, 3\)"),

@@ -38,8 +38,7 @@ class Ours(Entrant):
     def prepare(self, problem: Problem) -> Hierarchy:
         """Wrap the arrays."""
         return Hierarchy(problem.A, problem.lower, problem.upper, problem.sizes,
-                         problem.reference,
-                         tuple(f"level {k + 1}" for k in range(len(problem.sizes))))
+                         problem.reference)
 
     def solve(self, prepared: Hierarchy) -> Resolution:
         """Solve without memory."""

@@ -1,0 +1,173 @@
+"""The gate for numbers: what arrays are before a kernel, which looks at nothing, reads them."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from hierarchy.errors import HierarchyError, brief
+
+Array = NDArray[np.float64]
+Sizes = NDArray[np.int64]
+_NUMBERS = "biufO"  # kinds of numpy's types that are real numbers, or may be
+
+
+def array_of(what: str, value: Any) -> Array:
+    """Return numbers as a new array; raises a HierarchyError for anything else."""
+    try:
+        given = np.asarray(value)
+        if given.dtype.kind in _NUMBERS:
+            return np.array(given, dtype=np.float64, order="C")
+    except (TypeError, ValueError, OverflowError) as error:
+        raise HierarchyError(f"{what} is not an array of numbers: {brief(value)}") from error
+    kind = "real numbers: it is complex," if given.dtype.kind == "c" else "numbers:"
+    raise HierarchyError(f"{what} is not an array of {kind} {brief(value)}")
+
+
+def readable(what: str, value: Any) -> Array:
+    """Return numbers as kernels read them: float64, C-contiguous, aligned and writeable.
+
+    The same memory if it is like that, through a view of its own: a caller who then gives his array
+    another shape or type does not change this one. Raises a HierarchyError as `array_of`.
+    """
+    if type(value) is np.ndarray and value.dtype == np.float64 and value.flags.carray:
+        return value.view()
+    return array_of(what, value).view()  # whose `base` is another array
+
+
+def shaped(what: str, value: Any, shape: tuple[int, ...]) -> Array:
+    """Return numbers of this shape as kernels read them; raises a HierarchyError for another."""
+    array = readable(what, value)
+    if array.shape != shape:
+        raise HierarchyError(f"{what} has shape {array.shape}, expected {shape}")
+    return array
+
+
+def level_names(names: Sequence[str] | None, count: int) -> tuple[str, ...]:
+    """Return one name for each of so many levels; None for "level 1", "level 2", ...
+
+    Raises HierarchyError unless they are texts, as many, and all different.
+    """
+    if names is None:
+        return tuple(f"level {k + 1}" for k in range(count))
+    if isinstance(names, str) or not all(isinstance(name, str) for name in names):
+        raise HierarchyError(f"names: expected a list of texts, got {brief(names)}")
+    if len(names) != count:
+        raise HierarchyError(f"{len(names)} names for {count} levels")
+    for name, times in Counter(names).items():
+        if times > 1:
+            raise HierarchyError(f"{times} levels are named {name!r}; give each its own name")
+    return tuple(names)
+
+
+def checked_sizes(sizes: ArrayLike, rows: int) -> Sizes:
+    """Return a copy of the sizes (L,) of levels that share so many rows.
+
+    Raises HierarchyError, naming the level, unless they are whole numbers >= 0 of this sum.
+    """
+    try:
+        found = np.asarray(sizes)
+    except ValueError:
+        found = np.asarray(None)
+    if found.ndim != 1 or (found.size and found.dtype.kind not in "iu"):
+        raise HierarchyError(f"sizes: expected a whole number of rows for each level, got "
+                             f"{brief(sizes)}")
+    numbers = found.tolist()  # those of Python have no largest, so their sum cannot wrap
+    for k, size in enumerate(numbers):
+        if not 0 <= size <= rows:
+            raise HierarchyError(f"level {k + 1}: size {size}, expected a whole number of rows "
+                                 f"from 0 to {rows}")
+    if sum(numbers) != rows:
+        raise HierarchyError(f"sizes sum to {sum(numbers)}, but A has {rows} rows")
+    return np.array(numbers, dtype=np.int64)
+
+
+def unchangeable(numbers: Sizes) -> Sizes:
+    """Return a copy that cannot be made writeable again."""
+    return np.ndarray(numbers.shape, np.int64, numbers.tobytes()).view()
+
+
+def check_rows(name: str, A: Array, lower: Array, upper: Array) -> None:
+    """Raise a HierarchyError that names the first bad row of a level, or return None.
+
+    Shapes: A (m_k, n), lower and upper (m_k,).
+    """
+    if sound_rows(A, lower, upper):
+        return
+    for row, column in np.argwhere(~np.isfinite(A))[:1]:
+        raise HierarchyError(f"{name}, row {row}: A[{row}, {column}] is {A[row, column]}")
+    for side, values in (("lower", lower), ("upper", upper)):
+        for (row,) in np.argwhere(np.isnan(values))[:1]:
+            raise HierarchyError(f"{name}, row {row}: {side} is nan")
+    for (row,) in np.argwhere((lower > upper) | (lower == np.inf) | (upper == -np.inf))[:1]:
+        raise HierarchyError(
+            f"{name}, row {row}: no value lies between lower {lower[row]} and upper {upper[row]}")
+
+
+def sound_rows(A: Array, lower: Array, upper: Array) -> bool:
+    """Whether A is finite and a value lies between the sides of every row."""
+    return bool(np.isfinite(A).all() and (lower <= upper).all() and (lower < np.inf).all()
+                and (upper > -np.inf).all())
+
+
+def check_finite(what: str, values: Array) -> None:
+    """Raise a HierarchyError that names the first entry of (n,) that is not finite."""
+    for (i,) in np.argwhere(~np.isfinite(values))[:1]:
+        raise HierarchyError(f"{what}, entry {i}: {values[i]} is not finite")
+
+
+def checked_metric(metric: ArrayLike, n: int | None = None) -> Array:
+    """Return a metric (n, n), n being any number if None.
+
+    Raises HierarchyError if it has another shape, an entry that is not finite, or is not symmetric
+    or not positive definite, up to rounding.
+    """
+    W = array_of("metric", metric)
+    size = W.shape[0] if n is None and W.ndim else n or 0
+    W = shaped("metric", W, (size, size))
+    for i, j in np.argwhere(~np.isfinite(W))[:1]:
+        raise HierarchyError(f"metric[{i}, {j}] is {W[i, j]}")
+    rounding = size * float(np.finfo(float).eps) * abs(W).max(initial=0.0)
+    for i, j in np.argwhere(abs(W - W.T) > rounding)[:1]:
+        raise HierarchyError(f"metric is not symmetric: [{i}, {j}] is {W[i, j]} and [{j}, {i}] is "
+                             f"{W[j, i]}")
+    smallest = np.linalg.eigvalsh(W).min(initial=np.inf)
+    if not smallest > rounding:
+        raise HierarchyError("metric is not positive definite: its smallest eigenvalue is "
+                             f"{smallest:.3g}")
+    return W
+
+
+def checked_give(name: str, give: ArrayLike, size: int) -> Array:
+    """Return what the rows of a level give (size,), of one number or as many.
+
+    Raises HierarchyError, naming the level, for another shape or a number that is not finite and at
+    least zero.
+    """
+    rows = array_of(f"{name}: give", give)
+    if rows.shape not in ((), (size,)):
+        raise HierarchyError(f"{name}: give has shape {rows.shape}, expected one number or "
+                             f"({size},)")
+    rows = np.broadcast_to(rows, (size,)).copy()
+    for i in np.flatnonzero(~(np.isfinite(rows) & (rows >= 0.0)))[:1]:
+        raise HierarchyError(f"{name}, row {i}: give is {rows[i]}, expected a number >= 0")
+    return rows
+
+
+def checked_level(name: str, level: Sequence[ArrayLike]) -> tuple[Array, Array, Array]:
+    """Return A (m_k, n), lower and upper (m_k,) of a level (A, b) or (A, lower, upper).
+
+    Raises HierarchyError, naming the level, for a wrong type or shape; values are not looked at.
+    """
+    if not isinstance(level, (tuple, list)) or len(level) not in (2, 3):
+        raise HierarchyError(f"{name}: expected (A, b) or (A, lower, upper), got {brief(level)}")
+    A = array_of(f"{name}: A", level[0])
+    if A.ndim != 2:
+        raise HierarchyError(f"{name}: A has shape {A.shape}, expected (rows, n)")
+    first = "lower" if len(level) == 3 else "b"
+    return (A, shaped(f"{name}: {first}", level[1], A.shape[:1]),
+            shaped(f"{name}: {first if len(level) == 2 else 'upper'}", level[-1], A.shape[:1]))
