@@ -53,27 +53,18 @@ class Hierarchy:
     """Levels of rows `lower <= A x <= upper`, most important first.
 
     Level k minimises the Euclidean norm of its violation without giving up any of the norms above
-    it; among all such x the answer is the one nearest to `reference`. A missing bound is infinite.
+    it; among all such x the answer is the one nearest to `reference`. Arguments: see `from_levels`.
 
-    A : (m, n) the rows of all levels, stacked from the top level down, C-contiguous.
-    lower, upper : (m,) the bounds, in the unit of the rows; equal for an equality.
-    sizes, offsets : (L,) rows of each level, zero is allowed; (L + 1,) first row of each, and m.
-    reference : (n,) the x preferred where the levels leave freedom; None for zero.
-    names : L level names, used in messages; None for "level 1", ...
-    metric : (n, n) W, symmetric and positive definite, in which a step d to the reference has the
-        squared length d^T W d, or None for the identity.
-    give : (m,) >= 0, in the unit of the rows, or None for zero: for the levels below and the
-        reference, row i may be violated by |s_i| + give_i, s_i as at the least norm of its level.
+    A (m, n) : the rows of all levels, stacked. lower, upper (m,) : their bounds.
+    sizes (L,), offsets (L + 1,) : rows of each level, zero is allowed; first row of each, and m.
+    reference (n,), metric (n, n) or None, give (m,) or None.
+    names, named : of the L levels; a function that returns those of the m rows, or None.
+    plain : whether there is neither metric nor give.
+    rows, start() : A, lower, upper, sizes; a copy of the reference. For kernels only.
 
-    Numbers may be written in place, as a `Stack` does; they are then not looked at, and `solve` has
-    a status for NaN and the like. Shapes, types and sizes stay as they were checked: arrays are
-    handed out as views, sizes and offsets read-only. docs/arrays.md.
-
-    named : a function that returns the names of the m rows, for messages; None if they have none.
-    n, m : numbers of unknowns and rows. plain : whether there is neither metric nor give.
-    rows, start() : A, lower, upper, sizes; a copy of the reference. For kernels, and nobody else.
-
-    Raises HierarchyError, naming level, row and value, as `from_levels` does.
+    Numbers may be written in place, as a `Stack` does, and are then not looked at: `solve` has a
+    status for NaN. Shapes, types and sizes stay as they were checked: arrays are handed out as
+    views, sizes and offsets read-only; see docs/arrays.md.
     """
 
     __slots__ = ("_A", "_give", "_lower", "_metric", "_offsets", "_reference", "_sizes", "_upper",
@@ -108,14 +99,16 @@ class Hierarchy:
         self._check_values()
 
     @classmethod
-    def trusted(cls, *parts: Any, **named: Any) -> Hierarchy:
+    def trusted(cls, *parts: Any, named: Callable[[], tuple[str, ...]] | None = None,
+                **others: Any) -> Hierarchy:
         """Return the hierarchy of these arguments of `Hierarchy`, whose values are not looked at.
 
-        For what a program works out, which may overflow: `solve` has a status for that. Shapes and
-        sizes are checked as ever.
+        And of `named`. For what a program works out, which may overflow: `solve` has a status for
+        that. Shapes and sizes are checked as ever.
         """
         made = object.__new__(cls)
-        made._keep(*parts, **named)
+        made._keep(*parts, **others)
+        set_frozen(made, named=named)
         return made
 
     @classmethod
@@ -130,8 +123,11 @@ class Hierarchy:
         levels : each `A (m_k, n)` with `b (m_k,)`, or with `lower (m_k,)` and `upper (m_k,)`.
         reference : (n,) or None for zero.
         names : one name per level for messages, each different, or None for "level 1", ...
-        metric : (n, n) symmetric and positive definite, or None for the identity.
-        give : for each level one number for all rows, or (m_k,); None for zero.
+        metric : (n, n) W, symmetric and positive definite, in which a step d to the reference has
+            the squared length d^T W d; None for the identity.
+        give : for each level one number >= 0 for all rows, or (m_k,), in their unit; None for zero:
+            for the levels below and the reference, row i may be violated by |s_i| + give_i, s_i as
+            at the least norm of its level.
 
         Raises
         ------
@@ -164,26 +160,25 @@ class Hierarchy:
         set_frozen(self, **{slot: getattr(other, slot) for slot in self.__slots__})
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return Hierarchy.trusted, tuple(self.changed(named=None)._parts().values())
+        return Hierarchy.trusted, tuple(self._parts().values())
 
     def changed(self, **parts: Any) -> Hierarchy:
         """Return one with other arguments of `Hierarchy`, `trusted`; all others are shared."""
-        return self.trusted(**self._parts() | parts)
+        return self.trusted(**{"named": self.named} | self._parts() | parts)
 
     def copy(self) -> Hierarchy:
         """Return one with arrays of its own: a stack writes the same ones again in each tick."""
-        return self.trusted(*(part.copy() if isinstance(part, np.ndarray) else part
-                              for part in self._parts().values()))
+        return self.changed(**{name: part.copy() for name, part in self._parts().items()
+                               if isinstance(part, np.ndarray)})
 
     def _parts(self) -> dict[str, Any]:
         A, lower, upper, sizes = self.rows
         return {"A": A, "lower": lower, "upper": upper, "sizes": sizes,
                 "reference": self._reference, "names": self.names, "metric": self._metric,
-                "give": self._give, "named": self.named}
+                "give": self._give}
 
     def _keep(self, A: Any, lower: Any, upper: Any, sizes: Any, reference: Any = None,
-              names: Sequence[str] | None = None, metric: Any = None, give: Any = None,
-              named: Callable[[], tuple[str, ...]] | None = None) -> None:
+              names: Sequence[str] | None = None, metric: Any = None, give: Any = None) -> None:
         """Let arrays that fit each other in, or raise a HierarchyError."""
         A = readable("A", A)
         if A.ndim != 2 or not A.shape[1]:
@@ -198,7 +193,7 @@ class Hierarchy:
         offsets = np.fromiter(accumulate(sizes.tolist(), initial=0), np.int64)
         set_frozen(
             self, rows=(A, lower, upper, sizes), start=reference.copy, m=m, n=n, names=names,
-            named=named, plain=metric is None and give is None, _A=A, _lower=lower, _upper=upper,
+            named=None, plain=metric is None and give is None, _A=A, _lower=lower, _upper=upper,
             _reference=reference, _sizes=unchangeable(sizes), _offsets=unchangeable(offsets),
             _metric=None if metric is None else shaped("metric", metric, (n, n)),
             _give=None if give is None else shaped("give", give, (m,)))

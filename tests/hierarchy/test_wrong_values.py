@@ -90,7 +90,7 @@ class Own(Task):
     (lambda: Stack([Own(np.full((2, 7), NAN))]).hierarchy(STATE), "own"),
     (lambda: Stack([Position(FRAME, THERE)], reference="x"), "reference of a stack"),
     (lambda: Stack([Position(FRAME, THERE)], metric=np.eye(3)).hierarchy(STATE),
-     "metric of the stack: it has shape (3, 3), expected (7, 7)"),
+     "metric has shape (3, 3), expected (7, 7)"),
     (lambda: Stack().insert(Posture((0.0,) * 7), "0"), "index: expected an int, got str '0'"),
     (lambda: Robot.load("kuka_lwr", base="flying"), "base must be one of"),
     (lambda: ROBOT.control_point("joint_1", "x"), "control point on 'joint_1': offset"),
