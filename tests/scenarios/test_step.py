@@ -1,6 +1,5 @@
 """The scenario `step`: a foot lifts off and touches down, without a jump of the torques."""
 
-import numpy as np
 import pytest
 from standing import WEIGHT
 
