@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 
 from hierarchy.problem import Array
 
-ROUNDING = 1e-15  # of a row of order one
 REFINEMENTS = 25  # most steps from a backend's active set to the exact one
 AT_ONCE = 10  # the first steps change all rows on the wrong side, later ones a single row
 EXACT = 1e-10  # relative tolerance of the optimality conditions
 LITTLE = 1e-3  # rows violated by less are assumed to hold at a nearby minimiser
 LARGEST = 1e100  # entry: products of three stay finite; nnls kills the process on infinite numbers
+ROUNDING = 1e-15  # of a row of order one
 ACTIVE = 1e-6  # distance to its side, relative to 1 + |side|, at which a row is a candidate
 
 
