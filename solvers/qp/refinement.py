@@ -158,9 +158,16 @@ class _Refinement(NamedTuple):
         moves = sizes > self.rank_tolerance
         next_broken = np.sign(excess) * (abs(excess) > scale * np.where(moves, sizes, 1.0))
         left_out = (next_broken != 0) & (next_broken != broken) & moves
-        optimal = ((abs(over) <= scale).all() and not left_out.any()
+        optimal = (self._within_reach(z) and (abs(over) <= scale).all() and not left_out.any()
                    and rest <= EXACT * (1.0 + norm(B.T @ c)) and self._balanced(z, near, excess))
         return bool(optimal), next_active, next_broken
+
+    def _within_reach(self, z: Array) -> bool:
+        """Whether rows that count as independent can ask for a z as long as this one."""
+        sides = np.concatenate([self.e, *(side for rows in (self.limits, self.kept)
+                                          for side in (rows.lower, rows.upper))])
+        asked = float(abs(sides[np.isfinite(sides)]).max(initial=0.0))
+        return bool(norm(z) * self.rank_tolerance <= 1.0 + asked)
 
     def _balanced(self, z: Array, near: Array, excess: Array) -> bool:
         """Whether rows that are missed balance each other, however small they are.

@@ -33,5 +33,7 @@ class Augmented(Resolver):
     def solve(self, h: Hierarchy, memory: Array | None = None) -> Resolution:
         """Resolve h; a direct method that ignores `memory`."""
         x, whole = h.start(), h.offsets[-1:]  # one level of m rows
-        code = entry(solve_by_staircase)(*h.rows[:3], whole, x, self._settings, WORKSPACE.array)
+        A, lower, upper, _ = h.rows
+        code = entry(solve_by_staircase)(A, lower, upper, whole, x, self._settings,
+                                         WORKSPACE.array)
         return Resolution(x) if code in (SOLVED, INACCURATE) else self._otherwise(h, x, code)

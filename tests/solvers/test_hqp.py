@@ -95,6 +95,13 @@ def test_inequalities_that_cannot_all_hold_share_the_violation_and_then_stay_put
     assert_close(hqp, hqp.solve(h).x, [0.5, 8.5])
 
 
+def test_a_step_that_only_dust_of_rounding_asks_for_is_no_answer():
+    h = problems.structured(9420066, ("nested",))
+    found = make("hqp").solve(h)
+    assert np.abs(found.x).max() < 10.0
+    assert (found.status is Status.SOLVED) == certify(h, found.x).certified
+
+
 @every_backend
 def test_an_equality_between_inequalities_is_met_inside_them(hqp):
     h = Hierarchy.from_levels([([[1.0, 0.0, 0.0]], [-1.0], [1.0]), ([[1.0, 1.0, 0.0]], [3.0]),
