@@ -296,6 +296,10 @@ def test_a_factorization_refuses_what_it_cannot_factor_and_hands_out_copies():
             wrong()
 
 
+def seven_joints():
+    return [f"joint {i + 1}" for i in range(7)]
+
+
 def test_rows_of_a_foreign_task_must_fit_the_unknowns():
     class Wide:
         gain, cost = 1.0, 1.0
@@ -307,7 +311,7 @@ def test_rows_of_a_foreign_task_must_fit_the_unknowns():
             return np.ones((3, 2))
 
     with pytest.raises(HierarchyError, match=r"Wide: \(3, 2\) rows for \(3,\) values and 7"):
-        of_displacements(None, 7, 0.01, [], [], [Wide()])
+        of_displacements(None, seven_joints, 7, 0.01, [], [], [Wide()])
     with pytest.raises(HierarchyError, match=r"limits: \(2, 90\) rows for \(2,\) values and 7"):
-        of_displacements(None, 7, 0.01, [(np.ones((2, 90)), np.ones(2))], [], [])
+        of_displacements(None, seven_joints, 7, 0.01, [(np.ones((2, 90)), np.ones(2))], [], [])
 

@@ -102,8 +102,9 @@ def test_sizes_that_do_not_add_up_are_invalid(library, name, wrong):
 @pytest.mark.parametrize("sizes", [[3, 2, 3], [9, -1, -1], [2**62, 2**62, 7 - 2**63]])
 def test_sizes_of_levels_that_do_not_add_up_are_invalid(library, sizes):
     h, memory = box(), library.memory(box())
-    h.sizes[:] = sizes
-    assert library.call("hcod", c.problem_of(h), memory) == c.INVALID
+    wrong = np.array(sizes, dtype=np.int64)
+    problem = c.problem_of(h, sizes=wrong.ctypes.data_as(c.INTEGERS))
+    assert library.call("hcod", problem, memory) == c.INVALID
     assert (memory.work == c.CANARY).all()
 
 
