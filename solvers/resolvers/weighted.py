@@ -124,7 +124,7 @@ class Weighted(Resolver):
             return Hcod(rank_tolerance=self.rank_tolerance, damping=self.damping,
                         threshold=self.threshold).solve(self.merged(h), memory)
         x = h.reference.copy()
-        record, _ = warm_record(memory, 2 * len(h.lower) + 1, True)
+        record = warm_record(memory, 2 * len(h.lower) + 1)
         settings = self._settings_for(len(h.sizes))
         code = weighted(h.A, h.lower, h.upper, h.sizes, x, record, settings, WORKSPACE.array)
         if code == SOLVED:
