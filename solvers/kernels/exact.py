@@ -132,7 +132,7 @@ def solve_exactly(A, lower, upper, sizes, x, record, settings, work):
     limit, code, steps = np.int64(settings[MOST]), ZERO + UNPROVED, ZERO
     warm, level = record[3 * m] + record[3 * m + 1] > 0.0, ZERO - 1
     if warm:
-        level = np.int64(record[3 * m + 2])
+        level = _level_of(record[3 * m + 2], sizes.size)
         code, steps = pivot_in_blocks(s, limit, level >= 0)
     blocks, passed = steps, False
     if code == UNPROVED and level < 0:
@@ -162,6 +162,12 @@ def solve_exactly(A, lower, upper, sizes, x, record, settings, work):
     _keep(s, record, blocks, steps - blocks)
     record[3 * m + 2] = max(level, 0) if code == ITERATION_LIMIT else -1.0
     return code if all_finite(x) else finish(x, NUMERICAL_FAILURE)
+
+
+@inlined
+def _level_of(number, levels):
+    """Return the level at which an earlier search ended; -1 for none."""
+    return np.int64(number) if 0.0 <= number < levels else ZERO - 1
 
 
 @inlined

@@ -95,7 +95,7 @@ def judge(s, last, newest):
             s.index[CHANGE, i] = 1 if value > up else -1
             wrong += 1
             if over > worst * norm:
-                most, worst = i, over / norm
+                most, worst = ZERO + i, over / norm
     return Found(wrong + leaving, leaving, most)
 
 
@@ -104,7 +104,7 @@ def _points_inward(s):
     """Whether a row of the working set is to leave."""
     inward = False
     for q in range(s.index[BEGIN, s.multiplier.shape[0] - 1]):
-        inward |= s.index[SIGN, q] == INWARD
+        inward = inward or s.index[SIGN, q] == INWARD
     return inward
 
 

@@ -106,15 +106,12 @@ def load(s, lower, upper, sizes, record, rank_tolerance):
         index[FIRST, k] = first
         largest = 0.0
         for i in range(first, first + sizes[k]):
-            square, low, up, act = _measure(s, i), lower[i], upper[i], np.int64(record[i])
+            square, low, up = _measure(s, i), lower[i], upper[i]
             sane &= np.isfinite(square) and low <= up and low < np.inf and up > -np.inf
             number[NORM, i], number[LOWER, i], number[UPPER, i] = np.sqrt(square), low, up
             largest = max(largest, number[NORM, i])
-            if low == up:
-                act = EQUAL
-            elif not ((act == 1 and up < np.inf) or (act == -1 and low > -np.inf)):
-                act = FREE
-            index[STATE, i] = act
+            above, below = record[i] == 1.0 and up < np.inf, record[i] == -1.0 and low > -np.inf
+            index[STATE, i] = EQUAL if low == up else ZERO + above - below
         for i in range(first, first + sizes[k]):
             if number[NORM, i] <= NEGLIGIBLE * largest:
                 number[NORM, i] = 0.0
