@@ -50,6 +50,15 @@ def all_finite(x):
 
 
 @inlined
+def length_of(x):
+    """Return the Euclidean norm."""
+    square = 0.0
+    for c in range(x.size):
+        square += x[c] * x[c]
+    return np.sqrt(square)
+
+
+@inlined
 def all_equal(lower, upper):
     """Whether all rows are equalities."""
     equal = True
