@@ -70,6 +70,17 @@ def verify(s):
     return proved
 
 
+@compiled
+def neglects(s):
+    """Whether x misses a row that takes no part because rows of other levels are far larger."""
+    missed, reach = False, 1.0 + length_of(s.x)
+    for i in range(s.A.shape[0]):
+        value = _value(s, i)
+        over = max(value - s.number[UPPER, i], s.number[LOWER, i] - value)
+        missed = missed or over > BAND * -s.number[NORM, i] * reach > 0.0
+    return missed
+
+
 @inlined
 def _rows_hold(s, reach):
     """Whether (1) holds, down to a level that sets all of x."""
@@ -78,7 +89,7 @@ def _rows_hold(s, reach):
         while i >= s.index[FIRST, k + 1]:
             k += 1
         norm, state = s.number[NORM, i], s.index[STATE, i]
-        if norm == 0.0:
+        if norm <= 0.0:
             continue
         value, low, up = _value(s, i), s.number[LOWER, i], s.number[UPPER, i]
         side = low if state < 0 else up
