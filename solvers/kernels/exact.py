@@ -15,19 +15,23 @@ import numpy as np
 from hierarchy.jit import compiled, inlined
 from solvers.kernels.damping import carve_damped, damped_size, write_damped
 from solvers.kernels.levels import pass_through_levels
-from solvers.kernels.rows import ZERO, all_equal, all_finite, finish
+from solvers.kernels.rows import ZERO, all_equal, finish, length_of
 from solvers.kernels.search import pivot_in_blocks, pivot_one_by_one
 from solvers.kernels.space import matrix, vector
 from solvers.kernels.staircase import solve_by_staircase
 from solvers.kernels.tableau import STEPS, carve_tableau, tableau_size
 from solvers.kernels.tolerances import MOST_STEPS, MOST_TRIES
-from solvers.kernels.verification import verify
+from solvers.kernels.verification import neglects, verify
 from solvers.kernels.working_set import (
     COARSE,
     FIRST,
+    NEGLECTED,
+    SCALE,
     STATE,
+    Scaled,
     carve_working_set,
     load,
+    rescale,
     restore,
     working_set_size,
 )
@@ -48,7 +52,8 @@ DAMPING, RANK_TOLERANCE, TOLERANCE, MOST = 0, 2, 3, 4  # places in the settings 
 @inlined
 def exact_size(n, m, levels):
     """Return the numbers that `solve_exactly` needs."""
-    return (2 * levels + 2) * m + n + working_set_size(n, m, levels) + tableau_size(n, m)
+    return ((2 * levels + 2) * m + n + working_set_size(n, m, levels) + tableau_size(n, m)
+            + m * (n + 2))
 
 
 @inlined
@@ -124,9 +129,15 @@ def solve_exactly(A, lower, upper, sizes, x, record, settings, work):
     multiplier, at = matrix(work, ZERO, sizes.size + 1, m)
     current, at = matrix(work, at, sizes.size + 1, m)
     first_x, at = vector(work, at, n)
-    s, at = carve_working_set(A, sizes, x, multiplier, work, at)
+    own, after = carve_working_set(A, sizes, x, multiplier, work, at)
+    s, own.scalar[SCALE], own.count[COARSE] = own, 1.0, 0
     code = load(s, lower, upper, sizes, record, settings[RANK_TOLERANCE])
-    s.count[COARSE] = 0
+    if code == UNPROVED:
+        scaled, after = _carve_scaled(work, after, m, n)
+        code = rescale(own, lower, upper, scaled)
+        s, _ = carve_working_set(scaled.A, sizes, x, multiplier, work, at)
+        if code == SOLVED:
+            code = load(s, scaled.lower, scaled.upper, sizes, record, settings[RANK_TOLERANCE])
     if code != SOLVED:
         return finish(x, code)
     limit, code, steps = np.int64(settings[MOST]), ZERO + UNPROVED, ZERO
@@ -136,7 +147,7 @@ def solve_exactly(A, lower, upper, sizes, x, record, settings, work):
         code, steps = pivot_in_blocks(s, limit, level >= 0)
     blocks, passed = steps, False
     if code == UNPROVED and level < 0:
-        t, _ = carve_tableau(s, work, at)
+        t, _ = carve_tableau(s, work, after)
         code, level = pass_through_levels(t, settings[TOLERANCE],
                                           min(limit - steps, MOST_STEPS * (m + n)))
         steps += t.count[STEPS]
@@ -155,13 +166,24 @@ def solve_exactly(A, lower, upper, sizes, x, record, settings, work):
                 s, current, min(limit - steps, MOST_TRIES * (m + n)), ZERO if coarse else level)
             steps += tries
             code = _verified(s, code)
-    if code not in (SOLVED, NUMERICAL_FAILURE):
+    if code == SOLVED and s.count[NEGLECTED] > 0 and neglects(s):
+        code = ZERO + INACCURATE
+    elif code not in (SOLVED, NUMERICAL_FAILURE):
         code = ZERO + (ITERATION_LIMIT if steps >= limit else INACCURATE)
         for c in range(n if passed else 0):  # it keeps the levels above
             x[c] = first_x[c]
     _keep(s, record, blocks, steps - blocks)
     record[3 * m + 2] = max(level, 0) if code == ITERATION_LIMIT else -1.0
-    return code if all_finite(x) else finish(x, NUMERICAL_FAILURE)
+    return code if np.isfinite(length_of(x)) else finish(x, NUMERICAL_FAILURE)
+
+
+@inlined
+def _carve_scaled(work, at, m, n):
+    """Return a `Scaled` without data, and where it ends."""
+    A, at = matrix(work, at, m, n)
+    lower, at = vector(work, at, m)
+    upper, at = vector(work, at, m)
+    return Scaled(A, lower, upper), at
 
 
 @inlined
@@ -179,12 +201,13 @@ def _verified(s, code):
 @inlined
 def _keep(s, record, blocks, steps):
     """Write the record: of each row its state, the level it holds back, its multiplier there."""
-    m, levels, k = s.A.shape[0], s.multiplier.shape[0] - 1, 0
+    m, levels, k, scale = s.A.shape[0], s.multiplier.shape[0] - 1, 0, s.scalar[SCALE]
     for i in range(m):
         while i >= s.index[FIRST, k + 1]:
             k += 1
         record[i], record[m + i], record[2 * m + i] = s.index[STATE, i], -1.0, 0.0
         for p in range(levels, k - 1, -1):
             if s.multiplier[p, i] != 0.0 and s.index[STATE, i] not in (EQUAL, FREE):
-                record[m + i], record[2 * m + i] = p, s.multiplier[p, i]
+                mu = s.multiplier[p, i] * (scale if p == levels else 1.0 / scale)
+                record[m + i], record[2 * m + i] = p, mu
     record[3 * m], record[3 * m + 1] = blocks, steps

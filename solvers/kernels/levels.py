@@ -176,7 +176,7 @@ def _begin(t, k, last, whole, tolerance):
     for i in range(s.index[FIRST, k] if k < s.multiplier.shape[0] - 1 else last, last):
         value = _value(s, i)
         s.number[VALUE, i] = value
-        if s.number[NORM, i] == 0.0:
+        if s.number[NORM, i] <= 0.0:
             s.index[KIND, i] = FIXED
             continue
         if s.index[STATE, i] != EQUAL:

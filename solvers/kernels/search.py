@@ -86,7 +86,7 @@ def judge(s, last, newest):
             leaving += 1
     for i in range(s.index[FIRST, last]):
         norm, low, up = s.number[NORM, i], s.number[LOWER, i], s.number[UPPER, i]
-        if s.index[STATE, i] != FREE or norm == 0.0:
+        if s.index[STATE, i] != FREE or norm <= 0.0:
             continue
         value = value_at(s, i)
         over = max(value - up, low - value)

@@ -41,6 +41,7 @@ PATIENCE = 10       # releases per row of a level before small multipliers count
 LAST = 20           # releases per row of a level before it ends in doubt
 
 NEGLIGIBLE = 1e-13
+LEAST_SQUARE = 1e-200
 LOOSE = 1e-9
 MET = 1e-13
 SHADOW = 1e-5

@@ -21,7 +21,7 @@ from __future__ import annotations
 import numpy as np
 
 from hierarchy.jit import compiled, inlined
-from solvers.kernels.rows import add_multiple, length_of
+from solvers.kernels.rows import length_of
 from solvers.kernels.tolerances import (
     BAND,
     CLEAR_,
@@ -40,6 +40,7 @@ from solvers.kernels.working_set import (
     FIRST,
     GRADIENT,
     LOWER,
+    NOISE,
     NORM,
     PIVOT,
     REFERENCE,
@@ -69,6 +70,17 @@ def verify(s):
     return proved
 
 
+@compiled
+def neglects(s):
+    """Whether x misses a row that takes no part because rows of other levels are far larger."""
+    missed, reach = False, 1.0 + length_of(s.x)
+    for i in range(s.A.shape[0]):
+        value = _value(s, i)
+        over = max(value - s.number[UPPER, i], s.number[LOWER, i] - value)
+        missed = missed or over > BAND * -s.number[NORM, i] * reach > 0.0
+    return missed
+
+
 @inlined
 def _rows_hold(s, reach):
     """Whether (1) holds, down to a level that sets all of x."""
@@ -77,7 +89,7 @@ def _rows_hold(s, reach):
         while i >= s.index[FIRST, k + 1]:
             k += 1
         norm, state = s.number[NORM, i], s.index[STATE, i]
-        if norm == 0.0:
+        if norm <= 0.0:
             continue
         value, low, up = _value(s, i), s.number[LOWER, i], s.number[UPPER, i]
         side = low if state < 0 else up
@@ -116,9 +128,10 @@ def _balances(s, p, reach):
     levels, mu = s.multiplier.shape[0] - 1, s.multiplier[p]
     begin = s.index[FIRST, p] if p < levels else s.A.shape[0]
     end = s.index[FIRST, p + 1] if p < levels else begin
-    left, n = s.number[GRADIENT], s.x.size
+    left, noise, n = s.number[GRADIENT], s.number[NOISE], s.x.size
     for c in range(n):
         left[c] = 0.0 if p < levels else s.x[c] - s.number[REFERENCE, c]
+        noise[c] = UNIT_ROUNDING * reach if p == levels else 0.0
     least, square, far, source = np.inf, 0.0, 0.0, 0.0
     for i in range(begin, end):
         if s.index[STATE, i] != FREE and s.number[NORM, i] > 0.0:
@@ -141,9 +154,12 @@ def _balances(s, p, reach):
         if mu[i] != 0.0:
             rounding += UNIT_ROUNDING * abs(mu[i]) * s.number[NORM, i]
             turned += 2.0 * s.number[CUT, i] * abs(mu[i])
-            _add_row(s, left, mu[i], i)
-    rest = length_of(left[:n])
-    if not (rest <= allowed + rounding + turned
+            _add_row(s, mu[i], i)
+    square = 0.0
+    for c in range(n):
+        square += max(abs(left[c]) - noise[c], 0.0) ** 2
+    rest = np.sqrt(square)
+    if not (rest <= allowed + turned
             and turned <= SPREAD * (reach if p == levels else source)):
         return False
     unsure = SURE * (rest + rounding + turned) / s.scalar[PIVOT]
@@ -162,10 +178,14 @@ def _balances(s, p, reach):
 
 
 @inlined
-def _add_row(s, left, f, i):
-    """Add a multiple of row i of A."""
-    a, c = s.A[i], s.index[UNIT, i]
+def _add_row(s, f, i):
+    """Add a multiple of row i of A to what is left, and its rounding to the noise."""
+    a, c, left, noise = s.A[i], s.index[UNIT, i], s.number[GRADIENT], s.number[NOISE]
+    least = UNIT_ROUNDING * abs(f) * s.number[NORM, i]
     if c >= 0:
         left[c] += f * a[c]
+        noise[c] += least
     else:
-        add_multiple(left[:a.size], f, a)
+        for c in range(a.size):
+            left[c] += f * a[c]
+            noise[c] += least if a[c] != 0.0 else 0.0

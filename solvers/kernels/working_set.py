@@ -22,8 +22,8 @@ import numpy as np
 from hierarchy.jit import as_matrix, compiled, inlined
 from solvers.kernels.rows import ZERO, add_multiple, factor_level, reflect, swap
 from solvers.kernels.space import Basis, Rows, View, carve_basis, integers, matrix, vector
-from solvers.kernels.tolerances import CANCELLED, NEGLIGIBLE
-from solvers.status import EQUAL, FREE, NUMERICAL_FAILURE, SOLVED
+from solvers.kernels.tolerances import CANCELLED, LEAST_SQUARE, NEGLIGIBLE
+from solvers.status import EQUAL, FREE, NUMERICAL_FAILURE, SOLVED, UNPROVED
 
 # Rows of `number`. Per row of A: its norm, its only entry, its sides, the norm of what was cut from
 # it. By place in the list: the square at which a row counts as dependent, its
@@ -40,10 +40,20 @@ NUMBERS = 16  # one more than these: `levels.py` keeps its own behind REFERENCE
 # row, its first place in the list, its first column.
 UNIT, STATE, FIRST, CHANGE, ENTERED, SEED, LIST, SIGN, ORDER, PLACE, BEGIN, RANK = range(12)
 # In `count`: columns that are unknowns, the level that sets all of x (-1: none), whether a row was
-# cut since the rows were those of A, whether small coefficients are cut along other rows too.
-PICKED, WHOLE, DIRTY, COARSE = range(4)
-# In `scalar`: rank_tolerance, the largest number so far, the smallest pivot of a row over its norm.
-TOLERANCE, SIZE, PIVOT = range(3)
+# cut since the rows were those of A, whether small coefficients are cut along other rows too, the
+# number of rows that are negligible beside those of other levels alone.
+PICKED, WHOLE, DIRTY, COARSE, NEGLECTED = range(5)
+# In `scalar`: rank_tolerance, the largest number so far, the smallest pivot of a row over its norm,
+# the factor by which the data are those of the caller.
+TOLERANCE, SIZE, PIVOT, SCALE = range(4)
+
+
+class Scaled(NamedTuple):
+    """Rows A (m, n) and sides (m,) after scaling."""
+
+    A: View
+    lower: View
+    upper: View
 
 
 class WorkingSet(NamedTuple):
@@ -71,7 +81,7 @@ class WorkingSet(NamedTuple):
 @inlined
 def working_set_size(n, m, levels):
     """Return the numbers that a WorkingSet needs, without its multipliers."""
-    return (NUMBERS + 12) * max(m, n, levels + 1) + 7 + 3 * m * n + n * n + n
+    return (NUMBERS + 12) * max(m, n, levels + 1) + 9 + 3 * m * n + n * n + n
 
 
 @inlined
@@ -81,8 +91,8 @@ def carve_working_set(A, sizes, x, multiplier, work, at):
     w = max(m, n, sizes.size + 1)
     number, at = matrix(work, at, NUMBERS, w)
     numbers, at = integers(work, at, 12 * w)
-    count, at = integers(work, at, 4)
-    scalar, at = vector(work, at, 3)
+    count, at = integers(work, at, 5)
+    scalar, at = vector(work, at, 4)
     W, at = matrix(work, at, m, n)
     basis, at = carve_basis(work, at, n, n)
     T, at = matrix(work, at, n, m)
@@ -95,10 +105,13 @@ def carve_working_set(A, sizes, x, multiplier, work, at):
 def load(s, lower, upper, sizes, record, rank_tolerance):
     """Check and copy the data; return SOLVED, or NUMERICAL_FAILURE if an entry is not finite.
 
+    Or UNPROVED if squares of the rows leave the range of numbers, so that all must be rescaled.
     The sides at which rows act are those of the record, as far as a row has that side.
+    A row counts as zero beside a far larger one of its level; beside one of another level it has a
+    negative norm, takes no part, and `neglects` says whether x meets it all the same.
     """
-    number, index, first, sane = s.number, s.index, ZERO, True
-    s.scalar[TOLERANCE], s.count[DIRTY] = rank_tolerance, 0
+    number, index, first, sane, most = s.number, s.index, ZERO, True, 0.0
+    s.scalar[TOLERANCE], s.count[DIRTY], s.count[NEGLECTED] = rank_tolerance, 0, 0
     for c in range(s.x.size):
         sane &= np.isfinite(s.x[c])
         number[REFERENCE, c] = s.x[c]
@@ -108,15 +121,53 @@ def load(s, lower, upper, sizes, record, rank_tolerance):
         for i in range(first, first + sizes[k]):
             square, low, up = _measure(s, i), lower[i], upper[i]
             sane &= np.isfinite(square) and low <= up and low < np.inf and up > -np.inf
-            number[NORM, i], number[LOWER, i], number[UPPER, i] = np.sqrt(square), low, up
-            largest = max(largest, number[NORM, i])
+            norm = np.sqrt(square) if square > LEAST_SQUARE else _small_length(s.A[i])
+            number[NORM, i], number[LOWER, i], number[UPPER, i] = norm, low, up
+            largest = max(largest, norm)
             above, below = record[i] == 1.0 and up < np.inf, record[i] == -1.0 and low > -np.inf
             index[STATE, i] = EQUAL if low == up else ZERO + above - below
         for i in range(first, first + sizes[k]):
             if number[NORM, i] <= NEGLIGIBLE * largest:
                 number[NORM, i] = 0.0
-        first += sizes[k]
+        first, most = first + sizes[k], max(most, largest)
     index[FIRST, sizes.size] = first
+    for i in range(first):
+        if 0.0 < number[NORM, i] <= NEGLIGIBLE * most:
+            number[NORM, i], s.count[NEGLECTED] = -number[NORM, i], s.count[NEGLECTED] + 1
+    if not sane:
+        return ZERO + NUMERICAL_FAILURE
+    in_range = most == 0.0 or LEAST_SQUARE < most * most < 1.0 / LEAST_SQUARE
+    return ZERO + (SOLVED if in_range else UNPROVED)
+
+
+@inlined
+def _small_length(a):
+    """Return the norm of a row whose square underflows."""
+    largest, square = 0.0, 0.0
+    for c in range(a.size):
+        largest = max(largest, abs(a[c]))
+    for c in range(a.size if largest > 0.0 else 0):
+        square += (a[c] / largest) ** 2
+    return largest * np.sqrt(square)
+
+
+@compiled
+def rescale(s, lower, upper, scaled):
+    """Write the rows and sides times a power of two that brings their norms into range.
+
+    scaled: a `Scaled`. Returns SOLVED, or NUMERICAL_FAILURE if a side is then no number.
+    """
+    most, sane = 0.0, True
+    for i in range(s.A.shape[0]):
+        most = max(most, abs(s.number[NORM, i]))
+    factor = 2.0 ** -np.floor(np.log2(most))
+    for i in range(s.A.shape[0]):
+        for c in range(s.x.size):
+            scaled.A[i, c] = s.A[i, c] * factor
+        scaled.lower[i], scaled.upper[i] = lower[i] * factor, upper[i] * factor
+        sane &= np.isfinite(scaled.lower[i]) == np.isfinite(lower[i])
+        sane &= np.isfinite(scaled.upper[i]) == np.isfinite(upper[i])
+    s.scalar[SCALE] = factor
     return ZERO + (SOLVED if sane else NUMERICAL_FAILURE)
 
 
@@ -206,7 +257,7 @@ def gives_all(s, k, goal, seen):
     for i in range(first, last):
         c = s.index[UNIT, i]
         if (c < 0 or s.index[STATE, i] != EQUAL or s.number[NORM, i] != s.number[NORM, first]
-                or seen[c] != 0.0):
+                or seen[c] != 0.0 or s.number[NORM, i] <= 0.0):
             return False
         seen[c] = 1.0
         goal[c] = s.number[LOWER, i] / s.number[ENTRY, i]
