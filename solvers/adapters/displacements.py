@@ -139,6 +139,7 @@ class _Packed:
         """Write the rows of tasks that share a level; return the row after them."""
         row = self.rows
         for one in read:
+            _check_fit(label(one.task), one.J, one.e, self.A.shape[1])
             found = write_task(one.J, one.e, one.cost, one.gain / period, self.A, self.lower,
                                self.upper, row)
             if found == ODD:
@@ -186,6 +187,7 @@ class _Limits(NamedTuple):
         lower, upper = _filled(n, -np.inf), _filled(n, np.inf)
         several, left = [np.empty(len(h), np.bool_) for _, h in pairs], 0
         for (G, h), mark in zip(pairs, several, strict=True):
+            _check_fit("limits", G, h, n)
             found = narrow(G, h, period, lower, upper, mark)
             if found == ODD:
                 check_rows("limits", G, np.full(len(h), -np.inf), h)
@@ -236,6 +238,12 @@ def _read(task: Task, configuration: object, damped: bool, weighted: bool = True
     cost = costs(task, len(e)) if weighted else _filled(len(e), 1.0)
     gain = float(task.gain)
     return _Read(task, J, e, cost, gain, lm * gain * gain * squared(cost, e) if lm else 0.0)
+
+
+def _check_fit(what: str, rows: Array, sides: Array, n: int) -> None:
+    """Raise a HierarchyError unless rows are (k, n) and their sides (k,): kernels do not look."""
+    if (*sides.shape, n) != rows.shape:
+        raise HierarchyError(f"{what}: {rows.shape} rows for {sides.shape} values and {n} unknowns")
 
 
 def _plain(values: Any) -> Array:

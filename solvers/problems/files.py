@@ -190,6 +190,8 @@ def _joined(columns: dict[str, list[Any]], kinds: dict[str, str]) -> Arrays:
 def _unpacked(arrays: Arrays) -> Iterable[Hierarchy]:
     """Yield the problems; raises ValueError where lengths do not fit or a row is not valid."""
     rest = {name: values for name, values in arrays.items() if name in _DATA}
+    if len(rest["n"]) != len(rest["levels"]):
+        raise ValueError(f"n is of {len(rest['n'])} problems and levels of {len(rest['levels'])}")
     for p, (n, count) in enumerate(zip(rest["n"].tolist(), rest["levels"].tolist(), strict=True)):
         sizes = _taken(rest, "sizes", count, p).tolist()
         m = sum(sizes)

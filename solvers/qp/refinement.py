@@ -16,6 +16,7 @@ AT_ONCE = 10  # the first steps change all rows on the wrong side, later ones a 
 EXACT = 1e-10  # relative tolerance of the optimality conditions
 LITTLE = 1e-3  # rows violated by less are assumed to hold at a nearby minimiser
 LARGEST = 1e50  # entry: sums of products of four stay finite; beyond, backends run for minutes
+ROUNDING = 1e-15  # of a row of order one
 ACTIVE = 1e-6  # distance to its side, relative to 1 + |side|, at which a row is a candidate
 
 
@@ -153,8 +154,34 @@ class _Refinement(NamedTuple):
         B, c = self._acting(broken)
         next_active = np.where(multipliers > 0.0, near, 0.0)
         next_active = np.where(abs(over) > scale, np.sign(over), next_active)
-        optimal = (abs(over) <= scale).all() and rest <= EXACT * (1.0 + norm(B.T @ c))
-        return bool(optimal), next_active, np.sign(excess) * (abs(excess) > scale)
+        sizes = norm(self.limits.A, axis=1)
+        moves = sizes > self.rank_tolerance
+        next_broken = np.sign(excess) * (abs(excess) > scale * np.where(moves, sizes, 1.0))
+        left_out = (next_broken != 0) & (next_broken != broken) & moves
+        optimal = ((abs(over) <= scale).all() and not left_out.any()
+                   and rest <= EXACT * (1.0 + norm(B.T @ c)) and self._balanced(z, near, excess))
+        return bool(optimal), next_active, next_broken
+
+    def _balanced(self, z: Array, near: Array, excess: Array) -> bool:
+        """Whether rows that are missed balance each other, however small they are.
+
+        Next to rows of another scale their forces are lost in `judged`; rows that are met may hold
+        them like constraints.
+        """
+        M = np.vstack([self.E, self.limits.A])
+        r, sizes = np.concatenate([self.e - self.E @ z, -excess]), norm(M, axis=1)
+        missed = abs(r) > (EXACT * sizes + ROUNDING) * (1.0 + norm(z))
+        missed &= sizes > self.rank_tolerance
+        if not missed.any():
+            return True
+        met, k = ~missed, len(self.E)
+        side = self.limits.sides(z, EXACT)[met[k:], None]
+        holding = np.vstack([near[:, None] * self.kept.A, side * self.limits.A[met[k:]],
+                             self.E[met[:k]], -self.E[met[:k]]])
+        length = norm(holding, axis=1)
+        holding = holding[length > 0.0] / length[length > 0.0, None]
+        _, rest = _non_negative(holding.T, M[missed].T @ r[missed])
+        return rest <= ACTIVE * float(sizes[missed] @ abs(r[missed]))
 
     def _acting(self, broken: Array) -> tuple[Array, Array]:
         """Return B and c: the goal and the broken limits are ||B z - c||^2."""
@@ -216,8 +243,6 @@ def _multipliers(side: Array, A: Array, gradient: Array) -> tuple[Array, float]:
     Rows may be dependent: any multipliers with a zero residual prove the minimum.
     """
     found, on = np.zeros(len(side)), side != 0
-    if not on.any():
-        return found, float(norm(gradient))
     found[on], rest = _non_negative((side[on, None] * A[on]).T, gradient)
     return found, rest
 
@@ -231,6 +256,8 @@ def _non_negative(A: Array, b: Array) -> tuple[Array, float]:
     """Return u >= 0 that minimises ||A u - b||, and that norm; infinite if none was found."""
     from scipy.optimize import nnls
 
+    if not A.shape[1]:  # on which it may end the process
+        return np.zeros(0), float(norm(b))
     if not below_largest(A, b):
         return np.zeros(A.shape[1]), np.inf
     try:

@@ -210,7 +210,7 @@ class _Cascade:
     def _advance(self, level: _Level, own: Array) -> Array:
         """Step to the minimum of a level; return the side on which each inequality is violated."""
         limits = level.rows.where(~level.equal).from_(self.x)
-        near = EXACT * (1.0 + norm(self.x))
+        near = EXACT * (1.0 + norm(self.x)) * norm(limits.A, axis=1)
         if not level.equal.any() and (abs(limits.excess(np.zeros(self.h.n))) <= near).all():
             self._step(np.zeros(self.N.shape[1]))
             return np.zeros(limits.lower.size)

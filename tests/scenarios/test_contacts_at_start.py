@@ -148,7 +148,7 @@ def test_a_base_that_tilts_has_fallen():
         if plant.fault:
             break
         plant.act(np.zeros(ROBOT.n - 6))
-    assert plant.fault.startswith("the robot has fallen: its base has tilted by 0.5 rad, more than")
+    assert plant.fault.startswith("the robot has fallen: its base has tilted by 0.5 rad (")
 
 
 def test_a_turn_about_the_vertical_is_no_tilt():

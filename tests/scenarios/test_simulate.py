@@ -122,7 +122,7 @@ def test_a_start_is_found_for_an_end_effector_position():
 
 @pytest.mark.parametrize(("changes", "said"), [
     (["start.end_effector=[2, 0, 0]"], "start.end_effector [2.0, 0.0, 0.0] m cannot be reached"),
-    (["start.q=[0, 0, 0]"], "start: robot 'kuka_lwr': q has shape (3,)"),
+    (["start.q=[0, 0, 0]"], "start: 3 values for 7 joint positions of robot 'kuka_lwr'"),
     (["start.v=[0, 0]"], "start: robot 'kuka_lwr': v has shape (2,)"),
     (["avoidance.obstacles=[[5, 5, 5], [0.0, 0.0, 0.0]]", "start.q=[0, 0, 0, 0, 0, 0, 0]",
       "robot.control_points=[{joint='joint_2', offset=[0, 0, 0]}]"],

@@ -192,7 +192,7 @@ def test_a_run_that_breaks_is_a_row_with_its_reason(tmp_path, cluster):
     done = sweep(path, tmp_path / "out", scheduler=cluster)
     found = rows(tmp_path / "out")
     assert len(found) == done.failed == 4  # 2 values, 2 resolvers
-    assert all("q has shape" in row["error"] and row["ticks"] == 0 for row in found)
+    assert all("for 7 joint positions" in row["error"] and row["ticks"] == 0 for row in found)
     page = (tmp_path / "out" / "index.html").read_text()
     assert "did not finish" in page
     assert found[0]["error"].partition(":")[0] in page

@@ -280,3 +280,17 @@ def test_targets_beyond_all_sense_break_no_bound(size):
     found = make("hqp").solve(h)
     assert found.status is Status.NUMERICAL_FAILURE
     assert not found.x.any()
+
+
+@pytest.mark.parametrize("rows", [
+    ([[0, 0, 1e3], [0, 0, 1e-3], [2.7067129e-4, 8.9151391e-4, 3.6323543e-4]],
+     [-np.inf, -1e-3, 0.0], [1e3, -1e-3, 1e-3]),
+    ([[669.71, -52.95, -740.73], [-6.1103e-4, 5.5851e-4, 5.6098e-4], [405.35, 359.46, -840.52]],
+     [-2000.0, 0.0, -2000.0], [-2000.0, 1e-3, -2000.0])])
+def test_a_row_a_million_times_smaller_than_its_neighbours_is_met_as_they_are(rows):
+    h = Hierarchy.from_levels([rows, (np.eye(3), np.zeros(3))])
+    found = make("hqp").solve(h)
+    assert found.status is Status.SOLVED
+    np.testing.assert_allclose(h.slacks(found.x)[:3] / np.linalg.norm(h.A[:3], axis=1), 0.0,
+                               atol=1e-9)
+    assert certify(h, found.x).certified

@@ -33,4 +33,4 @@ class Stops:
             return None
         stop, unit = self._upper[i] if here[i] > self._upper[i] else self._lower[i], self._units[i]
         return (f"joint {self._names[i]} is {over[i]:.2g} {unit} beyond its stop at {stop:.4g} "
-                f"{unit}, more than plant.beyond_stop = {self._beyond:g},")
+                f"{unit} (plant.beyond_stop = {self._beyond:g}),")

@@ -104,8 +104,8 @@ class TorqueRobot:
             return f"the robot has fallen by {fallen:.2g} m"
         tilt = acos(float(np.clip(self._vertical() @ self._upright, -1.0, 1.0)))
         if tilt > self._section.tilt:
-            return (f"the robot has fallen: its base has tilted by {tilt:.2g} rad, more than "
-                    f"plant.tilt = {self._section.tilt:g},")
+            return (f"the robot has fallen: its base has tilted by {tilt:.2g} rad "
+                    f"(plant.tilt = {self._section.tilt:g}),")
         return self._stops.passed(self.q)
 
     def forces(self) -> dict[str, Array]:

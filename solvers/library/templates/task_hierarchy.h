@@ -54,7 +54,8 @@ typedef enum th_status {
   TH_INVALID = 12
 } th_status;
 
-/* A hierarchy: n unknowns (1 to 2^20), m rows (0 to 2^20), levels. All arrays are only read. */
+/* A hierarchy: n unknowns (1 to 2^20), m rows (0 to 2^20), levels. All arrays are only read. That the
+ * sizes add up is checked in each call; how long your arrays are, no function of C can see. */
 typedef struct th_problem {
   int64_t n;
   int64_t m;

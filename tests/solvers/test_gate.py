@@ -1,0 +1,313 @@
+"""Every door for arrays: what would let a kernel read foreign memory is refused, and named.
+
+What once ended the process (SIGBUS, SIGSEGV) is tried in another one.
+"""
+
+import copy
+import io
+import pickle
+import subprocess
+import sys
+import zipfile
+
+import numpy as np
+import pytest
+
+from hierarchy import Hierarchy, HierarchyError
+from solvers import make, problems
+from solvers.adapters.displacements import hierarchy as of_displacements
+from solvers.batch import Batch
+from solvers.factorization import Factorization
+from solvers.problems.files import Collection, Head, ProblemFileError, read
+
+HUGE = 2**63 - 1
+SIZES = [([HUGE, HUGE, 5], f"level 1: size {HUGE}"), ([2**62] * 4 + [3], "level 1: size 4611"),
+         ([10**9], "level 1: size 1000000000, expected a whole number of rows from 0 to 3"),
+         ([4, -1], "level 1: size 4"), ([1, 1], "sizes sum to 2, but A has 3 rows"),
+         ([3.0], "sizes: expected a whole number of rows for each level"),
+         ([True, True, True], "sizes: expected"), ([[3]], "sizes: expected"),
+         (3, "sizes: expected"),
+         (np.array([2**64 - 3, 6], dtype=np.uint64), "level 1: size 1844")]
+
+
+def plain(**other):
+    """Return a hierarchy of three rows in two unknowns, with other arguments than the usual."""
+    given = {"A": [[1.0, 0.0], [0.0, 1.0], [1.0, 1.0]], "lower": [1.0, 2.0, -np.inf],
+             "upper": [1.0, 2.0, 9.0], "sizes": [2, 1], "names": ["hand", "elbow"]}
+    return Hierarchy(**given | other)
+
+
+def stacked(**other):
+    given = {"A": np.ones((2, 3, 2)), "lower": np.zeros((2, 3)), "upper": np.ones((2, 3)),
+             "sizes": [2, 1]}
+    return Batch(**given | other)
+
+
+@pytest.mark.parametrize(("sizes", "said"), SIZES, ids=str)
+@pytest.mark.parametrize("door", [plain, stacked])
+def test_sizes_that_do_not_add_up_are_refused_without_wrapping(door, sizes, said):
+    with pytest.raises(HierarchyError) as error:
+        door(sizes=sizes, **({"names": None} if door is plain else {}))
+    assert said in str(error.value)
+
+
+@pytest.mark.parametrize(("other", "said"), [
+    ({"lower": np.zeros(2)}, "lower has shape (2,), expected (3,)"),
+    ({"upper": np.zeros((3, 1))}, "upper has shape (3, 1), expected (3,)"),
+    ({"reference": np.zeros(3)}, "reference has shape (3,), expected (2,)"),
+    ({"A": np.zeros(6)}, "A has shape (6,), expected (rows, n)"),
+    ({"A": np.zeros((3, 0))}, "A has shape (3, 0)"),
+    ({"metric": np.eye(3)}, "metric has shape (3, 3), expected (2, 2)"),
+    ({"give": np.zeros(2)}, "give has shape (2,), expected (3,)"),
+    ({"names": ["hand"]}, "1 names for 2 levels"),
+    ({"A": [[1, 0], [0, 1], [1, np.nan]]}, "elbow, row 0: A[0, 1] is nan"),
+    ({"lower": [1.0, 5.0, 0.0]}, "hand, row 1: no value lies between lower 5.0 and upper 2.0"),
+    ({"reference": [0.0, np.inf]}, "reference, entry 1: inf is not finite"),
+    ({"metric": -np.eye(2)}, "metric is not positive definite"),
+    ({"give": [0.0, 0.0, -1.0]}, "elbow, row 0: give is -1.0")])
+def test_a_hierarchy_that_is_made_or_changed_with_a_wrong_array_is_refused(other, said):
+    with pytest.raises(HierarchyError) as error:
+        plain(**other)
+    assert said in str(error.value)
+    h = plain()
+    for name, value in other.items():
+        if name not in ("names", "lower"):
+            with pytest.raises(HierarchyError) as error:
+                setattr(h, name, value)
+            assert said in str(error.value)
+    np.testing.assert_array_equal(make("hcod").solve(h).x, [1, 2])
+
+
+def test_both_sides_can_be_set_in_turn_and_each_is_looked_at():
+    h = plain()
+    h.lower, h.upper = [3.0, 4.0, 7.0], [3.0, 4.0, 7.0]
+    np.testing.assert_allclose(make("hcod").solve(h).x, [3, 4])
+    with pytest.raises(HierarchyError, match="hand, row 0: lower is nan"):
+        h.lower = [np.nan, 0, 0]
+    with pytest.raises(HierarchyError, match="elbow, row 0"):
+        h.upper = [0, 0, -np.inf]
+
+
+@pytest.mark.parametrize("name", ["sizes", "offsets", "names", "n", "m", "rows", "start", "other"])
+def test_nothing_else_of_a_hierarchy_can_be_set(name):
+    h = plain()
+    with pytest.raises(HierarchyError, match=f"{name} of a hierarchy cannot be set"):
+        setattr(h, name, 3)
+    for array in (h.sizes, h.offsets):
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = 10**9
+        with pytest.raises(ValueError, match="WRITEABLE"):
+            array.setflags(write=True)
+
+
+def test_an_array_that_is_handed_out_can_be_written_but_not_reshaped():
+    A, lower = np.eye(3)[:, :2].copy(), np.ones(3)
+    h = Hierarchy(A, lower, lower.copy(), [3])
+    for array in (A, lower, h.A, h.lower, h.upper, h.reference, h.sizes, h.offsets):
+        for holder in (array, array if array.base is None else array.base):
+            holder.shape = (1, holder.size)
+    h.lower.dtype = np.float32
+    with pytest.raises(ValueError, match="resize"):
+        h.upper.resize(9, refcheck=False)
+    assert (h.A.shape, h.lower.shape, h.reference.shape) == ((3, 2), (3,), (2,))
+    assert (h.sizes.shape, h.offsets.shape) == ((1,), (2,))
+    h.lower[:], h.upper[:] = 5.0, 5.0
+    np.testing.assert_allclose(make("hcod").solve(h).x, [5, 5])
+
+
+@pytest.mark.parametrize("again", [copy.copy, copy.deepcopy, Hierarchy.copy,
+                                   lambda h: pickle.loads(pickle.dumps(h))])
+def test_a_copy_and_a_pickle_pass_the_gate_too(again):
+    h = plain(metric=2 * np.eye(2), give=[0.0, 0.0, 1.0])
+    other = again(h)
+    for name in ("A", "lower", "upper", "sizes", "reference", "metric", "give"):
+        np.testing.assert_array_equal(getattr(h, name), getattr(other, name))
+    assert other.names == h.names
+    assert make("hcod").solve(other).status.name == "SOLVED"
+
+
+BROKEN_ONCE = '''
+import numpy as np
+from hierarchy import Hierarchy, HierarchyError
+from solvers import make
+from solvers.batch import Batch, solve
+
+A, b = np.random.default_rng(0).normal(size=(6, 7)), np.ones(6)
+made = lambda: Hierarchy.from_levels([(A[:4], b[:4]), (A[4:], b[4:])])
+batch = lambda: Batch(np.stack([A] * 9), np.ones((9, 6)), np.ones((9, 6)), [4, 2])
+
+def attempt(break_it, thing):
+    try:
+        break_it(thing)
+    except (HierarchyError, ValueError):  # of numpy: read-only
+        pass
+    try:
+        if isinstance(thing, Hierarchy):
+            for name in ("hcod", "tpm", "recursive", "sns", "weighted", "reverse", "augmented"):
+                make(name).solve(thing)
+        else:
+            solve(thing, make("hcod"))
+    except HierarchyError as error:
+        print(error)
+
+def write(thing, name, value):
+    getattr(thing, name)[:] = value
+
+for break_it in (
+        lambda h: setattr(h, "lower", np.zeros(2)), lambda h: setattr(h, "A", np.ones((2, 7))),
+        lambda h: setattr(h, "sizes", [4, 3000000]), lambda h: write(h, "sizes", 3000000),
+        lambda h: setattr(h, "reference", np.zeros(2)), lambda h: setattr(h.A, "shape", (42, 1)),
+        lambda h: setattr(h.lower, "shape", (1, 1, 1, 1, 1, 1, 1, 6)),
+        lambda h: setattr(h.lower, "dtype", np.float32), lambda h: setattr(h.A, "shape", (7, 6)),
+        lambda h: setattr(h, "m", 1), lambda h: object.__setattr__(h, "lower", np.zeros(2))):
+    try:
+        attempt(break_it, made())
+    except AttributeError:
+        pass
+for break_it in (
+        lambda b: write(b, "sizes", 10**9), lambda b: setattr(b.lower, "shape", (6, 9)),
+        lambda b: setattr(b.A, "shape", (9, 7, 6)), lambda b: setattr(b.reference, "shape", (63,)),
+        lambda b: object.__setattr__(b, "upper", np.zeros(3))):
+    attempt(break_it, batch())
+print("alive")
+'''
+
+
+def test_no_way_of_breaking_an_array_ends_the_process():
+    done = subprocess.run([sys.executable, "-W", "ignore", "-c", BROKEN_ONCE], text=True,
+                          capture_output=True, check=False)
+    assert done.returncode == 0, done.stderr
+    said = done.stdout.splitlines()
+    assert said[-1] == "alive"
+    assert "level 1: size 1000000000, expected a whole number of rows from 0 to 6" in said
+    assert "lower has shape (6, 9), expected (9, 6)" in said
+
+
+@pytest.mark.parametrize("name", ["hcod", "tpm", "weighted"])
+def test_a_memory_of_any_numbers_leads_to_the_same_answer(name):
+    rng = np.random.default_rng(3)
+    odd = np.array([np.nan, np.inf, -np.inf, 1e300, -1.0, 0.0, 1.0, 2.0, 3.0, 0.5, 1e18, -7.0])
+    h = Hierarchy.from_levels([(np.eye(7), -np.ones(7), np.ones(7)),
+                               (rng.normal(size=(3, 7)), 5.0 * rng.normal(size=3))])
+    cold = make(name).solve(h)
+    for trial in range(60):
+        memory = cold.memory.copy()
+        at = rng.choice(len(memory), rng.integers(1, len(memory)), replace=False)
+        memory[at] = rng.choice(odd, len(at))
+        if trial % 2:
+            memory[-3:-1] = 1.0
+        warm = make(name).solve(h, memory)
+        assert warm.status is cold.status
+        np.testing.assert_allclose(warm.x, cold.x, atol=1e-7)
+
+
+@pytest.fixture
+def file(tmp_path):
+    path = tmp_path / "problems.npz"
+    Collection(Head("mixed", "", "fresh", 3), (plain(names=None),) * 2).save(path)
+    return path
+
+
+def rewritten(path, compression=zipfile.ZIP_STORED, **content):
+    """Write an archive anew with other arrays, or bytes, under some names."""
+    with zipfile.ZipFile(path) as archive:
+        members = {name: archive.read(name) for name in archive.namelist()}
+    for name, value in content.items():
+        if isinstance(value, np.ndarray):
+            stream = io.BytesIO()
+            np.save(stream, value)
+            value = stream.getvalue()
+        members["head.json" if name == "head" else f"{name}.npy"] = value
+    with zipfile.ZipFile(path, "w", compression) as archive:
+        for name, value in members.items():
+            archive.writestr(name, value)
+
+
+def header(shape):
+    stream = io.BytesIO()
+    np.lib.format.write_array_header_1_0(
+        stream, {"descr": "<f8", "fortran_order": False, "shape": shape})
+    return stream.getvalue()
+
+
+@pytest.mark.parametrize(("content", "said"), [
+    ({"sizes": np.array([10**9, 1, 2, 1])}, "problem 0 needs 2000000002 more numbers"),
+    ({"levels": np.array([3, 3]), "sizes": np.array([HUGE, HUGE, 5] * 2)}, "A is too short"),
+    ({"lower": np.zeros(5)}, "lower is too short: problem 1 needs 3 more numbers, there are 2"),
+    ({"upper": np.array([1.0, 2, 9, 1, 2, -np.inf])}, "problem 1, level 2, row 0: no value"),
+    ({"reference": np.array([0.0, np.nan, 0, 0])}, "problem 0, reference, entry 1: nan"),
+    ({"n": np.array([2**62, 2])}, "reference is too short"),
+    ({"n": np.array([2])}, "n is of 1 problems and levels of 2"),
+    ({"levels": np.array([HUGE, 2])}, "sizes is too short"),
+    ({"head": b"[" * 100_000}, "head.json is nested too deep"),
+    ({"A": header((10**15,))}, "A: its header says 8000000000000000 bytes, and 0 follow"),
+    ({"A": header((10**15,))[:-9]}, "A: "), ({"A": b""}, "A: ")])
+def test_a_file_that_does_not_add_up_is_refused_before_it_is_used(file, content, said):
+    rewritten(file, **content)
+    with pytest.raises(ProblemFileError) as error:
+        read(file)
+    assert str(file) in str(error.value)
+    assert said in str(error.value)
+
+
+def test_an_archive_is_refused_that_unpacks_to_more_than_it_may(file, monkeypatch):
+    rewritten(file, zipfile.ZIP_DEFLATED, more=bytes(2**22))
+    assert file.stat().st_size < 2**14
+    assert len(read(file).problems) == 2
+    monkeypatch.setattr("hierarchy.archives.LARGEST", 2**21)
+    with pytest.raises(ProblemFileError, match=r"it unpacks to 419.* bytes, more than 2097152"):
+        read(file)
+
+
+def test_a_file_may_be_compressed_and_the_numbers_are_the_same(file):
+    before = read(file)
+    rewritten(file, zipfile.ZIP_DEFLATED)
+    assert read(file).digest == before.digest
+
+
+def test_a_single_hierarchy_in_a_file_passes_the_same_gate(tmp_path):
+    path = tmp_path / "one.npz"
+    problems.save(plain(), path)
+    assert problems.load(path).names == ("hand", "elbow")
+    for content, said in (({"lower": np.zeros(2)}, "lower has shape (2,), expected (3,)"),
+                          ({"sizes": np.array([2, 10**9])}, "level 2: size 1000000000"),
+                          ({"A": header((10**15, 2))}, "A.npy: its header says")):
+        problems.save(plain(), path)
+        rewritten(path, **content)
+        with pytest.raises(HierarchyError) as error:
+            problems.load(path)
+        assert f"{path} cannot be read as a hierarchy: {said}" in str(error.value)
+
+
+def test_a_factorization_refuses_what_it_cannot_factor_and_hands_out_copies():
+    factored = Factorization([np.eye(3)[:2], np.ones((1, 3))])
+    x = factored.solve(np.ones(3)).x
+    for array in (factored.rows, factored.basis, factored.coefficients):
+        array.shape = (array.size,)
+        array[:] = np.nan
+    np.testing.assert_array_equal(factored.solve(np.ones(3)).x, x)
+    for wrong, said in ((lambda: Factorization([], n=2.5), "n = 2.5, expected a whole number"),
+                        (lambda: Factorization([], n=-1), "n = -1"),
+                        (lambda: Factorization([1j * np.eye(2)]), "it is complex"),
+                        (lambda: factored.solve(1j * np.ones(3)), "it is complex"),
+                        (lambda: factored.solve(3), "targets: expected a Sequence"),
+                        (lambda: factored.delete(0.5), "index 0.5 is outside 0 .. 1")):
+        with pytest.raises(HierarchyError, match=said):
+            wrong()
+
+
+def test_rows_of_a_foreign_task_must_fit_the_unknowns():
+    class Wide:
+        gain, cost = 1.0, 1.0
+
+        def compute_error(self, _):
+            return np.ones(3)
+
+        def compute_jacobian(self, _):
+            return np.ones((3, 2))
+
+    with pytest.raises(HierarchyError, match=r"Wide: \(3, 2\) rows for \(3,\) values and 7"):
+        of_displacements(None, 7, 0.01, [], [], [Wide()])
+    with pytest.raises(HierarchyError, match=r"limits: \(2, 90\) rows for \(2,\) values and 7"):
+        of_displacements(None, 7, 0.01, [(np.ones((2, 90)), np.ones(2))], [], [])
+
