@@ -28,12 +28,12 @@ from solvers.kernels.working_set import (
     FIRST,
     LOWER,
     NORM,
-    PIVOT,
     REFERENCE,
     STATE,
     TOLERANCE,
     UNIT,
     UPPER,
+    note_pivot,
 )
 from solvers.status import EQUAL
 
@@ -181,7 +181,7 @@ def is_independent(t, i, square):
     s, norm = t.of, t.of.number[NORM, i]
     share = np.sqrt(square) / norm if norm > 0.0 else 0.0
     if share > s.scalar[TOLERANCE]:
-        s.scalar[PIVOT] = min(s.scalar[PIVOT], share)
+        note_pivot(s, share)
         return True
     if share > NEGLIGIBLE:
         s.number[CUT, i] = max(s.number[CUT, i], share * norm)

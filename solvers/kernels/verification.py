@@ -28,6 +28,7 @@ from solvers.kernels.tolerances import (
     ENOUGH,
     EPSILON,
     NEGLIGIBLE,
+    PRODUCT,
     SLIGHT_,
     SPREAD,
     STEEP,
@@ -44,6 +45,7 @@ from solvers.kernels.working_set import (
     NORM,
     PIVOT,
     REFERENCE,
+    SECOND,
     STATE,
     TOLERANCE,
     UNIT,
@@ -108,7 +110,8 @@ def _rows_hold(s, reach):
 def _ranks_are_clear(s, cut):
     """Whether no row would be dependent or not by an angle near the tolerance."""
     return (CLEAR_ * cut <= s.scalar[TOLERANCE] and cut <= STEEP * s.scalar[PIVOT]
-            and CLEAR_ * s.scalar[TOLERANCE] <= s.scalar[PIVOT])
+            and CLEAR_ * s.scalar[TOLERANCE] <= s.scalar[PIVOT]
+            and s.scalar[PIVOT] * s.scalar[SECOND] >= PRODUCT)
 
 
 @inlined

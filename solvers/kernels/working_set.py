@@ -43,9 +43,9 @@ UNIT, STATE, FIRST, CHANGE, ENTERED, SEED, LIST, SIGN, ORDER, PLACE, BEGIN, RANK
 # cut since the rows were those of A, whether small coefficients are cut along other rows too, the
 # number of rows that are negligible beside those of other levels alone.
 PICKED, WHOLE, DIRTY, COARSE, NEGLECTED = range(5)
-# In `scalar`: rank_tolerance, the largest number so far, the smallest pivot of a row over its norm,
-# the factor by which the data are those of the caller.
-TOLERANCE, SIZE, PIVOT, SCALE = range(4)
+# In `scalar`: rank_tolerance, the largest number so far, the smallest pivot of a row over its norm
+# and the next one, the factor by which the data are those of the caller.
+TOLERANCE, SIZE, PIVOT, SECOND, SCALE = range(5)
 
 
 class Scaled(NamedTuple):
@@ -81,7 +81,7 @@ class WorkingSet(NamedTuple):
 @inlined
 def working_set_size(n, m, levels):
     """Return the numbers that a WorkingSet needs, without its multipliers."""
-    return (NUMBERS + 12) * max(m, n, levels + 1) + 9 + 3 * m * n + n * n + n
+    return (NUMBERS + 12) * max(m, n, levels + 1) + 10 + 3 * m * n + n * n + n
 
 
 @inlined
@@ -92,7 +92,7 @@ def carve_working_set(A, sizes, x, multiplier, work, at):
     number, at = matrix(work, at, NUMBERS, w)
     numbers, at = integers(work, at, 12 * w)
     count, at = integers(work, at, 5)
-    scalar, at = vector(work, at, 4)
+    scalar, at = vector(work, at, 5)
     W, at = matrix(work, at, m, n)
     basis, at = carve_basis(work, at, n, n)
     T, at = matrix(work, at, n, m)
@@ -222,7 +222,8 @@ def meet(s, last):
     for c in range(s.x.size):
         index[ORDER, c] = index[PLACE, c] = c
         s.number[GOAL, c] = s.number[REFERENCE, c]
-    s.count[PICKED], s.count[WHOLE], s.scalar[SIZE], s.scalar[PIVOT] = 0, -1, 0.0, 1.0
+    s.count[PICKED], s.count[WHOLE], s.scalar[SIZE] = 0, -1, 0.0
+    s.scalar[PIVOT] = s.scalar[SECOND] = 1.0
     for k in range(levels):
         begin, index[BEGIN, k], index[RANK, k] = rows, rows, rank
         if k >= last or s.count[WHOLE] >= 0:
@@ -287,8 +288,7 @@ def _factor(s, begin, end, rank):
     rank = factor_level(Rows(s.W, listed, s.number[ZEROED], s.number[MISS]), s.basis, begin, end,
                         rank)
     for q in range(begin, begin + rank - above):
-        pivot = abs(s.W[q, above + q - begin])
-        s.scalar[PIVOT] = min(s.scalar[PIVOT], pivot / s.number[NORM, listed[q]])
+        note_pivot(s, abs(s.W[q, above + q - begin]) / s.number[NORM, listed[q]])
     for q in range(begin, end):  # rounding that other rows would be held against
         least = CANCELLED * s.number[NORM, listed[q]]
         for t in range(rank):
@@ -296,6 +296,13 @@ def _factor(s, begin, end, rank):
     for q in range(begin + (0 if s.count[COARSE] == 1 else rank - above), end):
         _cut(s, q, rank, q >= begin + rank - above)
     return rank
+
+
+@inlined
+def note_pivot(s, pivot):
+    """Note the pivot of a row over its norm if it is one of the two smallest."""
+    s.scalar[SECOND] = min(s.scalar[SECOND], max(s.scalar[PIVOT], pivot))
+    s.scalar[PIVOT] = min(s.scalar[PIVOT], pivot)
 
 
 @inlined
