@@ -29,8 +29,8 @@ from solvers.kernels.batch import (
     batch_without_bounds,
 )
 from solvers.resolver import Resolver, make, refuse_inequality
-from solvers.resolvers.hcod import Hcod, name_nothing, record_without_bounds, settle_doubt
-from solvers.resolvers.tpm import Tpm, name_bounds
+from solvers.resolvers.hcod import Hcod
+from solvers.resolvers.tpm import Tpm
 from solvers.status import INACCURATE, NUMERICAL_FAILURE, SOLVED, UNPROVED, Status
 from solvers.workspace import run
 
@@ -191,11 +191,12 @@ class _Run:
         self.record[anew] = 0.0
         self._set_reference(anew)
         self._call(batch_staircase, anew, self.x, self.codes, self.settings)
-        self._settle(anew)
+        doubtful = anew[self.codes[anew] == INACCURATE]
+        self._set_reference(doubtful)
+        self._call(batch_exact, doubtful, self.x, self.codes, self.record, self.settings)
         bounded = anew[self.codes[anew] < 0]
         self._set_reference(bounded)
         self._call(batch_without_bounds, bounded, self.x, self.codes, self.record, self.settings)
-        self._settle(bounded)
         saturated |= self._at_bounds(self.codes == UNPROVED)
         for p in np.flatnonzero(self.codes < 0)[:1]:
             refuse_inequality(self.resolver, self.batch[p], -int(self.codes[p]) - 1)
@@ -212,31 +213,15 @@ class _Run:
         self._call(batch_saturation, which[self.codes[which] != NUMERICAL_FAILURE], self.x, named,
                    self.record)
         self.codes[named < 0] = named[named < 0]
-        self._settle(which)
         saturated[which] = named[which] == SOLVED
         return saturated
 
     def by_hcod(self) -> BatchResolution:
-        """Resolve with the kernels of `hcod`; let `certify` judge answers still in doubt."""
+        """Resolve with the kernel of `hcod`."""
         everything = np.arange(len(self.batch))
         self._set_reference(everything)
-        rest = everything if self.resolver.damping == 0.0 else self._outside_bounds(everything)
-        self._call(batch_exact, rest, self.x, self.codes, self.record, self.settings)
-        self._settle(rest)
+        self._call(batch_exact, everything, self.x, self.codes, self.record, self.settings)
         return self._answer(self.record[:, -3] + self.record[:, -2], self.record)
-
-    def _outside_bounds(self, which: Indices) -> Indices:
-        """Resolve those whose x without bounds is within them; return the others."""
-        b, x = self.batch, self.x.copy()
-        records = np.zeros((len(b), x.shape[1] + len(b.sizes) + self.record.shape[1]))
-        self._call(batch_without_bounds, which, x, self.codes, records, self.settings)
-        inside = self.codes == SOLVED
-        self.x[inside] = x[inside]
-        written = self.record[inside]
-        record_without_bounds(b.lower[inside], b.upper[inside], written)
-        self.record[inside] = written
-        rest: Indices = which[~inside]
-        return rest
 
     def _set_reference(self, which: Indices) -> None:
         self.x[which] = self.batch.reference[which]
@@ -255,13 +240,6 @@ class _Run:
         parts = np.array_split(which, PARTS * threads)
         with ThreadPoolExecutor(threads) as pool:
             list(pool.map(call, parts))
-
-    def _settle(self, which: Indices) -> None:
-        """Settle the answers in doubt of the problems `which`, as `resolver.solve` does."""
-        name = name_bounds if isinstance(self.resolver, Tpm) else name_nothing
-        for p in which[self.codes[which] == INACCURATE].tolist():
-            if settle_doubt(self.batch[p], self.x[p], self.record[p], self.settings, name):
-                self.codes[p] = SOLVED
 
 
 def cores() -> int:

@@ -12,11 +12,9 @@ from __future__ import annotations
 
 from hierarchy.jit import unlocked
 from solvers.kernels.bounds import name_saturation, solve_without_bounds
-from solvers.kernels.guess import solve_by_guesses
-from solvers.kernels.levels import solve_by_levels
-from solvers.kernels.staircase import solve_by_staircase, solve_equalities
-from solvers.kernels.tableau import carve
-from solvers.status import EQUAL, NO_LIMITS, SOLVED, TOO_SMALL, UNPROVED
+from solvers.kernels.exact import solve_hierarchy, work_size
+from solvers.kernels.staircase import solve_by_staircase
+from solvers.status import SOLVED, TOO_SMALL
 
 
 @unlocked
@@ -53,26 +51,15 @@ def batch_saturation(problems, x, codes, records, which, work):
 
 @unlocked
 def batch_exact(problems, x, codes, records, settings, which, work):
-    """Solve the problems `which` as `solvers.resolvers.hcod.solve_exactly` does.
+    """Solve the problems `which` with the exact kernel.
 
     The record of the exact resolver is the last part of each record.
     """
     A, lower, upper, sizes = problems
     begin = records.shape[1] - 3 * A.shape[1] - 3
+    if work_size(A.shape[2], A.shape[1], sizes.size, settings[0] > 0.0) > work.size:
+        return TOO_SMALL
     for p in which:
-        _, enough = carve(A[p], sizes, x[p], settings, work)
-        if not enough:
-            return TOO_SMALL
-        record, code = records[p, begin:], UNPROVED
-        guesses, steps = record[record.size - 3], record[record.size - 2]
-        known = guesses + steps > 0.0 and settings[0] == 0.0
-        if not known or record[0] == EQUAL:
-            code = solve_equalities(A[p], lower[p], upper[p], sizes, x[p], record, settings, work)
-        if code == UNPROVED and known:
-            code = solve_by_guesses(A[p], lower[p], upper[p], sizes, x[p], record, settings, work)
-        if code == NO_LIMITS:
-            code = solve_equalities(A[p], lower[p], upper[p], sizes, x[p], record, settings, work)
-        if code == UNPROVED:
-            code = solve_by_levels(A[p], lower[p], upper[p], sizes, x[p], record, settings, work)
-        codes[p] = code
+        codes[p] = solve_hierarchy(A[p], lower[p], upper[p], sizes, x[p], records[p, begin:],
+                                   settings, work)
     return SOLVED

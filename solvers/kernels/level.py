@@ -9,91 +9,73 @@ by back substitution in sum_t lambda_t a_t = -A_k^T w_k, says whether that row h
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from hierarchy.jit import as_matrix, compiled, inlined
-from solvers.kernels.block import level_damping
-from solvers.kernels.rows import ZERO, reflect, reflect_back
-from solvers.kernels.space import Basis, Block, Settings, View
+from solvers.kernels.rows import reflect, reflect_back
+from solvers.kernels.space import Basis
 from solvers.kernels.tableau import (
     COLUMN,
-    ENTRY,
     FORCE,
     LIST,
-    NORM,
     OVER,
     OWNER,
     PULL,
     PULLED,
     REST,
     ROUNDING,
+    ROWS,
     SCALE,
     SHARE,
     SIZE,
-    STEP,
     WORST,
     Z,
     around,
+    entry_of,
     left_of,
-    side_of,
 )
-from solvers.kernels.tolerances import BRINK, CANCELLED, DOUBTFUL, EPSILON, SAME
-
-
-class Part(NamedTuple):
-    """A level's part: rows q0 .. q1 - 1 of the list, and `rank` basis vectors from `begin` on."""
-
-    q0: View
-    q1: View
-    begin: View
-    rank: View
+from solvers.kernels.tolerances import CANCELLED, EPSILON
+from solvers.kernels.working_set import NORM, TOLERANCE, side_at
 
 
 @inlined
-def solve_part(s, part):
-    """Write the step of an undamped level into Z, and the excess of its rows after the step.
+def step_of_rows(t, begin, rank):
+    """Write the step of a level into Z, and the excess of its rows after the step.
 
     Independent rows are met. Returns the size of the largest numbers involved.
     """
-    begin, rank, size, y = part.begin, part.rank, 0.0, s.number[Z, part.begin:]
-    if part.q1 - part.q0 > rank:
-        return least_squares_part(s, part, 0.0)
-    for t in range(rank):
-        i, left = s.index[LIST, part.q0 + t], s.number[REST, part.q0 + t]
-        column, entry = s.index[COLUMN, i], s.number[ENTRY, i]
-        diagonal = entry * s.M[begin + t, column]
+    if t.count[ROWS] > rank:
+        return _least_squares_step(t, begin, rank)
+    s, size, y = t.of, 0.0, t.of.number[Z, begin:]
+    for q in range(rank):
+        i, left = s.index[LIST, q], s.number[REST, q]
+        column, entry = s.index[COLUMN, i], entry_of(t, i)
+        diagonal = entry * t.M[begin + q, column]
         size = max(size, abs(left / diagonal))
-        for c in range(t):
-            left -= entry * s.M[begin + c, column] * y[c]
-        y[t] = left / diagonal
-        s.number[OVER, part.q0 + t] = 0.0
+        for c in range(q):
+            left -= entry * t.M[begin + c, column] * y[c]
+        y[q] = left / diagonal
+        s.number[OVER, q] = 0.0
     return size
 
 
 @inlined
-def least_squares_part(s, part, damped):
-    """Like `solve_part`, with damping; the targets of the damping are Z on entry."""
-    rows, rank, size, least = part.q1 - part.q0, part.rank, 0.0, s.settings.rank_tolerance
-    height = rows + rank if damped > 0.0 else rows
-    L, y = as_matrix(s.room[:height * (rank + 1)], rank + 1, height), s.number[Z, part.begin:]
+def _least_squares_step(t, begin, rank):
+    """Like `step_of_rows`, for more rows than rank."""
+    s, rows, size, y = t.of, t.count[ROWS], 0.0, t.of.number[Z, begin:]
+    L = as_matrix(t.room[:rows * (rank + 1)], rank + 1, rows)
     for q in range(rows):
-        i, rest = s.index[LIST, part.q0 + q], s.number[REST, part.q0 + q]
-        column, entry = s.index[COLUMN, i], s.number[ENTRY, i]
-        seen = left_of(s, i, part.begin, part.begin + rank) > (least * s.number[NORM, i]) ** 2
+        i, rest = s.index[LIST, q], s.number[REST, q]
+        column, entry, least = s.index[COLUMN, i], entry_of(t, i), s.scalar[TOLERANCE]
+        seen = left_of(t, i, begin, begin + rank) > (least * s.number[NORM, i]) ** 2
         for c in range(rank):  # entries of a row in the span of the rows above are rounding
-            L[c, q] = entry * s.M[part.begin + c, column] if c <= q and seen else 0.0
+            L[c, q] = entry * t.M[begin + c, column] if c <= q and seen else 0.0
         L[rank, q] = rest
         if q < rank:
             size = max(size, abs(rest / L[q, q]))
-    for q in range(rows, height):
-        for c in range(rank):
-            L[c, q] = damped if q - rows == c else 0.0
-        L[rank, q] = damped * y[q - rows]
-    least_squares(L, y, s.room[L.size:])
+    least_squares(L, y, t.room[L.size:])
     for q in range(rows):
-        s.number[OVER, part.q0 + q] = -L[rank, q]
+        s.number[OVER, q] = -L[rank, q]
     return size
 
 
@@ -128,137 +110,58 @@ def least_squares(T, y, work):
 
 
 @inlined
-def damping_of(s, part):
-    """Return lambda of a level, see `Resolver`."""
-    rows, rank = part.q1 - part.q0, part.rank
-    L = as_matrix(s.room[:rows * rank], rows, rank)
-    for q in range(rows):
-        i = s.index[LIST, part.q0 + q]
-        column, entry = s.index[COLUMN, i], s.number[ENTRY, i]
-        for c in range(rank):
-            L[q, c] = entry * s.M[part.begin + c, column] if c <= q else 0.0
-    shared = Settings(s.settings.damping, s.settings.threshold, s.settings.rank_tolerance)
-    return level_damping(L, Block(ZERO, rows, ZERO, rank), shared, s.room[rows * rank:])
-
-
-@inlined
-def weigh_rows(s, part):
+def weigh_rows(t):
     """Write the largest miss of the rows of a level, and the sum of their pulls.
 
     If the misses are rounding in all rows, they count as zero; in a single row the miss may be what
     balances a light row. The share of rounding in a pull is that in the miss.
     """
-    worst = pulled = 0.0
-    missed = False
-    for q in range(part.q0, part.q1):
+    s, worst, pulled, missed = t.of, 0.0, 0.0, False
+    for q in range(t.count[ROWS]):
         i, over = s.index[LIST, q], abs(s.number[OVER, q])
-        norm, side = s.number[NORM, i], side_of(s.number, i)
-        missed |= over > EPSILON * around(norm, side, s.scalar[SIZE])
-        pulled += norm * over
+        side = side_at(s, i)
+        missed |= over > EPSILON * around(s, i, side, t.scalar[SIZE])
+        pulled += s.number[NORM, i] * over
         if over > 0.0:
-            worst = max(worst, over / around(norm, side, s.scalar[SCALE]))
+            worst = max(worst, over / around(s, i, side, t.scalar[SCALE]))
     if not missed:
         worst = pulled = 0.0
-        for q in range(part.q0, part.q1):
+        for q in range(t.count[ROWS]):
             s.number[OVER, q] = 0.0
-    s.scalar[WORST], s.scalar[PULLED] = worst, pulled
-    length = worst * s.scalar[SCALE]
-    share = min(EPSILON * s.scalar[SIZE] / length, 1.0) if length > 0.0 else 0.0
-    s.scalar[ROUNDING] = pulled * max(CANCELLED, share)
+    t.scalar[WORST], t.scalar[PULLED] = worst, pulled
+    length = worst * t.scalar[SCALE]
+    share = min(EPSILON * t.scalar[SIZE] / length, 1.0) if length > 0.0 else 0.0
+    t.scalar[ROUNDING] = pulled * max(CANCELLED, share)
 
 
 @inlined
-def is_uneven(s, part, share):
-    """Whether a row of a level is smaller than this share of another."""
-    least, most = np.inf, 0.0
-    for q in range(part.q0, part.q1):
-        norm = s.number[NORM, s.index[LIST, q]]
-        least, most = min(least, norm), max(most, norm)
-    return least < share * most
-
-
-@inlined
-def is_unclear(s, i, begin, end):
-    """Whether a dependent row is only nearly so.
-
-    Little, but more than nothing, is left of it from basis vector `begin` on, where its level
-    begins, or hardly less than counts as something from `end` on, where its level ends.
-    """
-    least = s.settings.rank_tolerance * s.number[NORM, i]
-    left, beyond = left_of(s, i, begin, s.x.size), left_of(s, i, end, s.x.size)
-    nearly = least * least < left < (DOUBTFUL * s.number[NORM, i]) ** 2
-    return nearly or beyond > (BRINK * least) ** 2
-
-
-@inlined
-def pull_of_rows(s, part, begin, end):
-    """Add the excess of the rows of a level, times the rows, to its pull.
-
-    In the basis vectors begin .. end - 1.
-    """
-    pull = s.number[PULL]
-    for q in range(part.q0, part.q1):
+def pull_of_rows(t, begin, end):
+    """Add the excess of the rows of a level, times the rows, in the basis vectors begin .. end."""
+    s, pull = t.of, t.of.number[PULL]
+    for q in range(t.count[ROWS]):
         i = s.index[LIST, q]
-        push, column = s.number[OVER, q] * s.number[ENTRY, i], s.index[COLUMN, i]
+        push, column = s.number[OVER, q] * entry_of(t, i), s.index[COLUMN, i]
         if push != 0.0:
-            for t in range(begin, end):
-                pull[t] += push * s.M[t, column]
+            for k in range(begin, end):
+                pull[k] += push * t.M[k, column]
 
 
 @inlined
-def balance(s, begin, end, removed):
+def balance(t, begin, end):
     """Write the forces of the rows that own the basis vectors begin .. end - 1.
 
-    The first `removed` vectors are removed unknowns: their rows pull on nothing else. A pull that
-    may be rounding alone counts as zero: every entry of a row is rounded relative to its norm.
+    A pull that may be rounding alone counts as zero: every entry of a row is rounded relative to
+    its norm.
     """
-    pull, force, share = s.number[PULL], s.number[FORCE], s.number[SHARE]
-    rounding = s.scalar[ROUNDING]
-    for t in range(end - 1, begin - 1, -1):
-        force[t], share[t] = 0.0, abs(pull[t])
-        i = s.index[OWNER, t]
-        if i < 0 or share[t] <= rounding:
+    s, pull, force, share = t.of, t.of.number[PULL], t.of.number[FORCE], t.of.number[SHARE]
+    rounding = t.scalar[ROUNDING]
+    for k in range(end - 1, begin - 1, -1):
+        force[k], share[k] = 0.0, abs(pull[k])
+        i = s.index[OWNER, k]
+        if i < 0 or share[k] <= rounding:
             continue
-        column, entry = s.index[COLUMN, i], s.number[ENTRY, i]
-        force[t] = -pull[t] / (entry * s.M[t, column])
-        if t >= removed:
-            rounding += CANCELLED * abs(force[t]) * s.number[NORM, i]
-            for c in range(begin, t):
-                pull[c] += force[t] * entry * s.M[c, column]
-
-
-@inlined
-def nearly_parallel(s, part, above):
-    """Whether a row of a level depends on its other rows, up to a share of rank_tolerance.
-
-    The basis vectors above .. part.begin - 1 belong to rows that are only held.
-    """
-    M, h, n, v = s.M, part.begin - above, s.x.size, s.number[STEP]
-    least = s.settings.rank_tolerance
-    for q in range(part.q0 + part.rank, part.q1):
-        i = s.index[LIST, q]
-        square, norm = 0.0, s.number[NORM, i]
-        for t in range(above, n):
-            v[t - above] = M[t, s.index[COLUMN, i]] * s.number[ENTRY, i]
-        for c in range(part.rank - 1, -1, -1):
-            j = s.index[LIST, part.q0 + c]
-            share = v[h + c] / M[part.begin + c, s.index[COLUMN, j]]
-            if abs(share / s.number[ENTRY, j]) * s.number[NORM, j] > least * norm:
-                for t in range(h + c + 1):
-                    v[t] -= share * M[above + t, s.index[COLUMN, j]]
-        for t in range(n - above):
-            square += v[t] * v[t]
-        if (SAME * norm) ** 2 < square <= (least * norm) ** 2:
-            return True
-    return False
-
-
-@inlined
-def smallest_share(s, begin, end):
-    """Return the smallest share of a row in its own basis vector, relative to its norm."""
-    least = 1.0
-    for t in range(begin, end):
-        i = s.index[OWNER, t]
-        if i >= 0:
-            least = min(least, np.sqrt(left_of(s, i, t, t + 1)) / s.number[NORM, i])
-    return least
+        column, entry = s.index[COLUMN, i], entry_of(t, i)
+        force[k] = -pull[k] / (entry * t.M[k, column])
+        rounding += CANCELLED * abs(force[k]) * s.number[NORM, i]
+        for c in range(begin, k):
+            pull[c] += force[k] * entry * t.M[c, column]

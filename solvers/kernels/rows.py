@@ -12,7 +12,8 @@ from __future__ import annotations
 import numpy as np
 
 from hierarchy.jit import compiled, inlined
-from solvers.status import NUMERICAL_FAILURE, SOLVED
+from solvers.kernels.tolerances import LEAST_SQUARE
+from solvers.status import INACCURATE, NUMERICAL_FAILURE, SOLVED
 
 ZERO = np.int64(0)
 ROUNDING = 1e-13  # of the terms of a sum: smaller sums are rounding
@@ -23,10 +24,11 @@ def load_rows(W, zero, A, lower, upper, x, rank_tolerance):
     """Copy A into the first rows of W, check all data, and write when a row counts as zero.
 
     zero (m,) receives the squared norm at or below which the remainder of a row counts as zero.
-    Returns SOLVED, NUMERICAL_FAILURE for an entry that is not finite, or -(i + 1) if row i is an
-    inequality.
+    Returns SOLVED, NUMERICAL_FAILURE for an entry that is not finite, -(i + 1) if row i is an
+    inequality, or INACCURATE if the square of a row underflows.
     """
     m, n = A.shape
+    code = SOLVED if all_finite(x) else NUMERICAL_FAILURE
     for i in range(m):
         if lower[i] != upper[i]:
             return -(i + 1) if lower[i] < upper[i] else NUMERICAL_FAILURE
@@ -35,9 +37,11 @@ def load_rows(W, zero, A, lower, upper, x, rank_tolerance):
             W[i, c] = A[i, c]
             square += A[i, c] * A[i, c]
         zero[i] = rank_tolerance * rank_tolerance * square
+        if square <= LEAST_SQUARE and code == SOLVED and A[i].any():
+            code = INACCURATE
         if not (np.isfinite(square) and np.isfinite(lower[i])):
             return NUMERICAL_FAILURE
-    return SOLVED if all_finite(x) else NUMERICAL_FAILURE
+    return code
 
 
 @inlined
@@ -47,6 +51,15 @@ def all_finite(x):
     for c in range(x.size):
         finite &= np.isfinite(x[c])
     return finite
+
+
+@inlined
+def length_of(x):
+    """Return the Euclidean norm."""
+    square = 0.0
+    for c in range(x.size):
+        square += x[c] * x[c]
+    return np.sqrt(square)
 
 
 @inlined

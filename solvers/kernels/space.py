@@ -89,12 +89,6 @@ def matrix(work, at, rows, columns):
 
 
 @inlined
-def proof_size(n, m, levels):
-    """Return the size of what a proof by multipliers needs, see `multipliers.py`."""
-    return 13 * max(m, n, levels + 1) + (levels + 1) * (n + 1) + (n + 1) * (m + n)
-
-
-@inlined
 def carve_basis(work, at, k, n):
     """Return a Basis of up to k reflectors of n unknowns, and where it ends."""
     V, at = matrix(work, at, k, n)

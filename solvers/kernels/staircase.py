@@ -18,7 +18,6 @@ from hierarchy.jit import compiled, inlined
 from solvers.kernels.block import solve_level
 from solvers.kernels.rows import (
     ZERO,
-    all_equal,
     factor_level,
     finish,
     has_outlier,
@@ -38,7 +37,7 @@ from solvers.kernels.space import (
     vector,
 )
 from solvers.kernels.tolerances import BORDER, DOUBTFUL, DUST, LIGHT
-from solvers.status import EQUAL, INACCURATE, SOLVED, TOO_SMALL, UNPROVED
+from solvers.status import INACCURATE, SOLVED, TOO_SMALL
 
 
 class Staircase(NamedTuple):
@@ -142,21 +141,6 @@ def _smallest_pivot(rows, block, least):
         square, zero = rows.W[i, k] * rows.W[i, k], rows.zero[i]
         least = min(least, square / zero) if zero > 0.0 else least
     return least
-
-
-@compiled
-def solve_equalities(A, lower, upper, sizes, x, record, settings, work):
-    """Like `solve_by_staircase`, with the record of `solve_by_guesses`.
-
-    Returns UNPROVED, with nothing done, if a row is an inequality.
-    """
-    if not all_equal(lower, upper):
-        return UNPROVED
-    code, m = solve_by_staircase(A, lower, upper, sizes, x, settings, work), lower.size
-    for i in range(m):
-        record[i], record[m + i], record[2 * m + i] = EQUAL, -1.0, 0.0
-    record[3 * m], record[3 * m + 1], record[3 * m + 2] = 1.0, 0.0, -1.0
-    return code
 
 
 @inlined

@@ -18,196 +18,101 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hierarchy.jit import as_matrix, compiled, inlined
-from solvers.kernels.rows import ZERO, finish, has_outlier
-from solvers.kernels.space import View, integers, matrix, proof_size, vector
-from solvers.kernels.tolerances import DOUBTFUL, DUST, FLOOR, OUTGROWN
-from solvers.status import EQUAL, FREE, NUMERICAL_FAILURE, SOLVED, TOO_SMALL
+from hierarchy.jit import compiled, inlined
+from solvers.kernels.rows import ZERO
+from solvers.kernels.space import View, integers, matrix, vector
+from solvers.kernels.tolerances import FLOOR, NEGLIGIBLE
+from solvers.kernels.working_set import (
+    CUT,
+    ENTRY,
+    FIRST,
+    LOWER,
+    NORM,
+    REFERENCE,
+    STATE,
+    TOLERANCE,
+    UNIT,
+    UPPER,
+    note_pivot,
+)
+from solvers.status import EQUAL
 
-# Rows of `number`. Per row of A: its norm, its only entry (1 if there are more), its sides, the
-# sides as moved, its value and the rate of that, its residual before its level and its excess after
-# (these two in the order of the list), and the record, see `ActiveSetResolution`. Per unknown or
-# basis vector: the x at the start of the level, its goal, the reference, the step in x, x or its
-# step in the basis, the level's pull, the force that balances it, and the part of the pull that
-# it balances.
-(NORM, ENTRY, LOWER, UPPER, LOW, UP, VALUE, SPEED, REST, OVER, ACTIVE, HOLDS, MULTIPLIER,
- START, GOAL, REFERENCE, STEP, Z, PULL, FORCE, SHARE) = range(21)
-# Rows of `index`. Per row of A: its unknown (-1 for several entries), its column of M, its state;
-# the list of active rows, each level in pivot order. Per basis vector: the row that owns it, -1 for
-# none; the unknown it was initially. Per level: its number of rows, its start in the list, and in
-# the basis.
-UNIT, COLUMN, STATE, LIST, OWNER, ORDER, EXTENT, BEGIN, RANKS = range(9)
-# In `count`: levels; first column of M in use; first column of the remaining unknowns; removed
-# unknowns, which were put on a bound before all else; whether the answer is in doubt. The others
-# are those of `levels.py`.
-LEVELS, FIRST, BASE, REMOVED, DOUBT = range(5)
-COUNTS = 15
-# In `scalar`: the largest number so far, the scale of tolerances; a level's damping and weight; the
-# largest miss of its rows, the sum of their pulls, the part of that which may be rounding; guesses,
-# steps, the unfinished level; the largest number of a whole step.
-(SIZE, SCALE, DAMPED, WEIGHT, WORST, PULLED, ROUNDING,
- GUESSES, STEPS, UNFINISHED, REACH) = range(11)
-SCALARS = 11
-
-ALL, ACTING = np.int64(0), np.int64(1)  # the rows that a tableau holds
-
-
-class Exact(NamedTuple):
-    """The settings of `Hcod`, in the order of its array."""
-
-    damping: View
-    threshold: View
-    rank_tolerance: View
-    tolerance: View
-    guesses: View
-    max_iterations: View
+# Rows of `number` after those of the data. Per row of A: its value and the rate of that; its
+# residual before the step of its level and its excess after (in the order of the list). Per unknown
+# or basis vector: the goal of a level that sets all of x, the step in x, its step in the basis, the
+# gradient of the level, the force that balances it, and the part of the gradient that it balances.
+VALUE, SPEED, REST, OVER, GOAL, STEP, Z, PULL, FORCE, SHARE = range(REFERENCE + 1, REFERENCE + 11)
+# Rows of `index` after those of the data. Per row of A: its column of M, its kind; the list of the
+# rows of the level that act, in pivot order. Per basis vector: the row that owns it, -1 for none.
+COLUMN, KIND, LIST, OWNER = range(FIRST + 1, FIRST + 5)
+# In `count`: the first column of M in use; the first column of the unknowns; basis vectors of the
+# fixed, hard and soft rows, soft rows, equalities of the level that have columns; steps of zero
+# length; whether the level is missed; steps.
+IN_USE, BASE, FIX, HARD, RANKS, ROWS, EQUALITIES, STILL, MISSED, STEPS = range(10)
+# In `scalar`: the largest number so far, the scale of tolerances; the square of a level's weight;
+# the largest miss of its rows, the sum of their pulls, the part of that which may be rounding; the
+# largest number of a whole step.
+SIZE, SCALE, WEIGHT, WORST, PULLED, ROUNDING, REACH = range(7)
 
 
-class Solve(NamedTuple):
-    """The data of a solve: few arrays with named rows, since each array costs compile time.
+class Tableau(NamedTuple):
+    """The data of a solve level by level.
 
-    A (m, n), x (n,). number, index (.., w), w the largest of m, n, L + 1, and count, scalar: see
-    above. M (n, g + n). room: scratch.
+    of: the WorkingSet whose data it shares. count, scalar: see above. M (n, g + n). room: scratch.
     """
 
-    A: View
-    x: View
-    number: View
-    index: View
+    of: View
     count: View
     scalar: View
     M: View
     room: View
-    settings: Exact
 
 
 @inlined
-def prepare(A, lower, upper, sizes, x, record, settings, work):
-    """Return a Solve with all data, and SOLVED, TOO_SMALL or, with x = 0, NUMERICAL_FAILURE."""
-    s, enough = carve(A, sizes, x, settings, work)
-    if not enough:
-        return s, ZERO + TOO_SMALL
-    general = load(s, lower, upper, sizes, record)
-    if general < 0:
-        return s, ZERO + finish(x, NUMERICAL_FAILURE)
-    return with_tableau(s, general), ZERO + SOLVED
+def tableau_size(n, m):
+    """Return the numbers that a Tableau needs: M, and the least squares of all rows."""
+    return 17 + n * (m + n) + (m + n) * (n + 3)
 
 
 @inlined
-def carve(A, sizes, x, settings, work):
-    """Return a Solve without data whose M has no columns yet, and whether everything fits.
-
-    Everything is M, and a least squares problem of all rows with its damping or a proof.
-    """
-    m, n = A.shape
-    w = max(m, n, sizes.size + 1)
-    number, at = matrix(work, ZERO, 21, w)
-    numbers, at = integers(work, at, 9 * w)
-    count, at = integers(work, at, COUNTS)
-    scalar, at = vector(work, at, SCALARS)
-    needed = max((m + n) * (2 * n + 2), proof_size(n, m, sizes.size))
-    enough = at + n * (m + n) + needed <= work.size
-    room = work[at if enough else work.size:]
-    exact = Exact(settings[0], settings[1], settings[2], settings[3], settings[4], settings[5])
-    index = as_matrix(numbers, 9 if numbers.size > 0 else 0, w)
-    return Solve(A, x, number, index, count, scalar,
-                 as_matrix(room[:0], n, 0), room, exact), enough
-
-
-@inlined
-def with_tableau(s, general):
-    """Return the Solve with an M for `general` rows with several entries."""
-    n = s.x.size
-    M, at = matrix(s.room, ZERO, n, general + n)
-    return Solve(s.A, s.x, s.number, s.index, s.count, s.scalar, M, s.room[at:], s.settings)
+def carve_tableau(s, work, at):
+    """Return a Tableau of a WorkingSet, and where it ends."""
+    m, n = s.A.shape
+    general = ZERO
+    for i in range(m):
+        general += s.index[UNIT, i] < 0
+    count, at = integers(work, at, 10)
+    scalar, at = vector(work, at, 7)
+    M, at = matrix(work, at, n, general + n)
+    return Tableau(s, count, scalar, M, work[at:]), at
 
 
 @compiled
-def load(s, lower, upper, sizes, record):
-    """Check and copy all data; return the number of rows with several entries, -1 if invalid.
+def open_tableau(t):
+    """Write M for Q = I: equalities, inequalities, unknowns.
 
-    An active inequality whose side is missing becomes free.
+    So settled columns come before the others and can be skipped from then on.
     """
-    number, general, sane = s.number, ZERO, True
-    s.count[LEVELS] = sizes.size
-    for k in range(sizes.size):
-        s.index[EXTENT, k] = sizes[k]
-    for c in range(s.x.size):
-        sane &= np.isfinite(s.x[c])
-        number[REFERENCE, c], s.index[ORDER, c] = s.x[c], c
-    for i in range(lower.size):
-        a, square, entries, only = s.A[i], 0.0, 0, -1
-        for c in range(a.size):
-            square += a[c] * a[c]
-            if a[c] != 0.0:
-                entries, only = entries + 1, c
-        only = only if entries == 1 else -1
-        general += only < 0
-        low, up, act = lower[i], upper[i], record[i]
-        sane &= np.isfinite(square) and low <= up and low < np.inf and up > -np.inf
-        number[NORM, i], s.index[UNIT, i] = np.sqrt(square), only
-        number[ENTRY, i] = a[only] if only >= 0 else 1.0
-        number[LOWER, i] = number[LOW, i] = low
-        number[UPPER, i] = number[UP, i] = up
-        if low == up:
-            act = EQUAL
-        elif not ((act == 1.0 and up < np.inf) or (act == -1.0 and low > -np.inf)):
-            act = FREE
-        number[ACTIVE, i], number[HOLDS, i], number[MULTIPLIER, i] = act, -1.0, 0.0
-    s.scalar[SIZE] = s.scalar[SCALE] = s.scalar[GUESSES] = s.scalar[STEPS] = 0.0
-    s.scalar[UNFINISHED] = -1.0
-    return general if sane else -1
-
-
-@inlined
-def keep(s, record):
-    """Write the record."""
-    m = s.A.shape[0]
-    for i in range(m):
-        record[i], record[m + i] = s.number[ACTIVE, i], s.number[HOLDS, i]
-        record[2 * m + i] = s.number[MULTIPLIER, i]
-    record[3 * m], record[3 * m + 1] = s.scalar[GUESSES], s.scalar[STEPS]
-    record[3 * m + 2] = s.scalar[UNFINISHED]
-
-
-@compiled
-def open_tableau(s, rows):
-    """Write M for Q = I: removed unknowns, equalities, inequalities, the remaining unknowns.
-
-    So settled columns come before the others and can be skipped from then on. If only the ACTING
-    rows are needed, the columns of the others are skipped from the start.
-    """
-    M, active, unit, order = s.M, s.number[ACTIVE], s.index[UNIT], s.index[ORDER]
-    m, n, removed = s.A.shape[0], s.x.size, s.count[REMOVED]
-    at = removed
-    for i in range(m):
-        at += rows == ACTING and unit[i] < 0 and active[i] == FREE
-    s.count[FIRST], s.count[DOUBT] = at, 0
+    s, M, at = t.of, t.M, ZERO
     for equal in (True, False):
-        for i in range(m):
-            if unit[i] < 0 and (active[i] == EQUAL) == equal and not (
-                    rows == ACTING and active[i] == FREE):
+        for i in range(s.A.shape[0]):
+            if s.index[UNIT, i] < 0 and (s.index[STATE, i] == EQUAL) == equal:
                 s.index[COLUMN, i] = at
-                a = s.A[i]
-                for t in range(n):
-                    M[t, at] = a[order[t]]
+                for c in range(s.x.size):
+                    M[c, at] = s.A[i, c]
                 at += 1
-    s.count[BASE] = at
-    for t in range(n):
-        for c in range(removed):
-            M[t, c] = 0.0
+    t.count[IN_USE], t.count[BASE] = 0, at
+    for r in range(s.x.size):
         for c in range(at, M.shape[1]):
-            M[t, c] = 0.0
-        column = t if t < removed else at + t - removed
-        M[t, column] = 1.0
-        s.room[order[t]] = column
-    for i in range(m):
-        if unit[i] >= 0:
-            s.index[COLUMN, i] = np.int64(s.room[unit[i]])
+            M[r, c] = 0.0
+        M[r, at + r] = 1.0
+    for i in range(s.A.shape[0]):
+        if s.index[UNIT, i] >= 0:
+            s.index[COLUMN, i] = at + s.index[UNIT, i]
 
 
 @compiled
-def reflect(M, k, end, column, first, total):
+def reflect_columns(M, k, end, column, first, total):
     """Reflect rows k .. end - 1 of M so that `column` is zero below row k.
 
     Columns from `first` on are reflected too; total (g + n,) is scratch.
@@ -256,116 +161,75 @@ def fold(M, k, column, first):
 
 
 @inlined
-def left_of(s, i, begin, end):
+def left_of(t, i, begin, end):
     """Return the squared norm of row i in the basis vectors begin .. end - 1."""
-    square, column, entry = 0.0, s.index[COLUMN, i], s.number[ENTRY, i]
-    for t in range(begin, end):
-        square += s.M[t, column] * s.M[t, column]
+    square, column, entry = 0.0, t.of.index[COLUMN, i], entry_of(t, i)
+    for k in range(begin, end):
+        square += t.M[k, column] * t.M[k, column]
     return square * entry * entry
 
 
 @inlined
-def factor(s, q0, q1, begin, rank):
-    """Give rows q0 .. q1 - 1 of the list basis vectors from `begin` on, the largest row first.
+def entry_of(t, i):
+    """Return the factor of row i over its column of M."""
+    return t.of.number[ENTRY, i] if t.of.index[UNIT, i] >= 0 else 1.0
 
-    The first `rank` of them already have theirs. Puts the list into pivot order; returns the rank.
+
+@inlined
+def is_independent(t, i, square):
+    """Whether a row of which this square is left is independent; notes its pivot, or its cut."""
+    s, norm = t.of, t.of.number[NORM, i]
+    share = np.sqrt(square) / norm if norm > 0.0 else 0.0
+    if share > s.scalar[TOLERANCE]:
+        note_pivot(s, share)
+        return True
+    if share > NEGLIGIBLE:
+        s.number[CUT, i] = max(s.number[CUT, i], share * norm)
+    return False
+
+
+@inlined
+def pivot_rows(t, begin, rank):
+    """Give the listed rows basis vectors from `begin` on, the largest row first; return the rank.
+
+    The first `rank` of them already have theirs. Puts the list into pivot order.
     """
-    n, rows = s.x.size, s.index[LIST]
-    while q0 + rank < q1 and begin + rank < n:
+    s, n, rows, count = t.of, t.of.x.size, t.of.index[LIST], t.count[ROWS]
+    while rank < count and begin + rank < n:
         largest, best = 0.0, -1
-        for q in range(q0 + rank, q1):
-            least = s.settings.rank_tolerance * s.number[NORM, rows[q]]
-            square = left_of(s, rows[q], begin + rank, n)
+        for q in range(rank, count):
+            least = s.scalar[TOLERANCE] * s.number[NORM, rows[q]]
+            square = left_of(t, rows[q], begin + rank, n)
             if square > largest and square > least * least:
                 largest, best = square, q
         if best < 0:
             break
-        q = q0 + rank
-        rows[q], rows[best] = rows[best], rows[q]
-        if largest < (DOUBTFUL * s.number[NORM, rows[q]]) ** 2:
-            s.count[DOUBT] = 1
-        reflect(s.M, begin + rank, n, s.index[COLUMN, rows[q]], s.count[FIRST], s.room)
+        rows[rank], rows[best] = rows[best], rows[rank]
+        is_independent(t, rows[rank], largest)
+        reflect_columns(t.M, begin + rank, n, s.index[COLUMN, rows[rank]], t.count[IN_USE], t.room)
         rank += 1
     return rank
 
 
 @inlined
-def value_of(s, x, i):
-    """Return row i of A times x."""
-    if s.index[UNIT, i] >= 0:
-        return s.number[ENTRY, i] * x[s.index[UNIT, i]]
-    total, a = 0.0, s.A[i]
-    for c in range(a.size):
-        total += a[c] * x[c]
-    return total
+def around(s, i, side, scale):
+    """Return the scale of tolerances for row i at a side; see `tolerances.py`."""
+    return s.number[NORM, i] * scale + abs(side)
 
 
 @inlined
-def side_of(number, i):
-    """Return the side at which row i is active."""
-    return number[UP, i] if number[ACTIVE, i] > 0.0 else number[LOW, i]
-
-
-@inlined
-def around(norm, side, scale):
-    """Return the scale of tolerances for a row at a side; see `tolerances.py`."""
-    return norm * scale + abs(side)
-
-
-@inlined
-def missed_side(number, i, value, scale, tolerance):
+def missed_side(s, i, value, scale, tolerance):
     """Return +1 if row i is above its upper side, -1 if below its lower side, else 0."""
-    low, up, norm = number[LOW, i], number[UP, i], number[NORM, i]
-    if value > up + tolerance * around(norm, up, scale):
-        return 1.0
-    return -1.0 if value < low - tolerance * around(norm, low, scale) else 0.0
+    up, low = s.number[UPPER, i], s.number[LOWER, i]
+    if value > up + tolerance * around(s, i, up, scale):
+        return 1
+    if value < low - tolerance * around(s, i, low, scale):
+        return -1
+    return 0
 
 
 @inlined
-def length_of(x):
-    """Return the Euclidean norm."""
-    square = 0.0
-    for c in range(x.size):
-        square += x[c] * x[c]
-    return np.sqrt(square)
-
-
-@inlined
-def measure(s):
+def measure(t, length):
     """Write the scale of tolerances: the length of x, but at least the size of rounding."""
-    length = length_of(s.x)
-    s.scalar[SIZE] = max(s.scalar[SIZE], length)
-    s.scalar[SCALE] = max(length, FLOOR * s.scalar[SIZE])
-
-
-@inlined
-def has_outgrown(s):
-    """Whether x is so small relative to its terms that its tolerances mean little."""
-    return s.scalar[SIZE] > OUTGROWN * (1.0 + length_of(s.x))
-
-
-@inlined
-def has_dust(s):
-    """Whether a row is so small that it may be the rounding of another."""
-    return has_outlier(s.number[NORM, :s.A.shape[0]], DUST)
-
-
-@inlined
-def asks_for_x(s, first, last):
-    """Whether rows first .. last - 1 give each unknown one target, all with the same weight.
-
-    Such a level amounts to a reference of its own, which is written into the goal.
-    """
-    n, seen = s.x.size, s.number[STEP]
-    if last - first != n:
-        return False
-    for c in range(n):
-        seen[c] = 0.0
-    weight = abs(s.number[ENTRY, first])
-    for i in range(first, last):
-        c, entry = s.index[UNIT, i], s.number[ENTRY, i]
-        if c < 0 or s.number[ACTIVE, i] != EQUAL or abs(entry) != weight or seen[c] != 0.0:
-            return False
-        seen[c] = 1.0
-        s.number[GOAL, c] = s.number[LOWER, i] / entry
-    return True
+    t.scalar[SIZE] = max(t.scalar[SIZE], length)
+    t.scalar[SCALE] = max(length, FLOOR * t.scalar[SIZE])

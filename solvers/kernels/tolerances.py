@@ -23,8 +23,8 @@ SLIGHT = 0.25       # of rank_tolerance: a smaller miss counts as zero, without 
 NO_STEP = 1e-12     # length of a step: smaller ones count as zero
 
 # Of a proof by multipliers:
-BAND = 1e-8         # distance of a row from the side that it is on, over 1 + |x|: as in `certify`
-ENOUGH = 1e-9       # what may remain of the conditions, over the weakest possible pull of the level
+BAND = 5e-9         # distance of a row from the side that it is on, over 1 + |x|: as in `certify`
+ENOUGH = 2.5e-9       # what may remain of the conditions, over the weakest possible pull of the level
 CLEAR = 4e-9        # remainder of a unit row that counts as independent: at least
 NOTHING = 1e-9      # remainder of a unit row that counts as dependent: at most
 EXCHANGED = 4.0     # times ENOUGH: what may remain if such a row replaces one that it depends on
@@ -39,3 +39,18 @@ RELAXATIONS = 3     # most times per level; then the rule of least index applies
 BLAND_AFTER = 30    # consecutive steps of zero length before the row of least index leaves
 PATIENCE = 10       # releases per row of a level before small multipliers count as zero
 LAST = 20           # releases per row of a level before it ends in doubt
+
+NEGLIGIBLE = 1e-13
+LEAST_SQUARE = 1e-200
+LOOSE = 1e-9
+MET = 1e-13
+SHADOW = 1e-5
+SLIGHT_ = 5e-8
+UNIT_ROUNDING = 4e-15
+CLEAR_ = 1.1
+SPREAD = 2e-7
+MOST_STEPS = 2
+SURE = 4.0
+STEEP = 1e-3
+MOST_TRIES = 2
+PRODUCT = 1e-15

@@ -27,9 +27,9 @@ INVALID = 12  # sizes that do not add up, a missing pointer, a setting out of ra
 N, M, LEVELS, A, LOWER, UPPER, SIZES, REFERENCE, PROBLEM = range(9)
 VALUES, SIZE, USED, WARM, ITERATIONS, ROW, RECORD = range(7)
 
-REALS, COUNTS = 6, 5  # fields of th_settings: numbers, then integers
+REALS, COUNTS = 6, 4  # fields of th_settings: numbers, then integers
 DAMPING, THRESHOLD, RANK_TOLERANCE = Hcod.damping, Hcod.threshold, Hcod.rank_tolerance
-TOLERANCE, GUESSES, MAX_ITERATIONS = Hcod.tolerance, Hcod.guesses, Hcod.max_iterations
+TOLERANCE, MAX_ITERATIONS = Hcod.tolerance, Hcod.max_iterations
 LARGEST_TOLERANCE, MOST_ITERATIONS, METHODS = 1e-3, 2**31, 4
 
 
@@ -42,15 +42,13 @@ class Given(NamedTuple):
     tolerance: View
     isotropic: View
     largest: View
-    guesses: View
     max_iterations: View
     optimal: View
     miss: View
     method: View
 
 
-DEFAULTS = Given(DAMPING, THRESHOLD, RANK_TOLERANCE, TOLERANCE, 0.0, inf, GUESSES, MAX_ITERATIONS,
-                 0, 0, 0)
+DEFAULTS = Given(DAMPING, THRESHOLD, RANK_TOLERANCE, TOLERANCE, 0.0, inf, MAX_ITERATIONS, 0, 0, 0)
 
 
 class Call(NamedTuple):
@@ -116,7 +114,7 @@ def _in_range(settings):
     return (0.0 <= s.damping < np.inf and 0.0 < s.threshold < np.inf
             and 0.0 <= s.rank_tolerance < 1.0 and 0.0 < s.tolerance < LARGEST_TOLERANCE
             and 0.0 <= s.isotropic < np.inf and s.largest > 0.0
-            and 1 <= s.guesses < MOST_ITERATIONS and 1 <= s.max_iterations < MOST_ITERATIONS
+            and 1 <= s.max_iterations < MOST_ITERATIONS
             and 0 <= s.optimal <= 1 and 0 <= s.miss <= 1 and 0 <= s.method < METHODS)
 
 
@@ -140,7 +138,7 @@ def given(settings):
     if settings == 0:
         return DEFAULTS
     a, b = numbers_at(settings, REALS), integers_at(settings + 8 * REALS, COUNTS)
-    return Given(a[0], a[1], a[2], a[3], a[4], a[5], b[0], b[1], b[2], b[3], b[4])
+    return Given(a[0], a[1], a[2], a[3], a[4], a[5], b[0], b[1], b[2], b[3])
 
 
 @inlined

@@ -1,8 +1,6 @@
 """The functions of the C library: each does what the resolver of its name does in Python.
 
-They differ from Python in two points. An answer in doubt that its multipliers do not prove is not
-judged by `certify`: its status is INACCURATE. A work space that is too small is reported, not made
-larger.
+They differ from Python in one point: a work space that is too small is reported, not made larger.
 """
 
 # mypy: disable-error-code="no-untyped-def"
@@ -15,12 +13,11 @@ from hierarchy.jit import compiled, inlined
 from hierarchy.jit.exporting import INTEGER, STATUS, Entry
 from solvers.kernels.bounds import name_saturation, solve_without_bounds
 from solvers.kernels.damped import damped_recursion
-from solvers.kernels.guess import solve_by_guesses
-from solvers.kernels.levels import solve_by_levels
+from solvers.kernels.exact import solve_hierarchy
 from solvers.kernels.recursion import recursion
 from solvers.kernels.rows import ZERO
 from solvers.kernels.sns import sns
-from solvers.kernels.staircase import solve_by_staircase, solve_equalities
+from solvers.kernels.staircase import solve_by_staircase
 from solvers.library.calls import (
     INVALID,
     ITERATIONS,
@@ -39,8 +36,7 @@ from solvers.library.calls import (
 from solvers.library.sizes import in_range, record_size, work_size
 from solvers.status import (
     CONTRADICTION,
-    EQUAL,
-    NO_LIMITS,
+    INACCURATE,
     NUMERICAL_FAILURE,
     SOLVED,
     TOO_SMALL,
@@ -133,55 +129,25 @@ def _write_shared(settings, s):
 @inlined
 def _write_exact(settings, s):
     _write_shared(settings, s)
-    settings[3], settings[4], settings[5] = s.tolerance, s.guesses, s.max_iterations
+    settings[3], settings[4] = s.tolerance, s.max_iterations
 
 
 @inlined
 def _hcod(call):
     """Solve like `Hcod.solve`."""
     size = 3 * call.lower.size + 3
-    warm, code = begun(call, size), ZERO + UNPROVED
-    record = call.values[:size]
-    if call.settings[0] > 0.0:
-        code = solve_without_bounds(call.A, call.lower, call.upper, call.sizes, call.x, record,
-                                    call.settings, call.work)
-    if code == SOLVED:
-        _write_unbounded(call, record)
-    else:
-        begin_again(call)
-        code = exactly(call, record, warm)
-    call.state[ITERATIONS] = np.int64(record[size - 3] + record[size - 2])
+    begun(call, size)
+    code = exactly(call, call.values[:size])
+    call.state[ITERATIONS] = np.int64(call.values[size - 3] + call.values[size - 2])
     call.state[WARM] = 1
     return code
 
 
 @inlined
-def _write_unbounded(call, record):
-    """Write the record of an answer that no bound holds back."""
-    m = call.lower.size
-    for i in range(m):
-        record[i] = EQUAL if call.lower[i] == call.upper[i] else 0.0
-        record[m + i], record[2 * m + i] = -1.0, 0.0
-    record[3 * m], record[3 * m + 1], record[3 * m + 2] = 1.0, 0.0, -1.0
-
-
-@compiled
-def exactly(call, record, warm):
-    """Call the kernels in turn until one finds an answer, like `solve_exactly` of `hcod`."""
-    code = ZERO + NO_LIMITS
-    while code == NO_LIMITS:
-        code = ZERO + UNPROVED
-        if not warm or record[0] == EQUAL:
-            code = solve_equalities(call.A, call.lower, call.upper, call.sizes, call.x, record,
-                                    call.settings, call.work)
-        if code == UNPROVED and warm:
-            code = solve_by_guesses(call.A, call.lower, call.upper, call.sizes, call.x, record,
-                                    call.settings, call.work)
-        if code == UNPROVED:
-            code = solve_by_levels(call.A, call.lower, call.upper, call.sizes, call.x, record,
-                                   call.settings, call.work)
-        warm = False
-    return code
+def exactly(call, record):
+    """Solve like `solve_exactly` of `hcod`."""
+    return solve_hierarchy(call.A, call.lower, call.upper, call.sizes, call.x, record,
+                           call.settings, call.work)
 
 
 @inlined
@@ -196,6 +162,9 @@ def _tpm(call):
         begun(call, size)
     code = solve_by_staircase(call.A, call.lower, call.upper, call.sizes, call.x, call.settings,
                               call.work)
+    if code == INACCURATE:
+        begun(call, size)
+        code = exactly(call, call.values[size - 3 * call.lower.size - 3:size])
     if code < 0:
         begin_again(call)
         return _within_bounds(call, call.values[:size], False)
@@ -211,7 +180,7 @@ def _within_bounds(call, record, warm):
         code = solve_without_bounds(call.A, call.lower, call.upper, call.sizes, call.x, record,
                                     call.settings, call.work)
     if code == UNPROVED:
-        code = exactly(call, inner, warm)
+        code = exactly(call, inner)
     if code < 0 or code in (NUMERICAL_FAILURE, TOO_SMALL):
         return code
     call.state[ITERATIONS] = np.int64(inner[inner.size - 3] + inner[inner.size - 2])

@@ -10,8 +10,7 @@ so.
 from __future__ import annotations
 
 from hierarchy.jit import inlined
-from solvers.kernels.space import proof_size
-from solvers.kernels.tableau import COUNTS, SCALARS
+from solvers.kernels.exact import work_size as exact_size
 
 MOST = 1 << 20  # unknowns, rows or levels: with more the sizes could overflow
 SETTINGS = 6    # of a kernel
@@ -32,15 +31,7 @@ def record_size(n, m, levels):
 @inlined
 def work_size(n, m, levels):
     """Return the size of a work space that is enough for every resolver."""
-    return SETTINGS + max(exact(n, m, levels), recursive(n, m), saturation(n, m))
-
-
-@inlined
-def exact(n, m, levels):
-    """Return what the kernels of `hcod` need, see `kernels.tableau.carve`."""
-    w = max(m, n, levels + 1)
-    room = max((m + n) * (2 * n + 2), proof_size(n, m, levels))
-    return 30 * w + COUNTS + SCALARS + n * (m + n) + room
+    return SETTINGS + max(exact_size(n, m, levels, True), recursive(n, m), saturation(n, m))
 
 
 @inlined

@@ -23,13 +23,13 @@ from solvers.resolver import (
     register,
     register_variant,
 )
-from solvers.resolvers.hcod import Hcod, settle_doubt, solve_exactly, warm_record
+from solvers.resolvers.hcod import Hcod, solve_exactly, warm_record
 from solvers.resolvers.saturation import SaturatedResolution
 from solvers.status import INACCURATE, NO_LIMITS, NUMERICAL_FAILURE, SOLVED, UNPROVED, Status
 from solvers.workspace import WORKSPACE, entry, run
 
 FORMS = ("staircase", "published")
-_OF_THE_ENGINE = Hcod.tolerance, Hcod.guesses, Hcod.max_iterations
+_OF_THE_ENGINE = Hcod.tolerance, Hcod.max_iterations
 
 
 @final
@@ -84,8 +84,10 @@ class Tpm(Resolver):
         x = h.start()
         A, lower, upper, sizes = h.rows
         code = self._kernel(A, lower, upper, sizes, x, self._settings, WORKSPACE.array)
-        if code == SOLVED or (code == INACCURATE and settle_doubt(
-                h, x, np.zeros(3 * h.m + 3), self._settings)):
+        if code == INACCURATE:
+            x = h.start()
+            code = solve_exactly(h, x, np.zeros(3 * h.m + 3), self._settings)
+        if code == SOLVED:
             return Resolution(x)
         return (self._within_bounds(h, None) if code < 0 and self.strict
                 else self._otherwise(h, x, code, memory))
@@ -104,33 +106,23 @@ class Tpm(Resolver):
         With a memory, which only an answer at a bound leaves, the exact resolver starts from it;
         otherwise, or if no bound is active any more, the staircase is tried first.
         """
-        x, settings, levels = h.start(), self._settings, len(h.names)
-        first = len(x) + levels
-        record, known = warm_record(memory, first + 3 * h.m + 3, self.damping == 0.0)
-        code, inner = UNPROVED, record[first:]
+        x, levels = h.start(), len(h.names)
+        first, code = len(x) + levels, UNPROVED
+        record = warm_record(memory, first + 3 * h.m + 3)
+        known, inner = bool(record.any()) and self.damping == 0.0, record[first:]
         if not known:
-            code = run(solve_without_bounds, *h.rows, x, record, settings)
-        if code == UNPROVED:
-            code = solve_exactly(h, x, inner, settings, known)
+            code = run(solve_without_bounds, *h.rows, x, record, self._settings)
         if code == NO_LIMITS:
             return self.solve(h)
+        if code == UNPROVED:
+            code = solve_exactly(h, x, inner, self._settings)
         if code < 0 or code == NUMERICAL_FAILURE:
             return self._otherwise(h, x, code)
-        named = name_saturation(*h.rows, x, record, WORKSPACE.array)
+        named = run(name_saturation, *h.rows, x, record)
         if named != SOLVED and known:
             return self.solve(h)
-        if code == INACCURATE and settle_doubt(h, x, record, settings, name_bounds):
-            code = SOLVED
         return SaturatedResolution(x, Status(code), int(inner.item(-3) + inner.item(-2)), record,
                                    levels, record if named == SOLVED else None)
-
-
-def name_bounds(h: Hierarchy, x: Array, record: Array) -> None:
-    """Write the first part of the record, about unknowns at a bound; clamps x (n,) to its bounds.
-
-    record : (n + L + 3 m + 3,); see `name_saturation`.
-    """
-    name_saturation(*h.rows, x, record, WORKSPACE.array)
 
 
 register_variant("tpm-published", "tpm", form="published")

@@ -124,7 +124,7 @@ class Weighted(Resolver):
             return Hcod(rank_tolerance=self.rank_tolerance, damping=self.damping,
                         threshold=self.threshold).solve(self.merged(h), memory)
         x = h.start()
-        record, _ = warm_record(memory, 2 * h.m + 1, True)
+        record = warm_record(memory, 2 * h.m + 1)
         settings = self._settings_for(len(h.names))
         code = weighted(*h.rows, x, record, settings, WORKSPACE.array)
         if code == SOLVED:

@@ -31,13 +31,13 @@ class Settings(ctypes.Structure):
     _fields_ = [(name, ctypes.c_double) for name in (
         "damping", "threshold", "rank_tolerance", "tolerance", "isotropic", "largest")] + [
         (name, ctypes.c_int64) for name in (
-            "guesses", "max_iterations", "optimal", "miss", "method")]
+            "max_iterations", "optimal", "miss", "method")]
 
 
 def settings_of(**given):
     """Settings with the defaults of the header but for those given."""
     return Settings(**{"threshold": 0.1, "rank_tolerance": 1e-8, "tolerance": 1e-10,
-                       "largest": np.inf, "guesses": 3, "max_iterations": 1000, **given})
+                       "largest": np.inf, "max_iterations": 1000, **given})
 
 
 def problem_of(h, **changed):

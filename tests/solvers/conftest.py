@@ -49,8 +49,3 @@ def library(folder):
     return c.Library.of(folder)
 
 
-@pytest.fixture
-def unverified(monkeypatch):
-    """Let answers in doubt keep the x and status of the kernels in Python too."""
-    for module in ("resolvers.hcod", "resolvers.tpm", "batch.stacked"):
-        monkeypatch.setattr(f"solvers.{module}.settle_doubt", lambda *_: False)

@@ -45,14 +45,12 @@ def hierarchies(count, first=0):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("resolver", RESOLVERS, ids=str)
-@pytest.mark.usefixtures("unverified")
 def test_c_and_python_give_the_same_bits(library, resolver):
     answered = [c.check_same(library, resolver, h) for h in hierarchies(60)]
     assert sum(res is not None for res in answered) > 60
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("unverified")
 def test_c_and_python_give_the_same_bits_on_ten_thousand_hierarchies(library):
     count = 0
     for h in hierarchies(2500, first=1_000_000):
@@ -64,7 +62,6 @@ def test_c_and_python_give_the_same_bits_on_ten_thousand_hierarchies(library):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", FAMILIES)
-@pytest.mark.usefixtures("unverified")
 def test_c_and_python_give_the_same_bits_on_the_reference_families(library, name):
     for problem in family(name):
         for resolver in RESOLVERS:
@@ -73,7 +70,6 @@ def test_c_and_python_give_the_same_bits_on_the_reference_families(library, name
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["hcod", "tpm"])
-@pytest.mark.usefixtures("unverified")
 def test_warm_sequences_give_the_same_bits(library, name):
     warm = 0
     for seed in range(30):
@@ -98,7 +94,6 @@ def test_violations_are_those_of_python(library):
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("unverified")
 def test_a_record_goes_on_with_another_kind_of_rows(library):
     """From inequalities to equalities alone, and back."""
     rng = np.random.default_rng(5)
@@ -111,7 +106,7 @@ def test_a_record_goes_on_with_another_kind_of_rows(library):
 
 
 @pytest.mark.slow
-def test_the_object_loaded_without_a_linker_gives_the_same_bits(folder, unverified):
+def test_the_object_loaded_without_a_linker_gives_the_same_bits(folder):
     library = c.Library.unlinked(folder / "lib" / "libtask_hierarchy.a")
     for h in hierarchies(5):
         c.check_same(library, RESOLVERS[0], h)
@@ -142,7 +137,7 @@ def test_the_sizes_that_the_library_states_are_enough(library, n, sizes):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["ellipse-limits", "humanoid-reach", "dual-arm"])
-def test_the_commands_of_a_scenario_come_out_of_c_to_the_last_bit(library, name, unverified):
+def test_the_commands_of_a_scenario_come_out_of_c_to_the_last_bit(library, name):
     scenario = load(name)
     resolver, memory = scenario.make_resolver(), None
     damped, before = {"damping": resolver.damping}, None
@@ -153,7 +148,6 @@ def test_the_commands_of_a_scenario_come_out_of_c_to_the_last_bit(library, name,
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("unverified")
 def test_the_library_for_any_x86_64_agrees_to_rounding(generic):
     library = c.Library.of(generic)
     for h in hierarchies(50):

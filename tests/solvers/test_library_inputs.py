@@ -47,7 +47,6 @@ def test_numbers_that_are_none_are_a_status(library, name, array, value):
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("unverified")
 def test_spoilt_data_give_the_bits_and_statuses_of_python(library):
     rng = np.random.default_rng(1)
     worst = np.array([np.nan, np.inf, -np.inf, 1e308, -1e200, 5e-324, 0.0, 1e-300])

@@ -85,7 +85,6 @@ typedef struct th_settings {
   double tolerance;       /* hcod, tpm: of violations, relative to their terms; up to 1e-3 */
   double isotropic;       /* recursive, TH_CHIAVERINI: damping of all directions */
   double largest;         /* recursive, TH_SELECTIVE: largest step; INFINITY is no damping */
-  int64_t guesses;        /* hcod, tpm: active sets tried from a record */
   int64_t max_iterations; /* hcod, tpm: steps level by level, at least 1 */
   int64_t optimal;        /* sns: 1 for form = "optimal", 0 for "basic" */
   int64_t miss;           /* sns: 1 for scales = "miss", 0 for "target" */

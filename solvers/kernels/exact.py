@@ -1,0 +1,213 @@
+"""The exact solve: find a working set, verify what it claims, search on where that fails.
+
+Python, batches and the C library call this one kernel. The working set comes from the memory of an
+earlier solve, or from a pass level by level. It is factored anew and pivoted in blocks, then row by
+row, and then once more with small coefficients taken for zero. After each of these the claims are
+verified, and nothing is SOLVED otherwise.
+"""
+
+# mypy: disable-error-code="no-untyped-def"
+
+from __future__ import annotations
+
+import numpy as np
+
+from hierarchy.jit import compiled, inlined
+from solvers.kernels.damping import carve_damped, damped_size, write_damped
+from solvers.kernels.levels import pass_through_levels
+from solvers.kernels.rows import ZERO, all_equal, finish, length_of
+from solvers.kernels.search import pivot_in_blocks, pivot_one_by_one
+from solvers.kernels.space import matrix, vector
+from solvers.kernels.staircase import solve_by_staircase
+from solvers.kernels.tableau import STEPS, carve_tableau, tableau_size
+from solvers.kernels.tolerances import MOST_STEPS, MOST_TRIES
+from solvers.kernels.verification import neglects, verify
+from solvers.kernels.working_set import (
+    COARSE,
+    FIRST,
+    NEGLECTED,
+    SCALE,
+    STATE,
+    Scaled,
+    carve_working_set,
+    load,
+    rescale,
+    restore,
+    working_set_size,
+)
+from solvers.status import (
+    EQUAL,
+    FREE,
+    INACCURATE,
+    ITERATION_LIMIT,
+    NUMERICAL_FAILURE,
+    SOLVED,
+    TOO_SMALL,
+    UNPROVED,
+)
+
+DAMPING, RANK_TOLERANCE, TOLERANCE, MOST = 0, 2, 3, 4  # places in the settings of `Hcod`
+
+
+@inlined
+def exact_size(n, m, levels):
+    """Return the numbers that `solve_exactly` needs."""
+    return ((2 * levels + 2) * m + n + working_set_size(n, m, levels) + tableau_size(n, m)
+            + m * (n + 2))
+
+
+@inlined
+def work_size(n, m, levels, damped):
+    """Return the numbers that a work space of `solve_hierarchy` needs, with damping or without."""
+    if not damped:
+        return n + exact_size(n, m, levels)
+    rows = m + n
+    return rows * (n + 6) + levels + 3 + max(damped_size(n, m), exact_size(n, rows, levels))
+
+
+@compiled
+def solve_hierarchy(A, lower, upper, sizes, x, record, settings, work):
+    """Solve; x (n,) is the reference on entry and the answer on return, zero on failure.
+
+    record (3 m + 3,): see `ActiveSetResolution`; on entry that of an earlier solve, or zeros.
+    settings: those of `Hcod`, in one array because each argument costs time. work: any contents.
+    Equalities alone are solved by the staircase, where its pivots are clear. Returns SOLVED,
+    INACCURATE, ITERATION_LIMIT, NUMERICAL_FAILURE or TOO_SMALL.
+    """
+    n, damped = x.size, settings[DAMPING] > 0.0
+    if work_size(n, lower.size, sizes.size, damped) > work.size:
+        return ZERO + TOO_SMALL
+    reference, at = vector(work, ZERO, n)
+    if all_equal(lower, upper):
+        for c in range(n):
+            reference[c] = x[c]
+        code = solve_by_staircase(A, lower, upper, sizes, x, settings, work[at:])
+        if code != INACCURATE:
+            _keep_equalities(lower, record)
+            return code
+        for c in range(n):
+            x[c] = reference[c]
+    elif damped:
+        return solve_damped(A, lower, upper, sizes, x, record, settings, work)
+    return solve_exactly(A, lower, upper, sizes, x, record, settings, work[at:])
+
+
+@compiled
+def solve_damped(A, lower, upper, sizes, x, record, settings, work):
+    """Like `solve_hierarchy`, for rows with damping; the record has no memory."""
+    m, n = A.shape
+    d, at = carve_damped(sizes, work, ZERO, m, n)
+    inner, at = vector(work, at, 3 * (m + n) + 3)
+    rows = write_damped(d, A, lower, upper, sizes, settings, work[at:])
+    for i in range(inner.size):
+        inner[i] = 0.0
+    size = 3 * rows
+    code = solve_exactly(d.A[:rows], d.lower[:rows], d.upper[:rows], d.sizes, x,
+                         inner[:size + 3], settings, work[at:])
+    for i in range(3 * m + 3):
+        record[i] = inner[size + i - 3 * m] if i >= 3 * m else 0.0
+    for q in range(rows):
+        i = d.origin[q]
+        for part in range(3 if i >= 0 else 0):
+            record[part * m + i] = inner[part * rows + q]
+    return code
+
+
+@inlined
+def _keep_equalities(lower, record):
+    """Write the record of rows that all are equalities."""
+    m = lower.size
+    for i in range(m):
+        record[i], record[m + i], record[2 * m + i] = EQUAL, -1.0, 0.0
+    record[3 * m], record[3 * m + 1], record[3 * m + 2] = 1.0, 0.0, -1.0
+
+
+@compiled
+def solve_exactly(A, lower, upper, sizes, x, record, settings, work):
+    """Like `solve_hierarchy`, for any rows without damping."""
+    m, n = A.shape
+    multiplier, at = matrix(work, ZERO, sizes.size + 1, m)
+    current, at = matrix(work, at, sizes.size + 1, m)
+    first_x, at = vector(work, at, n)
+    own, after = carve_working_set(A, sizes, x, multiplier, work, at)
+    s, own.scalar[SCALE], own.count[COARSE] = own, 1.0, 0
+    code = load(s, lower, upper, sizes, record, settings[RANK_TOLERANCE])
+    if code == UNPROVED:
+        scaled, after = _carve_scaled(work, after, m, n)
+        code = rescale(own, lower, upper, scaled)
+        s, _ = carve_working_set(scaled.A, sizes, x, multiplier, work, at)
+        if code == SOLVED:
+            code = load(s, scaled.lower, scaled.upper, sizes, record, settings[RANK_TOLERANCE])
+    if code != SOLVED:
+        return finish(x, code)
+    limit, code, steps = np.int64(settings[MOST]), ZERO + UNPROVED, ZERO
+    warm, level = record[3 * m] + record[3 * m + 1] > 0.0, ZERO - 1
+    if warm:
+        level = _level_of(record[3 * m + 2], sizes.size)
+        code, steps = pivot_in_blocks(s, limit, level >= 0)
+    blocks, passed = steps, False
+    if code == UNPROVED and level < 0:
+        t, _ = carve_tableau(s, work, after)
+        code, level = pass_through_levels(t, settings[TOLERANCE],
+                                          min(limit - steps, MOST_STEPS * (m + n)))
+        steps += t.count[STEPS]
+        passed, code = code == SOLVED, _verified(s, code)
+        for c in range(n if code != SOLVED else 0):
+            first_x[c] = x[c]
+        restore(s)
+        if code != SOLVED and steps < limit:
+            code, tries = pivot_in_blocks(s, limit - steps, True)
+            steps, blocks = steps + tries, blocks + tries
+    for coarse in range(2):
+        if code in (UNPROVED, INACCURATE) and steps < limit:
+            s.count[COARSE] = coarse
+            restore(s)
+            code, tries, level = pivot_one_by_one(
+                s, current, min(limit - steps, MOST_TRIES * (m + n)), ZERO if coarse else level)
+            steps += tries
+            code = _verified(s, code)
+    if code == SOLVED and s.count[NEGLECTED] > 0 and neglects(s):
+        code = ZERO + INACCURATE
+    elif code not in (SOLVED, NUMERICAL_FAILURE):
+        code = ZERO + (ITERATION_LIMIT if steps >= limit else INACCURATE)
+        for c in range(n if passed else 0):  # it keeps the levels above
+            x[c] = first_x[c]
+    _keep(s, record, blocks, steps - blocks)
+    record[3 * m + 2] = max(level, 0) if code == ITERATION_LIMIT else -1.0
+    return code if np.isfinite(length_of(x)) else finish(x, NUMERICAL_FAILURE)
+
+
+@inlined
+def _carve_scaled(work, at, m, n):
+    """Return a `Scaled` without data, and where it ends."""
+    A, at = matrix(work, at, m, n)
+    lower, at = vector(work, at, m)
+    upper, at = vector(work, at, m)
+    return Scaled(A, lower, upper), at
+
+
+@inlined
+def _level_of(number, levels):
+    """Return the level at which an earlier search ended; -1 for none."""
+    return np.int64(number) if 0.0 <= number < levels else ZERO - 1
+
+
+@inlined
+def _verified(s, code):
+    """Return the code of a search: INACCURATE in place of SOLVED if its claims are no proof."""
+    return ZERO + (INACCURATE if code == SOLVED and not verify(s) else code)
+
+
+@inlined
+def _keep(s, record, blocks, steps):
+    """Write the record: of each row its state, the level it holds back, its multiplier there."""
+    m, levels, k, scale = s.A.shape[0], s.multiplier.shape[0] - 1, 0, s.scalar[SCALE]
+    for i in range(m):
+        while i >= s.index[FIRST, k + 1]:
+            k += 1
+        record[i], record[m + i], record[2 * m + i] = s.index[STATE, i], -1.0, 0.0
+        for p in range(levels, k - 1, -1):
+            if s.multiplier[p, i] != 0.0 and s.index[STATE, i] not in (EQUAL, FREE):
+                mu = s.multiplier[p, i] * (scale if p == levels else 1.0 / scale)
+                record[m + i], record[2 * m + i] = p, mu
+    record[3 * m], record[3 * m + 1] = blocks, steps

@@ -1,0 +1,264 @@
+"""The search for the working set: rows enter and leave until the multipliers are right.
+
+First, all rows that are wrong change at once (block pivoting), while their number falls. Then a
+dual active set (Goldfarb, Idnani 1983, here over series in e, see `multipliers.py`): levels join
+one at a time; the most violated row enters; where multipliers would change their sign, they move
+towards those of the new working set until the first is zero, and that row leaves. Each accepted set
+raises a strictly convex dual, so in exact arithmetic none recurs.
+"""
+
+# mypy: disable-error-code="no-untyped-def"
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from hierarchy.jit import compiled, inlined
+from solvers.kernels.multipliers import INWARD, UNDECIDED, write_multipliers
+from solvers.kernels.rows import ZERO, length_of
+from solvers.kernels.space import View
+from solvers.kernels.tolerances import LOOSE, MET, SHADOW
+from solvers.kernels.verification import verify
+from solvers.kernels.working_set import (
+    BEGIN,
+    CHANGE,
+    DIRTY,
+    ENTERED,
+    FIRST,
+    GOAL,
+    LIST,
+    LOWER,
+    NORM,
+    SCRATCH,
+    SEED,
+    SIGN,
+    SIZE,
+    STATE,
+    UPPER,
+    meet,
+    restore,
+    value_at,
+)
+from solvers.status import FREE, INACCURATE, NUMERICAL_FAILURE, SOLVED, UNPROVED
+
+LEAVES = 5    # change of a row that acts; else the side at which it is to act, or 0
+RESTORED = 3  # times that a final working set is solved anew from uncut rows
+RELEASED = 3  # times that a row may enter and leave again because nothing holds it
+PATIENCE = 2  # block pivots that may not reduce the number of wrong rows
+
+
+class Found(NamedTuple):
+    """What is wrong with a working set: rows to change, rows to leave, the most violated row."""
+
+    wrong: View
+    leaving: View
+    most: View
+
+
+@inlined
+def try_working_set(s, last, newest):
+    """Write the x and multipliers of a working set, and return what is wrong in the first levels.
+
+    newest: a row that entered because it was violated, so that it pushes; -1 for none.
+    """
+    meet(s, last)
+    write_multipliers(s, MET)
+    return judge(s, last, newest)
+
+
+@compiled
+def judge(s, last, newest):
+    """Write the changes that a working set asks for in the first `last` levels; see `Found`."""
+    wrong, leaving, most, worst = ZERO, ZERO, ZERO - 1, 0.0
+    reach = length_of(s.x) + SHADOW * s.scalar[SIZE]
+    for i in range(s.A.shape[0]):
+        s.index[CHANGE, i] = 0
+    for q in range(s.index[BEGIN, s.multiplier.shape[0] - 1]):
+        i = s.index[LIST, q]
+        if s.index[SIGN, q] == INWARD and i == newest:
+            s.index[SIGN, q] = UNDECIDED
+            for p in range(s.multiplier.shape[0]):
+                s.multiplier[p, i] = 0.0
+        elif s.index[SIGN, q] == INWARD:
+            s.index[CHANGE, i] = LEAVES
+            leaving += 1
+    for i in range(s.index[FIRST, last]):
+        norm, low, up = s.number[NORM, i], s.number[LOWER, i], s.number[UPPER, i]
+        if s.index[STATE, i] != FREE or norm <= 0.0:
+            continue
+        value = value_at(s, i)
+        over = max(value - up, low - value)
+        side = up if value > up else low
+        if over > LOOSE * (norm * reach + abs(side)):
+            s.index[CHANGE, i] = 1 if value > up else -1
+            wrong += 1
+            if over > worst * norm:
+                most, worst = ZERO + i, over / norm
+    return Found(wrong + leaving, leaving, most)
+
+
+@inlined
+def _points_inward(s):
+    """Whether a row of the working set is to leave."""
+    inward = False
+    for q in range(s.index[BEGIN, s.multiplier.shape[0] - 1]):
+        inward = inward or s.index[SIGN, q] == INWARD
+    return inward
+
+
+@compiled
+def pivot_in_blocks(s, limit, keep):
+    """Change all wrong rows at once while their number falls; return the code and the tries.
+
+    SOLVED is verified; INACCURATE: nothing is wrong, but that is not verified; UNPROVED: the number
+    does not fall. With `keep` the working set is then the one that it began with.
+    """
+    levels, best, left, tries = s.multiplier.shape[0] - 1, ZERO + s.A.shape[0] + 1, PATIENCE, ZERO
+    for i in range(s.A.shape[0]):
+        s.index[SEED, i] = s.index[STATE, i]
+    while tries < limit:
+        tries += 1
+        meet(s, levels)
+        write_multipliers(s, MET)
+        if not _points_inward(s) and verify(s):
+            return ZERO + SOLVED, tries
+        found = judge(s, levels, ZERO - 1)
+        if found.wrong == 0:
+            return ZERO + INACCURATE, tries
+        left = PATIENCE if found.wrong < best else left - 1
+        best = min(best, found.wrong)
+        if left < 0:
+            break
+        for i in range(s.A.shape[0]):
+            change = s.index[CHANGE, i]
+            if change != 0:
+                s.index[STATE, i] = FREE if change == LEAVES else change
+    for i in range(s.A.shape[0] if keep else 0):
+        s.index[STATE, i] = s.index[SEED, i]
+    return ZERO + UNPROVED, tries
+
+
+@compiled
+def pivot_one_by_one(s, current, limit, level):
+    """Let rows enter and leave one by one; return the code, the iterations, the last level.
+
+    current (L + 1, m): scratch, the multipliers on the way. level: where an earlier search ended.
+    """
+    levels, last, newest, fresh, clean, tries = (
+        s.multiplier.shape[0] - 1, _next_level(s, max(level, 0)), ZERO - 1, True, ZERO, ZERO)
+    for i in range(s.A.shape[0]):
+        s.index[ENTERED, i] = 0
+    while tries < limit:
+        tries += 1
+        found = try_working_set(s, last, newest)
+        if not np.isfinite(length_of(s.x)):
+            return ZERO + NUMERICAL_FAILURE, tries, last - 1
+        if found.leaving > 0 and fresh:
+            _release_all(s)
+        elif found.leaving > 0:
+            _release_first(s, current)
+        elif found.most >= 0:
+            _enter(s, current, found.most)
+            newest, fresh = found.most, False
+        elif last < levels:
+            last, newest, fresh = _next_level(s, last), ZERO - 1, True
+        elif s.count[DIRTY] == 1 and clean < RESTORED:  # free of what other working sets cut
+            restore(s)
+            newest, fresh, clean = ZERO - 1, True, clean + 1
+        else:
+            return ZERO + SOLVED, tries, last - 1
+    return ZERO + UNPROVED, tries, last - 1
+
+
+@inlined
+def _next_level(s, last):
+    """Return the number of levels with one more that has rows."""
+    levels = s.multiplier.shape[0] - 1
+    last += last < levels
+    while last < levels and s.index[FIRST, last] == s.index[FIRST, last - 1]:
+        last += 1
+    return last
+
+
+@inlined
+def _release_all(s):
+    """Release all rows whose multipliers point inward."""
+    for i in range(s.A.shape[0]):
+        if s.index[CHANGE, i] == LEAVES:
+            s.index[STATE, i] = FREE
+
+
+@inlined
+def _enter(s, current, newest):
+    """Let a row enter; rows that nothing holds at their side leave."""
+    for p in range(current.shape[0]):
+        for i in range(current.shape[1]):
+            current[p, i] = s.multiplier[p, i]
+    for q in range(s.index[BEGIN, current.shape[0] - 1]):
+        i = s.index[LIST, q]
+        if s.index[SIGN, q] == UNDECIDED and s.index[ENTERED, i] < RELEASED:
+            s.index[STATE, i] = FREE
+            _forget(current, i)
+    s.index[STATE, newest] = s.index[CHANGE, newest]
+    s.index[ENTERED, newest] += 1
+
+
+@inlined
+def _forget(current, i):
+    for p in range(current.shape[0]):
+        current[p, i] = 0.0
+
+
+@inlined
+def _release_first(s, current):
+    """Move the multipliers towards those of the working set until one is zero; that row leaves."""
+    levels, k, blocking = s.multiplier.shape[0] - 1, 0, -1
+    share, other = s.number[GOAL, :levels + 1], s.number[SCRATCH, :levels + 1]
+    for q in range(s.index[BEGIN, levels]):
+        while s.index[BEGIN, k + 1] <= q:
+            k += 1
+        if s.index[SIGN, q] == INWARD:
+            i = s.index[LIST, q]
+            _write_share(current[:, i], s.multiplier[:, i], k, other)
+            if blocking < 0 or _is_less(other, share):
+                blocking = i
+                for p in range(levels + 1):
+                    share[p] = other[p]
+    k = 0
+    for q in range(s.index[BEGIN, levels]):
+        while s.index[BEGIN, k + 1] <= q:
+            k += 1
+        i = s.index[LIST, q]
+        for p in range(levels, k - 1, -1):
+            change = 0.0
+            for j in range(p - k + 1):
+                change += share[j] * (s.multiplier[p - j, i] - current[p - j, i])
+            current[p, i] += change
+    s.index[STATE, blocking] = FREE
+    _forget(current, blocking)
+
+
+@inlined
+def _write_share(current, target, k, share):
+    """Write the share of the way, a series in e, at which a row of level k has nothing left."""
+    size, changed = current.size, k
+    while changed < size and current[changed] == target[changed]:
+        changed += 1
+    for j in range(size):
+        share[j] = 0.0
+        if changed + j < size:
+            left = current[changed + j]
+            for i in range(j):
+                left -= share[i] * (current[changed + j - i] - target[changed + j - i])
+            share[j] = left / (current[changed] - target[changed])
+
+
+@inlined
+def _is_less(one, other):
+    """Whether a series in e is less than another: the first term that differs decides."""
+    j = 0
+    while j < one.size - 1 and one[j] == other[j]:
+        j += 1
+    return one[j] < other[j]

@@ -1,0 +1,457 @@
+"""The working set: the rows that act, factored level by level, and the x that meets them.
+
+A row acts at one of its sides. With the acting rows J of all levels, J Q = W is lower trapezoidal,
+level by level as in `staircase.py`: a level takes as many columns of Q as it adds rank. y = Q^T x
+follows by forward substitution, least squares in each level, and the columns that no level takes
+keep the reference. Rows with a single entry that come first take their unknown as a column: they
+need no reflection. A level that gives every unknown a target of one weight is a reference.
+
+What a dependent row has outside the rows that it depends on, at most `rank_tolerance` of its norm,
+is cut from it, and stays so for the rest of the solve: so all working sets belong to one problem,
+within `rank_tolerance` of each row.
+"""
+
+# mypy: disable-error-code="no-untyped-def"
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from hierarchy.jit import as_matrix, compiled, inlined
+from solvers.kernels.rows import ZERO, add_multiple, factor_level, reflect, swap
+from solvers.kernels.space import Basis, Rows, View, carve_basis, integers, matrix, vector
+from solvers.kernels.tolerances import CANCELLED, LEAST_SQUARE, NEGLIGIBLE
+from solvers.status import EQUAL, FREE, NUMERICAL_FAILURE, SOLVED, UNPROVED
+
+# Rows of `number`. Per row of A: its norm, its only entry, its sides, the norm of what was cut from
+# it. By place in the list: the square at which a row counts as dependent, its
+# residual side - a x. Per unknown or column of Q: reference, y, the goal of the free columns, a
+# gradient and what of it may be rounding, scratch; diagonal and factor of the reflections of a
+# level with more rows than rank.
+(NORM, ENTRY, LOWER, UPPER, CUT, REFERENCE, ZEROED, MISS, Y, GOAL, GRADIENT, NOISE, SCRATCH,
+ DIAGONAL, FACTOR) = range(15)
+NUMBERS = 16  # one more than these: `levels.py` keeps its own behind REFERENCE
+# Rows of `index`. Per row of A: its unknown (-1 for several entries), the side at which it acts,
+# the change that the search asks for, how often it entered,
+# the side before a search. By place in the list: the row, the sign
+# of its multipliers. The unknown of each column, the column of each unknown. Per level: its first
+# row, its first place in the list, its first column.
+UNIT, STATE, FIRST, CHANGE, ENTERED, SEED, LIST, SIGN, ORDER, PLACE, BEGIN, RANK = range(12)
+# In `count`: columns that are unknowns, the level that sets all of x (-1: none), whether a row was
+# cut since the rows were those of A, whether small coefficients are cut along other rows too, the
+# number of rows that are negligible beside those of other levels alone.
+PICKED, WHOLE, DIRTY, COARSE, NEGLECTED = range(5)
+# In `scalar`: rank_tolerance, the largest number so far, the smallest pivot of a row over its norm
+# and the next one, the factor by which the data are those of the caller.
+TOLERANCE, SIZE, PIVOT, SECOND, SCALE = range(5)
+
+
+class Scaled(NamedTuple):
+    """Rows A (m, n) and sides (m,) after scaling."""
+
+    A: View
+    lower: View
+    upper: View
+
+
+class WorkingSet(NamedTuple):
+    """The data of a solve.
+
+    A (m, n), x (n,). number, index (.., w), w the largest of m, n, L + 1; count, scalar: see above.
+    multiplier (L + 1, m): of each row in each level, and in its own level its violation
+    a x - side. W (m, n): the listed rows in coordinates of Q. basis: the reflectors of Q. T (n, m):
+    the reflectors of the rows of a level, by its columns. C (m, n): the rows that were cut.
+    """
+
+    A: View
+    x: View
+    number: View
+    index: View
+    count: View
+    scalar: View
+    multiplier: View
+    W: View
+    basis: Basis
+    T: View
+    C: View
+
+
+@inlined
+def working_set_size(n, m, levels):
+    """Return the numbers that a WorkingSet needs, without its multipliers."""
+    return (NUMBERS + 12) * max(m, n, levels + 1) + 10 + 3 * m * n + n * n + n
+
+
+@inlined
+def carve_working_set(A, sizes, x, multiplier, work, at):
+    """Return a WorkingSet without data, and where it ends."""
+    m, n = A.shape
+    w = max(m, n, sizes.size + 1)
+    number, at = matrix(work, at, NUMBERS, w)
+    numbers, at = integers(work, at, 12 * w)
+    count, at = integers(work, at, 5)
+    scalar, at = vector(work, at, 5)
+    W, at = matrix(work, at, m, n)
+    basis, at = carve_basis(work, at, n, n)
+    T, at = matrix(work, at, n, m)
+    C, at = matrix(work, at, m, n)
+    index = as_matrix(numbers, 12 if numbers.size > 0 else 0, w)
+    return WorkingSet(A, x, number, index, count, scalar, multiplier, W, basis, T, C), at
+
+
+@compiled
+def load(s, lower, upper, sizes, record, rank_tolerance):
+    """Check and copy the data; return SOLVED, or NUMERICAL_FAILURE if an entry is not finite.
+
+    Or UNPROVED if squares of the rows leave the range of numbers, so that all must be rescaled.
+    The sides at which rows act are those of the record, as far as a row has that side.
+    A row counts as zero beside a far larger one of its level; beside one of another level it has a
+    negative norm, takes no part, and `neglects` says whether x meets it all the same.
+    """
+    number, index, first, sane, most = s.number, s.index, ZERO, True, 0.0
+    s.scalar[TOLERANCE], s.count[DIRTY], s.count[NEGLECTED] = rank_tolerance, 0, 0
+    for c in range(s.x.size):
+        sane &= np.isfinite(s.x[c])
+        number[REFERENCE, c] = s.x[c]
+    for k in range(sizes.size):
+        index[FIRST, k] = first
+        largest = 0.0
+        for i in range(first, first + sizes[k]):
+            square, low, up = _measure(s, i), lower[i], upper[i]
+            sane &= np.isfinite(square) and low <= up and low < np.inf and up > -np.inf
+            norm = np.sqrt(square) if square > LEAST_SQUARE else _small_length(s.A[i])
+            number[NORM, i], number[LOWER, i], number[UPPER, i] = norm, low, up
+            largest = max(largest, norm)
+            above, below = record[i] == 1.0 and up < np.inf, record[i] == -1.0 and low > -np.inf
+            index[STATE, i] = EQUAL if low == up else ZERO + above - below
+        for i in range(first, first + sizes[k]):
+            if number[NORM, i] <= NEGLIGIBLE * largest:
+                number[NORM, i] = 0.0
+        first, most = first + sizes[k], max(most, largest)
+    index[FIRST, sizes.size] = first
+    for i in range(first):
+        if 0.0 < number[NORM, i] <= NEGLIGIBLE * most:
+            number[NORM, i], s.count[NEGLECTED] = -number[NORM, i], s.count[NEGLECTED] + 1
+    if not sane:
+        return ZERO + NUMERICAL_FAILURE
+    in_range = most == 0.0 or LEAST_SQUARE < most * most < 1.0 / LEAST_SQUARE
+    return ZERO + (SOLVED if in_range else UNPROVED)
+
+
+@inlined
+def _small_length(a):
+    """Return the norm of a row whose square underflows."""
+    largest, square = 0.0, 0.0
+    for c in range(a.size):
+        largest = max(largest, abs(a[c]))
+    for c in range(a.size if largest > 0.0 else 0):
+        square += (a[c] / largest) ** 2
+    return largest * np.sqrt(square)
+
+
+@compiled
+def rescale(s, lower, upper, scaled):
+    """Write the rows and sides times a power of two that brings their norms into range.
+
+    scaled: a `Scaled`. Returns SOLVED, or NUMERICAL_FAILURE if a side is then no number.
+    """
+    most, sane = 0.0, True
+    for i in range(s.A.shape[0]):
+        most = max(most, abs(s.number[NORM, i]))
+    factor = 2.0 ** -np.floor(np.log2(most))
+    for i in range(s.A.shape[0]):
+        for c in range(s.x.size):
+            scaled.A[i, c] = s.A[i, c] * factor
+        scaled.lower[i], scaled.upper[i] = lower[i] * factor, upper[i] * factor
+        sane &= np.isfinite(scaled.lower[i]) == np.isfinite(lower[i])
+        sane &= np.isfinite(scaled.upper[i]) == np.isfinite(upper[i])
+    s.scalar[SCALE] = factor
+    return ZERO + (SOLVED if sane else NUMERICAL_FAILURE)
+
+
+@inlined
+def _measure(s, i):
+    """Note the only entry of a row of A, if it has one; return the square of its norm."""
+    a, square, entries, only = s.A[i], 0.0, 0, -1
+    for c in range(a.size):
+        square += a[c] * a[c]
+        if a[c] != 0.0:
+            entries, only = entries + 1, c
+    s.index[UNIT, i] = only if entries == 1 else -1
+    s.number[ENTRY, i] = a[only] if only >= 0 else 0.0
+    s.number[CUT, i] = 0.0
+    return square
+
+
+@compiled
+def restore(s):
+    """Give all rows back what was cut from them."""
+    s.count[DIRTY] = 0
+    for i in range(s.A.shape[0]):
+        if s.number[CUT, i] > 0.0:
+            _measure(s, i)
+
+
+@inlined
+def value_at(s, i):
+    """Return row i times x."""
+    total, only = 0.0, s.index[UNIT, i]
+    if only >= 0:
+        total = s.number[ENTRY, i] * s.x[only]
+    elif s.number[CUT, i] > 0.0:
+        for c in range(s.x.size):
+            total += s.C[i, c] * s.x[c]
+    else:
+        for c in range(s.x.size):
+            total += s.A[i, c] * s.x[c]
+    return total
+
+
+@inlined
+def side_at(s, i):
+    """Return the side at which row i acts."""
+    return s.number[LOWER, i] if s.index[STATE, i] < 0 else s.number[UPPER, i]
+
+
+@compiled
+def meet(s, last):
+    """Factor the rows that act in the first `last` levels, and write the x that meets them."""
+    index, levels, rank, rows = s.index, s.multiplier.shape[0] - 1, ZERO, ZERO
+    for c in range(s.x.size):
+        index[ORDER, c] = index[PLACE, c] = c
+        s.number[GOAL, c] = s.number[REFERENCE, c]
+    s.count[PICKED], s.count[WHOLE], s.scalar[SIZE] = 0, -1, 0.0
+    s.scalar[PIVOT] = s.scalar[SECOND] = 1.0
+    for k in range(levels):
+        begin, index[BEGIN, k], index[RANK, k] = rows, rows, rank
+        if k >= last or s.count[WHOLE] >= 0:
+            continue
+        if gives_all(s, k, s.number[GRADIENT], s.number[SCRATCH]):
+            for c in range(s.x.size):
+                s.number[GOAL, c] = s.number[GRADIENT, c]
+            s.count[WHOLE] = k
+            continue
+        for i in range(index[FIRST, k], index[FIRST, k + 1]):
+            if index[STATE, i] != FREE and s.number[NORM, i] > 0.0:
+                index[LIST, rows] = i
+                rows += 1
+        if rows > begin:
+            above, rank = rank, _factor(s, begin, rows, rank)
+            _solve(s, begin, rows, above, rank)
+    index[BEGIN, levels], index[RANK, levels] = rows, rank
+    _write_x(s, rank)
+
+
+@inlined
+def gives_all(s, k, goal, seen):
+    """Whether level k gives each unknown one target, all of one weight; writes them as the goal.
+
+    seen: scratch.
+    """
+    first, n, last = s.index[FIRST, k], s.x.size, s.index[FIRST, k + 1]
+    if last - first != n:
+        return False
+    for c in range(n):
+        seen[c] = 0.0
+    for i in range(first, last):
+        c = s.index[UNIT, i]
+        if (c < 0 or s.index[STATE, i] != EQUAL or s.number[NORM, i] != s.number[NORM, first]
+                or seen[c] != 0.0 or s.number[NORM, i] <= 0.0):
+            return False
+        seen[c] = 1.0
+        goal[c] = s.number[LOWER, i] / s.number[ENTRY, i]
+    return True
+
+
+@inlined
+def _factor(s, begin, end, rank):
+    """Give places begin .. end - 1 of the list columns of Q from `rank` on; return the new rank."""
+    listed, single = s.index[LIST], rank == s.count[PICKED]
+    for q in range(begin, end):
+        single &= s.index[UNIT, listed[q]] >= 0
+    if single:
+        return _pick(s, begin, end, rank)
+    for q in range(begin, end):
+        i = listed[q]
+        least = s.scalar[TOLERANCE] * s.number[NORM, i]
+        s.number[ZEROED, q] = least * least
+        if s.number[CUT, i] > 0.0:
+            for t in range(s.x.size):
+                s.W[q, t] = s.C[i, s.index[ORDER, t]]
+        else:
+            for t in range(s.x.size):
+                s.W[q, t] = s.A[i, s.index[ORDER, t]]
+    reflect(s.basis, s.count[PICKED], rank, s.W, begin, end)
+    above = rank
+    rank = factor_level(Rows(s.W, listed, s.number[ZEROED], s.number[MISS]), s.basis, begin, end,
+                        rank)
+    for q in range(begin, begin + rank - above):
+        note_pivot(s, abs(s.W[q, above + q - begin]) / s.number[NORM, listed[q]])
+    for q in range(begin, end):  # rounding that other rows would be held against
+        least = CANCELLED * s.number[NORM, listed[q]]
+        for t in range(rank):
+            s.W[q, t] = s.W[q, t] if abs(s.W[q, t]) > least else 0.0
+    for q in range(begin + (0 if s.count[COARSE] == 1 else rank - above), end):
+        _cut(s, q, rank, q >= begin + rank - above)
+    return rank
+
+
+@inlined
+def note_pivot(s, pivot):
+    """Note the pivot of a row over its norm if it is one of the two smallest."""
+    s.scalar[SECOND] = min(s.scalar[SECOND], max(s.scalar[PIVOT], pivot))
+    s.scalar[PIVOT] = min(s.scalar[PIVOT], pivot)
+
+
+@inlined
+def _pick(s, begin, end, rank):
+    """Take unknowns as columns, for rows of one entry; the others of these depend on them."""
+    order, place, at = s.index[ORDER], s.index[PLACE], begin
+    for q in range(begin, end):
+        c = s.index[UNIT, s.index[LIST, q]]
+        if place[c] >= rank:
+            other, old = order[rank], place[c]
+            order[rank], order[old], place[c], place[other] = c, other, rank, old
+            swap(s.index[LIST], q, at)
+            rank, at = rank + 1, at + 1
+    for q in range(begin, end):
+        i = s.index[LIST, q]
+        for t in range(rank):
+            s.W[q, t] = 0.0
+        s.W[q, place[s.index[UNIT, i]]] = s.number[ENTRY, i]
+    s.count[PICKED] = rank
+    return rank
+
+
+@inlined
+def _cut(s, q, rank, dependent):
+    """Cut from the row at place q of the list what a dependent row has beyond the first columns.
+
+    If coarse, small coefficients in these as well.
+    """
+    i, n, most, part = s.index[LIST, q], s.x.size, 0.0, s.number[SCRATCH]
+    small = s.scalar[TOLERANCE] * s.number[NORM, i]
+    for t in range(n):
+        gone = dependent if t >= rank else s.count[COARSE] == 1 and abs(s.W[q, t]) <= small
+        part[t] = s.W[q, t] if gone else 0.0
+        most = max(most, abs(part[t]))
+        s.W[q, t] = 0.0 if gone else s.W[q, t]
+    if most <= NEGLIGIBLE * s.number[NORM, i]:
+        return
+    for k in range(rank - 1, s.count[PICKED] - 1, -1):
+        reflect(s.basis, k, k + 1, s.number, SCRATCH, SCRATCH + 1)
+    square = 0.0
+    for t in range(n):
+        c = s.index[ORDER, t]
+        s.C[i, c] = (s.C[i, c] if s.number[CUT, i] > 0.0 else s.A[i, c]) - part[t]
+        square += (s.C[i, c] - s.A[i, c]) ** 2
+    s.number[CUT, i], s.index[UNIT, i], s.count[DIRTY] = np.sqrt(square), -1, 1
+
+
+@inlined
+def _solve(s, begin, end, above, rank):
+    """Write y of the columns above .. rank - 1, and the residuals of a level."""
+    y, miss = s.number[Y], s.number[MISS]
+    for q in range(begin, end):
+        rest, w = side_at(s, s.index[LIST, q]), s.W[q]
+        for t in range(above):
+            rest -= w[t] * y[t]
+        miss[q] = rest
+    tall = end - begin > rank - above
+    if tall and rank > above:
+        _reduce(s, begin, end, above, rank)
+        turn(s, miss, begin, end, above, rank, False)
+    for t in range(above, rank):
+        q = begin + t - above
+        if tall:
+            s.scalar[SIZE] = max(s.scalar[SIZE], abs(miss[q] / s.number[DIAGONAL, t]))
+        else:
+            rest = miss[q]
+            for c in range(above, t):
+                rest -= s.W[q, c] * y[c]
+            y[t], miss[q] = rest / s.W[q, t], 0.0
+    if tall:
+        for t in range(rank - 1, above - 1, -1):
+            rest = miss[begin + t - above]
+            for c in range(t + 1, rank):
+                rest -= s.T[c, begin + t - above] * y[c]
+            y[t] = rest / s.number[DIAGONAL, t]
+        for q in range(begin, begin + rank - above):
+            miss[q] = 0.0
+        if rank > above:
+            turn(s, miss, begin, end, above, rank, True)
+            s.scalar[SIZE] = max(s.scalar[SIZE], _compromise(s, begin, end))
+    for t in range(above, rank):
+        s.scalar[SIZE] = max(s.scalar[SIZE], abs(y[t]))
+
+
+@inlined
+def _compromise(s, begin, end):
+    """Return the length of what cancels where rows of a level contradict each other."""
+    far, heaviest = 0.0, 0.0
+    for q in range(begin, end):
+        norm = s.number[NORM, s.index[LIST, q]]
+        far, heaviest = max(far, abs(s.number[MISS, q]) * norm), max(heaviest, norm)
+    return far / (heaviest * heaviest)
+
+
+@inlined
+def _reduce(s, begin, end, above, rank):
+    """Reflect the rows of a level to make its columns upper triangular; T keeps the reflectors.
+
+    The rows are in pivot order, the heaviest first, so each residual is accurate relative to its
+    own row (Cox, Higham 1998).
+    """
+    for t in range(above, rank):
+        for q in range(begin, end):
+            s.T[t, q] = s.W[q, t] if t - above <= q - begin else 0.0
+    for t in range(above, rank):
+        v, square = s.T[t, begin + t - above:end], 0.0
+        for q in range(v.size):
+            square += v[q] * v[q]
+        norm = -np.sqrt(square) if v[0] > 0.0 else np.sqrt(square)
+        v[0] -= norm
+        s.number[DIAGONAL, t], s.number[FACTOR, t] = norm, -1.0 / (norm * v[0])
+        for c in range(t + 1, rank):
+            _turn_by(s.T[c, begin + t - above:end], v, s.number[FACTOR, t])
+
+
+@inlined
+def _turn_by(w, v, factor):
+    """Reflect w by I - factor v v^T."""
+    total = 0.0
+    for q in range(v.size):
+        total += w[q] * v[q]
+    add_multiple(w, -factor * total, v)
+
+
+@inlined
+def turn(s, values, begin, end, above, rank, back):
+    """Apply the reflections of the rows of a level to values by place in the list, or undo them."""
+    for r in range(rank - above):
+        t = rank - 1 - r if back else above + r
+        _turn_by(values[begin + t - above:end], s.T[t, begin + t - above:end],
+                 s.number[FACTOR, t])
+
+
+@inlined
+def _write_x(s, rank):
+    """Write x = Q y; the columns from `rank` on keep the goal."""
+    n, picked, order, moved, goal = s.x.size, s.count[PICKED], s.index[ORDER], False, s.number[GOAL]
+    for c in range(n):
+        s.number[SCRATCH, c] = goal[c]
+        moved |= goal[c] != 0.0
+    if moved:
+        for t in range(n):
+            goal[t] = s.number[SCRATCH, order[t]]
+        reflect(s.basis, picked, rank, s.number, GOAL, GOAL + 1)
+    for t in range(rank, n):
+        s.number[Y, t] = goal[t]
+    for t in range(n):
+        s.number[SCRATCH, t] = s.number[Y, t]
+    for k in range(rank - 1, picked - 1, -1):
+        reflect(s.basis, k, k + 1, s.number, SCRATCH, SCRATCH + 1)
+    for t in range(n):
+        s.x[order[t]] = s.number[SCRATCH, t]
