@@ -24,7 +24,7 @@ NO_STEP = 1e-12     # length of a step: smaller ones count as zero
 
 # Of a proof by multipliers:
 BAND = 5e-9         # distance of a row from the side that it is on, over 1 + |x|: as in `certify`
-ENOUGH = 2.5e-9       # what may remain of the conditions, over the weakest possible pull of the level
+ENOUGH = 1e-9       # what may remain of the conditions, over the weakest possible pull of the level
 CLEAR = 4e-9        # remainder of a unit row that counts as independent: at least
 NOTHING = 1e-9      # remainder of a unit row that counts as dependent: at most
 EXCHANGED = 4.0     # times ENOUGH: what may remain if such a row replaces one that it depends on
