@@ -172,7 +172,7 @@ def _balances(s, p, reach):
         norm = s.number[NORM, i]
         if i >= begin and abs(mu[i]) <= NEGLIGIBLE * far + EPSILON * norm * reach:
             continue
-        slight = norm * norm * reach if i >= begin else source
+        slight = min(norm * norm * reach, source) if i >= begin else source
         weak = abs(mu[i]) * norm <= max(unsure, SLIGHT_ * slight if p < levels else 0.0)
         if mu[i] * s.index[STATE, i] < 0.0 and (s.index[CHANGE, i] == OPEN or not weak):
             return False

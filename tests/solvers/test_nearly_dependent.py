@@ -93,17 +93,3 @@ def test_the_nearest_x_is_certified_beside_rows_that_differ_by_little():
     assert certify(h, nearest).certified
     aside = np.linalg.svd(np.array([a, [0, 0, 1, 0]]))[2][2]
     assert not certify(h, nearest + 1e-5 * aside).certified
-
-
-def test_guesses_that_change_more_rows_each_time_are_given_up():
-    """From the memory of the opposite corner the second guess changes more rows than the first."""
-    n, rng = 12, np.random.default_rng(0)
-    A, b = rng.normal(size=(n, n)), 5.0 * rng.normal(size=n)
-    box = np.eye(n), -np.ones(n), np.ones(n)
-    h = Hierarchy.from_levels([box, (A, b)])
-    opposite = make("hcod").solve(Hierarchy.from_levels([box, (A, -b)])).memory
-    res = make("hcod", guesses=50).solve(h, opposite)
-    guesses, steps = res.memory[-3:-1]
-    assert guesses == 2
-    assert steps > 0
-    np.testing.assert_allclose(res.x, make("hcod").solve(h).x, atol=1e-9)
