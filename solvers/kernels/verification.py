@@ -54,7 +54,7 @@ from solvers.kernels.working_set import (
 )
 from solvers.status import EQUAL, FREE
 
-FREE_ROWS = 10.0  # share of the band of a row that acts over that of one that does not
+FREE_ROWS = 2.0  # share of the band of a row that acts over that of one that does not
 # What is known of an inequality that acts: nothing, a weak multiplier decided, decided.
 OPEN, WEAKLY, DECIDED = range(3)
 
