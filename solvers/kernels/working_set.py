@@ -41,8 +41,9 @@ NUMBERS = 16  # one more than these: `levels.py` keeps its own behind REFERENCE
 UNIT, STATE, FIRST, CHANGE, ENTERED, SEED, LIST, SIGN, ORDER, PLACE, BEGIN, RANK = range(12)
 # In `count`: columns that are unknowns, the level that sets all of x (-1: none), whether a row was
 # cut since the rows were those of A, whether small coefficients are cut along other rows too, the
-# number of rows that are negligible beside those of other levels alone.
-PICKED, WHOLE, DIRTY, COARSE, NEGLECTED = range(5)
+# number of rows that are negligible beside those of other levels alone, the number of levels that
+# the saved x meets.
+PICKED, WHOLE, DIRTY, COARSE, NEGLECTED, FINISHED = range(6)
 # In `scalar`: rank_tolerance, the largest number so far, the smallest pivot of a row over its norm
 # and the next one, the factor by which the data are those of the caller.
 TOLERANCE, SIZE, PIVOT, SECOND, SCALE = range(5)
@@ -81,7 +82,7 @@ class WorkingSet(NamedTuple):
 @inlined
 def working_set_size(n, m, levels):
     """Return the numbers that a WorkingSet needs, without its multipliers."""
-    return (NUMBERS + 12) * max(m, n, levels + 1) + 10 + 3 * m * n + n * n + n
+    return (NUMBERS + 12) * max(m, n, levels + 1) + 11 + 3 * m * n + n * n + n
 
 
 @inlined
@@ -91,7 +92,7 @@ def carve_working_set(A, sizes, x, multiplier, work, at):
     w = max(m, n, sizes.size + 1)
     number, at = matrix(work, at, NUMBERS, w)
     numbers, at = integers(work, at, 12 * w)
-    count, at = integers(work, at, 5)
+    count, at = integers(work, at, 6)
     scalar, at = vector(work, at, 5)
     W, at = matrix(work, at, m, n)
     basis, at = carve_basis(work, at, n, n)

@@ -5,7 +5,7 @@ import numpy as np
 from solvers import certify
 from solvers.proof import prove
 
-TURNED = 1e-7  # x may differ by this where rows that agree to 1e-8 rad count as dependent
+TURNED = 1e-6  # x may differ by this where rows that agree to 1e-8 rad count as dependent
 
 
 def is_right(h, x):
