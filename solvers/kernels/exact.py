@@ -172,16 +172,14 @@ def solve_exactly(A, lower, upper, sizes, x, record, settings, work):
     if code == SOLVED and s.count[NEGLECTED] > 0 and neglects(s):
         code = ZERO + INACCURATE
     elif code not in (SOLVED, NUMERICAL_FAILURE):
-        code = ZERO + (ITERATION_LIMIT if steps >= limit else INACCURATE)
-        for c in range(n if s.count[FINISHED] > 0 else 0):
+        finished = s.count[FINISHED]
+        for c in range(n if finished == sizes.size or (code == UNPROVED and finished > 0) else 0):
             x[c] = saved[c]
+        code = ZERO + (ITERATION_LIMIT if steps >= limit else INACCURATE)
     _keep(s, record, blocks, steps - blocks)
     record[3 * m + 2] = -1.0
     if code == ITERATION_LIMIT:
-        finished = s.count[FINISHED]
-        half = 0.5 * s.count[COARSE]
-        record[3 * m + 2] = (min(finished, sizes.size - 1) + half if finished > 0
-                             else -2 - max(level, 0) - half)
+        record[3 * m + 2] = _resume(s, level)
     return code if np.isfinite(length_of(x)) else finish(x, NUMERICAL_FAILURE)
 
 
@@ -192,6 +190,15 @@ def _carve_scaled(work, at, m, n):
     lower, at = vector(work, at, m)
     upper, at = vector(work, at, m)
     return Scaled(A, lower, upper), at
+
+
+@inlined
+def _resume(s, level):
+    """Return what tells a later solve where to go on, see `_resumed_at`; rounded, the level."""
+    last, half = s.multiplier.shape[0] - 2, 0.5 * s.count[COARSE]
+    if s.count[FINISHED] == 0:
+        return -2.0 - half - (level if level > 0 else 0)
+    return half + (s.count[FINISHED] if s.count[FINISHED] < last else last)
 
 
 @inlined

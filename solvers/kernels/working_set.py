@@ -158,10 +158,13 @@ def rescale(s, lower, upper, scaled):
 
     scaled: a `Scaled`. Returns SOLVED, or NUMERICAL_FAILURE if a side is then no number.
     """
-    most, sane = 0.0, True
+    most, sane, factor = 0.0, True, 1.0
     for i in range(s.A.shape[0]):
         most = max(most, abs(s.number[NORM, i]))
-    factor = 2.0 ** -np.floor(np.log2(most))
+    while most * factor < 0.5:
+        factor *= 2.0
+    while most * factor > 1.0:
+        factor *= 0.5
     for i in range(s.A.shape[0]):
         for c in range(s.x.size):
             scaled.A[i, c] = s.A[i, c] * factor
