@@ -157,8 +157,9 @@ def _sets_goal(t, k):
     s = t.of
     levels = s.multiplier.shape[0] - 1
     if k < levels:
-        t.scalar[WEIGHT] = s.number[NORM, s.index[FIRST, k]] ** 2 if s.A.shape[0] > 0 else 1.0
-        return t.count[FIX] < s.x.size and gives_all(s, k, s.number[GOAL], s.number[STEP])
+        whole = t.count[FIX] < s.x.size and gives_all(s, k, s.number[GOAL], s.number[STEP])
+        t.scalar[WEIGHT] = s.number[NORM, s.index[FIRST, k]] ** 2 if whole else 1.0
+        return whole
     for c in range(s.x.size):
         s.number[GOAL, c] = s.number[REFERENCE, c]
     t.scalar[WEIGHT] = 1.0

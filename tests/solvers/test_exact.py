@@ -215,6 +215,7 @@ def test_damped_x_does_not_jump_where_a_bound_begins_to_act(name):
         assert np.abs(x[1] - x[0]).max() <= 1e-6
 
 
+@pytest.mark.filterwarnings("ignore:overflow")
 @pytest.mark.parametrize("below", [0, 1])
 def test_rows_of_any_size_are_solved_and_numbers_that_overflow_are_a_failure(below):
     tiny = Hierarchy.from_levels([([[1e-200]], [1e-200], [INF if below else 1e-200])])
