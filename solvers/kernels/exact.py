@@ -20,7 +20,7 @@ from solvers.kernels.search import pivot_in_blocks, pivot_one_by_one, save
 from solvers.kernels.space import matrix, vector
 from solvers.kernels.staircase import solve_by_staircase
 from solvers.kernels.tableau import STEPS, carve_tableau, tableau_size
-from solvers.kernels.tolerances import MOST_STEPS, MOST_TRIES
+from solvers.kernels.tolerances import PASS_STEPS, SEARCH_STEPS
 from solvers.kernels.verification import neglects, verify
 from solvers.kernels.working_set import (
     COARSE,
@@ -152,7 +152,7 @@ def solve_exactly(A, lower, upper, sizes, x, record, settings, work):
     if code == UNPROVED and level < 0:
         t, _ = carve_tableau(s, work, after)
         code, level = pass_through_levels(t, settings[TOLERANCE],
-                                          min(limit - steps, MOST_STEPS * (m + n)))
+                                          min(limit - steps, PASS_STEPS * (m + n)))
         steps += t.count[STEPS]
         save(s, saved, sizes.size if code == SOLVED else level)
         code = _verified(s, code)
@@ -165,7 +165,7 @@ def solve_exactly(A, lower, upper, sizes, x, record, settings, work):
             s.count[COARSE] = coarse
             restore(s)
             code, tries, level = pivot_one_by_one(
-                s, current, saved, min(limit - steps, MOST_TRIES * (m + n)),
+                s, current, saved, min(limit - steps, SEARCH_STEPS * (m + n)),
                 ZERO if coarse > begin else level)
             steps += tries
             code = _verified(s, code)

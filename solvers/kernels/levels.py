@@ -48,7 +48,6 @@ from solvers.kernels.tableau import (
     SPEED,
     STEP,
     STEPS,
-    STILL,
     VALUE,
     WEIGHT,
     WORST,
@@ -67,8 +66,7 @@ from solvers.kernels.tableau import (
 from solvers.kernels.tolerances import (
     CANCELLED,
     FLOOR,
-    NO_STEP,
-    WEAK,
+    REPIVOT,
 )
 from solvers.kernels.working_set import (
     ENTRY,
@@ -108,7 +106,6 @@ def pass_through_levels(t, tolerance, limit):
         last = s.index[FIRST, k + 1] if k < levels else first
         whole = _sets_goal(t, k)
         solved = not _begin(t, k, last, whole, tolerance)
-        t.count[STILL] = 0
         while not solved:
             if t.count[STEPS] >= limit:
                 return ZERO + UNPROVED, ZERO + k
@@ -309,7 +306,6 @@ def _advance(t, rank, last, tolerance):
             value[i] += length * speed[i]
     t.scalar[SIZE] = max(t.scalar[SIZE], length * t.scalar[REACH])
     t.scalar[SCALE] = max(t.scalar[SCALE], length * scale, FLOOR * t.scalar[SIZE])
-    t.count[STILL] = t.count[STILL] + 1 if length < NO_STEP else 0
     if entering >= 0:
         s.index[STATE, entering] = side
     return entering
@@ -360,7 +356,7 @@ def _enter(t, i, first):
     count[RANKS] = min(count[RANKS], n - begin - 1)
     for q in range(count[RANKS]):  # pivot again from the first row that lost its basis vector
         j, r = s.index[LIST, q], begin + 1 + q
-        if left_of(t, j, r, r + 1) <= (WEAK * s.number[NORM, j]) ** 2:
+        if left_of(t, j, r, r + 1) <= (REPIVOT * s.number[NORM, j]) ** 2:
             count[RANKS] = q
             break
 

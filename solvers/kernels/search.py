@@ -19,7 +19,7 @@ from hierarchy.jit import compiled, inlined
 from solvers.kernels.multipliers import INWARD, UNDECIDED, write_multipliers
 from solvers.kernels.rows import ZERO, length_of
 from solvers.kernels.space import View
-from solvers.kernels.tolerances import LOOSE, MET, SHADOW
+from solvers.kernels.tolerances import MET, PATIENCE, RELEASED, RESTORED, SHADOW, VIOLATED
 from solvers.kernels.verification import verify
 from solvers.kernels.working_set import (
     BEGIN,
@@ -45,9 +45,6 @@ from solvers.kernels.working_set import (
 from solvers.status import FREE, INACCURATE, NUMERICAL_FAILURE, SOLVED, UNPROVED
 
 LEAVES = 5    # change of a row that acts; else the side at which it is to act, or 0
-RESTORED = 3  # times that a final working set is solved anew from uncut rows
-RELEASED = 3  # times that a row may enter and leave again because nothing holds it
-PATIENCE = 2  # block pivots that may not reduce the number of wrong rows
 
 
 class Found(NamedTuple):
@@ -92,7 +89,7 @@ def judge(s, last, newest):
         value = value_at(s, i)
         over = max(value - up, low - value)
         side = up if value > up else low
-        if over > LOOSE * (norm * reach + abs(side)):
+        if over > VIOLATED * (norm * reach + abs(side)):
             s.index[CHANGE, i] = 1 if value > up else -1
             wrong += 1
             if over > worst * norm:

@@ -24,16 +24,17 @@ from hierarchy.jit import compiled, inlined
 from solvers.kernels.rows import length_of
 from solvers.kernels.tolerances import (
     BAND,
-    CLEAR_,
-    ENOUGH,
+    CERTAIN_SIGN,
+    CUT_BALANCE,
+    CUT_OVER_PIVOT,
     EPSILON,
+    FREE_ROWS,
+    GRADIENT_ROUNDING,
     NEGLIGIBLE,
-    PRODUCT,
-    SLIGHT_,
-    SPREAD,
-    STEEP,
-    SURE,
-    UNIT_ROUNDING,
+    PIVOT_PRODUCT,
+    RANK_MARGIN,
+    REMAINDER,
+    SIGN_MARGIN,
 )
 from solvers.kernels.working_set import (
     CHANGE,
@@ -54,7 +55,6 @@ from solvers.kernels.working_set import (
 )
 from solvers.status import EQUAL, FREE
 
-FREE_ROWS = 2.0  # share of the band of a row that acts over that of one that does not
 # What is known of an inequality that acts: nothing, a weak multiplier decided, decided.
 OPEN, WEAKLY, DECIDED = range(3)
 
@@ -109,9 +109,9 @@ def _rows_hold(s, reach):
 @inlined
 def _ranks_are_clear(s, cut):
     """Whether no row would be dependent or not by an angle near the tolerance."""
-    return (CLEAR_ * cut <= s.scalar[TOLERANCE] and cut <= STEEP * s.scalar[PIVOT]
-            and CLEAR_ * s.scalar[TOLERANCE] <= s.scalar[PIVOT]
-            and s.scalar[PIVOT] * s.scalar[SECOND] >= PRODUCT)
+    return (RANK_MARGIN * cut <= s.scalar[TOLERANCE] and cut <= CUT_OVER_PIVOT * s.scalar[PIVOT]
+            and RANK_MARGIN * s.scalar[TOLERANCE] <= s.scalar[PIVOT]
+            and s.scalar[PIVOT] * s.scalar[SECOND] >= PIVOT_PRODUCT)
 
 
 @inlined
@@ -134,7 +134,7 @@ def _balances(s, p, reach):
     left, noise, n = s.number[GRADIENT], s.number[NOISE], s.x.size
     for c in range(n):
         left[c] = 0.0 if p < levels else s.x[c] - s.number[REFERENCE, c]
-        noise[c] = UNIT_ROUNDING * reach if p == levels else 0.0
+        noise[c] = GRADIENT_ROUNDING * reach if p == levels else 0.0
     least, square, far, source = np.inf, 0.0, 0.0, 0.0
     for i in range(begin, end):
         if s.index[STATE, i] != FREE and s.number[NORM, i] > 0.0:
@@ -144,18 +144,18 @@ def _balances(s, p, reach):
             source = max(source, abs(mu[i]) * norm)
     if p < levels and far == 0.0:
         return True
-    allowed = ENOUGH * reach
+    allowed = REMAINDER * reach
     if p < levels:
         missed = np.sqrt(square)
         if missed <= BAND * reach:
             return True
-        allowed = ENOUGH * least * least * max(missed, reach) * s.scalar[PIVOT]
-    rounding, turned = UNIT_ROUNDING * reach if p == levels else 0.0, 0.0
+        allowed = REMAINDER * least * least * max(missed, reach) * s.scalar[PIVOT]
+    rounding, turned = GRADIENT_ROUNDING * reach if p == levels else 0.0, 0.0
     for i in range(end):
         if mu[i] != 0.0 and s.index[STATE, i] == FREE:
             return False
         if mu[i] != 0.0:
-            rounding += UNIT_ROUNDING * abs(mu[i]) * s.number[NORM, i]
+            rounding += GRADIENT_ROUNDING * abs(mu[i]) * s.number[NORM, i]
             turned += 2.0 * s.number[CUT, i] * abs(mu[i])
             _add_row(s, mu[i], i)
     square = 0.0
@@ -163,9 +163,9 @@ def _balances(s, p, reach):
         square += max(abs(left[c]) - noise[c], 0.0) ** 2
     rest = np.sqrt(square)
     if not (rest <= allowed + turned
-            and turned <= SPREAD * (reach if p == levels else source)):
+            and turned <= CUT_BALANCE * (reach if p == levels else source)):
         return False
-    unsure = SURE * (rest + rounding + turned) / s.scalar[PIVOT]
+    unsure = SIGN_MARGIN * (rest + rounding + turned) / s.scalar[PIVOT]
     for i in range(end):
         if mu[i] == 0.0 or s.index[CHANGE, i] == DECIDED:
             continue
@@ -173,7 +173,7 @@ def _balances(s, p, reach):
         if i >= begin and abs(mu[i]) <= NEGLIGIBLE * far + EPSILON * norm * reach:
             continue
         slight = min(norm * norm * reach, source) if i >= begin else source
-        weak = abs(mu[i]) * norm <= max(unsure, SLIGHT_ * slight if p < levels else 0.0)
+        weak = abs(mu[i]) * norm <= max(unsure, CERTAIN_SIGN * slight if p < levels else 0.0)
         if mu[i] * s.index[STATE, i] < 0.0 and (s.index[CHANGE, i] == OPEN or not weak):
             return False
         s.index[CHANGE, i] = WEAKLY if weak else DECIDED
@@ -184,7 +184,7 @@ def _balances(s, p, reach):
 def _add_row(s, f, i):
     """Add a multiple of row i of A to what is left, and its rounding to the noise."""
     a, c, left, noise = s.A[i], s.index[UNIT, i], s.number[GRADIENT], s.number[NOISE]
-    least = UNIT_ROUNDING * abs(f) * s.number[NORM, i]
+    least = GRADIENT_ROUNDING * abs(f) * s.number[NORM, i]
     if c >= 0:
         left[c] += f * a[c]
         noise[c] += least
