@@ -81,6 +81,7 @@ from solvers.kernels.working_set import (
     UPPER,
     WHOLE,
     gives_all,
+    row_times_x,
     side_at,
 )
 from solvers.status import EQUAL, FREE, SOLVED, UNPROVED
@@ -173,7 +174,7 @@ def _begin(t, k, last, whole, tolerance):
     measure(t, length_of(s.x))
     count[RANKS] = count[ROWS] = count[EQUALITIES] = 0
     for i in range(s.index[FIRST, k] if k < s.multiplier.shape[0] - 1 else last, last):
-        value = _value(s, i)
+        value = row_times_x(s, i)
         s.number[VALUE, i] = value
         if s.number[NORM, i] <= 0.0:
             s.index[KIND, i] = FIXED
@@ -238,18 +239,7 @@ def _watch_parallel(t, last):
     for i in range(last):
         if t.of.index[KIND, i] == PARALLEL:
             t.of.index[KIND, i] = WATCHED
-            t.of.number[VALUE, i] = _value(t.of, i)
-
-
-@inlined
-def _value(s, i):
-    """Return row i times x."""
-    total, a, c = 0.0, s.A[i], s.index[UNIT, i]
-    if c >= 0:
-        return a[c] * s.x[c]
-    for c in range(a.size):
-        total += a[c] * s.x[c]
-    return total
+            t.of.number[VALUE, i] = row_times_x(t.of, i)
 
 
 @inlined
@@ -262,7 +252,7 @@ def _aim(t, whole):
     t.count[RANKS] = pivot_rows(t, begin, t.count[RANKS])
     for q in range(t.count[ROWS]):
         i = s.index[LIST, q]
-        s.number[VALUE, i] = _value(s, i)
+        s.number[VALUE, i] = row_times_x(s, i)
         s.number[REST, q] = rest = side_at(s, i) - s.number[VALUE, i]
         t.scalar[SIZE] = max(t.scalar[SIZE], abs(rest) / s.number[NORM, i])
     t.scalar[REACH] = step_of_rows(t, begin, t.count[RANKS])
@@ -419,7 +409,7 @@ def _leave(t, i, last, tolerance):
 
     A soft row that is now beyond its other side stays, at that side.
     """
-    s, was, value = t.of, t.of.index[STATE, i], _value(t.of, i)
+    s, was, value = t.of, t.of.index[STATE, i], row_times_x(t.of, i)
     s.number[VALUE, i] = value
     if s.index[KIND, i] == SOFT:
         side = missed_side(s, i, value, t.scalar[SCALE], tolerance)
@@ -531,7 +521,7 @@ def _order(t, whole):
         at = _own(t, i, at, end)
         if at == before:
             kind[i], s.index[STATE, i] = WATCHED, FREE
-            s.number[VALUE, i] = _value(s, i)
+            s.number[VALUE, i] = row_times_x(s, i)
     count[HARD] = at - count[FIX]
     count[IN_USE] += count[EQUALITIES]
 

@@ -7,7 +7,6 @@ that there is a floor where x and all sides are zero.
 
 # Rounding. Sums of some hundred terms are off by 1e-15 to 1e-13 of the largest.
 EPSILON = 2e-15            # miss of a row, relative to its terms
-GRADIENT_ROUNDING = 4e-15  # of the gradient of a level, for each row in it, relative to its norm
 CANCELLED = 1e-14          # sum relative to the norms of its terms
 NEGLIGIBLE = 1e-13         # norm, entry or multiplier beside the largest: rounding in the other
 TERMS = 1e-13              # sum of products relative to its terms, in the kernels of sns
@@ -25,9 +24,9 @@ FLOOR = 1e-3         # the same in the pass level by level
 # Verification: half of what `certify` accepts, because shifts and turns add up.
 BAND = 5e-9          # shift of a side, relative to 1 + |x|
 FREE_ROWS = 2.0      # share of the band of a row that acts over that of one that does not
-REMAINDER = 1e-9     # what may remain of a gradient, as a shift of the sides of its level
+REMAINDER = 2.5e-9   # what may remain of a gradient, as a shift of the sides of its level
 CUT_BALANCE = 2e-7   # what cut rows may add to a gradient, relative to its terms
-CUT_OVER_PIVOT = 1e-3  # cut of a row over the smallest pivot: larger ones turn the answer
+CUT_OVER_PIVOT = 2e-4  # cut of a row over the smallest pivot: larger ones turn the answer
 RANK_MARGIN = 1.1    # between a pivot or a cut and rank_tolerance, as a factor
 PIVOT_PRODUCT = 1e-15  # of the two smallest pivots: less, and the second is rounding of the first
 CERTAIN_SIGN = 1e-8  # multiplier over what it balances: smaller ones have no certain sign

@@ -24,12 +24,12 @@ from hierarchy.jit import compiled, inlined
 from solvers.kernels.rows import length_of
 from solvers.kernels.tolerances import (
     BAND,
+    CANCELLED,
     CERTAIN_SIGN,
     CUT_BALANCE,
     CUT_OVER_PIVOT,
     EPSILON,
     FREE_ROWS,
-    GRADIENT_ROUNDING,
     NEGLIGIBLE,
     PIVOT_PRODUCT,
     RANK_MARGIN,
@@ -52,6 +52,7 @@ from solvers.kernels.working_set import (
     UNIT,
     UPPER,
     WHOLE,
+    row_times_x,
 )
 from solvers.status import EQUAL, FREE
 
@@ -77,7 +78,7 @@ def neglects(s):
     """Whether x misses a row that takes no part because rows of other levels are far larger."""
     missed, reach = False, 1.0 + length_of(s.x)
     for i in range(s.A.shape[0]):
-        value = _value(s, i)
+        value = row_times_x(s, i)
         over = max(value - s.number[UPPER, i], s.number[LOWER, i] - value)
         missed = missed or over > BAND * -s.number[NORM, i] * reach > 0.0
     return missed
@@ -93,7 +94,7 @@ def _rows_hold(s, reach):
         norm, state = s.number[NORM, i], s.index[STATE, i]
         if norm <= 0.0:
             continue
-        value, low, up = _value(s, i), s.number[LOWER, i], s.number[UPPER, i]
+        value, low, up = row_times_x(s, i), s.number[LOWER, i], s.number[UPPER, i]
         side = low if state < 0 else up
         if state == FREE:
             beyond, terms = max(value - up, low - value) * FREE_ROWS, abs(value)
@@ -115,17 +116,6 @@ def _ranks_are_clear(s, cut):
 
 
 @inlined
-def _value(s, i):
-    """Return row i of A times x."""
-    total, a, c = 0.0, s.A[i], s.index[UNIT, i]
-    if c >= 0:
-        return a[c] * s.x[c]
-    for c in range(a.size):
-        total += a[c] * s.x[c]
-    return total
-
-
-@inlined
 def _balances(s, p, reach):
     """Whether (2) and (3) hold for level p."""
     levels, mu = s.multiplier.shape[0] - 1, s.multiplier[p]
@@ -134,7 +124,7 @@ def _balances(s, p, reach):
     left, noise, n = s.number[GRADIENT], s.number[NOISE], s.x.size
     for c in range(n):
         left[c] = 0.0 if p < levels else s.x[c] - s.number[REFERENCE, c]
-        noise[c] = GRADIENT_ROUNDING * reach if p == levels else 0.0
+        noise[c] = CANCELLED * reach if p == levels else 0.0
     least, square, far, source = np.inf, 0.0, 0.0, 0.0
     for i in range(begin, end):
         if s.index[STATE, i] != FREE and s.number[NORM, i] > 0.0:
@@ -150,12 +140,12 @@ def _balances(s, p, reach):
         if missed <= BAND * reach:
             return True
         allowed = REMAINDER * least * least * max(missed, reach) * s.scalar[PIVOT]
-    rounding, turned = GRADIENT_ROUNDING * reach if p == levels else 0.0, 0.0
+    rounding, turned = CANCELLED * reach if p == levels else 0.0, 0.0
     for i in range(end):
         if mu[i] != 0.0 and s.index[STATE, i] == FREE:
             return False
         if mu[i] != 0.0:
-            rounding += GRADIENT_ROUNDING * abs(mu[i]) * s.number[NORM, i]
+            rounding += CANCELLED * abs(mu[i]) * s.number[NORM, i]
             turned += 2.0 * s.number[CUT, i] * abs(mu[i])
             _add_row(s, mu[i], i)
     square = 0.0
@@ -184,7 +174,7 @@ def _balances(s, p, reach):
 def _add_row(s, f, i):
     """Add a multiple of row i of A to what is left, and its rounding to the noise."""
     a, c, left, noise = s.A[i], s.index[UNIT, i], s.number[GRADIENT], s.number[NOISE]
-    least = GRADIENT_ROUNDING * abs(f) * s.number[NORM, i]
+    least = CANCELLED * abs(f) * s.number[NORM, i]
     if c >= 0:
         left[c] += f * a[c]
         noise[c] += least

@@ -200,16 +200,23 @@ def restore(s):
 
 @inlined
 def value_at(s, i):
-    """Return row i times x."""
-    total, only = 0.0, s.index[UNIT, i]
-    if only >= 0:
-        total = s.number[ENTRY, i] * s.x[only]
-    elif s.number[CUT, i] > 0.0:
-        for c in range(s.x.size):
-            total += s.C[i, c] * s.x[c]
-    else:
-        for c in range(s.x.size):
-            total += s.A[i, c] * s.x[c]
+    """Return row i, as it is after cuts, times x."""
+    return row_times(s.C[i], s.x) if s.number[CUT, i] > 0.0 else row_times_x(s, i)
+
+
+@inlined
+def row_times_x(s, i):
+    """Return row i of A times x."""
+    only = s.index[UNIT, i]
+    return s.A[i, only] * s.x[only] if only >= 0 else row_times(s.A[i], s.x)
+
+
+@inlined
+def row_times(a, x):
+    """Return the inner product."""
+    total = 0.0
+    for c in range(x.size):
+        total += a[c] * x[c]
     return total
 
 
