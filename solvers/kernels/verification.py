@@ -18,6 +18,8 @@ exactly optimal for a problem this close to the data.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from hierarchy.jit import compiled, inlined
@@ -115,59 +117,103 @@ def _ranks_are_clear(s, cut):
             and s.scalar[PIVOT] * s.scalar[SECOND] >= PIVOT_PRODUCT)
 
 
+class Level(NamedTuple):
+    """A level p to verify: its rows, and what they have in common.
+
+    least: the norm of the lightest row that acts. far: the largest violation. missed: the length of
+    all, each over the norm of its row. source: the largest violation times the norm of its row.
+    """
+
+    p: int
+    begin: int
+    end: int
+    least: float
+    far: float
+    missed: float
+    source: float
+
+
 @inlined
 def _balances(s, p, reach):
     """Whether (2) and (3) hold for level p."""
-    levels, mu = s.multiplier.shape[0] - 1, s.multiplier[p]
-    begin = s.index[FIRST, p] if p < levels else s.A.shape[0]
-    end = s.index[FIRST, p + 1] if p < levels else begin
-    left, noise, n = s.number[GRADIENT], s.number[NOISE], s.x.size
-    for c in range(n):
-        left[c] = 0.0 if p < levels else s.x[c] - s.number[REFERENCE, c]
-        noise[c] = CANCELLED * reach if p == levels else 0.0
+    last = p == s.multiplier.shape[0] - 1
+    level = _measured(s, p, last)
+    if not last and level.missed <= BAND * reach:
+        return True
+    allowed = REMAINDER * reach
+    if not last:
+        allowed = (REMAINDER * level.least * level.least * max(level.missed, reach)
+                   * s.scalar[PIVOT])
+    outside, rounding, turned = _add_rows(s, level, reach if last else 0.0)
+    rest = _beyond_rounding(s)
+    if (outside or not rest <= allowed + turned
+            or not turned <= CUT_BALANCE * (reach if last else level.source)):
+        return False
+    unsure = SIGN_MARGIN * (rest + rounding + turned) / s.scalar[PIVOT]
+    return _signs_hold(s, level, unsure, 0.0 if last else CERTAIN_SIGN, reach)
+
+
+@inlined
+def _measured(s, p, last):
+    """Return a `Level`."""
+    begin = s.index[FIRST, p] if not last else s.A.shape[0]
+    end = s.index[FIRST, p + 1] if not last else begin
     least, square, far, source = np.inf, 0.0, 0.0, 0.0
     for i in range(begin, end):
         if s.index[STATE, i] != FREE and s.number[NORM, i] > 0.0:
-            norm = s.number[NORM, i]
-            least, far = min(least, norm), max(far, abs(mu[i]))
-            square += (mu[i] / norm) ** 2
-            source = max(source, abs(mu[i]) * norm)
-    if p < levels and far == 0.0:
-        return True
-    allowed = REMAINDER * reach
-    if p < levels:
-        missed = np.sqrt(square)
-        if missed <= BAND * reach:
-            return True
-        allowed = REMAINDER * least * least * max(missed, reach) * s.scalar[PIVOT]
-    rounding, turned = CANCELLED * reach if p == levels else 0.0, 0.0
-    for i in range(end):
-        if mu[i] != 0.0 and s.index[STATE, i] == FREE:
-            return False
+            norm, miss = s.number[NORM, i], abs(s.multiplier[p, i])
+            least, far, source = min(least, norm), max(far, miss), max(source, miss * norm)
+            square += (miss / norm) ** 2
+    return Level(p, begin, end, least, far, np.sqrt(square), source)
+
+
+@inlined
+def _add_rows(s, level, reach):
+    """Write the sum of the rows times their multipliers, and per unknown what may be rounding.
+
+    reach: of x, for the level of the reference, else 0. Returns whether a row has a multiplier
+    that does not act, the rounding of the sum, and what the cuts of rows add to it.
+    """
+    mu, outside, rounding, turned = s.multiplier[level.p], False, CANCELLED * reach, 0.0
+    for c in range(s.x.size):
+        s.number[GRADIENT, c] = s.x[c] - s.number[REFERENCE, c] if reach > 0.0 else 0.0
+        s.number[NOISE, c] = rounding
+    for i in range(level.end):
         if mu[i] != 0.0:
+            outside = outside or s.index[STATE, i] == FREE
             rounding += CANCELLED * abs(mu[i]) * s.number[NORM, i]
             turned += 2.0 * s.number[CUT, i] * abs(mu[i])
             _add_row(s, mu[i], i)
+    return outside, rounding, turned
+
+
+@inlined
+def _beyond_rounding(s):
+    """Return the length of the gradient beyond what may be rounding."""
     square = 0.0
-    for c in range(n):
-        square += max(abs(left[c]) - noise[c], 0.0) ** 2
-    rest = np.sqrt(square)
-    if not (rest <= allowed + turned
-            and turned <= CUT_BALANCE * (reach if p == levels else source)):
-        return False
-    unsure = SIGN_MARGIN * (rest + rounding + turned) / s.scalar[PIVOT]
-    for i in range(end):
-        if mu[i] == 0.0 or s.index[CHANGE, i] == DECIDED:
+    for c in range(s.x.size):
+        square += max(abs(s.number[GRADIENT, c]) - s.number[NOISE, c], 0.0) ** 2
+    return np.sqrt(square)
+
+
+@inlined
+def _signs_hold(s, level, unsure, certain, reach):
+    """Whether (3) holds up to level p; notes for each row how far its sign is decided.
+
+    unsure, certain: multipliers below this, and below this share of the pulls, decide weakly.
+    """
+    mu, holds = s.multiplier[level.p], True
+    for i in range(level.end):
+        norm, own = s.number[NORM, i], i >= level.begin
+        if (mu[i] == 0.0 or s.index[CHANGE, i] == DECIDED
+                or (own and abs(mu[i]) <= NEGLIGIBLE * level.far + EPSILON * norm * reach)):
             continue
-        norm = s.number[NORM, i]
-        if i >= begin and abs(mu[i]) <= NEGLIGIBLE * far + EPSILON * norm * reach:
-            continue
-        slight = min(norm * norm * reach, source) if i >= begin else source
-        weak = abs(mu[i]) * norm <= max(unsure, CERTAIN_SIGN * slight if p < levels else 0.0)
+        pull = min(norm * norm * reach, level.source) if own else level.source
+        weak = abs(mu[i]) * norm <= max(unsure, certain * pull)
         if mu[i] * s.index[STATE, i] < 0.0 and (s.index[CHANGE, i] == OPEN or not weak):
-            return False
+            holds = False
         s.index[CHANGE, i] = WEAKLY if weak else DECIDED
-    return True
+    return holds
 
 
 @inlined
