@@ -318,15 +318,19 @@ def note_pivot(s, pivot):
 
 @inlined
 def _pick(s, begin, end, rank):
-    """Take unknowns as columns, for rows of one entry; the others of these depend on them."""
-    order, place, at = s.index[ORDER], s.index[PLACE], begin
+    """Take unknowns as columns, for rows of one entry, the heaviest of each; the others depend."""
+    order, place, listed, entry = s.index[ORDER], s.index[PLACE], s.index[LIST], s.number[ENTRY]
+    above, at = rank, begin
     for q in range(begin, end):
-        c = s.index[UNIT, s.index[LIST, q]]
+        c = s.index[UNIT, listed[q]]
+        first = begin + place[c] - above
         if place[c] >= rank:
             other, old = order[rank], place[c]
             order[rank], order[old], place[c], place[other] = c, other, rank, old
-            swap(s.index[LIST], q, at)
+            swap(listed, q, at)
             rank, at = rank + 1, at + 1
+        elif place[c] >= above and abs(entry[listed[q]]) > abs(entry[listed[first]]):
+            swap(listed, q, first)
     for q in range(begin, end):
         i = s.index[LIST, q]
         for t in range(rank):
