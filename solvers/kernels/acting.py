@@ -20,7 +20,7 @@ import numpy as np
 
 from hierarchy.jit import as_matrix, compiled, inlined
 from solvers.kernels.block import level_damping
-from solvers.kernels.rows import ROUNDING, ZERO, factor_level, reflect, reflect_back
+from solvers.kernels.rows import ZERO, factor_level, reflect, reflect_back
 from solvers.kernels.space import (
     Basis,
     Block,
@@ -31,9 +31,8 @@ from solvers.kernels.space import (
     matrix,
     vector,
 )
+from solvers.kernels.tolerances import EXACTLY_DEPENDENT, NEARLY_DEPENDENT, TERMS
 from solvers.status import FREE, LOWER
-
-EXACT, CLOSE = 1e-12, 1e-7  # remainder of a row, relative: ill-posed in between
 
 
 class Problem(NamedTuple):
@@ -172,7 +171,7 @@ def _clean(acting, rows, hard, end, p, rank):
         norm = acting.norm[j] * (1.0 if i < hard else acting.weight[j])
         own = i if i < hard else p + i - hard
         left = _drop_rounding(rows.W[i], own, rows.zero[i], p if i < hard else rank)
-        close |= EXACT * norm < left < CLOSE * norm
+        close |= EXACTLY_DEPENDENT * norm < left < NEARLY_DEPENDENT * norm
     return close
 
 
@@ -271,7 +270,7 @@ def _push_of_hard(acting, factors, at, mu):
             size[k] += abs(W[j, k] * force[j])
         force[k] /= W[k, k]
         acting.push[row[k]] = acting.state[row[k]] * force[k]
-        acting.noise[row[k]] = ROUNDING * size[k] / abs(W[k, k])
+        acting.noise[row[k]] = TERMS * size[k] / abs(W[k, k])
 
 
 @compiled
@@ -282,4 +281,4 @@ def _push_of_soft(problem, x, acting, rows, at):
         j = rows.row[i]
         around = acting.norm[j] * length + abs(side_of(problem, acting, j))
         acting.push[j] = -acting.state[j] * rows.miss[i]
-        acting.noise[j] = ROUNDING * acting.weight[j] * around
+        acting.noise[j] = TERMS * acting.weight[j] * around

@@ -7,8 +7,7 @@ from __future__ import annotations
 import numpy as np
 
 from hierarchy.jit import as_matrix, compiled, inlined
-
-SWEEPS = 40  # most sweeps; Jacobi needs 6 to 10
+from solvers.kernels.tolerances import ORTHOGONAL, SWEEPS
 
 
 @compiled
@@ -122,7 +121,7 @@ def orthogonalise_rows(W, U):
                     a += W[i, k] * W[i, k]
                     b += W[j, k] * W[j, k]
                     c += W[i, k] * W[j, k]
-                if c * c <= 1e-30 * a * b:
+                if c * c <= ORTHOGONAL * a * b:
                     continue
                 settled = False
                 zeta = (b - a) / (2.0 * c)

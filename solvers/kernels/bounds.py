@@ -16,6 +16,7 @@ from hierarchy.jit import compiled, inlined
 from solvers.kernels.rows import ZERO, all_equal, finish
 from solvers.kernels.space import View, vector
 from solvers.kernels.staircase import solve_by_staircase
+from solvers.kernels.tolerances import LEVEL_MET
 from solvers.status import (
     NO_LIMITS,
     NUMERICAL_FAILURE,
@@ -24,7 +25,6 @@ from solvers.status import (
     UNPROVED,
 )
 
-MET = 1e-10  # of the terms of a row: a row with a smaller miss is met
 NONE, CONFLICT = 0.0, 2.0  # besides -1 and 1: an unknown at no bound, or at both
 
 
@@ -190,7 +190,7 @@ def _scale(A, b, sizes, box, x, record):
             for c in range(n):
                 over += A[i, c] * x[c]
                 terms += abs(A[i, c] * x[c])
-            met &= abs(over) <= MET * terms
+            met &= abs(over) <= LEVEL_MET * terms
             missed += over * over
             asked += b[i] * b[i]
         begin += sizes[k]

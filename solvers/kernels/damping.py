@@ -4,7 +4,8 @@ The staircase of the equalities, without any inequality, gives each level k the 
 adds, and its lambda. Damped, the level minimises |A_k x - b_k|^2 + lambda^2 |Q_k^T x|^2: the rows
 lambda Q_k^T join it, with targets of zero. Neither depends on which inequalities act, so for any
 sides this is one convex problem for each level, and its answer varies continuously with them. Where
-no inequality acts it is the x of `tpm`.
+no inequality acts it is the x of `tpm`. A level of bounds on single unknowns is not damped: a fixed
+joint stays where it is.
 """
 
 # mypy: disable-error-code="no-untyped-def"
@@ -57,10 +58,14 @@ def write_damped(d, A, lower, upper, sizes, settings, work):
     (basis, rows, _, of_x, of_block), _ = carve_staircase(work, ZERO, m, n)
     settings, rank, first, count = shared(settings), ZERO, ZERO, ZERO
     for k in range(sizes.size):
-        begin, equal = count, ZERO
+        begin, equal, box = count, ZERO, True
         for i in range(first, first + sizes[k]):
             _copy_row(d, A[i], lower[i], upper[i], count)
             d.origin[count] = i
+            entries = 0
+            for c in range(n):
+                entries += A[i, c] != 0.0
+            box = box and entries <= 1
             if lower[i] == upper[i]:
                 square = 0.0
                 for c in range(n):
@@ -72,7 +77,7 @@ def write_damped(d, A, lower, upper, sizes, settings, work):
         reflect(basis, ZERO, rank, rows.W, ZERO, equal)
         above, rank = rank, factor_level(rows, basis, ZERO, equal, rank)
         damped = 0.0
-        if rank > above:
+        if rank > above and not (box and equal < sizes[k]):
             damped = level_damping(rows.W, Block(ZERO, equal, above, rank), settings, of_block)
         for t in range(above, rank if damped > 0.0 else above):
             for c in range(n):

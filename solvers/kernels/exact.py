@@ -16,14 +16,15 @@ from hierarchy.jit import compiled, inlined
 from solvers.kernels.damping import carve_damped, damped_size, write_damped
 from solvers.kernels.levels import pass_through_levels
 from solvers.kernels.rows import ZERO, all_equal, finish, length_of
-from solvers.kernels.search import pivot_in_blocks, pivot_one_by_one
+from solvers.kernels.search import pivot_in_blocks, pivot_one_by_one, save
 from solvers.kernels.space import matrix, vector
 from solvers.kernels.staircase import solve_by_staircase
 from solvers.kernels.tableau import STEPS, carve_tableau, tableau_size
-from solvers.kernels.tolerances import MOST_STEPS, MOST_TRIES
+from solvers.kernels.tolerances import PASS_STEPS, SEARCH_STEPS
 from solvers.kernels.verification import neglects, verify
 from solvers.kernels.working_set import (
     COARSE,
+    FINISHED,
     FIRST,
     NEGLECTED,
     SCALE,
@@ -128,7 +129,7 @@ def solve_exactly(A, lower, upper, sizes, x, record, settings, work):
     m, n = A.shape
     multiplier, at = matrix(work, ZERO, sizes.size + 1, m)
     current, at = matrix(work, at, sizes.size + 1, m)
-    first_x, at = vector(work, at, n)
+    saved, at = vector(work, at, n)
     own, after = carve_working_set(A, sizes, x, multiplier, work, at)
     s, own.scalar[SCALE], own.count[COARSE] = own, 1.0, 0
     code = load(s, lower, upper, sizes, record, settings[RANK_TOLERANCE])
@@ -141,39 +142,44 @@ def solve_exactly(A, lower, upper, sizes, x, record, settings, work):
     if code != SOLVED:
         return finish(x, code)
     limit, code, steps = np.int64(settings[MOST]), ZERO + UNPROVED, ZERO
-    warm, level = record[3 * m] + record[3 * m + 1] > 0.0, ZERO - 1
+    warm, level, s.count[FINISHED] = record[3 * m] + record[3 * m + 1] > 0.0, ZERO - 1, 0
+    begin = ZERO
     if warm:
-        level = _level_of(record[3 * m + 2], sizes.size)
-        code, steps = pivot_in_blocks(s, limit, level >= 0)
-    blocks, passed = steps, False
+        level, begin = _resumed_at(record[3 * m + 2], sizes.size)
+    if warm and level < 0:
+        code, steps = pivot_in_blocks(s, limit, False)
+    blocks = steps
     if code == UNPROVED and level < 0:
         t, _ = carve_tableau(s, work, after)
         code, level = pass_through_levels(t, settings[TOLERANCE],
-                                          min(limit - steps, MOST_STEPS * (m + n)))
+                                          min(limit - steps, PASS_STEPS * (m + n)))
         steps += t.count[STEPS]
-        passed, code = code == SOLVED, _verified(s, code)
-        for c in range(n if code != SOLVED else 0):
-            first_x[c] = x[c]
+        save(s, saved, sizes.size if code == SOLVED else level)
+        code = _verified(s, code)
         restore(s)
         if code != SOLVED and steps < limit:
             code, tries = pivot_in_blocks(s, limit - steps, True)
             steps, blocks = steps + tries, blocks + tries
-    for coarse in range(2):
+    for coarse in range(begin, 2):
         if code in (UNPROVED, INACCURATE) and steps < limit:
             s.count[COARSE] = coarse
             restore(s)
             code, tries, level = pivot_one_by_one(
-                s, current, min(limit - steps, MOST_TRIES * (m + n)), ZERO if coarse else level)
+                s, current, saved, min(limit - steps, SEARCH_STEPS * (m + n)),
+                ZERO if coarse > begin else level)
             steps += tries
             code = _verified(s, code)
     if code == SOLVED and s.count[NEGLECTED] > 0 and neglects(s):
         code = ZERO + INACCURATE
     elif code not in (SOLVED, NUMERICAL_FAILURE):
+        finished = s.count[FINISHED]
+        for c in range(n if finished == sizes.size or (code == UNPROVED and finished > 0) else 0):
+            x[c] = saved[c]
         code = ZERO + (ITERATION_LIMIT if steps >= limit else INACCURATE)
-        for c in range(n if passed else 0):  # it keeps the levels above
-            x[c] = first_x[c]
     _keep(s, record, blocks, steps - blocks)
-    record[3 * m + 2] = max(level, 0) if code == ITERATION_LIMIT else -1.0
+    record[3 * m + 2] = -1.0
+    if code == ITERATION_LIMIT:
+        record[3 * m + 2] = _resume(s, level)
     return code if np.isfinite(length_of(x)) else finish(x, NUMERICAL_FAILURE)
 
 
@@ -187,9 +193,20 @@ def _carve_scaled(work, at, m, n):
 
 
 @inlined
-def _level_of(number, levels):
-    """Return the level at which an earlier search ended; -1 for none."""
-    return np.int64(number) if 0.0 <= number < levels else ZERO - 1
+def _resume(s, level):
+    """Return what tells a later solve where to go on, see `_resumed_at`; rounded, the level."""
+    last, half = s.multiplier.shape[0] - 2, 0.5 * s.count[COARSE]
+    if s.count[FINISHED] == 0:
+        return -2.0 - half - (level if level > 0 else 0)
+    return half + (s.count[FINISHED] if s.count[FINISHED] < last else last)
+
+
+@inlined
+def _resumed_at(number, levels):
+    """Return the level at which an earlier search ended, -1 for none, and whether it was coarse."""
+    at = -2.0 - number if number <= -2.0 else number
+    level = np.int64(at) if 0.0 <= at < levels else ZERO - 1
+    return level, np.int64(level >= 0 and at > level)
 
 
 @inlined

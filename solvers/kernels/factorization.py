@@ -25,9 +25,9 @@ from solvers.kernels.block import solve_level
 from solvers.kernels.rows import ZERO, factor_level, finish, reflect, reflect_back
 from solvers.kernels.space import Basis, Block, Rows, View, shared
 from solvers.kernels.staircase import subtract
+from solvers.kernels.tolerances import OUTSIDE
 from solvers.status import NUMERICAL_FAILURE, SOLVED
 
-ROUNDED = 1e-14  # share of a row outside the basis: smaller ones are rounding, not a direction
 PASSES = 4       # most passes; two are enough unless the row is rounding
 EXTRA_ROWS = 4   # of W, in addition to staircase and reflectors
 
@@ -66,7 +66,7 @@ def project_rows(A, first, last, r, Q, C, squares):
             continue
         size = np.sqrt(squares[i])
         left = _orthogonalise(w, Q, r, coefficients, size)
-        if left > ROUNDED * size and r < n:
+        if left > OUTSIDE * size and r < n:
             coefficients[r] = left
             for c in range(n):
                 w[c] /= left
@@ -90,7 +90,7 @@ def _orthogonalise(w, Q, r, coefficients, size):
             for c in range(w.size):
                 w[c] -= s * q[c]
         left = np.sqrt(dot(w, w))
-        if left > 0.5 * before or left <= ROUNDED * size:
+        if left > 0.5 * before or left <= OUTSIDE * size:
             break
     return left
 

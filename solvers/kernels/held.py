@@ -11,10 +11,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from hierarchy.jit import compiled, inlined
-from solvers.kernels.rows import ROUNDING, ZERO, make_reflector, reflect, reflect_back
+from solvers.kernels.rows import ZERO, make_reflector, reflect, reflect_back
 from solvers.kernels.space import Basis, View, carve_basis, integers, matrix, vector
+from solvers.kernels.tolerances import BOUND_KEPT, TERMS
 
-SLACK = 1e-12  # relative to 1 + |bound|: a joint may exceed a bound by less
 NO_JOINT = -1
 
 
@@ -127,11 +127,11 @@ def to_reference(held, box, x, ways, rank, release):
         stopped = _step(x, d, box, held.side)
         if stopped != NO_JOINT:
             held.side[stopped] = 1.0 if d[stopped] > 0.0 else -1.0
-            count = hold(held, no_rows, stopped, 0.0, rank, count, ROUNDING)
+            count = hold(held, no_rows, stopped, 0.0, rank, count, TERMS)
             if rank + count == begin:
                 break
         elif release and _drop(held, rank, begin):
-            count = hold_again(held, no_rows, x, box, rank, count, ROUNDING)
+            count = hold_again(held, no_rows, x, box, rank, count, TERMS)
         else:
             break
     return steps
@@ -156,7 +156,7 @@ def _step(x, d, box, side):
     for j in range(x.size):
         size = max(size, abs(d[j]))
     for j in range(x.size):
-        if side[j] == 0.0 and abs(d[j]) > ROUNDING * size:
+        if side[j] == 0.0 and abs(d[j]) > TERMS * size:
             room = (box.up[j] if d[j] > 0.0 else box.low[j]) - x[j]
             if room / d[j] < share:
                 share, stopped = room / d[j], j
@@ -183,7 +183,7 @@ def _drop(held, rank, begin):
             y[k] -= E[i - rank, k] * y[i]
         y[k] /= E[k - rank, k]
         j = held.joint[k - rank]
-        if y[k] * held.side[j] < worst - SLACK * size:
+        if y[k] * held.side[j] < worst - BOUND_KEPT * size:
             worst, at = y[k] * held.side[j], j
     if at == NO_JOINT:
         return False

@@ -48,7 +48,6 @@ from solvers.kernels.tableau import (
     SPEED,
     STEP,
     STEPS,
-    STILL,
     VALUE,
     WEIGHT,
     WORST,
@@ -67,8 +66,7 @@ from solvers.kernels.tableau import (
 from solvers.kernels.tolerances import (
     CANCELLED,
     FLOOR,
-    NO_STEP,
-    WEAK,
+    REPIVOT,
 )
 from solvers.kernels.working_set import (
     ENTRY,
@@ -83,6 +81,7 @@ from solvers.kernels.working_set import (
     UPPER,
     WHOLE,
     gives_all,
+    row_times_x,
     side_at,
 )
 from solvers.status import EQUAL, FREE, SOLVED, UNPROVED
@@ -108,7 +107,6 @@ def pass_through_levels(t, tolerance, limit):
         last = s.index[FIRST, k + 1] if k < levels else first
         whole = _sets_goal(t, k)
         solved = not _begin(t, k, last, whole, tolerance)
-        t.count[STILL] = 0
         while not solved:
             if t.count[STEPS] >= limit:
                 return ZERO + UNPROVED, ZERO + k
@@ -157,8 +155,9 @@ def _sets_goal(t, k):
     s = t.of
     levels = s.multiplier.shape[0] - 1
     if k < levels:
-        t.scalar[WEIGHT] = s.number[NORM, s.index[FIRST, k]] ** 2 if s.A.shape[0] > 0 else 1.0
-        return t.count[FIX] < s.x.size and gives_all(s, k, s.number[GOAL], s.number[STEP])
+        whole = t.count[FIX] < s.x.size and gives_all(s, k, s.number[GOAL], s.number[STEP])
+        t.scalar[WEIGHT] = s.number[NORM, s.index[FIRST, k]] ** 2 if whole else 1.0
+        return whole
     for c in range(s.x.size):
         s.number[GOAL, c] = s.number[REFERENCE, c]
     t.scalar[WEIGHT] = 1.0
@@ -175,7 +174,7 @@ def _begin(t, k, last, whole, tolerance):
     measure(t, length_of(s.x))
     count[RANKS] = count[ROWS] = count[EQUALITIES] = 0
     for i in range(s.index[FIRST, k] if k < s.multiplier.shape[0] - 1 else last, last):
-        value = _value(s, i)
+        value = row_times_x(s, i)
         s.number[VALUE, i] = value
         if s.number[NORM, i] <= 0.0:
             s.index[KIND, i] = FIXED
@@ -240,18 +239,7 @@ def _watch_parallel(t, last):
     for i in range(last):
         if t.of.index[KIND, i] == PARALLEL:
             t.of.index[KIND, i] = WATCHED
-            t.of.number[VALUE, i] = _value(t.of, i)
-
-
-@inlined
-def _value(s, i):
-    """Return row i times x."""
-    total, a, c = 0.0, s.A[i], s.index[UNIT, i]
-    if c >= 0:
-        return a[c] * s.x[c]
-    for c in range(a.size):
-        total += a[c] * s.x[c]
-    return total
+            t.of.number[VALUE, i] = row_times_x(t.of, i)
 
 
 @inlined
@@ -264,7 +252,7 @@ def _aim(t, whole):
     t.count[RANKS] = pivot_rows(t, begin, t.count[RANKS])
     for q in range(t.count[ROWS]):
         i = s.index[LIST, q]
-        s.number[VALUE, i] = _value(s, i)
+        s.number[VALUE, i] = row_times_x(s, i)
         s.number[REST, q] = rest = side_at(s, i) - s.number[VALUE, i]
         t.scalar[SIZE] = max(t.scalar[SIZE], abs(rest) / s.number[NORM, i])
     t.scalar[REACH] = step_of_rows(t, begin, t.count[RANKS])
@@ -308,7 +296,6 @@ def _advance(t, rank, last, tolerance):
             value[i] += length * speed[i]
     t.scalar[SIZE] = max(t.scalar[SIZE], length * t.scalar[REACH])
     t.scalar[SCALE] = max(t.scalar[SCALE], length * scale, FLOOR * t.scalar[SIZE])
-    t.count[STILL] = t.count[STILL] + 1 if length < NO_STEP else 0
     if entering >= 0:
         s.index[STATE, entering] = side
     return entering
@@ -359,7 +346,7 @@ def _enter(t, i, first):
     count[RANKS] = min(count[RANKS], n - begin - 1)
     for q in range(count[RANKS]):  # pivot again from the first row that lost its basis vector
         j, r = s.index[LIST, q], begin + 1 + q
-        if left_of(t, j, r, r + 1) <= (WEAK * s.number[NORM, j]) ** 2:
+        if left_of(t, j, r, r + 1) <= (REPIVOT * s.number[NORM, j]) ** 2:
             count[RANKS] = q
             break
 
@@ -422,7 +409,7 @@ def _leave(t, i, last, tolerance):
 
     A soft row that is now beyond its other side stays, at that side.
     """
-    s, was, value = t.of, t.of.index[STATE, i], _value(t.of, i)
+    s, was, value = t.of, t.of.index[STATE, i], row_times_x(t.of, i)
     s.number[VALUE, i] = value
     if s.index[KIND, i] == SOFT:
         side = missed_side(s, i, value, t.scalar[SCALE], tolerance)
@@ -534,7 +521,7 @@ def _order(t, whole):
         at = _own(t, i, at, end)
         if at == before:
             kind[i], s.index[STATE, i] = WATCHED, FREE
-            s.number[VALUE, i] = _value(s, i)
+            s.number[VALUE, i] = row_times_x(s, i)
     count[HARD] = at - count[FIX]
     count[IN_USE] += count[EQUALITIES]
 

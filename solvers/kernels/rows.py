@@ -16,7 +16,6 @@ from solvers.kernels.tolerances import LEAST_SQUARE
 from solvers.status import INACCURATE, NUMERICAL_FAILURE, SOLVED
 
 ZERO = np.int64(0)
-ROUNDING = 1e-13  # of the terms of a sum: smaller sums are rounding
 
 
 @compiled

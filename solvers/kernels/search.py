@@ -19,13 +19,14 @@ from hierarchy.jit import compiled, inlined
 from solvers.kernels.multipliers import INWARD, UNDECIDED, write_multipliers
 from solvers.kernels.rows import ZERO, length_of
 from solvers.kernels.space import View
-from solvers.kernels.tolerances import LOOSE, MET, SHADOW
+from solvers.kernels.tolerances import MET, PATIENCE, RELEASED, RESTORED, SHADOW, VIOLATED
 from solvers.kernels.verification import verify
 from solvers.kernels.working_set import (
     BEGIN,
     CHANGE,
     DIRTY,
     ENTERED,
+    FINISHED,
     FIRST,
     GOAL,
     LIST,
@@ -44,9 +45,6 @@ from solvers.kernels.working_set import (
 from solvers.status import FREE, INACCURATE, NUMERICAL_FAILURE, SOLVED, UNPROVED
 
 LEAVES = 5    # change of a row that acts; else the side at which it is to act, or 0
-RESTORED = 3  # times that a final working set is solved anew from uncut rows
-RELEASED = 3  # times that a row may enter and leave again because nothing holds it
-PATIENCE = 2  # block pivots that may not reduce the number of wrong rows
 
 
 class Found(NamedTuple):
@@ -91,7 +89,7 @@ def judge(s, last, newest):
         value = value_at(s, i)
         over = max(value - up, low - value)
         side = up if value > up else low
-        if over > LOOSE * (norm * reach + abs(side)):
+        if over > VIOLATED * (norm * reach + abs(side)):
             s.index[CHANGE, i] = 1 if value > up else -1
             wrong += 1
             if over > worst * norm:
@@ -116,8 +114,7 @@ def pivot_in_blocks(s, limit, keep):
     does not fall. With `keep` the working set is then the one that it began with.
     """
     levels, best, left, tries = s.multiplier.shape[0] - 1, ZERO + s.A.shape[0] + 1, PATIENCE, ZERO
-    for i in range(s.A.shape[0]):
-        s.index[SEED, i] = s.index[STATE, i]
+    _copy_states(s, STATE, SEED)
     while tries < limit:
         tries += 1
         meet(s, levels)
@@ -135,19 +132,21 @@ def pivot_in_blocks(s, limit, keep):
             change = s.index[CHANGE, i]
             if change != 0:
                 s.index[STATE, i] = FREE if change == LEAVES else change
-    for i in range(s.A.shape[0] if keep else 0):
-        s.index[STATE, i] = s.index[SEED, i]
+    if keep:
+        _copy_states(s, SEED, STATE)
     return ZERO + UNPROVED, tries
 
 
 @compiled
-def pivot_one_by_one(s, current, limit, level):
+def pivot_one_by_one(s, current, saved, limit, level):
     """Let rows enter and leave one by one; return the code, the iterations, the last level.
 
-    current (L + 1, m): scratch, the multipliers on the way. level: where an earlier search ended.
+    current (L + 1, m): scratch, the multipliers on the way. saved (n,): the x that met most levels.
+    level: where an earlier search ended.
     """
-    levels, last, newest, fresh, clean, tries = (
-        s.multiplier.shape[0] - 1, _next_level(s, max(level, 0)), ZERO - 1, True, ZERO, ZERO)
+    levels, last, newest, fresh = (
+        s.multiplier.shape[0] - 1, _next_level(s, max(level, 0)), ZERO - 1, True)
+    clean, accepted, tries = ZERO, ZERO, ZERO
     for i in range(s.A.shape[0]):
         s.index[ENTERED, i] = 0
     while tries < limit:
@@ -160,16 +159,35 @@ def pivot_one_by_one(s, current, limit, level):
         elif found.leaving > 0:
             _release_first(s, current)
         elif found.most >= 0:
+            _copy_states(s, STATE, SEED)
             _enter(s, current, found.most)
-            newest, fresh = found.most, False
+            newest, fresh, accepted = found.most, False, accepted + 1
         elif last < levels:
+            save(s, saved, last)
             last, newest, fresh = _next_level(s, last), ZERO - 1, True
         elif s.count[DIRTY] == 1 and clean < RESTORED:  # free of what other working sets cut
             restore(s)
             newest, fresh, clean = ZERO - 1, True, clean + 1
         else:
             return ZERO + SOLVED, tries, last - 1
+    if accepted > 1:  # go on later from the last accepted set; if this step is long, from within
+        _copy_states(s, SEED, STATE)
     return ZERO + UNPROVED, tries, last - 1
+
+
+@inlined
+def _copy_states(s, source, target):
+    for i in range(s.A.shape[0]):
+        s.index[target, i] = s.index[source, i]
+
+
+@compiled
+def save(s, saved, finished):
+    """Keep x if it meets more levels than the one kept."""
+    if finished > s.count[FINISHED]:
+        s.count[FINISHED] = finished
+        for c in range(saved.size):
+            saved[c] = s.x[c]
 
 
 @inlined

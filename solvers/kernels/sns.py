@@ -25,7 +25,6 @@ from hierarchy.jit import compiled, inlined
 from solvers.kernels.block import solve_level
 from solvers.kernels.held import (
     NO_JOINT,
-    SLACK,
     Held,
     carve_box,
     carve_held,
@@ -48,6 +47,7 @@ from solvers.kernels.space import (
     vector,
 )
 from solvers.kernels.staircase import carve_staircase, climb
+from solvers.kernels.tolerances import BOUND_KEPT
 from solvers.status import CONTRADICTION, NUMERICAL_FAILURE, SOLVED, TOO_SMALL
 
 
@@ -177,7 +177,7 @@ def _record_bounds(x, box, record):
 @inlined
 def _touches(x, side):
     """Whether x is at this side of the box, up to rounding."""
-    return abs(side) < np.inf and abs(x - side) <= SLACK * (1.0 + abs(side))
+    return abs(side) < np.inf and abs(x - side) <= BOUND_KEPT * (1.0 + abs(side))
 
 
 @inlined
@@ -214,7 +214,7 @@ def _read_box(A, lower, upper, bounds, box, record):
         box.low[at] = max(min(low, up), box.low[at])
         box.up[at] = min(max(low, up), box.up[at])
         if box.low[at] > box.up[at]:
-            if box.low[at] - box.up[at] > SLACK * (1.0 + abs(box.low[at])):
+            if box.low[at] - box.up[at] > BOUND_KEPT * (1.0 + abs(box.low[at])):
                 record[record.size - 1] = i
                 return CONTRADICTION
             box.low[at] = box.up[at]
@@ -380,9 +380,9 @@ def _fits(x, step, box):
     """Whether x + step is in the box, up to cancellation in a large step."""
     for j in range(x.size):
         low, up = box.low[j], box.up[j]
-        if x[j] + step[j] > up + 10.0 * SLACK * (1.0 + abs(up)):
+        if x[j] + step[j] > up + 10.0 * BOUND_KEPT * (1.0 + abs(up)):
             return False
-        if x[j] + step[j] < low - 10.0 * SLACK * (1.0 + abs(low)):
+        if x[j] + step[j] < low - 10.0 * BOUND_KEPT * (1.0 + abs(low)):
             return False
     return True
 
@@ -401,8 +401,8 @@ def _scaling(a, c, box, side):
         if side[j] != 0.0:
             continue
         low, up = box.low[j], box.up[j]
-        low = low - c[j] - SLACK * (1.0 + abs(low)) if low > -np.inf else low
-        up = up - c[j] + SLACK * (1.0 + abs(up)) if up < np.inf else up
+        low = low - c[j] - BOUND_KEPT * (1.0 + abs(low)) if low > -np.inf else low
+        up = up - c[j] + BOUND_KEPT * (1.0 + abs(up)) if up < np.inf else up
         if a[j] != 0.0:
             s_min, s_max = min(low / a[j], up / a[j]), max(low / a[j], up / a[j])
         else:
@@ -440,7 +440,7 @@ def _release(space, at, s):
     wrong = False
     for t in range(begin - above):
         j = held.joint[t]
-        if y_a[above + t] * held.side[j] < -SLACK * size:
+        if y_a[above + t] * held.side[j] < -BOUND_KEPT * size:
             held.side[j] = 0.0
             wrong = True
     return wrong

@@ -36,7 +36,7 @@ from solvers.kernels.space import (
     shared,
     vector,
 )
-from solvers.kernels.tolerances import BORDER, DOUBTFUL, DUST, LIGHT
+from solvers.kernels.tolerances import FAR_LIGHTER, LIGHT_ROW, UNCLEAR_CUT, UNCLEAR_PIVOT
 from solvers.status import INACCURATE, SOLVED, TOO_SMALL
 
 
@@ -74,7 +74,7 @@ def solve_by_staircase(A, lower, upper, sizes, x, settings, work):
     if a row is nearly parallel to others or far lighter, and damping is off.
     """
     code, least = climb(A, lower, upper, sizes, x, settings, work)
-    if code == SOLVED and least < DOUBTFUL and settings[0] == 0.0:
+    if code == SOLVED and least < UNCLEAR_PIVOT and settings[0] == 0.0:
         return ZERO + INACCURATE
     return code
 
@@ -108,7 +108,7 @@ def climb(A, lower, upper, sizes, x, settings, work):
         solve_level(rows.W, rows.miss, y, block, settings, of_block)
         first = last
     _to_unknowns(basis, y, rank, x, of_x)
-    least = 0.0 if has_outlier(rows.zero, DUST * DUST) else least
+    least = 0.0 if has_outlier(rows.zero, FAR_LIGHTER * FAR_LIGHTER) else least
     return finish(x, SOLVED), np.sqrt(least) * settings.rank_tolerance
 
 
@@ -116,9 +116,9 @@ def climb(A, lower, upper, sizes, x, settings, work):
 def _is_doubtful(rows, block, settings, least):
     """Whether rounding in heavy rows of a level hides light ones, or a row is hardly dependent."""
     thin = min(np.sqrt(least) * settings.rank_tolerance, 1.0)  # the smallest pivot
-    return (has_outlier(rows.zero[block.i0:block.i1], LIGHT * LIGHT)
+    return (has_outlier(rows.zero[block.i0:block.i1], LIGHT_ROW * LIGHT_ROW)
             or is_borderline(rows, block.i0 + block.k1 - block.k0, block.i1, block.k1,
-                             BORDER * thin))
+                             UNCLEAR_CUT * thin))
 
 
 @inlined

@@ -46,9 +46,9 @@ VALUE, SPEED, REST, OVER, GOAL, STEP, Z, PULL, FORCE, SHARE = range(REFERENCE + 
 # rows of the level that act, in pivot order. Per basis vector: the row that owns it, -1 for none.
 COLUMN, KIND, LIST, OWNER = range(FIRST + 1, FIRST + 5)
 # In `count`: the first column of M in use; the first column of the unknowns; basis vectors of the
-# fixed, hard and soft rows, soft rows, equalities of the level that have columns; steps of zero
-# length; whether the level is missed; steps.
-IN_USE, BASE, FIX, HARD, RANKS, ROWS, EQUALITIES, STILL, MISSED, STEPS = range(10)
+# fixed, hard and soft rows, soft rows, equalities of the level that have columns; whether the
+# level is missed; steps.
+IN_USE, BASE, FIX, HARD, RANKS, ROWS, EQUALITIES, MISSED, STEPS = range(9)
 # In `scalar`: the largest number so far, the scale of tolerances; the square of a level's weight;
 # the largest miss of its rows, the sum of their pulls, the part of that which may be rounding; the
 # largest number of a whole step.
@@ -71,7 +71,7 @@ class Tableau(NamedTuple):
 @inlined
 def tableau_size(n, m):
     """Return the numbers that a Tableau needs: M, and the least squares of all rows."""
-    return 17 + n * (m + n) + (m + n) * (n + 3)
+    return 16 + n * (m + n) + (m + n) * (n + 3)
 
 
 @inlined
@@ -81,7 +81,7 @@ def carve_tableau(s, work, at):
     general = ZERO
     for i in range(m):
         general += s.index[UNIT, i] < 0
-    count, at = integers(work, at, 10)
+    count, at = integers(work, at, 9)
     scalar, at = vector(work, at, 7)
     M, at = matrix(work, at, n, general + n)
     return Tableau(s, count, scalar, M, work[at:]), at

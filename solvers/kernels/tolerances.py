@@ -1,56 +1,50 @@
-"""Every tolerance of the exact resolver that is not a setting.
+"""Every tolerance and limit of the kernels that is not a setting, with its reason.
 
-All are relative. For a row a with side b they are relative to |a| scale + |b|. `scale` is the
-length of x, but at least FLOOR times `size`: the largest of x, of the steps, and of the targets
-over their pivots so far in the solve. So they have a floor from the data: even where x and all
-sides are zero, rounding has the size of the numbers that cancelled.
+All are relative. Those of the pass level by level are relative, for a row a with side b, to
+|a| scale + |b|: `scale` is the length of x, but at least FLOOR times the largest number so far, so
+that there is a floor where x and all sides are zero.
 """
 
-FLOOR = 1e-3        # of the largest number so far: lower bound of `scale`
-OUTGROWN = 1e4      # largest number so far over 1 + |x|: larger ones leave the answer in doubt
+# Rounding. Sums of some hundred terms are off by 1e-15 to 1e-13 of the largest.
+EPSILON = 2e-15            # miss of a row, relative to its terms
+CANCELLED = 1e-14          # sum relative to the norms of its terms
+NEGLIGIBLE = 1e-13         # norm, entry or multiplier beside the largest: rounding in the other
+TERMS = 1e-13              # sum of products relative to its terms, in the kernels of sns
+FAR_LIGHTER = 1e-12        # norm of a row over the largest: the staircase hands such rows on
+LEAST_SQUARE = 1e-200      # square of a norm: smaller ones lose digits, as do larger inverses
 
-EPSILON = 2e-15     # miss of a row: smaller ones are rounding
-CANCELLED = 1e-14   # sum relative to the norms of its terms: smaller ones are rounding
-SAME = 1e-12        # remainder of a row outside the others: smaller ones are rounding
-WEAK = 1e-4         # share of a row in its own basis vector: smaller ones pivot the level again
-DOUBTFUL = 1e-5     # remainder or miss of a row: smaller ones leave the answer in doubt
-DUST = 1e-12        # norm of a row over the largest: smaller ones leave a doubt
-LIGHT = 1e-5        # the same in a level that is missed, over the largest of the level
-BORDER = 0.3        # of rank_tolerance: a dependent row with more left leaves the answer in doubt
-BRINK = 0.8         # the same in a hierarchy with inequalities
-DRIFT = 4e-9        # change of a settled row by the levels below: larger ones leave a doubt
-SLIGHT = 0.25       # of rank_tolerance: a smaller miss counts as zero, without doubt
-NO_STEP = 1e-12     # length of a step: smaller ones count as zero
+# What is met. A violation that the search pursues is larger than what the verification forgives.
+MET = 1e-13          # violation of a level whose multipliers are zero, relative to its terms
+VIOLATED = 1e-9      # violation at which a row enters, relative to its terms
+LEVEL_MET = 1e-10    # violation of a level of which tpm says that it is met, relative to its terms
+BOUND_KEPT = 1e-12   # of sns, relative to 1 + |bound|
+SHADOW = 1e-5        # of the largest number so far: part of the scale of x in the search
+FLOOR = 1e-3         # the same in the pass level by level
 
-# Of a proof by multipliers:
-BAND = 5e-9         # distance of a row from the side that it is on, over 1 + |x|: as in `certify`
-ENOUGH = 2.5e-9       # what may remain of the conditions, over the weakest possible pull of the level
-CLEAR = 4e-9        # remainder of a unit row that counts as independent: at least
-NOTHING = 1e-9      # remainder of a unit row that counts as dependent: at most
-EXCHANGED = 4.0     # times ENOUGH: what may remain if such a row replaces one that it depends on
-LARGEST = 1e5       # multiplier over the pull that it balances: at most
-ALONE = 0.01        # share of what remains that is left where one row alone is missing: at most
-UNIT = 2.0**-53     # rounding of a sum, over the sizes of its terms
-FORGIVEN = 0.1      # share of what remains that counts in levels below, where it is that rounding
+# Verification: half of what `certify` accepts, because shifts and turns add up.
+BAND = 5e-9          # shift of a side, relative to 1 + |x|
+FREE_ROWS = 2.0      # share of the band of a row that acts over that of one that does not
+REMAINDER = 2.5e-9   # what may remain of a gradient, as a shift of the sides of its level
+CUT_BALANCE = 2e-7   # what cut rows may add to a gradient, relative to its terms
+CUT_OVER_PIVOT = 2e-4  # cut of a row over the smallest pivot: larger ones turn the answer
+RANK_MARGIN = 1.1    # between a pivot or a cut and rank_tolerance, as a factor
+PIVOT_PRODUCT = 1e-15  # of the two smallest pivots: less, and the second is rounding of the first
+CERTAIN_SIGN = 1e-8  # multiplier over what it balances: smaller ones have no certain sign
+SIGN_MARGIN = 4.0    # multiplier over the error of the gradient, the same
 
-STALLED = 5         # consecutive steps of zero length before the sides are moved apart
-RELAXATION = 1e-6   # amount by which they are moved, times 1 to 2
-RELAXATIONS = 3     # most times per level; then the rule of least index applies
-BLAND_AFTER = 30    # consecutive steps of zero length before the row of least index leaves
-PATIENCE = 10       # releases per row of a level before small multipliers count as zero
-LAST = 20           # releases per row of a level before it ends in doubt
+# Pivots
+REPIVOT = 1e-4       # share of a row in its own basis vector: smaller ones pivot the level again
+UNCLEAR_PIVOT = 1e-5  # of a row in the staircase, or less: the exact engine decides
+LIGHT_ROW = 1e-5     # norm of a row over the largest in a level that is missed: the same
+UNCLEAR_CUT = 0.3    # remainder of a dependent row over the smallest pivot: the same
+OUTSIDE = 1e-14      # share of a row outside the basis of `Factorization`: less is no direction
+EXACTLY_DEPENDENT, NEARLY_DEPENDENT = 1e-12, 1e-7  # in `weighted`: ill-posed in between
+ORTHOGONAL = 1e-30   # squared cosine of two rows: Jacobi rotations stop
 
-NEGLIGIBLE = 1e-13
-LEAST_SQUARE = 1e-200
-LOOSE = 1e-9
-MET = 1e-13
-SHADOW = 1e-5
-SLIGHT_ = 5e-8
-UNIT_ROUNDING = 4e-15
-CLEAR_ = 1.1
-SPREAD = 2e-7
-MOST_STEPS = 2
-SURE = 4.0
-STEEP = 1e-3
-MOST_TRIES = 2
-PRODUCT = 1e-15
+# Limits. The pass and each search end after their number times rows plus unknowns.
+PASS_STEPS = 2
+SEARCH_STEPS = 2
+PATIENCE = 2         # block pivots that may not reduce the number of wrong rows
+RELEASED = 3         # times that a row may enter and leave again because nothing holds it
+RESTORED = 3         # times that a final working set is solved anew from uncut rows
+SWEEPS = 40          # of Jacobi rotations, which need 6 to 10

@@ -18,22 +18,25 @@ exactly optimal for a problem this close to the data.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from hierarchy.jit import compiled, inlined
 from solvers.kernels.rows import length_of
 from solvers.kernels.tolerances import (
     BAND,
-    CLEAR_,
-    ENOUGH,
+    CANCELLED,
+    CERTAIN_SIGN,
+    CUT_BALANCE,
+    CUT_OVER_PIVOT,
     EPSILON,
+    FREE_ROWS,
     NEGLIGIBLE,
-    PRODUCT,
-    SLIGHT_,
-    SPREAD,
-    STEEP,
-    SURE,
-    UNIT_ROUNDING,
+    PIVOT_PRODUCT,
+    RANK_MARGIN,
+    REMAINDER,
+    SIGN_MARGIN,
 )
 from solvers.kernels.working_set import (
     CHANGE,
@@ -51,10 +54,10 @@ from solvers.kernels.working_set import (
     UNIT,
     UPPER,
     WHOLE,
+    row_times_x,
 )
 from solvers.status import EQUAL, FREE
 
-FREE_ROWS = 10.0  # share of the band of a row that acts over that of one that does not
 # What is known of an inequality that acts: nothing, a weak multiplier decided, decided.
 OPEN, WEAKLY, DECIDED = range(3)
 
@@ -77,7 +80,7 @@ def neglects(s):
     """Whether x misses a row that takes no part because rows of other levels are far larger."""
     missed, reach = False, 1.0 + length_of(s.x)
     for i in range(s.A.shape[0]):
-        value = _value(s, i)
+        value = row_times_x(s, i)
         over = max(value - s.number[UPPER, i], s.number[LOWER, i] - value)
         missed = missed or over > BAND * -s.number[NORM, i] * reach > 0.0
     return missed
@@ -93,7 +96,7 @@ def _rows_hold(s, reach):
         norm, state = s.number[NORM, i], s.index[STATE, i]
         if norm <= 0.0:
             continue
-        value, low, up = _value(s, i), s.number[LOWER, i], s.number[UPPER, i]
+        value, low, up = row_times_x(s, i), s.number[LOWER, i], s.number[UPPER, i]
         side = low if state < 0 else up
         if state == FREE:
             beyond, terms = max(value - up, low - value) * FREE_ROWS, abs(value)
@@ -109,82 +112,115 @@ def _rows_hold(s, reach):
 @inlined
 def _ranks_are_clear(s, cut):
     """Whether no row would be dependent or not by an angle near the tolerance."""
-    return (CLEAR_ * cut <= s.scalar[TOLERANCE] and cut <= STEEP * s.scalar[PIVOT]
-            and CLEAR_ * s.scalar[TOLERANCE] <= s.scalar[PIVOT]
-            and s.scalar[PIVOT] * s.scalar[SECOND] >= PRODUCT)
+    return (RANK_MARGIN * cut <= s.scalar[TOLERANCE] and cut <= CUT_OVER_PIVOT * s.scalar[PIVOT]
+            and RANK_MARGIN * s.scalar[TOLERANCE] <= s.scalar[PIVOT]
+            and s.scalar[PIVOT] * s.scalar[SECOND] >= PIVOT_PRODUCT)
 
 
-@inlined
-def _value(s, i):
-    """Return row i of A times x."""
-    total, a, c = 0.0, s.A[i], s.index[UNIT, i]
-    if c >= 0:
-        return a[c] * s.x[c]
-    for c in range(a.size):
-        total += a[c] * s.x[c]
-    return total
+class Level(NamedTuple):
+    """A level p to verify: its rows, and what they have in common.
+
+    least: the norm of the lightest row that acts. far: the largest violation. missed: the length of
+    all, each over the norm of its row. source: the largest violation times the norm of its row.
+    """
+
+    p: int
+    begin: int
+    end: int
+    least: float
+    far: float
+    missed: float
+    source: float
 
 
 @inlined
 def _balances(s, p, reach):
     """Whether (2) and (3) hold for level p."""
-    levels, mu = s.multiplier.shape[0] - 1, s.multiplier[p]
-    begin = s.index[FIRST, p] if p < levels else s.A.shape[0]
-    end = s.index[FIRST, p + 1] if p < levels else begin
-    left, noise, n = s.number[GRADIENT], s.number[NOISE], s.x.size
-    for c in range(n):
-        left[c] = 0.0 if p < levels else s.x[c] - s.number[REFERENCE, c]
-        noise[c] = UNIT_ROUNDING * reach if p == levels else 0.0
+    last = p == s.multiplier.shape[0] - 1
+    level = _measured(s, p, last)
+    if not last and level.missed <= BAND * reach:
+        return True
+    allowed = REMAINDER * reach
+    if not last:
+        allowed = (REMAINDER * level.least * level.least * max(level.missed, reach)
+                   * s.scalar[PIVOT])
+    outside, rounding, turned = _add_rows(s, level, reach if last else 0.0)
+    rest = _beyond_rounding(s)
+    if (outside or not rest <= allowed + turned
+            or not turned <= CUT_BALANCE * (reach if last else level.source)):
+        return False
+    unsure = SIGN_MARGIN * (rest + rounding + turned) / s.scalar[PIVOT]
+    return _signs_hold(s, level, unsure, 0.0 if last else CERTAIN_SIGN, reach)
+
+
+@inlined
+def _measured(s, p, last):
+    """Return a `Level`."""
+    begin = s.index[FIRST, p] if not last else s.A.shape[0]
+    end = s.index[FIRST, p + 1] if not last else begin
     least, square, far, source = np.inf, 0.0, 0.0, 0.0
     for i in range(begin, end):
         if s.index[STATE, i] != FREE and s.number[NORM, i] > 0.0:
-            norm = s.number[NORM, i]
-            least, far = min(least, norm), max(far, abs(mu[i]))
-            square += (mu[i] / norm) ** 2
-            source = max(source, abs(mu[i]) * norm)
-    if p < levels and far == 0.0:
-        return True
-    allowed = ENOUGH * reach
-    if p < levels:
-        missed = np.sqrt(square)
-        if missed <= BAND * reach:
-            return True
-        allowed = ENOUGH * least * least * max(missed, reach) * s.scalar[PIVOT]
-    rounding, turned = UNIT_ROUNDING * reach if p == levels else 0.0, 0.0
-    for i in range(end):
-        if mu[i] != 0.0 and s.index[STATE, i] == FREE:
-            return False
+            norm, miss = s.number[NORM, i], abs(s.multiplier[p, i])
+            least, far, source = min(least, norm), max(far, miss), max(source, miss * norm)
+            square += (miss / norm) ** 2
+    return Level(p, begin, end, least, far, np.sqrt(square), source)
+
+
+@inlined
+def _add_rows(s, level, reach):
+    """Write the sum of the rows times their multipliers, and per unknown what may be rounding.
+
+    reach: of x, for the level of the reference, else 0. Returns whether a row has a multiplier
+    that does not act, the rounding of the sum, and what the cuts of rows add to it.
+    """
+    mu, outside, rounding, turned = s.multiplier[level.p], False, CANCELLED * reach, 0.0
+    for c in range(s.x.size):
+        s.number[GRADIENT, c] = s.x[c] - s.number[REFERENCE, c] if reach > 0.0 else 0.0
+        s.number[NOISE, c] = rounding
+    for i in range(level.end):
         if mu[i] != 0.0:
-            rounding += UNIT_ROUNDING * abs(mu[i]) * s.number[NORM, i]
+            outside = outside or s.index[STATE, i] == FREE
+            rounding += CANCELLED * abs(mu[i]) * s.number[NORM, i]
             turned += 2.0 * s.number[CUT, i] * abs(mu[i])
             _add_row(s, mu[i], i)
+    return outside, rounding, turned
+
+
+@inlined
+def _beyond_rounding(s):
+    """Return the length of the gradient beyond what may be rounding."""
     square = 0.0
-    for c in range(n):
-        square += max(abs(left[c]) - noise[c], 0.0) ** 2
-    rest = np.sqrt(square)
-    if not (rest <= allowed + turned
-            and turned <= SPREAD * (reach if p == levels else source)):
-        return False
-    unsure = SURE * (rest + rounding + turned) / s.scalar[PIVOT]
-    for i in range(end):
-        if mu[i] == 0.0 or s.index[CHANGE, i] == DECIDED:
+    for c in range(s.x.size):
+        square += max(abs(s.number[GRADIENT, c]) - s.number[NOISE, c], 0.0) ** 2
+    return np.sqrt(square)
+
+
+@inlined
+def _signs_hold(s, level, unsure, certain, reach):
+    """Whether (3) holds up to level p; notes for each row how far its sign is decided.
+
+    unsure, certain: multipliers below this, and below this share of the pulls, decide weakly.
+    """
+    mu, holds = s.multiplier[level.p], True
+    for i in range(level.end):
+        norm, own = s.number[NORM, i], i >= level.begin
+        if (mu[i] == 0.0 or s.index[CHANGE, i] == DECIDED
+                or (own and abs(mu[i]) <= NEGLIGIBLE * level.far + EPSILON * norm * reach)):
             continue
-        norm = s.number[NORM, i]
-        if i >= begin and abs(mu[i]) <= NEGLIGIBLE * far + EPSILON * norm * reach:
-            continue
-        slight = norm * norm * reach if i >= begin else source
-        weak = abs(mu[i]) * norm <= max(unsure, SLIGHT_ * slight if p < levels else 0.0)
+        pull = min(norm * norm * reach, level.source) if own else level.source
+        weak = abs(mu[i]) * norm <= max(unsure, certain * pull)
         if mu[i] * s.index[STATE, i] < 0.0 and (s.index[CHANGE, i] == OPEN or not weak):
-            return False
+            holds = False
         s.index[CHANGE, i] = WEAKLY if weak else DECIDED
-    return True
+    return holds
 
 
 @inlined
 def _add_row(s, f, i):
     """Add a multiple of row i of A to what is left, and its rounding to the noise."""
     a, c, left, noise = s.A[i], s.index[UNIT, i], s.number[GRADIENT], s.number[NOISE]
-    least = UNIT_ROUNDING * abs(f) * s.number[NORM, i]
+    least = CANCELLED * abs(f) * s.number[NORM, i]
     if c >= 0:
         left[c] += f * a[c]
         noise[c] += least

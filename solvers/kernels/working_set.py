@@ -41,8 +41,9 @@ NUMBERS = 16  # one more than these: `levels.py` keeps its own behind REFERENCE
 UNIT, STATE, FIRST, CHANGE, ENTERED, SEED, LIST, SIGN, ORDER, PLACE, BEGIN, RANK = range(12)
 # In `count`: columns that are unknowns, the level that sets all of x (-1: none), whether a row was
 # cut since the rows were those of A, whether small coefficients are cut along other rows too, the
-# number of rows that are negligible beside those of other levels alone.
-PICKED, WHOLE, DIRTY, COARSE, NEGLECTED = range(5)
+# number of rows that are negligible beside those of other levels alone, the number of levels that
+# the saved x meets.
+PICKED, WHOLE, DIRTY, COARSE, NEGLECTED, FINISHED = range(6)
 # In `scalar`: rank_tolerance, the largest number so far, the smallest pivot of a row over its norm
 # and the next one, the factor by which the data are those of the caller.
 TOLERANCE, SIZE, PIVOT, SECOND, SCALE = range(5)
@@ -81,7 +82,7 @@ class WorkingSet(NamedTuple):
 @inlined
 def working_set_size(n, m, levels):
     """Return the numbers that a WorkingSet needs, without its multipliers."""
-    return (NUMBERS + 12) * max(m, n, levels + 1) + 10 + 3 * m * n + n * n + n
+    return (NUMBERS + 12) * max(m, n, levels + 1) + 11 + 3 * m * n + n * n + n
 
 
 @inlined
@@ -91,7 +92,7 @@ def carve_working_set(A, sizes, x, multiplier, work, at):
     w = max(m, n, sizes.size + 1)
     number, at = matrix(work, at, NUMBERS, w)
     numbers, at = integers(work, at, 12 * w)
-    count, at = integers(work, at, 5)
+    count, at = integers(work, at, 6)
     scalar, at = vector(work, at, 5)
     W, at = matrix(work, at, m, n)
     basis, at = carve_basis(work, at, n, n)
@@ -157,10 +158,13 @@ def rescale(s, lower, upper, scaled):
 
     scaled: a `Scaled`. Returns SOLVED, or NUMERICAL_FAILURE if a side is then no number.
     """
-    most, sane = 0.0, True
+    most, sane, factor = 0.0, True, 1.0
     for i in range(s.A.shape[0]):
         most = max(most, abs(s.number[NORM, i]))
-    factor = 2.0 ** -np.floor(np.log2(most))
+    while most * factor < 0.5:
+        factor *= 2.0
+    while most * factor > 1.0:
+        factor *= 0.5
     for i in range(s.A.shape[0]):
         for c in range(s.x.size):
             scaled.A[i, c] = s.A[i, c] * factor
@@ -196,16 +200,23 @@ def restore(s):
 
 @inlined
 def value_at(s, i):
-    """Return row i times x."""
-    total, only = 0.0, s.index[UNIT, i]
-    if only >= 0:
-        total = s.number[ENTRY, i] * s.x[only]
-    elif s.number[CUT, i] > 0.0:
-        for c in range(s.x.size):
-            total += s.C[i, c] * s.x[c]
-    else:
-        for c in range(s.x.size):
-            total += s.A[i, c] * s.x[c]
+    """Return row i, as it is after cuts, times x."""
+    return row_times(s.C[i], s.x) if s.number[CUT, i] > 0.0 else row_times_x(s, i)
+
+
+@inlined
+def row_times_x(s, i):
+    """Return row i of A times x."""
+    only = s.index[UNIT, i]
+    return s.A[i, only] * s.x[only] if only >= 0 else row_times(s.A[i], s.x)
+
+
+@inlined
+def row_times(a, x):
+    """Return the inner product."""
+    total = 0.0
+    for c in range(x.size):
+        total += a[c] * x[c]
     return total
 
 
@@ -307,15 +318,19 @@ def note_pivot(s, pivot):
 
 @inlined
 def _pick(s, begin, end, rank):
-    """Take unknowns as columns, for rows of one entry; the others of these depend on them."""
-    order, place, at = s.index[ORDER], s.index[PLACE], begin
+    """Take unknowns as columns, for rows of one entry, the heaviest of each; the others depend."""
+    order, place, listed, entry = s.index[ORDER], s.index[PLACE], s.index[LIST], s.number[ENTRY]
+    above, at = rank, begin
     for q in range(begin, end):
-        c = s.index[UNIT, s.index[LIST, q]]
+        c = s.index[UNIT, listed[q]]
+        first = begin + place[c] - above
         if place[c] >= rank:
             other, old = order[rank], place[c]
             order[rank], order[old], place[c], place[other] = c, other, rank, old
-            swap(s.index[LIST], q, at)
+            swap(listed, q, at)
             rank, at = rank + 1, at + 1
+        elif place[c] >= above and abs(entry[listed[q]]) > abs(entry[listed[first]]):
+            swap(listed, q, first)
     for q in range(begin, end):
         i = s.index[LIST, q]
         for t in range(rank):

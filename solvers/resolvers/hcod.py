@@ -60,7 +60,8 @@ class ActiveSetResolution(Resolution):
     @property
     def unfinished(self) -> int | None:
         """The level at which the iteration limit was reached."""
-        return int(self.memory[-1]) if self.status is Status.ITERATION_LIMIT else None
+        limited = self.status is Status.ITERATION_LIMIT
+        return max(0, int(self.memory[-1])) if limited else None
 
     def _part(self, which: int) -> Array:
         m = (len(self.memory) - 3) // 3
@@ -86,7 +87,7 @@ class Hcod(Resolver):
 
     name: ClassVar[str] = "hcod"
     handles: ClassVar[Handles] = "inequalities"
-    damps_with_bounds: ClassVar[str] = "the equalities of each level, by rows of their own"
+    damps_with_bounds: ClassVar[str] = "each level, by rows that no inequality changes"
     tolerance: float = 1e-10
     max_iterations: int = 1000
 

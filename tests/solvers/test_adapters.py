@@ -263,7 +263,7 @@ def test_a_solver_of_qpsolvers_is_answered_by_hcod_with_a_note(configuration):
     solve_ik(configuration, hand, DT, "proxqp")  # said once; a second warning would be an error
     with pytest.warns(UserWarning, match="without effect: eps_abs, max_iter"):
         solve_ik(configuration, hand, DT, solver="mosek", max_iter=3, eps_abs=1e-3)
-    np.testing.assert_allclose(solve_ik(configuration, hand, DT, solver="hcod", guesses=1),
+    np.testing.assert_allclose(solve_ik(configuration, hand, DT, solver="hcod", tolerance=1e-9),
                                expected)
 
 

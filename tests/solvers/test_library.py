@@ -21,8 +21,7 @@ if not sys.platform.startswith("linux"):
 RESOLVERS = [
     ("hcod", {}, {}),
     ("hcod", {"damping": 0.1}, {"damping": 0.1}),
-    ("hcod", {"tolerance": 1e-8, "guesses": 1, "max_iterations": 3},
-     {"tolerance": 1e-8, "guesses": 1, "max_iterations": 3}),
+    ("hcod", {"tolerance": 1e-8, "max_iterations": 3}, {"tolerance": 1e-8, "max_iterations": 3}),
     ("tpm", {}, {}),
     ("tpm", {"damping": 0.1, "threshold": 0.3}, {"damping": 0.1, "threshold": 0.3}),
     ("recursive", {}, {}),

@@ -183,7 +183,7 @@ def test_too_little_memory_is_a_status(library, name, missing):
 @pytest.mark.parametrize("wrong", [
     {"damping": -0.1}, {"damping": np.nan}, {"threshold": 0.0}, {"rank_tolerance": 1.0},
     {"rank_tolerance": np.nan}, {"tolerance": 0.0}, {"tolerance": 0.1}, {"isotropic": -1.0},
-    {"largest": 0.0}, {"guesses": 0}, {"max_iterations": 0}, {"optimal": 2}, {"miss": -1},
+    {"largest": 0.0}, {"max_iterations": 0}, {"optimal": 2}, {"miss": -1},
     {"method": 4}], ids=str)
 def test_a_setting_out_of_range_is_invalid(library, wrong):
     assert library.solve("hcod", box(), c.settings_of(**wrong))[0] == c.INVALID

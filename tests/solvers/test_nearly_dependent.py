@@ -6,6 +6,7 @@ off, and levels below moved it back along directions of which a dependent row ha
 
 import numpy as np
 import pytest
+from right import is_right
 
 from hierarchy import Hierarchy
 from solvers import Status, certify, make, problems
@@ -62,13 +63,13 @@ def test_rows_that_levels_below_moved_are_noticed(make_case, order):
               271025782, 271041751, 273008558)),
     ("tpm", (180005648, 180039206, 180053662, 180059618, 180083959, 180086533, 180106780, 180122079,
              180128641, 180145055))])
-def test_what_was_solved_and_wrong_is_certified_or_in_doubt(name, seeds):
+def test_what_was_solved_and_wrong_is_right_or_inaccurate(name, seeds):
     resolver = make(name)
     for seed in seeds:
         h = problems.structured(seed, ("nearly_parallel",), name == "tpm")
         h = problems.bounded(h, seed) if name == "tpm" and seed % 3 else h
         res = resolver.solve(h)
-        assert certify(h, res.x).certified or res.status is Status.INACCURATE, seed
+        assert res.status is Status.INACCURATE or is_right(h, res.x), seed
 
 
 def test_a_row_that_holds_a_level_back_by_its_difference_from_others_is_certified():
@@ -93,17 +94,3 @@ def test_the_nearest_x_is_certified_beside_rows_that_differ_by_little():
     assert certify(h, nearest).certified
     aside = np.linalg.svd(np.array([a, [0, 0, 1, 0]]))[2][2]
     assert not certify(h, nearest + 1e-5 * aside).certified
-
-
-def test_guesses_that_change_more_rows_each_time_are_given_up():
-    """From the memory of the opposite corner the second guess changes more rows than the first."""
-    n, rng = 12, np.random.default_rng(0)
-    A, b = rng.normal(size=(n, n)), 5.0 * rng.normal(size=n)
-    box = np.eye(n), -np.ones(n), np.ones(n)
-    h = Hierarchy.from_levels([box, (A, b)])
-    opposite = make("hcod").solve(Hierarchy.from_levels([box, (A, -b)])).memory
-    res = make("hcod", guesses=50).solve(h, opposite)
-    guesses, steps = res.memory[-3:-1]
-    assert guesses == 2
-    assert steps > 0
-    np.testing.assert_allclose(res.x, make("hcod").solve(h).x, atol=1e-9)

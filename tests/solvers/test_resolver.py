@@ -34,7 +34,7 @@ def test_a_resolver_that_has_solved_can_be_pickled(name):
 EVERY = {"damping": 0.0, "threshold": 0.1, "rank_tolerance": 1e-8}
 STEPS = {"tolerance": 1e-10, "max_iterations": 1000}
 DEFAULTS = {
-    "augmented": {}, "hcod": {**STEPS, "guesses": 3},
+    "augmented": {}, "hcod": STEPS,
     "hqp": {"backend": "proxqp", "form": "null-space", "slack": 1e-7},
     "recursive": {"method": "level", "isotropic": 0.0, "largest": None},
     "reverse": {"form": "published"}, "sns": {"form": "basic", "scales": "target"},

@@ -125,7 +125,7 @@ static inline int th_matches(void) { return strcmp(th_digest(), TH_DIGEST) == 0;
 /* Exact, with inequalities at every level. values (3 m + 3): state of each row (2 an equality, 1
  * and -1 active at the upper and lower side, 0 inactive); the level that each row holds back (-1 for
  * none, `levels` for the reference); its multiplier there; active sets tried; steps; the level that
- * is unfinished, -1 for none. */
+ * is unfinished, rounded down, -1 for none; at most -2: x keeps no level, the search may go on. */
 int th_solve_hcod(const th_problem *problem, const th_settings *settings, th_record *record,
                   double *x, double *work, int64_t work_size);
 @end
