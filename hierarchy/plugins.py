@@ -1,6 +1,7 @@
-"""Own tasks, resolvers, robots, plants and sensors, found by name without changing the package.
+"""Kinds by name: tasks, resolvers, robots, plants, sensors, signals, metrics and figures.
 
-A plugin is a module that registers what it adds when it is imported:
+What the package ships registers itself here too. A plugin is a module that registers what it adds
+when it is imported:
 
     from hierarchy.plugins import register
 
@@ -9,7 +10,7 @@ A plugin is a module that registers what it adds when it is imported:
 
 Which modules are imported is the user's decision, never that of a file. A module is allowed by
 `allow` (on the command line `--plugin MODULE`), or by an entry point of an installed package in the
-group `task_hierarchy.tasks`, `.resolvers`, `.robots`, `.plants` or `.sensors`. A file may say with
+group `task_hierarchy.tasks`, or another of `GROUPS`. A file may say with
 `plugins = ["my_module"]` what it needs; `require` refuses it where that is not allowed.
 """
 
@@ -28,43 +29,58 @@ from hierarchy.errors import HierarchyError, UnknownNameError
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
 
-Group = Literal["tasks", "resolvers", "robots", "plants", "sensors"]
+Group = Literal["tasks", "resolvers", "robots", "plants", "sensors", "signals", "metrics",
+                "figures"]
 GROUPS: tuple[Group, ...] = get_args(Group)
 _PREFIX = "task_hierarchy"
 _Thing = TypeVar("_Thing")
 
+_shipped: dict[str, dict[str, Any]] = {group: {} for group in GROUPS}
 _registered: dict[str, dict[str, Any]] = {group: {} for group in GROUPS}
 _loaded: dict[str, None] = {}   # names of the modules that were allowed, by whatever rule
 _flagged: dict[str, None] = {}  # those of `allow`
 
 
-def register(group: Group, name: str) -> Callable[[_Thing], _Thing]:
+def register(group: Group, name: str, *, shipped: bool = False) -> Callable[[_Thing], _Thing]:
     """Return a decorator that makes a thing available under a name.
 
-    Raises UnknownNameError for an unknown group, HierarchyError if the name is taken.
+    `shipped` is for what this package brings. Raises UnknownNameError for an unknown group,
+    HierarchyError if the name is taken.
     """
     if group not in GROUPS:
         raise UnknownNameError("group", group, GROUPS)
 
     def keep(thing: _Thing) -> _Thing:
-        before = _registered[group].get(name, thing)
+        before = _shipped[group].get(name, _registered[group].get(name, thing))
         if _origin(before) != _origin(thing):  # a module may be imported again
             raise HierarchyError(f"{group}: {name!r} is already {_origin(before)}")
-        _registered[group][name] = thing
+        (_shipped if shipped else _registered)[group][name] = thing
         return thing
 
     return keep
 
 
 def own(group: Group) -> dict[str, Any]:
-    """Return what is registered in a group by name, and what installed packages offer in it."""
+    """Return what plugins register in a group by name, and what installed packages offer in it."""
     for point in _points(group):
         _load(point, group)
     return dict(_registered[group])
 
 
+def shipped(group: Group) -> dict[str, Any]:
+    """Return what this package has registered in a group by name."""
+    return dict(_shipped[group])
+
+
+def known(group: Group) -> dict[str, Any]:
+    """Return all of a group by name: what this package brings, then what plugins do."""
+    return {**_shipped[group], **own(group)}
+
+
 def find(group: Group, name: str) -> Any | None:
     """Return what has a name in a group, or None; loads an entry point of that name."""
+    if name in _shipped[group]:
+        return _shipped[group][name]
     if name not in _registered[group]:
         for point in _points(group):
             if point.name == name:

@@ -14,6 +14,7 @@ from scenarios.export.layout import layout
 from scenarios.export.numbers import plain
 from scenarios.export.schemas import FOXGLOVE, INTEGER, NUMBER, TEXT, TRUTH, a_list, an_object
 from scenarios.loop.columns import of_ticks, signal_units, stacks
+from scenarios.loop.signals import OTHER, known
 from scenarios.scene import scene
 
 if TYPE_CHECKING:
@@ -22,18 +23,6 @@ if TYPE_CHECKING:
 FRAMES_A_SECOND = 30.0  # of the 3D scene; signals have every tick
 _WARNING = 3            # Foxglove's level of a log message
 
-# The channels of the signals; all others go to "/other".
-TOPICS = {
-    "/joints": ("q", "v", "a", "command", "true_q", "true_v"),
-    "/end_effector": ("ee_position", "desired_position", "position_error", "true_ee_position",
-                      "pointing_error"),
-    "/distances": ("control_point_distance", "minimal_distance", "ee_distance",
-                   "active_control_point", "true_control_point_distance",
-                   "true_minimal_distance", "true_ee_distance"),
-    "/stack": ("order", "status", "iterations", "transition", "pointing_active",
-               "repulsion_active", "active_set"),
-    "/times": ("time_kinematics", "time_rows", "time_resolve", "time_tick"),
-}
 _KINDS = {"f": NUMBER, "i": INTEGER, "u": INTEGER, "b": TRUTH, "U": TEXT}
 
 Entry = tuple[int, str, dict[str, Any]]  # [ns], topic, message
@@ -42,8 +31,8 @@ Entry = tuple[int, str, dict[str, Any]]  # [ns], topic, message
 def write(recording: Recording, path: Path) -> list[Path]:
     """Write `path` and `path`.layout.json, times counted from zero.
 
-    Every signal of every tick has its name in `Recording`, in the channels of `TOPICS`; numbers
-    that are not finite are null, and an array with several indices is one flat list. `/stack` also
+    Every signal of every tick has the name and the topic of `scenarios.loop.signals`; numbers that
+    are not finite are null, and an array with several indices is one flat list. `/stack` also
     has the names of the tasks, `/events` the trouble, `/tf` and `/scene` the 3D scene.
     """
     from mcap.writer import Writer
@@ -61,13 +50,13 @@ def write(recording: Recording, path: Path) -> list[Path]:
 def grouped(recording: Recording) -> dict[str, dict[str, NDArray[Any]]]:
     """Return the per-tick signals by channel and name, without time."""
     signals = {name: signal for name, signal in of_ticks(recording).items() if name != "t"}
-    home = {name: topic for topic, names in TOPICS.items() for name in names}
-    groups: dict[str, dict[str, NDArray[Any]]] = {topic: {} for topic in (*TOPICS, "/other")}
+    groups: dict[str, dict[str, NDArray[Any]]] = {}
     for name, signal in signals.items():
         flat = signal.reshape(len(signal), -1) if signal.ndim > 2 else signal
-        groups[home.get(name, "/other")][name] = flat
+        of = known(name)
+        groups.setdefault(of.topic if of else OTHER, {})[name] = flat
     groups["/stack"]["tasks"] = stacks(recording)
-    return {topic: group for topic, group in groups.items() if group}
+    return groups
 
 
 def _write(writer: Any, recording: Recording, groups: dict[str, dict[str, NDArray[Any]]]) -> None:

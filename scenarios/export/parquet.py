@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from scenarios.export import new_file
 from scenarios.export.numbers import plain
-from scenarios.loop.columns import CONSTANTS, Column, columns
+from scenarios.loop.columns import Column, columns, constants
 
 if TYPE_CHECKING:
     from scenarios.loop.recording import Recording
@@ -25,7 +25,7 @@ def write(recording: Recording, path: Path) -> list[Path]:
     import pyarrow.parquet as pq
 
     table = list(columns(recording))
-    limits = {name: plain(recording[name]) for name in CONSTANTS if name in recording}
+    limits = {name: plain(values) for name, values in constants(recording).items()}
     metadata = {"scenario": recording.scenario.to_toml(),
                 "joints": json.dumps(recording.facts.robot.velocity_names),
                 "orders": json.dumps(recording.orders),

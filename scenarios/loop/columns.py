@@ -11,14 +11,7 @@ from numpy.typing import NDArray
 
 from scenarios.config import Scenario
 from scenarios.loop.facts import Facts
-
-CONSTANTS = ("joint_lower", "joint_upper", "velocity_limit", "torque_limit")
-_METRES = ("ee_position", "desired_position", "position_error", "true_ee_position",
-           "control_point_distance", "minimal_distance", "ee_distance",
-           "true_control_point_distance", "true_minimal_distance", "true_ee_distance",
-           "contact_depth", "obstacle_offset", "com", "slip", "pressure_margin",
-           "support_margin")
-_NEWTONS = ("contact_force", "planned_force", "floor_force", "push")
+from scenarios.loop.signals import known
 
 
 class Recorded(Protocol):
@@ -74,9 +67,16 @@ def columns(recording: Recorded) -> Iterator[Column]:
     yield Column("events", "", np.array(events, dtype=np.str_))
 
 
+def constants(recording: Recorded) -> dict[str, NDArray[Any]]:
+    """Return the signals that have one value for the whole run."""
+    return {name: signal for name, signal in recording.signals.items()
+            if (of := known(name)) and of.constant}
+
+
 def of_ticks(recording: Recorded) -> dict[str, NDArray[Any]]:
     """Return the signals that have one entry per tick."""
-    return {name: signal for name, signal in recording.signals.items() if name not in CONSTANTS}
+    fixed = constants(recording)
+    return {name: signal for name, signal in recording.signals.items() if name not in fixed}
 
 
 def stacks(recording: Recorded) -> NDArray[Any]:
@@ -87,14 +87,11 @@ def stacks(recording: Recorded) -> NDArray[Any]:
 
 def signal_units(recording: Recorded) -> dict[str, tuple[str, ...]]:
     """Return the units of the entries of each signal with units; a single one holds for all."""
-    positions, rates = (recording.facts.robot.position_units,
-                        recording.facts.robot.velocity_units)
-    velocities = tuple(f"{unit}/s" for unit in rates)
-    accelerations = tuple(f"{unit}/s^2" for unit in rates)
-    level = recording.scenario.control.level
-    commands = {"velocity": velocities, "acceleration": accelerations, "torque": ("N m",)}[level]
-    return {"t": ("s",), "q": positions, "true_q": positions, "v": velocities,
-            "true_v": velocities, "a": accelerations, "command": commands,
-            "planned_acceleration": accelerations, **dict.fromkeys(_NEWTONS, ("N",)),
-            **dict.fromkeys(_METRES, ("m",)),
-            **{name: ("s",) for name in recording.signals if name.startswith("time_")}}
+    robot, level = recording.facts.robot, recording.scenario.control.level
+    velocities = tuple(f"{unit}/s" for unit in robot.velocity_units)
+    accelerations = tuple(f"{unit}/s^2" for unit in robot.velocity_units)
+    per_joint = {"joint": robot.position_units, "joint/s": velocities, "joint/s^2": accelerations,
+                 "command": {"velocity": velocities, "acceleration": accelerations,
+                             "torque": ("N m",)}[level]}
+    return {name: per_joint.get(of.unit, (of.unit,)) for name in recording.signals
+            if (of := known(name)) and of.unit}

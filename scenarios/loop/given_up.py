@@ -48,9 +48,9 @@ def given_up(recording: Recording) -> tuple[GivenUp, ...]:
     level was missed. It is left out where the rows of a tick do not follow from the recording: with
     an image sensor, in a smooth stack, or where settings were changed by hand.
     """
-    fate = recording.signals.get("level_fate")
-    if fate is None or not recording.ticks:
+    if "level_fate" not in recording or not recording.ticks:
         return ()
+    fate = recording["level_fate"]
     found = []
     for column, name in enumerate(recording.task_names):
         known, missed = fate[:, column] > Fate.UNKNOWN, fate[:, column] == Fate.MISSED

@@ -39,7 +39,7 @@ def judge(recording: Recording, cell: Cell) -> None:
     orders, rows = recording.order_names, Rows(recording, cell)
     fates = Fates(recording.task_names, recording.ticks, cell.robot.n)
     accuracy, commands = recording.facts.resolver.accuracy, _meant(recording)
-    changed = recording.signals.get("changed", np.zeros(recording.ticks, bool))
+    changed = recording.get("changed", np.zeros(recording.ticks, bool))
     for k, index in enumerate(recording["order"].tolist()):
         order = orders[index]
         h = rows.hierarchy(k, order) if order and not changed[k] else None

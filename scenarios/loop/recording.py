@@ -1,49 +1,4 @@
-"""A finished run: arrays by name, time first, in SI units, and the facts to read them by.
-
-Row k of `q` and `v` is the state before the command of tick k, so row 0 is the start; `a` is
-the acceleration that this command means. T ticks, n joints, K control points, N tasks.
-
-t (T,) [s] · q, v, a (T, n) [rad, rad/s, rad/s^2], q and v as the controller knew them
-command as sent: a velocity or an acceleration (T, n), or the torques of the actuated joints
-(T, n - 6 with a floating base) [N m], depending on `scenario.control.level`
-planned_acceleration (T, n), planned_force (T, P, 3) [N] on each of P contact points, in world
-axes: the answer at level "torque", NaN where there was none
-com (T, 3) [m] the true centre of mass; floor_force (T, C, 3) [N] on each contact, slip (T, C)
-[m] along the floor since it touched down, pressure_margin (T, C) [m] of the centre of pressure
-from the nearest edge of the sole, NaN without load; support_margin (T,) [m] of com inside the
-support polygon, the hull of the loaded contacts, from above; push (T, 3) [N]: of the last step of
-the simulation in tick k, from a plant with torque motors
-true_q, true_v (T, n) the true state where measurement or physics make it differ from q and v;
-true_ee_position (T, 3) [m] from true_q
-contacts (T,) largest number of contacts between arm and obstacles at once in the period of
-tick k; contact_depth (T,) [m], contact_force (T,) [N]; from a plant with physics
-ee_position, desired_position, position_error (T, 3) [m], error = desired - actual
-pointing_error (T,) cos(alpha_d) - cos(alpha), positive outside the cone
-pointing_active (T,) bool, whether the pointing task was in the stack
-task_error_NAME (T, m) of each task of `[[tasks]]`, as the task defines it, with "_" for a space
-in its name; task_position_NAME (T, 3) [m] of the point or centre of mass that it moves
-control_point_distance (T, K) [m] to the nearest obstacle; minimal_distance (T,) [m], eq. (31)
-active_control_point (T,) number 1..K of the point whose avoidance is in the stack, or -1
-ee_distance (T,) [m]; repulsion_active (T,) bool, whether eq. (30) was in force
-true_control_point_distance, true_minimal_distance, true_ee_distance: the same of the true arm
-and obstacles, where a camera or measured joints make them differ
-order (T,) index into `orders`; status (T,) value of solvers.Status; iterations (T,)
-transition (T,) weight of the present stack's answer in the command, where stacks are blended
-certified (T,) bool, whether x is the undamped answer, in a certified run
-moved_by_lower (T,) [m], see `scenarios.loop.audit.Strictness`
-active_set (T,) number of the set of inequality rows that act, counted from 0 as they first
-occur, -1 where unknown; present if the resolver reports it
-level_fate (T, N) value of `scenarios.loop.fate.Fate` of each of the `task_names` under the
-command that was sent; level_violation (T, N) Euclidean norm of the violation of its rows, in
-their unit, NaN where the task is absent or its fate unknown; saturated (T, n) -1 or 1 where a
-joint is at the lower or upper side of its limits' box of commands, else 0
-time_kinematics, time_rows, time_resolve, time_tick (T,) [s] of computation; time_resolve
-includes the rows of former stacks where stacks are blended, time_tick the plant's step
-joint_lower, joint_upper, velocity_limit (n,) of the robot, infinite where it has none, and at
-level "torque" torque_limit of the actuated joints [N m]
-obstacle_offset (T, H, 3) [m] by which obstacles were dragged off their places, changed (T,)
-bool, whether obstacles or settings differ from the scenario, in a live run
-"""
+"""A finished run: its signals, see scenarios.loop.signals, and the facts to read them by."""
 
 from __future__ import annotations
 
@@ -66,6 +21,7 @@ from scenarios.files import write_json
 from scenarios.loop import notebook
 from scenarios.loop.depth_view import DepthView
 from scenarios.loop.facts import Facts
+from scenarios.loop.signals import check
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -86,10 +42,11 @@ _EVENT = np.dtype([("tick", np.int64), ("kind", "U24"), ("action", "U8")])
 
 @dataclass(frozen=True, repr=False)
 class Recording:
-    """One run, tick by tick; the module's text lists the signals.
+    """One run, tick by tick; `scenarios.loop.signals` lists the signals.
 
-    A signal that does not apply to the scenario is absent. `events` are the ticks with trouble,
-    `facts` describe robot and resolver, `depth` is an image of the camera, if there is one.
+    A signal that does not apply to the scenario is absent; a name that no signal has is an error.
+    `events` are the ticks with trouble, `facts` describe robot and resolver, `depth` is an image of
+    the camera, if there is one.
     """
 
     signals: dict[str, NDArray[Any]]
@@ -101,9 +58,13 @@ class Recording:
     depth: DepthView | None = None
 
     def __getitem__(self, name: str) -> NDArray[Any]:
-        if name not in self.signals:
+        if name not in self:
             raise UnknownNameError("signal", name, self.signals)
         return self.signals[name]
+
+    def get(self, name: str, default: NDArray[Any]) -> NDArray[Any]:
+        """Return a signal, or `default` where the run does not have it."""
+        return self.signals[name] if name in self else default
 
     def __repr__(self) -> str:
         end = f", fault={self.fault!r}" if self.fault else ""
@@ -129,6 +90,8 @@ class Recording:
         return notebook.data_frame(self, library)
 
     def __contains__(self, name: str) -> bool:
+        if name not in self.signals:
+            check(name)
         return name in self.signals
 
     @property

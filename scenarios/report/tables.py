@@ -104,7 +104,7 @@ def _happened(run: Run) -> list[tuple[str, str, str, str]]:
         t = recording["t"]
         found = [(kind.replace("_", " "), action, str(len(ticks)), f"{t[ticks[0]]:.3f} s")
                  for (kind, action), ticks in recording.troubles().items()]
-        touched = np.flatnonzero(recording.signals.get("contacts", ()))
+        touched = np.flatnonzero(recording.get("contacts", np.empty(0)))
         if touched.size:
             found.append(("contact", "–", str(touched.size), f"{t[touched[0]]:.3f} s"))
     if run.fault:

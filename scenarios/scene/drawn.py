@@ -204,7 +204,7 @@ def _distances(fixed: Stage, recording: Recording, ticks: NDArray[np.int64],
                              fixed.obstacles.table, _NO_LAWS, np.zeros(2))
     frames: dict[str, list[Array]] = {name: [] for name in (
         "points", "nearest", "distance", "centres")}
-    offsets = recording.signals.get("obstacle_offset", np.empty((recording.ticks, 0, 3)))
+    offsets = recording.get("obstacle_offset", np.empty((recording.ticks, 0, 3)))
     for k, placed in zip(ticks.tolist(), placements, strict=True):
         now[:] = placed
         fixed.obstacles.at(float(recording["t"][k]))

@@ -14,7 +14,7 @@ from scenarios import load, simulate
 from scenarios.cli.main import run_command
 from scenarios.export import export, foxglove
 from scenarios.files import OutputError
-from scenarios.loop.columns import CONSTANTS, columns
+from scenarios.loop.columns import columns, constants
 from scenarios.loop.recording import Event
 from scenarios.loop.tree import joint_units, tree_of
 from scenarios.measure.run_folder import save
@@ -58,7 +58,7 @@ def test_a_csv_has_units_in_its_header_and_every_number_to_the_last_bit(run, tmp
 
 def test_every_signal_of_the_ticks_is_a_column(run):
     names = {column.name.partition("[")[0] for column in columns(run)}
-    assert names == {*run.signals, "stack", "events"} - set(CONSTANTS)
+    assert names == {*run.signals, "stack", "events"} - set(constants(run))
 
 
 def test_units_follow_the_joints():
@@ -133,7 +133,7 @@ def test_an_mcap_file_has_every_signal_of_every_tick(run, messages):
         for name in found[topic][0][1]:
             read[name] = [message[name] for _, message in found[topic]]
     assert read.pop("tasks") == [run.orders[i] for i in run["order"]]
-    assert set(read) | {"t"} == set(run.signals) - set(CONSTANTS)
+    assert set(read) | {"t"} == set(run.signals) - set(constants(run))
     for name, values in read.items():
         signal = run[name].astype(float)
         np.testing.assert_array_equal(np.array(values, dtype=float),

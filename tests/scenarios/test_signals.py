@@ -1,0 +1,44 @@
+"""One table of signals: what is recorded, and what may be asked for."""
+
+import numpy as np
+import pytest
+
+from hierarchy import plugins
+from hierarchy.errors import UnknownNameError
+from scenarios import load, simulate
+from scenarios.export.mcap import grouped
+from scenarios.loop.columns import columns
+from scenarios.loop.signals import Signal, known
+
+pytestmark = pytest.mark.usefixtures("no_plugins")
+
+
+@pytest.fixture(scope="module")
+def run():
+    return simulate(load("dual-arm", ["control.duration=0.01"]))
+
+
+def test_a_misspelt_signal_is_an_error_that_names_the_nearest(run):
+    for ask in (lambda: "minimal_distnce" in run, lambda: run["minimal_distnce"],
+                lambda: run.get("minimal_distnce", np.zeros(0))):
+        with pytest.raises(UnknownNameError, match="minimal_distance"):
+            ask()
+
+
+def test_a_known_signal_that_a_run_lacks_is_absent(run):
+    assert "minimal_distance" not in run
+    assert run.get("minimal_distance", np.zeros(1)).shape == (1,)
+
+
+def test_every_recorded_signal_is_in_the_table_with_its_number_of_axes(run):
+    for name, values in run.signals.items():
+        assert known(name).shape.strip("(,)").count(",") + 1 == values.ndim, name
+
+
+def test_a_signal_of_a_plugin_has_its_unit_and_topic_everywhere(run):
+    plugins.register("signals", "strain")(Signal("strain", "Pa", "(T,)", "of a link", "/links"))
+    assert "strain" not in run
+    run.signals["strain"] = np.zeros(run.ticks)
+    assert {column.title for column in columns(run)} > {"strain [Pa]"}
+    assert set(grouped(run)["/links"]) == {"strain"}
+    del run.signals["strain"]
