@@ -15,8 +15,8 @@ from hierarchy.problem import Array
 from hierarchy.task import check_period
 from hierarchy.tasks import JointLimits, Pointing, Position, Separation
 from hierarchy.tasks.mechanism import above, model_rows
-from scenarios.cell.avoidance import areas_of, avoidance_tasks
-from scenarios.cell.forces import contacts_of, force_task, physics_of
+from scenarios.cell.avoidance import areas_of, avoidance_tasks, separable_pairs
+from scenarios.cell.forces import contacts_of, physics_of
 from scenarios.cell.order import Order, order_of
 from scenarios.cell.plant import plant_of
 from scenarios.cell.plants import Plant
@@ -34,8 +34,8 @@ from scenarios.cell.tasks import (
     task_of,
 )
 from scenarios.config import Scenario, ScenarioError
-from scenarios.config.listed import ListedForce, ListedLeastForce, ListedTask
 from scenarios.config.plant import TorqueSection
+from scenarios.config.references import References
 
 
 @dataclass(frozen=True)
@@ -115,10 +115,11 @@ def build(scenario: Scenario, kept: Cell | None = None) -> Cell:
         first = [*first, *physics] if bounded else [*physics, *first]
     first = above(model_rows(robot, control.period), first,
                   not bounded and scenario.make_resolver().can_resolve("inequalities"))
-    position, pointing = position_of(scenario, here), pointing_of(scenario, here)
-    listed = [_listed(section, here, contacts) for section in scenario.tasks
+    at = References(here, contacts, separable_pairs)
+    position, pointing = position_of(scenario, at), pointing_of(scenario, at)
+    listed = [task_of(section, at) for section in scenario.tasks
               if section.kind != "collision"]
-    last = posture_of(scenario, here, "task")
+    last = posture_of(scenario, at, "task")
     avoiding = avoidance_tasks(scenario, robot)
     always = first if areas else [*first, *avoiding]  # repulsion is placed by Algorithm 1
     tasks = _in_order(scenario, [*first, *avoiding, *(
@@ -128,7 +129,7 @@ def build(scenario: Scenario, kept: Cell | None = None) -> Cell:
             check_period(task, control.period)
     rows, activation = stacked(scenario, tasks, state)
     return Cell(scenario, robot, start, state, plant,
-                Stack(rows, control.level, reference_of(scenario, here), contacts,
+                Stack(rows, control.level, reference_of(scenario, at), contacts,
                       "mass" if control.metric == "mass" else None, _give(scenario)), sensor, areas,
                 position, pointing, limits, order_of(scenario, areas, always, tasks), tuple(listed),
                 activation, contacts)
@@ -153,13 +154,6 @@ def _start(scenario: Scenario, robot: Robot, contacts: Contacts | None) -> tuple
 def _give(scenario: Scenario) -> dict[str, float]:
     """Return how far tasks of the scenario may give, by name."""
     return {task.title: task.give for task in scenario.tasks if task.give}
-
-
-def _listed(section: ListedTask, start: State, contacts: Contacts | None) -> Task:
-    if isinstance(section, ListedForce | ListedLeastForce):
-        assert contacts is not None, "the level of the scenario was checked"
-        return force_task(section, contacts)
-    return task_of(section, start)
 
 
 def _in_order(scenario: Scenario, tasks: list[Task]) -> list[Task]:

@@ -11,16 +11,13 @@ from hierarchy.contacts import Contact, Contacts, corners
 from hierarchy.tasks import (
     BaseDynamics,
     CentreOfPressure,
-    ContactForce,
     ContactMotion,
     Friction,
-    LeastForce,
     Together,
     TorqueLimits,
 )
 from scenarios.config import Scenario, ScenarioError
 from scenarios.config.contacts import ContactSection
-from scenarios.config.listed import ListedForce, ListedLeastForce
 
 
 def contacts_of(scenario: Scenario, robot: Robot) -> Contacts | None:
@@ -71,13 +68,3 @@ def _limits(scenario: Scenario, contacts: Contacts) -> list[Task]:
     if forces.edge is not None:
         found.append(CentreOfPressure(contacts, forces.edge))
     return found
-
-
-def force_task(section: ListedForce | ListedLeastForce, contacts: Contacts) -> Task:
-    """Return a listed task of contact forces; raises ScenarioError, naming the task."""
-    try:
-        if isinstance(section, ListedForce):
-            return ContactForce(contacts, section.contact, section.target, section.title)
-        return LeastForce(contacts, section.title)
-    except HierarchyError as error:
-        raise ScenarioError(f"task {section.title!r}: {error}") from error

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from hierarchy.avoidance import Obstacle, Obstacles
-from scenarios.cell.paths import make_path
 from scenarios.config.avoidance import ObstacleSection
 
 
@@ -15,7 +14,7 @@ def make_obstacles(sections: tuple[ObstacleSection, ...]) -> Obstacles:
 
 
 def _obstacle(number: int, section: ObstacleSection) -> Obstacle:
-    path = None if section.path is None else make_path(section.path)
+    path = None if section.path is None else section.path.make()
     size = {"point": (), "sphere": (section.radius,),
             "capsule": (section.radius, section.half_length),
             "box": section.half_lengths}[section.shape]

@@ -8,7 +8,6 @@ from hierarchy import Robot
 from hierarchy.avoidance import Obstacles
 from hierarchy.contacts import Contacts
 from hierarchy.problem import Array
-from scenarios.cell.own import make_own
 from scenarios.cell.plants import (
     Apart,
     Commanded,
@@ -20,7 +19,7 @@ from scenarios.cell.plants import (
 )
 from scenarios.cell.plants.plant import Driven
 from scenarios.config import Scenario, ScenarioError
-from scenarios.config.plant import OwnPlant, TorqueSection
+from scenarios.config.plant import OwnPlant, PhysicsSection, TorqueSection
 
 
 def plant_of(scenario: Scenario, robot: Robot, start: tuple[Array, Array],
@@ -32,14 +31,14 @@ def plant_of(scenario: Scenario, robot: Robot, start: tuple[Array, Array],
     section, control, (q, v) = scenario.plant, scenario.control, start
     sensor = JointSensor(section.measurement, control.period, robot)
     if isinstance(section, OwnPlant):
-        own = make_own(section, robot, q=q, v=v, period=control.period, level=control.level,
+        own = section.made(robot, q=q, v=v, period=control.period, level=control.level,
                        obstacles=obstacles)
         return own if _unmeasured(section) else Apart(own, _feedback(section, own, sensor))
     if isinstance(section, TorqueSection):
         assert contacts is not None, "the level of the scenario was checked"
         body = TorqueRobot(robot, contacts, q, v, control.period, section)
         return body if section.measurement.ideal else Apart(body, sensor)
-    if section.kind == "mujoco":
+    if isinstance(section, PhysicsSection):
         arm = PhysicsArm(robot, q, v, control.period, control.level, obstacles, section)
         return Apart(arm, Commanded(arm) if section.feedback == "commanded" else sensor)
     exact = KinematicArm(robot, q, v, control.period, control.level)

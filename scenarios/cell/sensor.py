@@ -12,7 +12,6 @@ from hierarchy import HierarchyError, Robot
 from hierarchy.avoidance import Capsule, Obstacles, Repulsion
 from scenarios.cell.avoidance import repulsion_of
 from scenarios.cell.obstacles import make_obstacles
-from scenarios.cell.own import make_own
 from scenarios.cell.sensors import ExactDistances, Sensor
 from scenarios.cell.sensors.camera import DepthCamera, Pinhole, looking_at
 from scenarios.cell.sensors.depth_sensor import DepthSensor, Source
@@ -67,9 +66,10 @@ def _seen_by(scenario: Scenario, robot: Robot, exact: ExactDistances, asked: _As
     if isinstance(scenario.sensor, ExactSection):
         return exact
     if isinstance(scenario.sensor, OwnSensor):
-        own: Sensor = make_own(scenario.sensor, robot, exact=exact, body=asked.body, tip=asked.tip)
+        own: Sensor = scenario.sensor.made(robot, exact=exact, body=asked.body, tip=asked.tip)
         return own
     danger = scenario.limits.danger_reach if scenario.limits else None
+    assert isinstance(scenario.sensor, CameraSection | FramesSection)
     try:
         return _depth_sensor(scenario.sensor, robot, exact,
                              asked._replace(region=max(asked.region, danger or 0.0)))

@@ -8,14 +8,13 @@ import numpy as np
 from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
 
 from hierarchy.words import listed
+from scenarios.config.paths import PathSection, WaypointsSection
 from scenarios.config.sections import (
     Count,
     NotNegative,
-    PathSection,
     Positive,
     Section,
     Vector3,
-    WaypointsSection,
     kind_or,
 )
 from scenarios.config.waypoints import moved

@@ -10,14 +10,19 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable
-from typing import Any, ClassVar, Self, cast, get_args, get_origin, get_type_hints
+from typing import TYPE_CHECKING, Any, ClassVar, Self, cast, get_args, get_origin, get_type_hints
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model, model_validator
 
 from hierarchy import plugins
-from hierarchy.errors import UnknownNameError
+from hierarchy.errors import HierarchyError, UnknownNameError
 from hierarchy.plugins import Group
-from scenarios.config.sections import Finite, Flag, PathSection, Section, Whole
+from scenarios.config.errors import ScenarioError
+from scenarios.config.paths import PathSection
+from scenarios.config.sections import Finite, Flag, Section, Whole
+
+if TYPE_CHECKING:
+    from hierarchy import Robot
 
 GIVEN: dict[Group, tuple[str, ...]] = {
     "tasks": ("robot", "state", "name", "kind"),
@@ -54,6 +59,35 @@ class OwnSection(Section):
         except ValidationError as error:
             raise ValueError(_said(self.kind, error.errors()[0], known)) from None
         return {key: (known[key].annotation, getattr(values, key)) for key in given}
+
+    def made(self, robot: Robot, **given: Any) -> Any:
+        """Call the maker with the keys and those of `given` that it has a parameter for.
+
+        Raises ScenarioError, naming the kind, for whatever goes wrong in it: it is the user's code.
+        """
+        wanted = {"robot": robot, **given}
+        what = f"{self.group[:-1]} of kind {self.kind!r}"
+        try:
+            values = {key: _made(annotation, value, robot)
+                      for key, (annotation, value) in self.settings().items()}
+            provided = {name: value for name, value in wanted.items()
+                        if name in inspect.signature(self.maker).parameters}
+            return self.maker(**provided, **values)
+        except HierarchyError as error:
+            raise ScenarioError(f"{what}: {error}") from error
+        except Exception as error:
+            raise ScenarioError(f"{what}: {type(error).__name__}: {error}") from error
+
+
+def _made(annotation: Any, value: Any, robot: Robot) -> Any:
+    """Return the value of a key as the maker wants it: frames by name, paths by their table."""
+    from hierarchy.paths import Path
+    from hierarchy.robot import Frame
+
+    kinds = (annotation, *get_args(annotation))
+    if Frame in kinds and isinstance(value, str):
+        return robot.frame(value)
+    return value.make() if Path in kinds and value is not None else value
 
 
 def _said(kind: str, error: Any, known: dict[str, inspect.Parameter]) -> str:

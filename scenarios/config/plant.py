@@ -2,24 +2,23 @@
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar, Literal, Self
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from pydantic import Discriminator, Field, Tag, model_validator
+from pydantic import Field, model_validator
 
-from hierarchy.plugins import Group
+from hierarchy.plugins import Group, register
 from hierarchy.problem import Array
 from scenarios.config.own import OwnSection
 from scenarios.config.sections import (
-    PLUGIN,
     Count,
     Finite,
     Flag,
     NotNegative,
     Positive,
     Section,
-    kind_or,
+    any_kind,
 )
 
 _ROUNDING = 1e-9  # [s] of times
@@ -86,7 +85,7 @@ class JointsSection(Section):
     armature: NotNegative | tuple[NotNegative, ...] = 0.3
 
 
-class _Plant(Section):
+class AnyPlant(Section):
     """What every plant has.
 
     With feedback = "commanded" the controller receives its own commands, integrated to a joint
@@ -94,17 +93,20 @@ class _Plant(Section):
     commands through FRI are integrated blindly. Both are stable with the letter's gains.
     """
 
+    kind: str
     feedback: Literal["measured", "commanded"] = "measured"
     measurement: MeasurementSection = MeasurementSection()
 
 
-class KinematicSection(_Plant):
+@register("plants", "kinematic", shipped=True)
+class KinematicSection(AnyPlant):
     """A robot that follows its commands exactly."""
 
     kind: Literal["kinematic"] = "kinematic"
 
 
-class PhysicsSection(_Plant):
+@register("plants", "mujoco", shipped=True)
+class PhysicsSection(AnyPlant):
     """A robot in a physics simulation, under position servos (extra `sim`).
 
     A joint more than `beyond_stop` [rad] beyond its position limit ends the run with a fault.
@@ -140,7 +142,8 @@ class PushSection(Section):
         return (passed >= 0.0) & (passed < self.duration)
 
 
-class TorqueSection(_Plant):
+@register("plants", "torque", shipped=True)
+class TorqueSection(AnyPlant):
     """A robot with torque motors in a physics simulation (extra `sim`).
 
     Its [[contacts]] touch a floor, or table, at `height` [m] whose coefficient is `friction`;
@@ -165,13 +168,13 @@ class TorqueSection(_Plant):
     pushes: tuple[PushSection, ...] = ()
 
 
-class OwnPlant(_Plant, OwnSection):
+class OwnPlant(AnyPlant, OwnSection):
     """A plant of a plugin; further keys are those of the plugin."""
 
     group: ClassVar[Group] = "plants"
 
 
-PlantKind = Annotated[
-    Annotated[KinematicSection, Tag("kinematic")] | Annotated[PhysicsSection, Tag("mujoco")]
-    | Annotated[TorqueSection, Tag("torque")] | Annotated[OwnPlant, Tag(PLUGIN)],
-    Discriminator(kind_or("kinematic", "plants", ("kinematic", "mujoco", "torque")))]
+if TYPE_CHECKING:
+    PlantKind = AnyPlant
+else:
+    PlantKind = any_kind("plants", OwnPlant, "kinematic")

@@ -19,7 +19,7 @@ from scenarios.config.contacts import ContactSection, ForcesSection
 from scenarios.config.control import ControlSection
 from scenarios.config.distributions import Parameters
 from scenarios.config.faults import FaultSection
-from scenarios.config.listed import OF_FORCES, ListedTask
+from scenarios.config.listed import ListedTask
 from scenarios.config.plant import KinematicSection, PlantKind
 from scenarios.config.robot import RobotSection, StartSection
 from scenarios.config.sections import Section
@@ -84,7 +84,7 @@ class Scenario(Section):
     @model_validator(mode="after")
     def _has_the_level_of_its_forces(self) -> Self:
         torque, plant = self.control.level == "torque", self.plant.kind
-        forces = next((task.title for task in self.tasks if task.kind in OF_FORCES), None)
+        forces = next((task.title for task in self.tasks if task.of_forces), None)
         if not torque and (self.contacts or forces):
             what = "[[contacts]]" if self.contacts else f"task {forces!r}"
             raise ValueError(f'{what} needs control.level = "torque"')

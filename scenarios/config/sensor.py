@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
-from pydantic import Discriminator, Field, Tag
+from pydantic import Field
 
-from hierarchy.plugins import Group
+from hierarchy.plugins import Group, register
 from scenarios.config.own import OwnSection
 from scenarios.config.sections import (
-    PLUGIN,
     Count,
     Finite,
     Flag,
@@ -18,21 +17,30 @@ from scenarios.config.sections import (
     Section,
     Share,
     Vector3,
-    kind_or,
+    any_kind,
 )
 
 Pixels = Annotated[int, Field(strict=True, ge=1, le=8192)]
 _FOOT = 0.31  # [m] height of the column that a robot without floor stands on
 
 
-class ExactSection(Section):
+class AnySensor(Section):
+    """What every sensor has: the height `foot` [m] of the column that its robot stands on."""
+
+    kind: str
+    if TYPE_CHECKING:
+        foot: ClassVar[float]
+
+
+@register("sensors", "exact", shipped=True)
+class ExactSection(AnySensor):
     """Distances of the known geometry, without errors."""
 
     foot: ClassVar[float] = _FOOT
     kind: Literal["exact"] = "exact"
 
 
-class _ImageSection(Section):
+class _ImageSection(AnySensor):
     """What sources of depth images have; see scenarios.cell.sensors.depth_space.
 
     A frame is available `latency` [s] after it was taken. Without a new frame for more than
@@ -47,7 +55,7 @@ class _ImageSection(Section):
     latency: NotNegative = 0.0
     stale_after: NotNegative = 0.2
     least_readings: Share = 0.1
-    foot: NotNegative = _FOOT
+    foot: NotNegative = _FOOT  # type: ignore[misc]
     margin: NotNegative = 0.05
     region: Positive | None = None
     thin: NotNegative | None = None
@@ -55,6 +63,7 @@ class _ImageSection(Section):
     band: NotNegative = 0.05
 
 
+@register("sensors", "camera", shipped=True)
 class CameraSection(_ImageSection):
     """A simulated depth camera that sees obstacles and robot; see scenarios.cell.sensors.camera.
 
@@ -95,6 +104,7 @@ class CameraSection(_ImageSection):
     backdrop: NotNegative = 4.0
 
 
+@register("sensors", "frames", shipped=True)
 class FramesSection(_ImageSection):
     """Depth images from a `folder` or a shipped set, with their camera and times.
 
@@ -105,14 +115,14 @@ class FramesSection(_ImageSection):
     folder: str
 
 
-class OwnSensor(OwnSection):
+class OwnSensor(AnySensor, OwnSection):
     """A sensor of a plugin; its keys are those of the plugin."""
 
     group: ClassVar[Group] = "sensors"
     foot: ClassVar[float] = _FOOT
 
 
-SensorKind = Annotated[
-    Annotated[ExactSection, Tag("exact")] | Annotated[CameraSection, Tag("camera")]
-    | Annotated[FramesSection, Tag("frames")] | Annotated[OwnSensor, Tag(PLUGIN)],
-    Discriminator(kind_or("exact", "sensors", ("exact", "camera", "frames")))]
+if TYPE_CHECKING:
+    SensorKind = AnySensor
+else:
+    SensorKind = any_kind("sensors", OwnSensor, "exact")

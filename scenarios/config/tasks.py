@@ -1,39 +1,84 @@
 """The keys of the tasks of the end effector and of all joints, of [limits] and [damping].
 
-Each kind of task is one class; `scenarios.config.listed` adds names and frames for `[[tasks]]`.
+Each section of a task makes it; `scenarios.config.kinds` has those that only `[[tasks]]` have.
 """
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar, Literal, Self
+from collections.abc import Callable, Iterator
+from math import radians
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Self, TypeVar
 
+import numpy as np
 from pydantic import Field, model_validator
 
+from hierarchy import plugins
+from hierarchy.problem import Array
+from scenarios.config.paths import PathSection
 from scenarios.config.sections import (
     Finite,
     Flag,
     JointValue,
     NotNegative,
-    PathSection,
     Positive,
     Section,
     Vector3,
 )
 
+if TYPE_CHECKING:
+    from hierarchy import Task
+    from hierarchy.paths import Path
+    from scenarios.config.references import References
+
 Rows = Literal["equality", "inequality"]
+_Kind = TypeVar("_Kind", bound="Listed")
 TaskName = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_ -]*$")]
 
 
-class TaskSection(Section):
-    """What every task has: gains of its error, in [1/s^2] and [1/s] (acceleration) and [1/s].
+class Made(Section):
+    """What every section of a task has: a title, and the task that it makes.
 
-    `unit` is that of its error, "m", "rad" or "".
+    `unit` is that of its error, "m", "rad" or ""; `of_forces` says that its rows are over contact
+    forces, at level "torque".
     """
 
+    title: ClassVar[str]
     unit: ClassVar[str] = "m"
+    of_forces: ClassVar[bool] = False
+
+    @property
+    def one_sided(self) -> bool:
+        """Whether its rows are inequalities."""
+        return False
+
+    def make(self, at: References) -> Task:
+        """Return the task; values that the section omits are those of the start."""
+        raise NotImplementedError
+
+    def sizes(self, error: Array) -> Iterator[tuple[str, Array]]:
+        """Yield unit and size (T,) of what is missed, from errors (T, m)."""
+        missed = np.maximum(error, 0.0) if self.one_sided else error
+        yield self.unit, np.linalg.norm(missed, axis=1)
+
+    def wanted(self, position: Array, error: Array) -> Array | None:
+        """Return where the task wants the point (..., 3) [m] that it moves, None if it is silent.
+
+        In axes that the task leaves free that is where the point is.
+        """
+        return None
+
+
+class TaskSection(Made):
+    """What most tasks have: gains of its error, in [1/s^2] and [1/s] (acceleration) and [1/s]."""
+
     stiffness: NotNegative = 40.0
     damping: NotNegative = 20.0
     gain: NotNegative = 10.0
+
+    @property
+    def gains(self) -> tuple[float, float, float]:
+        """Stiffness, damping and gain."""
+        return self.stiffness, self.damping, self.gain
 
 
 class AlongSection(TaskSection):
@@ -52,9 +97,43 @@ class AlongSection(TaskSection):
             raise ValueError("from_start needs a path")
         return self
 
+    def along(self, here: Array) -> Path:
+        """Return the path of a point that starts `here` (3,) [m]."""
+        from hierarchy.paths import Shifted, Still
+
+        offset = np.array(self.offset)
+        if self.path is None:
+            return Still((here + offset).tolist())
+        path, shift = self.path.make(), offset + here * self.from_start
+        return Shifted(path, shift.tolist()) if shift.any() else path
+
+
+def of_pose(error: Array) -> Iterator[tuple[str, Array]]:
+    """Yield the sizes (T,) of errors (T, 6) of position [m] and rotation [deg]."""
+    yield "m", np.linalg.norm(error[:, :3], axis=1)
+    yield "deg", np.degrees(np.linalg.norm(error[:, 3:], axis=1))
+
 
 class PositionTask(AlongSection):
-    """The origin of a frame along a path (3 rows)."""
+    """The origin of a frame along a path, in some `axes`."""
+
+    frame: ClassVar[str | None]
+    axes: ClassVar[str]
+
+    def make(self, at: References) -> Task:
+        """Return the task."""
+        from hierarchy.tasks import Along, Position
+
+        frame = at.frame(self.frame)
+        task = Position(frame, self.along(at.start.position(frame)), *self.gains, name=self.title)
+        return task if self.axes == "xyz" else Along(
+            task, np.eye(3)[["xyz".index(axis) for axis in self.axes]].tolist(), self.title)
+
+    def wanted(self, position: Array, error: Array) -> Array | None:
+        """Return where the task wants the point."""
+        axes, goal = ["xyz".index(axis) for axis in self.axes], position.copy()
+        goal[..., axes] += error
+        return goal
 
 
 class PointingTask(TaskSection):
@@ -70,11 +149,25 @@ class PointingTask(TaskSection):
     stiffness: NotNegative = 5.0
     damping: NotNegative = 2.0
     gain: NotNegative = 5.0
+    frame: ClassVar[str | None]
 
     @property
     def one_sided(self) -> bool:
         """Whether its rows are inequalities."""
         return self.rows == "inequality"
+
+    def make(self, at: References) -> Task:
+        """Return the task."""
+        from hierarchy.tasks import Pointing
+
+        return Pointing(at.frame(self.frame), self.axis, radians(self.alpha_d), self.rows,
+                        *self.gains, name=self.title)
+
+    def sizes(self, error: Array) -> Iterator[tuple[str, Array]]:
+        """Yield the angle [deg] off the cone, or outside it."""
+        cosine = np.clip(np.cos(np.radians(self.alpha_d)) - error[:, 0], -1.0, 1.0)
+        beyond = np.degrees(np.arccos(cosine)) - self.alpha_d
+        yield "deg", np.maximum(beyond, 0.0 if self.rows == "inequality" else -beyond)
 
 
 class PostureTask(TaskSection):
@@ -87,19 +180,30 @@ class PostureTask(TaskSection):
     damping: NotNegative = 5.0
     gain: NotNegative = 1.0
 
+    def make(self, at: References) -> Task:
+        """Return the task."""
+        from hierarchy.tasks import Posture
+
+        robot, q = at.robot, at.start.q
+        if self.target is not None:
+            q = robot.configuration(self.target)
+        return Posture(robot.configuration(self.joints, q), *self.gains, name=self.title,
+                       robot=robot)
+
 
 class PositionSection(PositionTask):
     """The end effector's position along a path; without one it stays where it starts."""
 
     title: ClassVar[str] = "position"
-    frame: ClassVar[None] = None
+    frame: ClassVar[str | None] = None
+    axes: ClassVar[str] = "xyz"
 
 
 class PointingSection(PointingTask):
     """The end effector's z axis at `alpha_d` [deg] from `axis`, or with "inequality" within it."""
 
     title: ClassVar[str] = "pointing"
-    frame: ClassVar[None] = None
+    frame: ClassVar[str | None] = None
     rows: Rows = Field("inequality", alias="kind")
 
 
@@ -143,3 +247,25 @@ class DampingSection(Section):
 
     value: NotNegative
     weight: Literal["identity", "mass"] = "identity"
+
+
+class Listed(Made):
+    """A task of `[[tasks]]`; its name defaults to its kind.
+
+    For the sake of the tasks below, each of its rows may `give` that much beyond its least miss, in
+    the unit of the rows: [1/s] or [1/s^2] times that of the task, or [N] of forces.
+    """
+
+    name: TaskName | None = None
+    give: NotNegative = 0.0
+    kind: str
+
+    @property
+    def title(self) -> str:  # type: ignore[override]
+        """The task's name in stacks, messages and tables."""
+        return self.name or self.kind
+
+
+def register(kind: str) -> Callable[[type[_Kind]], type[_Kind]]:
+    """Return a decorator that makes a section a kind of `[[tasks]]`."""
+    return plugins.register("tasks", kind, shipped=True)

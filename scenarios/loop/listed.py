@@ -27,18 +27,6 @@ def position_of(name: str) -> str:
     return f"task_position_{name.replace(' ', '_')}"
 
 
-def wanted(section: ListedTask, position: Array, error: Array) -> Array | None:
-    """Return where a task wants the point (..., 3) [m] that it moves, or None if it does not say.
-
-    In axes that the task leaves free that is where the point is.
-    """
-    if section.kind not in ("position", "pose"):
-        return None
-    axes, goal = ["xyz".index(axis) for axis in getattr(section, "axes", "xyz")], position.copy()
-    goal[..., axes] += error[..., :len(axes)]
-    return goal
-
-
 def signals(robot: Robot, tasks: Iterable[Task], t: Array, q: Array, v: Array) -> dict[str, Array]:
     """Return error and position of listed tasks at t (T,) [s], q (T, nq), v (T, n).
 
@@ -81,22 +69,7 @@ def errors(recording: Recording) -> Iterator[tuple[ListedTask, str, Array]]:
     A pose or frame comes twice, in [m] and [deg]; a pointing task in [deg], off its cone or outside
     it; a task that looks at a point in [deg].
     """
-    from scenarios.config.listed import ListedPointing
-
     for section in recording.scenario.tasks:
-        if error_of(section.title) not in recording:
-            continue
-        error = recording[error_of(section.title)]
-        if section.kind in ("pose", "frame", "relative") and error.shape[1] == 6:
-            yield section, "m", np.linalg.norm(error[:, :3], axis=1)
-            yield section, "deg", np.degrees(np.linalg.norm(error[:, 3:], axis=1))
-        elif isinstance(section, ListedPointing):
-            cosine = np.clip(np.cos(np.radians(section.alpha_d)) - error[:, 0], -1.0, 1.0)
-            beyond = np.degrees(np.arccos(cosine)) - section.alpha_d
-            yield section, "deg", np.maximum(beyond, 0.0 if section.rows == "inequality"
-                                             else -beyond)
-        elif section.kind == "look-at":
-            yield section, "deg", np.degrees(2 * np.arctan(np.linalg.norm(error, axis=1) / 2))
-        else:
-            missed = np.maximum(error, 0.0) if section.one_sided else error
-            yield section, section.unit, np.linalg.norm(missed, axis=1)
+        if error_of(section.title) in recording:
+            for unit, size in section.sizes(recording[error_of(section.title)]):
+                yield section, unit, size

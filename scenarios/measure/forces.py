@@ -52,7 +52,7 @@ def of_wanted_forces(recording: Recording, settle: float) -> Iterator[Number]:
     """
     if "floor_force" not in recording:
         return
-    from scenarios.config.listed import ListedForce
+    from scenarios.config.kinds.forces import ListedForce
 
     names = [contact.name or contact.frame for contact in recording.scenario.contacts]
     after = recording["t"] >= settle

@@ -236,4 +236,4 @@ def _paths(recording: Recording, ticks: NDArray[np.int64]) -> Iterator[Moved]:
             continue
         actual = recording[listed.position_of(section.title)][ticks]
         error = recording[listed.error_of(section.title)][ticks]
-        yield Moved(section.title, actual, listed.wanted(section, actual, error))
+        yield Moved(section.title, actual, section.wanted(actual, error))

@@ -42,14 +42,10 @@ from hierarchy.tasks import (
 )
 from hierarchy.tasks.geometric import cross
 from hierarchy.tasks.pose import rotation_vector
-from scenarios.config.listed import (
-    ListedCentreOfMass,
-    ListedFrame,
-    ListedPointing,
-    ListedPose,
-    ListedPosition,
-    ListedPosture,
-)
+from scenarios.config.kinds.com import ListedCentreOfMass
+from scenarios.config.kinds.pointing import ListedPointing
+from scenarios.config.kinds.position import ListedFrame, ListedPose, ListedPosition
+from scenarios.config.kinds.posture import ListedPosture
 
 STEP = 1e-6
 STATES = states(20)

@@ -304,7 +304,7 @@ def test_a_changed_plugin_is_another_version(folder):
     ("plant.share='all'", "plant: share: Input should be a valid number, got 'all'"),
     ("plant.kind=waek",
      "plant: expected a kind, 'kinematic', 'mujoco', 'torque', 'weak'; got 'waek'"),
-    ("tasks.0.kind=elbwo", "'collision', 'elbow', 'along', 'broken'; got 'elbwo'"),
+    ("tasks.0.kind=elbwo", "'relative', 'elbow', 'along', 'broken'; got 'elbwo'"),
     ("control.resolver=havled", "unknown resolver 'havled'; did you mean 'halved'?"),
     ("control.options.shar=0.1", "unknown setting of halved 'shar'; did you mean 'share'?"),
     ("robot.model=my_arn", "unknown robot 'my_arn'; did you mean 'my_arm'?"),

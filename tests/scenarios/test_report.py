@@ -13,7 +13,7 @@ from hand_made import HandMadeScenario, recording
 from headless import chromium
 
 from scenarios.config import load
-from scenarios.config.listed import ListedPosition
+from scenarios.config.kinds.position import ListedPosition
 from scenarios.loop.recording import Event
 from scenarios.loop.simulation import simulate
 from scenarios.measure.comparison import Comparison

@@ -5,7 +5,6 @@ import pytest
 
 from hierarchy import HierarchyError
 from hierarchy.paths import Jittered, Still
-from scenarios.cell.paths import make_path
 from scenarios.config import ScenarioError, load
 from scenarios.loop.simulation import simulate
 from scenarios.measure.metrics import measure
@@ -72,7 +71,7 @@ def test_the_jerk_of_a_ramp_is_its_slope():
 def test_the_path_is_out_of_reach_when_it_says_so(name):
     """The hand points along x, so the wrist is HAND behind the end effector."""
     section = load(name).tasks[0].path
-    path, (span,) = make_path(section.model_copy(update={"jitter": None})), section.out_of_reach
+    path, (span,) = section.model_copy(update={"jitter": None}).make(), section.out_of_reach
     for t in np.arange(0.0, 12.5, 0.01):
         wrist = np.linalg.norm(path(t)[0] - [HAND, 0.0, 0.0])
         outside = span[0] + 0.005 < t < span[1] - 0.005
@@ -83,7 +82,7 @@ def test_the_path_is_out_of_reach_when_it_says_so(name):
 
 def test_the_path_passes_through_a_singularity_of_shoulder_and_wrist_and_of_the_elbow():
     scenario = load("singular")
-    path = make_path(scenario.tasks[0].path.model_copy(update={"jitter": None}))
+    path = scenario.tasks[0].path.model_copy(update={"jitter": None}).make()
     points = np.array([path(t)[0] for t in np.arange(0.5, 3.0, 0.001)])
     crossing = np.array([FOREARM + HAND, 0.0, UPPER_ARM])  # q = 0 but for the elbow at 90 deg
     assert np.linalg.norm(points - crossing, axis=1).min() < 1e-3

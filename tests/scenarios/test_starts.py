@@ -55,13 +55,12 @@ def test_a_variation_replaces_that_of_the_extended_file(tmp_path):
 
 
 def test_a_phase_starts_the_ellipse_elsewhere():
-    from scenarios.cell.paths import make_path
 
     path = load("ellipse").position.path
     shifted = path.model_copy(update={"phase": 0.3})
     first, second = np.empty((2, 3, 3))
-    make_path(path).write(1.3, first)
-    make_path(shifted).write(1.0, second)
+    path.make().write(1.3, first)
+    shifted.make().write(1.0, second)
     np.testing.assert_allclose(second, first, atol=1e-12)
 
 

@@ -151,7 +151,7 @@ class Watched:
             here = self.listed.get(listed.position_of(section.title))
             if here is not None:
                 error = self.listed[listed.error_of(section.title)]
-                yield here[0], listed.wanted(section, here[0], error[0])
+                yield here[0], section.wanted(here[0], error[0])
 
     def _judged(self) -> Judged:
         controller = self.controller

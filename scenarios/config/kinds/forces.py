@@ -1,0 +1,49 @@
+"""Forces of contacts, at level "torque"."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar, Literal
+
+from scenarios.config.sections import Finite
+from scenarios.config.tasks import Listed, register
+
+if TYPE_CHECKING:
+    from hierarchy import Task
+    from scenarios.config.references import References
+
+
+
+
+@register("contact-force")
+class ListedForce(Listed):
+    """The force of a contact at `target`: its normal force, its force, or its wrench [N, N m].
+
+    One, three or six numbers, see hierarchy.tasks.ContactForce; at level "torque".
+    """
+
+    unit: ClassVar[str] = "N"
+    of_forces: ClassVar[bool] = True
+    kind: Literal["contact-force"]
+    contact: str
+    target: tuple[Finite, ...]
+
+    def make(self, at: References) -> Task:
+        """Return the task."""
+        from hierarchy.tasks import ContactForce
+
+        return ContactForce(at.contacts, self.contact, self.target, self.title)
+
+
+@register("least-force")
+class ListedLeastForce(Listed):
+    """The smallest contact forces, as a last level; at level "torque"."""
+
+    unit: ClassVar[str] = "N"
+    of_forces: ClassVar[bool] = True
+    kind: Literal["least-force"]
+
+    def make(self, at: References) -> Task:
+        """Return the task."""
+        from hierarchy.tasks import LeastForce
+
+        return LeastForce(at.contacts, self.title)

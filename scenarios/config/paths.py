@@ -1,0 +1,159 @@
+"""Paths in a scenario file: the keys of each kind, and the path that they make."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import TYPE_CHECKING, Annotated, Literal, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from hierarchy.errors import HierarchyError
+from scenarios.config.errors import ScenarioError
+from scenarios.config.sections import Count, Finite, NotNegative, Positive, Section, Vector3
+
+if TYPE_CHECKING:
+    from hierarchy.paths import Path
+
+
+class JitterSection(Section):
+    """A smooth random motion of a path: at most `amplitude` [m] in each axis, up to `rate` [Hz].
+
+    The same `seed` gives the same motion.
+    """
+
+    amplitude: NotNegative
+    rate: Positive
+    seed: Count = 0
+
+
+class _AnyPath(Section):
+    """What every path may have.
+
+    `out_of_reach`: spans of time [s] in which the robot cannot be on the path. The loop ignores
+    them; metrics say how the robot comes back.
+    """
+
+    jitter: JitterSection | None = None
+    out_of_reach: tuple[tuple[NotNegative, NotNegative], ...] | None = None
+
+    @model_validator(mode="after")
+    def _spans_are_in_order(self) -> Self:
+        times = [t for span in self.out_of_reach or () for t in span]
+        if any(b <= a for a, b in pairwise(times)):
+            raise ValueError(f"out_of_reach: times must increase, got {times}")
+        return self
+
+    def make(self) -> Path:
+        """Return the path; raises ScenarioError where the values are no path."""
+        from hierarchy.paths import Jittered
+
+        try:
+            path, jitter = self._steady(), self.jitter
+        except HierarchyError as error:
+            raise ScenarioError(f"path of kind {getattr(self, 'kind', '')!r}: {error}") from error
+        return path if jitter is None else Jittered(path, jitter.amplitude, jitter.rate,
+                                                    jitter.seed)
+
+    def _steady(self) -> Path:
+        """Return the path without jitter."""
+        raise NotImplementedError
+
+
+class StillSection(_AnyPath):
+    """A point that does not move, `position` [m]."""
+
+    kind: Literal["still"]
+    position: Vector3
+
+    def _steady(self) -> Path:
+        from hierarchy.paths import Still
+
+        return Still(self.position)
+
+
+class EllipseSection(_AnyPath):
+    """p(t) = centre + cosine cos(s) + sine sin(s) [m] with s = rate t + phase [rad]."""
+
+    kind: Literal["ellipse"]
+    centre: Vector3
+    cosine: Vector3
+    sine: Vector3
+    rate: Finite = 1.0
+    phase: Finite = 0.0
+
+    def _steady(self) -> Path:
+        from hierarchy.paths import Ellipse
+
+        if self.phase == 0.0:
+            return Ellipse(self.centre, self.cosine, self.sine, self.rate)
+        cosine, sine = np.array(self.cosine), np.array(self.sine)
+        c, s = np.cos(self.phase), np.sin(self.phase)  # the phase by the addition theorems
+        turned = tuple((c * cosine + s * sine).tolist()), tuple((c * sine - s * cosine).tolist())
+        return Ellipse(self.centre, *turned, self.rate)
+
+
+class WaypointsSection(_AnyPath):
+    """Points [m] at increasing times [s], at rest at each point.
+
+    With `blend` [s] it does not stop: it rounds each point in a curve of that duration and is
+    nearest to it half that time later, see hierarchy.paths.Blended.
+    """
+
+    kind: Literal["waypoints"]
+    times: tuple[NotNegative, ...]
+    points: tuple[Vector3, ...]
+    blend: Positive | None = None
+
+    def _steady(self) -> Path:
+        from hierarchy.paths import Blended, Waypoints
+
+        return (Waypoints(self.times, self.points) if self.blend is None
+                else Blended(self.times, self.points, self.blend))
+
+
+class LineSection(_AnyPath):
+    """Straight from `start` to `end` [m] within `duration` [s], from `begin` [s] on."""
+
+    kind: Literal["line"]
+    start: Vector3
+    end: Vector3
+    duration: Positive
+    begin: NotNegative = 0.0
+
+    def _steady(self) -> Path:
+        from hierarchy.paths import line
+
+        return line(self.start, self.end, self.duration, self.begin)
+
+
+class CircleSection(_AnyPath):
+    """A circle of `radius` [m] about `normal`; rate [rad/s], phase [rad]."""
+
+    kind: Literal["circle"]
+    centre: Vector3
+    radius: NotNegative
+    normal: Vector3 = (0.0, 0.0, 1.0)
+    rate: Finite = 1.0
+    phase: Finite = 0.0
+
+    def _steady(self) -> Path:
+        from hierarchy.paths import circle
+
+        return circle(self.centre, self.radius, self.normal, self.rate, self.phase)
+
+
+class RecordedSection(_AnyPath):
+    """A recorded motion: a CSV `file` with t [s], x, y, z [m], relative to the scenario's file."""
+
+    kind: Literal["recorded"]
+    file: str
+
+    def _steady(self) -> Path:
+        from hierarchy.paths import Recorded
+
+        return Recorded.from_csv(self.file)
+
+
+PathSection = Annotated[StillSection | LineSection | CircleSection | EllipseSection
+                        | WaypointsSection | RecordedSection, Field(discriminator="kind")]
