@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 _LIBRARY = Path(__file__).parents[1] / "library"
+_VARIANT = re.compile(r"(?m)^\[variants\.([\w-]+)\]")
 
 
 def scenarios(incomplete: str) -> list[str]:
     """Return the matching scenarios; if there are none, the shell completes files."""
-    return _names(_LIBRARY, incomplete)
+    found = []
+    for path in _LIBRARY.glob("*.toml"):
+        text = path.read_text(encoding="utf-8")
+        found += [path.stem] if f'name = "{path.stem}"' in text else []
+        found += [f"{path.stem}-{key}" for key in _VARIANT.findall(text)]
+    return sorted(name for name in found if name.startswith(incomplete))
 
 
 def compared(incomplete: str) -> list[str]:

@@ -17,7 +17,7 @@ from hierarchy.robots import TABLES
 from hierarchy.robots.found import remarks
 from hierarchy.robots.names import elsewhere, file_of, in_package, is_file_name
 from hierarchy.words import some
-from scenarios.config import ScenarioError, shipped, shipped_groups
+from scenarios.config import ScenarioError, is_shipped, shipped, shipped_groups
 from scenarios.config.changes import change, parse_changes
 from scenarios.config.robot import RobotSection
 
@@ -29,7 +29,7 @@ _UNITS = {"rad": "rad, rad/s, N m", "m": "m, m/s, N"}
 
 def is_robot(text: str) -> bool:
     """Whether the text names a robot; a name that is also a scenario's means the scenario."""
-    if text.endswith(".toml") or text in shipped():
+    if text.endswith(".toml") or ".toml:" in text or is_shipped(text):
         return False
     return (in_package(text) or is_file_name(text) or text in TABLES
             or text in plugins.own("robots"))
@@ -37,7 +37,8 @@ def is_robot(text: str) -> bool:
 
 def check_known(text: str) -> None:
     """Raise UnknownNameError for a name that is neither a scenario's nor a robot's."""
-    if not text.endswith(".toml") and not {text} & {*shipped(), *shipped_groups()}:
+    if not (text.endswith(".toml") or ".toml:" in text or is_shipped(text)
+            or text in shipped_groups()):
         raise UnknownNameError("scenario or robot", text, {*shipped(), *TABLES}, elsewhere(text))
 
 

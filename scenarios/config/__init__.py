@@ -2,8 +2,8 @@
 
 from scenarios.config.errors import ScenarioError
 from scenarios.config.groups import members, shipped_groups
-from scenarios.config.reading import load, shipped
+from scenarios.config.reading import is_shipped, load, shipped
 from scenarios.config.scenario import Scenario
 
-__all__ = ["Scenario", "ScenarioError", "load", "members", "shipped",
+__all__ = ["Scenario", "ScenarioError", "is_shipped", "load", "members", "shipped",
            "shipped_groups"]

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from hierarchy import plugins
 from hierarchy.errors import HierarchyError, UnknownNameError, file_path
@@ -21,32 +22,61 @@ LIBRARY = Path(__file__).parents[1] / "library"
 _DEEPEST = 50  # files that may extend each other
 
 
+class Source(NamedTuple):
+    """A scenario in a file: the file's own, or one of its `[variants]`."""
+
+    path: Path
+    variant: str = ""
+
+    def __str__(self) -> str:
+        name = f"{self.path.stem}-{self.variant}" if self.variant else self.path.stem
+        if self.path.parent == LIBRARY:
+            return f"scenario {name!r}"
+        return f"{self.path}:{self.variant}" if self.variant else str(self.path)
+
+
+@cache
+def _library() -> dict[str, Source]:
+    """Return the shipped scenarios by name: FILE, and FILE-VARIANT of each variant in it."""
+    found: dict[str, Source] = {}
+    for path in LIBRARY.glob("*.toml"):
+        data = read_toml(path, "scenario file", ScenarioError)
+        variants = data.pop("variants", {})
+        found |= {path.stem: Source(path)} if data else {}
+        found |= {f"{path.stem}-{key}": Source(path, key) for key in variants}
+    return dict(sorted(found.items()))
+
+
 def shipped() -> tuple[str, ...]:
     """Return the names of the scenarios shipped with the package."""
-    return tuple(sorted(path.stem for path in LIBRARY.glob("*.toml")))
+    return tuple(_library())
+
+
+def is_shipped(name: str) -> bool:
+    """Whether a scenario of this name is shipped; a variant is FILE:VARIANT or FILE-VARIANT."""
+    return name.replace(":", "-", 1) in _library()
 
 
 def load(name_or_path: str | Path, changes: Sequence[str] | Mapping[str, Any] = ()) -> Scenario:
     """Read a shipped scenario by name, or a scenario file by path, and apply changes to it.
 
     A file with `extends = "ellipse"` (a shipped name or a relative path) contains only the
-    differences. Nothing is taken over of a section of another kind, nor of those named in
-    `replaces = ["avoidance"]`, and a `[variation]` replaces the other one. `changes` are
-    "dotted.key=value" texts with TOML values, or a mapping of dotted keys, see
-    scenarios.config.changes. Raises ScenarioError, naming the file and the key, and
-    UnknownNameError for an unknown name.
+    differences. A table `[variants.wide]` in ellipse.toml is such a file by itself, over the
+    scenario of its own file unless it `extends` another, or none with `extends = false`; its name
+    is "ellipse:wide" or "ellipse-wide", in a file of your own FILE.toml:wide. Nothing is taken over
+    of a section of another kind, nor of those named in `replaces = ["avoidance"]`, and a
+    `[variation]` replaces the other one. `changes` are "dotted.key=value" texts with TOML values,
+    or a mapping of dotted keys, see scenarios.config.changes. Raises ScenarioError, naming the file
+    and the key, and UnknownNameError for an unknown name.
     """
-    path = file_path("load", name_or_path)
-    if path.suffix != ".toml":
-        _check_name(str(name_or_path))
-        path = LIBRARY / f"{name_or_path}.toml"
-    data = _read_extended(path)
+    source = _found(file_path("load", name_or_path))
+    path, what = source.path, str(source)
+    data = _read_extended(source)
     if not isinstance(changes, Mapping):
         changes = parse_changes(changes, what="--set")
     _list_points_as_tables(data)
     change_all(data, changes, Scenario.tag_at)
     _make_files_absolute(data, path.parent.resolve())
-    what = str(path) if path.parent != LIBRARY else f"scenario {path.stem!r}"
     _require_plugins(data, what)
     return validated(Scenario, data, what)
 
@@ -81,36 +111,67 @@ def _require_plugins(data: dict[str, Any], what: str) -> None:
         data["plugins"] = list(dict.fromkeys(named))
 
 
-def _check_name(name: str) -> None:
+def _found(path: Path) -> Source:
+    """Return where a scenario is, given by name or file; raises ScenarioError for a group."""
+    file, colon, variant = str(path).rpartition(".toml:")
+    if colon:
+        return Source(Path(f"{file}.toml"), variant)
+    if path.suffix == ".toml":
+        return Source(path)
+    name = str(path)
+    if is_shipped(name):
+        return _library()[name.replace(":", "-", 1)]
     if name in shipped_groups():
         listed = ", ".join(load_group(name).scenarios)
         raise ScenarioError(f"{name!r} is a group of scenarios, to be run by `hierarchy compare "
                             f"{name}`; its scenarios are {listed}")
-    if name not in shipped():
-        raise UnknownNameError("scenario", name, shipped())
+    raise UnknownNameError("scenario", name, shipped())
 
 
-def _read_extended(path: Path, below: tuple[Path, ...] = ()) -> dict[str, Any]:
-    """Read a file, merged over the scenario or file that its `extends` names."""
-    data = read_toml(path, "scenario file", ScenarioError)
+def _read(source: Source) -> dict[str, Any]:
+    """Read one scenario of a file, without what it extends."""
+    data = read_toml(source.path, "scenario file", ScenarioError)
+    variants = data.pop("variants", {})
+    if not isinstance(variants, dict) or not all(isinstance(v, dict) for v in variants.values()):
+        raise ScenarioError(f"{source.path}: variants: expected a table of tables")
+    if not source.variant:
+        return data
+    if source.variant not in variants:
+        error = UnknownNameError("variant", source.variant, variants)
+        raise ScenarioError(f"{source.path}: {error}")
+    return {"name": f"{source.path.stem}-{source.variant}", "extends": Source(source.path),
+            **variants[source.variant]}
+
+
+def _read_extended(source: Source, below: tuple[Source, ...] = ()) -> dict[str, Any]:
+    """Read a scenario, merged over the scenario or file that its `extends` names."""
+    data, path = _read(source), source.path
     base, replaced = data.pop("extends", None), data.pop("replaces", None)
-    if base is None:
+    if base is None or (base is False and source.variant):
         if replaced is not None:
             raise ScenarioError(f"{path}: replaces: goes with extends")
         return data
-    if not isinstance(base, str):
-        raise ScenarioError(f"{path}: extends: expected a name or a path, got {base!r}")
-    source = LIBRARY / f"{base}.toml" if base in shipped() else path.parent / base
-    if source.resolve() in (*below, path.resolve()):
+    under = base if isinstance(base, Source) else _extended(base, path)
+    here = (*below, Source(path.resolve(), source.variant))
+    if Source(under.path.resolve(), under.variant) in here:
         raise ScenarioError(f"{path}: extends: {base!r} extends this file in turn")
     if len(below) >= _DEEPEST:
         raise ScenarioError(f"{path}: extends: more than {_DEEPEST} files, one over the other")
-    if source.suffix != ".toml":
-        raise ScenarioError(f"{path}: extends: {UnknownNameError('scenario', base, shipped())}")
-    found = _read_extended(source, (*below, path.resolve()))
+    found = _read_extended(under, here)
     if "variation" in data:  # its keys belong together
         found.pop("variation", None)
     return laid_over(_without(found, replaced or [], path), data, Scenario.tag_at)
+
+
+def _extended(base: Any, path: Path) -> Source:
+    """Return the scenario that `extends` names in the file at `path`."""
+    if not isinstance(base, str):
+        raise ScenarioError(f"{path}: extends: expected a name or a path, got {base!r}")
+    if is_shipped(base):
+        return _found(Path(base))
+    if Path(base).suffix != ".toml" and ".toml:" not in base:
+        raise ScenarioError(f"{path}: extends: {UnknownNameError('scenario', base, shipped())}")
+    return _found(path.parent / base)
 
 
 def _without(below: dict[str, Any], sections: Any, path: Path) -> dict[str, Any]:

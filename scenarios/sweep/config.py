@@ -71,7 +71,7 @@ def load_sweep(name_or_path: str | Path) -> Sweep:
         said = dict.fromkeys(_say(path, one) for one in error.errors())
         raise SweepError("\n".join(said)) from error
     return sweep.model_copy(update={"scenarios": tuple(
-        str(path.parent.resolve() / name) if name.endswith(".toml") else name
+        str(path.parent.resolve() / name) if name.endswith(".toml") or ".toml:" in name else name
         for name in sweep.scenarios)})
 
 

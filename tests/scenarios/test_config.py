@@ -20,6 +20,18 @@ def test_every_shipped_scenario_loads_under_its_own_name(name):
     scenario.make_resolver()
 
 
+def test_a_variant_has_two_names_and_those_of_a_file_extend_it(tmp_path):
+    assert load("ellipse:35deg") == load("ellipse-35deg")
+    (tmp_path / "mine.toml").write_text('extends = "ellipse:limits"\nname = "mine"\n'
+                                        "[variants.wide.pointing]\nalpha_d = 50.0\n")
+    assert load(f"{tmp_path}/mine.toml").pointing.alpha_d == 5.0
+    wide = load(f"{tmp_path}/mine.toml:wide")
+    assert (wide.name, wide.pointing.alpha_d) == ("mine-wide", 50.0)
+    assert wide.limits == load("ellipse-limits").limits
+    with pytest.raises(HierarchyError, match="wide"):
+        load(f"{tmp_path}/mine.toml:wid")
+
+
 @pytest.mark.parametrize("name", shipped())
 def test_a_scenario_as_run_reads_back_the_same(name, tmp_path):
     scenario = load(name)

@@ -46,7 +46,8 @@ def test_the_group_is_the_ladder_from_its_first_step_to_its_last():
 
 @pytest.mark.parametrize(("before", "name"), list(pairwise(["ellipse", *STEPS])))
 def test_a_step_extends_the_one_before_and_changes_what_it_says_and_nothing_else(name, before):
-    assert tomllib.loads((LIBRARY / f"{name}.toml").read_text())["extends"] == before
+    steps = tomllib.loads((LIBRARY / "ladder.toml").read_text())["variants"]
+    assert steps[name.removeprefix("ladder-")]["extends"] == before
     found = differing(before, name)
     assert found
     assert all(key == STEPS[name] or key.startswith(f"{STEPS[name]}.") for key in found)
