@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from functools import partial
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+
+from hierarchy import plugins
 
 if TYPE_CHECKING:
     from scenarios.loop.recording import Recording
@@ -44,24 +47,38 @@ class Metric:
     detail: bool = False
 
     @property
+    def _display(self) -> tuple[float, str, int]:
+        return _SHOWN.get(self.unit, (1.0, self.unit, 3))
+
+    @property
     def shown_unit(self) -> str:
         """The unit in which tables show the value."""
-        return _SHOWN[self.unit][1]
+        return self._display[1]
 
     @property
     def scale(self) -> float:
         """How many of `shown_unit` make one SI unit."""
-        return _SHOWN[self.unit][0]
+        return self._display[0]
 
     def shown(self) -> str:
         """Return the value for a table: in `shown_unit`, without the unit."""
         if self.value is None:
             return "–"
-        scale, _, decimals = _SHOWN[self.unit]
+        scale, _, decimals = self._display
         value = self.value * scale
         if value != 0.0 and (abs(value) < 0.5 * 10.0**-decimals or abs(value) >= 1e5):
             return f"{value:.1e}"
         return f"{value:.{decimals}f}"
+
+
+class Criteria(NamedTuple):
+    """What metrics are judged by, see `measure`."""
+
+    settle: float
+    cone_tolerance_deg: float
+
+
+_register = partial(plugins.register, "metrics", shipped=True)
 
 
 def measure(recording: Recording, settle: float = 2.0,
@@ -74,17 +91,14 @@ def measure(recording: Recording, settle: float = 2.0,
     cone_tolerance_deg : [deg] beyond the cone that still counts as being on it.
 
     Distances, joint speeds and joint limits are judged by the true state where it is known apart
-    from the measured one.
+    from the measured one. A plugin adds metrics with `register("metrics", NAME)` on a function of
+    a recording and Criteria that yields them.
     """
     if recording.ticks == 0:
         return {}
-    found = (*_tracking(recording, settle), *_pointing(recording, cone_tolerance_deg),
-             *_listed(recording, settle), *_strictness(recording),
-             *_distances(recording), *_contacts(recording), *_forces(recording, settle),
-             *_motion(recording),
-             *_returning(recording),
-             *_switching(recording), *_troubles(recording), *_time(recording))
-    return {metric.name: metric for metric in found}
+    by = Criteria(settle, cone_tolerance_deg)
+    return {metric.name: metric for found in plugins.known("metrics").values()
+            for metric in found(recording, by)}
 
 
 def as_plain_data(recording: Recording) -> dict[str, Any]:
@@ -103,18 +117,19 @@ def plain(metric: Metric) -> dict[str, Any]:
             "lower_is_better": metric.lower_is_better, **note}
 
 
-def _tracking(recording: Recording, settle: float) -> Iterator[Metric]:
+@_register("tracking")
+def _tracking(recording: Recording, by: Criteria) -> Iterator[Metric]:
     if "position_error" not in recording:
         return
     error = np.linalg.norm(recording["position_error"], axis=1)
-    after = error[recording["t"] - recording["t"][0] >= settle]
-    spans = (("", "Position error", error), ("_settled", f"Error after {settle:g} s", after))
+    after = error[recording["t"] - recording["t"][0] >= by.settle]
+    spans = (("", "Position error", error), ("_settled", f"Error after {by.settle:g} s", after))
     for suffix, when, e in spans:
         yield Metric(f"position_error_rms{suffix}", f"{when}, rms",
                      _finite(np.sqrt(np.mean(e**2))) if e.size else None, "m", group="Tracking")
         yield Metric(f"position_error_max{suffix}", f"{when}, max",
                      _largest(e), "m", group="Tracking")
-    yield Metric("position_error_median_settled", f"Error after {settle:g} s, median",
+    yield Metric("position_error_median_settled", f"Error after {by.settle:g} s, median",
                  _finite(np.median(after)) if after.size else None, "m", group="Tracking")
     if "true_ee_position" in recording:
         true = np.linalg.norm(recording["desired_position"] - recording["true_ee_position"], axis=1)
@@ -124,7 +139,8 @@ def _tracking(recording: Recording, settle: float) -> Iterator[Metric]:
                      group="Tracking")
 
 
-def _pointing(recording: Recording, tolerance: float) -> Iterator[Metric]:
+@_register("pointing")
+def _pointing(recording: Recording, by: Criteria) -> Iterator[Metric]:
     if "pointing_error" not in recording or recording.scenario.pointing is None:
         return
     half_angle = recording.scenario.pointing.alpha_d
@@ -133,17 +149,18 @@ def _pointing(recording: Recording, tolerance: float) -> Iterator[Metric]:
                  _finite(max(float(beyond.max()), 0.0)), "deg", group="Tracking",
                  note=f"a cone of {half_angle:g}°")
     yield Metric("cone_violation_share", "Time outside the cone",
-                 float(np.mean(beyond > tolerance)), "share", group="Tracking",
-                 note=f"outside by more than {tolerance:g}°")
+                 float(np.mean(beyond > by.cone_tolerance_deg)), "share", group="Tracking",
+                 note=f"outside by more than {by.cone_tolerance_deg:g}°")
 
 
-def _listed(recording: Recording, settle: float) -> Iterator[Metric]:
+@_register("listed")
+def _listed(recording: Recording, by: Criteria) -> Iterator[Metric]:
     """Errors of the tasks of `[[tasks]]`, each under its name."""
     if not recording.scenario.tasks:
         return
     from scenarios.loop.listed import errors
 
-    after = recording["t"] - recording["t"][0] >= settle
+    after = recording["t"] - recording["t"][0] >= by.settle
     for section, unit, exact in errors(recording):
         error = np.where(exact < _NOTHING, 0.0, exact)
         turned = unit == "deg" and section.kind in ("pose", "frame", "relative")
@@ -152,7 +169,7 @@ def _listed(recording: Recording, settle: float) -> Iterator[Metric]:
         lower = None if section.kind == "posture" else True  # it gets what is left
         yield Metric(f"{key}_rms", f"{title}: error, rms", _finite(np.sqrt(np.mean(error**2))),
                      unit, lower, "Tracking")
-        yield Metric(f"{key}_max_settled", f"{title}: after {settle:g} s, max",
+        yield Metric(f"{key}_max_settled", f"{title}: after {by.settle:g} s, max",
                      _largest(error[after]), unit, lower, "Tracking")
         yield Metric(f"{key}_end", f"{title}: at the end", _finite(error[-1]), unit, lower,
                      "Tracking", detail=True)
@@ -165,7 +182,8 @@ def pointing_angle(recording: Recording) -> Array:
     return np.asarray(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))))
 
 
-def _strictness(recording: Recording) -> Iterator[Metric]:
+@_register("strictness")
+def _strictness(recording: Recording, by: Criteria) -> Iterator[Metric]:
     if "moved_by_lower" in recording:
         moved = recording["moved_by_lower"]
         yield Metric("moved_by_lower_max", "Moved by lower tasks in a tick, max",
@@ -173,7 +191,8 @@ def _strictness(recording: Recording) -> Iterator[Metric]:
                      group="Tracking", note="strict: not at all")
 
 
-def _distances(recording: Recording) -> Iterator[Metric]:
+@_register("distances")
+def _distances(recording: Recording, by: Criteria) -> Iterator[Metric]:
     for who, signal, label in (("body", "minimal_distance", "Body"),
                                ("ee", "ee_distance", "End effector")):
         if signal not in recording:
@@ -200,7 +219,8 @@ def _below(recording: Recording, who: str, label: str, distance: Array) -> Itera
                      group="Safety", note=f"nearer than {promised:g} m")
 
 
-def _contacts(recording: Recording) -> Iterator[Metric]:
+@_register("contacts")
+def _contacts(recording: Recording, by: Criteria) -> Iterator[Metric]:
     if "contacts" in recording:
         yield Metric("contact_ticks", "Contacts: ticks",
                      float(np.count_nonzero(recording["contacts"])), "", group="Safety")
@@ -209,10 +229,11 @@ def _contacts(recording: Recording) -> Iterator[Metric]:
                          _largest(recording[f"contact_{key}"]), unit, group="Safety")
 
 
-def _forces(recording: Recording, settle: float) -> Iterator[Metric]:
+@_register("forces")
+def _forces(recording: Recording, by: Criteria) -> Iterator[Metric]:
     from scenarios.measure import forces
 
-    for number in forces.of_wanted_forces(recording, settle):
+    for number in forces.of_wanted_forces(recording, by.settle):
         yield Metric(*number, group="Contacts")
     for group, numbers in (("Contacts", forces.of_contacts), ("Torques", forces.of_torques),
                            ("Levels", forces.of_levels)):
@@ -225,7 +246,8 @@ def _true(recording: Recording, signal: str) -> Array:
     return recording[f"true_{signal}" if f"true_{signal}" in recording else signal]
 
 
-def _motion(recording: Recording) -> Iterator[Metric]:
+@_register("motion")
+def _motion(recording: Recording, by: Criteria) -> Iterator[Metric]:
     v, group = _true(recording, "v"), "Safety"
     yield _joint_limit_excess(recording)
     yield Metric("speed_max", "Joint speed, max", _largest(v), "rad/s", group=group)
@@ -270,7 +292,8 @@ def _joint_limit_excess(recording: Recording) -> Metric:
 _AFTER = 0.5  # [s] after the return within reach that do not count as error
 
 
-def _returning(recording: Recording) -> Iterator[Metric]:
+@_register("returning")
+def _returning(recording: Recording, by: Criteria) -> Iterator[Metric]:
     """Metrics of runs whose path leaves the workspace: freezes, jerk, limits, the way back."""
     from scenarios.measure.returning import frozen, jerk, returned
 
@@ -311,7 +334,8 @@ def _left_path(recording: Recording) -> tuple[tuple[tuple[float, float], ...], A
     return None
 
 
-def _switching(recording: Recording) -> Iterator[Metric]:
+@_register("switching")
+def _switching(recording: Recording, by: Criteria) -> Iterator[Metric]:
     yield Metric("stack_changes", "Changes of the stack", float(recording.switches().size), "",
                  group="Switching")
     if "active_set" in recording or recording.facts.asks != "equalities":
@@ -336,14 +360,16 @@ _DONE = {"brake": "Ticks braked", "hold": "Ticks with the last command held",
          "clamp": "Ticks clamped to the limits"}
 
 
-def _troubles(recording: Recording) -> Iterator[Metric]:
+@_register("troubles")
+def _troubles(recording: Recording, by: Criteria) -> Iterator[Metric]:
     for action, label in _DONE.items():
         ticks = {event.tick for event in recording.events if event.action == action}
         if ticks:
             yield Metric(f"ticks_{action}", label, float(len(ticks)), "", group="Computing")
 
 
-def _time(recording: Recording) -> Iterator[Metric]:
+@_register("time")
+def _time(recording: Recording, by: Criteria) -> Iterator[Metric]:
     if "status" in recording:
         from solvers import Status
         failed = np.count_nonzero(recording["status"] != int(Status.SOLVED))

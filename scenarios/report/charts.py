@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from markupsafe import Markup
 
+from hierarchy import plugins
 from hierarchy.words import listed
 from scenarios.draw.figures import drawing, panels
 from scenarios.draw.figures.drawing import svg
@@ -59,7 +60,7 @@ def multiples(name: str, found: Sequence[Motion], looks: Mapping[str, Look]) -> 
     """Return a card for each quantity, with one panel per motion on equal axes."""
     recordings = {one.label: one.recording for one in found}
     cards = []
-    for panel in (*panels.PANELS, *panels.TASK_PANELS):
+    for panel in plugins.known("figures").values():
         small = figures.side_by_side(panel, recordings, looks)
         if any(panel.shows(recordings[label]) for label in small):
             cards.append((panel, _key(panel.name, recordings), [

@@ -1,4 +1,4 @@
-"""One table of signals: what is recorded, and what may be asked for."""
+"""Signals, metrics and figures: what is recorded, and what a module of one's own adds."""
 
 import numpy as np
 import pytest
@@ -6,9 +6,15 @@ import pytest
 from hierarchy import plugins
 from hierarchy.errors import UnknownNameError
 from scenarios import load, simulate
+from scenarios.draw.figures.palette import looks
+from scenarios.draw.figures.panels import Panel
 from scenarios.export.mcap import grouped
 from scenarios.loop.columns import columns
 from scenarios.loop.signals import Signal, known
+from scenarios.measure.metrics import Metric
+from scenarios.measure.motions import motions
+from scenarios.measure.runs import Run, table
+from scenarios.report.charts import multiples
 
 pytestmark = pytest.mark.usefixtures("no_plugins")
 
@@ -42,3 +48,19 @@ def test_a_signal_of_a_plugin_has_its_unit_and_topic_everywhere(run):
     assert {column.title for column in columns(run)} > {"strain [Pa]"}
     assert set(grouped(run)["/links"]) == {"strain"}
     del run.signals["strain"]
+
+
+def test_a_metric_and_a_figure_of_a_plugin_are_in_the_table_and_on_the_page(run):
+    @plugins.register("metrics", "strained")
+    def strained(recording, by):
+        yield Metric("strain_max", "Strain, max", float(recording.ticks), "Pa")
+
+    def draw(ax, recording, colour):
+        ax.plot(recording["t"], recording["q"][:, 0], color=colour)
+
+    plugins.register("figures", "first-joint")(Panel("first-joint", "First", "rad", "q", draw))
+    ours = Run(run.scenario, "own", "own", run)
+    assert ours.metrics["strain_max"].shown_unit == "Pa"
+    assert {row.name for row in table([ours])} >= {"strain_max", "speed_max"}
+    found = motions([ours])
+    assert "own: First" in multiples("dual-arm", found, looks([ours.label]))

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.axes import Axes
 
+from hierarchy import plugins
 from scenarios.draw.figures import drawing
 from scenarios.draw.figures.drawing import ALERT, INK, MEASURED, Array
 from scenarios.loop.listed import errors
@@ -26,7 +27,7 @@ class Panel:
 
     A `signal` that ends in "_" stands for all signals with that prefix. `typeset` is the unit as
     matplotlib sets it, where that differs from plain text. With `zero_is_empty` there is nothing to
-    see while the signal is zero.
+    see while the signal is zero. A plugin adds one with `register("figures", NAME)(Panel(...))`.
     """
 
     name: str
@@ -170,6 +171,8 @@ TASK_PANELS = (
     Panel("task-angles", "Errors of the tasks, angles", "°, logarithmic", "task_error_",
           task_angles),
 )
+for _panel in (*PANELS, *TASK_PANELS):
+    plugins.register("figures", _panel.name, shipped=True)(_panel)
 _COMPONENTS = Panel("position-components", "Position error of the end effector", "mm",
                     "position_error", position_components)
 PANEL = {panel.name: panel for panel in (*PANELS, *TASK_PANELS, _COMPONENTS)}
