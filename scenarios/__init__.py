@@ -8,18 +8,19 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from scenarios.config import Scenario, load, shipped
-    from scenarios.loop.recording import Recording, load_run
     from scenarios.loop.simulation import simulate
     from scenarios.measure.comparison import Comparison
-    from scenarios.measure.run_folder import save
+    from scenarios.measure.run_folder import load_run, save
+    from scenarios.recording.recording import Recording
     from scenarios.report.comparing import compare
 
 __all__ = ["Comparison", "Recording", "Scenario", "compare", "load", "load_run", "save", "shipped",
            "simulate"]
 
-_HOME = {"Comparison": "measure.comparison", "Recording": "loop.recording", "Scenario": "config",
-         "compare": "report.comparing", "load": "config", "load_run": "loop.recording",
-         "save": "measure.run_folder", "shipped": "config", "simulate": "loop.simulation"}
+_HOME = {"Comparison": "measure.comparison", "Recording": "recording.recording",
+         "Scenario": "config", "compare": "report.comparing", "load": "config",
+         "load_run": "measure.run_folder", "save": "measure.run_folder", "shipped": "config",
+         "simulate": "loop.simulation"}
 
 
 def __getattr__(name: str) -> Any:

@@ -16,8 +16,8 @@ from hierarchy.problem import Array, Hierarchy
 from scenarios.cell.build import build
 from scenarios.config import Scenario, load
 from scenarios.config.sampling import changed, drawn
-from scenarios.loop.judging import Rows
 from scenarios.loop.simulation import simulate
+from scenarios.measure.judging import Rows
 from solvers import Status, certify, make
 from solvers.qp.backends import BACKENDS, installed
 

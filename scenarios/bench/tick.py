@@ -17,8 +17,8 @@ from scenarios.cell.build import build
 from scenarios.config import load
 from scenarios.loop.controller import Controller
 from scenarios.loop.recorder import Recorder
-from scenarios.loop.recording import Recording
 from scenarios.loop.simulation import simulate
+from scenarios.recording.recording import Recording
 
 SPECS = ("tpm-published", "tpm", "recursive", "augmented")
 PARTS = ("kinematics", "rows", "resolve", "act and record")

@@ -12,11 +12,9 @@ from hierarchy.avoidance import Obstacles, SurveillanceAreas
 from hierarchy.contacts import Contacts
 from hierarchy.jit import announce_compilation
 from hierarchy.problem import Array
-from hierarchy.task import check_period
-from hierarchy.tasks import JointLimits, Pointing, Position, Separation
-from hierarchy.tasks.mechanism import above, model_rows
-from scenarios.cell.avoidance import areas_of, avoidance_tasks, separable_pairs
-from scenarios.cell.forces import contacts_of, physics_of
+from hierarchy.tasks import JointLimits, Pointing, Position
+from scenarios.cell.avoidance import separable_pairs
+from scenarios.cell.contacts import check_contacts, contacts_of, standing_on
 from scenarios.cell.order import Order, order_of
 from scenarios.cell.plant import plant_of
 from scenarios.cell.plants import Plant
@@ -24,16 +22,8 @@ from scenarios.cell.robot import make_robot, start_of
 from scenarios.cell.sensor import sensor_of
 from scenarios.cell.sensors import Sensor
 from scenarios.cell.stacked import stacked
-from scenarios.cell.standing import check_contacts, standing_on
-from scenarios.cell.tasks import (
-    limits_of,
-    pointing_of,
-    position_of,
-    posture_of,
-    reference_of,
-    task_of,
-)
-from scenarios.config import Scenario, ScenarioError
+from scenarios.cell.tasks import check_there_are_tasks, tasks_of
+from scenarios.config import Scenario
 from scenarios.config.plant import TorqueSection
 from scenarios.config.references import References
 
@@ -91,7 +81,7 @@ def build(scenario: Scenario, kept: Cell | None = None) -> Cell:
     announce_compilation()
     control = scenario.control
     robot = kept.robot if kept else make_robot(scenario.robot)
-    _check_there_are_tasks(scenario, robot)
+    check_there_are_tasks(scenario, robot)
     sensor = _kept_sensor(scenario, kept) if kept else sensor_of(scenario, robot)
     contacts = kept.contacts if kept else contacts_of(scenario, robot)
     start = kept.start if kept else _start(scenario, robot, contacts)
@@ -107,40 +97,14 @@ def build(scenario: Scenario, kept: Cell | None = None) -> Cell:
             check_contacts(scenario, contacts, here)
         plant = plant_of(scenario, robot, start, sensor.obstacles if sensor else Obstacles(),
                          contacts)
-    areas = areas_of(scenario)
-    limits, first = limits_of(scenario, robot)
-    bounded = scenario.limits is not None and scenario.limits.place == "bounds"
-    if contacts is not None:
-        physics = physics_of(scenario, contacts)
-        first = [*first, *physics] if bounded else [*physics, *first]
-    first = above(model_rows(robot, control.period), first,
-                  not bounded and scenario.make_resolver().can_resolve("inequalities"))
-    at = References(here, contacts, separable_pairs)
-    position, pointing = position_of(scenario, at), pointing_of(scenario, at)
-    listed = [task_of(section, at) for section in scenario.tasks
-              if section.kind != "collision"]
-    last = posture_of(scenario, at, "task")
-    avoiding = avoidance_tasks(scenario, robot)
-    always = first if areas else [*first, *avoiding]  # repulsion is placed by Algorithm 1
-    tasks = _in_order(scenario, [*first, *avoiding, *(
-        task for task in (position, pointing, *listed, last) if task)])
-    if control.level == "velocity":
-        for task in tasks:
-            check_period(task, control.period)
-    rows, activation = stacked(scenario, tasks, state)
-    return Cell(scenario, robot, start, state, plant,
-                Stack(rows, control.level, reference_of(scenario, at), contacts,
-                      "mass" if control.metric == "mass" else None, _give(scenario)), sensor, areas,
-                position, pointing, limits, order_of(scenario, areas, always, tasks), tuple(listed),
-                activation, contacts)
-
-
-def _check_there_are_tasks(scenario: Scenario, robot: Robot) -> None:
-    """Raise a ScenarioError unless the scenario asks for something, or the robot's file does."""
-    asked = scenario.position or scenario.pointing or scenario.avoidance or scenario.tasks
-    if not (asked or robot.coupled or robot.loops):
-        raise ScenarioError(f"scenario {scenario.name!r}: the stack is empty: give at least one of "
-                            "[position], [pointing], [avoidance], [[tasks]]")
+    tasks = tasks_of(scenario, References(here, contacts, separable_pairs))
+    rows, activation = stacked(scenario, tasks.all, state)
+    stack = Stack(rows, control.level, tasks.reference, contacts,
+                  "mass" if control.metric == "mass" else None, tasks.give)
+    return Cell(scenario, robot, start, state, plant, stack, sensor, tasks.areas, tasks.position,
+                tasks.pointing, tasks.limits,
+                order_of(scenario, tasks.areas, tasks.always, tasks.all), tasks.listed, activation,
+                contacts)
 
 
 def _start(scenario: Scenario, robot: Robot, contacts: Contacts | None) -> tuple[Array, Array]:
@@ -149,24 +113,6 @@ def _start(scenario: Scenario, robot: Robot, contacts: Contacts | None) -> tuple
         floor = scenario.plant.height if isinstance(scenario.plant, TorqueSection) else 0.0
         q = standing_on(floor, contacts, q)
     return q, v
-
-
-def _give(scenario: Scenario) -> dict[str, float]:
-    """Return how far tasks of the scenario may give, by name."""
-    return {task.title: task.give for task in scenario.tasks if task.give}
-
-
-def _in_order(scenario: Scenario, tasks: list[Task]) -> list[Task]:
-    """Move the separation from obstacles to the place of the listed task "collision"."""
-    sections = [section.kind for section in scenario.tasks]
-    if "collision" not in sections:
-        return tasks
-    apart = [task for task in tasks if isinstance(task, Separation)]
-    rest = [task for task in tasks if not isinstance(task, Separation)]
-    below = len(sections) - sections.index("collision") - 1  # of the list
-    below += scenario.posture is not None and scenario.posture.role == "task"
-    place = len(rest) - below
-    return [*rest[:place], *apart, *rest[place:]]
 
 
 def _kept_sensor(scenario: Scenario, kept: Cell) -> Sensor | None:

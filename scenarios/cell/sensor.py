@@ -1,4 +1,4 @@
-"""Make the distance sensor from [sensor] and [avoidance]."""
+"""Make obstacles and the sensor of distances to them, from [avoidance] and [sensor]."""
 
 from __future__ import annotations
 
@@ -9,9 +9,8 @@ from typing import NamedTuple
 import numpy as np
 
 from hierarchy import HierarchyError, Robot
-from hierarchy.avoidance import Capsule, Obstacles, Repulsion
+from hierarchy.avoidance import Capsule, Obstacle, Obstacles, Repulsion
 from scenarios.cell.avoidance import repulsion_of
-from scenarios.cell.obstacles import make_obstacles
 from scenarios.cell.sensors import ExactDistances, Sensor
 from scenarios.cell.sensors.camera import DepthCamera, Pinhole, looking_at
 from scenarios.cell.sensors.depth_sensor import DepthSensor, Source
@@ -19,7 +18,7 @@ from scenarios.cell.sensors.depth_space import DepthSpace
 from scenarios.cell.sensors.errors import DepthErrors
 from scenarios.cell.sensors.frames import RecordedFrames
 from scenarios.config import Scenario, ScenarioError
-from scenarios.config.avoidance import AvoidanceSection, SeparationSection
+from scenarios.config.avoidance import AvoidanceSection, ObstacleSection, SeparationSection
 from scenarios.config.sensor import CameraSection, ExactSection, FramesSection, OwnSensor
 
 
@@ -116,3 +115,18 @@ def _capsules(robot: Robot, foot: float) -> tuple[Capsule, ...]:
         return robot.capsules
     column = Capsule("foot", 0, (0.0, 0.0, -foot), (0.0, 0.0, 0.0), robot.capsules[0].radius)
     return (column, *robot.capsules)
+
+
+def make_obstacles(sections: tuple[ObstacleSection, ...]) -> Obstacles:
+    """Make the scene's obstacles, numbered from 1 in messages."""
+    return Obstacles([_obstacle(i, section) for i, section in enumerate(sections, 1)])
+
+
+def _obstacle(number: int, section: ObstacleSection) -> Obstacle:
+    path = None if section.path is None else section.path.make()
+    size = {"point": (), "sphere": (section.radius,),
+            "capsule": (section.radius, section.half_length),
+            "box": section.half_lengths}[section.shape]
+    return Obstacle(section.shape, section.centre or (0.0, 0.0, 0.0),
+                    tuple(float(s) for s in size or () if s is not None),
+                    np.array(section.rotation), path, f"obstacle {number}")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from scenarios.export import export
-from scenarios.loop.recording import load_run
+from scenarios.measure.run_folder import load_run
 
 
 def export_command(folder: Path, format: str | None, out: Path | None) -> list[Path]:

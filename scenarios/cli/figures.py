@@ -22,7 +22,7 @@ def redraw(runs: Sequence[str | Path], style: str = "screen",
     """
     from hierarchy.errors import HierarchyError, UnknownNameError
     from scenarios.draw.figures import drawing, letter
-    from scenarios.loop.recording import load_run
+    from scenarios.measure.run_folder import load_run
 
     if style not in drawing.STYLES:
         raise UnknownNameError("style", style, drawing.STYLES)

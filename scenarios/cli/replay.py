@@ -9,7 +9,7 @@ from pathlib import Path
 from hierarchy.errors import HierarchyError
 from scenarios.draw.viewer.view import labelled
 from scenarios.files import named, write_text
-from scenarios.loop.recording import load_run
+from scenarios.measure.run_folder import load_run
 
 
 def replay_command(folders: Sequence[Path], out: Path | None, video: Path | None,

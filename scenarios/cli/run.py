@@ -19,11 +19,11 @@ from scenarios.cli.terminal import (
 )
 from scenarios.config import Scenario
 from scenarios.loop.first_tick import contact_warnings
-from scenarios.loop.recording import Recording
 from scenarios.loop.simulation import simulate
 from scenarios.measure.metrics import as_plain_data
 from scenarios.measure.run_folder import save
 from scenarios.measure.runs import Run
+from scenarios.recording.recording import Recording
 
 
 def run_scenario(scenario: Scenario, folder: Path, certify: bool, figures: bool,

@@ -29,7 +29,7 @@ def troubles(recording: Any) -> list[str]:
 
 def levels_given_up(recording: Any) -> list[str]:
     """Return one line per level that the run missed: for how long, and what held it back."""
-    from scenarios.loop.given_up import given_up
+    from scenarios.measure.given_up import given_up
 
     lines = [fill(str(one), _WIDTH, subsequent_indent="  ") for one in given_up(recording)]
     return ["", *lines] if lines else []
@@ -68,7 +68,7 @@ def print_table(runs: list[Run]) -> None:
 
     from scenarios.measure.partings import partings
     from scenarios.measure.runs import table
-    from scenarios.measure.verdict import verdict
+    from scenarios.measure.verdicts.verdict import verdict
 
     console = Console(markup=False, highlight=False)
     titles = dict.fromkeys(run.title for run in runs)

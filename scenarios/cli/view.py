@@ -20,7 +20,7 @@ def view_command(folders: Sequence[Path], port: int, side_by_side: bool, browser
     """Show finished runs until Ctrl-C, and return the exit code 0."""
     from scenarios.draw.viewer.server import announce, close, open_server
     from scenarios.draw.viewer.view import View, labelled
-    from scenarios.loop.recording import load_run
+    from scenarios.measure.run_folder import load_run
 
     found = [run for folder in folders for run in _runs_in(folder)]
     runs = labelled(found, [load_run(folder) for folder in found])

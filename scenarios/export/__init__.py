@@ -12,7 +12,7 @@ from hierarchy.errors import HierarchyError, UnknownNameError
 from scenarios.files import OutputError, named, written
 
 if TYPE_CHECKING:
-    from scenarios.loop.recording import Recording
+    from scenarios.recording.recording import Recording
 
 # Each is a module of this package with write(recording, path): its package, and the extra of it.
 FORMATS: dict[str, tuple[str, str]] = {"csv": ("csv", ""), "parquet": ("pyarrow", "export"),

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 from numpy.typing import NDArray
 
 from scenarios.export import new_file
-from scenarios.loop.columns import columns
+from scenarios.recording.columns import columns
 
 if TYPE_CHECKING:
-    from scenarios.loop.recording import Recording
+    from scenarios.recording.recording import Recording
 
 
 def write(recording: Recording, path: Path) -> list[Path]:

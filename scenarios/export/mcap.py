@@ -13,12 +13,12 @@ from scenarios.export import foxglove, new_file
 from scenarios.export.layout import layout
 from scenarios.export.numbers import plain
 from scenarios.export.schemas import FOXGLOVE, INTEGER, NUMBER, TEXT, TRUTH, a_list, an_object
-from scenarios.loop.columns import of_ticks, signal_units, stacks
-from scenarios.loop.signals import OTHER, known
+from scenarios.recording.columns import of_ticks, signal_units, stacks
+from scenarios.recording.signals import OTHER, known
 from scenarios.scene import scene
 
 if TYPE_CHECKING:
-    from scenarios.loop.recording import Recording
+    from scenarios.recording.recording import Recording
 
 FRAMES_A_SECOND = 30.0  # of the 3D scene; signals have every tick
 _WARNING = 3            # Foxglove's level of a log message
@@ -31,8 +31,8 @@ Entry = tuple[int, str, dict[str, Any]]  # [ns], topic, message
 def write(recording: Recording, path: Path) -> list[Path]:
     """Write `path` and `path`.layout.json, times counted from zero.
 
-    Every signal of every tick has the name and the topic of `scenarios.loop.signals`; numbers that
-    are not finite are null, and an array with several indices is one flat list. `/stack` also
+    Every signal of every tick has the name and the topic of `scenarios.recording.signals`; numbers
+    that are not finite are null, and an array with several indices is one flat list. `/stack` also
     has the names of the tasks, `/events` the trouble, `/tf` and `/scene` the 3D scene.
     """
     from mcap.writer import Writer

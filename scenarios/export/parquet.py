@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 from scenarios.export import new_file
 from scenarios.export.numbers import plain
-from scenarios.loop.columns import Column, columns, constants
+from scenarios.recording.columns import Column, columns, constants
 
 if TYPE_CHECKING:
-    from scenarios.loop.recording import Recording
+    from scenarios.recording.recording import Recording
 
 
 def write(recording: Recording, path: Path) -> list[Path]:

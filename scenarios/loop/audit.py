@@ -12,8 +12,8 @@ from hierarchy.problem import Hierarchy
 from scenarios.cell.build import Cell
 from scenarios.config import Scenario
 from scenarios.loop.controller import Controller
-from scenarios.loop.fate import Fates
-from scenarios.loop.recording import Recording
+from scenarios.recording.fate import Fates
+from scenarios.recording.recording import Recording
 from solvers import Resolver, Status, certify
 
 

@@ -12,7 +12,7 @@ from hierarchy.tasks.self_separation import SelfSeparation
 from hierarchy.words import listed
 from scenarios.cell.avoidance import inseparable_pairs
 from scenarios.cell.build import Cell
-from scenarios.cell.standing import doubts
+from scenarios.cell.contacts import doubts
 from scenarios.config import Scenario
 from scenarios.loop.controller import Controller
 from solvers import Status, explain, make

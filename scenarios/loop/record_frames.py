@@ -18,8 +18,8 @@ from scenarios.cell.build import build
 from scenarios.cell.sensors.camera import DepthCamera
 from scenarios.cell.sensors.frames import ABOUT, INTRINSICS
 from scenarios.config import load
-from scenarios.loop.recording import Recording
 from scenarios.loop.simulation import simulate
+from scenarios.recording.recording import Recording
 
 _MILLIMETRE = 1e-3
 

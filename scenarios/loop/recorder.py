@@ -16,12 +16,12 @@ from hierarchy.problem import Array
 from hierarchy.robot import Frame, Robot
 from hierarchy.state import State
 from scenarios.config import Scenario
-from scenarios.loop import listed
 from scenarios.loop.active_sets import ActiveSets
 from scenarios.loop.controller import Controller
-from scenarios.loop.facts import facts_of
-from scenarios.loop.recording import Event, Recording
 from scenarios.loop.truth import truth_of
+from scenarios.recording import listed
+from scenarios.recording.facts import facts_of
+from scenarios.recording.recording import Event, Recording
 
 FASTEST = 1e3  # [rad/s or m/s] of a joint; a faster motion has diverged
 _TIMES = ("time_kinematics", "time_rows", "time_resolve", "time_tick")

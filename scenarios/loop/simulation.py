@@ -14,9 +14,9 @@ from scenarios.config import Scenario, load
 from scenarios.loop.audit import Audit, Certified, Judging, Strictness
 from scenarios.loop.controller import Controller
 from scenarios.loop.faults import Faults
-from scenarios.loop.judging import completed
 from scenarios.loop.recorder import FASTEST, Recorder
-from scenarios.loop.recording import Recording
+from scenarios.measure.judging import completed
+from scenarios.recording.recording import Recording
 
 _REPORT_EVERY = 500  # ticks between two calls of `progress`
 

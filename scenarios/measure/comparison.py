@@ -12,7 +12,7 @@ from hierarchy.notebook import html_table
 from scenarios.measure import metrics
 from scenarios.measure.partings import Parting, partings
 from scenarios.measure.runs import Run, table
-from scenarios.measure.verdict import verdict
+from scenarios.measure.verdicts.verdict import verdict
 
 
 @dataclass(frozen=True, repr=False)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from scenarios.loop.recording import Recording
+    from scenarios.recording.recording import Recording
 
 Array = NDArray[np.float64]
 _LOAD = 1.0        # [N] from which a contact counts as loaded

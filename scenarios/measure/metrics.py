@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from hierarchy import plugins
 
 if TYPE_CHECKING:
-    from scenarios.loop.recording import Recording
+    from scenarios.recording.recording import Recording
 
 Array = NDArray[np.float64]
 _ON_IT = 1e-4  # [m] below a distance that still counts as keeping it
@@ -158,7 +158,7 @@ def _listed(recording: Recording, by: Criteria) -> Iterator[Metric]:
     """Errors of the tasks of `[[tasks]]`, each under its name."""
     if not recording.scenario.tasks:
         return
-    from scenarios.loop.listed import errors
+    from scenarios.recording.listed import errors
 
     after = recording["t"] - recording["t"][0] >= by.settle
     for section, unit, exact in errors(recording):
@@ -321,7 +321,7 @@ def _returning(recording: Recording, by: Criteria) -> Iterator[Metric]:
 
 def _left_path(recording: Recording) -> tuple[tuple[tuple[float, float], ...], Array] | None:
     """Return when the first path that leaves the workspace does so, and the error (T,) from it."""
-    from scenarios.loop.listed import errors
+    from scenarios.recording.listed import errors
 
     scenario = recording.scenario
     path = scenario.position.path if scenario.position else None

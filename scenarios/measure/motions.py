@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 if TYPE_CHECKING:
-    from scenarios.loop.recording import Recording
     from scenarios.measure.runs import Run
+    from scenarios.recording.recording import Recording
 
 # [rad] of any joint at any time, within which two runs are the same motion: 0.01 mm at the end of
 # an arm of 1 m, which no figure shows.

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 if TYPE_CHECKING:
-    from scenarios.loop.facts import Facts
     from scenarios.measure.runs import Run
+    from scenarios.recording.facts import Facts
 
 BOUND = 1e-6  # [rad] of any joint, or what the resolver declares as its accuracy where that is more
 

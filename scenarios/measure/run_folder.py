@@ -1,19 +1,35 @@
-"""The folder of one run: its recording and its metrics."""
+"""The folder of one run: its recording, its metrics, and the versions that it was made with."""
 
 from __future__ import annotations
 
+import dataclasses
+import json
+import os
+import platform
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+from typing import Any
 
-from hierarchy.errors import expect, file_path
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import TypeAdapter
+
+from hierarchy.archives import read_arrays
+from hierarchy.errors import HierarchyError, expect, file_path
+from scenarios.config import load
 from scenarios.files import whole, write_json
-from scenarios.loop.recording import Recording, write
 from scenarios.measure import metrics
+from scenarios.recording.depth_view import DepthView
+from scenarios.recording.facts import Facts
+from scenarios.recording.recording import Event, Recording
+
+_EVENT = np.dtype([("tick", np.int64), ("kind", "U24"), ("action", "U8")])
 
 
 def save(recording: Recording, folder: str | Path) -> Path:
     """Write a run's folder, completely or not at all, and return its path.
 
-    It has the files of `scenarios.loop.recording.write` and `metrics.json`; `hierarchy figures`
+    It has the files of `write` and `metrics.json`; `hierarchy figures`
     adds the figures. `folder` must be new or empty.
     """
     expect("save", recording, Recording, "give what `simulate` returns")
@@ -21,3 +37,101 @@ def save(recording: Recording, folder: str | Path) -> Path:
         write(recording, partial)
         write_json(partial / "metrics.json", metrics.as_plain_data(recording))
     return Path(folder)
+
+
+def write(recording: Recording, folder: Path) -> None:
+    """Write a run to an existing folder.
+
+    The files are `run.npz` (the signals by name, `orders`, `fault` and `events`), `timings.npz`
+    (the signals time_*), `facts.json`, `depth.npz` if there is a camera image, `scenario.toml` as
+    run, and `versions.json`. Only times are measured: the same scenario and versions give the same
+    bytes of `run.npz`.
+    """
+    times = {name: signal for name, signal in recording.signals.items() if name.startswith("time_")}
+    rest = {name: signal for name, signal in recording.signals.items() if name not in times}
+    np.savez_compressed(folder / "run.npz", allow_pickle=False, **rest,
+                        orders=np.array(recording.orders, dtype=np.str_),
+                        fault=np.array(recording.fault or ""),
+                        events=np.array(list(recording.events), dtype=_EVENT))
+    np.savez_compressed(folder / "timings.npz", allow_pickle=False, **times)
+    if recording.depth is not None:
+        np.savez_compressed(folder / "depth.npz", allow_pickle=False, **recording.depth.arrays())
+    write_json(folder / "facts.json", dataclasses.asdict(recording.facts))
+    write_json(folder / "versions.json", versions())
+    (folder / "scenario.toml").write_text(recording.scenario.to_toml(), encoding="utf-8")
+
+
+def load_run(folder: str | Path) -> Recording:
+    """Read the Recording that `write` wrote; nothing outside the folder is needed.
+
+    Raises
+    ------
+    HierarchyError : a file of the run is missing or damaged, named, or the run was written by an
+        earlier version.
+    """
+    path = file_path("load_run", folder)
+    if not path.is_dir():
+        raise HierarchyError(f"run folder {path} does not exist")
+    if not (path / "run.npz").exists():
+        inside = sorted(file.parent for file in path.glob("*/*/run.npz"))
+        hint = f"; it holds runs, such as {inside[0]}" if inside else ""
+        raise HierarchyError(f"{path} is not a run folder: it has no run.npz{hint}")
+    scenario = load(str(path / "scenario.toml"))
+    signals = _arrays(path / "run.npz")
+    if not (path / "facts.json").exists():
+        raise HierarchyError(f"{path} was written by an earlier version; run the scenario again")
+    for name in ("orders", "fault", "events"):
+        if name not in signals:
+            raise HierarchyError(f"{path / 'run.npz'} cannot be read: it has no {name!r}")
+    orders, fault, events = (signals.pop(name) for name in ("orders", "fault", "events"))
+    signals |= _arrays(path / "timings.npz")
+    return Recording(signals, tuple(map(str, orders)), scenario, _facts(path / "facts.json"),
+                     str(fault) or None, tuple(Event(*event) for event in events.tolist()),
+                     _depth(path / "depth.npz"))
+
+
+def _arrays(path: Path) -> dict[str, NDArray[Any]]:
+    try:
+        return read_arrays(path)
+    except HierarchyError as error:
+        raise HierarchyError(f"{path} cannot be read: {error}") from error
+
+
+def _facts(path: Path) -> Facts:
+    try:
+        return TypeAdapter(Facts).validate_python(json.loads(path.read_text(encoding="utf-8")))
+    except (OSError, ValueError, RecursionError) as error:
+        raise HierarchyError(f"{path} cannot be read: {error}") from error
+
+
+def _depth(path: Path) -> DepthView | None:
+    if not path.exists():
+        return None
+    try:
+        return DepthView.of_arrays(_arrays(path))
+    except KeyError as error:
+        raise HierarchyError(f"{path} cannot be read: it has no {error}") from error
+
+
+def versions() -> dict[str, str]:
+    """Return the versions and the processor of this installation."""
+    packages = ("task-hierarchy", "numpy", "numba", "pin", "qpsolvers", "proxsuite", "osqp",
+                "mujoco")
+    return {"python": platform.python_version(), **{name: _version(name) for name in packages},
+            "system": f"{platform.system()} {platform.machine()}",
+            "processor": f"{_processor()}, {os.cpu_count()} cores"}
+
+
+def _version(package: str) -> str:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return "not installed"
+
+
+def _processor() -> str:
+    try:
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+        return next(line.partition(":")[2].strip() for line in lines if line[:10] == "model name")
+    except (OSError, StopIteration):
+        return platform.processor() or "unknown processor"

@@ -14,7 +14,7 @@ from scenarios.measure.metrics import Metric
 
 if TYPE_CHECKING:
     from scenarios.config import Scenario
-    from scenarios.loop.recording import Recording
+    from scenarios.recording.recording import Recording
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class Run:
     @property
     def settings(self) -> dict[str, Any]:
         """The resolver's settings as they were used, also where the run broke."""
-        from scenarios.loop.facts import resolver_facts
+        from scenarios.recording.facts import resolver_facts
 
         facts = self.recording.facts.resolver if self.recording else resolver_facts(self.scenario)
         return dict(facts.settings)

@@ -19,8 +19,8 @@ from scenarios.report.tables import events
 from scenarios.templates import render
 
 if TYPE_CHECKING:
-    from scenarios.loop.recording import Recording
     from scenarios.measure.runs import Run
+    from scenarios.recording.recording import Recording
 
 
 def same_motion(found: Sequence[Motion]) -> str:

@@ -15,10 +15,9 @@ from scenarios.config import Scenario, load, members, shipped_groups
 from scenarios.config.resolvers import check_names, usable
 from scenarios.config.scenario import OWN
 from scenarios.files import claim, whole, write_json, write_text
-from scenarios.loop.recording import versions
 from scenarios.loop.simulation import simulate
 from scenarios.measure.comparison import Comparison
-from scenarios.measure.run_folder import save
+from scenarios.measure.run_folder import save, versions
 from scenarios.measure.runs import Run
 
 Progress = Callable[[str, int, int], None]

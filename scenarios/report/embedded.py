@@ -13,7 +13,7 @@ from scenarios.measure.motions import Motion
 from scenarios.templates import render
 
 if TYPE_CHECKING:
-    from scenarios.loop.recording import Recording
+    from scenarios.recording.recording import Recording
 
 MOST = 4  # motions in one replay
 _FASTEST, _SLOWEST = 30.0, 5.0  # [Hz] of the frames kept

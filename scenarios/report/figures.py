@@ -16,7 +16,7 @@ from scenarios.draw.figures.palette import Look
 from scenarios.draw.figures.panels import Draw, Panel
 
 if TYPE_CHECKING:
-    from scenarios.loop.recording import Recording
+    from scenarios.recording.recording import Recording
 
 
 def side_by_side(panel: Panel, recordings: Mapping[str, Recording], looks: Mapping[str, Look]

@@ -22,7 +22,7 @@ from scenarios.loop.simulation import simulate
 from scenarios.measure.metrics import measure
 
 if TYPE_CHECKING:
-    from scenarios.loop.recording import Recording
+    from scenarios.recording.recording import Recording
 
 FOLDER = Path("docs/images/gallery")  # from the root of the repository
 

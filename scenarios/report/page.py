@@ -14,7 +14,7 @@ from scenarios.draw.figures.drawing import svg
 from scenarios.draw.figures.palette import Look, looks
 from scenarios.draw.figures.picture import picture
 from scenarios.measure.motions import Motion, motions
-from scenarios.measure.verdict import verdict
+from scenarios.measure.verdicts.verdict import verdict
 from scenarios.report import charts, tables
 from scenarios.report.commands import commands
 from scenarios.report.embedded import replay

@@ -14,9 +14,9 @@ from scenarios.config import Scenario, load
 from scenarios.config.sampling import changed, drawn
 from scenarios.loop.audit import Audit
 from scenarios.loop.controller import Controller
-from scenarios.loop.recording import Recording
 from scenarios.loop.simulation import simulate
 from scenarios.measure.metrics import Metric
+from scenarios.recording.recording import Recording
 from scenarios.reproduce.rows import Rows, plain
 from scenarios.reproduce.studies import Pair, Pivot, Watched
 from scenarios.sweep.run import Job, digest, key_of, run_batch

@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hierarchy.problem import Array
-from scenarios.loop import listed
 from scenarios.measure.metrics import pointing_angle
+from scenarios.recording import listed
 
 if TYPE_CHECKING:
-    from scenarios.loop.recording import Recording
+    from scenarios.recording.recording import Recording
 
 _ERRORS = {"m": ", positions", "deg": ", directions", "rad": ", joints", "": "",
            "N s": ", linear momentum", "N m s": ", angular momentum"}

@@ -14,18 +14,18 @@ from hierarchy import HierarchyError
 from hierarchy.avoidance import Capsule, Measurement, Obstacles
 from hierarchy.avoidance.measurement import exact_measurer
 from hierarchy.problem import Array
-from scenarios.cell.obstacles import make_obstacles
-from scenarios.loop import listed
-from scenarios.loop.facts import Point, RobotFacts
-from scenarios.loop.fate import Fate
-from scenarios.loop.links import ends
+from scenarios.cell.sensor import make_obstacles
+from scenarios.recording import listed
+from scenarios.recording.facts import Point, RobotFacts
+from scenarios.recording.fate import Fate
+from scenarios.recording.links import ends
 from scenarios.scene.curves import Areas, Series, marks_of, series
 from scenarios.scene.levels import Levels, levels_at
 from scenarios.scene.pushes import Pushes, pushes
 
 if TYPE_CHECKING:
     from scenarios.config import Scenario
-    from scenarios.loop.recording import Recording
+    from scenarios.recording.recording import Recording
 
 SEPARATION = "separation"  # the task that keeps all points away from all obstacles
 _NO_LAWS = np.array([[0.0, 1.0, 1.0, 1.0]] * 2)  # no repulsion

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hierarchy.problem import Array
-from scenarios.loop.fate import Fate, unknown
-from scenarios.loop.recording import Recording
+from scenarios.recording.fate import Fate, unknown
+from scenarios.recording.recording import Recording
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ import numpy as np
 
 from hierarchy.problem import Array
 from scenarios.config.plant import PushSection
-from scenarios.loop.facts import ContactPoint, Facts, RobotFacts
+from scenarios.recording.facts import ContactPoint, Facts, RobotFacts
 
 if TYPE_CHECKING:
     from scenarios.config import Scenario

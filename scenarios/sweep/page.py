@@ -18,7 +18,7 @@ from scenarios.draw.figures.drawing import svg
 from scenarios.draw.figures.palette import Look, looks
 from scenarios.files import slug
 from scenarios.measure.metrics import Metric
-from scenarios.measure.verdict import Verdict
+from scenarios.measure.verdicts.verdict import Verdict
 from scenarios.sweep import figures
 from scenarios.sweep.planning import Plan, Planned
 from scenarios.sweep.results import Failure, Results, Worst, compared, summary

@@ -17,7 +17,7 @@ from scenarios.measure.metrics import Metric
 
 if TYPE_CHECKING:
     from scenarios.config import Scenario
-    from scenarios.loop.recording import Recording
+    from scenarios.recording.recording import Recording
 
 # Code that only requests or shows runs: changing it does not change the measurements.
 _NOT_IN_A_RUN = ("bench/", "cli/", "draw/", "export/", "library/", "report/", "scene/", "sweep/",
@@ -79,7 +79,7 @@ def digest() -> str:
 
 @cache
 def _of_the_package() -> str:
-    from scenarios.loop.recording import versions
+    from scenarios.measure.run_folder import versions
 
     root = Path(__file__).parents[2]
     files = (path for package in ("hierarchy", "solvers", "scenarios")

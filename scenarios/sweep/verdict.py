@@ -8,10 +8,10 @@ import numpy as np
 
 from hierarchy.words import listed
 from scenarios.config import Scenario
-from scenarios.loop.facts import resolver_facts
-from scenarios.measure.caveats import caveats
 from scenarios.measure.metrics import Metric
-from scenarios.measure.verdict import Verdict
+from scenarios.measure.verdicts.caveats import caveats
+from scenarios.measure.verdicts.verdict import Verdict
+from scenarios.recording.facts import resolver_facts
 from scenarios.sweep.results import Criterion, Results, Share, valued
 
 _DISTANCE = "Kept the distance asked for"

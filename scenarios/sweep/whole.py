@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Self, final
 
 from hierarchy.words import listed
 from scenarios.config import Scenario, load
-from scenarios.loop.recording import versions
+from scenarios.measure.run_folder import versions
 from scenarios.sweep.config import Sweep, find, load_sweep
 from scenarios.sweep.data import as_plain_data
 from scenarios.sweep.engine import Work, carry_out, connected

@@ -13,8 +13,8 @@ from hierarchy import Robot
 from scenarios.config.avoidance import ObstacleSection
 from scenarios.config.robot import RobotSection
 from scenarios.config.sensor import FramesSection
-from scenarios.loop.facts import Facts, ResolverFacts, RobotFacts, robot_facts
-from scenarios.loop.recording import Recording
+from scenarios.recording.facts import Facts, ResolverFacts, RobotFacts, robot_facts
+from scenarios.recording.recording import Recording
 
 
 @dataclass(frozen=True)

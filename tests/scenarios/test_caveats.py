@@ -1,6 +1,6 @@
 from scenarios.config import load
-from scenarios.loop.facts import resolver_facts
-from scenarios.measure.caveats import caveats
+from scenarios.measure.verdicts.caveats import caveats
+from scenarios.recording.facts import resolver_facts
 
 
 def said(name, *specs):

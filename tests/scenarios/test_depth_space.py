@@ -19,7 +19,7 @@ from scenarios.cell.sensors.frames import RecordedFrames
 from scenarios.config import ScenarioError
 from scenarios.draw.figures.depth import depth_figure
 from scenarios.loop import record_frames
-from scenarios.loop.depth_image import depth_view
+from scenarios.measure.judging import depth_view
 
 ROBOT = Robot.named("kuka_lwr")
 CAPSULES = link_capsules(TABLES["kuka_lwr"], foot=0.31)

@@ -14,10 +14,10 @@ from scenarios import load, simulate
 from scenarios.cli.main import run_command
 from scenarios.export import export, foxglove
 from scenarios.files import OutputError
-from scenarios.loop.columns import columns, constants
-from scenarios.loop.recording import Event
-from scenarios.loop.tree import joint_units, tree_of
 from scenarios.measure.run_folder import save
+from scenarios.recording.columns import columns, constants
+from scenarios.recording.recording import Event
+from scenarios.recording.tree import joint_units, tree_of
 from scenarios.scene import scene
 
 FORMATS = ("csv", "parquet", "mcap")

@@ -11,10 +11,9 @@ from scenarios.cell.build import build
 from scenarios.cli.main import run_command
 from scenarios.config import load
 from scenarios.loop.faults import Faults, FaultySensor
-from scenarios.loop.recording import load_run
 from scenarios.loop.simulation import simulate
 from scenarios.measure.metrics import measure
-from scenarios.measure.run_folder import save
+from scenarios.measure.run_folder import load_run, save
 from solvers import Status
 
 AT, LASTS, END = 50, 60, 200  # ticks of 1 ms

@@ -21,9 +21,9 @@ from scenarios.config.kinds.position import ListedPosition
 from scenarios.draw.figures import drawing, letter, palette, panels
 from scenarios.draw.figures.picture import once, picture
 from scenarios.draw.figures.timeline import timeline
-from scenarios.loop.recording import Event
 from scenarios.loop.simulation import simulate
 from scenarios.measure.run_folder import save
+from scenarios.recording.recording import Event
 from scenarios.report.figures import computing_time, overlay, side_by_side
 
 

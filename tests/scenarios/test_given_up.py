@@ -3,7 +3,7 @@
 import pytest
 
 from scenarios import load, simulate
-from scenarios.loop.given_up import given_up
+from scenarios.measure.given_up import given_up
 
 pytestmark = pytest.mark.slow
 

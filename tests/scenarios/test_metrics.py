@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from hand_made import HandMadeScenario, recording
 
-from scenarios.loop import listed
 from scenarios.measure.metrics import Metric, as_plain_data, measure
+from scenarios.recording import listed
 
 
 def value(name, **signals):

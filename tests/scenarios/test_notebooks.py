@@ -17,7 +17,7 @@ from hierarchy import Hierarchy, HierarchyError, Robot, Stack, State
 from hierarchy.notebook import html_table
 from hierarchy.tasks import Posture
 from scenarios import compare, load, simulate
-from scenarios.loop.columns import columns
+from scenarios.recording.columns import columns
 from solvers import certify, make
 
 ROOT = Path(__file__).parents[2]

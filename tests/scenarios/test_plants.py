@@ -15,9 +15,8 @@ from scenarios.cli.main import run_command
 from scenarios.config import ScenarioError
 from scenarios.config.plant import JointsSection, MeasurementSection, PhysicsSection
 from scenarios.loop.controller import Controller
-from scenarios.loop.recording import load_run
 from scenarios.measure.metrics import measure
-from scenarios.measure.run_folder import save
+from scenarios.measure.run_folder import load_run, save
 
 pytestmark = pytest.mark.slow
 

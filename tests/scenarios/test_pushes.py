@@ -15,8 +15,8 @@ from scenarios.draw.replay.page import html
 from scenarios.draw.viewer.curves import Lately
 from scenarios.draw.viewer.moment import Watched, of_scene
 from scenarios.loop.controller import Controller
-from scenarios.loop.facts import ContactPoint, facts_of
-from scenarios.loop.recording import load_run, write
+from scenarios.measure.run_folder import load_run, write
+from scenarios.recording.facts import ContactPoint, facts_of
 from scenarios.scene import scene
 from scenarios.scene.pushes import key, pushes
 

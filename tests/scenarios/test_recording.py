@@ -10,15 +10,14 @@ import pytest
 from hand_made import HandMadeScenario, recording
 
 from hierarchy.errors import HierarchyError
-from scenarios import config
 from scenarios.files import OutputError, claim, next_free, whole
-from scenarios.loop.recording import load_run
-from scenarios.measure.run_folder import save
+from scenarios.measure import run_folder
+from scenarios.measure.run_folder import load_run, save
 
 
 @pytest.fixture
 def hand_made_scenarios(monkeypatch):
-    monkeypatch.setattr(config, "load", lambda path, changes=(): HandMadeScenario())
+    monkeypatch.setattr(run_folder, "load", lambda path, changes=(): HandMadeScenario())
 
 
 @pytest.mark.usefixtures("hand_made_scenarios")

@@ -14,12 +14,12 @@ from headless import chromium
 
 from scenarios.config import load
 from scenarios.config.kinds.position import ListedPosition
-from scenarios.loop.recording import Event
 from scenarios.loop.simulation import simulate
 from scenarios.measure.comparison import Comparison
 from scenarios.measure.motions import motions
 from scenarios.measure.runs import Run, table
-from scenarios.measure.verdict import verdict
+from scenarios.measure.verdicts.verdict import verdict
+from scenarios.recording.recording import Event
 from scenarios.report import comparison_page as page
 from scenarios.report.commands import run_command
 from scenarios.report.embedded import replay

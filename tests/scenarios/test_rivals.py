@@ -134,7 +134,7 @@ def test_the_first_seconds_keep_distance_and_cone(name):
 
 
 def test_a_frozen_task_is_recorded_as_met_and_one_inside_its_set_as_free():
-    from scenarios.loop.fate import Fate
+    from scenarios.recording.fate import Fate
     run = simulate(load("ellipse-set-based", ["control.duration=0.3", "avoidance.distance=0.12"]))
     fates = run["level_fate"][:, run.task_names.index("separation")]
     assert set(np.unique(fates)) <= {Fate.FREE, Fate.MET}

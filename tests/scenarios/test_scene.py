@@ -12,10 +12,10 @@ from scenarios.cell.build import build
 from scenarios.cell.robot import make_robot
 from scenarios.config.robot import RobotSection
 from scenarios.loop.controller import Controller
-from scenarios.loop.facts import robot_facts
-from scenarios.loop.fate import Fate
-from scenarios.loop.judging import judge
-from scenarios.loop.links import lowest
+from scenarios.measure.judging import judge
+from scenarios.recording.facts import robot_facts
+from scenarios.recording.fate import Fate
+from scenarios.recording.links import lowest
 from scenarios.scene import capsules, ends, scene, stage
 from scenarios.scene.levels import levels_at
 

@@ -9,11 +9,11 @@ from scenarios import load, simulate
 from scenarios.draw.figures.palette import looks
 from scenarios.draw.figures.panels import Panel
 from scenarios.export.mcap import grouped
-from scenarios.loop.columns import columns
-from scenarios.loop.signals import Signal, known
 from scenarios.measure.metrics import Metric
 from scenarios.measure.motions import motions
 from scenarios.measure.runs import Run, table
+from scenarios.recording.columns import columns
+from scenarios.recording.signals import Signal, known
 from scenarios.report.charts import multiples
 
 pytestmark = pytest.mark.usefixtures("no_plugins")

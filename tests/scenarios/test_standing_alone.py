@@ -14,8 +14,8 @@ from hierarchy.robots import TABLES
 from scenarios import load, load_run, save, simulate
 from scenarios.cli.main import run_command
 from scenarios.draw.replay import html
-from scenarios.loop.tree import joint_units, placements, tree_of
 from scenarios.measure.metrics import as_plain_data
+from scenarios.recording.tree import joint_units, placements, tree_of
 from scenarios.scene import scene
 
 pytestmark = pytest.mark.slow

@@ -19,11 +19,10 @@ from scenarios.draw.viewer.moment import Became, Watched, of_scene
 from scenarios.draw.viewer.playback import Playback, Requests
 from scenarios.draw.viewer.stack_list import stack_html
 from scenarios.loop.controller import Controller
-from scenarios.loop.judging import judge
 from scenarios.loop.recorder import Recorder
-from scenarios.loop.recording import load_run
 from scenarios.loop.simulation import simulate, tick
-from scenarios.measure.run_folder import save
+from scenarios.measure.judging import judge
+from scenarios.measure.run_folder import load_run, save
 from scenarios.scene import scene
 from scenarios.scene.levels import Fate
 

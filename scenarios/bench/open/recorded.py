@@ -11,8 +11,8 @@ from hierarchy.problem import Hierarchy
 from scenarios.config import Scenario, ScenarioError, load
 from scenarios.config.sampling import changed, drawn
 from scenarios.loop.controller import Controller
-from scenarios.loop.recording import Recording
 from scenarios.loop.simulation import simulate
+from scenarios.recording.recording import Recording
 
 SCENARIOS = {
     "ellipse-hqp": "an arm on a path, with joint limits, distances and a cone as inequalities",

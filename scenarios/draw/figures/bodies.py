@@ -16,8 +16,8 @@ from scenarios.draw.figures.drawing import INK, Array
 from scenarios.scene import ends
 
 if TYPE_CHECKING:
-    from scenarios.loop.facts import RobotFacts
-    from scenarios.loop.recording import Recording
+    from scenarios.recording.facts import RobotFacts
+    from scenarios.recording.recording import Recording
 
 _POSES = 4
 _APART = 1.1    # distance between bodies, in widths of the widest

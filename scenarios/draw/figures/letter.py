@@ -23,7 +23,7 @@ from scenarios.draw.figures.picture import picture
 from scenarios.draw.figures.timeline import timeline
 
 if TYPE_CHECKING:
-    from scenarios.loop.recording import Recording
+    from scenarios.recording.recording import Recording
 
 _STRIP, _NARROW_STRIP, _MOST_STRIPS = 1.7, 1.2, 3  # heights [in], and up to how many are high
 

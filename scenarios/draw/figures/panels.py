@@ -13,10 +13,10 @@ from matplotlib.axes import Axes
 from hierarchy import plugins
 from scenarios.draw.figures import drawing
 from scenarios.draw.figures.drawing import ALERT, INK, MEASURED, Array
-from scenarios.loop.listed import errors
+from scenarios.recording.listed import errors
 
 if TYPE_CHECKING:
-    from scenarios.loop.recording import Recording
+    from scenarios.recording.recording import Recording
 
 Draw = Callable[[Axes, "Recording", str], None]
 

@@ -15,8 +15,8 @@ from scenarios.draw.figures.drawing import ALERT, INK, Array
 
 if TYPE_CHECKING:
     from hierarchy.avoidance import Obstacle, Obstacles
-    from scenarios.loop.facts import RobotFacts
-    from scenarios.loop.recording import Recording
+    from scenarios.recording.facts import RobotFacts
+    from scenarios.recording.recording import Recording
 
 _VERTICES = 1200
 _OTHER_POSES = 5
@@ -91,7 +91,7 @@ def _ball(ax: Axes, centre: Array, radius: float, alpha: float) -> None:
 
 
 def _obstacles_at(recording: Recording, tick: int) -> Obstacles:
-    from scenarios.cell.obstacles import make_obstacles
+    from scenarios.cell.sensor import make_obstacles
 
     avoidance = recording.scenario.avoidance
     obstacles = make_obstacles(avoidance.placed if avoidance else ())

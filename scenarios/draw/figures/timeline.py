@@ -16,7 +16,7 @@ from scenarios.draw.figures.drawing import ALERT, INK
 from scenarios.draw.figures.palette import task_colours
 
 if TYPE_CHECKING:
-    from scenarios.loop.recording import Recording
+    from scenarios.recording.recording import Recording
 
 _ON_BAND = "#101214"   # text on a band, in any theme: bands are light
 _LETTER = 0.016        # width of a character, relative to the time axis, in a band's name

@@ -12,8 +12,7 @@ from PIL import Image, ImageDraw, ImageFont
 
 from hierarchy.problem import Array
 from scenarios.draw.figures import drawing
-from scenarios.loop.fate import Fate
-from scenarios.loop.phrases import phrase
+from scenarios.recording.fate import Fate, phrase
 from scenarios.scene import Scene, Series
 
 _INK, _QUIET = (26, 29, 33), (92, 101, 112)

@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scenarios.loop.fate import Fate
-from scenarios.loop.phrases import PHRASES
+from scenarios.recording.fate import PHRASES, Fate
 from scenarios.scene import Scene, Series
 
 NOTHING = 65535  # NaN or infinite

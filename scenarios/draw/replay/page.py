@@ -16,7 +16,7 @@ from scenarios.scene.pushes import key
 from scenarios.templates import render, resource
 
 if TYPE_CHECKING:
-    from scenarios.loop.recording import Recording
+    from scenarios.recording.recording import Recording
 
 _FOLDER = "draw/replay"
 _SCRIPTS = ("data.js", "space.js", "painter.js", "sketch.js", "stage.js", "curves.js",

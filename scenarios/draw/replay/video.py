@@ -14,7 +14,7 @@ from scenarios.files import named, written
 
 if TYPE_CHECKING:
     from scenarios.draw.replay.frames import Frames
-    from scenarios.loop.recording import Recording
+    from scenarios.recording.recording import Recording
 
 
 def write_video(recording: Recording, path: Path, *, rate: float = 30.0,

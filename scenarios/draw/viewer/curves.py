@@ -10,8 +10,8 @@ import numpy as np
 from hierarchy.problem import Array
 from scenarios.draw.viewer.moment import Watched
 from scenarios.loop.controller import Controller
-from scenarios.loop.facts import Facts
-from scenarios.loop.recording import Recording
+from scenarios.recording.facts import Facts
+from scenarios.recording.recording import Recording
 from scenarios.scene import Series, series
 
 

@@ -16,11 +16,11 @@ from scenarios.cell.build import build
 from scenarios.config import Scenario, ScenarioError
 from scenarios.config.plant import KinematicSection
 from scenarios.loop.controller import Controller
-from scenarios.loop.judging import completed
 from scenarios.loop.recorder import Recorder
-from scenarios.loop.recording import Recording
 from scenarios.loop.simulation import tick
+from scenarios.measure.judging import completed
 from scenarios.measure.run_folder import save
+from scenarios.recording.recording import Recording
 
 _HAND = 1.0     # [m/s] greatest speed of a dragged obstacle
 _FARTHEST = 5.0  # [m] greatest distance of dragging

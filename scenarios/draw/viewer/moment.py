@@ -14,9 +14,9 @@ from hierarchy.allocation import AVOIDANCE
 from hierarchy.avoidance import Obstacles
 from hierarchy.problem import Array
 from scenarios.cell.sensors import ExactDistances
-from scenarios.loop import listed
-from scenarios.loop.facts import facts_of
-from scenarios.loop.fate import Fate, Judged, judged
+from scenarios.recording import listed
+from scenarios.recording.facts import facts_of
+from scenarios.recording.fate import Fate, Judged, judged
 from scenarios.scene import SEPARATION, Scene
 from scenarios.scene.pushes import Pushes, pushes
 
@@ -90,7 +90,7 @@ class Watched:
 
     Distances are measured again from known geometry at the true joints, even if the controller uses
     a camera. After `moment`, `listed` has the signals of listed tasks, one row each; see
-    scenarios.loop.listed.
+    scenarios.recording.listed.
     """
 
     def __init__(self, controller: Controller) -> None:

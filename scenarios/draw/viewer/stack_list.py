@@ -8,8 +8,7 @@ import numpy as np
 
 from scenarios.draw.viewer.model import PUSHES
 from scenarios.draw.viewer.moment import Moment
-from scenarios.loop.fate import Fate
-from scenarios.loop.phrases import PHRASES, phrase
+from scenarios.recording.fate import PHRASES, Fate, phrase
 from scenarios.templates import render
 
 _COLOURS = {  # of a text and its background

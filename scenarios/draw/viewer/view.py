@@ -17,7 +17,7 @@ from scenarios.draw.viewer.playback import Playback, PlayButton, Requests, add_s
 from scenarios.draw.viewer.plots import Plots
 from scenarios.draw.viewer.server import lay_floor, lay_out, look_at_all, right
 from scenarios.draw.viewer.stack_list import key_html, stack_html
-from scenarios.loop.recording import Recording
+from scenarios.recording.recording import Recording
 from scenarios.scene import Scene, scene
 from scenarios.scene.pushes import key
 

@@ -1,8 +1,8 @@
-"""Contacts at the start: do they stand on the plant's floor, as the controller takes for granted?
+"""Make contacts from [[contacts]], and check that they stand on the plant's floor at the start.
 
-It plans forces at every point of a closed contact from the first tick on. A point 2 mm above the
-floor takes 20 ms to come down, while contacts that stand give way by 0.1 mm; until then the robot
-does not do what was planned.
+The controller plans forces at every point of a closed contact from the first tick on. A point 2 mm
+above the floor takes 20 ms to come down, while contacts that stand give way by 0.1 mm; until then
+the robot does not do what was planned.
 """
 
 from __future__ import annotations
@@ -11,16 +11,37 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from hierarchy import State
-from hierarchy.contacts import Contact, Contacts
+from hierarchy import HierarchyError, Robot, State
+from hierarchy.contacts import Contact, Contacts, corners
 from hierarchy.problem import Array
 from scenarios.cell.plants.ground import BALL
 from scenarios.config import Scenario, ScenarioError
+from scenarios.config.contacts import ContactSection
 from scenarios.config.plant import TorqueSection
 
 _OFF = 0.002      # [m] of a point from the floor that is too far
 _TILTED = 1.0     # [deg] of a sole from the floor that is too much
 _ON_EDGE, _TURNED_OVER = 45.0, 135.0  # [deg] from which another plane of its frame must be meant
+
+
+def contacts_of(scenario: Scenario, robot: Robot) -> Contacts | None:
+    """Return the contacts at level "torque", None at the others; raises ScenarioError."""
+    if scenario.control.level != "torque":
+        return None
+    try:
+        return Contacts(robot, [_contact(section, robot) for section in scenario.contacts])
+    except HierarchyError as error:
+        raise ScenarioError(f"contacts: {error}") from error
+
+
+def _contact(section: ContactSection, robot: Robot) -> Contact:
+    frame = robot.frame(section.frame)
+    if section.x is None or section.y is None:
+        return Contact(frame, (section.offset,), section.friction, section.normal,
+                       section.name or "", section.open, section.ramp, section.slides)
+    points = np.array(section.offset) + corners(section.x, section.y, section.up)
+    return Contact(frame, points.tolist(), section.friction, section.normal, section.name or "",
+                   section.open, section.ramp, up=section.up)
 
 
 def standing_on(floor: float, contacts: Contacts, q: Array) -> Array:

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenarios.config import Scenario
-from scenarios.loop.facts import Facts
-from scenarios.loop.signals import known
+from scenarios.recording.facts import Facts
+from scenarios.recording.signals import known
 
 
 class Recorded(Protocol):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 from hierarchy.words import listed
-from scenarios.loop.facts import ResolverFacts
+from scenarios.recording.facts import ResolverFacts
 
 _SAME = {"each pivot": "each level"}  # the same x while no level loses rank
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hierarchy.words import in_words, listed
-from scenarios.measure.wording import Clause, digits, measured, mm, value, who
+from scenarios.measure.verdicts.wording import Clause, digits, measured, mm, value, who
 
 if TYPE_CHECKING:
     from scenarios.measure.runs import Run
@@ -89,7 +89,7 @@ def _given_up(runs: Sequence[Run]) -> Iterator[Clause]:
 
 def missed_throughout(run: Run) -> list[str]:
     """Return the tasks of a run that were missed whenever they acted, and so never met."""
-    from scenarios.loop.fate import Fate
+    from scenarios.recording.fate import Fate
 
     if run.recording is None or "level_fate" not in run.recording:
         return []

@@ -12,10 +12,12 @@ from hierarchy.avoidance import Measurement
 from hierarchy.contacts import Contacts
 from hierarchy.jit import compiled
 from hierarchy.problem import Array, Hierarchy
-from scenarios.cell.build import Cell
-from scenarios.loop.depth_image import depth_view
-from scenarios.loop.fate import Fates
-from scenarios.loop.recording import Recording
+from scenarios.cell.build import Cell, build
+from scenarios.cell.sensors import DepthSensor
+from scenarios.config.plant import KinematicSection
+from scenarios.recording.depth_view import DepthView
+from scenarios.recording.fate import Fates
+from scenarios.recording.recording import Recording
 
 _SAME = 1e-9  # [m] of distances that are those recorded
 
@@ -108,3 +110,29 @@ def _alike(values, others, within):
         if not (values[i] == others[i] or abs(values[i] - others[i]) <= within):
             return False
     return True
+
+
+def depth_view(recording: Recording, t: float | None = None) -> DepthView | None:
+    """Take the image of a run's camera at time t [s]; None without a camera or before its first.
+
+    The default is the tick in which the end effector is nearest to an obstacle, or the last tick if
+    no obstacle was seen. The camera is built from the scenario, with zero latency.
+    """
+    if recording.scenario.sensor.kind != "camera" or not recording.ticks:
+        return None
+    k = _nearest(recording) if t is None else int(np.argmin(np.abs(recording["t"] - t)))
+    sensor = recording.scenario.sensor.model_copy(update={"latency": 0.0})
+    at_rest = {"sensor": sensor, "plant": KinematicSection()}
+    cell = build(recording.scenario.model_copy(update=at_rest))
+    moved = cell.state.move(float(recording["t"][k]), recording["q"][k], recording["v"][k])
+    if not moved or not isinstance(cell.sensor, DepthSensor):
+        return None
+    seen, image = cell.sensor.measure(cell.state), cell.sensor.reading
+    return None if image is None else DepthView(
+        cell.state.t, image.copy(), cell.sensor.space.pinhole.packed(), seen.points.copy(),
+        seen.distance.copy(), seen.nearest.copy(), seen.active)
+
+
+def _nearest(recording: Recording) -> int:
+    distance = np.where(np.isnan(recording["ee_distance"]), np.inf, recording["ee_distance"])
+    return int(np.argmin(distance)) if np.isfinite(distance).any() else recording.ticks - 1

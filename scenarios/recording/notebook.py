@@ -10,7 +10,7 @@ import numpy as np
 
 from hierarchy.errors import HierarchyError, UnknownNameError
 from hierarchy.notebook import html_table
-from scenarios.loop.columns import Recorded, columns, of_ticks, signal_units
+from scenarios.recording.columns import Recorded, columns, of_ticks, signal_units
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

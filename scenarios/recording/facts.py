@@ -14,12 +14,12 @@ from hierarchy.avoidance import Capsule
 from hierarchy.problem import Array
 from hierarchy.robots import DHTable
 from hierarchy.robots.table import Base
-from scenarios.cell.forces import contacts_of
+from scenarios.cell.contacts import contacts_of
 from scenarios.cell.robot import sensed_points
 from scenarios.config import Scenario
 from scenarios.config.plant import TorqueSection
-from scenarios.loop.links import capsules, lowest
-from scenarios.loop.tree import Joint, Matrix, Vector, joint_units, placements, tree_of
+from scenarios.recording.links import capsules, lowest
+from scenarios.recording.tree import Joint, Matrix, Vector, joint_units, placements, tree_of
 from solvers.resolver import Handles, Resolver
 
 Setting = bool | int | float | str | tuple[float | str, ...] | None

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenarios.cell.build import build
-from scenarios.loop.fate import Fate
-from scenarios.loop.judging import Rows
-from scenarios.loop.recording import Recording
+from scenarios.measure.judging import Rows
+from scenarios.recording.fate import Fate
+from scenarios.recording.recording import Recording
 from solvers.explain import held_back_by, most_missed
 from solvers.resolvers.hcod import Hcod
 

@@ -14,7 +14,7 @@ from hierarchy.tasks.pose import PoseTask
 
 if TYPE_CHECKING:
     from scenarios.config.listed import ListedTask
-    from scenarios.loop.recording import Recording
+    from scenarios.recording.recording import Recording
 
 
 def error_of(name: str) -> str:

@@ -9,10 +9,10 @@ from operator import itemgetter
 from typing import TYPE_CHECKING
 
 from hierarchy.words import listed
-from scenarios.measure.caveats import caveats
 from scenarios.measure.motions import ALIKE, departure, motions
-from scenarios.measure.wording import TIE, Clause, at, digits, measured, mm, who, within
-from scenarios.measure.wrongs import soundest, wrongs
+from scenarios.measure.verdicts.caveats import caveats
+from scenarios.measure.verdicts.wording import TIE, Clause, at, digits, measured, mm, who, within
+from scenarios.measure.verdicts.wrongs import soundest, wrongs
 
 if TYPE_CHECKING:
     from scenarios.measure.runs import Run

@@ -17,7 +17,7 @@ from scenarios.cell.build import Cell
 from solvers.certificate import TOLERANCE
 
 if TYPE_CHECKING:
-    from scenarios.loop.recording import Recording
+    from scenarios.recording.recording import Recording
 
 
 class Fate(IntEnum):
@@ -28,6 +28,15 @@ class Fate(IntEnum):
     FREE = 2     # one-sided rows, none of them at a side: it does not act
     MET = 3      # rows that act, and are met
     MISSED = 4   # by the norm of its violation
+
+
+PHRASES = {Fate.MET: "met", Fate.FREE: "inactive", Fate.MISSED: "missed",
+           Fate.UNKNOWN: "in the stack, not judged", Fate.ABSENT: "not in the stack"}
+
+
+def phrase(fate: Fate, violation: float) -> str:
+    """Return a fate in words, with the violation where the level is missed."""
+    return f"missed by {violation:.2g}" if fate is Fate.MISSED else PHRASES[fate]
 
 
 class Judged(NamedTuple):

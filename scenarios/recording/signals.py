@@ -126,7 +126,7 @@ _TABLE = (
     Signal("contact_force", "N", "(T,)", "as contacts"),
     Signal("certified", "", "(T,)", "whether x is the undamped answer, in a certified run"),
     Signal("moved_by_lower", "m", "(T,)", "see scenarios.loop.audit.Strictness"),
-    Signal("level_fate", "", "(T, N)", "value of scenarios.loop.fate.Fate of each of the "
+    Signal("level_fate", "", "(T, N)", "value of scenarios.recording.fate.Fate of each of the "
            "`task_names` under the command that was sent"),
     Signal("level_violation", "", "(T, N)", "Euclidean norm of the violation of its rows, in their "
            "unit, NaN where the task is absent or its fate unknown"),
