@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
 from math import inf
 from typing import NamedTuple
 
@@ -15,11 +14,16 @@ from scenarios.cell.sensors import ExactDistances, Sensor
 from scenarios.cell.sensors.camera import DepthCamera, Pinhole, looking_at
 from scenarios.cell.sensors.depth_sensor import DepthSensor, Source
 from scenarios.cell.sensors.depth_space import DepthSpace
-from scenarios.cell.sensors.errors import DepthErrors
 from scenarios.cell.sensors.frames import RecordedFrames
 from scenarios.config import Scenario, ScenarioError
 from scenarios.config.avoidance import AvoidanceSection, ObstacleSection, SeparationSection
-from scenarios.config.sensor import CameraSection, ExactSection, FramesSection, OwnSensor
+from scenarios.config.sensor import (
+    CameraSection,
+    DepthErrors,
+    ExactSection,
+    FramesSection,
+    OwnSensor,
+)
 
 
 class _Asked(NamedTuple):
@@ -100,8 +104,7 @@ def _camera(section: CameraSection, exact: ExactDistances,
                 else np.array(section.rotation))
     pinhole = Pinhole(section.width, section.height, section.fx, section.fy, section.cx,
                       section.cy, section.position, rotation)
-    errors = DepthErrors.none(section.near, section.far) if section.ideal else DepthErrors(
-        **{field.name: getattr(section, field.name) for field in fields(DepthErrors)})
+    errors = DepthErrors.none(section.near, section.far) if section.ideal else section
     return DepthCamera(pinhole, exact.obstacles, capsules, errors, rate=section.rate,
                        jitter=section.jitter, latency=section.latency, seed=section.seed,
                        point_radius=section.point_radius, backdrop=section.backdrop or inf)

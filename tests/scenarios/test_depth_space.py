@@ -13,10 +13,10 @@ from scenarios.cell.build import build
 from scenarios.cell.sensors import DepthSensor
 from scenarios.cell.sensors.camera import DepthCamera, Pinhole, looking_at
 from scenarios.cell.sensors.depth_space import DepthSpace, ObstacleImage
-from scenarios.cell.sensors.errors import DepthErrors
 from scenarios.cell.sensors.exact import ExactDistances
 from scenarios.cell.sensors.frames import RecordedFrames
 from scenarios.config import ScenarioError
+from scenarios.config.sensor import DepthErrors
 from scenarios.draw.figures.depth import depth_figure
 from scenarios.loop import record_frames
 from scenarios.measure.judging import depth_view

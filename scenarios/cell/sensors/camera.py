@@ -13,8 +13,9 @@ from hierarchy.avoidance import Capsule, Obstacles
 from hierarchy.avoidance.self_collision import pack_capsules
 from hierarchy.problem import Array
 from hierarchy.records import set_frozen
-from scenarios.cell.sensors.errors import DepthErrors, Image, expose
+from scenarios.cell.sensors.errors import Image, expose
 from scenarios.cell.sensors.rendering import draw_scene
+from scenarios.config.sensor import DepthErrors
 
 _ROUNDING = 1e-9   # [s] of times that are compared
 _SKEW = 1e-6       # tolerance of a rotation matrix
