@@ -1,13 +1,20 @@
 """Every kind of `[[tasks]]` in a scenario: what it reaches, and what is refused."""
 
+from typing import Literal
+
 import numpy as np
 import pytest
+from pydantic import TypeAdapter
 
-from hierarchy import HierarchyError, State
-from hierarchy.tasks import Manipulability, SelfSeparation, Separation
+from hierarchy import HierarchyError, State, plugins
+from hierarchy.tasks import JointCoupling, Manipulability, SelfSeparation, Separation
 from scenarios import load, simulate
+from scenarios.cell.avoidance import separable_pairs
 from scenarios.cell.build import build
-from scenarios.config.listed import KINDS
+from scenarios.config.listed import KINDS, OwnTask
+from scenarios.config.references import References
+from scenarios.config.sections import any_kind
+from scenarios.config.tasks import Listed, register
 from scenarios.measure.metrics import measure
 
 BASE = {"name": "listed", "robot": {"model": "kuka_lwr"},
@@ -214,3 +221,26 @@ def test_every_kind_has_a_test_here(request):
     text = request.path.read_text(encoding="utf-8")
     tested = {"pose", "com", "pointing"}  # in test_humanoid.py
     assert [kind for kind in KINDS if f'"{kind}"' not in text and kind not in tested] == []
+
+
+def test_a_new_kind_is_one_section_that_nothing_else_lists(monkeypatch):
+    monkeypatch.setattr(plugins, "_shipped", {group: dict(kinds) for group, kinds
+                                              in plugins._shipped.items()})
+
+    @register("elbow")
+    class Elbow(Listed):
+        kind: Literal["elbow"]
+        joint: str
+
+        def make(self, at):
+            return JointCoupling(at.robot, {self.joint: 1.0}, 0.5, name=self.title)
+
+    section = TypeAdapter(any_kind("tasks", OwnTask)).validate_python(
+        {"kind": "elbow", "joint": "joint_4"})
+    assert isinstance(section, Elbow)
+    cell = build(load("ellipse-hqp"))
+    start = State.at(cell.robot, *cell.start)
+    task = section.make(References(start, None, separable_pairs))
+    assert (task.name, task.dimension) == ("elbow", 1)
+    assert [(unit, size.tolist()) for unit, size in section.sizes(np.array([[-3.0]]))] == [
+        ("m", [3.0])]
