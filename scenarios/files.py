@@ -18,6 +18,8 @@ from typing import Any
 
 from hierarchy.errors import HierarchyError
 
+_VARIANT = re.compile(r"(?m)^\[variants\.([\w-]+)\]")
+
 
 class OutputError(HierarchyError):
     """A folder that exists and is not empty, or that cannot be written."""
@@ -197,6 +199,19 @@ def read_toml(path: Path, what: str, error: type[HierarchyError]) -> dict[str, A
         raise error(f"{what} {str(path)!r} is nested too deep") from cause
     except ValueError as cause:
         raise error(f"{what} {str(path)!r} has an integer of thousands of digits") from cause
+
+
+def scenarios_in(folder: Path) -> dict[str, tuple[Path, str]]:
+    """Return file and variant ("" for the file itself) of each scenario in a library, by name.
+
+    The files are not parsed: a scenario has its own name, a variant its own table.
+    """
+    found: dict[str, tuple[Path, str]] = {}
+    for path in sorted(folder.glob("*.toml")):
+        text = path.read_text(encoding="utf-8")
+        found |= {path.stem: (path, "")} if f'\nname = "{path.stem}"' in f"\n{text}" else {}
+        found |= {f"{path.stem}-{key}": (path, key) for key in _VARIANT.findall(text)}
+    return dict(sorted(found.items()))
 
 
 def slug(text: str) -> str:

@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 
 _LIBRARY = Path(__file__).parents[1] / "library"
-_VARIANT = re.compile(r"(?m)^\[variants\.([\w-]+)\]")
 
 
 def scenarios(incomplete: str) -> list[str]:
     """Return the matching scenarios; if there are none, the shell completes files."""
-    found = []
-    for path in _LIBRARY.glob("*.toml"):
-        text = path.read_text(encoding="utf-8")
-        found += [path.stem] if f'name = "{path.stem}"' in text else []
-        found += [f"{path.stem}-{key}" for key in _VARIANT.findall(text)]
-    return sorted(name for name in found if name.startswith(incomplete))
+    from scenarios.files import scenarios_in
+
+    return [name for name in scenarios_in(_LIBRARY) if name.startswith(incomplete)]
 
 
 def compared(incomplete: str) -> list[str]:

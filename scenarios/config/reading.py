@@ -16,7 +16,7 @@ from scenarios.config.errors import ScenarioError
 from scenarios.config.groups import load_group, shipped_groups
 from scenarios.config.scenario import Scenario
 from scenarios.config.validation import validated
-from scenarios.files import read_toml
+from scenarios.files import read_toml, scenarios_in
 
 LIBRARY = Path(__file__).parents[1] / "library"
 _DEEPEST = 50  # files that may extend each other
@@ -38,13 +38,7 @@ class Source(NamedTuple):
 @cache
 def _library() -> dict[str, Source]:
     """Return the shipped scenarios by name: FILE, and FILE-VARIANT of each variant in it."""
-    found: dict[str, Source] = {}
-    for path in LIBRARY.glob("*.toml"):
-        data = read_toml(path, "scenario file", ScenarioError)
-        variants = data.pop("variants", {})
-        found |= {path.stem: Source(path)} if data else {}
-        found |= {f"{path.stem}-{key}": Source(path, key) for key in variants}
-    return dict(sorted(found.items()))
+    return {name: Source(*place) for name, place in scenarios_in(LIBRARY).items()}
 
 
 def shipped() -> tuple[str, ...]:
