@@ -16,6 +16,7 @@ LEAST_SQUARE = 1e-200      # square of a norm: smaller ones lose digits, as do l
 # What is met. A violation that the search pursues is larger than what the verification forgives.
 MET = 1e-13          # violation of a level whose multipliers are zero, relative to its terms
 VIOLATED = 1e-9      # violation at which a row enters, relative to its terms
+SATURATES = 10.0     # excess of a row over |x|, times this: share that damping takes for held
 LEVEL_MET = 1e-10    # violation of a level of which tpm says that it is met, relative to its terms
 BOUND_KEPT = 1e-12   # of sns, relative to 1 + |bound|
 SHADOW = 1e-5        # of the largest number so far: part of the scale of x in the search
