@@ -199,7 +199,7 @@ def solve_exactly(A, lower, upper, sizes, x, record, settings, work):
                                           min(limit - steps, PASS_STEPS * (m + n)))
         steps += t.count[STEPS]
         save(s, saved, sizes.size if code == SOLVED else level)
-        code = _verified(s, code)
+        code = _verified(s, code, False)
         restore(s)
         if code != SOLVED and steps < limit:
             code, tries = pivot_in_blocks(s, limit - steps, True)
@@ -212,7 +212,7 @@ def solve_exactly(A, lower, upper, sizes, x, record, settings, work):
                 s, current, saved, min(limit - steps, SEARCH_STEPS * (m + n)),
                 ZERO if coarse > begin else level)
             steps += tries
-            code = _verified(s, code)
+            code = _verified(s, code, True)
     if code == SOLVED and s.count[NEGLECTED] > 0 and neglects(s):
         code = ZERO + INACCURATE
     elif code not in (SOLVED, NUMERICAL_FAILURE):
@@ -254,9 +254,9 @@ def _resumed_at(number, levels):
 
 
 @inlined
-def _verified(s, code):
+def _verified(s, code, factored):
     """Return the code of a search: INACCURATE in place of SOLVED if its claims are no proof."""
-    return ZERO + (INACCURATE if code == SOLVED and not verify(s) else code)
+    return ZERO + (INACCURATE if code == SOLVED and not verify(s, factored) else code)
 
 
 @inlined

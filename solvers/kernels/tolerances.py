@@ -26,12 +26,13 @@ FLOOR = 1e-3         # the same in the pass level by level
 BAND = 5e-9          # shift of a side, relative to 1 + |x|
 FREE_ROWS = 2.0      # share of the band of a row that acts over that of one that does not
 REMAINDER = 2.5e-9   # what may remain of a gradient, as a shift of the sides of its level
-CUT_BALANCE = 2e-7   # what cut rows may add to a gradient, relative to its terms
+UNSURE_BALANCE = 2e-7  # what cut rows, or rounding, may add to a gradient, relative to its terms
 CUT_OVER_PIVOT = 2e-4  # cut of a row over the smallest pivot: larger ones turn the answer
 RANK_MARGIN = 1.1    # between a pivot or a cut and rank_tolerance, as a factor
 PIVOT_PRODUCT = 1e-15  # of the two smallest pivots: less, and the second is rounding of the first
-CERTAIN_SIGN = 1e-8  # multiplier over what it balances: smaller ones have no certain sign
-SIGN_MARGIN = 4.0    # multiplier over the error of the gradient, the same
+SIGN_MARGIN = 4.0    # multiplier over its error, that of the gradient over the smallest pivot
+SIGN_ROUNDING = 4e-16  # of a gradient over its terms
+COARSE_SIGN = 1e-10  # multiplier over its terms: the coarse search takes smaller ones for zero
 
 # Pivots
 REPIVOT = 1e-4       # share of a row in its own basis vector: smaller ones pivot the level again
