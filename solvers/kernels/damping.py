@@ -22,7 +22,7 @@ from solvers.kernels.block import level_damping
 from solvers.kernels.rows import ZERO, add_multiple, factor_level, length_of, reflect, reflect_back
 from solvers.kernels.space import Block, View, integers, matrix, shared, vector
 from solvers.kernels.staircase import carve_staircase, solve_by_staircase
-from solvers.kernels.tolerances import SATURATES
+from solvers.kernels.tolerances import LEVEL_MET, SATURATES
 from solvers.kernels.working_set import row_times
 from solvers.status import NUMERICAL_FAILURE
 
@@ -194,7 +194,9 @@ def keep_reached(d, A, lower, upper, x, k, end):
     for i in range(end):
         value = row_times(d.A[i], x)
         if lower[i] < upper[i]:
-            d.lower[i], d.upper[i] = min(d.lower[i], value), max(d.upper[i], value)
+            least = LEVEL_MET * (1.0 + abs(value))  # less is rounding of a side that is kept
+            d.lower[i] = value if value < d.lower[i] - least else d.lower[i]
+            d.upper[i] = value if value > d.upper[i] + least else d.upper[i]
         elif i < begin:
             d.lower[i] = d.upper[i] = value
         else:
