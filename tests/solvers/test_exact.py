@@ -142,8 +142,8 @@ def test_a_third_level_that_was_missed_by_2e_7_too_much_is_not_called_solved():
 def test_steps_of_inverse_kinematics_that_were_called_inaccurate_are_solved(name):
     """From `solve_ik` on public robots: weak multipliers decide, or rows are parallel to 5e-7."""
     h = read(name)
-    res = HCOD.solve(h)
-    for res in (res, HCOD.solve(h, res.memory)):
+    cold = HCOD.solve(h)
+    for res in (cold, HCOD.solve(h, cold.memory)):
         assert res.status is Status.SOLVED
         assert certify(h, res.x).certified
 
