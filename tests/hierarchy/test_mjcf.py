@@ -188,8 +188,26 @@ def test_a_locked_joint_stays_where_it_is_put(written):
     assert part.joint_names == ("b_joint",)
     np.testing.assert_allclose(State.at(part, [0.2]).position("b_tip"),
                                State.at(whole, [0.3, 0.2]).position("b_tip"), atol=1e-12)
-    with pytest.raises(RobotError, match="'root' is a free joint and cannot be locked"):
-        Robot.load(written(world(WALKER)), locked={"root": 0.0})
+
+
+@pytest.mark.parametrize(("joint", "value", "qpos"), [
+    ("shoulder", (0.0, 0.6, 0.0), [0.9553364891, 0.0, 0.2955202067, 0.0]),
+    ("shoulder", (0.0, 0.6, 0.0, 0.8), [0.8, 0.0, 0.6, 0.0]),
+    ("root", (0.1, 0.2, 0.3, 0.0, 0.6, 0.0), [.1, .2, .3, 0.9553364891, 0.0, 0.2955202067, 0.0])])
+def test_a_ball_and_a_free_joint_are_locked_where_mujoco_has_them(joint, value, qpos, written):
+    ball = link("arm", 'type="ball" pos=".1 0 .05"', link("hand")).replace("arm_joint", "shoulder")
+    path = written(world(WALKER.replace(GEOM, GEOM + ball, 1)))
+    robot = Robot.load(path, locked={joint: value})
+    assert joint not in robot.joint_names
+    model = mujoco.MjModel.from_xml_path(str(path))
+    data = mujoco.MjData(model)
+    at = model.joint(joint).qposadr[0]
+    data.qpos[at:at + len(qpos)] = qpos
+    mujoco.mj_kinematics(model, data)
+    np.testing.assert_allclose(State.at(robot, robot.rest).position("hand_tip"),
+                               data.site("hand_tip").xpos, atol=1e-9)
+    with pytest.raises(RobotError, match=f"locked: joint '{joint}'"):
+        Robot.load(path, locked={joint: (1.0, 2.0)})
 
 
 @pytest.mark.parametrize(("actuator", "joint", "effort"), [
