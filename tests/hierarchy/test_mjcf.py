@@ -284,6 +284,19 @@ def test_couplings_are_polynomials_of_positions(written):
     np.testing.assert_allclose(held.coefficients, [np.polyval(one.coefficients[::-1], 0.3)])
 
 
+@pytest.mark.parametrize(("before", "after", "said"), [
+    ('0" size', '0"size', ""), ("<worldbody>", "<!-- a--b --><worldbody>", ""),
+    ("</worldbody>", "", "cannot be read: XML")])
+def test_what_is_not_quite_xml_is_left_to_mujoco(before, after, said, written):
+    path = written(world(link("a")))
+    path.write_text(path.read_text().replace(before, after, 1))
+    if said:
+        with pytest.raises(RobotError, match=said):
+            Robot.load(path)
+    else:
+        assert Robot.load(path).joint_names == ("a_joint",)
+
+
 def test_tendons_that_keep_their_length_couple_their_joints(written):
     tie = ('<fixed name="{0}"><joint joint="{1}" coef=".5"/><joint joint="{2}" coef="-2"/></fixed>'
            '<fixed name="{2}"><joint joint="{2}" coef="3"/></fixed>')
