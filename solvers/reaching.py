@@ -172,7 +172,7 @@ class _Search:
 
 
 def _above(h: Hierarchy, k: int, wanted: Array, limits: Sequence[Task]) -> list[str]:
-    """Name the tasks above level k one of whose rows does not let go where it pulls (n,)."""
+    """Name the tasks above level k that keep it from moving as `wanted` (n,)."""
     own = {task.name for task in limits}
     return [name for name, (A, lower, upper) in zip(h.names[:k], h.levels(), strict=False)
             if name not in own and _blocks(A, lower, upper, wanted)]

@@ -204,4 +204,3 @@ def to_mujoco(built: Built, q: Array) -> Array:
         here = mj.jnt_qposadr[j]
         qpos[here:here + joint.nq] = rolled(q[joint.idx_q:joint.idx_q + joint.nq], 1)
     return qpos
-
