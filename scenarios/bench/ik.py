@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import subprocess
+import sys
 import xml.etree.ElementTree as ET
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -50,7 +51,8 @@ def run(out: Path | None = None, count: int = 1000, seed: int = 0) -> list[dict[
 
     Reachable poses are those of random configurations within the limits; for unreachable ones the
     first hand is moved out. Every answer is judged with our kinematics: all errors within
-    `TOLERANCE`, all joints within their limits. Prints a table; writes ik.csv into `out` if given.
+    `TOLERANCE`, all joints within their limits. Prints a table; ik.csv in `out`, if given, has the
+    rows measured so far.
     """
     rows: list[dict[str, Any]] = []
     with TemporaryDirectory() as folder:
@@ -67,12 +69,13 @@ def run(out: Path | None = None, count: int = 1000, seed: int = 0) -> list[dict[
                 problems = Path(folder) / "problems.npz"
                 np.savez(problems, urdf=str(file), frames=np.array(arm.frames), poses=poses,
                          starts=starts, tolerance=TOLERANCE)
-                rows += [{"robot": name, "poses": "reachable" if reachable else "unreachable"}
-                         | _measured(label, robot, arm, poses, problems, staged)
-                         for label in _PACKAGES]
+                for label in _PACKAGES:
+                    row = {"robot": name, "poses": "reachable" if reachable else "unreachable"}
+                    print(*row.values(), label, "...", file=sys.stderr, flush=True)
+                    rows.append(row | _measured(label, robot, arm, poses, problems, staged))
+                    if out is not None:
+                        write_rows(rows, out / "ik.csv")
     _print(rows)
-    if out is not None:
-        write_rows(rows, out / "ik.csv")
     return rows
 
 

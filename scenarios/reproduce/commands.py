@@ -29,7 +29,7 @@ from scenarios.files import slug, write_text
 
 PAGES = ("README.md", "docs/benchmarks.md", "docs/choosing.md", "docs/batch.md",
          "docs/tpm-limits.md", "docs/first-paper.md", "docs/letter.md", "docs/deploy.md",
-         "docs/peers.md", "docs/standing.md", "docs/robots.md")
+         "docs/peers.md", "docs/standing.md", "docs/robots.md", "docs/ik.md")
 OUTPUT = "docs/results/output"
 _COLUMNS = "100"  # of the terminal that a command writes to
 _BLOCK = re.compile(r"(?P<mark><!-- measured: (?P<table>table of )?(?P<command>[^|\n]*?)"
