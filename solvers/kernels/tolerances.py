@@ -42,6 +42,7 @@ UNCLEAR_CUT = 0.3    # remainder of a dependent row over the smallest pivot: the
 OUTSIDE = 1e-14      # share of a row outside the basis of `Factorization`: less is no direction
 EXACTLY_DEPENDENT, NEARLY_DEPENDENT = 1e-12, 1e-7  # in `weighted`: ill-posed in between
 ORTHOGONAL = 1e-30   # squared cosine of two rows: Jacobi rotations stop
+LONGEST = 1e150      # x of `weighted`: squares of longer ones overflow
 
 # Limits. The pass and each search end after their number times rows plus unknowns.
 PASS_STEPS = 2
