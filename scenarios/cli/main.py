@@ -280,18 +280,13 @@ def replay(folders: Annotated[list[Path], typer.Argument(
                metavar="RUN...", help="Folders of `hierarchy run` or `compare`.")],
            out: Annotated[Path | None, output(
                "HTML file to write. Default: RUN/replay.html.", "FILE")] = None,
-           video: Annotated[Path | None, typer.Option(
-               "--video", metavar="FILE", help="Write a video of one run with ffmpeg.")] = None,
            rate: Annotated[float, typer.Option(
                "--rate", metavar="HZ", help="Frames per second.")] = 30.0,
            plugin: Plugins = None) -> int:
-    """Write runs as one HTML file, or one run as a video.
-
-    The HTML file plays without a server.
-    """
+    """Write runs as one HTML file that plays without a server."""
     from scenarios.cli.replay import replay_command
 
-    return replay_command(folders, out, video, rate)
+    return replay_command(folders, out, rate)
 
 
 @app.command()

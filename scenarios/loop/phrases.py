@@ -1,4 +1,4 @@
-"""What became of a level in words: the same on every page, list and video."""
+"""What became of a level in words: the same on every page and list."""
 
 from __future__ import annotations
 
