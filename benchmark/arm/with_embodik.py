@@ -35,7 +35,7 @@ class Embodik:
         """See `Adapter`."""
         scene = self.scene
         self.robot.update_kinematics(q)
-        p = np.asarray(self.position.current_position)
+        p = np.asarray(self.robot.get_frame_pose(scene.frame).translation)  # the task lags a tick
         self.position.set_target_velocity(rate + scene.gain * (goal - p))
         if self.posture is not None:
             self.posture.set_target_velocity(scene.posture_gain * (np.array(scene.posture) - q))

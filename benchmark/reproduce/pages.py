@@ -30,7 +30,7 @@ from scenarios.files import make_folder, slug, write_text
 
 ROOT = Path(__file__).parents[2]
 PAGES = ("README.md", "docs/benchmarks.md", "docs/choosing.md", "docs/batch.md",
-         "docs/tpm-limits.md", "docs/first-paper.md", "docs/letter.md", "docs/deploy.md",
+         "docs/tpm-limits.md", "docs/first-paper.md", "docs/letter.md",
          "docs/peers.md", "docs/standing.md", "docs/robots.md", "docs/reproduction.md",
          "docs/ladder.md", "docs/experiment.md")
 RESULTS, OUTPUT = "docs/results", "docs/results/output"
