@@ -93,22 +93,16 @@ def resolvers(
                 resolvers=resolver, **chosen)
 
 
-@bench.command()
-def tick(out: Out = None) -> int:
-    """Time one control tick, compiled and in plain numpy."""
-    return _run(out, "tick")
+def _plain(name: str, words: str) -> None:
+    def command(out: Out = None) -> int:
+        return _run(out, name)
+
+    bench.command(name, help=words)(command)
 
 
-@bench.command()
-def start(out: Out = None) -> int:
-    """Measure start-up time, compilation and memory."""
-    return _run(out, "start")
-
-
-@bench.command()
-def strictness(out: Out = None) -> int:
-    """Measure whether lower tasks disturb upper ones."""
-    return _run(out, "strictness")
+_plain("tick", "Time one control tick, compiled and in plain numpy.")
+_plain("start", "Measure start-up time, compilation and memory.")
+_plain("strictness", "Measure whether lower tasks disturb upper ones.")
 
 
 @bench.command()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -56,23 +58,25 @@ class Iterated:
         return nearest, False
 
 
-class Pink(Iterated):
-    """Tasks of pink, weighted alike, with its limits."""
+class Tasks(Iterated):
+    """Tasks of pink or mink, weighted alike, with a configuration and limits of positions."""
 
-    def __init__(self, file: str, frames: list[str], tolerance: float) -> None:
-        import pinocchio as pin
-        from pink import Configuration
-        from pink.tasks import FrameTask
+    configuration: Any
+    tasks: list[Any]
+    limits: tuple[Array, Array]
 
-        super().__init__(tolerance)
-        self.pin, model = pin, pin.buildModelFromUrdf(file)
-        self.configuration = Configuration(model, model.createData(), pin.neutral(model))
-        self.tasks = [FrameTask(name, 1.0, 1.0, lm_damping=_LM) for name in frames]
+    def pose(self, matrix: Array) -> Any:
+        """Return a pose (4, 4) as the package has it."""
+        raise NotImplementedError
+
+    def velocity(self) -> Array:
+        """Return the velocity of a step."""
+        raise NotImplementedError
 
     def aim(self, poses: Poses) -> None:
         """See `Iterated`."""
         for task, pose in zip(self.tasks, poses, strict=True):
-            task.set_target(self.pin.SE3(pose[:3, :3], pose[:3, 3]))
+            task.set_target(self.pose(pose))
 
     def at(self, q: Array) -> float:
         """See `Iterated`."""
@@ -82,16 +86,34 @@ class Pink(Iterated):
 
     def step(self, q: Array) -> Array:
         """See `Iterated`."""
+        return np.asarray(np.clip(q + self.velocity() * PERIOD, *self.limits))
+
+
+class Pink(Tasks):
+    """pink, with its limits."""
+
+    def __init__(self, file: str, frames: list[str], tolerance: float) -> None:
         import pink
+        import pinocchio as pin
 
-        v = pink.solve_ik(self.configuration, self.tasks, PERIOD, "daqp", safety_break=False)
-        model = self.configuration.model
-        return np.asarray(np.clip(q + v * PERIOD, model.lowerPositionLimit,
-                                  model.upperPositionLimit))
+        super().__init__(tolerance)
+        self.pink, self.pin, model = pink, pin, pin.buildModelFromUrdf(file)
+        self.configuration = pink.Configuration(model, model.createData(), pin.neutral(model))
+        self.tasks = [pink.tasks.FrameTask(name, 1.0, 1.0, lm_damping=_LM) for name in frames]
+        self.limits = model.lowerPositionLimit, model.upperPositionLimit
+
+    def pose(self, matrix: Array) -> Any:
+        """See `Tasks`."""
+        return self.pin.SE3(matrix[:3, :3], matrix[:3, 3])
+
+    def velocity(self) -> Array:
+        """See `Tasks`."""
+        return np.asarray(self.pink.solve_ik(self.configuration, self.tasks, PERIOD, "daqp",
+                                             safety_break=False))
 
 
-class Mink(Iterated):
-    """Tasks of mink, weighted alike, with its limits."""
+class Mink(Tasks):
+    """mink, with its limits."""
 
     def __init__(self, file: str, frames: list[str], tolerance: float) -> None:
         import mink
@@ -101,23 +123,15 @@ class Mink(Iterated):
         self.mink, model = mink, mujoco.MjModel.from_xml_path(file)
         self.configuration = mink.Configuration(model)
         self.tasks = [mink.FrameTask(name, "body", 1.0, 1.0, lm_damping=_LM) for name in frames]
-        self.range = model.jnt_range.T
+        self.limits = model.jnt_range[:, 0], model.jnt_range[:, 1]
 
-    def aim(self, poses: Poses) -> None:
-        """See `Iterated`."""
-        for task, pose in zip(self.tasks, poses, strict=True):
-            task.set_target(self.mink.SE3.from_matrix(pose))
+    def pose(self, matrix: Array) -> Any:
+        """See `Tasks`."""
+        return self.mink.SE3.from_matrix(matrix)
 
-    def at(self, q: Array) -> float:
-        """See `Iterated`."""
-        self.configuration.update(q)
-        return float(np.linalg.norm([task.compute_error(self.configuration)
-                                     for task in self.tasks]))
-
-    def step(self, q: Array) -> Array:
-        """See `Iterated`."""
-        v = self.mink.solve_ik(self.configuration, self.tasks, PERIOD, "daqp")
-        return np.asarray(np.clip(q + v * PERIOD, *self.range))
+    def velocity(self) -> Array:
+        """See `Tasks`."""
+        return np.asarray(self.mink.solve_ik(self.configuration, self.tasks, PERIOD, "daqp"))
 
 
 class Placo(Iterated):
