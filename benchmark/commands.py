@@ -74,9 +74,9 @@ def main(ctx: typer.Context, out: Out = None) -> None:
 @bench.command()
 def resolvers(
         fresh: Annotated[int | None, typer.Option(
-            "--fresh", metavar="SEED", help="Time new problems too, from this seed on.")] = None,
+            "--fresh", metavar="SEED", help="Also time fresh problems, from this seed on.")] = None,
         count: Annotated[int, typer.Option(
-            "--count", min=1, metavar="N", help="New problems of each family.")] = 200,
+            "--count", min=1, metavar="N", help="Fresh problems of each family.")] = 200,
         family: Annotated[list[str] | None, typer.Option(
             "--family", metavar="NAME", help="Only this family. May be repeated.")] = None,
         resolver: Annotated[list[str] | None, typer.Option(

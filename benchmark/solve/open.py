@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -79,9 +79,8 @@ def _add(store: Store, entrant: Entrant, files: Sequence[Path], limit: float) ->
         store.add(rows, store.file_of(entrant.label, file))
 
 
-def asked(entrant: Entrant, files: Sequence[Path], limit: float = LIMIT) -> list[list[Row]]:
-    """Return the raw rows of an entrant on each file; raises MissingError if it cannot start."""
-    found = []
+def asked(entrant: Entrant, files: Sequence[Path], limit: float = LIMIT) -> Iterator[list[Row]]:
+    """Yield the raw rows of an entrant on each file; raises MissingError if it cannot start."""
     with staged() as folder:
         process = Process(entrant, QUESTIONS, folder)
         try:
@@ -91,10 +90,9 @@ def asked(entrant: Entrant, files: Sequence[Path], limit: float = LIMIT) -> list
                         "family": one.head.family, "half": one.head.half, "seed": one.head.seed,
                         "sha256": one.digest}
                 rows = _answers(process, file, len(one.problems), limit)
-                found.append([{**same, **row} for row in rows])
+                yield [{**same, **row} for row in rows]
         finally:
             process.stop()
-    return found
 
 
 def _answers(process: Process, file: Path, count: int, limit: float) -> list[Row]:
@@ -175,7 +173,7 @@ def check(entrant: Entrant, folder: Path) -> tuple[str, bool]:
     """
     files = [export(FAMILIES[name], 0, _CHECKS, True, folder) for name in CHECKED]
     try:
-        every = asked(entrant, files, _CHECK_LIMIT)
+        every = list(asked(entrant, files, _CHECK_LIMIT))
     except MissingError as reason:
         return f"{entrant.label}: cannot run: {reason}", False
     found = {one.digest: one for one in map(read, files)}

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 problems = typer.Typer(rich_markup_mode=None, invoke_without_command=True)
 
 Seed = Annotated[int, typer.Option("--seed", min=0, metavar="S",
-                                   help="0: the public half. Any other: fresh problems.")]
+                                   help="0: the public problems. Any other: fresh ones.")]
 Count = Annotated[int | None, typer.Option("--count", min=1, metavar="N",
                                            help="Number of problems. Default: that of the family.")]
 

@@ -63,13 +63,13 @@ def _resolvers() -> list[Resolver]:
 
 
 def file_of(folder: Path, family: str, seed: int) -> Path:
-    """Return the path of a half's file."""
+    """Return the path of a set's file."""
     return folder / f"{family}-{f'fresh-{seed}' if seed else 'public'}.npz"
 
 
 def export(family: Family, seed: int, count: int | None, answers: bool, folder: Path,
            progress: Progress | None = None) -> Path:
-    """Write a half of a family into the folder, and return the file."""
+    """Write a set of a family into the folder, and return the file."""
     made = family.half(seed, count)
     return save(with_answers(made, progress) if answers else made, folder)
 

@@ -1,7 +1,7 @@
-"""The families of the open benchmark: each makes a public half and fresh ones from a seed.
+"""The families of the open benchmark: each makes a public set and fresh ones from a seed.
 
 A family of your own is one entry in FAMILIES: a function from a seed and a count to hierarchies.
-Seed 0 is the public half, which everybody may tune on; any other seed is fresh.
+Seed 0 is the public set, which everybody may tune on; any other seed is fresh.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ COUNT = 50
 _CONSECUTIVE = 200
 _FEW = 20            # where a proof takes seconds
 _SIMULATED = (*stored.RECORDED, "stand-push")
-_STRIDE = 1_000_000  # seeds of single problems between two seeds of halves
+_STRIDE = 1_000_000  # seeds of single problems between two seeds of sets
 
 Make = Callable[[int, int], Sequence[Hierarchy]]
 
@@ -36,9 +36,9 @@ class Family:
     Attributes
     ----------
     name, group, what : what it is called, which families it goes with, and what it has.
-    make : from the seed of the half, 0 for the public one, and a count to that many problems.
+    make : from the seed of the set, 0 for the public one, and a count to that many problems.
     period : [s] between two problems that are consecutive ticks; 0 if they are not.
-    usual : number of problems of a half, unless asked otherwise.
+    usual : number of problems of a set, unless asked otherwise.
     """
 
     name: str
@@ -49,7 +49,7 @@ class Family:
     usual: int = COUNT
 
     def half(self, seed: int = 0, count: int | None = None) -> Collection:
-        """Return the public half (seed 0), or a fresh one; raises HierarchyError."""
+        """Return the public set (seed 0), or a fresh one; raises HierarchyError."""
         count = self.usual if count is None else count
         if seed < 0 or count < 1:
             raise HierarchyError(f"family {self.name!r}: seed {seed} and count {count}; expected a "

@@ -1,6 +1,6 @@
 """The family DYN60: ticks of `stand-push`, recorded (extra `sim`).
 
-`python -m scenarios.problems.recorded --out FILE` writes the stored half again, with another seed
+`python -m scenarios.problems.recorded --out FILE` writes the stored set again, with another seed
 a fresh one.
 """
 
@@ -22,7 +22,7 @@ from solvers import Status, certify, make
 from solvers.qp.backends import BACKENDS, installed
 
 SCENARIO = "stand-push"
-SEED, COUNT, TOGETHER = 60, 100, 10  # of the stored half; ticks in a row of one run
+SEED, COUNT, TOGETHER = 60, 100, 10  # of the stored set; ticks in a row of one run
 LEFT_OUT = "joint limits"            # a level of the scenario that the family lacks
 _FIRST, _LAST = 0.3, 1.0             # [s] between which the ticks lie: the push begins at 0.3 s
 _MISSING = 1e9                       # marks a missing side in the data

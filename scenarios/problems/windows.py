@@ -25,7 +25,7 @@ PERIODS = {"ellipse-hqp": 0.001, "ellipse-limits": 0.001, "human-hqp": 0.005,
            "humanoid-reach": 0.005, "stand-push": 0.001}
 """Time between two ticks [s]."""
 _WITHIN = (0.1, 0.7)  # share of a run at which a window begins
-_PUBLIC = 0.4         # the same for the public half
+_PUBLIC = 0.4         # the same for the public set
 _RUNS = 20            # sampled runs tried until one lasts to the end of its window
 
 

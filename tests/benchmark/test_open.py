@@ -27,6 +27,7 @@ from benchmark.store import Store
 from hierarchy import Hierarchy
 from hierarchy.errors import HierarchyError
 from scenarios.cli.main import run_command
+from scenarios.problems.families import FAMILIES
 from solvers import certify, library
 from solvers.problems.files import Collection, Head
 from solvers.proof import prove
@@ -58,7 +59,7 @@ def equalities(tmp_path_factory):
 
 
 def run_entrant(entrant, file, limit=10.0):
-    return asked(entrant, [file], limit)[0]
+    return list(asked(entrant, [file], limit))[0]  # noqa: RUF015
 
 
 def fake(name, **options):
@@ -91,7 +92,7 @@ def test_a_crash_costs_one_problem(equalities):
 
 @pytest.mark.slow
 def test_one_process_serves_all_files_until_it_ends(equalities):
-    said = asked(fake("Crashing"), [equalities] * 2)
+    said = list(asked(fake("Crashing"), [equalities] * 2))
     assert [ends(answers) for answers in said] == [[None, None, CRASHED, None, None]] * 2
     assert said[1][4]["x"] == pytest.approx([4.0, 1.0])
 
@@ -403,6 +404,20 @@ def test_the_command_runs_continues_and_writes_its_page(tmp_path, capsys, monkey
     for text in ("Fresh problems, seed 9", "Moody", "fake 1", "hierarchy"):
         assert text in page
     assert not re.search(r'(src|href)="http', page)
+
+
+@pytest.mark.slow
+def test_what_was_asked_before_an_interruption_is_stored(tmp_path, monkeypatch):
+    def interrupted(process, file, count, limit):
+        if "one_unknown" in file.name:
+            raise KeyboardInterrupt
+        return [{"problem": p, "ended": CRASHED} for p in range(count)]
+
+    monkeypatch.setattr(opened, "_answers", interrupted)
+    families = [FAMILIES[name] for name in ("integers", "one_unknown")]
+    with pytest.raises(KeyboardInterrupt):
+        opened.run(tmp_path, families, [fake("LeastSquares")], {0: 2}, told=str)
+    assert [row["family"] for row in Store(tmp_path).rows()] == ["integers"] * 2
 
 
 @pytest.mark.slow
