@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import typer
 
-from benchmark.reproduce import command, pages
+from benchmark.reproduce import pages, whole
 from benchmark.reproduce import rows as rows_
 from benchmark.reproduce.blocks import block, judged, statements
 from benchmark.reproduce.rows import Rows, read, rows_of_study, write
@@ -182,19 +182,19 @@ def test_a_command_that_fails_leaves_the_others(tmp_path, capsys):
     (tmp_path / "good.py").write_text("print('good')\n")
     (tmp_path / "bad.py").write_text("print('half')\nraise SystemExit(3)\n")
     (tmp_path / "page.md").write_text(page("python bad.py") + page("python good.py"))
-    assert dict(command.outputs(["page.md"], tmp_path, tmp_path / "out")) == {
+    assert dict(whole.outputs(["page.md"], tmp_path, tmp_path / "out")) == {
         "python good.py": "good\n"}
     said = capsys.readouterr().err
     assert "left as it is: python bad.py: exit code 3\nhalf" in said
     assert re.search(r"^  0:0\d min$", said, re.MULTILINE)
-    assert command.minutes(2467.4) == "41:07 min"
+    assert whole.minutes(2467.4) == "41:07 min"
 
 
 def test_studies_and_pages_are_chosen_by_name():
-    assert command.chosen([]) == ([*STUDIES], [*pages.PAGES])
-    assert command.chosen(["docs/batch.md", "letter"]) == (["letter"], ["docs/batch.md"])
+    assert whole.chosen([]) == ([*STUDIES], [*pages.PAGES])
+    assert whole.chosen(["docs/batch.md", "letter"]) == (["letter"], ["docs/batch.md"])
     with pytest.raises(HierarchyError, match=r"'docs/view\.md'"):
-        command.chosen(["docs/view.md"])
+        whole.chosen(["docs/view.md"])
     found = typer.main.get_command(app).commands["reproduce"].params[0].help
     assert set(STUDIES) <= set(re.findall(r"\w+", found))
 
@@ -224,8 +224,8 @@ def test_a_study_that_has_ended_is_stored_whatever_ends_the_command(
     old = read(documents / pages.RESULTS)["blend"]
     new = replace(old, values={name: {metric: [9.0] * old.starts for metric in values}
                                for name, values in old.values.items()})
-    monkeypatch.setattr(command, "ran", ending_with(error, new))
-    assert command.run(["blend", "letter"], documents / "out", root=documents) == code
+    monkeypatch.setattr(whole, "ran", ending_with(error, new))
+    assert whole.run(["blend", "letter"], documents / "out", root=documents) == code
     assert said in capsys.readouterr().err
     assert read(documents / "out") == {"blend": new}
     assert read(documents / pages.RESULTS)["blend"] == new
@@ -233,9 +233,9 @@ def test_a_study_that_has_ended_is_stored_whatever_ends_the_command(
 
 
 def test_an_output_is_written_as_its_command_ends(documents, monkeypatch):
-    monkeypatch.setattr(command, "outputs", ending_with(
+    monkeypatch.setattr(whole, "outputs", ending_with(
         KeyboardInterrupt(), ("hierarchy bench tick", "ten ticks\n")))
-    assert command.run(["docs/benchmarks.md"], documents / "out", root=documents) == 130
+    assert whole.run(["docs/benchmarks.md"], documents / "out", root=documents) == 130
     assert pages.file_of("hierarchy bench tick", documents).read_text() == "ten ticks\n"
     assert "ten ticks" in (documents / "docs/benchmarks.md").read_text()
 
@@ -251,12 +251,12 @@ def test_a_page_that_cannot_be_filled_does_not_keep_others_from_it(documents):
 
 
 def test_quick_lists_the_commands_that_it_does_not_run(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(command, "ran", lambda *_: iter([rows(a=[1.0])]))
-    assert command.run([], tmp_path, True, 1, as_json=True) == 0
+    monkeypatch.setattr(whole, "ran", lambda *_: iter([rows(a=[1.0])]))
+    assert whole.run([], tmp_path, True, 1, as_json=True) == 0
     made = json.loads(capsys.readouterr().out)
     assert made["not_made"]["hierarchy bench tick"] == ["docs/benchmarks.md"]
     with pytest.raises(HierarchyError, match=r"--quick runs studies, and docs/batch\.md has"):
-        command.run(["docs/batch.md"], tmp_path, True, 1)
+        whole.run(["docs/batch.md"], tmp_path, True, 1)
 
 
 def test_a_file_in_place_of_the_folder_is_refused(tmp_path):
@@ -264,7 +264,7 @@ def test_a_file_in_place_of_the_folder_is_refused(tmp_path):
     file.write_text("")
     for out in (file, file / "below"):
         with pytest.raises(HierarchyError, match=f"cannot be written: {file} is a file"):
-            command.run(["letter"], out, True, 1)
+            whole.run(["letter"], out, True, 1)
 
 
 @pytest.mark.slow
