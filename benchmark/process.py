@@ -117,8 +117,6 @@ class Process:
 
     def _last_words(self) -> str:
         assert self._process is not None
-        if self._hung:
-            self._process.wait()
         code = self._process.wait()
         self._log.seek(0)
         lines = self._log.read().strip().splitlines()

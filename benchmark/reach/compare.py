@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import xml.etree.ElementTree as ET
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -75,6 +76,7 @@ def run(count: int = 1000, seed: int = 0) -> Report:
                          starts=starts, tolerance=TOLERANCE)
                 for one in ENTRANTS:
                     about = {"robot": name, "poses": kind, "package": one.label}
+                    print(*about.values(), "...", file=sys.stderr, flush=True)
                     try:
                         answers = _asked(one, made, count)
                     except MissingError as error:

@@ -29,10 +29,6 @@ from hierarchy.errors import HierarchyError
 from scenarios.files import make_folder, slug, write_text
 
 ROOT = Path(__file__).parents[2]
-PAGES = ("README.md", "docs/benchmarks.md", "docs/choosing.md", "docs/batch.md",
-         "docs/tpm-limits.md", "docs/first-paper.md", "docs/letter.md",
-         "docs/peers.md", "docs/standing.md", "docs/robots.md", "docs/reproduction.md",
-         "docs/ladder.md", "docs/experiment.md")
 RESULTS, OUTPUT = "docs/results", "docs/results/output"
 _COLUMNS = "100"  # of the terminal that a command writes to
 _CODE = ("hierarchy", "solvers", "scenarios", "benchmark")
@@ -42,6 +38,13 @@ _MEASURED = re.compile(r"(?P<mark><!-- measured: (?P<table>table of )?(?P<comman
                        r"(?: \| (?P<first>[^\n]+?) \.\. (?P<last>[^\n]+?))? -->\n)"
                        r"(?P<text>.*?)(?P<end><!-- end of measurement -->)", re.DOTALL)
 _MEDIAN = re.compile(r"(?P<name>\S+(?: \S+)*?)\s+(?P<median>\d[\d.]*)\s")
+
+
+def marked(root: Path) -> list[str]:
+    """Return the pages of a checkout that have marks, by their paths in it."""
+    found = [root / "README.md", *sorted((root / "docs").rglob("*.md"))]
+    return [path.relative_to(root).as_posix() for path in found if path.is_file()
+            and re.search(r"^<!-- (?:measured|reproduce): ", path.read_text("utf-8"), re.MULTILINE)]
 
 
 class CommandError(RuntimeError):
@@ -106,7 +109,7 @@ def file_of(command: str, root: Path) -> Path:
 def fill(root: Path, rows: Mapping[str, Rows]) -> tuple[list[Path], list[str]]:
     """Fill the pages of a checkout; return those that changed, and why others cannot be filled."""
     changed, lacking = [], []
-    for name in PAGES:
+    for name in marked(root):
         path = root / name
         text = path.read_text(encoding="utf-8")
         try:

@@ -34,6 +34,7 @@ def fill() -> int:
 @dataclass
 class _Made:
     """What has been made so far, and the files it was written to as it ended."""
+
     out: Path
     root: Path | None  # of the checkout whose pages are written
     rows: dict[str, Rows] = field(default_factory=dict)
@@ -56,8 +57,8 @@ class _Made:
 def run(names: list[str], out: Path, quick: bool = False, workers: int | None = None,
         as_json: bool = False, root: Path | None = None) -> int:
     """Run studies and commands; unless `quick`, write the pages; print the statements' verdicts."""
-    studies, asked = chosen(names)
     begun, root = perf_counter(), root or pages.ROOT
+    studies, asked = chosen(names, root)
     if quick and not studies:
         raise HierarchyError(f"--quick runs studies, and {', '.join(asked)} has the output of "
                              "commands; leave --quick out")
@@ -78,13 +79,14 @@ def run(names: list[str], out: Path, quick: bool = False, workers: int | None = 
     return _lacking(made.lacking)
 
 
-def chosen(names: list[str]) -> tuple[list[str], list[str]]:
+def chosen(names: list[str], root: Path) -> tuple[list[str], list[str]]:
     """Return studies, and pages with commands, by name; all without names. See UnknownNameError."""
+    known = pages.marked(root)
     for name in names:
-        if name not in STUDIES and name not in pages.PAGES:
-            raise UnknownNameError("study or page", name, (*STUDIES, *pages.PAGES))
+        if name not in STUDIES and name not in known:
+            raise UnknownNameError("study or page", name, (*STUDIES, *known))
     return ([name for name in STUDIES if name in names or not names],
-            [name for name in pages.PAGES if name in names or not names])
+            [name for name in known if name in names or not names])
 
 
 def ran(studies: list[str], out: Path, quick: bool, workers: int | None) -> Iterator[Rows]:
