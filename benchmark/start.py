@@ -11,12 +11,12 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any, final
+from typing import Any, NamedTuple
 
 from benchmark.report import Report, Section
+from benchmark.store import Row
 from benchmark.tables import Column, Table, digits
 
 _REPEATED = 5        # repetitions of short processes; the minimum counts
@@ -74,9 +74,7 @@ with connected(1) as client:
 print(json.dumps(after))"""
 
 
-@final
-@dataclass(frozen=True)
-class Cost:
+class Cost(NamedTuple):
     """One number and its upper limit, None for no limit.
 
     unit : "s" or "MB". processor : processor time [s], which does not depend on other load; None if
@@ -89,12 +87,11 @@ class Cost:
     ceiling: float | None = None
     processor: float | None = None
 
-    @property
-    def verdict(self) -> str:
-        """"met" or "not met", "" without a limit."""
-        if self.ceiling is None:
-            return ""
-        return "met" if self.value <= self.ceiling else "not met"
+    def row(self) -> Row:
+        """Return the row of the table: whether the limit is met, "" without one."""
+        met = "" if self.ceiling is None else "met" if self.value <= self.ceiling else "not met"
+        shown = f"{self.value:.{2 if self.unit == 's' else 0}f} {self.unit}"
+        return {**self._asdict(), "verdict": met, "shown": shown}
 
 
 def run() -> Report:
@@ -103,9 +100,7 @@ def run() -> Report:
         folder = Path(temporary)
         compiled, kernels = first_compilation(folder / "cache")
         costs = [*beginnings(), *compiled, *memory(folder)]
-    rows = [{**asdict(cost), "verdict": cost.verdict,
-             "shown": f"{cost.value:.{2 if cost.unit == 's' else 0}f} {cost.unit}"}
-            for cost in costs]
+    rows = [cost.row() for cost in costs]
     slowest = ", ".join(f"{name.removeprefix('solvers.kernels.')} {s:.1f}"
                         for name, s in list(kernels.items())[:_KERNELS])
     return Report("Start-up costs", [Section("", [Table("Whole processes", rows, (
@@ -182,9 +177,7 @@ def resident() -> float:
     return int(file.read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 1024.0**2
 
 
-@final
-@dataclass(frozen=True)
-class _Done:
+class _Done(NamedTuple):
     """Output of a process, wall and processor seconds, peak memory [MB]."""
 
     said: str
@@ -208,6 +201,8 @@ def _run(arguments: list[str], **environment: str) -> _Done:
     that it imports, which takes longer than all else.
     """
     kept = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
+    kept["PYTHONPATH"] = os.pathsep.join([str(Path(__file__).parents[1]),
+                                          kept.get("PYTHONPATH", "")]).rstrip(os.pathsep)
     with tempfile.TemporaryDirectory() as temporary:
         measured = Path(temporary) / "measured.json"
         done = subprocess.run([sys.executable, "-S", "-c", _LAUNCH, str(measured), sys.executable,

@@ -67,13 +67,11 @@ class Tally:
 
     def iterations_per_row(self) -> tuple[float, float, float]:
         """Median, 99.9th percentile and largest of iterations divided by rows; zeros if none."""
-        if not self.effort:
+        every = np.repeat(np.array([*self.effort]) / 100.0, [*self.effort.values()])
+        if not every.size:
             return 0.0, 0.0, 0.0
-        value = np.array(sorted(self.effort)) / 100.0
-        reached = np.cumsum([self.effort[i] for i in sorted(self.effort)])
-        median, rare = (float(value[np.searchsorted(reached, share * reached[-1])])
-                        for share in (0.5, 0.999))
-        return median, rare, float(value[-1])
+        median, rare, most = np.percentile(every, (50.0, 99.9, 100.0), method="lower")
+        return float(median), float(rare), float(most)
 
 
 def outcome(resolver: Resolver, h: Hierarchy) -> str:

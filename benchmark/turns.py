@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -73,20 +74,13 @@ def measure(entrants: Sequence[Entrant], questions: str, scene: tuple[Any, ...],
     return rows, missing
 
 
-class _noted:  # noqa: N801
+@contextmanager
+def _noted(missing: dict[str, str], label: str) -> Iterator[None]:
     """Record why an entrant is missing, and continue."""
-
-    def __init__(self, missing: dict[str, str], label: str) -> None:
-        self.missing, self.label = missing, label
-
-    def __enter__(self) -> None:
-        pass
-
-    def __exit__(self, kind: type | None, error: BaseException | None, _: object) -> bool:
-        if isinstance(error, MissingError):
-            self.missing[self.label] = str(error)
-            return True
-        return False
+    try:
+        yield
+    except MissingError as error:
+        missing[label] = str(error)
 
 
 def joined(replies: Sequence[Row]) -> Log:

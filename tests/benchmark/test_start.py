@@ -8,9 +8,9 @@ from benchmark.start import Cost, own_seconds, run
 
 
 def test_a_cost_is_met_up_to_its_ceiling():
-    assert Cost("a", 1.0, "s", 1.0).verdict == "met"
-    assert Cost("a", 1.1, "s", 1.0).verdict == "not met"
-    assert Cost("a", 1.1, "s").verdict == ""
+    assert Cost("a", 1.0, "s", 1.0).row()["verdict"] == "met"
+    assert Cost("a", 1.1, "s", 1.0).row()["verdict"] == "not met"
+    assert Cost("a", 1.1, "s").row()["verdict"] == ""
 
 
 def test_seconds_of_what_is_compiled_within_are_not_counted_twice():
