@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, ClassVar, final
 
@@ -84,7 +84,7 @@ def strictness(resolver: Resolver, duration: float = 2.0) -> Row:
     with tempfile.TemporaryDirectory() as folder:
         scene = make_scenes(Path(folder))["step"]
         asked = Questions(Ours, {"resolver": resolver})
-        asked.begin(scene, beside=True)
+        asked.open(asdict(scene), beside=True)
         resolver.solve(asked.adapter.stack.hierarchy(asked.adapter.state))  # refuses here
         log = joined([asked.turn(round(duration / scene.period), 0)])
         found, failed = judge_step(log, scene), int(log["failed"].sum())

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from functools import partial
 from pathlib import Path
 
@@ -12,7 +12,7 @@ import numpy as np
 
 from benchmark import figures
 from benchmark.arm.questions import STEP_TICKS
-from benchmark.arm.scene import Scene, write_scenes
+from benchmark.arm.scene import Scene
 from benchmark.packages import (
     DAQP,
     EMBODIK,
@@ -84,12 +84,10 @@ def run(entrants: Sequence[Entrant] = ENTRANTS, ticks: int = 20_000, seconds: fl
     They take turns until each has `ticks` or took `seconds` [s].
     """
     with tempfile.TemporaryDirectory() as temporary:
-        file = Path(temporary) / "scenes.json"
-        scenes = make_scenes(file.parent)
-        write_scenes(scenes, file)
-        rows, missing = measure(entrants, QUESTIONS, (str(file), "ellipse"),
+        scenes = make_scenes(Path(temporary))
+        rows, missing = measure(entrants, QUESTIONS, (asdict(scenes["ellipse"]),),
                                 Turns(ticks, 1000, 1000, 50, seconds),
-                                partial(_judged, scenes=scenes, file=file))
+                                partial(_judged, scenes=scenes))
     title = "One tick of inverse kinematics of a KUKA LWR, and its quality"
     return Report("Inverse kinematics beside other packages", [
         Section(title, [Table(title, rows, _COLUMNS)], NOTES, {"peers": figures.bars(rows)}),
@@ -110,12 +108,12 @@ def make_scenes(folder: Path) -> dict[str, Scene]:
                                                 cosine=still, sine=still, turning=0.0)}
 
 
-def _judged(log: Log, why: str, process: Process, scenes: dict[str, Scene], file: Path) -> Row:
+def _judged(log: Log, why: str, process: Process, scenes: dict[str, Scene]) -> Row:
     """Return the row of an entrant from its path, its step, and what a NaN does to it."""
-    process.ask(("open", str(file), "step", True), START_LIMIT)
+    process.ask(("open", asdict(scenes["step"]), True), START_LIMIT)
     reply = process.ask(("turn", STEP_TICKS, 0), TURN_LIMIT)
     try:
-        process.ask(("open", str(file), "ellipse"), START_LIMIT)
+        process.ask(("open", asdict(scenes["ellipse"])), START_LIMIT)
         nan = process.ask(("after_nan",), START_LIMIT)
     except EndedError as end:
         nan = f"{end.kind}: {end}"

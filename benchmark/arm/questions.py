@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from functools import partial
-from pathlib import Path
 from typing import Any, final
 
 import numpy as np
 
-from benchmark.arm.scene import Array, RefusedError, Scene, read_scenes
+from benchmark.arm.scene import Array, RefusedError, scene_of
 from benchmark.ticks import Ticks
 
 STEP_TICKS = 2000
@@ -22,13 +21,10 @@ class Questions(Ticks):
     def __init__(self, kind: Any, options: dict[str, Any]) -> None:
         self.adapter, self.other, self.make = kind, None, partial(kind, **options)
 
-    def open(self, file: str, name: str, beside: bool = False) -> None:
+    def open(self, numbers: dict[str, Any], beside: bool = False) -> None:
         """Begin a scene; with `beside` also without the posture, at the same states."""
-        self.begin(read_scenes(Path(file))[name], beside)
-
-    def begin(self, scene: Scene, beside: bool = False) -> None:
-        """See `open`."""
-        self.scene, self.t, self.why = scene, 0.0, ""
+        self.scene = scene = scene_of(numbers)
+        self.t, self.why = 0.0, ""
         self.adapter = self.make(scene, True)
         self.other = self.make(scene, False) if beside else None
         self.q, self.v = np.array(scene.start), np.zeros(len(scene.start))

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import json
-from dataclasses import asdict, dataclass
-from pathlib import Path as File
+from dataclasses import dataclass
 from typing import Any, Protocol, final
 
 import numpy as np
@@ -76,17 +74,8 @@ class Scene:
                 self.turning * (c * sine - s * cosine))
 
 
-def write_scenes(scenes: dict[str, Scene], file: File) -> None:
-    """Write scenes by name as JSON."""
-    file.write_text(json.dumps({name: asdict(scene) for name, scene in scenes.items()}, indent=1))
-
-
-def read_scenes(file: File) -> dict[str, Scene]:
-    """Read what `write_scenes` wrote."""
-    return {name: _scene(numbers) for name, numbers in json.loads(file.read_text()).items()}
-
-
-def _scene(numbers: dict[str, Any]) -> Scene:
+def scene_of(numbers: dict[str, Any]) -> Scene:
+    """Return the scene of `dataclasses.asdict`, after JSON."""
     fields: dict[str, Any] = {key: tuple(value) if isinstance(value, list) else value
                               for key, value in numbers.items()}
     return Scene(**fields)

@@ -1,6 +1,6 @@
 """What a solver is to the benchmark. Needs only numpy, since any environment may run it.
 
-A solver is one class in one file: see `template.py` and docs/extending/entrant.md.
+A solver is one class in one file: docs/extending/entrant.md shows one.
 """
 
 from __future__ import annotations

@@ -421,9 +421,10 @@ def test_what_was_asked_before_an_interruption_is_stored(tmp_path, monkeypatch):
 
 
 @pytest.mark.slow
-def test_the_check_accepts_the_template_and_not_what_ends(capsys):
-    template = f"{SOLVE / 'template.py'}:Template"
-    assert run_command(["bench", "open", "--check", "--entrant", template]) == 0
+def test_the_check_accepts_the_example_of_the_documents_and_not_what_ends(tmp_path, capsys):
+    page = (Path(__file__).parents[2] / "docs" / "extending" / "entrant.md").read_text()
+    (tmp_path / "mine.py").write_text(re.search(r"```python\n(.*?)```", page, re.DOTALL)[1])
+    assert run_command(["bench", "open", "--check", "--entrant", f"{tmp_path}/mine.py:Mine"]) == 0
     assert run_command(["bench", "open", "--check", "--entrant",
                         f"{HELPERS / 'fake_entrants.py'}:Raising"]) == 1
     assert "the rules are broken" in capsys.readouterr().out

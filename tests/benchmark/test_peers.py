@@ -2,14 +2,14 @@
 
 import json
 import xml.etree.ElementTree as ET
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from benchmark.arm.compare import ENTRANTS, QUESTIONS, START, make_scenes, run
-from benchmark.arm.scene import read_scenes, write_scenes
+from benchmark.arm.scene import scene_of
 from benchmark.figures import bars
 from benchmark.packages import PACKAGES, Entrant, MissingError, Package, install, python_of
 from benchmark.process import Process, staged
@@ -142,14 +142,12 @@ def labels(entrants):
 
 @pytest.fixture(scope="module")
 def near(tmp_path_factory):
-    """A file with a goal 1 cm and a posture 0.1 rad away, which no limit keeps back."""
+    """A scene with a goal 1 cm and a posture 0.1 rad away, which no limit keeps back."""
     folder = tmp_path_factory.mktemp("near")
     scene, here = make_scenes(folder)["step"], State.at(Robot.named("kuka_lwr"), START)
     goal = np.add(here.position(here.robot.frame("end_effector")), [0.006, -0.008, 0.0])
     posture = np.add(START, [0.1, -0.1, 0.1, 0.1, -0.1, 0.1, -0.1])
-    write_scenes({"ellipse": replace(scene, centre=tuple(goal.tolist()),
-                                     posture=tuple(posture.tolist()))}, folder / "scenes.json")
-    return folder / "scenes.json"
+    return replace(scene, centre=tuple(goal.tolist()), posture=tuple(posture.tolist()))
 
 
 def wanted(scene, weight):
@@ -165,11 +163,10 @@ def wanted(scene, weight):
 @pytest.mark.slow
 @pytest.mark.parametrize("entrant", **labels(ENTRANTS))
 def test_an_adapter_of_the_arm_gives_the_known_velocity(entrant, near):
-    reply = answered(entrant, QUESTIONS, ("open", str(near), "ellipse"), ("turn", 1, 0))
-    scene = read_scenes(near)["ellipse"]
+    reply = answered(entrant, QUESTIONS, ("open", asdict(near)), ("turn", 1, 0))
     log = joined([reply])
     assert not log["failed"][0], reply["why"]
-    known = wanted(scene, np.inf), wanted(scene, scene.ratio**2)
+    known = wanted(near, np.inf), wanted(near, near.ratio**2)
     off = min(abs(log["v"][0] - v).max() for v in known)
     assert off < (2e-2 if entrant.label == "embodiK" else 5e-4)  # it damps; others linearise poses
 
@@ -237,10 +234,9 @@ def test_another_environment_sees_nothing_of_ours_but_the_benchmark():
 
 # -- the scenes and their judges -------------------------------------------------------------------
 
-def test_scenes_are_read_as_they_were_written(tmp_path):
-    scenes = make_scenes(tmp_path)
-    write_scenes(scenes, tmp_path / "scenes.json")
-    assert read_scenes(tmp_path / "scenes.json") == scenes
+def test_a_scene_arrives_as_it_was_sent(tmp_path):
+    for scene in make_scenes(tmp_path).values():
+        assert scene_of(json.loads(json.dumps(asdict(scene)))) == scene
 
 
 def test_the_path_of_the_scene_is_the_path_of_our_stack(tmp_path):
