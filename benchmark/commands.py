@@ -48,7 +48,8 @@ def _run(out: Path | None, *names: str, **options: Any) -> int:
 
     folder = claim(out if out is not None else next_free(Path("runs") / "bench"))
     failed = [_told(import_module(f"benchmark.{name}").run(**options),
-                    folder / name.split(".")[-1] if len(names) > 1 else folder)
+                    folder / name.removesuffix(".compare").split(".")[-1] if len(names) > 1
+                    else folder)
               for name in names]
     print(f"\nNumbers: {shown(folder)}")
     return int(any(failed))

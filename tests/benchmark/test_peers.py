@@ -8,12 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmark.arm import compare as moving
 from benchmark.arm.compare import ENTRANTS, QUESTIONS, START, make_scenes, run
 from benchmark.arm.scene import scene_of
 from benchmark.figures import bars
 from benchmark.packages import PACKAGES, Entrant, MissingError, Package, install, python_of
 from benchmark.process import Process, staged
 from benchmark.reach import compare as reaching
+from benchmark.report import Report
 from benchmark.solve import entrants as solvers_
 from benchmark.solve.open import asked
 from benchmark.stand import compare as standing
@@ -27,6 +29,7 @@ from hierarchy import Hierarchy, Robot, State
 from hierarchy.errors import RobotError
 from hierarchy.paths import Still
 from hierarchy.tasks import Position
+from scenarios.cli.main import run_command
 from solvers.problems.files import Collection, Head
 
 ROOT = Path(__file__).parents[2]
@@ -306,6 +309,18 @@ def test_inverse_dynamics_of_ours_is_judged_and_the_missing_are_named(alone):
     assert row["centre of mass max"] < 1e-8
     assert "--install" in found.missing["nobody"]
     assert found.failed
+
+
+def test_the_command_writes_a_folder_for_each_scene(tmp_path, monkeypatch, capsys):
+    for scene in (moving, standing):
+        monkeypatch.setattr(scene, "run", lambda: Report("title", [], {"peers": [{"a": 1}]},
+                                                         {"nobody": "not installed"}, True))
+    assert run_command(["bench", "peers", "--out", str(tmp_path / "out")]) == 0
+    assert {path.name for path in (tmp_path / "out").glob("*")} == {"arm", "stand"}
+    assert (tmp_path / "out" / "stand" / "peers.csv").is_file()
+    assert run_command(["bench", "peers", "--scene", "stand", "--out", str(tmp_path / "a")]) == 1
+    assert "skipped: nobody (not installed)" in capsys.readouterr().out
+    assert run_command(["bench", "peers", "--scene", "stnd"]) == 2
 
 
 def test_wrong_answers_to_stand_are_found(tmp_path):
