@@ -44,6 +44,7 @@ class Report:
     def say(self, console: Console | None = None) -> None:
         """Print the tables and texts."""
         console = console or Console(highlight=False, markup=False)
+        console.print(self.title, "", sep="\n")
         for section in self.sections:
             for table in section.tables:
                 console.print(*([table.title] if table.title else []), table.rich(), "", sep="\n")

@@ -14,7 +14,7 @@ from benchmark.packages import MINK, OWN, PINK, PLACO, Entrant, MissingError
 from benchmark.process import START_LIMIT, EndedError, Process, staged
 from benchmark.report import Report, Section
 from benchmark.store import Row
-from benchmark.tables import Column, Table, digits, power
+from benchmark.tables import Column, Table, power
 from benchmark.timing import times_of
 from hierarchy import Robot, State
 from hierarchy.errors import RobotError
@@ -31,10 +31,9 @@ _OUT = 1.5           # how much further than the furthest of the reachable ones
 
 ENTRANTS = (Entrant("ours", OWN, f"{_HERE}:Ours"), Entrant("pink", PINK, f"{_HERE}:Pink"),
             Entrant("mink", MINK, f"{_HERE}:Mink"), Entrant("placo", PLACO, f"{_HERE}:Placo"))
-_COLUMNS = (Column("reached %", "reached %", digits),
-            Column("beyond limits %", "beyond limits %", digits),
-            Column("error, median", "error, median", power), Column("ms, median", "ms, median"),
-            Column("ms, p95", "ms, p95"))
+_COLUMNS = (Column("reached\n%", "reached %"), Column("beyond\nlimits %", "beyond limits %"),
+            Column("error,\nmedian", "error, median", power), Column("ms,\nmedian", "ms, median"),
+            Column("\np95", "ms, p95"))
 
 
 class Arm(NamedTuple):

@@ -106,7 +106,7 @@ def run(count: int = 400, entrants: Sequence[Resolver] | None = None,
                 Column("p95", "p95_us", digits), Column("warm", "warm_median_us", digits)]))
         rows += found
     title = f"Resolvers inside limits, one core of {machine()['processor']}"
-    return Report(title, [Section("", tables, NOTES, lead=[title])], {"saturation": rows})
+    return Report(title, [Section("", tables, NOTES)], {"saturation": rows})
 
 
 def _certified(family: Family, count: int) -> list[tuple[Hierarchy, Array]]:
