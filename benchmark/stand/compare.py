@@ -11,7 +11,7 @@ from benchmark.report import Report, Section
 from benchmark.stand.judge import Judge, judge
 from benchmark.stand.ours import TASKS
 from benchmark.stand.states import TICKS, make_stand
-from benchmark.tables import Column, Table, power, whole
+from benchmark.tables import Column, Table, power, text, whole
 from benchmark.turns import Turns, measure
 
 QUESTIONS = "benchmark.stand.questions:Questions"
@@ -36,7 +36,7 @@ _COLUMNS = (Column("tick\nmedian", "median_us"), Column("\np95", "p95_us"),
             Column("fail", "failed", whole))
 _MISSES = (*(Column(f"{task if of == 'median' else ''}\n{of}", f"{task} {of}", power)
              for task in TASKS for of in ("median", "max")),
-           Column("version", "version", str))
+           Column("priorities", "priorities", text), Column("version", "version", str))
 
 
 def run(entrants: Sequence[Entrant] = ENTRANTS, ticks: int = TICKS) -> Report:
