@@ -14,8 +14,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from scenarios.cli import completion
-from scenarios.cli.bench import bench
+from scenarios.cli import benchmarks, completion
 from scenarios.cli.options import (
     INTERRUPTED,
     PORT,
@@ -37,7 +36,6 @@ if TYPE_CHECKING:
     from scenarios.config import Scenario
 
 app = typer.Typer(rich_markup_mode=None, pretty_exceptions_enable=False)
-app.add_typer(bench, name="bench")
 app.add_typer(problems, name="problems")
 
 
@@ -213,31 +211,6 @@ def sweep(file: Annotated[str, typer.Argument(help="Name of a sweep, or a sweep 
 
 
 @app.command()
-def reproduce(names: Annotated[list[str] | None, typer.Argument(
-                  metavar="[NAME]...", help="states, throttle, letter, resolvers, blend, ladder, "
-                  "inertia, rivals, singular, human, standing, reaching, or a page such as "
-                  "docs/first-paper.md for the commands in it. Default: all.")] = None,
-              out: Annotated[Path, output("Where the runs are kept.")] = Path("runs/reproduce"),
-              quick: Annotated[bool, typer.Option(
-                  "--quick", help="A tenth of the starts; leave the documents as they are. "
-                  "Commands, which have no starts, are not run but listed.")] = False,
-              fill: Annotated[bool, typer.Option(
-                  "--fill", help="Run nothing; write the pages from what docs/results keeps.")
-                  ] = False,
-              workers: Workers = None, as_json: AsJson = False) -> int:
-    """Regenerate the numbers in the documentation.
-
-    They are written into the pages of a checkout as each study or command ends. Run the same
-    command again to resume an interrupted one. Nothing else should run while timings are made.
-    """
-    from scenarios.cli.reproduce import fill_command, reproduce_command
-
-    if fill:
-        return fill_command()
-    return reproduce_command(names or [], out, quick, workers, as_json)
-
-
-@app.command()
 def view(folders: Annotated[list[Path], typer.Argument(
              metavar="RUN...", help="Folders of `hierarchy run` or `compare`.")],
          side_by_side: Annotated[bool, typer.Option(
@@ -398,6 +371,9 @@ def _fault(error: OSError) -> int:
 def _wrong(text: str) -> int:
     print(f"hierarchy: error: {text}", file=sys.stderr)
     return 2
+
+
+benchmarks.register(app)
 
 
 if __name__ == "__main__":

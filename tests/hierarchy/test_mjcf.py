@@ -14,7 +14,7 @@ from scenarios.cli.main import run_command
 from scenarios.config.robot import StartSection
 
 mujoco = pytest.importorskip("mujoco")
-public_robots = pytest.importorskip("public_robots")
+public_robots = pytest.importorskip("benchmark.studies.public_robots")
 
 GEOM = '<geom type="capsule" fromto="0 0 0 .3 0.1 0" size=".03"/>'
 
