@@ -28,16 +28,18 @@ from solvers.kernels.rows import length_of
 from solvers.kernels.tolerances import (
     BAND,
     CANCELLED,
+    CUT_BALANCE,
     CUT_OVER_PIVOT,
     EPSILON,
     FREE_ROWS,
+    KNOWN_MULTIPLIER,
     NEGLIGIBLE,
     PIVOT_PRODUCT,
     RANK_MARGIN,
     REMAINDER,
+    ROUNDING_BALANCE,
     SIGN_MARGIN,
     SIGN_ROUNDING,
-    UNSURE_BALANCE,
 )
 from solvers.kernels.working_set import (
     CHANGE,
@@ -145,9 +147,10 @@ def _balances(s, p, reach, factored):
     met = not last and level.missed <= BAND * reach
     if met and level.missed == 0.0:
         return True
-    allowed = REMAINDER * reach
+    source, allowed = (reach if last else level.source), REMAINDER * reach
     if not last:
         allowed = REMAINDER * level.least * level.least * max(level.missed, reach)
+    allowed = min(allowed, KNOWN_MULTIPLIER * source * s.scalar[PIVOT])
     outside, rounding, turned = _add_rows(s, level, reach if last else 0.0)
     rest = _beyond_rounding(s)
     if factored and not rest <= allowed + turned:
@@ -155,7 +158,7 @@ def _balances(s, p, reach, factored):
         outside, rounding, turned = _add_rows(s, level, reach if last else 0.0)
         rest = _beyond_rounding(s)
     holds = (not outside and rest <= allowed + turned
-             and max(turned, rounding) <= UNSURE_BALANCE * (reach if last else level.source))
+             and turned <= CUT_BALANCE * source and rounding <= ROUNDING_BALANCE * source)
     unsure = SIGN_MARGIN * (rest + rounding + turned) / s.scalar[PIVOT]
     holds = holds and _signs_hold(s, level, unsure, reach)
     if holds:
