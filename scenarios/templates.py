@@ -22,6 +22,11 @@ def render(template: str, **values: Any) -> Markup:
     return Markup(_environment().get_template(template).render(values))
 
 
+def filled(text: str, **values: Any) -> Markup:
+    """Return a template given as text, which may extend those of this package, filled in."""
+    return Markup(_environment().from_string(text).render(values))
+
+
 def resource(name: str) -> Markup:
     """Return a style sheet or a script, by its path in this package, as it is."""
     return Markup(files("scenarios").joinpath(name).read_text(encoding="utf-8"))

@@ -15,19 +15,21 @@ from numpy.typing import ArrayLike
 
 from hierarchy.errors import HierarchyError, brief, expect, number
 from hierarchy.notebook import numbers
-from hierarchy.problem import Array
+from hierarchy.problem import Array, Hierarchy
 from hierarchy.robot import Robot
 from hierarchy.stack import Stack
 from hierarchy.state import State
 from hierarchy.task import Task, check_period
-from hierarchy.tasks.mechanism import above, model_rows
+from hierarchy.tasks.mechanism import MECHANISM, Mechanism, above, bends, model_rows
 from hierarchy.tasks.step_limits import StepLimits
 from hierarchy.words import listed
 from solvers.reaching import Reached, reach
-from solvers.resolver import Resolver, make
+from solvers.resolver import Resolution, Resolver, make
 from solvers.resolvers.settled import Settled
 from solvers.status import Status
 
+_MOST_BENDS = 10   # corrections of the rows of a mechanism
+_STRAIGHT = 1e-8   # [m/s, rad/s] change of a correction that ends them
 _warned: set[tuple[str, ...]] = set()  # joints without velocity limits that were named
 
 
@@ -127,8 +129,26 @@ def _step(robot: Robot, state: State, tasks: Sequence[Task], dt: float, limits: 
     stack = Stack([*first, *tasks], "velocity")
     for task in (*box, *tasks):
         check_period(task, dt)
-    found = resolver.solve(stack.hierarchy(state), memory)
+    found = _solved(robot, state.q, stack.hierarchy(state), resolver, memory)
     return Step(found.x, found.status, Memory(found.memory, found.x.copy()))
+
+
+def _solved(robot: Robot, q: Array, h: Hierarchy, resolver: Settled,
+            memory: Array | None) -> Resolution:
+    """Solve, and where the mechanism bends within the period again with that on its sides."""
+    found = resolver.solve(h, memory)
+    if not bends(robot):
+        return found
+    mechanism, before, first = Mechanism(robot), np.zeros(0), h.offsets[h.names.index(MECHANISM)]
+    for _ in range(_MOST_BENDS):
+        bend = mechanism.bend(q, found.x, resolver.period)
+        if len(bend) == len(before) and np.abs(bend - before).max() < _STRAIGHT:
+            break
+        lower, upper, rows = h.lower.copy(), h.upper.copy(), slice(first, first + len(bend))
+        lower[rows] += bend
+        upper[rows] += bend
+        found, before = resolver.solve(h.changed(lower=lower, upper=upper), found.memory), bend
+    return found
 
 
 def _settled(inner: Resolver, tasks: Iterable[Task], dt: float, damping: float) -> Settled:

@@ -152,7 +152,7 @@ class _Search:
         k = h.names.index(task.name)
         pull = h.A[h.offsets[k]:h.offsets[k + 1]].T @ h.slacks(np.zeros(h.n))[
             h.offsets[k]:h.offsets[k + 1]]
-        held = [*self._limits_at(-pull), *_above(h, k, pull, self.limits)]
+        held = [*self._limits_at(-pull), *_above(h, k, -pull, self.limits)]
         said = nowhere(h, k, self.stack[task.name].row_names, np.zeros(h.n))
         by = f", held back by {listed(held)}" if held else f": {said}" if said else (
             ": it is as near as the robot comes")
@@ -171,16 +171,20 @@ class _Search:
                 if (pull > 0.0 and here > up - _AT) or (pull < 0.0 and here < low + _AT)]
 
 
-def _above(h: Hierarchy, k: int, pull: Array, limits: Sequence[Task]) -> list[str]:
-    """Name the tasks above level k whose rows carry part of its pull (n,)."""
-    names = []
+def _above(h: Hierarchy, k: int, wanted: Array, limits: Sequence[Task]) -> list[str]:
+    """Name the tasks above level k that keep it from moving as `wanted` (n,)."""
     own = {task.name for task in limits}
-    for level in (one for one in range(k) if h.names[one] not in own):
-        rows = h.A[h.offsets[level]:h.offsets[level + 1]]
-        size = np.linalg.norm(rows) * np.linalg.norm(pull)
-        if np.linalg.norm(rows @ pull) > _AT * size > 0.0:
-            names.append(h.names[level])
-    return names
+    return [name for name, (A, lower, upper) in zip(h.names[:k], h.levels(), strict=False)
+            if name not in own and _blocks(A, lower, upper, wanted)]
+
+
+def _blocks(A: Array, lower: Array, upper: Array, wanted: Array) -> bool:
+    """Whether a row that has no room left on one of its sides would leave it along `wanted`."""
+    sizes = np.linalg.norm(A, axis=1) * np.linalg.norm(wanted)
+    along = A @ wanted / np.where(sizes > 0.0, sizes, 1.0)
+    equal = lower == upper
+    return bool(((along < -_AT) & (equal | (lower > -_AT))
+                 | (along > _AT) & (equal | (upper < _AT))).any())
 
 
 def _drawn(robot: Robot, q: Array, rng: np.random.Generator) -> Array:

@@ -2,7 +2,7 @@
  * with the recorded ones of Python: are they the same bits, and in time? Exit code 1 if one differs
  * by more than 1e-8, relative to 1 + |x|.
  *
- *   python docs/studies/recorded.py stand-push standing.bin     a humanoid that is pushed
+ *   python -m benchmark.studies.recorded stand-push standing.bin     a humanoid that is pushed
  *   cc replay.c -I LIB/include LIB/lib/libtask_hierarchy.a -lm -o replay && ./replay standing.bin
  *
  * The file: n, m, levels, count and the sizes as int64; count times A, lower, upper and the

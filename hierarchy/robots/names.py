@@ -23,9 +23,10 @@ def in_package(model: str) -> bool:
 
 
 def is_file_name(model: str) -> bool:
-    """Whether `model` is meant as a file: by its suffix, or since it has a folder in front."""
+    """Whether `model` is meant as a file: one that is there, has a suffix or a folder in front."""
     return model not in plugins.own("robots") and (
-        model.lower().endswith(_SUFFIXES) or "/" in model or os.sep in model)
+        model.lower().endswith(_SUFFIXES) or "/" in model or os.sep in model
+        or ("." in model and Path(model).is_file()))
 
 
 def elsewhere(name: str) -> str:

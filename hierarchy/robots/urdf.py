@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Iterator
 from itertools import pairwise
@@ -31,7 +32,8 @@ def read_xml(path: Path) -> Element:
     """Return the root of an XML file; raises RobotError with the line of a fault in it.
 
     As in pinocchio a prefix is a part of a name, whether or not a namespace is bound to it, and
-    space in front of the file does not count.
+    space in front of the file does not count. Of an MJCF that is not quite XML, which MuJoCo may
+    read, only the empty root.
     """
     tree, parser = ElementTree.TreeBuilder(), expat.ParserCreate()
     parser.StartElementHandler, parser.EndElementHandler = tree.start, tree.end
@@ -39,12 +41,21 @@ def read_xml(path: Path) -> Element:
     try:
         parser.Parse(path.read_bytes().lstrip(), True)
     except (expat.ExpatError, ValueError, LookupError) as error:
+        if _first_tag(path) == "mujoco":
+            return Element("mujoco")
         if path.suffix == ".toml":
             raise RobotError(f"robot file {str(path)!r} is a TOML file; {_EXPECTED}. A scenario "
                              "is read by scenarios.load or `hierarchy run`") from error
         raise RobotError(f"robot file {str(path)!r} is not valid XML: {error}; {_EXPECTED}"
                          ) from error
     return tree.close()
+
+
+def _first_tag(path: Path) -> str:
+    """Return the name of the first element of a file, "" if it has none."""
+    text = path.read_text(encoding="utf-8", errors="replace")
+    found = re.search(r"<([A-Za-z][\w:.-]*)", re.sub(r"<!--.*?-->", "", text, flags=re.S))
+    return found[1] if found else ""
 
 
 def root_of(path: Path) -> Element:

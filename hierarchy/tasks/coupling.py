@@ -19,6 +19,7 @@ from hierarchy.problem import Array
 from hierarchy.records import set_frozen
 from hierarchy.robot import Robot
 from hierarchy.robots.found import Coupled
+from hierarchy.robots.joints import Part
 from hierarchy.state import State
 from hierarchy.task import Level, Task
 
@@ -83,8 +84,9 @@ class JointCoupling(_Coupling):
 
     `joints` has a factor for each joint by name: {"motor": 1.0, "wheel": -50.0} is a gear of ratio
     50. The position of a continuous joint is its angle; of two angles that are a turn apart, times
-    the smallest factor of such joints, the nearer one counts. Raises HierarchyError for an unknown
-    joint, one with several velocities, or no factor.
+    the smallest factor of such joints, the nearer one counts. Of a joint with several velocities
+    only the turn of a planar one can be coupled, as "NAME 3". Raises HierarchyError for another, an
+    unknown joint, or no factor.
     """
 
     robot: Robot
@@ -150,21 +152,31 @@ def _terms(robot: Robot, rows: int,
     """Return terms given by row, joint and coefficients; RobotError for several velocities."""
     found, turns = [], np.full(rows, np.inf)
     for row, name, coefficients in terms:
-        own = [part for part in robot.parts if part.joint == robot.joint(name)]
-        if len(own) != 1 or own[0].size == 4:
-            raise HierarchyError(f"robot {robot.name!r}: joint {name!r} has "
-                                 f"{sum(part.velocities for part in own)} velocities and cannot be "
-                                 "coupled")
-        continuous = own[0].size == 2
+        part = _part(robot, name)
+        continuous = part.size == 2
         slope, *bends = (*coefficients[1:], 0.0)
         if continuous and slope and not any(bends):
             turns[row] = min(turns[row], 2.0 * np.pi * abs(slope))
-        found.append((row, own[0].q, own[0].v, continuous, coefficients))
+        found.append((row, part.q, part.v, continuous, coefficients))
     rows_of, positions, velocities, around, polynomials = zip(*found, strict=True)
     padded = np.array(list(zip_longest(*polynomials, fillvalue=0.0))).T
     return Terms(np.array(rows_of, dtype=np.int64), np.array(positions, dtype=np.int64),
                  np.array(velocities, dtype=np.int64), np.array(around, dtype=np.bool_),
                  np.ascontiguousarray(padded), turns)
+
+
+def _part(robot: Robot, name: str) -> Part:
+    """Return the part of a joint with one velocity, or that is the turn `name` of a planar one."""
+    turns = {robot.velocity_names[part.v]: part for part in robot.parts if part.size == 2}
+    if name in turns:
+        return turns[name]
+    own = [part for part in robot.parts if part.joint == robot.joint(name)]
+    if [part.size for part in own] == [1]:
+        return own[0]
+    turn = [f", but for its turn {other!r}" for other, part in turns.items() if part in own]
+    raise HierarchyError(f"robot {robot.name!r}: joint {name!r} has "
+                         f"{sum(part.velocities for part in own)} velocities and cannot be "
+                         f"coupled{''.join(turn)}")
 
 
 class _Gains(NamedTuple):

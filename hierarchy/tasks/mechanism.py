@@ -53,6 +53,11 @@ def model_rows(robot: Robot, period: float = 0.001) -> list[Task]:
     return [] if whole is None else [ClosedChains(whole) if robot.loops else whole]
 
 
+def bends(robot: Robot) -> bool:
+    """Whether a mechanism leaves its tangent: it has a loop, or a polynomial that is no line."""
+    return bool(robot.loops) or any(len(one.coefficients) > 2 for one in robot.coupled)
+
+
 def above(rows: Sequence[Task], limits: Sequence[Task], anywhere: bool) -> list[Task]:
     """Return the rows of a mechanism above limits, or below them for a resolver of bounds alone.
 
@@ -189,6 +194,18 @@ class Mechanism:
         J = self._rows(self._robot.normalised(q))[0]
         beside = J @ v
         return v - self._solved(J, beside, 0.0) if np.abs(beside).max() > _EXACT else v
+
+    def bend(self, q: ArrayLike, v: Array, period: float) -> Array:
+        """Return what to add to the sides of the first k rows of `model_rows` at q (k,).
+
+        With that the mechanism, which leaves its tangent, is where the rows say after a `period`
+        [s] of a velocity v (n,).
+        """
+        J, error = self._rows(self._robot.normalised(q))
+        after = self._rows(self._robot.integrate(q, v * period))[1]
+        side = (after - error) / period + J @ v
+        part = self._tasks[0].parts(J, side)
+        return part.side / part.sizes if self._robot.loops else side
 
     def _free(self, held: Iterable[str]) -> Array:
         """Return 1 for each velocity (n,), 0 for those of joints that stay where they are."""

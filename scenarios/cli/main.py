@@ -14,8 +14,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from scenarios.cli import completion
-from scenarios.cli.bench import bench
+from scenarios.cli import benchmarks, completion
 from scenarios.cli.options import (
     INTERRUPTED,
     PORT,
@@ -37,7 +36,6 @@ if TYPE_CHECKING:
     from scenarios.config import Scenario
 
 app = typer.Typer(rich_markup_mode=None, pretty_exceptions_enable=False)
-app.add_typer(bench, name="bench")
 app.add_typer(problems, name="problems")
 
 
@@ -213,31 +211,6 @@ def sweep(file: Annotated[str, typer.Argument(help="Name of a sweep, or a sweep 
 
 
 @app.command()
-def reproduce(names: Annotated[list[str] | None, typer.Argument(
-                  metavar="[NAME]...", help="states, throttle, letter, resolvers, blend, ladder, "
-                  "inertia, rivals, singular, human, standing, reaching, or a page such as "
-                  "docs/first-paper.md for the commands in it. Default: all.")] = None,
-              out: Annotated[Path, output("Where the runs are kept.")] = Path("runs/reproduce"),
-              quick: Annotated[bool, typer.Option(
-                  "--quick", help="A tenth of the starts; leave the documents as they are. "
-                  "Commands, which have no starts, are not run but listed.")] = False,
-              fill: Annotated[bool, typer.Option(
-                  "--fill", help="Run nothing; write the pages from what docs/results keeps.")
-                  ] = False,
-              workers: Workers = None, as_json: AsJson = False) -> int:
-    """Regenerate the numbers in the documentation.
-
-    They are written into the pages of a checkout as each study or command ends. Run the same
-    command again to resume an interrupted one. Nothing else should run while timings are made.
-    """
-    from scenarios.cli.reproduce import fill_command, reproduce_command
-
-    if fill:
-        return fill_command()
-    return reproduce_command(names or [], out, quick, workers, as_json)
-
-
-@app.command()
 def view(folders: Annotated[list[Path], typer.Argument(
              metavar="RUN...", help="Folders of `hierarchy run` or `compare`.")],
          side_by_side: Annotated[bool, typer.Option(
@@ -280,18 +253,13 @@ def replay(folders: Annotated[list[Path], typer.Argument(
                metavar="RUN...", help="Folders of `hierarchy run` or `compare`.")],
            out: Annotated[Path | None, output(
                "HTML file to write. Default: RUN/replay.html.", "FILE")] = None,
-           video: Annotated[Path | None, typer.Option(
-               "--video", metavar="FILE", help="Write a video of one run with ffmpeg.")] = None,
            rate: Annotated[float, typer.Option(
                "--rate", metavar="HZ", help="Frames per second.")] = 30.0,
            plugin: Plugins = None) -> int:
-    """Write runs as one HTML file, or one run as a video.
-
-    The HTML file plays without a server.
-    """
+    """Write runs as one HTML file that plays without a server."""
     from scenarios.cli.replay import replay_command
 
-    return replay_command(folders, out, video, rate)
+    return replay_command(folders, out, rate)
 
 
 @app.command()
@@ -403,6 +371,9 @@ def _fault(error: OSError) -> int:
 def _wrong(text: str) -> int:
     print(f"hierarchy: error: {text}", file=sys.stderr)
     return 2
+
+
+benchmarks.register(app)
 
 
 if __name__ == "__main__":

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 problems = typer.Typer(rich_markup_mode=None, invoke_without_command=True)
 
 Seed = Annotated[int, typer.Option("--seed", min=0, metavar="S",
-                                   help="0: the public half. Any other: fresh problems.")]
+                                   help="0: the public problems. Any other: fresh ones.")]
 Count = Annotated[int | None, typer.Option("--count", min=1, metavar="N",
                                            help="Number of problems. Default: that of the family.")]
 
@@ -34,7 +34,7 @@ def main(ctx: typer.Context) -> None:
 @problems.command("list")
 def list_(as_json: AsJson = False) -> None:
     """List the families of problems."""
-    from scenarios.bench.open.families import FAMILIES
+    from scenarios.problems.families import FAMILIES
 
     groups: dict[str, dict[str, str]] = {}
     for one in FAMILIES.values():
@@ -68,10 +68,10 @@ def export(family: Annotated[list[str], typer.Argument(
                                        "FAMILY-fresh-S.npz.")] = Path("problems"),
            as_json: AsJson = False) -> None:
     """Write problems as files, with proved answers."""
-    from scenarios.bench.open.exported import export as write
-    from scenarios.bench.open.families import available, unavailable
-    from scenarios.bench.open.families import family as named
     from scenarios.cli.progress import bar
+    from scenarios.problems.answers import export as write
+    from scenarios.problems.families import available, unavailable
+    from scenarios.problems.families import family as named
 
     chosen = available() if family == ["all"] else [named(name) for name in family]
     for name, why in (unavailable() if family == ["all"] else {}).items():
@@ -92,7 +92,7 @@ def check(file: Annotated[Path, typer.Argument(metavar="FILE", help="A file of p
 
     Exit code 1 if an answer in the file differs.
     """
-    from scenarios.bench.open.exported import check as compare
+    from scenarios.problems.answers import check as compare
     from solvers.problems.files import read
 
     collection = read(file)
@@ -109,7 +109,7 @@ def check(file: Annotated[Path, typer.Argument(metavar="FILE", help="A file of p
 
 
 def _named(name: str, seed: int, count: int | None) -> Collection:
-    from scenarios.bench.open.families import family
+    from scenarios.problems.families import family
     from solvers.problems.files import read
 
     return read(name) if name.endswith(".npz") else family(name).half(seed, count)

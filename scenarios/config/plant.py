@@ -147,12 +147,13 @@ class TorqueSection(AnyPlant):
     """A robot with torque motors in a physics simulation (extra `sim`).
 
     Its [[contacts]] touch a floor, or table, at `height` [m] whose coefficient is `friction`;
-    `softness` [s] is the time constant of a contact. `joint_friction` [N m] is Coulomb's friction
-    and `armature` [kg m^2] the inertia of the drive of every joint, `delay` [s], a whole number of
-    periods, the time by which torques arrive late; the controller knows of none of them. `pushes`
-    disturb it. A robot whose centre of mass is `fall` [m] below its start, or whose base has tilted
-    by `tilt` [rad] from it, has fallen, which ends the run with a fault. So does a joint more than
-    `beyond_stop` [rad] beyond its position limit: joints have no stops in the simulation.
+    `softness` [s] is the time constant of a contact. `joint_friction` [N m] is Coulomb's friction,
+    `armature` [kg m^2] the inertia of the drive of every joint beyond the robot's own, `delay` [s],
+    a whole number of periods, the time by which torques arrive late; the controller knows of none
+    of them. `pushes` disturb it. A robot whose centre of mass is `fall` [m] below its start, or
+    whose base has tilted by `tilt` [rad] from it, has fallen, which ends the run with a fault. So
+    does a joint more than `beyond_stop` [rad] beyond its position limit: joints have no stops in
+    the simulation.
     """
 
     kind: Literal["torque"]

@@ -1,11 +1,14 @@
-"""Damping as rows: the damped hierarchy is one without damping that has a few rows more.
+"""Damping beside inequalities: each damped level is one convex problem.
 
-The staircase of the equalities, without any inequality, gives each level k the columns Q_k that it
-adds, and its lambda. Damped, the level minimises |A_k x - b_k|^2 + lambda^2 |Q_k^T x|^2: the rows
-lambda Q_k^T join it, with targets of zero. Neither depends on which inequalities act, so for any
-sides this is one convex problem for each level, and its answer varies continuously with them. Where
-no inequality acts it is the x of `tpm`. A level of bounds on single unknowns is not damped: a fixed
-joint stays where it is.
+The staircase of the equalities alone gives an x. Where inequalities hold it, that is the answer, as
+in `tpm`. Where a row is exceeded, what lies along it is taken out of the equalities, in proportion
+up to all of it, and the staircase of the rest gives each level its lambda: an arm that would be
+singular with a joint at its limit is damped as one that is singular. Then level by level
+
+    min |A_k x - b_k|^2 + lambda_k^2 |x|^2, levels above at what they have reached,
+
+and last the distance to the reference. No lambda depends on which inequalities act, so each of
+these is one strictly convex problem, and its answer varies continuously with the data.
 """
 
 # mypy: disable-error-code="no-untyped-def"
@@ -16,83 +19,188 @@ from typing import NamedTuple
 
 from hierarchy.jit import compiled, inlined
 from solvers.kernels.block import level_damping
-from solvers.kernels.rows import ZERO, factor_level, reflect, reflect_back
+from solvers.kernels.rows import ZERO, add_multiple, factor_level, length_of, reflect, reflect_back
 from solvers.kernels.space import Block, View, integers, matrix, shared, vector
-from solvers.kernels.staircase import carve_staircase
+from solvers.kernels.staircase import carve_staircase, solve_by_staircase
+from solvers.kernels.tolerances import LEVEL_MET, SATURATES
+from solvers.kernels.working_set import row_times
+from solvers.status import NUMERICAL_FAILURE
 
 
 class Damped(NamedTuple):
-    """A hierarchy with damping as rows: A (m + n, n), lower, upper (m + n,), sizes (L,) int64.
+    """The rows of one level to damp and of those above it, and of the equalities alone.
 
-    origin (m + n,) int64: the row that each was, -1 for one of damping.
+    A (m + n, n), lower, upper (m + n,), sizes (L,): m rows of the hierarchy, their sides as far as
+    they are met, then n rows of damping. factor (L,): lambda. E (m, n), b (m,), ends (L,): the
+    equalities, their targets, their number per level. Q (m, n), ranks (L,): the columns of the
+    staircase that each level adds, in its rows of E. free (n,): the x that meets the equalities.
     """
 
     A: View
     lower: View
     upper: View
     sizes: View
-    origin: View
+    factor: View
+    E: View
+    b: View
+    ends: View
+    Q: View
+    ranks: View
+    free: View
 
 
 @inlined
-def damped_size(n, m):
-    """Return the numbers that `write_damped` needs, those of a Staircase."""
-    return m * (n + 3) + n * (n + 3) + (m + n) * (n + 1)
+def damped_size(n, m, levels):
+    """Return the numbers that a Damped and its staircase need."""
+    return (3 * m + n) * (n + 3) + 4 * levels + n + (m + n) * (n + 3) + (m + n) * (n + 1)
 
 
 @inlined
-def carve_damped(sizes, work, at, m, n):
+def carve_damped(work, at, m, n, levels):
     """Return a Damped without data, and where it ends."""
     A, at = matrix(work, at, m + n, n)
     lower, at = vector(work, at, m + n)
     upper, at = vector(work, at, m + n)
-    levels, at = integers(work, at, sizes.size)
-    origin, at = integers(work, at, m + n)
-    return Damped(A, lower, upper, levels, origin), at
+    sizes, at = integers(work, at, levels)
+    factor, at = vector(work, at, levels)
+    E, at = matrix(work, at, m, n)
+    b, at = vector(work, at, m)
+    ends, at = integers(work, at, levels)
+    Q, at = matrix(work, at, m, n)
+    ranks, at = integers(work, at, levels)
+    free, at = vector(work, at, n)
+    return Damped(A, lower, upper, sizes, factor, E, b, ends, Q, ranks, free), at
 
 
 @compiled
-def write_damped(d, A, lower, upper, sizes, settings, work):
-    """Write a hierarchy with its damping as rows; return the number of rows."""
-    m, n = A.shape
-    (basis, rows, _, of_x, of_block), _ = carve_staircase(work, ZERO, m, n)
-    settings, rank, first, count = shared(settings), ZERO, ZERO, ZERO
+def open_damped(d, A, lower, upper, sizes, x, settings, work):
+    """Write the rows, and the x and lambda of the equalities; return whether x meets all rows.
+
+    The second number is the code of the staircase. x: the reference.
+    """
+    first, count = ZERO, ZERO
     for k in range(sizes.size):
-        begin, equal, box = count, ZERO, True
+        d.sizes[k], begin = sizes[k], count
         for i in range(first, first + sizes[k]):
-            _copy_row(d, A[i], lower[i], upper[i], count)
-            d.origin[count] = i
-            entries = 0
-            for c in range(n):
-                entries += A[i, c] != 0.0
-            box = box and entries <= 1
+            _copy_row(d, A, lower, upper, i)
             if lower[i] == upper[i]:
-                square = 0.0
-                for c in range(n):
-                    rows.W[equal, c] = A[i, c]
-                    square += A[i, c] * A[i, c]
-                rows.zero[equal] = settings.rank_tolerance * settings.rank_tolerance * square
-                equal += 1
-            count += 1
-        reflect(basis, ZERO, rank, rows.W, ZERO, equal)
-        above, rank = rank, factor_level(rows, basis, ZERO, equal, rank)
-        damped = 0.0
-        if rank > above and not (box and equal < sizes[k]):
-            damped = level_damping(rows.W, Block(ZERO, equal, above, rank), settings, of_block)
-        for t in range(above, rank if damped > 0.0 else above):
-            for c in range(n):
-                of_x[0, c] = damped if c == t else 0.0
-            reflect_back(basis, rank, of_x, ZERO, ZERO + 1)
-            _copy_row(d, of_x[0], 0.0, 0.0, count)
-            d.origin[count] = -1
-            count += 1
-        d.sizes[k], first = count - begin, first + sizes[k]
-    return count
+                for c in range(x.size):
+                    d.E[count, c] = A[i, c]
+                d.b[count] = lower[i]
+                count += 1
+        d.ends[k], first = count - begin, first + sizes[k]
+    for c in range(x.size):
+        d.free[c] = x[c]
+    E, b = d.E[:count], d.b[:count]
+    code = solve_by_staircase(E, b, b, d.ends, d.free, settings, work)
+    if code == NUMERICAL_FAILURE or _is_met(d, A, lower, upper):
+        return True, code
+    _factor_equalities(d, A, sizes, settings, work, True)
+    _take_out_exceeded(d, E, A, lower, upper, x)
+    _factor_equalities(d, A, sizes, settings, work, False)
+    return False, code
 
 
 @inlined
-def _copy_row(d, a, low, up, at):
-    """Append a row with its sides."""
-    for c in range(a.size):
-        d.A[at, c] = a[c]
-    d.lower[at], d.upper[at] = low, up
+def _copy_row(d, A, lower, upper, i):
+    """Write row i of the hierarchy."""
+    for c in range(A.shape[1]):
+        d.A[i, c] = A[i, c]
+    d.lower[i], d.upper[i] = lower[i], upper[i]
+
+
+@inlined
+def _is_met(d, A, lower, upper):
+    """Whether the x of the equalities meets all inequalities."""
+    met = True
+    for i in range(lower.size):
+        met &= lower[i] == upper[i] or lower[i] <= row_times(A[i], d.free) <= upper[i]
+    return met
+
+
+@inlined
+def _take_out_exceeded(d, E, A, lower, upper, reference):
+    """Take the directions of exceeded rows out of the equalities."""
+    reach = length_of(d.free) + length_of(reference)
+    for i in range(lower.size):
+        value, norm = row_times(A[i], d.free), length_of(A[i])
+        over = max(value - upper[i], lower[i] - value)
+        if lower[i] < upper[i] and over > 0.0 and norm > 0.0:
+            share = min(SATURATES * over / (norm * reach), 1.0) if reach > 0.0 else 1.0
+            for e in range(E.shape[0]):
+                add_multiple(E[e], -share * row_times(E[e], A[i]) / (norm * norm), A[i])
+
+
+@inlined
+def _factor_equalities(d, A, sizes, settings, work, whole):
+    """Write what each level adds to the staircase, if `whole`, else its lambda.
+
+    Bounds on single unknowns are not damped.
+    """
+    m, n = d.E.shape
+    (basis, rows, _, _, of_block), _ = carve_staircase(work, ZERO, m, n)
+    settings, rank, first, begin = shared(settings), ZERO, ZERO, ZERO
+    for k in range(sizes.size):
+        end, last, bounds = begin + d.ends[k], first + sizes[k], True
+        for i in range(first, last):
+            entries = 0
+            for c in range(n):
+                entries += A[i, c] != 0.0
+            bounds = bounds and entries <= 1
+        for e in range(begin, end):
+            for c in range(n):
+                rows.W[e, c] = d.E[e, c]
+            rows.zero[e] = (settings.rank_tolerance * length_of(d.E[e])) ** 2
+        reflect(basis, ZERO, rank, rows.W, begin, end)
+        above, rank = rank, factor_level(rows, basis, begin, end, rank)
+        if whole:
+            d.ranks[k] = rank - above
+            for t in range(above, rank):
+                for c in range(n):
+                    d.Q[begin + t - above, c] = 1.0 if c == t else 0.0
+            reflect_back(basis, rank, d.Q, begin, begin + rank - above)
+        elif begin < end and not (bounds and end - begin < sizes[k]):
+            d.factor[k] = level_damping(rows.W, Block(begin, end, above, rank), settings, of_block)
+        else:
+            d.factor[k] = 0.0
+        first, begin = last, end
+
+
+@compiled
+def damp_level(d, k):
+    """Write the rows of damping below level k; return the number of rows up to them."""
+    n, end = d.free.size, ZERO
+    for j in range(k + 1):
+        end += d.sizes[j]
+    for t in range(n):
+        for c in range(n):
+            d.A[end + t, c] = d.factor[k] if c == t else 0.0
+        d.lower[end + t] = d.upper[end + t] = 0.0
+    return end
+
+
+@compiled
+def keep_reached(d, A, lower, upper, x, k, end):
+    """Hold level k where x has brought it: its sides, and its columns of Q for its equalities.
+
+    The levels above keep theirs, and the rows from `end` on get their data back.
+    """
+    for i in range(end, lower.size):
+        _copy_row(d, A, lower, upper, i)
+    begin, t = ZERO, ZERO
+    for j in range(k):
+        begin, t = begin + d.sizes[j], t + d.ends[j]
+    last = t + d.ranks[k]
+    for i in range(end):
+        value = row_times(d.A[i], x)
+        if lower[i] < upper[i]:
+            least = LEVEL_MET * (1.0 + abs(value))  # less is rounding of a side that is kept
+            d.lower[i] = value if value < d.lower[i] - least else d.lower[i]
+            d.upper[i] = value if value > d.upper[i] + least else d.upper[i]
+        elif i < begin:
+            d.lower[i] = d.upper[i] = value
+        else:
+            for c in range(x.size):
+                d.A[i, c] = d.Q[t, c] if t < last else 0.0
+            d.lower[i] = d.upper[i] = row_times(d.A[i], x)
+            t += 1

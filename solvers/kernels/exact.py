@@ -13,7 +13,13 @@ from __future__ import annotations
 import numpy as np
 
 from hierarchy.jit import compiled, inlined
-from solvers.kernels.damping import carve_damped, damped_size, write_damped
+from solvers.kernels.damping import (
+    carve_damped,
+    damp_level,
+    damped_size,
+    keep_reached,
+    open_damped,
+)
 from solvers.kernels.levels import pass_through_levels
 from solvers.kernels.rows import ZERO, all_equal, finish, length_of
 from solvers.kernels.search import pivot_in_blocks, pivot_one_by_one, save
@@ -62,8 +68,7 @@ def work_size(n, m, levels, damped):
     """Return the numbers that a work space of `solve_hierarchy` needs, with damping or without."""
     if not damped:
         return n + exact_size(n, m, levels)
-    rows = m + n
-    return rows * (n + 6) + levels + 3 + max(damped_size(n, m), exact_size(n, rows, levels))
+    return damped_size(n, m, levels) + 3 * (m + n) + n + 16 + exact_size(n, m + n, levels)
 
 
 @compiled
@@ -95,23 +100,62 @@ def solve_hierarchy(A, lower, upper, sizes, x, record, settings, work):
 
 @compiled
 def solve_damped(A, lower, upper, sizes, x, record, settings, work):
-    """Like `solve_hierarchy`, for rows with damping; the record has no memory."""
-    m, n = A.shape
-    d, at = carve_damped(sizes, work, ZERO, m, n)
+    """Like `solve_hierarchy`, level by level with damping; the record has no memory."""
+    (m, n), code, last = A.shape, ZERO + SOLVED, sizes.size - 1
+    d, at = carve_damped(work, ZERO, m, n, sizes.size)
+    reference, at = vector(work, at, n)
+    limits, at = vector(work, at, settings.size)
     inner, at = vector(work, at, 3 * (m + n) + 3)
-    rows = write_damped(d, A, lower, upper, sizes, settings, work[at:])
-    for i in range(inner.size):
-        inner[i] = 0.0
-    size = 3 * rows
-    code = solve_exactly(d.A[:rows], d.lower[:rows], d.upper[:rows], d.sizes, x,
-                         inner[:size + 3], settings, work[at:])
-    for i in range(3 * m + 3):
-        record[i] = inner[size + i - 3 * m] if i >= 3 * m else 0.0
-    for q in range(rows):
-        i = d.origin[q]
-        for part in range(3 if i >= 0 else 0):
-            record[part * m + i] = inner[part * rows + q]
+    for c in range(n):
+        reference[c] = x[c]
+    for c in range(settings.size):
+        limits[c] = settings[c]
+    for i in range(record.size):
+        record[i] = -1.0 if m <= i < 2 * m or i == 3 * m + 2 else 0.0
+    met, staircase = open_damped(d, A, lower, upper, sizes, x, settings, work[at:])
+    if met or staircase == NUMERICAL_FAILURE:
+        for c in range(n):
+            x[c] = d.free[c]
+        for i in range(m):
+            record[i] = EQUAL if lower[i] == upper[i] else FREE
+        record[3 * m] = 1.0
+        return finish(x, staircase)
+    whole = last >= 0 and d.factor[last] > 0.0 and length_of(reference) == 0.0
+    for k in range(sizes.size + (not whole)):
+        if code != SOLVED or (k <= last and d.factor[k] == 0.0):
+            continue
+        end = m if k > last else damp_level(d, k)
+        rows, levels = end + (0 if k > last else n), min(k + 1, sizes.size)
+        if k <= last:
+            d.sizes[k] += n
+        for i in range(3 * rows + 3):
+            inner[i] = 0.0
+        for c in range(n):
+            x[c] = reference[c]
+        code = solve_exactly(d.A[:rows], d.lower[:rows], d.upper[:rows], d.sizes[:levels], x,
+                             inner[:3 * rows + 3], limits, work[at:])
+        if k <= last:
+            d.sizes[k] -= n
+        _add_record(record, inner, lower, upper, d, rows, end, k)
+        limits[MOST] -= inner[3 * rows] + inner[3 * rows + 1]
+        if limits[MOST] < 1.0 and k <= last and code == SOLVED:
+            code = ZERO + ITERATION_LIMIT
+        if k <= last:
+            keep_reached(d, A, lower, upper, x, k, end)
     return code
+
+
+@inlined
+def _add_record(record, inner, lower, upper, d, rows, end, k):
+    """Add what a level says: states of rows, and which rows hold it back."""
+    m = lower.size
+    for i in range(end):
+        missed = d.lower[i] < lower[i] or d.upper[i] > upper[i]  # by a level before
+        record[i] = record[i] if missed else inner[i]
+        if record[m + i] < 0.0 and 0.0 <= inner[rows + i] <= k:
+            record[m + i], record[2 * m + i] = inner[rows + i], inner[2 * rows + i]
+    record[3 * m] += inner[3 * rows]
+    record[3 * m + 1] += inner[3 * rows + 1]
 
 
 @inlined
@@ -155,7 +199,7 @@ def solve_exactly(A, lower, upper, sizes, x, record, settings, work):
                                           min(limit - steps, PASS_STEPS * (m + n)))
         steps += t.count[STEPS]
         save(s, saved, sizes.size if code == SOLVED else level)
-        code = _verified(s, code)
+        code = _verified(s, code, False)
         restore(s)
         if code != SOLVED and steps < limit:
             code, tries = pivot_in_blocks(s, limit - steps, True)
@@ -168,7 +212,7 @@ def solve_exactly(A, lower, upper, sizes, x, record, settings, work):
                 s, current, saved, min(limit - steps, SEARCH_STEPS * (m + n)),
                 ZERO if coarse > begin else level)
             steps += tries
-            code = _verified(s, code)
+            code = _verified(s, code, True)
     if code == SOLVED and s.count[NEGLECTED] > 0 and neglects(s):
         code = ZERO + INACCURATE
     elif code not in (SOLVED, NUMERICAL_FAILURE):
@@ -210,9 +254,9 @@ def _resumed_at(number, levels):
 
 
 @inlined
-def _verified(s, code):
+def _verified(s, code, factored):
     """Return the code of a search: INACCURATE in place of SOLVED if its claims are no proof."""
-    return ZERO + (INACCURATE if code == SOLVED and not verify(s) else code)
+    return ZERO + (INACCURATE if code == SOLVED and not verify(s, factored) else code)
 
 
 @inlined

@@ -18,10 +18,11 @@ from __future__ import annotations
 import numpy as np
 
 from hierarchy.jit import compiled, inlined
-from solvers.kernels.rows import length_of
-from solvers.kernels.tolerances import CANCELLED, EPSILON, NEGLIGIBLE, SHADOW
+from solvers.kernels.rows import length_of, reflect
+from solvers.kernels.tolerances import CANCELLED, COARSE_SIGN, EPSILON, NEGLIGIBLE, SHADOW
 from solvers.kernels.working_set import (
     BEGIN,
+    COARSE,
     DIAGONAL,
     FIRST,
     GOAL,
@@ -30,7 +31,10 @@ from solvers.kernels.working_set import (
     MISS,
     NOISE,
     NORM,
+    ORDER,
+    PICKED,
     RANK,
+    SCRATCH,
     SIGN,
     SIZE,
     STATE,
@@ -134,21 +138,45 @@ def _pull_of_goal(s, level, weight, reach):
 def _add(s, f, unsure, q, end):
     """Add a multiple of the row at place q to the gradient in the first `end` columns."""
     w, gradient, noise = s.W[q, :end], s.number[GRADIENT], s.number[NOISE]
-    unsure += CANCELLED * abs(f)
+    unsure += (COARSE_SIGN if s.count[COARSE] == 1 else CANCELLED) * abs(f)
     for t in range(w.size):
         gradient[t] += f * w[t]
         noise[t] += abs(w[t]) * unsure
 
 
+@compiled
+def refine(s, p):
+    """Correct the multipliers of level p by what remains of its gradient, by unknown in GRADIENT.
+
+    Large multipliers of nearly dependent rows leave rounding in unknowns that no such row touches.
+    """
+    n, picked = s.x.size, s.count[PICKED]
+    last = min(p, s.count[WHOLE]) if s.count[WHOLE] >= 0 else p
+    for t in range(n):
+        s.number[SCRATCH, t] = s.number[GRADIENT, s.index[ORDER, t]]
+    reflect(s.basis, picked, s.index[RANK, last], s.number, SCRATCH, SCRATCH + 1)
+    for t in range(n):
+        s.number[GRADIENT, t], s.number[NOISE, t] = s.number[SCRATCH, t], 0.0
+    _write_forces(s, last)
+    for q in range(s.index[BEGIN, last]):
+        s.multiplier[p, s.index[LIST, q]] += s.number[FORCE, q]
+
+
 @inlined
-def _balance(s, p, last):
-    """Write the multipliers in level p of the rows of the levels before `last`, and their signs."""
+def _write_forces(s, last):
+    """Write the forces of the rows of the levels before `last` that take the gradient to zero."""
     for k in range(last - 1, -1, -1):
         begin, end = s.index[BEGIN, k], s.index[BEGIN, k + 1]
         if end - begin > s.index[RANK, k + 1] - s.index[RANK, k]:
             _share(s, begin, end, s.index[RANK, k], s.index[RANK, k + 1])
         else:
             _substitute(s, begin, end, s.index[RANK, k])
+
+
+@inlined
+def _balance(s, p, last):
+    """Write the multipliers in level p of the rows of the levels before `last`, and their signs."""
+    _write_forces(s, last)
     for q in range(s.index[BEGIN, last]):
         i, force = s.index[LIST, q], s.number[FORCE, q]
         if force != 0.0:

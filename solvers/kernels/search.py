@@ -119,7 +119,7 @@ def pivot_in_blocks(s, limit, keep):
         tries += 1
         meet(s, levels)
         write_multipliers(s, MET)
-        if not _points_inward(s) and verify(s):
+        if not _points_inward(s) and verify(s, True):
             return ZERO + SOLVED, tries
         found = judge(s, levels, ZERO - 1)
         if found.wrong == 0:

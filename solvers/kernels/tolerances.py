@@ -16,6 +16,7 @@ LEAST_SQUARE = 1e-200      # square of a norm: smaller ones lose digits, as do l
 # What is met. A violation that the search pursues is larger than what the verification forgives.
 MET = 1e-13          # violation of a level whose multipliers are zero, relative to its terms
 VIOLATED = 1e-9      # violation at which a row enters, relative to its terms
+SATURATES = 10.0     # excess of a row over |x|, times this: share that damping takes for held
 LEVEL_MET = 1e-10    # violation of a level of which tpm says that it is met, relative to its terms
 BOUND_KEPT = 1e-12   # of sns, relative to 1 + |bound|
 SHADOW = 1e-5        # of the largest number so far: part of the scale of x in the search
@@ -25,12 +26,15 @@ FLOOR = 1e-3         # the same in the pass level by level
 BAND = 5e-9          # shift of a side, relative to 1 + |x|
 FREE_ROWS = 2.0      # share of the band of a row that acts over that of one that does not
 REMAINDER = 2.5e-9   # what may remain of a gradient, as a shift of the sides of its level
+KNOWN_MULTIPLIER = 1e-4  # what may remain of it over its terms and the smallest pivot
 CUT_BALANCE = 2e-7   # what cut rows may add to a gradient, relative to its terms
+ROUNDING_BALANCE = 5e-9  # the same for rounding
 CUT_OVER_PIVOT = 2e-4  # cut of a row over the smallest pivot: larger ones turn the answer
 RANK_MARGIN = 1.1    # between a pivot or a cut and rank_tolerance, as a factor
 PIVOT_PRODUCT = 1e-15  # of the two smallest pivots: less, and the second is rounding of the first
-CERTAIN_SIGN = 1e-8  # multiplier over what it balances: smaller ones have no certain sign
-SIGN_MARGIN = 4.0    # multiplier over the error of the gradient, the same
+SIGN_MARGIN = 4.0    # multiplier over its error, that of the gradient over the smallest pivot
+SIGN_ROUNDING = 4e-16  # of a gradient over its terms
+COARSE_SIGN = 1e-10  # multiplier over its terms: the coarse search takes smaller ones for zero
 
 # Pivots
 REPIVOT = 1e-4       # share of a row in its own basis vector: smaller ones pivot the level again
@@ -40,6 +44,7 @@ UNCLEAR_CUT = 0.3    # remainder of a dependent row over the smallest pivot: the
 OUTSIDE = 1e-14      # share of a row outside the basis of `Factorization`: less is no direction
 EXACTLY_DEPENDENT, NEARLY_DEPENDENT = 1e-12, 1e-7  # in `weighted`: ill-posed in between
 ORTHOGONAL = 1e-30   # squared cosine of two rows: Jacobi rotations stop
+LONGEST = 1e150      # x of `weighted`: squares of longer ones overflow
 
 # Limits. The pass and each search end after their number times rows plus unknowns.
 PASS_STEPS = 2

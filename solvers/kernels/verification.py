@@ -23,20 +23,23 @@ from typing import NamedTuple
 import numpy as np
 
 from hierarchy.jit import compiled, inlined
+from solvers.kernels.multipliers import refine
 from solvers.kernels.rows import length_of
 from solvers.kernels.tolerances import (
     BAND,
     CANCELLED,
-    CERTAIN_SIGN,
     CUT_BALANCE,
     CUT_OVER_PIVOT,
     EPSILON,
     FREE_ROWS,
+    KNOWN_MULTIPLIER,
     NEGLIGIBLE,
     PIVOT_PRODUCT,
     RANK_MARGIN,
     REMAINDER,
+    ROUNDING_BALANCE,
     SIGN_MARGIN,
+    SIGN_ROUNDING,
 )
 from solvers.kernels.working_set import (
     CHANGE,
@@ -63,15 +66,18 @@ OPEN, WEAKLY, DECIDED = range(3)
 
 
 @compiled
-def verify(s):
-    """Whether the claims of a working set prove its x."""
+def verify(s, factored):
+    """Whether the claims of a working set prove its x.
+
+    factored: whether `meet` has factored this set, so that its multipliers can be refined.
+    """
     levels, whole = s.multiplier.shape[0] - 1, s.count[WHOLE]
     reach = 1.0 + length_of(s.x)
     if not np.isfinite(reach) or not _rows_hold(s, reach):
         return False
     proved = True
     for p in range(levels + 1 if whole < 0 else whole + 1):
-        proved = proved and _balances(s, p, reach)
+        proved = proved and _balances(s, p, reach, factored)
     return proved
 
 
@@ -134,23 +140,30 @@ class Level(NamedTuple):
 
 
 @inlined
-def _balances(s, p, reach):
+def _balances(s, p, reach, factored):
     """Whether (2) and (3) hold for level p."""
     last = p == s.multiplier.shape[0] - 1
     level = _measured(s, p, last)
-    if not last and level.missed <= BAND * reach:
+    met = not last and level.missed <= BAND * reach
+    if met and level.missed == 0.0:
         return True
-    allowed = REMAINDER * reach
+    source, allowed = (reach if last else level.source), REMAINDER * reach
     if not last:
-        allowed = (REMAINDER * level.least * level.least * max(level.missed, reach)
-                   * s.scalar[PIVOT])
+        allowed = REMAINDER * level.least * level.least * max(level.missed, reach)
+    allowed = min(allowed, KNOWN_MULTIPLIER * source * s.scalar[PIVOT])
     outside, rounding, turned = _add_rows(s, level, reach if last else 0.0)
     rest = _beyond_rounding(s)
-    if (outside or not rest <= allowed + turned
-            or not turned <= CUT_BALANCE * (reach if last else level.source)):
-        return False
+    if factored and not rest <= allowed + turned:
+        refine(s, p)
+        outside, rounding, turned = _add_rows(s, level, reach if last else 0.0)
+        rest = _beyond_rounding(s)
+    holds = (not outside and rest <= allowed + turned
+             and turned <= CUT_BALANCE * source and rounding <= ROUNDING_BALANCE * source)
     unsure = SIGN_MARGIN * (rest + rounding + turned) / s.scalar[PIVOT]
-    return _signs_hold(s, level, unsure, 0.0 if last else CERTAIN_SIGN, reach)
+    holds = holds and _signs_hold(s, level, unsure, reach)
+    if holds:
+        _decide(s, level, unsure, reach)
+    return holds or met
 
 
 @inlined
@@ -174,14 +187,14 @@ def _add_rows(s, level, reach):
     reach: of x, for the level of the reference, else 0. Returns whether a row has a multiplier
     that does not act, the rounding of the sum, and what the cuts of rows add to it.
     """
-    mu, outside, rounding, turned = s.multiplier[level.p], False, CANCELLED * reach, 0.0
+    mu, outside, rounding, turned = s.multiplier[level.p], False, SIGN_ROUNDING * reach, 0.0
     for c in range(s.x.size):
         s.number[GRADIENT, c] = s.x[c] - s.number[REFERENCE, c] if reach > 0.0 else 0.0
-        s.number[NOISE, c] = rounding
+        s.number[NOISE, c] = CANCELLED * reach
     for i in range(level.end):
         if mu[i] != 0.0:
             outside = outside or s.index[STATE, i] == FREE
-            rounding += CANCELLED * abs(mu[i]) * s.number[NORM, i]
+            rounding += SIGN_ROUNDING * abs(mu[i]) * s.number[NORM, i]
             turned += 2.0 * s.number[CUT, i] * abs(mu[i])
             _add_row(s, mu[i], i)
     return outside, rounding, turned
@@ -197,23 +210,34 @@ def _beyond_rounding(s):
 
 
 @inlined
-def _signs_hold(s, level, unsure, certain, reach):
-    """Whether (3) holds up to level p; notes for each row how far its sign is decided.
+def _signs_hold(s, level, unsure, reach):
+    """Whether no multiplier of level p points inward for a row that nothing has decided.
 
-    unsure, certain: multipliers below this, and below this share of the pulls, decide weakly.
+    unsure: those below it decide weakly.
     """
     mu, holds = s.multiplier[level.p], True
     for i in range(level.end):
-        norm, own = s.number[NORM, i], i >= level.begin
-        if (mu[i] == 0.0 or s.index[CHANGE, i] == DECIDED
-                or (own and abs(mu[i]) <= NEGLIGIBLE * level.far + EPSILON * norm * reach)):
-            continue
-        pull = min(norm * norm * reach, level.source) if own else level.source
-        weak = abs(mu[i]) * norm <= max(unsure, certain * pull)
-        if mu[i] * s.index[STATE, i] < 0.0 and (s.index[CHANGE, i] == OPEN or not weak):
-            holds = False
-        s.index[CHANGE, i] = WEAKLY if weak else DECIDED
+        weak = abs(mu[i]) * s.number[NORM, i] <= unsure
+        if mu[i] * s.index[STATE, i] < 0.0 and not _is_rounding(s, level, i, reach):
+            holds = holds and s.index[CHANGE, i] != OPEN and (weak or s.index[CHANGE, i] == DECIDED)
     return holds
+
+
+@inlined
+def _decide(s, level, unsure, reach):
+    """Note for each row how far level p decides its sign."""
+    for i in range(level.end):
+        if s.index[CHANGE, i] != DECIDED and not _is_rounding(s, level, i, reach):
+            weak = abs(s.multiplier[level.p, i]) * s.number[NORM, i] <= unsure
+            s.index[CHANGE, i] = WEAKLY if weak else DECIDED
+
+
+@inlined
+def _is_rounding(s, level, i, reach):
+    """Whether a row has no multiplier in level p."""
+    mu = abs(s.multiplier[level.p, i])
+    return mu == 0.0 or (i >= level.begin and mu <= NEGLIGIBLE * level.far
+                         + EPSILON * s.number[NORM, i] * reach)
 
 
 @inlined

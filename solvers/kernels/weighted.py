@@ -32,6 +32,7 @@ from solvers.kernels.acting import (
 )
 from solvers.kernels.rows import ZERO, finish
 from solvers.kernels.space import Settings, View, shared, vector
+from solvers.kernels.tolerances import LONGEST
 from solvers.status import (
     EQUAL,
     FREE,
@@ -107,10 +108,18 @@ def weighted(A, lower, upper, sizes, x, record, settings, work):
     while space.count[0] < space.options.guesses:
         close = _solve(space, x)
         if inequalities == 0:
-            return finish(x, SOLVED)
+            return _found(x, False)
         if not _all_change(space, x) and _no_doubt(space):
-            return INACCURATE if close and np.isfinite(length_of(x)) else finish(x, SOLVED)
+            return _found(x, close)
     return UNPROVED
+
+
+@inlined
+def _found(x, close):
+    """Return the code of an answer: no number is left of sides beside one that is this long."""
+    if not length_of(x) < LONGEST:
+        return finish(x, NUMERICAL_FAILURE)
+    return ZERO + (INACCURATE if close else SOLVED)
 
 
 @compiled
@@ -142,7 +151,7 @@ def weighted_steps(A, lower, upper, sizes, x, record, settings, work):
         if freed >= 0:
             space.acting.state[freed] = FREE
         elif _no_doubt(space):
-            return INACCURATE if close and np.isfinite(length_of(x)) else finish(x, SOLVED)
+            return _found(x, close)
     return finish(x, SOLVED) if not np.isfinite(length_of(x)) else ITERATION_LIMIT
 
 

@@ -87,7 +87,7 @@ class Hcod(Resolver):
 
     name: ClassVar[str] = "hcod"
     handles: ClassVar[Handles] = "inequalities"
-    damps_with_bounds: ClassVar[str] = "each level, by rows that no inequality changes"
+    damps_with_bounds: ClassVar[str] = "each level, without what bounds hold"
     tolerance: float = 1e-10
     max_iterations: int = 1000
 

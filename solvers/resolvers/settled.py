@@ -110,7 +110,7 @@ class _Above:
         n = h.n
         self.inner, self.calmed, self.status, self.names = inner, False, Status.SOLVED, h.names
         self.levels: list[tuple[Array, Array, Array]] = []
-        self.x, self.held = np.zeros(n), np.empty((0, n))
+        self.x, self._held, self._later = np.zeros(n), np.empty((0, n)), list[Array]()
         self.box = np.full(n, -np.inf), np.full(n, np.inf)
         self.paced = inner.can_resolve("bounds")
         # One that resolves bounds in a first level only needs all of them there.
@@ -121,7 +121,15 @@ class _Above:
         """Add a level."""
         self.levels.append((A, lower, upper))
         if (lower == upper).all():
-            self.held = np.vstack([self.held, self._directions(A, _FAINT)])
+            self._later.append(A)
+
+    def held(self) -> Array:
+        """Return the directions (k, n), orthonormal, that levels of equalities have taken."""
+        while self._later:
+            A = self._later.pop(0)
+            free = A - (A @ self._held.T) @ self._held
+            self._held = np.vstack([self._held, _directions(A, free)])
+        return self._held
 
     def calm(self, A: Array, b: Array, half: float) -> tuple[Array, Array, Array]:
         """Return the rows of a level A x = b that minimises (a), unchanged where it is met.
@@ -132,16 +140,17 @@ class _Above:
         alpha = half * size
         if not 0.0 < _LEAST * size * size < alpha * out < np.inf:
             return A, b, b
-        first = self._probe(A, b, _LEAST * size * size)
+        probe = self._damped(A, b)
+        first = probe(_LEAST * size * size)
         if alpha * first.missed <= first.mu:
             self.x = first.x
             return A, b, b
-        found = _search(lambda mu: self._probe(A, b, mu), first, alpha, alpha * out)
+        found = _search(probe, first, alpha, alpha * out)
         step = float(np.linalg.norm(found.x - self.x))
-        self._pace(A, found.x, step * max(out / found.missed - 1.0, 0.0))
+        free = A - (A @ self.held().T) @ self.held()
+        self._pace(free, found.x, step * max(out / found.missed - 1.0, 0.0))
         self.calmed, self.x = True, found.x
-        kept = self._directions(A, _FAINT)
-        rows = np.zeros_like(A)
+        kept, rows = _directions(A, free), np.zeros_like(A)
         rows[:len(kept)] = kept
         return rows, rows @ found.x, rows @ found.x
 
@@ -154,23 +163,32 @@ class _Above:
             found.status = self.status
         return _without_pace(found, h.n, not self.joined) if self.paced else found
 
-    def _pace(self, A: Array, x: Array, most: float) -> None:
+    def _pace(self, free: Array, x: Array, most: float) -> None:
         """Let levels below change the speeds x by (b) and no more."""
-        columns = np.linalg.norm(A - (A @ self.held.T) @ self.held, axis=0)
+        columns = np.linalg.norm(free, axis=0)
         room = np.full(len(x), np.inf)
         used = columns > _NONE * columns.max(initial=0.0)
         room[used] = _PACE + most * columns.max() / columns[used]
         self.box = np.maximum(self.box[0], x - room), np.minimum(self.box[1], x + room)
 
-    def _probe(self, A: Array, b: Array, mu: float) -> _Reached:
-        """Return the x within the levels above that minimises |A x - b|^2 + mu |x - x0|^2."""
-        weight = np.sqrt(mu) * np.eye(len(self.x))
-        target = np.concatenate([b, weight @ self.x])
-        level = np.vstack([A, weight]), target, target
-        found = self.inner.solve(self._stacked([*self.levels, level], np.zeros_like(self.x)))
-        if found.status is not Status.SOLVED:
-            self.status = found.status
-        return _Reached(mu, found.x, float(np.linalg.norm(b - A @ found.x)))
+    def _damped(self, A: Array, b: Array) -> Callable[[float], _Reached]:
+        """Return, by mu, the x within the levels above of least |A x - b|^2 + mu |x - x0|^2."""
+        n, x0 = len(self.x), self.x
+        side = np.concatenate([b, x0])
+        h = self._stacked([*self.levels, (np.vstack([A, np.eye(n)]), side, side)],
+                          np.zeros_like(x0))
+        rows, lower, upper, _ = h.rows
+        weights = rows[-n:].reshape(-1)[::n + 1]
+
+        def probe(mu: float) -> _Reached:
+            weights[:] = np.sqrt(mu)
+            lower[-n:] = upper[-n:] = weights * x0
+            found = self.inner.solve(h)
+            if found.status is not Status.SOLVED:
+                self.status = found.status
+            return _Reached(mu, found.x, float(np.linalg.norm(b - A @ found.x)))
+
+        return probe
 
     def _stacked(self, levels: list[tuple[Array, Array, Array]], reference: Array) -> Hierarchy:
         names = self.names[:len(levels)]
@@ -185,14 +203,11 @@ class _Above:
         A, lower, upper = (np.concatenate(parts) for parts in zip(*levels, strict=True))
         return Hierarchy.trusted(A, lower, upper, sizes, reference, names)
 
-    def _directions(self, A: Array, least: float) -> Array:
-        """Return the directions (k, n) that the rows A take beyond those held.
 
-        Their singular values are above `least` times |A|.
-        """
-        free = A - (A @ self.held.T) @ self.held
-        _, values, directions = np.linalg.svd(free, full_matrices=False)
-        return np.asarray(directions[values > least * np.linalg.norm(A)])
+def _directions(A: Array, free: Array) -> Array:
+    """Return the directions (k, n), but for rounding, of what levels above leave of A."""
+    _, values, directions = np.linalg.svd(free, full_matrices=False)
+    return np.asarray(directions[values > _FAINT * np.linalg.norm(A)])
 
 
 def _search(probe: Callable[[float], _Reached], low: _Reached, alpha: float,

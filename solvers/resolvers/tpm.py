@@ -108,8 +108,8 @@ class Tpm(Resolver):
         """
         x, levels = h.start(), len(h.names)
         first, code = len(x) + levels, UNPROVED
-        record = warm_record(memory, first + 3 * h.m + 3)
-        known, inner = bool(record.any()) and self.damping == 0.0, record[first:]
+        record = warm_record(None if self.damping > 0.0 else memory, first + 3 * h.m + 3)
+        known, inner = bool(record.any()), record[first:]
         if not known:
             code = run(solve_without_bounds, *h.rows, x, record, self._settings)
         if code == NO_LIMITS:

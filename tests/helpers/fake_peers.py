@@ -1,4 +1,4 @@
-"""Packages that the comparison of `scenarios.bench.peers` has to cope with. Needs numpy only."""
+"""Packages that the comparison of `hierarchy bench peers` has to cope with. Needs numpy only."""
 
 import os
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from hierarchy import Hierarchy
-from scenarios.bench import families
+from scenarios.problems import reference as families
 
 
 def rng(seed=7):
@@ -102,6 +102,6 @@ def build(case, with_reference):
 
 
 def family(name):
-    """Yield (hierarchy, x, norms) of a reference family; see data/hlsp/README.md."""
+    """Yield (hierarchy, x, norms) of a reference family; see scenarios/problems/data/README.md."""
     for problem in families.family(name):
         yield problem.h, problem.x, problem.norms

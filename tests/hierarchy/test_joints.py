@@ -156,9 +156,11 @@ def test_a_posture_that_fits_no_form_is_refused():
         _ = Posture({"arm": 0.0}).dimension
 
 
-def test_continuous_joints_are_coupled_by_their_angles():
-    task, h = JointCoupling(ROBOT, {"wheel": 1.0, "arm": -1.0}, 3.0), 1e-6
-    state = State.at(ROBOT, ROBOT.configuration({"wheel": -3.0, "arm": 0.2}))
+@pytest.mark.parametrize(("turn", "values"), [
+    ("wheel", {"wheel": -3.0, "arm": 0.2}), ("drive 3", {"drive": (1.0, 2.0, -3.0), "arm": 0.2})])
+def test_joints_that_turn_on_are_coupled_by_their_angles(turn, values):
+    task, h = JointCoupling(ROBOT, {turn: 1.0, "arm": -1.0}, 3.0), 1e-6
+    state = State.at(ROBOT, ROBOT.configuration(values))
     np.testing.assert_allclose(task.error(state), 3.2 - (-3.0) - 2 * np.pi, atol=1e-12)
     ahead, behind = ([task.error(State.at(ROBOT, ROBOT.integrate(state.q, s * h * e)))[0]
                       for e in np.eye(9)] for s in (1, -1))
@@ -166,6 +168,8 @@ def test_continuous_joints_are_coupled_by_their_angles():
                                atol=1e-8)
     with pytest.raises(HierarchyError, match="'neck' has 3 velocities and cannot be coupled"):
         JointCoupling(ROBOT, {"neck": 1.0})
+    with pytest.raises(HierarchyError, match="cannot be coupled, but for its turn 'drive 3'"):
+        JointCoupling(ROBOT, {"drive": 1.0})
 
 
 URDF = """<robot name="c"><link name="l0"/><link name="l1"/><link name="l2"/><link name="l3"/>

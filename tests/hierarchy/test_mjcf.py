@@ -14,7 +14,7 @@ from scenarios.cli.main import run_command
 from scenarios.config.robot import StartSection
 
 mujoco = pytest.importorskip("mujoco")
-public_robots = pytest.importorskip("public_robots")
+public_robots = pytest.importorskip("benchmark.studies.public_robots")
 
 GEOM = '<geom type="capsule" fromto="0 0 0 .3 0.1 0" size=".03"/>'
 
@@ -188,8 +188,26 @@ def test_a_locked_joint_stays_where_it_is_put(written):
     assert part.joint_names == ("b_joint",)
     np.testing.assert_allclose(State.at(part, [0.2]).position("b_tip"),
                                State.at(whole, [0.3, 0.2]).position("b_tip"), atol=1e-12)
-    with pytest.raises(RobotError, match="'root' is a free joint and cannot be locked"):
-        Robot.load(written(world(WALKER)), locked={"root": 0.0})
+
+
+@pytest.mark.parametrize(("joint", "value", "qpos"), [
+    ("shoulder", (0.0, 0.6, 0.0), [0.9553364891, 0.0, 0.2955202067, 0.0]),
+    ("shoulder", (0.0, 0.6, 0.0, 0.8), [0.8, 0.0, 0.6, 0.0]),
+    ("root", (0.1, 0.2, 0.3, 0.0, 0.6, 0.0), [.1, .2, .3, 0.9553364891, 0.0, 0.2955202067, 0.0])])
+def test_a_ball_and_a_free_joint_are_locked_where_mujoco_has_them(joint, value, qpos, written):
+    ball = link("arm", 'type="ball" pos=".1 0 .05"', link("hand")).replace("arm_joint", "shoulder")
+    path = written(world(WALKER.replace(GEOM, GEOM + ball, 1)))
+    robot = Robot.load(path, locked={joint: value})
+    assert joint not in robot.joint_names
+    model = mujoco.MjModel.from_xml_path(str(path))
+    data = mujoco.MjData(model)
+    at = model.joint(joint).qposadr[0]
+    data.qpos[at:at + len(qpos)] = qpos
+    mujoco.mj_kinematics(model, data)
+    np.testing.assert_allclose(State.at(robot, robot.rest).position("hand_tip"),
+                               data.site("hand_tip").xpos, atol=1e-9)
+    with pytest.raises(RobotError, match=f"locked: joint '{joint}'"):
+        Robot.load(path, locked={joint: (1.0, 2.0)})
 
 
 @pytest.mark.parametrize(("actuator", "joint", "effort"), [
@@ -217,13 +235,15 @@ def test_what_is_left_out_is_said(written):
     robot = Robot.load(written(world(
         link("a", 'stiffness="1" damping="1"', link("b", 'type="ball" range="0 50"')) + TARGET
         + CUBE + '<geom name="floor" type="plane" size="1 1 1"/>',
-        '<tendon><fixed name="tie"><joint joint="a_joint" coef="1"/></fixed></tendon>'
+        '<tendon><fixed name="tie"><joint joint="a_joint" coef="1"/></fixed><spatial name="rope">'
+        '<site site="a_tip"/><site site="b_tip"/></spatial></tendon>'
         '<actuator><motor name="pull" tendon="tie"/></actuator>'
-        '<equality><tendon name="hold" tendon1="tie"/><weld name="off" body1="a" active="false"/>'
+        '<equality><tendon name="hold" tendon1="rope"/><weld name="off" body1="a" active="false"/>'
         '<weld name="drag" body1="target" body2="a"/></equality>')))
     said = " | ".join(robot.missing)
     for name in ("mocap bodies are left out: target", "left out (root = \"NAME\" takes one as the "
-                 "robot): cube", "tendons are left out: tie", "left out: pull", "left out: hold",
+                 "robot): cube", "of tendons only couplings of joints are here: tie, rope",
+                 "left out: pull", "left out: hold",
                  "not active are left out: off", "'drag' is left out", "ball joints are not kept: "
                  "b_joint", "no actuator moves the joint, and nothing limits its effort here: "
                  "a_joint", "stiffness and damping of joints", "'floor' is a plane"):
@@ -262,6 +282,37 @@ def test_couplings_are_polynomials_of_positions(written):
         np.testing.assert_allclose(residual(path, robot, q), 0.0, atol=1e-12)
     held = Robot.load(path, locked={"b_joint": 0.3}).coupled[0]
     np.testing.assert_allclose(held.coefficients, [np.polyval(one.coefficients[::-1], 0.3)])
+
+
+@pytest.mark.parametrize(("before", "after", "said"), [
+    ('0" size', '0"size', ""), ("<worldbody>", "<!-- a--b --><worldbody>", ""),
+    ("</worldbody>", "", "cannot be read: XML")])
+def test_what_is_not_quite_xml_is_left_to_mujoco(before, after, said, written):
+    path = written(world(link("a")))
+    path.write_text(path.read_text().replace(before, after, 1))
+    if said:
+        with pytest.raises(RobotError, match=said):
+            Robot.load(path)
+    else:
+        assert Robot.load(path).joint_names == ("a_joint",)
+
+
+def test_tendons_that_keep_their_length_couple_their_joints(written):
+    tie = ('<fixed name="{0}"><joint joint="{1}" coef=".5"/><joint joint="{2}" coef="-2"/></fixed>'
+           '<fixed name="{2}"><joint joint="{2}" coef="3"/></fixed>')
+    path = written(world(
+        link("a", 'ref="20"', link("b", 'ref="-30"', link("c", more=link("d")))),
+        f'<tendon>{tie.format("ab", "a_joint", "b_joint")}{tie.format("cd", "c_joint", "d_joint")}'
+        '</tendon><equality><tendon tendon1="ab" polycoef=".1 0 0 0 0"/>'
+        '<tendon tendon1="d_joint" polycoef=".3 0 0 0 0"/></equality>'))
+    robot = Robot.load(path)
+    one, other = robot.coupled
+    assert (one.joint, one.other, other.joint, other.other) == ("b_joint", "a_joint", "d_joint", "")
+    for a in (-1.0, 0.4):
+        q = [a, np.polyval(one.coefficients[::-1], a), 0.2, other.coefficients[0]]
+        np.testing.assert_allclose(residual(path, robot, q), 0.0, atol=1e-12)
+    (held, _) = Robot.load(path, locked={"b_joint": q[1]}).coupled
+    assert (held.joint, held.coefficients) == ("a_joint", (pytest.approx(0.4),))
 
 
 @pytest.mark.parametrize(("equality", "rigid"), [

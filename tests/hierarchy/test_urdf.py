@@ -272,3 +272,10 @@ def test_a_folder_and_a_missing_file_are_no_unknown_robots(tmp_path):
         Robot.load(tmp_path)
     with pytest.raises(RobotError, match="does not exist"):
         Robot.load("nowhere.SDF")
+
+
+def test_a_file_that_is_there_is_read_whatever_its_suffix(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "arm.srdf").write_text('<robot name="arm"/>')
+    with pytest.raises(RobotError, match=r"robot file 'arm.srdf': it has no link"):
+        Robot.load("arm.srdf")

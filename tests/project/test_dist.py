@@ -15,12 +15,13 @@ from packaging.requirements import Requirement
 pytestmark = pytest.mark.slow
 
 ROOT = Path(__file__).parents[2]
-UNCOMPILED = {**os.environ, "NUMBA_DISABLE_JIT": "1"}  # kernels run as plain Python
+OUTSIDE = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+UNCOMPILED = {**OUTSIDE, "NUMBA_DISABLE_JIT": "1"}  # kernels run as plain Python
 
 
 def run(*command, **kept):
     done = subprocess.run(list(map(str, command)), capture_output=True, text=True, check=False,
-                          **kept)
+                          **{"env": OUTSIDE, **kept})
     assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-4000:]
     return done.stdout
 
@@ -75,6 +76,20 @@ def test_what_needs_an_extra_says_which(clean, tmp_path):
         assert done.returncode == 2
         assert f"pip install 'task-hierarchy[{extra}]'" in done.stderr
         assert "Traceback" not in done.stderr
+
+
+def test_the_problems_of_the_benchmark_are_part_of_it(clean, tmp_path):
+    said = json.loads(run(clean / "hierarchy", "problems", "show", "EQ7", "--json", cwd=tmp_path,
+                          env=UNCOMPILED))
+    assert (said["problems"], said["unknowns"]) == (50, "7")
+
+
+@pytest.mark.parametrize("command", [["bench", "open", "--fresh", "1"], ["reproduce", "--quick"]])
+def test_what_needs_a_checkout_says_so(clean, tmp_path, command):
+    done = subprocess.run([str(clean / "hierarchy"), *command], capture_output=True, text=True,
+                          check=False, cwd=tmp_path, env=OUTSIDE)
+    assert done.returncode == 2
+    assert f"`hierarchy {command[0]}` is not part of the installed package" in done.stderr
 
 
 def test_every_shipped_file_is_in_the_wheel(clean, tmp_path):

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from hierarchy import HierarchyError
-from scenarios.bench import families
-from scenarios.bench.open.postures import posed
+from scenarios.problems import reference as families
+from scenarios.problems.postures import posed
 from solvers import Status, make
 from solvers.problems import FAMILIES, family
 

@@ -6,9 +6,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from scenarios.bench.open.exported import export, save
-from scenarios.bench.open.families import FAMILIES, available, family
 from scenarios.cli.main import run_command
+from scenarios.problems.answers import export, save
+from scenarios.problems.families import FAMILIES, available, family
 from solvers import problems
 from solvers.problems.files import read
 
@@ -16,7 +16,7 @@ QUICK = ("EQ7", "INEQ7", "DEGEN7", *problems.KINDS, "recipe")
 
 
 def test_a_family_without_its_package_is_left_out_and_said(monkeypatch, capsys, tmp_path):
-    from scenarios.bench.open import families
+    from scenarios.problems import families
 
     def distribution(name):
         if name == "example-robot-data":
@@ -86,12 +86,12 @@ def test_a_sequence_with_a_plant_is_as_long_as_asked_and_has_consecutive_ticks()
 
 
 def test_a_run_that_ends_before_its_window_is_an_error(monkeypatch):
-    from scenarios.bench.open import recorded
     from scenarios.config import ScenarioError
+    from scenarios.problems import windows
 
-    monkeypatch.setattr(recorded, "simulate", lambda *_, **__: None)
+    monkeypatch.setattr(windows, "simulate", lambda *_, **__: None)
     with pytest.raises(ScenarioError, match="ellipse-limits: no run with seed 3 has 2 problems"):
-        recorded.recorded("ellipse-limits", 3, 2)
+        windows.recorded("ellipse-limits", 3, 2)
 
 
 def test_list_names_every_family(capsys):

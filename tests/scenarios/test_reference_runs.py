@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from reference_runs import EVERY, RIGHT, RUNS, differences, reference
 
+from benchmark.studies.reference_runs import EVERY, RIGHT, RUNS, differences, reference
 from scenarios.config import load
 from scenarios.loop.controller import Controller
 from scenarios.loop.simulation import simulate

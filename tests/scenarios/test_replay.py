@@ -1,7 +1,6 @@
 import json
 import re
 from html.parser import HTMLParser
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -392,10 +391,5 @@ def test_the_same_run_gives_the_same_file(folder, tmp_path):
     assert files[0].read_bytes() == files[1].read_bytes()
 
 
-@pytest.mark.parametrize("arguments", [["--rate", "0"], ["--video", "x.mp4", "second"]],
-                         ids=["no rate", "two runs in a video"])
-def test_a_wrong_command_line_is_refused(folder, arguments, capsys, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    arguments = [str(folder) if one == "second" else one for one in arguments]
-    assert run_command(["replay", str(folder), *arguments]) == 2
-    assert list(Path.cwd().glob("*.mp4")) == []
+def test_a_rate_of_zero_is_refused(folder):
+    assert run_command(["replay", str(folder), "--rate", "0"]) == 2

@@ -99,6 +99,13 @@ def test_the_verdict_says_who_kept_distance_and_who_is_fast():
     assert "tpm-published resolves a tick in 2 µs, hqp in 80 µs" in said
 
 
+@pytest.mark.parametrize(("fates", "said"), [
+    ([3, 4, 4, 4, 4], "tpm missed a to the end."), ([1, 4, 4, 4, 4], "tpm never met a."),
+    ([4, 4, 4, 4, 3], "Nothing went wrong: tpm ran the whole 4 s.")])
+def test_the_verdict_begins_with_what_was_missed_to_the_end(fates, said):
+    assert words([made("tpm", orders=("a",), level_fate=np.array(fates)[:, None])]).startswith(said)
+
+
 def test_the_verdict_says_who_tracked_best():
     off = np.zeros((5, 3))
     off[:, 0] = 2e-3

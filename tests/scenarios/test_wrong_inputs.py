@@ -90,7 +90,7 @@ def test_a_value_that_is_wrong_is_named_with_its_key(change, said):
     (["robot.end_effector=thumb"], "thumb"),
     (["robot.model=nope"],
      "unknown robot 'nope'. Known: dual_arm, humanoid, kuka_lwr, quadruped. Others:"),
-    (["robot.model=ur5"], "such as example_robot_data:ur5_robot"),
+    (["robot.model=ur5"], "example_robot_data:ur5_robot"),
     (["damping.value=0", "limits={acceleration=10}", "control.resolver=recursive"], "row"),
     (["robot.control_points=[]"], "no control points"),
     (["limits={acceleration=10, margin=3}"], "margin 3 leaves joint_1 no room between"),

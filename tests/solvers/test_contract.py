@@ -10,8 +10,8 @@ import pytest
 from rank_cases import CASES, build, family, generic, rng
 
 from hierarchy import Hierarchy, HierarchyError
-from scenarios.bench import families
-from scenarios.bench.families import EQUALITIES
+from scenarios.problems import reference as families
+from scenarios.problems.reference import EQUALITIES
 from solvers import Status, certify, make, names
 from solvers.qp.backends import BACKENDS
 

@@ -6,12 +6,12 @@ from concurrent.futures import ThreadPoolExecutor
 import c_library as c
 import numpy as np
 import pytest
-from c_speed import sequence
-from recorded import recorded
+from sequences import sequence
 
+from benchmark.studies.recorded import recorded
 from hierarchy import Hierarchy
 from scenarios import load
-from scenarios.bench.families import FAMILIES, family
+from scenarios.problems.reference import FAMILIES, family
 from solvers import make, problems
 
 if not sys.platform.startswith("linux"):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from hierarchy import Hierarchy
-from scenarios.bench.families import family
+from scenarios.problems.reference import family
 from solvers import make, problems
 from solvers.library.folder import _link
 

@@ -10,19 +10,17 @@ import sys
 from pathlib import Path
 
 import c_library as c
-import c_peers
-import c_speed
 import numpy as np
 import pytest
-import recorded
-from c_speed import sequence
-from recorded import record_sequence
+from sequences import sequence
 
+from benchmark.studies import recorded
+from benchmark.studies.recorded import record_sequence
 from hierarchy import HierarchyError, Robot, Stack, State
 from hierarchy.paths import Still
 from hierarchy.tasks import JointLimits, Position
-from scenarios.bench.families import family
 from scenarios.cli.main import run_command
+from scenarios.problems.reference import family
 from solvers import make
 from solvers.library import differs, entries, write
 from solvers.library.archive import archive
@@ -33,7 +31,7 @@ if not sys.platform.startswith("linux"):
 
 ROOT = Path(__file__).parents[2]
 ROS2 = ROOT / "examples" / "ros2_control"
-EXAMPLES, PROGRAM = ROOT / "examples" / "c", ROOT / "docs" / "studies" / "c_speed.c"
+EXAMPLES, PROGRAM = ROOT / "examples" / "c", ROOT / "tests" / "helpers" / "c_speed.c"
 STRICT = ["-Wall", "-Wextra", "-Werror", "-pedantic", "-O2"]
 COMPILER = next(filter(None, map(shutil.which, ("cc", "gcc", "clang"))), None)
 CXX = next(filter(None, map(shutil.which, ("c++", "g++", "clang++"))), None)
@@ -177,36 +175,6 @@ def test_a_million_solves_allocate_nothing_and_touch_no_new_page(folder, tmp_pat
     solves, failed, allocated, faults, *_ = map(int, said(
         program, tmp_path / "ticks", resolver, "1000000").split())
     assert (solves, failed, allocated, faults) == (1_000_000, 0, 0, 0)
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(CXX is None, reason="no compiler of C++")
-def test_the_study_of_peers_judges_ours_where_there_is_no_checkout(folder, tmp_path, capsys,
-                                                                   monkeypatch):
-    monkeypatch.setattr(c_peers, "PASSES", 2)
-    rows = c_peers.run(*c_peers.compiled(tmp_path, folder), seed=1, count=5, turns=1)
-    assert [row["solver"] for row in rows] == ["tpm", *["hcod"] * 5]
-    assert all(row["right"] == 1.0 and row["median"] > 0.0 for row in rows)
-    said = capsys.readouterr().out
-    assert all(of.title in said for of in c_peers.CLASSES)
-    assert "target" not in said
-
-
-def test_a_target_is_judged_by_the_fastest_peer_that_is_right():
-    def row(solver, median, right=1.0):
-        return {"problems": "INEQ7 warm", "solver": solver, "median": median, "right": right}
-
-    rows = [row("hcod", 2.0), row("LexLS", 1.0, right=0.5), row("LexLS bounds", 2.2)]
-    assert c_peers.verdicts(rows) == ["INEQ7 warm: hcod 0.91 x LexLS bounds, target 0.8: not met"]
-
-
-@needs_c
-@pytest.mark.slow
-def test_the_study_of_speed_prints_a_row_for_every_sequence(folder, tmp_path, capsys):
-    rows = c_speed.run(tmp_path, turns=1, library=folder)
-    assert all(row["c_median_us"] > 0.0 and row["ratio"] > 0.0 for row in rows)
-    said = capsys.readouterr().out
-    assert all(f"{row['problems']}, {row['resolver']}" in said for row in rows)
 
 
 @needs_c

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from exact import exact
 
 from hierarchy import Hierarchy
 from hierarchy.errors import HierarchyError
-from scenarios.bench.exact import exact
-from scenarios.bench.families import FAMILIES, family
+from scenarios.problems.reference import FAMILIES, family
 from solvers import make, problems
 from solvers.proof import prove
 

@@ -9,7 +9,7 @@ from rank_cases import CASES, build, family, generic, more_rows_than_joints, rng
 
 from hierarchy import Hierarchy
 from hierarchy.errors import UnknownNameError
-from scenarios.bench.families import EQUALITIES
+from scenarios.problems.reference import EQUALITIES
 from solvers import Status, make
 
 REVERSE, IN_ORDER, STRICT = make("reverse"), make("reverse", form="in-order"), make("tpm")

@@ -15,7 +15,8 @@ from hierarchy.robots.mjcf.model import Built, add_frame, pose
 from hierarchy.robots.mjcf.part import Part
 from hierarchy.words import some
 
-_CONNECT, _WELD, _JOINT = 0, 1, 2  # mjtEq
+_CONNECT, _WELD, _JOINT, _TENDON = 0, 1, 2, 3  # mjtEq
+_WRAP_JOINT = 1                    # mjtWrap
 _SITE = 6                          # mjOBJ_SITE
 
 
@@ -27,24 +28,55 @@ def couplings(part: Part) -> tuple[tuple[Coupled, ...], list[str]]:
     """
     file, found = part.compiled, []
     mj, said = file.model, []
-    for name, i in _active(mj, _JOINT):
-        one, other = (int(j) for j in (mj.eq_obj1id[i], mj.eq_obj2id[i]))
+    for name, one, other, moved in (*_polynomials(mj), *_tendons(part)):
         if one not in part.joints:
             if other in part.joints:
                 said.append(f"{name!r} is left out: joint {file.joints[one]!r} does not move")
             continue
         own = mj.qpos0[mj.jnt_qposadr[one]]
         if other < 0:
-            found.append(Coupled(file.joints[one], "", (float(own + mj.eq_data[i, 0]),)))
+            found.append(Coupled(file.joints[one], "", (float(own + moved(0.0)),)))
             continue
         here = mj.jnt_qposadr[other]
-        line = Polynomial([-mj.qpos0[here], 1.0])
-        q = Polynomial(mj.eq_data[i, :5])(line) + own
+        q = moved(Polynomial([-mj.qpos0[here], 1.0])) + own
         if other in part.joints:
             found.append(Coupled(file.joints[one], file.joints[other], _trimmed(q)))
         else:
             found.append(Coupled(file.joints[one], "", (float(q(part.held[here])),)))
     return tuple(found), said
+
+
+_Follows = tuple[str, int, int, Polynomial]  # name, a joint, another or -1, and how one follows it
+
+
+def _polynomials(mj: Any) -> Iterator[_Follows]:
+    """Yield couplings of joints, as polynomials of differences from the reference."""
+    for name, i in _active(mj, _JOINT):
+        yield name, int(mj.eq_obj1id[i]), int(mj.eq_obj2id[i]), Polynomial(mj.eq_data[i, :5])
+
+
+def _tendons(part: Part) -> Iterator[_Follows]:
+    """Yield fixed tendons of one or two joints that keep their length, as lines of the same."""
+    mj = part.compiled.model
+    for name, i in _active(mj, _TENDON):
+        if weights := _fixed(mj, i):
+            weights.sort(key=lambda weight: weight[0] not in part.joints)  # what moves follows
+            (one, own), (other, by) = *weights, *[(-1, 0.0)] * (2 - len(weights))
+            yield name, one, other, Polynomial([mj.eq_data[i, 0] / own, -by / own])
+
+
+def _fixed(mj: Any, i: int) -> list[tuple[int, float]]:
+    """Return the one or two joints, with their weights, of the tendon that an equality holds.
+
+    The last of the tendon comes first. Empty for another tendon, or one that follows another.
+    """
+    tendon = int(mj.eq_obj1id[i])
+    first = int(mj.tendon_adr[tendon])
+    wraps = slice(first, first + int(mj.tendon_num[tendon]))
+    weights = [(int(j), float(by)) for j, by in zip(mj.wrap_objid[wraps], mj.wrap_prm[wraps],
+                                                    strict=True) if by]
+    fixed = (mj.wrap_type[wraps] == _WRAP_JOINT).all() and mj.eq_obj2id[i] < 0
+    return weights[::-1] if fixed and 1 <= len(weights) <= 2 else []
 
 
 def _trimmed(polynomial: Any) -> tuple[float, ...]:
@@ -72,9 +104,9 @@ def loops(built: Built) -> tuple[tuple[Loop, ...], list[str]]:
                 said.append(f"equality {name!r} is left out: a body of it is not of the robot")
     idle = [_name(mj, i) for i in range(mj.neq) if not mj.eq_active0[i]]
     others = [name for kind in set(mj.eq_type.tolist()) - {_CONNECT, _WELD, _JOINT}
-              for name, _ in _active(mj, kind)]
+              for name, i in _active(mj, kind) if kind != _TENDON or not _fixed(mj, i)]
     said += [f"equalities that are not active are left out: {some(idle)}"] if idle else []
-    said += [f"equalities of tendons, flexes and distances are left out: {some(others)}"] if (
+    said += [f"equalities of flexes, distances and some tendons are left out: {some(others)}"] if (
         others) else []
     return tuple(found), said
 

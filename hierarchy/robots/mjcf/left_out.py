@@ -16,7 +16,7 @@ def left_out(part: Part) -> Iterator[str]:
     """Yield sentences on what the file has and the robot has not."""
     mj = part.compiled.model
     for kind, count, said in (
-            ("tendon", mj.ntendon, "tendons are left out"),
+            ("tendon", mj.ntendon, "of tendons only couplings of joints are here"),
             ("flex", mj.nflex, "of flexes only the joints are here"),
             ("skin", mj.nskin, "skins are left out")):
         if count:

@@ -18,7 +18,7 @@ import pinocchio as pin
 from hierarchy.problem import Array
 from hierarchy.robots.from_table import ROOT
 from hierarchy.robots.mjcf.compiled import WORLD
-from hierarchy.robots.mjcf.part import Part
+from hierarchy.robots.mjcf.part import SIZES, Part, rolled
 
 
 @dataclass(frozen=True)
@@ -90,7 +90,7 @@ def _place(built: Built, body: int) -> None:
                                             place * at * reference, part.compiled.joints[j])
             place = at.inverse()
         else:
-            q = part.held[here:here + _COORDINATES[kind]]
+            q = part.held[here:here + sum(SIZES[kind])]
             if kind in _ALONG:
                 q = q - mj.qpos0[here]
             place = place * at * _motion(kind, axis, q) * at.inverse()
@@ -98,7 +98,6 @@ def _place(built: Built, body: int) -> None:
 
 
 _ALONG = ("slide", "hinge")
-_COORDINATES = {"free": 7, "ball": 4, "slide": 1, "hinge": 1}
 
 
 def _model(kind: str, axis: Array) -> Any:
@@ -194,7 +193,7 @@ def configuration(built: Built, qpos: Array) -> Array:
     mj, q = built.part.compiled.model, np.array(pin.neutral(built.model))
     for j, joint in built.pairs():
         here = mj.jnt_qposadr[j]
-        q[joint.idx_q:joint.idx_q + joint.nq] = _turn(qpos[here:here + joint.nq], -1)
+        q[joint.idx_q:joint.idx_q + joint.nq] = rolled(qpos[here:here + joint.nq], -1)
     return np.asarray(pin.normalize(built.model, q))
 
 
@@ -203,13 +202,5 @@ def to_mujoco(built: Built, q: Array) -> Array:
     mj, qpos = built.part.compiled.model, built.part.held.copy()
     for j, joint in built.pairs():
         here = mj.jnt_qposadr[j]
-        qpos[here:here + joint.nq] = _turn(q[joint.idx_q:joint.idx_q + joint.nq], 1)
+        qpos[here:here + joint.nq] = rolled(q[joint.idx_q:joint.idx_q + joint.nq], 1)
     return qpos
-
-
-def _turn(coordinates: Array, by: int) -> Array:
-    """Return coordinates of a joint with its quaternion, if it has one, rolled by an entry."""
-    turned = np.array(coordinates)
-    if len(turned) > 1:
-        turned[-4:] = np.roll(turned[-4:], by)
-    return turned

@@ -8,8 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hierarchy.errors import RobotError, UnknownNameError, finite_numbers
+from hierarchy.errors import HierarchyError, RobotError, UnknownNameError
 from hierarchy.problem import Array
+from hierarchy.robots.joints import Part as JointPart
+from hierarchy.robots.joints import set_joint
 from hierarchy.robots.mjcf.compiled import WORLD, Compiled
 from hierarchy.robots.table import Base
 from hierarchy.words import some
@@ -49,10 +51,7 @@ def part_of(file: Compiled, base: Base | None, locked: Mapping[str, ArrayLike],
                          + (f" from {', '.join(root)} on; there are some on the bodies "
                             f"{', '.join(moving)}" if root and moving else ""))
     for name, value in locked.items():
-        j = _lockable(file, joints, name)
-        held[model.jnt_qposadr[j]] = finite_numbers(
-            f"robot file {file.file!r}: locked: joint {name!r}", np.atleast_1d(value), 1)[0]
-        joints.remove(j)
+        joints.remove(_lock(file, joints, held, name, value))
     if base == "fixed":
         joints = [j for j in joints if file.kind(j) != "free"]
     _check_floating(file, joints)
@@ -114,14 +113,36 @@ def _below(file: Compiled, top: int) -> list[int]:
     return np.flatnonzero(file.model.body_rootid == top).tolist()
 
 
-def _lockable(file: Compiled, joints: Sequence[int], name: str) -> int:
+def _lock(file: Compiled, joints: Sequence[int], held: Array, name: str,
+          value: ArrayLike) -> int:
+    """Set the value of the joint `name`, one of `joints`, in `held` (nq,); return the joint."""
     names = [file.joints[j] for j in joints]
     if name not in names:
         raise UnknownNameError("joint", name, names)
     j = joints[names.index(name)]
-    if file.kind(j) in ("free", "ball"):
-        raise file.error(f"joint {name!r} is a {file.kind(j)} joint and cannot be locked")
+    sizes = SIZES[file.kind(j)]
+    q, here = np.zeros(sum(sizes)), file.model.jnt_qposadr[j]
+    own = [JointPart(j, sum(sizes[:i]), 0, size) for i, size in enumerate(sizes)]
+    try:
+        set_joint(own, q, j, name, value)
+    except HierarchyError as error:
+        raise file.error(f"locked: {error}") from error
+    held[here:here + len(q)] = rolled(q, 1)
     return j
+
+
+SIZES = {"free": (1, 1, 1, 4), "ball": (4,), "slide": (1,), "hinge": (1,)}  # see joints.Part
+
+
+def rolled(coordinates: Array, by: int) -> Array:
+    """Return coordinates of a joint with its quaternion, if it has one, rolled by `by` entries.
+
+    MuJoCo's are w, x, y, z, ours x, y, z, w: by 1 for MuJoCo, by -1 from it.
+    """
+    turned = np.array(coordinates)
+    if len(turned) > 1:
+        turned[-4:] = np.roll(turned[-4:], by)
+    return turned
 
 
 def _check_floating(file: Compiled, joints: Sequence[int]) -> None:

@@ -57,16 +57,16 @@ def on_floor(robot: Robot, contacts: Contacts, floor: TorqueSection, timestep: f
 
 
 def _bodies(world: Element, robot: Robot, floor: TorqueSection) -> list[Element]:
-    axes, elements = _axes(robot), [world]
+    axes, own, elements = _axes(robot), robot.model.armature, [world]
     for i, body in enumerate(robot.bodies()):
         element = _body(elements[body.parent], body)
         elements.append(element)
         if i == 0 and robot.base == "floating":
-            ElementTree.SubElement(element, "freejoint")
+            ElementTree.SubElement(element, "joint", type="free", armature=text(own[0]))
             continue
-        kind, axis = axes[i + 1]
+        kind, axis, v = axes[i + 1]
         ElementTree.SubElement(element, "joint", name=body.name, type=kind,
-                               axis=text(*axis), armature=text(floor.armature),
+                               axis=text(*axis), armature=text(own[v] + floor.armature),
                                frictionloss=text(floor.joint_friction))
     return elements
 
@@ -128,8 +128,8 @@ def _equalities(root: Element, robot: Robot, elements: list[Element], timestep: 
         ElementTree.SubElement(equality, "weld" if loop.rigid else "connect", sites | stiff)
 
 
-def _axes(robot: Robot) -> dict[int, tuple[str, Array]]:
-    """Return kind and axis (3,) of each joint with one velocity, in its own frame."""
+def _axes(robot: Robot) -> dict[int, tuple[str, Array, int]]:
+    """Return kind, axis (3,) in its own frame, and velocity of each joint with one velocity."""
     state, axes = State(robot), {}
     for joint in range(2 if robot.base == "floating" else 1, len(robot.parents)):
         own = np.flatnonzero(state.supports[joint] & ~state.supports[robot.parents[joint]])
@@ -138,5 +138,5 @@ def _axes(robot: Robot) -> dict[int, tuple[str, Array]]:
         if len(own) != 1 or abs(np.linalg.norm(axis) - 1.0) > 1e-9:
             raise ScenarioError(f"joint {robot.joint_names[joint - 1]!r} does not turn about or "
                                 "slide along one axis")
-        axes[joint] = kind, state.placements[joint, :9].reshape(3, 3) @ axis
+        axes[joint] = kind, state.placements[joint, :9].reshape(3, 3) @ axis, int(own[0])
     return axes

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from math import acos, ceil, cos, sin
+from math import acos, ceil, cos, pi, sin
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,7 @@ from hierarchy import Robot, State
 from hierarchy.contacts import Contacts
 from hierarchy.errors import UnknownNameError
 from hierarchy.problem import Array
+from hierarchy.tasks.mechanism import Mechanism
 from scenarios.cell.plants.ground import on_floor
 from scenarios.cell.plants.measured import whole_periods
 from scenarios.cell.plants.physics import mujoco_module
@@ -52,14 +53,11 @@ class TorqueRobot:
         self.q, self.v = q.copy(), np.zeros(robot.n) if v is None else v.copy()
         self.a = np.zeros(robot.n)
         self._parts = [part for part in robot.parts if part.v >= robot.actuated]
+        self._robot, self._mechanism = robot, Mechanism(robot)
         joints = [self.model.joint(name) for name in robot.joint_names[int(self._floating):]]
         self._places = [int(joint.qposadr[0]) for joint in joints]
         self._rates = [*range(robot.actuated), *(int(joint.dofadr[0]) for joint in joints)]
-        self.data.qpos[self._places] = robot.vector(q)[robot.actuated:]
-        self.data.qvel[self._rates] = self.v
-        if self._floating:
-            self.data.qpos[:7] = q[[0, 1, 2, 6, 3, 4, 5]]
-            self.data.qvel[:3] = self._rotation() @ self.v[:3]
+        self._write()
         mujoco.mj_forward(self.model, self.data)
         delay = whole_periods(section.delay, period, "plant.delay")
         self._waiting = deque([State.at(robot, q).bias_effort()[robot.actuated:]] * delay)
@@ -92,6 +90,10 @@ class TorqueRobot:
             self._mujoco.mj_step(self.model, self.data)
         self._time += self._period
         self._read()
+        if self._mechanism:  # MuJoCo keeps it to some 1e-6
+            self.q[:] = self._mechanism.closed(self.q)
+            self.v[:] = self._mechanism.moving(self.q, self.v)
+            self._write()
         self.a[:] = (self.v - before) / self._period
         self._com[:] = self.data.subtree_com[0]
         self._touch.look(self.data)
@@ -137,8 +139,22 @@ class TorqueRobot:
         self._mujoco.mju_quat2Mat(R, self.data.qpos[3:7])
         return R.reshape(3, 3)
 
+    def _write(self) -> None:
+        """Give MuJoCo the state: its free joint has w first, and a velocity in the world.
+
+        It counts the turns of continuous joints, which stay as they are.
+        """
+        values = self._robot.vector(self.q)[self._robot.actuated:]
+        turns = np.round((self.data.qpos[self._places] - values) / (2.0 * pi))
+        turning = np.array([part.size == 2 for part in self._parts], dtype=bool)
+        self.data.qpos[self._places] = values + 2.0 * pi * turns * turning
+        self.data.qvel[self._rates] = self.v
+        if self._floating:
+            self.data.qpos[:7] = self.q[[0, 1, 2, 6, 3, 4, 5]]
+            self.data.qvel[:3] = self._rotation() @ self.v[:3]
+
     def _read(self) -> None:
-        """Take over the state: a free joint of MuJoCo has w first, and a velocity in the world."""
+        """Take the state from MuJoCo."""
         for part, x in zip(self._parts, self.data.qpos[self._places].tolist(), strict=True):
             self.q[part.q:part.q + part.size] = x if part.size == 1 else (cos(x), sin(x))
         self.v[:] = self.data.qvel[self._rates]

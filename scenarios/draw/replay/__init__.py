@@ -1,4 +1,4 @@
-"""Replays of runs: one self-contained HTML file, or a video."""
+"""Replays of runs: one self-contained HTML file."""
 
 from scenarios.draw.replay.page import html
 

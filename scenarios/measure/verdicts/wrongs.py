@@ -1,4 +1,4 @@
-"""What went wrong in runs: faults, contacts, limits, distances, levels never met, no answer."""
+"""What went wrong in runs: faults, contacts, limits, distances, levels given up, no answer."""
 
 from __future__ import annotations
 
@@ -78,26 +78,33 @@ def _shortfall(run: Run) -> float:
 
 
 def _given_up(runs: Sequence[Run]) -> Iterator[Clause]:
-    """Yield which levels were missed in all ticks in which they were in the stack."""
+    """Yield which levels were missed whenever they acted, and which to the end of the run."""
     said: dict[str, list[Run]] = {}
     for run in runs:
-        if levels := missed_throughout(run):
-            said.setdefault(f"never met {listed(levels)}", []).append(run)
+        for levels, what in zip(missed(run), ("never met {}", "missed {} to the end"), strict=True):
+            if levels:
+                said.setdefault(what.format(listed(levels)), []).append(run)
     for what, some in said.items():
         yield who(some, runs), what
 
 
-def missed_throughout(run: Run) -> list[str]:
-    """Return the tasks of a run that were missed whenever they acted, and so never met."""
+def missed(run: Run) -> tuple[list[str], list[str]]:
+    """Return the tasks that a run missed throughout, and others that it missed in its last tenth.
+
+    Ticks in which a task was not in the stack, or its fate is not known, do not count.
+    """
     from scenarios.recording.fate import Fate
 
     if run.recording is None or "level_fate" not in run.recording:
-        return []
+        return [], []
     fate = run.recording["level_fate"]
-    known = fate > Fate.UNKNOWN
-    share = (fate == Fate.MISSED).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
-    return [name for name, missed in zip(run.recording.task_names, share, strict=True)
-            if missed >= THROUGHOUT]
+    parts = fate, fate[-max(1, len(fate) // 10):]
+    share, at_the_end = ((part == Fate.MISSED).sum(axis=0)
+                         / np.maximum((part > Fate.UNKNOWN).sum(axis=0), 1) for part in parts)
+    names = run.recording.task_names
+    throughout = [name for name, one in zip(names, share, strict=True) if one >= THROUGHOUT]
+    return throughout, [name for name, one in zip(names, at_the_end, strict=True)
+                        if one >= THROUGHOUT and name not in throughout]
 
 
 _DONE = {"stop": "was stopped", "brake": "braked", "hold": "held its last command",

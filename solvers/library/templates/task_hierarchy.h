@@ -40,8 +40,7 @@ typedef enum th_status {
   TH_ITERATION_LIMIT = 1,
   /* The data hold NaN, an infinite entry, lower > upper, or numbers whose squares overflow. */
   TH_NUMERICAL_FAILURE = 2,
-  /* x is an answer in doubt: rows are nearly parallel or differ greatly in scale. In Python such an
-   * answer is judged by `certify`, which most often confirms it; here it is not verified.
+  /* x is an answer that could not be verified: rows are nearly parallel or differ greatly in scale.
    * th_violations says what each level still misses at x, not whether it could miss less. */
   TH_INACCURATE = 4,
   /* The work space or the record is smaller than th_work_size or th_record_size says. */

@@ -1,0 +1,293 @@
+"""`hierarchy bench`: every benchmark there is, one command each."""
+
+from __future__ import annotations
+
+import os
+import sys
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from scenarios.cli.options import Out, output
+from scenarios.cli.terminal import shown
+
+if TYPE_CHECKING:
+    from benchmark.packages import Package
+    from benchmark.report import Report
+
+_USUAL = ("solve.resolvers", "tick", "solve.accuracy", "solve.growth", "strictness", "start")
+
+Seconds = Annotated[float, typer.Option("--seconds", min=0.001, metavar="S",
+                                        help="Time for all measurements together.")]
+Arms = Annotated[int, typer.Option("--arms", min=1, metavar="N", help="Arms of each case.")]
+Checked = Annotated[int, typer.Option("--checked", min=1, metavar="N",
+                                      help="Arms that are compared with proved answers.")]
+Install = Annotated[bool, typer.Option(
+    "--install", help="Create an environment for each package and measure nothing.")]
+
+
+class _Benchmarks(typer.core.TyperGroup):
+    """Suggests the nearest benchmark for an unknown name."""
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        if args and not args[0].startswith("-") and args[0] not in self.commands:
+            from hierarchy.errors import UnknownNameError
+
+            raise UnknownNameError("benchmark", args[0], list(self.commands))
+        return super().resolve_command(ctx, args)
+
+
+bench = typer.Typer(cls=_Benchmarks, invoke_without_command=True, rich_markup_mode=None)
+
+
+def _run(out: Path | None, *names: str, **options: Any) -> int:
+    """Run benchmarks, modules of this package; print and write what they found."""
+    from scenarios.files import claim, next_free
+
+    folder = claim(out if out is not None else next_free(Path("runs") / "bench"))
+    failed = [_told(import_module(f"benchmark.{name}").run(**options),
+                    folder / name.removesuffix(".compare").split(".")[-1] if len(names) > 1
+                    else folder)
+              for name in names]
+    print(f"\nNumbers: {shown(folder)}")
+    return int(any(failed))
+
+
+def _told(report: Report, folder: Path) -> bool:
+    report.say()
+    report.write(folder)
+    return report.failed
+
+
+@bench.callback()
+def main(ctx: typer.Context, out: Out = None) -> None:
+    """Measure speed, accuracy and strictness.
+
+    Without a name: resolvers, tick, accuracy, growth, strictness and start, one after the other.
+    """
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy is loaded: one core is timed
+    if ctx.invoked_subcommand is None:
+        _run(out, *_USUAL)
+
+
+@bench.command()
+def resolvers(
+        fresh: Annotated[int | None, typer.Option(
+            "--fresh", metavar="SEED", help="Also time fresh problems, from this seed on.")] = None,
+        count: Annotated[int, typer.Option(
+            "--count", min=1, metavar="N", help="Fresh problems of each family.")] = 200,
+        family: Annotated[list[str] | None, typer.Option(
+            "--family", metavar="NAME", help="Only this family. May be repeated.")] = None,
+        resolver: Annotated[list[str] | None, typer.Option(
+            "--resolver", metavar="NAME",
+            help="Only this resolver, with its variants and backends, beside the yardsticks. May "
+                 "be repeated.")] = None,
+        seconds: Annotated[float, typer.Option(
+            "--seconds", min=0.001, metavar="S",
+            help="Time for each resolver in each family.")] = 0.5,
+        out: Out = None) -> int:
+    """Time every resolver on the reference problems."""
+    chosen = {"families": family} if family else {}
+    return _run(out, "solve.resolvers", seconds=seconds, seed=fresh, count=count,
+                resolvers=resolver, **chosen)
+
+
+def _plain(name: str, words: str) -> None:
+    def command(out: Out = None) -> int:
+        return _run(out, name)
+
+    bench.command(name, help=words)(command)
+
+
+_plain("tick", "Time one control tick, compiled and in plain numpy.")
+_plain("start", "Measure start-up time, compilation and memory.")
+_plain("strictness", "Measure whether lower tasks disturb upper ones.")
+
+
+@bench.command()
+def accuracy(arms: Arms = 10_000, checked: Checked = 300, out: Out = None) -> int:
+    """Measure errors on random arms against proved answers."""
+    return _run(out, "solve.accuracy", arms=arms, checked=checked)
+
+
+@bench.command()
+def growth(seconds: Seconds = 40.0, larger: Annotated[bool, typer.Option(
+               "--larger", help="Up to 20 tasks, 300 joints and 20 rows a task.")] = False,
+           out: Out = None) -> int:
+    """Time a solve as the numbers of tasks and joints grow."""
+    sizes = import_module("benchmark.solve.growth").LARGER if larger else None
+    return _run(out, "solve.growth", seconds=seconds, sizes=sizes)
+
+
+@bench.command("first-paper")
+def first_paper(arms: Arms = 10_000, checked: Checked = 300, seconds: Seconds = 40.0,
+                out: Out = None) -> int:
+    """Repeat the first TPM paper: accuracy and growth."""
+    return _run(out, "solve.first_paper", arms=arms, checked=checked, seconds=seconds)
+
+
+@bench.command()
+def batch(count: Annotated[list[int] | None, typer.Option(
+              "--count", min=1, metavar="N", help="Problems in a batch. May be repeated.")] = None,
+          seconds: Seconds = 1.0, out: Out = None) -> int:
+    """Measure how many problems per second batches solve."""
+    return _run(out, "batch", seconds=seconds, **({"counts": count} if count else {}))
+
+
+@bench.command()
+def peers(install: Install = False,
+          scene: Annotated[str | None, typer.Option(
+              "--scene", metavar="NAME", help="Only `ellipse`, inverse kinematics of an arm, or "
+              "`stand`, inverse dynamics of a humanoid on two feet.")] = None,
+          out: Out = None) -> int:
+    """Compare with pink, mink, placo, tsid, embodiK, roboplan and frax.
+
+    Run it once with --install first. Exit code 1 if a package of `--scene stand` is missing.
+    """
+    from hierarchy.errors import UnknownNameError
+
+    if install:
+        return _installed()
+    modules = {"ellipse": "arm.compare", "stand": "stand.compare"}
+    if scene not in (None, *modules):
+        raise UnknownNameError("scene", str(scene), tuple(modules))
+    if scene is not None:
+        return _run(out, modules[scene])
+    _run(out, "arm.compare", "stand.compare")
+    return 0
+
+
+@bench.command()
+def ik(count: Annotated[int, typer.Option("--count", min=1, metavar="N",
+                                          help="Poses of each kind and robot.")] = 1000,
+       out: Out = None) -> int:
+    """Find configurations for poses beside pink, mink and placo.
+
+    Reachable and unreachable poses of UR5, Panda and both arms of G1, which need
+    example-robot-data; for placo run `hierarchy bench peers --install` first.
+    """
+    return _run(out, "reach.compare", count=count)
+
+
+@bench.command("open")
+def open_(families: Annotated[list[str] | None, typer.Option(
+              "--family", metavar="NAME", help="Only this family. May be repeated.")] = None,
+          entrants: Annotated[list[str] | None, typer.Option(
+              "--entrant", metavar="LABEL", help="Only this entrant of the table, or FILE.py:CLASS "
+              "for yours. May be repeated.")] = None,
+          library: Annotated[list[Path] | None, typer.Option(
+              "--library", metavar="FILE.so", help="Also a solver in a shared library that has the "
+              "functions of benchmark/solve/solver.h. May be repeated.")] = None,
+          name: Annotated[list[str] | None, typer.Option(
+              "--name", metavar="NAME", help="What tables call it, one for each --library.")
+              ] = None,
+          fresh: Annotated[list[int] | None, typer.Option(
+              "--fresh", metavar="SEED", min=1, help="Seed of fresh problems. May be repeated. "
+              "Default: 1.")] = None,
+          count: Annotated[int | None, typer.Option(
+              "--count", min=1, metavar="N", help="Problems of the public set and of each fresh "
+              "one. Default: 50, or 200 consecutive ones.")] = None,
+          public: Annotated[int | None, typer.Option(
+              "--public", min=1, metavar="N", help="Problems of the public set. Default: that of "
+              "--count.")] = None,
+          limit: Annotated[float, typer.Option("--limit", min=0.1, metavar="S",
+                                               help="Time for one problem.")] = 10.0,
+          python: Annotated[str, typer.Option(
+              "--python", metavar="PATH", help="Interpreter that has your entrant's package.")
+              ] = "",
+          check: Annotated[bool, typer.Option(
+              "--check", help="Try the entrants on a few problems of each kind, in a minute, and "
+              "store nothing.")] = False,
+          install: Install = False,
+          out: Annotated[Path, output("Folder to begin or to continue.")] = Path("runs/open")
+          ) -> int:
+    """Compare solvers on public and fresh problems with proved answers.
+
+    Run the same command again to resume an interrupted one.
+    """
+    from benchmark.packages import EMBODIK
+    from benchmark.solve.entrants import chosen, compiled
+
+    if install:
+        return _installed((EMBODIK,))
+    table = chosen(entrants or [], python, compiled(library or [], name or []))
+    if check:
+        return _checked(table)
+    counts = {0: public or count, **dict.fromkeys(fresh or [1], count)}
+    return _opened(families or [], table, counts, limit, out)
+
+
+def _checked(table: list[Any]) -> int:
+    """Try entrants on a few problems; exit code 1 if one of them ends or contradicts itself."""
+    from tempfile import TemporaryDirectory
+
+    from benchmark.solve.open import check
+
+    passed = True
+    with TemporaryDirectory() as folder:
+        for one in table:
+            said, well = check(one, Path(folder))
+            passed = passed and well
+            print(said)
+    return int(not passed)
+
+
+def _opened(families: list[str], table: list[Any], counts: dict[int, int | None], limit: float,
+            out: Path) -> int:
+    """Run the open benchmark, or what is left of it; print its tables and write its page."""
+    from rich.console import Console
+
+    from benchmark.solve.open import report, run
+    from scenarios.problems.families import available, family, unavailable
+
+    chosen = [family(name) for name in families] or available()
+    for name, why in ({} if families else unavailable()).items():
+        print(f"left out: {name}, which {why}", file=sys.stderr)
+    store = run(out, chosen, table, counts, limit,
+                lambda text: print(text, file=sys.stderr, flush=True))
+    console = Console(highlight=False, markup=False)
+    found = report(store, console.width)
+    found.say(console)
+    found.write(out)
+    print(f"\nPage: {shown(out / 'index.html')}")
+    return 0
+
+
+def _installed(packages: tuple[Package, ...] | None = None) -> int:
+    from benchmark.packages import PACKAGES, install
+
+    said = install(PACKAGES if packages is None else packages)
+    for name, why in said.items():
+        print(f"{name}: {why or 'installed'}")
+    return int(any(said.values()))
+
+
+@bench.command()
+def stress(count: Annotated[int, typer.Option("--count", min=1, metavar="N",
+                                              help="Number of problems.")] = 1_000_000,
+           resolver: Annotated[str, typer.Option("--resolver", metavar="NAME",
+                                                 help="Resolver to test.")] = "hcod",
+           kind: Annotated[str, typer.Option("--kind", metavar="KIND",
+                                             help="Kind of problems.")] = "all",
+           first: Annotated[int, typer.Option("--first", min=0, metavar="SEED",
+                                              help="First seed.")] = 0,
+           processes: Annotated[int | None, typer.Option(
+               "--processes", min=1, metavar="N", help="Default: one for each core.")] = None,
+           out: Annotated[Path, output("Where failing problems are saved.")
+                          ] = Path("runs/stress")) -> int:
+    """Certify a resolver on generated problems.
+
+    Exit code 1 if an answer fails.
+    """
+    from benchmark.stress import ALL, KINDS, report, run
+    from hierarchy.errors import UnknownNameError
+    from solvers import make
+
+    make(resolver)
+    if kind not in (ALL, *KINDS):
+        raise UnknownNameError("kind", kind, (ALL, *KINDS))
+    found = report(resolver, run(count, resolver, first, processes, kind), out)
+    found.say()
+    return int(found.failed)

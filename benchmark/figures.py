@@ -1,0 +1,219 @@
+"""The figures of the benchmarks: time against error, profiles, shares, bars, times over sizes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import LinearSegmentedColormap
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from matplotlib.ticker import NullLocator, ScalarFormatter
+
+from benchmark.store import Row
+from hierarchy.problem import Array
+from scenarios.draw.figures import drawing
+from scenarios.draw.figures.palette import Look, looks
+
+_LEAST, _MOST = 1e-17, 1e-2  # errors beyond are drawn at the edge
+_SHADES = LinearSegmentedColormap.from_list("share", ["#b42318", "#f0c66b", "#e9f4ee", "#7cc4a0"])
+_STRICT = 1e-9               # [m per tick], as in `hierarchy bench strictness`
+_APART = 0.058               # of two labels, as a share of the height of the axes
+_MARKS = "osD^v<P>X"
+
+
+def time_against_error(rows: Sequence[Row], title: str = "largest miss of an answer called solved"
+                       ) -> Figure:
+    """Return median time over the largest error, one panel for each family; low and left is better.
+
+    Of a row `hollow` marks are warm starts, faint ones left some unsolved, a cross was wrong.
+    """
+    names = list(dict.fromkeys(row["family"] for row in rows))
+    style = looks(dict.fromkeys(row["entrant"].removesuffix(" warm") for row in rows))
+    columns = min(4, max(1, len(names)))
+    lines = max(1, -(-len(names) // columns))
+    with matplotlib.rc_context({**drawing.style(), "font.size": 8.5}):
+        fig = Figure(figsize=(2.6 * columns + 0.4, 2.35 * lines + 1.1), layout="constrained")
+        axes = list(fig.subplots(lines, columns, sharex=True, sharey=True, squeeze=False).flat)
+        for ax, name in zip(axes, names, strict=False):
+            for row in rows:
+                if row["family"] == name:
+                    _dot(ax, row, style[row["entrant"].removesuffix(" warm")])
+            ax.set(xscale="log", yscale="log", title=name, xlim=(_LEAST / 4.0, _MOST * 4.0))
+            ax.set_xticks([1e-16, 1e-12, 1e-8, 1e-4])
+        for ax in axes[len(names):]:
+            ax.set_axis_off()
+        fig.supxlabel(title, fontsize=9.0)
+        fig.supylabel("median time of a solve [µs]", fontsize=9.0)
+        fig.legend(handles=[Line2D([], [], color=look.colour, marker="o", linestyle="",
+                                   markersize=5.0, label=label) for label, look in style.items()],
+                   loc="outside upper center", ncols=min(6, max(1, len(style))), fontsize=8.0)
+    return fig
+
+
+def _dot(ax: Axes, row: Row, look: Look) -> None:
+    x, y = float(np.clip(np.nan_to_num(row["error"], nan=_MOST), _LEAST, _MOST)), row["median_us"]
+    ax.plot(x, y, "o", color=look.colour, markersize=5.0, clip_on=False,
+            alpha=0.4 if row["faint"] else 1.0,
+            markerfacecolor="none" if row.get("hollow") else look.colour)
+    if row["crossed"]:
+        ax.plot(x, y, "x", color=drawing.ALERT, markersize=4.0, markeredgewidth=0.8, clip_on=False)
+
+
+def profiles(ratios: Array, found: Mapping[str, Array]) -> Figure:
+    """Return the performance profile: share solved against time over that of the fastest."""
+    style = looks(found)
+    with matplotlib.rc_context(drawing.style()):
+        fig = Figure(figsize=(6.2, max(4.2, 0.155 * len(found) + 0.3)), layout="constrained")
+        ax = fig.subplots()
+        for label, share in found.items():
+            look = style[label]
+            ax.plot(ratios, 100.0 * share, color=look.colour, label=label, linewidth=1.2,
+                    linestyle=(0, look.dash) if look.dash else "-")
+        drawing.make_logarithmic(ax, "x")
+        ax.set(xlabel="median time of a problem, over that of the fastest entrant",
+               ylabel="problems solved [%]", xlim=(ratios[0], ratios[-1]), ylim=(0.0, 102.0))
+        fig.legend(loc="outside right upper", fontsize=7.0)
+    return fig
+
+
+def heat(cells: Sequence[Row]) -> Figure:
+    """Return the share of right answers of each entrant in each family, of what it can be asked."""
+    names, labels = (list(dict.fromkeys(row[key] for row in cells))
+                     for key in ("family", "entrant"))
+    shares = np.full((len(labels), len(names)), np.nan)
+    for row in cells:
+        shares[labels.index(row["entrant"]), names.index(row["family"])] = row["right"]
+    with matplotlib.rc_context({**drawing.style(), "axes.grid": False, "font.size": 8.0}):
+        fig = Figure(figsize=(0.36 * len(names) + 2.0, 0.24 * len(labels) + 1.6),
+                     layout="constrained")
+        ax = fig.subplots()
+        ax.imshow(np.ma.masked_invalid(shares), cmap=_SHADES, vmin=0.0, vmax=1.0, aspect="auto")
+        for i, j in np.argwhere(~np.isnan(shares)):
+            text = "100" if shares[i, j] == 1.0 else f"{min(99.0, 100.0 * shares[i, j]):.0f}"
+            ax.text(j, i, text, ha="center", va="center", fontsize=6.5, color="#0b0c0d", gid="dark")
+        ax.set_xticks(range(len(names)), names, rotation=60, ha="right", rotation_mode="anchor")
+        ax.set_yticks(range(len(labels)), labels)
+        ax.tick_params(length=0)
+        for side in ax.spines.values():
+            side.set_visible(False)
+    return fig
+
+
+def bars(rows: Sequence[Row]) -> Figure:
+    """Return a bar for each median tick, logarithmic, with a line to the 95th percentile.
+
+    The dark part is the solve alone, where it can be called alone.
+    """
+    timed = [row for row in rows if not np.isnan(row["median_us"])]
+    style = looks(row["entrant"] for row in timed)
+    with matplotlib.rc_context({**drawing.style(), "font.size": 8.5}):
+        fig = Figure(figsize=(7.6, 0.27 * len(timed) + 1.1), layout="constrained")
+        ax = fig.subplots()
+        for i, row in enumerate(timed):
+            colour = style[row["entrant"]].colour
+            ax.barh(i, row["median_us"], 0.66, color=colour, alpha=0.5)
+            if not np.isnan(row["solve_us"]):
+                ax.barh(i, row["solve_us"], 0.66, color=colour)
+            ax.plot([row["median_us"], row["p95_us"]], [i, i], color=drawing.INK, linewidth=0.8)
+            ax.annotate(_bought(row), (row["p95_us"], i), (4.0, 0.0), textcoords="offset points",
+                        va="center", fontsize=8.0)
+        ax.set(xscale="log", xlabel="time of one tick, one core [µs]")
+        ax.set_xlim(1.0, 12.0 * max((row["p95_us"] for row in timed), default=10.0))
+        ax.set_yticks(range(len(timed)), [row["entrant"] for row in timed])
+        ax.invert_yaxis()
+        ax.grid(visible=False, axis="y")
+        ax.margins(y=0.01)
+        fig.legend(handles=[Patch(color=drawing.INK, alpha=0.35, label="whole tick"),
+                            Patch(color=drawing.INK, alpha=0.8, label="its solve alone")],
+                   loc="outside upper center", ncols=2, fontsize=8.0)
+    return fig
+
+
+def _bought(row: Row) -> str:
+    """Return what the time has bought: strictness, or how far the posture moves the hand."""
+    if np.isnan(row["moved_m"]):
+        return "no answer at the limits"
+    lost = f", no answer in {row['step_failed']} ticks" if row["step_failed"] else ""
+    return ("strict" if row["moved_m"] <= _STRICT
+            else f"posture moves it by {row['moved_m']:.0e} m a tick") + lost
+
+
+def over_sizes(rows: Sequence[Row], panels: Mapping[str, tuple[str, str, str]]) -> Figure:
+    """Return medians over sizes, with the 95th percentile as the upper edge of a band.
+
+    Both axes are logarithmic, so that a straight line is a power; its exponent is beside the name.
+    panels : for each `figure` of the rows its label, the letter of its size, and its title.
+    """
+    labels = list(dict.fromkeys(row["entrant"] for row in rows))
+    style = looks(labels)
+    with matplotlib.rc_context({**drawing.style(), "font.size": 9.0}):
+        lines = (len(panels) + 1) // 2
+        fig = Figure(figsize=(9.2, 3.8 * lines), layout="constrained")
+        axes = fig.subplots(lines, 2, squeeze=False).ravel()
+        for ax in axes[len(panels):]:
+            ax.set_axis_off()
+        for ax, (figure, (xlabel, letter, title)) in zip(axes, panels.items(), strict=False):
+            some = [row for row in rows if row["figure"] == figure]
+            for i, label in enumerate(labels):
+                _band(ax, figure, [row for row in some if row["entrant"] == label],
+                      style[label].colour, _MARKS[i % len(_MARKS)])
+            ax.set(xscale="log", yscale="log", xlabel=xlabel, title=title)
+            ax.set_xticks(sorted({row[figure] for row in some}))
+            ax.xaxis.set_minor_locator(NullLocator())
+            ax.xaxis.set_major_formatter(ScalarFormatter())
+            ax.tick_params(axis="x", labelsize=7.0)
+            _name_lines(ax, figure, letter, some, style)
+        for ax in axes[::2]:
+            ax.set_ylabel("time [µs]: median, band to the 95th percentile", fontsize=8.0)
+    return fig
+
+
+def _band(ax: Axes, figure: str, rows: Sequence[Row], colour: str, mark: str) -> None:
+    size, median, p95 = (np.array([row[key] for row in rows], dtype=float)
+                         for key in (figure, "median_us", "p95_us"))
+    ax.fill_between(size, median, p95, color=colour, alpha=0.15, linewidth=0)
+    ax.plot(size, median, marker=mark, color=colour, markersize=3.6, linewidth=1.4)
+
+
+def _name_lines(ax: Axes, figure: str, letter: str, rows: Sequence[Row],
+                style: Mapping[str, Look]) -> None:
+    """Write each name and exponent beside the end of its line without overlap."""
+    ends = {row["entrant"]: row for row in sorted(rows, key=lambda row: float(row[figure]))}
+    order = sorted(ends, key=lambda label: float(ends[label]["median_us"]))
+    low, high = np.log(ax.get_ylim())
+    heights = [(np.log(ends[label]["median_us"]) - low) / (high - low) for label in order]
+    powers = exponents(rows, figure)
+    for label, height in zip(order, spread(heights), strict=True):
+        power = "" if np.isnan(powers[label]) else f"  ${letter}^{{{powers[label]:.1f}}}$"
+        ax.annotate(label + power, (ends[label][figure], ends[label]["median_us"]), (1.05, height),
+                    color=drawing.INK, textcoords="axes fraction", va="center", fontsize=8.5,
+                    annotation_clip=False,
+                    arrowprops={"arrowstyle": "-", "color": style[label].colour, "linewidth": 0.9,
+                                "relpos": (0.0, 0.5), "shrinkA": 1.0, "shrinkB": 3.0})
+
+
+def exponents(rows: Sequence[Row], figure: str, fewest: int = 3) -> dict[str, float]:
+    """Return the slope of log time over log size in the upper half of sizes, by entrant."""
+    found: dict[str, Any] = {}
+    for label in dict.fromkeys(row["entrant"] for row in rows):
+        points = sorted((row[figure], row["median_us"]) for row in rows if row["entrant"] == label)
+        upper = np.log(points[min(len(points) // 2, max(len(points) - fewest, 0)):])
+        found[label] = (float(np.polyfit(upper[:, 0], upper[:, 1], 1)[0]) if len(upper) > 1
+                        else float("nan"))
+    return found
+
+
+def spread(heights: Sequence[float]) -> Array:
+    """Return the nearest ascending heights that are at least _APART from each other."""
+    steps = np.arange(len(heights)) * _APART
+    pools: list[list[float]] = []  # of heights without their steps, made ascending
+    for height in np.asarray(heights) - steps:
+        pools.append([height])
+        while len(pools) > 1 and np.mean(pools[-2]) > np.mean(pools[-1]):
+            pools[-2:] = [pools[-2] + pools[-1]]
+    return np.asarray(steps + [np.mean(pool) for pool in pools for _ in pool])

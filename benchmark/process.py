@@ -1,0 +1,123 @@
+"""The one runner: an entrant in its own process, asked line by line, started again if it ends."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from threading import Timer
+from typing import Any, final
+
+from benchmark.packages import Entrant, MissingError, python_of
+
+START_LIMIT = 180.0  # [s] for imports, including compilation of kernels
+CRASHED, HUNG = "crashed", "time limit"
+_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
+
+
+class EndedError(MissingError):
+    """A process that ended, or was ended at its time limit, without an answer."""
+
+    def __init__(self, kind: str, why: str) -> None:
+        super().__init__(why)
+        self.kind = kind
+
+
+@contextmanager
+def staged() -> Iterator[Path]:
+    """Give a folder from which environments without this project can import the benchmark."""
+    with tempfile.TemporaryDirectory() as temporary:
+        shutil.copytree(Path(__file__).parent, Path(temporary) / "benchmark",
+                        ignore=shutil.ignore_patterns("__pycache__", "studies", "reproduce"))
+        yield Path(temporary)
+
+
+@final
+class Process:
+    """`benchmark.worker` for one entrant; MissingError where it cannot be had.
+
+    questions : MODULE:CLASS of what asks it. folder : of `staged`. about : what it says of itself.
+    ends : how often it ended without an answer; the next question starts it again.
+    """
+
+    def __init__(self, entrant: Entrant, questions: str, folder: Path) -> None:
+        self.entrant, self.questions, self.ends = entrant, questions, 0
+        self._folder, self._hung = folder, False
+        self._process: subprocess.Popen[str] | None = None
+        self.about: dict[str, Any] = {}
+        self._begin()
+
+    def ask(self, question: tuple[Any, ...], limit: float) -> Any:
+        """Return the answer to (METHOD, ARGUMENTS...); EndedError if none comes in `limit` [s]."""
+        if self._process is None:
+            self._begin()
+        assert self._process is not None
+        assert self._process.stdin is not None
+        try:
+            self._process.stdin.write(json.dumps(question) + "\n")
+            self._process.stdin.flush()
+        except OSError:  # it has ended; why, the log says
+            pass
+        return self._next(limit)
+
+    def stop(self) -> None:
+        """End the process."""
+        if self._process is not None:
+            self._process.kill()
+            self._process.communicate()
+            self._log.close()
+            self._process = None
+
+    def _begin(self) -> None:
+        entrant = self.entrant
+        python = entrant.python or python_of(entrant.package)
+        own = dict(os.environ, **dict.fromkeys(_THREADS, "1"))
+        if python != sys.executable:
+            own.pop("PYTHONPATH", None)
+        core = str(max(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 0)
+        self._log = tempfile.TemporaryFile("w+", errors="replace")  # noqa: SIM115
+        try:
+            self._process = subprocess.Popen(
+                [python, "-m", "benchmark.worker", self.questions, entrant.adapter,
+                 json.dumps(dict(entrant.options)), core], stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE, stderr=self._log, text=True, cwd=self._folder, env=own)
+        except OSError as error:
+            self._log.close()
+            raise MissingError(f"{python}: {error.strerror}") from error
+        self.about = self._next(START_LIMIT)
+
+    def _next(self, limit: float) -> Any:
+        """Return the next line; raises EndedError if there is none within the limit [s]."""
+        assert self._process is not None
+        assert self._process.stdout is not None
+        self._hung = False
+        timer = Timer(limit, self._kill)
+        timer.start()
+        try:
+            line = self._process.stdout.readline()
+        finally:
+            timer.cancel()
+        if line.endswith("\n"):
+            return json.loads(line)
+        self.ends += 1
+        kind, why = HUNG if self._hung else CRASHED, self._last_words()
+        self.stop()
+        raise EndedError(kind, why)
+
+    def _kill(self) -> None:
+        self._hung = True
+        assert self._process is not None
+        self._process.kill()
+
+    def _last_words(self) -> str:
+        assert self._process is not None
+        code = self._process.wait()
+        self._log.seek(0)
+        lines = self._log.read().strip().splitlines()
+        return f"ended with code {code}" + (f": {lines[-1]}" if lines else "")

@@ -1,0 +1,1 @@
+"""Whole inverse kinematics beside other packages: poses reached, and the time for it."""

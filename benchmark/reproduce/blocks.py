@@ -1,0 +1,151 @@
+"""The blocks of the documents that are made from rows: tables, statements, findings."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from textwrap import fill
+from typing import Any
+
+import numpy as np
+
+from benchmark.reproduce.rows import Rows
+from benchmark.reproduce.studies import BLOCKS
+from scenarios.measure.statistics import Paired, wilson
+
+_WIDTH = 100     # columns of a page
+_NAMED = re.compile(r"\{(?P<study>[\w-]+) (?P<column>[\w.-]+)(?: (?P<metric>\w+))?"
+                    r"(?: (?P<first>[\w.-]+))?\}")
+
+Statement = Sequence[Any]  # a text, and what decides it
+
+
+def block(name: str, rows: Mapping[str, Rows]) -> str:
+    """Return the Markdown of a block; raises KeyError for an unknown block, study or column."""
+    given = BLOCKS[name]
+    if "items" in given:
+        return "\n".join(fill(f"- {_NAMED.sub(lambda named: _named(named, rows), item)}", _WIDTH,
+                              subsequent_indent="  ") for item in given["items"])
+    found = rows[given["study"]]
+    lines = (_statements(found, given["claims"]) if "claims" in given else
+             _by_metric(found, given["metrics"], given["beside"]) if "beside" in given else
+             _table(found, given["metrics"], given.get("interval", False)))
+    source = f"From `{found.command}` ({found.starts} starts, seed {found.seed})."
+    return "\n".join([*lines, "", source])
+
+
+def judged(rows: Rows, decides: Mapping[str, Any]) -> tuple[str, str]:
+    """Return what rows say about a statement, in one of three sentences, and the verdict.
+
+    of : a column. metric : of which; without one, whether every run reaches its end. below, above :
+    a column whose metric is to be larger, or smaller, start by start; or least, most : bounds that
+    are to be kept from every start.
+    """
+    column, metric = decides["of"], decides.get("metric")
+    if metric is None:
+        ended = rows.ended[column]
+        return f"{share(ended, rows.starts)} reach the end", _always(ended, rows.starts)
+    first = decides.get("below", decides.get("above"))
+    if first is not None:
+        pair = rows.paired(metric, first, column)
+        return (f"{in_text(rows, column, metric)} against {in_text(rows, first, metric)}; {pair}",
+                _agrees(pair, "below" in decides))
+    values = rows.column(column, metric)
+    kept = int(((values <= decides.get("most", np.inf))
+                & (values >= decides.get("least", -np.inf))).sum())
+    return (f"{in_text(rows, column, metric)}; kept from {share(kept, rows.starts)}",
+            _always(kept, rows.starts))
+
+
+def statements(study: str) -> list[Statement]:
+    """Return every statement about a study."""
+    return [one for given in BLOCKS.values() if given.get("study") == study
+            for one in given.get("claims", ())]
+
+
+def _always(met: int, of: int) -> str:
+    return "true" if met == of else "false" if met == 0 else "not from every start"
+
+
+def _agrees(pair: Paired, lower: bool) -> str:
+    if not pair.count:
+        return "not decided"
+    if pair.equal:
+        return "the same"
+    if not pair.distinguishable:
+        return "not distinguishable"
+    return "true" if (pair.lower > pair.higher) == lower else "reversed"
+
+
+def in_text(rows: Rows, column: str, metric: str) -> str:
+    """Return "median [lower quartile, upper quartile] unit" of a metric."""
+    found = rows.spread(column, metric)
+    if found is None:
+        return "–"
+    median, low, high = (rows.metric(metric, value).shown()
+                         for value in (found.median, found.lower, found.upper))
+    return f"{median} [{low}, {high}] {rows.metric(metric).shown_unit}".strip()
+
+
+def share(met: int, of: int) -> str:
+    """Return "18 of 24 (55 to 88 %)" with the 95 % Wilson interval."""
+    low, high = wilson(met, of)
+    return f"{met} of {of} ({100 * low:.0f} to {100 * high:.0f} %)"
+
+
+def _named(named: re.Match[str], rows: Mapping[str, Rows]) -> str:
+    found, column, metric = rows[named["study"]], named["column"], named["metric"]
+    if metric is None:
+        return share(found.ended[column], found.starts)
+    if named["first"]:
+        return str(found.paired(metric, named["first"], column))
+    return in_text(found, column, metric)
+
+
+def _statements(rows: Rows, claims: Sequence[Statement]) -> list[str]:
+    """Return a table of statements: what was found, and the verdict."""
+    lines = ["| statement | found: median [quartiles] | verdict |", "|---|---|---|"]
+    for text, decides in claims:
+        found, verdict = judged(rows, decides)
+        lines.append(f"| {text} | {found} | **{verdict}** |")
+    return lines
+
+
+def _table(rows: Rows, metrics: Sequence[str], interval: bool) -> list[str]:
+    """Return a table of a study, its columns as rows: median and quartiles of metrics.
+
+    With `interval` the share of runs that reached their end has its 95 % interval.
+    """
+    known = [name for name in metrics if name in rows.metrics]
+    ended = share if interval else "{} of {}".format
+    return [f"| | reached the end | {' | '.join(_head(rows, name) for name in known)} |",
+            "|---" * (len(known) + 2) + "|",
+            *(f"| `{column}` | {ended(rows.ended[column], rows.starts)} | "
+              f"{' | '.join(_bare(rows, column, name) for name in known)} |"
+              for column in rows.values)]
+
+
+def _by_metric(rows: Rows, metrics: Sequence[str], columns: Sequence[str]) -> list[str]:
+    """Return a table with a row per metric: median and quartiles in some columns of a study.
+
+    Each column but the first is compared with the first, start by start.
+    """
+    lines = [f"| | {' | '.join(f'`{column}`' for column in columns)} |",
+             "|---" * (len(columns) + 1) + "|"]
+    for metric in metrics:
+        cells = [_bare(rows, columns[0], metric)]
+        for column in columns[1:]:
+            pair = rows.paired(metric, columns[0], column)
+            cells.append(_bare(rows, column, metric) + (f"; {pair}" if pair.count else ""))
+        lines.append(f"| {_head(rows, metric)} | {' | '.join(cells)} |")
+    return lines
+
+
+def _head(rows: Rows, name: str) -> str:
+    metric = rows.metric(name)
+    return f"{metric.label}{f' [{metric.shown_unit}]' if metric.shown_unit else ''}"
+
+
+def _bare(rows: Rows, column: str, name: str) -> str:
+    text, unit = in_text(rows, column, name), rows.metric(name).shown_unit
+    return text.removesuffix(f" {unit}") if unit else text

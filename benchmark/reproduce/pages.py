@@ -1,0 +1,205 @@
+"""The marks of pages, and what is put between them.
+
+    <!-- reproduce: NAME -->  a block of `studies.toml`, up to  <!-- end of NAME -->
+    <!-- measured: hierarchy bench tick -->  what a command prints
+    <!-- measured: hierarchy bench resolvers --fresh 1 | EQ7, fresh .. Times of -->
+    <!-- measured: table of hierarchy bench resolvers --seconds 0.2 -->
+
+the last three up to `<!-- end of measurement -->`. After `|`, only the lines from one that starts
+with the first text to the last before one that starts with the second. `table of`: in a table whose
+columns are named after families and whose rows after resolvers, the cells are filled with medians.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+from collections.abc import Mapping
+from itertools import dropwhile, takewhile
+from pathlib import Path
+
+from benchmark.reproduce.blocks import block
+from benchmark.reproduce.rows import Rows
+from hierarchy.errors import HierarchyError
+from scenarios.files import make_folder, slug, write_text
+
+ROOT = Path(__file__).parents[2]
+RESULTS, OUTPUT = "docs/results", "docs/results/output"
+_COLUMNS = "100"  # of the terminal that a command writes to
+_CODE = ("hierarchy", "solvers", "scenarios", "benchmark")
+_MADE = re.compile(r"(<!-- reproduce: (?P<name>[\w-]+) -->\n).*?(<!-- end of \w[\w-]* -->)",
+                   re.DOTALL)
+_MEASURED = re.compile(r"(?P<mark><!-- measured: (?P<table>table of )?(?P<command>[^|\n]*?)"
+                       r"(?: \| (?P<first>[^\n]+?) \.\. (?P<last>[^\n]+?))? -->\n)"
+                       r"(?P<text>.*?)(?P<end><!-- end of measurement -->)", re.DOTALL)
+_MEDIAN = re.compile(r"(?P<name>\S+(?: \S+)*?)\s+(?P<median>\d[\d.]*)\s")
+
+
+def marked(root: Path) -> list[str]:
+    """Return the pages of a checkout that have marks, by their paths in it."""
+    found = [root / "README.md", *sorted((root / "docs").rglob("*.md"))]
+    return [path.relative_to(root).as_posix() for path in found if path.is_file()
+            and re.search(r"^<!-- (?:measured|reproduce): ", path.read_text("utf-8"), re.MULTILINE)]
+
+
+class CommandError(RuntimeError):
+    """A command ended with another exit code than 0."""
+
+
+def commands(text: str) -> list[str]:
+    """Return the commands of a page, each once."""
+    return list(dict.fromkeys(found["command"] for found in _MEASURED.finditer(text)))
+
+
+def run(command: str, root: Path, out: Path) -> str:
+    """Return what a command prints, run in the checkout `root`; raises CommandError.
+
+    `out` stores it: the same code does not run the same command again.
+    """
+    folder = out / _digest(root) / slug(command)
+    stored = folder / "output.txt"
+    if not stored.is_file():
+        shutil.rmtree(folder, ignore_errors=True)
+        folder.mkdir(parents=True)
+        write_text(stored, _printed(command, root, folder / "run"))
+    return stored.read_text(encoding="utf-8")
+
+
+def _printed(command: str, root: Path, out: Path) -> str:
+    program, *arguments = shlex.split(command)
+    line = [sys.executable, *arguments]
+    if program == "hierarchy":
+        line = [sys.executable, "-m", "scenarios.cli.main", *arguments, "--out", str(out)]
+    done = subprocess.run(line, cwd=root, env=os.environ | {"COLUMNS": _COLUMNS}, text=True,
+                          stdout=subprocess.PIPE, check=False)
+    if done.returncode:
+        raise CommandError(f"{command}: exit code {done.returncode}\n{done.stdout}")
+    lines = [line.rstrip() for line in done.stdout.splitlines()
+             if not line.startswith("Numbers: ")]
+    return "\n".join(lines).rstrip() + "\n"
+
+
+def _digest(root: Path) -> str:
+    """Return a digest of the code that a command may run."""
+    found = hashlib.sha256()
+    for folder in _CODE:
+        for path in sorted((root / folder).rglob("*.py")):
+            found.update(path.relative_to(root).as_posix().encode() + path.read_bytes())
+    return found.hexdigest()[:16]
+
+
+def store(command: str, printed: str, root: Path) -> Path:
+    """Write what a command printed beside the documents of a checkout, and return the file."""
+    path = file_of(command, root)
+    make_folder(path.parent)
+    write_text(path, printed)
+    return path
+
+
+def file_of(command: str, root: Path) -> Path:
+    """Return the file that has what a command prints."""
+    return root / OUTPUT / f"{slug(command)}.txt"
+
+
+def fill(root: Path, rows: Mapping[str, Rows]) -> tuple[list[Path], list[str]]:
+    """Fill the pages of a checkout; return those that changed, and why others cannot be filled."""
+    changed, lacking = [], []
+    for name in marked(root):
+        path = root / name
+        text = path.read_text(encoding="utf-8")
+        try:
+            made = filled(text, root, name, rows)
+        except HierarchyError as error:
+            lacking.append(str(error))
+            continue
+        if made != text:
+            write_text(path, made)
+            changed.append(path)
+    return changed, lacking
+
+
+def filled(text: str, root: Path, page: str, rows: Mapping[str, Rows]) -> str:
+    """Return a page with what is between its marks made anew.
+
+    Raises HierarchyError, naming the page, for an unknown block, a study without rows, or an output
+    that is missing or lacks the lines asked for.
+    """
+    def made(match: re.Match[str]) -> str:
+        try:
+            return f"{match[1]}{block(match['name'], rows).rstrip()}\n{match[3]}"
+        except KeyError as error:
+            raise HierarchyError(f"{page}: block {match['name']!r}: there is no block, or no rows "
+                                 f"of study, {error}") from None
+
+    return _MEASURED.sub(lambda found: _output(found, root, page), _MADE.sub(made, text))
+
+
+def _output(found: re.Match[str], root: Path, page: str) -> str:
+    command = found["command"]
+    try:
+        output = file_of(command, root).read_text(encoding="utf-8")
+    except FileNotFoundError:
+        raise HierarchyError(f"{page}: no output of {command!r} is stored; run "
+                             f"`hierarchy reproduce {page}`") from None
+    if found["table"]:
+        inside = _with_medians(found["text"], medians(output))
+    else:
+        part = _part(output.splitlines(), found["first"], found["last"])
+        if not part:
+            raise HierarchyError(f"{page}: no line of the output of {command!r} starts with "
+                                 f"{found['first']!r}")
+        inside = "\n".join(["```", *part, "```\n"])
+    return f"{found['mark']}{inside}{found['end']}"
+
+
+def _part(lines: list[str], first: str | None, last: str | None) -> list[str]:
+    """Return the lines from one that starts with `first` to one that starts with `last`."""
+    if first and last:
+        lines = list(dropwhile(lambda line: not line.startswith(first), lines))
+        lines = list(takewhile(lambda line: not line.startswith(last), lines))
+    while lines and not lines[-1]:
+        lines.pop()
+    return lines
+
+
+def medians(output: str) -> dict[tuple[str, str], float]:
+    """Return the medians [us] that `hierarchy bench resolvers` printed, by family and name.
+
+    A family is a line of its own; the rows of its table begin with a name and the median.
+    """
+    found, family, before = {}, "", ""
+    for line in output.splitlines():
+        if line.split()[:1] == ["median"]:
+            family = before
+        elif (row := _MEDIAN.match(line)) and family:
+            found[family, row["name"]] = float(row["median"])
+        before = line
+    return found
+
+
+def _with_medians(table: str, found: Mapping[tuple[str, str], float]) -> str:
+    """Return a table of a page with new medians [us] in the columns named after families."""
+    families = {family for family, _ in found}
+    head, rule, *rows = [line for line in table.splitlines() if line]
+    columns = [heading.strip().split(" ")[0] for heading in _cells(head)]
+    made = [head, rule]
+    for row in rows:
+        cells = _cells(row)
+        name = re.sub(r'[`,"]|form = ', "", cells[0]).strip()
+        name = {"hqp": "hqp proxqp"}.get(name, name)
+        for c, family in enumerate(columns):
+            if family in families:
+                median = found.get((family, name))
+                cells[c] = (" – " if median is None else
+                            f" {median:.0f} " if median >= 10.0 else f" {median:.1f} ")
+        made.append(f"|{'|'.join(cells)}|")
+    return "\n".join(made) + "\n"
+
+
+def _cells(row: str) -> list[str]:
+    return row.strip().strip("|").split("|")

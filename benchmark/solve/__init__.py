@@ -1,0 +1,1 @@
+"""Questions to solvers: problems of prioritized control, their answers judged by x alone."""

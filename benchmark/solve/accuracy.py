@@ -1,0 +1,162 @@
+"""Errors of tasks and of x on random 6R arms: regular, near-singular, damped, conflicting.
+
+The first experiment of the paper that introduced the Task Priority Matrix: F. Flacco, "The Tasks
+Priority Matrix: a new tool for hierarchical redundancy resolution" (2016).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from math import nan
+from typing import Any, final
+
+import numpy as np
+
+from benchmark.arms import near_singular, regular
+from benchmark.packages import OWN, Entrant
+from benchmark.report import Report, Section
+from benchmark.solve.entrants import ENTRANTS, NUMPY
+from benchmark.solve.interface import Problem, Solver
+from benchmark.store import Row
+from benchmark.tables import Column, Table, percent, power, whole
+from benchmark.worker import load
+from hierarchy.problem import Array, Hierarchy
+from scenarios.problems.answers import answer
+from solvers import certify
+
+ARMS, CHECKED = 10_000, 300
+DAMPING, THRESHOLD = 0.05, 0.1  # the letter's code
+_TARGETS = 1.0                  # [m/s or rad/s] the largest target of a row
+_REST, _CROSSED, _FULL = ((0, 1), (2, 3), (4, 5)), ((0, 1), (1, 2), (3, 4)), (
+    (0, 1), (1, 2), (3, 4), (5, 0))
+_NOTES = """\
+Errors: norm of a task's violation [m/s and rad/s], over the least that it can have; x: distance \
+to the proved answer over 1 + |x|, on a sample; for damped cases to that of numpy's SVD. cert: \
+share of the sample that `certify` accepts. fail: not called solved. Arms: random \
+Denavit-Hartenberg tables, alpha of -90, 0, 90 deg in one half and any in the other, a and d up \
+to 0.5 m; targets up to 1 m/s or rad/s."""
+
+
+@final
+@dataclass(frozen=True)
+class Case:
+    """One kind of arm and of tasks.
+
+    tasks : for each task, rows of the end effector's Jacobian: 0 to 2 position, 3 to 5 rotation. A
+        row that an upper task has too conflicts with it, since the targets differ.
+    jacobians : returns Jacobians (N, 6, 6) for a count N and a seed.
+    """
+
+    name: str
+    title: str
+    tasks: tuple[tuple[int, ...], ...]
+    jacobians: Callable[[int, int], Array]
+    damping: float = 0.0
+
+
+CASES = (
+    Case("regular", "Regular arms, three tasks of two rows", _REST, regular),
+    Case("near-singular", "Near a singularity, undamped", _REST, near_singular),
+    Case("damped", f"Near a singularity, damped by {DAMPING:g} below {THRESHOLD:g}", _REST,
+         near_singular, DAMPING),
+    Case("conflict", "Task 2 conflicts with a row of task 1", _CROSSED, regular),
+    Case("crowded", "The same with a fourth task: eight rows, no redundancy left", _FULL, regular),
+)
+
+
+def entrants(damping: float = 0.0) -> list[Entrant]:
+    """Return every resolver in each form that differs for equalities; numpy, without damping."""
+    settings = {"damping": damping, "threshold": THRESHOLD}
+    ours = [one for one in ENTRANTS if one.adapter.endswith("ours:Ours")
+            and one.options.get("backend", "proxqp") == "proxqp"]
+    return [*(one for one in ENTRANTS if one.label == NUMPY and not damping),
+            *(Entrant(one.label, OWN, one.adapter, {**one.options, **settings}) for one in ours),
+            Entrant("reverse in-order", OWN, ours[0].adapter,
+                    {"resolver": "reverse", "form": "in-order", **settings})]
+
+
+def run(arms: int = ARMS, checked: int = CHECKED, seed: int = 0,
+        cases: Iterable[Case] = CASES) -> Report:
+    """Resolve `arms` of every case with all resolvers.
+
+    `checked` of the arms are also compared with the proved x, and certified.
+    """
+    rows: list[Row] = []
+    tables = []
+    for case in cases:
+        problems, least = hierarchies(case, arms, seed)
+        right = [_right(case, h) for h in problems[:max(1, min(checked, arms))]]
+        found = [{"case": case.name, "entrant": one.label, "arms": arms, "checked": len(right),
+                  **_errors(load(one.adapter)(**one.options), case, problems, least, right)}
+                 for one in entrants(case.damping)]
+        columns = [Column(f"{over}\n{key}", f"task_{k + 1}_{key}", power)
+                   for k in range(len(case.tasks))
+                   for key, over in (("mean", f"task {k + 1}"), ("max", ""))]
+        tables.append(Table(f"{case.title}; {arms} arms", found, (
+            *columns, Column("x\nmax", "x_max", power), Column("cert", "certified", percent),
+            *([Column("fail", "failed", whole)] if any(row["failed"] for row in found) else []))))
+        rows += found
+    return Report("Errors on random arms", [Section("Errors", tables, _NOTES)], {"errors": rows})
+
+
+def hierarchies(case: Case, count: int, seed: int) -> tuple[list[Hierarchy], Array]:
+    """Return the problems of a case, and the smallest possible violation (count, L) of each task.
+
+    Rows of upper tasks are always met, and all other rows can be met, so a repeated row is missed
+    by the difference of its targets.
+    """
+    order = [row for task in case.tasks for row in task]
+    sizes = np.array([len(task) for task in case.tasks])
+    A = np.ascontiguousarray(case.jacobians(count, seed)[:, order])
+    b = np.random.default_rng(seed + 1).uniform(-_TARGETS, _TARGETS, (count, len(order)))
+    off = b - b[:, [order.index(row) for row in order]]
+    least = np.sqrt(np.add.reduceat(off**2, np.cumsum(sizes) - sizes, axis=1))
+    return [Hierarchy(A[i], b[i], b[i], sizes) for i in range(count)], least
+
+
+def damped(h: Hierarchy, damping: float, threshold: float, smallest: float = 1e-9) -> Array:
+    """Return x (n,) of a hierarchy of equalities with the damping of `Resolver`, from numpy's SVD.
+
+    Singular values of a level's rows, projected into the null space of the levels above, count as
+    zero below `smallest`.
+    """
+    x, N = np.zeros(h.n), np.eye(h.n)
+    for A, b, _ in h.levels():
+        U, s, Vt = np.linalg.svd(A @ N)
+        rank = int(np.count_nonzero(s > smallest))
+        least = s[-1] if rank == len(b) else 0.0
+        lam2 = damping**2 * max(0.0, 1.0 - (least / threshold) ** 2)
+        missing = U[:, :rank].T @ (b - A @ x)
+        x = x + N @ (Vt[:rank].T @ (s[:rank] / (s[:rank] ** 2 + lam2) * missing))
+        N = N @ Vt[rank:].T
+    return np.asarray(x + N @ (N.T @ h.reference))
+
+
+def _right(case: Case, h: Hierarchy) -> Array:
+    return damped(h, case.damping, THRESHOLD) if case.damping else answer(h).x
+
+
+def _errors(solver: Solver, case: Case, problems: Sequence[Hierarchy], least: Array,
+            right: Sequence[Array]) -> Mapping[str, Any]:
+    """Solve every problem; return errors of tasks and x, and the shares certified and failed."""
+    answered = [solver.read(solver.solve(solver.prepare(
+        Problem(h.A, h.lower, h.upper, np.asarray(h.sizes), h.reference)))) for h in problems]
+    solved = np.array([one.solved for one in answered])
+    errors = np.array([abs(h.violations(one.x) - lowest) for h, one, lowest in zip(
+        problems, answered, least, strict=True)])[solved]
+    sample = [(h, one.x, x) for h, one, x in zip(problems, answered, right, strict=False)
+              if one.solved]
+    apart = [float(np.linalg.norm(x - best) / (1.0 + np.linalg.norm(best)))
+             for _, x, best in sample]
+    certified = sum(certify(h, x).certified for h, x, _ in sample)
+    tasks = {f"task_{k + 1}_{key}": value for k in range(len(case.tasks))
+             for key, value in _summed(errors[:, k]).items()}
+    return {"failed": int((~solved).sum()), **tasks,
+            **{f"x_{key}": value for key, value in _summed(apart).items()},
+            "certified": nan if case.damping else certified / len(right)}
+
+
+def _summed(errors: Sequence[float] | Array) -> dict[str, float]:
+    reduced: dict[str, Callable[..., Any]] = {"mean": np.mean, "median": np.median, "max": np.max}
+    return {key: float(of(errors)) if len(errors) else nan for key, of in reduced.items()}

@@ -1,0 +1,79 @@
+"""A cascade of quadratic programs through qpsolvers, as one writes it by hand.
+
+One program for each level, in x and the violations w of its rows: minimise |w|^2, keep the rows
+above within what they have reached. A last program finds the x nearest to the reference.
+"""
+
+from __future__ import annotations
+
+from importlib.metadata import version
+
+import numpy as np
+from qpsolvers import solve_qp
+
+from benchmark.solve.interface import Answer, Array, Problem, Solver
+
+_TINY = 1e-9  # weight of |x - reference|^2 beside |w|^2, for solvers that need a definite Hessian
+
+
+class Cascade(Solver):
+    """One backend of qpsolvers; `slack` is left to rows above when they are kept."""
+
+    def __init__(self, backend: str, slack: float = 0.0) -> None:
+        self.backend, self.slack = backend, slack
+
+    def version(self) -> str:
+        """Return that of qpsolvers and of the backend."""
+        package = {"proxqp": "proxsuite"}.get(self.backend, self.backend)
+        return f"qpsolvers {version('qpsolvers')}, {package} {version(package)}"
+
+    def solve(self, prepared: Problem) -> tuple[Array, bool]:
+        """Solve level by level; False from the first program without a solution."""
+        x, n, begin = prepared.reference.copy(), len(prepared.reference), 0
+        lower, upper = prepared.lower.copy(), prepared.upper.copy()
+        for end in [int(end) for end in prepared.ends]:
+            own = slice(begin, end)
+            if end > begin:
+                found = self._level(prepared, lower, upper, begin, end)
+                if found is None:
+                    return x, False
+                x = found[:n]
+                self._freeze(prepared, lower, upper, own, prepared.A[own] @ x)
+            begin = end
+        found = self._solve(np.eye(n), -prepared.reference, prepared.A, lower, upper)
+        return (x, False) if found is None else (found, True)
+
+    def _freeze(self, problem: Problem, lower: Array, upper: Array, own: slice, reached: Array
+                ) -> None:
+        """Fix equalities and violated rows at what they have reached; others keep their sides."""
+        fixed = ((problem.lower[own] == problem.upper[own])
+                 | (reached > problem.upper[own]) | (reached < problem.lower[own]))
+        lower[own] = np.where(fixed, reached - self.slack, problem.lower[own])
+        upper[own] = np.where(fixed, reached + self.slack, problem.upper[own])
+
+    def _level(self, problem: Problem, lower: Array, upper: Array, begin: int, end: int
+               ) -> Array | None:
+        n, m = len(problem.reference), end - begin
+        P = np.diag(np.concatenate([np.full(n, _TINY), np.ones(m)]))
+        q = np.concatenate([-_TINY * problem.reference, np.zeros(m)])
+        A = np.zeros((end, n + m))
+        A[:, :n] = problem.A[:end]
+        A[begin:, n:] = -np.eye(m)
+        return self._solve(P, q, A, lower[:end], upper[:end])
+
+    def _solve(self, P: Array, q: Array, A: Array, lower: Array, upper: Array) -> Array | None:
+        equal = lower == upper
+        above, below = ~equal & (upper < np.inf), ~equal & (lower > -np.inf)
+        G = np.vstack([A[above], -A[below]])
+        h = np.concatenate([upper[above], -lower[below]])
+        try:
+            found = solve_qp(P, q, G if len(G) else None, h if len(G) else None,
+                             A[equal] if equal.any() else None,
+                             lower[equal] if equal.any() else None, solver=self.backend)
+        except Exception:  # backends raise for what others call infeasible
+            return None
+        return None if found is None or not np.isfinite(found).all() else np.asarray(found)
+
+    def read(self, raw: tuple[Array, bool]) -> Answer:
+        """Return x, and whether every program had a solution."""
+        return Answer(*raw)

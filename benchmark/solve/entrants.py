@@ -1,0 +1,99 @@
+"""The table of solvers: one row each."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from benchmark.packages import DAQP, EMBODIK, OWN, Entrant
+from hierarchy.errors import HierarchyError, UnknownNameError
+from solvers import names
+from solvers.qp.backends import BACKENDS
+
+QUESTIONS = "benchmark.solve.questions:Questions"
+_HERE = "benchmark.solve"
+NUMPY, HIERARCHICAL = "plain numpy", "DAQP hierarchical"
+_SLACK = 1e-7
+_LIMITS = {
+    "augmented": "Not strict: levels share one damped system.",
+    "weighted": "Weights in place of levels, to a finite ratio.",
+    "tpm-published": "Equalities; not strict where upper levels lose rank.",
+    "recursive": "Equalities only.", "tpm": "Bounds of single unknowns in the first level only.",
+    "reverse": "Equalities; strict in the first level only.",
+    "sns": "Bounds of single unknowns in the first level only; scales what they do not allow."}
+_QP = "Levels above are kept to the backend's tolerance."
+_EMBODIK = ("Scales a task that limits do not allow, and damps near singularities; the first level "
+            "holds as hard limits, the others are equalities.")
+_CASCADE = "Programs written by hand, in floating point; rows above"
+
+
+def _ours() -> list[Entrant]:
+    ours = f"{_HERE}.ours:Ours"
+    rows = [Entrant(name, OWN, ours, {"resolver": name}, _LIMITS.get(name, ""))
+            for name in (*names(), "tpm-published") if name != "hqp"]
+    return rows + [Entrant(f"hqp {name}", OWN, ours, {"resolver": "hqp", "backend": name}, _QP)
+                   for name in BACKENDS]
+
+
+def _cascades() -> list[Entrant]:
+    cascade = f"{_HERE}.cascade:Cascade"
+    exact = [Entrant(f"cascade {name}", OWN, cascade, {"backend": name},
+                     f"{_CASCADE} are kept exactly.") for name in BACKENDS]
+    return exact + [Entrant(f"cascade {name}, slack", OWN, cascade,
+                            {"backend": name, "slack": _SLACK},
+                            f"{_CASCADE} may move by {_SLACK:g}.")
+                    for name in ("quadprog", "daqp")]
+
+
+ENTRANTS = (
+    *_ours(),
+    Entrant(NUMPY, OWN, f"{_HERE}.ours:Plain", limits="Equalities only, by np.linalg.pinv."),
+    Entrant(HIERARCHICAL, DAQP, f"{_HERE}.with_daqp:Daqp",
+            limits="Minimises violations divided by the norms of rows, with a finite weight; rows "
+            "of zeros are infeasible to it."),
+    *_cascades(),
+    Entrant("embodiK", EMBODIK, f"{_HERE}.with_embodik:Embodik", {}, _EMBODIK),
+    Entrant("embodiK refined", EMBODIK, f"{_HERE}.with_embodik:Embodik", {"refine": True},
+            _EMBODIK),
+)
+"""The solvers, in the order of tables."""
+
+
+def chosen(labels: Sequence[str], python: str = "", more: Sequence[Entrant] = ()) -> list[Entrant]:
+    """Return the entrants of these labels; FILE.py:CLASS makes one of the user's own.
+
+    labels : all of the table, and of `more`, if empty.
+    python : interpreter of the user's own entrants.
+
+    Raises
+    ------
+    UnknownNameError : a label that is not in the table.
+    HierarchyError : a file that does not exist.
+    """
+    known = {one.label: one for one in (*ENTRANTS, *more)}
+    found = []
+    for label in labels or known:
+        file, _, kind = label.rpartition(":")
+        if file.endswith(".py"):
+            if not Path(file).is_file():
+                raise HierarchyError(f"entrant {label!r}: {file} does not exist")
+            found.append(Entrant(kind, OWN, f"{Path(file).resolve()}:{kind}", {},
+                                 "Not of the table.", python))
+        elif label not in known:
+            raise UnknownNameError("entrant", label, list(known))
+        else:
+            found.append(known[label])
+    return found + [one for one in more if labels and one not in found]
+
+
+def compiled(libraries: Sequence[Path], labels: Sequence[str]) -> list[Entrant]:
+    """Return an entrant for each library that has the functions of solver.h; see HierarchyError."""
+    if len(libraries) != len(labels):
+        raise HierarchyError(f"{len(libraries)} libraries and {len(labels)} names; each --library "
+                             "needs a --name")
+    for file in libraries:
+        if not file.is_file():
+            raise HierarchyError(f"--library: {file} does not exist")
+    return [Entrant(label, OWN, f"{_HERE}.compiled:Compiled",
+                    {"library": str(file.resolve()), "name": label}, f"From {file.name}.")
+            for file, label in zip(libraries, labels, strict=True)]

@@ -1,0 +1,94 @@
+"""Growth of the time of a solve with the numbers of tasks, rows and joints."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from benchmark import figures
+from benchmark.report import Report, Section
+from benchmark.solve.accuracy import entrants
+from benchmark.solve.interface import Problem, Solver
+from benchmark.store import Row
+from benchmark.tables import Column, Table, short, wide
+from benchmark.timing import Timed, take_turns
+from benchmark.worker import load
+
+Size = tuple[int, int, int]  # joints, tasks, rows of each
+SECONDS = 40.0
+FIRST_PAPER: dict[str, tuple[Size, ...]] = {
+    "tasks": tuple((30, count, 3) for count in range(1, 11)),
+    "joints": tuple((n, 5, 3) for n in (20, 30, 45, 70, 100, 150, 200, 300))}
+LARGER: dict[str, tuple[Size, ...]] = {
+    "tasks": tuple((70, count, 3) for count in (1, 2, 3, 4, 5, 7, 10, 14, 20)),
+    "rows": tuple((100, 5, each) for each in (1, 2, 3, 4, 6, 9, 14, 20)),
+    "joints": tuple((n, 5, 3) for n in (6, 7, 10, 15, 20, 30, 45, 70, 100, 150, 200, 300))}
+LEVEL_LESS = ("augmented", "weighted")  # not timed: no priorities
+_NOTES = """\
+Times: one call from Python, one core, all resolvers in turns; power: slope of the upper half of \
+sizes, log over log."""
+
+
+def run(seconds: float = SECONDS, sizes: Mapping[str, Sequence[Size]] | None = None,
+        seed: int = 0) -> Report:
+    """Time all resolvers with priorities at every size for `seconds` [s] in total.
+
+    sizes : joints, tasks and rows of each, by what varies; None for those of the first paper.
+    """
+    asked = FIRST_PAPER if sizes is None else sizes
+    rows = take_turns([one for i, figure in enumerate(asked)
+                       for one in _field(figure, asked[figure], seed + i)], seconds)
+    return Report("Growth of the time of a solve", sections(rows, asked), {"growth": rows})
+
+
+def sections(rows: Sequence[Row], sizes: Mapping[str, Sequence[Size]]) -> list[Section]:
+    """Return a table for each number that varies, and the figure."""
+    panels, tables = {}, []
+    for figure, own in sizes.items():
+        some = [row for row in rows if row["figure"] == figure]
+        fixed = _fixed(figure, own[0])
+        tables.append(_table(figure, fixed, some))
+        panels[figure] = f"number of {figure}", figure[0], fixed
+    return [Section("Median times", tables, _NOTES, {"growth": figures.over_sizes(rows, panels)})]
+
+
+def _fixed(figure: str, size: Size) -> str:
+    joints, tasks, each = size
+    words = {"joints": f"{joints} joints", "tasks": f"{tasks} tasks", "rows": f"{each} rows a task"}
+    return ", ".join(text for key, text in words.items() if key != figure)
+
+
+def _table(figure: str, fixed: str, rows: Sequence[Row]) -> Table:
+    made, columns = wide(rows, "entrant", figure, "median_us", short)
+    powers = figures.exponents(rows, figure)
+    return Table(f"Median time of a solve [us], {fixed}, over the number of {figure}",
+                 [{**row, "power": powers[row["entrant"]]} for row in made],
+                 [*columns, Column("power", "power")])
+
+
+def _field(figure: str, sizes: Sequence[Size], seed: int) -> list[Timed]:
+    solvers = {one.label: load(one.adapter)(**one.options) for one in entrants()
+               if one.label not in LEVEL_LESS}
+    found = []
+    for i, (joints, tasks, each) in enumerate(sizes):
+        problem = random_problem((joints, tasks, each), seed + i)
+        found += [Timed(_call(solver, solver.prepare(problem)), {
+            "figure": figure, "entrant": label, "joints": joints, "tasks": tasks,
+            "rows": each if figure == "rows" else each * tasks})
+            for label, solver in solvers.items()]
+    return found
+
+
+def random_problem(size: Size, seed: int) -> Problem:
+    """Return random levels, almost surely of full rank where there are joints enough."""
+    joints, tasks, each = size
+    rng = np.random.default_rng(seed)
+    b = rng.normal(size=each * tasks)
+    return Problem(rng.normal(size=(each * tasks, joints)), b, b, np.full(tasks, each),
+                   np.zeros(joints))
+
+
+def _call(solver: Solver, prepared: Any) -> Callable[[], Any]:
+    return lambda: solver.solve(prepared)

@@ -1,0 +1,128 @@
+"""What a solver is asked about a problem: answers cold and warm, times, the same bits twice."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from time import perf_counter_ns
+from typing import Any, final
+
+import numpy as np
+
+from benchmark.solve.interface import Answer, Problem, Solver, read_problems
+from benchmark.worker import Repeats, reason, timed
+
+REPEATS = Repeats()
+
+
+@final
+class Questions:
+    """The problems of a file, asked one after the other."""
+
+    def __init__(self, solver: type[Solver], options: dict[str, Any]) -> None:
+        self.solver = solver(**options)
+        self.problems: list[Problem] = []
+        self.before: list[Problem | None] = []
+        self.repeats, self._answer, self._sequence = REPEATS, (-1, None), False
+
+    def about(self) -> dict[str, Any]:
+        """Return what the solver says of itself."""
+        return {"version": self.solver.version()}
+
+    def open(self, file: str, first: int) -> dict[str, Any]:
+        """Read a file of problems and solve one untimed; return how large and how fast all is."""
+        with np.load(file, allow_pickle=False) as kept:
+            sequence = bool(json.loads(kept["head.json"])["sequence"])
+        self.take(read_problems(Path(file)), sequence=sequence)
+        self._rehearse(self.problems[first])
+        return {"start_kib": resident(), "yardstick_ns": yardstick()}
+
+    def take(self, problems: list[Problem], before: list[Problem | None] | None = None,
+             sequence: bool = False) -> None:
+        """Take problems, each with that of the tick before, if there is one and none is asked."""
+        self.problems, self._sequence = problems, sequence
+        self.before, self._answer = before or [None] * len(problems), (-1, None)
+
+    def problem(self, p: int) -> dict[str, Any]:
+        """Return the raw row of a problem: the answers, and what was measured."""
+        refusal = self.solver.refuses(self.problems[p])
+        if refusal:
+            return {"refused": refusal}
+        try:
+            said, raw = self._cold(self.problems[p])
+            if self.solver.warm and (start := self._start(p)) is not None:
+                more, raw = self._warm(self.problems[p], start)
+                said |= more
+            self._answer = p, raw
+        except Exception as error:
+            return {"raised": reason(error)}
+        return {**said, "rss_kib": resident()}
+
+    def _start(self, p: int) -> Any:
+        """Return the solver's own answer that a warm start begins with, None without one."""
+        if self._sequence:
+            asked, raw = self._answer
+            return raw if asked == p - 1 else None
+        earlier = self.before[p] or self.problems[p].moved(p)
+        return self.solver.solve(self.solver.prepare(earlier))
+
+    def _rehearse(self, problem: Problem) -> None:
+        """Solve a problem, so that nothing is loaded or compiled while it is timed."""
+        solver = self.solver
+        try:
+            if not solver.refuses(problem):
+                raw = solver.solve(solver.prepare(problem))
+                solver.inside(solver.prepare(problem), None, Repeats(1, 1))
+                if solver.warm:
+                    solver.solve_from(solver.prepare(problem), raw)
+        except Exception:  # it is asked again, and what it raises is told
+            return
+
+    def _cold(self, problem: Problem) -> tuple[dict[str, Any], Any]:
+        """Solve from a cold start, time it, repeat it, and solve without the last level."""
+        solver = self.solver
+        prepared = solver.prepare(problem)
+        raw = solver.solve(prepared)
+        first = solver.read(raw)
+        said = {**plain(first),
+                "cold_ns": timed(lambda: solver.solve(prepared), self.repeats),
+                "cold_inside_ns": solver.inside(prepared, None, self.repeats)}
+        again = solver.read(solver.solve(solver.prepare(problem)))
+        said["same"] = bool(np.array_equal(first.x, again.x, equal_nan=True))
+        shorter = problem.without_last()
+        if shorter is not None and not solver.refuses(shorter):
+            answer = solver.read(solver.solve(solver.prepare(shorter)))
+            said["without"] = answer.x.tolist() if answer.solved else None
+        return said, raw
+
+    def _warm(self, problem: Problem, before: Any) -> tuple[dict[str, Any], Any]:
+        """Solve from an earlier answer and time it."""
+        solver, prepared = self.solver, self.solver.prepare(problem)
+        raw = solver.solve_from(prepared, before)
+        said = {f"warm_{key}": value for key, value in plain(solver.read(raw)).items()}
+        return {**said, "warm_ns": timed(lambda: solver.solve_from(prepared, before), self.repeats),
+                "warm_inside_ns": solver.inside(prepared, before, self.repeats)}, raw
+
+
+def plain(answer: Answer) -> dict[str, Any]:
+    """Return an answer as plain data."""
+    return {"solved": bool(answer.solved), "x": np.asarray(answer.x, dtype=float).tolist(),
+            "iterations": answer.iterations}
+
+
+def yardstick() -> int:
+    """Return the time [ns] of a fixed piece of work, so that a slow machine is noticed."""
+    work = np.arange(40_000.0).reshape(200, 200)
+    times = []
+    for _ in range(20):
+        start = perf_counter_ns()
+        np.sort(work[::-1], axis=0).sum()
+        times.append(perf_counter_ns() - start)
+    return int(np.median(times))
+
+
+def resident() -> int:
+    """Return the largest memory that this process has had so far [KiB]; 0 if it is not known."""
+    about = Path("/proc/self/status")  # getrusage counts what the parent had before
+    lines = about.read_text().splitlines() if about.is_file() else []
+    return next((int(line.split()[1]) for line in lines if line.startswith("VmHWM:")), 0)

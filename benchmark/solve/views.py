@@ -1,0 +1,111 @@
+"""What is shown of a half: tables, figures, and three sentences of fixed form."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from math import isnan
+
+import numpy as np
+
+from benchmark import figures
+from benchmark.report import Section
+from benchmark.solve.judge import RIGHT
+from benchmark.solve.summary import by, profile
+from benchmark.store import Row
+from benchmark.tables import Column, Table, digits, percent, power, text, whole, yes
+from hierarchy.words import listed
+
+NOTES = f"""\
+right: share of the problems asked that are solved, and called so: every level missed by no more \
+than {RIGHT:g} |a| (1 + |x|). wrong: called solved, but missed by more. modest: right, but not \
+called so. failed: neither. ended: raised, crashed, or took too long. miss: largest of those \
+called solved, in the rows' unit, and relative to |a| (1 + |x|). moved: how far the last level \
+moved one above, relative likewise. same: the same bits twice. rough: largest step between two \
+ticks, beside that of the proved answers. MB: growth of the process. Times in microseconds, of one \
+call from Python; C: of the solve alone, taken in a compiled loop."""
+CHOSEN = ("EQ7", "INEQ7", "HUM38", "ellipse-hqp", "humanoid-reach")
+"""Families whose times are drawn."""
+TIMED = ("EQ7", "INEQ7", "HUM38", "human-hqp")
+"""Families whose times are printed."""
+_WIDELY = 0.95            # share of the problems that an entrant of the first sentence can be asked
+_RATIOS = np.geomspace(1.0, 1e4, 200)  # of times, in the performance profile
+_LABEL, _FAMILY = 23, 19  # width of the entrants' column and of a family's three
+_ANSWERS = (Column("asked", "asked", whole), Column("right", "right", percent),
+            *(Column(key, key, whole) for key in ("wrong", "modest", "failed", "ended")))
+_QUALITY = (Column("miss", "absolute", power), Column("relative", "relative", power),
+            Column("moved", "moved", power), Column("same", "same", yes), Column("rough", "rough"),
+            Column("MB", "memory_mb", whole))
+_INSIDE = (Column("Python", "median_us"), Column("C", "inside_median_us"),
+           Column("warm, Python", "warm_median_us"), Column("C", "warm_inside_median_us"))
+
+
+def section(title: str, rows: Sequence[Row], whole_: Sequence[Row], cells: Sequence[Row],
+            width: int) -> Section:
+    """Return the section of a half: its judged rows, and their summaries."""
+    families = list(dict.fromkeys(row["family"] for row in rows))
+    count = len({(row["family"], row["problem"]) for row in rows})
+    tables = [Table(f"{title}: {count} problems of {len(families)} families", whole_, _ANSWERS),
+              Table(f"{title}: quality", whole_, _QUALITY), _times(title, cells, families, width)]
+    inside = [row for row in cells if not isnan(row["inside_median_us"])]
+    if inside:
+        tables.append(Table(f"{title}: medians of compiled entrants", [
+            {**row, "entrant": f"{row['family']}, {row['entrant']}"} for row in inside], _INSIDE))
+    chosen = [name for name in CHOSEN if name in families] or families[:4]
+    drawn = {f"{title}: performance profiles": figures.profiles(_RATIOS, profile(rows, _RATIOS)),
+             f"{title}: time against miss": figures.time_against_error(
+                 [mark(row) for row in cells if row["family"] in chosen and row["answered"]]),
+             f"{title}: share right": figures.heat(cells)}
+    return Section(title, tables, NOTES, drawn, lead(title, whole_, cells))
+
+
+def mark(row: Row) -> Row:
+    """Return a summary of a family as `figures.time_against_error` draws it."""
+    return {**row, "error": row["relative"], "faint": row["right"] < 1.0,
+            "crossed": row["wrong"] > 0}
+
+
+def entrants(versions: Mapping[str, str], limits: Mapping[str, str]) -> Section:
+    """Return the section of versions and known limits."""
+    rows = [{"entrant": label, "version": version, "limits": limits.get(label, "")}
+            for label, version in versions.items()]
+    return Section("Entrants, and what is known of their limits", [Table("", rows, (
+        Column("version", "version", text), Column("limits", "limits", text)))])
+
+
+def _times(title: str, cells: Sequence[Row], families: Sequence[str], width: int) -> Table:
+    """Return the table of times in a few families, as many as fit the width."""
+    room = max(1, (width - _LABEL) // _FAMILY)
+    chosen = [name for name in TIMED if name in families][:room] or [*families[:room]]
+    rows: dict[str, dict[str, object]] = {}
+    for row in cells:
+        if row["family"] in chosen and row["answered"]:
+            own = rows.setdefault(row["entrant"], {"entrant": row["entrant"]})
+            own |= {f"{row['family']} {key}": row[key]
+                    for key in ("median_us", "p95_us", "warm_median_us")}
+    columns = [Column(f"{head}\n{key}", f"{name} {of}") for name in chosen
+               for head, key, of in ((name, "median", "median_us"), ("", "p95", "p95_us"),
+                                     ("", "warm", "warm_median_us"))]
+    return Table(f"{title}: times", list(rows.values()), columns)
+
+
+def lead(title: str, whole_: Sequence[Row], cells: Sequence[Row]) -> list[str]:
+    """Return who solves the most, where another is right more often, and where one is faster."""
+    asked = max(row["asked"] for row in whole_)
+    widely = {row["entrant"]: row["right"] for row in whole_ if row["asked"] >= _WIDELY * asked}
+    best = [label for label, share in widely.items() if share == max(widely.values())]
+    better, faster = [], []
+    for family, some in by(cells, "family"):
+        own = next(row for row in some if row["entrant"] == best[0])
+        other = max(some, key=lambda row: (row["entrant"] in widely) * row["right"])
+        if other["right"] > own["right"]:
+            better.append(f"{family} ({other['entrant']}, {percent(other['right'])} against "
+                          f"{percent(own['right'])})")
+        other = min((row for row in some if row["asked"] == own["asked"]
+                     and row["right"] >= own["right"]), key=lambda row: row["median_us"])
+        if other["median_us"] < own["median_us"]:
+            faster.append(f"{family} ({other['entrant']}, {digits(other['median_us'])} µs against "
+                          f"{digits(own['median_us'])} µs)")
+    return [f"{title}: solved most often, of those that can be asked at least "
+            f"{100 * _WIDELY:.0f} % of the problems: {listed(best)}, {percent(widely[best[0]])}.",
+            f"More often right than {best[0]}: {listed(better or ['none'])}.",
+            f"As often right as {best[0]}, and faster: {listed(faster or ['none'])}."]

@@ -1,0 +1,59 @@
+"""embodiK's velocity solver: limits as rows of their own, then levels of equalities."""
+
+from __future__ import annotations
+
+import itertools
+from importlib.metadata import version
+from typing import Any
+
+import embodik
+import numpy as np
+
+from benchmark.solve.interface import Answer, Problem, Solver
+
+_UNBOUNDED = 1e10  # how it writes a missing side
+
+
+class Embodik(Solver):
+    """`computeMultiObjectiveVelocitySolutionEigen`, with its defaults or with refinement."""
+
+    def __init__(self, refine: bool = False) -> None:
+        self.refine = refine
+
+    def version(self) -> str:
+        """Return that of embodiK."""
+        return f"embodik {version('embodik')}"
+
+    def refuses(self, problem: Problem) -> str:
+        """Inequalities belong in the first level, and there is no reference."""
+        equal = problem.lower == problem.upper
+        first = int(problem.sizes[0]) if len(problem.sizes) else 0
+        if not equal[first:].all():
+            return "inequalities in the first level only"
+        if problem.reference.any():
+            return "no reference but zero"
+        return "" if (len(problem.A) > first or not equal.all()) else "no task"
+
+    def prepare(self, problem: Problem) -> tuple[Any, ...]:
+        """Split limits and tasks; a first level of equalities is a task."""
+        n, first = len(problem.reference), int(problem.sizes[0])
+        limits = 0 if (problem.lower[:first] == problem.upper[:first]).all() else first
+        begins = np.concatenate([[0], problem.ends])
+        levels = [slice(begin, end) for begin, end in itertools.pairwise(begins)
+                  if end > begin >= limits]
+        C = problem.A[:limits] if limits else np.eye(n)
+        lower = problem.lower[:limits] if limits else np.full(n, -_UNBOUNDED)
+        upper = problem.upper[:limits] if limits else np.full(n, _UNBOUNDED)
+        return ([problem.lower[rows].copy() for rows in levels],
+                [np.asfortranarray(problem.A[rows]) for rows in levels], np.asfortranarray(C),
+                np.maximum(lower, -_UNBOUNDED), np.minimum(upper, _UNBOUNDED))
+
+    def solve(self, prepared: tuple[Any, ...]) -> Any:
+        """Call it."""
+        return embodik.computeMultiObjectiveVelocitySolutionEigen(
+            *prepared, refine_partial_scale=self.refine)
+
+    def read(self, raw: Any) -> Answer:
+        """Return the solution, and whether the status is SUCCESS."""
+        x = np.array(raw.solution, dtype=float)
+        return Answer(x, raw.status == embodik.SolverStatus.SUCCESS)

@@ -1,0 +1,1 @@
+"""Studies behind single pages: `python -m benchmark.studies.NAME`."""

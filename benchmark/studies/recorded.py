@@ -1,0 +1,72 @@
+"""Problems of a run in a file for C: python -m benchmark.studies.recorded stand-push FILE.
+
+The file has the first ticks of the run and the answers of `hcod`, each from the memory of the tick
+before; examples/c/replay.c solves them again.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from hierarchy.problem import Array, Hierarchy
+from scenarios import Recording, Scenario, load, simulate
+from scenarios.loop.controller import Controller
+from solvers import make
+
+
+def recorded(name: str, ticks: int) -> list[Hierarchy]:
+    """Return the problems of the first ticks of a scenario, which all have one shape."""
+    scenario = load(name)
+    run = simulate(scenario.with_changes({"control.duration": ticks * scenario.control.period}))
+    return problems_at(run, scenario)
+
+
+def problems_at(run: Recording, scenario: Scenario) -> list[Hierarchy]:
+    """Return what a scenario asks of its resolver in the states of a run."""
+    controller, problems = Controller(scenario), []
+    for t, q, v in zip(run["t"], run["q"], run["v"], strict=True):
+        controller.command(t, q, v)
+        problems.append(controller.hierarchy.copy())
+    return problems
+
+
+def answers(problems: Sequence[Hierarchy]) -> list[Array]:
+    """Return x of each problem, by `hcod`, from the memory of the one before."""
+    resolver, memory, found = make("hcod"), None, []
+    for h in problems:
+        res = resolver.solve(h, memory)
+        memory = res.memory
+        found.append(res.x)
+    return found
+
+
+def record_sequence(file: Path, ticks: Sequence[Hierarchy], xs: Sequence[Array] = ()) -> None:
+    """Write problems of one shape, and their answers if given.
+
+    n, m, levels, count and the sizes as int64; count times A (m, n) row after row, lower, upper and
+    the reference as double; count times x.
+    """
+    h = ticks[0]
+    head = np.array([h.n, h.m, len(h.sizes), len(ticks), *h.sizes], dtype=np.int64)
+    parts = [part for h in ticks for part in (h.A.ravel(), h.lower, h.upper, h.reference)]
+    file.write_bytes(head.tobytes() + np.concatenate([*parts, *xs]).tobytes())
+
+
+def main() -> None:
+    """Run from the command line."""
+    parser = argparse.ArgumentParser(description="Problems of a scenario in a file for C.")
+    parser.add_argument("scenario", help="such as stand-push")
+    parser.add_argument("file", type=Path)
+    parser.add_argument("--ticks", type=int, default=500)
+    given = parser.parse_args()
+    problems = recorded(given.scenario, given.ticks)
+    record_sequence(given.file, problems, answers(problems))
+    print(f"{len(problems)} problems of {given.scenario}: {given.file}")
+
+
+if __name__ == "__main__":
+    main()

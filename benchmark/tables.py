@@ -1,0 +1,116 @@
+"""Tables of rows: on the screen, as HTML, as CSV. A column says how its cells are written."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from math import isnan
+from pathlib import Path
+from typing import Any, NamedTuple, final
+
+from rich.table import Table as Rich
+
+from scenarios.files import make_folder, named, written
+
+Row = Mapping[str, Any]
+NONE = "–"
+
+
+def digits(value: Any) -> str:
+    """Return a number with three digits, or all digits before the decimal point."""
+    if _absent(value):
+        return NONE
+    return f"{value:.0f}" if value >= 100.0 else f"{value:.1f}" if value >= 10.0 else f"{value:.2f}"
+
+
+def short(value: Any) -> str:
+    """Return a number with one decimal, or all digits before the decimal point."""
+    return NONE if _absent(value) else f"{value:.0f}" if value >= 10.0 else f"{value:.1f}"
+
+
+def power(value: Any) -> str:
+    """Return a size as 1e-09."""
+    return NONE if _absent(value) else f"{value:.0e}"
+
+
+def whole(value: Any) -> str:
+    """Return a number without decimals."""
+    return NONE if _absent(value) else f"{value:.0f}"
+
+
+def text(value: Any) -> str:
+    """Return words, in a column whose lines are broken."""
+    return NONE if value is None else str(value)
+
+
+def percent(value: Any) -> str:
+    """Return a share in percent; 100 only if it is all."""
+    if _absent(value):
+        return NONE
+    return f"{100.0 * value:.0f}%" if value in (0.0, 1.0) else f"{min(100.0 * value, 99.9):.1f}%"
+
+
+def yes(value: Any) -> str:
+    """Return yes or no."""
+    return NONE if value is None else "yes" if value else "no"
+
+
+def _absent(value: Any) -> bool:
+    return value is None or (isinstance(value, float) and isnan(value))
+
+
+class Column(NamedTuple):
+    """A heading, the key of a row, and how its value is written."""
+
+    head: str
+    key: str
+    shown: Callable[[Any], str] = digits
+
+
+@final
+@dataclass(frozen=True)
+class Table:
+    """Rows under a title, with a column for the name that `first` is the key of."""
+
+    title: str
+    rows: Sequence[Row]
+    columns: Sequence[Column]
+    first: str = "entrant"
+
+    def cells(self) -> list[tuple[str, list[str]]]:
+        """Return the name and the cells of each row."""
+        return [(str(row[self.first]), [one.shown(row.get(one.key)) for one in self.columns])
+                for row in self.rows]
+
+    def rich(self) -> Rich:
+        """Return the table for a terminal, without its title."""
+        made = Rich(box=None, padding=(0, 1, 0, 0), pad_edge=False)
+        made.add_column("", no_wrap=True)
+        for column in self.columns:
+            words = column.shown is text
+            made.add_column(column.head, justify="left" if words else "right", no_wrap=not words,
+                            overflow="fold" if words else "ellipsis")
+        for name, cells in self.cells():
+            made.add_row(name, *cells)
+        return made
+
+
+def write_rows(rows: Sequence[Row], path: Path) -> None:
+    """Write rows as CSV; rows may have different columns."""
+    make_folder(path.parent)
+    with (named(path), written(path) as partial,
+          partial.open("w", newline="", encoding="utf-8") as file):
+        writer = csv.DictWriter(file, list(dict.fromkeys(key for row in rows for key in row)))
+        writer.writeheader()
+        writer.writerows(rows)
+
+
+def wide(rows: Sequence[Row], down: str, across: str, value: str,
+         shown: Callable[[Any], str] = digits) -> tuple[list[Row], list[Column]]:
+    """Return rows by the key `down`, with a column for each value of the key `across`."""
+    made: dict[Any, dict[str, Any]] = {}
+    for row in rows:
+        made.setdefault(row[down], {down: row[down]})[str(row[across])] = row[value]
+    heads = dict.fromkeys(str(row[across]) for row in rows)
+    return list(made.values()), [Column(head, head, shown) for head in heads]

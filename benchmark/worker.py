@@ -1,0 +1,94 @@
+"""Ask one entrant in its own process. Needs only numpy and the entrant.
+
+    python -m benchmark.worker QUESTIONS ADAPTER OPTIONS CORE
+
+QUESTIONS is MODULE:CLASS of what asks: `QUESTIONS(ADAPTER, OPTIONS)` makes it, `about()` is the
+first line of the answers, and each line of stdin, [METHOD, ARGUMENTS...] in JSON, is a call whose
+result is the next. ADAPTER is MODULE:CLASS or FILE.py:CLASS, OPTIONS its arguments in JSON.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import os
+import sys
+from collections.abc import Callable
+from importlib import import_module
+from pathlib import Path
+from time import get_clock_info, perf_counter_ns, process_time_ns
+from typing import Any, NamedTuple
+
+_FINE = get_clock_info("process_time").resolution < 1e-6  # coarse on some systems
+
+
+class Repeats(NamedTuple):
+    """How often a call is timed: `least` to `most` times, no more once they took `turn` [ns].
+
+    Of calls that are slow fewer than `least` are enough, once they took `enough` [ns].
+    """
+
+    least: int = 3
+    most: int = 20
+    turn: int = 2_000_000
+    enough: int = 20_000_000
+
+
+def main() -> None:
+    """Run from the command line; see the docstring of the module."""
+    questions, adapter, options, core = sys.argv[1:]
+    pipe = os.fdopen(os.dup(1), "w")
+    os.dup2(2, 1)  # output of a package must not mix with answers
+    if hasattr(os, "sched_setaffinity"):
+        os.sched_setaffinity(0, {int(core)})
+    asked = load(questions)(load(adapter), json.loads(options))
+    print(json.dumps(asked.about()), file=pipe, flush=True)
+    for line in sys.stdin:
+        method, *arguments = json.loads(line)
+        answer = getattr(asked, method)(*arguments)
+        print(json.dumps(answer, default=_plain), file=pipe, flush=True)
+
+
+def load(place: str) -> Any:
+    """Return the class of MODULE:CLASS or FILE.py:CLASS."""
+    module, _, name = place.rpartition(":")
+    if not module.endswith(".py"):
+        return getattr(import_module(module), name)
+    spec = importlib.util.spec_from_file_location(Path(module).stem, module)
+    assert spec is not None
+    assert spec.loader is not None
+    made = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = made
+    spec.loader.exec_module(made)
+    return getattr(made, name)
+
+
+def timed(call: Callable[[], Any], repeats: Repeats = Repeats()) -> list[int]:  # noqa: B008
+    """Return times of calls [ns], as many as `repeats` says.
+
+    Each is the time that passed, or the processor time of this process if that is less, which is so
+    where other work interrupted it.
+    """
+    times: list[int] = []
+    begin = perf_counter_ns()
+    while not times or (len(times) < repeats.most and perf_counter_ns() - begin < (
+            repeats.enough if len(times) < repeats.least else repeats.turn)):
+        busy = process_time_ns()
+        start = perf_counter_ns()
+        call()
+        passed = perf_counter_ns() - start
+        times.append(min(passed, process_time_ns() - busy) if _FINE else passed)
+    return times
+
+
+def reason(error: Exception) -> str:
+    """Return the kind of an exception and its first line."""
+    return f"{type(error).__name__}: {error}".partition("\n")[0]
+
+
+def _plain(value: Any) -> Any:
+    return value.tolist()  # of numpy
+
+
+if __name__ == "__main__":
+    main()

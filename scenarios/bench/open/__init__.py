@@ -1,1 +1,0 @@
-"""The open benchmark of prioritized control: problems as files, entrants, judged answers."""

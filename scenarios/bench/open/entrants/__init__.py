@@ -1,1 +1,0 @@
-"""The entrants: one file each; `scenarios.bench.open.table` has a row for every one."""

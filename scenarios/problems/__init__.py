@@ -1,0 +1,1 @@
+"""The problems of the open benchmark: families, public and from a seed, with proved answers."""

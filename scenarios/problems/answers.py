@@ -1,0 +1,111 @@
+"""Proved answers: resolvers give candidates, `solvers.proof` decides; files of both, and checks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from hierarchy.problem import Array, Hierarchy
+from scenarios.files import named, written
+from scenarios.problems.families import Family
+from solvers import make
+from solvers.problems.files import Collection
+from solvers.proof import Proof, prove
+from solvers.qp.backends import installed
+from solvers.resolver import Resolver
+
+_BACKENDS = ("daqp", "quadprog", "clarabel", "proxqp")
+
+Progress = Callable[[int, int], None]
+
+_SAME = 1e-9  # relative to 1 + the value
+
+
+def with_answers(collection: Collection, progress: Progress | None = None) -> Collection:
+    """Return the collection with what could be proved of each problem.
+
+    progress : told the number of problems done, and their number.
+    """
+    found = []
+    for done, h in enumerate(collection.problems, 1):
+        found.append(answer(h))
+        if progress is not None:
+            progress(done, len(collection.problems))
+    return replace(collection, answers=tuple(found))
+
+
+def answer(h: Hierarchy) -> Proof:
+    """Return the proof that the first suitable candidate leads to, or the best of all."""
+    best: Proof | None = None
+    for x in _candidates(h):
+        found = prove(h, [x])
+        if found.complete:
+            return found
+        if best is None or found.judged > best.judged:
+            best = found
+    assert best is not None
+    return best
+
+
+def _candidates(h: Hierarchy) -> Iterator[Array]:
+    for resolver in _resolvers():
+        if resolver.name == "recursive" and not h.is_equality:
+            continue
+        yield resolver.solve(h).x
+
+
+def _resolvers() -> list[Resolver]:
+    return [make("hcod"), *(make("hqp", backend=name) for name in _BACKENDS
+                            if installed(name)), make("recursive")]
+
+
+def file_of(folder: Path, family: str, seed: int) -> Path:
+    """Return the path of a set's file."""
+    return folder / f"{family}-{f'fresh-{seed}' if seed else 'public'}.npz"
+
+
+def export(family: Family, seed: int, count: int | None, answers: bool, folder: Path,
+           progress: Progress | None = None) -> Path:
+    """Write a set of a family into the folder, and return the file."""
+    made = family.half(seed, count)
+    return save(with_answers(made, progress) if answers else made, folder)
+
+
+def save(collection: Collection, folder: Path) -> Path:
+    """Write a collection under its usual name, whole or not at all."""
+    file = file_of(folder, collection.head.family, collection.head.seed)
+    with named(folder):
+        folder.mkdir(parents=True, exist_ok=True)
+    with named(file), written(file) as partial:
+        collection.save(partial)
+    return file
+
+
+def check(collection: Collection) -> dict[int, str]:
+    """Return what is wrong with the answers of a collection, by number of the problem.
+
+    An answer is wrong if one that is proved here has other least violations or another x.
+    """
+    wrong = {}
+    for p, (h, said) in enumerate(zip(collection.problems, collection.answers or (),
+                                      strict=collection.answers is not None)):
+        difference = _difference(said, answer(h))
+        if difference:
+            wrong[p] = difference
+    return wrong
+
+
+def _difference(said: Proof, found: Proof) -> str:
+    judged = min(said.judged, found.judged)
+    off = abs(said.least - found.least)[:judged] > _SAME * (1.0 + abs(found.least[:judged]))
+    if off.any():
+        k = int(np.argmax(off))
+        return f"level {k + 1}: least violation {said.least[k]:.17g}, proved {found.least[k]:.17g}"
+    off = abs(said.x - found.x) > _SAME * (1.0 + abs(found.x).max())
+    if judged > len(said.least) and off.any():
+        i = int(np.argmax(abs(said.x - found.x)))
+        return f"x[{i}] is {said.x[i]:.17g}, proved {found.x[i]:.17g}"
+    return ""

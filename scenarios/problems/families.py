@@ -1,0 +1,162 @@
+"""The families of the open benchmark: each makes a public set and fresh ones from a seed.
+
+A family of your own is one entry in FAMILIES: a function from a seed and a count to hierarchies.
+Seed 0 is the public set, which everybody may tune on; any other seed is fresh.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from importlib.metadata import PackageNotFoundError, distribution, version
+from typing import final
+
+from hierarchy.errors import HierarchyError, UnknownNameError
+from hierarchy.problem import Hierarchy
+from scenarios.problems import postures, windows
+from scenarios.problems import reference as stored
+from solvers import problems
+from solvers.problems.files import FRESH, PUBLIC, Collection, Head
+
+COUNT = 50
+_CONSECUTIVE = 200
+_FEW = 20            # where a proof takes seconds
+_SIMULATED = (*stored.RECORDED, "stand-push")
+_STRIDE = 1_000_000  # seeds of single problems between two seeds of sets
+
+Make = Callable[[int, int], Sequence[Hierarchy]]
+
+
+@final
+@dataclass(frozen=True)
+class Family:
+    """Problems of one kind.
+
+    Attributes
+    ----------
+    name, group, what : what it is called, which families it goes with, and what it has.
+    make : from the seed of the set, 0 for the public one, and a count to that many problems.
+    period : [s] between two problems that are consecutive ticks; 0 if they are not.
+    usual : number of problems of a set, unless asked otherwise.
+    """
+
+    name: str
+    group: str
+    what: str
+    make: Make
+    period: float = 0.0
+    usual: int = COUNT
+
+    def half(self, seed: int = 0, count: int | None = None) -> Collection:
+        """Return the public set (seed 0), or a fresh one; raises HierarchyError."""
+        count = self.usual if count is None else count
+        if seed < 0 or count < 1:
+            raise HierarchyError(f"family {self.name!r}: seed {seed} and count {count}; expected a "
+                                 "seed of at least 0 and a count of at least 1")
+        source = f"task-hierarchy {version('task-hierarchy')}"
+        head = Head(self.name, self.what, FRESH if seed else PUBLIC, seed, self.period > 0.0,
+                    self.period, source)
+        return Collection(head, tuple(self.make(seed, count)))
+
+
+def family(name: str) -> Family:
+    """Return a family by name; raises UnknownNameError."""
+    if name not in FAMILIES:
+        raise UnknownNameError("family of problems", name, list(FAMILIES))
+    return FAMILIES[name]
+
+
+def _reference(name: str, seed: int, count: int) -> list[Hierarchy]:
+    """Return stored problems, or new ones of the same make."""
+    if seed and name in stored.RECORDED:
+        return [one.h for one in stored.fresh(name, seed, count)]
+    if seed:
+        return [problems.family(name, seed * _STRIDE + i) for i in range(count)]
+    return [one.h for one in stored.family(name)[:count]]
+
+
+def _kind(name: str, seed: int, count: int) -> list[Hierarchy]:
+    return [problems.structured(seed * _STRIDE + i, (name,)) for i in range(count)]
+
+
+def _recipe(seed: int, count: int) -> list[Hierarchy]:
+    return [problems.generate(seed * _STRIDE + i) for i in range(count)]
+
+
+_REFERENCE = {
+    "EQ7": "7 unknowns, equalities in levels of 3, 1, 1",
+    "EQ7over": "more rows than unknowns, 3 levels of 3",
+    "EQ7sing": "repeated and dependent rows with conflicting targets",
+    "EQ30L8": "30 unknowns, 8 levels of 3",
+    "EQ30L10": "30 unknowns, 10 levels of 3",
+    "INEQ7": "an arm: limits, avoidance, position, cone, posture",
+    "HUM38": "38 unknowns: limits, four tasks, posture",
+    "DEGEN7": "INEQ7 with rows repeated, negated, zero, nearly parallel",
+    "DYN60": "a humanoid with torque motors: dynamics, contacts, friction (fresh: extra `sim`)"}
+_KINDS = {
+    "singular_arm": "random arms at multiples of 90 degrees",
+    "dusty_arm": "the same, with the rounding of cosines kept",
+    "tied_box": "limits of 0, and tasks into their corner",
+    "opposed": "avoidance from two sides with too little room",
+    "contacts": "forces of feet in friction pyramids",
+    "nested": "levels that repeat upper ones",
+    "mixed_units": "rows of norm 0.001, 1 and 1000 in one level",
+    "integers": "entries and sides from -2 to 2",
+    "chain": "bounds on differences of neighbours",
+    "signs": "all sides 0, 1 or -1",
+    "one_unknown": "one unknown, many rows that disagree",
+    "sixty_unknowns": "limits, tasks and posture of 60 unknowns",
+    "fifteen_levels": "fifteen levels, most without freedom",
+    "near_ties": "repeated rows whose sides differ by 1e-9",
+    "nearly_parallel": "rows at angles of 1e-9 to 1e-6 rad",
+    "tiny_rows": "rows of norm 1e-14",
+    "shifted": "another kind with all unknowns shifted"}
+_POSTURES = {
+    "singular-lwr": "KUKA LWR at and near singular postures",
+    "singular-dual-arm": "an upper body with two arms, likewise",
+    "singular-humanoid": "a humanoid on two feet, likewise",
+    "singular-panda": "Franka Panda, likewise (extra `robots`)",
+    "singular-romeo": "Romeo on two feet, likewise (extra `robots`)"}
+
+
+def _all() -> dict[str, Family]:
+    made = [Family(name, "reference", what, partial(_reference, name),
+                   usual=_FEW if name in _SIMULATED else COUNT)
+            for name, what in _REFERENCE.items()]
+    made += [Family(name, "recorded", what, partial(windows.recorded, name),
+                    windows.PERIODS[name], _FEW if name in _SIMULATED else _CONSECUTIVE)
+             for name, what in windows.SCENARIOS.items()]
+    made += [Family(name, "postures", what, partial(postures.posed, name))
+             for name, what in _POSTURES.items()]
+    made += [Family(name, "degenerate", what, partial(_kind, name))
+             for name, what in _KINDS.items()]
+    made.append(Family("recipe", "random", "random sizes, ranks, ties, scales", _recipe))
+    return {one.name: one for one in made}
+
+
+FAMILIES = _all()
+"""The families by name."""
+_NEEDS = {**dict.fromkeys(("singular-panda", "singular-romeo"), ("example-robot-data", "robots")),
+          **dict.fromkeys(_SIMULATED, ("mujoco", "sim"))}
+"""Distribution and extra of this project that a family needs."""
+
+
+def available() -> list[Family]:
+    """Return the families whose packages are installed."""
+    left = unavailable()
+    return [one for name, one in FAMILIES.items() if name not in left]
+
+
+def unavailable() -> dict[str, str]:
+    """Return what to install for each of the other families, by name."""
+    return {name: f"needs {package}: pip install 'task-hierarchy[{extra}]'"
+            for name, (package, extra) in _NEEDS.items() if not _installed(package)}
+
+
+def _installed(package: str) -> bool:
+    try:  # a wheel of example-robot-data has no module of Python
+        distribution(package)
+    except PackageNotFoundError:
+        return False
+    return True

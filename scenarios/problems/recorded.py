@@ -1,0 +1,118 @@
+"""The family DYN60: ticks of `stand-push`, recorded (extra `sim`).
+
+`python -m scenarios.problems.recorded --out FILE` writes the stored set again, with another seed
+a fresh one.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from hierarchy.problem import Array, Hierarchy
+from scenarios.cell.build import build
+from scenarios.config import Scenario, load
+from scenarios.config.sampling import changed, drawn
+from scenarios.loop.simulation import simulate
+from scenarios.measure.judging import Rows
+from solvers import Status, certify, make
+from solvers.qp.backends import BACKENDS, installed
+
+SCENARIO = "stand-push"
+SEED, COUNT, TOGETHER = 60, 100, 10  # of the stored set; ticks in a row of one run
+LEFT_OUT = "joint limits"            # a level of the scenario that the family lacks
+_FIRST, _LAST = 0.3, 1.0             # [s] between which the ticks lie: the push begins at 0.3 s
+_MISSING = 1e9                       # marks a missing side in the data
+_NEAREST = 1e-9                      # tolerance of `certify`
+_AGREE = 1e-6                        # of answers, relative to 1 + |x|
+
+
+def sequences(seed: int) -> Iterator[list[tuple[Hierarchy, Array]]]:
+    """Yield TOGETHER consecutive ticks of one sampled run after another, with certified answers.
+
+    A run that falls before its ticks is left out, and one with a tick that has no certified answer,
+    or two.
+    """
+    base, run = load(SCENARIO), 0
+    while True:
+        values = drawn(base, base.variation, seed, run)
+        chance = np.random.default_rng([seed, run])
+        first = int(chance.uniform(_FIRST, _LAST) / base.control.period)
+        some = [(h, x) for h in _ticks(changed(base, values, "DYN60"), first)
+                if (x := answer(h)) is not None]
+        if len(some) == TOGETHER:
+            yield some
+        run += 1
+
+
+def _ticks(scenario: Scenario, first: int) -> list[Hierarchy]:
+    """Return the hierarchies of TOGETHER ticks of a run from tick `first` on, none if it fell."""
+    duration = (first + TOGETHER) * scenario.control.period
+    recording = simulate(scenario.with_changes({"control.duration": duration}))
+    if recording.fault is not None:
+        return []
+    rows, order = Rows(recording, build(scenario)), recording.order_names[0]
+    found = (rows.hierarchy(k, order) for k in range(first, first + TOGETHER))
+    return [_without(h, LEFT_OUT) for h in found if h is not None]
+
+
+def _without(h: Hierarchy, name: str) -> Hierarchy:
+    """Return a copy of h without a level."""
+    level = h.names.index(name)
+    kept = np.delete(np.arange(h.m), np.arange(h.offsets[level], h.offsets[level + 1]))
+    names = tuple(other for other in h.names if other != name)
+    return h.changed(A=h.A[kept], lower=h.lower[kept], upper=h.upper[kept],
+                     sizes=np.delete(h.sizes, level), reference=h.start(), names=names)
+
+
+def answer(h: Hierarchy) -> Array | None:
+    """Return the certified answer of hcod and the backends of hqp, None without one they agree on.
+
+    Where rows are parallel up to the angle at which they count as dependent, there are two.
+    """
+    tried = [make("hcod"), *(make("hqp", backend=name) for name in BACKENDS if installed(name))]
+    found = [res.x for res in (resolver.solve(h) for resolver in tried)
+             if res.status in (Status.SOLVED, Status.INACCURATE)
+             and certify(h, res.x, _NEAREST).certified]
+    if not found or any(np.abs(x - found[0]).max() > _AGREE * (1.0 + np.abs(x).max())
+                        for x in found):
+        return None
+    return found[0]
+
+
+def packed(problems: list[tuple[Hierarchy, Array]]) -> dict[str, Array]:
+    """Return problems of one shape as the arrays of a family's file."""
+    hs, x = [h for h, _ in problems], np.array([x for _, x in problems])
+    first = hs[0]
+    found = {"n": np.array(first.n), "L": np.array(len(first.sizes)), "m": first.sizes, "x": x,
+             "norms": np.array([h.violations(y) for h, y in problems]),
+             "violation": np.array([h.slacks(y) for h, y in problems]),
+             "sequence": np.arange(len(hs)) // TOGETHER}
+    for k, (i, j) in enumerate(zip(first.offsets[:-1], first.offsets[1:], strict=True)):
+        found |= {f"A{k}": np.array([h.A[i:j] for h in hs]),
+                  f"lb{k}": np.array([np.maximum(h.lower[i:j], -_MISSING) for h in hs]),
+                  f"ub{k}": np.array([np.minimum(h.upper[i:j], _MISSING) for h in hs])}
+    return found
+
+
+def main() -> None:
+    """Record the family and write its file."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seed", type=int, default=SEED)
+    parser.add_argument("--count", type=int, default=COUNT, help="problems")
+    parser.add_argument("--out", type=Path, required=True, metavar="FILE")
+    asked = parser.parse_args()
+    problems: list[tuple[Hierarchy, Array]] = []
+    for some in sequences(asked.seed):
+        problems += some
+        print(f"{len(problems)} of {asked.count}", flush=True)
+        if len(problems) >= asked.count:
+            break
+    np.savez_compressed(asked.out, allow_pickle=False, **packed(problems[:asked.count]))
+
+
+if __name__ == "__main__":
+    main()

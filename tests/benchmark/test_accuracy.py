@@ -1,0 +1,156 @@
+"""Accuracy and growth: their arms, their references, who reaches what, their rows."""
+
+from dataclasses import replace
+
+import exact
+import numpy as np
+import oracle
+import pytest
+import rank_cases
+
+from benchmark import arms, figures
+from benchmark.solve import accuracy, first_paper, growth
+from benchmark.solve.ours import Ours
+from benchmark.timing import Timed
+from hierarchy import Hierarchy, Robot, State
+from hierarchy.robots import KUKA_LWR, TABLES
+from scenarios.problems.answers import answer
+from solvers import names
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def tables():
+    """Errors and times of a small run."""
+    few = pytest.MonkeyPatch()
+    few.setattr(growth, "FIRST_PAPER", {key: sizes[:3] for key, sizes in
+                                        growth.FIRST_PAPER.items()})
+    found = first_paper.run(arms=50, checked=10, seconds=0.0)
+    few.undo()
+    return found.rows["errors"], found.rows["growth"]
+
+
+def claims():
+    """Accuracy by label of those that claim to be strict."""
+    made = [(one.label, Ours(**one.options).resolver) for one in accuracy.entrants()
+            if "resolver" in one.options]
+    return {label: resolver.accuracy for label, resolver in made if resolver.strict}
+
+
+def test_the_jacobians_are_those_of_pinocchio(monkeypatch):
+    rng = np.random.default_rng(5)
+    some, q = arms.draw(4, rng), rng.uniform(-3.0, 3.0, (4, 6))
+    for i, J in enumerate(some.jacobians(q)):
+        table = replace(KUKA_LWR, name="some", a=tuple(some.a[i]), d=tuple(some.d[i]),
+                        alpha=tuple(np.degrees(some.alpha[i])), range=(180.0,) * 6,
+                        velocity=(1.0,) * 6, mass=(1.0,) * 6, control_points=())
+        monkeypatch.setitem(TABLES, "some", table)
+        state = State.at(Robot.named("some"), q[i])
+        p = state.position(state.robot.frame("end_effector"))
+        linear = state.J[:3] + np.cross(state.J[3:].T, p).T
+        np.testing.assert_allclose(J, np.vstack([linear, state.J[3:]]), atol=1e-12)
+
+
+def test_regular_arms_are_regular_and_near_singular_ones_lack_one_direction():
+    regular = np.linalg.svd(arms.regular(200), compute_uv=False)
+    near = np.linalg.svd(arms.near_singular(200), compute_uv=False)
+    assert regular[:, -1].min() >= arms.REGULAR
+    assert near[:, -2].min() >= arms.REGULAR
+    assert near[:, -1].min() >= arms.NEAREST
+    assert near[:, -1].max() < 0.02
+    assert np.percentile(near[:, -1], 10) < 1e-5
+
+
+@pytest.mark.parametrize("case", [
+    rank_cases.generic, rank_cases.more_rows_than_joints, rank_cases.row_repeated_inside_a_level,
+    rank_cases.rows_repeated_in_a_lower_level, rank_cases.zero_rows,
+    rank_cases.conflicting_targets, rank_cases.one_joint, rank_cases.no_freedom_left])
+def test_rational_arithmetic_gives_the_answer_of_the_oracle(case):
+    h = rank_cases.build(case, with_reference=True)
+    np.testing.assert_allclose(exact.exact(h), oracle.solve(h), rtol=1e-10, atol=1e-10)
+
+
+def test_rational_arithmetic_has_no_tolerance():
+    h = Hierarchy.from_levels([([[1.0, 0.0]], [0.0]), ([[1.0, 2.0**-40]], [1.0])])
+    assert exact.exact(h).tolist() == [0.0, 2.0**40]
+
+
+def test_the_damped_reference_is_that_of_the_oracle():
+    for h in accuracy.hierarchies(accuracy.CASES[2], 20, 0)[0]:
+        np.testing.assert_allclose(accuracy.damped(h, 0.05, 0.1), oracle.solve(h, 0.05, 0.1),
+                                   atol=1e-9)
+
+
+@pytest.mark.parametrize("case", [c for c in accuracy.CASES if not c.damping], ids=lambda c: c.name)
+def test_the_least_that_a_task_can_miss_is_what_the_exact_answer_misses(case):
+    for h, least in zip(*accuracy.hierarchies(case, 5, 3), strict=True):
+        x = exact.exact(h)
+        np.testing.assert_allclose(answer(h).x, x, rtol=1e-12, atol=1e-12)
+        rounding = 1e-14 * (1.0 + np.linalg.norm(x))
+        np.testing.assert_allclose(h.violations(x), least, atol=rounding)
+
+
+def test_a_row_for_every_resolver_and_case(tables):
+    errors, _ = tables
+    labels = set(names()) - {"hqp"} | {"tpm-published", "reverse in-order", "hqp proxqp"}
+    for case in accuracy.CASES:
+        rows = [row for row in errors if row["case"] == case.name]
+        expected = labels if case.damping else labels | {accuracy.NUMPY}
+        assert {row["entrant"] for row in rows} == expected
+        assert all(row["failed"] == 0 and row["arms"] == 50 for row in rows)
+
+
+def test_strict_resolvers_reach_all_that_the_tasks_can_have(tables):
+    errors, _ = tables
+    for row in errors:
+        if row["entrant"] in claims() and row["case"] in ("regular", "conflict", "crowded"):
+            worst = [row[key] for key in row if key.endswith("_max")]
+            assert max(worst) < claims()[row["entrant"]], row
+            assert row["certified"] == 1.0, row
+
+
+def test_damped_resolvers_but_reverse_agree_with_the_damped_reference(tables):
+    errors, _ = tables
+    for row in errors:
+        if row["case"] == "damped" and row["entrant"] in claims().keys() - {"reverse in-order"}:
+            assert row["x_max"] < claims()[row["entrant"]], row
+
+
+def test_the_table_tells_who_is_not_strict(tables):
+    errors, _ = tables
+    found = {(row["case"], row["entrant"]): row for row in errors}
+    assert found["conflict", "augmented"]["task_1_max"] > 0.1
+    assert found["regular", "tpm-published"]["task_3_max"] < 1e-9
+    assert found["crowded", "tpm-published"]["task_4_max"] > 0.1
+    assert found["crowded", "tpm-published"]["certified"] < 1.0
+
+
+def test_every_strict_resolver_is_timed_at_every_size(tables):
+    _, times = tables
+    sizes = {(key, *size[:2]) for key, some in growth.FIRST_PAPER.items() for size in some[:3]}
+    labels = {one.label for one in accuracy.entrants()} - set(growth.LEVEL_LESS)
+    assert {(row["figure"], row["joints"], row["tasks"], row["entrant"]) for row in times} == {
+        (*size, label) for size in sizes for label in labels}
+    assert all(row["solves"] >= 1 and row["median_us"] > 0.0 for row in times)
+
+
+def test_what_goes_before_a_call_is_not_timed():
+    seen = []
+    timed = Timed(lambda: seen.append("call"), {"what": "some"}, lambda: seen.append("before"))
+    timed.take_turn()
+    assert seen == ["before", "call"]
+    assert timed.row()["what"] == "some"
+    assert timed.row()["solves"] == 1
+
+
+def test_an_exponent_is_the_slope_of_the_upper_half_of_the_sizes():
+    rows = [{"joints": n, "entrant": "some", "median_us": max(100.0, n**2)}
+            for n in (1, 3, 9, 20, 40, 80)]
+    assert figures.exponents(rows, "joints") == {"some": pytest.approx(2.0)}
+
+
+def test_no_name_in_the_figure_is_written_over_another():
+    spread = figures.spread([0.1, 0.11, 0.5, 0.9, 0.9])
+    assert np.diff(spread).min() >= figures._APART - 1e-12
+    assert spread[2] == pytest.approx(0.5)

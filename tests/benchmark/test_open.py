@@ -1,0 +1,430 @@
+"""The open benchmark: what it makes of entrants, how it judges, what it prints and draws."""
+
+import json
+import re
+import shutil
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmark import solve
+from benchmark.packages import OWN, Entrant, MissingError
+from benchmark.process import CRASHED, HUNG
+from benchmark.solve import judge as judging
+from benchmark.solve import open as opened
+from benchmark.solve.entrants import ENTRANTS, chosen, compiled
+from benchmark.solve.interface import Problem, read_problems
+from benchmark.solve.judge import judge, judged
+from benchmark.solve.open import LEFT_OUT, asked
+from benchmark.solve.questions import REPEATS
+from benchmark.solve.summary import cells, profile, summaries, summary
+from benchmark.solve.views import lead
+from benchmark.store import Store
+from hierarchy import Hierarchy
+from hierarchy.errors import HierarchyError
+from scenarios.cli.main import run_command
+from scenarios.problems.families import FAMILIES
+from solvers import certify, library
+from solvers.problems.files import Collection, Head
+from solvers.proof import prove
+
+HELPERS = Path(__file__).parents[1] / "helpers"
+SOLVE = Path(solve.__file__).parent
+
+
+def simple(side):
+    """x1 = side, then x2 <= 1 against x2 = 2: the least violations are 0, 0 and 1."""
+    return Hierarchy.from_levels([([[1.0, 0.0]], [side]), ([[0.0, 1.0]], [-np.inf], [1.0]),
+                                  ([[0.0, 2.0]], [4.0])])
+
+
+def collection(problems, sequence=False):
+    answers = tuple(prove(h, [np.linalg.lstsq(h.A, np.where(np.isfinite(h.lower), h.lower, 0.0))[0],
+                              [h.lower[0], 1.0]]) for h in problems)
+    return Collection(Head("simple", "for tests", "fresh", 7, sequence, 0.001 * sequence),
+                      tuple(problems), answers)
+
+
+@pytest.fixture(scope="module")
+def equalities(tmp_path_factory):
+    """Problems of one level, whose first sides are 0 to 4."""
+    file = tmp_path_factory.mktemp("problems") / "simple.npz"
+    collection([Hierarchy.from_levels([(np.eye(2), [float(side), 1.0])])
+                for side in range(5)]).save(file)
+    return file
+
+
+def run_entrant(entrant, file, limit=10.0):
+    return list(asked(entrant, [file], limit))[0]  # noqa: RUF015
+
+
+def fake(name, **options):
+    return Entrant(name, OWN, f"{HELPERS / 'fake_entrants.py'}:{name}", options)
+
+
+def ends(answers):
+    return [answer.get("ended") for answer in answers]
+
+
+def test_every_resolver_of_the_project_is_an_entrant():
+    from solvers import names
+    from solvers.qp.backends import BACKENDS
+
+    labels = {row.label for row in ENTRANTS}
+    assert {name for name in names() if name != "hqp"} <= labels
+    assert {f"hqp {name}" for name in BACKENDS} <= labels
+    assert len(labels) == len(ENTRANTS)
+
+
+@pytest.mark.slow
+def test_a_crash_costs_one_problem(equalities):
+    answers = run_entrant(fake("Crashing"), equalities)
+    assert answers[0]["version"] == "fake 1"
+    assert ends(answers) == [None, None, CRASHED, None, None]
+    assert "code -9" in answers[2]["why"]
+    assert answers[4]["x"] == pytest.approx([4.0, 1.0])
+    assert [answer["problem"] for answer in answers] == [0, 1, 2, 3, 4]
+
+
+@pytest.mark.slow
+def test_one_process_serves_all_files_until_it_ends(equalities):
+    said = list(asked(fake("Crashing"), [equalities] * 2))
+    assert [ends(answers) for answers in said] == [[None, None, CRASHED, None, None]] * 2
+    assert said[1][4]["x"] == pytest.approx([4.0, 1.0])
+
+
+@pytest.mark.slow
+def test_a_hang_costs_one_problem(equalities):
+    answers = run_entrant(fake("Hanging"), equalities, limit=1.0)
+    assert ends(answers) == [None, None, HUNG, None, None]
+
+
+@pytest.mark.slow
+def test_what_is_raised_is_told_and_what_is_printed_does_not_mix(equalities):
+    answers = run_entrant(fake("Raising"), equalities)
+    assert [answer["raised"] for answer in answers] == ["ArithmeticError: not today"] * 5
+
+
+@pytest.mark.slow
+def test_an_entrant_that_cannot_start_is_missing_with_the_reason(equalities):
+    with pytest.raises(MissingError, match="takes no arguments"):
+        run_entrant(fake("LeastSquares", no=1), equalities)
+    with pytest.raises(MissingError, match="No such file"):
+        run_entrant(replace(fake("LeastSquares"), python="/no/such/python"), equalities)
+
+
+@pytest.mark.slow
+def test_an_entrant_that_starts_warm_is_asked_warm(equalities):
+    answers = run_entrant(fake("Starting"), equalities)
+    assert all(answer["warm_ns"] and answer["warm_solved"] for answer in answers)
+    assert answers[3]["warm_x"] == pytest.approx([3.0, 1.0])
+
+
+@pytest.mark.slow
+def test_an_entrant_that_crashes_for_ever_is_left_out_in_the_end(monkeypatch, equalities):
+    monkeypatch.setattr(opened, "MOST_ENDS", 2)
+    answers = run_entrant(fake("Doomed"), equalities)
+    assert ends(answers) == [CRASHED, CRASHED, LEFT_OUT, LEFT_OUT, LEFT_OUT]
+    assert "code 3" in answers[0]["why"]
+
+
+CC = next(filter(None, map(shutil.which, ("cc", "gcc", "clang"))), None)
+needs_c = pytest.mark.skipif(CC is None, reason="no compiler of C")
+LIBRARY = """
+#include "solver.h"
+#include <stdlib.h>
+
+void *prepare(int64_t n, int64_t levels, const int64_t *sizes, const double *A,
+              const double *lower, const double *upper, const double *reference) {
+  double *x = n == 2 ? malloc(2 * sizeof *x) : NULL;
+  if (x) x[0] = lower[0], x[1] = lower[1];
+  return x;
+}
+int solve(void *prepared, void *before, double *x, int64_t *iterations) {
+  const double *kept = prepared;
+  x[0] = kept[0], x[1] = kept[1], *iterations = before ? 1 : 7;
+  return 1;
+}
+void release(void *prepared) { free(prepared); }
+"""
+"""Solves levels of the identity with two unknowns."""
+
+
+def shared(source, out, *flags):
+    subprocess.run([CC, "-O2", "-fPIC", "-shared", f"-I{SOLVE}", source, *flags, "-o", out],
+                   check=True)
+    return out
+
+
+@needs_c
+@pytest.mark.slow
+def test_a_solver_in_a_library_is_timed_from_python_and_inside(tmp_path, equalities):
+    (tmp_path / "one.c").write_text(LIBRARY)
+    (one,) = compiled([shared(tmp_path / "one.c", tmp_path / "one.so")], ["one"])
+    answers = run_entrant(one, equalities)
+    assert [answer["x"] for answer in answers] == [[float(side), 1.0] for side in range(5)]
+    for answer in answers:
+        assert (answer["iterations"], answer["warm_iterations"]) == (7, 1)
+        if sys.platform == "linux":
+            assert 1 <= len(answer["cold_inside_ns"]) <= REPEATS.most
+            assert 0 <= min(answer["cold_inside_ns"]) < min(answer["cold_ns"])
+
+
+@needs_c
+@pytest.mark.slow
+def test_a_library_may_refuse_a_problem(tmp_path):
+    (tmp_path / "one.c").write_text(LIBRARY)
+    (one,) = compiled([shared(tmp_path / "one.c", tmp_path / "one.so")], ["one"])
+    made = collection([Hierarchy.from_levels([(np.eye(3), np.ones(3))])])
+    made.save(tmp_path / "three.npz")
+    assert run_entrant(one, tmp_path / "three.npz")[0]["refused"] == "not for this solver"
+
+
+@needs_c
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform != "linux", reason="the C library is made on Linux")
+@pytest.mark.parametrize("resolver", ["hcod", "tpm"])
+def test_our_c_library_answers_behind_the_header_as_python_does(tmp_path, resolver):
+    """The worked example of solver.h; tpm refuses inequalities beyond bounds."""
+    library.write(tmp_path / "lib", ("hcod", "tpm"))
+    out = shared(SOLVE / "library.c", tmp_path / "ours.so", f"-DSOLVE=th_solve_{resolver}",
+                 f"-I{tmp_path / 'lib' / 'include'}",
+                 tmp_path / "lib" / "lib" / "libtask_hierarchy.a", "-lm")
+    made = collection([simple(side) for side in (1.0, 2.0, 3.0)], sequence=True)
+    made.save(tmp_path / "simple.npz")
+    rows = run_entrant(compiled([out], ["ours"])[0], tmp_path / "simple.npz")
+    if resolver == "tpm":
+        assert {row["refused"] for row in rows} == {"not for this solver"}
+        return
+    found = judge(rows, {made.digest: made})
+    assert [row["verdict"] for row in found] == [judging.SOLVED] * 3
+    assert [row["warm_right"] for row in found] == [None, True, True]
+
+
+def test_each_library_needs_a_name_and_a_file(tmp_path):
+    with pytest.raises(HierarchyError, match="1 libraries and 0 names"):
+        compiled([tmp_path / "a.so"], [])
+    with pytest.raises(HierarchyError, match=r"a\.so does not exist"):
+        compiled([tmp_path / "a.so"], ["a"])
+
+
+@pytest.mark.slow
+def test_an_entrant_in_python_has_no_times_inside(equalities):
+    answers = run_entrant(fake("Starting"), equalities)
+    assert all(answer["cold_inside_ns"] == answer["warm_inside_ns"] == [] for answer in answers)
+
+
+def test_the_worker_reads_the_problems_that_were_written(tmp_path):
+    from solvers import problems
+
+    found = tuple(problems.structured(seed) for seed in range(5))
+    Collection(Head("mixed", "", "fresh", 1), found).save(tmp_path / "mixed.npz")
+    for h, one in zip(found, read_problems(tmp_path / "mixed.npz"), strict=True):
+        for name in ("A", "lower", "upper", "sizes", "reference"):
+            np.testing.assert_array_equal(getattr(one, name), getattr(h, name))
+
+
+def test_a_problem_without_its_last_level_skips_empty_ones():
+    sizes = np.array([1, 0, 2, 0])
+    one = Problem(np.eye(3), np.zeros(3), np.ones(3), sizes, np.zeros(3)).without_last()
+    assert one is not None
+    assert one.sizes.tolist() == [1, 0]
+    assert one.A.shape == (1, 3)
+    assert one.without_last() is None
+
+
+def raw(x, collected, problem=0, solved=True, **more):
+    said = {"entrant": "one", "version": "1", "family": "simple", "half": "fresh", "seed": 7,
+            "sha256": collected.digest, "problem": problem, "solved": solved, "same": True,
+            "x": None if x is None else list(map(float, x)), "cold_ns": [1000, 3000, 2000]}
+    return {**said, **more}
+
+
+def found(x, solved=True, **more):
+    one = collection([simple(3.0)])
+    return judge([raw(x, one, solved=solved, **more)], {one.digest: one})[0]
+
+
+@pytest.mark.parametrize(("x", "solved", "verdict", "level"), [
+    ([3.0, 1.0], True, judging.SOLVED, -1), ([3.0, 1.0], False, judging.MODEST, -1),
+    ([3.0 + 1e-7, 1.0], True, judging.SOLVED, -1), ([3.1, 1.0], True, judging.WRONG, 0),
+    ([3.0, 1.5], True, judging.WRONG, 1), ([3.0, 0.5], True, judging.WRONG, 2),
+    ([3.0, 0.5], False, judging.FAILED, 2), ([np.nan, 1.0], True, judging.WRONG, 0),
+    ([3.0], True, judging.WRONG, 0)])
+def test_only_x_decides_whether_an_answer_is_right(x, solved, verdict, level):
+    one = found(x, solved)
+    assert (one["verdict"], one["level"]) == (verdict, level)
+
+
+def test_a_miss_is_told_in_the_rows_unit_and_relative():
+    one = found([3.0, 0.5])
+    assert one["absolute"] == pytest.approx(1.0)  # |2 * 0.5 - 4| beyond 2
+    assert one["relative"] == pytest.approx(1.0 / (2.0 * (1.0 + np.sqrt(10.0))))
+
+
+def test_the_distance_to_the_reference_counts_as_a_last_level():
+    h = Hierarchy.from_levels([([[1.0, 0.0]], [1.0])], reference=[0.0, 5.0])
+    one = collection([h])
+    near, far = judge([raw([1.0, 5.0], one), raw([1.0, 4.0], one)], {one.digest: one})
+    assert near["verdict"] == judging.SOLVED
+    assert (far["verdict"], far["level"]) == (judging.WRONG, 1)
+
+
+def test_what_moves_a_level_above_is_seen():
+    assert found([3.0, 1.0], without=[3.0, 0.0])["moved"] == 0.0
+    assert found([3.5, 1.0], without=[3.0, 0.0])["moved"] == pytest.approx(0.5 / (1 + 10**0.5))
+
+
+@pytest.mark.parametrize(("more", "verdict"), [
+    ({"ended": CRASHED}, judging.CRASHED), ({"ended": HUNG}, judging.HUNG),
+    ({"ended": LEFT_OUT}, judging.CRASHED), ({"refused": "no"}, judging.REFUSED),
+    ({"raised": "Error"}, judging.RAISED)])
+def test_what_is_not_answered_has_its_own_verdict(more, verdict):
+    assert found(None, **more)["verdict"] == verdict
+
+
+def test_a_warm_answer_is_judged_as_well():
+    assert found([3.0, 1.0], warm_x=[3.0, 1.0], warm_solved=True)["warm_right"] is True
+    assert found([3.0, 1.0], warm_x=[3.0, 0.0], warm_solved=True)["warm_right"] is False
+    assert found([3.0, 1.0])["warm_right"] is None
+
+
+def test_problems_of_which_nothing_is_proved_are_left_out():
+    one = collection([simple(3.0)])
+    nothing = replace(one.answers[0], proved=0)
+    assert judge([raw([9.0, 9.0], one)],
+                 {one.digest: replace(one, answers=(nothing,))}) == []
+    assert judge([raw([9.0, 9.0], one)], {}) == []
+
+
+def test_a_level_that_is_ill_posed_is_not_judged():
+    one = collection([simple(3.0)])
+    upper = replace(one, answers=(replace(one.answers[0], posed=1),))
+    assert judge([raw([3.0, 7.0], one)], {one.digest: upper})[0]["verdict"] == judging.SOLVED
+
+
+def test_a_problem_without_a_proof_is_judged_by_its_certificate():
+    h = simple(3.0)
+    assert judged(raw([3.0, 1.0], collection([h])), h, None)["verdict"] == judging.SOLVED
+    wrong = judged(raw([3.0, 0.5], collection([h])), h, None)
+    assert (wrong["verdict"], wrong["level"]) == (judging.WRONG, 2)
+    assert not certify(h, [3.0, 0.5]).certified
+
+
+def test_a_summary_counts_and_takes_the_worst_of_what_is_called_solved():
+    one = collection([simple(3.0), simple(1.0)], sequence=True)
+    rows = judge([raw([3.0, 1.0], one), raw([1.5, 1.0], one, 1)], {one.digest: one})
+    whole = summary(rows, {"simple": 2.0})
+    assert (whole["right"], whole["wrong"], whole["answered"]) == (0.5, 1, 2)
+    assert whole["absolute"] == pytest.approx(0.5)
+    assert whole["rough"] == pytest.approx(0.75)  # 1.5 where the proved answers move by 2
+    assert (whole["median_us"], whole["most_us"]) == (2.0, 3.0)
+    assert np.isnan(whole["warm_median_us"])
+
+
+def test_a_profile_counts_only_what_is_solved():
+    one = collection([simple(3.0), simple(1.0)])
+    rows = judge([raw([3.0, 1.0], one), raw([9.0, 1.0], one, 1),
+                  raw([3.0, 1.0], one, entrant="slow", cold_ns=[4000]),
+                  raw([1.0, 1.0], one, 1, entrant="slow", cold_ns=[4000])], {one.digest: one})
+    found = profile(rows, np.array([1.0, 2.0, 10.0]))
+    np.testing.assert_array_equal(found["one"], [0.5, 0.5, 0.5])  # twice as fast, once wrong
+    np.testing.assert_array_equal(found["slow"], [0.5, 1.0, 1.0])
+
+
+def test_the_three_sentences_name_who_solves_most_and_who_is_faster():
+    one = collection([simple(3.0)])
+    rows = judge([raw([3.0, 1.0], one, entrant="hcod", cold_ns=[4000]),
+                  raw([3.0, 1.0], one, entrant="other", cold_ns=[1000]),
+                  raw([9.0, 1.0], one, entrant="wrong", cold_ns=[10])], {one.digest: one})
+    said = lead("Fresh", summaries(rows), cells(rows))
+    assert said == [
+        "Fresh: solved most often, of those that can be asked at least 95 % of the problems: hcod "
+        "and other, 100%.", "More often right than hcod: none.",
+        "As often right as hcod, and faster: simple (other, 1.00 µs against 4.00 µs)."]
+
+
+def test_a_file_of_rows_that_is_damaged_is_named(tmp_path):
+    (tmp_path / "rows").mkdir()
+    (tmp_path / "rows" / "old.jsonl.gz").write_bytes(b"no gzip")
+    with pytest.raises(HierarchyError, match=r"old\.jsonl\.gz cannot be read .*; remove it"):
+        Store(tmp_path).rows()
+
+
+def test_rows_come_back_as_they_were_stored(tmp_path):
+    store, one = Store(tmp_path), collection([simple(3.0)])
+    row = raw([3.0, 1.0], one, iterations=4)
+    store.add([row], store.file_of("a, b", Path("simple-fresh-7.npz")))
+    assert store.rows() == [row]
+
+
+def test_the_documents_ask_for_parts_that_the_report_can_make():
+    from benchmark.studies import open_report
+
+    root = Path(__file__).parents[2]
+    asked = {found["name"] for page in open_report.PAGES
+             for found in open_report.BLOCK.finditer((root / page).read_text(encoding="utf-8"))}
+    assert asked <= set(open_report.PARTS)
+    assert {"lead", "problems", "fresh answers", "public answers"} <= asked
+
+
+def test_an_unknown_entrant_and_a_missing_file_are_refused():
+    with pytest.raises(HierarchyError, match="did you mean 'hcod'"):
+        chosen(["hcodd"])
+    with pytest.raises(HierarchyError, match="does not exist"):
+        chosen(["no/such/file.py:Mine"])
+    assert [row.label for row in chosen(["tpm", "hcod"])] == ["tpm", "hcod"]
+
+
+@pytest.mark.slow
+def test_the_command_runs_continues_and_writes_its_page(tmp_path, capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    out = tmp_path / "open"
+    line = ["bench", "open", "--family", "integers", "--family", "one_unknown", "--count", "3",
+            "--public", "2", "--fresh", "9", "--entrant", "hcod", "--out", str(out)]
+    mine = f"{HELPERS / 'fake_entrants.py'}:Moody"
+    assert run_command(line) == 0
+    first = {file: file.stat().st_mtime_ns for file in out.glob("*/*")}
+    assert len(first) == 8  # four files of problems, four of rows
+    (out / "missing.json").write_text('{"absent": "not installed", "Moody": "not installed"}')
+    assert run_command([*line, "--entrant", mine]) == 0
+    assert json.loads((out / "missing.json").read_text()) == {"absent": "not installed"}
+    assert first.items() <= {file: file.stat().st_mtime_ns for file in out.glob("*/*")}.items()
+    said = capsys.readouterr()
+    assert said.err.count("integers, seed 9") == 1
+    assert max(len(line) for line in said.out.splitlines() if ": /" not in line) <= 80
+    fresh = said.out.index("Fresh problems, seed 9: 6 problems of 2 families")
+    assert fresh < said.out.index("Public problems: 4 problems of 2 families")
+    page = (out / "index.html").read_text()
+    assert page.count("<svg") >= 6
+    for text in ("Fresh problems, seed 9", "Moody", "fake 1", "hierarchy"):
+        assert text in page
+    assert not re.search(r'(src|href)="http', page)
+
+
+@pytest.mark.slow
+def test_what_was_asked_before_an_interruption_is_stored(tmp_path, monkeypatch):
+    def interrupted(process, file, count, limit):
+        if "one_unknown" in file.name:
+            raise KeyboardInterrupt
+        return [{"problem": p, "ended": CRASHED} for p in range(count)]
+
+    monkeypatch.setattr(opened, "_answers", interrupted)
+    families = [FAMILIES[name] for name in ("integers", "one_unknown")]
+    with pytest.raises(KeyboardInterrupt):
+        opened.run(tmp_path, families, [fake("LeastSquares")], {0: 2}, told=str)
+    assert [row["family"] for row in Store(tmp_path).rows()] == ["integers"] * 2
+
+
+@pytest.mark.slow
+def test_the_check_accepts_the_example_of_the_documents_and_not_what_ends(tmp_path, capsys):
+    page = (Path(__file__).parents[2] / "docs" / "extending" / "entrant.md").read_text()
+    (tmp_path / "mine.py").write_text(re.search(r"```python\n(.*?)```", page, re.DOTALL)[1])
+    assert run_command(["bench", "open", "--check", "--entrant", f"{tmp_path}/mine.py:Mine"]) == 0
+    assert run_command(["bench", "open", "--check", "--entrant",
+                        f"{HELPERS / 'fake_entrants.py'}:Raising"]) == 1
+    assert "the rules are broken" in capsys.readouterr().out

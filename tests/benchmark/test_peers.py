@@ -1,0 +1,378 @@
+"""Other packages: the same robots, known answers of each adapter, fair judgement."""
+
+import json
+import xml.etree.ElementTree as ET
+from dataclasses import asdict, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmark.arm import compare as moving
+from benchmark.arm.compare import ENTRANTS, QUESTIONS, START, make_scenes, run
+from benchmark.arm.scene import scene_of
+from benchmark.figures import bars
+from benchmark.packages import PACKAGES, Entrant, MissingError, Package, install, python_of
+from benchmark.process import Process, staged
+from benchmark.reach import compare as reaching
+from benchmark.report import Report
+from benchmark.solve import entrants as solvers_
+from benchmark.solve.open import asked
+from benchmark.stand import compare as standing
+from benchmark.stand.judge import Judge
+from benchmark.stand.ours import Ours
+from benchmark.stand.scene import read_stand
+from benchmark.stand.states import make_stand
+from benchmark.turns import joined
+from benchmark.urdf import roll_pitch_yaw, urdf
+from hierarchy import Hierarchy, Robot, State
+from hierarchy.errors import RobotError
+from hierarchy.paths import Still
+from hierarchy.tasks import Position
+from scenarios.cli.main import run_command
+from solvers.problems.files import Collection, Head
+
+ROOT = Path(__file__).parents[2]
+NUMPY = Package("numpy", "numpy")
+NOBODY = Entrant("nobody", Package("nobody", "no_such_module", ("nobody==1",)), "a:B")
+
+
+def fake(name, **options):
+    return Entrant(name, NUMPY, f"fake_peers:{name}", options)
+
+
+@pytest.fixture
+def alone(tmp_path, monkeypatch):
+    """Only what the tests bring."""
+    monkeypatch.setattr("benchmark.packages.folder_of",
+                        lambda package: tmp_path / "cache" / package.name)
+    monkeypatch.setenv("PYTHONPATH", f"{ROOT / 'tests' / 'helpers'}:{ROOT}")
+    monkeypatch.setenv("COLUMNS", "80")
+
+
+def answered(entrant, questions, *calls):
+    """The last answer of a process, which is skipped by name where the package is not installed."""
+    with staged() as folder:
+        try:
+            process = Process(entrant, questions, folder)
+        except MissingError as reason:
+            pytest.skip(f"{entrant.label}: {reason}")
+        try:
+            return [process.ask(call, 120.0) for call in calls][-1]
+        finally:
+            process.stop()
+
+
+# -- the robots ------------------------------------------------------------------------------------
+
+@pytest.fixture
+def arm(tmp_path):
+    robot = Robot.named("kuka_lwr")
+    file = tmp_path / "arm.urdf"
+    file.write_text(urdf(robot))
+    return robot, Robot.from_file(file, robot.end_effector)
+
+
+def test_the_arm_read_from_its_urdf_moves_and_weighs_as_ours(arm):
+    ours, read = arm
+    rng = np.random.default_rng(0)
+    for _ in range(50):
+        q, v = rng.uniform(ours.lower, ours.upper), rng.uniform(-1.0, 1.0, ours.n)
+        a, b = State.at(ours, q, v), State.at(read, q, v)
+        for of in ("J", "dJ"):
+            np.testing.assert_allclose(getattr(b, of), getattr(a, of), rtol=0.0, atol=1e-12)
+        end, same = ours.frame("end_effector"), read.frame("end_effector")
+        np.testing.assert_allclose(b.position(same), a.position(end), rtol=0.0, atol=1e-12)
+        np.testing.assert_allclose(b.rotation(same), a.rotation(end), rtol=0.0, atol=1e-12)
+        np.testing.assert_allclose(b.mass_matrix(), a.mass_matrix(), rtol=0.0, atol=1e-12)
+        np.testing.assert_allclose(b.bias_effort(), a.bias_effort(), rtol=0.0, atol=1e-12)
+
+
+def test_the_arm_read_from_its_urdf_has_our_joints_and_limits(arm):
+    ours, read = arm
+    assert read.joint_names == ours.joint_names
+    for of in ("lower", "upper", "velocity_limit", "effort_limit"):
+        np.testing.assert_array_equal(getattr(read, of), getattr(ours, of))
+
+
+def test_a_robot_that_came_from_a_file_is_not_written(arm):
+    with pytest.raises(RobotError, match="was not made from a table"):
+        urdf(arm[1])
+
+
+@pytest.mark.parametrize("angles", [(0.3, -0.7, 2.0), (np.pi / 2, 0.0, 0.0), (0.0, np.pi / 2, 0.4),
+                                    (0.0, -np.pi / 2, -1.0), (0.0, 0.0, np.pi)])
+def test_angles_of_a_rotation_make_the_rotation(angles):
+    def turned(roll, pitch, yaw):
+        (a, b, c), (u, v, w) = np.cos([roll, pitch, yaw]), np.sin([roll, pitch, yaw])
+        return np.array([[c * b, c * v * u - w * a, c * v * a + w * u],
+                         [w * b, w * v * u + c * a, w * v * a - c * u], [-v, b * u, b * a]])
+
+    R = turned(*angles)
+    np.testing.assert_allclose(turned(*roll_pitch_yaw(R)), R, atol=1e-12)
+
+
+def test_the_humanoid_read_from_its_urdf_weighs_as_ours(tmp_path):
+    ours, file = Robot.named("humanoid"), tmp_path / "humanoid.urdf"
+    feet = [ours.frame("left_foot"), ours.frame("right_foot")]
+    file.write_text(urdf(ours, feet))
+    read = Robot.from_file(file, "left_foot", base="floating")
+    order = [ours.velocity_names.index(name) for name in read.velocity_names]
+    np.testing.assert_array_equal(read.effort_limit[6:], ours.effort_limit[order][6:])
+    moved = [*range(7), *(i + 1 for i in order[6:])]
+    rng = np.random.default_rng(0)
+    for _ in range(10):
+        q, v = ours.integrate(ours.rest, rng.normal(size=ours.n)), rng.normal(size=ours.n)
+        a, b = State.at(ours, q, v), State.at(read, q[moved], v[order])
+        np.testing.assert_allclose(b.mass_matrix(), a.mass_matrix()[np.ix_(order, order)],
+                                   rtol=0.0, atol=1e-10)
+        np.testing.assert_allclose(b.bias_effort(), a.bias_effort()[order], rtol=0.0, atol=1e-10)
+        for foot in feet:
+            np.testing.assert_allclose(b.position(read.frame(foot.name)), a.position(foot),
+                                       rtol=0.0, atol=1e-12)
+
+
+def test_mujoco_is_told_to_keep_the_end_effector():
+    compiler = ET.fromstring(urdf(Robot.named("kuka_lwr"))).find("mujoco/compiler")
+    assert compiler.get("fusestatic") == "false"
+
+
+# -- known answers ---------------------------------------------------------------------------------
+
+def labels(entrants):
+    return {"ids": [one.label for one in entrants], "argvalues": entrants}
+
+
+@pytest.fixture(scope="module")
+def near(tmp_path_factory):
+    """A scene with a goal 1 cm and a posture 0.1 rad away, which no limit keeps back."""
+    folder = tmp_path_factory.mktemp("near")
+    scene, here = make_scenes(folder)["step"], State.at(Robot.named("kuka_lwr"), START)
+    goal = np.add(here.position(here.robot.frame("end_effector")), [0.006, -0.008, 0.0])
+    posture = np.add(START, [0.1, -0.1, 0.1, 0.1, -0.1, 0.1, -0.1])
+    return replace(scene, centre=tuple(goal.tolist()), posture=tuple(posture.tolist()))
+
+
+def wanted(scene, weight):
+    """The v that minimises |v - posture's|^2 + weight |J v - position's|^2; strict if infinite."""
+    robot = Robot.from_file(scene.file, scene.frame)
+    state = State.at(robot, scene.start)
+    J = Position(robot.frame(scene.frame), Still((0.0, 0.0, 0.0))).jacobian(state)
+    x = scene.gain * (np.array(scene.centre) - state.position(robot.frame(scene.frame)))
+    v = scene.posture_gain * (np.array(scene.posture) - scene.start)
+    return v + J.T @ np.linalg.solve(J @ J.T + np.eye(3) / weight, x - J @ v)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("entrant", **labels(ENTRANTS))
+def test_an_adapter_of_the_arm_gives_the_known_velocity(entrant, near):
+    reply = answered(entrant, QUESTIONS, ("open", asdict(near)), ("turn", 1, 0))
+    log = joined([reply])
+    assert not log["failed"][0], reply["why"]
+    known = wanted(near, np.inf), wanted(near, near.ratio**2)
+    off = min(abs(log["v"][0] - v).max() for v in known)
+    assert off < (2e-2 if entrant.label == "embodiK" else 5e-4)  # it damps; others linearise poses
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("entrant", **labels(standing.ENTRANTS))
+def test_an_adapter_of_the_humanoid_obeys_the_equations_of_motion(entrant, tmp_path):
+    scene, states = make_stand(tmp_path, 1)
+    log = joined([answered(entrant, standing.QUESTIONS, ("open", str(tmp_path / "scene.json")),
+                           ("turn", 1, 0))])
+    assert not log["failed"][0]
+    found = Judge(scene, states).residuals(0, log["a"][0], log["torques"][0], log["wrenches"][0])
+    assert max(found[key] for key in ("dynamics", "contact", "torque")) < 1e-6
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("entrant", **labels(reaching.ENTRANTS))
+def test_an_adapter_of_whole_inverse_kinematics_reaches_a_pose_that_was_taken(entrant, tmp_path):
+    robot, file = Robot.named("kuka_lwr"), tmp_path / "arm.urdf"
+    file.write_text(urdf(robot))
+    arm = reaching.Arm("", ("",), (robot.end_effector,))
+    read = Robot.from_file(file, robot.end_effector)
+    poses, starts = reaching.problems(read, arm, 2, 0, True)
+    np.savez(tmp_path / "problems.npz", urdf=str(file), frames=np.array(arm.frames), poses=poses,
+             starts=starts, tolerance=reaching.TOLERANCE)
+    found = answered(entrant, reaching.QUESTIONS, ("open", str(tmp_path / "problems.npz")),
+                     ("problem", 1))
+    assert found["met"]
+    assert reaching.error(read, arm, np.array(found["q"]), poses[1]) < 2.0 * reaching.TOLERANCE
+
+
+OTHERS = [one for one in solvers_.ENTRANTS if not one.adapter.endswith(":Ours")]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("entrant", **labels(OTHERS))
+def test_an_adapter_of_a_solver_gives_the_known_answer(entrant, tmp_path):
+    """x1 = 1 above x1 + x2 = 3; of limits above, where they can be asked, one acts: x2 <= 1."""
+    limits = (np.eye(2), [-9.0, -9.0], [9.0, 1.0])
+    tasks = [([[1.0, 0.0]], [1.0]), ([[1.0, 1.0]], [3.0])]
+    made = [Hierarchy.from_levels(tasks), Hierarchy.from_levels([limits, *tasks])]
+    file = tmp_path / "known.npz"
+    Collection(Head("known", "", "fresh", 1), tuple(made)).save(file)
+    try:
+        ((equal, limited),) = asked(entrant, [file])
+    except MissingError as reason:
+        pytest.skip(f"{entrant.label}: {reason}")
+    np.testing.assert_allclose(equal["x"], [1.0, 2.0], atol=2e-3)
+    if limited.get("refused"):
+        assert limited["refused"] == "equalities only"
+    elif limited["solved"]:  # a cascade may find a program infeasible, and then says so
+        np.testing.assert_allclose(limited["x"], [1.0, 1.0], atol=2e-3)
+
+
+def test_every_package_has_an_adapter_that_is_tested():
+    every = (*ENTRANTS, *standing.ENTRANTS, *reaching.ENTRANTS, *OTHERS)
+    assert {one.package for one in every} >= set(PACKAGES)
+
+
+def test_another_environment_sees_nothing_of_ours_but_the_benchmark():
+    with staged() as folder:
+        assert [path.name for path in folder.iterdir()] == ["benchmark"]
+        assert (folder / "benchmark" / "worker.py").is_file()
+
+
+# -- the scenes and their judges -------------------------------------------------------------------
+
+def test_a_scene_arrives_as_it_was_sent(tmp_path):
+    for scene in make_scenes(tmp_path).values():
+        assert scene_of(json.loads(json.dumps(asdict(scene)))) == scene
+
+
+def test_the_path_of_the_scene_is_the_path_of_our_stack(tmp_path):
+    from hierarchy.paths import Ellipse
+
+    scene = make_scenes(tmp_path)["ellipse"]
+    ours = Ellipse(scene.centre, scene.cosine, scene.sine, scene.turning)
+    for t in (0.0, 0.7, 5.0):
+        np.testing.assert_allclose(scene.target(t), ours(t)[:2], atol=1e-15)
+
+
+def test_a_package_that_is_not_there_is_missing_with_what_to_do(alone):
+    nobody = Package("nobody", "no_such_module", ("nobody==1",))
+    with pytest.raises(MissingError, match=r"not installed; hierarchy bench peers --install"):
+        python_of(nobody)
+
+
+def test_a_package_that_pip_refused_is_missing_with_what_pip_said(alone, monkeypatch):
+    nobody = Package("nobody", "no_such_module", ("nobody==1",))
+    said = iter(["", "ERROR: No matching distribution found"])
+    monkeypatch.setattr("benchmark.packages._said", lambda command: next(said))
+    assert install([nobody]) == {"nobody": "ERROR: No matching distribution found"}
+    with pytest.raises(MissingError, match="pip failed: ERROR: No matching distribution found"):
+        python_of(nobody)
+
+
+def test_an_environment_that_is_there_is_not_made_again(alone, tmp_path, monkeypatch):
+    somebody = Package("somebody", "no_such_module", ("somebody==1",))
+    said = iter(["", ""])
+    monkeypatch.setattr("benchmark.packages._said", lambda command: next(said))
+    assert install([somebody]) == install([somebody]) == {"somebody": ""}
+    assert python_of(somebody) == str(tmp_path / "cache" / "somebody" / "bin" / "python")
+
+
+@pytest.mark.slow
+def test_everybody_is_judged_or_named_with_the_reason(alone, tmp_path):
+    found = run([fake("Posture"), fake("Refuses"), fake("Lost"), fake("Ends"), NOBODY], ticks=1100)
+    rows = {row["entrant"]: row for row in found.rows["peers"]}
+    assert list(rows) == ["Posture", "Refuses", "Lost"]
+    good, none, lost = rows.values()
+    assert good["ticks"] == none["ticks"] == 1100
+    assert good["median_us"] <= good["p95_us"] <= good["p99.9_us"]
+    assert not np.isnan(good["solve_us"])
+    assert good["fails"] == "0/0"
+    assert good["excess_rad_s"] == 0.0
+    assert good["moved_m"] > 1e-4  # a posture with nothing above it moves the end effector
+    assert good["nan"] == lost["nan"] == "an answer with NaN"
+    assert none["step_failed"] == lost["step_failed"] == 2000
+    assert np.isnan(none["median_us"])
+    assert none["why"] == "ValueError: no answer"
+    assert none["nan"] == "raises ValueError"
+    assert "not finite" in lost["why"]
+    assert found.missing["Ends"] == "ended with code 7"
+    assert "--install" in found.missing["nobody"]
+    found.write(tmp_path / "out")
+    assert json.loads((tmp_path / "out" / "missing.json").read_text()) == found.missing
+    assert (tmp_path / "out" / "peers.csv").is_file()
+
+
+@pytest.mark.slow
+def test_inverse_dynamics_of_ours_is_judged_and_the_missing_are_named(alone):
+    found = standing.run([standing.ENTRANTS[0], NOBODY], ticks=20)
+    (row,) = found.rows["stand"]
+    assert row["failed"] == 0
+    assert row["median_us"] <= row["p95_us"]
+    assert row["friction max"] < 1e-6
+    assert row["centre of mass max"] < 1e-8
+    assert "--install" in found.missing["nobody"]
+    assert found.failed
+
+
+def test_the_command_writes_a_folder_for_each_scene(tmp_path, monkeypatch, capsys):
+    for scene in (moving, standing):
+        monkeypatch.setattr(scene, "run", lambda: Report("title", [], {"peers": [{"a": 1}]},
+                                                         {"nobody": "not installed"}, True))
+    assert run_command(["bench", "peers", "--out", str(tmp_path / "out")]) == 0
+    assert {path.name for path in (tmp_path / "out").glob("*")} == {"arm", "stand"}
+    assert (tmp_path / "out" / "stand" / "peers.csv").is_file()
+    assert run_command(["bench", "peers", "--scene", "stand", "--out", str(tmp_path / "a")]) == 1
+    assert "skipped: nobody (not installed)" in capsys.readouterr().out
+    assert run_command(["bench", "peers", "--scene", "stnd"]) == 2
+
+
+def test_wrong_answers_to_stand_are_found(tmp_path):
+    scene, states = make_stand(tmp_path, 2)
+    ours, judge = Ours(scene, "hcod"), Judge(scene, states)
+    ours.tick(0.0, states["q"][0], states["v"][0], None)
+    a, torques, wrenches = ours.answer()
+    good = judge.residuals(0, a, torques, wrenches)
+    assert max(good[key] for key in ("dynamics", "contact", "torque", "friction")) < 1e-6
+    assert judge.residuals(0, a, torques + 1.0, wrenches)["dynamics"] == pytest.approx(1.0)
+    assert judge.residuals(0, a, 100.0 * torques, wrenches)["torque"] > 100.0
+    sideways = wrenches + 1000.0 * np.eye(6)[0]
+    assert judge.residuals(0, a, torques, sideways)["friction"] > 100.0
+    twisted = wrenches + 100.0 * np.eye(6)[5]
+    assert judge.residuals(0, a, torques, twisted)["friction"] > 10.0
+    assert judge.residuals(0, 2.0 * a, torques, wrenches)["posture"] > good["posture"]
+
+
+def test_the_scene_stand_is_read_as_it_was_written(tmp_path):
+    scene, _ = make_stand(tmp_path, 1)
+    assert read_stand(tmp_path / "scene.json") == scene
+
+
+@pytest.mark.slow
+def test_a_velocity_beyond_its_limit_is_found(alone):
+    (row,) = run([fake("Posture", speed=1.5)], ticks=50).rows["peers"]
+    assert row["excess_rad_s"] > 0.1
+
+
+@pytest.mark.slow
+def test_who_does_not_survive_a_nan_is_said_to_crash(alone):
+    (row,) = run([fake("EndsAfterNan")], ticks=50).rows["peers"]
+    assert row["nan"] == "crashed: ended with code 7"
+
+
+@pytest.mark.slow
+def test_our_own_stack_is_strict_keeps_limits_and_refuses_a_nan():
+    (row,) = run([one for one in ENTRANTS if one.label == "tpm"], ticks=50).rows["peers"]
+    assert row["moved_m"] < 1e-9
+    assert row["excess_rad_s"] < 1e-9
+    assert row["fails"] == "0/0"
+    assert row["at_limit_ticks"] > 0
+    assert row["nan"].startswith("says so")
+
+
+def test_the_figure_has_a_bar_for_each_that_was_timed():
+    row = {"median_us": 5.0, "p95_us": 6.0, "solve_us": np.nan, "moved_m": 1e-17, "step_failed": 0}
+    fig = bars([{**row, "entrant": "tpm", "solve_us": 2.0},
+                {**row, "entrant": "pink", "moved_m": 1e-6},
+                {**row, "entrant": "mink hard", "moved_m": np.nan, "step_failed": 9},
+                {**row, "entrant": "tsid", "median_us": np.nan}])
+    (ax,) = fig.axes
+    assert [label.get_text() for label in ax.get_yticklabels()] == ["tpm", "pink", "mink hard"]
+    assert [text.get_text() for text in ax.texts] == [
+        "strict", "posture moves it by 1e-06 m a tick", "no answer at the limits"]

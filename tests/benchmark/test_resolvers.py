@@ -1,0 +1,113 @@
+"""The benchmark of resolvers: everybody asked, every answer judged, nothing cut off."""
+
+import csv
+import json
+import os
+
+import numpy as np
+import pytest
+
+from benchmark import machine
+from benchmark.solve import resolvers
+from benchmark.solve.entrants import HIERARCHICAL, NUMPY
+from benchmark.solve.interface import Problem
+from benchmark.timing import times_of
+from scenarios.cli.main import run_command
+from scenarios.problems import reference
+from scenarios.problems.reference import family
+from solvers.qp import backends
+
+pytestmark = pytest.mark.slow
+
+EQUALITIES = {NUMPY, "augmented", "recursive", "reverse", "sns", "tpm", "tpm-published"}
+
+
+@pytest.fixture
+def few(monkeypatch):
+    """Only two problems a family, since one cascade takes 40 ms for one of them."""
+    monkeypatch.setattr(resolvers.reference, "family", lambda name: family(name)[:2])
+
+
+def test_a_row_for_everybody_and_every_family(few, tmp_path, capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    found = resolvers.run(seconds=0.001)
+    rows = found.rows["resolvers"]
+    known = {row["entrant"] for row in rows}
+    assert {NUMPY, "augmented", "hcod", "recursive", "reverse", "sns", "tpm", "tpm-published",
+            "weighted", "hcod warm", "weighted warm", "hqp proxqp", "hqp proxqp warm"} <= known
+    assert {f"hqp {name}" for name in backends.BACKENDS if backends.installed(name)} <= known
+    assert {(row["family"], row["entrant"]) for row in rows} == {
+        (name, label) for name in reference.FAMILIES for label in known
+        if label not in EQUALITIES or name in reference.EQUALITIES}
+    for row in rows:
+        if row["entrant"].startswith(("hqp", "hcod")) or row["entrant"] in ("tpm", "recursive"):
+            assert row["wrong"] == 0, row
+    found.say()
+    found.write(tmp_path)
+    with (tmp_path / "resolvers.csv").open() as file:
+        assert len(list(csv.DictReader(file))) == len(rows)
+    assert {path.name for path in tmp_path.iterdir()} == {
+        "resolvers.csv", "machine.json", "missing.json", "time-accuracy.svg", "time-accuracy.png",
+        "index.html"}
+    assert "processor" in json.loads((tmp_path / "machine.json").read_text())
+    out = capsys.readouterr().out
+    assert max(map(len, out.splitlines())) <= 80
+    assert "…" not in out
+
+
+def test_times_are_given_by_median_and_tail():
+    row = times_of([1000 * i for i in range(1, 102)])
+    assert (row["median_us"], row["p95_us"], row["most_us"]) == (51.0, 96.0, 101.0)
+    assert np.isnan(row["p99.9_us"])  # rare times need a thousand
+    assert times_of([1000] * 1000)["p99.9_us"] == 1.0
+
+
+def test_a_backend_that_is_not_installed_is_named_and_not_skipped_silently(monkeypatch):
+    monkeypatch.setattr(resolvers, "installed", lambda name: name != "daqp")
+    field, missing = resolvers.field()
+    assert missing["hqp daqp"] == missing[HIERARCHICAL] == "pip install 'task-hierarchy[qp]'"
+    assert not {"hqp daqp", HIERARCHICAL} & {one.label for one in field}
+
+
+def test_a_warm_start_comes_from_targets_moved_by_a_percent():
+    h = family("INEQ7")[0].h
+    problem = Problem(h.A, h.lower, h.upper, h.sizes, h.reference)
+    moved, finite = problem.moved(0), np.isfinite(h.lower)
+    np.testing.assert_allclose(moved.lower[finite], h.lower[finite], rtol=0.01)
+    assert (moved.lower <= moved.upper).all()
+    assert not np.array_equal(moved.lower, h.lower)
+
+
+def test_fresh_problems_are_timed_and_reported_apart(few):
+    found = resolvers.run(seconds=0.001, families=("EQ7", "INEQ7"), seed=10_000_000, count=4,
+                          resolvers=["hcod"])
+    rows = found.rows["resolvers"]
+    assert {(row["family"], row["origin"], row["problems"]) for row in rows} == {
+        (name, origin, count) for name in ("EQ7", "INEQ7")
+        for origin, count in (("known", 2), ("fresh", 4))}
+    assert {row["entrant"] for row in rows} == {NUMPY, HIERARCHICAL, "hcod", "hcod warm"}
+    assert all(row["wrong"] == 0 for row in rows if row["entrant"] in ("hcod", "hcod warm"))
+    assert [table.title for table in found.sections[1].tables] == ["EQ7, fresh", "INEQ7, fresh"]
+    assert "fresh INEQ7" in found.sections[-1].text
+
+
+def test_fresh_problems_are_not_the_stored_ones():
+    stored = [problem.h.upper for problem in family("INEQ7")]
+    assert not any(np.array_equal(one.h.upper, old)
+                   for one in reference.fresh("INEQ7", 10_000_000, 4) for old in stored)
+
+
+def test_timing_on_one_core_gives_the_others_back():
+    before = os.sched_getaffinity(0)
+    with machine.one_core():
+        assert len(os.sched_getaffinity(0)) == 1
+    assert os.sched_getaffinity(0) == before
+
+
+@pytest.mark.parametrize(("asked", "says"), [
+    (["--family", "EQ8"], "unknown family 'EQ8'; did you mean 'EQ7'"),
+    (["--resolver", "hqod"], "unknown resolver 'hqod'; did you mean 'hcod'"),
+])
+def test_an_unknown_family_or_resolver_is_named(asked, says, tmp_path, capsys):
+    assert run_command(["bench", "resolvers", *asked, "--out", str(tmp_path / "out")]) == 2
+    assert says in capsys.readouterr().err

@@ -1,0 +1,143 @@
+"""Two thousand generated problems, every answer certified; problems that once failed."""
+
+import os
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmark import stress
+from hierarchy import Hierarchy
+from solvers import Resolution, Resolver, Status, certify, make, names, problems
+
+pytestmark = pytest.mark.slow
+
+REGRESSIONS = sorted((Path(__file__).parents[1] / "data" / "regressions").glob("*.npz"))
+JUDGED = [name for name in ("hcod", "tpm", "recursive") if name in names()]
+COUNT = 200 if os.environ.get("NUMBA_DISABLE_JIT") == "1" else 2_000
+PARTS = 4  # so that cores can share them
+FIRST = 10_000_000  # seeds that nothing was tuned on
+
+
+@pytest.mark.parametrize("part", range(PARTS))
+@pytest.mark.parametrize("name", JUDGED[:1])
+def test_generated_problems_are_solved_and_certified(name, part):
+    each = COUNT // PARTS
+    found = stress.tally(name, range(FIRST + part * each, FIRST + (part + 1) * each))
+    assert not found.failing
+    assert found.counts[stress.CERTIFIED] >= 0.999 * each, "the rest says that it is not sure"
+
+
+@pytest.mark.parametrize("kind", problems.KINDS)
+@pytest.mark.parametrize("name", JUDGED[:2])
+def test_structured_problems_end_certified_or_with_a_status(name, kind):
+    found = stress.tally(name, range(FIRST, FIRST + 100), kind)
+    assert not found.failing
+
+
+@pytest.mark.parametrize("name", JUDGED[1:])
+def test_generated_equalities_and_bounds_are_solved_and_certified(name):
+    found = stress.tally(name, range(FIRST, FIRST + COUNT // 8))
+    assert not found.failing
+    assert found.counts[stress.CERTIFIED] == COUNT // 8
+
+
+ONCE_FAILED = [(file, name) for file in REGRESSIONS for name in JUDGED
+               if make(name).handles == "inequalities" or problems.load(file).is_equality]
+
+
+@pytest.mark.parametrize(("file", "name"), ONCE_FAILED,
+                         ids=[f"{file.stem}-{name}" for file, name in ONCE_FAILED])
+def test_what_once_failed_is_solved_or_said_to_be_doubtful(file, name):
+    h = problems.load(file)
+    res = make(name).solve(h)
+    verdict = certify(h, res.x)
+    assert verdict.certified or res.status is Status.INACCURATE, str(verdict)
+
+
+class Wrong(Resolver):
+    """Fails on hierarchies in which the third unknown is asked to be above 1."""
+
+    name = "wrong"
+    handles = "inequalities"
+
+    def __init__(self, way):
+        self.way = way
+
+    def solve(self, h, memory=None):
+        triggered = h.n > 2 and bool(((h.A[:, 2] != 0.0) & (h.lower > 1.0)).any())
+        if triggered and self.way == stress.RAISED:
+            raise ZeroDivisionError
+        x = np.full(h.n, np.nan if triggered and self.way == stress.NOT_FINITE else 0.0)
+        solved = triggered and self.way == stress.WRONG
+        return Resolution(x, Status.SOLVED if solved else Status.ITERATION_LIMIT)
+
+
+def problem():
+    levels = [(np.eye(5), np.full(5, -9.0), np.full(5, 9.0)),
+              (np.ones((3, 5)), [0.0, 5.0, 0.0]), (np.eye(5), np.zeros(5))]
+    return Hierarchy.from_levels(levels, reference=np.ones(5))
+
+
+@pytest.mark.parametrize("way", [way for way in stress.FAILURES if way != stress.UNJUDGED])
+def test_each_way_to_fail_is_told_from_the_others_and_shrunk_to_its_core(way):
+    resolver = Wrong(way)
+    assert stress.outcome(resolver, problem()) == way
+    smallest = stress.shrunk(problem(), lambda h: stress.outcome(resolver, h) == way)
+    assert smallest.sizes.tolist() == [1]
+    assert smallest.n == 3
+    assert not smallest.reference.any()
+
+
+def test_an_answer_that_the_certificate_cannot_judge_is_a_failure(monkeypatch):
+    def raises(h, x):
+        raise ZeroDivisionError
+
+    monkeypatch.setattr(stress, "certify", raises)
+    assert stress.outcome(make("hcod"), problem()) == stress.UNJUDGED
+    assert stress.UNJUDGED in stress.FAILURES
+
+
+def test_a_status_other_than_solved_is_counted_by_its_name():
+    h = Hierarchy.from_levels([(np.eye(2), np.zeros(2))])
+    assert stress.outcome(Wrong(stress.RAISED), h) == "ITERATION_LIMIT"
+
+
+def test_a_right_answer_is_counted_as_certified():
+    assert stress.outcome(make("tpm"), Hierarchy.from_levels([(np.eye(2), [1.0, 2.0])])) == \
+        stress.CERTIFIED
+
+
+def test_a_failing_problem_is_kept_as_a_file(tmp_path, monkeypatch):
+    monkeypatch.setattr(stress, "make", lambda name: Wrong(stress.WRONG))
+    found = stress.tally("wrong", range(200))
+    seed, what = found.failing[0]
+    file = stress.keep("wrong", seed, what, tmp_path / "kept")
+    assert stress.outcome(Wrong(stress.WRONG), problems.load(file)) == stress.WRONG
+
+
+def test_iterations_are_counted_by_row():
+    found = stress.Tally(effort=Counter({10: 998, 50: 1, 700: 1}))
+    assert found.iterations_per_row() == (0.1, 0.5, 7.0)
+    assert stress.Tally().iterations_per_row() == (0.0, 0.0, 0.0)
+
+
+def test_many_processes_count_like_one_and_report_all_kinds_apart(tmp_path, monkeypatch):
+    monkeypatch.setattr(stress, "_CHUNK", 3)
+    found = stress.run(5 * len(stress.KINDS), "tpm", processes=2, kind=stress.ALL)
+    told = stress.report("tpm", found, tmp_path / "none")
+    assert found == {kind: stress.tally("tpm", range(5), kind) for kind in stress.KINDS}
+    assert [row["kind"] for row in told.rows["stress"]] == [*stress.KINDS, stress.ALL]
+    assert told.rows["stress"][-1]["problems"] == 5 * len(stress.KINDS)
+    assert not told.failed
+    assert not (tmp_path / "none").exists()
+
+
+def test_failing_problems_are_listed_and_saved(tmp_path, monkeypatch):
+    monkeypatch.setattr(stress, "make", lambda name: Wrong(stress.WRONG))
+    told = stress.report("wrong", {stress.RECIPE: stress.tally("wrong", range(200))}, tmp_path)
+    assert told.failed
+    assert f"recipe, seed {stress.tally('wrong', range(200)).failing[0][0]}, " in \
+        told.sections[0].text
+    assert list(tmp_path.glob("wrong-*.npz"))
