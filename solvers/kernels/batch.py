@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from hierarchy.jit import unlocked
 from solvers.kernels.bounds import name_saturation, solve_without_bounds
-from solvers.kernels.exact import solve_hierarchy, work_size
+from solvers.kernels.exact import DAMPING, solve_damped, solve_hierarchy, work_size
 from solvers.kernels.staircase import solve_by_staircase
 from solvers.status import SOLVED, TOO_SMALL
 
@@ -57,9 +57,11 @@ def batch_exact(problems, x, codes, records, settings, which, work):
     """
     A, lower, upper, sizes = problems
     begin = records.shape[1] - 3 * A.shape[1] - 3
-    if work_size(A.shape[2], A.shape[1], sizes.size, settings[0] > 0.0) > work.size:
+    if work_size(A.shape[2], A.shape[1], sizes.size, settings[DAMPING] > 0.0) > work.size:
         return TOO_SMALL
     for p in which:
-        codes[p] = solve_hierarchy(A[p], lower[p], upper[p], sizes, x[p], records[p, begin:],
-                                   settings, work)
+        record = records[p, begin:]
+        codes[p] = (solve_damped(A[p], lower[p], upper[p], sizes, x[p], record, settings, work)
+                    if settings[DAMPING] > 0.0 else
+                    solve_hierarchy(A[p], lower[p], upper[p], sizes, x[p], record, settings, work))
     return SOLVED

@@ -19,7 +19,16 @@ from typing import NamedTuple
 
 from hierarchy.jit import compiled, inlined
 from solvers.kernels.block import level_damping
-from solvers.kernels.rows import ZERO, add_multiple, factor_level, length_of, reflect, reflect_back
+from solvers.kernels.rows import (
+    NO,
+    YES,
+    ZERO,
+    add_multiple,
+    factor_level,
+    length_of,
+    reflect,
+    reflect_back,
+)
 from solvers.kernels.space import Block, View, integers, matrix, shared, vector
 from solvers.kernels.staircase import carve_staircase, solve_by_staircase
 from solvers.kernels.tolerances import LEVEL_MET, SATURATES
@@ -95,9 +104,9 @@ def open_damped(d, A, lower, upper, sizes, x, settings, work):
     code = solve_by_staircase(E, b, b, d.ends, d.free, settings, work)
     if code == NUMERICAL_FAILURE or _is_met(d, A, lower, upper):
         return True, code
-    _factor_equalities(d, A, sizes, settings, work, True)
+    _factor_equalities(d, A, sizes, settings, work, YES)
     _take_out_exceeded(d, E, A, lower, upper, x)
-    _factor_equalities(d, A, sizes, settings, work, False)
+    _factor_equalities(d, A, sizes, settings, work, NO)
     return False, code
 
 

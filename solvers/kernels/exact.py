@@ -21,7 +21,7 @@ from solvers.kernels.damping import (
     open_damped,
 )
 from solvers.kernels.levels import pass_through_levels
-from solvers.kernels.rows import ZERO, all_equal, finish, length_of
+from solvers.kernels.rows import NO, YES, ZERO, all_equal, finish, length_of
 from solvers.kernels.search import pivot_in_blocks, pivot_one_by_one, save
 from solvers.kernels.space import matrix, vector
 from solvers.kernels.staircase import solve_by_staircase
@@ -68,7 +68,7 @@ def work_size(n, m, levels, damped):
     """Return the numbers that a work space of `solve_hierarchy` needs, with damping or without."""
     if not damped:
         return n + exact_size(n, m, levels)
-    return damped_size(n, m, levels) + 3 * (m + n) + n + 16 + exact_size(n, m + n, levels)
+    return damped_size(n, m, levels) + 3 * (m + n) + 2 * n + 16 + exact_size(n, m + n, levels)
 
 
 @compiled
@@ -77,11 +77,12 @@ def solve_hierarchy(A, lower, upper, sizes, x, record, settings, work):
 
     record (3 m + 3,): see `ActiveSetResolution`; on entry that of an earlier solve, or zeros.
     settings: those of `Hcod`, in one array because each argument costs time. work: any contents.
-    Equalities alone are solved by the staircase, where its pivots are clear. Returns SOLVED,
-    INACCURATE, ITERATION_LIMIT, NUMERICAL_FAILURE or TOO_SMALL.
+    Equalities alone are solved by the staircase, where its pivots are clear, with damping; for
+    damping beside inequalities see `solve_damped`. Returns SOLVED, INACCURATE, ITERATION_LIMIT,
+    NUMERICAL_FAILURE or TOO_SMALL.
     """
-    n, damped = x.size, settings[DAMPING] > 0.0
-    if work_size(n, lower.size, sizes.size, damped) > work.size:
+    n = x.size
+    if n + exact_size(n, lower.size, sizes.size) > work.size:
         return ZERO + TOO_SMALL
     reference, at = vector(work, ZERO, n)
     if all_equal(lower, upper):
@@ -93,15 +94,17 @@ def solve_hierarchy(A, lower, upper, sizes, x, record, settings, work):
             return code
         for c in range(n):
             x[c] = reference[c]
-    elif damped:
-        return solve_damped(A, lower, upper, sizes, x, record, settings, work)
     return solve_exactly(A, lower, upper, sizes, x, record, settings, work[at:])
 
 
 @compiled
 def solve_damped(A, lower, upper, sizes, x, record, settings, work):
-    """Like `solve_hierarchy`, level by level with damping; the record has no memory."""
+    """Like `solve_hierarchy`, level by level with damping; the record is no memory."""
     (m, n), code, last = A.shape, ZERO + SOLVED, sizes.size - 1
+    if work_size(n, m, sizes.size, True) > work.size:
+        return ZERO + TOO_SMALL
+    if all_equal(lower, upper):
+        return solve_hierarchy(A, lower, upper, sizes, x, record, settings, work)
     d, at = carve_damped(work, ZERO, m, n, sizes.size)
     reference, at = vector(work, at, n)
     limits, at = vector(work, at, settings.size)
@@ -109,7 +112,7 @@ def solve_damped(A, lower, upper, sizes, x, record, settings, work):
     for c in range(n):
         reference[c] = x[c]
     for c in range(settings.size):
-        limits[c] = settings[c]
+        limits[c] = settings[c] if c != DAMPING else 0.0
     for i in range(record.size):
         record[i] = -1.0 if m <= i < 2 * m or i == 3 * m + 2 else 0.0
     met, staircase = open_damped(d, A, lower, upper, sizes, x, settings, work[at:])
@@ -132,8 +135,8 @@ def solve_damped(A, lower, upper, sizes, x, record, settings, work):
             inner[i] = 0.0
         for c in range(n):
             x[c] = reference[c]
-        code = solve_exactly(d.A[:rows], d.lower[:rows], d.upper[:rows], d.sizes[:levels], x,
-                             inner[:3 * rows + 3], limits, work[at:])
+        code = solve_hierarchy(d.A[:rows], d.lower[:rows], d.upper[:rows], d.sizes[:levels], x,
+                               inner[:3 * rows + 3], limits, work[at:])
         if k <= last:
             d.sizes[k] -= n
         _add_record(record, inner, lower, upper, d, rows, end, k)
@@ -191,7 +194,7 @@ def solve_exactly(A, lower, upper, sizes, x, record, settings, work):
     if warm:
         level, begin = _resumed_at(record[3 * m + 2], sizes.size)
     if warm and level < 0:
-        code, steps = pivot_in_blocks(s, limit, False)
+        code, steps = pivot_in_blocks(s, limit, NO)
     blocks = steps
     if code == UNPROVED and level < 0:
         t, _ = carve_tableau(s, work, after)
@@ -199,10 +202,10 @@ def solve_exactly(A, lower, upper, sizes, x, record, settings, work):
                                           min(limit - steps, PASS_STEPS * (m + n)))
         steps += t.count[STEPS]
         save(s, saved, sizes.size if code == SOLVED else level)
-        code = _verified(s, code, False)
+        code = _verified(s, code, NO)
         restore(s)
         if code != SOLVED and steps < limit:
-            code, tries = pivot_in_blocks(s, limit - steps, True)
+            code, tries = pivot_in_blocks(s, limit - steps, YES)
             steps, blocks = steps + tries, blocks + tries
     for coarse in range(begin, 2):
         if code in (UNPROVED, INACCURATE) and steps < limit:
@@ -212,7 +215,7 @@ def solve_exactly(A, lower, upper, sizes, x, record, settings, work):
                 s, current, saved, min(limit - steps, SEARCH_STEPS * (m + n)),
                 ZERO if coarse > begin else level)
             steps += tries
-            code = _verified(s, code, True)
+            code = _verified(s, code, YES)
     if code == SOLVED and s.count[NEGLECTED] > 0 and neglects(s):
         code = ZERO + INACCURATE
     elif code not in (SOLVED, NUMERICAL_FAILURE):

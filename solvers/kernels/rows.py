@@ -2,7 +2,8 @@
 
 The inner loops run over views of whole rows with unit stride, so that the compiler can vectorise
 them without fastmath. numba does not inline across functions, so each function here handles a range
-of rows. It also compiles a function again for a literal argument, so counters start from ZERO.
+of rows. It also compiles a function again for a literal argument, so counters start from ZERO
+and flags are YES or NO.
 """
 
 # mypy: disable-error-code="no-untyped-def"
@@ -16,6 +17,7 @@ from solvers.kernels.tolerances import LEAST_SQUARE
 from solvers.status import INACCURATE, NUMERICAL_FAILURE, SOLVED
 
 ZERO = np.int64(0)
+YES, NO = np.bool_(True), np.bool_(False)
 
 
 @compiled

@@ -17,7 +17,7 @@ import numpy as np
 
 from hierarchy.jit import compiled, inlined
 from solvers.kernels.multipliers import INWARD, UNDECIDED, write_multipliers
-from solvers.kernels.rows import ZERO, length_of
+from solvers.kernels.rows import YES, ZERO, length_of
 from solvers.kernels.space import View
 from solvers.kernels.tolerances import MET, PATIENCE, RELEASED, RESTORED, SHADOW, VIOLATED
 from solvers.kernels.verification import verify
@@ -119,7 +119,7 @@ def pivot_in_blocks(s, limit, keep):
         tries += 1
         meet(s, levels)
         write_multipliers(s, MET)
-        if not _points_inward(s) and verify(s, True):
+        if not _points_inward(s) and verify(s, YES):
             return ZERO + SOLVED, tries
         found = judge(s, levels, ZERO - 1)
         if found.wrong == 0:

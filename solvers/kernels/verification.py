@@ -150,8 +150,9 @@ def _balances(s, p, reach, factored):
     source, allowed = (reach if last else level.source), REMAINDER * reach
     if not last:
         allowed = REMAINDER * level.least * level.least * max(level.missed, reach)
-    allowed = min(allowed, KNOWN_MULTIPLIER * source * s.scalar[PIVOT])
     outside, rounding, turned = _add_rows(s, level, reach if last else 0.0)
+    if rounding > 0.0:
+        allowed = min(allowed, KNOWN_MULTIPLIER * source * s.scalar[PIVOT])
     rest = _beyond_rounding(s)
     if factored and not rest <= allowed + turned:
         refine(s, p)
@@ -185,19 +186,22 @@ def _add_rows(s, level, reach):
     """Write the sum of the rows times their multipliers, and per unknown what may be rounding.
 
     reach: of x, for the level of the reference, else 0. Returns whether a row has a multiplier
-    that does not act, the rounding of the sum, and what the cuts of rows add to it.
+    that does not act, the rounding of the sum, 0 where no multiplier needs a sign, and what the
+    cuts of rows add to it.
     """
     mu, outside, rounding, turned = s.multiplier[level.p], False, SIGN_ROUNDING * reach, 0.0
+    signed = False
     for c in range(s.x.size):
         s.number[GRADIENT, c] = s.x[c] - s.number[REFERENCE, c] if reach > 0.0 else 0.0
         s.number[NOISE, c] = CANCELLED * reach
     for i in range(level.end):
         if mu[i] != 0.0:
-            outside = outside or s.index[STATE, i] == FREE
+            state = s.index[STATE, i]
+            outside, signed = outside or state == FREE, signed or state != EQUAL
             rounding += SIGN_ROUNDING * abs(mu[i]) * s.number[NORM, i]
             turned += 2.0 * s.number[CUT, i] * abs(mu[i])
             _add_row(s, mu[i], i)
-    return outside, rounding, turned
+    return outside, rounding if signed else 0.0, turned
 
 
 @inlined

@@ -13,7 +13,7 @@ from hierarchy.jit import compiled, inlined
 from hierarchy.jit.exporting import INTEGER, STATUS, Entry
 from solvers.kernels.bounds import name_saturation, solve_without_bounds
 from solvers.kernels.damped import damped_recursion
-from solvers.kernels.exact import solve_hierarchy
+from solvers.kernels.exact import DAMPING, solve_damped, solve_hierarchy
 from solvers.kernels.recursion import recursion
 from solvers.kernels.rows import ZERO
 from solvers.kernels.sns import sns
@@ -146,6 +146,9 @@ def _hcod(call):
 @inlined
 def exactly(call, record):
     """Solve like `solve_exactly` of `hcod`."""
+    if call.settings[DAMPING] > 0.0:
+        return solve_damped(call.A, call.lower, call.upper, call.sizes, call.x, record,
+                            call.settings, call.work)
     return solve_hierarchy(call.A, call.lower, call.upper, call.sizes, call.x, record,
                            call.settings, call.work)
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hierarchy.problem import Array, Hierarchy
-from solvers.kernels.exact import solve_hierarchy
+from solvers.kernels.exact import DAMPING, solve_damped, solve_hierarchy
 from solvers.resolver import Handles, Resolution, Resolver, register
 from solvers.status import SOLVED, TOO_SMALL, Status
 from solvers.workspace import WORKSPACE, entry
@@ -114,12 +114,12 @@ def warm_record(memory: Array | None, size: int) -> Array:
 
 
 def solve_exactly(h: Hierarchy, x: Array, record: Array, settings: Array) -> int:
-    """Solve with `solve_hierarchy`, in a work space that is large enough; return its code.
+    """Solve with the exact kernel, in a work space that is large enough; return its code.
 
     x (n,) is the reference on entry and the answer on return.
     """
     A, lower, upper, sizes = h.rows  # `*h.rows` takes 60 ns more
-    solve = entry(solve_hierarchy)
+    solve = entry(solve_damped if settings[DAMPING] > 0.0 else solve_hierarchy)
     code = solve(A, lower, upper, sizes, x, record, settings, WORKSPACE.array)
     while code == TOO_SMALL:
         WORKSPACE.double()
