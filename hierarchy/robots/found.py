@@ -83,7 +83,7 @@ def remarks(model: Any) -> Iterator[str]:
             yield f"{kind} limits of {some(without)}: none, or 0, which is no limit"
     if names := ambiguous(model):
         yield (f"the frames called {some(names)}: each name is at two places, such as a joint and "
-               "a link, and is refused where it is asked for")
+               "a link, so asking for it is an error")
 
 
 def neutral_within_limits(model: Any, neutral: Array) -> Array:

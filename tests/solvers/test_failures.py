@@ -40,7 +40,6 @@ CERTAIN = ["contacts-50000500", "contacts-50067440", "contacts-50081046",
            "cycle-mixed_units-50103472", "cycle-tiny_rows-50015365", "cycle-tiny_rows-50031629",
            "mixed_units-262311872", "mixed_units-281029597", "mixed_units-50076333",
            "shifted-50025253", "sixty_unknowns-50043814"]
-WRONG = {("hcod_wrong_min_2007743_order", "hqp")}  # a level is divided by its largest entry
 
 
 def read(name):
@@ -48,9 +47,8 @@ def read(name):
 
 
 def cases(names):
-    small = pytest.mark.xfail(reason="hqp loses rows of 1e-7 of the largest entry of their level")
-    return [pytest.param(name, resolver, marks=[small] * ((name, resolver) in WRONG),
-                         id=f"{name}-{resolver}") for name in names for resolver in RESOLVERS]
+    return [pytest.param(name, resolver, id=f"{name}-{resolver}")
+            for name in names for resolver in RESOLVERS]
 
 
 def solved(name, resolver):

@@ -12,7 +12,8 @@ from scenarios.config.sections import Rows3
 from scenarios.config.tasks import AlongSection, Listed, PositionTask, of_pose, register
 
 if TYPE_CHECKING:
-    from hierarchy import Task
+    from hierarchy import Frame, Task
+    from hierarchy.paths import Path
     from scenarios.config.references import References
 
 
@@ -27,26 +28,34 @@ class ListedPosition(Listed, PositionTask):
     axes: Literal["x", "y", "z", "xy", "xz", "yz", "xyz"] = "xyz"  # type: ignore[misc]
 
 
+class _AlongPose(Listed, AlongSection):
+    """What asks for the position and the rotation of a frame (6 rows)."""
+
+    frame: str
+    rotation: Rows3 | None = None
+
+    def asked(self, at: References) -> tuple[Frame, Path, Array]:
+        """Return the frame, its path, and its rotation, by default the initial one."""
+        frame = at.frame(self.frame)
+        rotation = at.start.rotation(frame) if self.rotation is None else self.rotation
+        return frame, self.along(at.start.position(frame)), np.asarray(rotation)
+
+    def sizes(self, error: Array) -> Iterator[tuple[str, Array]]:
+        """Yield the error of the position and of the rotation."""
+        return of_pose(error)
+
+
 @register("pose")
-class ListedPose(Listed, AlongSection):
+class ListedPose(_AlongPose):
     """Origin and axes of `frame` (6 rows); `rotation` (rows) defaults to the initial one."""
 
     kind: Literal["pose"]
-    frame: str
-    rotation: Rows3 | None = None
 
     def make(self, at: References) -> Task:
         """Return the task."""
         from hierarchy.tasks import Pose
 
-        frame = at.frame(self.frame)
-        path = self.along(at.start.position(frame))
-        rotation = at.start.rotation(frame) if self.rotation is None else self.rotation
-        return Pose(frame, path, rotation, *self.gains, name=self.title)
-
-    def sizes(self, error: Array) -> Iterator[tuple[str, Array]]:
-        """Yield the error of the position and of the rotation."""
-        return of_pose(error)
+        return Pose(*self.asked(at), *self.gains, name=self.title)
 
     def wanted(self, position: Array, error: Array) -> Array | None:
         """Return where the task wants the point."""
@@ -54,22 +63,13 @@ class ListedPose(Listed, AlongSection):
 
 
 @register("frame")
-class ListedFrame(Listed, AlongSection):
+class ListedFrame(_AlongPose):
     """As `pose`, with the error log(T^-1 T_d) of SE(3) in the axes of `frame` (6 rows)."""
 
     kind: Literal["frame"]
-    frame: str
-    rotation: Rows3 | None = None
 
     def make(self, at: References) -> Task:
         """Return the task."""
         from hierarchy.tasks import FrameLog
 
-        frame = at.frame(self.frame)
-        path = self.along(at.start.position(frame))
-        rotation = at.start.rotation(frame) if self.rotation is None else self.rotation
-        return FrameLog(frame, path, rotation, *self.gains, name=self.title)
-
-    def sizes(self, error: Array) -> Iterator[tuple[str, Array]]:
-        """Yield the error of the position and of the rotation."""
-        return of_pose(error)
+        return FrameLog(*self.asked(at), *self.gains, name=self.title)
