@@ -29,16 +29,18 @@ _UNITS = {"rad": "rad, rad/s, N m", "m": "m, m/s, N"}
 
 def is_robot(text: str) -> bool:
     """Whether the text names a robot; a name that is also a scenario's means the scenario."""
-    if text.endswith(".toml") or ".toml:" in text or is_shipped(text):
-        return False
-    return (in_package(text) or is_file_name(text) or text in TABLES
-            or text in plugins.own("robots"))
+    return not _is_scenario(text) and (
+        in_package(text) or is_file_name(text) or text in TABLES
+        or text in plugins.own("robots"))
+
+
+def _is_scenario(text: str) -> bool:
+    return text.endswith(".toml") or ".toml:" in text or is_shipped(text)
 
 
 def check_known(text: str) -> None:
     """Raise UnknownNameError for a name that is neither a scenario's nor a robot's."""
-    if not (text.endswith(".toml") or ".toml:" in text or is_shipped(text)
-            or text in shipped_groups()):
+    if not (_is_scenario(text) or text in shipped_groups()):
         raise UnknownNameError("scenario or robot", text, {*shipped(), *TABLES}, elsewhere(text))
 
 

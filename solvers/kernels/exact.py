@@ -90,7 +90,7 @@ def solve_hierarchy(A, lower, upper, sizes, x, record, settings, work):
             reference[c] = x[c]
         code = solve_by_staircase(A, lower, upper, sizes, x, settings, work[at:])
         if code != INACCURATE:
-            _keep_equalities(lower, record)
+            _keep_staircase(lower, upper, record)
             return code
         for c in range(n):
             x[c] = reference[c]
@@ -119,9 +119,7 @@ def solve_damped(A, lower, upper, sizes, x, record, settings, work):
     if met or staircase == NUMERICAL_FAILURE:
         for c in range(n):
             x[c] = d.free[c]
-        for i in range(m):
-            record[i] = EQUAL if lower[i] == upper[i] else FREE
-        record[3 * m] = 1.0
+        _keep_staircase(lower, upper, record)
         return finish(x, staircase)
     whole = last >= 0 and d.factor[last] > 0.0 and length_of(reference) == 0.0
     for k in range(sizes.size + (not whole)):
@@ -162,11 +160,12 @@ def _add_record(record, inner, lower, upper, d, rows, end, k):
 
 
 @inlined
-def _keep_equalities(lower, record):
-    """Write the record of rows that all are equalities."""
+def _keep_staircase(lower, upper, record):
+    """Write the record of an answer in which no inequality acts."""
     m = lower.size
     for i in range(m):
-        record[i], record[m + i], record[2 * m + i] = EQUAL, -1.0, 0.0
+        record[i] = EQUAL if lower[i] == upper[i] else FREE
+        record[m + i], record[2 * m + i] = -1.0, 0.0
     record[3 * m], record[3 * m + 1], record[3 * m + 2] = 1.0, 0.0, -1.0
 
 
