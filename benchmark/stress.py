@@ -1,37 +1,41 @@
 """A resolver on a million generated problems, every answer certified.
 
 The problems come from `solvers.problems`: the recipe ("recipe") and every structured kind by name.
-A problem fails if the resolver raises, returns a number that is not finite, reports as solved what
-`certify` rejects, or kills its process, or if `certify` raises. A failing problem is reduced while
-it still fails in the same way, and saved as a file that `solvers.problems.load` reads. With
-NUMBA_BOUNDSCHECK=1 (and a separate NUMBA_CACHE_DIR) a kernel that accesses memory outside its
-arrays raises instead of corrupting memory.
+What `certify` refuses of an answer that is called solved, the proof in 120 digits decides. A problem
+fails if the resolver raises, returns a number that is not finite, calls solved what is proved wrong
+or cannot be proved, or kills its process, or if an oracle raises. A failing problem is reduced while
+it fails in the same way, and saved as a file that `solvers.problems.load` reads. With
+NUMBA_BOUNDSCHECK=1 (and a separate NUMBA_CACHE_DIR) a kernel that accesses memory outside its arrays
+raises instead of corrupting memory.
 """
 
 from __future__ import annotations
 
-import multiprocessing
 import os
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
-from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, field
+from multiprocessing import get_context
 from pathlib import Path
 from typing import final
 
 import numpy as np
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from benchmark.report import Report, Section
+from benchmark.solve.judge import RIGHT, miss_of
 from benchmark.tables import Column, Table, whole
-from hierarchy.problem import Hierarchy
+from hierarchy.problem import Array, Hierarchy
+from scenarios.cli.progress import bar
+from scenarios.problems.answers import answer
 from solvers import Resolver, Status, certify, make, problems
+from solvers.proof import prove
 
-CERTIFIED = "certified"
-RAISED, NOT_FINITE, WRONG = "raised", "not finite", "solved, not certified"
-UNJUDGED = "solved, the certificate raised"
-FAILURES = (RAISED, NOT_FINITE, WRONG, UNJUDGED)
+CERTIFIED, PROVED = "certified", "proved right"
+RAISED, NOT_FINITE, WRONG = "raised", "not finite", "proved wrong"
+UNDECIDED, UNJUDGED = "solved, neither certified nor proved", "solved, an oracle raised"
+FAILURES = (RAISED, NOT_FINITE, WRONG, UNDECIDED, UNJUDGED)
 CRASHED = "not judged, a process died"
 _CHUNK = 500  # seeds per task of a process
 _KEPT = 20    # failing problems reduced and saved, at most
@@ -53,11 +57,6 @@ class Tally:
     lost: list[range] = field(default_factory=list)
     effort: Counter[int] = field(default_factory=Counter)
 
-    @property
-    def passed(self) -> bool:
-        """Whether all problems were judged and none failed."""
-        return not self.failing and not self.lost
-
     def add(self, other: Tally) -> None:
         """Add the counts of another tally."""
         self.counts.update(other.counts)
@@ -65,22 +64,15 @@ class Tally:
         self.lost += other.lost
         self.effort.update(other.effort)
 
-    def iterations_per_row(self) -> tuple[float, float, float]:
+    def iterations_per_row(self) -> dict[str, float]:
         """Median, 99.9th percentile and largest of iterations divided by rows; zeros if none."""
         every = np.repeat(np.array([*self.effort]) / 100.0, [*self.effort.values()])
-        if not every.size:
-            return 0.0, 0.0, 0.0
-        median, rare, most = np.percentile(every, (50.0, 99.9, 100.0), method="lower")
-        return float(median), float(rare), float(most)
+        found = np.percentile(every, (50.0, 99.9, 100.0), method="lower") if every.size else [0.0] * 3
+        return dict(zip(("median", "p99.9", "most"), map(float, found), strict=True))
 
 
-def outcome(resolver: Resolver, h: Hierarchy) -> str:
-    """Return the outcome of a solve: certified, one of FAILURES, or the name of another Status."""
-    return _solved(resolver, h)[0]
-
-
-def _solved(resolver: Resolver, h: Hierarchy) -> tuple[str, int]:
-    """Return the outcome of a solve and its iterations, zero if it raised."""
+def outcome(resolver: Resolver, h: Hierarchy) -> tuple[str, int]:
+    """Return the outcome of a solve (a constant of this module or a Status) and its iterations."""
     try:
         res = resolver.solve(h)
     except Exception:  # a solve must never raise
@@ -90,14 +82,19 @@ def _solved(resolver: Resolver, h: Hierarchy) -> tuple[str, int]:
     if res.status is not Status.SOLVED:
         return res.status.name, res.iterations
     try:
-        return CERTIFIED if certify(h, res.x).certified else WRONG, res.iterations
-    except Exception:  # an error of the certificate must not end the run
+        return CERTIFIED if certify(h, res.x).certified else _proved(h, res.x), res.iterations
+    except Exception:  # an error of an oracle must not end the run
         return UNJUDGED, res.iterations
 
 
-def recipe_for(resolver: Resolver) -> problems.Recipe:
-    """Return a recipe for problems that the resolver can handle."""
-    return problems.Recipe(equalities_only=resolver.handles != "inequalities")
+def _proved(h: Hierarchy, x: Array) -> str:
+    """Return what the proof says of an answer: by itself, or else beside that of another."""
+    proof = prove(h, [x])
+    if not proof.complete:
+        proof = max(proof, answer(h), key=lambda one: one.judged)
+    if proof.judged and miss_of(h, proof, x).relative > RIGHT:
+        return WRONG
+    return PROVED if proof.complete else UNDECIDED
 
 
 def problem(resolver: Resolver, kind: str, seed: int) -> Hierarchy:
@@ -105,11 +102,9 @@ def problem(resolver: Resolver, kind: str, seed: int) -> Hierarchy:
 
     For a resolver of bounds, two of three problems have a box.
     """
-    recipe = recipe_for(resolver)
-    if kind == RECIPE:
-        h = problems.generate(seed, recipe)
-    else:
-        h = problems.structured(seed, (kind,), recipe.equalities_only)
+    recipe = problems.Recipe(equalities_only=resolver.handles != "inequalities")
+    h = (problems.generate(seed, recipe) if kind == RECIPE
+         else problems.structured(seed, (kind,), recipe.equalities_only))
     inside = resolver.handles == "bounds" and resolver.strict and seed % 3 > 0
     return problems.bounded(h, seed) if inside else h
 
@@ -119,7 +114,7 @@ def tally(name: str, seeds: range, kind: str = RECIPE) -> Tally:
     resolver, found = make(name), Tally()
     for seed in seeds:
         h = problem(resolver, kind, seed)
-        what, iterations = _solved(resolver, h)
+        what, iterations = outcome(resolver, h)
         found.counts[what] += 1
         found.effort[round(100 * iterations / max(1, h.m))] += 1
         if what in FAILURES:
@@ -127,18 +122,76 @@ def tally(name: str, seeds: range, kind: str = RECIPE) -> Tally:
     return found
 
 
+def run(count: int, name: str, first: int = 0, processes: int | None = None, kind: str = RECIPE
+        ) -> dict[str, Tally]:
+    """Judge a resolver on `count` problems starting at seed `first`; return the counts by kind.
+
+    processes : number of processes; None for one per core.
+    kind : one of KINDS, or "all" to distribute the problems evenly over them.
+    """
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # read by the processes when they start
+    kinds = KINDS if kind == ALL else (kind,)
+    each, found = -(-count // len(kinds)), {one: Tally() for one in kinds}
+    with ProcessPoolExecutor(processes, get_context("spawn")) as pool, bar("problems") as told:
+        parts = {pool.submit(tally, name, seeds, one): (one, seeds) for one in kinds
+                 for seeds in _chunks(first, each)}
+        for part in as_completed(parts):
+            one, seeds = parts[part]
+            try:
+                found[one].add(part.result())
+            except BrokenProcessPool:
+                found[one].add(Tally(Counter({CRASHED: len(seeds)}), lost=[seeds]))
+            told(name, sum(some.counts.total() for some in found.values()), each * len(kinds))
+    return found
+
+
+def _chunks(first: int, count: int) -> list[range]:
+    return [range(i, min(i + _CHUNK, first + count)) for i in range(first, first + count, _CHUNK)]
+
+
+def report(name: str, found: Mapping[str, Tally], out: Path) -> Report:
+    """Return a table of the outcomes of each kind; the failing problems are saved, and listed."""
+    total, lines = Tally(), list[str]()
+    for kind, one in found.items():
+        total.add(one)
+        lines += [f"{kind}, seed {seed}, {what}: {keep(name, seed, what, out, kind)}"
+                  for seed, what in sorted(one.failing)[:_KEPT]]
+        lines += [f"{kind}, seeds {seeds.start} to {seeds.stop - 1}: {CRASHED}"
+                  for seeds in sorted(one.lost, key=lambda seeds: seeds.start)[:_KEPT]]
+    every = {**found, **({ALL: total} if len(found) > 1 else {})}
+    rows = [{"kind": kind, "problems": one.counts.total(), **one.counts,
+             "failed": len(one.failing), "lost": one.counts[CRASHED], **one.iterations_per_row()}
+            for kind, one in every.items()]
+    others = sorted(set(total.counts) - {CERTIFIED, CRASHED, RAISED, NOT_FINITE})
+    columns = [*(Column(key, key, whole) for key in ("problems", CERTIFIED, "failed", "lost")),
+               *(Column(what.lower().replace("_", "\n").replace(" ", "\n"), what,
+                        lambda n: whole(n or 0)) for what in others),
+               *(Column(f"steps / row\n{key}", key) for key in ("median", "most"))]
+    return Report(f"{name} on generated problems", [Section("", [Table(
+        f"{name}: outcomes, each answer certified", rows, columns, "kind")], "\n".join(lines))],
+        {"stress": rows}, failed=bool(total.failing or total.lost))
+
+
+def keep(name: str, seed: int, what: str, out: Path, kind: str = RECIPE) -> Path:
+    """Reduce the problem of a seed while its outcome is the same; save it and return the file."""
+    resolver = make(name)
+    smallest = shrunk(problem(resolver, kind, seed),
+                      lambda smaller: outcome(resolver, smaller)[0] == what)
+    out.mkdir(parents=True, exist_ok=True)
+    file = out / (f"{name}-{seed}.npz" if kind == RECIPE else f"{name}-{kind}-{seed}.npz")
+    problems.save(smallest, file)
+    return file
+
+
 def shrunk(h: Hierarchy, fails: Callable[[Hierarchy], bool]) -> Hierarchy:
     """Remove levels, rows, columns and the reference as long as `fails` holds."""
-    left, changed = _TRIALS, True
-    while changed and left:
-        changed = False
-        for smaller in _smaller(h):
-            left -= 1
-            if fails(smaller):
-                h, changed = smaller, True
-                break
-            if not left:
-                break
+    candidates = _smaller(h)
+    for _ in range(_TRIALS):
+        smaller = next(candidates, None)
+        if smaller is None:
+            break
+        if fails(smaller):
+            h, candidates = smaller, _smaller(smaller)
     return h
 
 
@@ -157,76 +210,3 @@ def _smaller(h: Hierarchy) -> Iterator[Hierarchy]:
             np.delete(h.reference, column))
     if h.reference.any():
         yield Hierarchy.from_levels(levels, np.zeros(h.n))
-
-
-def run(count: int, name: str, first: int = 0, processes: int | None = None, kind: str = RECIPE
-        ) -> dict[str, Tally]:
-    """Judge a resolver on `count` problems starting at seed `first`; return the counts by kind.
-
-    processes : number of processes; None for one per core.
-    kind : one of KINDS, or "all" to distribute the problems evenly over them.
-    """
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # read by the processes when they start
-    kinds = KINDS if kind == ALL else (kind,)
-    each = -(-count // len(kinds))
-    found = {one: Tally() for one in kinds}
-    columns = (TextColumn(name), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn(),
-               TextColumn("failed: {task.fields[failed]}"))
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(processes, context) as pool, Progress(*columns) as bar:
-        task = bar.add_task(name, total=each * len(kinds), failed=0)
-        parts = {pool.submit(tally, name, chunk, one): (one, chunk) for one in kinds
-                 for chunk in _chunks(first, each)}
-        for part in as_completed(parts):
-            one, chunk = parts[part]
-            found[one].add(_judged(part, chunk))
-            bar.update(task, completed=sum(some.counts.total() for some in found.values()),
-                       failed=sum(len(some.failing) for some in found.values()))
-    return found
-
-
-def report(name: str, found: Mapping[str, Tally], out: Path) -> Report:
-    """Return a table of the outcomes of each kind; the failing problems are saved, and listed."""
-    whole_, lines = Tally(), list[str]()
-    for kind, one in found.items():
-        whole_.add(one)
-        lines += [f"{kind}, seed {seed}, {what}: {keep(name, seed, what, out, kind)}"
-                  for seed, what in sorted(one.failing)[:_KEPT]]
-        lines += [f"{kind}, seeds {chunk.start} to {chunk.stop - 1}: {CRASHED}"
-                  for chunk in sorted(one.lost, key=lambda seeds: seeds.start)[:_KEPT]]
-    every = {**found, **({ALL: whole_} if len(found) > 1 else {})}
-    rows = [{"kind": kind, "problems": one.counts.total(), **one.counts,
-             "failed": len(one.failing), "lost": one.counts[CRASHED],
-             **dict(zip(("median", "p99.9", "most"), one.iterations_per_row(), strict=True))}
-            for kind, one in every.items()]
-    others = sorted(set(whole_.counts) - {CERTIFIED, CRASHED, *FAILURES})  # other than solved
-    columns = [*(Column(key, key, whole) for key in ("problems", CERTIFIED, "failed", "lost")),
-               *(Column(what.lower().replace("_", "\n"), what, lambda n: whole(n or 0))
-                 for what in others),
-               *(Column(f"steps / row\n{key}", key) for key in ("median", "most"))]
-    return Report(f"{name} on generated problems", [Section("", [Table(
-        f"{name}: outcomes, each answer certified", rows, columns, "kind")], "\n".join(lines))],
-        {"stress": rows}, failed=not whole_.passed)
-
-
-def _chunks(first: int, count: int) -> list[range]:
-    return [range(i, min(i + _CHUNK, first + count)) for i in range(first, first + count, _CHUNK)]
-
-
-def _judged(part: Future[Tally], seeds: range) -> Tally:
-    """Return the tally of these seeds, or mark them as lost if their process died."""
-    try:
-        return part.result()
-    except BrokenProcessPool:
-        return Tally(Counter({CRASHED: len(seeds)}), lost=[seeds])
-
-
-def keep(name: str, seed: int, what: str, out: Path, kind: str = RECIPE) -> Path:
-    """Reduce the problem of a seed while its outcome is the same; save it and return the file."""
-    resolver = make(name)
-    smallest = shrunk(problem(resolver, kind, seed),
-                      lambda smaller: outcome(resolver, smaller) == what)
-    out.mkdir(parents=True, exist_ok=True)
-    file = out / (f"{name}-{seed}.npz" if kind == RECIPE else f"{name}-{kind}-{seed}.npz")
-    problems.save(smallest, file)
-    return file
