@@ -8,11 +8,11 @@ from a CPU.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from functools import partial
 from importlib.util import find_spec
 from time import perf_counter, process_time
-from typing import Any, final
+from typing import Any
 
 import numpy as np
 
@@ -33,33 +33,6 @@ Millions of problems per second: from the fastest call, and per core from the pr
 all calls. Both are insensitive to other load on the machine; medians are in the CSV."""
 
 
-@final
-@dataclass
-class Timed:
-    """One method to solve a batch: its call, and its times [s] on the wall and of the processor."""
-
-    way: str
-    call: Callable[[], Any]
-    count: int
-    wall: list[float] = field(default_factory=list)
-    processor: list[float] = field(default_factory=list)
-
-    def take_turn(self) -> None:
-        """Call once, timed."""
-        start, used = perf_counter(), process_time()
-        self.call()
-        self.processor.append(process_time() - used)
-        self.wall.append(perf_counter() - start)
-
-    def row(self) -> Row:
-        """Return what is written down: rates in millions a second, times [us] of a problem."""
-        best, median, p95 = np.percentile(self.wall, [0, 50, 95])
-        per_core = self.count * len(self.processor) / sum(self.processor)
-        return {"way": self.way, "calls": len(self.wall), "best_us": 1e6 * best / self.count,
-                "median_us": 1e6 * median / self.count, "p95_us": 1e6 * p95 / self.count,
-                "rate": 1e-6 * self.count / best, "per_core": 1e-6 * per_core}
-
-
 def run(counts: Sequence[int] = COUNTS, seconds: float = 1.0,
         entries: Sequence[tuple[str, str]] = ENTRIES) -> Report:
     """Time every method on every family and batch size.
@@ -74,59 +47,68 @@ def run(counts: Sequence[int] = COUNTS, seconds: float = 1.0,
     rows: list[Row] = []
     tables = []
     for name, resolver in entries:
-        own = [{"family": name, "resolver": resolver, "problems": count, **row}
-               for count in counts for row in _timed(name, make(resolver), count, seconds)]
-        tables.append(_table(f"{name}, {resolver}", own))
-        rows += own
+        sizes = []
+        for count in counts:
+            found = _timed(problems_like(name, count), make(resolver), seconds)
+            sizes.append({"problems": f"{count:,}"} | {
+                key: row[of] for row in found for key, of in (
+                    (row["way"], "rate"), (f"{row['way']} core", "per_core"))})
+            rows += [{"family": name, "resolver": resolver, "problems": count, **row}
+                     for row in found]
+        columns = [Column(head, key, "{:.3g}".format) for row in found
+                   for head, key in ((row["way"],) * 2, ("per core", f"{row['way']} core"))]
+        tables.append(Table(f"{name}, {resolver}", sizes, columns, "problems"))
     return Report(f"Batches on {cores()} cores of {machine()['processor']}",
                   [Section("", tables, _NOTES)], {"batch": rows})
-
-
-def _table(title: str, rows: Sequence[Row]) -> Table:
-    """Return a row for each batch size: the rate of each method, and its rate per core."""
-    sizes: dict[int, dict[str, Any]] = {}
-    for row in rows:
-        own = sizes.setdefault(row["problems"], {"problems": f"{row['problems']:,}"})
-        own |= {row["way"]: row["rate"], f"{row['way']} core": row["per_core"]}
-    columns = [Column(head, key, "{:.3g}".format) for way in dict.fromkeys(
-        row["way"] for row in rows) for head, key in ((way, way), ("per core", f"{way} core"))]
-    return Table(title, list(sizes.values()), columns, "problems")
 
 
 def problems_like(name: str, count: int, seed: int = 0) -> Batch:
     """Return `count` problems of a family, with targets varied by 1 % and random references."""
     r = np.random.default_rng(seed)
     originals = [problem.h for problem in family(name)]
-    return Batch.of([_like(originals[p % len(originals)], r) for p in range(count)])
+
+    def like(h: Hierarchy) -> Hierarchy:
+        factor = 1.0 + 0.01 * r.uniform(-1.0, 1.0, h.m)
+        return h.changed(lower=h.lower * factor, upper=h.upper * factor,
+                         reference=r.normal(size=h.n))
+
+    return Batch.of([like(originals[p % len(originals)]) for p in range(count)])
 
 
-def _like(h: Hierarchy, r: np.random.Generator) -> Hierarchy:
-    factor = 1.0 + 0.01 * r.uniform(-1.0, 1.0, h.m)
-    return h.changed(lower=h.lower * factor, upper=h.upper * factor, reference=r.normal(size=h.n))
-
-
-def _timed(name: str, resolver: Resolver, count: int, seconds: float) -> Iterable[Row]:
-    ways = list(_ways(problems_like(name, count), resolver))
-    for way in ways:
-        way.call()
+def _timed(batch: Batch, resolver: Resolver, seconds: float) -> list[Row]:
+    """Return what is measured of each way, in turns: rates in millions a second, times [us]."""
+    ways = _ways(batch, resolver)
+    for call, _ in ways.values():
+        call()
+    spent: dict[str, list[tuple[float, float]]] = {way: [] for way in ways}
     end = perf_counter() + seconds
-    while perf_counter() < end or len(ways[0].wall) < 3:
-        for way in ways:
-            way.take_turn()
-    return [way.row() for way in ways]
+    while perf_counter() < end or len(next(iter(spent.values()))) < 3:
+        for way, (call, _) in ways.items():
+            start, used = perf_counter(), process_time()
+            call()
+            used, passed = process_time() - used, perf_counter() - start
+            spent[way].append((passed, used))
+    rows = []
+    for way, (_, count) in ways.items():
+        wall, processor = np.array(spent[way]).T
+        best, median, p95 = np.percentile(wall, [0, 50, 95])
+        rows.append({"way": way, "calls": len(wall), "best_us": 1e6 * best / count,
+                     "median_us": 1e6 * median / count, "p95_us": 1e6 * p95 / count,
+                     "rate": 1e-6 * count / best,
+                     "per_core": 1e-6 * count * len(wall) / processor.sum()})
+    return rows
 
 
-def _ways(batch: Batch, resolver: Resolver) -> Iterable[Timed]:
+def _ways(batch: Batch, resolver: Resolver) -> dict[str, tuple[Callable[[], Any], int]]:
+    """Return a call for each way, and how many problems it solves."""
     alone = [batch[p] for p in range(min(len(batch), _LOOPED))]
-    yield Timed("one by one", lambda: [resolver.solve(h) for h in alone], len(alone))
+    found: dict[str, tuple[Callable[[], Any], int]] = {
+        "one by one": (lambda: [resolver.solve(h) for h in alone], len(alone))}
     for threads in dict.fromkeys((1, cores())):
-        yield Timed(f"{threads} thread" + "s" * (threads > 1), _call(batch, resolver, threads),
-                    len(batch))
+        found[f"{threads} thread" + "s" * (threads > 1)] = (
+            partial(solve, batch, resolver, threads), len(batch))
     if resolver.name == "tpm" and find_spec("jax") is not None:
-        from solvers.batch import on_jax as batch_jax
+        from solvers.batch import on_jax
 
-        yield Timed("jax", lambda: batch_jax.solve(batch, resolver), len(batch))
-
-
-def _call(batch: Batch, resolver: Resolver, threads: int) -> Callable[[], Any]:
-    return lambda: solve(batch, resolver, threads)
+        found["jax"] = (lambda: on_jax.solve(batch, resolver), len(batch))
+    return found

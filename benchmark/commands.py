@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from importlib import import_module
+from inspect import signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -15,7 +16,6 @@ from scenarios.cli.terminal import shown
 
 if TYPE_CHECKING:
     from benchmark.packages import Package
-    from benchmark.report import Report
 
 _USUAL = ("solve.resolvers", "tick", "solve.accuracy", "solve.growth", "strictness", "start")
 
@@ -47,18 +47,16 @@ def _run(out: Path | None, *names: str, **options: Any) -> int:
     from scenarios.files import claim, next_free
 
     folder = claim(out if out is not None else next_free(Path("runs") / "bench"))
-    failed = [_told(import_module(f"benchmark.{name}").run(**options),
-                    folder / name.removesuffix(".compare").split(".")[-1] if len(names) > 1
-                    else folder)
-              for name in names]
+    failed = False
+    for name in names:
+        run = import_module(f"benchmark.{name}").run
+        known = signature(run).parameters
+        report = run(**{key: value for key, value in options.items() if key in known})
+        report.say()
+        report.write(folder / name.split(".")[-1] if len(names) > 1 else folder)
+        failed = failed or report.failed
     print(f"\nNumbers: {shown(folder)}")
-    return int(any(failed))
-
-
-def _told(report: Report, folder: Path) -> bool:
-    report.say()
-    report.write(folder)
-    return report.failed
+    return int(failed)
 
 
 @bench.callback()
@@ -117,15 +115,14 @@ def growth(seconds: Seconds = 40.0, larger: Annotated[bool, typer.Option(
                "--larger", help="Up to 20 tasks, 300 joints and 20 rows a task.")] = False,
            out: Out = None) -> int:
     """Time a solve as the numbers of tasks and joints grow."""
-    sizes = import_module("benchmark.solve.growth").LARGER if larger else None
-    return _run(out, "solve.growth", seconds=seconds, sizes=sizes)
+    return _run(out, "solve.growth", seconds=seconds, larger=larger)
 
 
 @bench.command("first-paper")
 def first_paper(arms: Arms = 10_000, checked: Checked = 300, seconds: Seconds = 40.0,
                 out: Out = None) -> int:
     """Repeat the first TPM paper: accuracy and growth."""
-    return _run(out, "solve.first_paper", arms=arms, checked=checked, seconds=seconds)
+    return _run(out, "solve.accuracy", "solve.growth", arms=arms, checked=checked, seconds=seconds)
 
 
 @bench.command()
@@ -150,12 +147,12 @@ def peers(install: Install = False,
 
     if install:
         return _installed()
-    modules = {"ellipse": "arm.compare", "stand": "stand.compare"}
+    modules = {"ellipse": "peers.moving", "stand": "peers.standing"}
     if scene not in (None, *modules):
         raise UnknownNameError("scene", str(scene), tuple(modules))
     if scene is not None:
         return _run(out, modules[scene])
-    _run(out, "arm.compare", "stand.compare")
+    _run(out, *modules.values())
     return 0
 
 
@@ -168,7 +165,7 @@ def ik(count: Annotated[int, typer.Option("--count", min=1, metavar="N",
     Reachable and unreachable poses of UR5, Panda and both arms of G1, which need
     example-robot-data; for placo run `hierarchy bench peers --install` first.
     """
-    return _run(out, "reach.compare", count=count)
+    return _run(out, "peers.reaching", count=count)
 
 
 @bench.command("open")

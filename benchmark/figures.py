@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 import matplotlib
@@ -22,12 +23,16 @@ from scenarios.draw.figures.palette import Look, looks
 _LEAST, _MOST = 1e-17, 1e-2  # errors beyond are drawn at the edge
 _SHADES = LinearSegmentedColormap.from_list("share", ["#b42318", "#f0c66b", "#e9f4ee", "#7cc4a0"])
 _STRICT = 1e-9               # [m per tick], as in `hierarchy bench strictness`
-_APART = 0.058               # of two labels, as a share of the height of the axes
 _MARKS = "osD^v<P>X"
 
 
-def time_against_error(rows: Sequence[Row], title: str = "largest miss of an answer called solved"
-                       ) -> Figure:
+@contextmanager
+def _figure(width: float, height: float, style: Any = ()) -> Iterator[Figure]:
+    with matplotlib.rc_context({**drawing.style(), **dict(style)}):
+        yield Figure(figsize=(width, height), layout="constrained")
+
+
+def time_against_error(rows: Sequence[Row]) -> Figure:
     """Return median time over the largest error, one panel for each family; low and left is better.
 
     Of a row `hollow` marks are warm starts, faint ones left some unsolved, a cross was wrong.
@@ -36,8 +41,7 @@ def time_against_error(rows: Sequence[Row], title: str = "largest miss of an ans
     style = looks(dict.fromkeys(row["entrant"].removesuffix(" warm") for row in rows))
     columns = min(4, max(1, len(names)))
     lines = max(1, -(-len(names) // columns))
-    with matplotlib.rc_context({**drawing.style(), "font.size": 8.5}):
-        fig = Figure(figsize=(2.6 * columns + 0.4, 2.35 * lines + 1.1), layout="constrained")
+    with _figure(2.6 * columns + 0.4, 2.35 * lines + 1.1, {"font.size": 8.5}) as fig:
         axes = list(fig.subplots(lines, columns, sharex=True, sharey=True, squeeze=False).flat)
         for ax, name in zip(axes, names, strict=False):
             for row in rows:
@@ -47,7 +51,7 @@ def time_against_error(rows: Sequence[Row], title: str = "largest miss of an ans
             ax.set_xticks([1e-16, 1e-12, 1e-8, 1e-4])
         for ax in axes[len(names):]:
             ax.set_axis_off()
-        fig.supxlabel(title, fontsize=9.0)
+        fig.supxlabel("largest miss of an answer called solved", fontsize=9.0)
         fig.supylabel("median time of a solve [µs]", fontsize=9.0)
         fig.legend(handles=[Line2D([], [], color=look.colour, marker="o", linestyle="",
                                    markersize=5.0, label=label) for label, look in style.items()],
@@ -67,8 +71,7 @@ def _dot(ax: Axes, row: Row, look: Look) -> None:
 def profiles(ratios: Array, found: Mapping[str, Array]) -> Figure:
     """Return the performance profile: share solved against time over that of the fastest."""
     style = looks(found)
-    with matplotlib.rc_context(drawing.style()):
-        fig = Figure(figsize=(6.2, max(4.2, 0.155 * len(found) + 0.3)), layout="constrained")
+    with _figure(6.2, max(4.2, 0.155 * len(found) + 0.3)) as fig:
         ax = fig.subplots()
         for label, share in found.items():
             look = style[label]
@@ -88,9 +91,8 @@ def heat(cells: Sequence[Row]) -> Figure:
     shares = np.full((len(labels), len(names)), np.nan)
     for row in cells:
         shares[labels.index(row["entrant"]), names.index(row["family"])] = row["right"]
-    with matplotlib.rc_context({**drawing.style(), "axes.grid": False, "font.size": 8.0}):
-        fig = Figure(figsize=(0.36 * len(names) + 2.0, 0.24 * len(labels) + 1.6),
-                     layout="constrained")
+    with _figure(0.36 * len(names) + 2.0, 0.24 * len(labels) + 1.6,
+                 {"axes.grid": False, "font.size": 8.0}) as fig:
         ax = fig.subplots()
         ax.imshow(np.ma.masked_invalid(shares), cmap=_SHADES, vmin=0.0, vmax=1.0, aspect="auto")
         for i, j in np.argwhere(~np.isnan(shares)):
@@ -99,8 +101,7 @@ def heat(cells: Sequence[Row]) -> Figure:
         ax.set_xticks(range(len(names)), names, rotation=60, ha="right", rotation_mode="anchor")
         ax.set_yticks(range(len(labels)), labels)
         ax.tick_params(length=0)
-        for side in ax.spines.values():
-            side.set_visible(False)
+        ax.spines[:].set_visible(False)
     return fig
 
 
@@ -111,14 +112,12 @@ def bars(rows: Sequence[Row]) -> Figure:
     """
     timed = [row for row in rows if not np.isnan(row["median_us"])]
     style = looks(row["entrant"] for row in timed)
-    with matplotlib.rc_context({**drawing.style(), "font.size": 8.5}):
-        fig = Figure(figsize=(7.6, 0.27 * len(timed) + 1.1), layout="constrained")
+    with _figure(7.6, 0.27 * len(timed) + 1.1, {"font.size": 8.5}) as fig:
         ax = fig.subplots()
         for i, row in enumerate(timed):
             colour = style[row["entrant"]].colour
             ax.barh(i, row["median_us"], 0.66, color=colour, alpha=0.5)
-            if not np.isnan(row["solve_us"]):
-                ax.barh(i, row["solve_us"], 0.66, color=colour)
+            ax.barh(i, np.nan_to_num(row["solve_us"]), 0.66, color=colour)
             ax.plot([row["median_us"], row["p95_us"]], [i, i], color=drawing.INK, linewidth=0.8)
             ax.annotate(_bought(row), (row["p95_us"], i), (4.0, 0.0), textcoords="offset points",
                         va="center", fontsize=8.0)
@@ -151,69 +150,40 @@ def over_sizes(rows: Sequence[Row], panels: Mapping[str, tuple[str, str, str]]) 
     """
     labels = list(dict.fromkeys(row["entrant"] for row in rows))
     style = looks(labels)
-    with matplotlib.rc_context({**drawing.style(), "font.size": 9.0}):
-        lines = (len(panels) + 1) // 2
-        fig = Figure(figsize=(9.2, 3.8 * lines), layout="constrained")
+    lines = (len(panels) + 1) // 2
+    with _figure(9.2, 3.8 * lines, {"font.size": 9.0}) as fig:
         axes = fig.subplots(lines, 2, squeeze=False).ravel()
         for ax in axes[len(panels):]:
             ax.set_axis_off()
         for ax, (figure, (xlabel, letter, title)) in zip(axes, panels.items(), strict=False):
             some = [row for row in rows if row["figure"] == figure]
-            for i, label in enumerate(labels):
-                _band(ax, figure, [row for row in some if row["entrant"] == label],
-                      style[label].colour, _MARKS[i % len(_MARKS)])
+            powers = exponents(some, figure)
+            for label, mark in zip(labels, _MARKS * len(labels), strict=False):
+                size, median, p95 = (np.array([row[key] for row in some if row["entrant"] == label])
+                                     for key in (figure, "median_us", "p95_us"))
+                power = powers.get(label, np.nan)
+                ax.fill_between(size, median, p95, color=style[label].colour, alpha=0.15,
+                                linewidth=0)
+                ax.plot(size, median, marker=mark, color=style[label].colour, markersize=3.6,
+                        linewidth=1.4, label=label if np.isnan(power) else
+                        f"{label}  ${letter}^{{{power:.1f}}}$")
             ax.set(xscale="log", yscale="log", xlabel=xlabel, title=title)
             ax.set_xticks(sorted({row[figure] for row in some}))
             ax.xaxis.set_minor_locator(NullLocator())
             ax.xaxis.set_major_formatter(ScalarFormatter())
             ax.tick_params(axis="x", labelsize=7.0)
-            _name_lines(ax, figure, letter, some, style)
+            ax.legend(fontsize=7.0)
         for ax in axes[::2]:
             ax.set_ylabel("time [µs]: median, band to the 95th percentile", fontsize=8.0)
     return fig
 
 
-def _band(ax: Axes, figure: str, rows: Sequence[Row], colour: str, mark: str) -> None:
-    size, median, p95 = (np.array([row[key] for row in rows], dtype=float)
-                         for key in (figure, "median_us", "p95_us"))
-    ax.fill_between(size, median, p95, color=colour, alpha=0.15, linewidth=0)
-    ax.plot(size, median, marker=mark, color=colour, markersize=3.6, linewidth=1.4)
-
-
-def _name_lines(ax: Axes, figure: str, letter: str, rows: Sequence[Row],
-                style: Mapping[str, Look]) -> None:
-    """Write each name and exponent beside the end of its line without overlap."""
-    ends = {row["entrant"]: row for row in sorted(rows, key=lambda row: float(row[figure]))}
-    order = sorted(ends, key=lambda label: float(ends[label]["median_us"]))
-    low, high = np.log(ax.get_ylim())
-    heights = [(np.log(ends[label]["median_us"]) - low) / (high - low) for label in order]
-    powers = exponents(rows, figure)
-    for label, height in zip(order, spread(heights), strict=True):
-        power = "" if np.isnan(powers[label]) else f"  ${letter}^{{{powers[label]:.1f}}}$"
-        ax.annotate(label + power, (ends[label][figure], ends[label]["median_us"]), (1.05, height),
-                    color=drawing.INK, textcoords="axes fraction", va="center", fontsize=8.5,
-                    annotation_clip=False,
-                    arrowprops={"arrowstyle": "-", "color": style[label].colour, "linewidth": 0.9,
-                                "relpos": (0.0, 0.5), "shrinkA": 1.0, "shrinkB": 3.0})
-
-
 def exponents(rows: Sequence[Row], figure: str, fewest: int = 3) -> dict[str, float]:
     """Return the slope of log time over log size in the upper half of sizes, by entrant."""
-    found: dict[str, Any] = {}
+    found: dict[str, float] = {}
     for label in dict.fromkeys(row["entrant"] for row in rows):
         points = sorted((row[figure], row["median_us"]) for row in rows if row["entrant"] == label)
         upper = np.log(points[min(len(points) // 2, max(len(points) - fewest, 0)):])
         found[label] = (float(np.polyfit(upper[:, 0], upper[:, 1], 1)[0]) if len(upper) > 1
                         else float("nan"))
     return found
-
-
-def spread(heights: Sequence[float]) -> Array:
-    """Return the nearest ascending heights that are at least _APART from each other."""
-    steps = np.arange(len(heights)) * _APART
-    pools: list[list[float]] = []  # of heights without their steps, made ascending
-    for height in np.asarray(heights) - steps:
-        pools.append([height])
-        while len(pools) > 1 and np.mean(pools[-2]) > np.mean(pools[-1]):
-            pools[-2:] = [pools[-2] + pools[-1]]
-    return np.asarray(steps + [np.mean(pool) for pool in pools for _ in pool])

@@ -41,19 +41,11 @@ def on_all_cores(work: Callable[..., Found], calls: Sequence[tuple[Any, ...]]) -
 
 def machine() -> dict[str, str]:
     """Return processor, cores and versions by name, without personal data."""
-    found = {"processor": _processor(), "cores": str(os.cpu_count()),
-             "system": f"{platform.system()} {platform.machine()}",
-             "python": platform.python_version()}
-    for name in _PACKAGES:
-        try:
-            found[name] = metadata.version(name)
-        except metadata.PackageNotFoundError:
-            found[name] = "not installed"
-    return found
-
-
-def _processor() -> str:
     about = Path("/proc/cpuinfo")
     lines = about.read_text().splitlines() if about.is_file() else []
     named = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
-    return named[0] if named else platform.processor() or "unknown"
+    known = {one.metadata["Name"]: one.version for one in metadata.distributions()}
+    return {"processor": named[0] if named else platform.processor() or "unknown",
+            "cores": str(os.cpu_count()), "system": f"{platform.system()} {platform.machine()}",
+            "python": platform.python_version(),
+            **{name: known.get(name, "not installed") for name in _PACKAGES}}

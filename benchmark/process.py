@@ -8,7 +8,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from threading import Timer
@@ -17,7 +17,7 @@ from typing import Any, final
 from benchmark.packages import Entrant, MissingError, python_of
 
 START_LIMIT = 180.0  # [s] for imports, including compilation of kernels
-CRASHED, HUNG = "crashed", "time limit"
+CRASHED, HUNG, LEFT_OUT = "crashed", "time limit", "left out after crashes"
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 
@@ -43,22 +43,39 @@ class Process:
     """`benchmark.worker` for one entrant; MissingError where it cannot be had.
 
     questions : MODULE:CLASS of what asks it. folder : of `staged`. about : what it says of itself.
-    ends : how often it ended without an answer; the next question starts it again.
     """
 
     def __init__(self, entrant: Entrant, questions: str, folder: Path) -> None:
-        self.entrant, self.questions, self.ends = entrant, questions, 0
-        self._folder, self._hung = folder, False
+        self.entrant, self.questions = entrant, questions
+        self._folder, self._hung, self._fresh, self._starts = folder, False, False, 0
         self._process: subprocess.Popen[str] | None = None
         self.about: dict[str, Any] = {}
         self._begin()
 
+    def __enter__(self) -> Process:
+        return self
+
+    def __exit__(self, *raised: object) -> None:
+        """End the process."""
+        if self._process is not None:
+            self._process.kill()
+            self._process.communicate()
+            self._log.close()
+            self._process = None
+
     def ask(self, question: tuple[Any, ...], limit: float) -> Any:
-        """Return the answer to (METHOD, ARGUMENTS...); EndedError if none comes in `limit` [s]."""
+        """Return the answer to (METHOD, ARGUMENTS...); EndedError if none comes in `limit` [s].
+
+        The first question to a process may load and compile, and has more time; the next one after
+        an end starts a new process.
+        """
         if self._process is None:
             self._begin()
         assert self._process is not None
         assert self._process.stdin is not None
+        if self._fresh:
+            limit += START_LIMIT if self._starts == 1 else 2.0 * limit
+        self._fresh = False
         try:
             self._process.stdin.write(json.dumps(question) + "\n")
             self._process.stdin.flush()
@@ -66,13 +83,22 @@ class Process:
             pass
         return self._next(limit)
 
-    def stop(self) -> None:
-        """End the process."""
-        if self._process is not None:
-            self._process.kill()
-            self._process.communicate()
-            self._log.close()
-            self._process = None
+    def answers(self, questions: Iterable[tuple[Any, ...]], limit: float, most: int = 5
+                ) -> Iterator[dict[str, Any]]:
+        """Yield the answer to each question, or how and why the process ended without one.
+
+        After `most` ends the rest is left out.
+        """
+        ends = 0
+        for question in questions:
+            if ends >= most:
+                yield {"ended": LEFT_OUT}
+                continue
+            try:
+                yield self.ask(question, limit)
+            except EndedError as end:
+                ends += 1
+                yield {"ended": end.kind, "why": str(end)}
 
     def _begin(self) -> None:
         entrant = self.entrant
@@ -85,11 +111,13 @@ class Process:
         try:
             self._process = subprocess.Popen(
                 [python, "-m", "benchmark.worker", self.questions, entrant.adapter,
-                 json.dumps(dict(entrant.options)), core], stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE, stderr=self._log, text=True, cwd=self._folder, env=own)
+                 json.dumps(dict(entrant.options)), entrant.package.name, core],
+                stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._log, text=True,
+                cwd=self._folder, env=own)
         except OSError as error:
             self._log.close()
             raise MissingError(f"{python}: {error.strerror}") from error
+        self._starts, self._fresh = self._starts + 1, True
         self.about = self._next(START_LIMIT)
 
     def _next(self, limit: float) -> Any:
@@ -105,9 +133,8 @@ class Process:
             timer.cancel()
         if line.endswith("\n"):
             return json.loads(line)
-        self.ends += 1
         kind, why = HUNG if self._hung else CRASHED, self._last_words()
-        self.stop()
+        self.__exit__()
         raise EndedError(kind, why)
 
     def _kill(self) -> None:

@@ -10,7 +10,7 @@ import os
 import subprocess
 import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -41,7 +41,6 @@ from solvers import make
 h = Hierarchy.from_levels([(np.eye(3)[:1], [1.0]), (np.eye(3)[1:], [1.0, 2.0])])
 make("tpm").solve(h)"""
 _TICK = """\
-from scenarios.cell.build import build
 from scenarios.config import load
 from scenarios.loop.controller import Controller
 controller = Controller(load("ellipse"))
@@ -111,20 +110,25 @@ def run() -> Report:
                                         for name, s in kernels.items()]})
 
 
-def beginnings() -> list[Cost]:
+def beginnings() -> Iterator[Cost]:
     """Time whole processes from start to end, with compiled kernels in the cache.
 
-    Returns the minimum of several repetitions, since other load can only add to it.
+    The minimum of several repetitions counts, since other load can only add to it.
     """
-    timed = [("python -c pass", ["-c", "pass"], None),
-             ("import scenarios", ["-c", "import scenarios"], None),
-             ("import hierarchy, solvers", ["-c", "import hierarchy, solvers"], None),
-             ("hierarchy --help", ["-m", "scenarios.cli.main", "--help"], 0.5),
-             ("first solve, kernels cached", ["-c", _SOLVE], 0.6),
-             ("first tick of ellipse, cached", ["-c", _TICK], None),
-             (f"hierarchy {' '.join(_SHORT)}", ["-c", _COMMAND, *_SHORT], 1.5),
-             ("the same with --figures", ["-c", _COMMAND, *_SHORT, "--figures"], None)]
-    return [_least(what, arguments, most) for what, arguments, most in timed]
+    for what, most, *arguments in (
+            ("python -c pass", None, "-c", "pass"),
+            ("import scenarios", None, "-c", "import scenarios"),
+            ("import hierarchy, solvers", None, "-c", "import hierarchy, solvers"),
+            ("hierarchy --help", 0.5, "-m", "scenarios.cli.main", "--help"),
+            ("first solve, kernels cached", 0.6, "-c", _SOLVE),
+            ("first tick of ellipse, cached", None, "-c", _TICK),
+            (f"hierarchy {' '.join(_SHORT)}", 1.5, "-c", _COMMAND, *_SHORT),
+            ("the same with --figures", None, "-c", _COMMAND, *_SHORT, "--figures")):
+        _say(what)
+        _run(arguments)  # fills the caches of files, bytecode and kernels
+        done = [_run(arguments) for _ in range(_REPEATED)]
+        yield Cost(what, min(one.seconds for one in done), "s", most,
+                   min(one.processor for one in done))
 
 
 def first_compilation(cache: Path) -> tuple[list[Cost], dict[str, float]]:
@@ -144,15 +148,15 @@ def first_compilation(cache: Path) -> tuple[list[Cost], dict[str, float]]:
 def own_seconds(events: Sequence[Sequence[Any]]) -> dict[str, float]:
     """Return the seconds of each name without nested ones, from events (time, is start, name)."""
     own: dict[str, float] = {}
-    within: list[tuple[float, float]] = []  # start of each open event, seconds of nested ones
+    within: list[list[float]] = []  # start of each open event, seconds of nested ones
     for at, begins, name in events:
         if begins:
-            within.append((at, 0.0))
+            within.append([at, 0.0])
             continue
         began, inner = within.pop()
         own[name] = own.get(name, 0.0) + at - began - inner
         if within:
-            within[-1] = (within[-1][0], within[-1][1] + at - began)
+            within[-1][1] += at - began
     return dict(sorted(own.items(), key=lambda item: -item[1]))
 
 
@@ -172,9 +176,8 @@ def memory(folder: Path) -> list[Cost]:
 def resident() -> float:
     """Return the resident memory [MB] of this process; 0 if it is unknown."""
     file = Path("/proc/self/statm")
-    if not file.is_file():
-        return 0.0
-    return int(file.read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 1024.0**2
+    pages = int(file.read_text().split()[1]) if file.is_file() else 0
+    return pages * os.sysconf("SC_PAGE_SIZE") / 1024.0**2 if pages else 0.0
 
 
 class _Done(NamedTuple):
@@ -184,14 +187,6 @@ class _Done(NamedTuple):
     seconds: float
     processor: float
     memory: float
-
-
-def _least(what: str, arguments: list[str], most: float | None) -> Cost:
-    _say(what)
-    _run(arguments)  # fills the caches of files, bytecode and kernels
-    done = [_run(arguments) for _ in range(_REPEATED)]
-    return Cost(what, min(one.seconds for one in done), "s", most,
-                min(one.processor for one in done))
 
 
 def _run(arguments: list[str], **environment: str) -> _Done:

@@ -1,12 +1,12 @@
 """A resolver on a million generated problems, every answer certified.
 
 The problems come from `solvers.problems`: the recipe ("recipe") and every structured kind by name.
-What `certify` refuses of an answer that is called solved, the proof in 120 digits decides. A problem
+Where `certify` refuses an answer that is called solved, the proof in 120 digits decides. A problem
 fails if the resolver raises, returns a number that is not finite, calls solved what is proved wrong
-or cannot be proved, or kills its process, or if an oracle raises. A failing problem is reduced while
-it fails in the same way, and saved as a file that `solvers.problems.load` reads. With
-NUMBA_BOUNDSCHECK=1 (and a separate NUMBA_CACHE_DIR) a kernel that accesses memory outside its arrays
-raises instead of corrupting memory.
+or cannot be proved, or kills its process, or if an oracle raises. A failing problem is reduced
+while it fails in the same way, and saved as a file that `solvers.problems.load` reads. With
+NUMBA_BOUNDSCHECK=1 (and a separate NUMBA_CACHE_DIR) a kernel that accesses memory outside its
+arrays raises instead of corrupting memory.
 """
 
 from __future__ import annotations
@@ -67,7 +67,8 @@ class Tally:
     def iterations_per_row(self) -> dict[str, float]:
         """Median, 99.9th percentile and largest of iterations divided by rows; zeros if none."""
         every = np.repeat(np.array([*self.effort]) / 100.0, [*self.effort.values()])
-        found = np.percentile(every, (50.0, 99.9, 100.0), method="lower") if every.size else [0.0] * 3
+        found = (np.percentile(every, (50.0, 99.9, 100.0), method="lower") if every.size
+                 else [0.0, 0.0, 0.0])
         return dict(zip(("median", "p99.9", "most"), map(float, found), strict=True))
 
 

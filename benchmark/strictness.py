@@ -16,15 +16,15 @@ from typing import Any, ClassVar, final
 
 import numpy as np
 
-from benchmark.arm.compare import judge_step, make_scenes
-from benchmark.arm.ours import Ours
-from benchmark.arm.questions import Questions
 from benchmark.machine import on_all_cores
+from benchmark.peers.compare import joined
+from benchmark.peers.moving import judge_step, make_scenes
+from benchmark.peers.ours import arm
+from benchmark.peers.questions import Moving
 from benchmark.report import Report, Section
 from benchmark.store import Row
 from benchmark.tables import Column, Table, power, whole, yes
-from benchmark.turns import joined
-from hierarchy import Hierarchy
+from hierarchy import Hierarchy, HierarchyError
 from solvers import Resolution, Resolver, make, names
 from solvers.qp.backends import BACKENDS, installed
 from solvers.resolver import Handles
@@ -79,14 +79,16 @@ def strictness(resolver: Resolver, duration: float = 2.0) -> Row:
 
     Raises
     ------
-    HierarchyError : the resolver does not handle bounds.
+    HierarchyError : it has no answer in any tick, as when it does not handle bounds.
     """
     with tempfile.TemporaryDirectory() as folder:
         scene = make_scenes(Path(folder))["step"]
-        asked = Questions(Ours, {"resolver": resolver})
+        asked = Moving(arm, {"resolver": resolver})
         asked.open(asdict(scene), beside=True)
-        resolver.solve(asked.adapter.stack.hierarchy(asked.adapter.state))  # refuses here
-        log = joined([asked.turn(round(duration / scene.period), 0)])
+        reply = asked.turn(round(duration / scene.period), 0)
+        log = joined([reply])
+        if log["failed"].all():
+            raise HierarchyError(f"{resolver.label}: {reply['why']}")
         found, failed = judge_step(log, scene), int(log["failed"].sum())
     return {"entrant": resolver.label, "ticks": len(log["t"]), "failed": failed, **found,
             "strict": found["moved_m"] <= AIM and not failed}

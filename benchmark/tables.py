@@ -26,7 +26,7 @@ def digits(value: Any) -> str:
 
 def short(value: Any) -> str:
     """Return a number with one decimal, or all digits before the decimal point."""
-    return NONE if _absent(value) else f"{value:.0f}" if value >= 10.0 else f"{value:.1f}"
+    return whole(value) if _absent(value) or value >= 10.0 else f"{value:.1f}"
 
 
 def power(value: Any) -> str:
@@ -66,6 +66,9 @@ class Column(NamedTuple):
     head: str
     key: str
     shown: Callable[[Any], str] = digits
+
+
+TIMES = (Column("median", "median_us"), Column("p95", "p95_us"), Column("p99.9", "p99.9_us"))
 
 
 @final

@@ -7,10 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from benchmark.machine import one_core
 from benchmark.plain import PlainTick
 from benchmark.report import Report, Section
 from benchmark.store import Row
-from benchmark.tables import Column, Table, whole
+from benchmark.tables import TIMES, Column, Table, whole
 from benchmark.timing import times_of
 from hierarchy.problem import Array
 from scenarios.cell.build import build
@@ -26,10 +27,9 @@ LEAD_IN = 5        # ticks at the start of a block that do not count: cold cache
 _WARM_UP = 2000    # ticks before counting starts
 _BLOCK = 500       # ticks per turn of a candidate
 _AGREE = 1e-7      # [rad/s^2] tolerance between compiled and plain commands
-_COLUMNS = (Column("median", "median_us"), Column("p95", "p95_us"), Column("p99.9", "p99.9_us"),
-            *(Column(head, f"{part}_us") for head, part in zip(
-                ("kinem.", "rows", "resolve", "act+rec"), PARTS, strict=True)),
-            Column("failed", "failures", whole), Column("faster", "times_faster_than_plain"))
+_COLUMNS = (*TIMES, *(Column(head, f"{part}_us") for head, part in zip(
+    ("kinem.", "rows", "resolve", "act+rec"), PARTS, strict=True)),
+    Column("failed", "failures", whole), Column("faster", "times_faster_than_plain"))
 
 
 def run(scenario: Scenario | None = None) -> Report:
@@ -42,15 +42,20 @@ def run(scenario: Scenario | None = None) -> Report:
     path = simulate(scenario)  # the states at which all candidates are timed
     compiled = {spec: _Compiled(scenario.with_resolver(spec), path) for spec in SPECS}
     plain = _Plain(scenario, path)
-    _check_same_command(compiled["tpm"], plain, path)
+    for k in range(0, path.ticks, 50):
+        state = path["t"][k], path["q"][k], path["v"][k]
+        gap = np.abs(compiled["tpm"].controller.command(*state) - plain.tick.step(*state)).max()
+        if gap > _AGREE:
+            raise AssertionError(f"tick {k}: compiled and plain commands differ by {gap}")
     candidates: dict[str, _Compiled | _Plain] = {**compiled, "plain numpy": plain}
-    for candidate in candidates.values():
-        candidate.run(0, min(_WARM_UP, path.ticks))
-        candidate.forget()
-    for begin in range(0, path.ticks, _BLOCK):
+    with one_core():
         for candidate in candidates.values():
-            candidate.run(begin, min(begin + _BLOCK, path.ticks))
-    rows = [_row(name, candidate) for name, candidate in candidates.items()]
+            candidate.run(0, min(_WARM_UP, path.ticks))
+            candidate.forget()
+        for begin in range(0, path.ticks, _BLOCK):
+            for candidate in candidates.values():
+                candidate.run(begin, min(begin + _BLOCK, path.ticks))
+    rows = [_row(name, *candidate.result()) for name, candidate in candidates.items()]
     for row in rows:
         row["times_faster_than_plain"] = rows[-1]["median_us"] / row["median_us"]
     title = "One control tick of ellipse, microseconds, one core, warm kernels"
@@ -93,35 +98,23 @@ class _Plain:
 
     def forget(self) -> None:
         self.tick.log.clear()
-        self._times: list[float] = []
+        self.times: list[float] = []
 
     def run(self, begin: int, end: int) -> None:
         t, q, v = self.path["t"], self.path["q"], self.path["v"]
         for k in range(begin, end):
             start = perf_counter()
             self.tick.step(t[k], q[k], v[k])
-            self._times.append(perf_counter() - start)
+            self.times.append(perf_counter() - start)
 
     def result(self) -> tuple[Array, int]:
-        whole_ = 1e6 * np.array(self._times)
-        return np.column_stack([np.full((len(whole_), 4), np.nan), whole_]), 0
+        """Return the same; the times of the parts are not known."""
+        return np.array([[np.nan] * 4 + [1e6 * time] for time in self.times]), 0
 
 
-def _check_same_command(compiled: _Compiled, plain: _Plain, path: Recording) -> None:
-    for k in range(0, path.ticks, 50):
-        state = path["t"][k], path["q"][k], path["v"][k]
-        gap = np.abs(compiled.controller.command(*state) - plain.tick.step(*state)).max()
-        if gap > _AGREE:
-            raise AssertionError(f"tick {k}: compiled and plain commands differ by {gap}")
-
-
-def _row(name: str, candidate: _Compiled | _Plain) -> dict[str, Any]:
-    times, failures = candidate.result()
+def _row(name: str, times: Array, failures: int) -> Row:
     times = times[np.arange(len(times)) % _BLOCK >= LEAD_IN]
-    parts: Row = dict(zip((f"{part}_us" for part in PARTS), np.median(times[:, :-1], axis=0),
-                          strict=True))
+    parts = dict(zip((f"{part}_us" for part in PARTS), np.median(times[:, :-1], axis=0),
+                     strict=True))
     return {"tick": name, "ticks": len(times), **times_of(1e3 * times[:, -1]), **parts,
             "failures": failures}
-
-
-

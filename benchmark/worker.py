@@ -1,10 +1,11 @@
 """Ask one entrant in its own process. Needs only numpy and the entrant.
 
-    python -m benchmark.worker QUESTIONS ADAPTER OPTIONS CORE
+    python -m benchmark.worker QUESTIONS ADAPTER OPTIONS PACKAGE CORE
 
-QUESTIONS is MODULE:CLASS of what asks: `QUESTIONS(ADAPTER, OPTIONS)` makes it, `about()` is the
-first line of the answers, and each line of stdin, [METHOD, ARGUMENTS...] in JSON, is a call whose
-result is the next. ADAPTER is MODULE:CLASS or FILE.py:CLASS, OPTIONS its arguments in JSON.
+QUESTIONS is MODULE:CLASS of what asks: `QUESTIONS(ADAPTER, OPTIONS)` makes it. The first line of
+the answers has the version, its own or that of PACKAGE, and each line of stdin, [METHOD,
+ARGUMENTS...] in JSON, is a call whose result is the next. ADAPTER is MODULE:NAME or FILE.py:NAME of
+a class or function, OPTIONS its arguments in JSON.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ import os
 import sys
 from collections.abc import Callable
 from importlib import import_module
+from importlib.metadata import version
 from pathlib import Path
 from time import get_clock_info, perf_counter_ns, process_time_ns
 from typing import Any, NamedTuple
@@ -36,13 +38,14 @@ class Repeats(NamedTuple):
 
 def main() -> None:
     """Run from the command line; see the docstring of the module."""
-    questions, adapter, options, core = sys.argv[1:]
+    questions, adapter, options, package, core = sys.argv[1:]
     pipe = os.fdopen(os.dup(1), "w")
     os.dup2(2, 1)  # output of a package must not mix with answers
     if hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(0, {int(core)})
     asked = load(questions)(load(adapter), json.loads(options))
-    print(json.dumps(asked.about()), file=pipe, flush=True)
+    own = getattr(asked, "version", None)
+    print(json.dumps({"version": own() if own else version(package)}), file=pipe, flush=True)
     for line in sys.stdin:
         method, *arguments = json.loads(line)
         answer = getattr(asked, method)(*arguments)
@@ -50,7 +53,7 @@ def main() -> None:
 
 
 def load(place: str) -> Any:
-    """Return the class of MODULE:CLASS or FILE.py:CLASS."""
+    """Return what MODULE:NAME or FILE.py:NAME names."""
     module, _, name = place.rpartition(":")
     if not module.endswith(".py"):
         return getattr(import_module(module), name)

@@ -3,35 +3,56 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from itertools import dropwhile
 from textwrap import fill
 from typing import Any
 
 import numpy as np
 
-from benchmark.reproduce.rows import Rows
-from benchmark.reproduce.studies import BLOCKS
+from benchmark.reproduce.studies import BLOCKS, Rows
+from hierarchy.errors import HierarchyError
 from scenarios.measure.statistics import Paired, wilson
 
 _WIDTH = 100     # columns of a page
 _NAMED = re.compile(r"\{(?P<study>[\w-]+) (?P<column>[\w.-]+)(?: (?P<metric>\w+))?"
                     r"(?: (?P<first>[\w.-]+))?\}")
+_CELL = re.compile(r"\{(?P<output>[^{}/]+)/(?P<table>[^{}/]+)/(?P<row>[^{}/]+)/(?P<place>\d+)\}")
 
 Statement = Sequence[Any]  # a text, and what decides it
 
 
-def block(name: str, rows: Mapping[str, Rows]) -> str:
-    """Return the Markdown of a block; raises KeyError for an unknown block, study or column."""
+def block(name: str, rows: Mapping[str, Rows], output: Callable[[str], str]) -> str:
+    """Return the Markdown of a block; raises KeyError for an unknown block, study or column.
+
+    output : returns what a command has printed.
+    """
     given = BLOCKS[name]
     if "items" in given:
-        return "\n".join(fill(f"- {_NAMED.sub(lambda named: _named(named, rows), item)}", _WIDTH,
-                              subsequent_indent="  ") for item in given["items"])
+        outputs = given.get("outputs", {})
+        texts = [_CELL.sub(lambda found: cell(output(outputs[found["output"]]), found.groupdict()),
+                           item)
+                 for item in given["items"]]
+        return "\n".join(fill(f"- {_NAMED.sub(lambda named: _named(named, rows), text)}", _WIDTH,
+                              subsequent_indent="  ") for text in texts)
     found = rows[given["study"]]
     lines = (_statements(found, given["claims"]) if "claims" in given else
              _by_metric(found, given["metrics"], given["beside"]) if "beside" in given else
              _table(found, given["metrics"], given.get("interval", False)))
     source = f"From `{found.command}` ({found.starts} starts, seed {found.seed})."
     return "\n".join([*lines, "", source])
+
+
+def cell(output: str, asked: Mapping[str, str]) -> str:
+    """Return a number that was printed: that at `place`, from 1, after the name of a row.
+
+    The row is the first one below the line that starts as the title of the table does.
+    """
+    below = dropwhile(lambda line: not line.startswith(asked["table"]), output.splitlines())
+    for line in (re.sub("[│|]", " ", line).strip() for line in below):
+        if line.startswith(f"{asked['row']} "):
+            return line[len(asked["row"]):].split()[int(asked["place"]) - 1]
+    raise HierarchyError(f"the output has no row {asked['row']!r} below {asked['table']!r}")
 
 
 def judged(rows: Rows, decides: Mapping[str, Any]) -> tuple[str, str]:
@@ -70,21 +91,19 @@ def _always(met: int, of: int) -> str:
 def _agrees(pair: Paired, lower: bool) -> str:
     if not pair.count:
         return "not decided"
-    if pair.equal:
-        return "the same"
-    if not pair.distinguishable:
-        return "not distinguishable"
+    if pair.equal or not pair.distinguishable:
+        return "the same" if pair.equal else "not distinguishable"
     return "true" if (pair.lower > pair.higher) == lower else "reversed"
 
 
-def in_text(rows: Rows, column: str, metric: str) -> str:
+def in_text(rows: Rows, column: str, metric: str, unit: bool = True) -> str:
     """Return "median [lower quartile, upper quartile] unit" of a metric."""
     found = rows.spread(column, metric)
     if found is None:
         return "–"
     median, low, high = (rows.metric(metric, value).shown()
                          for value in (found.median, found.lower, found.upper))
-    return f"{median} [{low}, {high}] {rows.metric(metric).shown_unit}".strip()
+    return f"{median} [{low}, {high}] {rows.metric(metric).shown_unit if unit else ''}".strip()
 
 
 def share(met: int, of: int) -> str:
@@ -121,7 +140,7 @@ def _table(rows: Rows, metrics: Sequence[str], interval: bool) -> list[str]:
     return [f"| | reached the end | {' | '.join(_head(rows, name) for name in known)} |",
             "|---" * (len(known) + 2) + "|",
             *(f"| `{column}` | {ended(rows.ended[column], rows.starts)} | "
-              f"{' | '.join(_bare(rows, column, name) for name in known)} |"
+              f"{' | '.join(in_text(rows, column, name, False) for name in known)} |"
               for column in rows.values)]
 
 
@@ -133,10 +152,10 @@ def _by_metric(rows: Rows, metrics: Sequence[str], columns: Sequence[str]) -> li
     lines = [f"| | {' | '.join(f'`{column}`' for column in columns)} |",
              "|---" * (len(columns) + 1) + "|"]
     for metric in metrics:
-        cells = [_bare(rows, columns[0], metric)]
-        for column in columns[1:]:
+        cells = [in_text(rows, column, metric, False) for column in columns]
+        for k, column in enumerate(columns[1:], 1):
             pair = rows.paired(metric, columns[0], column)
-            cells.append(_bare(rows, column, metric) + (f"; {pair}" if pair.count else ""))
+            cells[k] += f"; {pair}" if pair.count else ""
         lines.append(f"| {_head(rows, metric)} | {' | '.join(cells)} |")
     return lines
 
@@ -144,8 +163,3 @@ def _by_metric(rows: Rows, metrics: Sequence[str], columns: Sequence[str]) -> li
 def _head(rows: Rows, name: str) -> str:
     metric = rows.metric(name)
     return f"{metric.label}{f' [{metric.shown_unit}]' if metric.shown_unit else ''}"
-
-
-def _bare(rows: Rows, column: str, name: str) -> str:
-    text, unit = in_text(rows, column, name), rows.metric(name).shown_unit
-    return text.removesuffix(f" {unit}") if unit else text

@@ -13,7 +13,7 @@ from scenarios.cli.options import AsJson, Workers, output
 def reproduce(names: Annotated[list[str] | None, typer.Argument(
                   metavar="[NAME]...", help="states, throttle, letter, resolvers, blend, ladder, "
                   "inertia, rivals, singular, human, standing, reaching, or a page such as "
-                  "docs/first-paper.md for the commands in it. Default: all.")] = None,
+                  "docs/results/problems.md for the commands in it. Default: all.")] = None,
               out: Annotated[Path, output("Where the runs are stored.")] = Path("runs/reproduce"),
               quick: Annotated[bool, typer.Option(
                   "--quick", help="A tenth of the starts; leave the documents as they are. "

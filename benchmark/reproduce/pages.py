@@ -4,10 +4,13 @@
     <!-- measured: hierarchy bench tick -->  what a command prints
     <!-- measured: hierarchy bench resolvers --fresh 1 | EQ7, fresh .. Times of -->
     <!-- measured: table of hierarchy bench resolvers --seconds 0.2 -->
+    <!-- kept: text of open-2026-11 | Fresh problems, seed .. right: -->
 
-the last three up to `<!-- end of measurement -->`. After `|`, only the lines from one that starts
-with the first text to the last before one that starts with the second. `table of`: in a table whose
-columns are named after families and whose rows after resolvers, the cells are filled with medians.
+all but the first up to `<!-- end of measurement -->`. After `|`, only the lines from one that
+starts with the first text to the last before one that starts with the second. `table of`: in a
+table whose columns are named after families and whose rows after resolvers, the cells are filled
+with medians. `text of`: the paragraphs as they are. `kept`: a file of outputs that no command makes
+again as it is.
 """
 
 from __future__ import annotations
@@ -24,7 +27,7 @@ from itertools import dropwhile, takewhile
 from pathlib import Path
 
 from benchmark.reproduce.blocks import block
-from benchmark.reproduce.rows import Rows
+from benchmark.reproduce.studies import Rows
 from hierarchy.errors import HierarchyError
 from scenarios.files import make_folder, slug, write_text
 
@@ -34,26 +37,28 @@ _COLUMNS = "100"  # of the terminal that a command writes to
 _CODE = ("hierarchy", "solvers", "scenarios", "benchmark")
 _MADE = re.compile(r"(<!-- reproduce: (?P<name>[\w-]+) -->\n).*?(<!-- end of \w[\w-]* -->)",
                    re.DOTALL)
-_MEASURED = re.compile(r"(?P<mark><!-- measured: (?P<table>table of )?(?P<command>[^|\n]*?)"
-                       r"(?: \| (?P<first>[^\n]+?) \.\. (?P<last>[^\n]+?))? -->\n)"
-                       r"(?P<text>.*?)(?P<end><!-- end of measurement -->)", re.DOTALL)
+_OUTPUT = re.compile(r"(?P<mark>^<!-- (?P<kind>measured|kept): (?:(?P<form>table|text) of )?"
+                     r"(?P<command>[^|\n]*?)"
+                     r"(?: \| (?P<first>[^\n]+?) \.\. (?P<last>[^\n]+?))? -->\n)"
+                     r"(?P<text>.*?)(?P<end><!-- end of measurement -->)", re.DOTALL | re.MULTILINE)
 _MEDIAN = re.compile(r"(?P<name>\S+(?: \S+)*?)\s+(?P<median>\d[\d.]*)\s")
-
-
-def marked(root: Path) -> list[str]:
-    """Return the pages of a checkout that have marks, by their paths in it."""
-    found = [root / "README.md", *sorted((root / "docs").rglob("*.md"))]
-    return [path.relative_to(root).as_posix() for path in found if path.is_file()
-            and re.search(r"^<!-- (?:measured|reproduce): ", path.read_text("utf-8"), re.MULTILINE)]
 
 
 class CommandError(RuntimeError):
     """A command ended with another exit code than 0."""
 
 
+def marked(root: Path) -> list[str]:
+    """Return the pages of a checkout that have marks, by their paths in it."""
+    found = [root / "README.md", *sorted((root / "docs").rglob("*.md"))]
+    return [path.relative_to(root).as_posix() for path in found if path.is_file() and any(
+        mark.search(path.read_text("utf-8")) for mark in (_OUTPUT, _MADE))]
+
+
 def commands(text: str) -> list[str]:
     """Return the commands of a page, each once."""
-    return list(dict.fromkeys(found["command"] for found in _MEASURED.finditer(text)))
+    return list(dict.fromkeys(found["command"] for found in _OUTPUT.finditer(text)
+                              if found["kind"] == "measured"))
 
 
 def run(command: str, root: Path, out: Path) -> str:
@@ -61,7 +66,10 @@ def run(command: str, root: Path, out: Path) -> str:
 
     `out` stores it: the same code does not run the same command again.
     """
-    folder = out / _digest(root) / slug(command)
+    code = hashlib.sha256()
+    for path in sorted(path for folder in _CODE for path in (root / folder).rglob("*.py")):
+        code.update(path.relative_to(root).as_posix().encode() + path.read_bytes())
+    folder = out / code.hexdigest()[:16] / slug(command)
     stored = folder / "output.txt"
     if not stored.is_file():
         shutil.rmtree(folder, ignore_errors=True)
@@ -84,26 +92,9 @@ def _printed(command: str, root: Path, out: Path) -> str:
     return "\n".join(lines).rstrip() + "\n"
 
 
-def _digest(root: Path) -> str:
-    """Return a digest of the code that a command may run."""
-    found = hashlib.sha256()
-    for folder in _CODE:
-        for path in sorted((root / folder).rglob("*.py")):
-            found.update(path.relative_to(root).as_posix().encode() + path.read_bytes())
-    return found.hexdigest()[:16]
-
-
-def store(command: str, printed: str, root: Path) -> Path:
-    """Write what a command printed beside the documents of a checkout, and return the file."""
-    path = file_of(command, root)
-    make_folder(path.parent)
-    write_text(path, printed)
-    return path
-
-
 def file_of(command: str, root: Path) -> Path:
-    """Return the file that has what a command prints."""
-    return root / OUTPUT / f"{slug(command)}.txt"
+    """Return the file that has what a command prints, or that is kept under a name."""
+    return make_folder(root / OUTPUT) / f"{slug(command)}.txt"
 
 
 def fill(root: Path, rows: Mapping[str, Rows]) -> tuple[list[Path], list[str]]:
@@ -129,32 +120,32 @@ def filled(text: str, root: Path, page: str, rows: Mapping[str, Rows]) -> str:
     Raises HierarchyError, naming the page, for an unknown block, a study without rows, or an output
     that is missing or lacks the lines asked for.
     """
+    def output(command: str) -> str:
+        try:
+            return file_of(command, root).read_text(encoding="utf-8")
+        except FileNotFoundError:
+            raise HierarchyError(f"{page}: no output of {command!r} is stored; run "
+                                 f"`hierarchy reproduce {page}`") from None
+
     def made(match: re.Match[str]) -> str:
         try:
-            return f"{match[1]}{block(match['name'], rows).rstrip()}\n{match[3]}"
+            return f"{match[1]}{block(match['name'], rows, output).rstrip()}\n{match[3]}"
         except KeyError as error:
             raise HierarchyError(f"{page}: block {match['name']!r}: there is no block, or no rows "
                                  f"of study, {error}") from None
 
-    return _MEASURED.sub(lambda found: _output(found, root, page), _MADE.sub(made, text))
-
-
-def _output(found: re.Match[str], root: Path, page: str) -> str:
-    command = found["command"]
-    try:
-        output = file_of(command, root).read_text(encoding="utf-8")
-    except FileNotFoundError:
-        raise HierarchyError(f"{page}: no output of {command!r} is stored; run "
-                             f"`hierarchy reproduce {page}`") from None
-    if found["table"]:
-        inside = _with_medians(found["text"], medians(output))
-    else:
-        part = _part(output.splitlines(), found["first"], found["last"])
+    def shown(found: re.Match[str]) -> str:
+        said = output(found["command"])
+        if found["form"] == "table":
+            return f"{found['mark']}{_with_medians(found['text'], medians(said))}{found['end']}"
+        part = _part(said.splitlines(), found["first"], found["last"])
         if not part:
-            raise HierarchyError(f"{page}: no line of the output of {command!r} starts with "
-                                 f"{found['first']!r}")
-        inside = "\n".join(["```", *part, "```\n"])
-    return f"{found['mark']}{inside}{found['end']}"
+            raise HierarchyError(f"{page}: no line of the output of {found['command']!r} starts "
+                                 f"with {found['first']!r}")
+        inside = part if found["form"] == "text" else ["```", *part, "```"]
+        return "\n".join([found["mark"].rstrip(), *inside, found["end"]])
+
+    return _OUTPUT.sub(shown, _MADE.sub(made, text))
 
 
 def _part(lines: list[str], first: str | None, last: str | None) -> list[str]:
@@ -162,9 +153,7 @@ def _part(lines: list[str], first: str | None, last: str | None) -> list[str]:
     if first and last:
         lines = list(dropwhile(lambda line: not line.startswith(first), lines))
         lines = list(takewhile(lambda line: not line.startswith(last), lines))
-    while lines and not lines[-1]:
-        lines.pop()
-    return lines
+    return "\n".join(lines).rstrip().splitlines()
 
 
 def medians(output: str) -> dict[tuple[str, str], float]:

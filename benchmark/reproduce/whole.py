@@ -8,16 +8,15 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from time import perf_counter
 
-from benchmark.reproduce import pages, rows
+from benchmark.reproduce import pages, studies
 from benchmark.reproduce.blocks import judged, statements
-from benchmark.reproduce.rows import Rows, rows_of_study
-from benchmark.reproduce.studies import STUDIES
+from benchmark.reproduce.studies import STUDIES, Rows, rows_of
 from hierarchy.errors import HierarchyError, UnknownNameError
 from hierarchy.words import counted
 from scenarios.cli.options import INTERRUPTED
 from scenarios.cli.progress import bar
 from scenarios.cli.terminal import print_json, shown
-from scenarios.files import make_folder, reason
+from scenarios.files import make_folder, reason, write_text
 from scenarios.sweep.engine import EngineError
 from scenarios.sweep.whole import Workers
 
@@ -26,7 +25,7 @@ _QUICK = 10  # with --quick, one in so many starts, but never fewer than two
 
 def fill() -> int:
     """Write the pages of the checkout from the rows and outputs that are stored."""
-    written, lacking = pages.fill(pages.ROOT, rows.read(pages.ROOT / pages.RESULTS))
+    written, lacking = pages.fill(pages.ROOT, studies.read(pages.ROOT / pages.RESULTS))
     print(*map(shown, written), sep="\n")
     return _lacking(lacking)
 
@@ -43,14 +42,16 @@ class _Made:
 
     def add(self, found: Rows | None, command: str = "", printed: str = "") -> None:
         """Store rows or an output, and write the pages."""
+        folder = self.root and self.root / pages.RESULTS
         if found is not None:
             self.rows[found.study] = found
-            self.files[rows.write(found, self.out)] = None
-        if self.root:
-            folder = self.root / pages.RESULTS
-            self.files[rows.write(found, folder) if found is not None else
-                       pages.store(command, printed, self.root)] = None
-            changed, self.lacking = pages.fill(self.root, rows.read(folder))
+            self.files |= {studies.write(found, one): None for one in (self.out, folder) if one}
+        elif self.root:
+            file = pages.file_of(command, self.root)
+            write_text(file, printed)
+            self.files[file] = None
+        if self.root and folder:
+            changed, self.lacking = pages.fill(self.root, studies.read(folder))
             self.files |= dict.fromkeys(changed)
 
 
@@ -58,18 +59,20 @@ def run(names: list[str], out: Path, quick: bool = False, workers: int | None = 
         as_json: bool = False, root: Path | None = None) -> int:
     """Run studies and commands; unless `quick`, write the pages; print the statements' verdicts."""
     begun, root = perf_counter(), root or pages.ROOT
-    studies, asked = chosen(names, root)
-    if quick and not studies:
+    some, asked = chosen(names, root)
+    if quick and not some:
         raise HierarchyError(f"--quick runs studies, and {', '.join(asked)} has the output of "
                              "commands; leave --quick out")
     made = _Made(make_folder(out), None if quick else root)
     try:
-        for found in ran(studies, out, quick, workers):
+        for found in ran(some, out, quick, workers):
             made.add(found)
         for command, printed in () if quick else outputs(asked, root, out / "output"):
             made.add(None, command, printed)
     except (OSError, EngineError) as error:
-        _say(f"hierarchy: fault: {_fault(error)}")
+        why = (f"{error.filename or 'a file'} cannot be written: {reason(error)}"
+               if isinstance(error, OSError) and error.strerror else str(error))
+        _say(f"hierarchy: fault: {why}")
         return 1
     except KeyboardInterrupt:
         _say("hierarchy: interrupted; the same command continues from here")
@@ -89,17 +92,17 @@ def chosen(names: list[str], root: Path) -> tuple[list[str], list[str]]:
             [name for name in known if name in names or not names])
 
 
-def ran(studies: list[str], out: Path, quick: bool, workers: int | None) -> Iterator[Rows]:
+def ran(names: list[str], out: Path, quick: bool, workers: int | None) -> Iterator[Rows]:
     """Run studies and yield the rows of each as it ends; runs that `out` has are not repeated."""
-    with bar("runs") as progress, Workers(workers) as some:
-        for count, name in enumerate(studies, 1):
+    with bar("runs") as progress, Workers(workers) as pool:
+        for count, name in enumerate(names, 1):
             study = STUDIES[name]
             if quick:
                 study = replace(study, starts=max(2, study.starts // _QUICK))
-            _say(f"{name} (study {count} of {len(studies)}): {study.title}, "
+            _say(f"{name} (study {count} of {len(names)}): {study.title}, "
                  f"{counted(len(study.names), 'column')} from {study.starts} starts")
             begun = perf_counter()
-            found = rows_of_study(study, out / name, some, progress)
+            found = rows_of(study, out / name, pool, progress)
             _say(f"  {minutes(perf_counter() - begun)}")
             yield found
 
@@ -136,12 +139,6 @@ def minutes(seconds: float) -> str:
     return f"{round(seconds) // 60}:{round(seconds) % 60:02} min"
 
 
-def _fault(error: Exception) -> str:
-    if isinstance(error, OSError) and error.strerror:
-        return f"{error.filename or 'a file'} cannot be written: {reason(error)}"
-    return str(error)
-
-
 def _lacking(lacking: list[str]) -> int:
     if lacking:
         raise HierarchyError("; ".join(lacking))
@@ -154,10 +151,8 @@ def _report(made: _Made, left: dict[str, list[str]], as_json: bool) -> None:
     every = [(text, study, *judged(rows, decides)) for study, rows in made.rows.items()
              for text, decides in statements(study)]
     if as_json:
-        print_json({"files": files, "not_made": left, "claims": [
-            {"text": text, "study": study, "found": found, "verdict": verdict}
-            for text, study, found, verdict in every]})
-        return
+        return print_json({"files": files, "not_made": left, "claims": [
+            dict(zip(("text", "study", "found", "verdict"), one, strict=True)) for one in every]})
     for text, _, found, verdict in every:
         print(f"{verdict:>20}  {text}\n{'':22}{found}")
     print("", *files, sep="\n")

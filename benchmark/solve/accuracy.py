@@ -6,10 +6,10 @@ Priority Matrix: a new tool for hierarchical redundancy resolution" (2016).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from math import nan
-from typing import Any, final
+from typing import final
 
 import numpy as np
 
@@ -17,7 +17,8 @@ from benchmark.arms import near_singular, regular
 from benchmark.packages import OWN, Entrant
 from benchmark.report import Report, Section
 from benchmark.solve.entrants import ENTRANTS, NUMPY
-from benchmark.solve.interface import Problem, Solver
+from benchmark.solve.interface import Solver
+from benchmark.solve.resolvers import as_problem
 from benchmark.store import Row
 from benchmark.tables import Column, Table, percent, power, whole
 from benchmark.worker import load
@@ -86,7 +87,8 @@ def run(arms: int = ARMS, checked: int = CHECKED, seed: int = 0,
     tables = []
     for case in cases:
         problems, least = hierarchies(case, arms, seed)
-        right = [_right(case, h) for h in problems[:max(1, min(checked, arms))]]
+        right = [damped(h, case.damping, THRESHOLD) if case.damping else answer(h).x
+                 for h in problems[:max(1, min(checked, arms))]]
         found = [{"case": case.name, "entrant": one.label, "arms": arms, "checked": len(right),
                   **_errors(load(one.adapter)(**one.options), case, problems, least, right)}
                  for one in entrants(case.damping)]
@@ -133,30 +135,20 @@ def damped(h: Hierarchy, damping: float, threshold: float, smallest: float = 1e-
     return np.asarray(x + N @ (N.T @ h.reference))
 
 
-def _right(case: Case, h: Hierarchy) -> Array:
-    return damped(h, case.damping, THRESHOLD) if case.damping else answer(h).x
-
-
 def _errors(solver: Solver, case: Case, problems: Sequence[Hierarchy], least: Array,
-            right: Sequence[Array]) -> Mapping[str, Any]:
+            right: Sequence[Array]) -> Row:
     """Solve every problem; return errors of tasks and x, and the shares certified and failed."""
-    answered = [solver.read(solver.solve(solver.prepare(
-        Problem(h.A, h.lower, h.upper, np.asarray(h.sizes), h.reference)))) for h in problems]
+    answered = [solver.read(solver.solve(solver.prepare(as_problem(h)))) for h in problems]
     solved = np.array([one.solved for one in answered])
     errors = np.array([abs(h.violations(one.x) - lowest) for h, one, lowest in zip(
         problems, answered, least, strict=True)])[solved]
     sample = [(h, one.x, x) for h, one, x in zip(problems, answered, right, strict=False)
               if one.solved]
-    apart = [float(np.linalg.norm(x - best) / (1.0 + np.linalg.norm(best)))
-             for _, x, best in sample]
+    columns = {f"task_{k + 1}": errors[:, k] for k in range(len(case.tasks))} | {"x": [
+        np.linalg.norm(x - best) / (1.0 + np.linalg.norm(best)) for _, x, best in sample]}
     certified = sum(certify(h, x).certified for h, x, _ in sample)
-    tasks = {f"task_{k + 1}_{key}": value for k in range(len(case.tasks))
-             for key, value in _summed(errors[:, k]).items()}
-    return {"failed": int((~solved).sum()), **tasks,
-            **{f"x_{key}": value for key, value in _summed(apart).items()},
+    return {"failed": int((~solved).sum()),
+            **{f"{name}_{key}": float(of(values)) if len(values) else nan
+               for name, values in columns.items()
+               for key, of in (("mean", np.mean), ("median", np.median), ("max", np.max))},
             "certified": nan if case.damping else certified / len(right)}
-
-
-def _summed(errors: Sequence[float] | Array) -> dict[str, float]:
-    reduced: dict[str, Callable[..., Any]] = {"mean": np.mean, "median": np.median, "max": np.max}
-    return {key: float(of(errors)) if len(errors) else nan for key, of in reduced.items()}

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
 from benchmark import figures
 from benchmark.report import Report, Section
 from benchmark.solve.accuracy import entrants
-from benchmark.solve.interface import Problem, Solver
+from benchmark.solve.interface import Problem
 from benchmark.store import Row
 from benchmark.tables import Column, Table, short, wide
 from benchmark.timing import Timed, take_turns
@@ -31,40 +31,32 @@ Times: one call from Python, one core, all resolvers in turns; power: slope of t
 sizes, log over log."""
 
 
-def run(seconds: float = SECONDS, sizes: Mapping[str, Sequence[Size]] | None = None,
-        seed: int = 0) -> Report:
+def run(seconds: float = SECONDS, larger: bool = False, seed: int = 0) -> Report:
     """Time all resolvers with priorities at every size for `seconds` [s] in total.
 
-    sizes : joints, tasks and rows of each, by what varies; None for those of the first paper.
+    The sizes are those of the first paper, or `larger`.
     """
-    asked = FIRST_PAPER if sizes is None else sizes
-    rows = take_turns([one for i, figure in enumerate(asked)
-                       for one in _field(figure, asked[figure], seed + i)], seconds)
-    return Report("Growth of the time of a solve", sections(rows, asked), {"growth": rows})
-
-
-def sections(rows: Sequence[Row], sizes: Mapping[str, Sequence[Size]]) -> list[Section]:
-    """Return a table for each number that varies, and the figure."""
+    sizes = LARGER if larger else FIRST_PAPER
+    rows = take_turns([one for i, figure in enumerate(sizes)
+                       for one in _field(figure, sizes[figure], seed + i)], seconds)
     panels, tables = {}, []
-    for figure, own in sizes.items():
-        some = [row for row in rows if row["figure"] == figure]
-        fixed = _fixed(figure, own[0])
-        tables.append(_table(figure, fixed, some))
+    for figure, ((joints, tasks, each), *_) in sizes.items():
+        words = {"joints": f"{joints} joints", "tasks": f"{tasks} tasks",
+                 "rows": f"{each} rows a task"}
+        fixed = ", ".join(text for key, text in words.items() if key != figure)
+        tables.append(over(f"Median time of a solve [us], {fixed}, over the number of {figure}",
+                           [row for row in rows if row["figure"] == figure], figure))
         panels[figure] = f"number of {figure}", figure[0], fixed
-    return [Section("Median times", tables, _NOTES, {"growth": figures.over_sizes(rows, panels)})]
+    return Report("Growth of the time of a solve", [Section(
+        "Median times", tables, _NOTES, {"growth": figures.over_sizes(rows, panels)})],
+        {"growth": rows})
 
 
-def _fixed(figure: str, size: Size) -> str:
-    joints, tasks, each = size
-    words = {"joints": f"{joints} joints", "tasks": f"{tasks} tasks", "rows": f"{each} rows a task"}
-    return ", ".join(text for key, text in words.items() if key != figure)
-
-
-def _table(figure: str, fixed: str, rows: Sequence[Row]) -> Table:
-    made, columns = wide(rows, "entrant", figure, "median_us", short)
-    powers = figures.exponents(rows, figure)
-    return Table(f"Median time of a solve [us], {fixed}, over the number of {figure}",
-                 [{**row, "power": powers[row["entrant"]]} for row in made],
+def over(title: str, rows: Sequence[Row], size: str) -> Table:
+    """Return the table of medians over a size, with the power of each entrant."""
+    made, columns = wide(rows, "entrant", size, "median_us", short)
+    powers = figures.exponents(rows, size)
+    return Table(title, [{**row, "power": powers[row["entrant"]]} for row in made],
                  [*columns, Column("power", "power")])
 
 
@@ -74,7 +66,7 @@ def _field(figure: str, sizes: Sequence[Size], seed: int) -> list[Timed]:
     found = []
     for i, (joints, tasks, each) in enumerate(sizes):
         problem = random_problem((joints, tasks, each), seed + i)
-        found += [Timed(_call(solver, solver.prepare(problem)), {
+        found += [Timed(partial(solver.solve, solver.prepare(problem)), {
             "figure": figure, "entrant": label, "joints": joints, "tasks": tasks,
             "rows": each if figure == "rows" else each * tasks})
             for label, solver in solvers.items()]
@@ -88,7 +80,3 @@ def random_problem(size: Size, seed: int) -> Problem:
     b = rng.normal(size=each * tasks)
     return Problem(rng.normal(size=(each * tasks, joints)), b, b, np.full(tasks, each),
                    np.zeros(joints))
-
-
-def _call(solver: Solver, prepared: Any) -> Callable[[], Any]:
-    return lambda: solver.solve(prepared)

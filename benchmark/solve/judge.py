@@ -1,4 +1,4 @@
-"""Raw rows judged: what a solver says counts for nothing, only its x.
+"""Raw rows judged and summed up: what a solver says counts for nothing, only its x.
 
 Where the answer of a problem is proved, x is compared with the least violations; else with what
 `certify` finds from the data alone.
@@ -6,13 +6,16 @@ Where the answer of a problem is proved, x is compared with the least violations
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from benchmark.process import CRASHED, HUNG
 from benchmark.store import Row
+from benchmark.timing import times_of
 from hierarchy.problem import Array, Hierarchy
 from solvers.certificate import certify
 from solvers.problems.files import Collection
@@ -25,6 +28,7 @@ SOLVED, WRONG = "solved", "called solved, wrong"
 MODEST, FAILED = "called failed, right", "failed"
 REFUSED, RAISED = "not asked", "raised"
 ENDED = (RAISED, CRASHED, HUNG)
+_TIMES = {"cold": "", "warm": "warm_", "cold_inside": "inside_", "warm_inside": "warm_inside_"}
 
 
 class Miss(NamedTuple):
@@ -62,26 +66,23 @@ def judged(row: Row, h: Hierarchy, proof: Proof | None) -> Row:
     above, relative; NaN if not known. warm_right : whether the warm answer is right and called
     solved; None without one. memory : growth of the process while it solved the file [KiB].
     """
-    x, warm = _vector(row.get("x")), _vector(row.get("warm_x"))
+    x, warm, without = (None if row.get(key) is None else np.array(row[key], dtype=np.float64)
+                        for key in ("x", "warm_x", "without"))
     miss = miss_of(h, proof, x)
     warm_right = (None if warm is None else
                   bool(row["warm_solved"]) and miss_of(h, proof, warm).relative <= RIGHT)
     return {**row, **miss._asdict(), "verdict": _verdict(row, miss.relative), "x": x,
-            "warm_right": warm_right, "moved": _moved(h, proof, x, _vector(row.get("without"))),
+            "warm_right": warm_right, "moved": _moved(h, proof, x, without),
             "memory": (row.get("rss_kib") or 0) - (row.get("start_kib") or 0)}
 
 
 def _verdict(row: Row, relative: float) -> str:
     if row.get("ended"):
         return HUNG if row["ended"] == HUNG else CRASHED
-    if row.get("refused"):
-        return REFUSED
-    if row.get("raised"):
-        return RAISED
+    if row.get("refused") or row.get("raised"):
+        return REFUSED if row.get("refused") else RAISED
     right = relative <= RIGHT
-    if row["solved"]:
-        return SOLVED if right else WRONG
-    return MODEST if right else FAILED
+    return (SOLVED if right else WRONG) if row["solved"] else (MODEST if right else FAILED)
 
 
 def miss_of(h: Hierarchy, proof: Proof | None, x: Array | None) -> Miss:
@@ -92,22 +93,18 @@ def miss_of(h: Hierarchy, proof: Proof | None, x: Array | None) -> Miss:
         return Miss(np.inf, np.inf, 0)
     if proof is None:
         found = certify(h, x, RIGHT)
-        residuals = np.append(found.stationarity, found.nearest)
-        return _largest(residuals, residuals)
-    count = proof.judged
-    beyond, sizes = h.violations(x)[:count] - proof.least[:count], _sizes(h, proof)[:count]
-    if count > len(h.sizes):
-        least = np.linalg.norm(proof.x - h.reference)
-        beyond = np.append(beyond, np.linalg.norm(x - h.reference) - least)
-        sizes = np.append(sizes, 1.0 + np.linalg.norm(proof.x))
-    miss = np.maximum(beyond, 0.0)
-    return _largest(miss, miss / sizes)
-
-
-def _largest(absolute: Array, relative: Array) -> Miss:
+        miss = relative = np.append(found.stationarity, found.nearest)
+    else:
+        count = proof.judged
+        beyond, sizes = h.violations(x)[:count] - proof.least[:count], _sizes(h, proof)[:count]
+        if count > len(h.sizes):
+            least = np.linalg.norm(proof.x - h.reference)
+            beyond = np.append(beyond, np.linalg.norm(x - h.reference) - least)
+            sizes = np.append(sizes, 1.0 + np.linalg.norm(proof.x))
+        miss = np.maximum(beyond, 0.0)
+        relative = miss / sizes
     missed = np.flatnonzero(relative > RIGHT)
-    return Miss(float(absolute.max()), float(relative.max()),
-                int(missed[0]) if missed.size else -1)
+    return Miss(float(miss.max()), float(relative.max()), int(missed[0]) if missed.size else -1)
 
 
 def _moved(h: Hierarchy, proof: Proof | None, x: Array | None, without: Array | None) -> float:
@@ -124,10 +121,97 @@ def _sizes(h: Hierarchy, proof: Proof | None) -> Array:
     """Return the norm of the largest row of each level times 1 + |x|: (L,), never zero."""
     norms = np.linalg.norm(h.A, axis=1)
     largest = np.array([norms[first:last].max(initial=0.0)
-                        for first, last in zip(h.offsets[:-1], h.offsets[1:], strict=True)])
+                        for first, last in pairwise(h.offsets)])
     reach = 1.0 + (float(np.linalg.norm(proof.x)) if proof is not None and proof.complete else 0.0)
     return np.where(largest > 0.0, largest, 1.0) * reach
 
 
-def _vector(values: Any) -> Array | None:
-    return None if values is None else np.array(values, dtype=np.float64)
+def summary(rows: Sequence[Row], steps: Mapping[str, float] | None = None) -> Row:
+    """Sum up the rows of one entrant.
+
+    asked, right (share), wrong, modest, failed, ended, answered : problems by verdict. absolute,
+    relative, moved : largest of those called solved. Times, also warm and inside. iterations,
+    warm_iterations : medians. warm_right : share. same : whether all second solves gave the same
+    bits. memory [KiB]. rough : along sequences, the largest step of x beside that of the proved
+    answers. NaN : unknown.
+
+    steps : of each sequence, by family, the largest step of the proved answers.
+    """
+    counts = Counter(row["verdict"] for row in rows)
+    claimed = [row for row in rows if row["verdict"] in (SOLVED, WRONG)]
+    asked = counts.total() - counts[REFUSED]
+    rough = [_step([row["x"] for row in own]) / steps[family]
+             for family, own in by(rows, "family") if steps and steps.get(family)]
+    found: Row = {
+        "entrant": rows[0]["entrant"], "version": rows[0].get("version"), "problems": len(rows),
+        "asked": asked, "right": counts[SOLVED] / asked if asked else np.nan,
+        "wrong": counts[WRONG], "modest": counts[MODEST], "failed": counts[FAILED],
+        "ended": sum(counts[verdict] for verdict in ENDED), "answered": len(claimed),
+        **{key: _over(np.max, (row[key] for row in claimed))
+           for key in ("absolute", "relative", "moved")},
+        "iterations": _over(np.median, (row.get("iterations") for row in rows)),
+        "warm_iterations": _over(np.median, (row.get("warm_iterations") for row in rows)),
+        "warm_right": _over(np.mean, (row["warm_right"] for row in rows)),
+        "same": all(row.get("same") is not False for row in rows),
+        "memory_mb": max(row["memory"] for row in rows) / 1024, "rough": _over(np.max, rough)}
+    for key, prefix in _TIMES.items():
+        found |= times_of([time for row in rows for time in row.get(f"{key}_ns") or ()], prefix)
+    return found
+
+
+def by(rows: Iterable[Row], key: str) -> list[tuple[str, list[Row]]]:
+    """Return the rows in groups, in the order in which they first occur."""
+    groups: dict[str, list[Row]] = {}
+    for row in rows:
+        groups.setdefault(row[key], []).append(row)
+    return list(groups.items())
+
+
+def summaries(rows: Sequence[Row], steps: Mapping[str, float] | None = None) -> list[Row]:
+    """Return the summary of each entrant."""
+    return [summary(own, steps) for _, own in by(rows, "entrant")]
+
+
+def cells(rows: Sequence[Row], steps: Mapping[str, float] | None = None) -> list[Row]:
+    """Return the summary of each entrant in each family."""
+    return [{"family": family, **one} for family, some in by(rows, "family")
+            for one in summaries(some, steps)]
+
+
+def steps_of(collections: Mapping[str, Collection]) -> dict[str, float]:
+    """Return the largest step of the proved answers along each sequence, by family."""
+    found = {name: _step([proof.x if proof.complete else None for proof in one.answers or ()])
+             for name, one in collections.items() if one.head.sequence}
+    return {name: step for name, step in found.items() if not np.isnan(step)}
+
+
+def _step(points: Sequence[Array | None]) -> float:
+    """Return the largest distance of two successive points of one length; NaN if there is none."""
+    steps = [float(np.linalg.norm(one - other)) for one, other in pairwise(points)
+             if one is not None and other is not None and len(one) == len(other)]
+    return max(steps, default=np.nan)
+
+
+def profile(rows: Sequence[Row], ratios: Array) -> dict[str, Array]:
+    """Return the performance profile of each entrant (Dolan and More 2002) at ratios (k,).
+
+    For each ratio the share of all problems that the entrant solves, calls solved, and needs no
+    more than that ratio of the time of the fastest entrant that does. Problems that it cannot be
+    asked count as not solved.
+    """
+    problems: dict[tuple[str, int], dict[str, float]] = {}
+    for row in rows:
+        own = problems.setdefault((row["family"], row["problem"]), {})
+        if row["verdict"] == SOLVED:
+            own[row["entrant"]] = float(np.median(row["cold_ns"]))
+    found = {}
+    for name, _ in by(rows, "entrant"):
+        ratio = np.array([own[name] / min(own.values()) if name in own else np.inf
+                          for own in problems.values()])
+        found[name] = np.array([(ratio <= most).mean() for most in ratios])
+    return found
+
+
+def _over(reduce: Callable[..., Any], values: Iterable[float | None]) -> float:
+    known = [value for value in values if value is not None and not np.isnan(value)]
+    return float(reduce(known)) if known else np.nan

@@ -3,138 +3,81 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
-from typing import Any, final
 
 from benchmark.machine import machine
 from benchmark.packages import Entrant, MissingError
-from benchmark.process import CRASHED, HUNG, START_LIMIT, EndedError, Process, staged
+from benchmark.process import CRASHED, HUNG, Process, staged
 from benchmark.report import Report
 from benchmark.solve import views
-from benchmark.solve.entrants import ENTRANTS, QUESTIONS
-from benchmark.solve.judge import RAISED, SOLVED, WRONG, judge
-from benchmark.solve.summary import cells, steps_of, summaries, summary
+from benchmark.solve.entrants import ENTRANTS
+from benchmark.solve.judge import RAISED, SOLVED, WRONG, by, judge, summary
 from benchmark.store import Row, Store
 from hierarchy.errors import HierarchyError
 from scenarios.problems.answers import export, file_of
 from scenarios.problems.families import FAMILIES, Family
-from solvers.problems.files import Collection, read
+from solvers.problems.files import read
 
+QUESTIONS = "benchmark.solve.questions:Questions"
 LIMIT = 10.0     # [s] for one problem with all its repetitions
 MOST_ENDS = 5    # crashes and hangs of an entrant on a file, after which the rest is left out
-LEFT_OUT = "left out after crashes"
 CHECKED = ("EQ7", "EQ7sing", "INEQ7", "tied_box", "contacts", "mixed_units", "one_unknown")
 _CHECKS, _CHECK_LIMIT = 4, 2.0  # problems of each of them; [s] for each problem
-_MACHINE, _MISSING, _LIMITS = "machine", "missing", "limits"
-
-Told = Callable[[str], None]
 
 
 def run(folder: Path, families: Sequence[Family], entrants: Sequence[Entrant],
-        counts: Mapping[int, int | None], limit: float = LIMIT, told: Told = print) -> Store:
+        counts: Mapping[int, int | None], limit: float = LIMIT,
+        told: Callable[[str], None] = print) -> Store:
     """Write the problems, run every entrant on them, and keep the raw rows.
 
     What is in the folder already stays as it is: an interrupted benchmark goes on, and an entrant
     that is added later meets the same problems.
 
-    counts : problems of each half, by its seed, None for the usual number; 0 is the public half.
+    counts : problems of each set, by its seed, None for the usual number; 0 is the public set.
     limit : [s] for one problem. told : gets a line of text now and then.
     """
-    store = Store(folder)
-    missing, limits = store.notes(_MISSING), store.notes(_LIMITS)
-    files = _problems(store, families, counts, told)
-    store.note(_MACHINE, machine())
+    store, files = Store(folder), []
+    for family in families:
+        for seed, count in counts.items():
+            files.append(file_of(store.problems, family.name, seed))
+            if not files[-1].is_file():
+                told(f"{family.name}, seed {seed}: problems and their proofs")
+                export(family, seed, count, True, store.problems)
+    missing, limits = store.notes("missing"), store.notes("limits")
+    store.note("machine", machine())
     for one in entrants:
         told(one.label)
         limits[one.label] = one.limits
         missing.pop(one.label, None)
+        left = [file for file in files if not store.file_of(one.label, file).is_file()]
         try:
-            _add(store, one, files, limit)
+            for file, rows in zip(left, asked(one, left, limit) if left else (), strict=True):
+                store.add(rows, store.file_of(one.label, file))
         except MissingError as reason:
             missing[one.label] = str(reason)
-        store.note(_LIMITS, limits)
-        store.note(_MISSING, missing)
+        store.note("limits", limits)
+        store.note("missing", missing)
     return store
-
-
-def _problems(store: Store, families: Sequence[Family], counts: Mapping[int, int | None],
-              told: Told) -> list[Path]:
-    files = []
-    for family in families:
-        for seed, count in counts.items():
-            file = file_of(store.problems, family.name, seed)
-            if not file.is_file():
-                told(f"{family.name}, seed {seed}: problems and their proofs")
-                export(family, seed, count, True, store.problems)
-            files.append(file)
-    return files
-
-
-def _add(store: Store, entrant: Entrant, files: Sequence[Path], limit: float) -> None:
-    """Run an entrant on the files on which it has not run yet."""
-    left = [file for file in files if not store.file_of(entrant.label, file).is_file()]
-    for file, rows in zip(left, asked(entrant, left, limit) if left else (), strict=True):
-        store.add(rows, store.file_of(entrant.label, file))
 
 
 def asked(entrant: Entrant, files: Sequence[Path], limit: float = LIMIT) -> Iterator[list[Row]]:
     """Yield the raw rows of an entrant on each file; raises MissingError if it cannot start."""
-    with staged() as folder:
-        process = Process(entrant, QUESTIONS, folder)
-        try:
-            for file in files:
-                one = read(file)
-                same = {"entrant": entrant.label, "version": process.about["version"],
-                        "family": one.head.family, "half": one.head.half, "seed": one.head.seed,
-                        "sha256": one.digest}
-                rows = _answers(process, file, len(one.problems), limit)
-                yield [{**same, **row} for row in rows]
-        finally:
-            process.stop()
+    with staged() as folder, Process(entrant, QUESTIONS, folder) as process:
+        for file in files:
+            one = read(file)
+            same = {"entrant": entrant.label, "version": process.about["version"],
+                    "family": one.head.family, "half": one.head.half, "seed": one.head.seed,
+                    "sha256": one.digest}
+            answers = process.answers((("problem", str(file.resolve()), p)
+                                       for p in range(len(one.problems))), limit, MOST_ENDS)
+            yield [{**same, "problem": p, **row} for p, row in enumerate(answers)]
 
 
-def _answers(process: Process, file: Path, count: int, limit: float) -> list[Row]:
-    """Ask for all problems of a file; an end costs one of them, and the next has a new process."""
-    process.ends, ready, rows = 0, None, list[Row]()
-    for p in range(count):
-        if process.ends >= MOST_ENDS:
-            rows.append({"problem": p, "ended": LEFT_OUT})
-            continue
-        try:
-            if ready is None:
-                patience = 2.0 * limit if process.ends else START_LIMIT
-                ready = process.ask(("open", str(file.resolve()), p), patience)
-            rows.append({"problem": p, **ready, **process.ask(("problem", p), limit)})
-        except EndedError as end:
-            rows.append({"problem": p, "ended": end.kind, "why": str(end)})
-            ready = None
-    return rows
+def report(store: Store, width: int = 80) -> Report:
+    """Return what a folder has, judged anew; raises HierarchyError if it has no rows.
 
-
-@final
-@dataclass(frozen=True)
-class Half:
-    """The judged rows of one half, never of both together; its problems, by family."""
-
-    title: str
-    rows: Sequence[Row]
-    collections: Mapping[str, Collection]
-
-    @cached_property
-    def whole(self) -> list[Row]:
-        """The summary of each entrant over all families."""
-        return summaries(self.rows, steps_of(self.collections))
-
-    @cached_property
-    def cells(self) -> list[Row]:
-        """The summary of each entrant in each family."""
-        return cells(self.rows, steps_of(self.collections))
-
-
-def halves(store: Store) -> list[Half]:
-    """Judge what a folder has, fresh halves first; raises HierarchyError if it has no rows."""
+    Each set has a section, fresh ones first; no number is of two sets together.
+    """
     found = [read(file) for file in sorted(store.problems.glob("[!.]*.npz"))]
     rows = judge(store.rows(), {one.digest: one for one in found})
     if not rows:
@@ -142,28 +85,22 @@ def halves(store: Store) -> list[Half]:
                              "open` first")
     order, labels = [*FAMILIES], [one.label for one in ENTRANTS]
     rows.sort(key=lambda row: (_place(order, row["family"]), _place(labels, row["entrant"])))
-    return [Half(f"Fresh problems, seed {seed}" if seed else "Public problems",
-                 [row for row in rows if row["seed"] == seed],
-                 {one.head.family: one for one in found if one.head.seed == seed})
-            for seed in sorted({row["seed"] for row in rows}, key=lambda seed: (seed == 0, seed))]
+    sections, kept = [], list[Row]()
+    for seed in sorted({row["seed"] for row in rows}, key=lambda seed: (seed == 0, seed)):
+        title = f"Fresh problems, seed {seed}" if seed else "Public problems"
+        section, cells = views.section(
+            title, [row for row in rows if row["seed"] == seed],
+            {one.head.family: one for one in found if one.head.seed == seed}, width)
+        sections.append(section)
+        kept += [{"half": title, **row} for row in cells]
+    versions = {row["entrant"]: row["version"] for row in rows}
+    return Report("The open benchmark of prioritized control",
+                  [*sections, views.entrants(versions, store.notes("limits"))], {"summary": kept},
+                  store.notes("missing"))
 
 
 def _place(order: Sequence[str], name: str) -> int:
     return order.index(name) if name in order else len(order)
-
-
-def report(store: Store, width: int = 80) -> Report:
-    """Return what a folder has, judged anew."""
-    found = halves(store)
-    limits, labels = store.notes(_LIMITS), {
-        row["entrant"]: row["version"] for half in found for row in half.rows}
-    sections = [views.section(half.title, half.rows, half.whole, half.cells, width)
-                for half in found]
-    known = views.entrants(labels, limits)
-    rows: dict[str, list[Row]] = {"summary": [
-        {"half": half.title, **row} for half in found for row in half.cells]}
-    return Report("The open benchmark of prioritized control", [*sections, known], rows,
-                  store.notes(_MISSING))
 
 
 def check(entrant: Entrant, folder: Path) -> tuple[str, bool]:
@@ -173,26 +110,23 @@ def check(entrant: Entrant, folder: Path) -> tuple[str, bool]:
     """
     files = [export(FAMILIES[name], 0, _CHECKS, True, folder) for name in CHECKED]
     try:
-        every = list(asked(entrant, files, _CHECK_LIMIT))
+        every = [row for rows in asked(entrant, files, _CHECK_LIMIT) for row in rows]
     except MissingError as reason:
         return f"{entrant.label}: cannot run: {reason}", False
-    found = {one.digest: one for one in map(read, files)}
-    rows = judge([row for rows in every for row in rows], found)
+    rows = judge(every, {one.digest: one for one in map(read, files)})
     answered = [row for row in rows if row["x"] is not None]
     ended = any(row["verdict"] in (CRASHED, HUNG, RAISED) for row in rows)
     well = bool(answered) and not ended and all(row["same"] for row in answered)
     lines = [f"{entrant.label}: {rows[0]['version']}",
-             *(f"  {name:12} {_line(own)}" for name in CHECKED
-               if (own := [row for row in rows if row["family"] == name])),
+             *(f"  {name:12} {_line(own)}" for name, own in by(rows, "family")),
              "  the rules are kept" if well else
              "  the rules are broken: see docs/extending/entrant.md"]
     return "\n".join(lines), well
 
 
 def _line(rows: list[Row]) -> str:
-    verdicts: list[str] = [row["verdict"] for row in rows]
+    verdicts = [row["verdict"] for row in rows]
     said = ", ".join(f"{verdict}: {verdicts.count(verdict)}" for verdict in dict.fromkeys(verdicts))
-    found: dict[str, Any] = summary(rows)
-    if not {SOLVED, WRONG} & set(verdicts):
-        return said
-    return f"{said}; miss {found['relative']:.0e}; median {found['median_us']:.1f} us"
+    found = summary(rows)
+    return said if not {SOLVED, WRONG} & set(verdicts) else (
+        f"{said}; miss {found['relative']:.0e}; median {found['median_us']:.1f} us")

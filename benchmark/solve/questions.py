@@ -12,30 +12,17 @@ import numpy as np
 from benchmark.solve.interface import Answer, Problem, Solver, read_problems
 from benchmark.worker import Repeats, reason, timed
 
-REPEATS = Repeats()
-
 
 @final
 class Questions:
-    """The problems of a file, asked one after the other."""
+    """The problems of a file, or those that were taken, asked one after the other."""
 
-    def __init__(self, solver: type[Solver], options: dict[str, Any]) -> None:
-        self.solver = solver(**options)
-        self.problems: list[Problem] = []
-        self.before: list[Problem | None] = []
-        self.repeats, self._answer, self._sequence = REPEATS, (-1, None), False
-
-    def about(self) -> dict[str, Any]:
-        """Return what the solver says of itself."""
-        return {"version": self.solver.version()}
-
-    def open(self, file: str, first: int) -> dict[str, Any]:
-        """Read a file of problems and solve one untimed; return how large and how fast all is."""
-        with np.load(file, allow_pickle=False) as kept:
-            sequence = bool(json.loads(kept["head.json"])["sequence"])
-        self.take(read_problems(Path(file)), sequence=sequence)
-        self._rehearse(self.problems[first])
-        return {"start_kib": resident(), "yardstick_ns": yardstick()}
+    def __init__(self, solver: type[Solver], options: dict[str, Any],
+                 repeats: Repeats = Repeats()) -> None:  # noqa: B008
+        self.solver, self.repeats = solver(**options), repeats
+        self.version = self.solver.version
+        self._file, self._ready = "", dict[str, Any]()
+        self.take([])
 
     def take(self, problems: list[Problem], before: list[Problem | None] | None = None,
              sequence: bool = False) -> None:
@@ -43,15 +30,29 @@ class Questions:
         self.problems, self._sequence = problems, sequence
         self.before, self._answer = before or [None] * len(problems), (-1, None)
 
-    def problem(self, p: int) -> dict[str, Any]:
-        """Return the raw row of a problem: the answers, and what was measured."""
-        refusal = self.solver.refuses(self.problems[p])
+    def problem(self, file: str, p: int) -> dict[str, Any]:
+        """Return the raw row of a problem of a file; a new file is read, and solved once untimed.
+
+        The row has how large and how fast all is where the file begins.
+        """
+        if file != self._file:
+            with np.load(file, allow_pickle=False) as kept:
+                sequence = bool(json.loads(kept["head.json"])["sequence"])
+            self.take(read_problems(Path(file)), sequence=sequence)
+            self._rehearse(self.problems[p])
+            self._file, self._ready = file, {"start_kib": resident(), "yardstick_ns": yardstick()}
+        return {**self._ready, **self.asked(p)}
+
+    def asked(self, p: int) -> dict[str, Any]:
+        """Return the answers to a problem that was taken, and what was measured."""
+        problem = self.problems[p]
+        refusal = self.solver.refuses(problem)
         if refusal:
             return {"refused": refusal}
         try:
-            said, raw = self._cold(self.problems[p])
+            said, raw = self._cold(problem)
             if self.solver.warm and (start := self._start(p)) is not None:
-                more, raw = self._warm(self.problems[p], start)
+                more, raw = self._warm(problem, start)
                 said |= more
             self._answer = p, raw
         except Exception as error:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import isnan, nan
+from typing import Any
 
 import numpy as np
 
@@ -17,13 +18,12 @@ from benchmark.packages import Entrant
 from benchmark.report import Report, Section
 from benchmark.solve.entrants import ENTRANTS, HIERARCHICAL, NUMPY
 from benchmark.solve.interface import Problem
-from benchmark.solve.judge import RIGHT, SOLVED, WRONG, judged
-from benchmark.solve.questions import REPEATS, Questions
-from benchmark.solve.summary import summary
+from benchmark.solve.judge import RIGHT, SOLVED, WRONG, by, judged, summary
+from benchmark.solve.questions import Questions
 from benchmark.solve.views import mark
 from benchmark.store import Row
-from benchmark.tables import Column, Table, digits, percent, power, whole
-from benchmark.worker import load
+from benchmark.tables import TIMES, Column, Table, digits, percent, power, whole
+from benchmark.worker import Repeats, load
 from hierarchy.errors import UnknownNameError
 from hierarchy.problem import Hierarchy
 from scenarios.problems import reference
@@ -34,7 +34,6 @@ from solvers.qp.backends import installed
 
 KNOWN, FRESH = "known", "fresh"
 COUNT = 200      # fresh problems of a family
-_LESS = "pip install 'task-hierarchy[qp]'"
 _MOST = 200      # times of one problem
 
 # Target medians relative to the median of DAQP on the same family in the same run.
@@ -54,8 +53,7 @@ Known limitations. DAQP's hierarchical mode minimizes violations divided by the 
 a different problem if rows conflict and differ in norm, softened by a finite weight; it treats \
 zero rows as infeasible; its arrays are prepared before timing. augmented and tpm-published are \
 not strict at every rank. Resolvers for equalities skip problems with inequalities."""
-_COLUMNS = (Column("median", "median_us"), Column("p95", "p95_us"), Column("p99.9", "p99.9_us"),
-            Column("iter", "iterations", whole), Column("cert", "certified", percent),
+_COLUMNS = (*TIMES, Column("iter", "iterations", whole), Column("cert", "certified", percent),
             Column("unso", "unsolved", whole), Column("wrong", "wrong", whole),
             Column("miss", "relative", power), Column("/DAQP", "to_daqp"),
             Column("/numpy", "to_numpy"))
@@ -70,15 +68,14 @@ def field(wanted: Sequence[str] | None = None) -> tuple[list[Entrant], dict[str,
     for name in wanted or ():
         if name not in names():
             raise UnknownNameError("resolver", name, names())
-    ours = [one for one in ENTRANTS if one.adapter.endswith("ours:Ours") and (
+    chosen = [one for one in ENTRANTS if one.label in (NUMPY, HIERARCHICAL)]
+    chosen += [one for one in ENTRANTS if one.adapter.endswith("ours:Ours") and (
         wanted is None or one.label.split("-")[0].split()[0] in wanted)]
-    yardsticks = [one for one in ENTRANTS if one.label in (NUMPY, HIERARCHICAL)]
-    missing = {one.label: _LESS for one in (*ours, *yardsticks) if not installed(_backend(one))}
-    return [one for one in (*yardsticks, *ours) if one.label not in missing], missing
-
-
-def _backend(one: Entrant) -> str:
-    return "daqp" if one.label == HIERARCHICAL else one.options.get("backend", "proxqp")
+    backends = {one.label: "daqp" if one.label == HIERARCHICAL else
+                one.options.get("backend", "proxqp") for one in chosen}
+    missing = {label: "pip install 'task-hierarchy[qp]'" for label, backend in backends.items()
+               if not installed(backend)}
+    return [one for one in chosen if one.label not in missing], missing
 
 
 def run(seconds: float = 0.5, families: Sequence[str] = FAMILIES, seed: int | None = None,
@@ -100,51 +97,58 @@ def run(seconds: float = 0.5, families: Sequence[str] = FAMILIES, seed: int | No
         if name not in FAMILIES:
             raise UnknownNameError("family", name, FAMILIES)
     entrants, missing = field(resolvers)
-    halves = {KNOWN: {name: reference.family(name) for name in families}}
-    if seed is not None:
-        halves[FRESH] = {name: reference.fresh(name, seed, count) for name in families}
-    rows: list[Row] = []
-    with one_core():
-        for origin, made in halves.items():
-            for name, problems in made.items():
-                rows += _measured(name, origin, problems, entrants, seconds)
+    rows, sections, targets = list[Row](), list[Section](), list[str]()
+    for origin in (KNOWN,) if seed is None else (KNOWN, FRESH):
+        some, tables = list[Row](), []
+        for name in families:
+            problems = (reference.family(name) if seed is None or origin == KNOWN
+                        else reference.fresh(name, seed, count))
+            with one_core():
+                own = [{"family": name, "origin": origin, **row}
+                       for row in _measured(name, problems, entrants, seconds)]
+            some += own
+            tables.append(Table(name if origin == KNOWN else f"{name}, {origin}", own, _COLUMNS))
+        drawn = [{**mark(row), "hollow": row["entrant"].endswith(" warm")} for row in some
+                 if row["answered"]]
+        figure = "time-accuracy" if origin == KNOWN else f"time-accuracy-{origin}"
+        sections.append(Section(origin, tables,
+                                figures={figure: figures.time_against_error(drawn)}))
+        targets += _targets(some, origin)
+        rows += some
     return Report(f"Resolvers on reference problems, one core of {machine()['processor']}",
-                  _sections(rows), {"resolvers": rows}, missing)
+                  [*sections, Section("Targets", text="\n".join([NOTES, *targets]))],
+                  {"resolvers": rows}, missing)
 
 
-def _measured(name: str, origin: str, problems: Sequence[reference.Problem],
-              entrants: Sequence[Entrant], seconds: float) -> list[Row]:
+def _measured(name: str, problems: Sequence[reference.Problem], entrants: Sequence[Entrant],
+              seconds: float) -> list[Row]:
     """Return a row for each entrant that can be asked, and one for its warm starts."""
-    plain = [_plain(one.h) for one in problems]
-    before = [None if one.before is None else _plain(one.before) for one in problems]
-    turn = REPEATS._replace(most=_MOST, turn=int(1e9 * seconds / len(plain)))
+    plain = [as_problem(one.h) for one in problems]
+    before = [None if one.before is None else as_problem(one.before) for one in problems]
+    turn = Repeats(most=_MOST, turn=int(1e9 * seconds / len(plain)))
     asked: dict[str, Questions] = {}
     for one in entrants:
-        own = Questions(load(one.adapter), dict(one.options))
+        own = Questions(load(one.adapter), dict(one.options), turn)
         if not own.solver.refuses(plain[0]):
             own.take(plain, before)
-            own.repeats = turn
-            own.problem(0)  # loads and compiles
+            own.asked(0)  # loads and compiles
             asked[one.label] = own
-    raw: dict[str, list[Row]] = {label: [] for label in asked}
-    for p, problem in enumerate(problems):
-        for label, own in asked.items():
-            row = {"entrant": label, "family": name, "problem": p, **own.problem(p)}
-            raw[label].append(judged(row, problem.h, proof_of(problem)))
-    rows = [_row(own, problems) for own in raw.values()]
-    rows += [_row([_warm(row) for row in own], problems) for own in raw.values()
-             if own[0].get("warm_ns")]
+    raw = [judged({"entrant": label, "family": name, "problem": p, **own.asked(p)}, problem.h,
+                  _proof(problem))
+           for p, problem in enumerate(problems) for label, own in asked.items()]
+    warm = [_warm(row) for row in raw if row.get("warm_ns")]
+    rows = [_row(own, problems) for _, own in (*by(raw, "entrant"), *by(warm, "entrant"))]
     medians = {row["entrant"]: row["median_us"] for row in rows}
-    return [{"family": name, "origin": origin, **row,
-             "to_daqp": row["median_us"] / medians.get(HIERARCHICAL, nan),
+    return [{**row, "to_daqp": row["median_us"] / medians.get(HIERARCHICAL, nan),
              "to_numpy": row["median_us"] / medians.get(NUMPY, nan)} for row in rows]
 
 
-def _plain(h: Hierarchy) -> Problem:
+def as_problem(h: Hierarchy) -> Problem:
+    """Return a hierarchy as entrants have it."""
     return Problem(h.A, h.lower, h.upper, np.asarray(h.sizes), h.reference)
 
 
-def proof_of(problem: reference.Problem) -> Proof | None:
+def _proof(problem: reference.Problem) -> Proof | None:
     """Return a stored answer in the form of a proof, None without one."""
     count = len(problem.norms) + 1
     return Proof(problem.x, problem.norms, count, count, 0.0, 0.0) if problem.known else None
@@ -152,48 +156,31 @@ def proof_of(problem: reference.Problem) -> Proof | None:
 
 def _warm(row: Row) -> Row:
     """Return the row of a warm start, as that of a cold one."""
-    right, solved = row["warm_right"], row.get("warm_solved")
-    return {**row, "entrant": f"{row['entrant']} warm", "cold_ns": row.get("warm_ns"),
-            "iterations": row.get("warm_iterations"), "solved": solved, "x": row.get("warm_x"),
-            "verdict": SOLVED if right else WRONG if solved else row["verdict"]}
+    verdict = SOLVED if row["warm_right"] else WRONG if row["warm_solved"] else row["verdict"]
+    warm = {key: row[f"warm_{key}"] for key in ("iterations", "solved", "x")}
+    return {**row, **warm, "entrant": f"{row['entrant']} warm", "cold_ns": row["warm_ns"],
+            "verdict": verdict}
 
 
 def _row(rows: Sequence[Row], problems: Sequence[reference.Problem]) -> Row:
-    certified = [bool(row.get("solved")) and certify(problem.h, row["x"], RIGHT).certified
-                 for row, problem in zip(rows, problems, strict=True)]
-    found = summary(rows)
-    return {**found, "certified": sum(certified) / len(rows),
+    certified = [row.get("solved") and certify(problems[row["problem"]].h, row["x"],
+                                               RIGHT).certified for row in rows]
+    found: dict[str, Any] = summary(rows)
+    return {**found, "certified": sum(map(bool, certified)) / len(rows),
             "solves": sum(len(row.get("cold_ns") or ()) for row in rows),
             "unsolved": len(rows) - found["answered"]}
 
 
-def _sections(rows: Sequence[Row]) -> list[Section]:
-    """Return a section for each half, with its tables, its targets and the figure."""
-    sections, targets = [], list[str]()
-    for origin in dict.fromkeys(row["origin"] for row in rows):
-        own = [row for row in rows if row["origin"] == origin]
-        tables = [Table(name if origin == KNOWN else f"{name}, {origin}",
-                        [row for row in own if row["family"] == name], _COLUMNS)
-                  for name in dict.fromkeys(row["family"] for row in own)]
-        drawn = [{**mark(row), "hollow": row["entrant"].endswith(" warm")} for row in own
-                 if row["answered"]]
-        name = "time-accuracy" if origin == KNOWN else f"time-accuracy-{origin}"
-        sections.append(Section(origin, tables, figures={name: figures.time_against_error(drawn)}))
-        targets += _targets(own, origin)
-    return [*sections, Section("Targets", text="\n".join([NOTES, *targets]))]
-
-
 def _targets(rows: Sequence[Row], origin: str) -> list[str]:
     """Return a line for each target: met or not; those of rows that are missing are left out."""
-    found = {(row["family"], row["entrant"]): row for row in rows}
     lines = []
-    for (name, label), most in TARGETS.items():
-        row = found.get((name, label))
-        if row is None or isnan(row["to_daqp"]):
-            continue
-        kept = row["certified"] == 1.0 and not row["unsolved"] and not row["wrong"]
-        met = "met" if kept and row["to_daqp"] <= most else (
-            "not met" if kept else "not met: not all certified")
-        lines.append(f"{origin:5} {name:7} {label:9} {digits(row['to_daqp'])} x DAQP, "
-                     f"target {most:g}: {met}")
+    for row in rows:
+        name, label = row["family"], row["entrant"]
+        most = TARGETS.get((name, label))
+        if most is not None and not isnan(row["to_daqp"]):
+            right = row["certified"] == 1.0 and not row["unsolved"] and not row["wrong"]
+            met = ("not met: not all certified" if not right else
+                   "met" if row["to_daqp"] <= most else "not met")
+            lines.append(f"{origin:5} {name:7} {label:9} {digits(row['to_daqp'])} x DAQP, "
+                         f"target {most:g}: {met}")
     return lines

@@ -1,4 +1,4 @@
-"""What is shown of a half: tables, figures, and three sentences of fixed form."""
+"""What is shown of a set of problems: tables, figures, and three sentences of fixed form."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ import numpy as np
 
 from benchmark import figures
 from benchmark.report import Section
-from benchmark.solve.judge import RIGHT
-from benchmark.solve.summary import by, profile
+from benchmark.solve.judge import RIGHT, by, cells, profile, steps_of, summaries
 from benchmark.store import Row
 from benchmark.tables import Column, Table, digits, percent, power, text, whole, yes
 from hierarchy.words import listed
+from solvers.problems.files import Collection
 
 NOTES = f"""\
 right: share of the problems asked that are solved, and called so: every level missed by no more \
@@ -39,23 +39,25 @@ _INSIDE = (Column("Python", "median_us"), Column("C", "inside_median_us"),
            Column("warm, Python", "warm_median_us"), Column("C", "warm_inside_median_us"))
 
 
-def section(title: str, rows: Sequence[Row], whole_: Sequence[Row], cells: Sequence[Row],
-            width: int) -> Section:
-    """Return the section of a half: its judged rows, and their summaries."""
+def section(title: str, rows: Sequence[Row], collections: Mapping[str, Collection], width: int
+            ) -> tuple[Section, list[Row]]:
+    """Return the section of a set and the summaries behind it, of its judged rows and problems."""
+    steps = steps_of(collections)
+    total, some = summaries(rows, steps), cells(rows, steps)
     families = list(dict.fromkeys(row["family"] for row in rows))
     count = len({(row["family"], row["problem"]) for row in rows})
-    tables = [Table(f"{title}: {count} problems of {len(families)} families", whole_, _ANSWERS),
-              Table(f"{title}: quality", whole_, _QUALITY), _times(title, cells, families, width)]
-    inside = [row for row in cells if not isnan(row["inside_median_us"])]
+    tables = [Table(f"{title}: {count} problems of {len(families)} families", total, _ANSWERS),
+              Table(f"{title}: quality", total, _QUALITY), _times(title, some, families, width)]
+    inside = [row for row in some if not isnan(row["inside_median_us"])]
     if inside:
         tables.append(Table(f"{title}: medians of compiled entrants", [
             {**row, "entrant": f"{row['family']}, {row['entrant']}"} for row in inside], _INSIDE))
     chosen = [name for name in CHOSEN if name in families] or families[:4]
     drawn = {f"{title}: performance profiles": figures.profiles(_RATIOS, profile(rows, _RATIOS)),
              f"{title}: time against miss": figures.time_against_error(
-                 [mark(row) for row in cells if row["family"] in chosen and row["answered"]]),
-             f"{title}: share right": figures.heat(cells)}
-    return Section(title, tables, NOTES, drawn, lead(title, whole_, cells))
+                 [mark(row) for row in some if row["family"] in chosen and row["answered"]]),
+             f"{title}: share right": figures.heat(some)}
+    return Section(title, tables, NOTES, drawn, lead(title, total, some)), some
 
 
 def mark(row: Row) -> Row:
@@ -88,10 +90,10 @@ def _times(title: str, cells: Sequence[Row], families: Sequence[str], width: int
     return Table(f"{title}: times", list(rows.values()), columns)
 
 
-def lead(title: str, whole_: Sequence[Row], cells: Sequence[Row]) -> list[str]:
+def lead(title: str, total: Sequence[Row], cells: Sequence[Row]) -> list[str]:
     """Return who solves the most, where another is right more often, and where one is faster."""
-    asked = max(row["asked"] for row in whole_)
-    widely = {row["entrant"]: row["right"] for row in whole_ if row["asked"] >= _WIDELY * asked}
+    asked = max(row["asked"] for row in total)
+    widely = {row["entrant"]: row["right"] for row in total if row["asked"] >= _WIDELY * asked}
     best = [label for label, share in widely.items() if share == max(widely.values())]
     better, faster = [], []
     for family, some in by(cells, "family"):

@@ -13,17 +13,16 @@ import pytest
 
 from benchmark import solve
 from benchmark.packages import OWN, Entrant, MissingError
-from benchmark.process import CRASHED, HUNG
+from benchmark.process import CRASHED, HUNG, LEFT_OUT
 from benchmark.solve import judge as judging
 from benchmark.solve import open as opened
 from benchmark.solve.entrants import ENTRANTS, chosen, compiled
 from benchmark.solve.interface import Problem, read_problems
-from benchmark.solve.judge import judge, judged
-from benchmark.solve.open import LEFT_OUT, asked
-from benchmark.solve.questions import REPEATS
-from benchmark.solve.summary import cells, profile, summaries, summary
+from benchmark.solve.judge import cells, judge, judged, profile, summaries, summary
+from benchmark.solve.open import asked
 from benchmark.solve.views import lead
 from benchmark.store import Store
+from benchmark.worker import Repeats
 from hierarchy import Hierarchy
 from hierarchy.errors import HierarchyError
 from scenarios.cli.main import run_command
@@ -170,7 +169,7 @@ def test_a_solver_in_a_library_is_timed_from_python_and_inside(tmp_path, equalit
     for answer in answers:
         assert (answer["iterations"], answer["warm_iterations"]) == (7, 1)
         if sys.platform == "linux":
-            assert 1 <= len(answer["cold_inside_ns"]) <= REPEATS.most
+            assert 1 <= len(answer["cold_inside_ns"]) <= Repeats().most
             assert 0 <= min(answer["cold_inside_ns"]) < min(answer["cold_ns"])
 
 
@@ -362,16 +361,6 @@ def test_rows_come_back_as_they_were_stored(tmp_path):
     assert store.rows() == [row]
 
 
-def test_the_documents_ask_for_parts_that_the_report_can_make():
-    from benchmark.studies import open_report
-
-    root = Path(__file__).parents[2]
-    asked = {found["name"] for page in open_report.PAGES
-             for found in open_report.BLOCK.finditer((root / page).read_text(encoding="utf-8"))}
-    assert asked <= set(open_report.PARTS)
-    assert {"lead", "problems", "fresh answers", "public answers"} <= asked
-
-
 def test_an_unknown_entrant_and_a_missing_file_are_refused():
     with pytest.raises(HierarchyError, match="did you mean 'hcod'"):
         chosen(["hcodd"])
@@ -408,12 +397,13 @@ def test_the_command_runs_continues_and_writes_its_page(tmp_path, capsys, monkey
 
 @pytest.mark.slow
 def test_what_was_asked_before_an_interruption_is_stored(tmp_path, monkeypatch):
-    def interrupted(process, file, count, limit):
-        if "one_unknown" in file.name:
-            raise KeyboardInterrupt
-        return [{"problem": p, "ended": CRASHED} for p in range(count)]
+    def interrupted(process, questions, limit, most):
+        for _, file, _ in questions:
+            if "one_unknown" in file:
+                raise KeyboardInterrupt
+            yield {"ended": CRASHED}
 
-    monkeypatch.setattr(opened, "_answers", interrupted)
+    monkeypatch.setattr(opened.Process, "answers", interrupted)
     families = [FAMILIES[name] for name in ("integers", "one_unknown")]
     with pytest.raises(KeyboardInterrupt):
         opened.run(tmp_path, families, [fake("LeastSquares")], {0: 2}, told=str)

@@ -1,33 +1,27 @@
 """Other packages: the same robots, known answers of each adapter, fair judgement."""
 
 import json
-import xml.etree.ElementTree as ET
 from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from benchmark.arm import compare as moving
-from benchmark.arm.compare import ENTRANTS, QUESTIONS, START, make_scenes, run
-from benchmark.arm.scene import scene_of
-from benchmark.figures import bars
 from benchmark.packages import PACKAGES, Entrant, MissingError, Package, install, python_of
+from benchmark.peers import moving, reaching, standing
+from benchmark.peers.compare import joined
+from benchmark.peers.moving import ENTRANTS, QUESTIONS, START, make_scenes, run
+from benchmark.peers.ours import stand
+from benchmark.peers.scenes import Arm, Stand
+from benchmark.peers.standing import Judge, followed, make_scene
 from benchmark.process import Process, staged
-from benchmark.reach import compare as reaching
 from benchmark.report import Report
 from benchmark.solve import entrants as solvers_
 from benchmark.solve.open import asked
-from benchmark.stand import compare as standing
-from benchmark.stand.judge import Judge
-from benchmark.stand.ours import Ours
-from benchmark.stand.scene import read_stand
-from benchmark.stand.states import make_stand
-from benchmark.turns import joined
 from benchmark.urdf import roll_pitch_yaw, urdf
 from hierarchy import Hierarchy, Robot, State
 from hierarchy.errors import RobotError
-from hierarchy.paths import Still
+from hierarchy.paths import Ellipse, Still
 from hierarchy.tasks import Position
 from scenarios.cli.main import run_command
 from solvers.problems.files import Collection, Head
@@ -57,10 +51,8 @@ def answered(entrant, questions, *calls):
             process = Process(entrant, questions, folder)
         except MissingError as reason:
             pytest.skip(f"{entrant.label}: {reason}")
-        try:
+        with process:
             return [process.ask(call, 120.0) for call in calls][-1]
-        finally:
-            process.stop()
 
 
 # -- the robots ------------------------------------------------------------------------------------
@@ -132,11 +124,6 @@ def test_the_humanoid_read_from_its_urdf_weighs_as_ours(tmp_path):
                                        rtol=0.0, atol=1e-12)
 
 
-def test_mujoco_is_told_to_keep_the_end_effector():
-    compiler = ET.fromstring(urdf(Robot.named("kuka_lwr"))).find("mujoco/compiler")
-    assert compiler.get("fusestatic") == "false"
-
-
 # -- known answers ---------------------------------------------------------------------------------
 
 def labels(entrants):
@@ -177,8 +164,10 @@ def test_an_adapter_of_the_arm_gives_the_known_velocity(entrant, near):
 @pytest.mark.slow
 @pytest.mark.parametrize("entrant", **labels(standing.ENTRANTS))
 def test_an_adapter_of_the_humanoid_obeys_the_equations_of_motion(entrant, tmp_path):
-    scene, states = make_stand(tmp_path, 1)
-    log = joined([answered(entrant, standing.QUESTIONS, ("open", str(tmp_path / "scene.json")),
+    scene = make_scene(tmp_path)
+    states = followed(scene, 1)
+    asked = {key: values.tolist() for key, values in states.items()}
+    log = joined([answered(entrant, standing.QUESTIONS, ("open", asdict(scene), asked),
                            ("turn", 1, 0))])
     assert not log["failed"][0]
     found = Judge(scene, states).residuals(0, log["a"][0], log["torques"][0], log["wrenches"][0])
@@ -190,15 +179,12 @@ def test_an_adapter_of_the_humanoid_obeys_the_equations_of_motion(entrant, tmp_p
 def test_an_adapter_of_whole_inverse_kinematics_reaches_a_pose_that_was_taken(entrant, tmp_path):
     robot, file = Robot.named("kuka_lwr"), tmp_path / "arm.urdf"
     file.write_text(urdf(robot))
-    arm = reaching.Arm("", ("",), (robot.end_effector,))
-    read = Robot.from_file(file, robot.end_effector)
-    poses, starts = reaching.problems(read, arm, 2, 0, True)
-    np.savez(tmp_path / "problems.npz", urdf=str(file), frames=np.array(arm.frames), poses=poses,
-             starts=starts, tolerance=reaching.TOLERANCE)
-    found = answered(entrant, reaching.QUESTIONS, ("open", str(tmp_path / "problems.npz")),
-                     ("problem", 1))
+    read, frames = Robot.from_file(file, robot.end_effector), (robot.end_effector,)
+    poses, starts = reaching.problems(read, frames, 1, 0, True)
+    found = answered(entrant, reaching.QUESTIONS, (
+        "problem", [str(file), frames, reaching.TOLERANCE], poses[0].tolist(), starts[0].tolist()))
     assert found["met"]
-    assert reaching.error(read, arm, np.array(found["q"]), poses[1]) < 2.0 * reaching.TOLERANCE
+    assert reaching.error(read, frames, np.array(found["q"]), poses[0]) < 2.0 * reaching.TOLERANCE
 
 
 OTHERS = [one for one in solvers_.ENTRANTS if not one.adapter.endswith(":Ours")]
@@ -238,13 +224,13 @@ def test_another_environment_sees_nothing_of_ours_but_the_benchmark():
 # -- the scenes and their judges -------------------------------------------------------------------
 
 def test_a_scene_arrives_as_it_was_sent(tmp_path):
-    for scene in make_scenes(tmp_path).values():
-        assert scene_of(json.loads(json.dumps(asdict(scene)))) == scene
+    for scene, read in ((make_scenes(tmp_path)["step"], lambda numbers: Arm(**numbers)),
+                        (make_scene(tmp_path), Stand.of)):
+        sent = json.dumps(asdict(scene))
+        assert json.dumps(asdict(read(json.loads(sent)))) == sent
 
 
 def test_the_path_of_the_scene_is_the_path_of_our_stack(tmp_path):
-    from hierarchy.paths import Ellipse
-
     scene = make_scenes(tmp_path)["ellipse"]
     ours = Ellipse(scene.centre, scene.cosine, scene.sine, scene.turning)
     for t in (0.0, 0.7, 5.0):
@@ -276,9 +262,9 @@ def test_an_environment_that_is_there_is_not_made_again(alone, tmp_path, monkeyp
 
 @pytest.mark.slow
 def test_everybody_is_judged_or_named_with_the_reason(alone, tmp_path):
-    found = run([fake("Posture"), fake("Refuses"), fake("Lost"), fake("Ends"), NOBODY], ticks=1100)
+    found = run([fake("posture"), fake("refuses"), fake("lost"), fake("ends"), NOBODY], ticks=1100)
     rows = {row["entrant"]: row for row in found.rows["peers"]}
-    assert list(rows) == ["Posture", "Refuses", "Lost"]
+    assert list(rows) == ["posture", "refuses", "lost"]
     good, none, lost = rows.values()
     assert good["ticks"] == none["ticks"] == 1100
     assert good["median_us"] <= good["p95_us"] <= good["p99.9_us"]
@@ -292,7 +278,7 @@ def test_everybody_is_judged_or_named_with_the_reason(alone, tmp_path):
     assert none["why"] == "ValueError: no answer"
     assert none["nan"] == "raises ValueError"
     assert "not finite" in lost["why"]
-    assert found.missing["Ends"] == "ended with code 7"
+    assert found.missing["ends"] == "ended with code 7"
     assert "--install" in found.missing["nobody"]
     found.write(tmp_path / "out")
     assert json.loads((tmp_path / "out" / "missing.json").read_text()) == found.missing
@@ -316,18 +302,19 @@ def test_the_command_writes_a_folder_for_each_scene(tmp_path, monkeypatch, capsy
         monkeypatch.setattr(scene, "run", lambda: Report("title", [], {"peers": [{"a": 1}]},
                                                          {"nobody": "not installed"}, True))
     assert run_command(["bench", "peers", "--out", str(tmp_path / "out")]) == 0
-    assert {path.name for path in (tmp_path / "out").glob("*")} == {"arm", "stand"}
-    assert (tmp_path / "out" / "stand" / "peers.csv").is_file()
+    assert {path.name for path in (tmp_path / "out").glob("*")} == {"moving", "standing"}
+    assert (tmp_path / "out" / "standing" / "peers.csv").is_file()
     assert run_command(["bench", "peers", "--scene", "stand", "--out", str(tmp_path / "a")]) == 1
     assert "skipped: nobody (not installed)" in capsys.readouterr().out
     assert run_command(["bench", "peers", "--scene", "stnd"]) == 2
 
 
 def test_wrong_answers_to_stand_are_found(tmp_path):
-    scene, states = make_stand(tmp_path, 2)
-    ours, judge = Ours(scene, "hcod"), Judge(scene, states)
-    ours.tick(0.0, states["q"][0], states["v"][0], None)
-    a, torques, wrenches = ours.answer()
+    scene = make_scene(tmp_path)
+    states = followed(scene, 2)
+    (tick, answer, _), judge = stand(scene, "hcod"), Judge(scene, states)
+    tick(0.0, states["q"][0], states["v"][0], None)
+    a, torques, wrenches = answer()
     good = judge.residuals(0, a, torques, wrenches)
     assert max(good[key] for key in ("dynamics", "contact", "torque", "friction")) < 1e-6
     assert judge.residuals(0, a, torques + 1.0, wrenches)["dynamics"] == pytest.approx(1.0)
@@ -339,20 +326,15 @@ def test_wrong_answers_to_stand_are_found(tmp_path):
     assert judge.residuals(0, 2.0 * a, torques, wrenches)["posture"] > good["posture"]
 
 
-def test_the_scene_stand_is_read_as_it_was_written(tmp_path):
-    scene, _ = make_stand(tmp_path, 1)
-    assert read_stand(tmp_path / "scene.json") == scene
-
-
 @pytest.mark.slow
 def test_a_velocity_beyond_its_limit_is_found(alone):
-    (row,) = run([fake("Posture", speed=1.5)], ticks=50).rows["peers"]
+    (row,) = run([fake("posture", speed=1.5)], ticks=50).rows["peers"]
     assert row["excess_rad_s"] > 0.1
 
 
 @pytest.mark.slow
 def test_who_does_not_survive_a_nan_is_said_to_crash(alone):
-    (row,) = run([fake("EndsAfterNan")], ticks=50).rows["peers"]
+    (row,) = run([fake("ends", at_nan=True)], ticks=50).rows["peers"]
     assert row["nan"] == "crashed: ended with code 7"
 
 
@@ -364,15 +346,3 @@ def test_our_own_stack_is_strict_keeps_limits_and_refuses_a_nan():
     assert row["fails"] == "0/0"
     assert row["at_limit_ticks"] > 0
     assert row["nan"].startswith("says so")
-
-
-def test_the_figure_has_a_bar_for_each_that_was_timed():
-    row = {"median_us": 5.0, "p95_us": 6.0, "solve_us": np.nan, "moved_m": 1e-17, "step_failed": 0}
-    fig = bars([{**row, "entrant": "tpm", "solve_us": 2.0},
-                {**row, "entrant": "pink", "moved_m": 1e-6},
-                {**row, "entrant": "mink hard", "moved_m": np.nan, "step_failed": 9},
-                {**row, "entrant": "tsid", "median_us": np.nan}])
-    (ax,) = fig.axes
-    assert [label.get_text() for label in ax.get_yticklabels()] == ["tpm", "pink", "mink hard"]
-    assert [text.get_text() for text in ax.texts] == [
-        "strict", "posture moves it by 1e-06 m a tick", "no answer at the limits"]

@@ -12,16 +12,12 @@ import pytest
 import typer
 
 from benchmark.reproduce import pages, whole
-from benchmark.reproduce import rows as rows_
-from benchmark.reproduce.blocks import block, judged, statements
-from benchmark.reproduce.rows import Rows, read, rows_of_study, write
-from benchmark.reproduce.studies import BLOCKS, SEED, STUDIES, Study
-from benchmark.reproduce.watched import DAMPED, LARGEST, LEFT, jobs, measured
+from benchmark.reproduce.blocks import block, cell, judged, statements
+from benchmark.reproduce.studies import BLOCKS, STUDIES, Rows, Study, plain, read, rows_of, write
+from benchmark.reproduce.ticks import DAMPED, LARGEST, LEFT
 from hierarchy.errors import HierarchyError
 from scenarios.cli.main import app
 from scenarios.config import shipped
-from scenarios.sweep.run import digest, run_batch
-from scenarios.sweep.store import Store
 from scenarios.sweep.whole import Workers
 
 ROOT = Path(__file__).parents[2]
@@ -76,7 +72,7 @@ def test_rows_are_read_as_they_were_written(tmp_path):
     stored = rows(a=[1.0, None, 3.0], b=[1e-9, 2.0, 3.0])
     path = write(stored, tmp_path)
     assert read(tmp_path) == {"study": stored}
-    assert '    "speed_max": [1.0, null, 3.0]' in path.read_text().splitlines()
+    assert '   "speed_max": [ 1.0, null, 3.0 ]' in path.read_text().splitlines()
 
 
 def test_every_statement_names_a_column_of_its_study():
@@ -103,9 +99,9 @@ def test_a_page_has_what_its_rows_and_commands_say(name):
 
 
 def test_every_output_that_is_stored_stands_in_a_page():
-    asked = {pages.file_of(one, ROOT).name for name in PAGES
-             for one in pages.commands((ROOT / name).read_text(encoding="utf-8"))}
-    assert {"README.md", "docs/benchmarks.md", "docs/reproduction.md"} <= set(PAGES)
+    asked = {pages.file_of(found["command"], ROOT).name for name in PAGES
+             for found in pages._OUTPUT.finditer((ROOT / name).read_text(encoding="utf-8"))}
+    assert {"README.md", "docs/results/problems.md", "docs/results/loops.md"} <= set(PAGES)
     assert {path.name for path in (ROOT / pages.OUTPUT).iterdir()} == asked
 
 
@@ -122,7 +118,7 @@ def test_a_block_is_replaced_and_the_rest_is_left(tmp_path):
     text = "before\n<!-- reproduce: blend -->\nold\n<!-- end of blend -->\nafter\n"
     found = read(ROOT / pages.RESULTS)
     made = pages.filled(text, tmp_path, "page.md", found)
-    assert made == text.replace("old", block("blend", found).rstrip())
+    assert made == text.replace("old", block("blend", found, str).rstrip())
 
 
 BENCH = """\
@@ -143,7 +139,7 @@ def page(mark, inside=""):
 
 
 def test_a_page_gets_the_whole_output_or_the_lines_between_two(tmp_path):
-    pages.store("python a.py", BENCH, tmp_path)
+    pages.file_of("python a.py", tmp_path).write_text(BENCH)
     fill = partial(pages.filled, root=tmp_path, page="page.md", rows={})
     assert fill(page("python a.py")) == page("python a.py", f"```\n{BENCH}```\n")
     mark = "python a.py | INEQ7 .. Times of"
@@ -156,13 +152,19 @@ def test_a_page_gets_the_whole_output_or_the_lines_between_two(tmp_path):
 
 
 def test_a_table_gets_the_medians_of_its_rows_and_columns(tmp_path):
-    pages.store("hierarchy bench resolvers", BENCH, tmp_path)
+    pages.file_of("hierarchy bench resolvers", tmp_path).write_text(BENCH)
     table = "| | EQ7 [us] | INEQ7 | notes |\n|---|---|---|---|\n{}"
     old = "| `hcod`, warm | 9 | 9 | kept |\n| `hqp` | 9 | 9 | too |\n"
     new = "| `hcod`, warm | 1.9 | – | kept |\n| `hqp` | – | 1443 | too |\n"
     mark = "table of hierarchy bench resolvers"
     assert pages.filled(page(mark, table.format(old)), tmp_path, "page.md", {}) == page(
         mark, table.format(new))
+
+
+def test_a_finding_names_a_number_that_was_printed():
+    assert cell(BENCH, {"table": "INEQ7", "row": "hqp proxqp", "place": "2"}) == "1945"
+    with pytest.raises(HierarchyError, match="no row 'sns' below 'EQ7'"):
+        cell(BENCH, {"table": "EQ7", "row": "sns", "place": "1"})
 
 
 def test_a_command_is_run_once_for_the_same_code(tmp_path):
@@ -201,9 +203,9 @@ def test_studies_and_pages_are_chosen_by_name():
 def documents(tmp_path):
     """A checkout that has documents only."""
     for name in PAGES:
-        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).parent.mkdir(exist_ok=True, parents=True)
         shutil.copy(ROOT / name, tmp_path / name)
-    shutil.copytree(ROOT / pages.RESULTS, tmp_path / pages.RESULTS)
+    shutil.copytree(ROOT / pages.RESULTS, tmp_path / pages.RESULTS, dirs_exist_ok=True)
     return tmp_path
 
 
@@ -227,32 +229,32 @@ def test_a_study_that_has_ended_is_stored_whatever_ends_the_command(
     assert said in capsys.readouterr().err
     assert read(documents / "out") == {"blend": new}
     assert read(documents / pages.RESULTS)["blend"] == new
-    assert "9.000" in (documents / "docs/reproduction.md").read_text()
+    assert "9.000" in (documents / "docs/results/loops.md").read_text()
 
 
 def test_an_output_is_written_as_its_command_ends(documents, monkeypatch):
-    monkeypatch.setattr(whole, "outputs", ending_with(
-        KeyboardInterrupt(), ("hierarchy bench tick", "ten ticks\n")))
-    assert whole.run(["docs/benchmarks.md"], documents / "out", root=documents) == 130
-    assert pages.file_of("hierarchy bench tick", documents).read_text() == "ten ticks\n"
-    assert "ten ticks" in (documents / "docs/benchmarks.md").read_text()
+    command = "hierarchy bench batch --seconds 4"
+    monkeypatch.setattr(whole, "outputs", ending_with(KeyboardInterrupt(), (command, "ten\n")))
+    assert whole.run(["docs/batch.md"], documents / "out", root=documents) == 130
+    assert pages.file_of(command, documents).read_text() == "ten\n"
+    assert "```\nten\n```" in (documents / "docs/batch.md").read_text()
 
 
 def test_a_page_that_cannot_be_filled_does_not_keep_others_from_it(documents):
-    page = documents / "docs/reproduction.md"
+    page = documents / "docs/results/loops.md"
     page.write_text(page.read_text() + "<!-- reproduce: other -->\n<!-- end of other -->\n")
     found = read(documents / pages.RESULTS)
     found["human"] = replace(found["human"], seed=99)
     changed, lacking = pages.fill(documents, found)
     assert changed == [documents / "docs/experiment.md"]
-    assert [why.partition(":")[0] for why in lacking] == ["docs/reproduction.md"]
+    assert [why.partition(":")[0] for why in lacking] == ["docs/results/loops.md"]
 
 
 def test_quick_lists_the_commands_that_it_does_not_run(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(whole, "ran", lambda *_: iter([rows(a=[1.0])]))
     assert whole.run([], tmp_path, True, 1, as_json=True) == 0
     made = json.loads(capsys.readouterr().out)
-    assert made["not_made"]["hierarchy bench tick"] == ["docs/benchmarks.md"]
+    assert made["not_made"]["hierarchy bench tick"] == ["docs/results/problems.md"]
     with pytest.raises(HierarchyError, match=r"--quick runs studies, and docs/batch\.md has"):
         whole.run(["docs/batch.md"], tmp_path, True, 1)
 
@@ -272,10 +274,7 @@ def test_what_is_measured_in_ticks_is_stored_for_each_start(tmp_path, monkeypatc
     common = {"title": "a title", "scenario": str(scenario), "resolver": "tpm", "starts": 2}
     for study in (Study("pairs", pairs={"recursive": ("tpm", "recursive")}, **common),
                   Study("pivots", pivots=("avoidance",), **common)):
-        store = Store(tmp_path / study.name)
-        with store.opened():
-            store.add(run_batch(jobs(study, SEED), digest(), partial(measured, study)))
-        found = rows_of_study(study, store.folder, Workers(), progress=pytest.fail)
+        found = rows_of(study, tmp_path / "none", Workers())
         assert found.ended == dict.fromkeys(study.names, 2)
         if study.pairs:
             assert (found.column("recursive", LARGEST) < 1e-9).all()
@@ -285,4 +284,4 @@ def test_what_is_measured_in_ticks_is_stored_for_each_start(tmp_path, monkeypatc
             assert 0.0 < one < 1.0
             assert 0.0 < other < 1.0
             assert one != other
-    assert rows_.plain(np.array([np.inf, 1.0])) == [None, 1.0]
+    assert plain(np.array([np.inf, 1.0])) == [None, 1.0]

@@ -5,49 +5,36 @@ import os
 import numpy as np
 
 
-class Posture:
+def posture(scene, asked, speed=1.0):
     """Goes to the posture and knows nothing else: all of its motion is the posture's."""
+    wanted, limit = np.array(scene.posture if asked else scene.start), np.array(scene.limit)
 
-    package, priorities, rows = "numpy", "none", "none"
+    def velocity(t, q, v, goal, rate):
+        return speed * np.clip(scene.posture_gain * (wanted - q), -limit, limit)
 
-    def __init__(self, scene, posture, speed=1.0):
-        self.scene, self.wanted = scene, np.array(scene.posture if posture else scene.start)
-        self.speed = speed
-
-    def velocity(self, t, q, v, goal, rate):
-        limit = np.array(self.scene.limit)
-        v = np.clip(self.scene.posture_gain * (self.wanted - q), -limit, limit)
-        return self.speed * v
-
-    def resolve(self):
-        return None
+    return velocity, lambda: None
 
 
-class Refuses(Posture):
+def refuses(scene, asked):
     """Has no answer, and says so."""
-
-    def velocity(self, t, q, v, goal, rate):
+    def velocity(t, q, v, goal, rate):
         raise ValueError("no answer")
 
+    return velocity, None
 
-class Lost(Posture):
+
+def lost(scene, asked):
     """Answers with NaN."""
-
-    def velocity(self, t, q, v, goal, rate):
-        return np.full(len(q), np.nan)
+    return lambda t, q, v, goal, rate: np.full(len(q), np.nan), None
 
 
-class Ends(Posture):
-    """Takes its process with it."""
+def ends(scene, asked, at_nan=False):
+    """Takes its process with it, or only where a joint position is NaN."""
+    moving, _ = posture(scene, asked)
 
-    def velocity(self, t, q, v, goal, rate):
-        os._exit(7)
-
-
-class EndsAfterNan(Posture):
-    """The same, but only where a joint position is NaN."""
-
-    def velocity(self, t, q, v, goal, rate):
-        if np.isnan(q).any():
+    def velocity(t, q, v, goal, rate):
+        if not at_nan or np.isnan(q).any():
             os._exit(7)
-        return super().velocity(t, q, v, goal, rate)
+        return moving(t, q, v, goal, rate)
+
+    return velocity, None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,10 +11,13 @@ import numpy as np
 from benchmark.packages import Entrant, MissingError
 from benchmark.process import START_LIMIT, Process, staged
 from benchmark.store import Row
+from benchmark.tables import Column
 from benchmark.timing import times_of
 from hierarchy.problem import Array
 
 TURN_LIMIT = 300.0  # [s]
+TICK = (Column("tick\nmedian", "median_us"), Column("\np95", "p95_us"),
+        Column("\np99.9", "p99.9_us"), Column("solve\nmedian", "solve_us"))
 
 Log = dict[str, Array]
 
@@ -22,14 +25,14 @@ Log = dict[str, Array]
 class Turns(NamedTuple):
     """Numbers of ticks: before the first turn, of a turn, and at its start for cold caches.
 
-    seconds : [s] of turns after which an entrant has no more; None for all `ticks`.
+    seconds : [s] of turns after which an entrant has no more.
     """
 
     ticks: int
     warm_up: int
     each: int
     rehearsed: int
-    seconds: float | None = None
+    seconds: float = np.inf
 
     def parts(self) -> list[tuple[int, int]]:
         """Return ticks of each turn, and how many of them do not count."""
@@ -39,38 +42,33 @@ class Turns(NamedTuple):
 
 
 def measure(entrants: Sequence[Entrant], questions: str, scene: tuple[Any, ...], turns: Turns,
-            judge: Callable[[Log, str, Process], Row]) -> tuple[list[Row], dict[str, str]]:
+            judge: Callable[[Log, Process], Row]) -> tuple[list[Row], dict[str, str]]:
     """Let all entrants take turns; return a judged row for each, and why others are missing.
 
-    questions : MODULE:CLASS, of `Ticks`. scene : arguments of its `open`. judge : makes of a log,
-    the reason of its first failure, and the process, in which it may ask for more, a row.
+    questions : MODULE:CLASS of what asks. scene : arguments of its `open`. judge : makes a row of a
+    log and the process, which it may ask for more.
     """
     missing: dict[str, str] = {}
     rows: list[Row] = []
-    processes: dict[str, Process] = {}
-    logs: dict[str, list[Row]] = {}
-    with staged() as folder:
-        try:
-            for one in entrants:
-                with _noted(missing, one.label):
-                    processes[one.label] = process = Process(one, questions, folder)
-                    process.ask(("open", *scene), START_LIMIT)
-            for part in turns.parts():
-                for label in [label for label in processes if label not in missing]:
-                    own = logs.setdefault(label, [])
-                    late = len(own) > 1 and turns.seconds is not None and (
-                        sum(reply["seconds"] for reply in own) > turns.seconds)
-                    if not late:
-                        with _noted(missing, label):
-                            own.append(processes[label].ask(("turn", *part), TURN_LIMIT))
-            for label, process in processes.items():
-                if label not in missing:
+    running: dict[str, tuple[Process, list[Row]]] = {}
+    with ExitStack() as stack:
+        folder = stack.enter_context(staged())
+        for one in entrants:
+            with _noted(missing, one.label):
+                process = stack.enter_context(Process(one, questions, folder))
+                process.ask(("open", *scene), START_LIMIT)
+                running[one.label] = process, []
+        for part in turns.parts():
+            for label, (process, replies) in running.items():
+                spent = sum(reply["seconds"] for reply in replies)
+                if label not in missing and (len(replies) < 2 or spent <= turns.seconds):
                     with _noted(missing, label):
-                        rows.append({"entrant": label, **process.about, **judge(
-                            joined(logs[label]), logs[label][-1]["why"], process)})
-        finally:
-            for process in processes.values():
-                process.stop()
+                        replies.append(process.ask(("turn", *part), TURN_LIMIT))
+        for one in entrants:
+            if one.label not in missing:
+                process, replies = running[one.label]
+                rows.append({"entrant": one.label, **process.about, "kind": one.limits,
+                             "why": replies[-1]["why"], **judge(joined(replies), process)})
     return rows, missing
 
 
@@ -96,4 +94,3 @@ def times(log: Log) -> Row:
     return {"ticks": int(log["clocked"].sum()), "failed": int(log["failed"].sum()),
             **times_of(log["time"][counted]),
             "solve_us": float(np.median(again)) / 1e3 if again.any() else np.nan}
-

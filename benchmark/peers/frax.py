@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 import xml.etree.ElementTree as ET
 from pathlib import Path
+from typing import Any
 
 os.environ.update(JAX_ENABLE_X64="1", JAX_PLATFORMS="cpu",
                   XLA_FLAGS="--xla_cpu_multi_thread_eigen=false")
@@ -18,38 +19,32 @@ import jax.numpy as jnp
 import numpy as np
 from frax import Manipulator
 
-from benchmark.arm.scene import Array, Scene
+from benchmark.peers.scenes import Arm, Array
 
 _NONE = {**dict.fromkeys(("ixx", "iyy", "izz"), "1e-9"),
          **dict.fromkeys(("ixy", "ixz", "iyz"), "0")}
 
 
-class Frax:
+def arm(scene: Arm, posture: bool) -> tuple[Any, None]:
     """One compiled function of joints, goal and rate."""
+    robot = Manipulator(str(_with_inertias(Path(scene.file))),
+                        ee_offset=_offset(Path(scene.file), scene.frame))
+    limit, still = jnp.array(scene.limit), jnp.array(scene.posture)
+    share = scene.posture_gain if posture else 0.0
 
-    package = "frax"
-    priorities = "strict, then clipped"
-    rows = "limits of joints, clipped"
+    @jax.jit  # type: ignore[untyped-decorator]
+    def compiled(q: Any, goal: Any, rate: Any) -> Any:
+        J, T = robot.velocity_control_matrices(q)
+        J = J[:3]
+        inverse = J.T @ jnp.linalg.inv(J @ J.T)
+        own = share * (still - q)
+        v = inverse @ (rate + scene.gain * (goal - T[:3, 3])) + own - inverse @ (J @ own)
+        return jnp.clip(v, -limit, limit)
 
-    def __init__(self, scene: Scene, posture: bool) -> None:
-        robot = Manipulator(str(_with_inertias(Path(scene.file))),
-                            ee_offset=_offset(Path(scene.file), scene.frame))
-        limit, still = jnp.array(scene.limit), jnp.array(scene.posture)
-        share = scene.posture_gain if posture else 0.0
+    def velocity(t: float, q: Array, v: Array, goal: Array, rate: Array) -> Array:
+        return np.asarray(compiled(q, goal, rate))
 
-        def velocity(q: jax.Array, goal: jax.Array, rate: jax.Array) -> jax.Array:
-            J, T = robot.velocity_control_matrices(q)
-            J = J[:3]
-            inverse = J.T @ jnp.linalg.inv(J @ J.T)
-            own = share * (still - q)
-            v = inverse @ (rate + scene.gain * (goal - T[:3, 3])) + own - inverse @ (J @ own)
-            return jnp.clip(v, -limit, limit)
-
-        self.compiled = jax.jit(velocity)
-
-    def velocity(self, t: float, q: Array, v: Array, goal: Array, rate: Array) -> Array:
-        """See `Adapter`."""
-        return np.asarray(self.compiled(q, goal, rate))
+    return velocity, None
 
 
 def _with_inertias(file: Path) -> Path:

@@ -1,18 +1,15 @@
-"""Times of a whole tick of inverse kinematics, with the quality of each package's solution."""
+"""The scenes `ellipse` and `step`: a whole tick of inverse kinematics of an arm, judged."""
 
 from __future__ import annotations
 
 import tempfile
 from collections.abc import Sequence
 from dataclasses import asdict, replace
-from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from benchmark import figures
-from benchmark.arm.questions import STEP_TICKS
-from benchmark.arm.scene import Scene
 from benchmark.packages import (
     DAQP,
     EMBODIK,
@@ -25,42 +22,48 @@ from benchmark.packages import (
     TSID,
     Entrant,
 )
+from benchmark.peers.compare import TICK, TURN_LIMIT, Log, Turns, joined, measure, times
+from benchmark.peers.scenes import Arm
 from benchmark.process import START_LIMIT, EndedError, Process
 from benchmark.report import Report, Section
 from benchmark.store import Row
 from benchmark.tables import Column, Table, power, text
-from benchmark.turns import TURN_LIMIT, Log, Turns, joined, measure, times
 from benchmark.urdf import urdf
 from hierarchy import Robot, State
 from hierarchy.paths import Still
 from hierarchy.tasks import Position
 
-QUESTIONS = "benchmark.arm.questions:Questions"
+QUESTIONS = "benchmark.peers.questions:Moving"
+STEP_TICKS = 2000
 START = (0.923, -0.854, 0.903, 1.195, 0.971, 1.796, 0.0)   # [rad] start of the letter's run
 STEP = (-0.3, 0.15, -0.25)                                 # [m]
 POSTURE = (1.2, 0.6, -1.0, -1.2, 1.0, -0.9, 1.0)           # [rad] from the start
-_HERE = "benchmark.arm"
 _SETTLED = 3.0     # [s] after which the start off the path has no influence
 _AT_LIMIT = 1e-6   # [rad/s]
+_HERE = "benchmark.peers"
+_ANY, _KINDS = "any, in any level", "of its own kinds"
 
 ENTRANTS = (
-    Entrant("tpm", OWN, f"{_HERE}.ours:Bounds", {"resolver": "tpm"}),
-    Entrant("sns", OWN, f"{_HERE}.ours:Bounds", {"resolver": "sns"}),
-    Entrant("hcod", OWN, f"{_HERE}.ours:Ours", {"resolver": "hcod"}),
-    Entrant("weighted", OWN, f"{_HERE}.ours:Weighted", {"resolver": "weighted", "ratio": 1000.0}),
-    Entrant("DAQP by hand", DAQP, f"{_HERE}.with_daqp:Daqp"),
-    Entrant("placo", PLACO, f"{_HERE}.with_placo:Placo"),
-    Entrant("placo hard", PLACO, f"{_HERE}.with_placo:PlacoHard"),
-    Entrant("placo scaled", PLACO, f"{_HERE}.with_placo:PlacoScaled"),
-    Entrant("tsid", TSID, f"{_HERE}.with_tsid:Tsid"),
-    Entrant("tsid hard", TSID, f"{_HERE}.with_tsid:TsidHard"),
-    Entrant("embodiK", EMBODIK, f"{_HERE}.with_embodik:Embodik"),
-    Entrant("OInK", ROBOPLAN, f"{_HERE}.with_roboplan:Oink"),
-    Entrant("frax", FRAX, f"{_HERE}.with_frax:Frax"),
-    Entrant("mink", MINK, f"{_HERE}.with_mink:Mink"),
-    Entrant("mink hard", MINK, f"{_HERE}.with_mink:MinkHard"),
-    Entrant("pink", PINK, f"{_HERE}.with_pink:Pink"),
-    Entrant("pink hard", PINK, f"{_HERE}.with_pink:PinkHard"),
+    *(Entrant(name, OWN, f"{_HERE}.ours:arm", {"resolver": name}, f"strict; {rows}")
+      for name, rows in (("tpm", "bounds of joints, first"), ("sns", "bounds of joints, first"),
+                         ("hcod", _ANY))),
+    Entrant("weighted", OWN, f"{_HERE}.ours:arm", {"resolver": "weighted", "ratio": 1000.0},
+            f"weights; {_ANY}"),
+    Entrant("DAQP by hand", DAQP, f"{_HERE}.daqp:arm", {}, f"strict, softened; {_ANY}"),
+    *(Entrant(f"placo{name}", PLACO, f"{_HERE}.placo:arm", {"priority": priority},
+              f"{words}; {_KINDS}, hard or soft")
+      for name, priority, words in (("", "soft", "weights"),
+                                    (" hard", "hard", "hard, then weights"),
+                                    (" scaled", "scaled", "scaled, then weights"))),
+    *(Entrant(label + " hard" * hard, package, f"{_HERE}.{module}:arm", {"hard": hard},
+              f"{'hard, then ' * hard}weights; {rows}, hard")
+      for label, package, module, rows in (("tsid", TSID, "tsid", _KINDS),
+                                           ("mink", MINK, "mink", "any"),
+                                           ("pink", PINK, "pink", "any"))
+      for hard in (False, True)),
+    Entrant("embodiK", EMBODIK, f"{_HERE}.embodik:arm", {}, f"strict, scaled; {_KINDS}, hard"),
+    Entrant("OInK", ROBOPLAN, f"{_HERE}.roboplan:arm", {}, f"weights; {_KINDS}, hard"),
+    Entrant("frax", FRAX, f"{_HERE}.frax:arm", {}, "strict, then clipped; limits of joints"),
 )
 NOTES = """\
 Times in microseconds, one core, from Python. tick: kinematics, rows, solve. solve: the solve \
@@ -68,13 +71,11 @@ alone, if it can be called alone. at limit: median tick with a joint at its velo
 largest distance [m] from the path after 3 s. moved: largest motion [m per tick] of the end \
 effector due to the posture, in a step too fast for the joints. over: largest velocity [rad/s] \
 beyond a limit. fail: ticks without a solution, ellipse / step."""
-_COLUMNS = (Column("tick\nmedian", "median_us"), Column("\np95", "p95_us"),
-            Column("\np99.9", "p99.9_us"), Column("solve\nmedian", "solve_us"),
-            Column("at\nlimit", "at_limit_us"), Column("path", "path_error_m", power),
+_COLUMNS = (*TICK, Column("at\nlimit", "at_limit_us"), Column("path", "path_error_m", power),
             Column("moved", "moved_m", power), Column("over", "excess_rad_s", power),
             Column("fail", "fails", str))
-_KINDS = (Column("version", "version", text), Column("priorities", "priorities", text),
-          Column("inequality rows", "rows", text), Column("after a NaN in q", "nan", text))
+_ABOUT = (Column("version", "version", text), Column("priorities; inequality rows", "kind", text),
+          Column("after a NaN in q", "nan", text))
 
 
 def run(entrants: Sequence[Entrant] = ENTRANTS, ticks: int = 20_000, seconds: float = 20.0
@@ -87,28 +88,28 @@ def run(entrants: Sequence[Entrant] = ENTRANTS, ticks: int = 20_000, seconds: fl
         scenes = make_scenes(Path(temporary))
         rows, missing = measure(entrants, QUESTIONS, (asdict(scenes["ellipse"]),),
                                 Turns(ticks, 1000, 1000, 50, seconds),
-                                partial(_judged, scenes=scenes))
+                                lambda log, process: _judged(log, process, scenes))
     title = "One tick of inverse kinematics of a KUKA LWR, and its quality"
     return Report("Inverse kinematics beside other packages", [
         Section(title, [Table(title, rows, _COLUMNS)], NOTES, {"peers": figures.bars(rows)}),
-        Section("The packages", [Table("", rows, _KINDS)])], {"peers": rows}, missing)
+        Section("The packages", [Table("", rows, _ABOUT)])], {"peers": rows}, missing)
 
 
-def make_scenes(folder: Path) -> dict[str, Scene]:
+def make_scenes(folder: Path) -> dict[str, Arm]:
     """Return the scenes `ellipse` and `step`, and write their arm into the folder."""
     robot = Robot.named("kuka_lwr")
     file = folder / f"{robot.name}.urdf"
     file.write_text(urdf(robot))
     goal = State.at(robot, START).position(robot.frame(robot.end_effector)) + STEP
-    ellipse = Scene(str(file), robot.end_effector, robot.joint_names, START,
-                    tuple(robot.velocity_limit.tolist()), tuple(np.add(START, POSTURE).tolist()),
-                    (0.0, 0.6, 0.0), (0.2, 0.0, 0.2), (0.0, 0.1, 0.0), 1.0)
+    ellipse = Arm(str(file), robot.end_effector, robot.joint_names, START,
+                  robot.velocity_limit.tolist(), np.add(START, POSTURE).tolist(),
+                  (0.0, 0.6, 0.0), (0.2, 0.0, 0.2), (0.0, 0.1, 0.0), 1.0)
     still = (0.0, 0.0, 0.0)
-    return {"ellipse": ellipse, "step": replace(ellipse, centre=tuple(goal.tolist()),
-                                                cosine=still, sine=still, turning=0.0)}
+    return {"ellipse": ellipse, "step": replace(ellipse, centre=goal.tolist(), cosine=still,
+                                                sine=still, turning=0.0)}
 
 
-def _judged(log: Log, why: str, process: Process, scenes: dict[str, Scene]) -> Row:
+def _judged(path: Log, process: Process, scenes: dict[str, Arm]) -> Row:
     """Return the row of an entrant from its path, its step, and what a NaN does to it."""
     process.ask(("open", asdict(scenes["step"]), True), START_LIMIT)
     reply = process.ask(("turn", STEP_TICKS, 0), TURN_LIMIT)
@@ -117,19 +118,15 @@ def _judged(log: Log, why: str, process: Process, scenes: dict[str, Scene]) -> R
         nan = process.ask(("after_nan",), START_LIMIT)
     except EndedError as end:
         nan = f"{end.kind}: {end}"
-    return {**judge(log, joined([reply]), scenes), "why": why or reply["why"], "nan": nan}
-
-
-def judge(path: Log, step: Log, scenes: dict[str, Scene]) -> Row:
-    """Return the results of one entrant, from its logs and our own model of the arm."""
-    of_step, limit = judge_step(step, scenes["step"]), np.array(scenes["ellipse"].limit)
-    found = {**times(path), **of_step, "path_error_m": _path_error(path, scenes["ellipse"]),
-             "excess_rad_s": max(float((abs(path["v"]) - limit).max()), of_step["excess_rad_s"]),
+    step, limit = joined([reply]), np.array(scenes["ellipse"].limit)
+    found = {**times(path), **judge_step(step, scenes["step"]), "nan": nan,
+             "path_error_m": _path_error(path, scenes["ellipse"]),
              "step_failed": int(step["failed"].sum())}
+    found["excess_rad_s"] = max(float((abs(path["v"]) - limit).max()), found["excess_rad_s"])
     return {**found, "fails": f"{found['failed']}/{found['step_failed']}"}
 
 
-def judge_step(log: Log, scene: Scene) -> Row:
+def judge_step(log: Log, scene: Arm) -> Row:
     """Return what the posture does to the end effector in the step, from a log beside one without.
 
     moved_m, last_m : largest and last motion [m per tick] due to the posture. prevented_m : largest
@@ -141,8 +138,7 @@ def judge_step(log: Log, scene: Scene) -> Row:
     task, moved, prevented = Position(frame, Still((0.0, 0.0, 0.0))), [], []
     goal, _ = scene.target(0.0)
     answered = np.logical_not(log["failed"])
-    for q, v, other in zip(log["q"][answered], log["v"][answered], log["other"][answered],
-                           strict=True):
+    for q, v, other in zip(*(log[key][answered] for key in ("q", "v", "other")), strict=True):
         state = State.at(robot, q)
         J = task.jacobian(state)
         moved.append(period * float(np.linalg.norm(J @ (v - other))))
@@ -158,14 +154,13 @@ def judge_step(log: Log, scene: Scene) -> Row:
                             else np.nan)}
 
 
-def _path_error(log: Log, scene: Scene) -> float:
+def _path_error(log: Log, scene: Arm) -> float:
     """Return the largest distance [m] of the end effector from the path after settling."""
     robot = Robot.from_file(scene.file, scene.frame)
     state, frame, still = State.at(robot, scene.start), robot.frame(scene.frame), np.zeros(robot.n)
-    errors = [np.nan]
+    errors = []
     for t, q in zip(log["t"], log["q"], strict=True):
         if t >= _SETTLED:
             state.move(t, q, still)
             errors.append(float(np.linalg.norm(state.position(frame) - scene.target(t)[0])))
-    return float(np.nanmax(errors)) if len(errors) > 1 else np.nan
-
+    return max(errors, default=np.nan)

@@ -1,1 +1,0 @@
-"""The scenes `ellipse` and `step`: inverse kinematics of an arm, one tick of each package."""

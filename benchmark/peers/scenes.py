@@ -1,0 +1,146 @@
+"""What is asked, as plain numbers that go through JSON, and what an adapter is. Needs only numpy.
+
+    arm(scene, posture, **options)           -> velocity, resolve
+    stand(scene, **options)                  -> tick, answer, resolve
+    reach(file, frames, tolerance, **options) -> solve
+
+velocity(t, q, v, goal, rate) returns joint velocities (n,), one whole tick: q, v (n,) are joint
+positions and the velocities with which they were reached, goal (3,) [m] and rate (3,) [m/s] those
+of the path at t [s]; `posture` says whether the posture is asked for. tick(t, q, v, targets) does
+one whole tick and answer() returns its `Answer`: q (n + 1,) has the base's position and quaternion
+(x, y, z, w) first, v (n,) the base's velocity in its own axes; targets (3, 3, 3) are position,
+velocity and acceleration of the centre of mass and both hands. resolve() solves the last tick's
+problem again and nothing else; None where a package cannot. solve(poses, starts) returns the best
+configuration for poses (frames, 4, 4) from starts (s, nq), and whether it is within the tolerance.
+Any exception is a failure.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Numbers = Sequence[float]
+
+
+class RefusedError(Exception):
+    """Raised by an adapter whose package reports failure without an exception."""
+
+
+@final
+@dataclass(frozen=True)
+class Arm:
+    """An arm, a path for its end effector, a posture of lower priority, velocity limits.
+
+    file : the URDF; frame : its end effector; joints : their names.
+    centre, cosine, sine (3,) [m], turning [rad/s] : the path, centre + cosine cos + sine sin.
+    start, posture (n,) [rad]; limit (n,) [rad/s]; gain, posture_gain [1/s] : a velocity asked for
+    is the path's (the posture's is zero) and gain times the error. ratio : of weights or costs of
+    position to posture, for those that have no levels; period [s].
+    """
+
+    file: str
+    frame: str
+    joints: Sequence[str]
+    start: Numbers
+    limit: Numbers
+    posture: Numbers
+    centre: Numbers
+    cosine: Numbers = (0.0, 0.0, 0.0)
+    sine: Numbers = (0.0, 0.0, 0.0)
+    turning: float = 0.0
+    gain: float = 20.0
+    posture_gain: float = 5.0
+    ratio: float = 1000.0
+    period: float = 1e-3
+
+    def target(self, t: float) -> tuple[Array, Array]:
+        """Position (3,) [m] and velocity (3,) [m/s] of the path at t [s]."""
+        c, s = np.cos(self.turning * t), np.sin(self.turning * t)
+        cosine, sine = np.asarray(self.cosine), np.asarray(self.sine)
+        return (np.asarray(self.centre) + c * cosine + s * sine,
+                self.turning * (c * sine - s * cosine))
+
+
+class Answer(NamedTuple):
+    """What a package wants of the humanoid at one state.
+
+    a (n,) accelerations; torques (n - 6,) [N m]; wrenches (feet, 6): force [N] and moment [N m]
+    about the middle of each sole, on the robot, in world axes.
+    """
+
+    a: Array
+    torques: Array
+    wrenches: Array
+
+
+@final
+@dataclass(frozen=True)
+class Gains:
+    """Stiffness [1/s^2], damping [1/s], and weight of the rows where there are no levels."""
+
+    stiffness: float
+    damping: float
+    weight: float = 1.0
+
+
+@final
+@dataclass(frozen=True)
+class Stand:
+    """A humanoid on two soles: circles of its centre of mass and hands, a posture, least forces.
+
+    file : the URDF; joints : their names, in the order of the posture (n - 6,) [rad] and torque
+    limits (n - 6,) [N m]; soles, hands : frames. half : of length and width of a sole [m].
+    friction : of the pyramid's faces, f_t <= friction f_n along each axis of the sole.
+    circles : centre, cosine, sine (3,) [m] and rate [rad/s] of centre of mass, left and right hand.
+    rest (n + 1,) : where the soles touch the floor.
+    """
+
+    file: str
+    joints: Sequence[str]
+    soles: Sequence[str]
+    hands: Sequence[str]
+    rest: Numbers
+    posture: Numbers
+    torque: Numbers
+    circles: Sequence[Any]
+    half: Numbers = (0.105, 0.04)
+    friction: float = 0.4
+    contact: Gains = Gains(100.0, 20.0)
+    com: Gains = Gains(40.0, 13.0)
+    hand: Gains = Gains(100.0, 20.0)
+    joint: Gains = Gains(30.0, 11.0, 0.3)
+    force: float = 3e-3
+    period: float = 1e-3
+
+    @classmethod
+    def of(cls, numbers: dict[str, Any]) -> Stand:
+        """Return the scene of `dataclasses.asdict`, after JSON."""
+        gains = {key: Gains(**numbers[key]) for key in ("contact", "com", "hand", "joint")}
+        return cls(**numbers | gains)
+
+    @property
+    def corners(self) -> Array:
+        """The corners of a sole in its frame (4, 3) [m]."""
+        x, y = self.half
+        return np.array([[-x, -y, 0.0], [x, -y, 0.0], [x, y, 0.0], [-x, y, 0.0]])
+
+    def targets(self, t: float) -> Array:
+        """Position, velocity, acceleration of centre of mass and hands at t [s]: (3, 3, 3)."""
+        found = []
+        for centre, cosine, sine, rate in self.circles:
+            c, s = np.cos(rate * t) * np.array(cosine), np.sin(rate * t) * np.array(sine)
+            dc, ds = -np.sin(rate * t) * np.array(cosine), np.cos(rate * t) * np.array(sine)
+            found.append([np.array(centre) + c + s, rate * (dc + ds), -(rate**2) * (c + s)])
+        return np.array(found)
+
+
+def wrench(rotation: Array, points: Array, forces: Array) -> Array:
+    """Return the wrench (6,) in world axes of forces (p, 3) at points (p, 3), both in a frame."""
+    return np.concatenate([rotation @ forces.sum(axis=0),
+                           rotation @ np.cross(points, forces).sum(axis=0)])

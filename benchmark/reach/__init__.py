@@ -1,1 +1,0 @@
-"""Whole inverse kinematics beside other packages: poses reached, and the time for it."""
