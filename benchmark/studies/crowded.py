@@ -6,20 +6,19 @@ rows and joints: `hierarchy bench growth --larger`.
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Sequence
 from time import perf_counter
 from typing import Any
 
 import numpy as np
+import typer
 
 from benchmark import figures
 from benchmark.machine import one_core
 from benchmark.report import Report, Section
+from benchmark.solve.growth import over
 from benchmark.store import Row
-from benchmark.tables import Column, Table, short, wide
 from benchmark.timing import times_of
-from hierarchy.problem import Array
 from scenarios.config import Scenario, load
 from scenarios.loop.controller import Controller
 from scenarios.loop.simulation import simulate
@@ -28,7 +27,6 @@ from solvers import Status
 PAIRS = ((8, 3), (8, 8), (16, 8), (16, 16), (32, 16), (32, 32), (64, 32), (64, 64), (64, 128),
          (64, 256))          # (control points, obstacles)
 PARTS = ("kinematics", "sensing and rows", "resolve", "whole tick")
-_TICKS = 1500                # of the run whose states are used
 _BLOCK = 25                  # ticks of one candidate in its turn
 _ROOM = (0.7, 0.06)          # [m] half width of the box of obstacles; least distance to the path
 
@@ -76,7 +74,11 @@ def crowded(points: int, obstacles: int, path: Any, seed: int = 0) -> Scenario:
              *(("joint_4", [0.0, -0.39 * (i + 1) / (points - half), 0.0])
                for i in range(points - half))]
     placed = {"robot.control_points": [{"joint": joint, "offset": at} for joint, at in along]}
-    visited = _visited(load("ellipse-hqp", placed), path)
+    controller, seen = Controller(load("ellipse-hqp", placed)), []
+    for k in range(0, len(path["t"]), 50):
+        controller.command(path["t"][k], path["q"][k], path["v"][k])
+        seen.append(controller.cell.state.measurement.points.copy())  # type: ignore[union-attr]
+    visited = np.concatenate(seen)
     rng, found = np.random.default_rng(seed), np.empty((0, 3))
     while len(found) < obstacles:  # ends: nearly all of the box is free
         some = rng.uniform(-_ROOM[0], _ROOM[0], (obstacles, 3))
@@ -86,18 +88,12 @@ def crowded(points: int, obstacles: int, path: Any, seed: int = 0) -> Scenario:
         {"centre": centre.tolist()} for centre in found[:obstacles]]})
 
 
-def _visited(scenario: Scenario, path: Any) -> Array:
-    """Return where control points and end effector are along the path: (N, 3) [m]."""
-    controller, seen = Controller(scenario), []
-    for k in range(0, len(path["t"]), 50):
-        controller.command(path["t"][k], path["q"][k], path["v"][k])
-        seen.append(controller.cell.state.measurement.points.copy())  # type: ignore[union-attr]
-    return np.concatenate(seen)
-
-
-def run(seconds: float = 30.0, pairs: Sequence[tuple[int, int]] = PAIRS, ticks: int = _TICKS
+def run(seconds: float = 30.0, pairs: Sequence[tuple[int, int]] = PAIRS, ticks: int = 1500
         ) -> Report:
-    """Time the tick at every number of points and obstacles, by turns, for `seconds` [s]."""
+    """Time the tick at every number of points and obstacles, by turns, for `seconds` [s].
+
+    ticks : of the run whose states are used.
+    """
     path = simulate(load("ellipse-hqp", [f"control.duration={1e-3 * ticks!r}"]))
     everyone = [Ticks(points, obstacles, path) for points, obstacles in pairs]
     with one_core():
@@ -105,23 +101,20 @@ def run(seconds: float = 30.0, pairs: Sequence[tuple[int, int]] = PAIRS, ticks: 
             one.take_turn()
             one.times.clear()
         end = perf_counter() + seconds
-        while True:
+        while perf_counter() < end or not everyone[-1].times:
             for one in everyone:
                 one.take_turn()
-            if perf_counter() >= end:
-                break
     rows = [row for one in everyone for row in one.rows()]
-    made, columns = wide(rows, "entrant", "pairs", "median_us", short)
-    powers = figures.exponents(rows, "pairs")
     panels = {"pairs": ("pairs $p$ of a point and an obstacle", "p", "a tick, 7 joints, hcod")}
-    title = "Median time [us] over the number of pairs"
-    return Report("Ticks among many obstacles", [Section("", [Table(
-        title, [{**row, "power": powers[row["entrant"]]} for row in made],
-        [*columns, Column("power", "power")])], figures={
-            "crowded": figures.over_sizes(rows, panels)})], {"crowded": rows})
+    return Report("Ticks among many obstacles", [Section("", [
+        over("Median time [us] over the number of pairs", rows, "pairs")],
+        figures={"crowded": figures.over_sizes(rows, panels)})], {"crowded": rows})
+
+
+def main(seconds: float = 30.0) -> None:
+    """Print the table; seconds : for all times together."""
+    run(seconds).say()
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description="A tick over control points and obstacles.")
-    parser.add_argument("--seconds", type=float, default=30.0, help="for all times together")
-    run(parser.parse_args().seconds).say()
+    typer.run(main)

@@ -6,11 +6,11 @@ has to be done without one: `tpm` from the rows in their new order.
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
+import typer
 
 from benchmark.report import Report, Section
 from benchmark.tables import Table, short, wide
@@ -90,7 +90,10 @@ def _check(factored: Factorization, b: Array) -> None:
         factored.swap(0, 1)
 
 
+def main(seconds: float = SECONDS) -> None:
+    """Print the tables; seconds : for all times together."""
+    run(seconds).say()
+
+
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description="Time of a change of priorities.")
-    parser.add_argument("--seconds", type=float, default=SECONDS, help="for all times together")
-    run(parser.parse_args().seconds).say()
+    typer.run(main)

@@ -66,12 +66,6 @@ def _rates(A: Array, M: Array) -> tuple[float, float]:
     return found[0], found[-1]
 
 
-def starts(scenario: Scenario) -> list[Scenario]:
-    """Return the scenario from every sampled start."""
-    return [changed(scenario, drawn(scenario, scenario.variation, SEED, index), "variation")
-            for index in range(STARTS)]
-
-
 def cases() -> dict[str, tuple[Scenario, JointDamping | None]]:
     """Return scenarios with k M, each with the damping in its place, by name."""
     found: dict[str, tuple[Scenario, JointDamping | None]] = {}
@@ -87,8 +81,9 @@ def cases() -> dict[str, tuple[Scenario, JointDamping | None]]:
 def main() -> None:
     """Print everything."""
     asked = {"": (load("ellipse"), None), **cases()}
-    runs = on_all_cores(run, [(start, damping) for scenario, damping in asked.values()
-                              for start in starts(scenario)])
+    runs = on_all_cores(run, [
+        (changed(scenario, drawn(scenario, scenario.variation, SEED, start), "variation"), damping)
+        for scenario, damping in asked.values() for start in range(STARTS)])
     done = dict(zip(asked, (runs[i:i + STARTS] for i in range(0, len(runs), STARTS)), strict=True))
     plain = done.pop("")
     inertia = np.concatenate([one["inertia"] for one in plain])

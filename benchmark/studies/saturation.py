@@ -9,16 +9,17 @@ accepts it from the data alone.
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, final
 
 import numpy as np
+import typer
 
 from benchmark.machine import machine, one_core
 from benchmark.report import Report, Section
-from benchmark.solve.interface import Problem
+from benchmark.solve.resolvers import as_problem
 from benchmark.store import Row
 from benchmark.tables import Column, Table, digits, percent
 from benchmark.timing import times_of
@@ -131,9 +132,10 @@ def _row(family: Family, resolver: Resolver, asked: Sequence[tuple[Hierarchy, Ar
         at_bound.append(int(((res.x <= h.lower[:h.n]) | (res.x >= h.upper[:h.n])).sum()))
         beyond.append(float(missed[0]))
         off += res.status is not Status.SOLVED
-        memory = resolver.solve(_moved(h)).memory
-        cold.append(min(timed(_call(resolver, h, None), _TIMES)))
-        warm.append(min(timed(_call(resolver, h, memory), _TIMES)))
+        moved = as_problem(h).moved(0)
+        memory = resolver.solve(h.changed(lower=moved.lower, upper=moved.upper)).memory
+        cold.append(min(timed(partial(resolver.solve, h), _TIMES)))
+        warm.append(min(timed(partial(resolver.solve, h, memory), _TIMES)))
     optimal = np.logical_and.accumulate(np.array(extra) <= SAME, axis=1)
     above = np.hstack([np.ones((len(extra), 1), dtype=bool), optimal[:, :-1]])
     levels: dict[str, Any] = {}
@@ -148,24 +150,16 @@ def _row(family: Family, resolver: Resolver, asked: Sequence[tuple[Hierarchy, Ar
             **times_of(warm, "warm_")}
 
 
-def _moved(h: Hierarchy) -> Hierarchy:
-    moved = Problem(h.A, h.lower, h.upper, np.asarray(h.sizes), h.reference).moved(0)
-    return h.changed(lower=moved.lower, upper=moved.upper)
-
-
-def _call(resolver: Resolver, h: Hierarchy, memory: Any) -> Any:
-    return lambda: resolver.solve(h, memory)
-
-
 def _short(value: float) -> str:
     if np.isnan(value):
         return "–"
     return "0" if value <= SAME else f"{value:.1g}".removeprefix("0").replace("e-0", "e-")
 
 
+def main(count: int = 400, resolver: list[str] | None = None) -> None:
+    """Print the tables; count : problems of a family; resolver : only this, may be repeated."""
+    run(count, [make(name) for name in resolver or ()] or None).say()
+
+
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description="Resolvers inside joint limits.")
-    parser.add_argument("--count", type=int, default=400, help="problems of a family")
-    parser.add_argument("--resolver", action="append", help="a name; may be repeated")
-    given = parser.parse_args()
-    run(given.count, [make(name) for name in given.resolver or ()] or None).say()
+    typer.run(main)

@@ -6,10 +6,11 @@ tick from their memory of the one before, by turns. The run has the push and wha
 
 from __future__ import annotations
 
-import argparse
+from collections.abc import Iterable, Iterator
 from time import perf_counter_ns
 
 import numpy as np
+import typer
 
 from benchmark.machine import one_core
 from benchmark.report import Report, Section
@@ -22,30 +23,12 @@ from scenarios import load, simulate
 from solvers import Resolver, Status
 from solvers.qp.backends import BACKENDS, installed
 
-TICKS, TURNS, WARM_UP = 500, 2, 50
+_WARM_UP = 50
 _REFERENCE = "weighted"
 
 
-class Entrant:
-    """A resolver, its problems tick by tick, and what was measured on them."""
-
-    def __init__(self, label: str, resolver: Resolver, ticks: list[Hierarchy]) -> None:
-        self.label, self.resolver, self.ticks = label, resolver, ticks
-        self.times, self.unsolved = list[int](), 0  # [ns] of all turns; ticks of the last one
-
-    def take_turn(self, ticks: int | None = None) -> None:
-        """Solve ticks in order, all of them or the first."""
-        memory, self.unsolved = None, 0
-        for h in self.ticks[:ticks]:
-            begin = perf_counter_ns()
-            res = self.resolver.solve(h, memory)
-            self.times.append(perf_counter_ns() - begin)
-            memory = res.memory
-            self.unsolved += res.status is not Status.SOLVED
-
-
-def run(ticks: int = TICKS, turns: int = TURNS) -> Report:
-    """Time all."""
+def run(ticks: int = 500, turns: int = 2) -> Report:
+    """Time all resolvers on the ticks of the run, as often as there are turns."""
     scenario = load("stand-push")
     states = simulate(scenario.with_changes({
         "control.duration": ticks * scenario.control.period}))
@@ -55,30 +38,43 @@ def run(ticks: int = TICKS, turns: int = TURNS) -> Report:
         (_REFERENCE, "weighted", {}), ("bounds", "tpm", {"limits.place": "bounds"}),
         ("equalities", "tpm", {}), *((f"strict, {name}", f"hqp:backend={name}", {})
                                      for name in BACKENDS if installed(name))]
+    everybody: dict[str, tuple[Resolver, list[Hierarchy]]] = {}
+    for label, spec, changes in asked:
+        other = load("stand-push", changes).with_resolver(spec)
+        everybody[label] = other.make_resolver(), problems_at(states, other)
+    spent: dict[str, list[tuple[int, bool]]] = {label: [] for label in everybody}
     with one_core():
-        everybody = []
-        for label, spec, changes in asked:
-            other = load("stand-push", changes).with_resolver(spec)
-            everybody.append(Entrant(label, other.make_resolver(), problems_at(states, other)))
-        for one in everybody:
-            one.take_turn(WARM_UP)
-            one.times.clear()
+        for resolver, problems in everybody.values():
+            list(_solved(resolver, problems[:_WARM_UP]))
         for _ in range(turns):
-            for one in everybody:
-                one.take_turn()
-    usual = next(np.median(one.times) for one in everybody if one.label == _REFERENCE)
-    rows = [{"entrant": one.label, **times_of(one.times), "unsolved":
-             f"{one.unsolved} of {len(one.ticks)}",
-             "ratio": float(np.median(one.times) / usual)} for one in everybody]
+            for label, (resolver, problems) in everybody.items():
+                spent[label] += _solved(resolver, problems)
+    rows = [{"entrant": label, **times_of([time for time, _ in some]), "unsolved":
+             f"{sum(not solved for _, solved in some) // turns} of {ticks}"}
+            for label, some in spent.items()]
+    usual = next(row["median_us"] for row in rows if row["entrant"] == _REFERENCE)
+    for row in rows:
+        row["ratio"] = np.divide(row["median_us"], usual)
     return Report("Times of the pushed humanoid", [Section("", [Table("", rows, (
         Column("median [us]", "median_us", whole), Column("p95", "p95_us", whole),
         Column("p99.9", "p99.9_us", whole), Column("not solved", "unsolved", str),
         Column(f"median / {_REFERENCE}", "ratio")))])], {"standing": rows})
 
 
+def _solved(resolver: Resolver, problems: Iterable[Hierarchy]) -> Iterator[tuple[int, bool]]:
+    """Yield the time [ns] of each tick, and whether it was solved."""
+    memory = None
+    for h in problems:
+        begin = perf_counter_ns()
+        res = resolver.solve(h, memory)
+        yield perf_counter_ns() - begin, res.status is Status.SOLVED
+        memory = res.memory
+
+
+def main(ticks: int = 500, turns: int = 2) -> None:
+    """Print the table."""
+    run(ticks, turns).say()
+
+
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description="Times of a solve of the pushed humanoid.")
-    parser.add_argument("--ticks", type=int, default=TICKS, help="of the run")
-    parser.add_argument("--turns", type=int, default=TURNS, help="of all resolvers")
-    given = parser.parse_args()
-    run(given.ticks, given.turns).say()
+    typer.run(main)

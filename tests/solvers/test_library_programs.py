@@ -91,12 +91,9 @@ def replay(folder, tmp_path_factory):
 
 
 @pytest.mark.slow
-def test_recorded_problems_of_a_standing_humanoid_give_the_same_bits_in_c(replay, tmp_path,
-                                                                          monkeypatch):
+def test_recorded_problems_of_a_standing_humanoid_give_the_same_bits_in_c(replay, tmp_path):
     pytest.importorskip("mujoco")
-    file = tmp_path / "ticks"
-    monkeypatch.setattr("sys.argv", ["recorded.py", "stand-push", str(file), "--ticks", "15"])
-    recorded.main()
+    recorded.main("stand-push", tmp_path / "ticks", 15)
     assert said(replay, tmp_path / "ticks").startswith(
         "15 ticks of 60 unknowns and 181 rows: 15 with the bits of Python, others within 0e+00, "
         "0 unsolved")
