@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from benchmark.packages import Package
 
 _USUAL = ("solve.resolvers", "tick", "solve.accuracy", "solve.growth", "strictness", "start")
+_SCENES = {"ellipse": "peers.moving", "stand": "peers.standing"}
 
 Seconds = Annotated[float, typer.Option("--seconds", min=0.001, metavar="S",
                                         help="Time for all measurements together.")]
@@ -26,24 +27,32 @@ Checked = Annotated[int, typer.Option("--checked", min=1, metavar="N",
                                       help="Arms that are compared with proved answers.")]
 Install = Annotated[bool, typer.Option(
     "--install", help="Create an environment for each package and measure nothing.")]
+Family = Annotated[list[str] | None, typer.Option(
+    "--family", metavar="NAME", help="Only this family. May be repeated.")]
 
 
 class _Benchmarks(typer.core.TyperGroup):
     """Suggests the nearest benchmark for an unknown name."""
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
-        if args and not args[0].startswith("-") and args[0] not in self.commands:
-            from hierarchy.errors import UnknownNameError
-
-            raise UnknownNameError("benchmark", args[0], list(self.commands))
+        if args and not args[0].startswith("-"):
+            _known("benchmark", args[0], self.commands)
         return super().resolve_command(ctx, args)
+
+
+def _known(what: str, name: str | None, names: Any) -> None:
+    """Raise UnknownNameError unless a name, if there is one, is among names."""
+    if name is not None and name not in names:
+        from hierarchy.errors import UnknownNameError
+
+        raise UnknownNameError(what, name, list(names))
 
 
 bench = typer.Typer(cls=_Benchmarks, invoke_without_command=True, rich_markup_mode=None)
 
 
 def _run(out: Path | None, *names: str, **options: Any) -> int:
-    """Run benchmarks, modules of this package; print and write what they found."""
+    """Run benchmarks, modules of this package, with those of the options that each has."""
     from scenarios.files import claim, next_free
 
     folder = claim(out if out is not None else next_free(Path("runs") / "bench"))
@@ -59,6 +68,14 @@ def _run(out: Path | None, *names: str, **options: Any) -> int:
     return int(failed)
 
 
+def _installed(packages: tuple[Package, ...]) -> int:
+    from benchmark.packages import install
+
+    said = install(packages)
+    print(*(f"{name}: {why or 'installed'}" for name, why in said.items()), sep="\n")
+    return int(any(said.values()))
+
+
 @bench.callback()
 def main(ctx: typer.Context, out: Out = None) -> None:
     """Measure speed, accuracy and strictness.
@@ -68,28 +85,6 @@ def main(ctx: typer.Context, out: Out = None) -> None:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy is loaded: one core is timed
     if ctx.invoked_subcommand is None:
         _run(out, *_USUAL)
-
-
-@bench.command()
-def resolvers(
-        fresh: Annotated[int | None, typer.Option(
-            "--fresh", metavar="SEED", help="Also time fresh problems, from this seed on.")] = None,
-        count: Annotated[int, typer.Option(
-            "--count", min=1, metavar="N", help="Fresh problems of each family.")] = 200,
-        family: Annotated[list[str] | None, typer.Option(
-            "--family", metavar="NAME", help="Only this family. May be repeated.")] = None,
-        resolver: Annotated[list[str] | None, typer.Option(
-            "--resolver", metavar="NAME",
-            help="Only this resolver, with its variants and backends, beside the yardsticks. May "
-                 "be repeated.")] = None,
-        seconds: Annotated[float, typer.Option(
-            "--seconds", min=0.001, metavar="S",
-            help="Time for each resolver in each family.")] = 0.5,
-        out: Out = None) -> int:
-    """Time every resolver on the reference problems."""
-    chosen = {"families": family} if family else {}
-    return _run(out, "solve.resolvers", seconds=seconds, seed=fresh, count=count,
-                resolvers=resolver, **chosen)
 
 
 def _plain(name: str, words: str) -> None:
@@ -102,6 +97,26 @@ def _plain(name: str, words: str) -> None:
 _plain("tick", "Time one control tick, compiled and in plain numpy.")
 _plain("start", "Measure start-up time, compilation and memory.")
 _plain("strictness", "Measure whether lower tasks disturb upper ones.")
+
+
+@bench.command()
+def resolvers(
+        fresh: Annotated[int | None, typer.Option(
+            "--fresh", metavar="SEED", help="Also time fresh problems, from this seed on.")] = None,
+        count: Annotated[int, typer.Option(
+            "--count", min=1, metavar="N", help="Fresh problems of each family.")] = 200,
+        family: Family = None,
+        resolver: Annotated[list[str] | None, typer.Option(
+            "--resolver", metavar="NAME",
+            help="Only this resolver, with its variants and backends, beside the yardsticks. May "
+                 "be repeated.")] = None,
+        seconds: Annotated[float, typer.Option(
+            "--seconds", min=0.001, metavar="S",
+            help="Time for each resolver in each family.")] = 0.5,
+        out: Out = None) -> int:
+    """Time every resolver on the reference problems."""
+    return _run(out, "solve.resolvers", seconds=seconds, seed=fresh, count=count,
+                resolvers=resolver, families=family)
 
 
 @bench.command()
@@ -143,16 +158,14 @@ def peers(install: Install = False,
 
     Run it once with --install first. Exit code 1 if a package of `--scene stand` is missing.
     """
-    from hierarchy.errors import UnknownNameError
-
+    _known("scene", scene, _SCENES)
     if install:
-        return _installed()
-    modules = {"ellipse": "peers.moving", "stand": "peers.standing"}
-    if scene not in (None, *modules):
-        raise UnknownNameError("scene", str(scene), tuple(modules))
+        from benchmark.packages import PACKAGES
+
+        return _installed(PACKAGES)
     if scene is not None:
-        return _run(out, modules[scene])
-    _run(out, *modules.values())
+        return _run(out, _SCENES[scene])
+    _run(out, *_SCENES.values())
     return 0
 
 
@@ -169,8 +182,7 @@ def ik(count: Annotated[int, typer.Option("--count", min=1, metavar="N",
 
 
 @bench.command("open")
-def open_(families: Annotated[list[str] | None, typer.Option(
-              "--family", metavar="NAME", help="Only this family. May be repeated.")] = None,
+def open_(family: Family = None,
           entrants: Annotated[list[str] | None, typer.Option(
               "--entrant", metavar="LABEL", help="Only this entrant of the table, or FILE.py:CLASS "
               "for yours. May be repeated.")] = None,
@@ -205,60 +217,27 @@ def open_(families: Annotated[list[str] | None, typer.Option(
     Run the same command again to resume an interrupted one.
     """
     from benchmark.packages import EMBODIK
+    from benchmark.solve import open as opened
     from benchmark.solve.entrants import chosen, compiled
+    from scenarios.problems.families import available, unavailable
+    from scenarios.problems.families import family as named
 
     if install:
         return _installed((EMBODIK,))
     table = chosen(entrants or [], python, compiled(library or [], name or []))
     if check:
-        return _checked(table)
+        passed = [opened.check(one) for one in table]  # every one is tried
+        return int(not all(passed))
+    for left, why in ({} if family else unavailable()).items():
+        print(f"left out: {left}, which {why}", file=sys.stderr)
     counts = {0: public or count, **dict.fromkeys(fresh or [1], count)}
-    return _opened(families or [], table, counts, limit, out)
-
-
-def _checked(table: list[Any]) -> int:
-    """Try entrants on a few problems; exit code 1 if one of them ends or contradicts itself."""
-    from tempfile import TemporaryDirectory
-
-    from benchmark.solve.open import check
-
-    passed = True
-    with TemporaryDirectory() as folder:
-        for one in table:
-            said, well = check(one, Path(folder))
-            passed = passed and well
-            print(said)
-    return int(not passed)
-
-
-def _opened(families: list[str], table: list[Any], counts: dict[int, int | None], limit: float,
-            out: Path) -> int:
-    """Run the open benchmark, or what is left of it; print its tables and write its page."""
-    from rich.console import Console
-
-    from benchmark.solve.open import report, run
-    from scenarios.problems.families import available, family, unavailable
-
-    chosen = [family(name) for name in families] or available()
-    for name, why in ({} if families else unavailable()).items():
-        print(f"left out: {name}, which {why}", file=sys.stderr)
-    store = run(out, chosen, table, counts, limit,
-                lambda text: print(text, file=sys.stderr, flush=True))
-    console = Console(highlight=False, markup=False)
-    found = report(store, console.width)
-    found.say(console)
+    store = opened.run(out, [named(one) for one in family or ()] or available(), table, counts,
+                       limit, lambda text: print(text, file=sys.stderr, flush=True))
+    found = opened.report(store)
+    found.say()
     found.write(out)
     print(f"\nPage: {shown(out / 'index.html')}")
     return 0
-
-
-def _installed(packages: tuple[Package, ...] | None = None) -> int:
-    from benchmark.packages import PACKAGES, install
-
-    said = install(PACKAGES if packages is None else packages)
-    for name, why in said.items():
-        print(f"{name}: {why or 'installed'}")
-    return int(any(said.values()))
 
 
 @bench.command()
@@ -274,17 +253,15 @@ def stress(count: Annotated[int, typer.Option("--count", min=1, metavar="N",
                "--processes", min=1, metavar="N", help="Default: one for each core.")] = None,
            out: Annotated[Path, output("Where failing problems are saved.")
                           ] = Path("runs/stress")) -> int:
-    """Certify a resolver on generated problems.
+    """Certify a resolver on generated problems, or prove its answers right or wrong.
 
     Exit code 1 if an answer fails.
     """
     from benchmark.stress import ALL, KINDS, report, run
-    from hierarchy.errors import UnknownNameError
     from solvers import make
 
     make(resolver)
-    if kind not in (ALL, *KINDS):
-        raise UnknownNameError("kind", kind, (ALL, *KINDS))
+    _known("kind", kind, (ALL, *KINDS))
     found = report(resolver, run(count, resolver, first, processes, kind), out)
     found.say()
     return int(found.failed)

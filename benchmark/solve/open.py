@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from benchmark.machine import machine
 from benchmark.packages import Entrant, MissingError
@@ -73,7 +74,7 @@ def asked(entrant: Entrant, files: Sequence[Path], limit: float = LIMIT) -> Iter
             yield [{**same, "problem": p, **row} for p, row in enumerate(answers)]
 
 
-def report(store: Store, width: int = 80) -> Report:
+def report(store: Store) -> Report:
     """Return what a folder has, judged anew; raises HierarchyError if it has no rows.
 
     Each set has a section, fresh ones first; no number is of two sets together.
@@ -90,7 +91,7 @@ def report(store: Store, width: int = 80) -> Report:
         title = f"Fresh problems, seed {seed}" if seed else "Public problems"
         section, cells = views.section(
             title, [row for row in rows if row["seed"] == seed],
-            {one.head.family: one for one in found if one.head.seed == seed}, width)
+            {one.head.family: one for one in found if one.head.seed == seed})
         sections.append(section)
         kept += [{"half": title, **row} for row in cells]
     versions = {row["entrant"]: row["version"] for row in rows}
@@ -103,25 +104,27 @@ def _place(order: Sequence[str], name: str) -> int:
     return order.index(name) if name in order else len(order)
 
 
-def check(entrant: Entrant, folder: Path) -> tuple[str, bool]:
-    """Try an entrant on a few problems of each kind; return what came of it, and if it is well.
+def check(entrant: Entrant) -> bool:
+    """Try an entrant on a few problems of each kind; print what came of it; return if it is well.
 
     It must run, answer something, never end early, and give the same bits twice.
     """
-    files = [export(FAMILIES[name], 0, _CHECKS, True, folder) for name in CHECKED]
-    try:
-        every = [row for rows in asked(entrant, files, _CHECK_LIMIT) for row in rows]
-    except MissingError as reason:
-        return f"{entrant.label}: cannot run: {reason}", False
-    rows = judge(every, {one.digest: one for one in map(read, files)})
+    with TemporaryDirectory() as folder:
+        files = [export(FAMILIES[name], 0, _CHECKS, True, Path(folder)) for name in CHECKED]
+        try:
+            every = [row for rows in asked(entrant, files, _CHECK_LIMIT) for row in rows]
+        except MissingError as reason:
+            print(f"{entrant.label}: cannot run: {reason}")
+            return False
+        rows = judge(every, {one.digest: one for one in map(read, files)})
     answered = [row for row in rows if row["x"] is not None]
     ended = any(row["verdict"] in (CRASHED, HUNG, RAISED) for row in rows)
     well = bool(answered) and not ended and all(row["same"] for row in answered)
-    lines = [f"{entrant.label}: {rows[0]['version']}",
-             *(f"  {name:12} {_line(own)}" for name, own in by(rows, "family")),
-             "  the rules are kept" if well else
-             "  the rules are broken: see docs/extending/entrant.md"]
-    return "\n".join(lines), well
+    print(f"{entrant.label}: {rows[0]['version']}",
+          *(f"  {name:12} {_line(own)}" for name, own in by(rows, "family")),
+          "  the rules are kept" if well else
+          "  the rules are broken: see docs/extending/entrant.md", sep="\n")
+    return well
 
 
 def _line(rows: list[Row]) -> str:

@@ -78,7 +78,7 @@ def field(wanted: Sequence[str] | None = None) -> tuple[list[Entrant], dict[str,
     return [one for one in chosen if one.label not in missing], missing
 
 
-def run(seconds: float = 0.5, families: Sequence[str] = FAMILIES, seed: int | None = None,
+def run(seconds: float = 0.5, families: Sequence[str] | None = None, seed: int | None = None,
         count: int = COUNT, resolvers: Sequence[str] | None = None) -> Report:
     """Time the resolvers on every family on one core, and check every answer.
 
@@ -93,6 +93,7 @@ def run(seconds: float = 0.5, families: Sequence[str] = FAMILIES, seed: int | No
     ------
     UnknownNameError : unknown family or resolver.
     """
+    families = families or FAMILIES
     for name in families:
         if name not in FAMILIES:
             raise UnknownNameError("family", name, FAMILIES)

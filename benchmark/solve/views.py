@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from math import isnan
 
 import numpy as np
+from rich.console import Console
 
 from benchmark import figures
 from benchmark.report import Section
@@ -39,7 +40,7 @@ _INSIDE = (Column("Python", "median_us"), Column("C", "inside_median_us"),
            Column("warm, Python", "warm_median_us"), Column("C", "warm_inside_median_us"))
 
 
-def section(title: str, rows: Sequence[Row], collections: Mapping[str, Collection], width: int
+def section(title: str, rows: Sequence[Row], collections: Mapping[str, Collection]
             ) -> tuple[Section, list[Row]]:
     """Return the section of a set and the summaries behind it, of its judged rows and problems."""
     steps = steps_of(collections)
@@ -47,7 +48,7 @@ def section(title: str, rows: Sequence[Row], collections: Mapping[str, Collectio
     families = list(dict.fromkeys(row["family"] for row in rows))
     count = len({(row["family"], row["problem"]) for row in rows})
     tables = [Table(f"{title}: {count} problems of {len(families)} families", total, _ANSWERS),
-              Table(f"{title}: quality", total, _QUALITY), _times(title, some, families, width)]
+              Table(f"{title}: quality", total, _QUALITY), _times(title, some, families)]
     inside = [row for row in some if not isnan(row["inside_median_us"])]
     if inside:
         tables.append(Table(f"{title}: medians of compiled entrants", [
@@ -74,9 +75,9 @@ def entrants(versions: Mapping[str, str], limits: Mapping[str, str]) -> Section:
         Column("version", "version", text), Column("limits", "limits", text)))])
 
 
-def _times(title: str, cells: Sequence[Row], families: Sequence[str], width: int) -> Table:
-    """Return the table of times in a few families, as many as fit the width."""
-    room = max(1, (width - _LABEL) // _FAMILY)
+def _times(title: str, cells: Sequence[Row], families: Sequence[str]) -> Table:
+    """Return the table of times in a few families, as many as fit a terminal."""
+    room = max(1, (Console().width - _LABEL) // _FAMILY)
     chosen = [name for name in TIMED if name in families][:room] or [*families[:room]]
     rows: dict[str, dict[str, object]] = {}
     for row in cells:

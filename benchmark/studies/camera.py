@@ -50,7 +50,9 @@ def _measured(changes: list[str], times: int) -> tuple[dict[str, list[float]], f
     """Return the times [s] of each part, and the share of the points that see something."""
     cell, ideal = (build(load("human", [*changes, f"sensor.ideal={word}"]))
                    for word in ("false", "true"))
-    sensor, bare, state = cell.sensor, ideal.sensor, cell.state
+    sensor: Any = cell.sensor
+    bare: Any = ideal.sensor
+    state = cell.state
     image, q = ObstacleImage.empty(480, 640), cell.plant.q.copy()
     reading: Any = None
     rng, found = np.random.default_rng(0), dict[str, list[float]]()

@@ -9,12 +9,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from time import perf_counter_ns
 
-import numpy as np
 import typer
 
 from benchmark.machine import one_core
 from benchmark.report import Report, Section
 from benchmark.reproduce.studies import STUDIES
+from benchmark.store import Row
 from benchmark.studies.recorded import problems_at
 from benchmark.tables import Column, Table, whole
 from benchmark.timing import times_of
@@ -49,12 +49,12 @@ def run(ticks: int = 500, turns: int = 2) -> Report:
         for _ in range(turns):
             for label, (resolver, problems) in everybody.items():
                 spent[label] += _solved(resolver, problems)
-    rows = [{"entrant": label, **times_of([time for time, _ in some]), "unsolved":
+    rows: list[Row] = [{"entrant": label, **times_of([time for time, _ in some]), "unsolved":
              f"{sum(not solved for _, solved in some) // turns} of {ticks}"}
             for label, some in spent.items()]
     usual = next(row["median_us"] for row in rows if row["entrant"] == _REFERENCE)
     for row in rows:
-        row["ratio"] = np.divide(row["median_us"], usual)
+        row["ratio"] = row["median_us"] / usual
     return Report("Times of the pushed humanoid", [Section("", [Table("", rows, (
         Column("median [us]", "median_us", whole), Column("p95", "p95_us", whole),
         Column("p99.9", "p99.9_us", whole), Column("not solved", "unsolved", str),
