@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from time import perf_counter
-from typing import Any
 
 import numpy as np
 
@@ -16,16 +16,13 @@ from benchmark.timing import times_of
 from hierarchy.problem import Array
 from scenarios.cell.build import build
 from scenarios.config import Scenario, load
-from scenarios.loop.controller import Controller
-from scenarios.loop.recorder import Recorder
 from scenarios.loop.simulation import simulate
 from scenarios.recording.recording import Recording
 
 SPECS = ("tpm-published", "tpm", "recursive", "augmented")
 PARTS = ("kinematics", "rows", "resolve", "act and record")
-LEAD_IN = 5        # ticks at the start of a block that do not count: cold caches
-_WARM_UP = 2000    # ticks before counting starts
-_BLOCK = 500       # ticks per turn of a candidate
+LEAD_IN = 50       # ticks at the start of a run that do not count: cold caches
+_ROUNDS = 5        # runs of each candidate, which take turns
 _AGREE = 1e-7      # [rad/s^2] tolerance between compiled and plain commands
 _COLUMNS = (*TIMES, *(Column(head, f"{part}_us") for head, part in zip(
     ("kinem.", "rows", "resolve", "act+rec"), PARTS, strict=True)),
@@ -35,27 +32,17 @@ _COLUMNS = (*TIMES, *(Column(head, f"{part}_us") for head, part in zip(
 def run(scenario: Scenario | None = None) -> Report:
     """Time every tick of the letter's run under each resolver, and the plain numpy tick.
 
-    The candidates take turns in blocks of the same run, so that noise of the machine affects all
-    equally.
+    The plain tick is asked at the states of the run, and must command the same.
     """
     scenario = scenario or load("ellipse")
-    path = simulate(scenario)  # the states at which all candidates are timed
-    compiled = {spec: _Compiled(scenario.with_resolver(spec), path) for spec in SPECS}
-    plain = _Plain(scenario, path)
-    for k in range(0, path.ticks, 50):
-        state = path["t"][k], path["q"][k], path["v"][k]
-        gap = np.abs(compiled["tpm"].controller.command(*state) - plain.tick.step(*state)).max()
-        if gap > _AGREE:
-            raise AssertionError(f"tick {k}: compiled and plain commands differ by {gap}")
-    candidates: dict[str, _Compiled | _Plain] = {**compiled, "plain numpy": plain}
-    with one_core():
-        for candidate in candidates.values():
-            candidate.run(0, min(_WARM_UP, path.ticks))
-            candidate.forget()
-        for begin in range(0, path.ticks, _BLOCK):
-            for candidate in candidates.values():
-                candidate.run(begin, min(begin + _BLOCK, path.ticks))
-    rows = [_row(name, *candidate.result()) for name, candidate in candidates.items()]
+    path = simulate(scenario)
+    runs = runs_in_turns({spec: scenario.with_resolver(spec) for spec in SPECS}, _ROUNDS)
+    rows: list[Row] = []
+    for spec, times in runs.items():
+        parts = {f"{part}_us": float(np.nanmedian(some)) for part, some in zip(
+            PARTS, times.T, strict=False)}
+        rows.append({"tick": spec, **parts, **of_ticks(times[:, -1])})
+    rows.append({"tick": "plain numpy", **of_ticks(1e6 * _plain(scenario, path))})
     for row in rows:
         row["times_faster_than_plain"] = rows[-1]["median_us"] / row["median_us"]
     title = "One control tick of ellipse, microseconds, one core, warm kernels"
@@ -63,58 +50,43 @@ def run(scenario: Scenario | None = None) -> Report:
                   {"tick": rows})
 
 
-class _Compiled:
-    """The compiled tick: controller, plant and recorder as the loop calls them."""
+def runs_in_turns(scenarios: Mapping[str, Scenario], rounds: int) -> dict[str, Array]:
+    """Return the times [us] of ticks of runs, which take turns on one core: (T, 5) by label.
 
-    def __init__(self, scenario: Scenario, path: Recording) -> None:
-        self.controller, self.path = Controller(scenario), path
-        self.forget()
-
-    def forget(self) -> None:
-        self.recorder = Recorder(self.controller, self.path.ticks)
-
-    def run(self, begin: int, end: int) -> None:
-        controller, recorder, plant = self.controller, self.recorder, self.controller.cell.plant
-        t, q, v = self.path["t"], self.path["q"], self.path["v"]
-        for k in range(begin, end):
-            plant.act(controller.command(t[k], q[k], v[k]))
-            recorder.write()
-            recorder.stamp(perf_counter())
-
-    def result(self) -> tuple[Array, int]:
-        """Return times [us] of the parts and the whole (T, 5), and the ticks without an answer."""
-        run: Any = self.recorder.finish(None, None)  # type: ignore[arg-type]
-        parts = [run[f"time_{part}"] for part in ("kinematics", "rows", "resolve", "tick")]
-        times = np.column_stack([*parts[:3], parts[3] - sum(parts[:3]), parts[3]])
-        return 1e6 * times, int((run["status"] != 0).sum())
+    The columns are PARTS and the whole tick; NaN where there is no answer. One run of each before
+    them is not counted: it compiles and fills caches.
+    """
+    found: dict[str, list[Array]] = {label: [] for label in scenarios}
+    with one_core():
+        for _ in range(rounds + 1):
+            for label, scenario in scenarios.items():
+                found[label].append(_times(simulate(scenario)))
+    return {label: np.concatenate(runs[1:]) for label, runs in found.items()}
 
 
-class _Plain:
-    """The same tick in plain numpy."""
+def of_ticks(times: Array) -> Row:
+    """Return the row of times [us] of ticks: those answered, and how many are not."""
+    answered = times[~np.isnan(times)]
+    return {"ticks": len(times), "failures": len(times) - len(answered), **times_of(1e3 * answered)}
 
-    def __init__(self, scenario: Scenario, path: Recording) -> None:
-        self.tick, self.path = PlainTick(scenario, build(scenario)), path
-        self.forget()
 
-    def forget(self) -> None:
-        self.tick.log.clear()
-        self.times: list[float] = []
+def _times(run: Recording) -> Array:
+    parts = [run[f"time_{part}"] for part in ("kinematics", "rows", "resolve", "tick")]
+    times = 1e6 * np.column_stack([*parts[:3], parts[3] - sum(parts[:3]), parts[3]])
+    times[run["status"] != 0] = np.nan
+    return times[LEAD_IN:]
 
-    def run(self, begin: int, end: int) -> None:
-        t, q, v = self.path["t"], self.path["q"], self.path["v"]
-        for k in range(begin, end):
+
+def _plain(scenario: Scenario, path: Recording) -> Array:
+    """Return the times [s] of the plain tick along a run, whose commands it must repeat."""
+    tick, times = PlainTick(scenario, build(scenario)), np.empty(path.ticks)
+    with one_core():
+        for k, (t, q, v, a) in enumerate(zip(*(path[key] for key in ("t", "q", "v", "a")),
+                                             strict=True)):
             start = perf_counter()
-            self.tick.step(t[k], q[k], v[k])
-            self.times.append(perf_counter() - start)
-
-    def result(self) -> tuple[Array, int]:
-        """Return the same; the times of the parts are not known."""
-        return np.array([[np.nan] * 4 + [1e6 * time] for time in self.times]), 0
-
-
-def _row(name: str, times: Array, failures: int) -> Row:
-    times = times[np.arange(len(times)) % _BLOCK >= LEAD_IN]
-    parts = dict(zip((f"{part}_us" for part in PARTS), np.median(times[:, :-1], axis=0),
-                     strict=True))
-    return {"tick": name, "ticks": len(times), **times_of(1e3 * times[:, -1]), **parts,
-            "failures": failures}
+            found = tick.step(t, q, v)
+            times[k] = perf_counter() - start
+            if np.abs(found - a).max() > _AGREE:
+                raise AssertionError(f"tick {k}: compiled and plain commands differ by "
+                                     f"{np.abs(found - a).max()}")
+    return times[LEAD_IN:]

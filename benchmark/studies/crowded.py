@@ -7,61 +7,24 @@ rows and joints: `hierarchy bench growth --larger`.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from time import perf_counter
 from typing import Any
 
 import numpy as np
 import typer
 
 from benchmark import figures
-from benchmark.machine import one_core
 from benchmark.report import Report, Section
 from benchmark.solve.growth import over
 from benchmark.store import Row
-from benchmark.timing import times_of
+from benchmark.tick import of_ticks, runs_in_turns
 from scenarios.config import Scenario, load
 from scenarios.loop.controller import Controller
 from scenarios.loop.simulation import simulate
-from solvers import Status
 
 PAIRS = ((8, 3), (8, 8), (16, 8), (16, 16), (32, 16), (32, 32), (64, 32), (64, 64), (64, 128),
          (64, 256))          # (control points, obstacles)
 PARTS = ("kinematics", "sensing and rows", "resolve", "whole tick")
-_BLOCK = 25                  # ticks of one candidate in its turn
 _ROOM = (0.7, 0.06)          # [m] half width of the box of obstacles; least distance to the path
-
-
-class Ticks:
-    """The tick of `ellipse-hqp` with other points and obstacles, along the states of its run."""
-
-    def __init__(self, points: int, obstacles: int, path: Any) -> None:
-        self.points, self.obstacles, self.path = points, obstacles, path
-        self.times, self.failures, self.at = list[list[float]](), 0, 0
-        self.controller = Controller(crowded(points, obstacles, path))
-
-    def take_turn(self) -> None:
-        """Go a block of ticks further along the run; the first, whose caches are cold, not timed.
-
-        What the solver remembers is that of the tick before, as in the loop.
-        """
-        t, q, v = self.path["t"], self.path["q"], self.path["v"]
-        for k in range(_BLOCK):
-            i = (self.at + k) % len(t)
-            self.controller.command(t[i], q[i], v[i])
-            begin, moved, written, resolved = self.controller.stamps
-            if k > 0 and i > 0:
-                self.times.append([moved - begin, written - moved, resolved - written,
-                                   resolved - begin])
-                self.failures += self.controller.resolution.status is not Status.SOLVED
-        self.at = (self.at + _BLOCK) % len(t)
-
-    def rows(self) -> list[Row]:
-        """Return a row for each part of the tick."""
-        pairs = (self.points + 1) * self.obstacles  # the end effector is the last point
-        return [{"figure": "pairs", "entrant": part, "rows": self.controller.hierarchy.m,
-                 "points": self.points, "obstacles": self.obstacles, "pairs": pairs,
-                 "failures": self.failures, **times_of(1e9 * times)}
-                for part, times in zip(PARTS, np.array(self.times).T, strict=True)]
 
 
 def crowded(points: int, obstacles: int, path: Any, seed: int = 0) -> Scenario:
@@ -88,32 +51,32 @@ def crowded(points: int, obstacles: int, path: Any, seed: int = 0) -> Scenario:
         {"centre": centre.tolist()} for centre in found[:obstacles]]})
 
 
-def run(seconds: float = 30.0, pairs: Sequence[tuple[int, int]] = PAIRS, ticks: int = 1500
-        ) -> Report:
-    """Time the tick at every number of points and obstacles, by turns, for `seconds` [s].
+def run(rounds: int = 3, pairs: Sequence[tuple[int, int]] = PAIRS, ticks: int = 1500) -> Report:
+    """Time the tick at every number of points and obstacles, in runs that take turns.
 
-    ticks : of the run whose states are used.
+    ticks : of each run.
     """
-    path = simulate(load("ellipse-hqp", [f"control.duration={1e-3 * ticks!r}"]))
-    everyone = [Ticks(points, obstacles, path) for points, obstacles in pairs]
-    with one_core():
-        for one in everyone:
-            one.take_turn()
-            one.times.clear()
-        end = perf_counter() + seconds
-        while perf_counter() < end or not everyone[-1].times:
-            for one in everyone:
-                one.take_turn()
-    rows = [row for one in everyone for row in one.rows()]
+    duration = {"control.duration": 1e-3 * ticks}
+    path = simulate(load("ellipse-hqp", duration))
+    scenarios = {f"{points} {obstacles}": crowded(points, obstacles, path).with_changes(duration)
+                 for points, obstacles in pairs}
+    rows: list[Row] = []
+    for label, times in runs_in_turns(scenarios, rounds).items():
+        points, obstacles = map(int, label.split())
+        kinematics, writing, resolve, _, _ = times.T
+        parts = (kinematics, writing, resolve, kinematics + writing + resolve)
+        rows += [{"figure": "pairs", "entrant": part, "points": points, "obstacles": obstacles,
+                  "pairs": (points + 1) * obstacles, **of_ticks(some)}  # the last is the hand
+                 for part, some in zip(PARTS, parts, strict=True)]
     panels = {"pairs": ("pairs $p$ of a point and an obstacle", "p", "a tick, 7 joints, hcod")}
     return Report("Ticks among many obstacles", [Section("", [
         over("Median time [us] over the number of pairs", rows, "pairs")],
         figures={"crowded": figures.over_sizes(rows, panels)})], {"crowded": rows})
 
 
-def main(seconds: float = 30.0) -> None:
-    """Print the table; seconds : for all times together."""
-    run(seconds).say()
+def main(rounds: int = 3) -> None:
+    """Print the table; rounds : runs of each."""
+    run(rounds).say()
 
 
 if __name__ == "__main__":
