@@ -63,9 +63,11 @@ class Questions:
         """Return the solver's own answer that a warm start begins with, None without one."""
         if self._sequence:
             asked, raw = self._answer
-            return raw if asked == p - 1 else None
-        earlier = self.before[p] or self.problems[p].moved(p)
-        return self.solver.solve(self.solver.prepare(earlier))
+            raw = raw if asked == p - 1 else None
+        else:
+            earlier = self.before[p] or self.problems[p].moved(p)
+            raw = self.solver.solve(self.solver.prepare(earlier))
+        return None if getattr(raw, "memory", raw) is None else raw
 
     def _rehearse(self, problem: Problem) -> None:
         """Solve a problem, so that nothing is loaded or compiled while it is timed."""

@@ -124,24 +124,33 @@ def run(seconds: float = 0.5, families: Sequence[str] | None = None, seed: int |
 def _measured(name: str, problems: Sequence[reference.Problem], entrants: Sequence[Entrant],
               seconds: float) -> list[Row]:
     """Return a row for each entrant that can be asked, and one for its warm starts."""
-    plain = [as_problem(one.h) for one in problems]
-    before = [None if one.before is None else as_problem(one.before) for one in problems]
-    turn = Repeats(most=_MOST, turn=int(1e9 * seconds / len(plain)))
-    asked: dict[str, Questions] = {}
-    for one in entrants:
-        own = Questions(load(one.adapter), dict(one.options), turn)
-        if not own.solver.refuses(plain[0]):
-            own.take(plain, before)
-            own.asked(0)  # loads and compiles
-            asked[one.label] = own
-    raw = [judged({"entrant": label, "family": name, "problem": p, **own.asked(p)}, problem.h,
-                  _proof(problem))
-           for p, problem in enumerate(problems) for label, own in asked.items()]
+    raw = asked(name, problems, entrants, seconds)
     warm = [_warm(row) for row in raw if row.get("warm_ns")]
     rows = [_row(own, problems) for _, own in (*by(raw, "entrant"), *by(warm, "entrant"))]
     medians = {row["entrant"]: row["median_us"] for row in rows}
     return [{**row, "to_daqp": row["median_us"] / medians.get(HIERARCHICAL, nan),
              "to_numpy": row["median_us"] / medians.get(NUMPY, nan)} for row in rows]
+
+
+def asked(name: str, problems: Sequence[reference.Problem], entrants: Sequence[Entrant],
+          seconds: float) -> list[Row]:
+    """Ask all entrants that can be asked, in turns, for about `seconds` [s] each; judge the rows.
+
+    name : of the family.
+    """
+    plain = [as_problem(one.h) for one in problems]
+    before = [None if one.before is None else as_problem(one.before) for one in problems]
+    turn = Repeats(most=_MOST, turn=int(1e9 * seconds / len(plain)))
+    running: dict[str, Questions] = {}
+    for one in entrants:
+        own = Questions(load(one.adapter), dict(one.options), turn)
+        if not own.solver.refuses(plain[0]):
+            own.take(plain, before)
+            own.asked(0)  # loads and compiles
+            running[one.label] = own
+    return [judged({"entrant": label, "family": name, "problem": p, **own.asked(p)}, problem.h,
+                   _proof(problem))
+            for p, problem in enumerate(problems) for label, own in running.items()]
 
 
 def as_problem(h: Hierarchy) -> Problem:

@@ -11,32 +11,29 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
-from typing import Any, final
+from typing import final
 
 import numpy as np
 import typer
 
 from benchmark.machine import machine, one_core
+from benchmark.packages import OWN, Entrant
 from benchmark.report import Report, Section
-from benchmark.solve.resolvers import as_problem
+from benchmark.solve.judge import RIGHT, by, summary
+from benchmark.solve.resolvers import asked
 from benchmark.store import Row
-from benchmark.tables import Column, Table, digits, percent
-from benchmark.timing import times_of
-from benchmark.worker import Repeats, timed
-from hierarchy.problem import Array, Hierarchy
-from solvers import Resolver, Status, certify, make, names
+from benchmark.tables import Column, Table, percent, power, whole
+from hierarchy.problem import Hierarchy
+from scenarios.problems.reference import Problem
+from solvers import certify, make, names
 from solvers.problems import Recipe, written
 
-SAME = 1e-6  # of |b_k|: a level that misses no more than that beyond the exact answer is optimal
-_TIMES = Repeats(3, 3)  # solves of each problem that are timed; the fastest counts
+_SECONDS = 0.5  # for each resolver in each family
 _HARD = Recipe(equalities_only=True, near_parallel=0.0, scales=(1.0, 1.0), spread=1.0)
-
 NOTES = f"""\
-L k: share of problems in which levels 1 to k, the bounds not counted, miss no more than the \
-exact answer, to {SAME:g} of their targets. near: share that is also nearest to the reference. \
-extra k: what level k misses too much, median / 95th percentile, as a share of its target, where \
-the levels above it are optimal. off: share that ended with a status. us: a solve from Python in \
+L k: share of problems in which bounds and levels 1 to k miss no more than the exact answer, to \
+{RIGHT:g} |a| (1 + |x|). near: share that is also nearest to the reference. miss: the largest of \
+those called solved, relative. off: number that ended with a status. us: a solve from Python in \
 microseconds, cold; warm: with the memory of the same problem with its targets and sides moved by \
 up to 1 %."""
 
@@ -71,6 +68,11 @@ class Family:
         levels = [(A, b) for A, b, _ in free.levels()]
         return Hierarchy.from_levels([(np.eye(self.joints), -half[0], half[1]), *levels], reference)
 
+    def problems(self, count: int) -> list[Problem]:
+        """Return those of the first stacks whose answer is certified."""
+        found = [(h, make("hcod").solve(h).x) for h in map(self.problem, range(count))]
+        return [Problem(h, x, h.violations(x)) for h, x in found if certify(h, x).certified]
+
 
 FAMILIES = tuple(
     Family(f"{joints} joints, {'+'.join(map(str, sizes))} {what}", joints, sizes, room, hard)
@@ -80,85 +82,45 @@ FAMILIES = tuple(
                        ("hard, severe" if hard else "severe", 0.4)))
 
 
-def resolvers() -> list[Resolver]:
-    """Return every resolver that takes bounds, as it comes."""
-    return [one for one in map(make, names()) if one.handles in ("bounds", "inequalities")]
-
-
-def run(count: int = 400, entrants: Sequence[Resolver] | None = None,
-        families: Sequence[Family] = FAMILIES) -> Report:
-    """Judge and time the entrants on `count` stacks of each family."""
+def run(count: int = 400, resolvers: Sequence[str] = (), families: Sequence[Family] = FAMILIES
+        ) -> Report:
+    """Judge and time resolvers by name, or all that take bounds, on `count` stacks of a family."""
+    chosen = resolvers or [name for name in names()
+                           if make(name).handles in ("bounds", "inequalities")]
+    entrants = [Entrant(make(name).label, OWN, "benchmark.solve.ours:Ours", {"resolver": name})
+                for name in chosen]
     rows: list[Row] = []
     tables = []
     for family in families:
         with one_core():
-            asked = _certified(family, count)
-            found = [_row(family, resolver, asked) for resolver in entrants or resolvers()]
-        bound = np.mean([row["at_bound"] for row in found if row["entrant"] == "hcod"] or 0.0)
-        beyond = max(row["beyond"] for row in found)
-        levels = range(1, len(family.sizes) + 1)
-        tables.append(Table(
-            f"{family.name}: {len(asked)} problems, {bound:.1f} joints at a bound,\nat most "
-            f"{beyond:.0e} beyond", found, [
-                *(Column(f"L {k}", f"optimal_{k}", percent) for k in levels),
-                Column("near", "nearest", percent),
-                *(Column(f"extra {k}", f"extra_{k}", str) for k in levels),
-                Column("off", "off", percent), Column("us", "median_us", digits),
-                Column("p95", "p95_us", digits), Column("warm", "warm_median_us", digits)]))
-        rows += found
+            problems = family.problems(count)
+            raw = asked(family.name, problems, entrants, _SECONDS)
+        found = [_row(own, len(family.sizes)) for _, own in by(raw, "entrant")]
+        bound = np.mean([((one.x <= one.h.lower[:one.h.n]) | (one.x >= one.h.upper[:one.h.n])).sum()
+                         for one in problems])
+        tables.append(Table(f"{family.name}: {len(problems)} problems, {bound:.1f} joints at a "
+                            "bound", found, [
+            *(Column(f"L {k}", f"optimal_{k}", percent) for k in range(1, len(family.sizes) + 1)),
+            Column("near", "nearest", percent), Column("miss", "relative", power),
+            Column("off", "off", whole), Column("us", "median_us"), Column("p95", "p95_us"),
+            Column("warm", "warm_median_us")]))
+        rows += [{"family": family.name, **row} for row in found]
     title = f"Resolvers inside limits, one core of {machine()['processor']}"
     return Report(title, [Section("", tables, NOTES)], {"saturation": rows})
 
 
-def _certified(family: Family, count: int) -> list[tuple[Hierarchy, Array]]:
-    """Return the problems with a certified answer, and what each level misses at it."""
-    exact, found = make("hcod"), []
-    for h in map(family.problem, range(count)):
-        x = exact.solve(h).x
-        if certify(h, x).certified:
-            found.append((h, h.violations(x)))
-    return found
-
-
-def _row(family: Family, resolver: Resolver, asked: Sequence[tuple[Hierarchy, Array]]) -> Row:
-    extra, near, at_bound, beyond, off = [], [], [], [0.0], 0
-    cold, warm = list[int](), list[int]()
-    for h, exact in asked:
-        res = resolver.solve(h)
-        missed = h.violations(res.x)
-        wanted = np.array([np.linalg.norm(b) for _, b, _ in h.levels()][1:])
-        extra.append((missed - exact)[1:] / np.where(wanted > 0.0, wanted, 1.0))
-        near.append(bool((extra[-1] <= SAME).all()) and certify(h, res.x, SAME).certified)
-        at_bound.append(int(((res.x <= h.lower[:h.n]) | (res.x >= h.upper[:h.n])).sum()))
-        beyond.append(float(missed[0]))
-        off += res.status is not Status.SOLVED
-        moved = as_problem(h).moved(0)
-        memory = resolver.solve(h.changed(lower=moved.lower, upper=moved.upper)).memory
-        cold.append(min(timed(partial(resolver.solve, h), _TIMES)))
-        warm.append(min(timed(partial(resolver.solve, h, memory), _TIMES)))
-    optimal = np.logical_and.accumulate(np.array(extra) <= SAME, axis=1)
-    above = np.hstack([np.ones((len(extra), 1), dtype=bool), optimal[:, :-1]])
-    levels: dict[str, Any] = {}
-    for k in range(len(family.sizes)):
-        some = np.maximum(extra, 0.0)[above[:, k], k]
-        median, p95 = np.percentile(some, [50, 95]) if some.size else (np.nan, np.nan)
-        levels |= {f"optimal_{k + 1}": float(optimal[:, k].mean()),
-                   f"extra_{k + 1}": f"{_short(median)}/{_short(p95)}"}
-    return {"family": family.name, "entrant": resolver.label, "problems": len(asked), **levels,
-            "nearest": float(np.mean(near)), "at_bound": float(np.mean(at_bound)),
-            "beyond": max(beyond), "off": off / len(asked), **times_of(cold),
-            **times_of(warm, "warm_")}
-
-
-def _short(value: float) -> str:
-    if np.isnan(value):
-        return "–"
-    return "0" if value <= SAME else f"{value:.1g}".removeprefix("0").replace("e-0", "e-")
+def _row(rows: Sequence[Row], levels: int) -> Row:
+    """Return the summary of a resolver, and the shares by the first level that it misses."""
+    found = summary(rows)
+    first = np.array([levels + 2 if row["level"] < 0 else row["level"] for row in rows])
+    return {**found, "off": len(rows) - found["answered"],
+            "nearest": float((first > levels + 1).mean()), **{
+                f"optimal_{k}": float((first > k).mean()) for k in range(1, levels + 1)}}
 
 
 def main(count: int = 400, resolver: list[str] | None = None) -> None:
     """Print the tables; count : problems of a family; resolver : only this, may be repeated."""
-    run(count, [make(name) for name in resolver or ()] or None).say()
+    run(count, resolver or ()).say()
 
 
 if __name__ == "__main__":
