@@ -56,7 +56,7 @@ corners cannot push [N]. Below: median and largest miss of each task [m/s^2, rad
 _COLUMNS = (*TICK, *(Column(key, f"{key} max", power)
                       for key in ("dynamics", "contact", "torque", "friction")),
             Column("fail", "failed", whole))
-_MISSES = (*(Column(f"{task if of == 'median' else ''}\n{of}", f"{task} {of}", power)
+_MISSES = (*(Column("\n".join((*task.split(), of)), f"{task} {of}", power)
              for task in TASKS for of in ("median", "max")),
            Column("priorities", "kind", text), Column("version", "version", str))
 

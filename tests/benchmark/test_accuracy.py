@@ -6,13 +6,11 @@ import exact
 import numpy as np
 import oracle
 import pytest
-import rank_cases
 
 from benchmark import arms, figures
 from benchmark.solve import accuracy, growth
 from benchmark.solve.ours import Ours
-from benchmark.timing import Timed
-from hierarchy import Hierarchy, Robot, State
+from hierarchy import Robot, State
 from hierarchy.robots import KUKA_LWR, TABLES
 from scenarios.problems.answers import answer
 from solvers import names
@@ -60,20 +58,6 @@ def test_regular_arms_are_regular_and_near_singular_ones_lack_one_direction():
     assert near[:, -1].min() >= arms.NEAREST
     assert near[:, -1].max() < 0.02
     assert np.percentile(near[:, -1], 10) < 1e-5
-
-
-@pytest.mark.parametrize("case", [
-    rank_cases.generic, rank_cases.more_rows_than_joints, rank_cases.row_repeated_inside_a_level,
-    rank_cases.rows_repeated_in_a_lower_level, rank_cases.zero_rows,
-    rank_cases.conflicting_targets, rank_cases.one_joint, rank_cases.no_freedom_left])
-def test_rational_arithmetic_gives_the_answer_of_the_oracle(case):
-    h = rank_cases.build(case, with_reference=True)
-    np.testing.assert_allclose(exact.exact(h), oracle.solve(h), rtol=1e-10, atol=1e-10)
-
-
-def test_rational_arithmetic_has_no_tolerance():
-    h = Hierarchy.from_levels([([[1.0, 0.0]], [0.0]), ([[1.0, 2.0**-40]], [1.0])])
-    assert exact.exact(h).tolist() == [0.0, 2.0**40]
 
 
 def test_the_damped_reference_is_that_of_the_oracle():
@@ -124,24 +108,6 @@ def test_the_table_tells_who_is_not_strict(tables):
     assert found["regular", "tpm-published"]["task_3_max"] < 1e-9
     assert found["crowded", "tpm-published"]["task_4_max"] > 0.1
     assert found["crowded", "tpm-published"]["certified"] < 1.0
-
-
-def test_every_strict_resolver_is_timed_at_every_size(tables):
-    _, times = tables
-    sizes = {(key, *size[:2]) for key, some in growth.FIRST_PAPER.items() for size in some[:3]}
-    labels = {one.label for one in accuracy.entrants()} - set(growth.LEVEL_LESS)
-    assert {(row["figure"], row["joints"], row["tasks"], row["entrant"]) for row in times} == {
-        (*size, label) for size in sizes for label in labels}
-    assert all(row["solves"] >= 1 and row["median_us"] > 0.0 for row in times)
-
-
-def test_what_goes_before_a_call_is_not_timed():
-    seen = []
-    timed = Timed(lambda: seen.append("call"), {"what": "some"}, lambda: seen.append("before"))
-    timed.take_turn()
-    assert seen == ["before", "call"]
-    assert timed.row()["what"] == "some"
-    assert timed.row()["solves"] == 1
 
 
 def test_an_exponent_is_the_slope_of_the_upper_half_of_the_sizes():

@@ -12,7 +12,7 @@ import pytest
 import typer
 
 from benchmark.reproduce import pages, whole
-from benchmark.reproduce.blocks import block, cell, judged, statements
+from benchmark.reproduce.blocks import cell, judged, statements
 from benchmark.reproduce.studies import BLOCKS, STUDIES, Rows, Study, plain, read, rows_of, write
 from benchmark.reproduce.ticks import DAMPED, LARGEST, LEFT
 from hierarchy.errors import HierarchyError
@@ -112,13 +112,6 @@ def test_an_unknown_block_or_metric_is_named(tmp_path):
                          "page.md", {})
     with pytest.raises(HierarchyError, match="'speed_min'"):
         rows(a=[1.0]).column("a", "speed_min")
-
-
-def test_a_block_is_replaced_and_the_rest_is_left(tmp_path):
-    text = "before\n<!-- reproduce: blend -->\nold\n<!-- end of blend -->\nafter\n"
-    found = read(ROOT / pages.RESULTS)
-    made = pages.filled(text, tmp_path, "page.md", found)
-    assert made == text.replace("old", block("blend", found, str).rstrip())
 
 
 BENCH = """\
@@ -257,14 +250,6 @@ def test_quick_lists_the_commands_that_it_does_not_run(tmp_path, monkeypatch, ca
     assert made["not_made"]["hierarchy bench tick"] == ["docs/results/problems.md"]
     with pytest.raises(HierarchyError, match=r"--quick runs studies, and docs/batch\.md has"):
         whole.run(["docs/batch.md"], tmp_path, True, 1)
-
-
-def test_a_file_in_place_of_the_folder_is_refused(tmp_path):
-    file = tmp_path / "file"
-    file.write_text("")
-    for out in (file, file / "below"):
-        with pytest.raises(HierarchyError, match=f"cannot be written: {file} is a file"):
-            whole.run(["letter"], out, True, 1)
 
 
 @pytest.mark.slow

@@ -2,15 +2,12 @@
 
 import csv
 import json
-import os
 
 import numpy as np
 import pytest
 
-from benchmark import machine
 from benchmark.solve import resolvers
 from benchmark.solve.entrants import HIERARCHICAL, NUMPY
-from benchmark.solve.interface import Problem
 from benchmark.timing import times_of
 from scenarios.cli.main import run_command
 from scenarios.problems import reference
@@ -69,15 +66,6 @@ def test_a_backend_that_is_not_installed_is_named_and_not_skipped_silently(monke
     assert not {"hqp daqp", HIERARCHICAL} & {one.label for one in field}
 
 
-def test_a_warm_start_comes_from_targets_moved_by_a_percent():
-    h = family("INEQ7")[0].h
-    problem = Problem(h.A, h.lower, h.upper, h.sizes, h.reference)
-    moved, finite = problem.moved(0), np.isfinite(h.lower)
-    np.testing.assert_allclose(moved.lower[finite], h.lower[finite], rtol=0.01)
-    assert (moved.lower <= moved.upper).all()
-    assert not np.array_equal(moved.lower, h.lower)
-
-
 def test_fresh_problems_are_timed_and_reported_apart(few):
     found = resolvers.run(seconds=0.001, families=("EQ7", "INEQ7"), seed=10_000_000, count=4,
                           resolvers=["hcod"])
@@ -95,13 +83,6 @@ def test_fresh_problems_are_not_the_stored_ones():
     stored = [problem.h.upper for problem in family("INEQ7")]
     assert not any(np.array_equal(one.h.upper, old)
                    for one in reference.fresh("INEQ7", 10_000_000, 4) for old in stored)
-
-
-def test_timing_on_one_core_gives_the_others_back():
-    before = os.sched_getaffinity(0)
-    with machine.one_core():
-        assert len(os.sched_getaffinity(0)) == 1
-    assert os.sched_getaffinity(0) == before
 
 
 @pytest.mark.parametrize(("asked", "says"), [

@@ -7,12 +7,6 @@ from benchmark import start
 from benchmark.start import Cost, own_seconds, run
 
 
-def test_a_cost_is_met_up_to_its_ceiling():
-    assert Cost("a", 1.0, "s", 1.0).row()["verdict"] == "met"
-    assert Cost("a", 1.1, "s", 1.0).row()["verdict"] == "not met"
-    assert Cost("a", 1.1, "s").row()["verdict"] == ""
-
-
 def test_seconds_of_what_is_compiled_within_are_not_counted_twice():
     events = [(0.0, True, "outer"), (1.0, True, "inner"), (4.0, False, "inner"),
               (5.0, True, "inner"), (6.0, False, "inner"), (10.0, False, "outer")]
@@ -41,12 +35,6 @@ print(json.dumps([[at, start, f.__module__ + "." + f.__name__] for at, start, f 
 def test_a_process_that_fails_is_an_error_with_its_words():
     with pytest.raises(RuntimeError, match="went wrong"):
         start._run(["-c", "raise SystemExit('it went wrong')"])
-
-
-@pytest.mark.slow
-def test_memory_that_a_process_held_is_seen():
-    small, large = (start._run(["-c", f"x = bytearray({n} * 2**20)"]).memory for n in (1, 200))
-    assert 190.0 < large - small < 210.0
 
 
 def test_everything_measured_is_told(monkeypatch):
