@@ -62,13 +62,7 @@ def stand(scene: Stand) -> tuple[Any, Any, None]:
         robot.update_kinematics()
 
     place(np.array(scene.rest), np.zeros(len(scene.rest) - 1))
-    solver = placo.DynamicsSolver(robot)
-    solver.dt = scene.period
-    solver.enable_joint_limits(False)
-    solver.enable_velocity_limits(False)
-    solver.enable_torque_limits(True)
-    for name, limit in zip(scene.joints, scene.torque, strict=True):
-        robot.set_torque_limit(name, limit)
+    solver = _dynamics(scene, robot)
     soles = [_contact(scene, robot, solver, sole) for sole in scene.soles]
     tasks = [_added(solver.add_com_task(np.zeros(3)), "com", scene.com),
              *(_added(solver.add_position_task(hand, np.zeros(3)), hand, scene.hand)
@@ -95,6 +89,17 @@ def stand(scene: Stand) -> tuple[Any, Any, None]:
                       torques[_BASE:][to_theirs], np.array(wrenches))
 
     return tick, answer, None
+
+
+def _dynamics(scene: Stand, robot: Any) -> Any:
+    solver = placo.DynamicsSolver(robot)
+    solver.dt = scene.period
+    solver.enable_joint_limits(False)
+    solver.enable_velocity_limits(False)
+    solver.enable_torque_limits(True)
+    for name, limit in zip(scene.joints, scene.torque, strict=True):
+        robot.set_torque_limit(name, limit)
+    return solver
 
 
 def _contact(scene: Stand, robot: Any, solver: Any, sole: str) -> Any:

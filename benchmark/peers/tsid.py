@@ -14,7 +14,6 @@ from tsid import tsid_pywrap as tsid  # 1.7.1 has an empty module above it
 from benchmark.peers.scenes import Answer, Arm, Array, Gains, RefusedError, Stand, wrench
 
 _LARGEST = 1e4  # [N] of a contact; must be given
-_POSITION = np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
 _UNTURNED, _STILL = np.eye(3).ravel(), np.zeros(3)  # an orientation has no weight
 
 
@@ -23,6 +22,13 @@ def _solved(solver: Any, problem: Any) -> Any:
     if found.status != 0:
         raise RefusedError(f"status {found.status}")
     return found
+
+
+def _position(robot: Any, frame: str) -> Any:
+    task = tsid.TaskSE3Equality(frame, robot, frame)
+    task.setMask(np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0]))
+    task.useLocalFrame(False)
+    return task
 
 
 def arm(scene: Arm, posture: bool, hard: bool = False) -> tuple[Any, Any]:
@@ -38,13 +44,10 @@ def arm(scene: Arm, posture: bool, hard: bool = False) -> tuple[Any, Any]:
     bounds = tsid.TaskJointBounds("bounds", robot, period)
     bounds.setVelocityBounds(-np.array(scene.limit), np.array(scene.limit))
     formulation.addMotionTask(bounds, 1.0, 0, 0.0)
-    position = tsid.TaskSE3Equality("position", robot, scene.frame)
-    joints = tsid.TaskJointPosture("posture", robot)
+    position, joints = _position(robot, scene.frame), tsid.TaskJointPosture("posture", robot)
     for task, rows in ((position, 6), (joints, n)):
         task.setKp(np.zeros(rows))
         task.setKd(np.full(rows, 1.0 / period))
-    position.setMask(_POSITION)
-    position.useLocalFrame(False)
     formulation.addMotionTask(position, scene.ratio**2, 0 if hard else 1, 0.0)
     if posture:
         formulation.addMotionTask(joints, 1.0, 1, 0.0)
@@ -57,8 +60,8 @@ def arm(scene: Arm, posture: bool, hard: bool = False) -> tuple[Any, Any]:
         # The position is needed before computeProblemData, which computes it as well.
         data = formulation.data()
         pin.framesForwardKinematics(robot.model(), data, q)
-        p = data.oMf[position.frame_id].translation
-        wanted.derivative(np.append(rate + scene.gain * (goal - p), _STILL))
+        off = goal - data.oMf[position.frame_id].translation
+        wanted.derivative(np.append(rate + scene.gain * off, _STILL))
         position.setReference(wanted)
         rates.derivative(scene.posture_gain * (np.array(scene.posture) - q))
         joints.setReference(rates)
@@ -82,21 +85,8 @@ def stand(scene: Stand, solver: str) -> tuple[Any, Any, Any]:
     limits = tsid.TaskActuationBounds("limits", robot)
     limits.setBounds(-np.array(scene.torque), np.array(scene.torque))
     formulation.addActuationTask(limits, 1.0, 0, 0.0)
-
-    def added(task: Any, gains: Gains, rows: int) -> Any:
-        task.setKp(np.full(rows, gains.stiffness))
-        task.setKd(np.full(rows, gains.damping))
-        formulation.addMotionTask(task, gains.weight**2, 1, 0.0)
-        return task
-
-    hands = [tsid.TaskSE3Equality(hand, robot, hand) for hand in scene.hands]
-    for hand in hands:
-        hand.setMask(_POSITION)
-        hand.useLocalFrame(False)
-    tasks = [added(tsid.TaskComEquality("com", robot), scene.com, 3),
-             *(added(hand, scene.hand, 6) for hand in hands)]
-    samples = [tsid.TrajectorySample(3), *(tsid.TrajectorySample(12, 6) for _ in hands)]
-    joints = added(tsid.TaskJointPosture("posture", robot), scene.joint, len(scene.joints))
+    *tasks, joints = _tasks(scene, robot, formulation)
+    samples = [tsid.TrajectorySample(3), *(tsid.TrajectorySample(12, 6) for _ in scene.hands)]
     rest = tsid.TrajectorySample(len(scene.joints))
     rest.value(np.array(scene.posture))
     joints.setReference(rest)
@@ -125,6 +115,19 @@ def stand(scene: Stand, solver: str) -> tuple[Any, Any, Any]:
 
     tick.kept = soles, limits, joints, rest  # type: ignore[attr-defined]
     return tick, answer, lambda: solving.solve(problem)
+
+
+def _tasks(scene: Stand, robot: Any, formulation: Any) -> list[Any]:
+    """Return the tasks of the centre of mass, the hands and the joints."""
+    asked: list[tuple[Any, Gains, int]] = [
+        (tsid.TaskComEquality("com", robot), scene.com, 3),
+        *((_position(robot, hand), scene.hand, 6) for hand in scene.hands),
+        (tsid.TaskJointPosture("posture", robot), scene.joint, len(scene.joints))]
+    for task, gains, rows in asked:
+        task.setKp(np.full(rows, gains.stiffness))
+        task.setKd(np.full(rows, gains.damping))
+        formulation.addMotionTask(task, gains.weight**2, 1, 0.0)
+    return [task for task, _, _ in asked]
 
 
 def _contact(scene: Stand, robot: Any, formulation: Any, sole: str) -> Any:

@@ -100,25 +100,28 @@ def run(seconds: float = 0.5, families: Sequence[str] | None = None, seed: int |
     entrants, missing = field(resolvers)
     rows, sections, targets = list[Row](), list[Section](), list[str]()
     for origin in (KNOWN,) if seed is None else (KNOWN, FRESH):
-        some, tables = list[Row](), []
+        some = []
         for name in families:
             problems = (reference.family(name) if seed is None or origin == KNOWN
                         else reference.fresh(name, seed, count))
             with one_core():
-                own = [{"family": name, "origin": origin, **row}
-                       for row in _measured(name, problems, entrants, seconds)]
-            some += own
-            tables.append(Table(name if origin == KNOWN else f"{name}, {origin}", own, _COLUMNS))
-        drawn = [{**mark(row), "hollow": row["entrant"].endswith(" warm")} for row in some
-                 if row["answered"]]
-        figure = "time-accuracy" if origin == KNOWN else f"time-accuracy-{origin}"
-        sections.append(Section(origin, tables,
-                                figures={figure: figures.time_against_error(drawn)}))
+                some += [{"family": name, "origin": origin, **row}
+                         for row in _measured(name, problems, entrants, seconds)]
+        sections.append(_section(some, origin))
         targets += _targets(some, origin)
         rows += some
     return Report(f"Resolvers on reference problems, one core of {machine()['processor']}",
                   [*sections, Section("Targets", text="\n".join([NOTES, *targets]))],
                   {"resolvers": rows}, missing)
+
+
+def _section(rows: Sequence[Row], origin: str) -> Section:
+    tables = [Table(name if origin == KNOWN else f"{name}, {origin}", own, _COLUMNS)
+              for name, own in by(rows, "family")]
+    drawn = [{**mark(row), "hollow": row["entrant"].endswith(" warm")} for row in rows
+             if row["answered"]]
+    figure = "time-accuracy" if origin == KNOWN else f"time-accuracy-{origin}"
+    return Section(origin, tables, figures={figure: figures.time_against_error(drawn)})
 
 
 def _measured(name: str, problems: Sequence[reference.Problem], entrants: Sequence[Entrant],
