@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import placo
 
-from benchmark.peers.iterated import PERIOD, iterated
+from benchmark.peers.common import PERIOD, iterated
 from benchmark.peers.scenes import Answer, Arm, Array, Gains, RefusedError, Stand
 
 _REGULARISED = 1e-12  # as in pink and mink
