@@ -7,13 +7,14 @@ import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, final
+from typing import final
 
 from matplotlib.figure import Figure
 from rich.console import Console
 
 from benchmark.machine import machine
 from benchmark.tables import Row, Table, write_rows
+from scenarios.draw.figures import drawing
 from scenarios.files import make_folder, slug, write_json, write_text
 from scenarios.templates import filled, resource
 
@@ -63,24 +64,16 @@ class Report:
             if rows:
                 write_rows(rows, out / f"{name}.csv")
         for section in self.sections:
-            self._draw(section.figures, out)
-        write_text(out / "index.html", self.page())
+            for name, figure in section.figures.items():
+                drawing.write(figure, str(out / slug(name)))
+        write_text(out / "index.html", self._page())
 
-    @staticmethod
-    def _draw(figures: Mapping[str, Figure], out: Path) -> None:
-        from scenarios.draw.figures.drawing import write
-
-        for name, figure in figures.items():
-            write(figure, str(out / slug(name)))
-
-    def page(self, about: Mapping[str, Any] | None = None) -> str:
+    def _page(self) -> str:
         """Return the HTML page, which needs no other file."""
-        from scenarios.draw.figures.drawing import svg
-
-        shown = [(section, [(name, svg(figure, name)) for name, figure in section.figures.items()])
+        shown = [(section, [(name, drawing.svg(figure, name))
+                            for name, figure in section.figures.items()])
                  for section in self.sections]
         template = (Path(__file__).parent / "page.html").read_text(encoding="utf-8")
-        return str(filled(template, style=resource("report/style.css"),
-                          title=self.title, sections=shown, missing=dict(self.missing),
-                          machine=about or machine(),
+        return str(filled(template, style=resource("report/style.css"), title=self.title,
+                          sections=shown, missing=dict(self.missing), machine=machine(),
                           command=shlex.join(["hierarchy", *sys.argv[1:]])))

@@ -31,14 +31,10 @@ class Timed:
     before: Callable[[], Any] | None = None
     times: list[int] = field(default_factory=list)
 
-    def take_turn(self, repeats: Repeats = TURN) -> None:
-        """Call untimed, for the caches, then as often as `repeats` says."""
-        if self.before is None:
-            self.call()
-            self.times += timed(self.call, repeats)
-        else:
-            self.before()
-            self.times += timed(self.call, Repeats(1, 1))
+    def take_turn(self) -> None:
+        """Call untimed, for the caches, then timed for a millisecond; once after a `before`."""
+        (self.before or self.call)()
+        self.times += timed(self.call, Repeats(1, 1) if self.before else TURN)
 
     def row(self) -> dict[str, Any]:
         """Return the row of a table: what it is about, and its times."""
@@ -57,19 +53,18 @@ def times_of(nanoseconds: Sequence[float] | Array, prefix: str = "") -> dict[str
     return dict(zip(names, map(float, found), strict=True))
 
 
-def take_turns(everyone: Sequence[Timed], seconds: float, repeats: Repeats = TURN,
-               turns: int = 1) -> list[dict[str, Any]]:
+def take_turns(everyone: Sequence[Timed], seconds: float, turns: int = 1) -> list[dict[str, Any]]:
     """Let all take turns on one core for `seconds` [s], at least so many each; return their rows.
 
     One turn before them is not counted: it compiles and fills caches.
     """
     with one_core():
         for one in everyone:
-            one.take_turn(Repeats(1, 1))
+            one.take_turn()
             one.times.clear()
         end = perf_counter() + seconds
         while turns > 0 or perf_counter() < end:
             turns -= 1
             for one in everyone:
-                one.take_turn(repeats)
+                one.take_turn()
     return [one.row() for one in everyone]
