@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping, Sequence
-from itertools import dropwhile
+from itertools import dropwhile, takewhile
 from textwrap import fill
 from typing import Any
 
@@ -46,13 +46,16 @@ def block(name: str, rows: Mapping[str, Rows], output: Callable[[str], str]) -> 
 def cell(output: str, asked: Mapping[str, str]) -> str:
     """Return a number that was printed: that at `place`, from 1, after the name of a row.
 
-    The row is the first one below the line that starts as the title of the table does.
+    The table begins with the line that starts as `table` does, and ends at an empty one. Of rows
+    whose names begin alike, the shortest name counts, that of the row with the fewest words.
     """
     below = dropwhile(lambda line: not line.startswith(asked["table"]), output.splitlines())
-    for line in (re.sub("[│|]", " ", line).strip() for line in below):
-        if line.startswith(f"{asked['row']} "):
-            return line[len(asked["row"]):].split()[int(asked["place"]) - 1]
-    raise HierarchyError(f"the output has no row {asked['row']!r} below {asked['table']!r}")
+    lines = [re.sub("[│|]", " ", line).strip() for line in takewhile(str.strip, below)]
+    found = [line[len(asked["row"]):].split() for line in lines
+             if line.startswith(f"{asked['row']} ")]
+    if not found:
+        raise HierarchyError(f"the output has no row {asked['row']!r} below {asked['table']!r}")
+    return min(found, key=len)[int(asked["place"]) - 1]
 
 
 def judged(rows: Rows, decides: Mapping[str, Any]) -> tuple[str, str]:

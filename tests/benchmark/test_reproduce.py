@@ -156,6 +156,8 @@ def test_a_table_gets_the_medians_of_its_rows_and_columns(tmp_path):
 
 def test_a_finding_names_a_number_that_was_printed():
     assert cell(BENCH, {"table": "INEQ7", "row": "hqp proxqp", "place": "2"}) == "1945"
+    alike = "title\nsns 10   1  2\nsns      3  4\n\nsns 5 6\n"
+    assert cell(alike, {"table": "title", "row": "sns", "place": "1"}) == "3"
     with pytest.raises(HierarchyError, match="no row 'sns' below 'EQ7'"):
         cell(BENCH, {"table": "EQ7", "row": "sns", "place": "1"})
 
