@@ -28,6 +28,13 @@ _SHOWN = {"m": (1e3, "mm", 3), "s": (1e6, "µs", 2), "deg": (1.0, "°", 3), "sha
           "rows": (1.0, "", 3), "": (1.0, "", 0)}  # "rows": in the units of a level's rows
 
 
+def shown(value: float, unit: str) -> str:
+    """Return a value in an SI unit as it stands in a sentence: three digits, display unit."""
+    scale, name, _ = _SHOWN.get(unit, (1.0, unit, 3))
+    number = f"{value * scale:.3g}" if abs(value * scale) < 999.5 else f"{value * scale:.0f}"
+    return number + (name if name == "°" else f" {name}" if name else "")
+
+
 @dataclass(frozen=True)
 class Metric:
     """One number about one run.
