@@ -12,7 +12,7 @@ from hierarchy.notebook import html_table
 from scenarios.measure import metrics
 from scenarios.measure.partings import Parting, partings
 from scenarios.measure.runs import Run, table
-from scenarios.measure.verdicts.verdict import verdict
+from scenarios.measure.verdict import lines, verdicts
 
 
 @dataclass(frozen=True, repr=False)
@@ -64,7 +64,7 @@ class Comparison:
     def as_plain_data(self) -> dict[str, Any]:
         """Return what `comparison.json` holds."""
         return {"command": self.command, "versions": self.versions,
-                "verdicts": {name: list(verdict(runs).lines)
+                "verdicts": {name: list(lines(verdicts(runs)))
                              for name, runs in self.groups().items()},
                 "runs": [_plain(run) for run in self.runs], "refused": list(self.refused),
                 "partings": {name: [_plain_parting(one) for one in partings(runs)]

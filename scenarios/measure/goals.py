@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scenarios.measure.metrics import shown
+from scenarios.measure.metrics import passed, shown
 from scenarios.recording.listed import errors
 
 if TYPE_CHECKING:
@@ -168,7 +168,7 @@ def _of_units(name: str, units: Any, beyond: Array) -> Iterator[Asked]:
     for unit in dict.fromkeys(units):
         chosen = has_limits & np.array([one == unit for one in units])
         if chosen.any():
-            off = _broken(np.maximum(beyond[:, chosen], 0.0), PROMISED.get(unit, 0.0))
+            off = passed(np.maximum(beyond[:, chosen], 0.0), PROMISED.get(unit, 0.0))
             yield Asked(name, "", unit, off.max(axis=1), promise=True)
 
 
@@ -182,19 +182,13 @@ def _true(recording: Recording, signal: str) -> Array:
     return recording[f"true_{signal}" if f"true_{signal}" in recording else signal]
 
 
-def _broken(off: Array, tolerance: float) -> Array:
-    """Return by how much a limit is passed (T, ...), not blaming who began beyond and came back."""
-    came_back = (off <= tolerance).any(axis=0)
-    return np.asarray(np.where(came_back, off - np.fmin.accumulate(off), off))
-
-
 def _goal(one: Asked, t: Array) -> Goal:
     known = np.isfinite(one.off)
     t, off = t[known], np.where(one.off[known] < _NOTHING, 0.0, one.off[known])
     within = np.flatnonzero(off <= one.tolerance)
     reached = float(t[within[0]] - t[0]) if within.size else None
     if one.promise:
-        off = _broken(off, one.tolerance)
+        off = passed(off, one.tolerance)
     elif within.size:
         t, off = t[within[0]:], off[within[0]:]
     outside = np.flatnonzero(off > one.tolerance)

@@ -288,12 +288,21 @@ def _joint_limit_excess(recording: Recording) -> Metric:
         lower, upper, q = (recording["joint_lower"], recording["joint_upper"],
                            _true(recording, "q"))
         if np.isfinite(lower).any() or np.isfinite(upper).any():
-            excess = np.maximum(q - upper, lower - q).max(axis=0)
+            excess = passed(np.maximum(np.maximum(q - upper, lower - q), 0.0)).max(axis=0)
             joint = int(np.argmax(excess))
-            value = _finite(max(float(excess[joint]), 0.0))
+            value = _finite(excess[joint])
             note = f"joint {joint + 1}" if excess[joint] > 0.0 else ""
     return Metric("joint_limit_excess", "Beyond a joint limit, max", value, "rad",
                   group="Safety", note=note)
+
+
+def passed(off: Array, tolerance: float = 0.0) -> Array:
+    """Return by how much a limit is passed, from how far beyond it a run is (T, ...), at least 0.
+
+    Who begins beyond it and comes back has not passed it, unless by going further.
+    """
+    came_back = (off <= tolerance).any(axis=0)
+    return np.asarray(np.where(came_back, off - np.fmin.accumulate(off), off))
 
 
 _AFTER = 0.5  # [s] after the return within reach that do not count as error

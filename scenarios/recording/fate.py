@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from enum import IntEnum
 from math import sqrt
 from typing import TYPE_CHECKING, NamedTuple, final
@@ -17,6 +18,7 @@ from scenarios.cell.build import Cell
 from solvers.certificate import TOLERANCE
 
 if TYPE_CHECKING:
+    from scenarios.config import Scenario
     from scenarios.recording.recording import Recording
 
 
@@ -30,13 +32,35 @@ class Fate(IntEnum):
     MISSED = 4   # by the norm of its violation
 
 
-PHRASES = {Fate.MET: "met", Fate.FREE: "inactive", Fate.MISSED: "missed",
+PHRASES = {Fate.MET: "row met", Fate.FREE: "row inactive", Fate.MISSED: "row missed",
            Fate.UNKNOWN: "in the stack, not judged", Fate.ABSENT: "not in the stack"}
+_UNITS = {"position": "m", "avoidance": "m", "separation": "m", "joint limits": "rad",
+          "posture": "rad"}  # of the errors of tasks that no section lists
 
 
-def phrase(fate: Fate, violation: float) -> str:
+def phrase(fate: Fate, violation: float, unit: str = "") -> str:
     """Return a fate in words, with the violation where the level is missed."""
-    return f"missed by {violation:.2g}" if fate is Fate.MISSED else PHRASES[fate]
+    by = f" by {violation:.2g} {unit}".rstrip()
+    return PHRASES[fate] + (by if fate is Fate.MISSED else "")
+
+
+def row_units(scenario: Scenario, names: Sequence[str]) -> tuple[str, ...]:
+    """Return the unit of the rows of each task, "" where they differ or it is not known."""
+    sections = {task.title: task for task in scenario.tasks}
+    rate = "/s" if scenario.control.level == "velocity" else "/s²"
+
+    def unit(name: str) -> str:
+        section = sections.get(name)
+        if section is None:
+            return _UNITS[name] + rate if name in _UNITS else ""
+        if section.of_forces:
+            return section.unit
+        if section.unit.endswith(" s"):  # a momentum, whose rate is a force
+            return section.unit.removesuffix(" s")
+        mixed = hasattr(section, "rotation") or not section.unit
+        return "" if mixed else section.unit + rate
+
+    return tuple(unit(name) for name in names)
 
 
 class Judged(NamedTuple):

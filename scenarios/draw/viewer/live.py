@@ -18,6 +18,7 @@ from scenarios.config.plant import KinematicSection
 from scenarios.loop.controller import Controller
 from scenarios.loop.recorder import Recorder
 from scenarios.loop.simulation import tick
+from scenarios.measure.goals import Goal, goals
 from scenarios.measure.judging import completed
 from scenarios.measure.run_folder import save
 from scenarios.recording.recording import Recording
@@ -57,6 +58,7 @@ class Live:
         offset = np.zeros((0, 3)) if self.obstacles is None else self.obstacles.offset
         self._wanted, self._changed = offset.copy(), np.zeros(self.ticks, dtype=np.bool_)
         self._offsets = np.zeros((self.ticks, *offset.shape))
+        self._goals: tuple[int, tuple[Goal, ...]] = 0, ()
 
     @property
     def t(self) -> float:
@@ -119,6 +121,13 @@ class Live:
             recording.signals["obstacle_offset"] = self._offsets[:ticks]
         exact = self.begun.model_copy(update={"plant": KinematicSection()})
         return completed(recording, build(exact))
+
+    def goals(self) -> tuple[Goal, ...]:
+        """Return the goals of the run so far."""
+        ticks = self.recorder.ticks
+        if ticks != self._goals[0]:
+            self._goals = ticks, goals(self.recorder.finish(self.begun, None))
+        return self._goals[1]
 
     def save(self, folder: Path) -> Recording:
         """Write the run's folder as `hierarchy run` does, and any changes to `changes.json`."""
