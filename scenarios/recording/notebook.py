@@ -21,7 +21,7 @@ _LABELLED = 10  # curves of a panel that a legend can name
 
 
 def data_frame(recording: Recorded, library: str | None) -> Any:
-    """Return a data frame with the columns of `hierarchy export`; see `Recording.to_dataframe`."""
+    """Return a data frame; see `Recording.to_dataframe`."""
     if library is not None and library not in LIBRARIES:
         raise UnknownNameError("library", library, LIBRARIES)
     for name in LIBRARIES if library is None else (library,):
@@ -29,7 +29,11 @@ def data_frame(recording: Recorded, library: str | None) -> Any:
             package = import_module(name)
         except ImportError:
             continue
-        return package.DataFrame({column.name: column.values for column in columns(recording)})
+        table = list(columns(recording))
+        frame = package.DataFrame({column.name: column.values for column in table})
+        if hasattr(frame, "attrs"):  # pandas has a place for them
+            frame.attrs["units"] = {column.name: column.unit for column in table if column.unit}
+        return frame
     raise HierarchyError(f"to_dataframe needs {library or ' or '.join(LIBRARIES)}: pip install "
                          f"{library or LIBRARIES[0]}")
 

@@ -72,10 +72,10 @@ class Recording:
         return notebook.plot(self, names)
 
     def to_dataframe(self, library: str | None = None) -> Any:
-        """Return all signals as a data frame, one row per tick, columns as `hierarchy export` has.
+        """Return all signals as a data frame, one row per tick and one column per number.
 
-        `library` is "pandas" or "polars"; None takes the first that is installed. Raises
-        HierarchyError, saying what to install, where none is.
+        `library` is "pandas", which has the units in `attrs`, or "polars"; None takes the first
+        that is installed. Raises HierarchyError, saying what to install, where none is.
         """
         return notebook.data_frame(self, library)
 
