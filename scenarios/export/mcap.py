@@ -105,7 +105,7 @@ def _schema(signal: NDArray[Any]) -> dict[str, Any]:
 def _plain(values: NDArray[Any]) -> Any:
     """Return numbers as nested lists, with None for those that are not finite."""
     if values.dtype.kind == "f" and not np.isfinite(values).all():
-        values = np.where(np.isfinite(values), values, None)
+        return np.where(np.isfinite(values), values.astype(object), np.array(None)).tolist()
     return values.tolist()
 
 

@@ -47,21 +47,17 @@ def simulate(scenario: Scenario | str | Path, progress: Callable[[int, int], Non
     faults = Faults(scenario) if scenario.faults else None
     controller = Controller(scenario) if faults is None else faults.controller
     ticks = scenario.control.ticks
-    recorder = Recorder(controller, ticks)
-    every = (*_audits(controller, scenario, ticks, certified), *audits)
+    recorder = Recorder(controller, ticks, (*_audits(controller, scenario, certified), *audits))
     try:
         fault = _run(controller, recorder, scenario.control.period, ticks, progress or _silent,
-                     every, faults)
+                     faults)
     except KeyboardInterrupt:
         fault = f"interrupted at tick {recorder.ticks}"
-    recording = recorder.finish(scenario, fault)
-    for audit in every:
-        recording.signals.update(audit.signals(recording))
-    return completed(recording, rehearsal.cell)
+    return completed(recorder.finish(scenario, fault), rehearsal.cell)
 
 
-def _audits(controller: Controller, scenario: Scenario, ticks: int, certified: bool
-            ) -> list[Audit]:
+def _audits(controller: Controller, scenario: Scenario, certified: bool) -> list[Audit]:
+    ticks = scenario.control.ticks
     audits: list[Audit] = [Certified(ticks)] if certified else []
     if scenario.control.strictness:
         audits.append(Strictness(ticks, scenario))
@@ -71,8 +67,7 @@ def _audits(controller: Controller, scenario: Scenario, ticks: int, certified: b
 
 
 def _run(controller: Controller, recorder: Recorder, period: float, ticks: int,
-         progress: Callable[[int, int], None], audits: Sequence[Audit],
-         faults: Faults | None) -> str | None:
+         progress: Callable[[int, int], None], faults: Faults | None) -> str | None:
     policy = controller.policy
     for k in range(ticks):
         if k % _REPORT_EVERY == 0:
@@ -80,9 +75,6 @@ def _run(controller: Controller, recorder: Recorder, period: float, ticks: int,
         broken = tick(controller, recorder, k * period, faults)
         if broken:
             return f"{broken} from tick {k} on (t = {k * period:.3f} s)"
-        if controller.answered:
-            for audit in audits:
-                audit.look(k, controller)
         if policy.stopped:
             return policy.fault
     progress(ticks, ticks)

@@ -432,7 +432,7 @@ def test_in_a_browser_play_moves_the_arm(server, recording):
     with chromium() as browser:
         browser.look_at(address(server), *_WINDOW)
         until(shown(browser, "Joint speeds"), view.step, "the curves are shown")
-        until(shown(browser, "\nmet"), view.step, "the stack is shown")
+        until(shown(browser, "row met"), view.step, "the stack is shown")
         before = browser.screenshot()
         press(browser, "Play")
         until(lambda: view.playback.t > 0.3, view.step, "time plays")

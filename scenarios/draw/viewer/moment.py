@@ -14,9 +14,10 @@ from hierarchy.allocation import AVOIDANCE
 from hierarchy.avoidance import Obstacles
 from hierarchy.problem import Array
 from scenarios.cell.sensors import ExactDistances
+from scenarios.measure.judging import Judged, judged
 from scenarios.recording import listed
 from scenarios.recording.facts import facts_of
-from scenarios.recording.fate import Fate, Judged, judged, row_units
+from scenarios.recording.fate import Fate, row_units
 from scenarios.scene import SEPARATION, Scene
 from scenarios.scene.pushes import Pushes, pushes
 
