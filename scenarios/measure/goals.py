@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scenarios.measure.metrics import passed, shown
+from scenarios.measure.metric import norms, passed, shown, true
 from scenarios.recording.listed import errors
 
 if TYPE_CHECKING:
@@ -110,9 +110,9 @@ def asked_of(recording: Recording) -> Iterator[Asked]:
     """Yield what a scenario asks for, tick by tick."""
     scenario = recording.scenario
     if scenario.position is not None and "position_error" in recording:
-        where = _true(recording, "ee_position")
+        where = true(recording, "ee_position")
         yield Asked("position", _in_words(scenario.position), "m",
-                    np.linalg.norm(recording["desired_position"] - where, axis=1))
+                    norms(recording["desired_position"] - where))
     if scenario.pointing is not None and "pointing_error" in recording:
         for unit, off in scenario.pointing.sizes(recording["pointing_error"][:, None]):
             yield Asked("pointing", _in_words(scenario.pointing), unit, off,
@@ -146,16 +146,16 @@ def _distances(recording: Recording) -> Iterator[Asked]:
         if avoidance is not None and signal in recording and who in avoidance.promised:
             least = avoidance.promised[who]
             yield Asked(name, f"{shown(least, 'm')} or more from obstacles", "m",
-                        np.maximum(least - _true(recording, signal), 0.0), promise=True)
+                        np.maximum(least - true(recording, signal), 0.0), promise=True)
 
 
 def _limits(recording: Recording) -> Iterator[Asked]:
-    robot, q = recording.facts.robot, _true(recording, "q")
+    robot, q = recording.facts.robot, true(recording, "q")
     if "joint_lower" in recording:
         beyond = np.maximum(recording["joint_lower"] - q, q - recording["joint_upper"])
         yield from _of_units("joint limits", robot.position_units, beyond)
     if "velocity_limit" in recording:
-        beyond = np.abs(_true(recording, "v")) - recording["velocity_limit"]
+        beyond = np.abs(true(recording, "v")) - recording["velocity_limit"]
         yield from _of_units("speed limits", [f"{unit}/s" for unit in robot.velocity_units], beyond)
     if "torque_limit" in recording:
         beyond = np.abs(recording["command"]) - recording["torque_limit"]
@@ -175,11 +175,6 @@ def _of_units(name: str, units: Any, beyond: Array) -> Iterator[Asked]:
 def _contacts(recording: Recording) -> Iterator[Asked]:
     if "contact_depth" in recording:
         yield Asked("no contact with obstacles", "", "m", recording["contact_depth"], promise=True)
-
-
-def _true(recording: Recording, signal: str) -> Array:
-    """Return a signal as it was, where that is known apart from what was measured."""
-    return recording[f"true_{signal}" if f"true_{signal}" in recording else signal]
 
 
 def _goal(one: Asked, t: Array) -> Goal:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from scenarios.measure.goals import Goal, goals
-from scenarios.measure.metrics import shown
+from scenarios.measure.metric import shown
 
 if TYPE_CHECKING:
     from scenarios.measure.runs import Run

@@ -229,3 +229,12 @@ def test_a_resolver_that_does_not_say_which_rows_act_has_no_changes_of_them():
     unsaid = recording()
     facts = dataclasses.replace(unsaid.facts, asks="inequalities")
     assert measure(dataclasses.replace(unsaid, facts=facts))["active_set_changes"].value is None
+
+
+def test_steps_are_measured_and_large_ones_counted_by_tick():
+    a = np.zeros((5, 7))
+    a[1:, 0], a[3:, 1] = 60.0, 49.0
+    found = measure(recording(a=a, v=np.zeros((5, 7))))
+    assert found["acceleration_step_max"].value == 60.0
+    assert found["acceleration_step_ticks"].value == 1.0  # above 50 rad/s²
+    assert found["velocity_step_ticks"].value == 0.0
