@@ -9,11 +9,12 @@ import numpy as np
 
 from hierarchy.errors import HierarchyError, brief, expect
 from hierarchy.problem import Array
+from scenarios.cell.build import Cell
 from scenarios.cell.plants.plant import fault_of
 from scenarios.config import Scenario, load
 from scenarios.loop.audit import Audit, Certified, Judging, Strictness
 from scenarios.loop.controller import Controller
-from scenarios.loop.faults import Faults
+from scenarios.loop.faults import Faults, with_room
 from scenarios.loop.recorder import FASTEST, Recorder
 from scenarios.measure.judging import completed
 from scenarios.recording.recording import Recording
@@ -41,11 +42,9 @@ def simulate(scenario: Scenario | str | Path, progress: Callable[[int, int], Non
     if progress is not None and not callable(progress):
         raise HierarchyError(f"simulate: progress: expected a function, got {brief(progress)}")
     expect("simulate: audits", audits, Iterable, "give a list of audits")
-    rehearsal = Controller(scenario)
-    rehearsal.rehearse()
-    Recorder(rehearsal, 1).write()
+    rehearsal = rehearsed(scenario)
     faults = Faults(scenario) if scenario.faults else None
-    controller = Controller(scenario) if faults is None else faults.controller
+    controller = Controller(with_room(scenario), faults=faults)
     ticks = scenario.control.ticks
     recorder = Recorder(controller, ticks, (*_audits(controller, scenario, certified), *audits))
     try:
@@ -53,7 +52,18 @@ def simulate(scenario: Scenario | str | Path, progress: Callable[[int, int], Non
                      faults)
     except KeyboardInterrupt:
         fault = f"interrupted at tick {recorder.ticks}"
-    return completed(recorder.finish(scenario, fault), rehearsal.cell)
+    return completed(recorder.finish(scenario, fault), rehearsal)
+
+
+def rehearsed(scenario: Scenario) -> Cell:
+    """Call everything of a tick once, so that nothing is loaded later; return a cell at rest.
+
+    Raises HierarchyError where the scenario does not fit its robot or resolver.
+    """
+    controller = Controller(scenario)
+    controller.rehearse()
+    Recorder(controller, 1).write()
+    return controller.cell
 
 
 def _audits(controller: Controller, scenario: Scenario, certified: bool) -> list[Audit]:

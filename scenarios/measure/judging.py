@@ -17,7 +17,7 @@ from scenarios.cell.build import Cell, build
 from scenarios.cell.sensors import DepthSensor
 from scenarios.config.plant import KinematicSection
 from scenarios.recording.depth_view import DepthView
-from scenarios.recording.fate import unknown
+from scenarios.recording.fate import Fate
 from scenarios.recording.recording import Recording
 from solvers.certificate import TOLERANCE
 
@@ -78,7 +78,7 @@ class Fates:
         """Return the signals of a Recording; levels that were not judged are UNKNOWN."""
         columns = [self._names.index(name) for name in recording.task_names]
         fate, rows = self._fate[:recording.ticks, columns], slice(recording.ticks)
-        return {"level_fate": np.maximum(fate, unknown(recording)),
+        return {"level_fate": np.maximum(fate, np.int8(Fate.UNKNOWN) * recording.in_stack),
                 "level_violation": self._violation[rows, columns],
                 "saturated": self._saturated[rows]}
 

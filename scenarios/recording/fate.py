@@ -6,12 +6,8 @@ from collections.abc import Sequence
 from enum import IntEnum
 from typing import TYPE_CHECKING
 
-import numpy as np
-from numpy.typing import NDArray
-
 if TYPE_CHECKING:
     from scenarios.config import Scenario
-    from scenarios.recording.recording import Recording
 
 
 class Fate(IntEnum):
@@ -54,10 +50,3 @@ def row_units(scenario: Scenario, names: Sequence[str]) -> tuple[str, ...]:
 
     return tuple(unit(name) for name in names)
 
-
-def unknown(recording: Recording) -> NDArray[np.int8]:
-    """Return UNKNOWN for each task of each tick's stack, ABSENT for others: (T, N)."""
-    orders, names = recording.order_names, recording.task_names
-    table = np.array([[name in order for name in names] for order in orders],
-                     dtype=np.int8).reshape(len(orders), len(names))
-    return np.asarray(Fate.UNKNOWN * table[recording["order"]], dtype=np.int8)

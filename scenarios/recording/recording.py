@@ -99,6 +99,13 @@ class Recording:
         """The tasks that were in the stack in any tick (N,)."""
         return tuple(dict.fromkeys(name for order in self.order_names for name in order))
 
+    @property
+    def in_stack(self) -> NDArray[np.bool_]:
+        """Whether each of `task_names` is in each tick's stack (T, N)."""
+        orders, names = self.order_names, self.task_names
+        table = np.array([[name in order for name in names] for order in orders], dtype=bool)
+        return np.asarray(table.reshape(len(orders), len(names))[self.signals["order"]])
+
     def switches(self) -> NDArray[np.int64]:
         """Ticks k at which the order of the stack differs from that of tick k - 1."""
         return np.flatnonzero(np.diff(self.signals["order"])) + 1

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hierarchy.problem import Array
-from scenarios.recording.fate import Fate, row_units, unknown
+from scenarios.recording.fate import Fate, row_units
 from scenarios.recording.recording import Recording
 
 
@@ -44,5 +44,6 @@ def levels_at(recording: Recording, ticks: Sequence[int] | NDArray[np.int64]) ->
         return Levels(names, units, *(recording[name][ticks] for name in (
             "level_fate", "level_violation", "saturated")))
     shape = len(ticks), len(names)
-    return Levels(names, units, unknown(recording)[ticks], np.full(shape, np.nan),
+    return Levels(names, units,
+                  np.int8(Fate.UNKNOWN) * recording.in_stack[ticks], np.full(shape, np.nan),
                   np.zeros((len(ticks), recording["v"].shape[1]), np.int8))

@@ -10,7 +10,7 @@ from hierarchy import HierarchyError
 from scenarios.cell.build import build
 from scenarios.cli.main import run_command
 from scenarios.config import load
-from scenarios.loop.faults import Faults, FaultySensor
+from scenarios.loop.faults import FaultySensor
 from scenarios.loop.simulation import simulate
 from scenarios.measure.metrics import measure
 from scenarios.measure.run_folder import load_run, save
@@ -234,7 +234,7 @@ def test_the_command_line_says_what_happened_and_fails_only_where_the_run_ended(
 ])
 def test_a_fault_that_cannot_be_put_in_is_named(fault, said):
     with pytest.raises(HierarchyError) as error:
-        Faults(load("ellipse", [f"faults=[{fault}]"]))
+        simulate(load("ellipse", [f"faults=[{fault}]"]))
     assert said in str(error.value)
 
 

@@ -240,7 +240,8 @@ def test_a_tick_over_its_deadline_is_told_by_the_clock():
         return now[0]
 
     for deadline, kinds in ((0.31, []), (0.29, ["overrun"])):
-        c, q, v = controller(f"control.policy.deadline={deadline}", clock=clock)
+        c, q, v = controller(f"control.policy.deadline={deadline}")
+        c.clock = clock
         c.command(0.0, q, v)
         assert [kind for kind, _ in c.policy.events] == kinds
 

@@ -17,7 +17,7 @@ from scenarios.config import Scenario, ScenarioError
 from scenarios.config.plant import KinematicSection
 from scenarios.loop.controller import Controller
 from scenarios.loop.recorder import Recorder
-from scenarios.loop.simulation import tick
+from scenarios.loop.simulation import rehearsed, tick
 from scenarios.measure.goals import Goal, goals
 from scenarios.measure.judging import completed
 from scenarios.measure.run_folder import save
@@ -38,9 +38,7 @@ class Live:
     def __init__(self, scenario: Scenario) -> None:
         if scenario.faults:
             raise ScenarioError(f"scenario {scenario.name!r}: a live run injects no [[faults]]")
-        rehearsal = Controller(scenario)
-        rehearsal.rehearse()
-        Recorder(rehearsal, 1).write()
+        rehearsed(scenario)
         self.scenario = self._first = scenario
         self.restart()
 
