@@ -48,21 +48,23 @@ def _contacts(recording: Recording) -> Iterator[Metric]:
 
 
 def _wanted(recording: Recording, settle: float) -> Iterator[Metric]:
-    """Yield how well contacts push with the normal force that a task asks for, after `settle` [s].
-
-    The surface is horizontal, as in the plant.
-    """
-    names = [contact.name or contact.frame for contact in recording.scenario.contacts]
+    """Yield how well contacts push with the normal force that a task asks for, after `settle`."""
     after = recording["t"] >= settle
-    for task in recording.scenario.tasks:
-        if isinstance(task, ListedForce) and len(task.target) == 1 and after.any():
-            force = recording["floor_force"][after, names.index(task.contact), 2]
-            key, title = task.title.replace(" ", "_"), f"{task.title[0].upper()}{task.title[1:]}"
-            yield Metric(f"{key}_rms", f"{title}: error after {settle:g} s, rms",
-                         float(np.sqrt(np.mean((force - task.target[0])**2))), "N",
-                         group="Contacts")
-            yield Metric(f"{key}_touching_share", f"{title}: time in contact after {settle:g} s",
-                         float(np.mean(force > 0.0)), "share", False, "Contacts")
+    for task, force in wanted_forces(recording) if after.any() else ():
+        key, title = task.title.replace(" ", "_"), f"{task.title[0].upper()}{task.title[1:]}"
+        error = force[after] - task.target[0]
+        yield Metric(f"{key}_rms", f"{title}: error after {settle:g} s, rms",
+                     float(np.sqrt(np.mean(error**2))), "N", group="Contacts")
+        yield Metric(f"{key}_touching_share", f"{title}: time in contact after {settle:g} s",
+                     float(np.mean(force[after] > 0.0)), "share", False, "Contacts")
+
+
+def wanted_forces(recording: Recording) -> Iterator[tuple[ListedForce, Array]]:
+    """Yield each task of a normal force with that force (T,) [N]; floors are horizontal."""
+    names = [contact.name or contact.frame for contact in recording.scenario.contacts]
+    for task in recording.scenario.tasks if "floor_force" in recording else ():
+        if isinstance(task, ListedForce) and len(task.target) == 1:
+            yield task, recording["floor_force"][:, names.index(task.contact), 2]
 
 
 def _torques(recording: Recording) -> Iterator[Metric]:

@@ -106,24 +106,26 @@ def _promises(found: Sequence[Verdict]) -> str:
     said = []
     for what, who in by.items():
         worst = max((goal for _, goal in who), key=lambda goal: goal.worst)
-        under = f" by {_some([label for label, _ in who])}" if len(found) > 1 else ""
+        under = "" if len(found) == 1 else " by all" if len(who) == len(found) else (
+            f" by {_some([label for label, _ in who])}")
         said.append(f"{what}{under}, {shown(worst.worst, worst.unit)} at worst")
     return _sentence(f"broken: {'; '.join(said)}")
 
 
 def _targets(found: Sequence[Verdict]) -> str:
     """Return how far from its targets the best and the worst run are in the median."""
-    by: dict[str, list[tuple[float, str, Goal]]] = {}
+    by: dict[str, dict[str, Goal]] = {}
     for one in found:
         for goal in one.goals:
             if not goal.promise:
-                by.setdefault(goal.name, []).append((goal.median, one.label, goal))
+                by.setdefault(goal.name, {})[one.label] = goal
     said = []
     for name, some in list(by.items())[:_NAMED]:
-        best, worst = min(some, key=lambda one: one[0]), max(some, key=lambda one: one[0])
-        low, high = (shown(one[0], one[2].unit) for one in (best, worst))
+        ranked = sorted(some, key=lambda label: float(f"{some[label].median:.3g}"))
+        low, high = (shown(some[label].median, some[label].unit)
+                     for label in (ranked[0], ranked[-1]))
         said.append(f"{name} {low}" if low == high else
-                    f"{name} {low} ({best[1]}) to {high} ({worst[1]})")
+                    f"{name} {low} ({ranked[0]}) to {high} ({ranked[-1]})")
     return _sentence(f"off in the median: {'; '.join(said)}") if said else ""
 
 

@@ -46,6 +46,7 @@ class HandMadeScenario:
     description: str = "Nothing was simulated."
     resolver: str = "tpm"
     tasks: tuple[Any, ...] = ()
+    contacts: tuple[Any, ...] = ()
     position: Any = field(default_factory=PositionSection)
     pointing: Any = field(default_factory=lambda: PointingSection(
         axis=(1.0, 0.0, 0.0), alpha_d=60.0))
