@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from scenarios.export import foxglove, new_file
 from scenarios.export.layout import layout
 from scenarios.export.schemas import FOXGLOVE, INTEGER, NUMBER, TEXT, TRUTH, a_list, an_object
-from scenarios.recording.columns import of_ticks, signal_units, stacks
 from scenarios.recording.signals import OTHER, known
 from scenarios.scene import scene
 
@@ -49,19 +48,19 @@ def write(recording: Recording, path: Path) -> list[Path]:
 
 def grouped(recording: Recording) -> dict[str, dict[str, NDArray[Any]]]:
     """Return the per-tick signals by channel and name, without time."""
-    signals = {name: signal for name, signal in of_ticks(recording).items() if name != "t"}
+    signals = {name: signal for name, signal in recording.of_ticks().items() if name != "t"}
     groups: dict[str, dict[str, NDArray[Any]]] = {}
     for name, signal in signals.items():
         flat = signal.reshape(len(signal), -1) if signal.ndim > 2 else signal
         of = known(name)
         groups.setdefault(of.topic if of else OTHER, {})[name] = flat
-    groups["/stack"]["tasks"] = stacks(recording)
+    groups["/stack"]["tasks"] = recording.stacks()
     return groups
 
 
 def _write(writer: Any, recording: Recording, groups: dict[str, dict[str, NDArray[Any]]]) -> None:
     writer.start(library="task-hierarchy")
-    units = signal_units(recording)
+    units = recording.units()
     schemas = {topic: (f"hierarchy.{topic[1:]}", an_object(
         **{name: {**_schema(signal), "description": " ".join(units.get(name, ()))}
            for name, signal in group.items()})) for topic, group in groups.items()}

@@ -12,10 +12,11 @@ from scenarios import load, simulate
 from scenarios.cli.main import run_command
 from scenarios.export import export, foxglove
 from scenarios.measure.run_folder import save
-from scenarios.recording.columns import columns, constants
 from scenarios.recording.recording import Event
 from scenarios.recording.tree import joint_units, tree_of
 from scenarios.scene import scene
+
+CONSTANT = {"joint_lower", "joint_upper", "velocity_limit"}
 
 
 @pytest.fixture(scope="module")
@@ -27,8 +28,8 @@ def run():
 
 
 def test_every_signal_of_the_ticks_is_a_column(run):
-    names = {column.name.partition("[")[0] for column in columns(run)}
-    assert names == {*run.signals, "stack", "events"} - set(constants(run))
+    names = {column.name.partition("[")[0] for column in run.columns()}
+    assert names == {*run.signals, "stack", "events"} - CONSTANT
 
 
 def test_units_follow_the_joints():
@@ -79,7 +80,7 @@ def test_an_mcap_file_has_every_signal_of_every_tick(run, messages):
         for name in found[topic][0][1]:
             read[name] = [message[name] for _, message in found[topic]]
     assert read.pop("tasks") == [run.orders[i] for i in run["order"]]
-    assert set(read) | {"t"} == set(run.signals) - set(constants(run))
+    assert set(read) | {"t"} == set(run.signals) - CONSTANT
     for name, values in read.items():
         signal = run[name].astype(float)
         np.testing.assert_array_equal(np.array(values, dtype=float),
