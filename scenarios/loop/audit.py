@@ -14,7 +14,6 @@ from scenarios.cell.build import Cell
 from scenarios.cell.sensors import ExactDistances
 from scenarios.config import Scenario
 from scenarios.loop.controller import Controller
-from scenarios.measure.judging import Fates
 from scenarios.recording.recording import Recording
 from solvers import Resolution, Resolver, Status, certify
 from solvers.resolvers.saturation import SaturatedResolution
@@ -158,23 +157,6 @@ class Strictness:
         res = resolver.solve(h, self._memory)
         self._memory = res.memory
         return res.x if res.status is Status.SOLVED else None
-
-
-@final
-class Judging:
-    """The fate of each task of the stack under the command that was sent."""
-
-    def __init__(self, ticks: int, cell: Cell) -> None:
-        self._fates = Fates(cell.stack.names, ticks, cell.robot.n)
-
-    def look(self, tick: int, controller: Controller) -> None:
-        """Judge the command of a tick."""
-        self._fates.judge(tick, controller.cell, controller.hierarchy, controller.meant,
-                          controller.resolver.accuracy)
-
-    def signals(self, recording: Recording) -> Signals:
-        """Return `level_fate`, `level_violation` and `saturated`, see Recording."""
-        return self._fates.signals(recording)
 
 
 def _rows(h: Hierarchy, active: NDArray[np.int8]) -> Iterator[Row]:

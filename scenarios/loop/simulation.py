@@ -12,11 +12,11 @@ from hierarchy.problem import Array
 from scenarios.cell.build import Cell
 from scenarios.cell.plants.plant import fault_of
 from scenarios.config import Scenario, load
-from scenarios.loop.audit import Audit, Certified, Judging, Strictness
+from scenarios.loop.audit import Audit, Certified, Strictness
 from scenarios.loop.controller import Controller
 from scenarios.loop.faults import Faults, with_room
 from scenarios.loop.recorder import FASTEST, Recorder
-from scenarios.measure.judging import completed
+from scenarios.measure.judging import Fates, completed
 from scenarios.recording.recording import Recording
 
 _REPORT_EVERY = 500  # ticks between two calls of `progress`
@@ -72,7 +72,7 @@ def _audits(controller: Controller, scenario: Scenario, certified: bool) -> list
     if scenario.control.strictness:
         audits.append(Strictness(ticks, scenario))
     if scenario.sensor.kind != "exact":  # rows cannot be written again without the images
-        audits.append(Judging(ticks, controller.cell))
+        audits.append(Fates(controller.cell.stack.names, ticks, controller.cell.robot.n))
     return audits
 
 

@@ -55,7 +55,7 @@ def write(recording: Recording, folder: Path) -> None:
                         events=np.array(list(recording.events), dtype=_EVENT))
     np.savez_compressed(folder / "timings.npz", allow_pickle=False, **times)
     if recording.depth is not None:
-        np.savez_compressed(folder / "depth.npz", allow_pickle=False, **recording.depth.arrays())
+        np.savez_compressed(folder / "depth.npz", allow_pickle=False, **recording.depth._asdict())
     write_json(folder / "facts.json", dataclasses.asdict(recording.facts))
     write_json(folder / "versions.json", versions())
     (folder / "scenario.toml").write_text(recording.scenario.to_toml(), encoding="utf-8")
@@ -107,10 +107,11 @@ def _facts(path: Path) -> Facts:
 def _depth(path: Path) -> DepthView | None:
     if not path.exists():
         return None
-    try:
-        return DepthView.of_arrays(_arrays(path))
-    except KeyError as error:
-        raise HierarchyError(f"{path} cannot be read: it has no {error}") from error
+    arrays: dict[str, Any] = _arrays(path)
+    for name in DepthView._fields:
+        if name not in arrays:
+            raise HierarchyError(f"{path} cannot be read: it has no {name!r}")
+    return DepthView(**{**arrays, "t": float(arrays["t"]), "active": int(arrays["active"])})
 
 
 def versions() -> dict[str, str]:
