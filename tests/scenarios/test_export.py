@@ -32,10 +32,6 @@ def test_every_signal_of_the_ticks_is_a_column(run):
     assert names == {*run.signals, "stack", "events"} - CONSTANT
 
 
-def test_units_follow_the_joints():
-    assert joint_units(tree_of(Robot.named("kuka_lwr"))) == (("rad",) * 7, ("rad",) * 7)
-
-
 def test_a_slide_is_measured_in_metres_and_a_wheel_by_cosine_and_sine(tmp_path):
     (tmp_path / "cart.urdf").write_text("""<robot name="cart"><link name="a"/><link name="b"/>
       <link name="c"/><joint name="slide" type="prismatic"><parent link="a"/><child link="b"/>
@@ -210,15 +206,6 @@ def test_every_shape_of_an_obstacle_is_drawn_at_its_size(shape):
     expected = {"box": [0.2, 0.4, 0.6], "capsule": [0.1, 0.1, 0.4], "point": [0.02] * 3}[shape]
     np.testing.assert_allclose([*part["size"].values()], expected)
     assert len(drawn["spheres"]) == {"box": 0, "capsule": 2, "point": 1}[shape]
-
-
-def test_quaternions_are_those_of_every_rotation():
-    rng = np.random.default_rng(0)
-    half_turns = [np.diag(np.roll([1.0, -1.0, -1.0], k)) for k in range(3)]
-    for Q in [np.eye(3), *half_turns, *(np.linalg.qr(rng.normal(size=(3, 3)))[0]
-                                        for _ in range(20))]:
-        R = Q * np.linalg.det(Q)
-        np.testing.assert_allclose(rotation(foxglove.xyzw(foxglove.quaternion(R))), R, atol=1e-12)
 
 
 @pytest.mark.slow
