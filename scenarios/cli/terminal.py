@@ -79,7 +79,8 @@ def print_table(runs: list[Run]) -> None:
         print()
         console.print(_table(runs, rows, range(first, min(first + beside, len(runs)))))
     found = verdicts(runs)
-    goals = [f"  {goal}" for goal in found[0].goals] if len(found) == 1 else []
+    goals = [fill(f"  {goal}", _WIDTH, subsequent_indent="    ") for goal in found[0].goals
+             ] if len(found) == 1 else []
     console.print("", *map(str, partings(runs)), *flags(runs), *lines(found), *goals, sep="\n")
 
 

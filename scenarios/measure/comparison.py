@@ -86,7 +86,8 @@ def _plain(run: Run) -> dict[str, Any]:
             "folder": run.folder, "fault": run.fault,
             "settings": {name: _plain_value(value) for name, value in run.settings.items()},
             "ticks": run.recording.ticks if run.recording else 0,
-            "metrics": {name: metrics.plain(metric) for name, metric in run.metrics.items()}}
+            "metrics": {name: metrics.plain(metric) for name, metric in run.metrics.items()},
+            **verdicts([run])[0].as_plain_data()}
 
 
 def _plain_parting(one: Parting) -> dict[str, Any]:

@@ -68,7 +68,7 @@ class Goal:
         if self.promise and self.met:
             return self.flag
         numbers = f"{shown(self.median, self.unit)}, worst {shown(self.worst, self.unit)}"
-        return numbers if self.met else f"{numbers}, out {_percent(self.share)}"
+        return numbers if self.met else f"{numbers}, out {percent(self.share)}"
 
     def __str__(self) -> str:
         since = f" from {self.reached:.2f} s on" if self.met and self.reached else ""
@@ -79,7 +79,7 @@ class Goal:
                  f"{shown(self.worst, self.unit)} at worst")
         return said if self.met else (
             f"{said}; more than {shown(self.tolerance, self.unit)} off for "
-            f"{_percent(self.share)} of the time, first at {self.first:.2f} s")
+            f"{percent(self.share)} of the time, first at {self.first:.2f} s")
 
 
 def goals(recording: Recording) -> tuple[Goal, ...]:
@@ -184,5 +184,6 @@ def _goal(name: str, asked: str, unit: str, off: Array, promise: bool, t: Array)
                 outside.size / off.size, float(t[outside[0]]) if outside.size else None, reached)
 
 
-def _percent(share: float) -> str:
+def percent(share: float) -> str:
+    """Return a share as it stands in a sentence."""
     return f"{100.0 * share:.2g} %" if share < 0.995 else f"{100.0 * share:.0f} %"

@@ -40,7 +40,7 @@ def measure(recording: Recording, settle: float = 2.0,
 
 
 def as_plain_data(recording: Recording) -> dict[str, Any]:
-    """Return what `metrics.json` holds: ticks, fault, events, and each metric as `plain` has it."""
+    """Return ticks, fault, events, and each metric as `plain` has it, for a JSON file."""
     events = [{"kind": kind, "action": action, "ticks": len(ticks), "first_tick": ticks[0],
                "first_time": float(recording["t"][ticks[0]])}
               for (kind, action), ticks in recording.troubles().items()]

@@ -19,6 +19,7 @@ from hierarchy.errors import HierarchyError, expect, file_path
 from scenarios.config import load
 from scenarios.files import whole, write_json
 from scenarios.measure import metrics
+from scenarios.measure.verdict import verdict
 from scenarios.recording.depth_view import DepthView
 from scenarios.recording.facts import Facts
 from scenarios.recording.recording import Event, Recording
@@ -29,13 +30,14 @@ _EVENT = np.dtype([("tick", np.int64), ("kind", "U24"), ("action", "U8")])
 def save(recording: Recording, folder: str | Path) -> Path:
     """Write a run's folder, completely or not at all, and return its path.
 
-    It has the files of `write` and `metrics.json`; `hierarchy figures`
-    adds the figures. `folder` must be new or empty.
+    It has the files of `write` and `metrics.json`, with the goals; `hierarchy figures` adds the
+    figures. `folder` must be new or empty.
     """
     expect("save", recording, Recording, "give what `simulate` returns")
     with whole(file_path("save", folder)) as partial:
         write(recording, partial)
-        write_json(partial / "metrics.json", metrics.as_plain_data(recording))
+        write_json(partial / "metrics.json", metrics.as_plain_data(recording)
+                   | verdict(recording).as_plain_data())
     return Path(folder)
 
 

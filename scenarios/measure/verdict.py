@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from scenarios.measure.goals import Goal, goals
+from scenarios.measure.goals import Goal, goals, percent
 from scenarios.measure.metric import shown
 
 if TYPE_CHECKING:
@@ -87,7 +87,8 @@ def _ends(found: Sequence[Verdict]) -> str:
         said = found[0].end
     else:
         whole = [one for one in found if one.fault is None]
-        said = f"{len(whole)} of {len(found)} ran to the end"
+        did = "stood" if all(one.stands for one in found) else "ran"
+        said = f"{len(whole)} of {len(found)} {did} to the end"
         said += "".join(f"; {one.label} {one.end}" for one in found if one.fault is not None)
     helped = [f"{one.label} {one.helped}".strip() for one in found if one.helped]
     return _sentence(said + (f"; ticks in which the policy stepped in: {', '.join(helped)}"
@@ -108,24 +109,31 @@ def _promises(found: Sequence[Verdict]) -> str:
         worst = max((goal for _, goal in who), key=lambda goal: goal.worst)
         under = "" if len(found) == 1 else " by all" if len(who) == len(found) else (
             f" by {_some([label for label, _ in who])}")
-        said.append(f"{what}{under}, {shown(worst.worst, worst.unit)} at worst")
+        said.append(f"{what}{under}, {shown(worst.worst, worst.unit)} at worst, for "
+                    f"{percent(worst.share)} of the time")
     return _sentence(f"broken: {'; '.join(said)}")
 
 
 def _targets(found: Sequence[Verdict]) -> str:
-    """Return how far from its targets the best and the worst run are in the median."""
+    """Return how far from its targets the best and the worst run are in the median.
+
+    Those that were left come first, in order of priority.
+    """
     by: dict[str, dict[str, Goal]] = {}
     for one in found:
         for goal in one.goals:
             if not goal.promise:
                 by.setdefault(goal.name, {})[one.label] = goal
+    left = sorted(by.items(), key=lambda one: all(goal.met for goal in one[1].values()))
     said = []
-    for name, some in list(by.items())[:_NAMED]:
+    for name, some in left[:_NAMED]:
         ranked = sorted(some, key=lambda label: float(f"{some[label].median:.3g}"))
         low, high = (shown(some[label].median, some[label].unit)
                      for label in (ranked[0], ranked[-1]))
-        said.append(f"{name} {low}" if low == high else
-                    f"{name} {low} ({ranked[0]}) to {high} ({ranked[-1]})")
+        worst = max(some.values(), key=lambda goal: goal.worst)
+        said.append((f"{name} {low}" if low == high else
+                     f"{name} {low} ({ranked[0]}) to {high} ({ranked[-1]})")
+                    + f", {shown(worst.worst, worst.unit)} at worst")
     return _sentence(f"off in the median: {'; '.join(said)}") if said else ""
 
 

@@ -64,5 +64,5 @@ def test_three_sentences_say_the_end_the_promises_and_the_targets():
                      "b")]
     end, promises, targets = lines(found)
     assert end.startswith("1 of 2 ran to the end; b fell at ")
-    assert promises == "Broken: joint limits by b, 0.5 rad at worst."
-    assert targets == "Off in the median: position 0 mm (b) to 2 mm (a)."
+    assert promises == "Broken: joint limits by b, 0.5 rad at worst, for 20 % of the time."
+    assert targets == "Off in the median: position 0 mm (b) to 2 mm (a), 2 mm at worst."

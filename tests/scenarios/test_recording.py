@@ -22,7 +22,7 @@ def hand_made_scenarios(monkeypatch):
 
 @pytest.mark.usefixtures("hand_made_scenarios")
 def test_what_was_saved_is_loaded_again_to_the_last_bit(tmp_path):
-    saved = recording(q=np.random.default_rng(0).normal(size=(5, 2)), fault="stopped at tick 5")
+    saved = recording(q=np.random.default_rng(0).normal(size=(5, 7)), fault="stopped at tick 5")
     loaded = load_run(save(saved, tmp_path / "run"))
     assert loaded.signals.keys() == saved.signals.keys()
     for name, signal in saved.signals.items():
