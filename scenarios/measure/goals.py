@@ -174,7 +174,7 @@ def _goal(name: str, asked: str, unit: str, off: Array, promise: bool, t: Array)
     known = np.isfinite(off)
     t, off = t[known], np.where(off[known] < _NOTHING, 0.0, off[known])
     within = np.flatnonzero(off <= tolerance)
-    reached = float(t[within[0]] - t[0]) if within.size else None
+    reached = float(t[within[0]]) if within.size else None
     if promise:
         off = passed(off, tolerance)
     elif within.size:
