@@ -69,7 +69,7 @@ class Recorder:
         self._orders: dict[tuple[str, ...], int] = {}
 
         def rows(*shape: int, count: int = ticks) -> Array:
-            """All rows are written once here: the system maps memory when it is first touched."""
+            """Return rows of NaN: the system maps memory when it is first touched."""
             return np.full((count, *shape), np.nan)
 
         self._log = _Log(rows(), rows(robot.nq), rows(robot.n),
@@ -182,7 +182,7 @@ class Recorder:
                         "planned_force": answers[:, n:].reshape(len(answers), -1, 3)}
         if self._blend is not None:
             signals["transition"] = self._weights[rows].copy()
-        if log.distance.size:
+        if log.distance.shape[1]:
             body = log.distance[:, :-1].copy()
             signals |= {"control_point_distance": body, "minimal_distance": body.min(axis=1),
                         "ee_distance": log.distance[:, -1].copy(), "active_control_point": active,
