@@ -93,7 +93,12 @@ TESTS = {
     "hierarchy/tasks/tangent_cone": "scenarios/test_rivals",
     "hierarchy/tasks/torque_limits": "hierarchy/test_limits hierarchy/test_contacts",
     "scenarios/measure/": "scenarios/test_parting scenarios/test_report",
-    "scenarios/measure/returning": "scenarios/test_singular",
+    "scenarios/measure/goals": "scenarios/test_goals",
+    "scenarios/measure/verdict": "scenarios/test_goals",
+    "scenarios/measure/tracking": "scenarios/test_metrics scenarios/test_singular",
+    "scenarios/measure/safety": "scenarios/test_metrics scenarios/test_plants",
+    "scenarios/measure/computing": "scenarios/test_metrics scenarios/test_faults",
+    "scenarios/measure/metric": "scenarios/test_metrics",
     "scenarios/measure/run_folder": "scenarios/test_recording scenarios/test_plants",
     "scenarios/measure/statistics": "scenarios/test_statistics",
     "scenarios/measure/metrics": "scenarios/test_metrics scenarios/test_hierarchical "

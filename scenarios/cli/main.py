@@ -229,20 +229,21 @@ def view(folders: Annotated[list[Path], typer.Argument(
 @app.command()
 def export(folder: Annotated[Path, typer.Argument(
                metavar="RUN", help="Run folder of `hierarchy run`.")],
-           format: Annotated[str | None, typer.Option(
-               "--format", metavar="FORMAT", help="csv, parquet or mcap. Default: by the suffix of "
-               "--out, or csv.")] = None,
+           format: Annotated[str, typer.Option(
+               "--format", metavar="FORMAT", help="mcap. Tables of other formats: "
+               "load_run(RUN).to_dataframe() in Python.")] = "mcap",
            out: Annotated[Path | None, output(
-               "A new file. Default: run.FORMAT in RUN.", "FILE")] = None,
+               "A new file. Default: run.mcap in RUN.", "FILE")] = None,
            plugin: Plugins = None,
            as_json: AsJson = False) -> None:
-    """Export a run as CSV, Parquet or MCAP.
+    """Export a run as MCAP, with a layout for Foxglove.
 
-    Parquet and MCAP need the extra `export`.
+    Needs the extra `export`.
     """
-    from scenarios.cli.export import export_command
+    from scenarios import load_run
+    from scenarios.export import export as write
 
-    files = [shown(path) for path in export_command(folder, format, out)]
+    files = [shown(path) for path in write(load_run(folder), out or folder / f"run.{format}")]
     if as_json:
         return print_json({"files": files})
     print(*files, sep="\n")

@@ -23,6 +23,7 @@ from scenarios.loop.simulation import simulate
 from scenarios.measure.metrics import as_plain_data
 from scenarios.measure.run_folder import save
 from scenarios.measure.runs import Run
+from scenarios.measure.verdict import verdict
 from scenarios.recording.recording import Recording
 
 
@@ -39,7 +40,8 @@ def run_scenario(scenario: Scenario, folder: Path, certify: bool, figures: bool,
         redraw([folder])
     if as_json:
         print_json({"scenario": scenario.name, "resolver": scenario.control.resolver,
-                    "folder": shown(folder), **as_plain_data(recording)})
+                    "folder": shown(folder), **as_plain_data(recording),
+                    **verdict(recording).as_plain_data()})
     else:
         _print(scenario, recording, certify)
         print(f"\n{recording.ticks} ticks in {shown(folder)}")

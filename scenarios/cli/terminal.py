@@ -63,12 +63,12 @@ def _finite(data: Any) -> Any:
 
 
 def print_table(runs: list[Run]) -> None:
-    """Print the metrics of runs side by side, where strict resolvers diverge, and the verdict."""
+    """Print the metrics of runs, where strict resolvers diverge, and the verdict by goal."""
     from rich.console import Console
 
     from scenarios.measure.partings import partings
-    from scenarios.measure.runs import table
-    from scenarios.measure.verdicts.verdict import verdict
+    from scenarios.measure.runs import flags, table
+    from scenarios.measure.verdict import lines, verdicts
 
     console = Console(markup=False, highlight=False)
     titles = dict.fromkeys(run.title for run in runs)
@@ -78,8 +78,10 @@ def print_table(runs: list[Run]) -> None:
     for first in range(0, len(runs), beside):
         print()
         console.print(_table(runs, rows, range(first, min(first + beside, len(runs)))))
-    said = [str(one) for one in partings(runs)]
-    console.print("", *said, *verdict(runs).lines, sep="\n")
+    found = verdicts(runs)
+    goals = [fill(f"  {goal}", _WIDTH, subsequent_indent="    ") for goal in found[0].goals
+             ] if len(found) == 1 else []
+    console.print("", *map(str, partings(runs)), *flags(runs), *lines(found), *goals, sep="\n")
 
 
 def _table(runs: list[Run], rows: list[Row], chosen: range) -> Table:

@@ -7,13 +7,12 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from numpy.typing import NDArray
 
 from scenarios.export import foxglove, new_file
 from scenarios.export.layout import layout
-from scenarios.export.numbers import plain
 from scenarios.export.schemas import FOXGLOVE, INTEGER, NUMBER, TEXT, TRUTH, a_list, an_object
-from scenarios.recording.columns import of_ticks, signal_units, stacks
 from scenarios.recording.signals import OTHER, known
 from scenarios.scene import scene
 
@@ -49,19 +48,19 @@ def write(recording: Recording, path: Path) -> list[Path]:
 
 def grouped(recording: Recording) -> dict[str, dict[str, NDArray[Any]]]:
     """Return the per-tick signals by channel and name, without time."""
-    signals = {name: signal for name, signal in of_ticks(recording).items() if name != "t"}
+    signals = {name: signal for name, signal in recording.of_ticks().items() if name != "t"}
     groups: dict[str, dict[str, NDArray[Any]]] = {}
     for name, signal in signals.items():
         flat = signal.reshape(len(signal), -1) if signal.ndim > 2 else signal
         of = known(name)
         groups.setdefault(of.topic if of else OTHER, {})[name] = flat
-    groups["/stack"]["tasks"] = stacks(recording)
+    groups["/stack"]["tasks"] = recording.stacks()
     return groups
 
 
 def _write(writer: Any, recording: Recording, groups: dict[str, dict[str, NDArray[Any]]]) -> None:
     writer.start(library="task-hierarchy")
-    units = signal_units(recording)
+    units = recording.units()
     schemas = {topic: (f"hierarchy.{topic[1:]}", an_object(
         **{name: {**_schema(signal), "description": " ".join(units.get(name, ()))}
            for name, signal in group.items()})) for topic, group in groups.items()}
@@ -87,7 +86,7 @@ def _entries(recording: Recording, groups: dict[str, dict[str, NDArray[Any]]]) -
     for frame, update in foxglove.scene_updates(drawn, round(FRAMES_A_SECOND)):
         yield foxglove.nanoseconds(drawn.t[frame]), "/scene", update
     for topic, group in groups.items():
-        names, rows = list(group), zip(*(plain(signal) for signal in group.values()), strict=True)
+        names, rows = list(group), zip(*(_plain(signal) for signal in group.values()), strict=True)
         for at, row in zip(times, rows, strict=True):
             yield at, topic, dict(zip(names, row, strict=True))
     for tick, kind, action in recording.events:
@@ -100,6 +99,13 @@ def _entries(recording: Recording, groups: dict[str, dict[str, NDArray[Any]]]) -
 def _schema(signal: NDArray[Any]) -> dict[str, Any]:
     schema = _KINDS[signal.dtype.kind]
     return a_list(schema) if signal.ndim > 1 else schema
+
+
+def _plain(values: NDArray[Any]) -> Any:
+    """Return numbers as nested lists, with None for those that are not finite."""
+    if values.dtype.kind == "f" and not np.isfinite(values).all():
+        return np.where(np.isfinite(values), values.astype(object), np.array(None)).tolist()
+    return values.tolist()
 
 
 def _bytes(message: dict[str, Any]) -> bytes:

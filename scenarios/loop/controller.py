@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import partial
 from math import inf, nan
 from time import perf_counter
 from typing import Any
 
 import numpy as np
 
-from hierarchy import State
 from hierarchy.allocation import Allocation
 from hierarchy.jit import bind
 from hierarchy.problem import Array, Hierarchy
 from scenarios.cell.build import Cell, build
 from scenarios.cell.stacked import stack_resolver
 from scenarios.config import Scenario
-from scenarios.loop.policy import Policy, smallest
+from scenarios.loop.faults import Faults
+from scenarios.loop.policy import policy_of, smallest
 from scenarios.loop.transition import Blend
 from solvers import Resolution, Resolver, Status
 
@@ -40,14 +38,15 @@ class Controller:
     hierarchy: Hierarchy
 
     def __init__(self, scenario: Scenario, cell: Cell | None = None,
-                 resolver: Resolver | None = None,
-                 clock: Callable[[], float] = perf_counter) -> None:
-        self.cell = cell = build(scenario) if cell is None else cell
-        self.resolver = (stack_resolver(scenario, cell.stack, cell.activation) if resolver is None
-                         else resolver)
-        control = scenario.control
-        self.level, self.clock = control.level, clock
-        self.policy = _policy(scenario, cell)
+                 resolver: Resolver | None = None, faults: Faults | None = None) -> None:
+        cell = build(scenario) if cell is None else cell
+        if resolver is None:
+            resolver = stack_resolver(scenario, cell.stack, cell.activation)
+        self.clock = perf_counter
+        if faults is not None:
+            cell, resolver, self.clock = faults.around(cell, resolver)
+        self.cell, self.resolver, control = cell, resolver, scenario.control
+        self.level, self.policy = control.level, policy_of(cell, control)
         self.blend = Blend(control.transition_time) if control.transition == "blend" else None
         self.cone_error = nan
         self._measure_cone = cell.pointing.follow_cone_error(cell.state) if cell.pointing else None
@@ -181,24 +180,3 @@ class Controller:
         if resolution.status is not _SOLVED:
             troubles.append(resolution.status.name.lower())
         return x
-
-
-def _policy(scenario: Scenario, cell: Cell) -> Policy:
-    control, robot = scenario.control, cell.robot
-    if control.level != "torque":
-        clamp = partial(cell.limits.clamp, cell.state, control.level) if cell.limits else None
-        return Policy(control.policy, control.level, control.period, clamp)
-    limits, limit = scenario.limits, cell.torque_limit
-    damping = np.where(np.isfinite(limit), limit, 0.0) / robot.velocity_limit[robot.actuated:]
-    step = (limits and limits.torque_step) or inf
-    return Policy(control.policy, control.level, control.period,
-                  partial(_clamped, cell.state, limit, step), damping)
-
-
-def _clamped(state: State, limit: Array, step: float, torques: Array) -> Array:
-    """Return torques moved within their limits, and at most `step` from those sent before."""
-    low, up = -limit, limit
-    if state.commanded is not None:
-        low, up = (np.clip(side, state.commanded - step, state.commanded + step)
-                   for side in (low, up))
-    return np.clip(torques, low, up)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from time import perf_counter
 from typing import Any, ClassVar, final
@@ -13,41 +13,44 @@ from hierarchy.avoidance import Measurement
 from hierarchy.problem import Array, Hierarchy
 from hierarchy.robot import Frame, Robot
 from hierarchy.state import State
-from scenarios.cell.build import build
+from scenarios.cell.build import Cell
 from scenarios.cell.sensors import DepthSensor, Sensor
-from scenarios.cell.stacked import stack_resolver
 from scenarios.config import Scenario, ScenarioError
 from scenarios.config.avoidance import ObstacleSection
 from scenarios.config.faults import FaultSection
-from scenarios.loop.controller import Controller
 from solvers import Resolution, Resolver, Status
+
+Clock = Callable[[], float]
 
 _AWAY = (1e3, 1e3, 1e3)  # [m] where an obstacle is until its fault starts
 
 
 @final
 class Faults:
-    """The faults of a scenario, and the `controller` that they affect.
+    """The faults of a scenario, put `around` the cell and the resolver of its controller.
 
-    Call `measure` once before each command, in order of time. Raises ScenarioError where a fault
-    does not fit the robot.
+    Call `measure` once before each command, in order of time.
     """
 
     def __init__(self, scenario: Scenario) -> None:
         self._sections, self._now = scenario.faults, 0.0
         self._half = scenario.control.period / 2
-        cell = build(_with_room_for_obstacles(scenario))
-        for i, fault in enumerate(scenario.faults):
+        self._skipped, self._skipped_at = 0.0, -1.0
+        self._standing: set[int] = set()
+
+    def around(self, cell: Cell, resolver: Resolver) -> tuple[Cell, Resolver, Clock]:
+        """Return a cell, a resolver and a clock with these faults.
+
+        The cell is that of the scenario `with_room`. Raises ScenarioError where a fault does not
+        fit the robot.
+        """
+        for i, fault in enumerate(self._sections):
             _check(f"faults.{i}", fault, cell.robot)
         if cell.sensor is not None:
             cell = replace(cell, sensor=FaultySensor(cell.sensor, self))
         self._plant, self._robot, self._sensor = cell.plant, cell.robot, cell.sensor
         self._last = cell.plant.q.copy(), cell.plant.v.copy(), 0.0
-        self._skipped, self._skipped_at = 0.0, -1.0
-        self._standing: set[int] = set()
-        inner = stack_resolver(scenario, cell.stack, cell.activation)
-        resolver = _FaultyResolver(inner=inner, faults=self)
-        self.controller = Controller(scenario, cell, resolver, self.clock)
+        return cell, _FaultyResolver(inner=resolver, faults=self), self._clock
 
     def measure(self, t: float) -> tuple[Array, Array, float]:
         """Return q (nq,) and v (n,) as measured at time t [s], and when that was [s]."""
@@ -68,7 +71,7 @@ class Faults:
         """Yield the active faults of a kind."""
         return (fault for fault in self._sections if fault.kind == kind and self._on(fault))
 
-    def clock(self) -> float:
+    def _clock(self) -> float:
         """Return the time [s] of a clock that faults may advance."""
         return perf_counter() + self._skipped
 
@@ -141,8 +144,8 @@ class _FaultyResolver(Resolver):
         return resolution
 
 
-def _with_room_for_obstacles(scenario: Scenario) -> Scenario:
-    """Return the scenario with one distant obstacle added for each obstacle fault."""
+def with_room(scenario: Scenario) -> Scenario:
+    """Return a scenario with one distant obstacle added for each obstacle fault."""
     radii = [fault.radius for fault in scenario.faults if fault.kind == "obstacle"]
     if not radii or scenario.avoidance is None:
         return scenario

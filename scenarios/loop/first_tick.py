@@ -47,9 +47,7 @@ def first_tick(scenario: Scenario) -> FirstTick:
 
     Raises HierarchyError where a run would: the scenario does not fit its robot or resolver.
     """
-    controller = Controller(scenario)
-    plant = controller.cell.plant
-    controller.command(0.0, plant.q, plant.v)
+    controller = _after_one(scenario)
     distances = _distances(controller)
     warnings = (*_warnings(scenario, distances), *_itself(controller.cell),
                 *_of_contacts(controller))
@@ -64,12 +62,15 @@ def contact_warnings(scenario: Scenario) -> tuple[str, ...]:
 
     Nothing but at level "torque". Raises HierarchyError where a run would.
     """
-    if scenario.control.level != "torque":
-        return ()
+    return tuple(_of_contacts(_after_one(scenario))) if scenario.control.level == "torque" else ()
+
+
+def _after_one(scenario: Scenario) -> Controller:
+    """Return a controller after its first tick."""
     controller = Controller(scenario)
     plant = controller.cell.plant
     controller.command(0.0, plant.q, plant.v)
-    return tuple(_of_contacts(controller))
+    return controller
 
 
 def _of_contacts(controller: Controller) -> Iterator[str]:

@@ -5,14 +5,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
+from math import inf
 from typing import final
 
 import numpy as np
 
 from hierarchy.jit import compiled
 from hierarchy.problem import Array
+from hierarchy.state import State
 from hierarchy.task import Level
-from scenarios.config.control import PolicySection
+from scenarios.cell.build import Cell
+from scenarios.config.control import ControlSection, PolicySection
 
 _ORDER = ("use", "hold", "brake", "stop")  # the last of those requested in a tick is taken
 _BRAKE = 10.0    # [1/s] deceleration per velocity
@@ -103,6 +107,28 @@ class Policy:
         if _differ(command, x):
             self.events = [*self.events, ("beyond_limits", "clamp")]
         return command
+
+
+def policy_of(cell: Cell, control: ControlSection) -> Policy:
+    """Return the policy of a cell, with the limits of its robot."""
+    if control.level != "torque":
+        clamp = partial(cell.limits.clamp, cell.state, control.level) if cell.limits else None
+        return Policy(control.policy, control.level, control.period, clamp)
+    limits, limit = cell.scenario.limits, cell.torque_limit
+    speed = cell.robot.velocity_limit[cell.robot.actuated:]
+    step = (limits and limits.torque_step) or inf
+    return Policy(control.policy, control.level, control.period,
+                  partial(_clamped, cell.state, limit, step),
+                  np.where(np.isfinite(limit), limit, 0.0) / speed)
+
+
+def _clamped(state: State, limit: Array, step: float, torques: Array) -> Array:
+    """Return torques moved within their limits, and at most `step` from those sent before."""
+    low, up = -limit, limit
+    if state.commanded is not None:
+        low, up = (np.clip(side, state.commanded - step, state.commanded + step)
+                   for side in (low, up))
+    return np.clip(torques, low, up)
 
 
 @compiled

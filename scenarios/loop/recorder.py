@@ -4,7 +4,8 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,21 +17,31 @@ from hierarchy.problem import Array
 from hierarchy.robot import Frame, Robot
 from hierarchy.state import State
 from scenarios.config import Scenario
-from scenarios.loop.active_sets import ActiveSets
+from scenarios.loop.audit import ActiveSets, Audit, Truth
 from scenarios.loop.controller import Controller
-from scenarios.loop.truth import truth_of
 from scenarios.recording import listed
 from scenarios.recording.facts import facts_of
 from scenarios.recording.recording import Event, Recording
 
 FASTEST = 1e3  # [rad/s or m/s] of a joint; a faster motion has diverged
+_CHOICES = ("order", "active_control_point", "repulsion_active", "status", "iterations")
 _TIMES = ("time_kinematics", "time_rows", "time_resolve", "time_tick")
 
 
-class _Tables(NamedTuple):
-    """What is written, one row per tick: numbers, choices (T, 5), times (T, 4) [s]."""
+class _Log(NamedTuple):
+    """What is written in each tick; names are those of signals.
 
-    log: Array
+    given : a, then the command. choices, times : see _CHOICES, _TIMES; the last of the times is
+    first the clock at the start of the tick.
+    """
+
+    t: Array
+    q: Array
+    v: Array
+    given: Array
+    ee_position: Array
+    pointing_error: Array
+    distance: Array
     choices: NDArray[np.int16]
     times: Array
 
@@ -48,29 +59,29 @@ class Recorder:
     """Memory for a whole run, filled row by row.
 
     `ticks` is the number of rows written so far; `facts` are those of the first controller.
+    `audits` look at every tick that the controller has answered.
     """
 
-    def __init__(self, controller: Controller, ticks: int) -> None:
+    def __init__(self, controller: Controller, ticks: int, audits: Sequence[Audit] = ()) -> None:
         self.ticks = 0
         cell, robot = controller.cell, controller.cell.robot
-        distances = len(cell.sensor.measurement.distance) if cell.sensor else 0
+        points = len(cell.sensor.measurement.distance) if cell.sensor else 0
         self._orders: dict[tuple[str, ...], int] = {}
-        # One row: t, q, v, a, command, end effector, cone error, distances.
-        self._commanded = len(controller.sent)
-        # All rows are written once here: the system maps memory when it is first touched.
-        width = 5 + robot.nq + 2 * robot.n + self._commanded + distances
-        self._log = np.full((ticks, width), np.nan)
-        self._desired = np.full((ticks if cell.position else 0, 3, 3), np.nan)
-        self._answers = np.full((ticks if cell.contacts else 0, len(controller.resolution.x)),
-                                np.nan)
-        self._choices = np.full((ticks, 5), -1, dtype=np.int16)
-        self._times, self._over = np.full((ticks, len(_TIMES)), np.nan), np.full(ticks, np.nan)
-        self._given = 1 + robot.nq + robot.n  # column of a
+
+        def rows(*shape: int, count: int = ticks) -> Array:
+            """Return rows of NaN: the system maps memory when it is first touched."""
+            return np.full((count, *shape), np.nan)
+
+        self._log = _Log(rows(), rows(robot.nq), rows(robot.n),
+                         rows(robot.n + len(controller.sent)), rows(3), rows(), rows(points),
+                         np.full((ticks, len(_CHOICES)), -1, dtype=np.int16), rows(len(_TIMES)))
+        self._desired = rows(3, 3, count=ticks if cell.position else 0)
+        self._answers = rows(len(controller.resolution.x), count=ticks if cell.contacts else 0)
         self._extra = {name: np.empty((ticks, *value.shape), value.dtype)
                        for name, value in cell.plant.extra.items()}
         self._weights = np.empty(ticks if controller.blend else 0)
         self._events: list[Event] = []
-        self._truth, self._active = truth_of(cell, ticks), ActiveSets(ticks)
+        self._truth, self._audits = Truth(ticks, cell), (ActiveSets(ticks), *audits)
         self.facts = facts_of(cell.scenario, robot)
         self.follow(controller)
 
@@ -79,12 +90,11 @@ class Recorder:
         self._controller, self._cell = controller, controller.cell
         cell, state = controller.cell, controller.cell.state
         self._frame = cell.robot.frame(cell.robot.end_effector)
-        self._distance = cell.sensor.measurement.distance if cell.sensor else np.empty(0)
-        self._write_rest = bind(
-            _write, _Tables(self._log, self._choices, self._times),
-            _Seen(state.q, state.v, state.placements, self._distance),
-            self._frame.joint, self._frame.offset, self._commanded,
-            then=(0, (0,) * 5, (0.0,) * 6))
+        distance = cell.sensor.measurement.distance if cell.sensor else np.empty(0)
+        self._write_rest = bind(_write, self._log,
+                                _Seen(state.q, state.v, state.placements, distance),
+                                self._frame.joint, self._frame.offset,
+                                then=(0, (0,) * len(_CHOICES), (0.0,) * 6))
         self._blend, self._policy = controller.blend, controller.policy
 
     def write(self) -> bool:
@@ -97,7 +107,7 @@ class Recorder:
         index = self._orders.setdefault(order, len(self._orders))
         active = cell.sensor.measurement.active + 1 if AVOIDANCE in order and cell.sensor else -1
         resolution, plant = controller.resolution, cell.plant
-        finite = _write_given(self._log, k, self._given, plant.a, controller.sent)
+        finite = _write_given(self._log.given, k, plant.a, controller.sent)
         finite &= self._write_rest(
             k, (index, active, repulsion, resolution.status, resolution.iterations),
             (cell.state.t, controller.cone_error, *controller.stamps))
@@ -115,68 +125,69 @@ class Recorder:
 
     def stamp(self, clock: float) -> None:
         """Note the clock [s] at the end of the tick just written."""
-        self._over[self.ticks - 1] = clock
+        times = self._log.times[self.ticks - 1]
+        times[3] = clock - times[3]
 
     def look(self) -> None:
-        """Note of the tick just written what only a simulation knows or nobody waits for.
+        """Note the desired position, true distances and audits of the tick just written.
 
-        That is not part of the tick's time: the desired position, true distances, and which rows
-        act.
+        That is not part of the tick's time: a controller does not wait for it.
         """
         controller, cell, k = self._controller, self._cell, self.ticks - 1
         if cell.position is not None:
             cell.position.path.write(cell.state.t, self._desired[k])
+        self._truth.look(k, controller)
         if controller.answered:
-            self._active.look(k, controller.hierarchy, controller.resolution)
-        if self._truth is not None:
-            self._truth.look(k, cell.state.t, cell.plant.extra.get("true_q", cell.state.q))
+            for audit in self._audits:
+                audit.look(k, controller)
 
     def finish(self, scenario: Scenario, fault: str | None) -> Recording:
         """Return the run as recorded so far."""
-        robot, rows = self._cell.robot, slice(0, self.ticks)
-        n, log = robot.n, self._log[rows]
-        widths = [1, robot.nq, n, n, self._commanded, 3, 1, max(len(self._distance) - 1, 0)]
-        ends = np.cumsum(widths)
-        t, q, v, a, command, actual, cone, body = (
-            log[:, end - width:end].copy() for end, width in zip(ends, widths, strict=True))
-        order, active, repulsion, status, iterations = self._choices[rows].T.copy()
-        signals = {"t": t[:, 0], "q": q, "v": v, "a": a, "command": command,
-                   "ee_position": actual, "order": order, "status": status,
-                   "iterations": iterations}
-        orders = tuple(self._orders)
-        if self._cell.position is not None:
+        log = _Log._make([values[:self.ticks].copy() for values in self._log])
+        signals = self._of_controller(log) | {
+            name: values[:self.ticks].copy() for name, values in self._extra.items()}
+        robot, cell = self._cell.robot, self._cell
+        if "true_q" in signals:
+            signals["true_ee_position"] = _positions(robot, self._frame, signals["true_q"])
+        signals |= {"joint_lower": robot.lower, "joint_upper": robot.upper,
+                    "velocity_limit": cell.velocity_limit}
+        if cell.contacts is not None:
+            signals["torque_limit"] = cell.torque_limit
+        recording = Recording(signals, tuple(map(" > ".join, self._orders)), scenario, self.facts,
+                              fault, tuple(self._events))
+        for audit in (self._truth, *self._audits):
+            signals.update(audit.signals(recording))
+        return recording
+
+    def _of_controller(self, log: _Log) -> dict[str, NDArray[Any]]:
+        """Return the signals of what the controller knew and did."""
+        cell, rows, n = self._cell, slice(self.ticks), self._cell.robot.n
+        order, active, repulsion, status, iterations = log.choices.T.copy()
+        signals = {"t": log.t, "q": log.q, "v": log.v, "a": log.given[:, :n].copy(),
+                   "command": log.given[:, n:].copy(), "ee_position": log.ee_position,
+                   "order": order, "status": status, "iterations": iterations,
+                   **dict(zip(_TIMES, log.times.T.copy(), strict=True))}
+        if cell.position is not None:
             desired = self._desired[rows, 0].copy()
-            signals |= {"desired_position": desired, "position_error": desired - actual}
-        if self._cell.pointing is not None:
-            asked = np.array(["pointing" in names for names in orders])
-            signals |= {"pointing_error": cone[:, 0], "pointing_active": asked[order]}
-        if self._cell.listed:
-            signals |= listed.signals(robot, self._cell.listed, t[:, 0], q, v)
-        if self._cell.contacts is not None:
+            signals |= {"desired_position": desired,
+                        "position_error": desired - log.ee_position}
+        if cell.pointing is not None:
+            asked = np.array(["pointing" in names for names in self._orders])
+            signals |= {"pointing_error": log.pointing_error, "pointing_active": asked[order]}
+        if cell.listed:
+            signals |= listed.signals(cell.robot, cell.listed, log.t, log.q, log.v)
+        if cell.contacts is not None:
             answers = self._answers[rows].copy()
             signals |= {"planned_acceleration": answers[:, :n],
                         "planned_force": answers[:, n:].reshape(len(answers), -1, 3)}
         if self._blend is not None:
             signals["transition"] = self._weights[rows].copy()
-        signals |= {name: values[rows].copy() for name, values in self._extra.items()}
-        if "true_q" in signals:
-            signals["true_ee_position"] = _positions(robot, self._frame, signals["true_q"])
-        if len(self._distance):
+        if log.distance.shape[1]:
+            body = log.distance[:, :-1].copy()
             signals |= {"control_point_distance": body, "minimal_distance": body.min(axis=1),
-                        "ee_distance": log[:, -1].copy(), "active_control_point": active,
+                        "ee_distance": log.distance[:, -1].copy(), "active_control_point": active,
                         "repulsion_active": repulsion.astype(bool)}
-        if self._truth is not None:
-            signals |= self._truth.signals(self.ticks)
-        signals |= self._active.signals(self.ticks)
-        times = self._times[rows].copy()
-        times[:, 3] = self._over[rows] - times[:, 3]
-        signals |= dict(zip(_TIMES, times.T.copy(), strict=True))
-        signals |= {"joint_lower": robot.lower, "joint_upper": robot.upper,
-                    "velocity_limit": self._cell.velocity_limit}
-        if self._cell.contacts is not None:
-            signals["torque_limit"] = self._cell.torque_limit
-        return Recording(signals, tuple(" > ".join(names) for names in orders), scenario,
-                         self.facts, fault, tuple(self._events))
+        return signals
 
 
 def _positions(robot: Robot, frame: Frame, q: Array) -> Array:
@@ -190,45 +201,39 @@ def _positions(robot: Robot, frame: Frame, q: Array) -> Array:
 
 
 @compiled
-def _write_given(log, k, first, a, command):
+def _write_given(given, k, a, command):
     """Write acceleration and command of tick k; return whether the acceleration is finite."""
-    row, n, finite = log[k], len(a), True
+    row, n, finite = given[k], len(a), True
     for j in range(n):
-        row[first + j] = a[j]
+        row[j] = a[j]
         finite &= np.isfinite(a[j])
     for j in range(len(command)):
-        row[first + n + j] = command[j]
+        row[n + j] = command[j]
     return finite
 
 
 @compiled
-def _write(tables, seen, joint, offset, commanded, k, chosen, measured):
+def _write(log, seen, joint, offset, k, chosen, measured):
     """Write the rest of tick k; return whether q is finite and v within FASTEST.
 
-    chosen: order, active point, repulsion, status, iterations. measured: t, the error of the cone,
-    and the clock at the start of the tick and after kinematics, rows and resolution.
+    chosen: see _CHOICES. measured: t, the error of the cone, and the clock at the start of the tick
+    and after kinematics, rows and resolution.
     """
-    row, finite = tables.log[k], True
-    t, cone_error, begin, moved, written, resolved = measured
-    row[0] = t
-    i = 1
+    finite = True
+    log.t[k], log.pointing_error[k], begin, moved, written, resolved = measured
     for j in range(len(seen.q)):
-        row[i + j] = seen.q[j]
+        log.q[k, j] = seen.q[j]
         finite &= np.isfinite(seen.q[j])
-    i += len(seen.q)
     for j in range(len(seen.v)):
-        row[i + j] = seen.v[j]
+        log.v[k, j] = seen.v[j]
         finite &= abs(seen.v[j]) <= FASTEST
-    i += 2 * len(seen.v) + commanded
     for j in range(3):
-        row[i + j] = point_at(seen.placements, joint, offset, j)
-    row[i + 3] = cone_error
-    i += 4
+        log.ee_position[k, j] = point_at(seen.placements, joint, offset, j)
     for j in range(len(seen.distance)):
-        row[i + j] = seen.distance[j]
+        log.distance[k, j] = seen.distance[j]
     for j in range(len(chosen)):
-        tables.choices[k, j] = min(chosen[j], 32767)
-    times = tables.times[k]
+        log.choices[k, j] = min(chosen[j], 32767)
+    times = log.times[k]
     times[0], times[1], times[2] = moved - begin, written - moved, resolved - written
     times[3] = begin
     return finite

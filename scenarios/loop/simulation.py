@@ -9,13 +9,14 @@ import numpy as np
 
 from hierarchy.errors import HierarchyError, brief, expect
 from hierarchy.problem import Array
+from scenarios.cell.build import Cell
 from scenarios.cell.plants.plant import fault_of
 from scenarios.config import Scenario, load
-from scenarios.loop.audit import Audit, Certified, Judging, Strictness
+from scenarios.loop.audit import Audit, Certified, Strictness
 from scenarios.loop.controller import Controller
-from scenarios.loop.faults import Faults
+from scenarios.loop.faults import Faults, with_room
 from scenarios.loop.recorder import FASTEST, Recorder
-from scenarios.measure.judging import completed
+from scenarios.measure.judging import Fates, completed
 from scenarios.recording.recording import Recording
 
 _REPORT_EVERY = 500  # ticks between two calls of `progress`
@@ -41,38 +42,42 @@ def simulate(scenario: Scenario | str | Path, progress: Callable[[int, int], Non
     if progress is not None and not callable(progress):
         raise HierarchyError(f"simulate: progress: expected a function, got {brief(progress)}")
     expect("simulate: audits", audits, Iterable, "give a list of audits")
-    rehearsal = Controller(scenario)
-    rehearsal.rehearse()
-    Recorder(rehearsal, 1).write()
+    rehearsal = rehearsed(scenario)
     faults = Faults(scenario) if scenario.faults else None
-    controller = Controller(scenario) if faults is None else faults.controller
+    controller = Controller(with_room(scenario), faults=faults)
     ticks = scenario.control.ticks
-    recorder = Recorder(controller, ticks)
-    every = (*_audits(controller, scenario, ticks, certified), *audits)
+    recorder = Recorder(controller, ticks, (*_audits(controller, scenario, certified), *audits))
     try:
         fault = _run(controller, recorder, scenario.control.period, ticks, progress or _silent,
-                     every, faults)
+                     faults)
     except KeyboardInterrupt:
         fault = f"interrupted at tick {recorder.ticks}"
-    recording = recorder.finish(scenario, fault)
-    for audit in every:
-        recording.signals.update(audit.signals(recording))
-    return completed(recording, rehearsal.cell)
+    return completed(recorder.finish(scenario, fault), rehearsal)
 
 
-def _audits(controller: Controller, scenario: Scenario, ticks: int, certified: bool
-            ) -> list[Audit]:
+def rehearsed(scenario: Scenario) -> Cell:
+    """Call everything of a tick once, so that nothing is loaded later; return a cell at rest.
+
+    Raises HierarchyError where the scenario does not fit its robot or resolver.
+    """
+    controller = Controller(scenario)
+    controller.rehearse()
+    Recorder(controller, 1).write()
+    return controller.cell
+
+
+def _audits(controller: Controller, scenario: Scenario, certified: bool) -> list[Audit]:
+    ticks = scenario.control.ticks
     audits: list[Audit] = [Certified(ticks)] if certified else []
     if scenario.control.strictness:
         audits.append(Strictness(ticks, scenario))
     if scenario.sensor.kind != "exact":  # rows cannot be written again without the images
-        audits.append(Judging(ticks, controller.cell))
+        audits.append(Fates(controller.cell.stack.names, ticks, controller.cell.robot.n))
     return audits
 
 
 def _run(controller: Controller, recorder: Recorder, period: float, ticks: int,
-         progress: Callable[[int, int], None], audits: Sequence[Audit],
-         faults: Faults | None) -> str | None:
+         progress: Callable[[int, int], None], faults: Faults | None) -> str | None:
     policy = controller.policy
     for k in range(ticks):
         if k % _REPORT_EVERY == 0:
@@ -80,9 +85,6 @@ def _run(controller: Controller, recorder: Recorder, period: float, ticks: int,
         broken = tick(controller, recorder, k * period, faults)
         if broken:
             return f"{broken} from tick {k} on (t = {k * period:.3f} s)"
-        if controller.answered:
-            for audit in audits:
-                audit.look(k, controller)
         if policy.stopped:
             return policy.fault
     progress(ticks, ticks)

@@ -12,7 +12,7 @@ from hierarchy.notebook import html_table
 from scenarios.measure import metrics
 from scenarios.measure.partings import Parting, partings
 from scenarios.measure.runs import Run, table
-from scenarios.measure.verdicts.verdict import verdict
+from scenarios.measure.verdict import lines, verdicts
 
 
 @dataclass(frozen=True, repr=False)
@@ -64,7 +64,7 @@ class Comparison:
     def as_plain_data(self) -> dict[str, Any]:
         """Return what `comparison.json` holds."""
         return {"command": self.command, "versions": self.versions,
-                "verdicts": {name: list(verdict(runs).lines)
+                "verdicts": {name: list(lines(verdicts(runs)))
                              for name, runs in self.groups().items()},
                 "runs": [_plain(run) for run in self.runs], "refused": list(self.refused),
                 "partings": {name: [_plain_parting(one) for one in partings(runs)]
@@ -86,7 +86,8 @@ def _plain(run: Run) -> dict[str, Any]:
             "folder": run.folder, "fault": run.fault,
             "settings": {name: _plain_value(value) for name, value in run.settings.items()},
             "ticks": run.recording.ticks if run.recording else 0,
-            "metrics": {name: metrics.plain(metric) for name, metric in run.metrics.items()}}
+            "metrics": {name: metrics.plain(metric) for name, metric in run.metrics.items()},
+            **verdicts([run])[0].as_plain_data()}
 
 
 def _plain_parting(one: Parting) -> dict[str, Any]:

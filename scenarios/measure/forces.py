@@ -3,96 +3,93 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, NamedTuple
+from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+
+from scenarios.config.kinds.forces import ListedForce
+from scenarios.measure.metric import Array, Criteria, Metric, known, largest, least, register
+from scenarios.measure.safety import steps
 
 if TYPE_CHECKING:
     from scenarios.recording.recording import Recording
 
-Array = NDArray[np.float64]
 _LOAD = 1.0        # [N] from which a contact counts as loaded
 _AT_LIMIT = 0.999  # share of a torque limit that counts as being at it
 
 
-class Number(NamedTuple):
-    """One number of a run, as the first fields of a Metric."""
+@register("forces")
+def _forces(recording: Recording, by: Criteria) -> Iterator[Metric]:
+    if "floor_force" in recording:
+        yield from _wanted(recording, by.settle)
+        if recording["floor_force"].size:
+            yield from _contacts(recording)
+    if recording.scenario.control.level == "torque":
+        yield from _torques(recording)
+        yield from _levels(recording)
 
-    name: str
-    label: str
-    value: float | None
-    unit: str
-    lower_is_better: bool | None = True
 
-
-def of_contacts(recording: Recording) -> Iterator[Number]:
+def _contacts(recording: Recording) -> Iterator[Metric]:
     """Yield what the floor says: slip, margins of friction and of the centre of pressure."""
-    if "floor_force" not in recording or not recording["floor_force"].size:
-        return
+    metric = partial(Metric, group="Contacts")
     if not all(contact.slides for contact in recording.scenario.contacts):
-        yield Number("slip_max", "Slip of a contact, max", _largest(recording["slip"]), "m")
-        yield Number("friction_margin_min", "Friction left, min", _least(friction_left(recording)),
-                     "share", False)
-    if np.isfinite(recording["pressure_margin"]).any():
-        yield Number("pressure_margin_min", "Centre of pressure from the edge, min",
-                     _least(recording["pressure_margin"]), "m", False)
-    if np.isfinite(recording["support_margin"]).any():
-        yield Number("support_margin_min", "Centre of mass inside the support polygon, min",
-                     _least(recording["support_margin"]), "m", False)
+        yield metric("slip_max", "Slip of a contact, max", largest(known(recording["slip"])), "m")
+        yield metric("friction_margin_min", "Friction left, min",
+                     least(known(friction_left(recording))), "share", False)
+    for key, label in (("pressure", "Centre of pressure from the edge"),
+                       ("support", "Centre of mass inside the support polygon")):
+        margin = known(recording[f"{key}_margin"])
+        if margin.size:
+            yield metric(f"{key}_margin_min", f"{label}, min", least(margin), "m", False)
     error = force_error(recording)
-    yield Number("force_error_p95", "Force of a contact against that planned, 95 %",
+    yield metric("force_error_p95", "Force of a contact against that planned, 95 %",
                  float(np.percentile(error, 95.0)) if error.size else None, "N")
 
 
-def of_wanted_forces(recording: Recording, settle: float) -> Iterator[Number]:
-    """Yield how well contacts push with the normal force that a task asks for, after `settle` [s].
-
-    The surface is horizontal, as in the plant.
-    """
-    if "floor_force" not in recording:
-        return
-    from scenarios.config.kinds.forces import ListedForce
-
-    names = [contact.name or contact.frame for contact in recording.scenario.contacts]
+def _wanted(recording: Recording, settle: float) -> Iterator[Metric]:
+    """Yield how well contacts push with the normal force that a task asks for, after `settle`."""
     after = recording["t"] >= settle
-    for task in recording.scenario.tasks:
-        if isinstance(task, ListedForce) and len(task.target) == 1 and after.any():
-            force = recording["floor_force"][after, names.index(task.contact), 2]
-            key, title = task.title.replace(" ", "_"), f"{task.title[0].upper()}{task.title[1:]}"
-            yield Number(f"{key}_rms", f"{title}: error after {settle:g} s, rms",
-                         float(np.sqrt(np.mean((force - task.target[0])**2))), "N")
-            yield Number(f"{key}_touching_share", f"{title}: time in contact after {settle:g} s",
-                         float(np.mean(force > 0.0)), "share", False)
+    for task, force in wanted_forces(recording) if after.any() else ():
+        key, title = task.title.replace(" ", "_"), f"{task.title[0].upper()}{task.title[1:]}"
+        error = force[after] - task.target[0]
+        yield Metric(f"{key}_rms", f"{title}: error after {settle:g} s, rms",
+                     float(np.sqrt(np.mean(error**2))), "N", group="Contacts")
+        yield Metric(f"{key}_touching_share", f"{title}: time in contact after {settle:g} s",
+                     float(np.mean(force[after] > 0.0)), "share", False, "Contacts")
 
 
-def of_torques(recording: Recording) -> Iterator[Number]:
+def wanted_forces(recording: Recording) -> Iterator[tuple[ListedForce, Array]]:
+    """Yield each task of a normal force with that force (T,) [N]; floors are horizontal."""
+    names = [contact.name or contact.frame for contact in recording.scenario.contacts]
+    for task in recording.scenario.tasks if "floor_force" in recording else ():
+        if isinstance(task, ListedForce) and len(task.target) == 1:
+            yield task, recording["floor_force"][:, names.index(task.contact), 2]
+
+
+def _torques(recording: Recording) -> Iterator[Metric]:
     """Yield how near to their limits the torques are, and how they jump."""
-    if recording.scenario.control.level != "torque":
-        return
-    torque = recording["command"]
+    torque, metric = recording["command"], partial(Metric, group="Torques")
     if "torque_limit" in recording:
         at = (np.abs(torque) >= _AT_LIMIT * recording["torque_limit"]).any(axis=1)
-        yield Number("torque_limit_share", "Time with a torque at its limit", float(at.mean()),
+        yield metric("torque_limit_share", "Time with a torque at its limit", float(at.mean()),
                      "share")
-    yield Number("torque_step_max", "Torque step, max", _largest(np.diff(torque, axis=0)), "N m")
+    yield from steps("torque", "Torque", torque, "N m", group="Torques")
     if "com" in recording:
         height = recording["com"][:, 2]
-        yield Number("com_drop_max", "Centre of mass below its start, max",
+        yield metric("com_drop_max", "Centre of mass below its start, max",
                      float(height[0] - height.min()), "m")
         moved = np.linalg.norm((recording["com"][-1] - recording["com"][0])[:2])
-        yield Number("com_travel", "Centre of mass from start to end", float(moved), "m", None)
+        yield metric("com_travel", "Centre of mass from start to end", float(moved), "m", None)
 
 
-def of_levels(recording: Recording) -> Iterator[Number]:
+def _levels(recording: Recording) -> Iterator[Metric]:
     """Yield by how much each level is missed, on average over the ticks in which it is known."""
-    if recording.scenario.control.level != "torque" or "level_violation" not in recording:
-        return
-    missed = recording["level_violation"]
-    for name, column in zip(recording.task_names, missed.T, strict=True):
-        known = column[np.isfinite(column)]
-        mean = float(known.mean()) if known.size else None
-        yield Number(f"miss_{name.replace(' ', '_')}", f"Missed by {name}, mean", mean, "rows")
+    if "level_violation" in recording:
+        for name, column in zip(recording.task_names, recording["level_violation"].T, strict=True):
+            missed = known(column)
+            yield Metric(f"miss_{name.replace(' ', '_')}", f"Missed by {name}, mean",
+                         float(missed.mean()) if missed.size else None, "rows", group="Levels")
 
 
 def friction_left(recording: Recording) -> Array:
@@ -107,21 +104,8 @@ def friction_left(recording: Recording) -> Array:
 
 def force_error(recording: Recording) -> Array:
     """Return the largest component [N] of floor_force against planned, in ticks without push."""
-    planned, at = recording["planned_force"], 0
-    sums = np.empty_like(recording["floor_force"])
-    for c, contact in enumerate(recording.scenario.contacts):
-        count = 1 if contact.x is None else 4
-        sums[:, c] = planned[:, at:at + count].sum(axis=1)
-        at += count
-    error: Array = np.abs(recording["floor_force"] - sums).max(axis=(1, 2))
+    counts = [1 if contact.x is None else 4 for contact in recording.scenario.contacts]
+    first = np.cumsum([0, *counts[:-1]])
+    planned = np.add.reduceat(recording["planned_force"], first, axis=1)
+    error: Array = np.abs(recording["floor_force"] - planned).max(axis=(1, 2))
     return error[np.isfinite(error) & ~recording["push"].any(axis=1)]
-
-
-def _largest(values: Array) -> float | None:
-    known = np.abs(values[np.isfinite(values)])
-    return float(known.max()) if known.size else None
-
-
-def _least(values: Array) -> float | None:
-    known = values[np.isfinite(values)]
-    return float(known.min()) if known.size else None

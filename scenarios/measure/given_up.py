@@ -36,7 +36,7 @@ class GivenUp:
     def __str__(self) -> str:
         held, at = (", ".join(f"{name} ({100.0 * share:.0f} %)" for name, share in named)
                     for named in (self.held_by, self.rows))
-        return (f"{self.level} was missed in {100.0 * self.share:.0f} % of its ticks "
+        return (f"row missed: {self.level} in {100.0 * self.share:.0f} % of its ticks "
                 f"({self.seconds:.3g} s)" + (f", at {at}" if at else "")
                 + (f"; held back by {held}" if held else ""))
 

@@ -1,25 +1,91 @@
-"""Completes a Recording after its last tick, so that readers need no robot."""
+"""The fate of each level: the rows of every tick, and the command that was sent judged by them."""
 
 # mypy: disable-error-code="no-untyped-def"
 
 from __future__ import annotations
 
 from dataclasses import replace
+from math import nan, sqrt
+from typing import Any, NamedTuple, final
 
 import numpy as np
+from numpy.typing import NDArray
 
-from hierarchy.avoidance import Measurement
-from hierarchy.contacts import Contacts
 from hierarchy.jit import compiled
 from hierarchy.problem import Array, Hierarchy
 from scenarios.cell.build import Cell, build
 from scenarios.cell.sensors import DepthSensor
 from scenarios.config.plant import KinematicSection
 from scenarios.recording.depth_view import DepthView
-from scenarios.recording.fate import Fates
+from scenarios.recording.fate import Fate
 from scenarios.recording.recording import Recording
+from solvers.certificate import TOLERANCE
 
 _SAME = 1e-9  # [m] of distances that are those recorded
+
+
+class Judged(NamedTuple):
+    """Fate (L,) and violation (L,) of each level, and the saturated entries (n,) of x."""
+
+    fate: NDArray[np.int8]
+    violation: Array
+    saturated: NDArray[np.int8]
+
+
+def judged(cell: Cell, h: Hierarchy, x: Array, accuracy: float) -> Judged:
+    """Judge a command x (n,) by the rows of its tick; `accuracy` is the resolver's.
+
+    A row is on a side if it is as near to it as the resolver, or a certificate, may be.
+    """
+    near = max(TOLERANCE, accuracy) * (1.0 + sqrt(float(x @ x)))
+    n, levels = cell.robot.n, len(h.sizes)
+    found = Judged(np.zeros(levels, np.int8), np.zeros(levels), np.zeros(n, np.int8))
+    lower = h.lower if cell.activation is None else cell.activation.demanded(h)
+    _judge_levels(h.A, lower, h.upper, h.offsets, x, near, found.fate, found.violation)
+    if (limits := cell.limits) is not None:
+        if limits.name in h.names:
+            rows = slice(*h.offsets[h.names.index(limits.name):][:2])
+            box = h.lower[rows], h.upper[rows]
+        else:
+            box = limits.box(cell.state, "velocity" if cell.stack.level == "velocity"
+                             else "acceleration")
+        _find_saturated(x[:n], *box, near, found.saturated)
+    return found
+
+
+@final
+class Fates:
+    """Collects the fates of the tasks called `names` tick by tick; an Audit of a run."""
+
+    def __init__(self, names: tuple[str, ...], ticks: int, joints: int) -> None:
+        self._names = names
+        self._fate = np.zeros((ticks, len(names)), np.int8)
+        self._violation = np.full((ticks, len(names)), np.nan)
+        self._saturated = np.zeros((ticks, joints), np.int8)
+        self._columns: dict[tuple[str, ...], NDArray[np.int64]] = {}
+
+    def look(self, tick: int, controller: Any) -> None:
+        """Judge the command of the tick that a Controller has just answered."""
+        self.judge(tick, controller.cell, controller.hierarchy, controller.meant,
+                   controller.resolver.accuracy)
+
+    def judge(self, tick: int, cell: Cell, h: Hierarchy, x: Array, accuracy: float) -> None:
+        """Judge the command x (n,) of a tick; see `judged`."""
+        columns = self._columns.get(h.names)
+        if columns is None:
+            columns = np.array([self._names.index(name) for name in h.names], dtype=np.int64)
+            self._columns[h.names] = columns
+        found = judged(cell, h, x, accuracy)
+        self._fate[tick, columns], self._violation[tick, columns] = found.fate, found.violation
+        self._saturated[tick] = found.saturated
+
+    def signals(self, recording: Recording) -> dict[str, NDArray[np.int8] | Array]:
+        """Return the signals of a Recording; levels that were not judged are UNKNOWN."""
+        columns = [self._names.index(name) for name in recording.task_names]
+        fate, rows = self._fate[:recording.ticks, columns], slice(recording.ticks)
+        return {"level_fate": np.maximum(fate, np.int8(Fate.UNKNOWN) * recording.in_stack),
+                "level_violation": self._violation[rows, columns],
+                "saturated": self._saturated[rows]}
 
 
 def completed(recording: Recording, cell: Cell) -> Recording:
@@ -50,34 +116,23 @@ def judge(recording: Recording, cell: Cell) -> None:
     recording.signals.update(fates.signals(recording))
 
 
-def _meant(recording: Recording) -> Array:
-    """Return what the commands stand for in the rows: at level "torque" the answers."""
-    if recording.scenario.control.level != "torque":
-        return recording["command"]
-    forces = recording["planned_force"].reshape(recording.ticks, -1)
-    return np.hstack([recording["planned_acceleration"], forces])
-
-
-def _carried(recording: Recording, contacts: Contacts) -> list[Array | None]:
-    """Return what the contacts carried before each tick, see `Contacts.carried`."""
-    found: list[Array | None] = [None]
-    for t, x in zip(recording["t"].tolist(), _meant(recording), strict=True):
-        found.append(found[-1] if np.isnan(x[0]) else contacts.carried(t, x, found[-1]))
-    return found
-
-
 class Rows:
     """Moves a cell through the recorded ticks."""
 
     def __init__(self, recording: Recording, cell: Cell) -> None:
-        self._cell = cell
+        self._cell, level = cell, recording.scenario.control.level
         self._t = recording["t"].tolist()
         self._q, self._v, self._command = (recording[name] for name in ("q", "v", "command"))
-        level = recording.scenario.control.level
         self._follows = level != "acceleration"  # whether rows depend on the last command
         self._first = self._v[0] if level == "velocity" else None
-        self._carried = _carried(recording, cell.contacts) if cell.contacts else ()
-        self._cone_error = cell.pointing.follow_cone_error(cell.state) if cell.pointing else None
+        self._carried: list[Array | None] = [None]  # by the contacts before each tick
+        if cell.contacts:
+            for t, x in zip(self._t, _meant(recording), strict=True):
+                last = self._carried[-1]
+                self._carried.append(
+                    last if np.isnan(x[0]) else cell.contacts.carried(t, x, last))
+        self._cone_error = (cell.pointing.follow_cone_error(cell.state) if cell.pointing
+                            else lambda: nan)
         if "ee_distance" in recording:
             self._distance = np.column_stack([recording["control_point_distance"],
                                               recording["ee_distance"]])
@@ -91,25 +146,21 @@ class Rows:
             return None
         if self._follows:
             cell.state.commanded = self._command[k - 1] if k else self._first
-        if self._carried:
+        if cell.contacts:
             cell.state.carried = self._carried[k]
-        cone = self._cone_error() if self._cone_error else float("nan")
-        seen = cell.sensor.measure(cell.state) if cell.sensor else None
-        if not self._is_as_recorded(k, seen) or cell.order(seen, cone).order != order:
+        cone, seen = self._cone_error(), cell.sensor.measure(cell.state) if cell.sensor else None
+        same = seen is None or _alike(seen.distance, self._distance[k], _SAME)
+        if not same or cell.order(seen, cone).order != order:
             return None
         return cell.stack.hierarchy(cell.state, order)
 
-    def _is_as_recorded(self, k: int, seen: Measurement | None) -> bool:
-        return seen is None or bool(_alike(seen.distance, self._distance[k], _SAME))
 
-
-@compiled
-def _alike(values, others, within):
-    """Whether two arrays agree to `within`; infinite entries agree, NaN agrees with nothing."""
-    for i in range(len(values)):
-        if not (values[i] == others[i] or abs(values[i] - others[i]) <= within):
-            return False
-    return True
+def _meant(recording: Recording) -> Array:
+    """Return what the commands stand for in the rows: at level "torque" the answers."""
+    if recording.scenario.control.level != "torque":
+        return recording["command"]
+    forces = recording["planned_force"].reshape(recording.ticks, -1)
+    return np.hstack([recording["planned_acceleration"], forces])
 
 
 def depth_view(recording: Recording, t: float | None = None) -> DepthView | None:
@@ -118,12 +169,12 @@ def depth_view(recording: Recording, t: float | None = None) -> DepthView | None
     The default is the tick in which the end effector is nearest to an obstacle, or the last tick if
     no obstacle was seen. The camera is built from the scenario, with zero latency.
     """
-    if recording.scenario.sensor.kind != "camera" or not recording.ticks:
+    scenario = recording.scenario
+    if scenario.sensor.kind != "camera" or not recording.ticks:
         return None
     k = _nearest(recording) if t is None else int(np.argmin(np.abs(recording["t"] - t)))
-    sensor = recording.scenario.sensor.model_copy(update={"latency": 0.0})
-    at_rest = {"sensor": sensor, "plant": KinematicSection()}
-    cell = build(recording.scenario.model_copy(update=at_rest))
+    sensor = scenario.sensor.model_copy(update={"latency": 0.0})
+    cell = build(scenario.model_copy(update={"sensor": sensor, "plant": KinematicSection()}))
     moved = cell.state.move(float(recording["t"][k]), recording["q"][k], recording["v"][k])
     if not moved or not isinstance(cell.sensor, DepthSensor):
         return None
@@ -136,3 +187,38 @@ def depth_view(recording: Recording, t: float | None = None) -> DepthView | None
 def _nearest(recording: Recording) -> int:
     distance = np.where(np.isnan(recording["ee_distance"]), np.inf, recording["ee_distance"])
     return int(np.argmin(distance)) if np.isfinite(distance).any() else recording.ticks - 1
+
+
+@compiled
+def _judge_levels(A, lower, upper, offsets, x, near, fate, violation):
+    """Write fate and violation of each level; a row within `near` of a side is on it."""
+    for k in range(len(fate)):
+        squared, acts = 0.0, False
+        for i in range(offsets[k], offsets[k + 1]):
+            value = 0.0
+            for j in range(len(x)):
+                value += A[i, j] * x[j]
+            room = min(value - lower[i], upper[i] - value)
+            acts |= room <= near
+            if room < 0.0:
+                squared += room * room
+        violation[k] = sqrt(squared)
+        fate[k] = 4 if violation[k] > near else 3 if acts else 2  # MISSED, MET, FREE
+
+
+@compiled
+def _find_saturated(x, lower, upper, near, saturated):
+    """Write the side, -1 or 1, of its box at which each entry of x is; a floating base has none."""
+    base = len(x) - len(lower)
+    for i in range(len(lower)):
+        saturated[base + i] = int(x[base + i] >= upper[i] - near) - int(
+            x[base + i] <= lower[i] + near)
+
+
+@compiled
+def _alike(values, others, within):
+    """Whether two arrays agree to `within`; infinite entries agree, NaN agrees with nothing."""
+    for i in range(len(values)):
+        if not (values[i] == others[i] or abs(values[i] - others[i]) <= within):
+            return False
+    return True

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 if TYPE_CHECKING:
     from scenarios.measure.runs import Run
-    from scenarios.recording.facts import Facts
+    from scenarios.recording.recording import Recording
 
 BOUND = 1e-6  # [rad] of any joint, or what the resolver declares as its accuracy where that is more
 
@@ -48,56 +48,43 @@ def partings(runs: Sequence[Run]) -> list[Parting]:
     """
     if len({run.scenario.name for run in runs}) != 1:
         return []
-    strict = [run for run in runs if run.recording and run.recording.ticks
+    strict = [(run.label, run.recording) for run in runs if run.recording and run.recording.ticks
               and run.recording.facts.resolver.strict]
-    return [_parting(run, strict[0]) for run in strict[1:]]
+    return [_parting(one, strict[0]) for one in strict[1:]]
 
 
-def _parting(run: Run, other: Run) -> Parting:
-    assert run.recording is not None
-    assert other.recording is not None
-    ticks = min(run.recording.ticks, other.recording.ticks)
-    accuracy = run.recording.facts.resolver.accuracy
+Labelled = tuple[str, "Recording"]
+
+
+def _parting(one: Labelled, other: Labelled) -> Parting:
+    (label, mine), (first, theirs) = one, other
+    ticks, accuracy = min(mine.ticks, theirs.ticks), mine.facts.resolver.accuracy
     bound = max(BOUND, accuracy)
-    apart = abs(run.recording["q"][:ticks] - other.recording["q"][:ticks]).max(axis=1)
+    apart = abs(mine["q"][:ticks] - theirs["q"][:ticks]).max(axis=1)
     beyond = np.flatnonzero(~(apart <= bound))
     largest = float(np.nan_to_num(apart, nan=np.inf).max())
     if not beyond.size:
-        return Parting(run.label, other.label, bound, largest)
+        return Parting(label, first, bound, largest)
     tick = int(beyond[0])
-    return Parting(run.label, other.label, bound, largest, tick, float(run.recording["t"][tick]),
-                   _why(run, other, tick, accuracy))
+    return Parting(label, first, bound, largest, tick, float(mine["t"][tick]),
+                   _why(one, other, tick, accuracy))
 
 
-def _why(run: Run, other: Run, tick: int, accuracy: float) -> str:
-    for one in (run, other):
-        failed = np.flatnonzero(_signal(one, "status")[:tick + 1] != 0)
+def _why(one: Labelled, other: Labelled, tick: int, accuracy: float) -> str:
+    for label, recording in (one, other):
+        failed = np.flatnonzero(recording["status"][:tick + 1] != 0)
         if failed.size:
-            return f"tick {failed[0]} of {one.label} was not solved"
-    mine, theirs = _facts(run), _facts(other)
+            return f"tick {failed[0]} of {label} was not solved"
+    mine, theirs = one[1].facts, other[1].facts
     if mine.limits_in_stack != theirs.limits_in_stack:
         return "the limits are in the stack of one, and a guard outside it for the other"
     if mine.asks == "bounds" and "bounds" in (mine.resolver.handles, theirs.resolver.handles):
         return ("while limits act they agree only undamped, and sns not then: it scales what it "
                 "cannot meet")
-    switched = np.flatnonzero(_orders(run)[:tick + 1] != _orders(other)[:tick + 1])
+    stacks = [np.array([*run.orders, ""])[run["order"][:tick + 1]] for _, run in (one, other)]
+    switched = np.flatnonzero(stacks[0] != stacks[1])
     if switched.size:
         return (f"the stack is another one at tick {switched[0]}, where a switch came earlier or "
                 "later for errors below that bound")
     return (f"no tick failed and the stacks are the same; the motion magnifies the errors of each "
             f"tick (declared: {accuracy:.0e})")
-
-
-def _facts(run: Run) -> Facts:
-    assert run.recording is not None
-    return run.recording.facts
-
-
-def _signal(run: Run, name: str) -> Any:
-    assert run.recording is not None
-    return run.recording[name]
-
-
-def _orders(run: Run) -> Any:
-    assert run.recording is not None
-    return np.array([*run.recording.orders, ""])[_signal(run, "order")]

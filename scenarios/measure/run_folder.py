@@ -19,6 +19,7 @@ from hierarchy.errors import HierarchyError, expect, file_path
 from scenarios.config import load
 from scenarios.files import whole, write_json
 from scenarios.measure import metrics
+from scenarios.measure.verdict import verdict
 from scenarios.recording.depth_view import DepthView
 from scenarios.recording.facts import Facts
 from scenarios.recording.recording import Event, Recording
@@ -29,13 +30,14 @@ _EVENT = np.dtype([("tick", np.int64), ("kind", "U24"), ("action", "U8")])
 def save(recording: Recording, folder: str | Path) -> Path:
     """Write a run's folder, completely or not at all, and return its path.
 
-    It has the files of `write` and `metrics.json`; `hierarchy figures`
-    adds the figures. `folder` must be new or empty.
+    It has the files of `write` and `metrics.json`, with the goals; `hierarchy figures` adds the
+    figures. `folder` must be new or empty.
     """
     expect("save", recording, Recording, "give what `simulate` returns")
     with whole(file_path("save", folder)) as partial:
         write(recording, partial)
-        write_json(partial / "metrics.json", metrics.as_plain_data(recording))
+        write_json(partial / "metrics.json", metrics.as_plain_data(recording)
+                   | verdict(recording).as_plain_data())
     return Path(folder)
 
 
@@ -55,7 +57,7 @@ def write(recording: Recording, folder: Path) -> None:
                         events=np.array(list(recording.events), dtype=_EVENT))
     np.savez_compressed(folder / "timings.npz", allow_pickle=False, **times)
     if recording.depth is not None:
-        np.savez_compressed(folder / "depth.npz", allow_pickle=False, **recording.depth.arrays())
+        np.savez_compressed(folder / "depth.npz", allow_pickle=False, **recording.depth._asdict())
     write_json(folder / "facts.json", dataclasses.asdict(recording.facts))
     write_json(folder / "versions.json", versions())
     (folder / "scenario.toml").write_text(recording.scenario.to_toml(), encoding="utf-8")
@@ -107,10 +109,11 @@ def _facts(path: Path) -> Facts:
 def _depth(path: Path) -> DepthView | None:
     if not path.exists():
         return None
-    try:
-        return DepthView.of_arrays(_arrays(path))
-    except KeyError as error:
-        raise HierarchyError(f"{path} cannot be read: it has no {error}") from error
+    arrays: dict[str, Any] = _arrays(path)
+    for name in DepthView._fields:
+        if name not in arrays:
+            raise HierarchyError(f"{path} cannot be read: it has no {name!r}")
+    return DepthView(**{**arrays, "t": float(arrays["t"]), "active": int(arrays["active"])})
 
 
 def versions() -> dict[str, str]:

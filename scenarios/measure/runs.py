@@ -14,6 +14,7 @@ from scenarios.measure.metrics import Metric
 
 if TYPE_CHECKING:
     from scenarios.config import Scenario
+    from scenarios.recording.facts import ResolverFacts
     from scenarios.recording.recording import Recording
 
 
@@ -88,6 +89,21 @@ def table(runs: Sequence[Run], details: bool = True) -> list[Row]:
     groups = list(dict.fromkeys(metric.group for metric in known.values()))
     return [_row(metric, [run.metrics.get(name) for run in runs], competes)
             for name, metric in sorted(known.items(), key=lambda one: groups.index(one[1].group))]
+
+
+def flags(runs: Sequence[Run]) -> list[str]:
+    """Return the `caveats` about the resolvers of runs."""
+    return caveats({run.label: run.recording.facts.resolver for run in runs if run.recording})
+
+
+def caveats(resolvers: Mapping[str, ResolverFacts]) -> list[str]:
+    """Return which columns, by label, have no strict priorities, or damp unlike the first."""
+    damped = [one.damped.replace("each pivot", "each level") for one in resolvers.values()]
+    flags = {"not strict at every rank": [
+        label for label, one in resolvers.items() if not one.strict],
+        f"damped differently from {next(iter(resolvers), '')}": [
+        label for label, what in zip(resolvers, damped, strict=True) if what != damped[0]]}
+    return [f"{', '.join(labels)}: {flag}" for flag, labels in flags.items() if labels]
 
 
 def _row(metric: Metric, found: Sequence[Metric | None], competes: Sequence[bool]) -> Row:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,8 +10,7 @@ from numpy.typing import NDArray
 from hierarchy.problem import Array
 
 
-@dataclass(frozen=True)
-class DepthView:
+class DepthView(NamedTuple):
     """One depth image with the distances that follow from it; P points, the end effector last.
 
     t [s]; image (h, w) [m], 0 where there is no reading; camera (16,), see `Pinhole.packed`;
@@ -28,13 +26,3 @@ class DepthView:
     distance: Array
     pixel: NDArray[np.int64]
     active: int
-
-    def arrays(self) -> dict[str, NDArray[Any]]:
-        """Return the fields by name, as arrays."""
-        return {name: np.asarray(value) for name, value in vars(self).items()}
-
-    @classmethod
-    def of_arrays(cls, arrays: dict[str, NDArray[Any]]) -> DepthView:
-        """Return what `arrays` was made of; KeyError names a field that is missing."""
-        return cls(float(arrays["t"]), arrays["image"], arrays["camera"], arrays["points"],
-                   arrays["distance"], arrays["pixel"], int(arrays["active"]))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -9,15 +10,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hierarchy.errors import UnknownNameError
-from scenarios.recording import notebook
+from hierarchy.notebook import html_table
 from scenarios.recording.depth_view import DepthView
 from scenarios.recording.facts import Facts
-from scenarios.recording.signals import check
+from scenarios.recording.notebook import Column, curves, data_frame
+from scenarios.recording.signals import check, known
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from scenarios.config import Scenario
+
+_USUAL = ("q", "v", "position_error", "minimal_distance")  # what `plot` draws unless told
 
 
 class Event(NamedTuple):
@@ -26,8 +30,6 @@ class Event(NamedTuple):
     tick: int
     kind: str
     action: str
-
-
 
 
 @dataclass(frozen=True, repr=False)
@@ -52,6 +54,11 @@ class Recording:
             raise UnknownNameError("signal", name, self.signals)
         return self.signals[name]
 
+    def __contains__(self, name: str) -> bool:
+        if name not in self.signals:
+            check(name)
+        return name in self.signals
+
     def get(self, name: str, default: NDArray[Any]) -> NDArray[Any]:
         """Return a signal, or `default` where the run does not have it."""
         return self.signals[name] if name in self else default
@@ -62,27 +69,68 @@ class Recording:
                 f"{self.ticks} ticks, {len(self.signals)} signals{end})")
 
     def _repr_html_(self) -> str:
-        return notebook.html(self)
+        """Return what ran, how it ended, and its signals."""
+        facts = [("scenario", self.scenario.title or self.scenario.name),
+                 ("robot", self.facts.robot.name), ("resolver", self.facts.resolver.label),
+                 ("end", self.fault or f"after {self.ticks} ticks"),
+                 ("ticks with trouble", len({event.tick for event in self.events}))]
+        shapes = [(name, " x ".join(map(str, signal.shape)), str(signal.dtype))
+                  for name, signal in self.signals.items()]
+        return (html_table(f"Recording of {self.scenario.name}", (), facts)
+                + html_table("Signals", ("name", "shape", "type"), shapes))
 
     def plot(self, *names: str) -> Figure:
         """Return a matplotlib figure of signals over time, one panel each; by default the usual.
 
         `savefig` writes it to a file. Raises UnknownNameError for a signal that the run lacks.
         """
-        return notebook.plot(self, names)
+        drawn = {name: signal for name, signal in self.of_ticks().items()
+                 if signal.dtype.kind in "bif" and name != "t"}
+        for name in names:
+            if name not in drawn:
+                raise UnknownNameError("signal", name, drawn)
+        asked = names or [name for name in _USUAL if name in drawn]
+        return curves(self["t"], {name: drawn[name] for name in asked}, self.units())
 
     def to_dataframe(self, library: str | None = None) -> Any:
-        """Return all signals as a data frame, one row per tick, columns as `hierarchy export` has.
+        """Return all signals as a data frame, one row per tick and one column per number.
 
-        `library` is "pandas" or "polars"; None takes the first that is installed. Raises
-        HierarchyError, saying what to install, where none is.
+        `library` is "pandas", which has the units in `attrs`, or "polars"; None takes the first
+        that is installed. Raises HierarchyError, saying what to install, where none is.
         """
-        return notebook.data_frame(self, library)
+        return data_frame(list(self.columns()), library)
 
-    def __contains__(self, name: str) -> bool:
-        if name not in self.signals:
-            check(name)
-        return name in self.signals
+    def columns(self) -> Iterator[Column]:
+        """Yield every per-tick signal number by number, then the stack and the events as text."""
+        units = self.units()
+        for name, signal in self.of_ticks().items():
+            unit_of = units.get(name, ("",))
+            for i, place in enumerate(np.ndindex(shape := signal.shape[1:])):
+                index = "".join(f"[{k}]" for k in place)
+                unit = unit_of[i] if len(unit_of) == int(np.prod(shape)) else unit_of[0]
+                yield Column(name + index, unit, signal[(slice(None), *place)])
+        yield Column("stack", "", self.stacks())
+        events = [""] * self.ticks
+        for tick, kind, action in self.events:
+            events[tick] += f"{'; ' if events[tick] else ''}{kind}: {action}"
+        yield Column("events", "", np.array(events, dtype=np.str_))
+
+    def of_ticks(self) -> dict[str, NDArray[Any]]:
+        """Return the signals that have one entry per tick, not one value for the whole run."""
+        return {name: signal for name, signal in self.signals.items()
+                if not ((of := known(name)) and of.constant)}
+
+    def units(self) -> dict[str, tuple[str, ...]]:
+        """Return the units of the entries of each signal with units; a single one holds for all."""
+        robot, level = self.facts.robot, self.scenario.control.level
+        velocities = tuple(f"{unit}/s" for unit in robot.velocity_units)
+        accelerations = tuple(f"{unit}/s^2" for unit in robot.velocity_units)
+        per_joint = {
+            "joint": robot.position_units, "joint/s": velocities, "joint/s^2": accelerations,
+            "command": {"velocity": velocities, "acceleration": accelerations,
+                        "torque": ("N m",)}[level]}
+        return {name: per_joint.get(of.unit, (of.unit,)) for name in self.signals
+                if (of := known(name)) and of.unit}
 
     @property
     def ticks(self) -> int:
@@ -98,6 +146,18 @@ class Recording:
     def task_names(self) -> tuple[str, ...]:
         """The tasks that were in the stack in any tick (N,)."""
         return tuple(dict.fromkeys(name for order in self.order_names for name in order))
+
+    @property
+    def in_stack(self) -> NDArray[np.bool_]:
+        """Whether each of `task_names` is in each tick's stack (T, N)."""
+        orders, names = self.order_names, self.task_names
+        table = np.array([[name in order for name in names] for order in orders], dtype=bool)
+        return np.asarray(table.reshape(len(orders), len(names))[self.signals["order"]])
+
+    def stacks(self) -> NDArray[Any]:
+        """Return the tasks of each tick's stack (T,) as text, most important first."""
+        names: NDArray[Any] = np.array(self.orders or ("",), dtype=np.str_)
+        return np.asarray(names[self.signals["order"]])
 
     def switches(self) -> NDArray[np.int64]:
         """Ticks k at which the order of the stack differs from that of tick k - 1."""

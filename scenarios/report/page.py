@@ -14,7 +14,7 @@ from scenarios.draw.figures.drawing import svg
 from scenarios.draw.figures.palette import Look, looks
 from scenarios.draw.figures.picture import picture
 from scenarios.measure.motions import Motion, motions
-from scenarios.measure.verdicts.verdict import verdict
+from scenarios.measure.verdict import lines, table, verdicts
 from scenarios.report import charts, tables
 from scenarios.report.commands import commands
 from scenarios.report.embedded import replay
@@ -33,10 +33,11 @@ def comparison_page(comparison: Comparison) -> str:
     groups = comparison.groups()
     with drawing.styled(drawing.SCREEN):
         sections = [_group(comparison, name, runs) for name, runs in groups.items()]
-    contents = {name: verdict(runs) for name, runs in groups.items()} if len(groups) > 1 else {}
+    ends = {name: lines(verdicts(runs))[0] for name, runs in groups.items()}
     return str(render("report/page.html", title=f"{', '.join(groups)}: a comparison",
                       style=resource("report/style.css"), script=resource("report/page.js"),
-                      contents=contents, count=in_words(len(groups)).capitalize(),
+                      contents=ends if len(ends) > 1 else {},
+                      count=in_words(len(groups)).capitalize(),
                       sampled=comparison.sampled(_STARTS), groups=sections,
                       refused=comparison.refused, command=comparison.command,
                       versions=comparison.versions))
@@ -45,11 +46,13 @@ def comparison_page(comparison: Comparison) -> str:
 def _group(comparison: Comparison, name: str, runs: Sequence[Run]) -> Markup:
     """Return the article about the runs of one group."""
     found, look = motions(runs), looks(run.label for run in runs)
+    judged = verdicts(runs)
     room = min(_REPLAY_BYTES, _REPLAYS_BYTES // len(comparison.groups()))
     moved = {"replay": replay(name, found, room),
              "panels": charts.multiples(name, found, look),
              "overlays": charts.overlays(name, runs, found, look)} if found else {}
-    return render("report/group.html", name=name, looks=look, verdict=verdict(runs),
+    return render("report/group.html", name=name, looks=look, verdict=lines(judged),
+                  goals=table(judged),
                   **_about(name, runs), **_picture(name, found, look),
                   **{"replay": "", "panels": "", "overlays": "", **moved},
                   numbers=tables.numbers(runs, look), stack=charts.stack(name, runs, look),

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hierarchy.problem import Array
-from scenarios.measure.metrics import pointing_angle
+from scenarios.measure.tracking import pointing_angle
 from scenarios.recording import listed
 
 if TYPE_CHECKING:

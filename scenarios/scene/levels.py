@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hierarchy.problem import Array
-from scenarios.recording.fate import Fate, unknown
+from scenarios.recording.fate import Fate, row_units
 from scenarios.recording.recording import Recording
 
 
@@ -17,13 +17,15 @@ from scenarios.recording.recording import Recording
 class Levels:
     """Fates of N tasks and saturation of n joints in F ticks.
 
-    names (N,) of all tasks that are in the stack in any tick of the run; fate (F, N) values of
+    names (N,) of all tasks that are in the stack in any tick of the run, units (N,) of their rows,
+    "" where not known; fate (F, N) values of
     `Fate`; violation (F, N) Euclidean norm of a level's violation by the command that was sent, in
     the unit of its rows, NaN where absent or unknown; saturated (F, n) -1 or 1 where a joint is at
     the lower or upper side of its limits' box of commands, else 0.
     """
 
     names: tuple[str, ...]
+    units: tuple[str, ...]
     fate: NDArray[np.int8]
     violation: Array
     saturated: NDArray[np.int8]
@@ -37,9 +39,11 @@ class Levels:
 def levels_at(recording: Recording, ticks: Sequence[int] | NDArray[np.int64]) -> Levels:
     """Return the recorded fates of the levels in some ticks; UNKNOWN if none were recorded."""
     ticks, names = np.asarray(ticks, dtype=np.int64), recording.task_names
+    units = row_units(recording.scenario, names)
     if "level_fate" in recording:
-        return Levels(names, *(recording[name][ticks] for name in (
+        return Levels(names, units, *(recording[name][ticks] for name in (
             "level_fate", "level_violation", "saturated")))
     shape = len(ticks), len(names)
-    return Levels(names, unknown(recording)[ticks], np.full(shape, np.nan),
+    return Levels(names, units,
+                  np.int8(Fate.UNKNOWN) * recording.in_stack[ticks], np.full(shape, np.nan),
                   np.zeros((len(ticks), recording["v"].shape[1]), np.int8))

@@ -20,7 +20,7 @@ def as_plain_data(plan: Plan, found: Mapping[str, Results], command: str,
 
 
 def _group(results: Results) -> dict[str, Any]:
-    return {"verdict": list(verdict(results).lines),
+    return {"verdict": list(verdict(results)),
             "columns": {label: _column(results, label) for label in results.labels},
             "failures": [{"reason": one.reason, "resolver": one.run.label, "runs": one.count}
                          for one in results.failures()]}

@@ -18,7 +18,6 @@ from scenarios.draw.figures.drawing import svg
 from scenarios.draw.figures.palette import Look, looks
 from scenarios.files import slug
 from scenarios.measure.metrics import Metric
-from scenarios.measure.verdicts.verdict import Verdict
 from scenarios.sweep import figures
 from scenarios.sweep.planning import Plan, Planned
 from scenarios.sweep.results import Failure, Results, Worst, compared, summary
@@ -50,7 +49,7 @@ class Shown(NamedTuple):
     name: str
     title: str
     about: str
-    verdict: Verdict
+    verdict: tuple[str, ...]
     shares: Markup
     failures: list[tuple[Failure, Again]]
     more_failures: int

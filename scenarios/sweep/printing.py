@@ -20,7 +20,7 @@ _LABELS = 26   # columns of it for the names of metrics
 def show(name: str, results: Results, console: Console | None = None) -> None:
     """Print the verdict, success rates, and the spread of each metric by resolver."""
     console = console or Console(markup=False, highlight=False)
-    console.print(f"\n{name}: {results.samples} samples, paired", *verdict(results).lines, sep="\n")
+    console.print(f"\n{name}: {results.samples} samples, paired", *verdict(results), sep="\n")
     beside = _beside(results)
     for first in range(0, len(results.labels), beside):
         console.print()

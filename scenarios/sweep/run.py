@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 # Code that only requests or shows runs: changing it does not change the measurements.
 _NOT_IN_A_RUN = ("bench/", "cli/", "draw/", "export/", "library/", "report/", "scene/", "sweep/",
                  "files.py", "words.py", *(f"measure/{name}.py" for name in (
-                     "comparison", "motions", "partings", "runs", "verdict")),
+                     "comparison", "goals", "motions", "partings", "runs", "verdict")),
                  *(f"reproduce/{name}.py" for name in (
                      "blocks", "claims", "commands", "pages", "rows", "studies", "whole")))
 _PLACE = ("system", "processor")  # entries of versions() that describe the machine

@@ -9,8 +9,7 @@ import numpy as np
 from hierarchy.words import listed
 from scenarios.config import Scenario
 from scenarios.measure.metrics import Metric
-from scenarios.measure.verdicts.caveats import caveats
-from scenarios.measure.verdicts.verdict import Verdict
+from scenarios.measure.runs import caveats
 from scenarios.recording.facts import resolver_facts
 from scenarios.sweep.results import Criterion, Results, Share, valued
 
@@ -24,9 +23,10 @@ _WEIGHED = {"position_error_median_settled": "path error", "body_distance_min": 
             "speed_max": "joint speed", "acceleration_max": "joint acceleration"}
 
 
-def verdict(results: Results) -> Verdict:
+def verdict(results: Results) -> tuple[str, ...]:
     """Return what went wrong and how often, which columns are the same, and what to use."""
-    return Verdict(success(results), _sentence(_sameness(results)), _sentence(_advice(results)))
+    said = success(results), _sentence(_sameness(results)), _sentence(_advice(results))
+    return tuple(line for line in said if line)
 
 
 def success(results: Results) -> str:

@@ -13,6 +13,7 @@ from hierarchy import Robot
 from scenarios.config.avoidance import ObstacleSection
 from scenarios.config.robot import RobotSection
 from scenarios.config.sensor import FramesSection
+from scenarios.config.tasks import PointingSection, PositionSection
 from scenarios.recording.facts import Facts, ResolverFacts, RobotFacts, robot_facts
 from scenarios.recording.recording import Recording
 
@@ -45,9 +46,10 @@ class HandMadeScenario:
     description: str = "Nothing was simulated."
     resolver: str = "tpm"
     tasks: tuple[Any, ...] = ()
-    position: Any = None
-    pointing: Any = field(default_factory=lambda: SimpleNamespace(
-        alpha_d=60.0, kind="inequality", axis=(1.0, 0.0, 0.0)))
+    contacts: tuple[Any, ...] = ()
+    position: Any = field(default_factory=PositionSection)
+    pointing: Any = field(default_factory=lambda: PointingSection(
+        axis=(1.0, 0.0, 0.0), alpha_d=60.0))
     avoidance: Any = field(default_factory=lambda: SimpleNamespace(
         thresholds={"near": 0.05, "far": 0.15}, tip_thresholds={"tip": 0.1}, dimension=1,
         promised={"body": 0.05},

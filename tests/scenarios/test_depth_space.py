@@ -1,6 +1,8 @@
 """Distances out of depth images, against all pixels one by one and against known geometry."""
 
 from math import inf
+from pathlib import Path
+from runpy import run_path
 
 import numpy as np
 import pytest
@@ -18,7 +20,6 @@ from scenarios.cell.sensors.frames import RecordedFrames
 from scenarios.config import ScenarioError
 from scenarios.config.sensor import DepthErrors
 from scenarios.draw.figures.depth import depth_figure
-from scenarios.loop import record_frames
 from scenarios.measure.judging import depth_view
 
 ROBOT = Robot.named("kuka_lwr")
@@ -476,7 +477,9 @@ def test_a_scenario_with_a_camera_survives_its_file(tmp_path):
 @pytest.fixture(scope="module")
 def written(tmp_path_factory):
     run = simulate(load("human", [*QUICK, "control.duration=0.3"]))
-    return record_frames.write(tmp_path_factory.mktemp("frames") / "some", run, frames=6), run
+    example = Path(__file__).parents[2] / "examples" / "record_frames.py"
+    write, folder = run_path(str(example))["write"], tmp_path_factory.mktemp("frames") / "some"
+    return write(folder, run, frames=6), run
 
 
 @pytest.mark.slow

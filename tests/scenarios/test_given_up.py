@@ -18,7 +18,7 @@ def test_a_step_that_is_too_fast_is_held_back_by_the_joints_at_their_limits():
     assert max(held.values()) == 1.0
     assert all(name.startswith("joint limits joint_") and name.endswith(" side") for name in held)
     assert "position" in dict(posture.held_by)
-    assert str(position).startswith(f"position was missed in {100 * position.share:.0f} % of its "
+    assert str(position).startswith(f"row missed: position in {100 * position.share:.0f} % of its "
                                     f"ticks ({position.seconds:.3g} s); held back by joint limits ")
 
 

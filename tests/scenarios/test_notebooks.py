@@ -17,7 +17,6 @@ from hierarchy import Hierarchy, HierarchyError, Robot, Stack, State
 from hierarchy.notebook import html_table
 from hierarchy.tasks import Posture
 from scenarios import compare, load, simulate
-from scenarios.recording.columns import columns
 from solvers import certify, make
 
 ROOT = Path(__file__).parents[2]
@@ -136,7 +135,7 @@ def test_a_data_frame_has_a_column_for_each_number(run, library, monkeypatch):
     for name in ("pandas", "polars"):  # None: the import fails
         monkeypatch.setitem(sys.modules, name, fake if name == library else None)
     for found in (run.to_dataframe(), run.to_dataframe(library)):
-        assert list(found) == [column.name for column in columns(run)]
+        assert list(found) == [column.name for column in run.columns()]
         np.testing.assert_array_equal(found["q[3]"], run["q"][:, 3])
 
 

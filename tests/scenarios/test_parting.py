@@ -12,7 +12,6 @@ from scenarios.measure.comparison import Comparison
 from scenarios.measure.motions import motions
 from scenarios.measure.partings import partings
 from scenarios.measure.runs import Run
-from scenarios.measure.verdicts.verdict import verdict
 from scenarios.report import comparison_page as page
 from solvers.qp import backends
 
@@ -37,22 +36,6 @@ def test_runs_that_stay_together_are_said_to():
     assert str(one) == "hqp keeps within 1.0e-08 rad of recursive to the end"
 
 
-def test_runs_of_the_same_bits_are_said_to_be():
-    assert [str(one) for one in partings([run_of("recursive"), run_of("hcod")])] == [
-        "hcod moves as recursive to the last bit"]
-
-
-def test_the_verdict_tells_a_run_that_parted_late_from_another_motion():
-    said = str(verdict([run_of("recursive"), run_of("hcod"), run_of("hqp", away_from(3)),
-                        run_of("augmented", away_from(1, 0.5))]))
-    assert "recursive and hcod moved the arm alike to the last bit" in said
-    assert "augmented moved otherwise" in said
-    assert "hqp stayed within 1e-03 rad of recursive" in said
-    said = str(verdict([run_of("recursive"), run_of("hqp", away_from(3))]))
-    assert "alike" not in said
-    assert "hqp stayed within 1e-03 rad of recursive" in said
-
-
 def test_runs_that_are_one_motion_are_as_far_apart_as_the_farthest_of_them():
     (one,) = motions([run_of("recursive"), run_of("hqp", away_from(1, 5e-6)),
                       run_of("hcod", away_from(1, 2e-6))])
@@ -65,12 +48,6 @@ def test_the_first_tick_beyond_the_bound_is_named():
     assert one.tick == 3
     assert "at tick 3 (3.00 s), by 1.0e-03 rad at most" in str(one)
     assert "the motion magnifies the errors of each tick (declared: 1e-09)" in one.why
-
-
-def test_a_tick_that_was_not_solved_is_the_reason():
-    failing = run_of("hqp", away_from(3), status=np.array([0, 0, 3, 0, 0]))
-    (one,) = partings([run_of("recursive"), failing])
-    assert one.why == "tick 2 of hqp was not solved"
 
 
 @pytest.mark.parametrize(("tick", "is_the_reason"), [(3, True), (4, False)])

@@ -8,7 +8,7 @@ from hierarchy.paths import Jittered, Still
 from scenarios.config import ScenarioError, load
 from scenarios.loop.simulation import simulate
 from scenarios.measure.metrics import measure
-from scenarios.measure.returning import frozen, jerk, returned, within_reach
+from scenarios.measure.tracking import frozen, jerk, returned, within_reach
 
 NAMES = ("singular", "singular-limits", "singular-acceleration", "singular-acceleration-limits")
 UPPER_ARM, FOREARM, HAND = 0.4, 0.39, 0.078  # m, KUKA LWR

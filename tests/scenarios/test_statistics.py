@@ -2,9 +2,9 @@ from itertools import product
 
 import numpy as np
 import pytest
-from scipy.stats import rankdata, wilcoxon
+from scipy.stats import rankdata
 
-from scenarios.measure.statistics import EXACT, best, paired, spread, wilson
+from scenarios.measure.statistics import best, paired, spread, wilson
 
 
 def enumerated(apart):
@@ -17,24 +17,13 @@ def enumerated(apart):
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_the_p_value_is_that_of_all_signs(seed):
+def test_the_p_value_is_that_of_all_signs_with_and_without_ties(seed):
     random = np.random.default_rng(seed)
     first = random.normal(size=9)
     second = first + 0.4 + random.normal(size=9)
     assert paired(first, second).p == pytest.approx(enumerated(second - first))
-
-
-@pytest.mark.parametrize("seed", range(5))
-def test_the_p_value_is_that_of_all_signs_with_ties(seed):
     second = np.random.default_rng(seed).integers(-2, 5, 11).astype(float)
     assert paired(np.zeros(11), second).p == pytest.approx(enumerated(second[second != 0.0]))
-
-
-@pytest.mark.parametrize("pairs", [12, 30, EXACT, EXACT + 1])
-def test_the_p_value_is_that_of_scipy(pairs):
-    random = np.random.default_rng(pairs)
-    second = 0.3 + random.normal(size=pairs)
-    assert paired(np.zeros(pairs), second).p == pytest.approx(wilcoxon(second).pvalue, rel=1e-9)
 
 
 def test_pairs_are_counted_by_their_direction():
@@ -44,11 +33,6 @@ def test_pairs_are_counted_by_their_direction():
     assert (found.count, found.same, found.lower, found.higher) == (4, 2, 1, 1)
     assert not found.distinguishable
     assert str(found) == "not distinguishable"
-
-
-def test_the_middle_half_of_the_differences_lies_between_the_quartiles():
-    found = paired(np.zeros(9), np.arange(1.0, 10.0)[::-1])
-    assert (found.median, found.quartiles) == (5.0, (3.0, 7.0))
 
 
 def test_rounding_in_every_pair_is_no_difference():
@@ -71,13 +55,6 @@ def test_too_few_pairs_tell_nothing():
     assert not paired(np.zeros(5), np.ones(5)).distinguishable
     assert paired(np.zeros(6), np.arange(1.0, 7.0)).distinguishable
     assert str(paired(np.full(3, np.nan), np.ones(3))) == "no pair"
-
-
-def test_chance_is_called_a_difference_rarely():
-    random = np.random.default_rng(1)
-    found = [paired(random.normal(size=16), random.normal(size=16)).distinguishable
-             for _ in range(400)]
-    assert np.mean(found) < 0.08
 
 
 def test_the_best_is_marked_with_those_equal_to_it():

@@ -1,11 +1,13 @@
 """True distances beside measured ones, and the sets of rows that act."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from hierarchy import Hierarchy, Robot, State
 from scenarios.config import load
-from scenarios.loop.active_sets import ActiveSets
+from scenarios.loop.audit import ActiveSets
 from scenarios.loop.simulation import simulate
 from solvers import Resolution, Status, make
 
@@ -60,8 +62,8 @@ def test_an_exact_sensor_measures_the_true_distances_and_nothing_is_recorded_twi
 
 def noted(sets, hierarchies, resolver="hcod"):
     for k, h in enumerate(hierarchies):
-        sets.look(k, h, make(resolver).solve(h))
-    return sets.signals(len(hierarchies))["active_set"].tolist()
+        sets.note(k, h, make(resolver).solve(h))
+    return sets.signals(SimpleNamespace(ticks=len(hierarchies)))["active_set"].tolist()
 
 
 def bounded(target, box=1.0, names=("box", "task")):
@@ -86,13 +88,14 @@ def test_a_change_of_the_stack_alone_is_no_change_of_the_set():
 
 def test_a_tick_without_an_answer_or_without_a_report_has_no_set():
     sets, h = ActiveSets(3), bounded((2.0, 0.5))
-    sets.look(0, h, Resolution(np.zeros(2)))
-    assert sets.signals(3) == {}
-    sets.look(1, h, make("hcod").solve(h))
+    run = SimpleNamespace(ticks=3)
+    sets.note(0, h, Resolution(np.zeros(2)))
+    assert sets.signals(run) == {}
+    sets.note(1, h, make("hcod").solve(h))
     failed = make("hcod").solve(h)
     failed.status = Status.ITERATION_LIMIT
-    sets.look(2, h, failed)
-    assert sets.signals(3)["active_set"].tolist() == [-1, 0, -1]
+    sets.note(2, h, failed)
+    assert sets.signals(run)["active_set"].tolist() == [-1, 0, -1]
 
 
 @pytest.mark.slow

@@ -120,10 +120,10 @@ def test_the_list_says_what_is_active_given_up_saturated_and_out_of_the_stack(re
     saturated = np.array([0, 1, 0, 0, -1, 0, 0], np.int8)
     now = type(now)(**{**vars(now), "order": ("position", "<pointing>"), "saturated": saturated,
                        "became": {"position": Became(Fate.MET, 0.0),
-                                  "<pointing>": Became(Fate.MISSED, 0.123)}})
+                                  "<pointing>": Became(Fate.MISSED, 0.123, "m/s²")}})
     html = stack_html("tpm", "#123456", now, ["position", "avoidance"])
     assert html.index("position") < html.index("&lt;pointing&gt;") < html.index("avoidance")
-    for said in (">met<", "missed by 0.12", "not in the stack",
+    for said in (">row met<", "row missed by 0.12 m/s²", "not in the stack",
                  "saturated: joint 2 (upper), 5 (lower)", "#123456"):
         assert said in html
 
@@ -432,7 +432,7 @@ def test_in_a_browser_play_moves_the_arm(server, recording):
     with chromium() as browser:
         browser.look_at(address(server), *_WINDOW)
         until(shown(browser, "Joint speeds"), view.step, "the curves are shown")
-        until(shown(browser, "\nmet"), view.step, "the stack is shown")
+        until(shown(browser, "row met"), view.step, "the stack is shown")
         before = browser.screenshot()
         press(browser, "Play")
         until(lambda: view.playback.t > 0.3, view.step, "time plays")

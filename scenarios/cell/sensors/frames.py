@@ -5,7 +5,7 @@ the camera's axes in the world), scale [m] of one step of a pixel, and a table `
 image: file, time [s], and optionally q [rad or m], the robot's joints when it was taken. A pixel of
 0 means no reading.
 
-`scenarios.loop.record_frames` writes such a folder.
+`examples/record_frames.py` writes such a folder.
 """
 
 from __future__ import annotations

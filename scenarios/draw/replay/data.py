@@ -60,7 +60,7 @@ def run_data(scene: Scene, about: dict[str, Any]) -> dict[str, Any]:
             "areas": fixed.areas, "floor": fixed.floor, "azimuth": fixed.azimuth,
             "halfAngle": fixed.half_angle,
             "wanted": None if fixed.axis is None else fixed.axis.tolist(),
-            "orders": scene.orders, "tasks": levels.names,
+            "orders": scene.orders, "tasks": levels.names, "units": levels.units,
             "paths": [{"task": path.task, "actual": packed(path.actual, steps=True),
                        "wanted": None if path.wanted is None else packed(path.wanted, steps=True)}
                       for path in scene.paths],

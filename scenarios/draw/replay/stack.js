@@ -17,9 +17,10 @@ class StackList {
     this.list = element("ol", {class: "order", style: `height: ${ROW * run.tasks.length}px`},
                         ...this.rows.map(parts => parts.row));
     this.near = element("p");
+    this.goals = element("div", {class: "goals"}, ...run.goals.map(goal => element("div", {}, goal)));
     this.note = element("p");
     const head = element("h2", {}, ...(several ? [sample(run)] : []), run.label, element("small", {}, run.scenario));
-    this.card = element("article", {class: "card"}, head, this.list, ...this.joint_row(),
+    this.card = element("article", {class: "card"}, head, this.goals, this.list, ...this.joint_row(),
                         this.near, this.note);
     const judged = !run.fate.values.includes(this.unknown);
     this.doubt = judged ? [] : ["Unknown where the rows cannot be reconstructed, for example after a change by hand."];
@@ -63,9 +64,9 @@ class StackList {
       row.style.transform = `translateY(${at * ROW}px)`;
       rank.textContent = place < 0 ? "–" : `${place + 1}`;
       said.textContent = fate === "missed" ?
-        `${this.phrases.missed} by ${short(violations[n])}` : this.phrases[fate];
+        `${this.phrases.missed} by ${short(violations[n])} ${run.units[n]}` : this.phrases[fate];
       row.title = fate === "missed" ?
-        "Norm of the violation of its rows, in their unit" : "";
+        `Norm of the violation of its rows (${run.level})` : "";
     });
   }
 

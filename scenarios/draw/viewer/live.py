@@ -17,7 +17,8 @@ from scenarios.config import Scenario, ScenarioError
 from scenarios.config.plant import KinematicSection
 from scenarios.loop.controller import Controller
 from scenarios.loop.recorder import Recorder
-from scenarios.loop.simulation import tick
+from scenarios.loop.simulation import rehearsed, tick
+from scenarios.measure.goals import Goal, goals
 from scenarios.measure.judging import completed
 from scenarios.measure.run_folder import save
 from scenarios.recording.recording import Recording
@@ -37,9 +38,7 @@ class Live:
     def __init__(self, scenario: Scenario) -> None:
         if scenario.faults:
             raise ScenarioError(f"scenario {scenario.name!r}: a live run injects no [[faults]]")
-        rehearsal = Controller(scenario)
-        rehearsal.rehearse()
-        Recorder(rehearsal, 1).write()
+        rehearsed(scenario)
         self.scenario = self._first = scenario
         self.restart()
 
@@ -57,6 +56,7 @@ class Live:
         offset = np.zeros((0, 3)) if self.obstacles is None else self.obstacles.offset
         self._wanted, self._changed = offset.copy(), np.zeros(self.ticks, dtype=np.bool_)
         self._offsets = np.zeros((self.ticks, *offset.shape))
+        self._goals: tuple[int, tuple[Goal, ...]] = 0, ()
 
     @property
     def t(self) -> float:
@@ -119,6 +119,13 @@ class Live:
             recording.signals["obstacle_offset"] = self._offsets[:ticks]
         exact = self.begun.model_copy(update={"plant": KinematicSection()})
         return completed(recording, build(exact))
+
+    def goals(self) -> tuple[Goal, ...]:
+        """Return the goals of the run so far."""
+        ticks = self.recorder.ticks
+        if ticks != self._goals[0]:
+            self._goals = ticks, goals(self.recorder.finish(self.begun, None))
+        return self._goals[1]
 
     def save(self, folder: Path) -> Recording:
         """Write the run's folder as `hierarchy run` does, and any changes to `changes.json`."""

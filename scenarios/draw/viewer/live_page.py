@@ -210,6 +210,7 @@ class LivePage:
         note = f"t = {now.t:.1f} of {live.ticks * live.scenario.control.period:.1f} s"
         if live.over:
             note += f", {live.fault or 'ended'}"
+        playing = self.playing and not live.over
         self.list = stack_html(self.label, self._colour, now, live.controller.cell.stack.names,
-                               note)
-        self.panel.show(self.playing and not live.over, self.list)
+                               note, () if playing else live.goals())
+        self.panel.show(playing, self.list)

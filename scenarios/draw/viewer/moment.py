@@ -14,9 +14,10 @@ from hierarchy.allocation import AVOIDANCE
 from hierarchy.avoidance import Obstacles
 from hierarchy.problem import Array
 from scenarios.cell.sensors import ExactDistances
+from scenarios.measure.judging import Judged, judged
 from scenarios.recording import listed
 from scenarios.recording.facts import facts_of
-from scenarios.recording.fate import Fate, Judged, judged
+from scenarios.recording.fate import Fate, row_units
 from scenarios.scene import SEPARATION, Scene
 from scenarios.scene.pushes import Pushes, pushes
 
@@ -29,6 +30,7 @@ class Became(NamedTuple):
 
     fate: Fate
     violation: float
+    unit: str = ""
 
 
 @dataclass(frozen=True)
@@ -79,7 +81,8 @@ def of_scene(scene: Scene, f: int) -> Moment:
         float(scene.t[f]), scene.placements[f], scene.points[f],
         _where_finite(scene.nearest[f, linked]), linked, int(scene.active[f]), scene.centres[f],
         scene.axis[f], None if scene.desired is None else scene.desired[f], order,
-        {name: Became(Fate(levels.fate[f, column]), float(levels.violation[f, column]))
+        {name: Became(Fate(levels.fate[f, column]), float(levels.violation[f, column]),
+                      levels.units[column])
          for name, column in zip(order, columns, strict=True)}, levels.saturated[f],
         tuple((path.actual[f], None if path.wanted is None else path.wanted[f])
               for path in scene.paths), scene.pushes.at(f) if scene.pushes else None)
@@ -110,8 +113,9 @@ class Watched:
         self._exact.measure(self._state)
         order = controller.allocation.order
         found = self._judged()
-        became = {name: Became(Fate(fate), violation) for name, fate, violation in zip(
-            order, found.fate.tolist(), found.violation.tolist(), strict=True)}
+        became = {name: Became(Fate(fate), violation, unit) for name, fate, violation, unit in zip(
+            order, found.fate.tolist(), found.violation.tolist(),
+            row_units(cell.scenario, order), strict=True)}
         active, linked = self._active(became), int(np.argmin(seen.distance))
         linked = active if active >= 0 else linked
         D = seen.distance[linked]

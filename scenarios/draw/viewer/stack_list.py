@@ -19,12 +19,15 @@ _SATURATED = ("#8a5300", "#fdeccb")
 
 
 def stack_html(label: str, colour: str, now: Moment, tasks: Iterable[str] = (),
-               note: str = "") -> str:
-    """Return the list at a moment: the stack in its order, then the other `tasks` in grey."""
+               note: str = "", goals: Iterable[object] = ()) -> str:
+    """Return the list at a moment: the stack in its order, then the other `tasks` in grey.
+
+    Above stand the `goals` of the run.
+    """
     became = [now.became[name] for name in now.order]
     return str(render(
-        "draw/viewer/stack_list.html", label=label, colour=colour, note=note,
-        stack=[(name, phrase(one.fate, one.violation), _COLOURS[one.fate])
+        "draw/viewer/stack_list.html", label=label, colour=colour, note=note, goals=goals,
+        stack=[(name, phrase(*one), _COLOURS[one.fate])
                for name, one in zip(now.order, became, strict=True)],
         absent=[name for name in tasks if name not in now.order],
         not_in_stack=(PHRASES[Fate.ABSENT], _COLOURS[Fate.ABSENT]),

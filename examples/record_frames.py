@@ -1,6 +1,6 @@
 """Write the depth images of a scenario's camera to a folder.
 
-python -m scenarios.loop.record_frames SCENARIO FOLDER [KEY=VALUE ...]
+python examples/record_frames.py SCENARIO FOLDER [KEY=VALUE ...]
 """
 
 from __future__ import annotations
@@ -63,8 +63,7 @@ def _plain(value: Any) -> Any:
 def main(arguments: Sequence[str]) -> int:
     """Run the command described in the module's docstring."""
     if len(arguments) < 2:
-        print("python -m scenarios.loop.record_frames SCENARIO FOLDER [KEY=VALUE ...]",
-              file=sys.stderr)
+        print(__doc__, file=sys.stderr)
         return 2
     try:
         run = simulate(load(arguments[0], ["sensor.kind=camera", *arguments[2:]]))

@@ -1,0 +1,139 @@
+"""What a metric is: a number about a run with a unit, a plain name and a direction."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hierarchy import plugins
+
+if TYPE_CHECKING:
+    from scenarios.recording.recording import Recording
+
+Array = NDArray[np.float64]
+
+# Display units by SI unit: how many of them make one, what it is called, decimals.
+_SHOWN = {"m": (1e3, "mm", 3), "s": (1e6, "µs", 2), "deg": (1.0, "°", 3), "share": (100.0, "%", 2),
+          "rad": (1.0, "rad", 3), "rad/s": (1.0, "rad/s", 3), "rad/s^2": (1.0, "rad/s²", 2),
+          "rad/s^3": (1.0, "rad/s³", 0),
+          "N": (1.0, "N", 1), "N m": (1.0, "N m", 2), "N s": (1.0, "N s", 3),
+          "N m s": (1.0, "N m s", 3),
+          "rows": (1.0, "", 3), "": (1.0, "", 0)}  # "rows": in the units of a level's rows
+
+
+@dataclass(frozen=True)
+class Metric:
+    """One number about one run.
+
+    `value` is in the SI `unit` ("" for a count, "share" of 1, "deg"), and None when the run has
+    no such thing. `lower_is_better` is None where neither direction is. A `detail` is left out of
+    tables that must be short.
+    """
+
+    name: str
+    label: str
+    value: float | None
+    unit: str
+    lower_is_better: bool | None = True
+    group: str = ""
+    note: str = ""
+    detail: bool = False
+
+    @property
+    def shown_unit(self) -> str:
+        """The unit in which tables show the value."""
+        return _display(self.unit)[1]
+
+    @property
+    def scale(self) -> float:
+        """How many of `shown_unit` make one SI unit."""
+        return _display(self.unit)[0]
+
+    def shown(self) -> str:
+        """Return the value for a table: in `shown_unit`, without the unit."""
+        if self.value is None:
+            return "–"
+        scale, _, decimals = _display(self.unit)
+        value = self.value * scale
+        if value != 0.0 and (abs(value) < 0.5 * 10.0**-decimals or abs(value) >= 1e5):
+            return f"{value:.1e}"
+        return f"{value:.{decimals}f}"
+
+
+class Criteria(NamedTuple):
+    """What metrics are judged by, see `measure`."""
+
+    settle: float
+    cone_tolerance_deg: float
+
+
+Measure = Callable[["Recording", Criteria], Iterator[Metric]]
+
+
+def register(name: str) -> Callable[[Measure], Measure]:
+    """Return a decorator that makes a function yield metrics of every run."""
+    return plugins.register("metrics", name, shipped=True)
+
+
+def shown(value: float, unit: str) -> str:
+    """Return a value in an SI unit as it stands in a sentence: three digits, display unit."""
+    scale, name, _ = _display(unit)
+    number = f"{value * scale:.3g}" if abs(value * scale) < 999.5 else f"{value * scale:.0f}"
+    return number + (name if name == "°" else f" {name}" if name else "")
+
+
+def _display(unit: str) -> tuple[float, str, int]:
+    return _SHOWN.get(unit, (1.0, unit, 3))
+
+
+def true(recording: Recording, signal: str) -> Array:
+    """Return a signal as it was, where that is known apart from what was measured."""
+    return recording[f"true_{signal}" if f"true_{signal}" in recording else signal]
+
+
+def passed(off: Array, tolerance: float = 0.0) -> Array:
+    """Return by how much a limit is passed, from how far beyond it a run is (T, ...), at least 0.
+
+    Who begins beyond it and comes back has not passed it, unless by going further.
+    """
+    came_back = (off <= tolerance).any(axis=0)
+    return np.asarray(np.where(came_back, off - np.fmin.accumulate(off), off))
+
+
+def norms(values: Array) -> Array:
+    """Return the Euclidean norm of each row."""
+    return np.asarray(np.linalg.norm(values, axis=1))
+
+
+def largest(values: Array) -> float | None:
+    """Return the largest magnitude; None if there is none, or it is not finite."""
+    return finite(np.abs(values).max()) if values.size else None
+
+
+def least(values: Array) -> float | None:
+    """Return the smallest of the values that are not NaN; None if there is none."""
+    known = values[~np.isnan(values)]
+    return finite(known.min()) if known.size else None
+
+
+def known(values: Array) -> Array:
+    """Return the finite ones of values."""
+    return values[np.isfinite(values)]
+
+
+def finite(value: Any) -> float | None:
+    """Return a number, None if it is not finite."""
+    return float(value) if np.isfinite(value) else None
+
+
+def rms_and_max(key: str, label: str, values: Array, unit: str, *, group: str, suffix: str = "",
+                note: str = "") -> Iterator[Metric]:
+    """Yield the root of the mean square and the largest magnitude of values."""
+    rms = finite(np.sqrt(np.mean(values**2))) if values.size else None
+    yield Metric(f"{key}_rms{suffix}", f"{label}, rms", rms, unit, group=group)
+    yield Metric(f"{key}_max{suffix}", f"{label}, max", largest(values), unit, group=group,
+                 note=note)

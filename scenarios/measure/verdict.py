@@ -1,0 +1,146 @@
+"""What runs came to: who reached the end, which promise broke, how far from each target."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from scenarios.measure.goals import Goal, goals, percent
+from scenarios.measure.metric import shown
+
+if TYPE_CHECKING:
+    from scenarios.measure.runs import Run
+    from scenarios.recording.recording import Recording
+
+_NAMED = 3  # things that a sentence names
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What one run came to.
+
+    seconds : how long it ran, of those `planned`. fault : why it ended early, or None. stands :
+    whether its robot is one that can fall. helped : ticks in which its policy stepped in.
+    """
+
+    label: str
+    seconds: float
+    planned: float
+    fault: str | None
+    stands: bool
+    goals: tuple[Goal, ...]
+    helped: int = 0
+
+    @property
+    def broken(self) -> tuple[Goal, ...]:
+        """The promises that broke."""
+        return tuple(goal for goal in self.goals if goal.promise and not goal.met)
+
+    @property
+    def end(self) -> str:
+        """How it ended: ran the whole time, stood, fell, or stopped."""
+        if self.fault is None:
+            return f"{'stood' if self.stands else 'ran'} the whole {self.planned:.4g} s"
+        how = "fell" if "fallen" in self.fault else "stopped"
+        return f"{how} at {self.seconds:.2f} s of {self.planned:.4g} s: {self.fault}"
+
+    def as_plain_data(self) -> dict[str, Any]:
+        """Return the verdict for a JSON file."""
+        return {"end": self.end, "goals": [
+            {**dataclasses.asdict(goal), "flag": goal.flag} for goal in self.goals]}
+
+
+def verdict(recording: Recording, label: str = "") -> Verdict:
+    """Return what a run came to."""
+    planned, facts = recording.scenario.control.duration, recording.facts
+    seconds = recording.ticks * recording.scenario.control.period
+    return Verdict(label, seconds, planned, recording.fault, facts.robot.base == "floating",
+                   goals(recording), len({event.tick for event in recording.events}))
+
+
+def verdicts(runs: Sequence[Run]) -> tuple[Verdict, ...]:
+    """Return the verdict of each run; one that could not begin has no goals."""
+    return tuple(
+        verdict(run.recording, run.label) if run.recording is not None else
+        Verdict(run.label, 0.0, run.scenario.control.duration, run.error, False, ())
+        for run in runs)
+
+
+def lines(found: Sequence[Verdict]) -> tuple[str, ...]:
+    """Return three sentences about one run or several: ends, promises, targets."""
+    return tuple(line for line in (_ends(found), _promises(found), _targets(found)) if line)
+
+
+def table(found: Sequence[Verdict]) -> list[tuple[str, tuple[str, ...]]]:
+    """Return a row for each goal: what was asked, and each run's cell."""
+    by = [{goal.title: goal for goal in one.goals} for one in found]
+    titles = dict.fromkeys(title for one in by for title in one)
+    return [(title, tuple(one[title].cell if title in one else "–" for one in by))
+            for title in titles]
+
+
+def _ends(found: Sequence[Verdict]) -> str:
+    """Return who reached the end, and where and why the others did not."""
+    if len(found) == 1:
+        said = found[0].end
+    else:
+        whole = [one for one in found if one.fault is None]
+        did = "stood" if all(one.stands for one in found) else "ran"
+        said = f"{len(whole)} of {len(found)} {did} to the end"
+        said += "".join(f"; {one.label} {one.end}" for one in found if one.fault is not None)
+    helped = [f"{one.label} {one.helped}".strip() for one in found if one.helped]
+    return _sentence(said + (f"; ticks in which the policy stepped in: {', '.join(helped)}"
+                             if helped else ""))
+
+
+def _promises(found: Sequence[Verdict]) -> str:
+    """Return which promises broke, under whom, and by how much at worst."""
+    by: dict[str, list[tuple[str, Goal]]] = {}
+    for one in found:
+        for goal in one.broken:
+            by.setdefault(f"{goal.name} {goal.asked}".strip(), []).append((one.label, goal))
+    if not by:
+        promised = any(goal.promise for one in found for goal in one.goals)
+        return "Every promise was kept." if promised else ""
+    said = []
+    for what, who in by.items():
+        worst = max((goal for _, goal in who), key=lambda goal: goal.worst)
+        under = "" if len(found) == 1 else " by all" if len(who) == len(found) else (
+            f" by {_some([label for label, _ in who])}")
+        said.append(f"{what}{under}, {shown(worst.worst, worst.unit)} at worst, for "
+                    f"{percent(worst.share)} of the time")
+    return _sentence(f"broken: {'; '.join(said)}")
+
+
+def _targets(found: Sequence[Verdict]) -> str:
+    """Return how far from its targets the best and the worst run are in the median.
+
+    Those that were left come first, in order of priority.
+    """
+    by: dict[str, dict[str, Goal]] = {}
+    for one in found:
+        for goal in one.goals:
+            if not goal.promise:
+                by.setdefault(goal.name, {})[one.label] = goal
+    left = sorted(by.items(), key=lambda one: all(goal.met for goal in one[1].values()))
+    said = []
+    for name, some in left[:_NAMED]:
+        ranked = sorted(some, key=lambda label: float(f"{some[label].median:.3g}"))
+        low, high = (shown(some[label].median, some[label].unit)
+                     for label in (ranked[0], ranked[-1]))
+        worst = max(some.values(), key=lambda goal: goal.worst)
+        said.append((f"{name} {low}" if low == high else
+                     f"{name} {low} ({ranked[0]}) to {high} ({ranked[-1]})")
+                    + f", {shown(worst.worst, worst.unit)} at worst")
+    return _sentence(f"off in the median: {'; '.join(said)}") if said else ""
+
+
+def _some(labels: Sequence[str]) -> str:
+    left = len(labels) - _NAMED
+    return ", ".join(labels[:_NAMED]) + (f" and {left} more" if left > 0 else "")
+
+
+def _sentence(text: str) -> str:
+    return f"{text[0].upper()}{text[1:]}."

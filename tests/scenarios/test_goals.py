@@ -1,0 +1,143 @@
+"""How far a run was from each goal, by signals made by hand."""
+
+import numpy as np
+import pytest
+from hand_made import recording
+
+from scenarios import load, simulate
+from scenarios.measure.goals import goals, percent
+from scenarios.measure.runs import Run
+from scenarios.measure.verdict import lines, table, verdict, verdicts
+
+
+def goal(name, fault=None, **signals):
+    return next(one for one in goals(recording(fault=fault, **signals)) if one.name == name)
+
+
+def at(x):
+    """Five errors of position along one axis, in mm, as the signals of a path at rest."""
+    desired = np.outer(1e-3 * np.asarray(x, float), (1.0, 0.0, 0.0))
+    return {"desired_position": desired, "position_error": desired}
+
+
+def joint(values):
+    return {"q": np.outer(values, np.eye(7)[0])}  # limits are -2 and 2
+
+
+def test_median_worst_and_share_count_from_when_the_target_was_first_reached():
+    one = goal("position", **at([90, 0, 0.5, 4, 3]))
+    assert (one.reached, one.first) == (1.0, 3.0)
+    assert (one.median, one.worst, one.share) == pytest.approx((1.75e-3, 4e-3, 0.5))
+    assert (one.flag, one.unit) == ("left", "m")
+
+
+def test_a_target_that_is_never_reached_counts_from_the_start():
+    one = goal("position", **at([437, 437, 500, 400, 437]))
+    assert (one.flag, one.share, one.reached) == ("never met", 1.0, None)
+    assert one.median == pytest.approx(0.437)
+
+
+@pytest.mark.parametrize(("q", "flag", "worst"), [
+    ([2.5, 2.2, 1.9, 1.9, 1.9], "kept", 0.0),           # came back
+    ([2.5, 2.7, 1.9, 1.9, 1.9], "broken", 0.2),         # went further first
+    ([2.5, 1.9, 2.1, 1.9, 1.9], "broken", 0.1),         # and out again
+    ([2.5, 2.4, 2.4, 2.4, 2.4], "never kept", 0.5),     # stayed
+    ([0.0, 2.3, -2.1, 0.0, 0.0], "broken", 0.3)])
+def test_who_starts_beyond_a_limit_and_comes_back_has_not_passed_it(q, flag, worst):
+    one = goal("joint limits", **joint(q))
+    assert (one.flag, one.worst) == (flag, pytest.approx(worst))
+
+
+def test_a_distance_is_a_promise_in_metres_and_an_unknown_one_is_no_breach():
+    one = goal("body", minimal_distance=[1.0, np.nan, 0.03, 1.0, 1.0])  # 50 mm are asked
+    assert one.promise
+    assert (one.worst, one.share) == pytest.approx((0.02, 0.25))
+
+
+def test_a_cone_is_kept_in_degrees():
+    error = np.cos(np.radians(60.0)) - np.cos(np.radians([60.0, 58.0, 76.0, 60.0, 60.0]))
+    one = goal("pointing", pointing_error=error)
+    assert (one.flag, one.worst, one.unit) == ("broken", pytest.approx(16.0), "deg")
+
+
+def test_three_sentences_say_the_end_the_promises_and_the_targets():
+    found = [verdict(recording(**at([2, 2, 2, 2, 2])), "a"),
+             verdict(recording(fault="the robot has fallen by 1 m", **joint([0, 0, 0, 0, 2.5])),
+                     "b")]
+    end, promises, targets = lines(found)
+    assert end.startswith("1 of 2 ran to the end; b fell at ")
+    assert promises == "Broken: joint limits by b, 0.5 rad at worst, for 20 % of the time."
+    assert targets == "Off in the median: position 0 mm (b) to 2 mm (a), 2 mm at worst."
+
+
+@pytest.mark.parametrize(("signals", "name", "said"), [
+    (at([0.25, 0.5, 0.25, 0.25, 1.0]), "position",
+     "position, at its target: met; 0.25 mm off in the median, 1 mm at worst"),
+    (at([90, 0.5, 0.5, 0.25, 0.5]), "position",
+     "position, at its target: met from 1.00 s on; 0.5 mm off in the median, 0.5 mm at worst"),
+    (at([437] * 5), "position", "position, at its target: never met; 437 mm off in the median, 437 "
+     "mm at worst; more than 1 mm off for 100 % of the time, first at 0.00 s"),
+    (joint([0.0] * 5), "joint limits", "joint limits: kept"),
+    (joint([2.5, 0, 0, 2.25, 0]), "joint limits",
+     "joint limits: broken; 0 rad off in the median, 0.25 rad at worst; more than 0.0001 rad off "
+     "for 20 % of the time, first at 3.00 s"),
+    ({"v": np.diag([0, 0, 4.0, 0, 0, 0, 0])[:5], "velocity_limit": np.full(7, 3.0)},
+     "speed limits", "speed limits: broken; 0 rad/s off in the median, 1 rad/s at worst; more than "
+     "0.001 rad/s off for 20 % of the time, first at 2.00 s"),
+    ({"contact_depth": [0, 2e-3, 0, 0, 0], "contacts": np.zeros(5)}, "no contact with obstacles",
+     "no contact with obstacles: broken; 0 mm off in the median, 2 mm at worst; more than 0.1 mm "
+     "off for 20 % of the time, first at 1.00 s")])
+def test_a_line_says_what_was_asked_how_far_off_and_for_how_long(signals, name, said):
+    assert str(goal(name, **signals)) == said
+
+
+def test_a_run_of_no_known_number_has_no_goal_of_it():
+    with pytest.raises(StopIteration):
+        goal("body", minimal_distance=np.full(5, np.nan))
+
+
+def run(label, **signals):
+    made = recording(**signals)
+    return Run(made.scenario, label, label, made)
+
+
+def test_the_table_has_a_row_for_each_goal_and_a_cell_for_each_run():
+    broken = Run(recording().scenario, "c", "c", None, "HierarchyError: no")
+    found = verdicts([run("a", **at([2, 0, 4, 0, 0])), run("b"), broken])
+    rows = dict(table(found))
+    assert rows["position, at its target"] == ("0 mm, worst 4 mm, out 25 %",
+                                               "0 mm, worst 0 mm", "–")
+    assert rows["joint limits"] == ("kept", "kept", "–")
+    assert lines(found)[0] == ("2 of 3 ran to the end; c stopped at 0.00 s of 4 s: "
+                               "HierarchyError: no.")
+    assert found[0].as_plain_data()["goals"][0]["flag"] == "left"
+
+
+def test_one_run_says_its_end_and_all_kept():
+    end, promises, _ = lines(verdicts([run("a")]))
+    assert (end, promises) == ("Ran the whole 4 s.", "Every promise was kept.")
+
+
+def test_many_that_broke_a_promise_are_named_up_to_three():
+    found = [run(label, **joint([0, 0, 0, 0, 2.5])) for label in "abcd"]
+    assert lines(verdicts(found))[1].startswith("Broken: joint limits by all, 0.5 rad at worst")
+    said = lines(verdicts([*found, run("e")]))[1]
+    assert said.startswith("Broken: joint limits by a, b, c and 1 more, 0.5 rad at worst")
+
+
+def test_a_share_is_rounded_to_two_digits_and_never_up_to_the_whole():
+    assert [percent(share) for share in (0.0094, 0.123, 0.994, 0.997, 1.0)] == [
+        "0.94 %", "12 %", "99 %", "100 %", "100 %"]
+
+
+@pytest.mark.parametrize(("name", "asked"), [
+    ("dual-arm", {"right hand": "on its path", "right hand ahead": "on a cone of 10°",
+                  "posture": "at its target", "speed limits": ""}),
+    ("singular", {"pose": "on its path", "pose turned": "as asked"}),
+    ("ellipse-hqp", {"pointing": "in a cone of 5°", "body": "50 mm or more from obstacles"}),
+    ("wipe", {"force": "20 N", "upright": "at its target", "torque limits": ""})])
+def test_what_a_scenario_asks_is_in_its_words(name, asked):
+    if name == "wipe":
+        pytest.importorskip("mujoco")
+    found = {one.name: one.asked for one in goals(simulate(load(name, ["control.duration=0.02"])))}
+    assert found.items() >= asked.items()
