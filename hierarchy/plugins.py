@@ -72,6 +72,11 @@ def shipped(group: Group) -> dict[str, Any]:
     return dict(_shipped[group])
 
 
+def registered(group: Group) -> dict[str, Any]:
+    """Return what is registered in a group so far, without loading what packages offer in it."""
+    return {**_shipped[group], **_registered[group]}
+
+
 def known(group: Group) -> dict[str, Any]:
     """Return all of a group by name: what this package brings, then what plugins do."""
     return {**_shipped[group], **own(group)}

@@ -17,7 +17,7 @@ from hierarchy.problem import Array
 from scenarios.cell.plants.ground import BALL
 from scenarios.config import Scenario, ScenarioError
 from scenarios.config.contacts import ContactSection
-from scenarios.config.plant import TorqueSection
+from scenarios.config.kinds.torque import TorqueSection
 
 _OFF = 0.002      # [m] of a point from the floor that is too far
 _TILTED = 1.0     # [deg] of a sole from the floor that is too much

@@ -50,11 +50,15 @@ class Tasks(NamedTuple):
 
 
 def tasks_of(scenario: Scenario, at: References) -> Tasks:
-    """Return the tasks of a scenario, most important first."""
+    """Return the tasks of a scenario, most important first.
+
+    Raises ScenarioError if it asks for nothing, or for what its robot cannot do.
+    """
+    _check_there_are_any(scenario, at.robot)
     areas, (limits, first) = areas_of(scenario), _first(scenario, at)
     position, pointing = position_of(scenario, at), pointing_of(scenario, at)
     listed = [task_of(section, at) for section in scenario.tasks if section.kind != "collision"]
-    avoiding = avoidance_tasks(scenario, at.robot)
+    avoiding = avoidance_tasks(scenario, at)
     always = first if areas else [*first, *avoiding]  # repulsion is placed by Algorithm 1
     tasks = _in_order(scenario, [*first, *avoiding, *(
         task for task in (position, pointing, *listed, posture_of(scenario, at, "task")) if task)])
@@ -76,7 +80,7 @@ def _first(scenario: Scenario, at: References) -> tuple[JointLimits | None, list
                          not bounded and scenario.make_resolver().can_resolve("inequalities"))
 
 
-def check_there_are_tasks(scenario: Scenario, robot: Robot) -> None:
+def _check_there_are_any(scenario: Scenario, robot: Robot) -> None:
     """Raise a ScenarioError unless the scenario asks for something, or the robot's file does."""
     asked = scenario.position or scenario.pointing or scenario.avoidance or scenario.tasks
     if not (asked or robot.coupled or robot.loops):

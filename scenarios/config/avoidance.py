@@ -2,31 +2,45 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
-from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from hierarchy.words import listed
 from scenarios.config.paths import PathSection, WaypointsSection
 from scenarios.config.sections import (
     Count,
-    NotNegative,
+    Distance,
+    Length,
+    OneOf,
+    Point,
     Positive,
+    Rate,
+    Rows3,
     Section,
-    Vector3,
-    kind_or,
+    Speed,
+    Unit,
 )
 from scenarios.config.waypoints import moved
+
+if TYPE_CHECKING:
+    from hierarchy.avoidance import Barrier, Repulsion
 
 
 class RepulsionSection(Section):
     """Magnitude of the repulsion, eq. (23); see hierarchy.avoidance.Repulsion."""
 
     maximum: Positive
-    reach: Positive
+    reach: Length
     shape: Positive
     scale: Positive = 2.0
+
+    def make(self) -> Repulsion:
+        """Return the law."""
+        from hierarchy.avoidance import Repulsion
+
+        return Repulsion(self.maximum, self.reach, self.shape, self.scale)
 
 
 class ObstacleSection(Section):
@@ -34,11 +48,11 @@ class ObstacleSection(Section):
 
     tag: ClassVar[str] = "shape"
     shape: Literal["point", "sphere", "capsule", "box"] = "point"
-    centre: Vector3 | None = None
-    radius: Positive | None = None
-    half_length: Positive | None = None
-    half_lengths: tuple[Positive, Positive, Positive] | None = None
-    rotation: tuple[Vector3, Vector3, Vector3] = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
+    centre: Point | None = None
+    radius: Length | None = None
+    half_length: Length | None = None
+    half_lengths: tuple[Length, Length, Length] | None = None
+    rotation: Rows3 = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
     path: PathSection | None = None
 
     @model_validator(mode="after")
@@ -70,7 +84,7 @@ class VariationSection(Section):
     """
 
     seed: Count
-    spread: NotNegative = 0.05
+    spread: Distance = 0.05
     timing: Annotated[float, Field(strict=True, ge=0.0, lt=1.0)] = 0.1
 
 
@@ -124,14 +138,14 @@ class AvoidanceSection(_Avoiding):
     kind: Literal["repulsion"] = "repulsion"
     dimension: Literal[1, 3] = 1
     direction: Literal["nearest", "mean"] = "nearest"
-    near: NotNegative
-    far: NotNegative
-    end_effector: NotNegative
+    near: Distance
+    far: Distance
+    end_effector: Distance
     body: RepulsionSection
     tip: RepulsionSection
     jacobian: Literal["exact", "published"] = "exact"
     place: Literal["stack", "null-space"] = "stack"
-    asked: Positive | None = None
+    asked: Length | None = None
 
     @model_validator(mode="after")
     def _areas_nested(self) -> Self:
@@ -160,7 +174,23 @@ class AvoidanceSection(_Avoiding):
         return {"body": self.near} if self.asked is None else {"body": self.asked, "ee": self.asked}
 
 
-class SeparationSection(_Avoiding):
+class BarrierSection(Section):
+    """How one-sided rows keep a distance, see hierarchy.avoidance.Barrier."""
+
+    distance: Distance = 0.03
+    rate: Rate = 10.0
+    influence: Length = 0.3
+    recovery: Speed = 0.2
+    limit: Annotated[Positive, Unit("m/s^2")] = 50.0
+
+    def barrier(self, distance: float) -> Barrier:
+        """Return the barrier of a distance [m] to keep; HierarchyError if it is out of range."""
+        from hierarchy.avoidance import Barrier
+
+        return Barrier(distance, self.rate, self.influence, self.recovery, self.limit)
+
+
+class SeparationSection(BarrierSection, _Avoiding):
     """Keep all control points and the end effector away from all obstacles, as one-sided rows.
 
     `distance` [m] is the clearance and `rate` [1/s] limits the approach to it. Obstacles beyond
@@ -174,13 +204,8 @@ class SeparationSection(_Avoiding):
     """
 
     kind: Literal["separation"]
-    distance: NotNegative = 0.03
-    rate: Positive = 10.0
-    influence: Positive = 0.3
-    recovery: NotNegative = 0.2
-    limit: Positive = 50.0
-    self_collision: NotNegative | None = None
-    buffer: Positive | None = None
+    self_collision: Distance | None = None
+    buffer: Length | None = None
     obstacles: Obstacles = ()
 
     @model_validator(mode="after")
@@ -206,6 +231,4 @@ class SeparationSection(_Avoiding):
         return {"body": self.distance, "ee": self.distance}
 
 
-AvoidanceKind = Annotated[
-    Annotated[AvoidanceSection, Tag("repulsion")] | Annotated[SeparationSection, Tag("separation")],
-    Discriminator(kind_or("repulsion"))]
+AvoidanceKind = Annotated[AvoidanceSection | SeparationSection, OneOf("repulsion")]

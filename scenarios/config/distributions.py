@@ -7,9 +7,8 @@ from typing import Annotated, Any, Self
 import numpy as np
 from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
 
-from scenarios.config.sections import Finite, NotNegative, Section
+from scenarios.config.sections import Finite, NotNegative, Section, Whole
 
-Whole = Annotated[int, Field(strict=True)]
 Value = bool | int | float | str | list[Any]
 
 

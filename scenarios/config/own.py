@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable
+from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any, ClassVar, Self, cast, get_args, get_origin, get_type_hints
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model, model_validator
@@ -31,12 +32,26 @@ GIVEN: dict[Group, tuple[str, ...]] = {
 Maker = Callable[..., Any]
 
 
-class OwnSection(Section):
+class PartSection(Section):
+    """A section of [plant] or [sensor]; `made_by`, "module:name", makes the part.
+
+    Reading a file loads no robot, so that its maker stands here by name.
+    """
+
+    made_by: ClassVar[str]
+    kind: str
+
+    def made(self, robot: Robot, **given: Any) -> Any:
+        """Call the maker with those of this `section`, `robot` and `given` that it takes."""
+        maker = resolve_name(self.made_by)
+        return maker(**_taken(maker, {"section": self, "robot": robot, **given}))
+
+
+class OwnSection(PartSection):
     """A section whose kind and keys are those of a plugin."""
 
     model_config = ConfigDict(extra="allow")
     group: ClassVar[Group]
-    kind: str
 
     @model_validator(mode="after")
     def _fits_its_maker(self) -> Self:
@@ -65,18 +80,23 @@ class OwnSection(Section):
 
         Raises ScenarioError, naming the kind, for whatever goes wrong in it: it is the user's code.
         """
-        wanted = {"robot": robot, **given}
+        wanted = {name: value for name, value in {"robot": robot, **given}.items()
+                  if name in GIVEN[self.group]}
         what = f"{self.group[:-1]} of kind {self.kind!r}"
         try:
             values = {key: _made(annotation, value, robot)
                       for key, (annotation, value) in self.settings().items()}
-            provided = {name: value for name, value in wanted.items()
-                        if name in inspect.signature(self.maker).parameters}
-            return self.maker(**provided, **values)
+            return self.maker(**_taken(self.maker, wanted), **values)
         except HierarchyError as error:
             raise ScenarioError(f"{what}: {error}") from error
         except Exception as error:
             raise ScenarioError(f"{what}: {type(error).__name__}: {error}") from error
+
+
+def _taken(maker: Maker, given: dict[str, Any]) -> dict[str, Any]:
+    """Return what of some arguments a maker has parameters for."""
+    known = inspect.signature(maker).parameters
+    return {name: value for name, value in given.items() if name in known}
 
 
 def _made(annotation: Any, value: Any, robot: Robot) -> Any:

@@ -6,11 +6,24 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Annotated, Literal, Self
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import model_validator
 
 from hierarchy.errors import HierarchyError
 from scenarios.config.errors import ScenarioError
-from scenarios.config.sections import Count, Finite, NotNegative, Positive, Section, Vector3
+from scenarios.config.sections import (
+    Angle,
+    Count,
+    Distance,
+    Finite,
+    OneOf,
+    Point,
+    Positive,
+    Section,
+    Span,
+    Time,
+    Unit,
+    Vector3,
+)
 
 if TYPE_CHECKING:
     from hierarchy.paths import Path
@@ -22,8 +35,8 @@ class JitterSection(Section):
     The same `seed` gives the same motion.
     """
 
-    amplitude: NotNegative
-    rate: Positive
+    amplitude: Distance
+    rate: Annotated[Positive, Unit("Hz")]
     seed: Count = 0
 
 
@@ -35,7 +48,7 @@ class _AnyPath(Section):
     """
 
     jitter: JitterSection | None = None
-    out_of_reach: tuple[tuple[NotNegative, NotNegative], ...] | None = None
+    out_of_reach: tuple[tuple[Time, Time], ...] | None = None
 
     @model_validator(mode="after")
     def _spans_are_in_order(self) -> Self:
@@ -64,7 +77,7 @@ class StillSection(_AnyPath):
     """A point that does not move, `position` [m]."""
 
     kind: Literal["still"]
-    position: Vector3
+    position: Point
 
     def _steady(self) -> Path:
         from hierarchy.paths import Still
@@ -76,11 +89,11 @@ class EllipseSection(_AnyPath):
     """p(t) = centre + cosine cos(s) + sine sin(s) [m] with s = rate t + phase [rad]."""
 
     kind: Literal["ellipse"]
-    centre: Vector3
-    cosine: Vector3
-    sine: Vector3
-    rate: Finite = 1.0
-    phase: Finite = 0.0
+    centre: Point
+    cosine: Point
+    sine: Point
+    rate: Annotated[Finite, Unit("rad/s")] = 1.0
+    phase: Angle = 0.0
 
     def _steady(self) -> Path:
         from hierarchy.paths import Ellipse
@@ -101,9 +114,9 @@ class WaypointsSection(_AnyPath):
     """
 
     kind: Literal["waypoints"]
-    times: tuple[NotNegative, ...]
-    points: tuple[Vector3, ...]
-    blend: Positive | None = None
+    times: tuple[Time, ...]
+    points: tuple[Point, ...]
+    blend: Span | None = None
 
     def _steady(self) -> Path:
         from hierarchy.paths import Blended, Waypoints
@@ -116,10 +129,10 @@ class LineSection(_AnyPath):
     """Straight from `start` to `end` [m] within `duration` [s], from `begin` [s] on."""
 
     kind: Literal["line"]
-    start: Vector3
-    end: Vector3
-    duration: Positive
-    begin: NotNegative = 0.0
+    start: Point
+    end: Point
+    duration: Span
+    begin: Time = 0.0
 
     def _steady(self) -> Path:
         from hierarchy.paths import line
@@ -131,11 +144,11 @@ class CircleSection(_AnyPath):
     """A circle of `radius` [m] about `normal`; rate [rad/s], phase [rad]."""
 
     kind: Literal["circle"]
-    centre: Vector3
-    radius: NotNegative
+    centre: Point
+    radius: Distance
     normal: Vector3 = (0.0, 0.0, 1.0)
-    rate: Finite = 1.0
-    phase: Finite = 0.0
+    rate: Annotated[Finite, Unit("rad/s")] = 1.0
+    phase: Angle = 0.0
 
     def _steady(self) -> Path:
         from hierarchy.paths import circle
@@ -156,4 +169,4 @@ class RecordedSection(_AnyPath):
 
 
 PathSection = Annotated[StillSection | LineSection | CircleSection | EllipseSection
-                        | WaypointsSection | RecordedSection, Field(discriminator="kind")]
+                        | WaypointsSection | RecordedSection, OneOf()]

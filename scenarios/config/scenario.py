@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Self
 import tomli_w
 from pydantic import Field, field_validator, model_validator
 
+import scenarios.config.kinds  # noqa: F401, registers them
 from hierarchy import plugins
 from hierarchy.errors import expect
 from scenarios.config.avoidance import AvoidanceKind
@@ -19,7 +20,6 @@ from scenarios.config.contacts import ContactSection, ForcesSection
 from scenarios.config.control import ControlSection
 from scenarios.config.distributions import Parameters
 from scenarios.config.faults import FaultSection
-from scenarios.config.listed import ListedTask
 from scenarios.config.plant import KinematicSection, PlantKind
 from scenarios.config.robot import RobotSection, StartSection
 from scenarios.config.sections import Section
@@ -28,6 +28,7 @@ from scenarios.config.stacks import RIVALS, unfit
 from scenarios.config.tasks import (
     DampingSection,
     LimitsSection,
+    ListedTask,
     PointingSection,
     PointingTask,
     PositionSection,

@@ -13,15 +13,24 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from hierarchy import plugins
+from hierarchy.plugins import Group
 from hierarchy.problem import Array
+from scenarios.config.errors import ScenarioError
+from scenarios.config.own import OwnSection
 from scenarios.config.paths import PathSection
 from scenarios.config.sections import (
     Finite,
     Flag,
+    Gain,
     JointValue,
+    Length,
     NotNegative,
+    Point,
     Positive,
+    Registered,
     Section,
+    Stiffness,
+    Unit,
     Vector3,
 )
 
@@ -30,6 +39,7 @@ if TYPE_CHECKING:
     from hierarchy.paths import Path
     from scenarios.config.references import References
 
+Acceleration = Annotated[Positive, Unit("rad/s^2")]
 Rows = Literal["equality", "inequality"]
 _Kind = TypeVar("_Kind", bound="Listed")
 TaskName = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_ -]*$")]
@@ -71,9 +81,9 @@ class Made(Section):
 class TaskSection(Made):
     """What most tasks have: gains of its error, in [1/s^2] and [1/s] (acceleration) and [1/s]."""
 
-    stiffness: NotNegative = 40.0
-    damping: NotNegative = 20.0
-    gain: NotNegative = 10.0
+    stiffness: Stiffness = 40.0
+    damping: Gain = 20.0
+    gain: Gain = 10.0
 
     @property
     def gains(self) -> tuple[float, float, float]:
@@ -88,7 +98,7 @@ class AlongSection(TaskSection):
     """
 
     path: PathSection | None = None
-    offset: Vector3 = (0.0, 0.0, 0.0)
+    offset: Point = (0.0, 0.0, 0.0)
     from_start: Flag = False
 
     @model_validator(mode="after")
@@ -143,12 +153,12 @@ class PointingTask(TaskSection):
     """
 
     axis: Vector3
-    alpha_d: Annotated[float, Field(strict=True, ge=0.0, le=180.0)]
+    alpha_d: Annotated[float, Field(strict=True, ge=0.0, le=180.0), Unit("deg")]
     rows: Rows = "inequality"
-    buffer: Positive | None = None
-    stiffness: NotNegative = 5.0
-    damping: NotNegative = 2.0
-    gain: NotNegative = 5.0
+    buffer: Annotated[Positive, Unit("deg")] | None = None
+    stiffness: Stiffness = 5.0
+    damping: Gain = 2.0
+    gain: Gain = 5.0
     frame: ClassVar[str | None]
 
     @property
@@ -176,9 +186,9 @@ class PostureTask(TaskSection):
     unit: ClassVar[str] = "rad"
     target: tuple[Finite, ...] | None = None
     joints: dict[str, JointValue] = Field(default_factory=dict)
-    stiffness: NotNegative = 10.0
-    damping: NotNegative = 5.0
-    gain: NotNegative = 1.0
+    stiffness: Stiffness = 10.0
+    damping: Gain = 5.0
+    gain: Gain = 1.0
 
     def make(self, at: References) -> Task:
         """Return the task."""
@@ -232,12 +242,12 @@ class LimitsSection(Section):
     are slowed down, see hierarchy.tasks.DangerBounds.
     """
 
-    acceleration: Positive | tuple[Positive, ...]
+    acceleration: Acceleration | tuple[Acceleration, ...]
     place: Literal["stack", "guard", "either", "bounds"] = "stack"
-    margin: NotNegative = 0.0
-    danger_reach: Positive | None = None
+    margin: Annotated[NotNegative, Unit("rad")] = 0.0
+    danger_reach: Length | None = None
     torque: Annotated[float, Field(strict=True, gt=0.0, le=1.0)] | None = None
-    torque_step: Positive | None = None
+    torque_step: Annotated[Positive, Unit("N m")] | None = None
     base_speed: tuple[Positive, Positive] | None = None
     base_acceleration: tuple[Positive, Positive] | None = None
 
@@ -264,6 +274,34 @@ class Listed(Made):
     def title(self) -> str:  # type: ignore[override]
         """The task's name in stacks, messages and tables."""
         return self.name or self.kind
+
+
+class OwnTask(Listed, OwnSection):
+    """A task of a plugin; its keys are those of the plugin."""
+
+    group: ClassVar[Group] = "tasks"
+    unit: ClassVar[str] = ""
+
+    @property
+    def one_sided(self) -> bool:
+        """Whether its rows are inequalities, as the plugin's class says with `kind`."""
+        return str(getattr(self.maker, "kind", "equality")) == "inequality"
+
+    def make(self, at: References) -> Task:
+        """Return the task; raises ScenarioError for whatever goes wrong in the user's code."""
+        from hierarchy import Task
+        from hierarchy.errors import brief
+
+        task = self.made(at.robot, state=at.start, name=self.title)
+        if not isinstance(task, Task):
+            raise ScenarioError(f"the plugin made {brief(task)}, not a Task")
+        if task.name != self.title:
+            raise ScenarioError(f"its name is {task.name!r}; take the name as the parameter `name`,"
+                                " or give the section this name")
+        return task
+
+
+ListedTask = Annotated[Listed, Registered(None, "tasks", OwnTask)]
 
 
 def register(kind: str) -> Callable[[type[_Kind]], type[_Kind]]:

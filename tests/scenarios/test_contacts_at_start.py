@@ -16,7 +16,7 @@ from scenarios.cell.plants.physics import PhysicsArm
 from scenarios.cell.plants.torque import TorqueRobot
 from scenarios.cli.main import run_command
 from scenarios.config import ScenarioError
-from scenarios.config.plant import TorqueSection
+from scenarios.config.kinds.torque import TorqueSection
 from scenarios.config.reading import shipped
 from scenarios.loop.first_tick import contact_warnings, first_tick
 

@@ -16,7 +16,7 @@ from scenarios.cell.sensors.depth_space import DepthSpace, ObstacleImage
 from scenarios.cell.sensors.exact import ExactDistances
 from scenarios.cell.sensors.frames import RecordedFrames
 from scenarios.config import ScenarioError
-from scenarios.config.sensor import DepthErrors
+from scenarios.config.kinds.camera import DepthErrors
 from scenarios.draw.figures.depth import depth_figure
 from scenarios.loop import record_frames
 from scenarios.measure.judging import depth_view

@@ -13,7 +13,8 @@ from scenarios.cell.build import build
 from scenarios.cell.plants import Apart, JointSensor, KinematicArm, PhysicsArm
 from scenarios.cli.main import run_command
 from scenarios.config import ScenarioError
-from scenarios.config.plant import JointsSection, MeasurementSection, PhysicsSection
+from scenarios.config.kinds.mujoco import JointsSection, PhysicsSection
+from scenarios.config.plant import MeasurementSection
 from scenarios.loop.controller import Controller
 from scenarios.measure.metrics import measure
 from scenarios.measure.run_folder import load_run, save

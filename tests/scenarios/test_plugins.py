@@ -300,7 +300,7 @@ def test_a_changed_plugin_is_another_version(folder):
     ("tasks.0.steps=1.5", "tasks.0: steps: Input should be a valid integer, got 1.5"),
     ("tasks.0.dimension=2", "unknown key of kind 'elbow' 'dimension'"),
     ("tasks.0.name='1'", "tasks.0.name"),
-    ("tasks.1.path.kind=spiral", "tasks.1: path: Input tag 'spiral'"),
+    ("tasks.1.path.kind=spiral", "tasks.1: path: expected a kind, 'still', 'line'"),
     ("plant.share='all'", "plant: share: Input should be a valid number, got 'all'"),
     ("plant.kind=waek",
      "plant: expected a kind, 'kinematic', 'mujoco', 'torque', 'weak'; got 'waek'"),

@@ -12,7 +12,7 @@ from hierarchy.problem import Array
 from hierarchy.robot import Body
 from scenarios.cell.plants.mjcf import GRAVITY, text
 from scenarios.config import ScenarioError
-from scenarios.config.plant import TorqueSection
+from scenarios.config.kinds.torque import TorqueSection
 
 _LEAST_MASS, _LEAST_INERTIA = 1e-6, 1e-9  # [kg], [kg m^2] of a body that only joins two joints
 _THICKNESS = 0.01                         # [m] half of that of a sole

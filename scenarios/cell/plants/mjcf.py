@@ -13,7 +13,7 @@ from hierarchy.avoidance import Capsule, Obstacle
 from hierarchy.problem import Array
 from hierarchy.robot import Body
 from scenarios.config import ScenarioError
-from scenarios.config.plant import JointsSection, ServoSection
+from scenarios.config.kinds.mujoco import JointsSection, ServoSection
 
 GRAVITY = 9.81     # [m/s^2], along -z of the world, as in the robot's own model
 _SOFTNESS = 0.02   # [s] time constant of a contact: a few mm of penetration at usual speeds

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, ClassVar, Literal
 
-from scenarios.config.sections import NotNegative, Positive
+from scenarios.config.avoidance import BarrierSection
 from scenarios.config.tasks import Listed, register
 
 if TYPE_CHECKING:
@@ -26,24 +26,17 @@ class _Apart(Listed):
 
 
 @register("self-collision")
-class ListedSelfCollision(_Apart):
+class ListedSelfCollision(_Apart, BarrierSection):
     """Links that are not neighbours, kept `distance` [m] apart; other keys as in [avoidance]."""
 
     kind: Literal["self-collision"]
-    distance: NotNegative = 0.03
-    rate: Positive = 10.0
-    influence: Positive = 0.3
-    recovery: NotNegative = 0.2
-    limit: Positive = 50.0
 
     def make(self, at: References) -> Task:
         """Return the task."""
-        from hierarchy.avoidance import Barrier
         from hierarchy.tasks import SelfSeparation
 
-        pairs = at.pairs(self.distance)
-        barrier = Barrier(self.distance, self.rate, self.influence, self.recovery, self.limit)
-        return SelfSeparation(at.robot.capsules, barrier, pairs, name=self.title)
+        return SelfSeparation(at.robot.capsules, self.barrier(self.distance),
+                              at.pairs(self.distance), name=self.title)
 
 
 @register("collision")

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 from pydantic import Field
 
-from scenarios.config.sections import Finite, NotNegative
+from scenarios.config.sections import Finite, Stiffness
 from scenarios.config.tasks import Listed, TaskSection, register
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ class ListedCoupling(Listed, TaskSection):
     kind: Literal["coupling"]
     joints: Annotated[dict[str, Finite], Field(min_length=1)]
     value: Finite = 0.0
-    stiffness: NotNegative = 100.0
+    stiffness: Stiffness = 100.0
 
     def make(self, at: References) -> Task:
         """Return the task."""

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from hierarchy.problem import Array
-from scenarios.config.sections import NotNegative, Vector3
+from scenarios.config.sections import Gain, Point, Stiffness
 from scenarios.config.tasks import Listed, TaskSection, register
 
 if TYPE_CHECKING:
@@ -24,10 +24,10 @@ class ListedLookAt(Listed, TaskSection):
 
     kind: Literal["look-at"]
     frame: str
-    target: Vector3
-    stiffness: NotNegative = 20.0
-    damping: NotNegative = 10.0
-    gain: NotNegative = 5.0
+    target: Point
+    stiffness: Stiffness = 20.0
+    damping: Gain = 10.0
+    gain: Gain = 5.0
 
     def make(self, at: References) -> Task:
         """Return the task."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, ClassVar, Literal
 
-from scenarios.config.sections import NotNegative
+from scenarios.config.sections import Gain, NotNegative, Stiffness
 from scenarios.config.tasks import Listed, Rows, TaskSection, register
 
 if TYPE_CHECKING:
@@ -28,9 +28,9 @@ class ListedManipulability(Listed, TaskSection):
     least: NotNegative
     part: Literal["position", "pose"] = "position"
     rows: Rows = "inequality"
-    stiffness: NotNegative = 20.0
-    damping: NotNegative = 10.0
-    gain: NotNegative = 5.0
+    stiffness: Stiffness = 20.0
+    damping: Gain = 10.0
+    gain: Gain = 5.0
 
     @property
     def one_sided(self) -> bool:

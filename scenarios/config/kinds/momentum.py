@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Literal
 
-from scenarios.config.sections import NotNegative
+from scenarios.config.sections import Gain
 from scenarios.config.tasks import Listed, register
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ class ListedMomentum(Listed):
 
     kind: Literal["momentum"]
     part: Literal["linear", "angular"] = "angular"
-    damping: NotNegative = 10.0
+    damping: Gain = 10.0
 
     @property
     def unit(self) -> str:  # type: ignore[override]

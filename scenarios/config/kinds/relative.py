@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Literal, Self
 from pydantic import model_validator
 
 from hierarchy.problem import Array
-from scenarios.config.sections import Flag, Rows3, Vector3
+from scenarios.config.sections import Flag, Point, Rows3
 from scenarios.config.tasks import Listed, TaskSection, of_pose, register
 
 if TYPE_CHECKING:
@@ -29,7 +29,7 @@ class ListedRelative(Listed, TaskSection):
     kind: Literal["relative"]
     frame: str
     to: str
-    position: Vector3 | None = None
+    position: Point | None = None
     rotation: Rows3 | None = None
     orientation: Flag = True
 

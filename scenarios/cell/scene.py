@@ -1,0 +1,64 @@
+"""Make obstacles and the sensor of distances to them, from [avoidance] and [sensor]."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hierarchy import HierarchyError, State
+from hierarchy.avoidance import Obstacle, Obstacles
+from scenarios.cell.sensors import ExactDistances, Sensor
+from scenarios.cell.sensors.sensor import Asked
+from scenarios.config import Scenario, ScenarioError
+from scenarios.config.avoidance import AvoidanceKind, AvoidanceSection, ObstacleSection
+
+
+def sensor_of(scenario: Scenario, start: State,
+              obstacles: Obstacles | None = None) -> Sensor | None:
+    """Return the sensor of distances to the obstacles, None without [avoidance].
+
+    `obstacles` default to those of the scenario, and then must not touch the robot at the start.
+    Raises ScenarioError if the robot has no control points, or [sensor] does not fit it.
+    """
+    section, robot = scenario.avoidance, start.robot
+    if section is None:
+        return None
+    if not robot.control_points:
+        raise ScenarioError(f"[avoidance]: robot {robot.name!r} has no control points; list them "
+                            "in robot.control_points")
+    asked = _asked(section, (scenario.limits and scenario.limits.danger_reach) or 0.0)
+    exact = ExactDistances(robot, obstacles or make_obstacles(section.placed), asked.body,
+                           asked.tip, asked.mean_within,
+                           pairs=not isinstance(section, AvoidanceSection))
+    try:
+        sensor: Sensor = scenario.sensor.made(robot, exact=exact, asked=asked, body=asked.body,
+                                              tip=asked.tip)
+    except ScenarioError:
+        raise
+    except HierarchyError as error:
+        raise ScenarioError(f"sensor: {error}") from error
+    if obstacles is None:
+        sensor.check_start(start)
+    return sensor
+
+
+def _asked(section: AvoidanceKind, danger: float) -> Asked:
+    if not isinstance(section, AvoidanceSection):
+        return Asked(max(section.influence, danger))
+    mean = (section.far, section.end_effector) if section.direction == "mean" else (0.0, 0.0)
+    return Asked(max(section.far, section.end_effector, danger), mean, section.body.make(),
+                 section.tip.make())
+
+
+def make_obstacles(sections: tuple[ObstacleSection, ...]) -> Obstacles:
+    """Make the scene's obstacles, numbered from 1 in messages."""
+    return Obstacles([_obstacle(i, section) for i, section in enumerate(sections, 1)])
+
+
+def _obstacle(number: int, section: ObstacleSection) -> Obstacle:
+    path = None if section.path is None else section.path.make()
+    size = {"point": (), "sphere": (section.radius,),
+            "capsule": (section.radius, section.half_length),
+            "box": section.half_lengths}[section.shape]
+    return Obstacle(section.shape, section.centre or (0.0, 0.0, 0.0),
+                    tuple(float(s) for s in size or () if s is not None),
+                    np.array(section.rotation), path, f"obstacle {number}")
