@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
+from hierarchy.avoidance import Barrier, Obstacle, Repulsion
 from hierarchy.words import listed
 from scenarios.config.paths import PathSection, WaypointsSection
 from scenarios.config.sections import (
@@ -24,9 +25,6 @@ from scenarios.config.sections import (
 )
 from scenarios.config.waypoints import moved
 
-if TYPE_CHECKING:
-    from hierarchy.avoidance import Barrier, Repulsion
-
 
 class RepulsionSection(Section):
     """Magnitude of the repulsion, eq. (23); see hierarchy.avoidance.Repulsion."""
@@ -38,8 +36,6 @@ class RepulsionSection(Section):
 
     def make(self) -> Repulsion:
         """Return the law."""
-        from hierarchy.avoidance import Repulsion
-
         return Repulsion(self.maximum, self.reach, self.shape, self.scale)
 
 
@@ -65,6 +61,14 @@ class ObstacleSection(Section):
         if (self.centre is None) == (self.path is None):
             raise ValueError("give either a centre or a path")
         return self
+
+    def make(self, name: str) -> Obstacle:
+        """Return the obstacle, with its name in messages."""
+        sizes = (self.radius, self.half_length, *(self.half_lengths or ()))
+        return Obstacle(self.shape, self.centre or (0.0, 0.0, 0.0),
+                        tuple(float(size) for size in sizes if size is not None),
+                        np.array(self.rotation),
+                        None if self.path is None else self.path.make(), name)
 
 
 def as_table(obstacle: Any) -> Any:
@@ -185,8 +189,6 @@ class BarrierSection(Section):
 
     def barrier(self, distance: float) -> Barrier:
         """Return the barrier of a distance [m] to keep; HierarchyError if it is out of range."""
-        from hierarchy.avoidance import Barrier
-
         return Barrier(distance, self.rate, self.influence, self.recovery, self.limit)
 
 

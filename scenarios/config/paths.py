@@ -3,12 +3,23 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import TYPE_CHECKING, Annotated, Literal, Self
+from typing import Annotated, Literal, Self
 
 import numpy as np
 from pydantic import model_validator
 
 from hierarchy.errors import HierarchyError
+from hierarchy.paths import (
+    Blended,
+    Ellipse,
+    Jittered,
+    Path,
+    Recorded,
+    Still,
+    Waypoints,
+    circle,
+    line,
+)
 from scenarios.config.errors import ScenarioError
 from scenarios.config.sections import (
     Angle,
@@ -24,9 +35,6 @@ from scenarios.config.sections import (
     Unit,
     Vector3,
 )
-
-if TYPE_CHECKING:
-    from hierarchy.paths import Path
 
 
 class JitterSection(Section):
@@ -59,8 +67,6 @@ class _AnyPath(Section):
 
     def make(self) -> Path:
         """Return the path; raises ScenarioError where the values are no path."""
-        from hierarchy.paths import Jittered
-
         try:
             path, jitter = self._steady(), self.jitter
         except HierarchyError as error:
@@ -80,8 +86,6 @@ class StillSection(_AnyPath):
     position: Point
 
     def _steady(self) -> Path:
-        from hierarchy.paths import Still
-
         return Still(self.position)
 
 
@@ -96,8 +100,6 @@ class EllipseSection(_AnyPath):
     phase: Angle = 0.0
 
     def _steady(self) -> Path:
-        from hierarchy.paths import Ellipse
-
         if self.phase == 0.0:
             return Ellipse(self.centre, self.cosine, self.sine, self.rate)
         cosine, sine = np.array(self.cosine), np.array(self.sine)
@@ -119,8 +121,6 @@ class WaypointsSection(_AnyPath):
     blend: Span | None = None
 
     def _steady(self) -> Path:
-        from hierarchy.paths import Blended, Waypoints
-
         return (Waypoints(self.times, self.points) if self.blend is None
                 else Blended(self.times, self.points, self.blend))
 
@@ -135,8 +135,6 @@ class LineSection(_AnyPath):
     begin: Time = 0.0
 
     def _steady(self) -> Path:
-        from hierarchy.paths import line
-
         return line(self.start, self.end, self.duration, self.begin)
 
 
@@ -151,8 +149,6 @@ class CircleSection(_AnyPath):
     phase: Angle = 0.0
 
     def _steady(self) -> Path:
-        from hierarchy.paths import circle
-
         return circle(self.centre, self.radius, self.normal, self.rate, self.phase)
 
 
@@ -163,8 +159,6 @@ class RecordedSection(_AnyPath):
     file: str
 
     def _steady(self) -> Path:
-        from hierarchy.paths import Recorded
-
         return Recorded.from_csv(self.file)
 
 

@@ -102,15 +102,14 @@ class OneOf:
 
 @dataclass(frozen=True)
 class Registered(OneOf):
-    """The same for the kinds of a group: shipped sections, or `own` for what a plugin registers."""
+    """The same for the kinds of a group: sections, or what `own.of` makes of something else."""
 
     group: Group = "tasks"
-    own: type[Section] = Section
+    own: Any = None
 
     def sections(self, annotation: Any) -> tuple[type[Section], ...]:
         """See `OneOf`."""
-        return tuple(dict.fromkeys(map(self._as_section, (
-            *plugins.registered(self.group).values(), self.own))))
+        return (*map(self._as_section, plugins.registered(self.group).values()), self.own)
 
     def names(self, annotation: Any) -> tuple[str, ...]:
         """See `OneOf`."""
@@ -122,7 +121,9 @@ class Registered(OneOf):
         return None if thing is None else self._as_section(thing)
 
     def _as_section(self, thing: Any) -> type[Section]:
-        return thing if isinstance(thing, type) and issubclass(thing, Section) else self.own
+        is_section = isinstance(thing, type) and issubclass(thing, Section)
+        section: type[Section] = thing if is_section else self.own.of(thing)
+        return section
 
 
 def kinds_of(section: type[Section]) -> tuple[str, ...]:

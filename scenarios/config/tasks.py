@@ -5,14 +5,15 @@ Each section of a task makes it; `scenarios.config.kinds` has those that only `[
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from math import radians
-from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Self, TypeVar
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
 
-from hierarchy import plugins
+from hierarchy.errors import brief
+from hierarchy.paths import Path, Shifted, Still
 from hierarchy.plugins import Group
 from hierarchy.problem import Array
 from scenarios.config.errors import ScenarioError
@@ -36,12 +37,10 @@ from scenarios.config.sections import (
 
 if TYPE_CHECKING:
     from hierarchy import Task
-    from hierarchy.paths import Path
     from scenarios.config.references import References
 
 Acceleration = Annotated[Positive, Unit("rad/s^2")]
 Rows = Literal["equality", "inequality"]
-_Kind = TypeVar("_Kind", bound="Listed")
 TaskName = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_ -]*$")]
 
 
@@ -109,8 +108,6 @@ class AlongSection(TaskSection):
 
     def along(self, here: Array) -> Path:
         """Return the path of a point that starts `here` (3,) [m]."""
-        from hierarchy.paths import Shifted, Still
-
         offset = np.array(self.offset)
         if self.path is None:
             return Still((here + offset).tolist())
@@ -285,12 +282,11 @@ class OwnTask(Listed, OwnSection):
     @property
     def one_sided(self) -> bool:
         """Whether its rows are inequalities, as the plugin's class says with `kind`."""
-        return str(getattr(self.maker, "kind", "equality")) == "inequality"
+        return str(getattr(type(self).maker, "kind", "equality")) == "inequality"
 
     def make(self, at: References) -> Task:
         """Return the task; raises ScenarioError for whatever goes wrong in the user's code."""
         from hierarchy import Task
-        from hierarchy.errors import brief
 
         task = self.made(at.robot, state=at.start, name=self.title)
         if not isinstance(task, Task):
@@ -302,8 +298,3 @@ class OwnTask(Listed, OwnSection):
 
 
 ListedTask = Annotated[Listed, Registered(None, "tasks", OwnTask)]
-
-
-def register(kind: str) -> Callable[[type[_Kind]], type[_Kind]]:
-    """Return a decorator that makes a section a kind of `[[tasks]]`."""
-    return plugins.register("tasks", kind, shipped=True)

@@ -295,16 +295,16 @@ def test_a_changed_plugin_is_another_version(folder):
 
 
 @pytest.mark.parametrize(("change", "said"), [
-    ("tasks.0.angel=1.0", "tasks.0: unknown key of kind 'elbow' 'angel'; did you mean 'angle'?"),
-    ("tasks.0.angle=true", "tasks.0: angle: Input should be a valid number, got True"),
-    ("tasks.0.steps=1.5", "tasks.0: steps: Input should be a valid integer, got 1.5"),
-    ("tasks.0.dimension=2", "unknown key of kind 'elbow' 'dimension'"),
+    ("tasks.0.angel=1.0", "unknown key 'tasks.0.angel'; did you mean 'tasks.0.angle'?"),
+    ("tasks.0.angle=true", "tasks.0.angle: Input should be a valid number, got True"),
+    ("tasks.0.steps=1.5", "tasks.0.steps: Input should be a valid integer, got 1.5"),
+    ("tasks.0.dimension=2", "unknown key 'tasks.0.dimension'"),
     ("tasks.0.name='1'", "tasks.0.name"),
-    ("tasks.1.path.kind=spiral", "tasks.1: path: expected a kind, 'still', 'line'"),
-    ("plant.share='all'", "plant: share: Input should be a valid number, got 'all'"),
+    ("tasks.1.path.kind=spiral", "tasks.1.path: expected a kind, 'still', 'line'"),
+    ("plant.share='all'", "plant.share: Input should be a valid number, got 'all'"),
     ("plant.kind=waek",
      "plant: expected a kind, 'kinematic', 'mujoco', 'torque', 'weak'; got 'waek'"),
-    ("tasks.0.kind=elbwo", "'relative', 'elbow', 'along', 'broken'; got 'elbwo'"),
+    ("tasks.0.kind=elbwo", "'collision', 'elbow', 'along', 'broken'; got 'elbwo'"),
     ("control.resolver=havled", "unknown resolver 'havled'; did you mean 'halved'?"),
     ("control.options.shar=0.1", "unknown setting of halved 'shar'; did you mean 'share'?"),
     ("robot.model=my_arn", "unknown robot 'my_arn'; did you mean 'my_arm'?"),

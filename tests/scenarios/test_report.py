@@ -13,7 +13,7 @@ from hand_made import HandMadeScenario, recording
 from headless import chromium
 
 from scenarios.config import load
-from scenarios.config.kinds.position import ListedPosition
+from scenarios.config.kinds.frames import ListedPosition
 from scenarios.loop.simulation import simulate
 from scenarios.measure.comparison import Comparison
 from scenarios.measure.motions import motions
