@@ -73,24 +73,6 @@ def test_manipulability_is_kept_while_the_hand_reaches_out(level, tmp_path):
 
 
 @pytest.mark.slow
-def test_two_hands_hold_one_thing():
-    hold = {"kind": "relative", "name": "hold", "frame": "right_hand", "to": "left_hand"}
-    base = load("dual-arm")
-    frames = build(base).robot.frame_names
-    left, right = (next(f for f in frames if side in f.lower() and "hand" in f.lower())
-                   for side in ("left", "right"))
-    lead = {"kind": "position", "name": "lead", "frame": left, "offset": [0.03, 0.0, 0.05]}
-    run = simulate(base.with_changes({
-        "tasks": [{**hold, "frame": right, "to": left}, lead], "control.duration": 3.0}))
-    assert run.fault is None
-    found = measure(run)
-    assert found["task_hold_max_settled"].value is None or (
-        found["task_hold_max_settled"].value < 1e-4)
-    assert np.abs(run["task_error_hold"]).max() < 1e-4
-    assert found["task_lead_end"].value < 5e-3
-
-
-@pytest.mark.slow
 def test_self_collision_is_a_task_of_the_list(tmp_path):
     apart = {"kind": "self-collision", "distance": 0.02, "name": "apart"}
     home = {"kind": "posture", "target": [0.9, -1.9, 0.9, 2.0, 1.0, 1.9, 0.3]}
@@ -137,13 +119,6 @@ def test_a_path_is_followed(path, tmp_path):
     assert run.fault is None
     # What is left is what integrating velocities over a period leaves: v T / 2 and less.
     assert np.linalg.norm(run["position_error"][-30:], axis=1).max() < 2e-3
-
-
-def test_a_recorded_file_is_found_beside_the_scenario(tmp_path, monkeypatch):
-    monkeypatch.chdir("/")
-    there = {"kind": "recorded", "file": "motion.csv"}
-    scenario = scenario_of(tmp_path, {"kind": "position", "frame": "end_effector", "path": there})
-    assert scenario.tasks[0].path.file == str(tmp_path / "motion.csv")
 
 
 @pytest.mark.parametrize(("task", "said"), [

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hierarchy import HierarchyError, Robot, plugins
-from scenarios import compare, load, simulate
+from scenarios import load, simulate
 from scenarios.cli.main import run_command
 from scenarios.config import Scenario
 from solvers import make
@@ -245,15 +245,6 @@ def test_a_sensor_of_a_plugin_measures():
 
 
 @pytest.mark.slow
-def test_compare_sees_a_resolver_of_a_plugin(capsys):
-    code, text = said(["compare", "own.toml", "--resolvers", "halved,halved:share=1.0,hcod",
-                       "--plugin", "doors_of_mine", "--out", "b"], capsys)
-    assert code == 0, text
-    runs = compare([load("own.toml")], ["halved:share=1.0", "hcod"]).runs
-    np.testing.assert_array_equal(*(run.recording["q"] for run in runs))
-
-
-@pytest.mark.slow
 def test_a_finished_run_of_a_plugin_is_opened_with_the_plugin_only(capsys):
     assert said(["run", "own.toml", "--plugin", "doors_of_mine", "--out", "a"], capsys)[0] == 0
     plugins._loaded.clear()
@@ -327,13 +318,6 @@ def test_what_goes_wrong_in_a_plugin_is_said_with_its_name():
         simulate(missing)
 
 
-@pytest.mark.slow
-def test_an_installed_entry_point_needs_no_flag(capsys, folder):
-    install(folder, "tasks", "elbow = doors_of_mine:Elbow")
-    code, text = said(["check", "own.toml"], capsys)  # the file names the entry point's module
-    assert code == 0, text
-
-
 @pytest.mark.parametrize(("group", "line", "use"), [
     ("resolvers", "third = entry_of_mine:Third", lambda: make("third").name),
     ("robots", "arm_of_mine = entry_of_mine:TABLE", lambda: Robot.load("arm_of_mine").name)])
@@ -363,10 +347,3 @@ def test_two_things_of_one_name_are_refused():
         plugins.register("tasks", "thing")(type("Two", (), {}))
     with pytest.raises(HierarchyError, match="unknown group 'task'; did you mean 'tasks'"):
         plugins.register("task", "thing")
-
-
-@pytest.mark.slow
-def test_list_shows_what_plugins_bring(capsys):
-    code, text = said(["list", "--plugin", "doors_of_mine"], capsys)
-    assert code == 0
-    assert all(name in text for name in ("elbow", "halved", "my_arm", "weak", "coarse"))
