@@ -10,9 +10,8 @@ from hierarchy.paths import Still
 from hierarchy.problem import Array
 from hierarchy.tasks import Position
 from hierarchy.tasks.mechanism import Mechanism, model_rows
-from scenarios.cell.contacts import check_contacts, contacts_of, standing_on
+from scenarios.cell.contacts import on_contacts
 from scenarios.config import Scenario, ScenarioError
-from scenarios.config.kinds.torque import TorqueSection
 from scenarios.config.references import References
 from scenarios.config.robot import RobotSection, StartSection
 from solvers import make
@@ -30,16 +29,7 @@ def placed(scenario: Scenario) -> References:
     Raises ScenarioError if a section does not fit the robot, or contacts do not touch the floor.
     """
     robot = make_robot(scenario.robot)
-    contacts = contacts_of(scenario, robot)
-    q, v = start_of(robot, scenario.start)
-    if contacts is None:
-        return References(State.at(robot, q, v))
-    floor = scenario.plant.height if isinstance(scenario.plant, TorqueSection) else 0.0
-    if scenario.start.on_floor:
-        q = standing_on(floor, contacts, q)
-    start = State.at(robot, q, v)
-    check_contacts(scenario, contacts, start)
-    return References(start, contacts)
+    return References(*on_contacts(scenario, State.at(robot, *start_of(robot, scenario.start))))
 
 
 def make_robot(section: RobotSection) -> Robot:
