@@ -77,7 +77,7 @@ def build(scenario: Scenario, kept: Cell | None = None) -> Cell:
     """
     announce_compilation()
     at = References(State.at(kept.robot, *kept.start), kept.contacts) if kept else placed(scenario)
-    sensor = _kept_sensor(scenario, kept, at) if kept else sensor_of(scenario, at.start)
+    sensor = sensor_of(scenario, at.start, (kept.scenario, kept.sensor) if kept else None)
     plant = kept.plant if kept else plant_of(
         scenario, at.start, sensor.obstacles if sensor else Obstacles(), at.contacts_or_none)
     tasks = tasks_of(scenario, at)
@@ -88,11 +88,3 @@ def build(scenario: Scenario, kept: Cell | None = None) -> Cell:
     return Cell(scenario, at.robot, (at.start.q, at.start.v), state, plant, stack, sensor,
                 tasks.areas, tasks.position, tasks.pointing, tasks.limits, order, tasks.listed,
                 activation, at.contacts_or_none)
-
-
-def _kept_sensor(scenario: Scenario, kept: Cell, at: References) -> Sensor | None:
-    same = (scenario.avoidance, scenario.sensor, scenario.limits) == (
-        kept.scenario.avoidance, kept.scenario.sensor, kept.scenario.limits)
-    if same or kept.sensor is None:
-        return kept.sensor
-    return sensor_of(scenario, at.start, kept.sensor.obstacles)

@@ -11,32 +11,37 @@ from scenarios.config.avoidance import AvoidanceKind, AvoidanceSection, Obstacle
 
 
 def sensor_of(scenario: Scenario, start: State,
-              obstacles: Obstacles | None = None) -> Sensor | None:
+              kept: tuple[Scenario, Sensor | None] | None = None) -> Sensor | None:
     """Return the sensor of distances to the obstacles, None without [avoidance].
 
-    `obstacles` default to those of the scenario, and then must not touch the robot at the start.
-    Raises ScenarioError if the robot has no control points, or [sensor] does not fit it.
+    `kept` is another scenario and its sensor, which stays if all settings of it are the same; else
+    its obstacles stay. New ones must not touch the robot at the start. Raises ScenarioError if the
+    robot has no control points, or [sensor] does not fit it.
     """
     section, robot = scenario.avoidance, start.robot
+    before, sensor = kept or (None, None)
+    if before and (sensor is None or (section, scenario.sensor, scenario.limits) == (
+            before.avoidance, before.sensor, before.limits)):
+        return sensor
     if section is None:
         return None
     if not robot.control_points:
         raise ScenarioError(f"[avoidance]: robot {robot.name!r} has no control points; list them "
                             "in robot.control_points")
     asked = _asked(section, (scenario.limits and scenario.limits.danger_reach) or 0.0)
-    exact = ExactDistances(robot, obstacles or make_obstacles(section.placed), asked.body,
-                           asked.tip, asked.mean_within,
+    exact = ExactDistances(robot, sensor.obstacles if sensor else make_obstacles(section.placed),
+                           asked.body, asked.tip, asked.mean_within,
                            pairs=not isinstance(section, AvoidanceSection))
     try:
-        sensor: Sensor = scenario.sensor.made(robot, exact=exact, asked=asked, body=asked.body,
-                                              tip=asked.tip)
+        made: Sensor = scenario.sensor.made(robot, exact=exact, asked=asked, body=asked.body,
+                                            tip=asked.tip)
     except ScenarioError:
         raise
     except HierarchyError as error:
         raise ScenarioError(f"sensor: {error}") from error
-    if obstacles is None:
-        sensor.check_start(start)
-    return sensor
+    if sensor is None:
+        made.check_start(start)
+    return made
 
 
 def _asked(section: AvoidanceKind, danger: float) -> Asked:

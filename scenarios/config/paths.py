@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from itertools import pairwise
-from typing import Annotated, Literal, Self
+from typing import Annotated, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import model_validator
@@ -55,6 +56,7 @@ class _AnyPath(Section):
     them; metrics say how the robot comes back.
     """
 
+    of: ClassVar[Callable[..., Path]]
     jitter: JitterSection | None = None
     out_of_reach: tuple[tuple[Time, Time], ...] | None = None
 
@@ -75,18 +77,18 @@ class _AnyPath(Section):
                                                     jitter.seed)
 
     def _steady(self) -> Path:
-        """Return the path without jitter."""
-        raise NotImplementedError
+        """Return the path without jitter: what `of` makes of the keys of the kind, in order."""
+        common = {"kind", *_AnyPath.model_fields}
+        return type(self).of(*(getattr(self, key) for key in type(self).model_fields
+                               if key not in common))
 
 
 class StillSection(_AnyPath):
     """A point that does not move, `position` [m]."""
 
+    of: ClassVar[Callable[..., Path]] = Still
     kind: Literal["still"]
     position: Point
-
-    def _steady(self) -> Path:
-        return Still(self.position)
 
 
 class EllipseSection(_AnyPath):
@@ -128,19 +130,18 @@ class WaypointsSection(_AnyPath):
 class LineSection(_AnyPath):
     """Straight from `start` to `end` [m] within `duration` [s], from `begin` [s] on."""
 
+    of: ClassVar[Callable[..., Path]] = staticmethod(line)
     kind: Literal["line"]
     start: Point
     end: Point
     duration: Span
     begin: Time = 0.0
 
-    def _steady(self) -> Path:
-        return line(self.start, self.end, self.duration, self.begin)
-
 
 class CircleSection(_AnyPath):
     """A circle of `radius` [m] about `normal`; rate [rad/s], phase [rad]."""
 
+    of: ClassVar[Callable[..., Path]] = staticmethod(circle)
     kind: Literal["circle"]
     centre: Point
     radius: Distance
@@ -148,18 +149,13 @@ class CircleSection(_AnyPath):
     rate: Annotated[Finite, Unit("rad/s")] = 1.0
     phase: Angle = 0.0
 
-    def _steady(self) -> Path:
-        return circle(self.centre, self.radius, self.normal, self.rate, self.phase)
-
 
 class RecordedSection(_AnyPath):
     """A recorded motion: a CSV `file` with t [s], x, y, z [m], relative to the scenario's file."""
 
+    of: ClassVar[Callable[..., Path]] = Recorded.from_csv
     kind: Literal["recorded"]
     file: str
-
-    def _steady(self) -> Path:
-        return Recorded.from_csv(self.file)
 
 
 PathSection = Annotated[StillSection | LineSection | CircleSection | EllipseSection
