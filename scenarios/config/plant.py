@@ -51,6 +51,7 @@ class AnyPlant(PartSection):
     """
 
     follows: ClassVar[bool] = False  # whether its state is what its commands add up to
+    levels: ClassVar[tuple[str, ...]] = ("velocity", "acceleration", "torque")
     feedback: Literal["measured", "commanded"] = "measured"
     measurement: MeasurementSection = MeasurementSection()
 
@@ -61,6 +62,7 @@ class KinematicSection(AnyPlant):
 
     made_by: ClassVar[str] = "scenarios.cell.plants.kinematic:KinematicArm"
     follows: ClassVar[bool] = True
+    levels: ClassVar[tuple[str, ...]] = ("velocity", "acceleration")
     kind: Literal["kinematic"] = "kinematic"
 
 

@@ -14,6 +14,8 @@ FOOT = 0.31  # [m] height of the column that a robot without floor stands on
 class AnySensor(PartSection):
     """What every sensor has: the height `foot` [m] of the column that its robot stands on."""
 
+    has_frames: ClassVar[bool] = True    # that a fault may leave out
+    is_recorded: ClassVar[bool] = False  # whether it shows no obstacle of the scenario
     if TYPE_CHECKING:
         foot: ClassVar[float]
 
@@ -23,6 +25,7 @@ class ExactSection(AnySensor):
     """Distances of the known geometry, without errors."""
 
     foot: ClassVar[float] = FOOT
+    has_frames: ClassVar[bool] = False
     kind: Literal["exact"] = "exact"
 
     def made(self, robot: Any, **given: Any) -> Any:

@@ -162,5 +162,6 @@ class FramesSection(ImageSection):
     """
 
     made_by: ClassVar[str] = "scenarios.cell.sensors.images:frames"
+    is_recorded: ClassVar[bool] = True
     kind: Literal["frames"]
     folder: str

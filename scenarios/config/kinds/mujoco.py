@@ -54,6 +54,7 @@ class PhysicsSection(AnyPlant):
     """
 
     made_by: ClassVar[str] = "scenarios.cell.plants.physics:PhysicsArm"
+    levels: ClassVar[tuple[str, ...]] = ("velocity", "acceleration")
     kind: Literal["mujoco"]
     beyond_stop: Annotated[Positive, Unit("rad")] = 0.2
     servo: ServoSection = ServoSection()

@@ -64,6 +64,7 @@ class TorqueSection(AnyPlant):
     """
 
     made_by: ClassVar[str] = "scenarios.cell.plants.torque:TorqueRobot"
+    levels: ClassVar[tuple[str, ...]] = ("torque",)
     kind: Literal["torque"]
     height: Annotated[Finite, Unit("m")] = 0.0
     friction: Positive = 0.7
