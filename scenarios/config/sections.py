@@ -66,19 +66,28 @@ class OneOf:
     """
 
     default: str | None = None
+    wants: ClassVar[str] = "expected a kind,"
 
     def sections(self, annotation: Any) -> tuple[type[Section], ...]:
         """Return the sections of all kinds."""
         return get_args(annotation)
 
+    def kinds(self, section: type[Section]) -> tuple[str, ...]:
+        """Return the kinds that a section is for."""
+        return kinds_of(section)
+
     def names(self, annotation: Any) -> tuple[str, ...]:
         """Return the kinds."""
-        return tuple(kind for section in self.sections(annotation) for kind in kinds_of(section))
+        return tuple(kind for section in self.sections(annotation) for kind in self.kinds(section))
+
+    def kind_of(self, table: dict[str, Any]) -> Any:
+        """Return the kind of a table."""
+        return table.get("kind", self.default)
 
     def find(self, annotation: Any, kind: str) -> type[Section] | None:
         """Return the section of a kind, None if there is none."""
         return next((section for section in self.sections(annotation)
-                     if kind in kinds_of(section)), None)
+                     if kind in self.kinds(section)), None)
 
     def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
         kinds = [handler.generate_schema(section) for section in self.sections(source)]
@@ -89,13 +98,11 @@ class OneOf:
     def _section(self, source: Any, table: Any) -> Section:
         if isinstance(table, Section):
             return table
-        if not isinstance(table, dict):
-            raise PydanticCustomError("table", "Input should be a table")
-        kind = table.get("kind", self.default)
-        found = self.find(source, kind) if isinstance(kind, str) else None
+        kind = self.kind_of(table) if isinstance(table, dict) else table
+        found = self.find(source, kind) if isinstance(kind, str) and kind is not table else None
         if found is None:
             got = "" if kind is None else f"; got {kind!r}"
-            raise PydanticCustomError("kind", "expected a kind, {kinds}{got}", {
+            raise PydanticCustomError("kind", f"{self.wants} {{kinds}}{{got}}", {
                 "kinds": ", ".join(map(repr, self.names(source))), "got": got})
         return found.model_validate(table)
 

@@ -14,6 +14,7 @@ from scenarios.config.errors import ScenarioError
 from scenarios.config.sections import OneOf, Section, Unit, kinds_of
 
 Kind = TypeVar("Kind", bound=Section)
+_UNIONS = ("constrained-float", "float", "str")  # what pydantic calls the parts of one in a key
 
 
 def validated(kind: type[Kind], data: dict[str, Any], what: str) -> Kind:
@@ -44,7 +45,8 @@ def sections_at(root: type[Section], path: Sequence[str]) -> list[type[Section]]
 
 
 def _said(root: type[Section], data: Any, error: Any) -> str:
-    keys = [str(key) for key in error["loc"]]
+    keys = [str(key) for key in error["loc"] if key not in _UNIONS
+            and not str(key).startswith("tuple[")]
     where = ".".join(keys) or "file"
     if error["type"] == "extra_forbidden":
         return _unknown(root, keys, _table(data, error["loc"][:-1]))
