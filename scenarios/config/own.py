@@ -24,6 +24,7 @@ from typing import (
 
 from pydantic import ConfigDict, Field, create_model
 
+from hierarchy import plugins
 from hierarchy.errors import HierarchyError
 from hierarchy.paths import Path
 from hierarchy.plugins import Group
@@ -82,6 +83,9 @@ class OwnSection(PartSection):
         made.maker = maker
         return made
 
+    def __reduce__(self) -> Any:  # a class that was made has no module to be unpickled from
+        return _again, (type(self).__mro__[1], self.kind, self.model_dump())
+
     def made(self, robot: Robot, **given: Any) -> Any:
         """Call the maker with the keys in the file and what it takes of the scenario.
 
@@ -100,6 +104,10 @@ class OwnSection(PartSection):
             raise ScenarioError(f"{what}: {error}") from error
         except Exception as error:
             raise ScenarioError(f"{what}: {type(error).__name__}: {error}") from error
+
+
+def _again(own: type[OwnSection], kind: str, data: dict[str, Any]) -> OwnSection:
+    return own.of(plugins.find(own.group, kind)).model_validate(data)
 
 
 def _taken(maker: Maker, given: dict[str, Any]) -> dict[str, Any]:

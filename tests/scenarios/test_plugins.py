@@ -1,5 +1,7 @@
 """Own tasks, resolvers, robots, plants and sensors, and who may load their code."""
 
+import copy
+import pickle
 import sys
 from importlib.metadata import distributions
 from pathlib import Path
@@ -268,6 +270,13 @@ def test_workers_of_a_sweep_import_the_plugin(capsys, folder):
     assert "4 runs; 0 did not finish" in text
 
 
+def test_a_scenario_with_own_kinds_is_copied_and_pickled():
+    plugins.allow("doors_of_mine")
+    scenario = load("own.toml")
+    assert pickle.loads(pickle.dumps(scenario)) == copy.deepcopy(scenario) == scenario
+    assert Scenario.from_toml(scenario.to_toml()) == scenario
+
+
 def test_the_working_directory_is_searched_for_plugins_only(folder):
     (folder / "pandas_of_mine.py").write_text("")
     before = list(sys.path)
@@ -347,3 +356,10 @@ def test_two_things_of_one_name_are_refused():
         plugins.register("tasks", "thing")(type("Two", (), {}))
     with pytest.raises(HierarchyError, match="unknown group 'task'; did you mean 'tasks'"):
         plugins.register("task", "thing")
+
+
+@pytest.mark.slow
+def test_list_shows_what_plugins_bring(capsys):
+    code, text = said(["list", "--plugin", "doors_of_mine"], capsys)
+    assert code == 0
+    assert all(name in text for name in ("elbow", "halved", "my_arm", "weak", "coarse"))
