@@ -5,11 +5,6 @@ from scenarios.cell.build import build
 from scenarios.config import ScenarioError, load, shipped
 
 
-def test_the_letters_scenarios_are_shipped():
-    assert {"ellipse", "ellipse-velocity", "ellipse-3d", "ellipse-35deg",
-            "ellipse-35deg-equality", "ellipse-published"} <= set(shipped())
-
-
 @pytest.mark.parametrize("name", shipped())
 def test_every_shipped_scenario_loads_under_its_own_name(name):
     scenario = load(name)
@@ -45,16 +40,6 @@ def test_changes_are_toml_values_at_dotted_keys():
     assert s.avoidance.obstacles[0].centre == (1, 2, 3)
     assert s.control.settings() == {"damping": 0.02, "threshold": 0.1}
     assert load("ellipse", {"pointing.alpha_d": 35}).pointing.alpha_d == 35
-
-
-def test_obstacles_may_have_shapes_and_move(tmp_path):
-    s = load("ellipse", ["avoidance.obstacles=[[1, 2, 3], {shape='sphere', radius=0.1, path="
-                         "{kind='waypoints', times=[0, 1], points=[[0, 0, 2], [0, 0, 3]]}},"
-                         "{shape='box', centre=[1, 1, 1], half_lengths=[0.1, 0.2, 0.3]}]"])
-    assert [o.shape for o in s.avoidance.obstacles] == ["point", "sphere", "box"]
-    path = tmp_path / "scenario.toml"
-    path.write_text(s.to_toml())
-    assert load(path) == s
 
 
 def test_a_resolver_is_swapped_by_name_keeping_the_shared_settings():
