@@ -131,7 +131,7 @@ def _parameters(maker: Maker, group: Group) -> dict[str, inspect.Parameter]:
     try:
         hints = get_type_hints(inspect.getattr_static(maker, "__init__")
                                if isinstance(maker, type) else maker)
-    except NameError:  # a name that is imported for type checkers only
+    except Exception:  # such as a name that is imported for type checkers only: it is user's code
         hints = {}
     return {name: parameter.replace(annotation=hints.get(name, Any))
             for name, parameter in inspect.signature(maker).parameters.items()
