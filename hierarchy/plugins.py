@@ -67,9 +67,9 @@ def own(group: Group) -> dict[str, Any]:
     return dict(_registered[group])
 
 
-def shipped(group: Group) -> dict[str, Any]:
-    """Return what this package has registered in a group by name."""
-    return dict(_shipped[group])
+def registered(group: Group) -> dict[str, Any]:
+    """Return what is registered in a group so far, without loading what packages offer in it."""
+    return {**_shipped[group], **_registered[group]}
 
 
 def known(group: Group) -> dict[str, Any]:

@@ -77,11 +77,12 @@ class Keys:
             return f"{len(entries)} × {self._kind(entries[0], place)}"
         if kind == "array":
             return f"list: {self._kind(value.get('items', {}), f'[{place}]')}"
+        unit = f" [{value['unit']}]" if "unit" in value else ""
         bounds = [f" {sign} {value[name]:g}" for name, sign in
                   (("minimum", "≥"), ("exclusiveMinimum", "\\>"), ("maximum", "≤"),
                    ("exclusiveMaximum", "\\<")) if name in value]
         return {"string": "text", "boolean": "true or false", "integer": "whole number",
-                "object": "table"}.get(kind, "number") + ",".join(bounds)
+                "object": "table"}.get(kind, "number") + unit + ",".join(bounds)
 
     def _reference(self, name, place):
         if "properties" not in self.known[name]:

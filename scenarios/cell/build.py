@@ -13,18 +13,15 @@ from hierarchy.contacts import Contacts
 from hierarchy.jit import announce_compilation
 from hierarchy.problem import Array
 from hierarchy.tasks import JointLimits, Pointing, Position
-from scenarios.cell.avoidance import separable_pairs
-from scenarios.cell.contacts import check_contacts, contacts_of, standing_on
-from scenarios.cell.order import Order, order_of
+from scenarios.cell.order import Order
 from scenarios.cell.plant import plant_of
 from scenarios.cell.plants import Plant
-from scenarios.cell.robot import make_robot, start_of
-from scenarios.cell.sensor import sensor_of
+from scenarios.cell.robot import placed
+from scenarios.cell.scene import sensor_of
 from scenarios.cell.sensors import Sensor
 from scenarios.cell.stacked import stacked
-from scenarios.cell.tasks import check_there_are_tasks, tasks_of
+from scenarios.cell.tasks import tasks_of
 from scenarios.config import Scenario
-from scenarios.config.plant import TorqueSection
 from scenarios.config.references import References
 
 
@@ -79,45 +76,15 @@ def build(scenario: Scenario, kept: Cell | None = None) -> Cell:
     start, state, plant and obstacles are reused, and its sensor if the sensor settings are equal.
     """
     announce_compilation()
-    control = scenario.control
-    robot = kept.robot if kept else make_robot(scenario.robot)
-    check_there_are_tasks(scenario, robot)
-    sensor = _kept_sensor(scenario, kept) if kept else sensor_of(scenario, robot)
-    contacts = kept.contacts if kept else contacts_of(scenario, robot)
-    start = kept.start if kept else _start(scenario, robot, contacts)
-    here = State.at(robot, *start)
-    if kept:
-        state, plant = kept.state, kept.plant
-    else:
-        differences = control.jacobian_derivative == "difference"
-        state = State(robot, control.period if differences else None)
-        if sensor is not None:
-            sensor.check_start(here)
-        if contacts is not None:
-            check_contacts(scenario, contacts, here)
-        plant = plant_of(scenario, robot, start, sensor.obstacles if sensor else Obstacles(),
-                         contacts)
-    tasks = tasks_of(scenario, References(here, contacts, separable_pairs))
-    rows, activation = stacked(scenario, tasks.all, state)
-    stack = Stack(rows, control.level, tasks.reference, contacts,
-                  "mass" if control.metric == "mass" else None, tasks.give)
-    return Cell(scenario, robot, start, state, plant, stack, sensor, tasks.areas, tasks.position,
-                tasks.pointing, tasks.limits,
-                order_of(scenario, tasks.areas, tasks.always, tasks.all), tasks.listed, activation,
-                contacts)
-
-
-def _start(scenario: Scenario, robot: Robot, contacts: Contacts | None) -> tuple[Array, Array]:
-    q, v = start_of(robot, scenario.start)
-    if scenario.start.on_floor and contacts is not None:
-        floor = scenario.plant.height if isinstance(scenario.plant, TorqueSection) else 0.0
-        q = standing_on(floor, contacts, q)
-    return q, v
-
-
-def _kept_sensor(scenario: Scenario, kept: Cell) -> Sensor | None:
-    same = (scenario.avoidance, scenario.sensor, scenario.limits) == (
-        kept.scenario.avoidance, kept.scenario.sensor, kept.scenario.limits)
-    if same or kept.sensor is None:
-        return kept.sensor
-    return sensor_of(scenario, kept.robot, kept.sensor.obstacles)
+    at = References(State.at(kept.robot, *kept.start), kept.contacts) if kept else placed(scenario)
+    sensor = sensor_of(scenario, at.start, (kept.scenario, kept.sensor) if kept else None)
+    plant = kept.plant if kept else plant_of(
+        scenario, at.start, sensor.obstacles if sensor else Obstacles(), at.contacts_or_none)
+    tasks = tasks_of(scenario, at)
+    differences = scenario.control.jacobian_derivative == "difference"
+    state = kept.state if kept else State(at.robot,
+                                          scenario.control.period if differences else None)
+    stack, order, activation = stacked(scenario, tasks, state, at.contacts_or_none)
+    return Cell(scenario, at.robot, (at.start.q, at.start.v), state, plant, stack, sensor,
+                tasks.areas, tasks.position, tasks.pointing, tasks.limits, order, tasks.listed,
+                activation, at.contacts_or_none)

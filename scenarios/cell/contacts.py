@@ -17,7 +17,7 @@ from hierarchy.problem import Array
 from scenarios.cell.plants.ground import BALL
 from scenarios.config import Scenario, ScenarioError
 from scenarios.config.contacts import ContactSection
-from scenarios.config.plant import TorqueSection
+from scenarios.config.kinds.torque import TorqueSection
 
 _OFF = 0.002      # [m] of a point from the floor that is too far
 _TILTED = 1.0     # [deg] of a sole from the floor that is too much
@@ -44,33 +44,40 @@ def _contact(section: ContactSection, robot: Robot) -> Contact:
                    section.open, section.ramp, up=section.up)
 
 
-def standing_on(floor: float, contacts: Contacts, q: Array) -> Array:
-    """Return q (nq,) with the base at the height that brings the lowest contact to `floor` [m].
+def on_contacts(scenario: Scenario, start: State) -> tuple[State, Contacts | None]:
+    """Return the start on its contacts, and those; see `contacts_of`.
 
-    Raises ScenarioError for a fixed base, or without contacts.
+    With start.on_floor the base is raised or lowered so that the lowest contact touches the floor.
+    Raises a ScenarioError for a fixed base then, or for a contact that does not stand on the
+    plant's floor. One that is open at the start may be anywhere, one that slides above the floor.
     """
+    contacts = contacts_of(scenario, start.robot)
+    if contacts is None:
+        return start, None
+    plant = scenario.plant
+    floor = plant.height if isinstance(plant, TorqueSection) else 0.0
+    if scenario.start.on_floor:
+        start = _lowered(contacts, start, floor)
+    if isinstance(plant, TorqueSection) and (found := list(_astray(contacts, start, floor))):
+        raise ScenarioError(min(found)[1])
+    return start, contacts
+
+
+def _lowered(contacts: Contacts, start: State, floor: float) -> State:
     if contacts.robot.base != "floating" or not contacts.contacts:
         raise ScenarioError("start.on_floor needs a floating base and [[contacts]]")
-    state, q = State.at(contacts.robot, q), q.copy()
-    q[2] += floor - min(_heights(contact, state).min() for contact in contacts.contacts)
-    return q
+    q = start.q.copy()
+    q[2] += floor - min(_heights(contact, start).min() for contact in contacts.contacts)
+    return State.at(contacts.robot, q, start.v)
 
 
-def check_contacts(scenario: Scenario, contacts: Contacts, start: State) -> None:
-    """Raise a ScenarioError that names the contact that is farthest from standing on the floor.
-
-    One that is open at the start may be anywhere, one that slides above the floor.
-    """
-    if not isinstance(scenario.plant, TorqueSection):
-        return
-    found = []
+def _astray(contacts: Contacts, start: State, floor: float) -> Iterator[tuple[float, str]]:
+    """Yield how far contacts are from the floor, the farthest least, and how they stand there."""
     for i, contact in enumerate(contacts.contacts):
-        above = _heights(contact, start) - scenario.plant.height
+        above = _heights(contact, start) - floor
         waits = contact.load(0.0) == 0.0 or (contact.slides and above[0] > 0.0)
         if not waits and (wrong := _wrong(contact, above, start.rotation(contact.frame))):
-            found.append((-np.abs(above).max(), f"contacts.{i}: at the start {wrong}"))
-    if found:
-        raise ScenarioError(min(found)[1])
+            yield -np.abs(above).max(), f"contacts.{i}: at the start {wrong}"
 
 
 def doubts(scenario: Scenario, contacts: Contacts) -> Iterator[str]:

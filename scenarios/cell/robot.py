@@ -10,7 +10,9 @@ from hierarchy.paths import Still
 from hierarchy.problem import Array
 from hierarchy.tasks import Position
 from hierarchy.tasks.mechanism import Mechanism, model_rows
-from scenarios.config import ScenarioError
+from scenarios.cell.contacts import on_contacts
+from scenarios.config import Scenario, ScenarioError
+from scenarios.config.references import References
 from scenarios.config.robot import RobotSection, StartSection
 from solvers import make
 
@@ -19,6 +21,15 @@ _REACH_STEPS = 500   # damped Newton steps; a reachable point takes about ten
 _ON_LIMIT = 1e-9     # [rad or m] beyond a limit that is rounding
 _LONGEST_STEP = 0.3  # [rad] of any joint
 _CLOSED = 1e-3       # [m or rad] by which rounding in a file may leave a mechanism open
+
+
+def placed(scenario: Scenario) -> References:
+    """Return the robot of a scenario at its start, with its contacts.
+
+    Raises ScenarioError if a section does not fit the robot, or contacts do not touch the floor.
+    """
+    robot = make_robot(scenario.robot)
+    return References(*on_contacts(scenario, State.at(robot, *start_of(robot, scenario.start))))
 
 
 def make_robot(section: RobotSection) -> Robot:

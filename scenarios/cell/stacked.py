@@ -1,4 +1,4 @@
-"""Tasks and resolver as the kind of `control.stack` has them."""
+"""Stack, order and resolver as the kind of `control.stack` has them."""
 
 from __future__ import annotations
 
@@ -8,9 +8,12 @@ from math import cos, radians
 
 from hierarchy import Stack, State, Task
 from hierarchy.activation import Activation
+from hierarchy.contacts import Contacts
 from hierarchy.tasks import Pointing, Separation
 from hierarchy.tasks.self_separation import SelfSeparation
 from hierarchy.tasks.tangent_cone import TangentCone
+from scenarios.cell.order import Order, order_of
+from scenarios.cell.tasks import Tasks
 from scenarios.config import Scenario, ScenarioError
 from solvers import Resolver
 from solvers.resolvers.set_based import SetBased
@@ -18,8 +21,17 @@ from solvers.resolvers.settled import Settled
 from solvers.resolvers.smooth import Activated, Smooth
 
 
-def stacked(scenario: Scenario, tasks: Sequence[Task],
-            state: State) -> tuple[Sequence[Task], Activation | None]:
+def stacked(scenario: Scenario, tasks: Tasks, state: State,
+            contacts: Contacts | None) -> tuple[Stack, Order, Activation | None]:
+    """Return the stack of the tasks, which order they have in a tick, and activations if any."""
+    rows, activation = _rows(scenario, tasks.all, state)
+    stack = Stack(rows, scenario.control.level, tasks.reference, contacts,
+                  "mass" if scenario.control.metric == "mass" else None, tasks.give)
+    return stack, order_of(scenario, tasks.areas, tasks.always, tasks.all), activation
+
+
+def _rows(scenario: Scenario, tasks: Sequence[Task],
+          state: State) -> tuple[Sequence[Task], Activation | None]:
     """Return the tasks with the rows of their stack, and their activations if it has any."""
     if scenario.control.stack == "set-based":
         return [TangentCone(task) if task.kind == "inequality" else task for task in tasks], None

@@ -11,6 +11,7 @@ from hierarchy.avoidance import SurveillanceAreas
 from hierarchy.contacts import Contacts
 from hierarchy.task import check_period
 from hierarchy.tasks import (
+    Avoidance,
     BaseDynamics,
     CentreOfPressure,
     ContactMotion,
@@ -26,10 +27,11 @@ from hierarchy.tasks import (
     TorqueLimits,
 )
 from hierarchy.tasks.mechanism import above, model_rows
-from scenarios.cell.avoidance import areas_of, avoidance_tasks
+from hierarchy.tasks.self_separation import SelfSeparation
+from scenarios.cell.published import PublishedAvoidance
 from scenarios.cell.robot import sensed_points
 from scenarios.config import Scenario, ScenarioError
-from scenarios.config.avoidance import AvoidanceSection
+from scenarios.config.avoidance import AvoidanceSection, SeparationSection
 from scenarios.config.control import ControlSection
 from scenarios.config.references import References
 from scenarios.config.tasks import LimitsSection, Made
@@ -50,57 +52,61 @@ class Tasks(NamedTuple):
 
 
 def tasks_of(scenario: Scenario, at: References) -> Tasks:
-    """Return the tasks of a scenario, most important first."""
-    areas, (limits, first) = areas_of(scenario), _first(scenario, at)
-    position, pointing = position_of(scenario, at), pointing_of(scenario, at)
-    listed = [task_of(section, at) for section in scenario.tasks if section.kind != "collision"]
-    avoiding = avoidance_tasks(scenario, at.robot)
-    always = first if areas else [*first, *avoiding]  # repulsion is placed by Algorithm 1
+    """Return the tasks of a scenario, most important first.
+
+    Raises ScenarioError if it asks for nothing, or for what its robot cannot do.
+    """
+    _check_there_are_any(scenario, at.robot)
+    limits, first = _first(scenario, at)
+    areas, avoiding = _avoidance(scenario, at)
+    position, pointing = _position(scenario, at), _pointing(scenario, at)
+    listed = [_made(section, at) for section in scenario.tasks if section.kind != "collision"]
+    posture = None if scenario.posture is None else _made(scenario.posture, at)
+    last = posture if scenario.posture and scenario.posture.role == "task" else None
     tasks = _in_order(scenario, [*first, *avoiding, *(
-        task for task in (position, pointing, *listed, posture_of(scenario, at, "task")) if task)])
+        task for task in (position, pointing, *listed, last) if task)])
     if scenario.control.level == "velocity":
         for task in tasks:
             check_period(task, scenario.control.period)
-    return Tasks(tasks, always, position, pointing, limits, tuple(listed), areas,
-                 reference_of(scenario, at), _give(scenario))
+    return Tasks(tasks, first if areas else [*first, *avoiding], position, pointing, limits,
+                 tuple(listed), areas, _reference(scenario, at, None if last else posture),
+                 {task.title: task.give for task in scenario.tasks if task.give})
 
 
-def _first(scenario: Scenario, at: References) -> tuple[JointLimits | None, list[Task]]:
-    """Return the joint limits, and all tasks at the top: mechanism, physics, limits."""
-    limits, first = limits_of(scenario, at.robot)
-    bounded = scenario.limits is not None and scenario.limits.place == "bounds"
-    if at.contacts_or_none is not None:
-        physics = _physics_of(scenario, at.contacts)
-        first = [*first, *physics] if bounded else [*physics, *first]
-    return limits, above(model_rows(at.robot, scenario.control.period), first,
-                         not bounded and scenario.make_resolver().can_resolve("inequalities"))
-
-
-def check_there_are_tasks(scenario: Scenario, robot: Robot) -> None:
-    """Raise a ScenarioError unless the scenario asks for something, or the robot's file does."""
+def _check_there_are_any(scenario: Scenario, robot: Robot) -> None:
     asked = scenario.position or scenario.pointing or scenario.avoidance or scenario.tasks
     if not (asked or robot.coupled or robot.loops):
         raise ScenarioError(f"scenario {scenario.name!r}: the stack is empty: give at least one of "
                             "[position], [pointing], [avoidance], [[tasks]]")
 
 
-def limits_of(scenario: Scenario, robot: Robot) -> tuple[JointLimits | None, list[Task]]:
-    """Return the joint limits, and the tasks at the top of the stack."""
+def _first(scenario: Scenario, at: References) -> tuple[JointLimits | None, list[Task]]:
+    """Return the joint limits, and all tasks at the top: mechanism, physics, limits."""
+    try:
+        limits, first = _limits(scenario, at.robot)
+    except HierarchyError as error:
+        raise ScenarioError(f"limits: {error}") from error
+    bounded = scenario.limits is not None and scenario.limits.place == "bounds"
+    if at.contacts_or_none is not None:
+        physics = _physics(scenario, at.contacts)
+        first = [*first, *physics] if bounded else [*physics, *first]
+    return limits, above(model_rows(at.robot, scenario.control.period), first,
+                         not bounded and scenario.make_resolver().can_resolve("inequalities"))
+
+
+def _limits(scenario: Scenario, robot: Robot) -> tuple[JointLimits | None, list[Task]]:
+    """Return the joint limits, and the levels that they are in the stack."""
     section = scenario.limits
     if section is None:
         return None, []
-    try:
-        limits = _joint_limits(section, scenario.control, robot)
-        box = limits if section.danger_reach is None else DangerBounds(
-            limits, sensed_points(robot), section.danger_reach, name=limits.name)
-        if not scenario.limits_in_stack:
-            return limits, []
-        elsewhere = scenario.control.level == "torque" or section.place == "bounds"
-        torque = [] if section.torque is None or elsewhere else [
-            TorqueLimits(robot, section.torque)]  # with contact forces: `_physics_of`
-    except HierarchyError as error:
-        raise ScenarioError(f"limits: {error}") from error
-    return limits, [box, *torque]
+    limits = _joint_limits(section, scenario.control, robot)
+    box = limits if section.danger_reach is None else DangerBounds(
+        limits, sensed_points(robot), section.danger_reach, name=limits.name)
+    if not scenario.limits_in_stack:
+        return limits, []
+    if section.torque is None or section.place == "bounds" or scenario.control.level == "torque":
+        return limits, [box]  # with contact forces torques are limited by `_physics`
+    return limits, [box, TorqueLimits(robot, section.torque)]
 
 
 def _joint_limits(section: LimitsSection, control: ControlSection, robot: Robot) -> JointLimits:
@@ -112,11 +118,38 @@ def _joint_limits(section: LimitsSection, control: ControlSection, robot: Robot)
                        base_speed=speed, base_acceleration=section.base_acceleration)
 
 
-def position_of(scenario: Scenario, at: References) -> Position | None:
-    """Return the task of [position], or None."""
+def _avoidance(scenario: Scenario,
+               at: References) -> tuple[SurveillanceAreas | None, list[Task]]:
+    """Return the areas of Algorithm 1 if it places avoidance, and the tasks that avoid."""
+    section = scenario.avoidance
+    if isinstance(section, SeparationSection):
+        return None, _separation(section, at, scenario.sensor.kind == "exact")
+    if section is None or section.place == "null-space":
+        return None, []
+    kind = PublishedAvoidance if section.jacobian == "published" else Avoidance
+    return (SurveillanceAreas(section.near, section.far, section.end_effector),
+            [kind(at.robot.control_points, section.dimension)])
+
+
+def _separation(section: SeparationSection, at: References, exact: bool) -> list[Task]:
+    """Return the tasks that keep clear of obstacles, and of the robot itself."""
+    tasks: list[Task] = []
+    if section.obstacles or not exact:
+        tasks.append(Separation(sensed_points(at.robot), section.barrier(section.distance),
+                                len(section.obstacles) if exact else None))
+    if (distance := section.self_collision) is not None:
+        try:
+            tasks.append(SelfSeparation(at.robot.capsules, section.barrier(distance),
+                                        at.pairs(distance)))
+        except HierarchyError as error:
+            raise ScenarioError(f"avoidance.self_collision: {error}") from error
+    return tasks
+
+
+def _position(scenario: Scenario, at: References) -> Position | None:
     if scenario.position is None:
         return None
-    task = task_of(scenario.position, at)
+    task = _made(scenario.position, at)
     assert isinstance(task, Position)
     avoidance = scenario.avoidance
     if isinstance(avoidance, AvoidanceSection):
@@ -124,37 +157,26 @@ def position_of(scenario: Scenario, at: References) -> Position | None:
     return task
 
 
-def pointing_of(scenario: Scenario, at: References) -> Pointing | None:
-    """Return the task of [pointing], or None."""
+def _pointing(scenario: Scenario, at: References) -> Pointing | None:
     if scenario.pointing is None:
         return None
-    task = task_of(scenario.pointing, at)
+    task = _made(scenario.pointing, at)
     assert isinstance(task, Pointing)
     # Algorithm 1 adds the cone's surface to the stack while it is violated: an equality.
     return replace(task, kind="equality") if scenario.control.stack == "switched" else task
 
 
-def posture_of(scenario: Scenario, at: References, role: str) -> Task | None:
-    """Return the task of [posture] if it has this role ("task" or "null-space"), or None."""
-    section = scenario.posture
-    return task_of(section, at) if section and section.role == role else None
-
-
-def reference_of(scenario: Scenario, at: References) -> Task | None:
-    """Return the null-space task: [damping], or [posture] in that role; or None.
-
-    The body's repulsion is added to it where that is its place.
-    """
-    base = (posture_of(scenario, at, "null-space") if scenario.damping is None
-            else JointDamping(at.robot.n, scenario.damping.value, scenario.damping.weight))
-    avoidance = scenario.avoidance
-    if not isinstance(avoidance, AvoidanceSection) or avoidance.place == "stack":
+def _reference(scenario: Scenario, at: References, posture: Task | None) -> Task | None:
+    """Return the null-space task: [damping] or a posture, and the body's repulsion if placed so."""
+    base = posture if scenario.damping is None else JointDamping(
+        at.robot.n, scenario.damping.value, scenario.damping.weight)
+    avoidance, points = scenario.avoidance, at.robot.control_points
+    if not isinstance(avoidance, AvoidanceSection) or avoidance.place == "stack" or not points:
         return base
-    points = at.robot.control_points
-    return CumulatedRepulsion(at.robot.n, points, avoidance.far, base) if points else base
+    return CumulatedRepulsion(at.robot.n, points, avoidance.far, base)
 
 
-def task_of(section: Made, at: References) -> Task:
+def _made(section: Made, at: References) -> Task:
     """Make a task; raises ScenarioError, naming it, where it does not fit the robot."""
     try:
         return section.make(at)
@@ -164,23 +186,18 @@ def task_of(section: Made, at: References) -> Task:
 
 def _in_order(scenario: Scenario, tasks: list[Task]) -> list[Task]:
     """Move the separation from obstacles to the place of the listed task "collision"."""
-    sections = [section.kind for section in scenario.tasks]
-    if "collision" not in sections:
+    kinds = [section.kind for section in scenario.tasks]
+    if "collision" not in kinds:
         return tasks
     apart = [task for task in tasks if isinstance(task, Separation)]
     rest = [task for task in tasks if not isinstance(task, Separation)]
-    below = len(sections) - sections.index("collision") - 1  # of the list
+    below = len(kinds) - kinds.index("collision") - 1  # of the list
     below += scenario.posture is not None and scenario.posture.role == "task"
     place = len(rest) - below
     return [*rest[:place], *apart, *rest[place:]]
 
 
-def _give(scenario: Scenario) -> dict[str, float]:
-    """Return how far tasks of the scenario may give, by name."""
-    return {task.title: task.give for task in scenario.tasks if task.give}
-
-
-def _physics_of(scenario: Scenario, contacts: Contacts) -> list[Task]:
+def _physics(scenario: Scenario, contacts: Contacts) -> list[Task]:
     """Return the levels at the top of a stack at level "torque".
 
     "physics" has the equations of motion of a floating base and the contacts at rest, "limits" the

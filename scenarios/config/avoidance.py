@@ -5,28 +5,38 @@ from __future__ import annotations
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
-from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
+from hierarchy.avoidance import Barrier, Obstacle, Repulsion
+from hierarchy.problem import Array
 from hierarchy.words import listed
 from scenarios.config.paths import PathSection, WaypointsSection
 from scenarios.config.sections import (
     Count,
-    NotNegative,
+    Distance,
+    Length,
+    OneOf,
+    Point,
     Positive,
+    Rate,
+    Rows3,
     Section,
-    Vector3,
-    kind_or,
+    Speed,
+    Unit,
 )
-from scenarios.config.waypoints import moved
 
 
 class RepulsionSection(Section):
     """Magnitude of the repulsion, eq. (23); see hierarchy.avoidance.Repulsion."""
 
     maximum: Positive
-    reach: Positive
+    reach: Length
     shape: Positive
     scale: Positive = 2.0
+
+    def make(self) -> Repulsion:
+        """Return the law."""
+        return Repulsion(self.maximum, self.reach, self.shape, self.scale)
 
 
 class ObstacleSection(Section):
@@ -34,11 +44,11 @@ class ObstacleSection(Section):
 
     tag: ClassVar[str] = "shape"
     shape: Literal["point", "sphere", "capsule", "box"] = "point"
-    centre: Vector3 | None = None
-    radius: Positive | None = None
-    half_length: Positive | None = None
-    half_lengths: tuple[Positive, Positive, Positive] | None = None
-    rotation: tuple[Vector3, Vector3, Vector3] = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
+    centre: Point | None = None
+    radius: Length | None = None
+    half_length: Length | None = None
+    half_lengths: tuple[Length, Length, Length] | None = None
+    rotation: Rows3 = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
     path: PathSection | None = None
 
     @model_validator(mode="after")
@@ -51,6 +61,14 @@ class ObstacleSection(Section):
         if (self.centre is None) == (self.path is None):
             raise ValueError("give either a centre or a path")
         return self
+
+    def make(self, name: str) -> Obstacle:
+        """Return the obstacle, with its name in messages."""
+        sizes = (self.radius, self.half_length, *(self.half_lengths or ()))
+        return Obstacle(self.shape, self.centre or (0.0, 0.0, 0.0),
+                        tuple(float(size) for size in sizes if size is not None),
+                        np.array(self.rotation),
+                        None if self.path is None else self.path.make(), name)
 
 
 def as_table(obstacle: Any) -> Any:
@@ -70,7 +88,7 @@ class VariationSection(Section):
     """
 
     seed: Count
-    spread: NotNegative = 0.05
+    spread: Distance = 0.05
     timing: Annotated[float, Field(strict=True, ge=0.0, lt=1.0)] = 0.1
 
 
@@ -80,10 +98,38 @@ def _varied(obstacle: ObstacleSection, variation: VariationSection,
     path = obstacle.path
     if not isinstance(path, WaypointsSection):
         return obstacle
-    times, points = moved(np.array(path.times), np.array(path.points), variation.spread,
+    times, points = _moved(np.array(path.times), np.array(path.points), variation.spread,
                           variation.timing, np.random.default_rng((variation.seed, number)))
     waypoints = {"times": tuple(times.tolist()), "points": tuple(map(tuple, points.tolist()))}
     return obstacle.model_copy(update={"path": path.model_copy(update=waypoints)})
+
+
+def _moved(times: Array, points: Array, spread: float, timing: float,
+          random: np.random.Generator) -> tuple[Array, Array]:
+    """Return the times (W,) [s] and points (W, 3) [m] of randomly moved waypoints.
+
+    spread : largest displacement [m] of a point. timing : largest shift in time, as a share of half
+        the interval to its neighbours. The path still rests where it rested.
+    """
+    away = points + spread * _in_ball(random, len(points))
+    for i in range(1, len(points)):
+        if (points[i] == points[i - 1]).all():
+            away[i] = away[i - 1]
+    return _shifted(times, timing, random), away
+
+
+def _in_ball(random: np.random.Generator, count: int) -> Array:
+    """Return random points (count, 3), uniform in the unit ball."""
+    points = random.standard_normal((count, 3))
+    radii = random.random((count, 1)) ** (1 / 3)
+    return np.asarray(points / np.linalg.norm(points, axis=1, keepdims=True) * radii)
+
+
+def _shifted(times: Array, timing: float, random: np.random.Generator) -> Array:
+    """Return shifted times, still increasing; the first is unchanged."""
+    half = np.diff(times) / 2
+    room = np.concatenate([[0.0], np.minimum(half[:-1], half[1:]), half[-1:]])
+    return np.asarray(times + timing * room * random.uniform(-1.0, 1.0, len(times)))
 
 
 class _Avoiding(Section):
@@ -124,14 +170,14 @@ class AvoidanceSection(_Avoiding):
     kind: Literal["repulsion"] = "repulsion"
     dimension: Literal[1, 3] = 1
     direction: Literal["nearest", "mean"] = "nearest"
-    near: NotNegative
-    far: NotNegative
-    end_effector: NotNegative
+    near: Distance
+    far: Distance
+    end_effector: Distance
     body: RepulsionSection
     tip: RepulsionSection
     jacobian: Literal["exact", "published"] = "exact"
     place: Literal["stack", "null-space"] = "stack"
-    asked: Positive | None = None
+    asked: Length | None = None
 
     @model_validator(mode="after")
     def _areas_nested(self) -> Self:
@@ -160,7 +206,21 @@ class AvoidanceSection(_Avoiding):
         return {"body": self.near} if self.asked is None else {"body": self.asked, "ee": self.asked}
 
 
-class SeparationSection(_Avoiding):
+class BarrierSection(Section):
+    """How one-sided rows keep a distance, see hierarchy.avoidance.Barrier."""
+
+    distance: Distance = 0.03
+    rate: Rate = 10.0
+    influence: Length = 0.3
+    recovery: Speed = 0.2
+    limit: Annotated[Positive, Unit("m/s^2")] = 50.0
+
+    def barrier(self, distance: float) -> Barrier:
+        """Return the barrier of a distance [m] to keep; HierarchyError if it is out of range."""
+        return Barrier(distance, self.rate, self.influence, self.recovery, self.limit)
+
+
+class SeparationSection(BarrierSection, _Avoiding):
     """Keep all control points and the end effector away from all obstacles, as one-sided rows.
 
     `distance` [m] is the clearance and `rate` [1/s] limits the approach to it. Obstacles beyond
@@ -174,13 +234,8 @@ class SeparationSection(_Avoiding):
     """
 
     kind: Literal["separation"]
-    distance: NotNegative = 0.03
-    rate: Positive = 10.0
-    influence: Positive = 0.3
-    recovery: NotNegative = 0.2
-    limit: Positive = 50.0
-    self_collision: NotNegative | None = None
-    buffer: Positive | None = None
+    self_collision: Distance | None = None
+    buffer: Length | None = None
     obstacles: Obstacles = ()
 
     @model_validator(mode="after")
@@ -206,6 +261,4 @@ class SeparationSection(_Avoiding):
         return {"body": self.distance, "ee": self.distance}
 
 
-AvoidanceKind = Annotated[
-    Annotated[AvoidanceSection, Tag("repulsion")] | Annotated[SeparationSection, Tag("separation")],
-    Discriminator(kind_or("repulsion"))]
+AvoidanceKind = Annotated[AvoidanceSection | SeparationSection, OneOf("repulsion")]

@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from hierarchy.errors import brief, expect
+from scenarios.config.distributions import flat
 from scenarios.config.errors import ScenarioError
 
 
@@ -179,19 +180,8 @@ def _begin_anew(data: dict[str, Any], dotted: str, kind: Any, tag_at: TagAt) -> 
 def _vary_no_more(data: dict[str, Any], section: str) -> None:
     """Drop the distributions of a section's keys."""
     if isinstance(varied := data.get("variation"), dict):
-        data["variation"] = _without(varied, section)
-
-
-def _without(varied: Mapping[str, Any], section: str, above: str = "") -> dict[str, Any]:
-    """Return distributions, in nested tables or at dotted keys, without those of a section."""
-    kept = {}
-    for key, value in varied.items():
-        dotted = f"{above}{key}."
-        if section.startswith(dotted) and f"{section}." != dotted and isinstance(value, dict):
-            kept[key] = _without(value, section, dotted)
-        elif not dotted.startswith(f"{section}."):
-            kept[key] = value
-    return kept
+        data["variation"] = {key: value for key, value in flat(varied).items()
+                             if not f"{key}.".startswith(f"{section}.")}
 
 
 def without_none(data: Any) -> Any:

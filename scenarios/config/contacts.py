@@ -6,8 +6,21 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from scenarios.config.sections import Finite, Flag, NotNegative, Positive, Section, Vector3
+from scenarios.config.sections import (
+    Finite,
+    Flag,
+    Force,
+    Gain,
+    Point,
+    Positive,
+    Section,
+    Time,
+    Unit,
+    Vector3,
+)
 from scenarios.config.tasks import TaskName
+
+Place = Annotated[Finite, Unit("m")]
 
 
 class ContactSection(Section):
@@ -24,14 +37,14 @@ class ContactSection(Section):
 
     frame: str
     name: TaskName | None = None
-    x: tuple[Finite, Finite] | None = None
-    y: tuple[Finite, Finite] | None = None
-    offset: Vector3 = (0.0, 0.0, 0.0)
+    x: tuple[Place, Place] | None = None
+    y: tuple[Place, Place] | None = None
+    offset: Point = (0.0, 0.0, 0.0)
     friction: Positive = 0.7
     normal: Vector3 = (0.0, 0.0, 1.0)
     up: Vector3 = (0.0, 0.0, 1.0)
-    open: tuple[tuple[NotNegative, NotNegative], ...] = ()
-    ramp: NotNegative = 0.1
+    open: tuple[tuple[Time, Time], ...] = ()
+    ramp: Time = 0.1
     slides: Flag = False
 
     @model_validator(mode="after")
@@ -53,7 +66,7 @@ class ForcesSection(Section):
     """
 
     faces: Literal[4, 8] = 4
-    least: NotNegative = 0.0
-    largest: Positive | None = None
-    edge: Annotated[float, Field(strict=True, gt=0.0)] | None = None
-    damping: NotNegative = 20.0
+    least: Force = 0.0
+    largest: Annotated[Positive, Unit("N")] | None = None
+    edge: Annotated[float, Field(strict=True, gt=0.0), Unit("m")] | None = None
+    damping: Gain = 20.0

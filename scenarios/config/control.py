@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-from scenarios.config.sections import Count, Flag, NotNegative, Positive, Section
+from scenarios.config.sections import Count, Flag, NotNegative, Section, Span, Time, Unit
 
 AnswerPolicy = Literal["brake", "hold", "stop", "use"]
 BlindPolicy = Literal["brake", "hold", "stop"]
@@ -40,8 +40,8 @@ class PolicySection(Section):
     overrun: AnswerPolicy = "brake"
     inside: AnswerPolicy = "brake"
     patience: Count = 10
-    stale_after: NotNegative = 0.02
-    deadline: Positive | None = None
+    stale_after: Time = 0.02
+    deadline: Span | None = None
 
 
 class ControlSection(Section):
@@ -62,8 +62,8 @@ class ControlSection(Section):
     strictness: Flag = False
     """Whether every tick is also resolved without the levels below the position, to measure
     whether they move the end effector; this is not part of the measured times."""
-    period: Annotated[float, Field(strict=True, gt=0.0, le=1.0)] = 0.001
-    duration: Positive
+    period: Annotated[float, Field(strict=True, gt=0.0, le=1.0), Unit("s")] = 0.001
+    duration: Span
     jacobian_derivative: Literal["exact", "difference"] = "exact"
     resolver: str
     options: dict[str, Any] = Field(default_factory=dict)
@@ -83,7 +83,7 @@ class ControlSection(Section):
     """"blend": when the order of the stack or the active control point changes, the command moves
     from the old stack's to the new one's within `transition_time` [s], and a new task has its full
     effect only after that time. "none": it changes at once."""
-    transition_time: Positive = 0.02
+    transition_time: Span = 0.02
 
     @model_validator(mode="after")
     def _makes_a_resolver(self) -> Self:

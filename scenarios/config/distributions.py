@@ -2,27 +2,26 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
-from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field
 
-from scenarios.config.sections import Finite, NotNegative, Section
+from scenarios.config.sections import Finite, NotNegative, OneOf, Section, Whole
 
-Whole = Annotated[int, Field(strict=True)]
 Value = bool | int | float | str | list[Any]
+
+
+def _in_order(bounds: tuple[float, float]) -> tuple[float, float]:
+    if bounds[0] > bounds[1]:
+        raise ValueError(f"{bounds[0]:g} is above {bounds[1]:g}")
+    return bounds
 
 
 class Uniform(Section):
     """A number from a uniform distribution."""
 
-    uniform: tuple[Finite, Finite]
-
-    @model_validator(mode="after")
-    def _in_order(self) -> Self:
-        if self.uniform[0] > self.uniform[1]:
-            raise ValueError(f"{self.uniform[0]:g} is above {self.uniform[1]:g}")
-        return self
+    uniform: Annotated[tuple[Finite, Finite], AfterValidator(_in_order)]
 
     def draw(self, chance: np.random.Generator, own: Value | None) -> Value:
         """Return a number within the bounds."""
@@ -88,13 +87,7 @@ class Around(Section):
 class Integers(Section):
     """An integer from the first to the last, both included; for seeds."""
 
-    integers: tuple[Whole, Whole]
-
-    @model_validator(mode="after")
-    def _in_order(self) -> Self:
-        if self.integers[0] > self.integers[1]:
-            raise ValueError(f"{self.integers[0]} is above {self.integers[1]}")
-        return self
+    integers: Annotated[tuple[Whole, Whole], AfterValidator(_in_order)]
 
     def draw(self, chance: np.random.Generator, own: Value | None) -> Value:
         """Return an integer of the range."""
@@ -104,34 +97,35 @@ class Integers(Section):
         return f"integers from {self.integers[0]} to {self.integers[1]}"
 
 
-_KINDS = ("uniform", "normal", "choice", "around", "integers")
+class _ByKey(OneOf):
+    """Says which distribution a table is by its key."""
+
+    wants: ClassVar[str] = "expected a table with one of"
+
+    def kinds(self, section: type[Section]) -> tuple[str, ...]:
+        """Return the key of a distribution."""
+        return tuple(section.model_fields)
+
+    def kind_of(self, table: dict[str, Any]) -> Any:
+        """Return the first key that is one of a distribution."""
+        return next((key for key in table if key in _KEYS), None)
 
 
-def _kind(table: Any) -> str | None:
-    if isinstance(table, dict):
-        return next((kind for kind in _KINDS if kind in table), None)
-    return type(table).__name__.lower()
+_KEYS = ("uniform", "normal", "choice", "around", "integers")
+Distribution = Annotated[Uniform | Normal | Choice | Around | Integers, _ByKey()]
 
 
-Distribution = Annotated[
-    Annotated[Uniform, Tag("uniform")] | Annotated[Normal, Tag("normal")]
-    | Annotated[Choice, Tag("choice")] | Annotated[Around, Tag("around")]
-    | Annotated[Integers, Tag("integers")],
-    Discriminator(_kind, custom_error_type="distribution",
-                  custom_error_message=f"expected a table with one of {', '.join(_KINDS)}")]
-
-
-def _flat(table: Any, above: str = "") -> Any:
+def flat(table: Any, above: str = "") -> Any:
     """Flatten nested tables, which TOML makes of dotted keys, to one level."""
     if not isinstance(table, dict):
         return table
-    flat: dict[str, Any] = {}
+    found: dict[str, Any] = {}
     for key, value in table.items():
-        if isinstance(value, dict) and value and _kind(value) is None:
-            flat |= _flat(value, f"{above}{key}.")
+        if isinstance(value, dict) and value and not any(key in _KEYS for key in value):
+            found |= flat(value, f"{above}{key}.")
         else:
-            flat[f"{above}{key}"] = value
-    return flat
+            found[f"{above}{key}"] = value
+    return found
 
 
-Parameters = Annotated[dict[str, Distribution], BeforeValidator(_flat)]
+Parameters = Annotated[dict[str, Distribution], BeforeValidator(flat)]

@@ -7,7 +7,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from scenarios.config.robot import ControlPointSection
-from scenarios.config.sections import NotNegative, Positive, Section, Vector3
+from scenarios.config.sections import Length, Point, Section, Span, Time
 
 
 class FaultSection(Section):
@@ -23,16 +23,16 @@ class FaultSection(Section):
 
     kind: Literal["nan_position", "nan_velocity", "nan_distance", "stale", "status", "overrun",
                   "obstacle", "no_frames", "dark_frames"]
-    at: NotNegative
-    duration: Positive
+    at: Time
+    duration: Span
     joint: Annotated[int, Field(strict=True, ge=1)] | None = None
     point: Annotated[int, Field(strict=True, ge=1)] | None = None
     status: Literal["iteration_limit", "numerical_failure", "backend_failure",
                     "inaccurate"] | None = None
-    takes: Positive | None = None
-    centre: Vector3 | None = None
+    takes: Span | None = None
+    centre: Point | None = None
     place: ControlPointSection | None = None
-    radius: Positive | None = None
+    radius: Length | None = None
 
     @model_validator(mode="after")
     def _complete(self) -> Self:

@@ -10,12 +10,23 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, ClassVar, Self, cast, get_args, get_origin, get_type_hints
+from functools import cache
+from pkgutil import resolve_name
+from typing import (
+    TYPE_CHECKING,
+    Any,
+    ClassVar,
+    Self,
+    get_args,
+    get_origin,
+    get_type_hints,
+)
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model, model_validator
+from pydantic import ConfigDict, Field, create_model
 
 from hierarchy import plugins
-from hierarchy.errors import HierarchyError, UnknownNameError
+from hierarchy.errors import HierarchyError
+from hierarchy.paths import Path
 from hierarchy.plugins import Group
 from scenarios.config.errors import ScenarioError
 from scenarios.config.paths import PathSection
@@ -29,59 +40,84 @@ GIVEN: dict[Group, tuple[str, ...]] = {
     "plants": ("robot", "q", "v", "period", "level", "obstacles"),
     "sensors": ("robot", "exact", "body", "tip")}
 Maker = Callable[..., Any]
+_KEY = "key_"  # in front of the names of fields
 
 
-class OwnSection(Section):
-    """A section whose kind and keys are those of a plugin."""
+class PartSection(Section):
+    """A section of [plant] or [sensor]; `made_by`, "module:name", makes the part.
 
-    model_config = ConfigDict(extra="allow")
-    group: ClassVar[Group]
+    Reading a file loads no robot, so that its maker stands here by name.
+    """
+
+    made_by: ClassVar[str]
     kind: str
 
-    @model_validator(mode="after")
-    def _fits_its_maker(self) -> Self:
-        self.settings()
-        return self
+    def made(self, robot: Robot, **given: Any) -> Any:
+        """Call the maker with those of this `section`, `robot` and `given` that it takes."""
+        maker = resolve_name(self.made_by)
+        return maker(**_taken(maker, {"section": self, "robot": robot, **given}))
 
-    @property
-    def maker(self) -> Maker:
-        """What the plugin registered under this kind."""
-        found = plugins.find(self.group, self.kind)
-        assert found is not None, "the kind was found when the section was read"
-        return cast(Maker, found)
 
-    def settings(self) -> dict[str, tuple[Any, Any]]:
-        """Return annotation and value of each key; raises ValueError for a wrong one."""
-        given = dict(self.model_extra or {})
-        known = _parameters(self.maker, self.group)
-        try:
-            values = _model(known).model_validate(given)
-        except ValidationError as error:
-            raise ValueError(_said(self.kind, error.errors()[0], known)) from None
-        return {key: (known[key].annotation, getattr(values, key)) for key in given}
+class OwnSection(PartSection):
+    """A section whose kind and keys are those of a plugin; `of` adds the keys."""
+
+    model_config = ConfigDict(arbitrary_types_allowed=True)
+    group: ClassVar[Group]
+    maker: ClassVar[Maker]
+
+    @classmethod
+    @cache
+    def of(cls, maker: Maker) -> type[Self]:
+        """Return the section of a plugin's kind: the keys of this one, and its own parameters.
+
+        A key is the alias of a field, so that it may have any name. One that the file leaves out is
+        left to the maker.
+        """
+        fields: dict[str, Any] = {
+            f"{_KEY}{name}": (kind, Field(alias=name)) if parameter.default is parameter.empty
+            else (kind | None, Field(None, alias=name))
+            for name, parameter in _parameters(maker, cls.group).items()
+            if name not in cls.model_fields
+            for kind in (_in_a_file(parameter.annotation),)}
+        made = create_model(cls.__name__, __base__=cls, __doc__=cls.__doc__, **fields)
+        made.maker = maker
+        return made
+
+    def __reduce__(self) -> Any:  # a class that was made has no module to be unpickled from
+        return _again, (type(self).__mro__[1], self.kind, self.model_dump())
 
     def made(self, robot: Robot, **given: Any) -> Any:
-        """Call the maker with the keys and those of `given` that it has a parameter for.
+        """Call the maker with the keys in the file and what it takes of the scenario.
 
         Raises ScenarioError, naming the kind, for whatever goes wrong in it: it is the user's code.
         """
-        wanted = {"robot": robot, **given}
+        maker = type(self).maker
         what = f"{self.group[:-1]} of kind {self.kind!r}"
+        provided = {name: value for name, value in {"robot": robot, **given}.items()
+                    if name in GIVEN[self.group]}
         try:
-            values = {key: _made(annotation, value, robot)
-                      for key, (annotation, value) in self.settings().items()}
-            provided = {name: value for name, value in wanted.items()
-                        if name in inspect.signature(self.maker).parameters}
-            return self.maker(**provided, **values)
+            keys = {name: _made(parameter.annotation, value, robot)
+                    for name, parameter in _parameters(maker, self.group).items()
+                    if (value := getattr(self, f"{_KEY}{name}", None)) is not None}
+            return maker(**_taken(maker, provided), **keys)
         except HierarchyError as error:
             raise ScenarioError(f"{what}: {error}") from error
         except Exception as error:
             raise ScenarioError(f"{what}: {type(error).__name__}: {error}") from error
 
 
+def _again(own: type[OwnSection], kind: str, data: dict[str, Any]) -> OwnSection:
+    return own.of(plugins.find(own.group, kind)).model_validate(data)
+
+
+def _taken(maker: Maker, given: dict[str, Any]) -> dict[str, Any]:
+    """Return what of some arguments a maker has parameters for."""
+    known = inspect.signature(maker).parameters
+    return {name: value for name, value in given.items() if name in known}
+
+
 def _made(annotation: Any, value: Any, robot: Robot) -> Any:
     """Return the value of a key as the maker wants it: frames by name, paths by their table."""
-    from hierarchy.paths import Path
     from hierarchy.robot import Frame
 
     kinds = (annotation, *get_args(annotation))
@@ -90,20 +126,12 @@ def _made(annotation: Any, value: Any, robot: Robot) -> Any:
     return value.make() if Path in kinds and value is not None else value
 
 
-def _said(kind: str, error: Any, known: dict[str, inspect.Parameter]) -> str:
-    key = ".".join(str(part) for part in error["loc"])
-    if error["type"] == "extra_forbidden":
-        return str(UnknownNameError(f"key of kind {kind!r}", key, known))
-    value = "" if isinstance(error["input"], dict) else f", got {error['input']!r}"
-    return f"{key}: {error['msg']}{value}"
-
-
 def _parameters(maker: Maker, group: Group) -> dict[str, inspect.Parameter]:
     """Return the parameters of a maker that are keys, with annotations that are not text."""
     try:
         hints = get_type_hints(inspect.getattr_static(maker, "__init__")
                                if isinstance(maker, type) else maker)
-    except NameError:  # a name that is imported for type checkers only
+    except Exception:  # such as a name that is imported for type checkers only: it is user's code
         hints = {}
     return {name: parameter.replace(annotation=hints.get(name, Any))
             for name, parameter in inspect.signature(maker).parameters.items()
@@ -111,18 +139,8 @@ def _parameters(maker: Maker, group: Group) -> dict[str, inspect.Parameter]:
                 inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD)}
 
 
-def _model(parameters: dict[str, inspect.Parameter]) -> type[BaseModel]:
-    fields: dict[str, Any] = {
-        name: (_in_a_file(parameter.annotation),
-               Field() if parameter.default is parameter.empty else Field(parameter.default))
-        for name, parameter in parameters.items()}
-    return create_model("Own", __config__=ConfigDict(
-        extra="forbid", arbitrary_types_allowed=True, protected_namespaces=()), **fields)
-
-
 def _in_a_file(annotation: Any) -> Any:
     """Return the type that the value of a parameter has in a file, with strict numbers."""
-    from hierarchy.paths import Path
     from hierarchy.robot import Frame  # loads pinocchio, which reading a file does not need
 
     kinds: dict[Any, Any] = {Frame: str, Path: PathSection, float: Finite, int: Whole, bool: Flag}

@@ -2,18 +2,40 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from itertools import pairwise
-from typing import TYPE_CHECKING, Annotated, Literal, Self
+from typing import Annotated, ClassVar, Literal, Self
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import model_validator
 
 from hierarchy.errors import HierarchyError
+from hierarchy.paths import (
+    Blended,
+    Ellipse,
+    Jittered,
+    Path,
+    Recorded,
+    Still,
+    Waypoints,
+    circle,
+    line,
+)
 from scenarios.config.errors import ScenarioError
-from scenarios.config.sections import Count, Finite, NotNegative, Positive, Section, Vector3
-
-if TYPE_CHECKING:
-    from hierarchy.paths import Path
+from scenarios.config.sections import (
+    Angle,
+    Count,
+    Distance,
+    Finite,
+    OneOf,
+    Point,
+    Positive,
+    Section,
+    Span,
+    Time,
+    Unit,
+    Vector3,
+)
 
 
 class JitterSection(Section):
@@ -22,8 +44,8 @@ class JitterSection(Section):
     The same `seed` gives the same motion.
     """
 
-    amplitude: NotNegative
-    rate: Positive
+    amplitude: Distance
+    rate: Annotated[Positive, Unit("Hz")]
     seed: Count = 0
 
 
@@ -34,8 +56,9 @@ class _AnyPath(Section):
     them; metrics say how the robot comes back.
     """
 
+    of: ClassVar[Callable[..., Path]]
     jitter: JitterSection | None = None
-    out_of_reach: tuple[tuple[NotNegative, NotNegative], ...] | None = None
+    out_of_reach: tuple[tuple[Time, Time], ...] | None = None
 
     @model_validator(mode="after")
     def _spans_are_in_order(self) -> Self:
@@ -46,8 +69,6 @@ class _AnyPath(Section):
 
     def make(self) -> Path:
         """Return the path; raises ScenarioError where the values are no path."""
-        from hierarchy.paths import Jittered
-
         try:
             path, jitter = self._steady(), self.jitter
         except HierarchyError as error:
@@ -56,35 +77,31 @@ class _AnyPath(Section):
                                                     jitter.seed)
 
     def _steady(self) -> Path:
-        """Return the path without jitter."""
-        raise NotImplementedError
+        """Return the path without jitter: what `of` makes of the keys of the kind, in order."""
+        common = {"kind", *_AnyPath.model_fields}
+        return type(self).of(*(getattr(self, key) for key in type(self).model_fields
+                               if key not in common))
 
 
 class StillSection(_AnyPath):
     """A point that does not move, `position` [m]."""
 
+    of: ClassVar[Callable[..., Path]] = Still
     kind: Literal["still"]
-    position: Vector3
-
-    def _steady(self) -> Path:
-        from hierarchy.paths import Still
-
-        return Still(self.position)
+    position: Point
 
 
 class EllipseSection(_AnyPath):
     """p(t) = centre + cosine cos(s) + sine sin(s) [m] with s = rate t + phase [rad]."""
 
     kind: Literal["ellipse"]
-    centre: Vector3
-    cosine: Vector3
-    sine: Vector3
-    rate: Finite = 1.0
-    phase: Finite = 0.0
+    centre: Point
+    cosine: Point
+    sine: Point
+    rate: Annotated[Finite, Unit("rad/s")] = 1.0
+    phase: Angle = 0.0
 
     def _steady(self) -> Path:
-        from hierarchy.paths import Ellipse
-
         if self.phase == 0.0:
             return Ellipse(self.centre, self.cosine, self.sine, self.rate)
         cosine, sine = np.array(self.cosine), np.array(self.sine)
@@ -101,13 +118,11 @@ class WaypointsSection(_AnyPath):
     """
 
     kind: Literal["waypoints"]
-    times: tuple[NotNegative, ...]
-    points: tuple[Vector3, ...]
-    blend: Positive | None = None
+    times: tuple[Time, ...]
+    points: tuple[Point, ...]
+    blend: Span | None = None
 
     def _steady(self) -> Path:
-        from hierarchy.paths import Blended, Waypoints
-
         return (Waypoints(self.times, self.points) if self.blend is None
                 else Blended(self.times, self.points, self.blend))
 
@@ -115,45 +130,33 @@ class WaypointsSection(_AnyPath):
 class LineSection(_AnyPath):
     """Straight from `start` to `end` [m] within `duration` [s], from `begin` [s] on."""
 
+    of: ClassVar[Callable[..., Path]] = staticmethod(line)
     kind: Literal["line"]
-    start: Vector3
-    end: Vector3
-    duration: Positive
-    begin: NotNegative = 0.0
-
-    def _steady(self) -> Path:
-        from hierarchy.paths import line
-
-        return line(self.start, self.end, self.duration, self.begin)
+    start: Point
+    end: Point
+    duration: Span
+    begin: Time = 0.0
 
 
 class CircleSection(_AnyPath):
     """A circle of `radius` [m] about `normal`; rate [rad/s], phase [rad]."""
 
+    of: ClassVar[Callable[..., Path]] = staticmethod(circle)
     kind: Literal["circle"]
-    centre: Vector3
-    radius: NotNegative
+    centre: Point
+    radius: Distance
     normal: Vector3 = (0.0, 0.0, 1.0)
-    rate: Finite = 1.0
-    phase: Finite = 0.0
-
-    def _steady(self) -> Path:
-        from hierarchy.paths import circle
-
-        return circle(self.centre, self.radius, self.normal, self.rate, self.phase)
+    rate: Annotated[Finite, Unit("rad/s")] = 1.0
+    phase: Angle = 0.0
 
 
 class RecordedSection(_AnyPath):
     """A recorded motion: a CSV `file` with t [s], x, y, z [m], relative to the scenario's file."""
 
+    of: ClassVar[Callable[..., Path]] = Recorded.from_csv
     kind: Literal["recorded"]
     file: str
 
-    def _steady(self) -> Path:
-        from hierarchy.paths import Recorded
-
-        return Recorded.from_csv(self.file)
-
 
 PathSection = Annotated[StillSection | LineSection | CircleSection | EllipseSection
-                        | WaypointsSection | RecordedSection, Field(discriminator="kind")]
+                        | WaypointsSection | RecordedSection, OneOf()]

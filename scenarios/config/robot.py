@@ -7,14 +7,14 @@ from typing import Self
 from pydantic import Field, model_validator
 
 from hierarchy.robots.table import Base
-from scenarios.config.sections import Finite, Flag, JointValue, NotNegative, Section, Vector3
+from scenarios.config.sections import Distance, Finite, Flag, JointValue, Point, Section
 
 
 class ControlPointSection(Section):
     """A point on the body of `joint`, at `offset` [m] in the joint's frame."""
 
     joint: str
-    offset: Vector3
+    offset: Point
 
 
 class RobotPointSection(Section):
@@ -22,7 +22,7 @@ class RobotPointSection(Section):
 
     joint: str | None = None
     frame: str | None = None
-    offset: Vector3 = (0.0, 0.0, 0.0)
+    offset: Point = (0.0, 0.0, 0.0)
 
     @model_validator(mode="after")
     def _is_somewhere(self) -> Self:
@@ -38,9 +38,9 @@ class CapsuleSection(Section):
     """
 
     joint: str | None = None
-    start: Vector3
-    end: Vector3
-    radius: NotNegative
+    start: Point
+    end: Point
+    radius: Distance
 
 
 class RobotSection(Section):
@@ -79,7 +79,7 @@ class StartSection(Section):
     keyframe: str | None = None
     joints: dict[str, JointValue] = Field(default_factory=dict)
     v: tuple[Finite, ...] | None = None
-    end_effector: Vector3 | None = None
+    end_effector: Point | None = None
     on_floor: Flag = False
     allow_outside_limits: Flag = False
 

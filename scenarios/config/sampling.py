@@ -6,13 +6,12 @@ import hashlib
 from collections.abc import Mapping
 
 import numpy as np
-from pydantic import ValidationError
 
-from hierarchy.errors import HierarchyError
 from scenarios.config.changes import matching, place
 from scenarios.config.distributions import Distribution, Value
 from scenarios.config.errors import ScenarioError
 from scenarios.config.scenario import Scenario
+from scenarios.config.validation import validated
 
 
 def drawn(scenario: Scenario, parameters: Mapping[str, Distribution], seed: int, index: int,
@@ -50,21 +49,13 @@ def changed(scenario: Scenario, values: Mapping[str, Value], what: str) -> Scena
         table, last = place(data, key)
         table[last] = value
     try:
-        return Scenario.model_validate(data)
-    except ValidationError as error:
-        one = error.errors()[0]
-        where = ".".join(map(str, one["loc"])) or scenario.name
-        raise ScenarioError(f"{what}: {where}: {one['msg'].removeprefix('Value error, ')}, with "
-                            f"{_said(values)}") from error
-    except HierarchyError as error:  # what a resolver says of its settings
-        raise ScenarioError(f"{what}: {error}, with {_said(values)}") from error
+        return validated(Scenario, data, what)
+    except ScenarioError as error:
+        drawn_values = ", ".join(f"{key} = {value}" for key, value in values.items())
+        raise ScenarioError(f"{error}, with {drawn_values}") from error
 
 
 def _chance(seed: int, index: int, key: str) -> np.random.Generator:
     """Return a random generator for one parameter of one sample, the same on every machine."""
     words = np.frombuffer(hashlib.sha256(key.encode()).digest()[:16], dtype="<u4").tolist()
     return np.random.Generator(np.random.PCG64(np.random.SeedSequence([seed, index, *words])))
-
-
-def _said(values: Mapping[str, Value]) -> str:
-    return ", ".join(f"{key} = {value}" for key, value in values.items())

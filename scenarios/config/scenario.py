@@ -5,12 +5,14 @@ from __future__ import annotations
 import dataclasses
 import tomllib
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import chain
 from typing import TYPE_CHECKING, Annotated, Any, Self
 
 import tomli_w
 from pydantic import Field, field_validator, model_validator
 
+import scenarios.config.kinds  # noqa: F401, registers them
 from hierarchy import plugins
 from hierarchy.errors import expect
 from scenarios.config.avoidance import AvoidanceKind
@@ -19,7 +21,6 @@ from scenarios.config.contacts import ContactSection, ForcesSection
 from scenarios.config.control import ControlSection
 from scenarios.config.distributions import Parameters
 from scenarios.config.faults import FaultSection
-from scenarios.config.listed import ListedTask
 from scenarios.config.plant import KinematicSection, PlantKind
 from scenarios.config.robot import RobotSection, StartSection
 from scenarios.config.sections import Section
@@ -28,6 +29,7 @@ from scenarios.config.stacks import RIVALS, unfit
 from scenarios.config.tasks import (
     DampingSection,
     LimitsSection,
+    ListedTask,
     PointingSection,
     PointingTask,
     PositionSection,
@@ -82,93 +84,85 @@ class Scenario(Section):
         return modules
 
     @model_validator(mode="after")
-    def _has_the_level_of_its_forces(self) -> Self:
-        torque, plant = self.control.level == "torque", self.plant.kind
-        forces = next((task.title for task in self.tasks if task.of_forces), None)
-        if not torque and (self.contacts or forces):
-            what = "[[contacts]]" if self.contacts else f"task {forces!r}"
-            raise ValueError(f'{what} needs control.level = "torque"')
-        if self.start.on_floor and not torque:
-            raise ValueError('start.on_floor needs control.level = "torque"')
-        if torque and self.control.stack != "hierarchical":
-            raise ValueError('control.level = "torque" goes with control.stack = "hierarchical", '
-                             f'got "{self.control.stack}"')
-        if torque != (plant == "torque") and plant in ("kinematic", "mujoco", "torque"):
-            raise ValueError('control.level = "torque" and plant.kind = "torque" go together, got '
-                             f'"{self.control.level}" and "{plant}"')
-        return self
-
-    @model_validator(mode="after")
-    def _sections_go_together(self) -> Self:
-        if self.damping and self.posture and self.posture.role == "null-space":
-            raise ValueError("give [damping] or [posture], not both: each is the null-space term")
-        if self.posture and self.posture.role == "task" and self.control.stack == "switched":
-            raise ValueError('posture.role = "task" goes with control.stack = "hierarchical"')
-        if self.control.strictness and not self.position:
-            raise ValueError("control.strictness needs [position]")
-        repels = self.avoidance is not None and self.avoidance.kind == "repulsion"
-        if repels and self.control.stack != "switched":
-            raise ValueError('avoidance.kind = "repulsion" goes with control.stack = "switched", '
-                             f'got "{self.control.stack}"')
-        if repels and not self.position:
-            raise ValueError("[avoidance] needs [position]: Algorithm 1 orders one by the other")
-        if self.limits and self.limits.danger_reach and not self.avoidance:
-            raise ValueError("limits.danger_reach needs the obstacles of [avoidance]")
-        clipped = self.control.level == "torque"  # torques that are not limited in the stack
-        if self.limits and self.limits.place != "stack" and (
-                (self.limits.torque and not clipped) or self.limits.danger_reach):
-            raise ValueError('limits.torque and limits.danger_reach need limits.place = "stack"')
-        if self.limits and self.limits.torque and self.control.level == "velocity":
-            raise ValueError("limits.torque needs control.level = \"acceleration\"")
-        if self.limits and self.limits.torque_step and not clipped:
-            raise ValueError("limits.torque_step needs control.level = \"torque\"")
-        return self
-
-    @model_validator(mode="after")
-    def _fits_its_stack(self) -> Self:
-        pointing = {"pointing": self.pointing} if self.pointing else {}
-        listed = {f"tasks.{i}": task for i, task in enumerate(self.tasks)
-                  if isinstance(task, PointingTask)}
-        refused = unfit(self.control, self.limits, self.avoidance, {**pointing, **listed})
-        for reason in refused:
+    def _goes_together(self) -> Self:
+        for reason in chain(self._has_the_level_of_its_forces(), self._sections_go_together(),
+                            self._fits_its_stack(), self._lists_tasks_apart(),
+                            self._faults_have_a_sensor()):
             raise ValueError(reason)
         return self
 
-    @model_validator(mode="after")
-    def _lists_tasks_apart(self) -> Self:
+    def _has_the_level_of_its_forces(self) -> Iterator[str]:
+        torque = self.control.level == "torque"
+        forces = next((task.title for task in self.tasks if task.of_forces), None)
+        if not torque and (self.contacts or forces):
+            what = "[[contacts]]" if self.contacts else f"task {forces!r}"
+            yield f'{what} needs control.level = "torque"'
+        if self.start.on_floor and not torque:
+            yield 'start.on_floor needs control.level = "torque"'
+        if torque and self.control.stack != "hierarchical":
+            yield ('control.level = "torque" goes with control.stack = "hierarchical", '
+                   f'got "{self.control.stack}"')
+        if self.control.level not in self.plant.levels:
+            yield ('control.level = "torque" and plant.kind = "torque" go together, got '
+                   f'"{self.control.level}" and "{self.plant.kind}"')
+
+    def _sections_go_together(self) -> Iterator[str]:
+        if self.damping and self.posture and self.posture.role == "null-space":
+            yield "give [damping] or [posture], not both: each is the null-space term"
+        if self.posture and self.posture.role == "task" and self.control.stack == "switched":
+            yield 'posture.role = "task" goes with control.stack = "hierarchical"'
+        if self.control.strictness and not self.position:
+            yield "control.strictness needs [position]"
+        repels = self.avoidance is not None and self.avoidance.kind == "repulsion"
+        if repels and self.control.stack != "switched":
+            yield ('avoidance.kind = "repulsion" goes with control.stack = "switched", '
+                   f'got "{self.control.stack}"')
+        if repels and not self.position:
+            yield "[avoidance] needs [position]: Algorithm 1 orders one by the other"
+        if self.limits and self.limits.danger_reach and not self.avoidance:
+            yield "limits.danger_reach needs the obstacles of [avoidance]"
+        clipped = self.control.level == "torque"  # torques that are not limited in the stack
+        if self.limits and self.limits.place != "stack" and (
+                (self.limits.torque and not clipped) or self.limits.danger_reach):
+            yield 'limits.torque and limits.danger_reach need limits.place = "stack"'
+        if self.limits and self.limits.torque and self.control.level == "velocity":
+            yield "limits.torque needs control.level = \"acceleration\""
+        if self.limits and self.limits.torque_step and not clipped:
+            yield "limits.torque_step needs control.level = \"torque\""
+
+    def _fits_its_stack(self) -> Iterator[str]:
+        pointing = {"pointing": self.pointing} if self.pointing else {}
+        listed = {f"tasks.{i}": task for i, task in enumerate(self.tasks)
+                  if isinstance(task, PointingTask)}
+        return unfit(self.control, self.limits, self.avoidance, {**pointing, **listed})
+
+    def _lists_tasks_apart(self) -> Iterator[str]:
         if self.tasks and self.control.stack == "switched":
-            raise ValueError('[[tasks]] goes with control.stack = "hierarchical"')
+            yield '[[tasks]] goes with control.stack = "hierarchical"'
         names = [task.title for task in self.tasks]
         names += [name for name in ("position", "pointing", "posture") if getattr(self, name)]
         for name, count in Counter(names).items():
             if count > 1:
-                raise ValueError(f"{count} tasks are named {name!r}; give each its own name")
-        return self
-
-    @model_validator(mode="after")
-    def _lists_collision_once(self) -> Self:
+                yield f"{count} tasks are named {name!r}; give each its own name"
         listed = [task for task in self.tasks if task.kind == "collision"]
         if listed and (self.avoidance is None or self.avoidance.kind != "separation"):
-            raise ValueError('a task of kind "collision" needs [avoidance] with kind = '
-                             '"separation", which says what is kept apart')
+            yield ('a task of kind "collision" needs [avoidance] with kind = '
+                   '"separation", which says what is kept apart')
         if len(listed) > 1:
-            raise ValueError(f'{len(listed)} tasks are of kind "collision"')
-        return self
+            yield f'{len(listed)} tasks are of kind "collision"'
 
-    @model_validator(mode="after")
-    def _faults_have_a_sensor(self) -> Self:
+    def _faults_have_a_sensor(self) -> Iterator[str]:
         blind = next((fault.kind for fault in self.faults
                       if fault.kind in ("nan_distance", "obstacle")), None)
         if blind and not self.avoidance:
-            raise ValueError(f"a fault of kind {blind!r} needs [avoidance]")
+            yield f"a fault of kind {blind!r} needs [avoidance]"
         kinds, sensor = {fault.kind for fault in self.faults}, self.sensor.kind
         if sensor != "exact" and not self.avoidance:
-            raise ValueError(f"sensor.kind = {sensor!r} needs [avoidance]")
-        if sensor == "exact" and kinds & {"no_frames", "dark_frames"}:
-            raise ValueError("faults of frames need a sensor of kind \"camera\" or \"frames\"")
-        if sensor == "frames" and "obstacle" in kinds:
-            raise ValueError("a fault of kind 'obstacle' would not be in the recorded frames")
-        return self
+            yield f"sensor.kind = {sensor!r} needs [avoidance]"
+        if not self.sensor.has_frames and kinds & {"no_frames", "dark_frames"}:
+            yield "faults of frames need a sensor of kind \"camera\" or \"frames\""
+        if self.sensor.is_recorded and "obstacle" in kinds:
+            yield "a fault of kind 'obstacle' would not be in the recorded frames"
 
     @property
     def is_experiment(self) -> bool:

@@ -1,16 +1,26 @@
-"""Common parts of sections: numbers, and what says their kind."""
+"""Common parts of sections: numbers with their bounds and units, and what says their kind."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import reduce
-from operator import or_
-from typing import Annotated, Any, ClassVar
+from dataclasses import dataclass
+from typing import Annotated, Any, ClassVar, get_args
 
-from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag
+from pydantic import BaseModel, ConfigDict, Field
+from pydantic_core import PydanticCustomError, core_schema
 
 from hierarchy import plugins
 from hierarchy.plugins import Group
+
+
+@dataclass(frozen=True)
+class Unit:
+    """The unit of a key, for messages and for the page of keys."""
+
+    name: str
+
+    def __get_pydantic_json_schema__(self, core: Any, handler: Any) -> dict[str, Any]:
+        return {**handler(core), "unit": self.name}
+
 
 # Strict: true is not 1.0, and "5" is not 5. A whole number may be given for a float.
 Finite = Annotated[float, Field(strict=True, allow_inf_nan=False)]
@@ -23,6 +33,17 @@ Flag = Annotated[bool, Field(strict=True)]
 JointValue = Finite | tuple[Finite, ...]  # see hierarchy.Robot.configuration
 Vector3 = tuple[Finite, Finite, Finite]
 Rows3 = tuple[Vector3, Vector3, Vector3]
+Length = Annotated[Positive, Unit("m")]
+Distance = Annotated[NotNegative, Unit("m")]
+Span = Annotated[Positive, Unit("s")]
+Time = Annotated[NotNegative, Unit("s")]
+Rate = Annotated[Positive, Unit("1/s")]
+Speed = Annotated[NotNegative, Unit("m/s")]
+Angle = Annotated[Finite, Unit("rad")]
+Gain = Annotated[NotNegative, Unit("1/s")]
+Stiffness = Annotated[NotNegative, Unit("1/s^2")]
+Force = Annotated[NotNegative, Unit("N")]
+Point = Annotated[Vector3, Unit("m")]
 
 
 class Section(BaseModel):
@@ -36,31 +57,83 @@ class Section(BaseModel):
                               serialize_by_alias=True)
 
 
-PLUGIN = "plugin"  # the tag of sections whose kind a plugin has registered
+@dataclass(frozen=True)
+class OneOf:
+    """What makes `Annotated[A | B, OneOf()]` a section of the kind that its table names.
 
-
-def kind_or(default: str | None, group: Group | None = None) -> Callable[[Any], str | None]:
-    """Return a function that reads the kind of a table or section, `default` if it has none.
-
-    With a `group` the kind is PLUGIN for one that is not shipped, but registered there.
+    Without a key "kind" it is the `default`. Keys in messages are then those of the file, without
+    the kinds that a union of pydantic puts between them.
     """
-    def kind(section: Any) -> str | None:
-        found = (section.get("kind", default) if isinstance(section, dict)
-                 else getattr(section, "kind", default))
-        if not isinstance(found, str):
-            return None if found is None else str(found)
-        own = group and found not in plugins.shipped(group) and plugins.find(group, found)
-        return PLUGIN if own else found
 
-    return kind
+    default: str | None = None
+    wants: ClassVar[str] = "expected a kind,"
+
+    def sections(self, annotation: Any) -> tuple[type[Section], ...]:
+        """Return the sections of all kinds."""
+        return get_args(annotation)
+
+    def kinds(self, section: type[Section]) -> tuple[str, ...]:
+        """Return the kinds that a section is for."""
+        return kinds_of(section)
+
+    def names(self, annotation: Any) -> tuple[str, ...]:
+        """Return the kinds."""
+        return tuple(kind for section in self.sections(annotation) for kind in self.kinds(section))
+
+    def kind_of(self, table: dict[str, Any]) -> Any:
+        """Return the kind of a table."""
+        return table.get("kind", self.default)
+
+    def find(self, annotation: Any, kind: str) -> type[Section] | None:
+        """Return the section of a kind, None if there is none."""
+        return next((section for section in self.sections(annotation)
+                     if kind in self.kinds(section)), None)
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
+        kinds = [handler.generate_schema(section) for section in self.sections(source)]
+        return core_schema.no_info_wrap_validator_function(  # the union is for the page of keys
+            lambda table, _: self._section(source, table), core_schema.union_schema(kinds),
+            serialization=core_schema.simple_ser_schema("any"))
+
+    def _section(self, source: Any, table: Any) -> Section:
+        if isinstance(table, Section):
+            return table
+        kind = self.kind_of(table) if isinstance(table, dict) else table
+        found = self.find(source, kind) if isinstance(kind, str) and kind is not table else None
+        if found is None:
+            got = "" if kind is None else f"; got {kind!r}"
+            raise PydanticCustomError("kind", f"{self.wants} {{kinds}}{{got}}", {
+                "kinds": ", ".join(map(repr, self.names(source))), "got": got})
+        return found.model_validate(table)
 
 
-def any_kind(group: Group, own: type[Section], default: str | None = None) -> Any:
-    """Return the type of a section of any kind that is registered so far, or of a plugin's.
+@dataclass(frozen=True)
+class Registered(OneOf):
+    """The same for the kinds of a group: sections, or what `own.of` makes of something else."""
 
-    `own` is the section of a plugin's kind; without a key "kind" it is the `default`.
-    """
-    tagged: list[Any] = [Annotated[section, Tag(kind)]
-                         for kind, section in plugins.shipped(group).items()]
-    return Annotated[reduce(or_, [*tagged, Annotated[own, Tag(PLUGIN)]]),
-                     Discriminator(kind_or(default, group))]
+    group: Group = "tasks"
+    own: Any = None
+
+    def sections(self, annotation: Any) -> tuple[type[Section], ...]:
+        """See `OneOf`."""
+        return (*map(self._as_section, plugins.registered(self.group).values()), self.own)
+
+    def names(self, annotation: Any) -> tuple[str, ...]:
+        """See `OneOf`."""
+        return tuple(plugins.known(self.group))
+
+    def find(self, annotation: Any, kind: str) -> type[Section] | None:
+        """See `OneOf`; loads the entry point of that name only."""
+        thing = plugins.find(self.group, kind)
+        return None if thing is None else self._as_section(thing)
+
+    def _as_section(self, thing: Any) -> type[Section]:
+        is_section = isinstance(thing, type) and issubclass(thing, Section)
+        section: type[Section] = thing if is_section else self.own.of(thing)
+        return section
+
+
+def kinds_of(section: type[Section]) -> tuple[str, ...]:
+    """Return the values that a section allows for its key "kind"."""
+    field = section.model_fields.get("kind")
+    return get_args(field.annotation) if field else ()

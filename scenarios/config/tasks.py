@@ -5,33 +5,42 @@ Each section of a task makes it; `scenarios.config.kinds` has those that only `[
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from math import radians
-from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Self, TypeVar
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
 
-from hierarchy import plugins
+from hierarchy.errors import brief
+from hierarchy.paths import Path, Shifted, Still
+from hierarchy.plugins import Group
 from hierarchy.problem import Array
+from scenarios.config.errors import ScenarioError
+from scenarios.config.own import OwnSection
 from scenarios.config.paths import PathSection
 from scenarios.config.sections import (
     Finite,
     Flag,
+    Gain,
     JointValue,
+    Length,
     NotNegative,
+    Point,
     Positive,
+    Registered,
     Section,
+    Stiffness,
+    Unit,
     Vector3,
 )
 
 if TYPE_CHECKING:
     from hierarchy import Task
-    from hierarchy.paths import Path
     from scenarios.config.references import References
 
+Acceleration = Annotated[Positive, Unit("rad/s^2")]
 Rows = Literal["equality", "inequality"]
-_Kind = TypeVar("_Kind", bound="Listed")
 TaskName = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_ -]*$")]
 
 
@@ -71,9 +80,9 @@ class Made(Section):
 class TaskSection(Made):
     """What most tasks have: gains of its error, in [1/s^2] and [1/s] (acceleration) and [1/s]."""
 
-    stiffness: NotNegative = 40.0
-    damping: NotNegative = 20.0
-    gain: NotNegative = 10.0
+    stiffness: Stiffness = 40.0
+    damping: Gain = 20.0
+    gain: Gain = 10.0
 
     @property
     def gains(self) -> tuple[float, float, float]:
@@ -88,7 +97,7 @@ class AlongSection(TaskSection):
     """
 
     path: PathSection | None = None
-    offset: Vector3 = (0.0, 0.0, 0.0)
+    offset: Point = (0.0, 0.0, 0.0)
     from_start: Flag = False
 
     @model_validator(mode="after")
@@ -99,8 +108,6 @@ class AlongSection(TaskSection):
 
     def along(self, here: Array) -> Path:
         """Return the path of a point that starts `here` (3,) [m]."""
-        from hierarchy.paths import Shifted, Still
-
         offset = np.array(self.offset)
         if self.path is None:
             return Still((here + offset).tolist())
@@ -143,12 +150,12 @@ class PointingTask(TaskSection):
     """
 
     axis: Vector3
-    alpha_d: Annotated[float, Field(strict=True, ge=0.0, le=180.0)]
+    alpha_d: Annotated[float, Field(strict=True, ge=0.0, le=180.0), Unit("deg")]
     rows: Rows = "inequality"
-    buffer: Positive | None = None
-    stiffness: NotNegative = 5.0
-    damping: NotNegative = 2.0
-    gain: NotNegative = 5.0
+    buffer: Annotated[Positive, Unit("deg")] | None = None
+    stiffness: Stiffness = 5.0
+    damping: Gain = 2.0
+    gain: Gain = 5.0
     frame: ClassVar[str | None]
 
     @property
@@ -176,9 +183,9 @@ class PostureTask(TaskSection):
     unit: ClassVar[str] = "rad"
     target: tuple[Finite, ...] | None = None
     joints: dict[str, JointValue] = Field(default_factory=dict)
-    stiffness: NotNegative = 10.0
-    damping: NotNegative = 5.0
-    gain: NotNegative = 1.0
+    stiffness: Stiffness = 10.0
+    damping: Gain = 5.0
+    gain: Gain = 1.0
 
     def make(self, at: References) -> Task:
         """Return the task."""
@@ -232,12 +239,12 @@ class LimitsSection(Section):
     are slowed down, see hierarchy.tasks.DangerBounds.
     """
 
-    acceleration: Positive | tuple[Positive, ...]
+    acceleration: Acceleration | tuple[Acceleration, ...]
     place: Literal["stack", "guard", "either", "bounds"] = "stack"
-    margin: NotNegative = 0.0
-    danger_reach: Positive | None = None
+    margin: Annotated[NotNegative, Unit("rad")] = 0.0
+    danger_reach: Length | None = None
     torque: Annotated[float, Field(strict=True, gt=0.0, le=1.0)] | None = None
-    torque_step: Positive | None = None
+    torque_step: Annotated[Positive, Unit("N m")] | None = None
     base_speed: tuple[Positive, Positive] | None = None
     base_acceleration: tuple[Positive, Positive] | None = None
 
@@ -266,6 +273,28 @@ class Listed(Made):
         return self.name or self.kind
 
 
-def register(kind: str) -> Callable[[type[_Kind]], type[_Kind]]:
-    """Return a decorator that makes a section a kind of `[[tasks]]`."""
-    return plugins.register("tasks", kind, shipped=True)
+class OwnTask(Listed, OwnSection):
+    """A task of a plugin; its keys are those of the plugin."""
+
+    group: ClassVar[Group] = "tasks"
+    unit: ClassVar[str] = ""
+
+    @property
+    def one_sided(self) -> bool:
+        """Whether its rows are inequalities, as the plugin's class says with `kind`."""
+        return str(getattr(type(self).maker, "kind", "equality")) == "inequality"
+
+    def make(self, at: References) -> Task:
+        """Return the task; raises ScenarioError for whatever goes wrong in the user's code."""
+        from hierarchy import Task
+
+        task = self.made(at.robot, state=at.start, name=self.title)
+        if not isinstance(task, Task):
+            raise ScenarioError(f"the plugin made {brief(task)}, not a Task")
+        if task.name != self.title:
+            raise ScenarioError(f"its name is {task.name!r}; take the name as the parameter `name`,"
+                                " or give the section this name")
+        return task
+
+
+ListedTask = Annotated[Listed, Registered(None, "tasks", OwnTask)]

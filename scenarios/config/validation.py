@@ -1,20 +1,20 @@
-"""Validate plain data as a section; errors name the key and the value."""
+"""Validate plain data as a section; errors name the key, the value and its unit."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any, TypeVar
+from collections.abc import Iterator, Sequence
+from typing import Any, TypeVar, get_args
 
 from pydantic import ValidationError
 
-from hierarchy import plugins
 from hierarchy.errors import HierarchyError, UnknownNameError
 from hierarchy.words import listed
 from scenarios.config.changes import Tag
 from scenarios.config.errors import ScenarioError
-from scenarios.config.sections import PLUGIN, Section
+from scenarios.config.sections import OneOf, Section, Unit, kinds_of
 
 Kind = TypeVar("Kind", bound=Section)
+_UNIONS = ("constrained-float", "float", "str")  # what pydantic calls the parts of one in a key
 
 
 def validated(kind: type[Kind], data: dict[str, Any], what: str) -> Kind:
@@ -22,7 +22,8 @@ def validated(kind: type[Kind], data: dict[str, Any], what: str) -> Kind:
     try:
         return kind.model_validate(data)
     except ValidationError as error:
-        raise ScenarioError("\n".join(_say(kind, what, e) for e in error.errors())) from error
+        raise ScenarioError("\n".join(f"{what}: {_said(kind, data, e)}" for e in error.errors())
+                            ) from error
     except HierarchyError as error:  # what a resolver says of its settings
         raise ScenarioError(f"{what}: control: {error}") from error
 
@@ -38,85 +39,71 @@ def tag_at(root: type[Section], path: Sequence[str]) -> Tag | None:
     return Tag(key, defaults[0] if defaults else None) if found else None
 
 
-def _say(root: type[Section], what: str, error: Any) -> str:
-    keys = _without_kinds(root, [str(key) for key in error["loc"]])
+def sections_at(root: type[Section], path: Sequence[str]) -> list[type[Section]]:
+    """Return the sections allowed at a path: several if a kind selects one."""
+    return [found for part in _annotations(root, path) for found in _within(part, Section)]
+
+
+def _said(root: type[Section], data: Any, error: Any) -> str:
+    keys = [str(key) for key in error["loc"] if key not in _UNIONS
+            and not str(key).startswith("tuple[")]
     where = ".".join(keys) or "file"
     if error["type"] == "extra_forbidden":
-        if (having := _kinds_with(root, keys)) and len(keys) < len(error["loc"]):
-            kinds = listed([repr(kind) for kind in having])
-            return (f"{what}: {where}: only kind {kinds} has it; the kind here is "
-                    f"{str(error['loc'][-2])!r}")
-        beside = _keys_beside(root, keys, str(error["loc"][-2:][0]))
-        return f"{what}: {UnknownNameError('key', where, beside)}"
-    if error["type"] in ("union_tag_invalid", "union_tag_not_found"):
-        tag = error["ctx"].get("tag")
-        found = sorted(_kinds_at(root, [key for key in keys if not key.isdigit()]) - {PLUGIN})
-        known = _with_own(root, keys, error["ctx"].get("expected_tags")) or ", ".join(
-            map(repr, found))
-        return f"{what}: {where}: expected a kind, {known}" + (f"; got {tag!r}" if tag else "")
+        return _unknown(root, keys, _table(data, error["loc"][:-1]))
     text = error["msg"].removeprefix("Value error, ")
-    value = "" if isinstance(error["input"], dict) else f", got {error['input']!r}"
-    return f"{what}: {where}: {text}{value}"
+    if isinstance(error["input"], dict) or error["type"] == "kind":
+        return f"{where}: {text}"
+    unit = next((f" {unit.name}" for part in _annotations(root, keys)
+                 for unit in _within(part, Unit)), "")
+    return f"{where}: {text}, got {error['input']!r}{unit}"
 
 
-def _with_own(root: type[Section], keys: list[str], tags: str | None) -> str | None:
-    """Return the kinds that pydantic lists, with those of plugins in place of their tag."""
-    groups = [section.group for section in sections_at(root, keys) if hasattr(section, "group")]
-    own = "".join(f", {kind!r}" for group in groups[:1] for kind in plugins.own(group))
-    return tags and tags.replace(f", {PLUGIN!r}", own)
-
-
-def _without_kinds(root: type[Section], loc: list[str]) -> list[str]:
-    """Drop the kinds of sections that pydantic inserts into the location of an error."""
-    kept: list[str] = []
-    dropped = False  # the key before: a kind is followed by a key
-    for i, key in enumerate(loc):
-        last = i == len(loc) - 1 and key != PLUGIN
-        dropped = not (dropped or i == 0 or last) and key in _kinds_at(root, kept)
-        if not dropped:
-            kept.append(key)
-    return kept
-
-
-def _kinds_with(root: type[Section], keys: list[str]) -> list[str]:
-    """Return the kinds of sections that have the last of `keys`."""
-    return [kind for section in dict.fromkeys(sections_at(root, keys[:-1]))
-            if keys[-1] in section.model_fields for kind in _kinds_of(section)]
-
-
-def _kinds_of(section: type[Section]) -> tuple[str, ...]:
-    field = section.model_fields.get("kind")
-    kinds: tuple[str, ...] = getattr(field.annotation, "__args__", ()) if field else ()
-    return kinds
-
-
-def _keys_beside(root: type[Section], keys: list[str], kind: str) -> list[str]:
-    """Return the full names of the keys allowed in place of the last of `keys`.
-
-    Those of a section of this kind, if there is one, else of all that may stand there.
-    """
-    beside = sections_at(root, keys[:-1])
-    beside = [section for section in beside if kind in _kinds_of(section)] or beside
+def _unknown(root: type[Section], keys: list[str], table: dict[str, Any]) -> str:
+    """Return which kind has the last of some keys, or which known key is nearest to it."""
+    where, beside = ".".join(keys), list(dict.fromkeys(sections_at(root, keys[:-1])))
+    tag = tag_at(root, keys[:-1])
+    kind = table.get("kind", tag.default if tag else None)
+    having = [one for section in beside if keys[-1] in section.model_fields
+              for one in kinds_of(section)]
+    if having and len(beside) > 1:
+        return (f"{where}: only kind {listed([repr(one) for one in having])} has it; the kind here "
+                f"is {kind!r}")
+    beside = [section for section in beside if kind in kinds_of(section)] or beside
     known = dict.fromkeys(field.alias or key for section in beside
                           for key, field in section.model_fields.items())
-    return [".".join([*keys[:-1], key]) for key in known]
+    return str(UnknownNameError("key", where, [".".join([*keys[:-1], key]) for key in known]))
 
 
-def _kinds_at(root: type[Section], path: list[str]) -> set[str]:
-    named = {kind for section in sections_at(root, path) for kind in _kinds_of(section)}
-    return named | {PLUGIN} if named else named
+def _table(data: Any, path: Sequence[int | str]) -> dict[str, Any]:
+    """Return the table at a path; an empty one where data became a table on the way."""
+    for key in path:
+        try:
+            data = data[key]
+        except (KeyError, IndexError, TypeError):
+            return {}
+    return data if isinstance(data, dict) else {}
 
 
-def sections_at(root: type[Section], path: Sequence[str]) -> list[Any]:
-    """Return the sections allowed at a path: several if a kind selects one."""
-    sections: list[Any] = [root]
+def _annotations(root: type[Section], path: Sequence[str]) -> list[Any]:
+    """Return the annotations of the keys at a path, in all sections that it may lead through."""
+    parts: list[Any] = [root]
     for key in (key for key in path if not key.isdigit()):  # a list index is not a key
-        fields = [section.model_fields[key] for section in sections if key in section.model_fields]
-        sections = [found for field in fields for found in _sections_in(field.annotation)]
-    return sections
+        parts = [(field.annotation, *field.metadata) for part in parts
+                 for section in _within(part, Section) for name, field
+                 in section.model_fields.items() if key in (name, field.alias)]
+    return parts
 
 
-def _sections_in(annotation: Any) -> list[Any]:
-    if isinstance(annotation, type) and issubclass(annotation, Section):
-        return [annotation]
-    return [found for part in getattr(annotation, "__args__", ()) for found in _sections_in(part)]
+def _within(annotation: Any, wanted: type) -> Iterator[Any]:
+    """Yield what an annotation has of a type: classes of sections, or units."""
+    if isinstance(annotation, wanted) or (
+            isinstance(annotation, type) and issubclass(annotation, wanted)):
+        yield annotation
+    else:
+        parts = annotation if isinstance(annotation, tuple) else get_args(annotation)
+        choice = next((part for part in parts if isinstance(part, OneOf)), None)
+        if choice is not None and wanted is Section:
+            yield from choice.sections(parts[0])
+            return
+        for part in parts:
+            yield from _within(part, wanted)

@@ -10,10 +10,10 @@ import numpy as np
 
 from hierarchy.tasks.self_separation import SelfSeparation
 from hierarchy.words import listed
-from scenarios.cell.avoidance import inseparable_pairs
 from scenarios.cell.build import Cell
 from scenarios.cell.contacts import doubts
 from scenarios.config import Scenario
+from scenarios.config.references import inseparable_pairs
 from scenarios.loop.controller import Controller
 from solvers import Status, explain, make
 from solvers.explain import is_missed

@@ -17,7 +17,7 @@ from hierarchy.robots.table import Base
 from scenarios.cell.contacts import contacts_of
 from scenarios.cell.robot import sensed_points
 from scenarios.config import Scenario
-from scenarios.config.plant import TorqueSection
+from scenarios.config.kinds.torque import TorqueSection
 from scenarios.recording.links import capsules, lowest
 from scenarios.recording.tree import Joint, Matrix, Vector, joint_units, placements, tree_of
 from solvers.resolver import Handles, Resolver

@@ -13,7 +13,7 @@ from hierarchy.tasks import Along, CentreOfMass, Position
 from hierarchy.tasks.pose import PoseTask
 
 if TYPE_CHECKING:
-    from scenarios.config.listed import ListedTask
+    from scenarios.config.tasks import ListedTask
     from scenarios.recording.recording import Recording
 
 

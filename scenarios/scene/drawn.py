@@ -14,7 +14,7 @@ from hierarchy import HierarchyError
 from hierarchy.avoidance import Capsule, Measurement, Obstacles
 from hierarchy.avoidance.measurement import exact_measurer
 from hierarchy.problem import Array
-from scenarios.cell.sensor import make_obstacles
+from scenarios.cell.scene import make_obstacles
 from scenarios.recording import listed
 from scenarios.recording.facts import Point, RobotFacts
 from scenarios.recording.fate import Fate

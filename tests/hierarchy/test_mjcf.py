@@ -8,9 +8,9 @@ import pytest
 
 from hierarchy import Robot, State
 from hierarchy.errors import RobotError, UnknownNameError
-from scenarios.cell.avoidance import separable_pairs
 from scenarios.cell.robot import start_of
 from scenarios.cli.main import run_command
+from scenarios.config.references import separable_pairs
 from scenarios.config.robot import StartSection
 
 mujoco = pytest.importorskip("mujoco")

@@ -13,10 +13,10 @@ from hierarchy.errors import RobotError, UnknownNameError
 from hierarchy.robots.points import points_along_chain
 from hierarchy.robots.shapes import _capsule_of, bounding_capsule
 from hierarchy.tasks import DangerBounds, JointLimits, Posture, TorqueLimits
-from scenarios.cell.avoidance import separable_pairs
 from scenarios.cell.robot import make_robot
 from scenarios.cli.main import run_command
 from scenarios.cli.robot_check import look_at, paste
+from scenarios.config.references import separable_pairs
 from scenarios.config.robot import RobotSection
 
 ARM = """<robot name="arm">

@@ -42,10 +42,8 @@ from hierarchy.tasks import (
 )
 from hierarchy.tasks.geometric import cross
 from hierarchy.tasks.pose import rotation_vector
-from scenarios.config.kinds.com import ListedCentreOfMass
-from scenarios.config.kinds.pointing import ListedPointing
-from scenarios.config.kinds.position import ListedFrame, ListedPose, ListedPosition
-from scenarios.config.kinds.posture import ListedPosture
+from scenarios.config.kinds.frames import ListedFrame, ListedPointing, ListedPose, ListedPosition
+from scenarios.config.kinds.whole import ListedCentreOfMass, ListedPosture
 
 STEP = 1e-6
 STATES = states(20)

@@ -1,15 +1,8 @@
-import numpy as np
 import pytest
 
 from hierarchy import HierarchyError
-from hierarchy.errors import UnknownNameError
 from scenarios.cell.build import build
 from scenarios.config import ScenarioError, load, shipped
-
-
-def test_the_letters_scenarios_are_shipped():
-    assert {"ellipse", "ellipse-velocity", "ellipse-3d", "ellipse-35deg",
-            "ellipse-35deg-equality", "ellipse-published"} <= set(shipped())
 
 
 @pytest.mark.parametrize("name", shipped())
@@ -40,17 +33,6 @@ def test_a_scenario_as_run_reads_back_the_same(name, tmp_path):
     assert load(path) == scenario
 
 
-def test_the_letters_settings():
-    s = load("ellipse")
-    assert (s.control.level, s.control.resolver, s.control.period) == (
-        "acceleration", "tpm-published", 1e-3)
-    assert s.control.settings() == {"damping": 0.05, "threshold": 0.1}
-    assert s.control.duration == pytest.approx(6 * np.pi)
-    assert (s.pointing.alpha_d, s.pointing.rows) == (5.0, "inequality")
-    assert (s.avoidance.near, s.avoidance.far, s.avoidance.end_effector) == (0.05, 0.15, 0.1)
-    assert len(s.avoidance.obstacles) == 3
-
-
 def test_changes_are_toml_values_at_dotted_keys():
     s = load("ellipse", ["pointing.alpha_d=35", "pointing.kind=equality",
                          "avoidance.obstacles=[[1, 2, 3]]", "control.options.damping = 0.02"])
@@ -58,16 +40,6 @@ def test_changes_are_toml_values_at_dotted_keys():
     assert s.avoidance.obstacles[0].centre == (1, 2, 3)
     assert s.control.settings() == {"damping": 0.02, "threshold": 0.1}
     assert load("ellipse", {"pointing.alpha_d": 35}).pointing.alpha_d == 35
-
-
-def test_obstacles_may_have_shapes_and_move(tmp_path):
-    s = load("ellipse", ["avoidance.obstacles=[[1, 2, 3], {shape='sphere', radius=0.1, path="
-                         "{kind='waypoints', times=[0, 1], points=[[0, 0, 2], [0, 0, 3]]}},"
-                         "{shape='box', centre=[1, 1, 1], half_lengths=[0.1, 0.2, 0.3]}]"])
-    assert [o.shape for o in s.avoidance.obstacles] == ["point", "sphere", "box"]
-    path = tmp_path / "scenario.toml"
-    path.write_text(s.to_toml())
-    assert load(path) == s
 
 
 def test_a_resolver_is_swapped_by_name_keeping_the_shared_settings():
@@ -88,54 +60,6 @@ def test_a_file_extends_another(tmp_path):
     s = load(tmp_path / "yours.toml")
     assert (s.name, s.pointing.alpha_d, s.control.period) == ("yours", 12, 0.002)
     assert s.avoidance == load("ellipse").avoidance
-
-
-def test_files_that_extend_each_other_are_refused(tmp_path):
-    (tmp_path / "a.toml").write_text('extends = "b.toml"')
-    (tmp_path / "b.toml").write_text('extends = "a.toml"')
-    with pytest.raises(ScenarioError, match="extends"):
-        load(tmp_path / "a.toml")
-
-
-@pytest.mark.parametrize(("change", "said"), [
-    ("control.resolvr=tpm", "did you mean 'control.resolver'"),
-    ("pointing.alfa_d=3", "did you mean 'pointing.alpha_d'"),
-    ("avoidance.body.maximun=3", "did you mean 'avoidance.body.maximum'"),
-    ("pointign.alpha_d=3", "did you mean 'pointing'"),
-    ("control.resolver=tmp", "did you mean 'tpm'"),
-    ("control.options.dampin=0.1", "did you mean 'damping'"),
-    ("control.options.damping=-1", "damping"),
-    ("control.options.recursive.form=published", "unknown setting of recursive 'form'"),
-    ("control.options.tpm=3", "unknown setting of tpm 'tpm'"),
-    ("control.options.tmp.form=published", "unknown setting of tpm 'tmp'"),
-    ("control.options.form=printed", "published, staircase"),
-    ("control.period=0", "control.period"),
-    ("control.period=fast", "control.period"),
-    ("control.duration=-1", "control.duration"),
-    ("control.level=torque", "control.level"),
-    ("pointing.alpha_d=181", "pointing.alpha_d"),
-    ("pointing.alpha_d=nan", "pointing.alpha_d"),
-    ("avoidance.dimension=2", "avoidance.dimension"),
-    ("avoidance.near=0.2", "beyond far"),
-    ("avoidance.obstacles=[[1, 2]]", "avoidance.obstacles.0"),
-    ("avoidance.obstacles=[{shape='sphere', centre=[0, 0, 0]}]", "a sphere takes radius"),
-    ("avoidance.obstacles=[{shape='point'}]", "either a centre or a path"),
-    ("posture.target=[0, 0, 0, 0, 0, 0, 0]", "not both"),
-    ("position.path.kind=spiral", "position.path"),
-    ("start.q=[nan, 0, 0, 0, 0, 0, 0]", "start.q.0"),
-    ("pointing.alpha_d", "expected key=value"),
-    ("pointing.alpha_d=[1", "not a TOML value"),
-    ("name.first=1", "[name] is not a table"),
-])
-def test_a_bad_change_names_key_and_value(change, said):
-    with pytest.raises(HierarchyError) as error:
-        load("ellipse", [change])
-    assert said in str(error.value)
-
-
-def test_an_unknown_scenario_comes_with_the_nearest():
-    with pytest.raises(UnknownNameError, match="did you mean 'ellipse'"):
-        load("elipse")
 
 
 def test_bad_files_are_named(tmp_path):
@@ -159,8 +83,3 @@ def test_a_stack_that_asks_for_nothing_is_refused(tmp_path):
                     '[control]\nresolver = "tpm"\nduration = 1.0\n')
     with pytest.raises(ScenarioError, match="scenario 'idle': the stack is empty"):
         build(load(path))
-
-
-def test_config_files_are_data_and_not_executed():
-    with pytest.raises(HierarchyError):
-        load("ellipse", ["pointing.alpha_d=__import__('os').getpid()"])

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from scenarios import load, simulate
-from scenarios.cell.build import build
 from scenarios.cell.plants.touch import inside
 from scenarios.measure.metrics import measure
 
@@ -20,17 +19,6 @@ def first_step():
     pytest.importorskip("mujoco")
     return simulate(CRAWL.with_changes({
         "control.duration": 1.4, "plant.pushes.0.at": 0.3, "plant.pushes.0.force": 20.0}))
-
-
-def test_the_feet_of_the_quadruped_are_below_its_hips_at_the_start():
-    cell = build(CRAWL.with_changes({"start.on_floor": False}))
-    cell.state.move(0.0, *cell.start)
-    for name in FEET:
-        foot, hip = (cell.state.position(cell.robot.frame(frame))
-                     for frame in (name, name.replace("foot", "hip_pitch")))
-        np.testing.assert_allclose(foot, [*hip[:2], 0.0], atol=1e-12)
-    assert cell.robot.n == 18
-    assert cell.robot.masses.sum() == pytest.approx(15.0)
 
 
 def test_each_foot_steps_while_the_others_stand():

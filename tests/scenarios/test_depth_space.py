@@ -18,7 +18,7 @@ from scenarios.cell.sensors.depth_space import DepthSpace, ObstacleImage
 from scenarios.cell.sensors.exact import ExactDistances
 from scenarios.cell.sensors.frames import RecordedFrames
 from scenarios.config import ScenarioError
-from scenarios.config.sensor import DepthErrors
+from scenarios.config.kinds.camera import DepthErrors
 from scenarios.draw.figures.depth import depth_figure
 from scenarios.measure.judging import depth_view
 
@@ -72,14 +72,12 @@ def one_by_one(image, pinhole, point, region, thin=inf, within=inf):
     return distance[nearest], off[nearest] / distance[nearest], mean / np.linalg.norm(mean)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("thin", [inf, 0.1, 0.0])
-@pytest.mark.parametrize("share", [0.002, 0.3])
+@pytest.mark.parametrize(("share", "thin"), [(0.002, inf), (0.3, 0.1), (0.3, 0.0)])
 def test_distances_and_directions_are_those_of_all_pixels_one_by_one(share, thin):
     """Neither the square that is visited, nor the tiles that are left out, lose a pixel."""
     rng = np.random.default_rng(5)
     seen_some = 0
-    for _ in range(30):
+    for _ in range(6):
         image = rng.uniform(0.6, 2.5, (81, 101)) * (rng.random((81, 101)) < share)
         image = image.astype(np.float32)
         points = rng.uniform((-1, -1, 0.3), (1, 1, 2.8), (6, 3))
@@ -93,7 +91,7 @@ def test_distances_and_directions_are_those_of_all_pixels_one_by_one(share, thin
                 if 0.05 < D < inf:
                     np.testing.assert_allclose(seen.direction[k], average if mean else nearest,
                                                atol=1e-4)
-    assert seen_some > 60
+    assert seen_some > 12
 
 
 def test_a_point_at_the_edge_of_the_image_or_near_the_camera_misses_nothing():
@@ -105,31 +103,6 @@ def test_a_point_at_the_edge_of_the_image_or_near_the_camera_misses_nothing():
         assert seen_in(image, place).distance[0] == pytest.approx(D, abs=1e-6)
 
 
-def test_an_obstacle_behind_the_point_counts_at_its_own_depth():
-    seen = seen_in(image_of({(50, 40): 1.3}), (0.0, 0.0, 1.0))
-    assert seen.distance[0] == pytest.approx(0.3)
-    np.testing.assert_allclose(seen.direction[0], (0, 0, -1), atol=1e-9)
-    assert seen.nearest[0] == 40 * 101 + 50
-
-
-def test_an_obstacle_nearer_to_the_camera_counts_at_the_depth_of_the_point():
-    """The pixel 10 to the right is at 0.1 rad: 0.1 m beside the axis at the depth of 1 m."""
-    for depth in (0.999, 0.8, 0.3):
-        seen = seen_in(image_of({(60, 40): depth}), (0.0, 0.0, 1.0))
-        assert seen.distance[0] == pytest.approx(0.1)
-        np.testing.assert_allclose(seen.direction[0], (-1, 0, 0), atol=1e-9)
-
-
-def test_a_thin_obstacle_counts_at_its_back():
-    image = image_of({(60, 40): 0.5})
-    assert seen_in(image, (0, 0, 1), thin=0.2).distance[0] == pytest.approx(
-        np.hypot(0.07, 0.3))
-    assert seen_in(image, (0, 0, 1), thin=0.0, region=0.6).distance[0] == pytest.approx(
-        np.hypot(0.05, 0.5))
-    assert seen_in(image, (0, 0, 1), thin=0.5).distance[0] == pytest.approx(0.1)
-    assert seen_in(image, (0, 0, 1), thin=0.1, region=0.3).distance[0] == inf
-
-
 def test_a_point_in_the_shadow_of_an_obstacle_touches_it_and_leaves_it_where_it_ends_first():
     image = np.zeros((81, 101))
     image[20:61, 40:91] = 0.7  # its left side is 10 pixels off the point, all others farther
@@ -137,12 +110,6 @@ def test_a_point_in_the_shadow_of_an_obstacle_touches_it_and_leaves_it_where_it_
     assert seen.distance[0] == pytest.approx(0.0, abs=1e-9)
     assert seen.direction[0] @ (-1.0, 0.0, 0.0) > 0.99
     np.testing.assert_array_equal(seen.pairs.direction[0, 0], seen.direction[0])
-
-
-def test_a_direction_is_a_unit_vector_or_nothing():
-    seen = seen_in(image_of({(50, 40): 1.0}), (0, 0, 1.0), (0.3, 0.1, 1.0), (2.0, 0, 3.0))
-    np.testing.assert_allclose(np.linalg.norm(seen.direction, axis=1), (1, 1, 0))
-    assert (seen.distance[2], seen.magnitude[2], seen.nearest[2]) == (inf, 0.0, -1)
 
 
 def test_repulsion_is_that_of_the_distance_and_the_active_point_the_nearest_of_the_body():
@@ -153,17 +120,6 @@ def test_repulsion_is_that_of_the_distance_and_the_active_point_the_nearest_of_t
     assert seen.active == 1
     assert seen.minimal_distance == pytest.approx(0.1)
     assert seen.end_effector_distance == pytest.approx(0.05)
-
-
-def test_pairs_have_what_is_nearest_and_know_no_velocity():
-    image = image_of({(50, 40): 1.2, (60, 40): 1.3})
-    seen = seen_in(image, (0, 0, 1), (2.0, 0, 1), pairs=True)
-    assert seen.pairs.table.shape == (2, 1, 14)
-    assert seen.pairs.distance[:, 0] == pytest.approx([0.2, inf])
-    np.testing.assert_allclose(seen.pairs.direction[0, 0], (0, 0, -1), atol=1e-9)
-    assert not seen.pairs.velocity.any()
-    assert not seen.pairs.acceleration.any()
-    assert np.isinf(seen.pairs.radius).all()
 
 
 def facing_surface(obstacle, place):
@@ -234,23 +190,6 @@ def test_the_arm_does_not_avoid_itself():
         assert np.isinf(space.measure(obstacles, state.placements).distance).all()
 
 
-def test_a_moving_arm_does_not_avoid_where_it_was():
-    """The image is old, the points are where they are now; what was the arm is no obstacle."""
-    sensor, move = sensor_of(camera_of(latency=0.1), inf)
-    for k in range(60):
-        q = STATE.q + 0.5 * np.sin(3.0 * k * 0.02)
-        seen = sensor.measure(move(0.02 * k, q))
-        assert np.isinf(seen.distance).all()
-    assert not seen.blind
-
-
-def test_an_obstacle_before_or_beside_the_arm_is_not_taken_for_it():
-    ball = Obstacle("sphere", (0.3, 1.0, 0.3), (0.05,))
-    sensor, move = sensor_of(camera_of(ball), inf, region=1.5)
-    seen = sensor.measure(move(0.0, STATE.q))
-    assert np.isfinite(seen.distance).all()
-
-
 def test_the_margin_is_what_is_taken_out_around_the_arm():
     """A ball 8 cm off the arm's surface, to the side: seen with a margin of 5 cm, not of 20."""
     points = ExactDistances(ROBOT, Obstacles()).measure(STATE).points
@@ -276,12 +215,6 @@ def test_a_single_outlier_has_no_effect_with_support_and_a_wire_still_has():
     assert distances[2] == pytest.approx([inf, 0.2, 0.2, 0.2])
     assert distances[3] == pytest.approx([inf, inf, 0.2, 0.2])
     assert distances[9] == pytest.approx([inf, inf, inf, 0.2], rel=1e-2)
-
-
-def test_support_needs_agreement_within_the_band():
-    image = image_of({(50, 40): 1.2, (51, 40): 1.24, (52, 40): 1.3})
-    assert seen_in(image, (0, 0, 1), support=2, band=0.05).distance[0] == pytest.approx(0.2)
-    assert seen_in(image, (0, 0, 1), support=2, band=0.03).distance[0] == inf
 
 
 def test_pixels_that_are_not_numbers_are_no_obstacles():
@@ -317,20 +250,6 @@ def test_frames_are_used_from_their_latency_on_until_the_next():
                       0.29: 0.1, 0.35: 0.29}
 
 
-def test_frames_may_be_later_than_their_rate():
-    sensor, state_at = sensor_of(camera_of(rate=10.0, latency=0.35), stale_after=0.5)
-    stamps = [sensor.measure(state_at(0.05 * k)).stamp for k in range(21)]
-    assert stamps[6:8] == [-inf, 0.0]
-    np.testing.assert_allclose(stamps[7:], [0.1 * (k // 2) for k in range(14)], atol=1e-9)
-
-
-def test_before_the_first_frame_the_camera_is_blind():
-    sensor, state_at = sensor_of(camera_of(latency=0.05))
-    assert sensor.measure(state_at(0.0)).blind
-    assert sensor.measure(state_at(0.04)).blind
-    assert not sensor.measure(state_at(0.05)).blind
-
-
 @pytest.mark.parametrize("how", ["stopped", "covered"])
 def test_a_camera_that_stops_or_is_covered_is_blind_after_its_time_and_sees_again(how):
     ball = Obstacle("sphere", (0.4, 0.7, 0.2), (0.1,))
@@ -359,15 +278,6 @@ def test_a_clock_that_is_set_back_begins_anew():
     assert [sensor.measure(state_at(t)).stamp for t in (0.0, 0.5, 0.1)] == [0.0, 0.5, 0.1]
 
 
-def test_between_frames_the_points_move_and_the_image_stays():
-    ball = Obstacle("sphere", (0.4, 0.7, 0.2), (0.1,))
-    sensor, state_at = sensor_of(camera_of(ball), region=1.0)
-    before = sensor.measure(state_at(0.0)).points.copy()
-    after = sensor.measure(state_at(0.02, STATE.q + 0.1))
-    assert np.abs(after.points - before).max() > 0.01
-    assert after.stamp == 0.0
-
-
 # Scenarios.
 
 VIEW = "kind='camera', position=[0.3, 2.2, 0.8], look_at=[0.0, 0.3, 0.1]"
@@ -381,26 +291,7 @@ def troubles(run):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["human", "human-hqp"])
-def test_a_scenario_runs_with_a_camera(name):
-    run = simulate(load(name, QUICK))
-    assert run.fault is None
-    assert troubles(run) == {}
-    assert np.isfinite(run["command"]).all()
-
-
-@pytest.mark.slow
-def test_a_run_follows_from_its_seed():
-    ball = "avoidance.obstacles=[{shape='sphere', centre=[0.4, 0.75, 0.2], radius=0.08}]"
-    runs = [simulate(load("human", [*QUICK, ball, "control.duration=0.3", f"sensor.seed={seed}"]))
-            for seed in (1, 1, 2)]
-    np.testing.assert_array_equal(runs[0]["q"], runs[1]["q"])
-    assert (runs[0]["q"] != runs[2]["q"]).any()
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("kind", ["no_frames", "dark_frames"])
-@pytest.mark.parametrize("name", ["human", "human-hqp"])
+@pytest.mark.parametrize(("name", "kind"), [("human", "no_frames"), ("human-hqp", "dark_frames")])
 def test_a_blind_camera_leads_to_the_policy_for_stale_measurements(name, kind):
     """Frames at 0, 1/30, 2/30 s, then none up to 0.4 s; blind is 0.1 s after the last."""
     run = simulate(load(name, [*QUICK, "sensor.stale_after=0.1", "start.v=[0.1,0,0,0,0,0,0]",
@@ -421,12 +312,6 @@ def test_a_camera_that_is_late_leaves_the_arm_at_rest_until_it_sees():
     assert run["command"][40:].any()
 
 
-@pytest.mark.slow
-def test_a_latency_beyond_what_is_stale_stops_the_arm_for_good():
-    run = simulate(load("human", [*QUICK, "sensor.latency=0.3", "control.policy.stale=stop"]))
-    assert "stale" in run.fault
-
-
 def test_the_camera_tells_the_controller_what_exact_distances_would_nearly():
     """With balls near the arm of `human`; no more is known of thickness than that it hides."""
     for ball in ([0.4, 0.75, 0.2], [-0.3, 0.6, 0.1], [0.0, 0.4, 0.5]):
@@ -441,21 +326,6 @@ def test_the_camera_tells_the_controller_what_exact_distances_would_nearly():
 
 
 @pytest.mark.parametrize(("changes", "said"), [
-    (["sensor.kind=radar"], "sensor"),
-    (["sensor.kind=camera", "sensor.missing=2.0"], "sensor.missing"),
-    (["sensor.kind=camera", "sensor.hight=2"], "sensor.height"),
-    (["sensor={position=[1,1,1]}"], "only kind 'camera' has it"),
-    (["sensor={kind='frames'}"], "folder"),
-    (["sensor.kind=exact", "faults=[{kind='no_frames', at=0.0, duration=1.0}]"], "camera"),
-    (["sensor={kind='frames', folder='hand'}",
-      "faults=[{kind='obstacle', at=0.0, duration=1.0, radius=0.1, centre=[0,0,0]}]"], "recorded"),
-])
-def test_a_section_that_is_wrong_is_refused_by_its_key(changes, said):
-    with pytest.raises(ScenarioError, match=said):
-        load("human", changes)
-
-
-@pytest.mark.parametrize(("changes", "said"), [
     (["sensor={kind='camera', position=[1,1,1], look_at=[1,1,1]}"], "look_at"),
     (["sensor.kind=camera", "sensor.rotation=[[1,0,0],[0,1,0],[0,0,-1]]"], "rotation"),
     (["sensor.kind=camera", "sensor.jitter=0.1"], "jitter"),
@@ -464,12 +334,6 @@ def test_a_section_that_is_wrong_is_refused_by_its_key(changes, said):
 def test_a_section_that_does_not_fit_is_refused_when_it_is_built(changes, said):
     with pytest.raises(ScenarioError, match=f"sensor: .*{said}"):
         build(load("human", changes))
-
-
-def test_a_scenario_with_a_camera_survives_its_file(tmp_path):
-    scenario = load("human", [*QUICK, "sensor.thin=0.1", "sensor.cx=80.0"])
-    (tmp_path / "again.toml").write_text(scenario.to_toml())
-    assert load(tmp_path / "again.toml") == scenario
 
 
 # Frames.
@@ -537,16 +401,3 @@ def test_the_figure_shows_points_and_distances_and_nothing_where_there_is_none()
     assert fig.axes[0].get_legend() is None
     exact = simulate(load("human", ["sensor={kind='exact'}", "plant={}", "control.duration=0.05"]))
     assert exact.depth is None
-
-
-def test_the_shipped_frames_show_a_hand_that_comes_near():
-    frames = RecordedFrames("hand", ROBOT)
-    sensor, state_at = sensor_of(frames, least_readings=0.1)
-    distances = [sensor.measure(state_at(t, State.at(ROBOT, STATE.q).q)).distance.min()
-                 for t in frames.times]
-    assert len(frames.times) == 20
-    assert frames.pinhole.width == 160
-    assert not sensor.measurement.blind
-    assert np.isfinite(distances).any()
-    files = list(frames.folder.iterdir())
-    assert sum(file.stat().st_size for file in files) < 200_000

@@ -17,7 +17,7 @@ from hierarchy import HierarchyError
 from scenarios.cli.figures import redraw
 from scenarios.cli.main import run_command
 from scenarios.config import load
-from scenarios.config.kinds.position import ListedPosition
+from scenarios.config.kinds.frames import ListedPosition
 from scenarios.draw.figures import drawing, letter, palette, panels
 from scenarios.draw.figures.picture import once, picture
 from scenarios.draw.figures.timeline import timeline

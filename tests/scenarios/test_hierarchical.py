@@ -53,12 +53,6 @@ def test_the_order_is_fixed_and_limits_come_first():
     assert names_of("posture={role='task', target=[0,0,0,0,0,0,0]}")[-1] == "posture"
 
 
-def test_limits_stand_before_what_algorithm_1_orders():
-    cell = build(load("ellipse-limits"))
-    assert cell.order(None, 1.0).order == ("joint limits", "position", "pointing")
-    assert cell.order(None, -1.0).order == ("joint limits", "position")
-
-
 @pytest.mark.parametrize("resolver", ["recursive", "tpm", "augmented", "reverse"])
 def test_resolvers_that_cannot_do_inequalities_refuse_with_the_level_and_the_row(resolver):
     with pytest.raises(HierarchyError, match=r"separation, row \d+: an inequality|joint limits"):
@@ -75,11 +69,6 @@ def test_resolvers_that_cannot_do_inequalities_refuse_with_the_level_and_the_row
 def test_what_does_not_go_together_is_said(changes, says):
     with pytest.raises(HierarchyError, match=says):
         build(load("ellipse-hqp", changes))
-
-
-def test_repulsion_is_placed_by_algorithm_1_only():
-    with pytest.raises(HierarchyError, match=r'"repulsion" goes with control\.stack = "switched"'):
-        load("ellipse", ["control.stack=hierarchical"])
 
 
 def test_beside_one_sided_distances_algorithm_1_switches_the_cone_alone():

@@ -9,10 +9,9 @@ from hierarchy.paths import Ellipse, Still
 from hierarchy.tasks import CentreOfMass, Pointing, Pose, Position
 from scenarios import load, simulate
 from scenarios.cell.build import build
-from scenarios.config import Scenario, ScenarioError
+from scenarios.config import Scenario
 from scenarios.draw.figures.picture import picture
 from scenarios.measure.metrics import measure
-from scenarios.report.comparing import compare
 
 pytestmark = pytest.mark.slow
 
@@ -123,13 +122,6 @@ def test_left_and_right_of_a_table_are_mirror_images(name):
     np.testing.assert_allclose(left, right * [1, -1, 1], atol=1e-12)
 
 
-@pytest.mark.parametrize("name", ROBOTS)
-def test_a_table_starts_within_its_limits(name):
-    robot = ROBOTS[name]
-    assert (robot.rest >= robot.lower).all()
-    assert (robot.rest <= robot.upper).all()
-
-
 def test_a_table_can_have_another_base():
     hung = Robot.named("humanoid", "fixed")
     assert (hung.base, hung.n, hung.nq) == ("fixed", 30, 30)
@@ -230,29 +222,12 @@ def test_resolvers_that_take_bounds_keep_the_humanoids_limits():
         assert np.linalg.norm(run["task_error_right_hand"], axis=1).max() < 1e-3
 
 
-def test_a_comparison_has_a_row_for_each_task(tmp_path):
-    found = compare([load("humanoid", ["control.duration=0.1"])], ["tpm", "recursive"],
-                    out=tmp_path / "out")
-    labels = [metric.label for metric in found.runs[0].metrics.values()]
-    for name in ("Left foot", "Right hand", "Centre of mass", "Gaze", "Posture"):
-        assert f"{name}: error, rms" in labels
-    assert (tmp_path / "out" / "index.html").exists()
-
-
 def test_the_picture_of_a_robot_that_branches_shows_its_body(standing):
     from matplotlib.collections import PatchCollection
     axes = picture({"tpm": standing}).axes[0]
     bodies = [c for c in axes.collections if isinstance(c, PatchCollection)]
     assert len(bodies) == 4
     assert all(len(body.get_paths()) == 16 for body in bodies)
-
-
-def test_a_joint_can_be_started_by_its_name():
-    scenario = load("humanoid", {"start.joints": {"left_elbow": -1.5}})
-    cell = build(scenario)
-    assert cell.plant.q[cell.robot.coordinate("left_elbow")] == -1.5
-    with pytest.raises(ScenarioError, match="did you mean 'left_elbow'"):
-        build(load("humanoid", {"start.joints": {"left_elbo": -1.5}}))
 
 
 def listed(*entries, **control):
@@ -262,11 +237,6 @@ def listed(*entries, **control):
 
 
 HAND = {"kind": "position", "frame": "left_hand"}
-
-
-def test_a_task_without_a_path_stays_where_it_is():
-    run = simulate(Scenario.model_validate(listed(HAND)))
-    assert abs(run["task_error_position"]).max() < 1e-12
 
 
 def test_tasks_stand_behind_limits_position_and_pointing_in_their_order():
@@ -290,24 +260,6 @@ def test_a_wrong_list_of_tasks_is_refused(entries, control, said):
         Scenario.model_validate(listed(*entries, **control))
 
 
-@pytest.mark.parametrize(("entry", "said"), [
-    ({**HAND, "frame": "left_hnad"}, "task 'position': unknown frame 'left_hnad'; did you mean "
-                                     "'left_hand'"),
-    ({"kind": "posture", "target": [0.0]}, "1 values for 15 joint positions of robot 'dual_arm'"),
-    ({"kind": "posture", "joints": {"elbow": 0.0}}, "task 'posture': unknown joint 'elbow'"),
-])
-def test_a_task_that_does_not_fit_its_robot_is_named(entry, said):
-    with pytest.raises(ScenarioError) as error:
-        build(Scenario.model_validate(listed(entry)))
-    assert said in str(error.value)
-
-
-def test_an_inequality_in_the_list_asks_for_a_resolver_that_takes_them():
-    cone = {"kind": "pointing", "frame": "left_hand", "axis": [1, 0, 0], "alpha_d": 10}
-    assert Scenario.model_validate(listed(cone)).asks == "inequalities"
-    assert Scenario.model_validate(listed({**cone, "rows": "equality"})).asks == "equalities"
-
-
 def test_a_posture_in_the_null_space_leaves_a_floating_base_alone():
     robot = ROBOTS["humanoid"]
     from hierarchy.tasks import Posture
@@ -316,19 +268,6 @@ def test_a_posture_in_the_null_space_leaves_a_floating_base_alone():
     h = stack.hierarchy(State.at(robot, robot.rest))
     np.testing.assert_array_equal(h.reference[:6], 0.0)
     np.testing.assert_allclose(h.reference[6:], 10.0 * (0.1 - robot.rest[7:]))
-
-
-def test_a_file_as_run_is_read_back(standing, tmp_path):
-    (tmp_path / "again.toml").write_text(standing.scenario.to_toml())
-    assert load(tmp_path / "again.toml") == standing.scenario
-
-
-def test_links_of_the_dual_arm_can_be_kept_apart():
-    data = listed(HAND, resolver="hcod")
-    data["avoidance"] = {"kind": "separation", "self_collision": 0.02}
-    cell = build(Scenario.model_validate(data))
-    assert cell.stack.names == ("self-separation", "position")
-    assert simulate(Scenario.model_validate(data)).fault is None
 
 
 def test_romeo_out_of_its_package_moves_alike_under_strict_resolvers():

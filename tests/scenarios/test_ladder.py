@@ -53,13 +53,6 @@ def test_a_step_extends_the_one_before_and_changes_what_it_says_and_nothing_else
     assert all(key == STEPS[name] or key.startswith(f"{STEPS[name]}.") for key in found)
 
 
-def test_the_second_step_is_ellipse_limits_and_the_last_is_ellipse_hqp_but_for_unused_options():
-    assert differing("ladder-2-limits", "ellipse-limits") == set()
-    assert all(key.startswith("control.options") for key in differing("ladder-7-cone",
-                                                                       "ellipse-hqp"))
-    assert load("ladder-7-cone").make_resolver().damping == 0.0
-
-
 @pytest.mark.slow
 def test_the_last_step_runs_as_ellipse_hqp_to_the_last_bit():
     last, hqp = (simulate(load(name)) for name in ("ladder-7-cone", "ellipse-hqp"))
@@ -103,13 +96,6 @@ def test_compare_runs_a_group_side_by_side_each_scenario_with_its_own_resolver(
     page = (folder / "index.html").read_text()
     assert "Eight scenarios, resolved each by its own resolver" in page
     assert "Step 6: one-sided distances in place of repulsion (hcod)" in page
-
-
-def test_own_is_the_resolver_that_a_scenario_names():
-    assert load("ellipse-hqp").with_resolver("own") == load("ellipse-hqp")
-    short = [load(name, ["control.duration=0.01"]) for name in ("ellipse", "ellipse-limits")]
-    done = compare(short, ["own"])
-    assert [run.scenario.make_resolver().label for run in done.runs] == ["tpm-published", "tpm"]
 
 
 def test_a_group_is_not_a_scenario():

@@ -1,20 +1,20 @@
 """Every kind of `[[tasks]]` in a scenario: what it reaches, and what is refused."""
 
-from typing import Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 import pytest
-from pydantic import TypeAdapter
 
 from hierarchy import HierarchyError, State, plugins
 from hierarchy.tasks import JointCoupling, Manipulability, SelfSeparation, Separation
 from scenarios import load, simulate
-from scenarios.cell.avoidance import separable_pairs
 from scenarios.cell.build import build
-from scenarios.config.listed import KINDS, OwnTask
-from scenarios.config.references import References
-from scenarios.config.sections import any_kind
-from scenarios.config.tasks import Listed, register
+from scenarios.cell.plants import KinematicArm
+from scenarios.cell.sensors import ExactDistances
+from scenarios.config.plant import AnyPlant
+from scenarios.config.sections import Unit
+from scenarios.config.sensor import AnySensor
+from scenarios.config.tasks import Listed
 from scenarios.measure.metrics import measure
 
 BASE = {"name": "listed", "robot": {"model": "kuka_lwr"},
@@ -73,24 +73,6 @@ def test_manipulability_is_kept_while_the_hand_reaches_out(level, tmp_path):
 
 
 @pytest.mark.slow
-def test_two_hands_hold_one_thing():
-    hold = {"kind": "relative", "name": "hold", "frame": "right_hand", "to": "left_hand"}
-    base = load("dual-arm")
-    frames = build(base).robot.frame_names
-    left, right = (next(f for f in frames if side in f.lower() and "hand" in f.lower())
-                   for side in ("left", "right"))
-    lead = {"kind": "position", "name": "lead", "frame": left, "offset": [0.03, 0.0, 0.05]}
-    run = simulate(base.with_changes({
-        "tasks": [{**hold, "frame": right, "to": left}, lead], "control.duration": 3.0}))
-    assert run.fault is None
-    found = measure(run)
-    assert found["task_hold_max_settled"].value is None or (
-        found["task_hold_max_settled"].value < 1e-4)
-    assert np.abs(run["task_error_hold"]).max() < 1e-4
-    assert found["task_lead_end"].value < 5e-3
-
-
-@pytest.mark.slow
 def test_self_collision_is_a_task_of_the_list(tmp_path):
     apart = {"kind": "self-collision", "distance": 0.02, "name": "apart"}
     home = {"kind": "posture", "target": [0.9, -1.9, 0.9, 2.0, 1.0, 1.9, 0.3]}
@@ -137,13 +119,6 @@ def test_a_path_is_followed(path, tmp_path):
     assert run.fault is None
     # What is left is what integrating velocities over a period leaves: v T / 2 and less.
     assert np.linalg.norm(run["position_error"][-30:], axis=1).max() < 2e-3
-
-
-def test_a_recorded_file_is_found_beside_the_scenario(tmp_path, monkeypatch):
-    monkeypatch.chdir("/")
-    there = {"kind": "recorded", "file": "motion.csv"}
-    scenario = scenario_of(tmp_path, {"kind": "position", "frame": "end_effector", "path": there})
-    assert scenario.tasks[0].path.file == str(tmp_path / "motion.csv")
 
 
 @pytest.mark.parametrize(("task", "said"), [
@@ -220,27 +195,73 @@ def test_a_key_of_a_path_in_the_list_is_named_as_it_is_written(change, said, tmp
 def test_every_kind_has_a_test_here(request):
     text = request.path.read_text(encoding="utf-8")
     tested = {"pose", "com", "pointing"}  # in test_humanoid.py
-    assert [kind for kind in KINDS if f'"{kind}"' not in text and kind not in tested] == []
+    assert [kind for kind in plugins.registered("tasks")
+            if f'"{kind}"' not in text and kind not in tested] == []
 
 
-def test_a_new_kind_is_one_section_that_nothing_else_lists(monkeypatch):
-    monkeypatch.setattr(plugins, "_shipped", {group: dict(kinds) for group, kinds
-                                              in plugins._shipped.items()})
+# A new kind is one section that nothing else lists, in the product and in a user's module.
 
-    @register("elbow")
+@pytest.fixture
+def kinds(monkeypatch):
+    """The registers, which forget at the end what a test adds."""
+    for register in ("_shipped", "_registered"):
+        monkeypatch.setattr(plugins, register, {
+            group: dict(kinds) for group, kinds in getattr(plugins, register).items()})
+
+
+@pytest.mark.parametrize("shipped", [True, False])
+def test_a_new_task_is_one_section(shipped, kinds, tmp_path):
+    @plugins.register("tasks", "elbow", shipped=shipped)
     class Elbow(Listed):
         kind: Literal["elbow"]
         joint: str
+        angle: Annotated[float, Unit("rad")] = 0.5
 
         def make(self, at):
-            return JointCoupling(at.robot, {self.joint: 1.0}, 0.5, name=self.title)
+            return JointCoupling(at.robot, {self.joint: 1.0}, self.angle, name=self.title)
 
-    section = TypeAdapter(any_kind("tasks", OwnTask)).validate_python(
-        {"kind": "elbow", "joint": "joint_4"})
-    assert isinstance(section, Elbow)
-    cell = build(load("ellipse-hqp"))
-    start = State.at(cell.robot, *cell.start)
-    task = section.make(References(start, None, separable_pairs))
-    assert (task.name, task.dimension) == ("elbow", 1)
-    assert [(unit, size.tolist()) for unit, size in section.sizes(np.array([[-3.0]]))] == [
-        ("m", [3.0])]
+    cell = build(scenario_of(tmp_path, {"kind": "elbow", "joint": "joint_4"}))
+    assert cell.stack.names == ("elbow",)
+    with pytest.raises(HierarchyError, match=r"tasks\.0\.angle: .*, got 'wide' rad"):
+        scenario_of(tmp_path, {"kind": "elbow", "joint": "joint_4", "angle": "wide"})
+    with pytest.raises(HierarchyError, match="the kind here is 'elbow'"):
+        scenario_of(tmp_path, {"kind": "elbow", "joints": "joint_4"})
+
+
+class Slow(KinematicArm):
+    """Does a share of each command."""
+
+    def __init__(self, robot, q, v, period, level, section):
+        super().__init__(robot, q, v, period, level)
+        self.share = section.share
+
+    def act(self, command):
+        super().act(self.share * command)
+
+
+def test_a_new_plant_is_its_class_and_one_section(kinds, tmp_path):
+    @plugins.register("plants", "slow", shipped=True)
+    class SlowSection(AnyPlant):
+        made_by: ClassVar[str] = f"{__name__}:Slow"
+        kind: Literal["slow"]
+        share: float
+
+    runs = [simulate(scenario_of(tmp_path, COUPLING, plant=plant,
+                                 control={**BASE["control"], "duration": 0.02}))
+            for plant in ({"kind": "kinematic"}, {"kind": "slow", "share": 0.5})]
+    exact, slow = (run["q"][1] - run["q"][0] for run in runs)
+    np.testing.assert_allclose(slow, 0.5 * exact)
+
+
+def test_a_new_sensor_is_its_class_and_one_section(kinds, tmp_path):
+    @plugins.register("sensors", "near", shipped=True)
+    class NearSection(AnySensor):
+        foot: ClassVar[float] = 0.0
+        kind: Literal["near"]
+
+        def made(self, robot, **given):
+            return given["exact"]
+
+    avoidance = {"kind": "separation", "obstacles": [[0.1, 0.5, 0.1]]}
+    cell = build(scenario_of(tmp_path, COUPLING, avoidance=avoidance, sensor={"kind": "near"}))
+    assert isinstance(cell.sensor, ExactDistances)

@@ -55,11 +55,6 @@ def test_velocities_have_a_metric_too():
     assert certify(h, x).certified
 
 
-def test_the_metric_is_one_of_two():
-    with pytest.raises(ValueError, match=r"control\.metric"):
-        load("ellipse-mass", ["control.metric=weight"])
-
-
 def test_bounds_in_the_inertia_are_for_resolvers_of_any_rows():
     assert load("ellipse-limits").asks == "bounds"
     assert load("ellipse-limits", ["control.metric=mass"]).asks == "inequalities"

@@ -13,7 +13,8 @@ from scenarios.cell.build import build
 from scenarios.cell.plants import Apart, JointSensor, KinematicArm, PhysicsArm
 from scenarios.cli.main import run_command
 from scenarios.config import ScenarioError
-from scenarios.config.plant import JointsSection, MeasurementSection, PhysicsSection
+from scenarios.config.kinds.mujoco import PhysicsSection
+from scenarios.config.plant import MeasurementSection
 from scenarios.loop.controller import Controller
 from scenarios.measure.metrics import measure
 from scenarios.measure.run_folder import load_run, save
@@ -92,16 +93,6 @@ def test_the_links_are_where_the_robot_has_them(mujoco):
 # The servos.
 
 
-@pytest.mark.parametrize("period", [0.001, 0.005])
-def test_an_arm_without_commands_holds_its_posture(mujoco, period):
-    for q, _ in states(3):
-        plant = arm(mujoco, 0.9 * q, period=period)
-        for _ in range(round(2.0 / period)):
-            plant.act(STILL)
-        assert np.abs(plant.q - 0.9 * q).max() < 1e-4
-        assert np.abs(plant.v).max() < 1e-4
-
-
 def test_an_arm_sags_by_the_share_of_gravity_that_is_not_compensated(mujoco):
     plant = arm(mujoco, servo={"gravity": 0.5}, joints={"friction": 0.0})
     for _ in range(400):
@@ -109,21 +100,6 @@ def test_an_arm_sags_by_the_share_of_gravity_that_is_not_compensated(mujoco):
     expected = 0.5 * State.at(ROBOT, plant.q).bias_effort() / plant.stiffness
     np.testing.assert_allclose(START - plant.q, expected, rtol=1e-3, atol=1e-6)
     assert np.abs(expected).max() > 1e-4
-
-
-@pytest.mark.parametrize("joint", range(7))
-def test_a_step_is_followed_to_what_friction_leaves(mujoco, joint):
-    plant = arm(mujoco)
-    step = 0.01 * np.eye(7)[joint]  # [rad]
-    plant.act(step / PERIOD)
-    reached = []
-    for _ in range(100):
-        plant.act(STILL)
-        reached.append(plant.q[joint] - START[joint])
-    np.testing.assert_allclose(plant.reference_q, START + step, rtol=0, atol=1e-15)
-    left_over = JointsSection().friction / plant.stiffness
-    assert (np.abs(plant.q - plant.reference_q) < left_over + 1e-6).all()
-    assert max(reached) < 0.013  # a damped servo, whose feedforward was for another speed
 
 
 def test_a_smooth_motion_is_followed_closely(mujoco):
@@ -140,13 +116,6 @@ def test_a_smooth_motion_is_followed_closely(mujoco):
         np.testing.assert_array_equal(plant.a, exact.a)
     assert np.abs(exact.q - START).max() > 0.3
     assert 1e-6 < apart < 2e-3
-
-
-def test_the_servos_are_at_the_reference_at_the_end_of_a_period(mujoco):
-    plant = arm(mujoco, level="acceleration")
-    for k in range(20):
-        plant.act(np.cos(k * PERIOD + np.arange(7)))
-        np.testing.assert_allclose(plant.data.ctrl[:7], plant.reference_q, rtol=0, atol=1e-14)
 
 
 def test_servos_stay_within_the_effort_limits(mujoco):
@@ -188,14 +157,6 @@ def forearm(q=START):
     return placed[9:] + 0.195 * placed[6:9]
 
 
-def test_nothing_is_touched_where_nothing_is_near(mujoco):
-    plant = arm(mujoco, obstacles=[sphere_at((0.0, -1.0, 0.0))])
-    for _ in range(20):
-        plant.act(np.full(7, 0.2))
-        assert plant.extra["contacts"] == 0
-        assert plant.extra["contact_depth"] == plant.extra["contact_force"] == 0.0
-
-
 @pytest.mark.parametrize("shape", ["sphere", "capsule", "box"])
 def test_an_obstacle_put_into_the_arm_is_touched(mujoco, shape):
     sizes = {"sphere": (0.05,), "capsule": (0.05, 0.1), "box": (0.05, 0.05, 0.05)}[shape]
@@ -216,32 +177,11 @@ def test_the_depth_of_a_contact_is_how_far_shapes_overlap(mujoco):
     assert plant.extra["contact_depth"] == pytest.approx(deep, rel=1e-6)
 
 
-def test_a_point_has_no_body(mujoco):
-    plant = arm(mujoco, obstacles=[Obstacle("point", tuple(forearm()))])
-    plant.act(STILL)
-    assert plant.extra["contacts"] == 0
-
-
 def test_the_links_do_not_touch_each_other(mujoco):
     folded = [0.0, 0.0, 0.0, ROBOT.upper[3], 0.0, ROBOT.upper[5], 0.0]
     plant = arm(mujoco, folded)
     plant.act(STILL)
     assert plant.extra["contacts"] == 0
-
-
-def test_a_moving_obstacle_touches_when_it_arrives_and_pushes_the_arm(mujoco):
-    side = State.at(ROBOT, START).placements[5][0:3]
-    path = Waypoints((0.0, 1.0), (tuple(forearm() + 0.3 * side), tuple(forearm() + 0.05 * side)))
-    plant = arm(mujoco, obstacles=[sphere_at((0.0, 0.0, 0.0), path=path)])
-    touched = []
-    for k in range(200):
-        reach = np.linalg.norm(path((k + 1) * PERIOD)[0] - forearm()) - 0.11
-        plant.act(STILL)
-        touched.append(bool(plant.extra["contacts"]))
-        if reach > 1e-3:
-            assert not touched[-1]
-    assert touched[-1]
-    assert np.abs(plant.q - START).max() > 1e-2
 
 
 def test_a_moving_obstacle_is_at_each_step_where_its_path_has_it(mujoco):
@@ -290,12 +230,6 @@ def told(section, count, level="velocity", command=STILL, q=START):
     return [np.array(part) for part in zip(*rows, strict=True)]
 
 
-def test_an_ideal_measurement_is_the_truth():
-    q, v, true_q, true_v = told({}, 10, command=np.arange(7.0))
-    np.testing.assert_array_equal(q, true_q)
-    np.testing.assert_array_equal(v, true_v)
-
-
 def test_noise_has_the_size_that_is_asked_for_and_no_memory():
     q, v, true_q, true_v = told({"position_noise": 1e-3, "velocity_noise": 0.02}, 3000)
     for noise, size in ((q - true_q, 1e-3), (v - true_v, 0.02)):
@@ -305,13 +239,6 @@ def test_noise_has_the_size_that_is_asked_for_and_no_memory():
         between = np.corrcoef(noise.T) - np.eye(7)
         assert max(np.abs(along_time).max(), np.abs(between).max()) < 0.08
     np.testing.assert_array_equal(true_q, np.tile(START, (3000, 1)))
-
-
-def test_noise_belongs_to_its_seed():
-    first, again, other = (told({"position_noise": 1e-3, "seed": seed}, 20)[0]
-                           for seed in (1, 1, 2))
-    np.testing.assert_array_equal(first, again)
-    assert (first != other).all()
 
 
 @pytest.mark.parametrize("periods", [0, 1, 4])
@@ -349,13 +276,6 @@ def test_a_filtered_velocity_lags_by_the_time_of_its_filter():
     np.testing.assert_allclose(true_v[-1] - v[-1], slope * (time + PERIOD / 2), rtol=1e-6)
 
 
-@pytest.mark.parametrize("wrong", ["{velocity='differenced', velocity_noise=0.1}",
-                                   "{filter_time=0.1}", "{delay=-1.0}", "{noise=1.0}"])
-def test_a_measurement_that_makes_no_sense_is_refused(wrong):
-    with pytest.raises(ScenarioError, match=r"plant\.measurement"):
-        load("ellipse", [f"plant.measurement={wrong}"])
-
-
 def test_steps_of_a_continuous_joint_are_those_of_its_angle(tmp_path):
     scenario = load(on_file(tmp_path, "continuous"), ["plant.measurement.quantisation=0.01"])
     q = simulate(scenario)["q"]
@@ -365,17 +285,6 @@ def test_steps_of_a_continuous_joint_are_those_of_its_angle(tmp_path):
 
 
 # Runs.
-
-
-@pytest.mark.parametrize("changes", [[*SHORT, *NOISY], [*PHYSICS, *NOISY]],
-                         ids=["kinematic", "mujoco"])
-def test_a_run_repeats_to_the_byte(changes):
-    skip_without_mujoco(changes)
-    first, again = (simulate(load("ellipse", changes)) for _ in range(2))
-    for name in set(first.signals) - {name for name in first.signals if name.startswith("time_")}:
-        assert first[name].tobytes() == again[name].tobytes(), name
-    other = simulate(load("ellipse", [*changes, "plant.measurement.seed=7"]))
-    assert (other["q"] != first["q"]).any()
 
 
 @pytest.mark.parametrize("changes", [[*SHORT, *NOISY], [*PHYSICS, *NOISY]],
@@ -392,24 +301,7 @@ def test_the_controller_sees_what_is_measured_and_nothing_else(changes):
         np.testing.assert_array_equal(command, run["command"][k])
 
 
-def test_the_end_effector_is_also_recorded_where_it_is(mujoco):
-    run = simulate(load("ellipse", [*PHYSICS, *NOISY]))
-    frame = ROBOT.frame("end_effector")
-    for k in (0, 17, run.ticks - 1):
-        true = State.at(ROBOT, run["true_q"][k]).position(frame)
-        np.testing.assert_allclose(run["true_ee_position"][k], true, rtol=0, atol=1e-15)
-        told = State.at(ROBOT, run["q"][k]).position(frame)
-        np.testing.assert_allclose(run["ee_position"][k], told, rtol=0, atol=1e-15)
-        assert np.linalg.norm(told - true) > 1e-6
-
-
-def test_a_kinematic_run_without_noise_has_one_state():
-    run = simulate(load("ellipse", SHORT))
-    assert not {"true_q", "true_v", "true_ee_position", "contacts"} & set(run.signals)
-
-
-@pytest.mark.parametrize("feedback", ["measured", "commanded"])
-@pytest.mark.parametrize("period", [0.001, 0.005])
+@pytest.mark.parametrize(("feedback", "period"), [("measured", 0.001), ("commanded", 0.005)])
 def test_the_ellipse_away_from_obstacles_is_tracked(mujoco, period, feedback):
     changes = ["control.duration=4.0", f"control.period={period}", "limits.acceleration=10.0",
                "control.resolver=tpm", "avoidance.obstacles=[[5.0, 5.0, 5.0]]"]
@@ -452,18 +344,6 @@ def test_contacts_are_measured_in_a_run(mujoco, tmp_path):
     assert "contact_ticks" not in measure(simulate(load("ellipse", SHORT)))
 
 
-@pytest.mark.parametrize("kind", ["kinematic", "mujoco"])
-@pytest.mark.parametrize("fault", ["nan_position", "nan_velocity", "stale"])
-def test_faults_happen_to_what_is_measured(kind, fault):
-    skip_without_mujoco([kind])
-    run = simulate(load("ellipse", [*SHORT, *NOISY, f"plant.kind={kind}",
-                                    f"faults=[{{kind='{fault}', at=0.1, duration=0.1}}]"]))
-    assert run.fault is None
-    assert run.events
-    assert np.isfinite(run["command"]).all()
-    assert np.isfinite(run["true_q"]).all()
-
-
 def test_an_obstacle_of_a_fault_is_touched(mujoco):
     run = simulate(load("ellipse", [
         *PHYSICS, "faults=[{kind='obstacle', at=0.1, duration=0.1, radius=0.05, "
@@ -471,12 +351,6 @@ def test_an_obstacle_of_a_fault_is_touched(mujoco):
     ticks = np.flatnonzero(run["contacts"])
     assert ticks[0] == 20
     assert ticks[-1] < 40
-
-
-def test_a_scenario_without_obstacles_has_physics_too(mujoco):
-    run = simulate(load("ellipse", PHYSICS).model_copy(update={"avoidance": None}))
-    assert run.fault is None
-    assert not run["contacts"].any()
 
 
 # Mistakes.

@@ -1,5 +1,7 @@
 """Own tasks, resolvers, robots, plants and sensors, and who may load their code."""
 
+import copy
+import pickle
 import sys
 from importlib.metadata import distributions
 from pathlib import Path
@@ -8,7 +10,7 @@ import numpy as np
 import pytest
 
 from hierarchy import HierarchyError, Robot, plugins
-from scenarios import compare, load, simulate
+from scenarios import load, simulate
 from scenarios.cli.main import run_command
 from scenarios.config import Scenario
 from solvers import make
@@ -245,15 +247,6 @@ def test_a_sensor_of_a_plugin_measures():
 
 
 @pytest.mark.slow
-def test_compare_sees_a_resolver_of_a_plugin(capsys):
-    code, text = said(["compare", "own.toml", "--resolvers", "halved,halved:share=1.0,hcod",
-                       "--plugin", "doors_of_mine", "--out", "b"], capsys)
-    assert code == 0, text
-    runs = compare([load("own.toml")], ["halved:share=1.0", "hcod"]).runs
-    np.testing.assert_array_equal(*(run.recording["q"] for run in runs))
-
-
-@pytest.mark.slow
 def test_a_finished_run_of_a_plugin_is_opened_with_the_plugin_only(capsys):
     assert said(["run", "own.toml", "--plugin", "doors_of_mine", "--out", "a"], capsys)[0] == 0
     plugins._loaded.clear()
@@ -277,6 +270,13 @@ def test_workers_of_a_sweep_import_the_plugin(capsys, folder):
     assert "4 runs; 0 did not finish" in text
 
 
+def test_a_scenario_with_own_kinds_is_copied_and_pickled():
+    plugins.allow("doors_of_mine")
+    scenario = load("own.toml")
+    assert pickle.loads(pickle.dumps(scenario)) == copy.deepcopy(scenario) == scenario
+    assert Scenario.from_toml(scenario.to_toml()) == scenario
+
+
 def test_the_working_directory_is_searched_for_plugins_only(folder):
     (folder / "pandas_of_mine.py").write_text("")
     before = list(sys.path)
@@ -295,16 +295,16 @@ def test_a_changed_plugin_is_another_version(folder):
 
 
 @pytest.mark.parametrize(("change", "said"), [
-    ("tasks.0.angel=1.0", "tasks.0: unknown key of kind 'elbow' 'angel'; did you mean 'angle'?"),
-    ("tasks.0.angle=true", "tasks.0: angle: Input should be a valid number, got True"),
-    ("tasks.0.steps=1.5", "tasks.0: steps: Input should be a valid integer, got 1.5"),
-    ("tasks.0.dimension=2", "unknown key of kind 'elbow' 'dimension'"),
+    ("tasks.0.angel=1.0", "unknown key 'tasks.0.angel'; did you mean 'tasks.0.angle'?"),
+    ("tasks.0.angle=true", "tasks.0.angle: Input should be a valid number, got True"),
+    ("tasks.0.steps=1.5", "tasks.0.steps: Input should be a valid integer, got 1.5"),
+    ("tasks.0.dimension=2", "unknown key 'tasks.0.dimension'"),
     ("tasks.0.name='1'", "tasks.0.name"),
-    ("tasks.1.path.kind=spiral", "tasks.1: path: Input tag 'spiral'"),
-    ("plant.share='all'", "plant: share: Input should be a valid number, got 'all'"),
+    ("tasks.1.path.kind=spiral", "tasks.1.path: expected a kind, 'still', 'line'"),
+    ("plant.share='all'", "plant.share: Input should be a valid number, got 'all'"),
     ("plant.kind=waek",
      "plant: expected a kind, 'kinematic', 'mujoco', 'torque', 'weak'; got 'waek'"),
-    ("tasks.0.kind=elbwo", "'relative', 'elbow', 'along', 'broken'; got 'elbwo'"),
+    ("tasks.0.kind=elbwo", "'collision', 'elbow', 'along', 'broken'; got 'elbwo'"),
     ("control.resolver=havled", "unknown resolver 'havled'; did you mean 'halved'?"),
     ("control.options.shar=0.1", "unknown setting of halved 'shar'; did you mean 'share'?"),
     ("robot.model=my_arn", "unknown robot 'my_arn'; did you mean 'my_arm'?"),
@@ -325,13 +325,6 @@ def test_what_goes_wrong_in_a_plugin_is_said_with_its_name():
     missing = load("own.toml", {"tasks.1.frame": "thumb"})
     with pytest.raises(HierarchyError, match="task of kind 'along': unknown frame 'thumb'"):
         simulate(missing)
-
-
-@pytest.mark.slow
-def test_an_installed_entry_point_needs_no_flag(capsys, folder):
-    install(folder, "tasks", "elbow = doors_of_mine:Elbow")
-    code, text = said(["check", "own.toml"], capsys)  # the file names the entry point's module
-    assert code == 0, text
 
 
 @pytest.mark.parametrize(("group", "line", "use"), [

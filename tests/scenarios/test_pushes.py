@@ -1,12 +1,9 @@
 """What is drawn of contacts: forces, friction cones, support polygon, pushes."""
 
-import json
-import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from packing import unpacked
 
 from hierarchy import Robot
 from scenarios import load, simulate
@@ -15,7 +12,6 @@ from scenarios.draw.replay.page import html
 from scenarios.draw.viewer.curves import Lately
 from scenarios.draw.viewer.moment import Watched, of_scene
 from scenarios.loop.controller import Controller
-from scenarios.measure.run_folder import load_run, write
 from scenarios.recording.facts import ContactPoint, facts_of
 from scenarios.scene import scene
 from scenarios.scene.pushes import key, pushes
@@ -88,22 +84,6 @@ def test_the_key_names_what_is_drawn_and_nothing_else():
 def run():
     pytest.importorskip("mujoco")
     return simulate(load("stand-push").with_changes({"control.duration": 0.02}))
-
-
-def test_replay_and_kept_runs_have_them(run, tmp_path):
-    write(run, tmp_path)
-    again = load_run(tmp_path)
-    assert again.facts.contacts == run.facts.contacts
-    found = scene(again).pushes
-    assert found.force.shape[1:] == (8, 2, 3)
-    np.testing.assert_allclose(found.force[0, :, 0, 2], 0.0, atol=1e-9)  # soles on the floor
-    sole = found.support[0][np.isfinite(found.support[0]).all(axis=(1, 2))]
-    assert np.ptp(sole[..., 0]) == pytest.approx(0.21)
-    data = re.search(r'id="data">(.*?)</script>', html({"a": run}, "title"), re.DOTALL)
-    first = json.loads(data[1])["runs"][0]
-    np.testing.assert_allclose(unpacked(first["force"]), found.force, atol=1e-4)
-    assert [one["name"] for one in first["series"]][-3:] == [
-        "Normal forces", "Largest torque, of its limit", "Joint speeds"]
 
 
 @pytest.mark.slow

@@ -7,7 +7,6 @@ from hierarchy import HierarchyError
 from hierarchy.tasks import CumulatedRepulsion, DangerBounds
 from scenarios import load
 from scenarios.cell.build import build
-from scenarios.loop.controller import Controller
 
 NEAR = np.array([0.923, -0.854, 0.903, 1.195, 0.971, 1.796, 0.0])  # the start of `ellipse`
 
@@ -48,11 +47,6 @@ def test_what_the_null_space_gets_moves_no_task_of_the_stack():
     assert np.abs(x - without).max() > 1e-3
 
 
-def test_the_letter_s_scheme_changes_by_its_place_alone():
-    assert load("ellipse", ["avoidance.place=null-space"]).avoidance == load(
-        "ellipse-nullspace").avoidance
-
-
 def test_wrong_jacobians_are_of_the_letter_s_own_avoidance_only():
     with pytest.raises(HierarchyError, match=r'place = "null-space" goes with jacobian = "exact"'):
         load("ellipse-published", ["avoidance.place=null-space"])
@@ -67,13 +61,3 @@ def test_danger_closes_the_box_of_joints_and_pushes_nothing():
     seen.distance[:8] = 0.04
     assert "avoidance" not in cell.order(seen, 1.0).order
     assert scenario.make_resolver().name == "sns"
-
-
-def test_both_run_from_their_start():
-    for name in ("ellipse-nullspace", "ellipse-danger-bounds"):
-        controller = Controller(load(name))
-        plant = controller.cell.plant
-        for k in range(3):
-            plant.act(controller.command(k * 1e-3, plant.q, plant.v))
-            assert controller.resolution.status == 0
-        assert np.isfinite(plant.q).all()

@@ -5,8 +5,7 @@ import pytest
 from hand_made import recording as hand_made
 
 from hierarchy import HierarchyError, Robot, State
-from hierarchy.avoidance import Capsule
-from hierarchy.robots import TABLES, link_capsules
+from hierarchy.robots import TABLES
 from scenarios import load, simulate
 from scenarios.cell.build import build
 from scenarios.cell.robot import make_robot
@@ -15,7 +14,6 @@ from scenarios.loop.controller import Controller
 from scenarios.measure.judging import judge
 from scenarios.recording.facts import robot_facts
 from scenarios.recording.fate import Fate
-from scenarios.recording.links import lowest
 from scenarios.scene import capsules, ends, scene, stage
 from scenarios.scene.levels import levels_at
 
@@ -43,10 +41,6 @@ def test_frames_are_the_ticks_nearest_to_their_times(runs, ellipse):
     assert ellipse.ticks[-1] == runs["ellipse"].ticks - 1
     assert np.abs(np.diff(ellipse.t)[:-1] - 1 / 30).max() < 1.1e-3
     assert np.array_equal(ellipse.t, runs["ellipse"]["t"][ellipse.ticks])
-
-
-def test_more_frames_than_ticks_are_the_ticks(runs):
-    assert np.array_equal(scene(runs["ellipse"], rate=5000.0).ticks, np.arange(1500))
 
 
 def test_placements_and_links_are_those_of_the_kinematics(runs, ellipse):
@@ -112,24 +106,6 @@ def test_violations_are_those_of_the_hierarchy_that_was_resolved(name):
         for task, violation, fate in zip(levels.names, found, fates, strict=True):
             assert np.isclose(violation, expected.get(task, np.nan), atol=1e-9, equal_nan=True)
             assert (fate == Fate.ABSENT) == (task not in expected)
-
-
-def test_only_a_task_that_is_missed_is_violated(runs):
-    for name, fates in (("ellipse-hqp", {Fate.FREE, Fate.MET}),
-                        ("ellipse-limits", {Fate.FREE, Fate.MET, Fate.MISSED})):
-        levels = levels_at(runs[name], range(0, 1500, 10))
-        assert fates <= set(levels.fate.ravel().tolist())
-        assert (levels.violation[np.isin(levels.fate, (Fate.FREE, Fate.MET))] < 1e-6).all()
-        assert (levels.violation[levels.fate == Fate.MISSED] > 1e-9).all()
-
-
-def test_saturated_joints_have_the_command_of_a_side_of_their_limits():
-    scenario = load("ellipse-hqp", ["control.duration=0.5", "limits.acceleration=2.0"])
-    recording = simulate(scenario)
-    levels = levels_at(recording, range(recording.ticks))
-    assert (levels.saturated != 0).any()
-    at = levels.saturated[1:] != 0
-    assert np.abs(recording["command"][1:][~at]).max() < 2.0
 
 
 def test_distances_that_are_not_those_recorded_leave_levels_unknown(runs):
@@ -205,26 +181,6 @@ def test_no_robot_at_rest_is_below_the_floor(name):
     assert stage_of(load("humanoid")).floor == pytest.approx(0.0, abs=1e-6)  # it stands on it
 
 
-def test_the_floor_is_a_radius_below_the_lowest_end_of_a_link_and_not_above_the_base():
-    robot = Robot.named("kuka_lwr")
-    below = Capsule("below", 0, (0.0, 0.0, -0.5), (0.0, 0.0, 0.1), 0.04)
-    above = Capsule("above", 0, (0.0, 0.0, 0.3), (0.0, 0.0, 0.5), 0.04)
-    assert lowest(robot, [above, below]) == pytest.approx(-0.54)
-    assert lowest(robot, [above]) == 0.0
-
-
-def test_the_arm_given_as_a_table_has_its_own_capsules():
-    assert capsules(Robot.named("kuka_lwr"), 0.31) == link_capsules(TABLES["kuka_lwr"], 0.31)
-    assert stage_of(load("ellipse")).floor == pytest.approx(-0.31)
-
-
-def test_a_floating_base_has_no_limits_to_be_at():
-    recording = simulate(load("humanoid-reach", ["control.duration=0.02"]))
-    levels = levels_at(recording, [0, 1, 2, 3])
-    assert levels.saturated.shape == (4, recording["v"].shape[1])
-    assert (levels.saturated[:, :6] == 0).all()
-
-
 def test_listed_tasks_have_their_paths_and_errors():
     shown = scene(simulate(load("humanoid-reach", ["control.duration=0.4"])))
     paths = {path.task: path for path in shown.paths}
@@ -234,15 +190,6 @@ def test_listed_tasks_have_their_paths_and_errors():
     hand = errors.value[:, errors.labels.index("right hand")]
     missed = np.linalg.norm(paths["right hand"].wanted - paths["right hand"].actual, axis=1)
     assert np.allclose(hand, missed)
-
-
-@pytest.mark.slow
-def test_the_limits_of_a_floating_robot_are_those_of_its_joints():
-    recording = simulate(load("humanoid-reach", ["control.duration=1.8"]))
-    levels = levels_at(recording, range(340, 360))
-    assert levels.known.all()
-    assert not levels.saturated[:, :6].any()
-    assert levels.saturated.any()
 
 
 def test_after_a_camera_levels_are_those_judged_in_the_run():

@@ -112,7 +112,3 @@ def test_a_run_has_the_metrics_of_singularities(name):
     assert found["error_returned_max"].value is None  # it has not been away
     assert found["jerk_max"].value > 0.0
     assert found["speed_limit_excess"].value == 0.0
-
-
-def test_other_scenarios_have_no_metrics_of_singularities():
-    assert "ticks_frozen" not in measure(simulate(load("strictness", ["control.duration=0.01"])))

@@ -143,27 +143,6 @@ def test_its_metrics_have_units_and_say_what_the_signals_do(short):
     assert "command_step_max" not in found
 
 
-def test_a_fall_ends_the_run_and_is_its_fault():
-    pytest.importorskip("mujoco")
-    recording = simulate(changed(plant__pushes__0__force=300.0, plant__pushes__0__at=0.0,
-                                 plant__fall=0.002))
-    assert 50 < recording.ticks < 2500
-    assert recording.fault.startswith("the robot has fallen by 0.002")
-
-
-@pytest.mark.parametrize("keys", [{"contacts": []}, {"limits__torque": 0.05}],
-                         ids=["no contact", "torques that cannot carry the weight"])
-def test_a_robot_that_nothing_holds_falls_with_torques_within_their_limits(keys):
-    pytest.importorskip("mujoco")
-    run = simulate(changed(control__duration=0.6, **keys))
-    assert run.fault.startswith("the robot has fallen by 0.2 m")
-    assert (np.abs(run["command"]) <= run["torque_limit"] + 1e-9).all()
-    if "contacts" not in keys:
-        assert measure(run)["torque_limit_share"].value > 0.5
-        missed = run["level_violation"][:, run.task_names.index("centre of mass")]
-        assert np.nanmax(missed) > 1.0
-
-
 @pytest.mark.parametrize("resolver", ["hcod", "tpm"])
 def test_no_torque_changes_by_more_than_its_step(resolver):
     """Under a resolver without rows for it the torques are cut off."""
@@ -196,24 +175,6 @@ def test_noise_turns_and_moves_the_base_that_the_controller_sees():
         noisy["true_q"][:, 3:7]).inv()
     assert 5e-4 < turns.as_rotvec().std() < 2e-3
     np.testing.assert_allclose(np.linalg.norm(noisy["q"][:, 3:7], axis=1), 1.0)
-
-
-def test_steps_of_measured_positions_are_those_of_joints_only():
-    pytest.importorskip("mujoco")
-    read = simulate(SHORT.with_changes({"plant.measurement.quantisation": 1e-4}))
-    np.testing.assert_allclose(read["q"][:, :7], read["true_q"][:, :7], atol=1e-12)
-    steps = read["q"][:, 7:] / 1e-4
-    np.testing.assert_allclose(steps, np.round(steps), atol=1e-6)
-
-
-def test_a_sole_may_lie_beside_its_frame():
-    pytest.importorskip("mujoco")
-    beside = [0.01, 0.02, -0.03]
-    cell = build(changed(contacts__0__offset=beside, contacts__1__offset=beside,
-                         start__on_floor=True))
-    points = np.array(cell.contacts["left_foot"].points)
-    np.testing.assert_allclose(points.min(axis=0), [-0.04, -0.02, -0.03])
-    np.testing.assert_allclose(points.max(axis=0), [0.17, 0.06, -0.03])
 
 
 @pytest.mark.slow

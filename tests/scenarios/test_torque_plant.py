@@ -8,7 +8,7 @@ from standing import ROBOT, WEIGHT, feet, standing_stack
 from hierarchy import State
 from scenarios.cell.plants.torque import TorqueRobot
 from scenarios.config import ScenarioError
-from scenarios.config.plant import PushSection, TorqueSection
+from scenarios.config.kinds.torque import PushSection, TorqueSection
 from solvers import certify, make
 
 pytestmark = pytest.mark.slow
@@ -34,7 +34,7 @@ def in_the_air(seed):
     return q, rng.normal(size=ROBOT.n), 5.0 * rng.normal(size=30)
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", range(2))
 def test_without_contact_it_accelerates_as_the_robots_model(seed):
     """Bodies without mass get 1 mg there, and that is the difference."""
     q, v, torques = in_the_air(seed)
@@ -108,21 +108,6 @@ def test_it_stands_with_the_accelerations_and_forces_that_the_stack_predicts():
     assert sum(plant.forces().values())[2] == pytest.approx(WEIGHT, abs=0.5)
     assert np.linalg.norm(state.position(ROBOT.frame("left_foot"))
                           - start.position(ROBOT.frame("left_foot"))) < 2e-3
-
-
-def test_soles_slide_on_a_floor_without_friction():
-    """The legs are spread by a torque at both hips."""
-    torques = np.zeros(30)
-    torques[[1, 7]] = 8.0, -8.0
-    slid = []
-    for friction in (0.01, 1.0):
-        plant = TorqueRobot(ROBOT, CONTACTS, ROBOT.rest, section=plant_with(friction=friction))
-        for _ in range(60):
-            plant.act(torques)
-        state = State.at(ROBOT, plant.q)
-        feet_at = [state.position(ROBOT.frame(f"{side}_foot"))[1] for side in ("left", "right")]
-        slid.append(feet_at[0] - feet_at[1])
-    assert slid[0] > slid[1] + 1e-3
 
 
 def test_it_says_where_the_soles_slip_and_how_near_the_edge_the_pressure_is():

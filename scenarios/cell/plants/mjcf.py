@@ -1,4 +1,4 @@
-"""An arm and its obstacles as a MuJoCo scene in the format MJCF."""
+"""Robots and their surroundings as MuJoCo scenes in the format MJCF; here an arm under servos."""
 
 from __future__ import annotations
 
@@ -9,38 +9,67 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hierarchy import Robot
-from hierarchy.avoidance import Capsule, Obstacle
+from hierarchy.avoidance import Obstacle
 from hierarchy.problem import Array
 from hierarchy.robot import Body
 from scenarios.config import ScenarioError
-from scenarios.config.plant import JointsSection, ServoSection
+from scenarios.config.kinds.mujoco import JointsSection, ServoSection
 
-GRAVITY = 9.81     # [m/s^2], along -z of the world, as in the robot's own model
+_GRAVITY = (0.0, 0.0, -9.81)  # [m/s^2] in the world, as in the robot's own model
 _SOFTNESS = 0.02   # [s] time constant of a contact: a few mm of penetration at usual speeds
-_FRICTION = "0.5 0.005 0.0001"  # of a contact: sliding, turning [m], rolling [m]
+_FRICTION = (0.5, 0.005, 0.0001)  # of a contact: sliding, turning [m], rolling [m]
 Element = ElementTree.Element
 
 
-def scene(robot: Robot, capsules: Sequence[Capsule], obstacles: Sequence[Obstacle],
-          joints: JointsSection, servo: ServoSection, gains: tuple[Array, Array],
-          timestep: float) -> str:
-    """Return the scene: bodies of the robot, capsules, servos, and movable obstacles.
+def add(parent: Element, tag: str, **values: ArrayLike) -> Element:
+    """Add an element whose attributes are texts or numbers, written exactly."""
+    return ElementTree.SubElement(parent, tag, {
+        key: value if isinstance(value, str) else
+        " ".join(repr(float(number)) for number in np.ravel(np.asarray(value, dtype=float)))
+        for key, value in values.items()})
+
+
+def begin(robot: Robot, timestep: float, **option: ArrayLike) -> tuple[Element, Element]:
+    """Return the root of a scene and its world."""
+    root = Element("mujoco", model=robot.name)
+    add(root, "compiler", angle="radian", inertiafromgeom="false")
+    about = add(root, "option", timestep=timestep, gravity=_GRAVITY, **option)
+    add(about, "flag", autoreset="disable")  # a diverged state is not reset
+    return root, add(root, "worldbody")
+
+
+def add_body(parent: Element, body: Body, least: tuple[float, float] = (0.0, 0.0),
+             **values: ArrayLike) -> Element:
+    """Add a body "body NAME", with at least a mass [kg] and moments of inertia [kg m^2] more."""
+    I = body.inertia + least[1] * np.eye(3)  # noqa: E741
+    element = add(parent, "body", name=f"body {body.name}", pos=body.position,
+                  xyaxes=axes(body.rotation), **values)
+    add(element, "inertial", mass=max(body.mass, least[0]), pos=body.centre,
+        fullinertia=I[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]])
+    return element
+
+
+def axes(rotation: ArrayLike) -> Array:
+    """Return the x and y axes (6,) of a rotation (3, 3), as MJCF has them."""
+    return np.asarray(rotation, dtype=float)[:, :2].T.ravel()
+
+
+def scene(robot: Robot, obstacles: Sequence[Obstacle], joints: JointsSection, servo: ServoSection,
+          gains: tuple[Array, Array], timestep: float) -> str:
+    """Return the scene: bodies of the robot, its capsules, servos, and movable obstacles.
 
     gains : stiffness (n,) [N m/rad] and damping (n,) [N m s/rad] of the servos. Actuators are the
     n joint positions, then the n joint velocities. Obstacles are bodies "obstacle 1" and so on;
     points have no body. Raises ScenarioError unless all joints turn about their frames' z axes.
     """
-    root = Element("mujoco", model=robot.name)
-    ElementTree.SubElement(root, "compiler", angle="radian", inertiafromgeom="false")
-    option = ElementTree.SubElement(root, "option", timestep=repr(timestep),
-                                    gravity=f"0 0 {-GRAVITY}", integrator="implicitfast")
-    ElementTree.SubElement(option, "flag", autoreset="disable")  # a diverged state is not reset
-    default = ElementTree.SubElement(root, "default")
-    ElementTree.SubElement(default, "geom", solref=text(_SOFTNESS, 1.0), friction=_FRICTION)
-    world = ElementTree.SubElement(root, "worldbody")
-    _arm(world, robot, capsules, joints, servo)
+    root, world = begin(robot, timestep, integrator="implicitfast")
+    add(add(root, "default"), "geom", solref=(_SOFTNESS, 1.0), friction=_FRICTION)
+    _arm(world, robot, joints, servo)
     _obstacles(world, obstacles)
-    _servos(root, robot, gains)
+    actuator = add(root, "actuator")
+    for kind, key, values in (("position", "kp", gains[0]), ("velocity", "kv", gains[1])):
+        for name, gain in zip(robot.joint_names, values, strict=True):
+            add(actuator, kind, joint=name, **{key: gain})
     return ElementTree.tostring(root, encoding="unicode")
 
 
@@ -52,64 +81,31 @@ def each(value: float | tuple[float, ...], n: int, name: str) -> Array:
     return values
 
 
-def _arm(world: Element, robot: Robot, capsules: Sequence[Capsule], joints: JointsSection,
-         servo: ServoSection) -> None:
-    n, elements = robot.n, [world]
+def _arm(world: Element, robot: Robot, joints: JointsSection, servo: ServoSection) -> None:
+    elements = [world]
     friction, damping, armature = (
-        each(getattr(joints, key), n, f"plant.joints.{key}")
+        each(getattr(joints, key), robot.n, f"plant.joints.{key}")
         for key in ("friction", "damping", "armature"))
     for i, body in enumerate(robot.bodies()):
-        element = _body(elements[body.parent], body, servo.gravity)
-        elements.append(element)
-        joint = ElementTree.SubElement(
-            element, "joint", name=body.name, type="hinge", axis="0 0 1",
-            frictionloss=text(friction[i]), damping=text(damping[i]),
-            armature=text(armature[i]), actuatorgravcomp="true")
-        if np.isfinite([robot.lower[i], robot.upper[i]]).all():
-            joint.set("limited", "true")
-            joint.set("range", text(robot.lower[i], robot.upper[i]))
-        if np.isfinite(robot.effort_limit[i]):
-            joint.set("actuatorfrclimited", "true")
-            joint.set("actuatorfrcrange", text(-robot.effort_limit[i], robot.effort_limit[i]))
-    for capsule in capsules:
-        ElementTree.SubElement(
-            elements[capsule.joint], "geom", name=capsule.name, type="capsule",
-            fromto=text(*capsule.start, *capsule.end), size=text(capsule.radius),
-            contype="1", conaffinity="0")
-
-
-def _body(parent: Element, body: Body, gravity: float) -> Element:
-    element = ElementTree.SubElement(parent, "body", name=f"body {body.name}",
-                                     pos=text(*body.position),
-                                     xyaxes=text(*body.rotation[:, 0], *body.rotation[:, 1]),
-                                     gravcomp=text(gravity))
-    I = body.inertia  # noqa: E741
-    ElementTree.SubElement(
-        element, "inertial", mass=text(body.mass), pos=text(*body.centre),
-        fullinertia=text(I[0, 0], I[1, 1], I[2, 2], I[0, 1], I[0, 2], I[1, 2]))
-    return element
+        elements.append(add_body(elements[body.parent], body, gravcomp=servo.gravity))
+        range_, effort = (robot.lower[i], robot.upper[i]), robot.effort_limit[i]
+        limits = {"limited": "true", "range": range_} if np.isfinite(range_).all() else {}
+        efforts = {"actuatorfrclimited": "true", "actuatorfrcrange": (-effort, effort)
+                   } if np.isfinite(effort) else {}
+        add(elements[-1], "joint", name=body.name, type="hinge", axis=(0, 0, 1),
+            frictionloss=friction[i], damping=damping[i], armature=armature[i],
+            actuatorgravcomp="true", **limits, **efforts)
+    for capsule in robot.capsules:
+        add(elements[capsule.joint], "geom", name=capsule.name, type="capsule",
+            fromto=(*capsule.start, *capsule.end), size=capsule.radius, contype="1",
+            conaffinity="0")
 
 
 def _obstacles(world: Element, obstacles: Sequence[Obstacle]) -> None:
     """Add the obstacles: they collide with the arm, not with each other."""
     for number, obstacle in enumerate(obstacles, 1):
-        if obstacle.shape == "point":
-            continue
-        axes = np.asarray(obstacle.rotation, dtype=float)
-        element = ElementTree.SubElement(
-            world, "body", name=f"obstacle {number}", mocap="true",
-            pos=text(*obstacle.centre), xyaxes=text(*axes[:, 0], *axes[:, 1]))
-        ElementTree.SubElement(element, "geom", type=obstacle.shape, size=text(*obstacle.size),
-                               contype="0", conaffinity="1")
-
-
-def _servos(root: Element, robot: Robot, gains: tuple[Array, Array]) -> None:
-    actuator = ElementTree.SubElement(root, "actuator")
-    for kind, key, values in (("position", "kp", gains[0]), ("velocity", "kv", gains[1])):
-        for name, gain in zip(robot.joint_names, values, strict=True):
-            ElementTree.SubElement(actuator, kind, {"joint": name, key: text(gain)})
-
-
-def text(*numbers: ArrayLike) -> str:
-    """Return numbers as an attribute of MJCF."""
-    return " ".join(repr(float(number)) for number in np.array(numbers, dtype=float))
+        if obstacle.shape != "point":
+            body = add(world, "body", name=f"obstacle {number}", mocap="true",
+                       pos=obstacle.centre, xyaxes=axes(obstacle.rotation))
+            add(body, "geom", type=obstacle.shape, size=obstacle.size, contype="0",
+                conaffinity="1")

@@ -19,7 +19,7 @@ from hierarchy.task import Level
 from scenarios.cell.plants.mjcf import each, scene
 from scenarios.cell.plants.stops import Stops
 from scenarios.config import ScenarioError
-from scenarios.config.plant import JointsSection, PhysicsSection, ServoSection
+from scenarios.config.kinds.mujoco import JointsSection, PhysicsSection, ServoSection
 
 _ROUNDING = 1e-9  # of a number of steps
 _ARMS = [name for name, table in TABLES.items() if isinstance(table, DHTable)]
@@ -71,8 +71,8 @@ class PhysicsArm:
         self.stiffness, self.damping = _gains(robot, q, servo, joints)
         self._obstacles = obstacles or Obstacles()
         self.model = mujoco.MjModel.from_xml_string(
-            scene(robot, robot.capsules, self._obstacles.obstacles, joints,
-                  servo, (self.stiffness, self.damping), period / self._steps))
+            scene(robot, self._obstacles.obstacles, joints, servo,
+                  (self.stiffness, self.damping), period / self._steps))
         self.data = mujoco.MjData(self.model)
         self._step, self._force_of = mujoco.mj_step, mujoco.mj_contactForce
         self._servo = _Servo(period, level == "acceleration", robot.lower, robot.upper, servo.lead,

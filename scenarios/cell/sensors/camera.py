@@ -15,7 +15,7 @@ from hierarchy.problem import Array
 from hierarchy.records import set_frozen
 from scenarios.cell.sensors.errors import Image, expose
 from scenarios.cell.sensors.rendering import draw_scene
-from scenarios.config.sensor import DepthErrors
+from scenarios.config.kinds.camera import DepthErrors
 
 _ROUNDING = 1e-9   # [s] of times that are compared
 _SKEW = 1e-6       # tolerance of a rotation matrix

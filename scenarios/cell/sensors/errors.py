@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hierarchy.jit import compiled
-from scenarios.config.sensor import WIDEST
+from scenarios.config.kinds.camera import WIDEST
 
 Image = NDArray[np.float32]
 _EDGE = 0.05   # [m] depth difference between two pixels at an edge

@@ -2,10 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 from hierarchy import State
-from hierarchy.avoidance import Measurement, Obstacles
+from hierarchy.avoidance import Measurement, Obstacles, Repulsion
+
+
+class Asked(NamedTuple):
+    """What a sensor must provide: `region` [m], where directions are means [m], repulsion laws."""
+
+    region: float
+    mean_within: tuple[float, float] = (0.0, 0.0)
+    body: Repulsion | None = None
+    tip: Repulsion | None = None
 
 
 class Sensor(Protocol):

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, ClassVar, Literal
 
+from hierarchy.plugins import register
 from scenarios.config.sections import Finite
-from scenarios.config.tasks import Listed, register
+from scenarios.config.tasks import Listed
 
 if TYPE_CHECKING:
     from hierarchy import Task
@@ -14,7 +15,7 @@ if TYPE_CHECKING:
 
 
 
-@register("contact-force")
+@register("tasks", "contact-force", shipped=True)
 class ListedForce(Listed):
     """The force of a contact at `target`: its normal force, its force, or its wrench [N, N m].
 
@@ -34,7 +35,7 @@ class ListedForce(Listed):
         return ContactForce(at.contacts, self.contact, self.target, self.title)
 
 
-@register("least-force")
+@register("tasks", "least-force", shipped=True)
 class ListedLeastForce(Listed):
     """The smallest contact forces, as a last level; at level "torque"."""
 

@@ -1,0 +1,184 @@
+"""Kinds of tasks of frames: where one is, where it points, how it is to another."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import TYPE_CHECKING, ClassVar, Literal, Self
+
+import numpy as np
+from pydantic import model_validator
+
+from hierarchy.paths import Path
+from hierarchy.plugins import register
+from hierarchy.problem import Array
+from scenarios.config.sections import Flag, Gain, NotNegative, Point, Rows3, Stiffness
+from scenarios.config.tasks import (
+    AlongSection,
+    Listed,
+    PointingTask,
+    PositionTask,
+    Rows,
+    TaskSection,
+    of_pose,
+)
+
+if TYPE_CHECKING:
+    from hierarchy import Frame, Task
+    from scenarios.config.references import References
+
+
+@register("tasks", "position", shipped=True)
+class ListedPosition(Listed, PositionTask):
+    """The origin of `frame` along a path, by default its initial position, in some `axes`."""
+
+    kind: Literal["position"]
+    frame: str  # type: ignore[misc]
+    axes: Literal["x", "y", "z", "xy", "xz", "yz", "xyz"] = "xyz"  # type: ignore[misc]
+
+
+class _AlongPose(Listed, AlongSection):
+    """What asks for the position and the rotation of a frame (6 rows)."""
+
+    frame: str
+    rotation: Rows3 | None = None
+
+    def asked(self, at: References) -> tuple[Frame, Path, Array]:
+        """Return the frame, its path, and its rotation, by default the initial one."""
+        frame = at.frame(self.frame)
+        rotation = at.start.rotation(frame) if self.rotation is None else self.rotation
+        return frame, self.along(at.start.position(frame)), np.asarray(rotation)
+
+    def sizes(self, error: Array) -> Iterator[tuple[str, Array]]:
+        """Yield the error of the position and of the rotation."""
+        return of_pose(error)
+
+
+@register("tasks", "pose", shipped=True)
+class ListedPose(_AlongPose):
+    """Origin and axes of `frame` (6 rows); `rotation` (rows) defaults to the initial one."""
+
+    kind: Literal["pose"]
+
+    def make(self, at: References) -> Task:
+        """Return the task."""
+        from hierarchy.tasks import Pose
+
+        return Pose(*self.asked(at), *self.gains, name=self.title)
+
+    def wanted(self, position: Array, error: Array) -> Array | None:
+        """Return where the task wants the point."""
+        return np.asarray(position + error[..., :3])
+
+
+@register("tasks", "frame", shipped=True)
+class ListedFrame(_AlongPose):
+    """As `pose`, with the error log(T^-1 T_d) of SE(3) in the axes of `frame` (6 rows)."""
+
+    kind: Literal["frame"]
+
+    def make(self, at: References) -> Task:
+        """Return the task."""
+        from hierarchy.tasks import FrameLog
+
+        return FrameLog(*self.asked(at), *self.gains, name=self.title)
+
+
+@register("tasks", "pointing", shipped=True)
+class ListedPointing(PointingTask, Listed):
+    """The z axis of `frame` at `alpha_d` [deg] from `axis`, or with "inequality" at most that."""
+
+    kind: Literal["pointing"]
+    frame: str  # type: ignore[misc]
+
+
+@register("tasks", "look-at", shipped=True)
+class ListedLookAt(Listed, TaskSection):
+    """The z axis of `frame` toward the point `target` [m] of the world (2 rows)."""
+
+    kind: Literal["look-at"]
+    frame: str
+    target: Point
+    stiffness: Stiffness = 20.0
+    damping: Gain = 10.0
+    gain: Gain = 5.0
+
+    def make(self, at: References) -> Task:
+        """Return the task."""
+        from hierarchy.tasks import LookAt
+
+        return LookAt(at.frame(self.frame), self.target, *self.gains, self.title)
+
+    def sizes(self, error: Array) -> Iterator[tuple[str, Array]]:
+        """Yield the angle [deg] from the direction to the point."""
+        yield "deg", np.degrees(2 * np.arctan(np.linalg.norm(error, axis=1) / 2))
+
+
+@register("tasks", "relative", shipped=True)
+class ListedRelative(Listed, TaskSection):
+    """The pose of `frame` in the axes of the frame `to` (6 rows), by default the initial one.
+
+    `position` [m] and `rotation` (rows) are those wanted; without `orientation` only the position
+    counts (3 rows).
+    """
+
+    kind: Literal["relative"]
+    frame: str
+    to: str
+    position: Point | None = None
+    rotation: Rows3 | None = None
+    orientation: Flag = True
+
+    @model_validator(mode="after")
+    def _counts_its_rotation(self) -> Self:
+        if self.rotation is not None and not self.orientation:
+            raise ValueError("rotation goes with orientation = true")
+        return self
+
+    def make(self, at: References) -> Task:
+        """Return the task."""
+        from hierarchy.tasks import RelativePose
+
+        start, frame, to = at.start, at.frame(self.frame), at.frame(self.to)
+        axes = start.rotation(to).T
+        position = (axes @ (start.position(frame) - start.position(to)) if self.position is None
+                    else self.position)
+        rotation = axes @ start.rotation(frame) if self.rotation is None else self.rotation
+        return RelativePose(frame, to, position, rotation if self.orientation else None,
+                            *self.gains, self.title)
+
+    def sizes(self, error: Array) -> Iterator[tuple[str, Array]]:
+        """Yield the error of the position and of the rotation."""
+        return of_pose(error) if self.orientation else super().sizes(error)
+
+
+@register("tasks", "manipulability", shipped=True)
+class ListedManipulability(Listed, TaskSection):
+    """The manipulability of `frame` at `least` or more (1 row); rows = "equality": at `least`.
+
+    `part` "position" counts the linear rows of its Jacobian, "pose" all six.
+    """
+
+    unit: ClassVar[str] = ""
+    kind: Literal["manipulability"]
+    frame: str
+    least: NotNegative
+    part: Literal["position", "pose"] = "position"
+    rows: Rows = "inequality"
+    stiffness: Stiffness = 20.0
+    damping: Gain = 10.0
+    gain: Gain = 5.0
+
+    @property
+    def one_sided(self) -> bool:
+        """Whether its rows are inequalities."""
+        return self.rows == "inequality"
+
+    def make(self, at: References) -> Task:
+        """Return the task."""
+        from hierarchy.tasks import Manipulability
+
+        task = Manipulability(at.frame(self.frame), self.least, self.part, self.rows,
+                              name=self.title)
+        task.jacobian(at.start)  # refuses a robot that it is not for
+        return replace(task, stiffness=self.stiffness, damping=self.damping, gain=self.gain)

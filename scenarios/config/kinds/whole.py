@@ -1,0 +1,113 @@
+"""Kinds of tasks of the whole robot: joints, centre of mass, momentum, self-collision."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
+
+from pydantic import Field
+
+from hierarchy.paths import Still
+from hierarchy.plugins import register
+from scenarios.config.avoidance import BarrierSection
+from scenarios.config.sections import Finite, Gain, Stiffness
+from scenarios.config.tasks import AlongSection, Listed, PostureTask, TaskSection
+
+if TYPE_CHECKING:
+    from hierarchy import Task
+    from scenarios.config.references import References
+
+
+@register("tasks", "posture", shipped=True)
+class ListedPosture(Listed, PostureTask):
+    """All joints to `target` [rad or m], by default the start; `joints` override it by name."""
+
+    kind: Literal["posture"]
+
+
+@register("tasks", "coupling", shipped=True)
+class ListedCoupling(Listed, TaskSection):
+    """The sum of factor times position over `joints` at `value` [rad or m] (1 row)."""
+
+    unit: ClassVar[str] = "rad"
+    kind: Literal["coupling"]
+    joints: Annotated[dict[str, Finite], Field(min_length=1)]
+    value: Finite = 0.0
+    stiffness: Stiffness = 100.0
+
+    def make(self, at: References) -> Task:
+        """Return the task."""
+        from hierarchy.tasks import JointCoupling
+
+        return JointCoupling(at.robot, self.joints, self.value, *self.gains, self.title)
+
+
+@register("tasks", "com", shipped=True)
+class ListedCentreOfMass(Listed, AlongSection):
+    """The centre of mass along some of the axes "x", "y", "z" of the world."""
+
+    kind: Literal["com"]
+    axes: Literal["x", "y", "z", "xy", "xz", "yz", "xyz"] = "xyz"
+
+    def make(self, at: References) -> Task:
+        """Return the task."""
+        from hierarchy.tasks import CentreOfMass
+
+        anywhere = CentreOfMass(at.robot, Still((0.0, 0.0, 0.0)))
+        return CentreOfMass(at.robot, self.along(anywhere.position(at.start)),
+                            tuple("xyz".index(axis) for axis in self.axes), *self.gains,
+                            name=self.title)
+
+
+@register("tasks", "momentum", shipped=True)
+class ListedMomentum(Listed):
+    """The linear or angular momentum of the whole robot to zero, with `damping` [1/s]."""
+
+    kind: Literal["momentum"]
+    part: Literal["linear", "angular"] = "angular"
+    damping: Gain = 10.0
+
+    @property
+    def unit(self) -> str:  # type: ignore[override]
+        """That of its error."""
+        return "N s" if self.part == "linear" else "N m s"
+
+    def make(self, at: References) -> Task:
+        """Return the task."""
+        from hierarchy.tasks import Momentum
+
+        return Momentum(self.part, damping=self.damping, name=self.title)
+
+
+class _Apart(Listed):
+    """A task with one-sided rows between bodies."""
+
+    unit: ClassVar[str] = "m"
+
+    @property
+    def one_sided(self) -> bool:
+        """Whether its rows are inequalities."""
+        return True
+
+
+@register("tasks", "self-collision", shipped=True)
+class ListedSelfCollision(_Apart, BarrierSection):
+    """Links that are not neighbours, kept `distance` [m] apart; other keys as in [avoidance]."""
+
+    kind: Literal["self-collision"]
+
+    def make(self, at: References) -> Task:
+        """Return the task."""
+        from hierarchy.tasks import SelfSeparation
+
+        return SelfSeparation(at.robot.capsules, self.barrier(self.distance),
+                              at.pairs(self.distance), name=self.title)
+
+
+@register("tasks", "collision", shipped=True)
+class ListedCollision(_Apart):
+    """The place in the list of the rows that [avoidance] with kind = "separation" asks for.
+
+    Without this task they are above all tasks.
+    """
+
+    kind: Literal["collision"]
