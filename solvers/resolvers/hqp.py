@@ -46,7 +46,7 @@ class Hqp(Resolver):
     """A cascade of quadratic programs from the top level down, with inequalities at every level.
 
     What upper levels have settled leaves the programs, so that no backend can find it infeasible;
-    no answer of a backend is used unchecked. docs/theory/resolver-notes.md has the method and the
+    no answer of a backend is used unchecked. docs/theory/hqp.md has the method and the
     meaning of each status. The memory warm-starts backends that accept an initial guess.
 
     backend : proxqp, osqp, quadprog, daqp, piqp or clarabel.
