@@ -205,7 +205,7 @@ def _sides(rng: Random, value: Array, conflict: bool, recipe: Recipe) -> tuple[A
 
 
 def _scale(rng: Random, size: int, recipe: Recipe) -> Array:
-    """Return norms of the rows of a level: all one in half of the levels that allow it."""
+    """Return norms of the rows of a level: all one, with a chance of one half, where allowed."""
     low, high = recipe.scales
     if _happens(rng, 0.5) and low <= 1.0 <= high:
         return np.ones(size)
