@@ -1,4 +1,4 @@
-"""The gate for numbers: what arrays are before a kernel, which looks at nothing, reads them."""
+"""Checks of arrays before they reach kernels, which check nothing."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def shaped(what: str, value: Any, shape: tuple[int, ...]) -> Array:
 
 
 def level_names(names: Sequence[str] | None, count: int) -> tuple[str, ...]:
-    """Return one name for each of so many levels; None for "level 1", "level 2", ...
+    """Return one name for each level; None for "level 1", "level 2", ...
 
     Raises HierarchyError unless they are texts, as many, and all different.
     """
@@ -65,7 +65,7 @@ def level_names(names: Sequence[str] | None, count: int) -> tuple[str, ...]:
 
 
 def checked_sizes(sizes: ArrayLike, rows: int) -> Sizes:
-    """Return a copy of the sizes (L,) of levels that share so many rows.
+    """Return a copy of the level sizes (L,), which must add up to the number of rows.
 
     Raises HierarchyError, naming the level, unless they are whole numbers >= 0 of this sum.
     """
@@ -143,7 +143,7 @@ def checked_metric(metric: ArrayLike, n: int | None = None) -> Array:
 
 
 def checked_give(name: str, give: ArrayLike, size: int) -> Array:
-    """Return what the rows of a level give (size,), of one number or as many.
+    """Return the `give` of each row of a level (size,), from one number or as many.
 
     Raises HierarchyError, naming the level, for another shape or a number that is not finite and at
     least zero.

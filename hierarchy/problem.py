@@ -101,7 +101,7 @@ class Hierarchy:
     @classmethod
     def trusted(cls, *parts: Any, named: Callable[[], tuple[str, ...]] | None = None,
                 **others: Any) -> Hierarchy:
-        """Return the hierarchy of these arguments of `Hierarchy`, whose values are not looked at.
+        """Return a hierarchy made of arguments of `Hierarchy`, whose values are not checked.
 
         And of `named`. For what a program works out, which may overflow: `solve` has a status for
         that. Shapes and sizes are checked as ever.
@@ -167,7 +167,7 @@ class Hierarchy:
         return self.trusted(**{"named": self.named} | self._parts() | parts)
 
     def copy(self) -> Hierarchy:
-        """Return one with arrays of its own: a stack writes the same ones again in each tick."""
+        """Return a copy with separate arrays, since a stack reuses its arrays in each tick."""
         return self.changed(**{name: part.copy() for name, part in self._parts().items()
                                if isinstance(part, np.ndarray)})
 
@@ -179,7 +179,7 @@ class Hierarchy:
 
     def _keep(self, A: Any, lower: Any, upper: Any, sizes: Any, reference: Any = None,
               names: Sequence[str] | None = None, metric: Any = None, give: Any = None) -> None:
-        """Let arrays that fit each other in, or raise a HierarchyError."""
+        """Accept arrays of matching shapes, or raise a HierarchyError."""
         A = readable("A", A)
         if A.ndim != 2 or not A.shape[1]:
             raise HierarchyError(f"A has shape {A.shape}, expected (rows, n) with n >= 1")
@@ -222,7 +222,7 @@ class Hierarchy:
 
     @property
     def giving(self) -> list[int]:
-        """The levels of which a row gives."""
+        """The levels with a row that gives."""
         give = self._give
         if give is None:
             return []
@@ -233,14 +233,14 @@ class Hierarchy:
         return pairwise(self._offsets.tolist())
 
     def upper_part(self, count: int) -> Hierarchy:
-        """Return the first `count` levels, as views, of which none gives."""
+        """Return the first `count` levels, as views, none of which gives."""
         m = self._offsets[count]
         return self.changed(A=self._A[:m], lower=self._lower[:m], upper=self._upper[:m],
                             sizes=self._sizes[:count], names=self.names[:count], give=None,
                             named=None)
 
     def relaxed(self, level: int, x: ArrayLike) -> Hierarchy:
-        """Return the hierarchy that has room for what the rows of a level miss at x, and give.
+        """Return the hierarchy whose level is relaxed by its violations at x and by its `give`.
 
         For all levels below, and the reference, row i of the level may be violated by up to
         |s_i| + give_i at either side, where s_i is its violation at the least norm of its level. x

@@ -151,7 +151,7 @@ class State:
 
     @cached_property
     def dynamics(self) -> Dynamics:
-        """M(q) and h(q, v): views of what each `move` computes from the first use of this on."""
+        """M(q) and h(q, v) as views; after the first use, each `move` computes them."""
         model, data = self._model, self._data
         self._from_now_on(partial(pin.crba, model, data, self.q),
                           partial(pin.nonLinearEffects, model, data, self.q, self.v))

@@ -1,4 +1,4 @@
-"""What is asked of which robot, how the ways of resolving it do, and the report about it.
+"""Scenarios for robots, runs of them under resolvers, and reports that compare the runs.
 
 The names below are imported when first used, so that `import scenarios` costs nothing.
 """

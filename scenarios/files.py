@@ -47,7 +47,7 @@ def claim(folder: str | Path) -> Path:
 
 
 def _keep(path: Path) -> None:
-    """Keep a folder for this process; raises OutputError if another has kept it."""
+    """Lock a folder for this process; raises OutputError if another process has locked it."""
     for left in path.parent.glob(f".{glob.escape(path.name)}.*"):
         owner = _owner(left, path.name)
         if owner is not None and not _is_alive(owner):

@@ -69,7 +69,7 @@ def _crossed(h: Hierarchy, names: Sequence[str]) -> str:
 
 
 def is_missed(h: Hierarchy, x: Array, k: int, tolerance: float) -> bool:
-    """Whether x misses level k by more than `tolerance` times the size of its terms."""
+    """Whether x violates level k by more than `tolerance` times the size of its terms."""
     w = h.slacks(x)[h.offsets[k]:h.offsets[k + 1]]
     return bool(np.linalg.norm(w) > _least_miss(h, x, k, tolerance))
 
@@ -103,7 +103,7 @@ def _witnesses(resolution: Resolution) -> Array:
 
 def _giving(h: Hierarchy, resolution: ActiveSetResolution, k: int, witness: Array,
             tolerance: float, words: tuple[Sequence[str], Sequence[str]]) -> str:
-    """Say of a level that gives how much it is missed by, and for whom beyond its least."""
+    """Say by how much a level that gives is missed, and for which levels beyond its least."""
     assert h.give is not None
     rows = np.arange(h.offsets[k], h.offsets[k + 1])
     w, least = h.slacks(resolution.x)[rows], h.slacks(witness)[rows]
@@ -131,7 +131,7 @@ def _given(h: Hierarchy, resolution: ActiveSetResolution, i: int, by: float,
 
 
 def most_missed(h: Hierarchy, x: Array, k: int, names: Sequence[str]) -> list[str]:
-    """Return the names of up to three inequalities of level k that are missed by most at x."""
+    """Return the names of the up to three inequalities of level k that x violates most."""
     rows = np.arange(h.offsets[k], h.offsets[k + 1])
     w = np.abs(h.slacks(x)[rows]) * (h.lower[rows] != h.upper[rows])
     chosen = [i for i in np.argsort(-w, kind="stable")[:_NAMED].tolist()
@@ -140,7 +140,7 @@ def most_missed(h: Hierarchy, x: Array, k: int, names: Sequence[str]) -> list[st
 
 
 def nowhere(h: Hierarchy, k: int, names: Sequence[str], x: Array) -> str:
-    """Say along which rows no joint moves level k where that is why it is missed at x, or "".
+    """Say which rows of level k no joint can move, if that is why x misses it; else "".
 
     Rows that are missed together are a direction if they are axes, by the last letter of their
     names; of others only a row of zeros is one, since the data of two rows that contradict each

@@ -16,7 +16,7 @@ _Kind = TypeVar("_Kind", bound=Resolution)
 
 def giving(solve: Callable[[Hierarchy, Array | None], _Kind], h: Hierarchy,
            memory: Array | None) -> _Kind:
-    """Return what `solve` finds for h, level by level where rows may give.
+    """Return the answer of `solve` to h, level by level where rows may give.
 
     For each level that gives, the levels down to it are resolved alone: their answer is the witness
     of its least miss, (K, n) in `witnesses` for K such levels. Its rows then get that miss and what

@@ -34,7 +34,7 @@ _warned: set[tuple[str, ...]] = set()  # joints without velocity limits that wer
 
 
 class Memory(NamedTuple):
-    """What the next call of `solve_ik` starts from: that of its resolver, and the last v (n,)."""
+    """What the next call of `solve_ik` starts from: the resolver's memory, and the last v (n,)."""
 
     resolver: Array | None
     v: Array
@@ -157,7 +157,7 @@ def _settled(inner: Resolver, tasks: Iterable[Task], dt: float, damping: float) 
 
 def _before(memory: Memory | None, v: ArrayLike | None,
             limits: bool | Task) -> tuple[Array | None, ArrayLike | None]:
-    """Return the resolver's part of a memory, and the velocity of the tick before if known."""
+    """Return the memory of the resolver, and the velocity of the previous tick if known."""
     if memory is not None:
         expect("solve_ik: memory", memory, Memory, "give the memory of the last step")
         return memory.resolver, memory.v if v is None else v

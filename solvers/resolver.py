@@ -39,7 +39,7 @@ class Resolver(ABC):
     Without damping every strict resolver gives the same x, `sns` while no bound acts. Damping has
     one meaning on equalities in `tpm`, `recursive`, `hcod`, `hqp` and `sns`; `damps` and
     `damps_with_bounds` name it, and what the others damp. Definitions:
-    docs/theory/resolver-notes.md.
+    docs/theory/strict.md.
 
     damping : lambda_max of the variable damping near a singularity; 0 = off.
     threshold : singular value below which damping starts, in the unit of the rows.

@@ -32,7 +32,7 @@ _TYPES: dict[tuple[Any, ...], Any] = {}
 
 
 def _type_of(value: Any) -> Any:
-    """Return numba's type of a value; those of arrays are kept, for they take 4 us to find."""
+    """Return numba's type of a value; types of arrays are cached, since finding one takes 4 us."""
     if not isinstance(value, np.ndarray):
         return numba.typeof(value)
     kind = value.dtype, value.ndim, value.flags.num

@@ -262,7 +262,7 @@ class _Mending(caching.IndexDataCacheFile):  # type: ignore[misc]
 
 @cache
 def cache_folder() -> Path:
-    """Return where compiled kernels are kept."""
+    """Return the folder of compiled kernels."""
     base = os.environ.get("NUMBA_CACHE_DIR")
     if base is None:
         base = os.environ.get("XDG_CACHE_HOME", "~/.cache")

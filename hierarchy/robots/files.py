@@ -84,7 +84,7 @@ def _found(model: Any, coupled: tuple[Coupled, ...]) -> Found:
 
 @contextmanager
 def _printed() -> Iterator[Callable[[], list[str]]]:
-    """Keep what parsers print on standard error from it; yield a function that returns its lines.
+    """Capture what parsers print on standard error; yield a function that returns its lines.
 
     Lines that name the parser's source files are left out.
     """

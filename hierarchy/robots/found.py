@@ -73,7 +73,7 @@ def is_floating(model: Any) -> bool:
 
 
 def remarks(model: Any) -> Iterator[str]:
-    """Yield a sentence on each kind of limit that joints are without, and on ambiguous frames."""
+    """Yield a sentence for each kind of limit that joints lack, and for ambiguous frames."""
     joints = [joint for joint in model.joints[1 + is_floating(model):] if joint.nv > 0]
     for kind, limit in (("velocity", model.upperVelocityLimit), ("effort", model.effortLimit)):
         without = [str(model.names[joint.id]) for joint in joints

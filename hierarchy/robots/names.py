@@ -23,7 +23,7 @@ def in_package(model: str) -> bool:
 
 
 def is_file_name(model: str) -> bool:
-    """Whether `model` is meant as a file: one that is there, has a suffix or a folder in front."""
+    """Whether `model` means a file: it exists, or has a suffix or a folder."""
     return model not in plugins.own("robots") and (
         model.lower().endswith(_SUFFIXES) or "/" in model or os.sep in model
         or ("." in model and Path(model).is_file()))

@@ -1,4 +1,4 @@
-"""What a URDF says, read before pinocchio, whose complaints name no joint or end the process."""
+"""Checks of a URDF before pinocchio, whose errors name no joint or end the process."""
 
 from __future__ import annotations
 

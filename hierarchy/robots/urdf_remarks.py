@@ -1,4 +1,4 @@
-"""What a URDF says and the robot made from it is without, in sentences."""
+"""What a URDF has and the robot made from it lacks, in sentences."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def not_read(lines: Iterable[str]) -> Iterator[str]:
 
 
 def remarks(root: Element) -> Iterator[str]:
-    """Yield a sentence for each thing that a URDF says and the robot made from it is without."""
+    """Yield a sentence for each thing that a URDF has and the robot made from it lacks."""
     if macros := left_over(root):
         yield (f"what the macros {some(macros, _MACROS)} stand for is not in the robot; {EXPAND}")
     ignored = [name_of(joint) for joint in root.findall("joint") if joint.find("limit") is not None

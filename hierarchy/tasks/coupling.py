@@ -51,7 +51,7 @@ class _Coupling(Task):
         return len(self.terms.turns)
 
     def error(self, state: State) -> Array:
-        """What the sums lack to zero, or to a whole turn of a continuous joint (m,) [rad or m]."""
+        """Minus the sums, to the nearest full turn of a continuous joint (m,) [rad or m]."""
         return self._rows(state)[1]
 
     def jacobian(self, state: State) -> Array:

@@ -41,7 +41,7 @@ class ForceTask(Task):
         return A, lower, upper
 
     def error(self, state: State) -> Array:
-        """What x = 0 lacks (m,), in the unit of the rows."""
+        """The residual at x = 0 (m,), in the unit of the rows."""
         _, lower, upper = self.rows(state)
         return np.asarray(np.clip(0.0, lower, upper))
 

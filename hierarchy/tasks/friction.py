@@ -175,5 +175,5 @@ class Friction(FixedRows):
 
 
 def _summed(contact: Contact) -> int:
-    """Return how many rows have the normal force of all points: one if several open together."""
+    """Return the number of rows over all points' normal force: one if several open together."""
     return int(bool(contact.open) and contact.is_surface)

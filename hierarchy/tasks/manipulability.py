@@ -58,7 +58,7 @@ class Manipulability(Geometric):
         return 1
 
     def error(self, state: State) -> Array:
-        """What w lacks (1,), positive where it is too small."""
+        """`least` minus w (1,), positive where w is too small."""
         return np.array([self.least - self.value(state)])
 
     def value(self, state: State) -> float:

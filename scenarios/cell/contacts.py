@@ -81,7 +81,7 @@ def _astray(contacts: Contacts, start: State, floor: float) -> Iterator[tuple[fl
 
 
 def doubts(scenario: Scenario, contacts: Contacts) -> Iterator[str]:
-    """Yield what the plant's floor does not have, though the controller counts on it."""
+    """Yield what the controller assumes of the floor and the plant's floor lacks."""
     if not isinstance(scenario.plant, TorqueSection):
         return
     for contact in contacts.contacts:

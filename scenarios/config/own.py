@@ -1,4 +1,4 @@
-"""Sections of own kinds: their keys are the parameters of what a plugin registered.
+"""Sections of plug-in kinds: their keys are the parameters of what a plug-in registered.
 
 A task of `[[tasks]]`, [plant] and [sensor] may have a kind that the package lacks. Its maker is the
 class or function that a plugin registered under that name. The parameters of the maker are the keys

@@ -65,7 +65,7 @@ class Made(Section):
         raise NotImplementedError
 
     def sizes(self, error: Array) -> Iterator[tuple[str, Array]]:
-        """Yield unit and size (T,) of what is missed, from errors (T, m)."""
+        """Yield unit and size (T,) of the errors (T, m) of the task."""
         missed = np.maximum(error, 0.0) if self.one_sided else error
         yield self.unit, np.linalg.norm(missed, axis=1)
 
@@ -116,7 +116,7 @@ class AlongSection(TaskSection):
 
 
 def of_pose(error: Array) -> Iterator[tuple[str, Array]]:
-    """Yield the sizes (T,) of errors (T, 6) of position [m] and rotation [deg]."""
+    """Yield the sizes (T,) of errors (T, 6), of position [m] and of rotation [deg]."""
     yield "m", np.linalg.norm(error[:, :3], axis=1)
     yield "deg", np.degrees(np.linalg.norm(error[:, 3:], axis=1))
 

@@ -58,7 +58,7 @@ def first_tick(scenario: Scenario) -> FirstTick:
 
 
 def contact_warnings(scenario: Scenario) -> tuple[str, ...]:
-    """Return what the first tick of a scenario with contacts says that its run may not stand.
+    """Return warnings from the first tick of a scenario with contacts that its run may fall.
 
     Nothing but at level "torque". Raises HierarchyError where a run would.
     """
@@ -74,7 +74,7 @@ def _after_one(scenario: Scenario) -> Controller:
 
 
 def _of_contacts(controller: Controller) -> Iterator[str]:
-    """Yield what is wrong with the floor, and the joint whose acceleration is too large."""
+    """Yield what is wrong with the floor, and which joint accelerates too fast."""
     cell = controller.cell
     if cell.contacts is None:
         return

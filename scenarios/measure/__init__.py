@@ -1,1 +1,1 @@
-"""How well it went: metrics of runs, and where runs part that should agree."""
+"""Metrics of runs, and where runs diverge that should agree."""

@@ -1,4 +1,4 @@
-"""Where runs that ought to be the same motion part, and why."""
+"""Where runs diverge that should be the same motion, and why."""
 
 from __future__ import annotations
 

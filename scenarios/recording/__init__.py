@@ -1,1 +1,1 @@
-"""What is kept of a run: its signals, the facts to read them by, and what became of each level."""
+"""A recorded run: its signals, the facts to read them by, and whether each level was met."""

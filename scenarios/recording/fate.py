@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 
 class Fate(IntEnum):
-    """The fate of a task in one tick."""
+    """Whether a task was met in one tick."""
 
     ABSENT = 0   # not in the stack
     UNKNOWN = 1  # in the stack; its rows are not known after the run

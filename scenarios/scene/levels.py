@@ -1,4 +1,4 @@
-"""The fate of each level of the stack in some ticks of a run."""
+"""Whether each level of the stack was met, in some ticks of a run."""
 
 from __future__ import annotations
 

@@ -36,7 +36,7 @@ Limit = tuple[Array, Array]  # G (k, n), h (k,)
 
 
 class Task(Protocol):
-    """The part of a task of pink or mink that a level needs; `cost` is optional."""
+    """What a level needs of a task of pink or mink; `cost` is optional."""
 
     gain: float
 
@@ -99,7 +99,7 @@ class ContradictionError(HierarchyError):
 
 def _row_names(h: Hierarchy, joints: Names,
                read: Sequence[_Read]) -> tuple[str, ...]:
-    """Name each row: by its joint if it is about a single one, else by what its task says."""
+    """Name each row by its joint if it concerns only one, else by its task."""
     known = list(joints())
     of_tasks = [name for one in read for name in _names_of(one)]
     rows = [""] * (h.m - len(of_tasks)) + of_tasks
@@ -150,7 +150,7 @@ class _Packed:
         return row
 
     def damp(self, last: int, own: float, pull: Pull) -> None:
-        """Ask of the rows up to `last` for no more than a damped step reaches.
+        """Reduce the targets of the rows up to `last` to what a damped step reaches.
 
         They ask for A x of the x that minimises |A x - b|^2 + own |x|^2 + the pull. That x alone
         meets them, as in pink, and their null space is left to the levels below; a strict level
@@ -215,7 +215,7 @@ class _Limits(NamedTuple):
 
 
 class _Read(NamedTuple):
-    """What a task says: J (k, n), e (k,), cost (k,), gain, and the weight of its lm_damping."""
+    """The data of a task: J (k, n), e (k,), cost (k,), gain, and the weight of its lm_damping."""
 
     task: Task
     J: Array

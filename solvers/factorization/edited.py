@@ -28,7 +28,7 @@ class Factorization:
     Swap, reorder and delete work on C (m, r) alone, from the first changed level on, so their cost
     does not depend on n; insert projects its rows on the basis Q (n, r). The next solve does the
     work, so several edits cost one. It gives the x of `tpm` with the same settings. Costs and the
-    treatment of deleted rows: docs/factorization.md, docs/theory/resolver-notes.md.
+    treatment of deleted rows: docs/factorization.md.
 
     levels : A_k (m_k, n) of each level, most important first.
     names : one name per level; None for "level 1", "level 2", ...

@@ -1,4 +1,4 @@
-"""The exact solve: find a working set, verify what it claims, search on where that fails.
+"""The exact solve: find a working set, verify it, and search on where that fails.
 
 Python, batches and the C library call this one kernel. The working set comes from the memory of an
 earlier solve, or from a pass level by level. It is factored anew and pivoted in blocks, then row by
@@ -148,7 +148,7 @@ def solve_damped(A, lower, upper, sizes, x, record, settings, work):
 
 @inlined
 def _add_record(record, inner, lower, upper, d, rows, end, k):
-    """Add what a level says: states of rows, and which rows hold it back."""
+    """Add the result of a level: states of rows, and which rows hold it back."""
     m = lower.size
     for i in range(end):
         missed = d.lower[i] < lower[i] or d.upper[i] > upper[i]  # by a level before
@@ -240,7 +240,7 @@ def _carve_scaled(work, at, m, n):
 
 @inlined
 def _resume(s, level):
-    """Return what tells a later solve where to go on, see `_resumed_at`; rounded, the level."""
+    """Return where a later solve resumes, see `_resumed_at`; rounded, the level."""
     last, half = s.multiplier.shape[0] - 2, 0.5 * s.count[COARSE]
     if s.count[FINISHED] == 0:
         return -2.0 - half - (level if level > 0 else 0)

@@ -1,4 +1,4 @@
-"""A stack of equality levels factored as J = C Q^T, and the staircase of C, kept between edits.
+"""A stack of equality levels factored as J = C Q^T, and the staircase of C, across edits.
 
 Q (n, r) has orthonormal columns, C (m, r) the coefficients of the rows. Lengths and angles of rows
 of J are those of rows of C, so the staircase of C is that of J, with r numbers per row, not n: new

@@ -111,7 +111,7 @@ def least_squares(T, y, work):
 
 @inlined
 def weigh_rows(t):
-    """Write the largest miss of the rows of a level, and the sum of their pulls.
+    """Write the largest violation of the rows of a level, and the sum of their forces.
 
     If the misses are rounding in all rows, they count as zero; in a single row the miss may be what
     balances a light row. The share of rounding in a pull is that in the miss.

@@ -166,7 +166,7 @@ def _sets_goal(t, k):
 
 @inlined
 def _begin(t, k, last, whole, tolerance):
-    """List the rows that a level misses or must meet, watch the others; False if it is finished.
+    """List the violated rows of a level and its equalities, watch the others; False if finished.
 
     A row with no remainder outside the fixed rows is settled.
     """
@@ -235,7 +235,7 @@ def _pull_of_goal(t, begin, end):
 
 @inlined
 def _watch_parallel(t, last):
-    """Watch again the rows that held rows kept in place, because the held rows have changed."""
+    """Watch again the rows that held rows had fixed, because the held rows have changed."""
     for i in range(last):
         if t.of.index[KIND, i] == PARALLEL:
             t.of.index[KIND, i] = WATCHED
@@ -383,7 +383,7 @@ def _misses_goal(t, tolerance):
 
 @inlined
 def _misses_rows(t, tolerance):
-    """Whether a soft row misses its side by more than rounding, as 0 or 1."""
+    """Whether a soft row violates its side by more than rounding, as 0 or 1."""
     weigh_rows(t)
     return 0 if t.scalar[WORST] <= tolerance else 1
 

@@ -83,7 +83,7 @@ def verify(s, factored):
 
 @compiled
 def neglects(s):
-    """Whether x misses a row that takes no part because rows of other levels are far larger."""
+    """Whether x violates a row that is ignored because rows of other levels are far larger."""
     missed, reach = False, 1.0 + length_of(s.x)
     for i in range(s.A.shape[0]):
         value = row_times_x(s, i)

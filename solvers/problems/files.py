@@ -74,7 +74,7 @@ class Collection:
 
     @property
     def digest(self) -> str:
-        """SHA-256 of the problems, in hexadecimal; answers and head have no part in it."""
+        """SHA-256 of the problems, in hexadecimal, without answers and head."""
         return _digest(_packed_problems(self.problems))
 
     def save(self, path: str | Path) -> None:

@@ -41,7 +41,7 @@ class Recipe:
     largest to the smallest norm in a level, `angles` [rad] those of `near_parallel` rows. Chances
     of a structure: empty, rank_lost, linked (rows in the span of levels above), simple_bounds,
     zero_rows, duplicates, near_parallel; of a whole problem: conflicting, reference. Shares of the
-    inequalities: ties (a side exactly at x*), one_sided, sideless. docs/theory/resolver-notes.md
+    inequalities: ties (a side exactly at x*), one_sided, sideless. docs/problem-files.md
     defines each.
 
     Raises HierarchyError for an empty range or a chance outside 0..1.
@@ -205,7 +205,7 @@ def _sides(rng: Random, value: Array, conflict: bool, recipe: Recipe) -> tuple[A
 
 
 def _scale(rng: Random, size: int, recipe: Recipe) -> Array:
-    """Return norms of the rows of a level: all one in half of the levels that allow it."""
+    """Return norms of the rows of a level: all one, with a chance of one half, where allowed."""
     low, high = recipe.scales
     if _happens(rng, 0.5) and low <= 1.0 <= high:
         return np.ones(size)

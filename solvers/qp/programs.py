@@ -86,7 +86,7 @@ def null_space_program(goal: Rows, limits: Rows, kept: Rows, lam: float, start: 
 def slack_program(goal: Rows, limits: Rows, kept: Rows, F: Array, lam: float, *,
                   last: bool = False, start: Array | None = None, f: Array | None = None
                   ) -> Program:
-    """Return the program with unknowns d (n,), the step, and w (k,), the miss of each row.
+    """Return the program with unknowns d (n,), the step, and w (k,), the violation of each row.
 
     f : F d = f; None for zero.
     last : whether `goal` is d itself, which needs no w.

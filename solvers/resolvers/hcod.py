@@ -75,8 +75,8 @@ class ActiveSetResolution(Resolution):
 class Hcod(Resolver):
     """Active-set method on a hierarchical factorisation; exact at any rank, with inequalities.
 
-    Not the decomposition of Escande, Mansard and Wieber; docs/hcod.md says how it differs, and
-    docs/theory/resolver-notes.md describes the method, its damping and its checks.
+    Not the decomposition of Escande, Mansard and Wieber; docs/theory/hcod.md says how it
+    differs, and describes the method and its checks.
 
     Equalities alone give the answer of `tpm`, to the last digit. An answer is SOLVED only if its
     working set and multipliers verify it on the data, otherwise INACCURATE.

@@ -46,7 +46,7 @@ class Hqp(Resolver):
     """A cascade of quadratic programs from the top level down, with inequalities at every level.
 
     What upper levels have settled leaves the programs, so that no backend can find it infeasible;
-    no answer of a backend is used unchecked. docs/theory/resolver-notes.md has the method and the
+    no answer of a backend is used unchecked. docs/theory/hqp.md has the method and the
     meaning of each status. The memory warm-starts backends that accept an initial guess.
 
     backend : proxqp, osqp, quadprog, daqp, piqp or clarabel.
@@ -248,7 +248,7 @@ class _Cascade:
         return self._minimise(goal, Rows.none(self.h.n), np.eye(len(target)), 0.0, last=True)[0]
 
     def _movable(self) -> Rows:
-        """Return the kept rows that a step along N can still move, as rows of that step."""
+        """Return the rows from above that a step along N can still move, as rows of that step."""
         moved = norm(self.kept.A @ self.N, axis=1) > self.settings.rank_tolerance
         return self.kept.where(moved).from_(self.x)
 
@@ -283,7 +283,7 @@ class _Cascade:
 
     def _exact(self, z: Array, E: Array, e: Array, limits: Rows, kept: Rows
                ) -> tuple[Array, Array] | None:
-        """Refine the backend's z; if that fails, zero, where all kept rows hold because x does."""
+        """Refine the backend's z; if that fails, zero, at which all rows held from above hold."""
         for start in (z, np.zeros_like(z)):
             exact = refined(start, E, e, limits, kept, self.settings.rank_tolerance)
             if exact is not None:

@@ -29,7 +29,7 @@ class Reverse(Resolver):
         the strict answer.
 
     Damping applies to every correction and so differs from that of `tpm`; docs/theory/reverse.md
-    and docs/theory/resolver-notes.md have the details.
+    has the details.
 
     Source: Flacco, De Luca, "A reverse priority approach to multi-task control of redundant
     robots", IROS 2014.

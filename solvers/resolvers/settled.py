@@ -96,7 +96,7 @@ class Settled(Resolver):
 
 
 class _Reached(NamedTuple):
-    """The x for one mu, and what it misses: |b - A x|."""
+    """The x for one mu, and its residual |b - A x|."""
 
     mu: float
     x: Array

@@ -30,7 +30,7 @@ class Sns(Resolver):
     answer is that of `tpm`, to the last digit. x stays inside the box, and lower tasks do not
     change the values of upper levels. The answer is not optimal: it depends on the sets of
     saturated joints that were tried. Algorithm, departures and sources:
-    docs/theory/resolver-notes.md.
+    docs/theory/sns.md.
 
     form : "basic" keeps a saturated joint saturated for the task; "optimal" releases it where its
         multiplier has the wrong sign, and ends at the x nearest to the reference.

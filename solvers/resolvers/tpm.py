@@ -48,8 +48,7 @@ class Tpm(Resolver):
         freedom remains. Equalities only; its rank_tolerance is absolute for singular values, times
         the largest row norm of J.
 
-    See docs/theory/tpm.md, docs/tpm-limits.md, and docs/theory/resolver-notes.md for damping,
-    memory and status.
+    See docs/theory/tpm.md, and docs/theory/strict.md for damping.
     """
 
     name: ClassVar[str] = "tpm"

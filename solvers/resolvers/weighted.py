@@ -49,7 +49,7 @@ class Weighted(Resolver):
     """Minimises sum_k w_k^2 ||violation of level k||^2 + mu^2 ||x - reference||^2.
 
     Not strict; the top levels of inequalities are constraints. The memory is the state of each row.
-    docs/theory/weighted.md and docs/theory/resolver-notes.md describe the settings and the status.
+    docs/theory/weighted.md describes the settings and the status.
 
     ratio : weight of a level over that of the level below; the lowest level has weight 1.
     weights : weight of each level, in place of `ratio`; ignored for a hard or strict level.
@@ -207,7 +207,7 @@ def lexicographic_weights(violations: ArrayLike, tolerance: float, regularised: 
     """Return weights (L,) that keep each level within a tolerance of its strict violation.
 
     The rule of preemptive goal programming: what all lower levels together can gain in the sum
-    must not outweigh `tolerance` of a level. docs/theory/resolver-notes.md has the bound. The
+    must not outweigh `tolerance` of a level. docs/theory/weighted.md has the bound. The
     lowest weight is 1.
 
     Parameters

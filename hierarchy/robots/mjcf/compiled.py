@@ -65,7 +65,7 @@ def compiled(path: Path) -> Compiled:
 
 
 def _compiled(spec: Any) -> Any:
-    """Compile without what is only seen: its meshes take most of the time, and may be missing.
+    """Compile without visual meshes, which take most of the time and may be missing.
 
     MuJoCo refuses that where it would change a mass; then with it.
     """

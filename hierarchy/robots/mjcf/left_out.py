@@ -1,4 +1,4 @@
-"""What of an MJCF is not part of a robot here."""
+"""What a robot leaves out of its MJCF."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from hierarchy.words import listed, some
 
 
 def left_out(part: Part) -> Iterator[str]:
-    """Yield sentences on what the file has and the robot has not."""
+    """Yield a sentence for each thing that the file has and the robot lacks."""
     mj = part.compiled.model
     for kind, count, said in (
             ("tendon", mj.ntendon, "of tendons only couplings of joints are here"),

@@ -17,7 +17,7 @@ _FREE: Array = np.array([-np.inf, np.inf])
 
 
 def set_limits(built: Built) -> Iterator[str]:
-    """Set the ranges of hinges and slides; yield sentences on what limits there are not."""
+    """Set the ranges of hinges and slides; yield a sentence for each missing limit."""
     file, model = built.part.compiled, built.model
     mj, lower, upper = file.model, np.array(model.lowerPositionLimit), np.array(
         model.upperPositionLimit)
@@ -84,7 +84,7 @@ _INTEGRATOR = 1  # mjDYN_INTEGRATOR: control is a rate of the activation
 
 
 def _elsewhere(file: Compiled) -> Iterator[str]:
-    """Yield what acts on something else than one hinge or slide."""
+    """Yield what acts on anything but one hinge or slide."""
     mj = file.model
     known = {i for i, _, _ in joint_actuators(mj)}
     others = [name_of(mj, "actuator", i) for i in range(len(mj.actuator_trnid)) if i not in known]

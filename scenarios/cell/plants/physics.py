@@ -26,7 +26,7 @@ _ARMS = [name for name, table in TABLES.items() if isinstance(table, DHTable)]
 
 
 class _Servo(NamedTuple):
-    """How a reference follows commands: period [s], joint limits (n,), lead, share fed forward."""
+    """Settings of the reference: period [s], joint limits (n,), lead, share fed forward."""
 
     period: float
     acceleration: bool

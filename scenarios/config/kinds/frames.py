@@ -38,7 +38,7 @@ class ListedPosition(Listed, PositionTask):
 
 
 class _AlongPose(Listed, AlongSection):
-    """What asks for the position and the rotation of a frame (6 rows)."""
+    """The position and the rotation of a frame (6 rows)."""
 
     frame: str
     rotation: Rows3 | None = None

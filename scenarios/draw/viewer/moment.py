@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 class Became(NamedTuple):
-    """The fate of a task, and the Euclidean norm of its violation in the unit of its rows."""
+    """Whether a task was met, and the Euclidean norm of its violation in the unit of its rows."""
 
     fate: Fate
     violation: float
