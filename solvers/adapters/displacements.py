@@ -19,10 +19,10 @@ from hierarchy.problem import Array, Hierarchy
 from hierarchy.words import listed
 from solvers.adapters.packing import (
     ODD,
-    damp,
     narrow,
     squared,
     write_bounds,
+    write_pull,
     write_several,
     write_task,
 )
@@ -32,7 +32,8 @@ _AXES = ("x", "y", "z", "about x", "about y", "about z")
 _NO_DAMPING = 1e-12  # pink's default, a regularisation of its QP that ours does not need
 
 Names = Callable[[], Sequence[str]]
-Limit = tuple[Array, Array]  # G (k, n), h (k,)
+Solve = Callable[[Hierarchy], Array]
+Limit = tuple[str, Array, Array]  # its class, G (k, n), h (k,)
 
 
 class Task(Protocol):
@@ -60,14 +61,16 @@ class Pull(NamedTuple):
 
 def hierarchy(configuration: object, joints: Names, n: int, period: float,
               limits: Sequence[Limit], constraints: Sequence[Task],
-              tasks: Iterable[Task | Sequence[Task]], pull: Pull | None = None) -> Hierarchy:
+              tasks: Iterable[Task | Sequence[Task]], pull: Pull | None = None,
+              solve: Solve | None = None) -> Hierarchy:
     """Pack limits, constraints and tasks into levels, without the empty ones.
 
     n unknowns [rad/s or m/s], and a function that returns their names; period [s]. An entry of
     `tasks` is a task, or a sequence of tasks that share a level, weighted by their costs.
     Constraints have no cost, as in pink and mink.
-    Without `pull` a task's lm_damping is refused; with it, each level asks for no more than its
-    own damped step would reach.
+    Without `pull` a task's lm_damping is refused. With it, a level minimises |A x - b|^2 +
+    weight |x - centre|^2 within the levels above: the last one by n rows more, the others by
+    `solve`, after which they keep the A x that it reaches.
 
     Raises ContradictionError for limits of a joint that contradict each other.
     """
@@ -75,33 +78,34 @@ def hierarchy(configuration: object, joints: Names, n: int, period: float,
         raise HierarchyError(f"period {period} s must be positive and finite")
     entries = [entry if isinstance(entry, Sequence) else [entry] for entry in tasks]
     damped = pull is not None
-    levels = [(" + ".join(map(label, together)),
-               [_read(task, configuration, damped) for task in together]) for together in entries]
-    if constraints:
-        held = [_read(task, configuration, damped, weighted=False) for task in constraints]
-        levels.insert(0, ("constraints", held))
+    held = [_read(task, configuration, damped, weighted=False) for task in constraints]
+    levels = [[_read(task, configuration, damped) for task in together] for together in entries]
+    read = [*held, *(one for level in levels for one in level)]
     found = _Limits.of(limits, n, period, joints)
-    packed = _Packed(n, found.most + sum(len(one.e) for _, read in levels for one in read))
+    packed = _Packed(n, found.most + sum(len(one.e) for one in read) + n)
     packed.keep("limits", found.write(packed))
-    for name, read in levels:
-        last = packed.write(read, period)
-        if pull is not None and name != "constraints":
-            packed.damp(last, sum(one.damping for one in read), pull)
-        packed.keep(name, last)
+    packed.keep("constraints", packed.write(held, period))
+    for level in levels:
+        if not any(one.cost.any() for one in level):
+            continue
+        packed.hold(solve)
+        last = packed.write(level, period)
+        if pull is not None:
+            last = packed.damp(last, sum(one.damping for one in level), pull)
+        packed.keep(" + ".join(label(one.task) for one in level), last)
     h = packed.hierarchy()
-    return h.changed(named=partial(_row_names, h, joints, [one for _, read in levels
-                                                           for one in read]))
+    return h.changed(named=partial(_row_names, h, joints, read, packed.damped))
 
 
 class ContradictionError(HierarchyError):
     """Limits of one joint that no velocity meets."""
 
 
-def _row_names(h: Hierarchy, joints: Names,
-               read: Sequence[_Read]) -> tuple[str, ...]:
+def _row_names(h: Hierarchy, joints: Names, read: Sequence[_Read],
+               damped: int) -> tuple[str, ...]:
     """Name each row: by its joint if it is about a single one, else by what its task says."""
     known = list(joints())
-    of_tasks = [name for one in read for name in _names_of(one)]
+    of_tasks = [name for one in read for name in _names_of(one)] + [""] * damped
     rows = [""] * (h.m - len(of_tasks)) + of_tasks
     for i, (row, name) in enumerate(zip(h.A, rows, strict=True)):
         of_row = [known[c] for c in np.flatnonzero(row)]
@@ -124,6 +128,7 @@ class _Packed:
     def __init__(self, n: int, most: int) -> None:
         self.A, (self.lower, self.upper) = np.empty((most, n)), np.empty((2, most))
         self.reference, self.rows = np.zeros(n), 0
+        self.damped = 0  # rows that weigh the step, at the end of the last level
         self.names: list[str] = []
         self.sizes: list[int] = []
 
@@ -149,18 +154,29 @@ class _Packed:
             row = int(found)
         return row
 
-    def damp(self, last: int, own: float, pull: Pull) -> None:
-        """Ask of the rows up to `last` for no more than a damped step reaches.
-
-        They ask for A x of the x that minimises |A x - b|^2 + own |x|^2 + the pull. That x alone
-        meets them, as in pink, and their null space is left to the levels below; a strict level
-        cannot weigh its own step against its target.
-        """
+    def damp(self, last: int, own: float, pull: Pull) -> int:
+        """Weigh the step in the level that ends before row `last`; return the row after it."""
         weight = own + pull.weight
-        if weight > _NO_DAMPING:
-            if pull.weight > 0.0:
-                self.reference = pull.weight / weight * pull.centre
-            damp(self.A, self.lower, self.upper, weight, self.reference, self.rows, last)
+        if weight <= _NO_DAMPING:
+            return last
+        self.damped = len(self.reference)
+        write_pull(self.A, self.lower, self.upper, weight,
+                   pull.weight / weight * pull.centre, last)
+        return last + self.damped
+
+    def hold(self, solve: Solve | None) -> None:
+        """Make the last level, if it weighs its step, ask for what it then reaches."""
+        if not self.damped:
+            return
+        if solve is None:
+            raise HierarchyError(f"{self.names[-1]}: damped, and not the last level: what it "
+                                 "leaves to the levels below needs a resolver")
+        x = solve(self.hierarchy())
+        first, self.rows = self.rows - self.sizes[-1], self.rows - self.damped
+        self.sizes[-1] -= self.damped
+        self.damped = 0
+        self.lower[first:self.rows] = self.A[first:self.rows] @ x
+        self.upper[first:self.rows] = self.lower[first:self.rows]
 
     def hierarchy(self) -> Hierarchy:
         """Return the levels; a level is named like another one with a number."""
@@ -174,7 +190,7 @@ class _Limits(NamedTuple):
 
     lower: Array
     upper: Array
-    pairs: list[Limit]
+    given: list[Limit]
     several: list[NDArray[np.bool_]]
     left: int
     period: float
@@ -183,21 +199,18 @@ class _Limits(NamedTuple):
     def of(cls, limits: Iterable[Limit], n: int, period: float,
            joints: Names) -> _Limits:
         """Sort rows; raises HierarchyError for numbers that are not finite, or contradict."""
-        pairs = [(_plain(G), _plain(h)) for G, h in limits]
+        given = [(name, _plain(G), _plain(h)) for name, G, h in limits]
         lower, upper = _filled(n, -np.inf), _filled(n, np.inf)
-        several, left = [np.empty(len(h), np.bool_) for _, h in pairs], 0
-        for (G, h), mark in zip(pairs, several, strict=True):
-            _check_fit("limits", G, h, n)
+        several, left = [np.empty(len(h), np.bool_) for _, _, h in given], 0
+        for (name, G, h), mark in zip(given, several, strict=True):
+            _check_fit(name, G, h, n)
             found = narrow(G, h, period, lower, upper, mark)
             if found == ODD:
-                check_rows("limits", G, np.full(len(h), -np.inf), h)
+                check_rows(name, G, np.full(len(h), -np.inf), h)
             left += int(found)
         for i in np.flatnonzero(lower > upper)[:1]:
-            raise ContradictionError(
-                f"limits cannot all hold: joint {joints()[i]} must move by at least "
-                f"{lower[i]:.4g} and at most {upper[i]:.4g} rad/s or m/s; a joint outside its "
-                "range needs a velocity limit that lets it come back within the period")
-        return cls(lower, upper, pairs, several, left, period)
+            raise _contradiction(given, n, period, int(i), joints()[i])
+        return cls(lower, upper, given, several, left, period)
 
     @property
     def most(self) -> int:
@@ -207,11 +220,27 @@ class _Limits(NamedTuple):
     def write(self, packed: _Packed) -> int:
         """Write all rows from row 0 on, and return how many."""
         row = write_bounds(self.lower, self.upper, packed.A, packed.lower, packed.upper)
-        for (G, h), mark in zip(self.pairs, self.several, strict=True):
+        for (_, G, h), mark in zip(self.given, self.several, strict=True):
             if self.left:
                 row = write_several(G, h, self.period, mark, packed.A, packed.lower, packed.upper,
                                     row)
         return int(row)
+
+
+def _contradiction(limits: Sequence[Limit], n: int, period: float, i: int,
+                   joint: str) -> ContradictionError:
+    """Return the error that names the two limits that leave unknown i no value."""
+    lows, highs = [], []
+    for name, G, h in limits:
+        lower, upper = _filled(n, -np.inf), _filled(n, np.inf)
+        narrow(G, h, period, lower, upper, np.empty(len(h), np.bool_))
+        lows.append((float(lower[i]), name))
+        highs.append((float(upper[i]), name))
+    (low, demands), (high, allows) = max(lows), min(highs)
+    return ContradictionError(
+        f"limits cannot all hold: joint {joint} must move by at least {low:.4g} ({demands}) and at "
+        f"most {high:.4g} rad/s or m/s ({allows}); a joint outside its range needs a velocity "
+        "limit that lets it come back within the period")
 
 
 class _Read(NamedTuple):
@@ -235,6 +264,8 @@ def _read(task: Task, configuration: object, damped: bool, weighted: bool = True
                              "own step, which a strict level cannot; set it to 0 and use the "
                              "damping of the resolver")
     J, e = _plain(task.compute_jacobian(configuration)), _plain(task.compute_error(configuration))
+    if J.ndim == 1 and e.ndim == 1 and J.size == e.size:
+        J = J.reshape(-1, 1)  # as pinocchio returns the Jacobian of a single joint
     cost = costs(task, len(e)) if weighted else _filled(len(e), 1.0)
     gain = float(task.gain)
     return _Read(task, J, e, cost, gain, lm * gain * gain * squared(cost, e) if lm else 0.0)
@@ -290,8 +321,8 @@ def _filled(size: int, value: float) -> Array:
 def limit_level(limits: Iterable[Limit], n: int, period: float) -> tuple[Array, Array, Array]:
     """Pack rows G x <= h / period into one level A (k, n), lower (k,), upper (k,).
 
-    Rows on a single joint become bounds of that joint; ContradictionError if no value meets them.
-    Rows with infinite h are left out.
+    A limit is its name, G and h. Rows on a single joint become bounds of that joint;
+    ContradictionError if no value meets them. Rows with infinite h are left out.
     """
     found = _Limits.of(limits, n, period, lambda: [str(i) for i in range(n)])
     packed = _Packed(n, found.most)

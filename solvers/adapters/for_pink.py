@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterable, Sequence
-from functools import cache
+from functools import cache, partial
 from pkgutil import iter_modules
 from typing import TYPE_CHECKING, Any
 
@@ -59,10 +59,16 @@ def solve_ik(configuration: Configuration, tasks: Iterable[Task | Sequence[Task]
     configuration.check_limits(safety_break=safety_break)
     if not 0.0 <= damping < np.inf:
         raise HierarchyError(f"damping {damping} must not be negative")
+    solve = partial(_solved, resolver, tolerance)
     try:
-        h = hierarchy(configuration, tasks, dt, limits, barriers, constraints, damping)
+        return solve(hierarchy(configuration, tasks, dt, limits, barriers, constraints, damping,
+                               solve))
     except ContradictionError as error:
         raise _no_solution(None, None, str(error)) from error
+
+
+def _solved(resolver: Resolver, tolerance: float, h: Hierarchy) -> Array:
+    """Return x; raises NoSolutionFound unless limits and constraints hold."""
     resolution = resolver.solve(h)
     if resolution.status is not Status.SOLVED:
         raise _no_solution(h, resolution, f"{resolver.name}: {resolution.status}")

@@ -117,33 +117,10 @@ def squared(cost, e):
 
 
 @compiled
-def damp(A, b, upper, weight, centre, first, last):
-    """Replace b and upper of the rows from first to last by A x, x the minimum of a damped cost.
-
-    The cost is |A x - b|^2 + weight |x - centre|^2, and A x = b - weight y with
-    (A A^T + weight 1) y = b - A centre.
-    """
-    k = last - first
-    L, y = np.empty((k, k)), np.empty(k)
-    for i in range(k):
-        y[i] = b[first + i]
+def write_pull(A, lower, upper, weight, centre, row):
+    """Write sqrt(weight) x = sqrt(weight) centre from `row` on."""
+    root = np.sqrt(weight)
+    for i in range(len(centre)):
         for c in range(A.shape[1]):
-            y[i] -= A[first + i, c] * centre[c]
-        for j in range(i + 1):
-            total = weight if i == j else 0.0
-            for c in range(A.shape[1]):
-                total += A[first + i, c] * A[first + j, c]
-            for c in range(j):
-                total -= L[i, c] * L[j, c]
-            L[i, j] = np.sqrt(max(total, weight)) if i == j else total / L[j, j]
-    for i in range(k):
-        for c in range(i):
-            y[i] -= L[i, c] * y[c]
-        y[i] /= L[i, i]
-    for i in range(k - 1, -1, -1):
-        for c in range(i + 1, k):
-            y[i] -= L[c, i] * y[c]
-        y[i] /= L[i, i]
-    for i in range(k):
-        b[first + i] -= weight * y[i]
-        upper[first + i] = b[first + i]
+            A[row + i, c] = root if c == i else 0.0
+        lower[row + i] = upper[row + i] = root * centre[i]
