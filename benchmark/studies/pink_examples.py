@@ -24,6 +24,7 @@ from unittest.mock import MagicMock, patch
 import numpy as np
 import pink
 import qpsolvers
+from numpy.typing import NDArray
 
 from hierarchy.problem import Array
 from hierarchy.robots.names import file_of
@@ -83,13 +84,13 @@ def exact(A: Array, b: Array, G: Array, h: Array, C: Array, d: Array, near: Arra
         if acting and y.min() < -1e-15 * (1.0 + np.abs(b).max()):
             acting.pop(int(np.argmin(y)))
         elif over.size and over.max() > 1e-15:
-            acting.append(int(np.argmax(over)))
+            acting.append(np.intp(np.argmax(over)))
         else:
             return np.asarray(x, dtype=float)
     raise ArithmeticError("the active set did not settle")
 
 
-def _eliminated(K: Array, side: Array) -> Array:
+def _eliminated(K: Array, side: Array) -> NDArray[np.longdouble]:
     """Return the solution of K x = side in extended precision; dependent rows have none of it."""
     M = np.column_stack([K, side]).astype(np.longdouble)
     size = len(side)

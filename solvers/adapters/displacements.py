@@ -11,19 +11,19 @@ from functools import partial
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hierarchy.errors import HierarchyError
 from hierarchy.gate import check_rows
 from hierarchy.problem import Array, Hierarchy
 from hierarchy.words import listed
 from solvers.adapters.packing import (
+    CONTRADICT,
     ODD,
-    narrow,
+    make_triangular,
     squared,
     write_bounds,
+    write_limits,
     write_pull,
-    write_several,
     write_task,
 )
 
@@ -81,33 +81,36 @@ def hierarchy(configuration: object, joints: Names, n: int, period: float,
     held = [_read(task, configuration, damped, weighted=False) for task in constraints]
     levels = [[_read(task, configuration, damped) for task in together] for together in entries]
     read = [*held, *(one for level in levels for one in level)]
-    found = _Limits.of(limits, n, period, joints)
-    packed = _Packed(n, found.most + sum(len(one.e) for one in read) + n)
-    packed.keep("limits", found.write(packed))
+    packed = _Packed(n, sum(len(one[2]) for one in limits) + sum(len(one.e) for one in read)
+                     + 2 * n)
+    packed.keep("limits", packed.limit(limits, period, joints))
     packed.keep("constraints", packed.write(held, period))
     for level in levels:
-        if not any(one.cost.any() for one in level):
-            continue
-        packed.hold(solve)
+        if packed.damped and any(one.cost.any() for one in level):
+            packed.hold(solve, period)
         last = packed.write(level, period)
-        if pull is not None:
-            last = packed.damp(last, sum(one.damping for one in level), pull)
-        packed.keep(" + ".join(label(one.task) for one in level), last)
-    h = packed.hierarchy()
-    return h.changed(named=partial(_row_names, h, joints, read, packed.damped))
+        if pull is not None and last > packed.rows:
+            last = packed.damp(last, level, pull)
+        packed.keep(" + ".join([label(one.task) for one in level]), last)
+    return packed.hierarchy(partial(_row_names, packed, joints, limits, read))
 
 
 class ContradictionError(HierarchyError):
     """Limits of one joint that no velocity meets."""
 
 
-def _row_names(h: Hierarchy, joints: Names, read: Sequence[_Read],
-               damped: int) -> tuple[str, ...]:
-    """Name each row: by its joint if it is about a single one, else by what its task says."""
+def _row_names(packed: _Packed, joints: Names, limits: Sequence[Limit],
+               read: Sequence[_Read]) -> tuple[str, ...]:
+    """Name each row: by its joint if it is about a single one, else by its limit or task."""
     known = list(joints())
-    of_tasks = [name for one in read for name in _names_of(one)] + [""] * damped
-    rows = [""] * (h.m - len(of_tasks)) + of_tasks
-    for i, (row, name) in enumerate(zip(h.A, rows, strict=True)):
+    above, free = (packed.sizes[0] if packed.names[:1] == ["limits"] else 0), packed.rows
+    free -= packed.sizes[-1] if packed.damped else 0
+    of_tasks = [name for one in read for name in _names_of(one)][:free - above]
+    of_limits = [f"{name}, row {i}" for name, G, h in limits for i, side in enumerate(h)
+                 if side < np.inf and np.count_nonzero(G[i]) != 1]
+    rows = of_limits + [""] * (above - len(of_limits)) + of_tasks
+    rows += [f"{packed.names[-1]}, row {i}" for i in range(packed.rows - free)]
+    for i, (row, name) in enumerate(zip(packed.A, rows, strict=False)):
         of_row = [known[c] for c in np.flatnonzero(row)]
         if not name or (len(of_row) == 1 and name.startswith("row ")):
             rows[i] = listed(of_row) if of_row else "no joint"
@@ -128,7 +131,7 @@ class _Packed:
     def __init__(self, n: int, most: int) -> None:
         self.A, (self.lower, self.upper) = np.empty((most, n)), np.empty((2, most))
         self.reference, self.rows = np.zeros(n), 0
-        self.damped = 0  # rows that weigh the step, at the end of the last level
+        self.damped: Sequence[_Read] = ()  # the tasks of the last level, if it weighs the step
         self.names: list[str] = []
         self.sizes: list[int] = []
 
@@ -139,6 +142,25 @@ class _Packed:
             self.names.append(f"{name} ({again + 1})" if again else name)
             self.sizes.append(last - self.rows)
             self.rows = last
+
+    def limit(self, limits: Sequence[Limit], period: float, joints: Names) -> int:
+        """Write the rows G x <= h / period from row 0 on: one for a joint, after all others.
+
+        Returns their number. Raises HierarchyError for numbers that are not finite, or contradict.
+        """
+        n, row = len(self.reference), 0
+        lower, upper = _filled(n, -np.inf), _filled(n, np.inf)
+        given = [(name, _plain(G), _plain(h)) for name, G, h in limits]
+        for name, G, h in given:
+            _check_fit(name, G, h, n)
+            row = int(write_limits(G, h, period, lower, upper, self.A, self.lower, self.upper, row))
+            if row == ODD:
+                check_rows(name, G, _filled(len(h), -np.inf), h)
+        last = int(write_bounds(lower, upper, self.A, self.lower, self.upper, row))
+        if last == CONTRADICT:
+            i = int(np.flatnonzero(lower > upper)[0])
+            raise _contradiction(given, n, period, i, joints()[i])
+        return last
 
     def write(self, read: Sequence[_Read], period: float) -> int:
         """Write the rows of tasks that share a level; return the row after them."""
@@ -154,77 +176,37 @@ class _Packed:
             row = int(found)
         return row
 
-    def damp(self, last: int, own: float, pull: Pull) -> int:
-        """Weigh the step in the level that ends before row `last`; return the row after it."""
-        weight = own + pull.weight
+    def damp(self, last: int, level: Sequence[_Read], pull: Pull) -> int:
+        """Weigh the step in the level that ends before row `last`; return the row after it.
+
+        n rows then stand for all of the level: what its best x misses says nothing of that x.
+        """
+        weight = sum(one.damping for one in level) + pull.weight
         if weight <= _NO_DAMPING:
             return last
-        self.damped = len(self.reference)
-        write_pull(self.A, self.lower, self.upper, weight,
-                   pull.weight / weight * pull.centre, last)
-        return last + self.damped
+        n = len(self.reference)
+        self.damped = level
+        write_pull(self.A, self.lower, self.upper, weight, pull.weight / weight * pull.centre, last)
+        make_triangular(self.A, self.lower, self.upper, self.rows, last + n)
+        return self.rows + n
 
-    def hold(self, solve: Solve | None) -> None:
-        """Make the last level, if it weighs its step, ask for what it then reaches."""
-        if not self.damped:
-            return
+    def hold(self, solve: Solve | None, period: float) -> None:
+        """Make the last level, which weighs its step, ask for what it then reaches."""
         if solve is None:
             raise HierarchyError(f"{self.names[-1]}: damped, and not the last level: what it "
                                  "leaves to the levels below needs a resolver")
         x = solve(self.hierarchy())
-        first, self.rows = self.rows - self.sizes[-1], self.rows - self.damped
-        self.sizes[-1] -= self.damped
-        self.damped = 0
-        self.lower[first:self.rows] = self.A[first:self.rows] @ x
-        self.upper[first:self.rows] = self.lower[first:self.rows]
+        first = self.rows = self.rows - self.sizes.pop()
+        name, last = self.names.pop(), self.write(self.damped, period)
+        self.damped = ()
+        self.lower[first:last] = self.upper[first:last] = self.A[first:last] @ x
+        self.keep(name, last)
 
-    def hierarchy(self) -> Hierarchy:
+    def hierarchy(self, named: Callable[[], tuple[str, ...]] | None = None) -> Hierarchy:
         """Return the levels; a level is named like another one with a number."""
         m = self.rows
         return Hierarchy.trusted(self.A[:m], self.lower[:m], self.upper[:m], self.sizes,
-                                 self.reference, self.names)
-
-
-class _Limits(NamedTuple):
-    """Rows G x <= h / period, sorted: bounds of single unknowns, and marks of the other rows."""
-
-    lower: Array
-    upper: Array
-    given: list[Limit]
-    several: list[NDArray[np.bool_]]
-    left: int
-    period: float
-
-    @classmethod
-    def of(cls, limits: Iterable[Limit], n: int, period: float,
-           joints: Names) -> _Limits:
-        """Sort rows; raises HierarchyError for numbers that are not finite, or contradict."""
-        given = [(name, _plain(G), _plain(h)) for name, G, h in limits]
-        lower, upper = _filled(n, -np.inf), _filled(n, np.inf)
-        several, left = [np.empty(len(h), np.bool_) for _, _, h in given], 0
-        for (name, G, h), mark in zip(given, several, strict=True):
-            _check_fit(name, G, h, n)
-            found = narrow(G, h, period, lower, upper, mark)
-            if found == ODD:
-                check_rows(name, G, np.full(len(h), -np.inf), h)
-            left += int(found)
-        for i in np.flatnonzero(lower > upper)[:1]:
-            raise _contradiction(given, n, period, int(i), joints()[i])
-        return cls(lower, upper, given, several, left, period)
-
-    @property
-    def most(self) -> int:
-        """The largest number of rows that `write` may write."""
-        return self.left + 2 * len(self.lower)
-
-    def write(self, packed: _Packed) -> int:
-        """Write all rows from row 0 on, and return how many."""
-        row = write_bounds(self.lower, self.upper, packed.A, packed.lower, packed.upper)
-        for (_, G, h), mark in zip(self.given, self.several, strict=True):
-            if self.left:
-                row = write_several(G, h, self.period, mark, packed.A, packed.lower, packed.upper,
-                                    row)
-        return int(row)
+                                 self.reference, self.names, named=named)
 
 
 def _contradiction(limits: Sequence[Limit], n: int, period: float, i: int,
@@ -233,7 +215,8 @@ def _contradiction(limits: Sequence[Limit], n: int, period: float, i: int,
     lows, highs = [], []
     for name, G, h in limits:
         lower, upper = _filled(n, -np.inf), _filled(n, np.inf)
-        narrow(G, h, period, lower, upper, np.empty(len(h), np.bool_))
+        spare = np.empty((len(h), n)), np.empty(len(h)), np.empty(len(h))
+        write_limits(G, h, period, lower, upper, *spare, 0)
         lows.append((float(lower[i]), name))
         highs.append((float(upper[i]), name))
     (low, demands), (high, allows) = max(lows), min(highs)
@@ -316,18 +299,6 @@ def _filled(size: int, value: float) -> Array:
     filled = np.empty(size)
     filled.fill(value)
     return filled
-
-
-def limit_level(limits: Iterable[Limit], n: int, period: float) -> tuple[Array, Array, Array]:
-    """Pack rows G x <= h / period into one level A (k, n), lower (k,), upper (k,).
-
-    A limit is its name, G and h. Rows on a single joint become bounds of that joint;
-    ContradictionError if no value meets them. Rows with infinite h are left out.
-    """
-    found = _Limits.of(limits, n, period, lambda: [str(i) for i in range(n)])
-    packed = _Packed(n, found.most)
-    row = found.write(packed)
-    return packed.A[:row], packed.lower[:row], packed.upper[:row]
 
 
 def label(task: object) -> str:

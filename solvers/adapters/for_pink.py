@@ -12,6 +12,7 @@ import numpy as np
 
 from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array, Hierarchy
+from hierarchy.words import listed
 from solvers.adapters.displacements import ContradictionError, Task
 from solvers.adapters.from_pink import hierarchy
 from solvers.adapters.packing import largest_violation
@@ -110,9 +111,16 @@ def _check_held(h: Hierarchy, resolution: Resolution, tolerance: float) -> None:
             return
         beyond = largest_violation(h.A, h.lower, h.upper, resolution.x, first, first + size)
         if beyond > tolerance:
-            raise _no_solution(h, resolution, f"the {name} cannot all hold: they are violated by "
-                                              f"at least {beyond:.3g}")
+            raise _no_solution(h, resolution, _conflict(h, resolution.x, name, first, first + size,
+                                                        tolerance))
         first += size
+
+
+def _conflict(h: Hierarchy, x: Array, name: str, first: int, last: int, tolerance: float) -> str:
+    """Say which rows contradict each other: where |misses| is least, those that miss."""
+    misses, names = np.abs(h.slacks(x)), h.named() if h.named else ()
+    rows = [f"{names[i]} by {misses[i]:.3g}" for i in range(first, last) if misses[i] > tolerance]
+    return f"the {name} cannot all hold; at best these are violated: {listed(rows)}"
 
 
 def _no_solution(h: Hierarchy | None, resolution: Resolution | None, text: str) -> Exception:
