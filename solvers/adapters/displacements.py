@@ -29,7 +29,7 @@ from solvers.adapters.packing import (
 
 _FLOAT = np.dtype(np.float64)
 _AXES = ("x", "y", "z", "about x", "about y", "about z")
-_NO_DAMPING = 1e-12  # pink's default, a regularisation of its QP that ours does not need
+_NO_DAMPING = 1e-12  # pink's default: a level above others leaves it out
 
 Names = Callable[[], Sequence[str]]
 Solve = Callable[[Hierarchy], Array]
@@ -132,6 +132,7 @@ class _Packed:
         self.A, (self.lower, self.upper) = np.empty((most, n)), np.empty((2, most))
         self.reference, self.rows = np.zeros(n), 0
         self.damped: Sequence[_Read] = ()  # the tasks of the last level, if it weighs the step
+        self.weight = 0.0                  # that weight
         self.names: list[str] = []
         self.sizes: list[int] = []
 
@@ -182,24 +183,27 @@ class _Packed:
         n rows then stand for all of the level: what its best x misses says nothing of that x.
         """
         weight = sum(one.damping for one in level) + pull.weight
-        if weight <= _NO_DAMPING:
+        if weight == 0.0:
             return last
         n = len(self.reference)
-        self.damped = level
+        self.damped, self.weight = level, weight
         write_pull(self.A, self.lower, self.upper, weight, pull.weight / weight * pull.centre, last)
         make_triangular(self.A, self.lower, self.upper, self.rows, last + n)
         return self.rows + n
 
     def hold(self, solve: Solve | None, period: float) -> None:
         """Make the last level, which weighs its step, ask for what it then reaches."""
-        if solve is None:
-            raise HierarchyError(f"{self.names[-1]}: damped, and not the last level: what it "
-                                 "leaves to the levels below needs a resolver")
-        x = solve(self.hierarchy())
+        x = None
+        if self.weight > _NO_DAMPING:
+            if solve is None:
+                raise HierarchyError(f"{self.names[-1]}: damped, and not the last level: what it "
+                                     "leaves to the levels below needs a resolver")
+            x = solve(self.hierarchy())
         first = self.rows = self.rows - self.sizes.pop()
         name, last = self.names.pop(), self.write(self.damped, period)
         self.damped = ()
-        self.lower[first:last] = self.upper[first:last] = self.A[first:last] @ x
+        if x is not None:
+            self.lower[first:last] = self.upper[first:last] = self.A[first:last] @ x
         self.keep(name, last)
 
     def hierarchy(self, named: Callable[[], tuple[str, ...]] | None = None) -> Hierarchy:
