@@ -150,6 +150,10 @@ def test_a_damped_level_above_others_keeps_what_it_reaches_within_the_limits(con
     assert np.abs(both - alone).max() > 1e-3
     with pytest.raises(HierarchyError, match="FrameTask of end_effector: damped, and not the last"):
         pink_hierarchy(configuration, [hand, rest], DT, damping=0.0)
+    hand.lm_damping = 0.0  # with pink's default no level but the last is damped
+    h = pink_hierarchy(configuration, [hand, rest], DT, damping=1e-12)
+    np.testing.assert_array_equal(h.sizes, [7, 3, 7])
+    assert h.named()[7:10] == ("end_effector x", "end_effector y", "end_effector z")
 
 
 def limit(*rows):
