@@ -1,14 +1,18 @@
 """Mutation testing: which single changes of the packages does no test notice?
 
-    python tests/mutate.py --count 100 --seed 1                      samples all modules below
+    python tests/mutate.py --map                                     which test runs which line
+    python tests/mutate.py --count 100 --seed 1                      samples all three packages
     python tests/mutate.py solvers/explain.py --count 10 --seed 0    samples one module
 
 Each mutant is one change: a comparison, an arithmetic or boolean operator, a constant or a returned
 value. Its module is replaced as it is imported, in the tests and in every program that they start;
-the checkout is not touched, so kernels come from the cache. The tests are those of `TESTS`, or of
---tests: first those not marked slow, then, where these pass, the slow ones. Prints every survivor
-with its line, and the share of survivors. A mutant that takes over three times the CPU time
-of the unchanged tests, and 20 s, counts as killed.
+the checkout is not touched, so kernels come from the cache. The tests are those that run the
+changed line, by the map that --map makes with coverage (of all tests, or of those named by --tests;
+once, and again when tests have changed), or --tests: first those not marked slow, then, where these
+pass, the slow ones. A line that tests run only in other processes, or while importing, has the
+tests of its module. Of many tests, MOST are taken. Prints every survivor with its line, and the
+share of survivors. A mutant that takes over three times the CPU time of the unchanged tests, and
+20 s, counts as killed.
 
 Not mutated: compiled kernels and the numbers they read (each mutant would compile for minutes),
 `strict=` of zip (a check that does not fire where shapes have been checked), what only a type
@@ -37,6 +41,7 @@ from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 from types import CodeType
+from typing import Any
 
 import pytest
 
@@ -44,91 +49,12 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy is imported
 os.environ.setdefault("MPLBACKEND", "Agg")
 
 ROOT = Path(__file__).parents[1]
-SAMPLED = ("hierarchy", "solvers", "scenarios/measure")
+SAMPLED = ("hierarchy", "solvers", "scenarios")
+MAP = ROOT / "build" / "tests-of-lines"
+MOST = 60  # tests of a mutant
 COMPILED = ("compiled", "unlocked", "inlined")
 # The folder of kernels, and the integer codes that kernels read.
 OF_KERNELS = ("solvers/kernels/", "solvers/status.py")
-
-# Test files of a module or a folder, quickest first; the longest path that fits counts.
-TESTS = {
-    "hierarchy/": "hierarchy/test_robot hierarchy/test_stack",
-    "hierarchy/activation": "solvers/test_smooth",
-    "hierarchy/allocation": "hierarchy/test_allocation scenarios/test_hierarchical",
-    "hierarchy/avoidance/": "hierarchy/test_avoidance hierarchy/test_danger_bounds",
-    "hierarchy/avoidance/barrier": "hierarchy/test_separation hierarchy/test_self_collision",
-    "hierarchy/avoidance/pairs": "hierarchy/test_separation",
-    "hierarchy/avoidance/self_collision": "hierarchy/test_self_collision hierarchy/test_models",
-    "hierarchy/contacts": "hierarchy/test_contacts",
-    "hierarchy/jit/": "hierarchy/test_jit hierarchy/test_stack hierarchy/test_limits",
-    "hierarchy/jit/exporting": "solvers/test_library",
-    "hierarchy/kinematics": "hierarchy/test_tasks",
-    "hierarchy/limits": "hierarchy/test_limits hierarchy/test_danger_bounds",
-    "hierarchy/loop/": "hierarchy/test_loop",
-    "hierarchy/notebook": "scenarios/test_notebooks",
-    "hierarchy/paths": "hierarchy/test_paths hierarchy/test_tasks scenarios/test_continuing",
-    "hierarchy/plugins": "scenarios/test_plugins",
-    "hierarchy/problem": "hierarchy/test_problem solvers/test_wrong_types solvers/test_resolver "
-                         "solvers/test_give scenarios/test_notebooks",
-    "hierarchy/robot": "hierarchy/test_robot hierarchy/test_models",
-    "hierarchy/robots/": "hierarchy/test_robot hierarchy/test_models "
-                         "hierarchy/test_self_collision scenarios/test_humanoid",
-    "hierarchy/stack": "hierarchy/test_stack hierarchy/test_tasks solvers/test_wrong_types "
-                       "solvers/test_give hierarchy/test_contacts",
-    "hierarchy/state": "hierarchy/test_robot hierarchy/test_stack hierarchy/test_tasks "
-                       "solvers/test_wrong_types hierarchy/test_contacts",
-    "hierarchy/task": "hierarchy/test_stack hierarchy/test_tasks solvers/test_wrong_types",
-    "hierarchy/tasks/": "hierarchy/test_tasks solvers/test_wrong_types scenarios/test_humanoid",
-    "hierarchy/tasks/avoidance": "hierarchy/test_tasks hierarchy/test_avoidance",
-    **{f"hierarchy/tasks/{name}": "hierarchy/test_contacts solvers/test_whole_body"
-       for name in ("base_dynamics", "centre_of_pressure", "contact_force", "contact_motion",
-                    "forces", "friction", "least_force", "momentum", "together")},
-    **{f"hierarchy/tasks/{name}": "hierarchy/test_tasks scenarios/test_listed_kinds"
-       for name in ("coupling", "geometric", "look_at", "manipulability", "relative")},
-    "hierarchy/tasks/cumulated_repulsion": "hierarchy/test_cumulated_repulsion",
-    "hierarchy/tasks/danger_bounds": "hierarchy/test_danger_bounds hierarchy/test_models",
-    "hierarchy/tasks/joint_limits": "hierarchy/test_limits hierarchy/test_models",
-    "hierarchy/tasks/posture": "hierarchy/test_tasks hierarchy/test_models",
-    "hierarchy/tasks/self_separation": "hierarchy/test_self_collision",
-    "hierarchy/tasks/separation": "hierarchy/test_separation",
-    "hierarchy/tasks/tangent_cone": "scenarios/test_rivals",
-    "hierarchy/tasks/torque_limits": "hierarchy/test_limits hierarchy/test_contacts",
-    "scenarios/measure/": "scenarios/test_parting scenarios/test_report",
-    "scenarios/measure/goals": "scenarios/test_goals",
-    "scenarios/measure/verdict": "scenarios/test_goals",
-    "scenarios/measure/tracking": "scenarios/test_metrics scenarios/test_singular",
-    "scenarios/measure/safety": "scenarios/test_metrics scenarios/test_plants",
-    "scenarios/measure/computing": "scenarios/test_metrics scenarios/test_faults",
-    "scenarios/measure/metric": "scenarios/test_metrics",
-    "scenarios/measure/run_folder": "scenarios/test_recording scenarios/test_plants",
-    "scenarios/measure/statistics": "scenarios/test_statistics",
-    "scenarios/measure/metrics": "scenarios/test_metrics scenarios/test_hierarchical "
-                                 "scenarios/test_plants scenarios/test_faults",
-    "solvers/": "solvers/test_resolver solvers/test_wrong_types solvers/test_contract",
-    "solvers/adapters/": "solvers/test_adapters",
-    "solvers/batch/": "solvers/test_batch",
-    "solvers/certificate": "solvers/test_certificate solvers/test_contract",
-    "solvers/explain": "solvers/test_hcod",
-    "solvers/factorization/": "solvers/test_factorization",
-    "solvers/give": "solvers/test_give",
-    "solvers/ik": "solvers/test_ik solvers/test_wrong_types",
-    "solvers/library/": "solvers/test_library solvers/test_library_inputs "
-                        "solvers/test_library_programs",
-    "solvers/metric": "solvers/test_metric",
-    "solvers/problems/": "solvers/test_problems scenarios/test_problem_families",
-    "solvers/problems/kinds": "solvers/test_problem_kinds solvers/test_problems",
-    "solvers/qp/": "solvers/test_hqp solvers/test_failures solvers/test_contract",
-    "solvers/qp/programs": "solvers/test_adapters solvers/test_hqp solvers/test_contract",
-    **{f"solvers/resolvers/{name}": f"solvers/test_resolver {own} solvers/test_contract"
-       for name, own in {
-           "augmented": "", "hcod": "solvers/test_hcod",
-           "hqp": "solvers/test_hqp solvers/test_failures",
-           "recursive": "solvers/test_recursive solvers/test_dampings_of_recursive",
-           "reverse": "solvers/test_reverse", "saturation": "solvers/test_sns",
-           "set_based": "solvers/test_set_based", "smooth": "solvers/test_smooth",
-           "sns": "solvers/test_sns", "tpm": "solvers/test_tpm solvers/test_tpm_limits",
-           "weighted": "solvers/test_weighted"}.items()},
-    "solvers/workspace": "solvers/test_workspace solvers/test_tpm_limits",
-}
 
 IMPORTED_ONCE = ("numpy", "numba", "numba.np.arraymath", "scipy.optimize", "scipy.stats",
                  "scipy.spatial.transform", "pinocchio", "qpsolvers", "osqp", "matplotlib.pyplot",
@@ -263,14 +189,56 @@ def _other(value: bool | int | float) -> bool | int | float:
     return value + 1 if isinstance(value, int) else float(value == 0.0)
 
 
+class Contexts:
+    """Tells coverage which test runs."""
+
+    def __init__(self, coverage: Any) -> None:
+        self.coverage = coverage
+
+    @pytest.hookimpl(wrapper=True)
+    def pytest_runtest_protocol(self, item: pytest.Item) -> Iterator[None]:
+        self.coverage.switch_context(item.nodeid)
+        result = yield
+        self.coverage.switch_context("")
+        return result
+
+
+def write_map(tests: list[str]) -> None:
+    """Run tests, and keep which of them run which line."""
+    from coverage import Coverage
+
+    MAP.parent.mkdir(exist_ok=True)
+    coverage = Coverage(str(MAP), source=[str(ROOT / name) for name in SAMPLED])
+    coverage.start()
+    code = pytest.main(["-q", "-p", "no:cacheprovider", "-n", "0", *tests], [Contexts(coverage)])
+    coverage.stop()
+    coverage.save()
+    if code:
+        sys.exit("the tests fail without any change")
+
+
+@cache
+def lines_of(module: str) -> dict[int, tuple[str, ...]]:
+    """Return the tests of each line of a module; of line 0 those that run any line of it."""
+    from coverage import CoverageData
+
+    data = CoverageData(str(MAP))
+    data.read()
+    lines = {line: tuple(test for test in tests if test)
+             for line, tests in data.contexts_by_lineno(str(ROOT / module)).items()}
+    return lines | {0: tuple(sorted({test for tests in lines.values() for test in tests}))}
+
+
 def tests_of(mutant: Mutant) -> tuple[str, ...]:
-    """Return the test files of a mutant, relative to the root."""
+    """Return the tests that run the line of a mutant, or some of them, spread over the files."""
     line = (ROOT / mutant.module).read_text().splitlines()[mutant.line - 1]
     records = ("tests/project/test_records.py",)
     if "frozen=" in line:
         return records
-    path = max((path for path in TESTS if mutant.module.startswith(path)), key=len)
-    return ("field(" in line) * records + tuple(f"tests/{name}.py" for name in TESTS[path].split())
+    known = lines_of(mutant.module)
+    tests = known.get(mutant.line) or known[0]
+    chosen = random.Random(mutant.line).sample(tests, min(MOST, len(tests)))
+    return ("field(" in line) * records + tuple(sorted(chosen))
 
 
 class Runner:
@@ -282,7 +250,7 @@ class Runner:
 
     def __init__(self, folder: Path, limit: float) -> None:
         self.folder, self.limit = folder, limit
-        self.seconds: dict[tuple[str, str], float] = {}
+        self.seconds: dict[tuple[tuple[str, ...], str], float] = {}
         (folder / "sitecustomize.py").write_text(HOOK)
         for name in IMPORTED_ONCE:
             with contextlib.suppress(ImportError):
@@ -291,14 +259,14 @@ class Runner:
         for file in sorted((ROOT / "solvers" / "kernels").glob("*.py")):
             import_module(f"solvers.kernels.{file.stem}")
 
-    def unchanged(self, test: str, mark: str) -> float:
-        """Return the CPU time of a test file on the packages as they are [s]; exit if it fails."""
-        if (test, mark) not in self.seconds:
-            passed, self.seconds[test, mark] = self._run([test], mark, {}, self.limit)
+    def unchanged(self, tests: tuple[str, ...], mark: str) -> float:
+        """Return the CPU time of tests on the packages as they are [s]; exit if they fail."""
+        if (tests, mark) not in self.seconds:
+            passed, self.seconds[tests, mark] = self._run([*tests], mark, {}, self.limit)
             if not passed:
-                sys.exit(f"{(self.folder / 'output').read_text()}\n{test} ({mark}) fails without "
+                sys.exit(f"{(self.folder / 'output').read_text()}\n{tests} ({mark}) fails without "
                          f"any change, or takes over {self.limit:g} s")
-        return self.seconds[test, mark]
+        return self.seconds[tests, mark]
 
     def survives(self, module: str, code: CodeType, tests: tuple[str, ...]) -> bool:
         """Whether the tests pass with this code of a module."""
@@ -307,7 +275,7 @@ class Runner:
         environment = {"MUTANT_NAME": name, "MUTANT_FILE": str(ROOT / module),
                        "MUTANT_CODE": str(self.folder / "mutant")}
         for mark in ("not slow", "slow"):
-            limit = 20.0 + 3.0 * sum(self.unchanged(test, mark) for test in tests)
+            limit = 20.0 + 3.0 * self.unchanged(tests, mark)
             if not self._run([*tests], mark, environment, limit)[0]:
                 return False
         return True
@@ -366,15 +334,23 @@ def main() -> None:
     """Try a random sample of mutants; exit with 1 if the tests fail unchanged."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("modules", nargs="*", help="files to change, relative to the root")
-    parser.add_argument("--tests", nargs="+", help="test files, in place of those in TESTS")
+    parser.add_argument("--tests", nargs="+", help="tests, in place of those of the map")
+    parser.add_argument("--map", action="store_true", help="make the map of tests and end")
     parser.add_argument("--count", type=int, default=10, help="mutants to try")
     parser.add_argument("--seed", type=int, default=0, help="of the sample")
     parser.add_argument("--start", type=int, default=1, metavar="N",
                         help="leave out what comes before mutant N of the sample")
     parser.add_argument("--limit", type=float, default=900.0,
-                        help="CPU time limit of an unchanged test file [s]")
+                        help="CPU time limit of unchanged tests [s]")
     options = parser.parse_args()
+    if options.map:
+        write_map(options.tests or ["tests"])
+        return
+    if not (MAP.exists() or options.tests):
+        sys.exit(f"{MAP} is missing: python tests/mutate.py --map")
     every = [mutant for module in options.modules or modules() for mutant in mutants(module)]
+    if not options.tests:
+        every = [mutant for mutant in every if lines_of(mutant.module)[0]]
     sample = random.Random(options.seed).sample(every, min(options.count, len(every)))
     with tempfile.TemporaryDirectory() as folder:
         alive = _try(sample, options.start, options.tests, Runner(Path(folder), options.limit))

@@ -1,129 +1,220 @@
-"""Time pink's `solve_ik` and ours beside it, on scenes like those of pink's own examples.
+"""Run pink's own examples, and ask our `solve_ik` at each tick what pink is asked.
 
-Both answer the same call at each tick of a closed loop that follows pink, and take turns at being
-first. Needs the extras `adapters`, `qp` and `robots`. Prints a table.
+Takes the folder `examples` of a checkout of pink. Those run whose robot lies beside them or in
+`example_robot_data` (extra `robots`), without viewer and clock. All tasks share one level; the
+answers are compared with the exact minimum of pink's cost. Prints a table.
 """
 
 from __future__ import annotations
 
+import argparse
+import contextlib
+import io
+import runpy
+import sys
 import warnings
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
 from time import perf_counter
+from types import SimpleNamespace
 from typing import Any
+from unittest.mock import MagicMock, patch
 
 import numpy as np
 import pink
-import typer
-from pink.barriers import PositionBarrier
-from pink.tasks import FrameTask, PostureTask
+import qpsolvers
+from numpy.typing import NDArray
 
-from hierarchy import Robot
+from hierarchy.problem import Array
+from hierarchy.robots.names import file_of
 from solvers.adapters.for_pink import solve_ik
 
-PERIOD = 1.0 / 200.0  # [s]
-ANSWERS = 1e-3        # [rad/s] a difference above this is another answer
+STUBBED = ("meshcat", "meshcat.geometry", "meshcat.transformations", "meshcat_shapes",
+           "pink.visualization", "loop_rate_limiters", "robot_descriptions",
+           "robot_descriptions.loaders", "robot_descriptions.loaders.pinocchio", "viser",
+           "pinocchio.visualize")
+ROBOTS = {"ur3_official": "ur3_robot", "ur5_official": "ur5_robot", "ur10_official": "ur10_robot",
+          "gen2": "kinova", "panda": "panda", "z1": "z1", "g1": "g1_29dof_rev_1_0", "go2": "go2"}
+PINK: Callable[..., Array] = pink.solve_ik
+
+
+class Enough(Exception):  # noqa: N818 - not an error
+    """The example has run for as many ticks as were asked."""
+
+
+def least_squares(tasks: Iterable[Any], barriers: Iterable[Any], configuration: Any,
+                  damping: float) -> tuple[Array, Array]:
+    """Return A, b such that |A dq - b|^2 is pink's cost, with its damping as rows."""
+    n = configuration.model.nv
+    rows, sides, weights = [], [], [(damping, np.zeros(n))]
+    for task in tasks:
+        J, e = task.compute_jacobian(configuration), task.compute_error(configuration)
+        cost = np.broadcast_to(1.0 if task.cost is None else task.cost, len(e))
+        rows.append(cost[:, None] * J)
+        sides.append(-task.gain * cost * e)
+        weights.append((task.lm_damping * sides[-1] @ sides[-1], np.zeros(n)))
+    for barrier in barriers:
+        H, c = barrier.compute_qp_objective(configuration)
+        if H[0, 0] > 0.0:
+            weights.append((H[0, 0], -c / H[0, 0]))
+    for weight, centre in weights:
+        rows.append(np.sqrt(weight) * np.eye(n))
+        sides.append(np.sqrt(weight) * centre)
+    return np.vstack(rows), np.concatenate(sides)
+
+
+def exact(A: Array, b: Array, G: Array, h: Array, C: Array, d: Array, near: Array) -> Array:
+    """Return the x of least |A x - b| with G x <= h, C x = d, in extended precision.
+
+    Rows act that do at `near`; those with a multiplier of the wrong sign leave, exceeded ones
+    enter, one at a time. Augmented system: r = b - A x, A^T r = G^T y + C^T z.
+    """
+    scale = np.linalg.norm(G, axis=1)
+    G, h = G[scale > 0.0] / scale[scale > 0.0, None], h[scale > 0.0] / scale[scale > 0.0]
+    acting = list(np.flatnonzero(h - G @ near < 1e-9))
+    for _ in range(10 * len(h) + 10):
+        E, f = np.vstack([C, G[acting]]), np.concatenate([d, h[acting]])
+        m, n, k = len(b), A.shape[1], len(f)
+        K = np.block([[np.eye(m), A, np.zeros((m, k))], [A.T, np.zeros((n, n)), -E.T],
+                      [np.zeros((k, m)), E, np.zeros((k, k))]])
+        found = _eliminated(K, np.concatenate([b, np.zeros(n), f]))
+        x, y = found[m:m + n], found[m + n + len(d):]
+        over = G @ x - h
+        if acting and y.min() < -1e-15 * (1.0 + np.abs(b).max()):
+            acting.pop(int(np.argmin(y)))
+        elif over.size and over.max() > 1e-15:
+            acting.append(np.intp(np.argmax(over)))
+        else:
+            return np.asarray(x, dtype=float)
+    raise ArithmeticError("the active set did not settle")
+
+
+def _eliminated(K: Array, side: Array) -> NDArray[np.longdouble]:
+    """Return the solution of K x = side in extended precision; dependent rows have none of it."""
+    M = np.column_stack([K, side]).astype(np.longdouble)
+    size = len(side)
+    for i in range(size):
+        pivot = i + int(np.argmax(np.abs(M[i:, i])))
+        M[[i, pivot]] = M[[pivot, i]]
+        if abs(M[i, i]) > 1e-17:
+            M[i + 1:, i:] -= np.outer(M[i + 1:, i] / M[i, i], M[i, i:])
+    x = np.zeros(size, dtype=np.longdouble)
+    for i in range(size - 1, -1, -1):
+        if abs(M[i, i]) > 1e-17:
+            x[i] = (M[i, -1] - M[i, i + 1:-1] @ x[i + 1:]) / M[i, i]
+    return x
 
 
 @dataclass
-class Example:
-    """A configuration, its tasks, arguments of `solve_ik`, and how the targets move."""
+class Asked:
+    """What was asked in the ticks of one example: times [us] and differences [rad/s]."""
 
-    configuration: pink.Configuration
-    tasks: list[Any]
-    arguments: dict[str, Any]
-    move: Callable[[float], None]
+    ticks: int
+    every: int
+    theirs: list[float] = field(default_factory=list)
+    ours: list[float] = field(default_factory=list)
+    off: list[tuple[float, float, float]] = field(default_factory=list)
+    failed: str = ""
 
-
-def arm(model: str, tip: str, q: list[float], lm_damping: float = 0.0,
-        barriers: bool = False) -> Example:
-    """One hand follows a circle, with a weak posture: pink's examples of arms."""
-    robot = Robot.load(f"example_robot_data:{model}")
-    configuration = pink.Configuration(robot.model, robot.model.createData(), np.array(q))
-    hand = FrameTask(tip, position_cost=1.0, orientation_cost=1.0, lm_damping=lm_damping)
-    posture = PostureTask(cost=1e-3)
-    for task in (hand, posture):
-        task.set_target_from_configuration(configuration)
-    first = hand.transform_target_to_world.translation.copy()
-
-    def move(t: float) -> None:
-        turn = 0.1 * np.array([np.sin(t), 0.5 * np.sin(2.0 * t), 0.0])
-        hand.transform_target_to_world.translation[:] = first + turn
-
-    walls = [PositionBarrier(tip, indices=[1], p_min=np.array([first[1] - 0.02]),
-                             p_max=np.array([0.6]), gain=np.array([100.0]),
-                             safe_displacement_gain=1.0)]
-    return Example(configuration, [hand, posture], {"barriers": walls} if barriers else {}, move)
-
-
-def humanoid() -> Example:
-    """Feet stay, hands and pelvis move: pink's example of a humanoid."""
-    robot = Robot.load("example_robot_data:talos_reduced", base="floating")
-    q = robot.rest.copy()
-    for side in ("left", "right"):
-        for joint, angle in ((3, -0.45), (4, 0.9), (5, -0.45)):  # bent hip, knee and ankle
-            q[robot.coordinate(f"leg_{side}_{joint}_joint")] = angle
-        q[robot.coordinate(f"arm_{side}_4_joint")] = -1.0
-        q[robot.coordinate(f"arm_{side}_2_joint")] = 0.4 if side == "left" else -0.4
-    configuration = pink.Configuration(robot.model, robot.model.createData(), q)
-    tasks = [FrameTask(frame, position_cost=1.0, orientation_cost=1.0, lm_damping=1.0)
-             for frame in ("left_sole_link", "right_sole_link", "base_link",
-                           "wrist_left_ft_link", "wrist_right_ft_link")]
-    for task in (*tasks, posture := PostureTask(cost=1e-1)):
-        task.set_target_from_configuration(configuration)
-    first = tasks[2].transform_target_to_world.translation.copy()
-
-    def move(t: float) -> None:
-        tasks[2].transform_target_to_world.translation[:] = first + 0.03 * np.sin(t) * UP
-
-    return Example(configuration, [*tasks, posture], {"safety_break": False}, move)
-
-
-UP = np.array([0.0, 0.0, 1.0])
-UR5, PANDA = [0.0, -1.2, 1.6, -1.9, -1.57, 0.0], [0.0, -0.6, 0.0, -2.2, 0.0, 1.7, 0.8, 0.01, 0.01]
-EXAMPLES: dict[str, Callable[[], Example]] = {
-    "arm": lambda: arm("panda", "panda_hand_tcp", PANDA),
-    "arm, lm_damping": lambda: arm("ur5_robot", "tool0", UR5, lm_damping=1.0),
-    "arm, barrier": lambda: arm("ur5_robot", "tool0", UR5, barriers=True),
-    "humanoid": humanoid}
-
-
-def timed(example: Example, ticks: int, solver: str) -> tuple[np.ndarray, float]:
-    """Return times (ticks, 3) [us] of pink, of ours strict and in one level, and the difference.
-
-    The difference [rad/s] is that of the last from pink's answer, the largest of all ticks.
-    """
-    configuration, tasks, arguments = example.configuration, example.tasks, example.arguments
-    calls = (lambda: pink.solve_ik(configuration, tasks, PERIOD, solver, **arguments),
-             lambda: solve_ik(configuration, tasks, PERIOD, solver, **arguments),
-             lambda: solve_ik(configuration, [tasks], PERIOD, solver, **arguments))
-    times, apart = np.empty((ticks, 3)), 0.0
-    for call in calls:
-        call()
-    for k in range(ticks):
-        example.move(k * PERIOD)
-        answers: dict[int, Any] = {}
-        for i in np.roll(range(3), k).tolist():
+    def solve_ik(self, configuration: Any, tasks: Sequence[Any], dt: float, solver: str = "daqp",
+                 damping: float = 1e-12, limits: Any = None, barriers: Any = None,
+                 constraints: Any = None, safety_break: bool = True, **rest: Any) -> Array:
+        """Answer as pink with daqp, and compare with ours."""
+        tasks = list(tasks)
+        given = damping, limits, barriers, constraints, safety_break
+        calls = {"theirs": lambda: PINK(configuration, tasks, dt, "daqp", *given),
+                 "ours": lambda: solve_ik(configuration, [tasks], dt, "hcod", *given)}
+        order = list(calls)[::1 if len(self.ours) % 2 else -1]
+        answers = {}
+        if not self.ours:
+            calls["ours"]()
+        for name in order:
             start = perf_counter()
-            answers[i] = calls[i]()
-            times[k, i] = 1e6 * (perf_counter() - start)
-        apart = max(apart, float(np.abs(answers[2] - answers[0]).max()))
-        configuration.integrate_inplace(answers[0], PERIOD)
-    return times, apart
+            answers[name] = calls[name]()
+            getattr(self, name).append(1e6 * (perf_counter() - start))
+        if len(self.ours) % self.every == 1:
+            self.compare(configuration, tasks, dt, given, answers)
+        if len(self.ours) >= self.ticks:
+            raise Enough
+        return np.asarray(answers["theirs"])
+
+    def compare(self, configuration: Any, tasks: list[Any], dt: float, given: Any,
+                answers: dict[str, Array]) -> None:
+        """Note how far ours and pink's answer are from the minimum, and what rounding may do."""
+        damping, limits, barriers, constraints, _ = given
+        problem = pink.build_ik(configuration, tasks, dt, damping, limits, barriers, constraints)
+        A, b = least_squares(tasks, barriers or (), configuration, damping)
+        n = A.shape[1]
+        G, h = (problem.G, problem.h) if problem.G is not None else (np.empty((0, n)), np.empty(0))
+        C, d = (problem.A, problem.b) if problem.A is not None else (np.empty((0, n)), np.empty(0))
+        x = exact(A, b, G, h, C, d, dt * answers["ours"]) / dt
+        values = np.linalg.svd(A, compute_uv=False)
+        doubt = 2e-16 * (values[0] / values[-1]) ** 2 * np.abs(x).max()
+        self.off.append((float(np.abs(answers["ours"] - x).max()),
+                         float(np.abs(answers["theirs"] - x).max()), float(doubt)))
 
 
-def main(ticks: int = 1000, solver: str = "daqp") -> None:
-    """Print the table; solver : of pink, a name of qpsolvers."""
-    warnings.simplefilter("ignore")  # that hcod answers for a solver of qpsolvers
-    print("| example | pink [us] | strict [us] | one level [us] | ours in one level - pink |")
-    print("|---|---|---|---|---|")
-    for name, make in EXAMPLES.items():
-        times, apart = timed(make(), ticks, solver)
-        median, tail = np.median(times, axis=0), np.percentile(times, 95, axis=0)
-        cells = " | ".join(f"{m:.0f} ({t:.0f})" for m, t in zip(median, tail, strict=True))
-        said = f"{apart:.0e} rad/s" if apart < ANSWERS else f"{apart:.2g} rad/s"
-        print(f"| {name} | {cells} | {said} |")
+def _robot(name: str, root_joint: Any = None, **_: Any) -> Any:
+    """Stand in for robot_descriptions: the robot of example_robot_data."""
+    import pinocchio as pin
+
+    path = str(file_of(f"example_robot_data:{ROBOTS[name.removesuffix('_description')]}"))
+    model = pin.buildModelFromUrdf(path, *([] if root_joint is None else [root_joint]))
+    return SimpleNamespace(model=model, data=model.createData(), q0=pin.neutral(model),
+                           nv=model.nv,
+                           collision_model=MagicMock(), visual_model=MagicMock(), nq=model.nq)
+
+
+def run(path: Path, ticks: int, every: int) -> Asked:
+    """Run one example."""
+    asked = Asked(ticks, every)
+    with patch.object(pink, "solve_ik", asked.solve_ik), contextlib.redirect_stdout(io.StringIO()):
+        try:
+            runpy.run_path(str(path), run_name="__main__")
+        except Enough:
+            pass
+        except (Exception, SystemExit) as error:
+            asked.failed = f"{type(error).__name__}: {error}".splitlines()[0]
+    return asked
+
+
+def _stub() -> None:
+    """Take viewers, clocks and downloads out of the way of the examples."""
+    stubs = {name: MagicMock() for name in STUBBED}
+    stubs["loop_rate_limiters"].RateLimiter = lambda frequency=200.0, **_: SimpleNamespace(
+        period=1.0 / frequency, dt=1.0 / frequency, sleep=lambda: None)
+    stubs["robot_descriptions.loaders.pinocchio"].load_robot_description = _robot
+    sys.modules.update(stubs)
+
+
+def main() -> None:
+    """Print the table."""
+    _stub()
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("examples", type=Path)
+    parser.add_argument("--ticks", type=int, default=300)
+    parser.add_argument("--every", type=int, default=10, help="ticks between two exact minima")
+    parser.add_argument("--only", default="")
+    chosen = parser.parse_args()
+    sys.argv[1:] = []
+    warnings.simplefilter("ignore")
+    assert qpsolvers.available_solvers
+    print("| example | pink [us] | ours [us] | ours off | pink off | rounding of P |")
+    print("|---|---|---|---|---|---|")
+    for path in sorted(chosen.examples.rglob("*.py")):
+        if chosen.only not in str(path):
+            continue
+        asked = run(path, chosen.ticks, chosen.every)
+        name = path.relative_to(chosen.examples)
+        if not asked.off:
+            print(f"{name}: not run: {asked.failed}", file=sys.stderr)
+            continue
+        cells = [f"{np.median(t):.0f} ({np.percentile(t, 95):.0f})"
+                 for t in (asked.theirs, asked.ours)]
+        cells += [f"{worst:.0e}" for worst in np.max(asked.off, axis=0)]
+        print(f"| {name} | {' | '.join(cells)} | {asked.failed}", flush=True)
 
 
 if __name__ == "__main__":
-    typer.run(main)
+    main()

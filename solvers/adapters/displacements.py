@@ -11,32 +11,33 @@ from functools import partial
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hierarchy.errors import HierarchyError
 from hierarchy.gate import check_rows
 from hierarchy.problem import Array, Hierarchy
 from hierarchy.words import listed
 from solvers.adapters.packing import (
+    CONTRADICT,
     ODD,
-    damp,
-    narrow,
+    make_triangular,
     squared,
     write_bounds,
-    write_several,
+    write_limits,
+    write_pull,
     write_task,
 )
 
 _FLOAT = np.dtype(np.float64)
 _AXES = ("x", "y", "z", "about x", "about y", "about z")
-_NO_DAMPING = 1e-12  # pink's default, a regularisation of its QP that ours does not need
+_NO_DAMPING = 1e-12  # pink's default: a level above others leaves it out
 
 Names = Callable[[], Sequence[str]]
-Limit = tuple[Array, Array]  # G (k, n), h (k,)
+Solve = Callable[[Hierarchy], Array]
+Limit = tuple[str, Array, Array]  # its class, G (k, n), h (k,)
 
 
 class Task(Protocol):
-    """What a level needs of a task of pink or mink; `cost` is optional."""
+    """The part of a task of pink or mink that a level needs; `cost` is optional."""
 
     gain: float
 
@@ -60,14 +61,16 @@ class Pull(NamedTuple):
 
 def hierarchy(configuration: object, joints: Names, n: int, period: float,
               limits: Sequence[Limit], constraints: Sequence[Task],
-              tasks: Iterable[Task | Sequence[Task]], pull: Pull | None = None) -> Hierarchy:
+              tasks: Iterable[Task | Sequence[Task]], pull: Pull | None = None,
+              solve: Solve | None = None) -> Hierarchy:
     """Pack limits, constraints and tasks into levels, without the empty ones.
 
     n unknowns [rad/s or m/s], and a function that returns their names; period [s]. An entry of
     `tasks` is a task, or a sequence of tasks that share a level, weighted by their costs.
     Constraints have no cost, as in pink and mink.
-    Without `pull` a task's lm_damping is refused; with it, each level asks for no more than its
-    own damped step would reach.
+    Without `pull` a task's lm_damping is refused. With it, a level minimises |A x - b|^2 +
+    weight |x - centre|^2 within the levels above: the last one by n rows more, the others by
+    `solve`, after which they keep the A x that it reaches.
 
     Raises ContradictionError for limits of a joint that contradict each other.
     """
@@ -75,35 +78,39 @@ def hierarchy(configuration: object, joints: Names, n: int, period: float,
         raise HierarchyError(f"period {period} s must be positive and finite")
     entries = [entry if isinstance(entry, Sequence) else [entry] for entry in tasks]
     damped = pull is not None
-    levels = [(" + ".join(map(label, together)),
-               [_read(task, configuration, damped) for task in together]) for together in entries]
-    if constraints:
-        held = [_read(task, configuration, damped, weighted=False) for task in constraints]
-        levels.insert(0, ("constraints", held))
-    found = _Limits.of(limits, n, period, joints)
-    packed = _Packed(n, found.most + sum(len(one.e) for _, read in levels for one in read))
-    packed.keep("limits", found.write(packed))
-    for name, read in levels:
-        last = packed.write(read, period)
-        if pull is not None and name != "constraints":
-            packed.damp(last, sum(one.damping for one in read), pull)
-        packed.keep(name, last)
-    h = packed.hierarchy()
-    return h.changed(named=partial(_row_names, h, joints, [one for _, read in levels
-                                                           for one in read]))
+    held = [_read(task, configuration, damped, weighted=False) for task in constraints]
+    levels = [[_read(task, configuration, damped) for task in together] for together in entries]
+    read = [*held, *(one for level in levels for one in level)]
+    packed = _Packed(n, sum(len(one[2]) for one in limits) + sum(len(one.e) for one in read)
+                     + 2 * n)
+    packed.keep("limits", packed.limit(limits, period, joints))
+    packed.keep("constraints", packed.write(held, period))
+    for level in levels:
+        if packed.damped and any(one.cost.any() for one in level):
+            packed.hold(solve, period)
+        last = packed.write(level, period)
+        if pull is not None and last > packed.rows:
+            last = packed.damp(last, level, pull)
+        packed.keep(" + ".join([label(one.task) for one in level]), last)
+    return packed.hierarchy(partial(_row_names, packed, joints, limits, read))
 
 
 class ContradictionError(HierarchyError):
     """Limits of one joint that no velocity meets."""
 
 
-def _row_names(h: Hierarchy, joints: Names,
+def _row_names(packed: _Packed, joints: Names, limits: Sequence[Limit],
                read: Sequence[_Read]) -> tuple[str, ...]:
-    """Name each row by its joint if it concerns only one, else by its task."""
+    """Name each row: by its joint if it is about a single one, else by its limit or task."""
     known = list(joints())
-    of_tasks = [name for one in read for name in _names_of(one)]
-    rows = [""] * (h.m - len(of_tasks)) + of_tasks
-    for i, (row, name) in enumerate(zip(h.A, rows, strict=True)):
+    above, free = (packed.sizes[0] if packed.names[:1] == ["limits"] else 0), packed.rows
+    free -= packed.sizes[-1] if packed.damped else 0
+    of_tasks = [name for one in read for name in _names_of(one)][:free - above]
+    of_limits = [f"{name}, row {i}" for name, G, h in limits for i, side in enumerate(h)
+                 if side < np.inf and np.count_nonzero(G[i]) != 1]
+    rows = of_limits + [""] * (above - len(of_limits)) + of_tasks
+    rows += [f"{packed.names[-1]}, row {i}" for i in range(packed.rows - free)]
+    for i, (row, name) in enumerate(zip(packed.A, rows, strict=False)):
         of_row = [known[c] for c in np.flatnonzero(row)]
         if not name or (len(of_row) == 1 and name.startswith("row ")):
             rows[i] = listed(of_row) if of_row else "no joint"
@@ -124,6 +131,8 @@ class _Packed:
     def __init__(self, n: int, most: int) -> None:
         self.A, (self.lower, self.upper) = np.empty((most, n)), np.empty((2, most))
         self.reference, self.rows = np.zeros(n), 0
+        self.damped: Sequence[_Read] = ()  # the tasks of the last level, if it weighs the step
+        self.weight = 0.0                  # that weight
         self.names: list[str] = []
         self.sizes: list[int] = []
 
@@ -134,6 +143,25 @@ class _Packed:
             self.names.append(f"{name} ({again + 1})" if again else name)
             self.sizes.append(last - self.rows)
             self.rows = last
+
+    def limit(self, limits: Sequence[Limit], period: float, joints: Names) -> int:
+        """Write the rows G x <= h / period from row 0 on: one for a joint, after all others.
+
+        Returns their number. Raises HierarchyError for numbers that are not finite, or contradict.
+        """
+        n, row = len(self.reference), 0
+        lower, upper = _filled(n, -np.inf), _filled(n, np.inf)
+        given = [(name, _plain(G), _plain(h)) for name, G, h in limits]
+        for name, G, h in given:
+            _check_fit(name, G, h, n)
+            row = int(write_limits(G, h, period, lower, upper, self.A, self.lower, self.upper, row))
+            if row == ODD:
+                check_rows(name, G, _filled(len(h), -np.inf), h)
+        last = int(write_bounds(lower, upper, self.A, self.lower, self.upper, row))
+        if last == CONTRADICT:
+            i = int(np.flatnonzero(lower > upper)[0])
+            raise _contradiction(given, n, period, i, joints()[i])
+        return last
 
     def write(self, read: Sequence[_Read], period: float) -> int:
         """Write the rows of tasks that share a level; return the row after them."""
@@ -149,73 +177,61 @@ class _Packed:
             row = int(found)
         return row
 
-    def damp(self, last: int, own: float, pull: Pull) -> None:
-        """Reduce the targets of the rows up to `last` to what a damped step reaches.
+    def damp(self, last: int, level: Sequence[_Read], pull: Pull) -> int:
+        """Weigh the step in the level that ends before row `last`; return the row after it.
 
-        They ask for A x of the x that minimises |A x - b|^2 + own |x|^2 + the pull. That x alone
-        meets them, as in pink, and their null space is left to the levels below; a strict level
-        cannot weigh its own step against its target.
+        n rows then stand for all of the level: what its best x misses says nothing of that x.
         """
-        weight = own + pull.weight
-        if weight > _NO_DAMPING:
-            if pull.weight > 0.0:
-                self.reference = pull.weight / weight * pull.centre
-            damp(self.A, self.lower, self.upper, weight, self.reference, self.rows, last)
+        weight = sum(one.damping for one in level) + pull.weight
+        if weight == 0.0:
+            return last
+        n = len(self.reference)
+        self.damped, self.weight = level, weight
+        write_pull(self.A, self.lower, self.upper, weight, pull.weight / weight * pull.centre, last)
+        make_triangular(self.A, self.lower, self.upper, self.rows, last + n)
+        return self.rows + n
 
-    def hierarchy(self) -> Hierarchy:
+    def hold(self, solve: Solve | None, period: float) -> None:
+        """Make the last level, which weighs its step, ask for what it then reaches."""
+        x = None
+        if self.weight > _NO_DAMPING:
+            if solve is None:
+                raise HierarchyError(f"{self.names[-1]}: damped, and not the last level: what it "
+                                     "leaves to the levels below needs a resolver")
+            x = solve(self.hierarchy())
+        first = self.rows = self.rows - self.sizes.pop()
+        name, last = self.names.pop(), self.write(self.damped, period)
+        self.damped = ()
+        if x is not None:
+            self.lower[first:last] = self.upper[first:last] = self.A[first:last] @ x
+        self.keep(name, last)
+
+    def hierarchy(self, named: Callable[[], tuple[str, ...]] | None = None) -> Hierarchy:
         """Return the levels; a level is named like another one with a number."""
         m = self.rows
         return Hierarchy.trusted(self.A[:m], self.lower[:m], self.upper[:m], self.sizes,
-                                 self.reference, self.names)
+                                 self.reference, self.names, named=named)
 
 
-class _Limits(NamedTuple):
-    """Rows G x <= h / period, sorted: bounds of single unknowns, and marks of the other rows."""
-
-    lower: Array
-    upper: Array
-    pairs: list[Limit]
-    several: list[NDArray[np.bool_]]
-    left: int
-    period: float
-
-    @classmethod
-    def of(cls, limits: Iterable[Limit], n: int, period: float,
-           joints: Names) -> _Limits:
-        """Sort rows; raises HierarchyError for numbers that are not finite, or contradict."""
-        pairs = [(_plain(G), _plain(h)) for G, h in limits]
+def _contradiction(limits: Sequence[Limit], n: int, period: float, i: int,
+                   joint: str) -> ContradictionError:
+    """Return the error that names the two limits that leave unknown i no value."""
+    lows, highs = [], []
+    for name, G, h in limits:
         lower, upper = _filled(n, -np.inf), _filled(n, np.inf)
-        several, left = [np.empty(len(h), np.bool_) for _, h in pairs], 0
-        for (G, h), mark in zip(pairs, several, strict=True):
-            _check_fit("limits", G, h, n)
-            found = narrow(G, h, period, lower, upper, mark)
-            if found == ODD:
-                check_rows("limits", G, np.full(len(h), -np.inf), h)
-            left += int(found)
-        for i in np.flatnonzero(lower > upper)[:1]:
-            raise ContradictionError(
-                f"limits cannot all hold: joint {joints()[i]} must move by at least "
-                f"{lower[i]:.4g} and at most {upper[i]:.4g} rad/s or m/s; a joint outside its "
-                "range needs a velocity limit that lets it come back within the period")
-        return cls(lower, upper, pairs, several, left, period)
-
-    @property
-    def most(self) -> int:
-        """The largest number of rows that `write` may write."""
-        return self.left + 2 * len(self.lower)
-
-    def write(self, packed: _Packed) -> int:
-        """Write all rows from row 0 on, and return how many."""
-        row = write_bounds(self.lower, self.upper, packed.A, packed.lower, packed.upper)
-        for (G, h), mark in zip(self.pairs, self.several, strict=True):
-            if self.left:
-                row = write_several(G, h, self.period, mark, packed.A, packed.lower, packed.upper,
-                                    row)
-        return int(row)
+        spare = np.empty((len(h), n)), np.empty(len(h)), np.empty(len(h))
+        write_limits(G, h, period, lower, upper, *spare, 0)
+        lows.append((float(lower[i]), name))
+        highs.append((float(upper[i]), name))
+    (low, demands), (high, allows) = max(lows), min(highs)
+    return ContradictionError(
+        f"limits cannot all hold: joint {joint} must move by at least {low:.4g} ({demands}) and at "
+        f"most {high:.4g} rad/s or m/s ({allows}); a joint outside its range needs a velocity "
+        "limit that lets it come back within the period")
 
 
 class _Read(NamedTuple):
-    """The data of a task: J (k, n), e (k,), cost (k,), gain, and the weight of its lm_damping."""
+    """What a task says: J (k, n), e (k,), cost (k,), gain, and the weight of its lm_damping."""
 
     task: Task
     J: Array
@@ -235,6 +251,8 @@ def _read(task: Task, configuration: object, damped: bool, weighted: bool = True
                              "own step, which a strict level cannot; set it to 0 and use the "
                              "damping of the resolver")
     J, e = _plain(task.compute_jacobian(configuration)), _plain(task.compute_error(configuration))
+    if J.ndim == 1 and e.ndim == 1 and J.size == e.size:
+        J = J.reshape(-1, 1)  # as pinocchio returns the Jacobian of a single joint
     cost = costs(task, len(e)) if weighted else _filled(len(e), 1.0)
     gain = float(task.gain)
     return _Read(task, J, e, cost, gain, lm * gain * gain * squared(cost, e) if lm else 0.0)
@@ -285,18 +303,6 @@ def _filled(size: int, value: float) -> Array:
     filled = np.empty(size)
     filled.fill(value)
     return filled
-
-
-def limit_level(limits: Iterable[Limit], n: int, period: float) -> tuple[Array, Array, Array]:
-    """Pack rows G x <= h / period into one level A (k, n), lower (k,), upper (k,).
-
-    Rows on a single joint become bounds of that joint; ContradictionError if no value meets them.
-    Rows with infinite h are left out.
-    """
-    found = _Limits.of(limits, n, period, lambda: [str(i) for i in range(n)])
-    packed = _Packed(n, found.most)
-    row = found.write(packed)
-    return packed.A[:row], packed.lower[:row], packed.upper[:row]
 
 
 def label(task: object) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterable, Sequence
-from functools import cache
+from functools import cache, partial
 from pkgutil import iter_modules
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +12,7 @@ import numpy as np
 
 from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array, Hierarchy
+from hierarchy.words import listed
 from solvers.adapters.displacements import ContradictionError, Task
 from solvers.adapters.from_pink import hierarchy
 from solvers.adapters.packing import largest_violation
@@ -41,9 +42,9 @@ def solve_ik(configuration: Configuration, tasks: Iterable[Task | Sequence[Task]
     dt : period [s].
     solver : the name of a resolver of this package, or a resolver. The name of a solver of
         qpsolvers is accepted: `hcod` answers in its place, and a warning says so once.
-    damping, and lm_damping of a task, and safe_displacement_gain of a barrier: as in pink while no
-        limit acts, level by level. Up to 1e-12, pink's default, it is off: of all velocities that
-        serve the tasks equally well the shortest is returned.
+    damping, and lm_damping of a task, and safe_displacement_gain of a barrier: as in pink, within
+        the levels above. A level above others is exact up to 1e-12, pink's default; if its weights
+        are more it keeps what it reaches, which is one solve more.
     limits, barriers, constraints : as in pink. They come first, and must hold to `tolerance`
         [rad/s, or the unit of the row].
     of_the_solver : settings of the resolver; those of a solver of qpsolvers have no effect.
@@ -59,10 +60,16 @@ def solve_ik(configuration: Configuration, tasks: Iterable[Task | Sequence[Task]
     configuration.check_limits(safety_break=safety_break)
     if not 0.0 <= damping < np.inf:
         raise HierarchyError(f"damping {damping} must not be negative")
+    solve = partial(_solved, resolver, tolerance)
     try:
-        h = hierarchy(configuration, tasks, dt, limits, barriers, constraints, damping)
+        return solve(hierarchy(configuration, tasks, dt, limits, barriers, constraints, damping,
+                               solve))
     except ContradictionError as error:
         raise _no_solution(None, None, str(error)) from error
+
+
+def _solved(resolver: Resolver, tolerance: float, h: Hierarchy) -> Array:
+    """Return x; raises NoSolutionFound unless limits and constraints hold."""
     resolution = resolver.solve(h)
     if resolution.status is not Status.SOLVED:
         raise _no_solution(h, resolution, f"{resolver.name}: {resolution.status}")
@@ -104,9 +111,16 @@ def _check_held(h: Hierarchy, resolution: Resolution, tolerance: float) -> None:
             return
         beyond = largest_violation(h.A, h.lower, h.upper, resolution.x, first, first + size)
         if beyond > tolerance:
-            raise _no_solution(h, resolution, f"the {name} cannot all hold: they are violated by "
-                                              f"at least {beyond:.3g}")
+            raise _no_solution(h, resolution, _conflict(h, resolution.x, name, first, first + size,
+                                                        tolerance))
         first += size
+
+
+def _conflict(h: Hierarchy, x: Array, name: str, first: int, last: int, tolerance: float) -> str:
+    """Say which rows contradict each other: where |misses| is least, those that miss."""
+    misses, names = np.abs(h.slacks(x)), h.named() if h.named else ()
+    rows = [f"{names[i]} by {misses[i]:.3g}" for i in range(first, last) if misses[i] > tolerance]
+    return f"the {name} cannot all hold; at best these are violated: {listed(rows)}"
 
 
 def _no_solution(h: Hierarchy | None, resolution: Resolution | None, text: str) -> Exception:

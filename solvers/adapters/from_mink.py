@@ -6,9 +6,11 @@ from collections.abc import Iterable, Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from hierarchy.problem import Hierarchy
 from solvers.adapters import displacements
-from solvers.adapters.displacements import Task
+from solvers.adapters.displacements import Pull, Solve, Task
 
 if TYPE_CHECKING:
     from mink import Configuration, Limit
@@ -17,29 +19,33 @@ if TYPE_CHECKING:
 
 def hierarchy(configuration: Configuration, tasks: Iterable[Task | Sequence[Task]], dt: float,
               limits: Iterable[Limit] | None = None,
-              constraints: Iterable[Task] | None = None) -> Hierarchy:
+              constraints: Iterable[Task] | None = None, damping: float | None = None,
+              solve: Solve | None = None) -> Hierarchy:
     """Return the problem of `mink.build_ik` as levels: limits, constraints, then the tasks.
 
     The unknown is the velocity (nv,); dt [s]. The order of `tasks` is their priority; an entry may
     be a sequence of tasks that share a level, weighted by their costs. Without `limits` the joint
     ranges of the model are used, as in mink.
 
+    damping, solve : as `solvers.adapters.from_pink.hierarchy` takes them.
+
     Raises
     ------
     HierarchyError : limits of a joint that contradict each other (ContradictionError), as when it
-        is further outside its range than its velocity limit makes good in dt; lm_damping, or a task
-        without error and Jacobian (the kinetic-energy regularisation): both are weights against all
-        tasks, which a strict order has no place for.
+        is further outside its range than its velocity limit makes good in dt; lm_damping without
+        `damping`, or a task without error and Jacobian (the kinetic-energy regularisation).
     """
     if limits is None:
         from mink import ConfigurationLimit
 
         limits = [ConfigurationLimit(configuration.model)]
-    found = [limit.compute_qp_inequalities(configuration, dt) for limit in limits]
-    pairs = [(one.G, one.h) for one in found if not one.inactive]
-    return displacements.hierarchy(configuration, partial(_joints, configuration.model),
-                                   configuration.model.nv, dt, pairs, list(constraints or ()),
-                                   tasks)
+    found = [(type(limit).__name__, limit.compute_qp_inequalities(configuration, dt))
+             for limit in limits]
+    given = [(name, one.G, one.h) for name, one in found if not one.inactive]
+    n = configuration.model.nv
+    pull = None if damping is None else Pull(damping, np.zeros(n))
+    return displacements.hierarchy(configuration, partial(_joints, configuration.model), n, dt,
+                                   given, list(constraints or ()), tasks, pull, solve)
 
 
 def _joints(model: MjModel) -> list[str]:

@@ -119,16 +119,19 @@ def hierarchy(configuration: Configuration,
               tasks: Iterable[displacements.Task | Sequence[displacements.Task]], dt: float,
               limits: Iterable[Limit] | None = None, barriers: Iterable[Barrier] | None = None,
               constraints: Iterable[displacements.Task] | None = None,
-              damping: float | None = None) -> Hierarchy:
+              damping: float | None = None,
+              solve: displacements.Solve | None = None) -> Hierarchy:
     """Return the problem of `pink.build_ik` as levels: limits, constraints, then the tasks.
 
     The unknown is the velocity (n,); dt [s]. The order of `tasks` is their priority; an entry may
     be a sequence of tasks that share a level, weighted by their costs. Without `limits` those of
     the model are used, as in pink. Barriers are rows of the level of limits.
 
-    damping : None for exact levels. With a number, pink's damping, a task's lm_damping and a
-        barrier's safe_displacement_gain act on each level as they do on pink's only one: the level
-        asks for what its own step, damped by them, would reach.
+    damping : None for exact levels. With a number, a level minimises pink's cost of its tasks
+        within the levels above: damping, a task's lm_damping and a barrier's
+        safe_displacement_gain weigh the step, and are n rows more in the last level.
+    solve : returns the x (n,) of a hierarchy; needed if a level before the last one is damped,
+        since it keeps what it reaches.
 
     Raises
     ------
@@ -136,10 +139,9 @@ def hierarchy(configuration: Configuration,
         `damping`, for lm_damping and safe_displacement_gain: both are weights
         against all tasks, which exact levels have no place for.
     """
-    found = [limit.compute_qp_inequalities(configuration, dt)
-             for limit in (_limits_of_model(configuration) if limits is None else limits)]
     given, n = list(barriers or ()), configuration.model.nv
-    found += [barrier.compute_qp_inequalities(configuration, dt) for barrier in given]
+    found = [(type(one).__name__, one.compute_qp_inequalities(configuration, dt))
+             for one in (*(_limits_of_model(configuration) if limits is None else limits), *given)]
     pull = None if damping is None else displacements.Pull(damping, np.zeros(n))
     for barrier in given:
         if barrier.safe_displacement_gain and pull is None:
@@ -150,8 +152,8 @@ def hierarchy(configuration: Configuration,
             H, c = barrier.compute_qp_objective(configuration)
             pull = _pulled(pull, H, c, dt)
     return displacements.hierarchy(configuration, partial(_joints, configuration.model), n, dt,
-                                   [pair for pair in found if pair is not None],
-                                   list(constraints or ()), tasks, pull)
+                                   [(name, *pair) for name, pair in found if pair is not None],
+                                   list(constraints or ()), tasks, pull, solve)
 
 
 def _joints(model: Any) -> list[str]:

@@ -11,20 +11,20 @@ from __future__ import annotations
 import numpy as np
 
 from hierarchy.jit import compiled
+from solvers.kernels.tableau import reflect_columns
 
-ODD = -1  # returned for rows with numbers that are not finite, apart from missing limits
+ODD = -1         # returned for rows with numbers that are not finite, apart from missing limits
+CONTRADICT = -2  # returned for bounds that no value meets
 
 
 @compiled
-def narrow(G, h, period, lower, upper, several):
-    """Narrow the bounds lower, upper (n,) by the rows G x <= h / period on single unknowns.
+def write_limits(G, h, period, lower, upper, A, low, up, row):
+    """Write the rows G x <= h / period on several unknowns from `row` on.
 
-    `several` (k,) marks the rows on several unknowns, whose number is returned. Rows with infinite
-    h are no limits.
+    Rows on a single one narrow its bounds lower, upper (n,); rows with infinite h are no limits.
+    Returns the row after them, or ODD.
     """
-    left = 0
     for i in range(len(h)):
-        several[i] = False
         if np.isnan(h[i]) or h[i] == -np.inf:
             return ODD
         if h[i] == np.inf:
@@ -36,22 +36,26 @@ def narrow(G, h, period, lower, upper, several):
             if G[i, c] != 0.0:
                 unknown, count = c, count + 1
         if count != 1:
-            several[i] = True
-            left += 1
-            continue
-        side = h[i] / period / G[i, unknown]
-        if G[i, unknown] > 0.0:
-            upper[unknown] = min(upper[unknown], side)
+            for c in range(A.shape[1]):
+                A[row, c] = G[i, c]
+            low[row], up[row] = -np.inf, h[i] / period
+            row += 1
+        elif G[i, unknown] > 0.0:
+            upper[unknown] = min(upper[unknown], h[i] / period / G[i, unknown])
         else:
-            lower[unknown] = max(lower[unknown], side)
-    return left
+            lower[unknown] = max(lower[unknown], h[i] / period / G[i, unknown])
+    return row
 
 
 @compiled
-def write_bounds(lower, upper, A, low, up):
-    """Write the bounds that exist as rows of the identity from row 0 on; return how many."""
-    row = 0
+def write_bounds(lower, upper, A, low, up, row):
+    """Write the bounds that exist as rows of the identity from `row` on.
+
+    Returns the row after them, or CONTRADICT.
+    """
     for c in range(len(lower)):
+        if lower[c] > upper[c]:
+            return CONTRADICT
         if lower[c] == -np.inf and upper[c] == np.inf:
             continue
         for j in range(A.shape[1]):
@@ -59,18 +63,6 @@ def write_bounds(lower, upper, A, low, up):
         A[row, c] = 1.0
         low[row], up[row] = lower[c], upper[c]
         row += 1
-    return row
-
-
-@compiled
-def write_several(G, h, period, several, A, low, up, row):
-    """Write the marked rows of G x <= h / period from `row` on; return the row after them."""
-    for i in range(len(h)):
-        if several[i]:
-            for c in range(A.shape[1]):
-                A[row, c] = G[i, c]
-            low[row], up[row] = -np.inf, h[i] / period
-            row += 1
     return row
 
 
@@ -117,33 +109,30 @@ def squared(cost, e):
 
 
 @compiled
-def damp(A, b, upper, weight, centre, first, last):
-    """Replace b and upper of the rows from first to last by A x, x the minimum of a damped cost.
-
-    The cost is |A x - b|^2 + weight |x - centre|^2, and A x = b - weight y with
-    (A A^T + weight 1) y = b - A centre.
-    """
-    k = last - first
-    L, y = np.empty((k, k)), np.empty(k)
-    for i in range(k):
-        y[i] = b[first + i]
+def write_pull(A, lower, upper, weight, centre, row):
+    """Write sqrt(weight) x = sqrt(weight) centre from `row` on."""
+    root = np.sqrt(weight)
+    for i in range(len(centre)):
         for c in range(A.shape[1]):
-            y[i] -= A[first + i, c] * centre[c]
-        for j in range(i + 1):
-            total = weight if i == j else 0.0
-            for c in range(A.shape[1]):
-                total += A[first + i, c] * A[first + j, c]
-            for c in range(j):
-                total -= L[i, c] * L[j, c]
-            L[i, j] = np.sqrt(max(total, weight)) if i == j else total / L[j, j]
-    for i in range(k):
-        for c in range(i):
-            y[i] -= L[i, c] * y[c]
-        y[i] /= L[i, i]
-    for i in range(k - 1, -1, -1):
-        for c in range(i + 1, k):
-            y[i] -= L[c, i] * y[c]
-        y[i] /= L[i, i]
-    for i in range(k):
-        b[first + i] -= weight * y[i]
-        upper[first + i] = b[first + i]
+            A[row + i, c] = root if c == i else 0.0
+        lower[row + i] = upper[row + i] = root * centre[i]
+
+
+@compiled
+def make_triangular(A, lower, upper, first, last):
+    """Replace the rows A x = lower from first to last, of rank n, by n rows from `first` on.
+
+    |A x - lower|^2 of the new ones is less by what no x can change.
+    """
+    m, n = last - first, A.shape[1]
+    M, total = np.empty((m, n + 1)), np.empty(n + 1)
+    for i in range(m):
+        for c in range(n):
+            M[i, c] = A[first + i, c]
+        M[i, n] = lower[first + i]
+    for k in range(n):
+        reflect_columns(M, k, m, k, k + 1, total)
+    for i in range(n):
+        for c in range(n):
+            A[first + i, c] = M[i, c] if c >= i else 0.0
+        lower[first + i] = upper[first + i] = M[i, n]

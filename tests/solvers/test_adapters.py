@@ -10,7 +10,6 @@ from hierarchy import Hierarchy, HierarchyError, Robot, Stack, State
 from hierarchy.tasks import Position
 from solvers import make
 from solvers.adapters import displacements, from_mink, from_pink
-from solvers.adapters.displacements import limit_level
 from solvers.adapters.for_pink import solve_ik
 from solvers.adapters.from_pink import PinkTask
 from solvers.adapters.from_pink import hierarchy as pink_hierarchy
@@ -76,18 +75,107 @@ def speed_of(task, configuration, v):
     return asked, task.compute_jacobian(configuration) @ v
 
 
-@pytest.mark.parametrize("together", [True, False], ids=["hand and posture", "hand"])
-def test_one_level_within_limits_is_what_pink_finds_without_its_damping(configuration, together):
+def arm_scene(configuration, shift=(0.05, 0.02, -0.03), lm_damping=0.0, cost=1e-3, **arguments):
+    hand = frame_task(configuration, shift=shift)
+    hand.lm_damping = lm_damping
+    return configuration, [hand, posture_task(Q + 0.3, cost)], arguments
+
+
+def wall(configuration, room, gain, safe):
+    from pink.barriers import PositionBarrier
+
+    class Backing(PositionBarrier):
+        def compute_safe_displacement(self, configuration):
+            return np.linspace(-0.01, 0.01, 7)
+
+    here = configuration.get_transform_frame_to_world("end_effector").translation
+    return Backing("end_effector", indices=[0], p_max=here[:1] + room, gain=gain,
+                   safe_displacement_gain=safe)
+
+
+def humanoid_scene(_):
+    import pink
+    import pinocchio as pin
+    from pink.tasks import ComTask
+
+    robot = Robot.named("humanoid")
+    configuration = pink.Configuration(robot.model, robot.model.createData(), robot.rest)
+    feet = [frame_task(configuration, foot, (0.0, 0.0, 0.0), 0.0, 1.0, 200.0, 1.0)
+            for foot in ("left_foot", "right_foot")]
+    com = ComTask(cost=1.0, lm_damping=1.0)
+    com.set_target(pin.centerOfMass(robot.model, robot.model.createData(), robot.rest)
+                   + np.array([0.03, 0.0, -0.05]))
+    return configuration, [*feet, com, posture_task(robot.rest, cost=1e-2)], {}
+
+
+SCENES = {
+    "limits act": lambda c: arm_scene(c, cost=0.1),
+    "limits act, lm_damping": lambda c: arm_scene(c, lm_damping=1.0),
+    "damping": lambda c: arm_scene(c, damping=1e-2),
+    "no limits, little damping": lambda c: arm_scene(c, lm_damping=50.0, damping=1e-3, limits=[]),
+    "barrier": lambda c: arm_scene(c, barriers=[wall(c, 1e-3, 1.0, 0.0)]),
+    "barrier with a safe displacement": lambda c: arm_scene(c, barriers=[wall(c, 1e-3, 9.0, 0.7)]),
+    "one row": lambda c: (c, [posture_task(Q + 0.1)], {}),
+    "humanoid": humanoid_scene}
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_one_level_is_the_exact_minimum_of_pinks_cost_under_its_limits(configuration, scene):
     import pink
 
-    pytest.importorskip("quadprog")
-    tasks = [frame_task(configuration), *([posture_task(Q + 0.3)] if together else [])]
-    ours = solve_ik(configuration, [tasks], DT)
-    assert (np.abs(np.abs(ours) - configuration.model.velocityLimit) < 1e-9).any()  # limits act
-    off = {damping: np.abs(pink.solve_ik(configuration, tasks, DT, "quadprog", damping=damping)
-                           - ours).max() for damping in (1e-5, 1e-6, 1e-12)}
-    assert off[1e-12] < 1e-9
-    assert off[1e-6] == pytest.approx(off[1e-5] / 10.0, rel=0.05)  # the rest is pink's damping
+    from benchmark.studies.pink_examples import exact, least_squares
+
+    configuration, tasks, arguments = SCENES[scene](configuration)
+    ours = solve_ik(configuration, [tasks], DT, **arguments)
+    problem = pink.build_ik(configuration, tasks, DT, **arguments)
+    damping, n = arguments.get("damping", 1e-12), len(ours)
+    A, b = least_squares(tasks, arguments.get("barriers", ()), configuration, damping)
+    np.testing.assert_allclose(A.T @ A, problem.P, rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(-A.T @ b, problem.q, rtol=1e-9, atol=1e-9)
+    none = np.empty((0, n)), np.empty(0)
+    G, h = none if problem.G is None else (problem.G, problem.h)
+    np.testing.assert_allclose(ours, exact(A, b, G, h, *none, DT * ours) / DT, atol=1e-7)
+    if "limits act" in scene:
+        assert (np.abs(np.abs(ours) - configuration.model.velocityLimit) < 1e-9).any()
+
+
+def test_a_damped_level_above_others_keeps_what_it_reaches_within_the_limits(configuration):
+    hand, rest = frame_task(configuration, orientation=0.0), posture_task(Q - 0.2, 1.0)
+    hand.lm_damping = 10.0
+    alone = solve_ik(configuration, [hand], DT)
+    assert (np.abs(np.abs(alone) - configuration.model.velocityLimit) < 1e-9).any()
+    both = solve_ik(configuration, [hand, rest], DT)
+    J = hand.compute_jacobian(configuration)[:3]
+    np.testing.assert_allclose(J @ both, J @ alone, atol=1e-9)
+    assert np.abs(both - alone).max() > 1e-3
+    with pytest.raises(HierarchyError, match="FrameTask of end_effector: damped, and not the last"):
+        pink_hierarchy(configuration, [hand, rest], DT, damping=0.0)
+    hand.lm_damping = 0.0  # with pink's default no level but the last is damped
+    h = pink_hierarchy(configuration, [hand, rest], DT, damping=1e-12)
+    np.testing.assert_array_equal(h.sizes, [7, 3, 7])
+    assert h.named()[7:10] == ("end_effector x", "end_effector y", "end_effector z")
+
+
+def limit(*rows):
+    """Rows of a limit on seven joints: joint, coefficient, bound of the step [rad]."""
+    G = np.zeros((len(rows), 7))
+    for i, (joint, coefficient, _) in enumerate(rows):
+        G[i, joint] = coefficient
+    return SimpleNamespace(compute_qp_inequalities=lambda *_: (G, np.array([r[2] for r in rows])))
+
+
+def test_limits_that_contradict_each_other_are_no_solution_and_named(configuration):
+    from pink.exceptions import NoSolutionFound
+    from pink.limits import VelocityLimit
+
+    slow, hand = VelocityLimit(configuration.model, np.full(7, 0.01)), [frame_task(configuration)]
+    with pytest.raises(NoSolutionFound, match=r"joint joint_3 must move by at least 100 "
+                       r"\(SimpleNamespace\) and at most 0.01 rad/s or m/s \(VelocityLimit\)"):
+        solve_ik(configuration, hand, DT, limits=[slow, limit((0, 1.0, 3.0), (2, -1.0, -1.0))])
+    sums = SimpleNamespace(compute_qp_inequalities=lambda *_: (-np.ones((1, 7)), [-0.01]))
+    with pytest.raises(NoSolutionFound, match=r"limits cannot all hold; at best these are violated:"
+                       r" SimpleNamespace, row 0 by .*joint_1 by"):
+        solve_ik(configuration, hand, DT, limits=[slow, sums])
 
 
 def test_of_two_tasks_in_conflict_the_first_is_served_exactly_and_in_pink_neither_is(configuration):
@@ -128,30 +216,6 @@ def test_constraints_of_pink_hold_before_all_tasks_and_without_costs(configurati
     np.testing.assert_allclose(ours, theirs, atol=1e-4)
 
 
-def test_a_barrier_of_pink_is_a_row_of_the_first_level(configuration):
-    import pink
-    from pink.barriers import PositionBarrier
-
-    here = configuration.get_transform_frame_to_world("end_effector").translation
-    barrier = PositionBarrier("end_effector", indices=[0], p_max=here[:1] + 1e-3, gain=1.0)
-    hand = frame_task(configuration, shift=(0.01, 0.0, 0.0), turn=0.0)
-    ours = solve_ik(configuration, [[hand, posture_task(Q)]], DT, barriers=[barrier])
-    theirs = pink.solve_ik(configuration, [hand, posture_task(Q)], DT, "daqp", barriers=[barrier])
-    np.testing.assert_allclose(ours, theirs, atol=1e-6)
-    G, h = barrier.compute_qp_inequalities(configuration, DT)
-    assert (G @ ours * DT)[0] == pytest.approx(h[0])
-
-
-def test_limits_that_cannot_hold_are_no_solution_and_say_so(configuration):
-    from pink.exceptions import NoSolutionFound
-    from pink.limits import VelocityLimit
-
-    slow = VelocityLimit(configuration.model, np.full(7, 0.01))
-    away = SimpleNamespace(compute_qp_inequalities=lambda *_: (-np.eye(7)[:1], np.array([-1.0])))
-    with pytest.raises(NoSolutionFound, match="limits cannot all hold"):
-        solve_ik(configuration, [frame_task(configuration)], DT, limits=[slow, away])
-
-
 def test_a_configuration_outside_its_limits_is_refused_as_in_pink(robot):
     import pink
 
@@ -174,23 +238,6 @@ def test_weights_against_all_tasks_are_refused_where_levels_are_exact(configurat
         pink_hierarchy(configuration, [posture_task(Q)], DT, barriers=[barrier])
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(("damping", "lm_damping"), [(1e-2, 0.0), (0.0, 3.0), (1e-3, 50.0)])
-def test_damping_does_what_it_does_in_pink_while_no_limit_acts(configuration, damping, lm_damping):
-    import pink
-
-    pytest.importorskip("quadprog")
-    hand, posture = frame_task(configuration, shift=(0.02, 0.01, 0.0)), posture_task(Q + 0.1)
-    hand.lm_damping = lm_damping
-    for tasks in ([hand], [hand, posture]):
-        ours = solve_ik(configuration, [tasks], DT, "hcod", damping, limits=[])
-        theirs = pink.solve_ik(configuration, tasks, DT, "quadprog", damping or 1e-12, limits=[])
-        undamped = solve_ik(configuration, [[frame_task(configuration, shift=(0.02, 0.01, 0.0)),
-                                             *tasks[1:]]], DT, limits=[])
-        np.testing.assert_allclose(ours, theirs, atol=1e-7)
-        assert np.abs(ours - undamped).max() > 1e-4
-
-
 def test_a_damped_level_leaves_its_null_space_to_the_levels_below(configuration):
     hand, posture = frame_task(configuration, turn=0.0), posture_task(Q + 0.05)
     hand.lm_damping = 1e4
@@ -199,29 +246,6 @@ def test_a_damped_level_leaves_its_null_space_to_the_levels_below(configuration)
     J = hand.compute_jacobian(configuration)
     np.testing.assert_allclose(J @ both, J @ alone, atol=1e-9)
     assert np.abs(both - alone).max() > 1e-3
-
-
-@pytest.mark.slow
-def test_a_barrier_pulls_toward_its_safe_displacement_as_in_pink(configuration):
-    import pink
-    from pink.barriers import PositionBarrier
-
-    pytest.importorskip("quadprog")
-
-    class Backing(PositionBarrier):
-        def compute_safe_displacement(self, configuration):
-            return np.linspace(-0.01, 0.01, 7)
-
-    here = configuration.get_transform_frame_to_world("end_effector").translation
-    barrier = Backing("end_effector", indices=[0], p_max=here[:1] + 1.0, gain=1.0,
-                      safe_displacement_gain=0.7)
-    hand = frame_task(configuration, shift=(0.001, 0.0, 0.0), turn=0.0)
-    settings = {"barriers": [barrier], "limits": []}
-    ours = solve_ik(configuration, [[hand]], DT, **settings)
-    np.testing.assert_allclose(ours, pink.solve_ik(configuration, [hand], DT, "quadprog",
-                                                   **settings), atol=1e-6)
-    free = solve_ik(configuration, [[hand]], DT, limits=[])
-    assert np.abs(ours - free).max() > 0.01
 
 
 @pytest.mark.parametrize(("own", "added", "centre"), [
@@ -284,7 +308,7 @@ def test_numbers_that_are_not_finite_are_named(configuration):
     with pytest.raises(HierarchyError, match="PostureTask"):
         solve_ik(configuration, [posture], DT)
     wrong = SimpleNamespace(compute_qp_inequalities=lambda *_: (np.eye(7)[:1] * np.nan, np.ones(1)))
-    with pytest.raises(HierarchyError, match="limits, row 0"):
+    with pytest.raises(HierarchyError, match="SimpleNamespace, row 0"):
         solve_ik(configuration, [posture_task(Q)], DT, limits=[wrong])
 
 
@@ -352,41 +376,6 @@ def test_costs_may_change_but_not_which_rows_cost_something(robot, configuration
     hand.set_orientation_cost(1.0)
     with pytest.raises(HierarchyError, match="6 of its rows cost something, 3 did"):
         stack.hierarchy(state)
-
-
-def test_feet_and_centre_of_mass_of_a_floating_base_are_what_pink_finds():
-    pink = pytest.importorskip("pink")
-    pytest.importorskip("quadprog")
-    import pinocchio as pin
-    from pink.tasks import ComTask
-
-    robot = Robot.named("humanoid")
-    configuration = pink.Configuration(robot.model, robot.model.createData(), robot.rest)
-    feet = [frame_task(configuration, foot, (0.0, 0.0, 0.0), 0.0, 1.0, 1.0, 1.0)
-            for foot in ("left_foot", "right_foot")]
-    com = ComTask(cost=1.0)
-    centre = pin.centerOfMass(robot.model, robot.model.createData(), robot.rest)
-    com.set_target(centre + np.array([0.001, 0.0, -0.002]))
-    tasks = [*feet, com, posture_task(robot.rest, cost=1.0)]
-    theirs = pink.solve_ik(configuration, tasks, DT, "quadprog")
-    np.testing.assert_allclose(solve_ik(configuration, [tasks], DT), theirs, atol=1e-9)
-    strict = solve_ik(configuration, [feet, *tasks[2:]], DT)
-    for task in tasks[:3]:
-        asked, given = speed_of(task, configuration, strict)
-        np.testing.assert_allclose(given, asked, atol=1e-9)
-
-
-def test_rows_on_one_joint_become_a_box():
-    rows = (np.array([[2.0, 0.0], [-1.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]),
-            np.array([4.0, 1.0, 1.0, 3.0, np.inf]))
-    A, lower, upper = limit_level([rows], 2, 0.5)
-    np.testing.assert_array_equal(A, [[1.0, 0.0], [1.0, 1.0]])
-    np.testing.assert_array_equal(np.column_stack([lower, upper]), [[-2.0, 2.0], [-np.inf, 6.0]])
-
-
-def test_limits_of_a_joint_that_contradict_each_other_are_an_error():
-    with pytest.raises(HierarchyError, match="joint 0 must move by at least 1 and at most -1"):
-        limit_level([(np.array([[1.0], [-1.0]]), np.array([-1.0, -1.0]))], 1, 1.0)
 
 
 # --- MuJoCo and mink ----------------------------------------------------------------------------
@@ -494,19 +483,27 @@ def mink_tasks(model, configuration):
     return hand, posture
 
 
-def test_one_level_of_mink_is_what_mink_finds_without_its_damping(arm):
+@pytest.mark.parametrize(("lm_damping", "damping"), [(0.0, 1e-12), (1.0, 1e-12), (0.0, 1e-2)])
+def test_one_level_of_mink_is_the_exact_minimum_of_minks_cost_under_its_limits(arm, lm_damping,
+                                                                               damping):
     mink = pytest.importorskip("mink")
-    from solvers.adapters.from_mink import hierarchy
+    pytest.importorskip("pink")
+    from benchmark.studies.pink_examples import exact, least_squares
 
     model, _ = arm
     configuration = mink.Configuration(model, q=POSE)
-    hand, posture = mink_tasks(model, configuration)
+    tasks = list(mink_tasks(model, configuration))
+    tasks[0].lm_damping = lm_damping
     limits = [mink.ConfigurationLimit(model), mink.VelocityLimit(model, dict.fromkeys("abcd", 1.0))]
-    theirs = mink.solve_ik(configuration, [hand, posture], DT, "daqp", limits=limits)
-    h = hierarchy(configuration, [[hand, posture]], DT, limits)
+    h = from_mink.hierarchy(configuration, [tasks], DT, limits, damping=damping)
     ours = make("hcod").solve(h).x
     assert np.abs(ours).max() == pytest.approx(1.0)
-    np.testing.assert_allclose(ours, theirs, atol=1e-7)
+    problem = mink.build_ik(configuration, tasks, DT, damping, limits)
+    A, b = least_squares(tasks, (), configuration, damping)
+    np.testing.assert_allclose(A.T @ A, problem.P, rtol=1e-9, atol=1e-12)
+    none = np.empty((0, 4)), np.empty(0)
+    np.testing.assert_allclose(ours, exact(A, b, problem.G, problem.h, *none, DT * ours) / DT,
+                               atol=1e-7)
 
 
 def test_levels_of_mink_are_strict(arm):

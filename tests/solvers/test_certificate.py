@@ -54,23 +54,14 @@ def test_the_stored_solutions_are_certified_far_below_the_tolerance(name):
 
 @pytest.mark.slow
 @every_family
-def test_a_step_of_one_in_ten_thousand_in_any_direction_is_rejected(name):
+def test_steps_of_one_in_ten_thousand_are_rejected_and_rounding_is_forgiven(name):
     r = rng()
-    for h, x in well_posed(name)[::4]:
-        for direction in r.normal(size=(5, h.n)):
-            step = OFF * direction / np.linalg.norm(direction)
-            assert not certify(h, x + step).certified
-
-
-@pytest.mark.slow
-@every_family
-def test_a_step_along_the_row_of_any_level_is_rejected(name):
-    r = rng()
-    for h, x in well_posed(name)[::4]:
-        for A, *_ in h.levels():
-            row = A[r.integers(len(A))]
-            if row.any():
-                assert not certify(h, x + OFF * row / np.linalg.norm(row)).certified
+    for h, x in well_posed(name)[::8]:
+        rows = [A[r.integers(len(A))] for A, *_ in h.levels()]
+        for step in (*r.normal(size=(2, h.n)), *rows[::2]):
+            if step.any():
+                assert not certify(h, x + OFF * step / np.linalg.norm(step)).certified
+        assert certify(h, x + 1e-11 * r.normal(size=h.n)).certified
 
 
 @pytest.mark.slow
@@ -84,19 +75,10 @@ def test_a_step_that_no_row_feels_leaves_the_levels_optimal_but_not_nearest(name
         assert "not nearest to the reference" in str(verdict)
 
 
-@pytest.mark.slow
-@every_family
-def test_rounding_of_an_iterative_solver_is_forgiven(name):
-    r = rng()
-    for h, x in well_posed(name):
-        assert certify(h, x + 1e-11 * r.normal(size=h.n)).certified
-
-
 @pytest.mark.parametrize("case", CASES, ids=lambda c: c.__name__)
-@pytest.mark.parametrize("reference", [False, True], ids=["no_reference", "reference"])
-def test_strict_answers_are_certified_at_every_rank(case, reference):
-    h = build(case, reference)
-    assert certify(h, make("tpm").solve(h).x).certified
+def test_strict_answers_are_certified_at_every_rank(case):
+    for h in (build(case, False), build(case, True)):
+        assert certify(h, make("tpm").solve(h).x).certified
 
 
 @cache
@@ -107,30 +89,15 @@ def tried(seed):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(300))
-def test_the_answer_found_by_trying_everything_is_certified(seed):
-    h, answer = tried(seed)
-    verdict = certify(h, answer)
-    assert verdict.certified, str(verdict)
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(100))
-def test_levels_count_as_optimal_just_where_trying_everything_does_no_better(seed):
+def test_only_the_answer_found_by_trying_everything_is_certified(seed):
     """The least violation of a level is one vector, not only one norm."""
     (h, answer), r = tried(seed), rng(seed)
+    assert certify(h, answer).certified
     for x in candidates(h, answer, r):
-        worse = np.abs(h.slacks(x) - h.slacks(answer)).max()
+        verdict, worse = certify(h, x), np.abs(h.slacks(x) - h.slacks(answer)).max()
         if worse < 1e-9 or worse > 1e-5:
-            assert certify(h, x).optimal == (worse < 1e-9), worse
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", range(100))
-def test_of_all_that_is_optimal_only_the_nearest_is_certified(seed):
-    (h, answer), r = tried(seed), rng(seed)
-    for x in candidates(h, answer, r):
-        verdict = certify(h, x)
+            assert verdict.optimal == (worse < 1e-9), worse
         if verdict.optimal and np.linalg.norm(x - answer) > 1e-5:
             assert not verdict.is_nearest
 
@@ -177,8 +144,7 @@ def test_the_verdict_names_the_level():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("scale", [1e-6, 1e6])
-@pytest.mark.parametrize("level", range(5))
+@pytest.mark.parametrize(("scale", "level"), [(1e-6, 0), (1e6, 1), (1e-6, 2), (1e6, 3), (1e6, 4)])
 def test_the_unit_of_a_level_does_not_matter(scale, level):
     for h, x in well_posed("INEQ7")[:10]:
         levels = [[np.array(part) for part in parts] for parts in h.levels()]
@@ -238,15 +204,13 @@ def test_each_row_is_judged_by_its_own_norm():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(60))
-@pytest.mark.parametrize("spread", [1e3, 1e6])
-def test_units_mixed_inside_a_level_change_neither_what_is_accepted_nor_what_is_rejected(
-        seed, spread):
+@pytest.mark.parametrize("seed", range(40))
+def test_units_mixed_inside_a_level_change_neither_what_is_accepted_nor_what_is_rejected(seed):
     """Levels that can be met: their answer does not depend on the norms of the rows."""
     (h, answer), r = tried(seed), rng(seed)
     if h.violations(answer).max() > 1e-9:
         return
-    scale = spread ** r.uniform(-1.0, 1.0, h.m)
+    scale = (1e3, 1e6)[seed % 2] ** r.uniform(-1.0, 1.0, h.m)
     mixed = Hierarchy(h.A * scale[:, None], h.lower * scale, h.upper * scale, h.sizes,
                       h.reference, h.names)
     assert certify(mixed, answer).certified
@@ -284,7 +248,7 @@ EXTREMES = (0.0, 5e-324, 1e-310, 1e-200, 1e-160, 1e-8, 1.0, 1e8, 1e153, 1e160, 1
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(300))
+@pytest.mark.parametrize("seed", range(80))
 def test_no_number_is_too_large_or_too_small_to_be_judged(seed):
     r = rng(seed)
     levels = []
@@ -359,7 +323,7 @@ def test_dust_in_a_level_of_its_own_is_a_row_like_any_other():
 
 def certified_kinds(kind):
     """Answers of hcod, and whether each is certified: a certificate that is too strict shows."""
-    for seed in range(30):
+    for seed in range(12):
         h = structured(seed, (kind,))
         res = make("hcod").solve(h)
         if res.status is Status.SOLVED:

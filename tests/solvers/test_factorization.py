@@ -82,11 +82,10 @@ def orthogonality(factored):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("part", range(4))
-def test_after_random_edits_the_answers_are_those_of_tpm(part):
-    """Ten thousand sequences; the gap between two roundings is far below 1e-12 in nearly all."""
+def test_after_random_edits_the_answers_are_those_of_tpm():
+    """The gap between two roundings is far below 1e-12 in nearly all."""
     gaps = []
-    for sequence in range(2500 * part, 2500 * (part + 1)):
+    for sequence in range(1500):
         rng = np.random.default_rng(sequence)
         n = int(rng.integers(3, 41))
         levels = [rng.normal(size=(rng.integers(5), n)) for _ in range(rng.integers(6))]
@@ -97,14 +96,13 @@ def test_after_random_edits_the_answers_are_those_of_tpm(part):
                 gaps.append(agrees(factored, rng))
         gaps.append(agrees(factored, rng))
         assert orthogonality(factored) < 1e-14
-    assert len(gaps) > 10_000
+    assert len(gaps) > 6_000
     assert np.percentile(gaps, 99.9) < 1e-12
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(3))
-def test_nothing_drifts_over_thousands_of_edits(seed):
-    rng = np.random.default_rng(seed)
+def test_nothing_drifts_over_thousands_of_edits():
+    rng = np.random.default_rng(0)
     factored = Factorization([rng.normal(size=(3, 30)) for _ in range(5)])
     for number in range(3000):
         edit(factored, rng, number)

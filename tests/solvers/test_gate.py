@@ -313,5 +313,6 @@ def test_rows_of_a_foreign_task_must_fit_the_unknowns():
     with pytest.raises(HierarchyError, match=r"Wide: \(3, 2\) rows for \(3,\) values and 7"):
         of_displacements(None, seven_joints, 7, 0.01, [], [], [Wide()])
     with pytest.raises(HierarchyError, match=r"limits: \(2, 90\) rows for \(2,\) values and 7"):
-        of_displacements(None, seven_joints, 7, 0.01, [(np.ones((2, 90)), np.ones(2))], [], [])
+        of_displacements(None, seven_joints, 7, 0.01,
+                         [("limits", np.ones((2, 90)), np.ones(2))], [], [])
 

@@ -121,14 +121,15 @@ def rest(tasks, ticks=400, q=Q, **settings):
     return q, np.array(v)
 
 
-@pytest.mark.parametrize("goal", [[0.9, 0.0, 0.35], [1.5, 0.0, 0.3], [0.0, 0.1, 5.0]])
-@pytest.mark.parametrize("below", [[], [Posture(tuple(Q), gain=2.0)]])
-@pytest.mark.parametrize("settings", [{}, {"limits": False}, {"resolver": "tpm"}])
+@pytest.mark.parametrize(("goal", "below", "settings"), [
+    ([0.9, 0.0, 0.35], [Posture(tuple(Q), gain=2.0)], {}), ([1.5, 0.0, 0.3], [], {"limits": False}),
+    ([0.0, 0.1, 5.0], [Posture(tuple(Q), gain=2.0)], {"limits": False}), ([0.0, 0.1, 5.0], [], {}),
+    ([1.5, 0.0, 0.3], [Posture(tuple(Q), gain=2.0)], {"resolver": "tpm"})])
 def test_an_arm_that_cannot_reach_its_target_comes_to_rest_stretched(goal, below, settings):
     q, v = rest([Position(FRAME, Still(goal)), *below], **settings)
     assert np.abs(np.diff(v[-100:], axis=0)).max() < 1e-3
     missed = np.linalg.norm(goal - State.at(ROBOT, q).position(FRAME))
-    for near in q + np.random.default_rng(0).normal(scale=0.03, size=(200, 7)):
+    for near in q + np.random.default_rng(0).normal(scale=0.03, size=(50, 7)):
         assert np.linalg.norm(goal - State.at(ROBOT, near).position(FRAME)) > missed - 1e-6
 
 
@@ -143,7 +144,7 @@ def test_damping_changes_no_step_of_a_target_within_reach():
 def test_the_answer_near_a_singularity_is_continuous():
     stretched = np.array([0.2, 0.7, 0.1, 0.0, 0.3, 0.0, 0.1])
     task = [Position(FRAME, Still(1.3 * State.at(ROBOT, stretched).position(FRAME)))]
-    bends = np.linspace(-0.3, 0.3, 1201)
+    bends = np.linspace(-0.06, 0.06, 241)
     elbow = np.eye(7)[3]
     v = np.array([solve_ik(ROBOT, stretched + bend * elbow, task).v for bend in bends])
     assert np.abs(np.diff(v, axis=0)).max() < 0.1

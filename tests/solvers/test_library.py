@@ -50,13 +50,10 @@ def test_c_and_python_give_the_same_bits(library, resolver):
 
 
 @pytest.mark.slow
-def test_c_and_python_give_the_same_bits_on_ten_thousand_hierarchies(library):
-    count = 0
-    for h in hierarchies(2500, first=1_000_000):
-        count += 1
+def test_c_and_python_give_the_same_bits_on_a_thousand_hierarchies(library):
+    for h in hierarchies(250, first=1_000_000):
         for name in c.NAMES:
             c.check_same(library, (name, {}, {}), h)
-    assert count == 10_000
 
 
 @pytest.mark.slow

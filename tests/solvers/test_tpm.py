@@ -17,26 +17,17 @@ STAIRCASE = make("tpm")
 
 @every_case
 @every_form
-@pytest.mark.parametrize("damping", [0.0, 0.05])
-def test_contributions_and_null_space_term_add_up_to_the_answer(case, form, damping):
+def test_f_and_the_contributions_give_the_answer(case, form):
     h = build(case, True)
-    tpm = task_priority_matrix(h, form=form, damping=damping)
-    x = make("tpm", form=form, damping=damping).solve(h).x
-    assert tpm.contributions.shape == (len(h.sizes), h.n)
-    close(tpm.contributions.sum(axis=0) + tpm.null_space_term, x)
-
-
-@every_case
-@every_form
-@pytest.mark.parametrize("damping", [0.0, 0.05])
-def test_f_gives_the_answer_through_the_pseudoinverse_of_the_whole_stack(case, form, damping):
-    h = build(case, True)
-    tpm = task_priority_matrix(h, form=form, damping=damping)
-    if h.m:
-        J = pseudoinverse(h)
-        close(J @ tpm.F, tpm.G)
-        x = J @ (tpm.F @ h.lower - h.A @ h.reference) + h.reference  # (14)
-        close(x, make("tpm", form=form, damping=damping).solve(h).x)
+    for damping in (0.0, 0.05):
+        tpm = task_priority_matrix(h, form=form, damping=damping)
+        x = make("tpm", form=form, damping=damping).solve(h).x
+        assert tpm.contributions.shape == (len(h.sizes), h.n)
+        close(tpm.contributions.sum(axis=0) + tpm.null_space_term, x)
+        if h.m:
+            J = pseudoinverse(h)
+            close(J @ tpm.F, tpm.G)
+            close(x, J @ (tpm.F @ h.lower - h.A @ h.reference) + h.reference)  # (14)
 
 
 def pseudoinverse(h):
@@ -115,7 +106,7 @@ def test_where_its_equations_leave_a_choice_it_is_exact_down_to_the_level_that_l
     assert np.abs(res.x - right).max() > 0.1
 
 
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", range(6))
 @pytest.mark.parametrize("change", ["none", "last level dependent", "freedom left over"])
 def test_the_published_form_is_exact_where_no_upper_level_loses_rank_or_freedom_is_left(
         seed, change):
@@ -128,7 +119,7 @@ def test_the_published_form_is_exact_where_no_upper_level_loses_rank_or_freedom_
     close(PUBLISHED.solve(h).x, oracle.solve(h))
 
 
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", range(6))
 @pytest.mark.parametrize(("n", "sizes", "level"), [
     (6, (3, 2, 3), 1), (7, (3, 3, 3, 3), 0), (5, (3, 3), 0)])
 def test_the_published_form_departs_where_an_upper_level_loses_rank_that_is_needed_below(
@@ -147,7 +138,7 @@ def test_the_published_form_is_not_called_strict():
     assert not PUBLISHED.strict
 
 
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", range(6))
 def test_damped_pivots_are_the_damped_recursion_while_rows_are_independent(seed):
     """F b = R^T y with y from block substitution, so x = J^# J Q y, and Q y is in J's row space.
 

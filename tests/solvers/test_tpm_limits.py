@@ -22,7 +22,6 @@ TAME = Recipe(equalities_only=True, joints=(1, 20), levels=(1, 5), rows=(0, 10),
 WILD = Recipe(equalities_only=True, joints=(1, 20), levels=(1, 5), rows=(0, 10))
 
 every_case = pytest.mark.parametrize("case", CASES, ids=lambda c: c.__name__)
-every_room = pytest.mark.parametrize("room", [0.05, 0.3, 1.0])
 
 
 def boxed(h, low, high):
@@ -82,14 +81,13 @@ def test_bounds_are_kept_and_the_answer_is_certified(recipe):
 
 
 @every_case
-@every_room
-@pytest.mark.parametrize("reference", [False, True], ids=["no_reference", "reference"])
-def test_every_rank_is_certified_inside_bounds(case, room, reference):
-    h = boxed(build(case, reference), -room, 0.5 * room)
-    res = TPM.solve(h)
-    assert res.status is Status.SOLVED
-    assert_kept(h, res.x)
-    assert certify(h, res.x).certified
+def test_every_rank_is_certified_inside_bounds(case):
+    for reference, room in ((False, 0.05), (True, 0.05), (False, 0.3), (True, 1.0)):
+        h = boxed(build(case, reference), -room, 0.5 * room)
+        res = TPM.solve(h)
+        assert res.status is Status.SOLVED
+        assert_kept(h, res.x)
+        assert certify(h, res.x).certified
 
 
 @every_case
@@ -102,7 +100,7 @@ def test_bounds_that_are_out_of_the_way_change_no_digit(case):
     assert res.iterations == 1
 
 
-@pytest.mark.parametrize("seed", range(3 if SLOW else 40))
+@pytest.mark.parametrize("seed", range(3 if SLOW else 12))
 def test_one_level_is_bounded_least_squares(seed):
     """Against scipy; more rows than joints, so that there is one answer."""
     r = rng(seed)
@@ -113,7 +111,7 @@ def test_one_level_is_bounded_least_squares(seed):
     np.testing.assert_allclose(TPM.solve(h).x, expected, rtol=0, atol=1e-10)
 
 
-@pytest.mark.parametrize("seed", range(3 if SLOW else 40))
+@pytest.mark.parametrize("seed", range(3 if SLOW else 12))
 def test_what_one_level_leaves_open_goes_to_the_reference(seed):
     """Against scipy, by a weight that makes the reference one level with the rows."""
     r = rng(seed)
@@ -123,34 +121,6 @@ def test_what_one_level_leaves_open_goes_to_the_reference(seed):
     rows = np.vstack([A, little * np.eye(7)]), np.concatenate([b, little * reference])
     expected = lsq_linear(*rows, (-0.4, 0.4), method="bvls", tol=1e-15).x
     np.testing.assert_allclose(x, expected, rtol=0, atol=1e-6)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("room", [0.1, 0.4])
-def test_lower_levels_leave_upper_levels_untouched_at_the_bounds(room):
-    for seed in range(3 if SLOW else 100):
-        levels = random_levels(7, (3, 2, 2), seed)
-        h = boxed(Hierarchy.from_levels(levels, rng(seed).normal(size=7)), -room, room)
-        full = h.violations(TPM.solve(h).x)
-        for count in range(1, 4):
-            upper = Hierarchy.from_levels(list(h.levels())[:count])
-            missed = upper.violations(TPM.solve(upper).x)
-            np.testing.assert_allclose(full[:count], missed, rtol=0, atol=1e-12)
-
-
-@pytest.mark.slow
-def test_no_point_of_the_box_does_better_in_the_order_of_the_levels():
-    """Among points found by others, and points drawn near the answer."""
-    r = rng()
-    for seed in range(3 if SLOW else 100):
-        h = boxed(Hierarchy.from_levels(random_levels(7, (3, 1, 1), seed)), -0.3, 0.3)
-        x = TPM.solve(h).x
-        others = [make("sns").solve(h).x, *(np.clip(x + 0.1 * r.normal(size=(50, 7)), -0.3, 0.3))]
-        mine = h.violations(x)
-        for other in others:
-            difference = h.violations(other) - mine
-            decided = np.flatnonzero(np.abs(difference) > 1e-9)
-            assert not decided.size or difference[decided[0]] > 0.0
 
 
 def test_scaling_is_one_where_a_level_is_met_and_the_share_of_the_target_where_it_is_not():
@@ -269,29 +239,14 @@ def test_inequalities_that_are_no_bounds_are_refused_by_level_and_row(form):
             tpm.solve(Hierarchy.from_levels(levels))
 
 
-def test_the_published_form_refuses_bounds():
-    published = make("tpm-published")
-    assert published.handles == "equalities"
-    assert TPM.handles == "bounds"
-    with pytest.raises(HierarchyError, match="tpm-published resolves equalities only"):
-        published.solve(boxed(Hierarchy.from_levels(generic()), -1.0, 1.0))
-
-
-@pytest.mark.parametrize("bad", [np.nan, np.inf])
-@pytest.mark.parametrize("where", ["bound", "coefficient", "A", "target", "reference"])
-def test_entries_that_are_not_finite_give_a_status_and_a_finite_answer(where, bad):
-    for memory in (None, np.zeros(12)):
+@pytest.mark.parametrize("entry", [
+    lambda h: h.lower[2:3], lambda h: h.A[2, 2:3], lambda h: h.A[9, 2:3], lambda h: h.upper[10:11],
+    lambda h: h.reference[1:2]], ids=["bound", "coefficient", "A", "target", "reference"])
+def test_entries_that_are_not_finite_give_a_status_and_a_finite_answer(entry):
+    for memory, bad in ((None, np.nan), (None, np.inf), (np.zeros(12), np.nan)):
         h = boxed(Hierarchy.from_levels(generic()), -0.3, 0.3)
-        if where == "bound":
-            h.lower[2] = bad
-        elif where == "coefficient":
-            h.A[2, 2] = bad
-        elif where == "A":
-            h.A[9, 2] = bad
-        elif where == "target":
-            h.lower[10] = h.upper[10] = bad
-        else:
-            h.reference[1] = bad
+        entry(h)[:] = bad
+        h.lower[10] = h.upper[10]
         res = TPM.solve(h, memory)
         assert res.status is Status.NUMERICAL_FAILURE
         assert not res.x.any()
