@@ -11,5 +11,6 @@ from hierarchy.jit.compiling import (
 )
 from hierarchy.jit.compiling import as_integers as as_integers
 from hierarchy.jit.compiling import as_matrix as as_matrix
+from hierarchy.jit.lanes import inner_product as inner_product
 
 __all__ = ["announce_compilation", "bind", "cache_folder", "compiled", "inlined", "unlocked"]

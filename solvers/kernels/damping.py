@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from hierarchy.jit import compiled, inlined
+from hierarchy.jit import compiled, inlined, inner_product
 from solvers.kernels.block import level_damping
 from solvers.kernels.rows import (
     NO,
@@ -32,7 +32,6 @@ from solvers.kernels.rows import (
 from solvers.kernels.space import Block, View, integers, matrix, shared, vector
 from solvers.kernels.staircase import carve_staircase, solve_by_staircase
 from solvers.kernels.tolerances import LEVEL_MET, SATURATES
-from solvers.kernels.working_set import row_times
 from solvers.status import NUMERICAL_FAILURE
 
 
@@ -123,7 +122,7 @@ def _is_met(d, A, lower, upper):
     """Whether the x of the equalities meets all inequalities."""
     met = True
     for i in range(lower.size):
-        met &= lower[i] == upper[i] or lower[i] <= row_times(A[i], d.free) <= upper[i]
+        met &= lower[i] == upper[i] or lower[i] <= inner_product(A[i], d.free) <= upper[i]
     return met
 
 
@@ -132,12 +131,12 @@ def _take_out_exceeded(d, E, A, lower, upper, reference):
     """Take the directions of exceeded rows out of the equalities."""
     reach = length_of(d.free) + length_of(reference)
     for i in range(lower.size):
-        value, norm = row_times(A[i], d.free), length_of(A[i])
+        value, norm = inner_product(A[i], d.free), length_of(A[i])
         over = max(value - upper[i], lower[i] - value)
         if lower[i] < upper[i] and over > 0.0 and norm > 0.0:
             share = min(SATURATES * over / (norm * reach), 1.0) if reach > 0.0 else 1.0
             for e in range(E.shape[0]):
-                add_multiple(E[e], -share * row_times(E[e], A[i]) / (norm * norm), A[i])
+                add_multiple(E[e], -share * inner_product(E[e], A[i]) / (norm * norm), A[i])
 
 
 @inlined
@@ -201,7 +200,7 @@ def keep_reached(d, A, lower, upper, x, k, end):
         begin, t = begin + d.sizes[j], t + d.ends[j]
     last = t + d.ranks[k]
     for i in range(end):
-        value = row_times(d.A[i], x)
+        value = inner_product(d.A[i], x)
         if lower[i] < upper[i]:
             least = LEVEL_MET * (1.0 + abs(value))  # less is rounding of a side that is kept
             d.lower[i] = value if value < d.lower[i] - least else d.lower[i]
@@ -211,5 +210,5 @@ def keep_reached(d, A, lower, upper, x, k, end):
         else:
             for c in range(x.size):
                 d.A[i, c] = d.Q[t, c] if t < last else 0.0
-            d.lower[i] = d.upper[i] = row_times(d.A[i], x)
+            d.lower[i] = d.upper[i] = inner_product(d.A[i], x)
             t += 1

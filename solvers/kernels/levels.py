@@ -25,12 +25,10 @@ from solvers.kernels.rows import ZERO, add_multiple, length_of
 from solvers.kernels.tableau import (
     BASE,
     COLUMN,
-    EQUALITIES,
     FIX,
     FORCE,
     GOAL,
     HARD,
-    IN_USE,
     KIND,
     LIST,
     MISSED,
@@ -41,6 +39,7 @@ from solvers.kernels.tableau import (
     REACH,
     REST,
     ROUNDING,
+    ROW,
     ROWS,
     SCALE,
     SHARE,
@@ -48,20 +47,23 @@ from solvers.kernels.tableau import (
     SPEED,
     STEP,
     STEPS,
+    TURNING,
     VALUE,
     WEIGHT,
     WORST,
     Z,
+    add_column,
     around,
+    close_column,
     entry_of,
-    fold,
+    fold_to,
     is_independent,
     left_of,
     measure,
     missed_side,
     open_tableau,
     pivot_rows,
-    reflect_columns,
+    turn_to,
 )
 from solvers.kernels.tolerances import (
     CANCELLED,
@@ -81,6 +83,7 @@ from solvers.kernels.working_set import (
     UPPER,
     WHOLE,
     gives_all,
+    product_with,
     row_times_x,
     side_at,
 )
@@ -172,7 +175,7 @@ def _begin(t, k, last, whole, tolerance):
     """
     s, count, n = t.of, t.count, t.of.x.size
     measure(t, length_of(s.x))
-    count[RANKS] = count[ROWS] = count[EQUALITIES] = 0
+    count[RANKS] = count[ROWS] = 0
     for i in range(s.index[FIRST, k] if k < s.multiplier.shape[0] - 1 else last, last):
         value = row_times_x(s, i)
         s.number[VALUE, i] = value
@@ -181,11 +184,10 @@ def _begin(t, k, last, whole, tolerance):
             continue
         if s.index[STATE, i] != EQUAL:
             s.index[STATE, i] = missed_side(s, i, value, t.scalar[SCALE], tolerance)
-        elif s.index[UNIT, i] < 0:
-            count[EQUALITIES] += 1
         s.index[KIND, i] = WATCHED if s.index[STATE, i] == FREE else FIXED
         if s.index[KIND, i] == WATCHED or whole:
             continue
+        add_column(t, i)
         if is_independent(t, i, left_of(t, i, count[FIX], n)):
             s.index[KIND, i] = SOFT
             s.index[LIST, count[ROWS]] = i
@@ -196,7 +198,7 @@ def _begin(t, k, last, whole, tolerance):
     if count[ROWS] == 0 and not whole:
         if _has_misses(s, k):
             _write_multipliers(t, k, whole)
-        count[IN_USE] += count[EQUALITIES]
+        _close_columns(t)
     return count[ROWS] > 0 or whole
 
 
@@ -276,12 +278,11 @@ def _head_for_goal(t, begin):
 def _advance(t, rank, last, tolerance):
     """Move along the step up to the first watched row; return it, or -1 if there is none."""
     s, x, p, value, speed = t.of, t.of.x, t.of.number[STEP], t.of.number[VALUE], t.of.number[SPEED]
-    scale, rates, first = _write_step(t, rank), t.room, t.count[IN_USE]
-    entering, side, length = -1, 0, 1.0
+    scale, entering, side, length = _write_step(t, rank), -1, 0, 1.0
     for i in range(last):
         if s.index[KIND, i] != WATCHED:
             continue
-        speed[i] = v = entry_of(t, i) * rates[s.index[COLUMN, i] - first]
+        speed[i] = v = product_with(s, i, p)
         bound = s.number[UPPER, i] if v > 0.0 else s.number[LOWER, i]
         over = value[i] + v - bound if v > 0.0 else bound - value[i] - v
         if v == 0.0 or over <= tolerance * around(s, i, bound, scale) or not np.isfinite(bound):
@@ -305,20 +306,17 @@ def _advance(t, rank, last, tolerance):
 def _write_step(t, rank):
     """Write the step in x, given the step in basis vectors; return the scale at its end.
 
-    Writes the rates of all columns from IN_USE on into the room. A step of a level that is nearly
-    singular is long, and cut short by the first row in its way: so its end sets no tolerance before
-    it is reached.
+    A step of a level that is nearly singular is long, and cut short by the first row in its way: so
+    its end sets no tolerance before it is reached.
     """
     x, p, z, size, square = t.of.x, t.of.number[STEP], t.of.number[Z], t.scalar[REACH], 0.0
-    begin, first, base = t.count[FIX] + t.count[HARD], t.count[IN_USE], t.count[BASE]
-    rates = t.room[:t.M.shape[1] - first]
-    for c in range(rates.size):
-        rates[c] = 0.0
+    begin, base = t.count[FIX] + t.count[HARD], t.count[BASE]
+    for c in range(x.size):
+        p[c] = 0.0
     for r in range(begin, begin + rank):
         size = max(size, abs(z[r]))
-        add_multiple(rates, z[r], t.M[r, first:])
+        add_multiple(p[:x.size], z[r], t.M[r, base:])
     for c in range(x.size):
-        p[c] = rates[base - first + c]
         square += (x[c] + p[c]) ** 2
     t.scalar[REACH] = size = max(size, np.sqrt(square))
     return max(t.scalar[SCALE], np.sqrt(square), FLOOR * max(size, t.scalar[SIZE]))
@@ -327,20 +325,21 @@ def _write_step(t, rank):
 @inlined
 def _enter(t, i, first):
     """Add row i to the working set, as a soft row of the level or as a held row."""
-    s, count, M, n = t.of, t.count, t.M, t.of.x.size
+    s, count, n = t.of, t.count, t.of.x.size
+    add_column(t, i)
     if i >= first:
         s.index[KIND, i] = SOFT
         s.index[LIST, count[ROWS]] = i
         count[ROWS] += 1
         return
-    begin, column, lo = count[FIX] + count[HARD], s.index[COLUMN, i], count[IN_USE]
+    begin = count[FIX] + count[HARD]
     if not is_independent(t, i, left_of(t, i, begin, n)):
         s.index[KIND, i], s.index[STATE, i] = PARALLEL, FREE
         return
     free = min(begin + count[RANKS], n - 1)
-    reflect_columns(M, free, n, column, lo, t.room)
+    turn_to(t, free, n, i)
     for r in range(free - 1, begin - 1, -1):
-        fold(M, r, column, lo)
+        fold_to(t, r, i)
     s.index[OWNER, begin], s.index[KIND, i] = i, HELD
     count[HARD] += 1
     count[RANKS] = min(count[RANKS], n - begin - 1)
@@ -433,15 +432,15 @@ def _release(t, i):
     end = count[FIX] + count[HARD]
     for r in range(place, end):
         owner[r] = owner[r + 1]
-        fold(t.M, r, s.index[COLUMN, owner[r]], count[IN_USE])
+        fold_to(t, r, owner[r])
     for q in range(count[RANKS]):
-        fold(t.M, end + q, s.index[COLUMN, s.index[LIST, q]], count[IN_USE])
+        fold_to(t, end + q, s.index[LIST, q])
 
 
 @inlined
 def _drop(t, i):
     """Remove row i from the soft rows."""
-    s, count, soft, place = t.of, t.count, t.of.index[LIST], 0
+    count, soft, place = t.count, t.of.index[LIST], 0
     while soft[place] != i:
         place += 1
     count[ROWS] -= 1
@@ -453,7 +452,7 @@ def _drop(t, i):
     count[RANKS] -= 1
     begin = count[FIX] + count[HARD]
     for q in range(place, count[RANKS]):
-        fold(t.M, begin + q, s.index[COLUMN, soft[q]], count[IN_USE])
+        fold_to(t, begin + q, soft[q])
 
 
 @inlined
@@ -523,7 +522,16 @@ def _order(t, whole):
             kind[i], s.index[STATE, i] = WATCHED, FREE
             s.number[VALUE, i] = row_times_x(s, i)
     count[HARD] = at - count[FIX]
-    count[IN_USE] += count[EQUALITIES]
+    _close_columns(t)
+
+
+@inlined
+def _close_columns(t):
+    """Settle the columns of the fixed rows, and close those of rows that no longer act."""
+    for at in range(t.count[TURNING], t.count[BASE]):
+        kind = t.of.index[KIND, t.of.index[ROW, at]]
+        if kind in (WATCHED, FIXED, PARALLEL):
+            close_column(t, at, np.int64(kind == FIXED))
 
 
 @inlined
@@ -531,7 +539,7 @@ def _own(t, i, at, end):
     """Give row i the basis vector `at` if it is independent of those before; return the next."""
     s, left = t.of, left_of(t, i, at, end)
     if at < end and is_independent(t, i, left):
-        reflect_columns(t.M, at, end, s.index[COLUMN, i], t.count[IN_USE], t.room)
+        turn_to(t, at, end, i)
         s.index[OWNER, at] = i
         return at + 1
     return at

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hierarchy.jit import compiled, inlined
+from hierarchy.jit import compiled, inlined, inner_product
 from solvers.kernels.tolerances import LEAST_SQUARE
 from solvers.status import INACCURATE, NUMERICAL_FAILURE, SOLVED
 
@@ -57,10 +57,7 @@ def all_finite(x):
 @inlined
 def length_of(x):
     """Return the Euclidean norm."""
-    square = 0.0
-    for c in range(x.size):
-        square += x[c] * x[c]
-    return np.sqrt(square)
+    return np.sqrt(inner_product(x, x))
 
 
 @inlined
@@ -80,10 +77,7 @@ def largest_row(W, zero, i0, i1, c0):
     """
     largest, pivot = 0.0, -1
     for i in range(i0, i1):
-        w = W[i, c0:]
-        square = 0.0
-        for c in range(w.size):
-            square += w[c] * w[c]
+        square = inner_product(W[i, c0:], W[i, c0:])
         if square > largest and square > zero[i]:
             largest, pivot = square, i
     return pivot, largest
@@ -113,36 +107,12 @@ def swap_rows(W, i, j):
 
 @inlined
 def reflect(basis, k0, k1, W, i0, i1):
-    """Apply reflectors k0 .. k1 - 1 of the basis to rows i0 .. i1 - 1 of W, in this order.
-
-    Three rows at a time: the order of each sum is fixed, but three sums do not wait for each other.
-    """
+    """Apply reflectors k0 .. k1 - 1 of the basis to rows i0 .. i1 - 1 of W, in this order."""
     for k in range(k0, k1):
-        v, beta, i = basis.V[k, k:], basis.beta[k], i0
-        while i + 2 < i1:
-            a, b, c = three_products(W[i, k:], W[i + 1, k:], W[i + 2, k:], v)
-            add_multiple(W[i, k:], -beta * a, v)
-            add_multiple(W[i + 1, k:], -beta * b, v)
-            add_multiple(W[i + 2, k:], -beta * c, v)
-            i += 3
-        while i < i1:
+        v, beta = basis.V[k, k:], basis.beta[k]
+        for i in range(i0, i1):
             w = W[i, k:]
-            s = 0.0
-            for c in range(v.size):
-                s += w[c] * v[c]
-            add_multiple(w, -beta * s, v)
-            i += 1
-
-
-@inlined
-def three_products(u, v, w, x):
-    """Return the inner products of u, v and w with x."""
-    a = b = c = 0.0
-    for j in range(x.size):
-        a += u[j] * x[j]
-        b += v[j] * x[j]
-        c += w[j] * x[j]
-    return a, b, c
+            add_multiple(w, -beta * inner_product(v, w), v)
 
 
 @inlined

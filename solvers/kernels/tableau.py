@@ -1,9 +1,11 @@
 """An orthogonal tableau: the rows of a hierarchy in a basis that follows the working set.
 
-The tableau is M = Q^T [A^T, I] (n, g + n), one row for each basis vector: the coordinates of the g
-rows of A with more than one entry, then the basis vector itself. A row of A with a single entry is
-a multiple of a column of the identity, so a bound costs nothing. Each active row of A gets a basis
-vector of its own and is zero beyond it: the active rows are lower triangular.
+The tableau is M = Q^T [A_a^T, I], one row for each basis vector: the coordinates of the rows of A
+that act and have more than one entry, then the basis vector itself. A row of A with a single entry
+is a multiple of a column of the identity, so a bound costs nothing. Each active row of A gets a
+basis vector of its own and is zero beyond it: the active rows are lower triangular. Equalities
+have their columns from the start, an inequality gets its own when it comes to act; those of rows
+that act for good move to the left and turn no more.
 
 Adding and removing a row is a few plane rotations of adjacent rows of M (Gill, Golub, Murray,
 Saunders 1974), never a new factorisation. The columns of a row depend on that row alone, so rows of
@@ -18,10 +20,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hierarchy.jit import compiled, inlined
-from solvers.kernels.rows import ZERO
+from hierarchy.jit import compiled, inlined, inner_product
+from solvers.kernels.rows import ZERO, swap
 from solvers.kernels.space import View, integers, matrix, vector
-from solvers.kernels.tolerances import FLOOR, NEGLIGIBLE
+from solvers.kernels.tolerances import CLEAR_SQUARE, FLOOR, NEGLIGIBLE
 from solvers.kernels.working_set import (
     CUT,
     ENTRY,
@@ -42,13 +44,14 @@ from solvers.status import EQUAL
 # or basis vector: the goal of a level that sets all of x, the step in x, its step in the basis, the
 # gradient of the level, the force that balances it, and the part of the gradient that it balances.
 VALUE, SPEED, REST, OVER, GOAL, STEP, Z, PULL, FORCE, SHARE = range(REFERENCE + 1, REFERENCE + 11)
-# Rows of `index` after those of the data. Per row of A: its column of M, its kind; the list of the
-# rows of the level that act, in pivot order. Per basis vector: the row that owns it, -1 for none.
-COLUMN, KIND, LIST, OWNER = range(FIRST + 1, FIRST + 5)
-# In `count`: the first column of M in use; the first column of the unknowns; basis vectors of the
-# fixed, hard and soft rows, soft rows, equalities of the level that have columns; whether the
-# level is missed; steps.
-IN_USE, BASE, FIX, HARD, RANKS, ROWS, EQUALITIES, MISSED, STEPS = range(9)
+# Rows of `index` after those of the data. Per row of A: its column of M (-1: none), its kind; the
+# list of the rows of the level that act, in pivot order. Per basis vector: the row that owns it, -1
+# for none. Per column: the row that it belongs to.
+COLUMN, KIND, LIST, OWNER, ROW = range(FIRST + 1, FIRST + 6)
+# In `count`: columns at the left that turn no more; the first of those that do; the first of the
+# unknowns; basis vectors of the fixed, hard and soft rows, soft rows; whether
+# the level is missed; steps.
+SETTLED, TURNING, BASE, FIX, HARD, RANKS, ROWS, MISSED, STEPS = range(9)
 # In `scalar`: the largest number so far, the scale of tolerances; the square of a level's weight;
 # the largest miss of its rows, the sum of their pulls, the part of that which may be rounding; the
 # largest number of a whole step.
@@ -58,7 +61,8 @@ SIZE, SCALE, WEIGHT, WORST, PULLED, ROUNDING, REACH = range(7)
 class Tableau(NamedTuple):
     """The data of a solve level by level.
 
-    of: the WorkingSet whose data it shares. count, scalar: see above. M (n, g + n). room: scratch.
+    of: the WorkingSet whose data it shares. count, scalar: see above. M (n, g + n), g the number of
+    rows with more than one entry. room: scratch.
     """
 
     of: View
@@ -89,26 +93,64 @@ def carve_tableau(s, work, at):
 
 @compiled
 def open_tableau(t):
-    """Write M for Q = I: equalities, inequalities, unknowns.
-
-    So settled columns come before the others and can be skipped from then on.
-    """
-    s, M, at = t.of, t.M, ZERO
-    for equal in (True, False):
-        for i in range(s.A.shape[0]):
-            if s.index[UNIT, i] < 0 and (s.index[STATE, i] == EQUAL) == equal:
-                s.index[COLUMN, i] = at
-                for c in range(s.x.size):
-                    M[c, at] = s.A[i, c]
-                at += 1
-    t.count[IN_USE], t.count[BASE] = 0, at
+    """Write M for Q = I, with the columns of the equalities."""
+    s, M, base = t.of, t.M, t.M.shape[1] - t.of.x.size
+    at = base
     for r in range(s.x.size):
-        for c in range(at, M.shape[1]):
+        for c in range(base, M.shape[1]):
             M[r, c] = 0.0
-        M[r, at + r] = 1.0
+        M[r, base + r] = 1.0
     for i in range(s.A.shape[0]):
-        if s.index[UNIT, i] >= 0:
-            s.index[COLUMN, i] = at + s.index[UNIT, i]
+        s.index[COLUMN, i] = base + s.index[UNIT, i] if s.index[UNIT, i] >= 0 else -1
+        if s.index[COLUMN, i] < 0 and s.index[STATE, i] == EQUAL:
+            at -= 1
+            s.index[COLUMN, i], s.index[ROW, at] = at, i
+            for c in range(s.x.size):
+                M[c, at] = s.A[i, c]
+    t.count[BASE], t.count[TURNING] = base, at
+
+
+@inlined
+def add_column(t, i):
+    """Give row i its column, if it has none."""
+    s, at = t.of, t.count[TURNING] - 1
+    if s.index[COLUMN, i] < 0:
+        s.index[COLUMN, i], s.index[ROW, at], t.count[TURNING] = at, i, at
+        _write_column(t.M, at, t.count[BASE], s.A[i])
+
+
+@compiled
+def _write_column(M, at, base, a):
+    for r in range(M.shape[0]):
+        M[r, at] = inner_product(a, M[r, base:])
+
+
+@inlined
+def close_column(t, at, settled):
+    """Take a column from those that turn, to the settled or away; the first fills its place."""
+    s, M, first, to = t.of, t.M, t.count[TURNING], t.count[SETTLED]
+    i, other = s.index[ROW, at], s.index[ROW, first]
+    for r in range(s.x.size):
+        entry = M[r, at]
+        M[r, at] = M[r, first]
+        if settled:
+            M[r, to] = entry
+    s.index[COLUMN, other], s.index[ROW, at] = at, other
+    s.index[COLUMN, i] = to if settled else -1
+    t.count[TURNING] += 1
+    t.count[SETTLED] += settled
+
+
+@inlined
+def turn_to(t, k, end, i):
+    """Reflect basis vectors k .. end - 1 so that row i has nothing in them beyond the first."""
+    reflect_columns(t.M, k, end, t.of.index[COLUMN, i], t.count[TURNING], t.room)
+
+
+@inlined
+def fold_to(t, k, i):
+    """Rotate basis vectors k and k + 1 so that row i has nothing in the second."""
+    fold(t.M, k, t.of.index[COLUMN, i], t.count[TURNING])
 
 
 @compiled
@@ -195,19 +237,26 @@ def pivot_rows(t, begin, rank):
     The first `rank` of them already have theirs. Puts the list into pivot order.
     """
     s, n, rows, count = t.of, t.of.x.size, t.of.index[LIST], t.count[ROWS]
+    left, norm = s.number[REST], s.number[NORM]
+    for q in range(rank, count):
+        left[q] = left_of(t, rows[q], begin + rank, n)
     while rank < count and begin + rank < n:
         largest, best = 0.0, -1
         for q in range(rank, count):
-            least = s.scalar[TOLERANCE] * s.number[NORM, rows[q]]
-            square = left_of(t, rows[q], begin + rank, n)
-            if square > largest and square > least * least:
-                largest, best = square, q
+            least = s.scalar[TOLERANCE] * norm[rows[q]]
+            if left[q] > largest and left[q] > least * least:
+                largest, best = left[q], q
         if best < 0:
             break
-        rows[rank], rows[best] = rows[best], rows[rank]
+        swap(rows, rank, best)
+        swap(left, rank, best)
         is_independent(t, rows[rank], largest)
-        reflect_columns(t.M, begin + rank, n, s.index[COLUMN, rows[rank]], t.count[IN_USE], t.room)
+        turn_to(t, begin + rank, n, rows[rank])
         rank += 1
+        for q in range(rank, count):
+            left[q] -= (entry_of(t, rows[q]) * t.M[begin + rank - 1, s.index[COLUMN, rows[q]]]) ** 2
+            if left[q] < CLEAR_SQUARE * norm[rows[q]] ** 2:
+                left[q] = left_of(t, rows[q], begin + rank, n)
     return rank
 
 

@@ -37,6 +37,7 @@ SIGN_ROUNDING = 4e-16  # of a gradient over its terms
 COARSE_SIGN = 1e-10  # multiplier over its terms: the coarse search takes smaller ones for zero
 
 # Pivots
+CLEAR_SQUARE = 1e-2  # of a remainder over that of the row: smaller ones are summed, not updated
 REPIVOT = 1e-4       # share of a row in its own basis vector: smaller ones pivot the level again
 UNCLEAR_PIVOT = 1e-5  # of a row in the staircase, or less: the exact engine decides
 LIGHT_ROW = 1e-5     # norm of a row over the largest in a level that is missed: the same

@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hierarchy.jit import as_matrix, compiled, inlined
+from hierarchy.jit import as_matrix, compiled, inlined, inner_product
 from solvers.kernels.rows import ZERO, add_multiple, factor_level, reflect, swap
 from solvers.kernels.space import Basis, Rows, View, carve_basis, integers, matrix, vector
 from solvers.kernels.tolerances import CANCELLED, LEAST_SQUARE, NEGLIGIBLE
@@ -178,13 +178,17 @@ def rescale(s, lower, upper, scaled):
 @inlined
 def _measure(s, i):
     """Note the only entry of a row of A, if it has one; return the square of its norm."""
-    a, square, entries, only = s.A[i], 0.0, 0, -1
+    a, entries, only, square = s.A[i], ZERO, ZERO, 0.0
     for c in range(a.size):
-        square += a[c] * a[c]
-        if a[c] != 0.0:
-            entries, only = entries + 1, c
+        entries += a[c] != 0.0
+    if entries == 1:
+        while a[only] == 0.0:
+            only += 1
+        square = a[only] * a[only]
+    elif entries > 1:
+        square = inner_product(a, a)
     s.index[UNIT, i] = only if entries == 1 else -1
-    s.number[ENTRY, i] = a[only] if only >= 0 else 0.0
+    s.number[ENTRY, i] = a[only] if entries == 1 else 0.0
     s.number[CUT, i] = 0.0
     return square
 
@@ -201,23 +205,20 @@ def restore(s):
 @inlined
 def value_at(s, i):
     """Return row i, as it is after cuts, times x."""
-    return row_times(s.C[i], s.x) if s.number[CUT, i] > 0.0 else row_times_x(s, i)
+    return inner_product(s.C[i], s.x) if s.number[CUT, i] > 0.0 else row_times_x(s, i)
 
 
 @inlined
 def row_times_x(s, i):
     """Return row i of A times x."""
-    only = s.index[UNIT, i]
-    return s.A[i, only] * s.x[only] if only >= 0 else row_times(s.A[i], s.x)
+    return product_with(s, i, s.x)
 
 
 @inlined
-def row_times(a, x):
-    """Return the inner product."""
-    total = 0.0
-    for c in range(x.size):
-        total += a[c] * x[c]
-    return total
+def product_with(s, i, p):
+    """Return row i of A times p."""
+    only = s.index[UNIT, i]
+    return s.A[i, only] * p[only] if only >= 0 else inner_product(s.A[i], p)
 
 
 @inlined
