@@ -18,10 +18,10 @@ from scenarios.config.scenario import OWN
 from scenarios.files import write_text
 from scenarios.measure.metrics import Metric
 from scenarios.measure.statistics import Paired, Spread, paired, spread
-from scenarios.sweep.results import Results, valued
-from scenarios.sweep.run import run_batch
-from scenarios.sweep.store import Store
-from scenarios.sweep.whole import Progress, Workers, compare_starts, complete
+from scenarios.results.columns import Results, valued
+from scenarios.results.run import outcome
+from scenarios.results.sampled import Progress, Workers, compare_starts, complete
+from scenarios.results.store import Store
 
 Array = NDArray[np.float64]
 _DIGITS = 6  # kept of each value
@@ -99,14 +99,15 @@ def measured_rows(study: Study, out: Path, workers: Workers, progress: Progress 
     asked, store = jobs(study, SEED), Store(out)
     with store.opened():
         complete(asked, store, workers, study.name, progress,
-                 partial(run_batch, measured=partial(measured, study)))
-        runs = {row["key"]: row for row in store.table().to_pylist()}
-    found = [runs[job.key] for job in asked]
+                 partial(outcome, measured=partial(measured, study)))
+        kept = store.outcomes()
+    runs = [kept[job.key] for job in asked]
+    found = [{one.name: one.value for one in run.metrics} for run in runs]
     metrics = PAIR if study.pairs else PIVOT
-    values = {column: {name: plain(np.array([run[f"{column} {name}"] for run in found],
+    values = {column: {name: plain(np.array([run.get(f"{column} {name}") for run in found],
                                             dtype=float)) for name in metrics}
               for column in study.names}
-    ended = sum(run["fault"] is None and run["error"] is None for run in found)
+    ended = sum(run.reason is None for run in runs)
     return Rows(study.name, f"hierarchy reproduce {study.name}", study.starts, SEED,
                 {name: {**METRICS[name]} for name in metrics}, values, dict.fromkeys(values, ended))
 

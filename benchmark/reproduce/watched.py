@@ -16,7 +16,7 @@ from scenarios.loop.controller import Controller
 from scenarios.loop.simulation import simulate
 from scenarios.measure.metrics import Metric
 from scenarios.recording.recording import Recording
-from scenarios.sweep.run import Job, digest, key_of
+from scenarios.results.run import Job, digest, key_of
 
 Array = NDArray[np.float64]
 MEDIAN, LARGEST = "command_difference_median", "command_difference_max"
@@ -106,7 +106,7 @@ def jobs(study: Study, seed: int) -> list[Job]:
         values = drawn(scenario, scenario.variation, seed, start)
         text = changed(scenario, values, "variation").to_toml()
         key = key_of(text, f"{study.resolver} {study.pairs} {study.pivots}", digest())
-        found.append(Job(key, text, study.resolver))
+        found.append(Job(key, text, study.resolver, study.scenario, start, values))
     return found
 
 

@@ -18,8 +18,7 @@ from scenarios.cli.options import INTERRUPTED
 from scenarios.cli.progress import bar
 from scenarios.cli.terminal import print_json, shown
 from scenarios.files import make_folder, reason
-from scenarios.sweep.engine import EngineError
-from scenarios.sweep.whole import Workers
+from scenarios.results.sampled import Workers
 
 _QUICK = 10  # with --quick, one in so many starts, but never fewer than two
 
@@ -68,7 +67,7 @@ def run(names: list[str], out: Path, quick: bool = False, workers: int | None = 
             made.add(found)
         for command, printed in () if quick else outputs(asked, root, out / "output"):
             made.add(None, command, printed)
-    except (OSError, EngineError) as error:
+    except OSError as error:
         _say(f"hierarchy: fault: {_fault(error)}")
         return 1
     except KeyboardInterrupt:
@@ -91,7 +90,7 @@ def chosen(names: list[str], root: Path) -> tuple[list[str], list[str]]:
 
 def ran(studies: list[str], out: Path, quick: bool, workers: int | None) -> Iterator[Rows]:
     """Run studies and yield the rows of each as it ends; runs that `out` has are not repeated."""
-    with bar("runs") as progress, Workers(workers) as some:
+    with bar("runs") as progress:
         for count, name in enumerate(studies, 1):
             study = STUDIES[name]
             if quick:
@@ -99,7 +98,7 @@ def ran(studies: list[str], out: Path, quick: bool, workers: int | None) -> Iter
             _say(f"{name} (study {count} of {len(studies)}): {study.title}, "
                  f"{counted(len(study.names), 'column')} from {study.starts} starts")
             begun = perf_counter()
-            found = rows_of_study(study, out / name, some, progress)
+            found = rows_of_study(study, out / name, Workers(workers), progress)
             _say(f"  {minutes(perf_counter() - begun)}")
             yield found
 

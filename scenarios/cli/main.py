@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from scenarios.cli import benchmarks, completion
+from scenarios.cli import benchmarks, completion, options
 from scenarios.cli.options import (
     INTERRUPTED,
     PORT,
@@ -23,6 +23,7 @@ from scenarios.cli.options import (
     Changes,
     Duration,
     Out,
+    Part,
     Plugins,
     Port,
     Scheduler,
@@ -58,8 +59,11 @@ def run_command(arguments: list[str]) -> int:
 
         if isinstance(error, HierarchyError):
             return _wrong(str(error))
-        if isinstance(error, OSError) and error.errno is not None:
-            return _fault(error)
+        if isinstance(error, OSError):
+            return _fault(f"{error.filename}: {error.strerror}" if error.filename else
+                          error.strerror or str(error))
+        if isinstance(error, RuntimeError) and type(error).__module__.startswith("scenarios."):
+            return _fault(str(error))  # a page that cannot be made, a cluster that is lost
         raise
 
 
@@ -72,7 +76,7 @@ def _print_version(asked: bool) -> None:
 
 
 @app.callback()
-def options(version: Annotated[bool, typer.Option(
+def root(version: Annotated[bool, typer.Option(
         "--version", is_eager=True, callback=_print_version,
         help="Print the version and exit.")] = False) -> None:
     """Resolve prioritized robot tasks in many ways, and compare the results."""
@@ -88,7 +92,7 @@ def list_(plugin: Plugins = None, as_json: AsJson = False) -> None:
     from hierarchy.tasks import TASKS
     from scenarios.config import load, shipped, shipped_groups
     from scenarios.config.groups import load_group
-    from scenarios.sweep.config import load_sweep, shipped_sweeps
+    from scenarios.results.sweep_file import load_sweep, shipped_sweeps
 
     entries = {"scenarios": {name: load(name).title for name in shipped()},
                "groups": {name: load_group(name).title for name in shipped_groups()},
@@ -164,18 +168,18 @@ def compare(scenarios: Annotated[list[str], typer.Argument(
             changes: Changes = None, plugin: Plugins = None, duration: Duration = None,
             out: Out = None, starts: Annotated[int | None, typer.Option(
                 "--starts", metavar="N", min=2, help="Compare over N starts sampled from each "
-                "scenario's [variation]; needs the extra `sweep`.")] = None,
+                "scenario's [variation].")] = None,
             seed: Annotated[int, typer.Option(
                 "--seed", metavar="S", min=0, help="With --starts: seed of the samples.")] = 0,
-            workers: Workers = None, scheduler: Scheduler = None,
+            workers: Workers = None, scheduler: Scheduler = None, part: Part = None,
             as_json: AsJson = False) -> int:
     """Run scenarios under several resolvers and report.
 
     With --starts every resolver gets the same sampled starts, and the report gives statistics; run
     the same command again to resume an interrupted comparison.
     """
-    if starts is None and (seed or workers or scheduler):
-        raise typer.BadParameter("needs --starts", param_hint="--seed, --workers, --scheduler")
+    if starts is None and (seed or scheduler or part):
+        raise typer.BadParameter("needs --starts", param_hint="--seed, --scheduler, --part")
     from scenarios.config import members, shipped_groups
     from scenarios.config.scenario import OWN
 
@@ -185,13 +189,14 @@ def compare(scenarios: Annotated[list[str], typer.Argument(
     if starts is not None:
         from scenarios.cli.sweep import starts_command
 
-        return starts_command(chosen, specs, starts, seed, out, workers, scheduler, as_json)
+        return starts_command(chosen, specs, starts, seed, out,
+                              options.workers(workers, scheduler, part), as_json)
     from scenarios.cli.compare import compare_scenarios
     from scenarios.files import next_free
 
     name = scenarios[0] if grouped else chosen[0].name
     folder = out if out is not None else next_free(Path("runs") / f"compare-{name}")
-    return compare_scenarios(chosen, specs, folder, as_json)
+    return compare_scenarios(chosen, specs, folder, as_json, workers)
 
 
 @app.command()
@@ -200,14 +205,14 @@ def sweep(file: Annotated[str, typer.Argument(help="Name of a sweep, or a sweep 
           out: Annotated[Path | None, output(
               "Output folder, new or of a sweep to resume. Default: runs/sweep-NAME.")] = None,
           plugin: Plugins = None, workers: Workers = None, scheduler: Scheduler = None,
-          as_json: AsJson = False) -> int:
+          part: Part = None, as_json: AsJson = False) -> int:
     """Run scenarios with sampled parameters.
 
     Run the same command again to resume an interrupted sweep.
     """
     from scenarios.cli.sweep import sweep_command
 
-    return sweep_command(file, out, workers, scheduler, as_json)
+    return sweep_command(file, out, options.workers(workers, scheduler, part), as_json)
 
 
 @app.command()
@@ -361,10 +366,8 @@ def _interrupted() -> int:
     return INTERRUPTED
 
 
-def _fault(error: OSError) -> int:
-    """Say what the system refused: a full disk, a folder without permission, a lost device."""
-    where = f"{error.filename}: " if error.filename else ""
-    print(f"hierarchy: fault: {where}{error.strerror}", file=sys.stderr)
+def _fault(text: str) -> int:
+    print(f"hierarchy: fault: {text}", file=sys.stderr)
     return 1
 
 

@@ -20,9 +20,9 @@ from benchmark.reproduce.watched import DAMPED, LARGEST, LEFT, jobs, measured
 from hierarchy.errors import HierarchyError
 from scenarios.cli.main import app
 from scenarios.config import shipped
-from scenarios.sweep.run import digest, run_batch
-from scenarios.sweep.store import Store
-from scenarios.sweep.whole import Workers
+from scenarios.results.run import outcome
+from scenarios.results.sampled import Workers
+from scenarios.results.store import Store
 
 ROOT = Path(__file__).parents[2]
 PAGES = pages.marked(ROOT)
@@ -274,7 +274,8 @@ def test_what_is_measured_in_ticks_is_stored_for_each_start(tmp_path, monkeypatc
                   Study("pivots", pivots=("avoidance",), **common)):
         store = Store(tmp_path / study.name)
         with store.opened():
-            store.add(run_batch(jobs(study, SEED), digest(), partial(measured, study)))
+            for job in jobs(study, SEED):
+                store.add(job, outcome(job, partial(measured, study)))
         found = rows_of_study(study, store.folder, Workers(), progress=pytest.fail)
         assert found.ended == dict.fromkeys(study.names, 2)
         if study.pairs:

@@ -176,7 +176,7 @@ def test_an_output_folder_that_cannot_be_written_stops_the_run_before_it_begins(
 
 
 def simulation_is(stand_in, monkeypatch):
-    for module in ("scenarios.cli.run", "scenarios.report.comparing"):
+    for module in ("scenarios.cli.run", "scenarios.results.comparing"):
         monkeypatch.setattr(importlib.import_module(module), "simulate", stand_in)
 
 
@@ -203,7 +203,7 @@ def test_ctrl_c_in_a_comparison_keeps_what_was_run_and_runs_no_more(tmp_path, mo
 
     simulation_is(interrupted_at_the_second, monkeypatch)
     assert run_command(["compare", "ellipse", "--resolvers", "tpm,recursive,hqp",
-                        "--out", "b"]) == 1
+                        "--workers", "1", "--out", "b"]) == 1
     assert begun == ["tpm", "recursive"]
     assert {path.name for path in (tmp_path / "b" / "ellipse").iterdir()} == {"tpm", "recursive"}
     assert "interrupted at tick 5" in (tmp_path / "b" / "index.html").read_text()
@@ -218,7 +218,8 @@ def test_one_run_that_breaks_does_not_lose_the_others(tmp_path, monkeypatch, cap
     simulation_is(breaks_under_recursive, monkeypatch)
     done = compare("ellipse", ["recursive", "tpm"], out=tmp_path / "b")
     assert [run.fault for run in done.runs] == ["ArithmeticError: [bold]no[/bold] answer", None]
-    assert run_command(["compare", "ellipse", "--resolvers", "recursive,tpm", "--out", "c"]) == 1
+    assert run_command(["compare", "ellipse", "--resolvers", "recursive,tpm", "--workers", "1",
+                        "--out", "c"]) == 1
     assert "[bold]no[/bold] answer" in capsys.readouterr().err
 
 

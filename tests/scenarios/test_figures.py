@@ -24,7 +24,7 @@ from scenarios.draw.figures.timeline import timeline
 from scenarios.loop.simulation import simulate
 from scenarios.measure.run_folder import save
 from scenarios.recording.recording import Event
-from scenarios.report.figures import computing_time, overlay, side_by_side
+from scenarios.results.curves import computing_time, overlay, side_by_side
 
 
 def beside(panel, recordings):

@@ -12,7 +12,7 @@ from scenarios.cell.build import build
 from scenarios.config import Scenario, ScenarioError
 from scenarios.draw.figures.picture import picture
 from scenarios.measure.metrics import measure
-from scenarios.report.comparing import compare
+from scenarios.results.comparing import compare
 
 pytestmark = pytest.mark.slow
 

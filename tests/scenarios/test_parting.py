@@ -13,7 +13,7 @@ from scenarios.measure.motions import motions
 from scenarios.measure.partings import partings
 from scenarios.measure.runs import Run
 from scenarios.measure.verdicts.verdict import verdict
-from scenarios.report import comparison_page as page
+from scenarios.results.page import comparison_page as page
 from solvers.qp import backends
 
 LETTER = "tpm-published"

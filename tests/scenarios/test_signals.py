@@ -14,7 +14,7 @@ from scenarios.measure.motions import motions
 from scenarios.measure.runs import Run, table
 from scenarios.recording.columns import columns
 from scenarios.recording.signals import Signal, known
-from scenarios.report.charts import multiples
+from scenarios.results.charts import multiples
 
 pytestmark = pytest.mark.usefixtures("no_plugins")
 
