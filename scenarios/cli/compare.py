@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 from scenarios.cli.progress import bar
-from scenarios.cli.terminal import exit_code, print_json, print_table, shown
+from scenarios.cli.terminal import exit_code, interruptible, print_json, print_table, shown
 from scenarios.config import Scenario
 from scenarios.config.resolvers import default_resolvers
 from scenarios.results.comparing import compare
@@ -20,7 +20,8 @@ def compare_scenarios(scenarios: list[Scenario], resolvers: list[str] | None, fo
     if resolvers is None:
         _say_what_is_missing(scenarios, as_json)
     command, count = shlex.join(["hierarchy", *sys.argv[1:]]), workers or processors()
-    with bar("runs" if count > 1 else "ticks") as told:
+    with (interruptible(f"the runs made so far are in {shown(folder)}"),
+          bar("runs" if count > 1 else "ticks") as told):
         comparison = compare(scenarios, resolvers, out=folder, progress=told, command=command,
                              workers=count)
     report = shown(folder / "index.html")

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from rich.text import Text
 
 from scenarios.cli.progress import bar
-from scenarios.cli.terminal import print_columns, print_json
+from scenarios.cli.terminal import interruptible, print_columns, print_json
 from scenarios.results.columns import Results, compared, summary, verdict
 from scenarios.results.sampled import Finished, Workers, compare_starts, sweep
 from scenarios.results.store import TABLE
@@ -28,7 +28,7 @@ def sweep_command(file: str, out: Path | None, workers: Workers, as_json: bool =
     """
     folder = out if out is not None else Path("runs") / f"sweep-{load_sweep(file).name}"
     begun = perf_counter()
-    with bar("runs") as told:
+    with interruptible(_continues(folder)), bar("runs") as told:
         done = sweep(file, folder, workers, told, shlex.join(["hierarchy", *sys.argv[1:]]))
     return _say(done, folder, as_json, perf_counter() - begun)
 
@@ -38,10 +38,14 @@ def starts_command(scenarios: list[Scenario], resolvers: list[str] | None, start
     """Compare scenarios from sampled starts, print the statistics, and return the exit code."""
     folder = out if out is not None else Path("runs") / f"starts-{scenarios[0].name}"
     begun = perf_counter()
-    with bar("runs") as told:
+    with interruptible(_continues(folder)), bar("runs") as told:
         done = compare_starts(scenarios, resolvers, starts, seed, folder, workers=workers,
                               progress=told, command=shlex.join(["hierarchy", *sys.argv[1:]]))
     return _say(done, folder, as_json, perf_counter() - begun)
+
+
+def _continues(folder: Path) -> str:
+    return f"finished runs are in {folder}, and the same command continues from there"
 
 
 def _say(done: Finished, folder: Path, as_json: bool, seconds: float) -> int:

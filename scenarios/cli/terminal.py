@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 import re
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from math import isfinite
 from pathlib import Path
 from textwrap import fill, wrap
@@ -115,6 +116,16 @@ def print_list(what: str, entries: dict[str, str]) -> None:
 def first_line(thing: Any) -> str:
     """Return the first line of the docstring of a class or an instance."""
     return (thing.__doc__ or "").strip().partition("\n")[0]
+
+
+@contextmanager
+def interruptible(kept: str) -> Iterator[None]:
+    """Let the message of an interruption say what is kept, and where."""
+    try:
+        yield
+    except KeyboardInterrupt as error:
+        error.args = (kept,)
+        raise
 
 
 def exit_code(fault: str | None) -> int:
