@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 
 import numpy as np
@@ -78,7 +79,8 @@ def build(scenario: Scenario, kept: Cell | None = None) -> Cell:
     `kept` is the cell of a scenario that differs only in its resolver or task settings: its robot,
     start, state, plant and obstacles are reused, and its sensor if the sensor settings are equal.
     """
-    announce_compilation()
+    if "TASK_HIERARCHY_WORKER" not in os.environ:  # what started this process has said it
+        announce_compilation()
     control = scenario.control
     robot = kept.robot if kept else make_robot(scenario.robot)
     check_there_are_tasks(scenario, robot)

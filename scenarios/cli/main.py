@@ -37,6 +37,8 @@ from scenarios.cli.terminal import first_line, print_json, print_list, shown
 if TYPE_CHECKING:
     from scenarios.config import Scenario
 
+_LONG = 50  # characters of a change in a title
+
 app = typer.Typer(rich_markup_mode=None, pretty_exceptions_enable=False)
 app.add_typer(problems, name="problems")
 
@@ -358,10 +360,15 @@ def doctor(as_json: AsJson = False) -> int:
 
 
 def _load(name: str, changes: list[str] | None, duration: float | None) -> Scenario:
+    """Load a scenario with changes, which then stand in its title."""
     from scenarios.config import load
 
     lengthened = [] if duration is None else [f"control.duration={duration!r}"]
-    return load(name, [*(changes or []), *lengthened])
+    found = load(name, [*(changes or []), *lengthened])
+    if not changes:
+        return found
+    said = ", ".join(one if len(one) < _LONG else f"{one[:_LONG]}..." for one in changes)
+    return found.model_copy(update={"title": f"{found.title or found.name} ({said})"})
 
 
 def _split(specs: str) -> list[str]:

@@ -115,8 +115,9 @@ class _Worker(Thread):
 
 def _started() -> subprocess.Popen[bytes]:
     path = os.pathsep.join(entry or str(Path.cwd()) for entry in sys.path)
+    settings = {**os.environ, "PYTHONPATH": path, "TASK_HIERARCHY_WORKER": "1"}
     return subprocess.Popen([sys.executable, "-c", _SERVE], stdin=subprocess.PIPE,
-                            stdout=subprocess.PIPE, env={**os.environ, "PYTHONPATH": path},
+                            stdout=subprocess.PIPE, env=settings,
                             start_new_session=True)  # Ctrl-C of a terminal reaches the caller only
 
 

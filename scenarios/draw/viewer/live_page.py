@@ -61,7 +61,7 @@ class LivePage:
         self.panel = LivePanel(
             server, self.requests, live.scenario, list(self.specs),
             self._lately.curves(live.controller), speed, len(self._stage.obstacles),
-            key_html(key(live.recorder.facts, live.scenario), self._colour))
+            self._stage.floor, key_html(key(live.recorder.facts, live.scenario), self._colour))
         self.draw()
 
     @property
@@ -211,5 +211,5 @@ class LivePage:
         if live.over:
             note += f", {live.fault or 'ended'}"
         self.list = stack_html(self.label, self._colour, now, live.controller.cell.stack.names,
-                               note)
+                               note, self._stage)
         self.panel.show(self.playing and not live.over, self.list)
