@@ -2,7 +2,8 @@
 
 Heavy imports happen only when needed, so that `--help` and completion are fast. With `--json` a
 command prints one JSON object on standard output and nothing else there. Exit codes: 0 done, 1 a
-run stopped with a reported fault, 2 the command line or a file is invalid, 130 Ctrl-C, 143 SIGTERM.
+run stopped with a reported fault, 2 the command line or a file is invalid, 130 Ctrl-C,
+SIGTERM or SIGHUP.
 """
 
 from __future__ import annotations
@@ -43,16 +44,8 @@ app = typer.Typer(rich_markup_mode=None, pretty_exceptions_enable=False)
 app.add_typer(problems, name="problems")
 
 
-class _Ended(KeyboardInterrupt):
-    """A signal that asks the command to end: what is made so far is kept, as at Ctrl-C."""
-
-    code = INTERRUPTED
-
-
-def _end(number: int, _: object) -> None:
-    ended = _Ended()
-    ended.code = 128 + number
-    raise ended
+def _end(*_: object) -> None:
+    raise KeyboardInterrupt  # what is made so far is kept
 
 
 def main() -> None:
@@ -68,11 +61,11 @@ def run_command(arguments: list[str]) -> int:
     """Run a command line and return its exit code; errors become one line on stderr."""
     try:
         code = app(arguments or ["--help"], prog_name="hierarchy", standalone_mode=False)
-        return int(code or 0)
+        return int(code or 0) if code != INTERRUPTED else _interrupted()
     except typer.TyperException as error:
         return _wrong(f"{error.format_message()}{_given(error, arguments)}")
-    except (KeyboardInterrupt, typer.Abort) as error:
-        return _interrupted(error if isinstance(error, KeyboardInterrupt) else error.__cause__)
+    except (KeyboardInterrupt, typer.Abort):
+        return _interrupted()
     except Exception as error:
         from hierarchy.errors import HierarchyError
 
@@ -385,9 +378,9 @@ def _given(error: typer.TyperException, arguments: list[str]) -> str:
     return f", got {given[-1]!r}" if given and repr(given[-1]) not in error.format_message() else ""
 
 
-def _interrupted(error: BaseException | None) -> int:
-    print(": ".join(["hierarchy: interrupted", *(error.args if error else ())]), file=sys.stderr)
-    return getattr(error, "code", INTERRUPTED)
+def _interrupted() -> int:
+    print("hierarchy: interrupted", file=sys.stderr)
+    return INTERRUPTED
 
 
 def _fault(text: str) -> int:

@@ -120,11 +120,11 @@ def first_line(thing: Any) -> str:
 
 @contextmanager
 def interruptible(kept: str) -> Iterator[None]:
-    """Let the message of an interruption say what is kept, and where."""
+    """Say at an interruption what is kept, and where."""
     try:
         yield
-    except KeyboardInterrupt as error:
-        error.args = (kept,)
+    except KeyboardInterrupt:
+        print(f"hierarchy: {kept}", file=sys.stderr)
         raise
 
 

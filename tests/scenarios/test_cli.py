@@ -1,16 +1,19 @@
 import importlib
 import json
+import os
 import signal
 import subprocess
 import sys
 from importlib.metadata import version
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hand_made import recording
 
-from scenarios import compare
+from scenarios import compare, load
 from scenarios.cli.main import app, run_command
+from scenarios.results import comparing
 
 SHORT = ["--duration", "0.02"]
 pytestmark = pytest.mark.slow
@@ -237,10 +240,11 @@ main()
 """
 
 
-def test_ctrl_c_in_the_middle_of_a_run_saves_every_tick_so_far_whole(tmp_path):
+@pytest.mark.parametrize("number", ["SIGINT", "SIGTERM", "SIGHUP"])
+def test_a_signal_in_the_middle_of_a_run_saves_every_tick_so_far_whole(number, tmp_path):
     from scenarios import load_run
 
-    command = [sys.executable, "-c", INTERRUPTED_AT_TICK_500,
+    command = [sys.executable, "-c", INTERRUPTED_AT_TICK_500.replace("SIGINT", number),
                "run", "ellipse", "--duration", "20", "--out", "a"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 1
@@ -249,6 +253,77 @@ def test_ctrl_c_in_the_middle_of_a_run_saves_every_tick_so_far_whole(tmp_path):
     assert run.fault == f"interrupted at tick {run.ticks}"
     assert run.fault in done.stderr
     assert [path.name for path in tmp_path.iterdir()] == ["a"]
+
+
+INTERRUPTED_AFTER_THE_FIRST_RUN = """
+import os, signal
+from scenarios.results import comparing
+
+add = comparing._Written.add
+
+def add_and_interrupt(written, i, run):
+    add(written, i, run)
+    os.kill(os.getpid(), signal.SIGTERM)
+
+comparing._Written.add = add_and_interrupt
+from scenarios.cli.main import main
+main()
+"""
+
+
+def test_a_signal_in_a_comparison_side_by_side_keeps_what_ended_and_names_the_folder(tmp_path):
+    command = [sys.executable, "-c", INTERRUPTED_AFTER_THE_FIRST_RUN, "compare", "ellipse",
+               "--resolvers", "tpm,hcod", "--workers", "2", *SHORT, "--out", "b"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 130
+    assert "the runs made so far are in b\n" in done.stderr
+    assert list((tmp_path / "b").rglob("run.npz"))
+    assert {"results.csv", "index.html", "comparison.json"} <= {
+        path.name for path in (tmp_path / "b").iterdir()}
+
+
+def test_runs_side_by_side_are_those_made_one_by_one_and_are_timed_alone(tmp_path, monkeypatch):
+    monkeypatch.setattr(comparing, "TIMED", 10)
+    apart, beside = (compare(load("ellipse", ["control.duration=0.02"]), ["tpm", "hcod"],
+                             tmp_path / str(workers), workers=workers) for workers in (1, 2))
+    for one, other in zip(apart.runs, beside.runs, strict=True):
+        assert (one.recording["q"] == other.recording["q"]).all()
+        assert (one.timing, other.timing.ticks) == (None, 10)
+        assert other.metrics["time_tick_median"].value == pytest.approx(
+            float(np.median(other.timing["time_tick"])))
+    assert "first 10 ticks of each repeated" in (tmp_path / "2" / "index.html").read_text()
+
+
+def test_an_error_in_the_page_costs_no_run_and_says_where_they_are(tmp_path, monkeypatch, capsys):
+    def broken(*_):
+        raise LookupError("no such style")
+
+    monkeypatch.setattr("scenarios.results.page.comparison_page", broken)
+    assert run_command(["compare", "ellipse", "--resolvers", "tpm,hcod", *SHORT, "--out", "b"]) == 1
+    assert "no such style; the runs are in b" in capsys.readouterr().err
+    assert len(list((tmp_path / "b").rglob("run.npz"))) == 2
+
+
+def test_figures_do_not_depend_on_the_users_matplotlib(tmp_path):
+    (tmp_path / "matplotlibrc").write_text("text.usetex: True\nsavefig.bbox: tight\n")
+    command = [sys.executable, "-m", "scenarios.cli.main", "run", "ellipse", "--figures", *SHORT]
+    settings = {**os.environ, "MPLBACKEND": "no-such-backend"}
+    for out, more in (("a", {}), ("b", {"MATPLOTLIBRC": str(tmp_path)})):
+        subprocess.run([*command, "--out", out], cwd=tmp_path, env={**settings, **more}, check=True)
+    pictures = sorted((tmp_path / "a").glob("*.svg"))
+    assert pictures
+    assert all(one.read_bytes() == (tmp_path / "b" / one.name).read_bytes()
+               for one in pictures if "time" not in one.name)
+
+
+def test_a_change_stands_in_the_title_and_an_inexact_resolver_is_named(capsys):
+    assert run_command(["run", "ellipse", *SHORT, "--set", "pointing.alpha_d=35"]) == 0
+    said = capsys.readouterr().out
+    assert "5 deg" not in said
+    assert "(pointing.alpha_d=35)" in said
+    assert "tpm-published is inexact where a level loses rank" in said
+    assert run_command(["run", "ellipse", *SHORT, "--resolver", "hcod"]) == 0
+    assert "inexact" not in capsys.readouterr().out
 
 
 def test_help_needs_none_of_the_heavy_packages():

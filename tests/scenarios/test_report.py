@@ -14,6 +14,7 @@ from headless import chromium
 
 from scenarios.config import load
 from scenarios.config.kinds.position import ListedPosition
+from scenarios.config.resolvers import default_resolvers
 from scenarios.loop.simulation import simulate
 from scenarios.measure.comparison import Comparison
 from scenarios.measure.motions import motions
@@ -375,6 +376,19 @@ def test_a_page_in_a_browser_fits_its_window_and_has_no_complaints(short_compari
         tab.run("document.querySelector('.command button').click()")
         tab.wait("/copied|selected/.test(document.querySelector('.command button').textContent)")
         assert tab.complaints == []
+
+
+@pytest.mark.slow
+def test_the_table_of_eight_resolvers_is_whole_in_a_wide_window(tmp_path):
+    specs = default_resolvers()[0]
+    file = tmp_path / "index.html"
+    file.write_text(page(comparison(*map(made, specs))), encoding="utf-8")
+    with chromium() as tab:
+        tab.look_at(file.as_uri(), width=1400)
+        assert tab.run("document.querySelectorAll('table.many thead')[0].rows[0].cells.length"
+                       ) == len(specs) + 1
+        assert tab.run("[...document.querySelectorAll('.scroll')].every("
+                       "one => one.scrollWidth <= one.clientWidth)")
 
 
 @pytest.mark.slow

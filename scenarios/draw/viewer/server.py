@@ -19,12 +19,13 @@ HOST = "127.0.0.1"
 _ELEVATION = 22.0  # [deg] of the camera
 _FIELD_OF_VIEW = 38.0  # [deg]
 _ASPECT = 0.9  # width over height of the area between the panels
-_NARROW = 0.7  # width over height of a window below which the panel hides its lower part
+_NARROW = 600  # [px] width of a window below which the panel hides its lower part
 _HIDDEN = 0.6  # of the height of such a window
 _ROOM = 1.06   # relative to the distance at which all points are just visible
 # Of the floor's cells, sections and plane. The dark one leaves black paths visible.
 _LIGHT = ((226, 230, 235), (196, 203, 211), (247, 248, 250))
 _DARK = ((108, 115, 124), (128, 136, 146), (92, 98, 107))
+_BOTH = 1000  # [px] width of a window below which the curves are folded
 _WIDTH = 330  # [px] width of the panels
 
 
@@ -41,7 +42,7 @@ def open_server(port: int, label: str) -> Any:
         raise HierarchyError("the page in the browser needs viser, which is not installed: "
                              "pip install 'task-hierarchy[view]'") from error
     port = _free(port)
-    with redirect_stdout(io.StringIO()), guarded():  # viser prints a table
+    with redirect_stdout(io.StringIO()), guarded(label):  # viser prints a table
         server = viser.ViserServer(host=HOST, port=port, label=label, verbose=False)
     _theme(server, dark=False)
     return server
@@ -88,13 +89,17 @@ def right(azimuth: float) -> Array:
 def look_at_all(server: Any, points: Array, azimuth: float) -> None:
     """Place the camera at an azimuth [rad] so that points (N, 3) [m] fill the view.
 
-    In a narrow window that is what the panel, which floats there, leaves free.
+    That is what the panels leave free: in a narrow window one floats in its lower part.
     """
     _place(server.initial_camera, points, azimuth, _ASPECT)
 
     def fit(client: Any) -> None:
-        if client.camera.aspect < _NARROW:
-            _place(client.camera, points, azimuth, client.camera.aspect, _HIDDEN)
+        width, height = client.camera.image_width, max(client.camera.image_height, 1)
+        if width < _NARROW:
+            _place(client.camera, points, azimuth, width / height, _HIDDEN)
+        else:
+            free = (width - _WIDTH * (2 if width >= _BOTH else 1)) / height
+            _place(client.camera, points, azimuth, min(free, _ASPECT))
 
     server.on_client_connect(fit)
 
@@ -121,6 +126,12 @@ def lay_out(server: Any) -> Any:
     main.set_width(_WIDTH)
     left.dock_left()
     left.set_width(_WIDTH)
+
+    @server.on_client_connect  # type: ignore[untyped-decorator]
+    def _(client: Any) -> None:
+        if client.camera.image_width < _BOTH:
+            left.minimize()
+
     return left.add_tab("Curves")
 
 

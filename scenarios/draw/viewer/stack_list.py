@@ -29,7 +29,7 @@ def stack_html(label: str, colour: str, now: Moment, tasks: Iterable[str] = (),
     became = [now.became[name] for name in now.order]
     return str(render(
         "draw/viewer/stack_list.html", label=label, colour=colour, note=note,
-        cone=None if stage is None or stage.axis is None else _of_cone(now, stage),
+        cone=_of_cone(now, stage),
         stack=[(name, phrase(one.fate, one.violation), _COLOURS[one.fate])
                for name, one in zip(now.order, became, strict=True)],
         absent=[name for name in tasks if name not in now.order],
@@ -37,8 +37,10 @@ def stack_html(label: str, colour: str, now: Moment, tasks: Iterable[str] = (),
         joints=_at_limits(now), saturated=_SATURATED))
 
 
-def _of_cone(now: Moment, stage: Stage) -> tuple[str, tuple[str, str]]:
-    """Return how far the tool's axis is inside or outside its cone, and the colours of that."""
+def _of_cone(now: Moment, stage: Stage | None) -> tuple[str, tuple[str, str]] | None:
+    """Return how far the tool's axis is inside or outside its cone, if any, and the colours."""
+    if stage is None or stage.axis is None:
+        return None
     angle = np.degrees(np.arccos(np.clip(now.axis @ stage.axis, -1.0, 1.0)))
     beyond = float(angle - np.degrees(stage.half_angle))
     if beyond > _ON_CONE:
