@@ -13,9 +13,7 @@ from typing import final
 
 from hierarchy import plugins
 from hierarchy.errors import HierarchyError, brief, expect, file_path
-from scenarios.cell.build import build
 from scenarios.config import Scenario, load, members, shipped_groups
-from scenarios.config.resolvers import check_names, usable
 from scenarios.config.scenario import OWN
 from scenarios.files import OutputError, claim, make_folder, unlock, write_json, write_text
 from scenarios.loop.simulation import simulate
@@ -24,7 +22,7 @@ from scenarios.measure.run_folder import save, versions
 from scenarios.measure.runs import Run
 from scenarios.recording.recording import Recording
 from scenarios.results import pool
-from scenarios.results.plan import distinct
+from scenarios.results.plan import side_by_side
 from scenarios.results.run import Job, Outcome, digest, key_of
 from scenarios.results.store import TABLE, write_table
 
@@ -71,10 +69,10 @@ def compare(scenarios: Iterable[str | Scenario] | str | Scenario,
     planned, refused = _plan(asked, resolvers)
     folder = None if out is None else make_folder(claim(file_path("compare: out", out)))
     written = _Written(folder, Comparison(
-        (), command or _command(planned, out), versions(), tuple(refused),
+        (), command or _command(planned, out), versions(), refused,
         None if out is None else str(out)), len(planned))
     try:
-        for i, run in (_side_by_side(planned, folder, workers, progress)
+        for i, run in (_together(planned, folder, workers, progress)
                        if min(workers, len(planned)) > 1 else
                        _one_by_one(planned, folder, progress)):
             written.add(i, run)
@@ -149,7 +147,7 @@ def _job(run: Run) -> Job:
 
 
 def _plan(scenarios: Iterable[str | Scenario],
-          resolvers: Sequence[str] | None) -> tuple[list[Run], list[str]]:
+          resolvers: Sequence[str] | None) -> tuple[list[Run], tuple[str, ...]]:
     """Return the planned runs, and why others are not possible."""
     named = list(scenarios)
     if resolvers is None and any(one in shipped_groups() for one in named):
@@ -157,19 +155,7 @@ def _plan(scenarios: Iterable[str | Scenario],
     loaded = [load(s) if isinstance(s, (str, Path)) else s for s in members(named)]
     for one in loaded:
         expect("compare", one, Scenario, "give names, files, or what `load` returns")
-    check_names(loaded)
-    runs, refused = [], []
-    for scenario in loaded:
-        build(scenario)
-        can, cannot = usable(scenario, resolvers)
-        labels = distinct({spec: str(one.make_resolver().label) for spec, one in can.items()})
-        runs += [Run(one, spec, labels[spec]) for spec, one in can.items()]
-        refused += cannot
-    if not runs:
-        raise HierarchyError("; ".join(refused) or "no resolver was given")
-    if len(runs) > 1 and len({run.spec for run in runs}) == 1:
-        runs = [dataclasses.replace(run, label=run.scenario.name) for run in runs]
-    return runs, refused
+    return side_by_side(loaded, resolvers)
 
 
 def _one_by_one(planned: Sequence[Run], folder: Path | None, progress: Progress | None
@@ -184,7 +170,7 @@ def _one_by_one(planned: Sequence[Run], folder: Path | None, progress: Progress 
             return
 
 
-def _side_by_side(planned: Sequence[Run], folder: Path | None, workers: int,
+def _together(planned: Sequence[Run], folder: Path | None, workers: int,
                   progress: Progress | None) -> Iterator[tuple[int, Run]]:
     """Make the runs in processes; then repeat the first ticks of each here, to time them alone."""
     made, total = dict[int, Run](), len(planned)

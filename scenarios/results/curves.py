@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
@@ -81,65 +80,26 @@ def departure(recordings: Mapping[str, Recording], looks: Mapping[str, Look]) ->
     return fig
 
 
-def computing_time(recordings: Mapping[str, Recording], looks: Mapping[str, Look]
-                   ) -> tuple[Figure, str]:
-    """Return the computing times of a tick [us], one row per run, and the meaning of the marks.
+def computing_time(recordings: Mapping[str, Recording], looks: Mapping[str, Look]) -> Figure:
+    """Return the computing times of a tick [us] on a logarithmic axis, one row per run.
 
-    A bar shows the medians of its parts; if some runs take much longer than others, a dot on a
-    logarithmic axis. Marks show the median and the 99.9th percentile of the whole tick.
+    A dot for the median of resolving, then median (|) and 99.9th percentile (x) of whole ticks.
     """
     fig, (ax,) = drawing.figure(width=4.9, height=0.7 + 0.4 * len(recordings))
-    wide = _wide(recordings)
     for row, (label, recording) in enumerate(recordings.items()):
-        if wide:
-            ax.plot(_micro(recording, "time_resolve", 50.0), row, "o", color=looks[label].colour)
-        else:
-            _bar(ax, row, recording, looks[label].colour)
-        ax.plot(_micro(recording, "time_tick", 50.0), row, "|", color=INK, markersize=8)
-    if wide:
-        drawing.make_logarithmic(ax, "x")
-    else:
-        ax.set_xlim(left=0.0)
-    _slowest(ax, recordings, wide)
+        for signal, percent, marker, colour in (("time_resolve", 50.0, "o", looks[label].colour),
+                                                ("time_tick", 50.0, "|", INK),
+                                                ("time_tick", 99.9, "x", INK)):
+            if signal in recording:
+                ax.plot(1e6 * np.percentile(recording[signal], percent), row, marker, color=colour)
+    drawing.make_logarithmic(ax, "x")
     ax.set_yticks(range(len(recordings)), list(recordings))
     ax.set_ylim(len(recordings) - 0.5, -0.5)
     ax.grid(axis="y", visible=False)
     ax.set_xlabel("µs per tick")
-    bars = "kinematics, rows, resolve (light to full), medians"
-    return fig, f"{'dot: resolve, median' if wide else bars}; whole tick | median, × 99.9 %"
-
-
-def _bar(ax: Axes, row: int, recording: Recording, colour: str) -> None:
-    left = 0.0
-    for signal, alpha in (("time_kinematics", 0.35), ("time_rows", 0.6), ("time_resolve", 1.0)):
-        width = _micro(recording, signal, 50.0)
-        ax.barh(row, width, left=left, color=colour, alpha=alpha, height=0.6)
-        left += width
-
-
-def _slowest(ax: Axes, recordings: Mapping[str, Recording], wide: bool) -> None:
-    """Mark the 99.9th percentile; far from all bars it is a number at the edge."""
-    edge = ax.get_xlim()[1] * (100.0 if wide else 1.6)
-    for row, recording in enumerate(recordings.values()):
-        slow = _micro(recording, "time_tick", 99.9)
-        if slow <= edge:
-            ax.plot(slow, row, "x", color=INK, markersize=6)
-        else:
-            ax.annotate(f"× {slow:.0f} \N{RIGHTWARDS ARROW}", (1.0, row), ha="right", va="center",
-                        xycoords=("axes fraction", "data"), fontsize=8, color=INK)
-    if not wide:
-        ax.set_xlim(0.0, edge)
-
-
-def _micro(recording: Recording, signal: str, percent: float) -> float:
-    return 1e6 * float(np.percentile(recording[signal], percent)) if signal in recording else 0.0
+    return fig
 
 
 def _dashed(look: Look) -> Any:
     """Return the dashes of a look in matplotlib's form."""
     return (0, look.dash) if look.dash else "-"
-
-
-def _wide(recordings: Mapping[str, Recording]) -> bool:
-    medians = [_micro(recording, "time_tick", 50.0) for recording in recordings.values()]
-    return max(medians) > 20 * min(medians)

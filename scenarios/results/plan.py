@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 from hierarchy import plugins
 from hierarchy.errors import HierarchyError
-from scenarios.config import Scenario, load
+from scenarios.config import Scenario, ScenarioError, load
 from scenarios.config.distributions import Value
 from scenarios.config.resolvers import check_names, usable
 from scenarios.config.sampling import changed, drawn
+from scenarios.measure.runs import Run
 from scenarios.results.run import Job, digest, key_of
-from scenarios.results.sweep_file import Sweep, SweepError
+from scenarios.results.sweep_file import Sweep
 
 
 @dataclass(frozen=True)
@@ -48,10 +50,9 @@ def plan(sweep: Sweep, scenarios: Sequence[Scenario] | None = None) -> Plan:
     HierarchyError : an unknown scenario, resolver or setting, a scenario that does not fit its
         robot, a parameter that a scenario does not have, an invalid sampled value.
     """
-    asked = _checked(sweep, _loaded(sweep) if scenarios is None else scenarios)
-    labels, refused = _resolvers(asked, sweep.resolvers)
-    specs = {spec for named in labels.values() for spec in named}
-    one = next(iter(specs)) if len(specs) == 1 and len(asked) > 1 else None
+    asked = _loaded(sweep) if scenarios is None else scenarios
+    columns, refused = side_by_side(asked, sweep.resolvers or None, f"sweep {sweep.name!r}: ")
+    alone = len({run.spec for run in columns}) == 1 and len(asked) > 1
     versions = digest()
     runs: dict[str, Planned] = {}
     for index in range(sweep.samples):
@@ -59,16 +60,20 @@ def plan(sweep: Sweep, scenarios: Sequence[Scenario] | None = None) -> Plan:
             values = _drawn(sweep, index, scenario)
             what = f"sweep {sweep.name!r}: sample {index} of scenario {scenario.name!r}"
             text = changed(scenario, values, what).to_toml()
-            for spec, label in labels[scenario.name].items():
-                key = key_of(text, spec, versions)
-                job = Job(key, text, spec, scenario.name, index, values, plugins.loaded())
-                runs.setdefault(key, Planned(one or scenario.name,
-                                             scenario.name if one else label, job))
+            for run in columns:
+                if run.scenario.name == scenario.name:
+                    key = key_of(text, run.spec, versions)
+                    job = Job(key, text, run.spec, scenario.name, index, values, plugins.loaded())
+                    runs.setdefault(key, Planned(run.spec if alone else scenario.name, run.label,
+                                                 job))
     return Plan(sweep, tuple(asked), tuple(runs.values()), refused)
 
 
 def _drawn(sweep: Sweep, index: int, scenario: Scenario) -> dict[str, Value]:
     """Return the values of a sample: the scenario's own variation, overridden by the sweep's."""
+    if sweep.variation and not scenario.variation:
+        raise ScenarioError(f"scenario {scenario.name!r} has no [variation] to sample from; add "
+                            "one, such as start.q = { around = 0.02 }")
     own = drawn(scenario, scenario.variation, sweep.seed, index) if sweep.variation else {}
     return own | drawn(scenario, sweep.parameters, sweep.seed, index,
                        f"sweep {sweep.name!r}: parameters")
@@ -79,34 +84,33 @@ def _loaded(sweep: Sweep) -> tuple[Scenario, ...]:
     return tuple(load(name, lasting) for name in sweep.scenarios)
 
 
-def _checked(sweep: Sweep, scenarios: Sequence[Scenario]) -> Sequence[Scenario]:
+def side_by_side(scenarios: Sequence[Scenario], specs: Sequence[str] | None, what: str = ""
+                 ) -> tuple[list[Run], tuple[str, ...]]:
+    """Return every scenario under every resolver that can resolve it, and why others cannot.
+
+    A run is labelled by its resolver, by its spec if another resolver has the same label, and by
+    its scenario if there is one resolver for several scenarios.
+
+    Raises
+    ------
+    HierarchyError : two scenarios of one name, with `what` in front; a scenario that does not fit
+        its robot; an unknown resolver or setting; no resolver that can resolve any scenario.
+    """
     from scenarios.cell.build import build
 
-    check_names(scenarios, f"sweep {sweep.name!r}: ")
-    for scenario in scenarios:
-        build(scenario)
-        if sweep.variation and not scenario.variation:
-            raise SweepError(f"scenario {scenario.name!r} has no [variation] to sample from; add "
-                             "one, such as start.q = { around = 0.02 }")
-    return scenarios
-
-
-def _resolvers(scenarios: Sequence[Scenario], specs: Sequence[str]
-               ) -> tuple[Mapping[str, Mapping[str, str]], tuple[str, ...]]:
-    """Return the labels of the usable specs by scenario, and why others are not usable."""
-    labels: dict[str, dict[str, str]] = {}
+    check_names(scenarios, what)
+    runs: list[Run] = []
     refused: list[str] = []
     for scenario in scenarios:
-        can, cannot = usable(scenario, specs or None)
-        labels[scenario.name] = distinct({spec: str(one.make_resolver().label)
-                                          for spec, one in can.items()})
+        build(scenario)
+        can, cannot = usable(scenario, specs)
+        labels = {spec: str(one.make_resolver().label) for spec, one in can.items()}
+        shared = Counter(labels.values())
+        runs += [Run(one, spec, spec if shared[labels[spec]] > 1 else labels[spec])
+                 for spec, one in can.items()]
         refused += cannot
-    if not any(labels.values()):
+    if not runs:
         raise HierarchyError("; ".join(refused) or "no resolver was given")
-    return labels, tuple(refused)
-
-
-def distinct(labels: Mapping[str, str]) -> dict[str, str]:
-    """Return labels by spec; specs of the same label are called by their spec."""
-    found = list(labels.values())
-    return {spec: spec if found.count(label) > 1 else label for spec, label in labels.items()}
+    if len(runs) > 1 and len({run.spec for run in runs}) == 1:
+        runs = [replace(run, label=run.scenario.name) for run in runs]
+    return runs, tuple(refused)

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import matplotlib
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
@@ -21,21 +19,17 @@ def shares(results: Results) -> Figure:
     rows = len(criteria) * (len(labels) + 1)
     fig, (ax,) = drawing.figure(width=5.4, height=0.5 + 0.2 * rows)
     colours = drawing.colours(labels)
-    with matplotlib.rc_context(drawing.style()):
-        for i, criterion in enumerate(criteria):
-            top = i * (len(labels) + 1)
-            ax.text(0.0, top - 0.62, criterion.label, fontweight="bold", va="center", fontsize=9)
-            for j, label in enumerate(labels):
-                share = results.share(criterion, label)
-                low, high = share.interval
-                y, colour = top + j + 0.15, colours[label]
-                ax.plot([0.0, 1.0], [y, y], color=drawing.INK, alpha=0.1, lw=5.0,
-                        solid_capstyle="butt")
-                ax.plot([low, high], [y, y], color=colour, lw=5.0, alpha=0.4,
-                        solid_capstyle="butt")
-                ax.plot([share.met / share.of], [y], "o", color=colour, ms=6.0)
-                ax.text(1.04, y, f"{share}", va="center", fontsize=8)
-                ax.text(-0.03, y, label, va="center", ha="right", fontsize=8)
+    for i, criterion in enumerate(criteria):
+        top = i * (len(labels) + 1)
+        ax.text(0.0, top - 0.62, criterion.label, fontweight="bold", va="center", fontsize=9)
+        for j, label in enumerate(labels):
+            share = results.share(criterion, label)
+            y, colour = top + j + 0.15, colours[label]
+            ax.hlines(y, 0.0, 1.0, color=drawing.INK, alpha=0.1, lw=5.0)
+            ax.hlines(y, *share.interval, color=colour, lw=5.0, alpha=0.4)
+            ax.plot([share.met / share.of], [y], "o", color=colour, ms=6.0)
+            ax.text(1.04, y, f"{share}", va="center", fontsize=8)
+            ax.text(-0.03, y, label, va="center", ha="right", fontsize=8)
     ax.set_ylim(rows - 1.2, -1.1)
     ax.set_xlim(-0.02, 1.02)
     ax.set_xticks([0.0, 0.25, 0.5, 0.75, 1.0], ["0 %", "25 %", "50 %", "75 %", "100 %"])
@@ -48,25 +42,28 @@ def shares(results: Results) -> Figure:
 def spread(results: Results, metric: Metric) -> Figure:
     """Draw the distribution of a metric over the samples, one row per resolver.
 
-    Box: quartiles with the median; line: 5th to 95th percentile; dots: smallest and largest value.
-    Outliers beyond the axis are counted, and an arrow gives the extreme value.
+    Box: quartiles with the median; line: 5th to 95th percentile; dots: smallest and largest value,
+    where they are near. How many lie beyond the axis stands at its end.
     """
-    known = {label: metric.scale * results.of(metric.name, label) for label in results.labels}
-    known = {label: values for label, values in known.items() if values.size}
+    known = {label: metric.scale * values for label in results.labels
+             if (values := results.of(metric.name, label)).size}
     fig, (ax,) = drawing.figure(width=3.9, height=0.5 + 0.3 * len(known))
     colours = drawing.colours(results.labels)
     low, high = _limits(list(known.values()))
-    with matplotlib.rc_context(drawing.style()):
-        for y, (label, values) in enumerate(known.items()):
-            _box(ax, y, values, colours[label])
-            seen = values[(values >= low) & (values <= high)]
-            ax.plot([seen.min(), seen.max()], [y, y], ".", color=colours[label], ms=4.5)
-            _beyond(ax, y, values[values < low], low, colours[label])
-            _beyond(ax, y, values[values > high], high, colours[label])
+    for y, (label, values) in enumerate(known.items()):
+        line = {"color": colours[label], "linewidth": 1.2}
+        ax.boxplot(values, positions=[y], vert=False, widths=0.56, whis=(5.0, 95.0),
+                   showfliers=False, showcaps=False, patch_artist=True, whiskerprops=line,
+                   medianprops={**line, "linewidth": 2.4},
+                   boxprops={"facecolor": colours[label], "alpha": 0.4, "linewidth": 0.0})
+        seen = values[(values >= low) & (values <= high)]
+        ax.plot([seen.min(), seen.max()], [y, y], ".", color=colours[label], ms=4.5)
+        if beyond := values.size - seen.size:
+            ax.text(1.0, y, f"{beyond} beyond, to {max(values, key=abs):.3g}", fontsize=7.5,
+                    ha="right", va="bottom", transform=ax.get_yaxis_transform())
     ax.set_yticks(range(len(known)), list(known))
     ax.set_ylim(len(known) - 0.5, -0.5)
-    margin = 0.03 * (high - low)
-    ax.set_xlim(low - margin, high + margin)
+    ax.set_xlim(low - 0.03 * (high - low), high + 0.03 * (high - low))
     ax.tick_params(axis="y", length=0)
     ax.grid(False, axis="y")
     ax.spines["left"].set_visible(False)
@@ -74,34 +71,14 @@ def spread(results: Results, metric: Metric) -> Figure:
     return fig
 
 
-def _box(ax: Axes, y: float, values: Array, colour: str) -> None:
-    p5, q1, median, q3, p95 = np.percentile(values, [5.0, 25.0, 50.0, 75.0, 95.0])
-    ax.plot([p5, p95], [y, y], color=colour, lw=1.2)
-    ax.barh(y, q3 - q1, left=q1, height=0.56, color=colour, alpha=0.4, lw=0)
-    ax.plot([median, median], [y - 0.28, y + 0.28], color=colour, lw=2.4)
-
-
-def _beyond(ax: Axes, y: float, values: Array, edge: float, colour: str) -> None:
-    """Write at an edge how many values lie beyond it, and the extreme one."""
-    if not values.size:
-        return
-    right = values[0] > edge
-    farthest = values.max() if right else values.min()
-    text = f"{values.size}, to {farthest:.3g} \N{RIGHTWARDS ARROW}" if right else (
-        f"\N{LEFTWARDS ARROW} {values.size}, to {farthest:.3g}")
-    ax.text(edge, y - 0.3, text, ha="right" if right else "left", va="center", fontsize=7.5,
-            color=colour)
-
-
 def _limits(rows: list[Array], reach: float = 2.0) -> tuple[float, float]:
-    """Return limits that contain the middle 90 % of all rows and the values near them.
+    """Return the ends of the values near the middle 90 % of all rows.
 
-    Values up to `reach` times the width of that range away are near.
+    Those are at most `reach` times its width away.
     """
-    ends = [np.percentile(values, [5.0, 95.0]) for values in rows]
-    low, high = min(end[0] for end in ends), max(end[1] for end in ends)
-    far = reach * (high - low) or reach * max(abs(high), 1e-12)
     values = np.concatenate(rows)
+    low = min(float(np.percentile(row, 5.0)) for row in rows)
+    high = max(float(np.percentile(row, 95.0)) for row in rows)
+    far = reach * (high - low) or reach * max(abs(high), 1e-12)
     near = values[(values >= low - far) & (values <= high + far)]
-    return (float(near.min()), float(near.max())) if near.min() < near.max() else (
-        float(low - far), float(high + far))
+    return float(near.min()), float(max(near.max(), near.min() + 1e-12))

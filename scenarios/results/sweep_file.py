@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
-from pydantic import Field, ValidationError
+from pydantic import Field
 
-from hierarchy.errors import HierarchyError, UnknownNameError
+from hierarchy.errors import UnknownNameError
 from scenarios.config.distributions import Parameters
+from scenarios.config.errors import ScenarioError
 from scenarios.config.sections import Section
+from scenarios.config.validation import validated
 from scenarios.files import read_toml
 
 LIBRARY = Path(__file__).parents[1] / "library" / "sweeps"
-
-
-class SweepError(HierarchyError):
-    """An invalid sweep file; the message names the file and the key."""
 
 
 class Sweep(Section):
@@ -61,34 +59,10 @@ def load_sweep(name_or_path: str | Path) -> Sweep:
     """Read a shipped sweep by name or a sweep file by path.
 
     Paths of scenario files in it are relative to the file, and absolute in the returned sweep.
-    Raises SweepError, naming the file and the key, and UnknownNameError for an unknown name.
+    Raises ScenarioError, naming the file and the key, and UnknownNameError for an unknown name.
     """
     path = find(name_or_path)
-    data = read_toml(path, "sweep file", SweepError)
-    try:
-        sweep = Sweep.model_validate(data)
-    except ValidationError as error:
-        said = dict.fromkeys(_say(path, one) for one in error.errors())
-        raise SweepError("\n".join(said)) from error
+    sweep = validated(Sweep, read_toml(path, "sweep file", ScenarioError), str(path))
     return sweep.model_copy(update={"scenarios": tuple(
         str(path.parent.resolve() / name) if name.endswith(".toml") or ".toml:" in name else name
         for name in sweep.scenarios)})
-
-
-def _say(path: Path, error: Any) -> str:
-    loc = [str(part) for part in error["loc"]]
-    if error["type"] == "extra_forbidden":
-        *above, _ = loc
-        known = [".".join(above)] if above else list(Sweep.model_fields)
-        return f"{path}: {UnknownNameError('key', '.'.join(_without_kind(loc)), known)}"
-    where = ".".join(_without_kind(loc)) or "file"
-    value = "" if isinstance(error["input"], dict) else f", got {error['input']!r}"
-    return f"{path}: {where}: {error['msg'].removeprefix('Value error, ')}{value}"
-
-
-def _without_kind(loc: list[str]) -> list[str]:
-    """Drop the distribution's kind that pydantic inserts into the location of an error.
-
-    The form of the value that it tried is dropped too.
-    """
-    return loc[:2] + loc[3:4] if loc[0] == "parameters" and len(loc) > 3 else loc

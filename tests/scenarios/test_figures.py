@@ -405,23 +405,19 @@ def test_a_resolver_has_its_colour_in_every_figure(label):
     looks = palette.looks(runs)
     drawn = [side_by_side(panels.PANEL["body-distance"], runs, looks)[label].axes[0].lines,
              overlay(panels.position_error, runs, looks).axes[0].lines,
-             picture(runs).axes[0].lines, computing_time(runs, looks)[0].axes[0].patches]
+             picture(runs).axes[0].lines, computing_time(runs, looks).axes[0].lines]
     for artists in drawn:
         colours = [to_hex(one.get_facecolor() if isinstance(one, Patch) else one.get_color())
                    for one in artists]
         assert wanted in colours
 
 
-def test_times_far_apart_are_dots_and_a_tick_far_slower_than_its_bar_is_a_number():
-    near = {"tpm": recording(), "hcod": recording(time_tick=[4e-6, 4e-6, 4e-6, 4e-6, 4e-3])}
-    fig, marks = computing_time(near, palette.looks(near))
-    assert "light to full" in marks
-    assert [text.get_text()[0] for text in fig.axes[0].texts] == ["×"]
-    far = {"tpm": recording(), "hqp": recording(time_tick=np.full(5, 1e-3))}
-    fig, marks = computing_time(far, palette.looks(far))
-    assert fig.axes[0].get_xscale() == "log"
-    assert not fig.axes[0].patches
-    assert "dot" in marks
+def test_computing_times_stand_at_their_medians_and_slowest_ticks():
+    run = recording(time_tick=[4e-6, 4e-6, 4e-6, 4e-6, 4e-3], time_resolve=np.full(5, 2e-6))
+    (ax,) = computing_time({"tpm": run}, palette.looks(["tpm"])).axes
+    resolve, median, slow = (float(line.get_xdata()[0]) for line in ax.lines)
+    assert (resolve, median) == (pytest.approx(2.0), pytest.approx(4.0))
+    assert slow > 3900.0
 
 
 def test_the_stack_over_time_has_a_band_for_each_place_and_a_row_for_each_event():

@@ -27,7 +27,7 @@ from scenarios.results.plan import Planned, plan
 from scenarios.results.run import Job, Outcome, outcome
 from scenarios.results.sampled import Workers, compare_starts, sweep
 from scenarios.results.store import FullError, Store, read
-from scenarios.results.sweep_file import SweepError, load_sweep, shipped_sweeps
+from scenarios.results.sweep_file import load_sweep, shipped_sweeps
 
 BODY = {"name": '"small"', "scenarios": '["ellipse"]', "resolvers": '["tpm", "recursive"]',
         "duration": "0.02", "samples": "3", "seed": "7"}
@@ -88,7 +88,7 @@ def test_a_wrong_file_is_refused_before_anything_is_run(parameters, changed, say
 
 def test_unreadable_files_and_unknown_names_are_named(tmp_path):
     (tmp_path / "bad.toml").write_text("name = ")
-    with pytest.raises(SweepError, match=r"bad\.toml"):
+    with pytest.raises(HierarchyError, match=r"bad\.toml"):
         load_sweep(tmp_path / "bad.toml")
     with pytest.raises(HierarchyError, match="'ellipse-starts'"):
         load_sweep("ellipse-start")
