@@ -53,15 +53,6 @@ class Criterion:
 
 
 @dataclass(frozen=True)
-class Worst:
-    """The run with the worst value of a metric, and the values of the others on that sample."""
-
-    metric: Metric
-    run: Planned
-    others: dict[str, Metric]
-
-
-@dataclass(frozen=True)
 class Failure:
     """A reason why runs stopped early or failed, the first such run, and their number."""
 
@@ -165,7 +156,7 @@ class Results:
         return [metric for name, metric in self.metrics.items()
                 if metric.group != "Computing" and np.isfinite(self.values[name]).any()]
 
-    def worst(self) -> list[Worst]:
+    def worst(self) -> list[tuple[Metric, Planned]]:
         """Return the worst run for each metric that has a direction and differs between runs."""
         found = []
         for metric in self.shown():
@@ -173,9 +164,7 @@ class Results:
             if metric.lower_is_better is None or np.nanmin(values) == np.nanmax(values):
                 continue
             i = int(np.nanargmax(values) if metric.lower_is_better else np.nanargmin(values))
-            others = {run.label: valued(metric, values[j]) for j, run in enumerate(self.runs)
-                      if j != i and run.job.sample == self.runs[i].job.sample}
-            found.append(Worst(valued(metric, values[i]), self.runs[i], others))
+            found.append((valued(metric, values[i]), self.runs[i]))
         return found
 
     def alike(self) -> list[list[str]]:

@@ -18,7 +18,7 @@ from scenarios.results import cluster, pool
 from scenarios.results.columns import Results, results, verdict
 from scenarios.results.plan import Plan, plan
 from scenarios.results.run import Job, Outcome, outcome
-from scenarios.results.sampled_page import Page, name_of
+from scenarios.results.sampled_page import name_of, sampled_page, worst_runs
 from scenarios.results.store import TABLE, Store, write_table, writing
 from scenarios.results.sweep_file import Sweep, find, load_sweep
 
@@ -149,16 +149,16 @@ def _written(planned: Plan, store: Store, source: tuple[str, str]) -> dict[str, 
     kept = store.outcomes()
     found = results(planned, kept)
     command, file = source
-    page = Page(planned, found, store.folder, command, file, versions())
     write_table(store.folder / TABLE, [(run.job, kept[run.job.key]) for run in planned.runs])
     texts = {"results.json": json.dumps(_plain(planned, found, command), indent=2) + "\n",
-             **{f"worst/{name_of(run)}": run.job.load().to_toml() for run in page.worst_runs()}}
+             **{f"worst/{name_of(run)}": run.job.load().to_toml() for run in worst_runs(found)}}
     (store.folder / "worst").mkdir(exist_ok=True)
     for name, text in texts.items():
         with writing(store.folder / name):
             write_text(store.folder / name, text)
     with writing(store.folder / "index.html"):
-        write_text(store.folder / "index.html", page.html())
+        write_text(store.folder / "index.html",
+                   sampled_page(planned, found, store.folder, command, file))
     return found
 
 

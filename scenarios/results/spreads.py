@@ -51,11 +51,10 @@ def spread(results: Results, metric: Metric) -> Figure:
     colours = drawing.colours(results.labels)
     low, high = _limits(list(known.values()))
     for y, (label, values) in enumerate(known.items()):
-        line = {"color": colours[label], "linewidth": 1.2}
-        ax.boxplot(values, positions=[y], vert=False, widths=0.56, whis=(5.0, 95.0),
-                   showfliers=False, showcaps=False, patch_artist=True, whiskerprops=line,
-                   medianprops={**line, "linewidth": 2.4},
-                   boxprops={"facecolor": colours[label], "alpha": 0.4, "linewidth": 0.0})
+        p5, q1, median, q3, p95 = np.percentile(values, [5.0, 25.0, 50.0, 75.0, 95.0])
+        ax.hlines(y, p5, p95, color=colours[label], lw=1.2)
+        ax.barh(y, q3 - q1, left=q1, height=0.56, color=colours[label], alpha=0.4, lw=0)
+        ax.vlines(median, y - 0.28, y + 0.28, color=colours[label], lw=2.4)
         seen = values[(values >= low) & (values <= high)]
         ax.plot([seen.min(), seen.max()], [y, y], ".", color=colours[label], ms=4.5)
         if beyond := values.size - seen.size:
