@@ -4,7 +4,6 @@ import os
 import signal
 import subprocess
 import sys
-from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
@@ -71,19 +70,6 @@ def test_a_saved_run_says_itself_how_to_repeat_it(tmp_path):
     assert "alpha_d = 35" in (tmp_path / "b" / "scenario.toml").read_text()
 
 
-def test_a_loaded_run_is_the_run_that_was_saved(tmp_path):
-    import numpy as np
-
-    from scenarios import load_run
-
-    assert run_command(["run", "ellipse", *SHORT, "--out", "a"]) == 0
-    run = load_run(tmp_path / "a")
-    assert run.ticks == 20
-    assert run.scenario.name == "ellipse"
-    with np.load(tmp_path / "a" / "run.npz") as file:
-        np.testing.assert_array_equal(file["q"], run["q"])
-
-
 def test_compare_writes_page_numbers_and_a_folder_for_each_run(tmp_path, capsys):
     arguments = ["compare", "ellipse", "--resolvers", "tpm-published,tpm,recursive", *SHORT]
     assert run_command([*arguments, "--out", "b"]) == 0
@@ -102,26 +88,6 @@ def test_the_table_fits_a_terminal_of_80_columns(capsys, monkeypatch):
     lines = capsys.readouterr().out.splitlines()
     assert max(map(len, lines)) <= 80
     assert not any("…" in line for line in lines)
-
-
-def test_nothing_but_results_goes_to_stdout_and_no_bar_off_a_terminal(capsys):
-    assert run_command(["run", "ellipse", *SHORT, "--out", "a"]) == 0
-    assert "ticks" not in capsys.readouterr().err
-
-
-def test_list_names_scenarios_resolvers_tasks_and_robots(capsys):
-    assert run_command(["list"]) == 0
-    out = capsys.readouterr().out
-    for name in ("ellipse", "recursive", "tpm", "pointing", "kuka_lwr"):
-        assert f"  {name} " in out or f"  {name}\n" in out
-
-
-def test_check_says_what_was_understood(tmp_path, capsys):
-    assert run_command(["check", "ellipse"]) == 0
-    out = capsys.readouterr().out
-    assert "18850 ticks of 1 ms" in out
-    assert "kuka_lwr" in out
-    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize(("arguments", "says"), [
@@ -154,13 +120,6 @@ def test_a_mistake_is_named_before_anything_is_run(arguments, says, capsys, tmp_
     assert not list(tmp_path.rglob("run.npz"))
 
 
-def test_a_broken_file_is_named_with_line_and_column(tmp_path, capsys):
-    (tmp_path / "broken.toml").write_text('name = "x"\n[robot\n')
-    said = fails(["check", "broken.toml"], capsys)
-    assert "broken.toml" in said
-    assert "line 2" in said
-
-
 def test_an_output_folder_in_use_stops_the_run_before_it_begins(tmp_path, capsys, monkeypatch):
     simulation_is(must_not_run, monkeypatch)
     (tmp_path / "precious").mkdir()
@@ -168,14 +127,6 @@ def test_an_output_folder_in_use_stops_the_run_before_it_begins(tmp_path, capsys
     for command in ("run", "compare"):
         assert "not empty" in fails([command, "ellipse", "--out", "precious"], capsys)
     assert [path.name for path in (tmp_path / "precious").iterdir()] == ["thesis.tex"]
-
-
-def test_an_output_folder_that_cannot_be_written_stops_the_run_before_it_begins(
-        tmp_path, capsys, monkeypatch):
-    simulation_is(must_not_run, monkeypatch)
-    (tmp_path / "file").touch()
-    for command in ("run", "compare"):
-        assert "cannot be written" in fails([command, "ellipse", "--out", "file/x"], capsys)
 
 
 def simulation_is(stand_in, monkeypatch):
@@ -354,23 +305,12 @@ def test_json_of_a_comparison_is_what_it_keeps(tmp_path, capsys):
     assert [run["resolver"] for run in found["runs"]] == ["tpm", "augmented"]
 
 
-def test_json_lists_what_there_is(capsys):
-    found = said(["list"], capsys)
-    assert "ellipse" in found["scenarios"]
-    assert "hcod" in found["resolvers"]
-    assert list(found)[:6] == ["scenarios", "groups", "sweeps", "resolvers", "tasks", "robots"]
-
-
 def test_json_of_a_check_is_the_whole_scenario_and_its_first_tick(capsys):
     found = said(["check", "ellipse", "--set", "pointing.alpha_d=35"], capsys)
     assert found["scenario"]["pointing"]["alpha_d"] == 35.0
     assert found["scenario"]["control"]["resolver"] == "tpm-published"
     assert found["first_tick"]["levels"] == ["position", "avoidance"]
     assert (found["first_tick"]["unmet"], found["warnings"]) == ([], [])
-
-
-def test_a_mistake_with_json_is_an_error_on_stderr_all_the_same(capsys):
-    assert "unknown scenario or robot 'elipse'" in fails(["check", "elipse", "--json"], capsys)
 
 
 def test_the_list_fits_80_columns(capsys):
@@ -393,11 +333,6 @@ def test_the_shell_completes_commands_scenarios_and_resolvers(monkeypatch, capsy
     assert completed("hierarchy", "compare", "ladder")[-1] == "ladder"
     assert completed("hierarchy", "compare", "ellipse", "--resolvers", "tpm,hc") == ["tpm,hcod"]
     assert completed("hierarchy", "sweep", "ell") == ["ellipse-starts"]
-
-
-def test_the_version_is_printed(capsys):
-    assert run_command(["--version"]) == 0
-    assert capsys.readouterr().out == f"hierarchy {version('task-hierarchy')}\n"
 
 
 def test_every_benchmark_is_a_command_and_listed(capsys):
