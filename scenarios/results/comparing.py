@@ -171,7 +171,7 @@ def _one_by_one(planned: Sequence[Run], folder: Path | None, progress: Progress 
 
 
 def _together(planned: Sequence[Run], folder: Path | None, workers: int,
-                  progress: Progress | None) -> Iterator[tuple[int, Run]]:
+              progress: Progress | None) -> Iterator[tuple[int, Run]]:
     """Make the runs in processes; then repeat the first ticks of each here, to time them alone."""
     made, total = dict[int, Run](), len(planned)
     asked = [(i, _job(run), None if folder is None else folder / run.folder)
@@ -216,12 +216,14 @@ def recorded(scenario: Scenario, folder: Path | None,
 
 
 def _timed(run: Run) -> Recording | None:
-    """Return the first ticks of a run, made while no other run is."""
+    """Return the first ticks of a run, made while no other run is; None if they cannot be."""
     if run.recording is None or not run.recording.ticks:
         return None
     control = run.scenario.control
     ticks = min(TIMED, run.recording.ticks)
-    return simulate(run.scenario.with_changes({"control.duration": ticks * control.period}))
+    with suppress(Exception):  # a scenario that allows no shorter duration keeps its own times
+        return simulate(run.scenario.with_changes({"control.duration": ticks * control.period}))
+    return None
 
 
 def _command(planned: Sequence[Run], out: str | Path | None) -> str:
