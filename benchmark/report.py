@@ -74,6 +74,6 @@ class Report:
                             for name, figure in section.figures.items()])
                  for section in self.sections]
         template = (Path(__file__).parent / "page.html").read_text(encoding="utf-8")
-        return str(filled(template, style=resource("report/style.css"), title=self.title,
+        return str(filled(template, style=resource("results/style.css"), title=self.title,
                           sections=shown, missing=dict(self.missing), machine=machine(),
                           command=shlex.join(["hierarchy", *sys.argv[1:]])))

@@ -63,14 +63,12 @@ print(json.dumps([[at, start, f.__module__ + "." + f.__name__] for at, start, f 
 _WORKER = """\
 import json
 from scenarios import load
-from benchmark.start import resident
-from scenarios.sweep.engine import carry_out, connected
-from scenarios.sweep.run import Job
-text, after = load("ellipse", ["control.duration=0.5"]).to_toml(), []
-with connected(1) as client:
-    carry_out([Job(str(k), text, "tpm") for k in range(20)], client, batch=1, keep=lambda outcomes:
-              after.extend(client.run(resident).values()))
-print(json.dumps(after))"""
+from benchmark.start import resident_after
+from scenarios.results.pool import ended
+from scenarios.results.run import Job
+text = load("ellipse", ["control.duration=0.5"]).to_toml()
+jobs = [Job(str(k), text, "tpm") for k in range(20)]
+print(json.dumps([found for _, found in ended(resident_after, jobs, 1)]))"""
 
 
 class Cost(NamedTuple):
@@ -178,6 +176,14 @@ def resident() -> float:
     file = Path("/proc/self/statm")
     pages = int(file.read_text().split()[1]) if file.is_file() else 0
     return pages * os.sysconf("SC_PAGE_SIZE") / 1024.0**2 if pages else 0.0
+
+
+def resident_after(job: Any) -> float:
+    """Return the resident memory [MB] of this process after a run of a sweep."""
+    from scenarios.results.run import outcome
+
+    outcome(job)
+    return resident()
 
 
 class _Done(NamedTuple):

@@ -12,13 +12,13 @@ if TYPE_CHECKING:
     from scenarios.measure.comparison import Comparison
     from scenarios.measure.run_folder import load_run, save
     from scenarios.recording.recording import Recording
-    from scenarios.report.comparing import compare
+    from scenarios.results.comparing import compare
 
 __all__ = ["Comparison", "Recording", "Scenario", "compare", "load", "load_run", "save", "shipped",
            "simulate"]
 
 _HOME = {"Comparison": "measure.comparison", "Recording": "recording.recording",
-         "Scenario": "config", "compare": "report.comparing", "load": "config",
+         "Scenario": "config", "compare": "results.comparing", "load": "config",
          "load_run": "measure.run_folder", "save": "measure.run_folder", "shipped": "config",
          "simulate": "loop.simulation"}
 

@@ -7,14 +7,15 @@ import glob
 import itertools
 import json
 import os
+import platform
 import re
 import shutil
 import tempfile
 import tomllib
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO
 
 from hierarchy.errors import HierarchyError
 
@@ -25,11 +26,14 @@ class OutputError(HierarchyError):
     """A folder that exists and is not empty, or that cannot be written."""
 
 
-def claim(folder: str | Path) -> Path:
-    """Make sure that `folder` can be written later, and return its absolute path.
+_HELD: dict[Path, TextIO] = {}  # lock files of this process, by what they lock
 
-    It is not made yet, only the folders above it, and a hidden file beside it that keeps it for
-    this process until its end. What killed processes left there is removed.
+
+def claim(folder: str | Path) -> Path:
+    """Lock `folder`, which must be new or empty, for this process, and return its absolute path.
+
+    It is not made yet, only the folders above it. What a process that was killed left beside it is
+    removed.
 
     Raises
     ------
@@ -42,42 +46,71 @@ def claim(folder: str | Path) -> Path:
         if path.exists() and any(path.iterdir()):
             raise OutputError(f"output folder {folder} exists and is not empty; "
                               "choose another, or remove it first")
-        _keep(path)
+        lock(path)
+        for left in path.parent.glob(f".{glob.escape(path.name)}.????????.partial"):
+            shutil.rmtree(left)
     return path
 
 
-def _keep(path: Path) -> None:
-    """Lock a folder for this process; raises OutputError if another process has locked it."""
-    for left in path.parent.glob(f".{glob.escape(path.name)}.*"):
-        owner = _owner(left, path.name)
-        if owner is not None and not _is_alive(owner):
-            shutil.rmtree(left) if left.is_dir() else left.unlink(missing_ok=True)
-        elif owner not in (None, os.getpid()):
-            raise OutputError(f"output folder {path} is going to be written by process {owner}; "
-                              "choose another, or wait for it to end")
-    _mark(path).touch()
-    atexit.register(_mark(path).unlink, missing_ok=True)
+def lock(path: Path) -> None:
+    """Lock a path for this process until its end or `unlock`; raises OutputError if it is locked.
+
+    The system holds the lock and releases it however the process ends, in containers that share the
+    folder too. The hidden file beside the path only says whose it is.
+    """
+    if path in _HELD:
+        return
+    file = _lock_file(path)
+    stream = file.open("a+", encoding="utf-8")
+    if not _locked(stream):
+        with stream:
+            stream.seek(0)
+            owner = stream.read().strip() or "another process"
+        raise OutputError(f"output folder {path} is going to be written by {owner}; choose "
+                          "another, or wait for it to end")
+    if not file.exists() or file.stat().st_ino != os.fstat(stream.fileno()).st_ino:
+        stream.close()
+        return lock(path)  # whoever held it has just removed the file
+    stream.truncate(0)
+    stream.write(_identity())
+    stream.flush()
+    _HELD[path] = stream
+    atexit.register(unlock, path)
 
 
-def _mark(path: Path) -> Path:
-    """Return the hidden file that keeps a folder for this process."""
-    return path.with_name(f".{path.name}.{os.getpid()}.kept")
+def unlock(path: Path) -> None:
+    """Release what `lock` has locked, if it has."""
+    if path in _HELD:
+        _lock_file(path).unlink(missing_ok=True)
+        _HELD.pop(path).close()
 
 
-def _owner(left: Path, name: str) -> int | None:
-    """Return the process that made a hidden file or folder beside a folder called `name`."""
-    found = re.fullmatch(re.escape(f".{name}.") + r"(\d+)\..*", left.name)
-    return int(found[1]) if found else None
+def _lock_file(path: Path) -> Path:
+    return path.with_name(f".{path.name}.lock")
 
 
-def _is_alive(process: int) -> bool:
+def _locked(stream: TextIO) -> bool:
+    """Whether the lock of an open file could be had; a file system without locks has none."""
     try:
-        os.kill(process, 0)
-    except ProcessLookupError:
+        import fcntl
+    except ImportError:  # Windows
+        return True
+    try:
+        fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
         return False
-    except OSError:  # another user's
+    except OSError:
         return True
     return True
+
+
+def _identity() -> str:
+    """Return this process in words: number, host, its start and that of the system."""
+    boot, start = "unknown", "unknown"
+    with suppress(OSError, IndexError):
+        boot = Path("/proc/sys/kernel/random/boot_id").read_text(encoding="utf-8").strip()
+        start = Path("/proc/self/stat").read_text(encoding="utf-8").rpartition(")")[2].split()[19]
+    return f"process {os.getpid()} on {platform.node()} (boot {boot}, started at tick {start})"
 
 
 def next_free(base: str | Path) -> Path:
@@ -96,8 +129,8 @@ def whole(folder: str | Path) -> Iterator[Path]:
     path = Path(folder).expanduser().resolve()
     path.parent.mkdir(parents=True, exist_ok=True)
     with named(path):
-        prefix = f".{path.name}.{os.getpid()}."
-        partial = Path(tempfile.mkdtemp(prefix=prefix, dir=path.parent))
+        partial = Path(tempfile.mkdtemp(prefix=f".{path.name}.", suffix=".partial",
+                                        dir=path.parent))
     try:
         with named(path):
             yield partial
@@ -107,22 +140,18 @@ def whole(folder: str | Path) -> Iterator[Path]:
         raise OutputError(str(error).replace(str(partial), str(path))) from error
     finally:
         shutil.rmtree(partial, ignore_errors=True)
-        _mark(path).unlink(missing_ok=True)
+        unlock(path)
 
 
 @contextmanager
-def written(file: Path, *, synced: bool = False) -> Iterator[Path]:
+def written(file: Path) -> Iterator[Path]:
     """Give a temporary sibling of a file to write to; it takes the file's name only when whole.
 
-    A reader finds the old file or the new one, never a part. With `synced` it is on the disk before
-    it takes its name, so that it survives a loss of power.
+    A reader finds the old file or the new one, never a part.
     """
     partial = file.with_name(f".{os.getpid()}-{file.name}")
     try:
         yield partial
-        if synced:
-            with partial.open("rb") as stream:
-                os.fsync(stream.fileno())
         partial.replace(file)
     finally:
         partial.unlink(missing_ok=True)

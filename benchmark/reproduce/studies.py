@@ -21,8 +21,8 @@ from scenarios.config.scenario import OWN
 from scenarios.files import make_folder, write_text
 from scenarios.measure.metrics import Metric
 from scenarios.measure.statistics import Paired, Spread, paired, spread
-from scenarios.sweep.results import valued
-from scenarios.sweep.whole import Progress, Workers, compare_starts
+from scenarios.results.columns import valued
+from scenarios.results.sampled import Progress, Workers, compare_starts
 
 _TOML = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
 BLOCKS: Mapping[str, Mapping[str, Any]] = _TOML["block"]

@@ -17,8 +17,7 @@ from scenarios.cli.options import INTERRUPTED
 from scenarios.cli.progress import bar
 from scenarios.cli.terminal import print_json, shown
 from scenarios.files import make_folder, reason, write_text
-from scenarios.sweep.engine import EngineError
-from scenarios.sweep.whole import Workers
+from scenarios.results.sampled import Workers
 
 _QUICK = 10  # with --quick, one in so many starts, but never fewer than two
 
@@ -69,9 +68,9 @@ def run(names: list[str], out: Path, quick: bool = False, workers: int | None = 
             made.add(found)
         for command, printed in () if quick else outputs(asked, root, out / "output"):
             made.add(None, command, printed)
-    except (OSError, EngineError) as error:
+    except OSError as error:
         why = (f"{error.filename or 'a file'} cannot be written: {reason(error)}"
-               if isinstance(error, OSError) and error.strerror else str(error))
+               if error.strerror else str(error))
         _say(f"hierarchy: fault: {why}")
         return 1
     except KeyboardInterrupt:
@@ -94,7 +93,7 @@ def chosen(names: list[str], root: Path) -> tuple[list[str], list[str]]:
 
 def ran(names: list[str], out: Path, quick: bool, workers: int | None) -> Iterator[Rows]:
     """Run studies and yield the rows of each as it ends; runs that `out` has are not repeated."""
-    with bar("runs") as progress, Workers(workers) as pool:
+    with bar("runs") as progress:
         for count, name in enumerate(names, 1):
             study = STUDIES[name]
             if quick:
@@ -102,7 +101,7 @@ def ran(names: list[str], out: Path, quick: bool, workers: int | None) -> Iterat
             _say(f"{name} (study {count} of {len(names)}): {study.title}, "
                  f"{counted(len(study.names), 'column')} from {study.starts} starts")
             begun = perf_counter()
-            found = rows_of(study, out / name, pool, progress)
+            found = rows_of(study, out / name, Workers(workers), progress)
             _say(f"  {minutes(perf_counter() - begun)}")
             yield found
 

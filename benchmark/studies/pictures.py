@@ -1,6 +1,6 @@
 """Pictures of runs in the documents, drawn again: python -m benchmark.studies.pictures.
 
-The gallery has a command of its own, `python -m scenarios.report.gallery`.
+The gallery has a command of its own, `python -m benchmark.studies.gallery`.
 """
 
 from __future__ import annotations

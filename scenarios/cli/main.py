@@ -2,11 +2,13 @@
 
 Heavy imports happen only when needed, so that `--help` and completion are fast. With `--json` a
 command prints one JSON object on standard output and nothing else there. Exit codes: 0 done, 1 a
-run stopped with a reported fault, 2 the command line or a file is invalid, 130 Ctrl-C.
+run stopped with a reported fault, 2 the command line or a file is invalid, 130 Ctrl-C,
+SIGTERM or SIGHUP.
 """
 
 from __future__ import annotations
 
+import signal
 import sys
 from itertools import pairwise
 from pathlib import Path
@@ -14,7 +16,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from scenarios.cli import benchmarks, completion
+from scenarios.cli import benchmarks, completion, options
 from scenarios.cli.options import (
     INTERRUPTED,
     PORT,
@@ -23,6 +25,7 @@ from scenarios.cli.options import (
     Changes,
     Duration,
     Out,
+    Part,
     Plugins,
     Port,
     Scheduler,
@@ -35,12 +38,22 @@ from scenarios.cli.terminal import first_line, print_json, print_list, shown
 if TYPE_CHECKING:
     from scenarios.config import Scenario
 
+_LONG = 50  # characters of a change in a title
+
 app = typer.Typer(rich_markup_mode=None, pretty_exceptions_enable=False)
 app.add_typer(problems, name="problems")
 
 
+def _end(*_: object) -> None:
+    raise KeyboardInterrupt  # what is made so far is kept
+
+
 def main() -> None:
     """Run the command line and exit with its code."""
+    for name in ("SIGTERM", "SIGHUP"):
+        number = getattr(signal, name, None)
+        if number is not None and signal.getsignal(number) is not signal.SIG_IGN:
+            signal.signal(number, _end)
     sys.exit(run_command(sys.argv[1:]))
 
 
@@ -58,8 +71,11 @@ def run_command(arguments: list[str]) -> int:
 
         if isinstance(error, HierarchyError):
             return _wrong(str(error))
-        if isinstance(error, OSError) and error.errno is not None:
-            return _fault(error)
+        if isinstance(error, OSError):
+            return _fault(f"{error.filename}: {error.strerror}" if error.filename else
+                          error.strerror or str(error))
+        if isinstance(error, RuntimeError) and type(error).__module__.startswith("scenarios."):
+            return _fault(str(error))  # a page that cannot be made, a cluster that is lost
         raise
 
 
@@ -72,7 +88,7 @@ def _print_version(asked: bool) -> None:
 
 
 @app.callback()
-def options(version: Annotated[bool, typer.Option(
+def root(version: Annotated[bool, typer.Option(
         "--version", is_eager=True, callback=_print_version,
         help="Print the version and exit.")] = False) -> None:
     """Resolve prioritized robot tasks in many ways, and compare the results."""
@@ -88,7 +104,7 @@ def list_(plugin: Plugins = None, as_json: AsJson = False) -> None:
     from hierarchy.tasks import TASKS
     from scenarios.config import load, shipped, shipped_groups
     from scenarios.config.groups import load_group
-    from scenarios.sweep.config import load_sweep, shipped_sweeps
+    from scenarios.results.sweep_file import load_sweep, shipped_sweeps
 
     entries = {"scenarios": {name: load(name).title for name in shipped()},
                "groups": {name: load_group(name).title for name in shipped_groups()},
@@ -164,18 +180,18 @@ def compare(scenarios: Annotated[list[str], typer.Argument(
             changes: Changes = None, plugin: Plugins = None, duration: Duration = None,
             out: Out = None, starts: Annotated[int | None, typer.Option(
                 "--starts", metavar="N", min=2, help="Compare over N starts sampled from each "
-                "scenario's [variation]; needs the extra `sweep`.")] = None,
+                "scenario's [variation].")] = None,
             seed: Annotated[int, typer.Option(
                 "--seed", metavar="S", min=0, help="With --starts: seed of the samples.")] = 0,
-            workers: Workers = None, scheduler: Scheduler = None,
+            workers: Workers = None, scheduler: Scheduler = None, part: Part = None,
             as_json: AsJson = False) -> int:
     """Run scenarios under several resolvers and report.
 
     With --starts every resolver gets the same sampled starts, and the report gives statistics; run
     the same command again to resume an interrupted comparison.
     """
-    if starts is None and (seed or workers or scheduler):
-        raise typer.BadParameter("needs --starts", param_hint="--seed, --workers, --scheduler")
+    if starts is None and (seed or scheduler or part):
+        raise typer.BadParameter("needs --starts", param_hint="--seed, --scheduler, --part")
     from scenarios.config import members, shipped_groups
     from scenarios.config.scenario import OWN
 
@@ -185,13 +201,14 @@ def compare(scenarios: Annotated[list[str], typer.Argument(
     if starts is not None:
         from scenarios.cli.sweep import starts_command
 
-        return starts_command(chosen, specs, starts, seed, out, workers, scheduler, as_json)
+        return starts_command(chosen, specs, starts, seed, out,
+                              options.workers(workers, scheduler, part), as_json)
     from scenarios.cli.compare import compare_scenarios
     from scenarios.files import next_free
 
     name = scenarios[0] if grouped else chosen[0].name
     folder = out if out is not None else next_free(Path("runs") / f"compare-{name}")
-    return compare_scenarios(chosen, specs, folder, as_json)
+    return compare_scenarios(chosen, specs, folder, as_json, workers)
 
 
 @app.command()
@@ -200,14 +217,14 @@ def sweep(file: Annotated[str, typer.Argument(help="Name of a sweep, or a sweep 
           out: Annotated[Path | None, output(
               "Output folder, new or of a sweep to resume. Default: runs/sweep-NAME.")] = None,
           plugin: Plugins = None, workers: Workers = None, scheduler: Scheduler = None,
-          as_json: AsJson = False) -> int:
+          part: Part = None, as_json: AsJson = False) -> int:
     """Run scenarios with sampled parameters.
 
     Run the same command again to resume an interrupted sweep.
     """
     from scenarios.cli.sweep import sweep_command
 
-    return sweep_command(file, out, workers, scheduler, as_json)
+    return sweep_command(file, out, options.workers(workers, scheduler, part), as_json)
 
 
 @app.command()
@@ -337,10 +354,15 @@ def doctor(as_json: AsJson = False) -> int:
 
 
 def _load(name: str, changes: list[str] | None, duration: float | None) -> Scenario:
+    """Load a scenario with changes, which then stand in its title."""
     from scenarios.config import load
 
     lengthened = [] if duration is None else [f"control.duration={duration!r}"]
-    return load(name, [*(changes or []), *lengthened])
+    found = load(name, [*(changes or []), *lengthened])
+    if not changes:
+        return found
+    said = ", ".join(one if len(one) < _LONG else f"{one[:_LONG]}..." for one in changes)
+    return found.model_copy(update={"title": f"{found.title or found.name} ({said})"})
 
 
 def _split(specs: str) -> list[str]:
@@ -362,10 +384,8 @@ def _interrupted() -> int:
     return INTERRUPTED
 
 
-def _fault(error: OSError) -> int:
-    """Say what the system refused: a full disk, a folder without permission, a lost device."""
-    where = f"{error.filename}: " if error.filename else ""
-    print(f"hierarchy: fault: {where}{error.strerror}", file=sys.stderr)
+def _fault(text: str) -> int:
+    print(f"hierarchy: fault: {text}", file=sys.stderr)
     return 1
 
 

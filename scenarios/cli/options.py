@@ -44,7 +44,25 @@ Workers = Annotated[int | None, typer.Option(
     "--workers", metavar="N", min=1,
     help="Processes on this machine. Default: one per processor.")]
 Scheduler = Annotated[str | None, typer.Option(
-    "--scheduler", metavar="ADDRESS", help="Use the workers of this Dask scheduler instead.")]
+    "--scheduler", metavar="ADDRESS", help="Use the workers of this Dask scheduler instead; needs "
+    "the extra `sweep`.")]
+Part = Annotated[str | None, typer.Option(
+    "--part", metavar="I/N", help="Make only the I-th of N parts of the runs, for job arrays; the "
+    "same command without it then merges all parts.")]
+
+
+def workers(processes: int | None, scheduler: str | None, part: str | None) -> Any:
+    """Return where the runs of a sweep are made."""
+    from scenarios.results.sampled import Workers
+
+    if part is None:
+        return Workers(processes, scheduler)
+    i, slash, count = part.partition("/")
+    if not (slash and i.isdigit() and count.isdigit()):
+        raise typer.BadParameter(f"expected I/N such as 1/8, got {part!r}", param_hint="--part")
+    return Workers(processes, scheduler, (int(i), int(count)))
+
+
 PORT = 8080
 INTERRUPTED = 130  # exit code of a command that Ctrl-C ended
 Port = Annotated[int, typer.Option("--port", metavar="N", min=0, max=65535,

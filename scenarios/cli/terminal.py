@@ -5,18 +5,20 @@ from __future__ import annotations
 import json
 import re
 import sys
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from math import isfinite
 from pathlib import Path
 from textwrap import fill, wrap
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from rich.table import Table
+    from rich.text import Text
 
-    from scenarios.measure.runs import Row, Run
+    from scenarios.measure.runs import Run
 
 _WIDTH = 80   # columns of a terminal
-_BESIDE = 5   # runs in a table of that width
+_NAMES = 26   # columns of it for the names of metrics
 
 
 def troubles(recording: Any) -> list[str]:
@@ -64,46 +66,44 @@ def _finite(data: Any) -> Any:
 
 def print_table(runs: list[Run]) -> None:
     """Print the metrics of runs, where strict resolvers diverge, and the verdict by goal."""
-    from rich.console import Console
+    from rich.text import Text
 
     from scenarios.measure.partings import partings
     from scenarios.measure.runs import flags, table
     from scenarios.measure.verdict import lines, verdicts
 
-    console = Console(markup=False, highlight=False)
-    titles = dict.fromkeys(run.title for run in runs)
-    print("", *titles, sep="\n")
-    rows = table(runs, details=False)
-    beside = -(-len(runs) // -(-len(runs) // _BESIDE))  # so that tables are about equally wide
-    for first in range(0, len(runs), beside):
-        print()
-        console.print(_table(runs, rows, range(first, min(first + beside, len(runs)))))
+    rows = [(f"{row.label} [{row.unit}]" if row.unit else row.label,
+             [Text(cell + "* "[i not in row.best], "bold" if i in row.best else "")
+              for i, cell in enumerate(row.cells)]) for row in table(runs, details=False)]
     found = verdicts(runs)
     goals = [fill(f"  {goal}", _WIDTH, subsequent_indent="    ") for goal in found[0].goals
              ] if len(found) == 1 else []
-    console.print("", *map(str, partings(runs)), *flags(runs), *lines(found), *goals, sep="\n")
+    print_columns(dict.fromkeys(run.title for run in runs), "", [run.label for run in runs], rows,
+                  ["", *map(str, partings(runs)), *flags(runs), *lines(found), *goals])
 
 
-def _table(runs: list[Run], rows: list[Row], chosen: range) -> Table:
-    """Return a table of metrics for the terminal, the best values bold with a star."""
+def print_columns(above: Iterable[str], corner: str, labels: Sequence[str],
+                  rows: Sequence[tuple[str, Sequence[Text]]], below: Iterable[str] = ()) -> None:
+    """Print lines and a table of labelled columns, in as many tables as 80 columns need."""
+    from rich.console import Console
     from rich.table import Table
     from rich.text import Text
 
-    laid_out = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False)
-    laid_out.add_column("", overflow="fold")
-    for i in chosen:
-        head = re.sub(r"(?<=[^ :-])[ :-]", _broken, runs[i].label)
-        laid_out.add_column(Text(head), justify="right", no_wrap=True)
-    for row in rows:
-        cells = [Text(row.cells[i] + ("*" if i in row.best else " "),
-                      "bold" if i in row.best else "") for i in chosen]
-        laid_out.add_row(Text(f"{row.label} [{row.unit}]" if row.unit else row.label), *cells)
-    return laid_out
-
-
-def _broken(separator: re.Match[str]) -> str:
-    """Break a column's heading after a colon or hyphen, or at a space."""
-    return f"{separator[0].strip()}\n"
+    console = Console(markup=False, highlight=False)
+    console.print("", *above, sep="\n")
+    heads = [re.sub(r"(?<=[^ :-])[ :-]", lambda at: at[0].strip() + "\n", one) for one in labels]
+    widest = max(len(line) for text in (*heads, *(cell.plain for _, cells in rows
+                                                  for cell in cells)) for line in text.splitlines())
+    fit = max(1, (_WIDTH - _NAMES) // (widest + 1))
+    beside = -(-len(labels) // -(-len(labels) // fit))  # so that tables are about equally wide
+    for first in range(0, len(labels), beside):
+        laid_out = Table(corner, box=None, padding=(0, 1, 0, 0), pad_edge=False)
+        for head in heads[first:first + beside]:
+            laid_out.add_column(Text(head), justify="right", no_wrap=True)
+        for name, cells in rows:
+            laid_out.add_row(Text(name), *cells[first:first + beside])
+        console.print("", laid_out)
+    console.print(*below, sep="\n", end="\n" if below else "")
 
 
 def print_list(what: str, entries: dict[str, str]) -> None:
@@ -119,6 +119,16 @@ def print_list(what: str, entries: dict[str, str]) -> None:
 def first_line(thing: Any) -> str:
     """Return the first line of the docstring of a class or an instance."""
     return (thing.__doc__ or "").strip().partition("\n")[0]
+
+
+@contextmanager
+def interruptible(kept: str) -> Iterator[None]:
+    """Say at an interruption what is kept, and where."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        print(f"hierarchy: {kept}", file=sys.stderr)
+        raise
 
 
 def exit_code(fault: str | None) -> int:

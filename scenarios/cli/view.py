@@ -24,7 +24,8 @@ def view_command(folders: Sequence[Path], port: int, side_by_side: bool, browser
 
     found = [run for folder in folders for run in _runs_in(folder)]
     runs = labelled(found, [load_run(folder) for folder in found])
-    server = open_server(port, ", ".join(folder.name for folder in folders))
+    names = dict.fromkeys(run.scenario.name for run in runs.values())
+    server = open_server(port, ", ".join(names))
     try:
         view = View(server, runs, side_by_side)
         announce(server, browser)

@@ -22,7 +22,8 @@ if TYPE_CHECKING:
 class Run:
     """One scenario under one resolver, with what came of it.
 
-    `recording` is None when the run could not begin or broke; `error` then says why.
+    `recording` is None when the run could not begin or broke; `error` then says why. `timing` has
+    its first ticks, made while no other run was, if computing times are to be taken from those.
     """
 
     scenario: Scenario
@@ -30,6 +31,7 @@ class Run:
     label: str
     recording: Recording | None = None
     error: str | None = None
+    timing: Recording | None = None
 
     @property
     def fault(self) -> str | None:
@@ -59,7 +61,10 @@ class Run:
     @cached_property
     def metrics(self) -> dict[str, Metric]:
         """What was measured on it, by name; empty without a recording."""
-        return metrics.measure(self.recording) if self.recording else {}
+        found = metrics.measure(self.recording) if self.recording else {}
+        timed = metrics.measure(self.timing) if self.timing else {}
+        return found | {name: one for name, one in timed.items()
+                        if name in found and name.startswith(("time_", "ticks_late"))}
 
 
 @dataclass(frozen=True)

@@ -67,8 +67,12 @@ class Paired:
             return "the same"
         if not self.distinguishable:
             return "not distinguishable"
-        word, times = ("lower", self.lower) if self.lower > self.higher else ("higher", self.higher)
-        return f"{word} in {times} of {self.count}, {probability(self.p)}"
+        counts = {"lower": self.lower, "higher": self.higher}
+        word = max(counts, key=lambda one: counts[one])
+        rest = {**counts, "the same": self.same}
+        said = [f"{word} in {rest.pop(word)} of {self.count}",
+                *(f"{other} in {times}" for other, times in rest.items() if times)]
+        return f"{', '.join(said)}, {probability(self.p)}"
 
 
 def spread(values: Array) -> Spread | None:

@@ -18,7 +18,7 @@ from benchmark.reproduce.ticks import DAMPED, LARGEST, LEFT
 from hierarchy.errors import HierarchyError
 from scenarios.cli.main import app
 from scenarios.config import shipped
-from scenarios.sweep.whole import Workers
+from scenarios.results.sampled import Workers
 
 ROOT = Path(__file__).parents[2]
 PAGES = pages.marked(ROOT)

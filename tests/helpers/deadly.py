@@ -2,11 +2,11 @@
 
 import os
 
-from scenarios.sweep.run import Outcome
+from scenarios.results.run import Outcome
 
 
-def dies_of_one(jobs, versions):
-    """Stands for runs of which one, of resolver "deadly", ends the process that it is in."""
-    if any(job.resolver == "deadly" for job in jobs):
+def dies_of_one(job):
+    """Stands for a run; one of resolver "deadly" ends the process that it is in."""
+    if job.resolver == "deadly":
         os._exit(1)
-    return [Outcome(job.key, 1, None, None, 0.0, versions) for job in jobs]
+    return Outcome(job.key, 1, None, 0.0)

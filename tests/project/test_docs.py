@@ -15,9 +15,9 @@ from sphinx.util.inventory import InventoryFile
 import hierarchy
 import scenarios
 import solvers
+from benchmark.studies.gallery import main as draw_gallery
 from hierarchy.tasks import TASKS
 from scenarios.config import shipped
-from scenarios.report.gallery import main as draw_gallery
 
 pytestmark = pytest.mark.slow
 
@@ -148,7 +148,7 @@ def test_every_scenario_is_in_the_gallery_with_a_picture(name):
     picture = DOCS / "images" / "gallery" / f"{name}.png"
     section = f"\n## {name}\n\n![{name}](images/gallery/{name}.png)\n"
     shown = picture.exists() and text.count(section) == 1
-    assert shown, (f"run `python -m scenarios.report.gallery {name}` and give it a section in "
+    assert shown, (f"run `python -m benchmark.studies.gallery {name}` and give it a section in "
                    "docs/gallery.md, as the others have it")
     assert picture.stat().st_size < LARGEST
 

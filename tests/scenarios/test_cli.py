@@ -1,16 +1,18 @@
 import importlib
 import json
+import os
 import signal
 import subprocess
 import sys
-from importlib.metadata import version
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hand_made import recording
 
-from scenarios import compare
+from scenarios import compare, load
 from scenarios.cli.main import app, run_command
+from scenarios.results import comparing
 
 SHORT = ["--duration", "0.02"]
 pytestmark = pytest.mark.slow
@@ -68,19 +70,6 @@ def test_a_saved_run_says_itself_how_to_repeat_it(tmp_path):
     assert "alpha_d = 35" in (tmp_path / "b" / "scenario.toml").read_text()
 
 
-def test_a_loaded_run_is_the_run_that_was_saved(tmp_path):
-    import numpy as np
-
-    from scenarios import load_run
-
-    assert run_command(["run", "ellipse", *SHORT, "--out", "a"]) == 0
-    run = load_run(tmp_path / "a")
-    assert run.ticks == 20
-    assert run.scenario.name == "ellipse"
-    with np.load(tmp_path / "a" / "run.npz") as file:
-        np.testing.assert_array_equal(file["q"], run["q"])
-
-
 def test_compare_writes_page_numbers_and_a_folder_for_each_run(tmp_path, capsys):
     arguments = ["compare", "ellipse", "--resolvers", "tpm-published,tpm,recursive", *SHORT]
     assert run_command([*arguments, "--out", "b"]) == 0
@@ -99,26 +88,6 @@ def test_the_table_fits_a_terminal_of_80_columns(capsys, monkeypatch):
     lines = capsys.readouterr().out.splitlines()
     assert max(map(len, lines)) <= 80
     assert not any("…" in line for line in lines)
-
-
-def test_nothing_but_results_goes_to_stdout_and_no_bar_off_a_terminal(capsys):
-    assert run_command(["run", "ellipse", *SHORT, "--out", "a"]) == 0
-    assert "ticks" not in capsys.readouterr().err
-
-
-def test_list_names_scenarios_resolvers_tasks_and_robots(capsys):
-    assert run_command(["list"]) == 0
-    out = capsys.readouterr().out
-    for name in ("ellipse", "recursive", "tpm", "pointing", "kuka_lwr"):
-        assert f"  {name} " in out or f"  {name}\n" in out
-
-
-def test_check_says_what_was_understood(tmp_path, capsys):
-    assert run_command(["check", "ellipse"]) == 0
-    out = capsys.readouterr().out
-    assert "18850 ticks of 1 ms" in out
-    assert "kuka_lwr" in out
-    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize(("arguments", "says"), [
@@ -151,13 +120,6 @@ def test_a_mistake_is_named_before_anything_is_run(arguments, says, capsys, tmp_
     assert not list(tmp_path.rglob("run.npz"))
 
 
-def test_a_broken_file_is_named_with_line_and_column(tmp_path, capsys):
-    (tmp_path / "broken.toml").write_text('name = "x"\n[robot\n')
-    said = fails(["check", "broken.toml"], capsys)
-    assert "broken.toml" in said
-    assert "line 2" in said
-
-
 def test_an_output_folder_in_use_stops_the_run_before_it_begins(tmp_path, capsys, monkeypatch):
     simulation_is(must_not_run, monkeypatch)
     (tmp_path / "precious").mkdir()
@@ -167,16 +129,8 @@ def test_an_output_folder_in_use_stops_the_run_before_it_begins(tmp_path, capsys
     assert [path.name for path in (tmp_path / "precious").iterdir()] == ["thesis.tex"]
 
 
-def test_an_output_folder_that_cannot_be_written_stops_the_run_before_it_begins(
-        tmp_path, capsys, monkeypatch):
-    simulation_is(must_not_run, monkeypatch)
-    (tmp_path / "file").touch()
-    for command in ("run", "compare"):
-        assert "cannot be written" in fails([command, "ellipse", "--out", "file/x"], capsys)
-
-
 def simulation_is(stand_in, monkeypatch):
-    for module in ("scenarios.cli.run", "scenarios.report.comparing"):
+    for module in ("scenarios.cli.run", "scenarios.results.comparing"):
         monkeypatch.setattr(importlib.import_module(module), "simulate", stand_in)
 
 
@@ -203,7 +157,7 @@ def test_ctrl_c_in_a_comparison_keeps_what_was_run_and_runs_no_more(tmp_path, mo
 
     simulation_is(interrupted_at_the_second, monkeypatch)
     assert run_command(["compare", "ellipse", "--resolvers", "tpm,recursive,hqp",
-                        "--out", "b"]) == 1
+                        "--workers", "1", "--out", "b"]) == 1
     assert begun == ["tpm", "recursive"]
     assert {path.name for path in (tmp_path / "b" / "ellipse").iterdir()} == {"tpm", "recursive"}
     assert "interrupted at tick 5" in (tmp_path / "b" / "index.html").read_text()
@@ -218,7 +172,8 @@ def test_one_run_that_breaks_does_not_lose_the_others(tmp_path, monkeypatch, cap
     simulation_is(breaks_under_recursive, monkeypatch)
     done = compare("ellipse", ["recursive", "tpm"], out=tmp_path / "b")
     assert [run.fault for run in done.runs] == ["ArithmeticError: [bold]no[/bold] answer", None]
-    assert run_command(["compare", "ellipse", "--resolvers", "recursive,tpm", "--out", "c"]) == 1
+    assert run_command(["compare", "ellipse", "--resolvers", "recursive,tpm", "--workers", "1",
+                        "--out", "c"]) == 1
     assert "[bold]no[/bold] answer" in capsys.readouterr().err
 
 
@@ -236,10 +191,11 @@ main()
 """
 
 
-def test_ctrl_c_in_the_middle_of_a_run_saves_every_tick_so_far_whole(tmp_path):
+@pytest.mark.parametrize("number", ["SIGINT", "SIGTERM", "SIGHUP"])
+def test_a_signal_in_the_middle_of_a_run_saves_every_tick_so_far_whole(number, tmp_path):
     from scenarios import load_run
 
-    command = [sys.executable, "-c", INTERRUPTED_AT_TICK_500,
+    command = [sys.executable, "-c", INTERRUPTED_AT_TICK_500.replace("SIGINT", number),
                "run", "ellipse", "--duration", "20", "--out", "a"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 1
@@ -248,6 +204,77 @@ def test_ctrl_c_in_the_middle_of_a_run_saves_every_tick_so_far_whole(tmp_path):
     assert run.fault == f"interrupted at tick {run.ticks}"
     assert run.fault in done.stderr
     assert [path.name for path in tmp_path.iterdir()] == ["a"]
+
+
+INTERRUPTED_AFTER_THE_FIRST_RUN = """
+import os, signal
+from scenarios.results import comparing
+
+add = comparing._Written.add
+
+def add_and_interrupt(written, i, run):
+    add(written, i, run)
+    os.kill(os.getpid(), signal.SIGTERM)
+
+comparing._Written.add = add_and_interrupt
+from scenarios.cli.main import main
+main()
+"""
+
+
+def test_a_signal_in_a_comparison_side_by_side_keeps_what_ended_and_names_the_folder(tmp_path):
+    command = [sys.executable, "-c", INTERRUPTED_AFTER_THE_FIRST_RUN, "compare", "ellipse",
+               "--resolvers", "tpm,hcod", "--workers", "2", *SHORT, "--out", "b"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 130
+    assert "the runs made so far are in b\n" in done.stderr
+    assert list((tmp_path / "b").rglob("run.npz"))
+    assert {"results.csv", "index.html", "comparison.json"} <= {
+        path.name for path in (tmp_path / "b").iterdir()}
+
+
+def test_runs_side_by_side_are_those_made_one_by_one_and_are_timed_alone(tmp_path, monkeypatch):
+    monkeypatch.setattr(comparing, "TIMED", 10)
+    apart, beside = (compare(load("ellipse", ["control.duration=0.02"]), ["tpm", "hcod"],
+                             tmp_path / str(workers), workers=workers) for workers in (1, 2))
+    for one, other in zip(apart.runs, beside.runs, strict=True):
+        assert (one.recording["q"] == other.recording["q"]).all()
+        assert (one.timing, other.timing.ticks) == (None, 10)
+        assert other.metrics["time_tick_median"].value == pytest.approx(
+            float(np.median(other.timing["time_tick"])))
+    assert "first 10 ticks of each repeated" in (tmp_path / "2" / "index.html").read_text()
+
+
+def test_an_error_in_the_page_costs_no_run_and_says_where_they_are(tmp_path, monkeypatch, capsys):
+    def broken(*_):
+        raise LookupError("no such style")
+
+    monkeypatch.setattr("scenarios.results.page.comparison_page", broken)
+    assert run_command(["compare", "ellipse", "--resolvers", "tpm,hcod", *SHORT, "--out", "b"]) == 1
+    assert "no such style; the runs are in b" in capsys.readouterr().err
+    assert len(list((tmp_path / "b").rglob("run.npz"))) == 2
+
+
+def test_figures_do_not_depend_on_the_users_matplotlib(tmp_path):
+    (tmp_path / "matplotlibrc").write_text("text.usetex: True\nsavefig.bbox: tight\n")
+    command = [sys.executable, "-m", "scenarios.cli.main", "run", "ellipse", "--figures", *SHORT]
+    settings = {**os.environ, "MPLBACKEND": "no-such-backend"}
+    for out, more in (("a", {}), ("b", {"MATPLOTLIBRC": str(tmp_path)})):
+        subprocess.run([*command, "--out", out], cwd=tmp_path, env={**settings, **more}, check=True)
+    pictures = sorted((tmp_path / "a").glob("*.svg"))
+    assert pictures
+    assert all(one.read_bytes() == (tmp_path / "b" / one.name).read_bytes()
+               for one in pictures if "time" not in one.name)
+
+
+def test_a_change_stands_in_the_title_and_an_inexact_resolver_is_named(capsys):
+    assert run_command(["run", "ellipse", *SHORT, "--set", "pointing.alpha_d=35"]) == 0
+    said = capsys.readouterr().out
+    assert "5 deg" not in said
+    assert "(pointing.alpha_d=35)" in said
+    assert "tpm-published is inexact where a level loses rank" in said
+    assert run_command(["run", "ellipse", *SHORT, "--resolver", "hcod"]) == 0
+    assert "inexact" not in capsys.readouterr().out
 
 
 def test_help_needs_none_of_the_heavy_packages():
@@ -278,23 +305,12 @@ def test_json_of_a_comparison_is_what_it_keeps(tmp_path, capsys):
     assert [run["resolver"] for run in found["runs"]] == ["tpm", "augmented"]
 
 
-def test_json_lists_what_there_is(capsys):
-    found = said(["list"], capsys)
-    assert "ellipse" in found["scenarios"]
-    assert "hcod" in found["resolvers"]
-    assert list(found)[:6] == ["scenarios", "groups", "sweeps", "resolvers", "tasks", "robots"]
-
-
 def test_json_of_a_check_is_the_whole_scenario_and_its_first_tick(capsys):
     found = said(["check", "ellipse", "--set", "pointing.alpha_d=35"], capsys)
     assert found["scenario"]["pointing"]["alpha_d"] == 35.0
     assert found["scenario"]["control"]["resolver"] == "tpm-published"
     assert found["first_tick"]["levels"] == ["position", "avoidance"]
     assert (found["first_tick"]["unmet"], found["warnings"]) == ([], [])
-
-
-def test_a_mistake_with_json_is_an_error_on_stderr_all_the_same(capsys):
-    assert "unknown scenario or robot 'elipse'" in fails(["check", "elipse", "--json"], capsys)
 
 
 def test_the_list_fits_80_columns(capsys):
@@ -317,11 +333,6 @@ def test_the_shell_completes_commands_scenarios_and_resolvers(monkeypatch, capsy
     assert completed("hierarchy", "compare", "ladder")[-1] == "ladder"
     assert completed("hierarchy", "compare", "ellipse", "--resolvers", "tpm,hc") == ["tpm,hcod"]
     assert completed("hierarchy", "sweep", "ell") == ["ellipse-starts"]
-
-
-def test_the_version_is_printed(capsys):
-    assert run_command(["--version"]) == 0
-    assert capsys.readouterr().out == f"hierarchy {version('task-hierarchy')}\n"
 
 
 def test_every_benchmark_is_a_command_and_listed(capsys):

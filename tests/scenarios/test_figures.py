@@ -1,10 +1,6 @@
 import dataclasses
 import itertools
-import json
-import os
 import re
-import subprocess
-import sys
 
 import numpy as np
 import pytest
@@ -12,10 +8,8 @@ from hand_made import HandMadeScenario, recording
 from matplotlib.colors import to_hex
 from matplotlib.patches import Patch
 
-import solvers
 from hierarchy import HierarchyError
 from scenarios.cli.figures import redraw
-from scenarios.cli.main import run_command
 from scenarios.config import load
 from scenarios.config.kinds.frames import ListedPosition
 from scenarios.draw.figures import drawing, letter, palette, panels
@@ -24,7 +18,7 @@ from scenarios.draw.figures.timeline import timeline
 from scenarios.loop.simulation import simulate
 from scenarios.measure.run_folder import save
 from scenarios.recording.recording import Event
-from scenarios.report.figures import computing_time, overlay, side_by_side
+from scenarios.results.curves import computing_time, overlay, side_by_side
 
 
 def beside(panel, recordings):
@@ -43,10 +37,6 @@ def test_a_thinned_curve_keeps_its_ends_and_every_peak():
     assert len(kept) < 1_000
     assert {0, 12_345, len(y) - 1} <= set(kept.tolist())
     assert (np.diff(kept) > 0).all()
-
-
-def test_a_short_curve_is_not_thinned():
-    np.testing.assert_array_equal(drawing.envelope(np.arange(50.0)), np.arange(50))
 
 
 def test_a_thinned_curve_keeps_the_gaps_of_what_was_not_there():
@@ -99,11 +89,6 @@ def test_the_colours_are_legible_on_light_and_dark(ground):
     assert min(contrast(c, ground) for c in palette.COLOURS.values()) > 2.2
 
 
-def test_every_resolver_there_is_has_a_colour_of_its_own():
-    assert set(palette.COLOURS) == set(solvers.names())
-    assert len(set(palette.COLOURS.values())) == len(palette.COLOURS)
-
-
 def test_a_resolver_has_the_same_colour_in_any_company():
     for label in ("recursive", "hqp osqp", "tpm-published"):
         for others in ([], ["hqp proxqp", "something new"], ["tpm", "hqp daqp", "my own"]):
@@ -119,18 +104,6 @@ def test_a_variant_has_the_colour_of_its_resolver_and_a_line_of_its_own():
     assert len(set(looks.values())) == 5
 
 
-def test_only_a_plain_name_and_what_it_stands_for_are_solid():
-    for label in ("hqp", "hqp proxqp", "tpm"):
-        assert palette.dash(label) == palette.SOLID
-    dashes = [palette.dash(label) for label in ("hqp osqp", "hqp daqp", "tpm-published", "hqp new")]
-    assert palette.SOLID not in dashes
-    assert dashes[0] != dashes[1]
-
-
-def test_a_label_and_the_spec_that_asks_for_it_have_one_colour():
-    assert palette.colour("hqp:backend=osqp") == palette.colour("hqp osqp")
-
-
 def test_no_two_that_stand_side_by_side_look_alike():
     labels = ["tpm-published", "one", "two", "three", "hqp", "weighted 10", "weighted 20",
               "weighted 30", "ellipse", "human"]
@@ -141,11 +114,6 @@ def test_shared_limits_leave_out_the_one_run_that_would_flatten_the_others():
     low, high = drawing.shared_limits([(-1.0, 1.0), (-1.2, 1.1), (-80.0, 90.0)])
     assert -2.0 < low < -1.2
     assert 1.1 < high < 2.0
-
-
-def test_shared_limits_of_constants_are_still_a_range():
-    low, high = drawing.shared_limits([(0.0, 0.0), (0.0, 0.0)])
-    assert low < 0.0 < high
 
 
 def test_the_picture_is_seen_without_distortion():
@@ -163,13 +131,6 @@ def test_every_panel_draws_a_run_that_has_its_signal(panel):
     drawn = beside(panel, {"tpm-published": run, "hqp": run})
     assert list(drawn) == ["tpm-published", "hqp"]
     assert drawn["hqp"].axes[0].get_ylim() == drawn["tpm-published"].axes[0].get_ylim()
-
-
-@pytest.mark.parametrize("panel", panels.PANELS, ids=lambda panel: panel.name)
-def test_a_panel_without_its_signal_is_left_out_and_not_drawn_empty(panel):
-    run = recording()
-    del run.signals[panel.signal]
-    assert beside(panel, {"hqp": run}) == {}
 
 
 def test_the_errors_of_listed_tasks_are_drawn_with_a_line_for_each():
@@ -192,45 +153,12 @@ def test_a_run_far_beyond_the_others_is_cut_and_says_so():
     assert drawn["a"].axes[0].get_ylim()[1] < 10.0
 
 
-def test_the_stretches_in_which_a_task_is_active_are_red():
-    run = recording(pointing_active=[False, True, True, False, False],
-                    pointing_error=[0.0, 1.0, 2.0, 3.0, 4.0])
-    fig = beside(panels.PANEL["pointing-error"], {"hqp": run})["hqp"]
-    (red,) = [line for line in fig.axes[0].lines if line.get_color() == drawing.ALERT]
-    np.testing.assert_array_equal(red.get_ydata(), [np.nan, 1.0, 2.0, np.nan, np.nan])
-
-
 @pytest.fixture(scope="module")
 def drawn(tmp_path_factory):
     """The folder of all figures of a run."""
     folder = tmp_path_factory.mktemp("drawn")
     letter.write_all(recording(), folder)
     return folder
-
-
-@pytest.mark.slow
-def test_all_figures_of_a_run_are_written_as_svg_and_png(drawn):
-    stems = {path.stem for path in drawn.iterdir()}
-    asked = {figure.name for figure in letter.SIMULATION} - {"task-errors"}  # it lists none
-    assert stems == asked | {"picture", "stack", "tick-times"}
-    assert len(list(drawn.iterdir())) == 2 * len(stems)
-
-
-@pytest.mark.slow
-def test_the_same_figure_is_the_same_file(drawn, tmp_path):
-    with drawing.styled(dataclasses.replace(drawing.SCREEN, formats=("svg",))):
-        letter.write_all(recording(), tmp_path)
-    for path in drawn.glob("*.svg"):
-        assert path.read_bytes() == (tmp_path / path.name).read_bytes()
-
-
-def test_numbers_on_a_logarithmic_axis_are_plain_text():
-    assert [drawing.in_powers(x) for x in (1e-8, 0.01, 20.0, 1500.0, 1e4, 2e5)] == [
-        "10⁻⁸", "0.01", "20", "1500", "10⁴", "2·10⁵"]
-    fig, (ax,) = drawing.figure()
-    ax.plot([1.0, 2.0], [1e-7, 1.0])
-    drawing.make_logarithmic(ax, "y")
-    assert "10⁻⁴" in drawing.svg(fig, "any")
 
 
 def letters(name, **changed):
@@ -267,48 +195,6 @@ def test_the_letters_pairs_are_made_of_its_runs_in_its_order():
     assert [text[:4] for text in headings(drawn["figure-5-distances"])] == ["(a) ", "(b) ", "Body"]
     speeds = [ax.lines[0].get_ydata()[0] for ax in drawn["figure-4-joint-velocities"].axes]
     assert speeds == [2.0, 1.0]  # the velocity level is (a)
-
-
-def test_two_other_runs_make_pairs_without_numbers():
-    drawn = dict(letter._together([recording(), recording()]))
-    assert set(drawn) == {"joint-velocities", "distances", "pointing-error", "position-error"}
-    assert [text[:4] for text in headings(drawn["joint-velocities"])] == ["(a) ", "(b) "]
-    assert len(drawn["distances"].axes) == 6
-
-
-def test_more_than_two_runs_that_are_not_the_letters_are_refused(tmp_path):
-    with pytest.raises(HierarchyError, match="only the letter's figures"):
-        letter.write_together([recording()] * 3, tmp_path)
-
-
-def test_figures_of_several_runs_need_a_folder_of_their_own(tmp_path):
-    with pytest.raises(HierarchyError, match="--out"):
-        redraw([tmp_path / "a", tmp_path / "b"])
-
-
-def test_a_legend_has_the_lines_of_all_panels_once():
-    run = recording(pointing_active=[False, True, True, False, False],
-                    true_ee_distance=np.ones(5), true_minimal_distance=np.ones(5))
-    chosen = [panels.PANEL[name] for name in ("position-components", "pointing-error",
-                                              "ee-distance", "body-distance")]
-    (legend,) = letter.stacked([(run, chosen)], "any").legends
-    assert [text.get_text() for text in legend.get_texts()] == [
-        "x", "y", "z", "task active", "measured", "true"]
-
-
-def test_the_experiment_shows_the_components_of_its_error_on_a_linear_scale():
-    error = np.arange(15.0).reshape(5, 3) * 1e-3
-    fig = letter.stacked([(recording(position_error=error),
-                           [panels.PANEL["position-components"]])], "any")
-    drawn = np.array([line.get_ydata() for line in fig.axes[0].lines])
-    np.testing.assert_allclose(drawn, 1e3 * error.T)
-    assert fig.axes[0].get_yscale() == "linear"
-    assert panels.PANEL["position-components"].name in letter.EXPERIMENT[1].panels
-
-
-def test_the_pointing_error_is_typeset():
-    heading = panels.PANEL["pointing-error"].heading
-    assert heading == r"Pointing error [$\cos\alpha_d - \cos\alpha$]"
 
 
 def test_a_scene_without_obstacles_or_a_path_asked_for_is_still_a_picture():
@@ -354,25 +240,6 @@ def test_figures_for_a_paper_are_vectors_one_column_wide_with_their_fonts_inside
         assert (b"/FontFile2" in content) is (file.stem != "picture")  # which has no letters
 
 
-@pytest.mark.slow
-def test_figures_for_a_paper_are_the_same_bytes_in_another_process(run_folder, paper, tmp_path):
-    subprocess.run([sys.executable, "-c", "import sys\n"
-                    "from scenarios.cli.figures import redraw\n"
-                    "redraw([sys.argv[1]], 'paper', sys.argv[2])", run_folder, tmp_path / "there"],
-                   check=True, env={**os.environ, "PYTHONHASHSEED": "5"})
-    for file in paper:
-        assert file.read_bytes() == (tmp_path / "there" / file.name).read_bytes()
-
-
-@pytest.mark.slow
-def test_joints_of_a_paper_figure_are_told_apart_in_grey_too():
-    with drawing.styled(drawing.PAPER):
-        fig = beside(panels.PANEL["joint-velocities"], {"hqp": recording()})["hqp"]
-    assert len({line.get_linestyle() for line in fig.axes[0].lines}) >= 4
-    plain = beside(panels.PANEL["joint-velocities"], {"hqp": recording()})["hqp"]
-    assert {line.get_linestyle() for line in plain.axes[0].lines} == {"-"}
-
-
 def test_figures_drawn_anew_take_the_place_of_those_in_the_run_folder(run_folder, monkeypatch):
     for text in ("old", "new"):
         monkeypatch.setattr(letter, "write_all",
@@ -391,37 +258,25 @@ def test_a_style_or_folder_that_is_not_there_is_an_error_that_names_it(run_folde
         redraw([tmp_path / "nothing"])
 
 
-def test_the_command_says_which_files_it_drew(run_folder, monkeypatch, capsys):
-    monkeypatch.setattr(letter, "write_all",
-                        lambda recording, folder: (folder / "a.pdf").write_text("drawn"))
-    assert run_command(["figures", str(run_folder), "--style", "paper", "--json"]) == 0
-    assert json.loads(capsys.readouterr().out) == {"files": [str(run_folder / "a.pdf")]}
-    assert run_command(["figures", str(run_folder), "--style", "papr"]) == 2
-
-
 @pytest.mark.parametrize("label", ["tpm-published", "recursive", "hqp osqp"])
 def test_a_resolver_has_its_colour_in_every_figure(label):
     runs, wanted = {label: recording(), "hcod": recording()}, palette.colour(label)
     looks = palette.looks(runs)
     drawn = [side_by_side(panels.PANEL["body-distance"], runs, looks)[label].axes[0].lines,
              overlay(panels.position_error, runs, looks).axes[0].lines,
-             picture(runs).axes[0].lines, computing_time(runs, looks)[0].axes[0].patches]
+             picture(runs).axes[0].lines, computing_time(runs, looks).axes[0].lines]
     for artists in drawn:
         colours = [to_hex(one.get_facecolor() if isinstance(one, Patch) else one.get_color())
                    for one in artists]
         assert wanted in colours
 
 
-def test_times_far_apart_are_dots_and_a_tick_far_slower_than_its_bar_is_a_number():
-    near = {"tpm": recording(), "hcod": recording(time_tick=[4e-6, 4e-6, 4e-6, 4e-6, 4e-3])}
-    fig, marks = computing_time(near, palette.looks(near))
-    assert "light to full" in marks
-    assert [text.get_text()[0] for text in fig.axes[0].texts] == ["×"]
-    far = {"tpm": recording(), "hqp": recording(time_tick=np.full(5, 1e-3))}
-    fig, marks = computing_time(far, palette.looks(far))
-    assert fig.axes[0].get_xscale() == "log"
-    assert not fig.axes[0].patches
-    assert "dot" in marks
+def test_computing_times_stand_at_their_medians_and_slowest_ticks():
+    run = recording(time_tick=[4e-6, 4e-6, 4e-6, 4e-6, 4e-3], time_resolve=np.full(5, 2e-6))
+    (ax,) = computing_time({"tpm": run}, palette.looks(["tpm"])).axes
+    resolve, median, slow = (float(line.get_xdata()[0]) for line in ax.lines)
+    assert (resolve, median) == (pytest.approx(2.0), pytest.approx(4.0))
+    assert slow > 3900.0
 
 
 def test_the_stack_over_time_has_a_band_for_each_place_and_a_row_for_each_event():
@@ -440,13 +295,6 @@ def test_stacks_beside_each_other_have_the_same_rows_and_time():
     rows = [[text.get_text() for text in ax.get_yticklabels()] for ax in axes]
     assert rows[0] == rows[1] == ["1", "2", "3", "stale: brake"]
     assert axes[0].get_xlim() == axes[1].get_xlim() == (0.0, 4.0)
-
-
-@pytest.mark.slow
-def test_a_stack_that_changes_at_every_tick_is_still_a_small_figure():
-    ticks = 20_000
-    run = recording(t=np.arange(ticks) * 1e-3, order=np.arange(ticks) % 2)
-    assert len(drawing.svg(timeline(run), "stack")) < 300_000
 
 
 def test_the_desired_path_is_drawn_for_one_turn():

@@ -12,7 +12,7 @@ from scenarios.measure.comparison import Comparison
 from scenarios.measure.motions import motions
 from scenarios.measure.partings import partings
 from scenarios.measure.runs import Run
-from scenarios.report import comparison_page as page
+from scenarios.results.page import comparison_page as page
 from solvers.qp import backends
 
 LETTER = "tpm-published"

@@ -1,6 +1,5 @@
 import json
 import re
-from html.parser import HTMLParser
 
 import numpy as np
 import pytest
@@ -8,11 +7,9 @@ from hand_made import recording as hand_made
 from headless import chromium
 from packing import unpacked
 
-from hierarchy import HierarchyError
 from scenarios import load, save, simulate
 from scenarios.cli.main import run_command
 from scenarios.draw.replay import html
-from scenarios.draw.replay.data import packed
 from scenarios.scene import scene
 
 VOID = {"meta", "input", "br", "link", "img"}
@@ -34,29 +31,6 @@ def document(runs):
 def data_of(document):
     found = re.search(r'<script type="application/json" id="data">(.*?)</script>', document, re.S)
     return json.loads(found[1])
-
-
-class Balanced(HTMLParser):
-    """Fails where a tag is closed that is not the last one opened."""
-
-    def __init__(self):
-        super().__init__()
-        self.open = []
-
-    def handle_starttag(self, tag, attributes):
-        if tag not in VOID:
-            self.open.append(tag)
-
-    def handle_endtag(self, tag):
-        assert self.open.pop() == tag
-
-
-def test_the_document_is_whole(document):
-    parser = Balanced()
-    parser.feed(document)
-    parser.close()
-    assert parser.open == []
-    assert "<h1>An &lt;ellipse&gt; &amp; two ways</h1>" in document
 
 
 def test_the_document_refers_to_nothing_outside_itself(document):
@@ -90,35 +64,11 @@ def test_the_data_are_those_of_the_recording(runs, document):
             error, 1e3 * np.linalg.norm(recording["position_error"][shown.ticks], axis=1))
 
 
-@pytest.mark.parametrize("values", [
-    np.array([[1.5, -2.0], [0.25, 1e-9]]), np.array([[np.nan, 1.0]]), np.zeros((0, 3)),
-    np.arange(-5, 400), np.array([-1, 0, 1], np.int8), np.full((2, 2), 7.0)],
-    ids=["numbers", "not a number", "none", "whole", "small", "all the same"])
-@pytest.mark.parametrize("steps", [False, True])
-def test_what_is_packed_is_unpacked(values, steps):
-    found = unpacked(packed(values.astype(float) if steps else values, steps))
-    assert found.shape == values.shape
-    step = np.ptp(values[np.isfinite(values)]) / 65534 if steps and values.size else 0.0
-    assert np.allclose(found, values, rtol=1e-6, atol=step, equal_nan=True)
-
-
 def test_a_minute_at_30_hz_takes_less_than_a_megabyte_and_a_half(runs, document):
     """Size grows with the frames: 60 a run here, of which a minute has 1800."""
     code = len(html({"x": hand_made()}, "x"))
     for_a_frame = (len(document) - code) / sum(len(scene(run).t) for run in runs.values())
     assert for_a_frame * 1800 + code < 1.5e6
-
-
-@pytest.mark.parametrize("run", [
-    hand_made(), hand_made(t=[0.0]), hand_made(fault="stopped by hand")],
-    ids=["quiet", "one tick", "a fault"])
-def test_runs_of_any_kind_make_a_document(run):
-    assert data_of(html({"a": run}, "x"))["runs"][0]["fault"] == run.fault
-
-
-def test_a_replay_of_nothing_is_refused():
-    with pytest.raises(HierarchyError, match="at least one run"):
-        html({}, "x")
 
 
 # In a browser.
@@ -173,23 +123,6 @@ def test_play_moves_the_arm_and_pause_stops_it(page):
     assert page.run("player.t") == stopped
 
 
-def test_play_ends_at_the_end_and_begins_anew(page):
-    page.run("player.seek(player.end - 0.05)")
-    page.run("document.getElementById('play').click()")
-    page.wait("!player.playing")
-    assert page.run("player.t === player.end")
-    page.run("document.getElementById('play').click()")
-    page.wait("player.t < 1")
-    page.run("document.getElementById('play').click()")
-
-
-@pytest.mark.parametrize("speed", [0.1, 1, 4])
-def test_the_speed_is_that_of_time(page, speed):
-    passed = page.run(f"""(() => {{ document.getElementById('speed').value = '{speed}';
-        player.toggle(); player.tick(player.last + 100); player.toggle(); return player.t; }})()""")
-    assert passed == pytest.approx(0.1 * speed)
-
-
 def test_scrubbing_moves_the_cursor_of_every_curve(page):
     places = "player.curves.cursors.map(cursor => +cursor.getAttribute('x1'))"
     assert len(set(page.run(places))) == 1
@@ -198,16 +131,6 @@ def test_scrubbing_moves_the_cursor_of_every_curve(page):
     after = page.run(places)
     assert after == [page.run("player.curves.x(1)")] * len(after)
     assert page.run("player.t") == 1.0
-
-
-def test_a_click_in_a_curve_goes_there(page):
-    box = page.run("""(() => { const svg = document.querySelectorAll('.curve svg')[2];
-        svg.scrollIntoView();
-        const box = svg.getBoundingClientRect(); return [box.left, box.top, box.width]; })()""")
-    x = page.run("player.curves.x(0.5)")
-    place = box[0] + x, box[1] + 30
-    page.mouse(("mousePressed", *place), ("mouseReleased", *place))
-    assert page.run("player.t") == pytest.approx(0.5, abs=0.02)
 
 
 def test_keys_step_by_a_frame_and_by_a_second(page):
@@ -246,26 +169,6 @@ def test_runs_stand_side_by_side_and_can_be_hidden(page):
     assert page.run("document.querySelectorAll('#names span').length") == 1
 
 
-def test_the_mouse_turns_and_the_wheel_zooms(page):
-    before = page.run("[player.stage.camera.azimuth, player.stage.camera.zoom]")
-    page.mouse(("mousePressed", 300, 400), ("mouseMoved", 360, 420), ("mouseReleased", 360, 420))
-    page.mouse(("mouseWheel", 300, 400), deltaX=0, deltaY=-120, button="none", buttons=0)
-    page.wait(f"player.stage.camera.zoom > {before[1]}")
-    assert page.run("player.stage.camera.azimuth") != before[0]
-
-
-def test_two_fingers_zoom(page):
-    def touch(kind, *places):
-        page.call("Input.dispatchTouchEvent", type=kind, touchPoints=[
-            {"x": x, "y": 400, "id": i} for i, x in enumerate(places)])
-    touch("touchStart", 300, 400)
-    touch("touchMove", 250, 450)
-    touch("touchMove", 200, 500)
-    touch("touchEnd")
-    page.painted()
-    assert page.run("player.stage.camera.zoom") > 1.5
-
-
 def test_the_arm_is_drawn_again_after_the_graphics_card_was_lost(page):
     page.run("""new Promise(done => {
         const space = document.getElementById('space');
@@ -277,15 +180,6 @@ def test_the_arm_is_drawn_again_after_the_graphics_card_was_lost(page):
     page.painted()
     assert page.run("player.stage.painter.gl.getError()") == 0
     page.complaints[:] = [said for said in page.complaints if "CONTEXT_LOST" not in said]
-
-
-def test_a_time_in_the_address_is_where_it_begins(page):
-    address = page.address
-    page.look_at("about:blank")
-    page.look_at(f"{address}#t=1.5", 1000, 600)
-    assert page.run("player.t") == 1.5
-    page.look_at("about:blank")
-    page.look_at(address, 1000, 600)
 
 
 @pytest.mark.parametrize("width", [360, 800, 1400])
@@ -331,14 +225,6 @@ def test_without_webgl_the_arm_is_sketched_and_moves(without):
     assert colours > 20
 
 
-def test_without_any_canvas_it_says_so_and_shows_the_rest(without):
-    page = without("webgl", "2d")
-    assert "cannot be drawn" in page.run("document.getElementById('notice').textContent")
-    assert page.run("document.querySelectorAll('.curve').length") > 4
-    page.run("player.seek(1)")
-    assert page.run("player.t") == 1.0
-
-
 def test_embedded_it_is_as_tall_as_its_content_whatever_the_frame(browser, runs, tmp_path):
     inner = html(runs, "x", embedded=True).replace("&", "&amp;").replace('"', "&quot;")
     file = tmp_path / "outer.html"
@@ -370,13 +256,6 @@ def folder(short, tmp_path):
     return save(short, tmp_path / "run")
 
 
-@pytest.mark.slow
-def test_the_command_writes_a_file_beside_the_run(folder, capsys):
-    assert run_command(["replay", str(folder)]) == 0
-    assert (folder / "replay.html").read_text(encoding="utf-8").startswith("<!DOCTYPE html>")
-    assert "replay.html" in capsys.readouterr().out
-
-
 def test_the_command_takes_several_runs_and_a_name(folder, short, tmp_path):
     other = save(short, tmp_path / "other")
     file = tmp_path / "new" / "two.html"
@@ -391,5 +270,3 @@ def test_the_same_run_gives_the_same_file(folder, tmp_path):
     assert files[0].read_bytes() == files[1].read_bytes()
 
 
-def test_a_rate_of_zero_is_refused(folder):
-    assert run_command(["replay", str(folder), "--rate", "0"]) == 2

@@ -51,6 +51,12 @@ def test_a_shift_of_all_pairs_is_told():
     assert str(found) == "lower in 16 of 16, p < 0.001"
 
 
+def test_what_does_not_differ_is_said_beside_what_does():
+    first = np.arange(1.0, 17.0)
+    second = first - np.where(first <= 7.0, 0.5, 0.0)
+    assert str(paired(first, second)) == "lower in 7 of 16, the same in 9, p = 0.016"
+
+
 def test_too_few_pairs_tell_nothing():
     assert not paired(np.zeros(5), np.ones(5)).distinguishable
     assert paired(np.zeros(6), np.arange(1.0, 7.0)).distinguishable

@@ -1,6 +1,5 @@
 """The page in the browser: what it shows, and what is asked for on it."""
 
-import sys
 import time
 
 import numpy as np
@@ -16,13 +15,13 @@ from scenarios.config import load
 from scenarios.draw.viewer.curves import Lately
 from scenarios.draw.viewer.live import Live
 from scenarios.draw.viewer.moment import Became, Watched, of_scene
-from scenarios.draw.viewer.playback import Playback, Requests
+from scenarios.draw.viewer.playback import Playback
 from scenarios.draw.viewer.stack_list import stack_html
 from scenarios.loop.controller import Controller
 from scenarios.loop.recorder import Recorder
 from scenarios.loop.simulation import simulate, tick
 from scenarios.measure.judging import judge
-from scenarios.measure.run_folder import load_run, save
+from scenarios.measure.run_folder import load_run
 from scenarios.scene import scene
 from scenarios.scene.levels import Fate
 
@@ -61,32 +60,6 @@ def test_time_stands_until_it_is_played_and_stops_at_the_end():
     assert (playback.t, playback.playing) == (2.0, True)
     playback.advance(9.0)
     assert (playback.t, playback.playing) == (3.0, False)
-
-
-def test_play_at_the_end_begins_anew_and_elsewhere_goes_on():
-    playback = Playback(0.0, 3.0)
-    playback.seek(3.0)
-    playback.play()
-    assert playback.t == 0.0
-    playback.seek(2.0)
-    playback.play()
-    assert playback.t == 2.0
-
-
-@pytest.mark.parametrize(("asked", "there"), [(-1.0, 0.0), (1.5, 1.5), (9.0, 3.0)])
-def test_scrubbing_pauses_at_the_nearest_time_there_is(asked, there):
-    playback = Playback(0.0, 3.0)
-    playback.play()
-    playback.seek(asked)
-    assert (playback.t, playback.playing) == (there, False)
-
-
-def test_of_requests_for_one_thing_the_last_is_kept_and_all_in_order():
-    requests = Requests()
-    for what, value in (("a", 1), ("b", 2), ("a", 3)):
-        requests.put(what, value)
-    assert requests.take() == [("b", 2), ("a", 3)]
-    assert requests.take() == []
 
 
 # The moment that is drawn
@@ -228,29 +201,6 @@ def test_what_cannot_be_is_refused_and_the_run_goes_on(spoil, recording):
     assert live.changes == []
 
 
-def test_a_restart_keeps_the_settings_and_puts_obstacles_back(tmp_path):
-    live = Live(LIMITED)
-    live.change({"pointing.alpha_d": 20.0})
-    live.drag(1, (0.0, 0.1, 0.0))
-    ticks(live, 50)
-    live.restart()
-    assert live.t == 0.0
-    assert live.obstacles.offset.tolist() == [[0.0] * 3] * 3
-    ticks(live, 30)
-    live.change({"avoidance.far": 0.2})
-    ticks(live, 30)
-    live.save(tmp_path / "run")
-    kept = load_run(tmp_path / "run")
-    assert kept.scenario.pointing.alpha_d == 20.0
-    assert (kept.ticks, kept.fault) == (60, "interrupted at tick 60")
-    assert '"avoidance.far"' in (tmp_path / "run" / "changes.json").read_text()
-
-
-def test_a_live_run_takes_no_faults():
-    with pytest.raises(HierarchyError, match="injects no"):
-        Live(load("ellipse", {"faults": [{"kind": "stale", "at": 0.1, "duration": 0.1}]}))
-
-
 def test_curves_of_what_was_before_stay_when_the_cone_is_another():
     live = Live(LIMITED)
     watched, lately = Watched(live.controller), Lately(10, live.recorder.facts)
@@ -287,12 +237,6 @@ def test_a_page_plays_and_scrubs_runs_of_different_length(server, recording):
     assert view.models["hcod"]._root.position.tolist() == [0.0] * 3
 
 
-def test_runs_of_the_same_resolver_are_told_apart_by_their_folders(recording):
-    from scenarios.draw.viewer.view import labelled
-
-    assert list(labelled(["a", "b"], [recording, recording])) == ["tpm in a", "tpm in b"]
-
-
 @pytest.mark.slow
 def test_a_live_page_does_what_is_asked_for_and_says_what_it_refuses(server):
     from scenarios.draw.viewer.live_page import LivePage
@@ -322,27 +266,6 @@ def test_a_live_page_does_what_is_asked_for_and_says_what_it_refuses(server):
 
 
 @pytest.mark.slow
-def test_a_live_page_at_its_end_begins_anew_when_it_is_played(server):
-    from scenarios.draw.viewer.live_page import LivePage
-
-    page = LivePage(server, Live(load("ellipse", ["control.duration=0.05"])))
-    page.step(0.06)
-    assert page.live.over
-    assert "ended" in page.list
-    page.requests.put("toggle")
-    page.step(0.01)
-    assert not page.live.over
-
-
-def test_a_missing_extra_is_named(monkeypatch):
-    from scenarios.draw.viewer.server import open_server
-
-    monkeypatch.setitem(sys.modules, "viser", None)
-    with pytest.raises(HierarchyError, match=r"pip install 'task-hierarchy\[view\]'"):
-        open_server(0, "test")
-
-
-@pytest.mark.slow
 def test_a_live_run_is_kept_at_ctrl_c(tmp_path, monkeypatch, capsys):
     pytest.importorskip("viser", reason="needs the extra view")
     from scenarios.draw.viewer.live_page import LivePage
@@ -369,17 +292,6 @@ def test_a_wrong_command_line_is_told_before_anything_is_opened(arguments, capsy
     monkeypatch.chdir(tmp_path)
     assert run_command(arguments) == 2
     assert capsys.readouterr().err.startswith("hierarchy: error: ")
-
-
-def test_the_page_is_served_to_this_machine_alone(server):
-    assert server.get_host() == "127.0.0.1"
-
-
-def test_a_port_that_is_taken_is_told(server):
-    from scenarios.draw.viewer.server import open_server
-
-    with pytest.raises(HierarchyError, match=r"--port \d+ cannot be used"):
-        open_server(server.get_port(), "second")
 
 
 # In a browser
@@ -463,14 +375,3 @@ def test_in_a_browser_the_resolver_is_switched_in_mid_motion(server):
         assert errors(browser) == []
 
 
-def test_a_run_is_shown_by_its_folder(tmp_path, recording, monkeypatch, capsys):
-    pytest.importorskip("viser", reason="needs the extra view")
-    from scenarios.draw.viewer.view import View
-
-    def interrupt(view):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(View, "serve", interrupt)
-    save(recording, tmp_path / "a")
-    assert run_command(["view", str(tmp_path / "a"), "--no-browser", "--port", "0"]) == 0
-    assert "Page: http://127.0.0.1:" in capsys.readouterr().out

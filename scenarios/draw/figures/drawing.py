@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import matplotlib
+import matplotlib.style
 import numpy as np
 from markupsafe import Markup, escape
 from matplotlib.axes import Axes
@@ -96,10 +97,10 @@ _present: ContextVar[Style] = ContextVar("style", default=SCREEN)
 
 @contextmanager
 def styled(style: Style) -> Iterator[None]:
-    """Draw and write all figures in a style within the context."""
+    """Draw and write all figures in a style within the context, whatever the user's own is."""
     token = _present.set(style)
     try:
-        with matplotlib.rc_context(dict(style.settings)):
+        with matplotlib.style.context(["default", dict(style.settings)]):
             yield
     finally:
         _present.reset(token)

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from html import escape
 from http import HTTPStatus
 from typing import Any
 from urllib.parse import urlsplit
 
+_TITLE = b"<title>Viser</title>"
 NAMES = ("127.0.0.1", "localhost")
 
 
@@ -22,9 +24,19 @@ def is_own(headers: Mapping[str, str]) -> bool:
     return own and (origin is None or urlsplit(origin).netloc == host)
 
 
+def _titled(response: Any, title: str) -> Any:
+    """Give a page of viser another title."""
+    if response is not None and response.body and _TITLE in response.body:
+        response.body = response.body.replace(
+            _TITLE, f"<title>{escape(title)}</title>".encode(), 1)
+        del response.headers["Content-Length"]
+        response.headers["Content-Length"] = str(len(response.body))
+    return response
+
+
 @contextmanager
-def guarded() -> Iterator[None]:
-    """Let a server of websockets that is started meanwhile reject the requests of others."""
+def guarded(title: str) -> Iterator[None]:
+    """Let a server that is started meanwhile reject the requests of others, and title its page."""
     from websockets.asyncio import server
 
     serve = server.serve
@@ -34,7 +46,11 @@ def guarded() -> Iterator[None]:
         def judge(connection: Any, request: Any) -> Any:
             if not is_own(request.headers):
                 return connection.respond(HTTPStatus.FORBIDDEN, "Only pages of this machine.\n")
-            return process_request(connection, request) if process_request else None
+            if process_request is None:
+                return None
+            if urlsplit(request.path).path in ("/", "/index.html"):
+                request.headers.pop("Accept-Encoding", None)  # compressed, it has no title to find
+            return _titled(process_request(connection, request), title)
 
         return serve(*arguments, process_request=judge, **options)
 

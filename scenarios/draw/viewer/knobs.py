@@ -26,23 +26,23 @@ class Knob:
 
 
 _BOTH = (
-    Knob("pointing.alpha_d", "α_d [deg]", 90.0, 0.5),
-    Knob("avoidance.near", "ε₁ [m]", 0.4, 0.005),
-    Knob("avoidance.far", "ε₂ [m]", 0.4, 0.005),
-    Knob("avoidance.end_effector", "ε_ee [m]", 0.4, 0.005),
-    Knob("avoidance.distance", "distance [m]", 0.3, 0.005),
-    Knob("avoidance.influence", "influence [m]", 0.8, 0.01),
-    Knob("avoidance.rate", "rate [1/s]", 40.0, 0.5),
-    Knob("limits.acceleration", "limit [rad/s²]", 40.0, 0.5),
-    Knob("damping.value", "D, joints [1/s]", 20.0, 0.1))
+    Knob("pointing.alpha_d", "Cone, half angle [deg]", 90.0, 0.5),
+    Knob("avoidance.near", "Body, near distance [m]", 0.4, 0.005),
+    Knob("avoidance.far", "Body, far distance [m]", 0.4, 0.005),
+    Knob("avoidance.end_effector", "End effector, distance [m]", 0.4, 0.005),
+    Knob("avoidance.distance", "Distance kept [m]", 0.3, 0.005),
+    Knob("avoidance.influence", "Influence from [m]", 0.8, 0.01),
+    Knob("avoidance.rate", "Approach rate [1/s]", 40.0, 0.5),
+    Knob("limits.acceleration", "Joint acceleration [rad/s²]", 40.0, 0.5),
+    Knob("damping.value", "Joint damping [1/s]", 20.0, 0.1))
 _ACCELERATION = (
-    Knob("position.stiffness", "K, path [1/s²]", 200.0, 1.0),
-    Knob("position.damping", "D, path [1/s]", 60.0, 0.5),
-    Knob("pointing.stiffness", "K, cone [1/s²]", 100.0, 0.5),
-    Knob("pointing.damping", "D, cone [1/s]", 40.0, 0.5))
+    Knob("position.stiffness", "Path, stiffness [1/s²]", 200.0, 1.0),
+    Knob("position.damping", "Path, damping [1/s]", 60.0, 0.5),
+    Knob("pointing.stiffness", "Cone, stiffness [1/s²]", 100.0, 0.5),
+    Knob("pointing.damping", "Cone, damping [1/s]", 40.0, 0.5))
 _VELOCITY = (
-    Knob("position.gain", "K, path [1/s]", 50.0, 0.5),
-    Knob("pointing.gain", "K, cone [1/s]", 50.0, 0.5))
+    Knob("position.gain", "Path, gain [1/s]", 50.0, 0.5),
+    Knob("pointing.gain", "Cone, gain [1/s]", 50.0, 0.5))
 
 
 def knobs(scenario: Scenario) -> Iterator[tuple[Knob, float]]:

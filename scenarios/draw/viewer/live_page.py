@@ -61,7 +61,7 @@ class LivePage:
         self.panel = LivePanel(
             server, self.requests, live.scenario, list(self.specs),
             self._lately.curves(live.controller), speed, len(self._stage.obstacles),
-            key_html(key(live.recorder.facts, live.scenario), self._colour))
+            self._stage.floor, key_html(key(live.recorder.facts, live.scenario), self._colour))
         self.draw()
 
     @property

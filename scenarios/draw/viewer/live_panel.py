@@ -7,12 +7,13 @@ from typing import Any
 
 from hierarchy.errors import HierarchyError
 from scenarios.config import Scenario
-from scenarios.draw.figures.drawing import INK
 from scenarios.draw.viewer.handles import Handles
 from scenarios.draw.viewer.knobs import knobs
 from scenarios.draw.viewer.playback import PlayButton, Requests, add_speed
 from scenarios.draw.viewer.plots import Plots
-from scenarios.draw.viewer.server import lay_out
+from scenarios.draw.viewer.server import add_dark, lay_out
+
+_CURVE = "#1c86c7"  # on light and dark pages
 
 
 class LivePanel:
@@ -20,14 +21,15 @@ class LivePanel:
 
     They request ("toggle", None), ("restart", None), ("speed", x), ("resolver", label), ("handles",
     shown), (dotted key, value), and what `Handles` does. The inputs are `choice` and `sliders` by
-    key. `key` says in HTML what lines mean.
+    key. `key` says in HTML what lines mean; the floor is at the height `floor` [m].
     """
 
     def __init__(self, server: Any, requests: Requests, scenario: Scenario, labels: Sequence[str],
-                 curves: Any, speed: float, obstacles: int, key: str = "") -> None:
+                 curves: Any, speed: float, obstacles: int, floor: float, key: str = "") -> None:
         gui = server.gui
         with lay_out(server):
-            self._plots = Plots(gui, {"run": curves}, {"run": INK}, rolling=True)
+            self._plots = Plots(gui, {"run": curves}, {"run": _CURVE}, rolling=True)
+        gui.add_markdown(f"**{scenario.title or scenario.name}**")
         self._button = PlayButton(gui, requests)
         requests.when_pressed(gui.add_button("Restart", icon="player-skip-back", color="gray"),
                               "restart")
@@ -41,6 +43,7 @@ class LivePanel:
         with gui.add_folder("Settings"):
             shown = gui.add_checkbox("Handles to drag", initial_value=True)
             requests.when_changed(shown, "handles")
+            add_dark(server, floor)
             self.sliders = {knob.key: gui.add_slider(
                 knob.label, 0.0, max(knob.high, value), knob.step, value, hint=knob.key)
                 for knob, value in knobs(scenario)}

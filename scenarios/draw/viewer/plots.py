@@ -9,12 +9,13 @@ from typing import Any
 import numpy as np
 
 from hierarchy.problem import Array
-from scenarios.draw.figures.drawing import ALERT, INK, JOINTS
+from scenarios.draw.figures.drawing import ALERT, JOINTS
 from scenarios.scene import Series
 
 _POINTS = 500   # per curve
 _HEIGHT = 118   # [px]
 _MARGIN = 0.06  # above and below, relative to the range of a plot
+_NOW = "#7a838d"  # of the cursor, on light and dark pages
 _DASHED = [4, 4]
 _NO_DOTS = {"show": False}
 _FONT = "10px sans-serif"
@@ -82,7 +83,7 @@ class Plots:
                     "points": _NO_DOTS} for name, colour, _ in plot.marks]
         scales: dict[str, Any] = {"x": {"time": False}}
         if not self._rolling:
-            series.append({"label": "now", "stroke": INK, "width": 1.5, "points": _NO_DOTS})
+            series.append({"label": "now", "stroke": _NOW, "width": 1.5, "points": _NO_DOTS})
             scales = {"x": {"time": False, "range": (plot.times[0], plot.times[-1])},
                       "y": {"range": plot.range}}
         data = tuple(plot.data) if self._rolling else plot.with_cursor(plot.times[0])

@@ -19,7 +19,13 @@ HOST = "127.0.0.1"
 _ELEVATION = 22.0  # [deg] of the camera
 _FIELD_OF_VIEW = 38.0  # [deg]
 _ASPECT = 0.9  # width over height of the area between the panels
+_NARROW = 600  # [px] width of a window below which the panel hides its lower part
+_HIDDEN = 0.6  # of the height of such a window
 _ROOM = 1.06   # relative to the distance at which all points are just visible
+# Of the floor's cells, sections and plane. The dark one leaves black paths visible.
+_LIGHT = ((226, 230, 235), (196, 203, 211), (247, 248, 250))
+_DARK = ((108, 115, 124), (128, 136, 146), (92, 98, 107))
+_BOTH = 1000  # [px] width of a window below which the curves are folded
 _WIDTH = 330  # [px] width of the panels
 
 
@@ -36,11 +42,25 @@ def open_server(port: int, label: str) -> Any:
         raise HierarchyError("the page in the browser needs viser, which is not installed: "
                              "pip install 'task-hierarchy[view]'") from error
     port = _free(port)
-    with redirect_stdout(io.StringIO()), guarded():  # viser prints a table
+    with redirect_stdout(io.StringIO()), guarded(label):  # viser prints a table
         server = viser.ViserServer(host=HOST, port=port, label=label, verbose=False)
-    server.gui.configure_theme(show_logo=False, show_share_button=False, control_width="medium",
-                               brand_color=(0, 114, 178))
+    _theme(server, dark=False)
     return server
+
+
+def add_dark(server: Any, height: float) -> None:
+    """Add a switch between the light and the dark page, with a floor at a height [m]."""
+    dark = server.gui.add_checkbox("Dark page", initial_value=False)
+
+    @dark.on_update  # type: ignore[untyped-decorator]
+    def _(_: object) -> None:
+        _theme(server, dark.value)
+        lay_floor(server, height, dark.value)
+
+
+def _theme(server: Any, dark: bool) -> None:
+    server.gui.configure_theme(show_logo=False, show_share_button=False, control_width="medium",
+                               brand_color=(0, 114, 178), dark_mode=dark)
 
 
 def close(server: Any) -> None:
@@ -67,17 +87,36 @@ def right(azimuth: float) -> Array:
 
 
 def look_at_all(server: Any, points: Array, azimuth: float) -> None:
-    """Place the camera at an azimuth [rad] so that points (N, 3) [m] fill the view."""
+    """Place the camera at an azimuth [rad] so that points (N, 3) [m] fill the view.
+
+    That is what the panels leave free: in a narrow window one floats in its lower part.
+    """
+    _place(server.initial_camera, points, azimuth, _ASPECT)
+
+    def fit(client: Any) -> None:
+        width, height = client.camera.image_width, max(client.camera.image_height, 1)
+        if width < _NARROW:
+            _place(client.camera, points, azimuth, width / height, _HIDDEN)
+        else:
+            free = (width - _WIDTH * (2 if width >= _BOTH else 1)) / height
+            _place(client.camera, points, azimuth, min(free, _ASPECT))
+
+    server.on_client_connect(fit)
+
+
+def _place(camera: Any, points: Array, azimuth: float, aspect: float, hidden: float = 0.0) -> None:
+    """Place a camera; `hidden` is the lower share of its view that something covers."""
     e, half_field = radians(_ELEVATION), radians(_FIELD_OF_VIEW / 2)
     away = np.array([cos(e) * cos(azimuth), cos(e) * sin(azimuth), sin(e)])
     axes = np.array([right(azimuth), np.cross(away, right(azimuth)), away])
     seen = points @ axes.T
     middle = (seen.min(axis=0) + seen.max(axis=0)) / 2
-    off = np.abs(seen - middle) / (_ASPECT, 1.0, 1.0)
+    off = np.abs(seen - middle) / (aspect, 1.0 - hidden, 1.0)
     distance = float((off[:, :2].max(axis=1) / tan(half_field) + seen[:, 2] - middle[2]).max())
-    camera = server.initial_camera
-    camera.fov, camera.look_at = 2.0 * half_field, middle @ axes
+    middle[1] -= hidden * distance * tan(half_field)
+    camera.fov = 2.0 * half_field
     camera.position = middle @ axes + _ROOM * distance * away
+    camera.look_at = middle @ axes  # after the position, which takes it along
 
 
 def lay_out(server: Any) -> Any:
@@ -87,15 +126,22 @@ def lay_out(server: Any) -> Any:
     main.set_width(_WIDTH)
     left.dock_left()
     left.set_width(_WIDTH)
+
+    @server.on_client_connect  # type: ignore[untyped-decorator]
+    def _(client: Any) -> None:
+        if client.camera.image_width < _BOTH:
+            left.minimize()
+
     return left.add_tab("Curves")
 
 
-def lay_floor(server: Any, height: float) -> None:
+def lay_floor(server: Any, height: float, dark: bool = False) -> None:
     """Draw a grid at a height [m], with shadows."""
+    cell, section, plane = _DARK if dark else _LIGHT
     server.scene.add_grid("/floor", 8.0, 8.0, cell_size=0.1, section_size=0.5,
-                          cell_color=(226, 230, 235), section_color=(196, 203, 211),
-                          plane_color=(247, 248, 250), plane_opacity=1.0, shadow_opacity=0.25,
-                          fade_distance=9.0, fade_from="origin", position=(0.0, 0.0, height))
+                          cell_color=cell, section_color=section, plane_color=plane,
+                          plane_opacity=1.0, shadow_opacity=0.25, fade_distance=9.0,
+                          fade_from="origin", position=(0.0, 0.0, height))
     server.scene.world_axes.visible = False
     server.scene.configure_default_lights(cast_shadow=True)
 

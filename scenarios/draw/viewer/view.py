@@ -15,7 +15,7 @@ from scenarios.draw.viewer.model import Model
 from scenarios.draw.viewer.moment import of_scene
 from scenarios.draw.viewer.playback import Playback, PlayButton, Requests, add_speed
 from scenarios.draw.viewer.plots import Plots
-from scenarios.draw.viewer.server import lay_floor, lay_out, look_at_all, right
+from scenarios.draw.viewer.server import add_dark, lay_floor, lay_out, look_at_all, right
 from scenarios.draw.viewer.stack_list import key_html, stack_html
 from scenarios.measure.goals import goals
 from scenarios.recording.recording import Recording
@@ -52,7 +52,8 @@ class View:
         self._names = self._name_runs()
         self._shown: dict[str, int] = {}
         self._cursor, self._cursor_at = np.nan, -np.inf
-        self._panel(side_by_side)
+        self._panel(side_by_side, [one.scenario.title or one.scenario.name
+                                   for one in runs.values()])
         for label, one in runs.items():
             if words := key(one.facts, one.scenario):
                 server.gui.add_html(key_html(words, self.colours[label]))
@@ -117,11 +118,13 @@ class View:
         elif what == "layout":
             self._arrange(value == _BESIDE)
 
-    def _panel(self, side_by_side: bool) -> None:
+    def _panel(self, side_by_side: bool, titles: Sequence[str]) -> None:
         gui, playback = self.server.gui, self.playback
         with lay_out(self.server):
             self._plots = Plots(gui, {label: (one.t, one.series)
                                       for label, one in self.scenes.items()}, self.colours)
+        for title in dict.fromkeys(titles):
+            gui.add_markdown(f"**{title}**")
         self._button = PlayButton(gui, self.requests)
         self._slider = gui.add_slider("Time [s]", playback.first, playback.last, 0.001,
                                       playback.first)
@@ -131,6 +134,7 @@ class View:
             layout = gui.add_dropdown("Runs", [_BESIDE, _OVERLAID],
                                       initial_value=_BESIDE if side_by_side else _OVERLAID)
             self.requests.when_changed(layout, "layout")
+        add_dark(self.server, min(one.stage.floor for one in self.scenes.values()))
         gui.add_markdown("**Stack**, most important first")
         self._stacks = {label: gui.add_html("") for label in self.scenes}
 

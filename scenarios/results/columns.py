@@ -1,0 +1,263 @@
+"""Results of a sweep: runs as columns, success rates, worst cases, failures."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hierarchy.words import listed
+from scenarios.config import Scenario
+from scenarios.measure import statistics
+from scenarios.measure.metrics import Metric
+from scenarios.measure.statistics import Paired, Spread, paired, wilson
+from scenarios.recording.facts import resolver_facts
+from scenarios.results.plan import Plan, Planned
+from scenarios.results.run import Outcome
+
+# What is weighed in the verdict.
+_WEIGHED = ("position_error_median_settled", "body_distance_min", "ee_distance_min",
+            "cone_violation_max", "speed_max", "acceleration_max")
+_SAME = {"each pivot": "each level"}  # the same x while no level loses rank
+_TOLERANCE = 1e-6  # [rad] beyond a joint limit that still counts as within it
+
+
+@dataclass(frozen=True)
+class Share:
+    """A share of runs, with its 95 % Wilson interval."""
+
+    met: int
+    of: int
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """The 95 % interval of the share, between 0 and 1."""
+        return wilson(self.met, self.of)
+
+    def __str__(self) -> str:
+        return f"{self.met} of {self.of}"
+
+
+@dataclass(frozen=True)
+class Criterion:
+    """A success criterion: its name, and whether each run meets it."""
+
+    label: str
+    met: NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Failure:
+    """A reason why runs stopped early or failed, the first such run, and their number."""
+
+    reason: str
+    run: Planned
+    count: int
+
+
+@dataclass(frozen=True)
+class Results:
+    """Runs that stand side by side, in the order of the plan; unknown values are NaN.
+
+    Those are the runs of one scenario under its resolvers, or, with one resolver, of all scenarios.
+    """
+
+    runs: tuple[Planned, ...]
+    reasons: tuple[str | None, ...]
+    metrics: dict[str, Metric]
+    values: dict[str, NDArray[np.float64]]
+
+    @cached_property
+    def labels(self) -> tuple[str, ...]:
+        """Labels of the resolvers in the requested order."""
+        return tuple(dict.fromkeys(run.label for run in self.runs))
+
+    @cached_property
+    def _of(self) -> dict[str, NDArray[np.bool_]]:
+        names = np.array([run.label for run in self.runs])
+        return {label: names == label for label in self.labels}
+
+    def firsts(self) -> list[Planned]:
+        """Return the first run of each label."""
+        return [next(run for run in self.runs if run.label == label) for label in self.labels]
+
+    def of(self, name: str, label: str) -> NDArray[np.float64]:
+        """Return the known values of a metric under a resolver."""
+        values = self.values[name][self._of[label]]
+        return np.asarray(values[np.isfinite(values)])
+
+    @cached_property
+    def samples(self) -> int:
+        """Number of samples."""
+        return 1 + max(run.job.sample for run in self.runs)
+
+    def column(self, name: str, label: str) -> NDArray[np.float64]:
+        """Return a metric under a resolver by sample, (samples,)."""
+        found = np.full(self.samples, np.nan)
+        for i in np.flatnonzero(self._of[label]):
+            found[self.runs[i].job.sample] = self.values[name][i]
+        return found
+
+    def spread(self, name: str, label: str) -> Spread | None:
+        """Return the spread of a metric under a resolver; None if it has no value."""
+        return statistics.spread(self.column(name, label))
+
+    def paired(self, name: str, label: str, first: str | None = None) -> Paired:
+        """Return the paired differences of a metric from a column, by default the first."""
+        return paired(self.column(name, first or self.labels[0]), self.column(name, label))
+
+    def best(self, metric: Metric) -> tuple[str, ...]:
+        """Return the labels that are better than all others; empty where a test cannot tell."""
+        if metric.lower_is_better is None:
+            return ()
+        return statistics.best({label: self.column(metric.name, label) for label in self.labels},
+                               metric.lower_is_better)
+
+    def share(self, criterion: Criterion, label: str) -> Share:
+        """Return the share of a resolver's runs that meet a criterion."""
+        return Share(int((criterion.met & self._of[label]).sum()), int(self._of[label].sum()))
+
+    def criteria(self, tolerance: float = _TOLERANCE) -> list[Criterion]:
+        """Return the criteria that can be judged; a failed run meets none.
+
+        Up to `tolerance` [rad] beyond a joint limit counts as within it.
+        """
+        finished = np.array([reason is None for reason in self.reasons])
+        found = [Criterion("Reached the end", finished)]
+        near = [self.values[name] for name in ("body_distance_min", "ee_distance_min")
+                if name in self.values]
+        contacts = [self.values["contact_ticks"]] if "contact_ticks" in self.values else []
+        if near or contacts:
+            found.append(Criterion("Touched nothing", np.all(
+                [*(values > 0.0 for values in near), *(values == 0.0 for values in contacts)],
+                axis=0)))
+        for label, name, most in (("Kept the joint limits", "joint_limit_excess", tolerance),
+                                  ("Every tick solved", "ticks_not_solved", 0.0)):
+            if name in self.values:
+                found.append(Criterion(label, self.values[name] <= most))
+        below = [self.values[name] for name in ("body_below_share", "ee_below_share")
+                 if name in self.values]
+        if below:
+            found.append(Criterion("Kept the distance asked for", np.any(
+                np.isfinite(below), axis=0) & ~np.any(np.array(below) > 0.0, axis=0)))
+        return [*found, Criterion("All of the above", np.all([one.met for one in found], axis=0))]
+
+    def shown(self) -> list[Metric]:
+        """Return the metrics to compare: those of any run, except computing times.
+
+        Computing times depend on the load of the machine.
+        """
+        return [metric for name, metric in self.metrics.items()
+                if metric.group != "Computing" and np.isfinite(self.values[name]).any()]
+
+    def worst(self) -> list[tuple[Metric, Planned]]:
+        """Return the worst run for each metric that has a direction and differs between runs."""
+        found = []
+        for metric in self.shown():
+            values = self.values[metric.name]
+            if metric.lower_is_better is None or np.nanmin(values) == np.nanmax(values):
+                continue
+            i = int(np.nanargmax(values) if metric.lower_is_better else np.nanargmin(values))
+            found.append((valued(metric, values[i]), self.runs[i]))
+        return found
+
+    def alike(self) -> list[list[str]]:
+        """Return the labels, together where no metric of any sample differs."""
+        found: list[list[str]] = []
+        for label in self.labels:
+            like = (group for group in found if all(
+                self.paired(metric.name, label, group[0]).equal for metric in self.shown()))
+            if group := next(like, None):
+                group.append(label)
+            else:
+                found.append([label])
+        return found
+
+    def failures(self) -> list[Failure]:
+        """Return why runs failed; reasons that differ only in numbers are merged by resolver."""
+        found: dict[tuple[str, str], Failure] = {}
+        for run, reason in zip(self.runs, self.reasons, strict=True):
+            if reason is not None:
+                kind = run.label, re.sub(r"\d+(\.\d+)?(e[+-]?\d+)?", "#", reason)
+                first = found.get(kind, Failure(reason, run, 0))
+                found[kind] = dataclasses.replace(first, count=first.count + 1)
+        return sorted(found.values(), key=lambda one: -one.count)
+
+
+def verdict(results: Results) -> list[str]:
+    """Return three lines of fixed form: what was not met, what is the same, what is best."""
+    met = {one.label: {label: results.share(one, label) for label in results.labels}
+           for one in results.criteria()[:-1]}
+    missed = [f"{name}: " + ", ".join(f"{label} {share}" for label, share in shares.items())
+              for name, shares in met.items()
+              if any(share.met < share.of for share in shares.values())]
+    lines = [f"Not in every run: {'; '.join(missed)}." if missed else
+             f"In all {len(results.runs)} runs: {listed([name.lower() for name in met])}."]
+    if same := [group for group in results.alike() if len(group) > 1]:
+        lines.append(f"The same in every sample: {'; '.join(map(listed, same))}.")
+    if len(results.labels) > 1:
+        best = {metric.label: results.best(metric) for metric in results.shown()
+                if metric.name in _WEIGHED}
+        said = "; ".join(f"{name}: {listed(who)}" for name, who in best.items() if who)
+        lines.append(f"Best beyond chance: {said or 'none'}.")
+    return lines
+
+
+def flags(runs: Mapping[str, Scenario]) -> dict[str, str]:
+    """Return by column what to know of its resolver before it is called the best."""
+    facts = {label: resolver_facts(scenario) for label, scenario in runs.items()}
+    damped = {label: _SAME.get(one.damped, one.damped) for label, one in facts.items()}
+    first = next(iter(damped), "")
+    return {label: ", ".join(["not strict at every rank"] * (not one.strict)
+                             + [f"damps otherwise than {first}"] * (damped[label] != damped[first]))
+            for label, one in facts.items()}
+
+
+def valued(metric: Metric, value: float) -> Metric:
+    """Return a metric with a value, None for NaN."""
+    return dataclasses.replace(metric, value=float(value) if math.isfinite(value) else None)
+
+
+def summary(results: Results, metric: Metric, label: str) -> str:
+    """Return "median [lower quartile, upper quartile]" of a metric under a resolver."""
+    found = results.spread(metric.name, label)
+    if found is None:
+        return "–"
+    median, low, high = (valued(metric, value).shown()
+                         for value in (found.median, found.lower, found.upper))
+    return median if low == high else f"{median} [{low}, {high}]"
+
+
+def compared(results: Results, metric: Metric, label: str) -> str:
+    """Return how a metric under a resolver compares with the first column; "" for that one."""
+    return "" if label == results.labels[0] else str(results.paired(metric.name, label))
+
+
+def results(plan: Plan, kept: Mapping[str, Outcome]) -> dict[str, Results]:
+    """Return the results of each group of runs from their outcomes by key.
+
+    A group is a scenario; with one resolver and several scenarios there is one group, named after
+    the resolver, whose columns are the scenarios.
+    """
+    groups: dict[str, list[Planned]] = {}
+    for run in plan.runs:
+        groups.setdefault(run.group, []).append(run)
+    return {name: _group(runs, [kept[run.job.key] for run in runs])
+            for name, runs in groups.items()}
+
+
+def _group(runs: Sequence[Planned], found: Sequence[Outcome]) -> Results:
+    known = {one.name: one for outcome in found for one in outcome.metrics
+             if one.value is not None}
+    values = {name: np.full(len(runs), np.nan) for name in known}
+    for i, outcome in enumerate(found):
+        for one in outcome.metrics:
+            if one.value is not None:
+                values[one.name][i] = one.value
+    return Results(tuple(runs), tuple(one.reason for one in found), known, values)

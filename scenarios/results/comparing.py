@@ -1,0 +1,233 @@
+"""Run scenarios under several resolvers, write the runs and report the comparison."""
+
+from __future__ import annotations
+
+import dataclasses
+import shlex
+import time
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import suppress
+from functools import partial
+from pathlib import Path
+from typing import final
+
+from hierarchy import plugins
+from hierarchy.errors import HierarchyError, brief, expect, file_path
+from scenarios.config import Scenario, load, members, shipped_groups
+from scenarios.config.scenario import OWN
+from scenarios.files import OutputError, claim, make_folder, unlock, write_json, write_text
+from scenarios.loop.simulation import simulate
+from scenarios.measure.comparison import Comparison
+from scenarios.measure.run_folder import save, versions
+from scenarios.measure.runs import Run
+from scenarios.recording.recording import Recording
+from scenarios.results import pool
+from scenarios.results.plan import side_by_side
+from scenarios.results.run import Job, Outcome, digest, key_of
+from scenarios.results.store import TABLE, write_table
+
+Progress = Callable[[str, int, int], None]
+
+TIMED = 1000  # ticks that are timed alone after runs side by side
+_SHARE = 0.2  # of the time that is spent on pages while runs are still being made
+
+
+def compare(scenarios: Iterable[str | Scenario] | str | Scenario,
+            resolvers: Sequence[str] | None = None,
+            out: str | Path | None = None, progress: Progress | None = None,
+            command: str | None = None, workers: int = 1) -> Comparison:
+    """Run every scenario under every resolver and compare.
+
+    A resolver that cannot resolve a scenario's rows is skipped, and the Comparison says so.
+
+    With `out`, each run's folder is out/<scenario>/<resolver>, the page is out/index.html, the
+    table of results out/results.csv, and the numbers are in out/comparison.json. They are written
+    as runs end and are never removed: a run that fails does not affect the others, and Ctrl-C keeps
+    the runs made so far.
+
+    Parameters
+    ----------
+    scenarios : names of scenarios or groups, paths or Scenario objects.
+    resolvers : specs `name` or `name:setting=value:setting=value`, or "own", the one that each
+        scenario names; by default those of DEFAULT_RESOLVERS that can resolve the scenario and are
+        installed, with a group "own".
+    progress : called as progress(label, ticks done, total ticks); with several workers as
+        progress(what, runs done, total runs).
+    command : the command line shown on the page; derived from the names by default.
+    workers : number of processes that make runs side by side; the first TIMED ticks of each run are
+        then repeated alone for the computing times. With 1, runs are made here one by one.
+
+    Raises
+    ------
+    HierarchyError : before any run: an unknown scenario, resolver or setting, a scenario that does
+        not fit its robot, no resolver that can resolve any scenario, or an output folder in use.
+    """
+    if not isinstance(scenarios, str | Scenario | Iterable):
+        raise HierarchyError("compare: expected names, files, or what `load` returns, got "
+                             f"{brief(scenarios)}")
+    asked = [scenarios] if isinstance(scenarios, str | Scenario) else scenarios
+    planned, refused = _plan(asked, resolvers)
+    folder = None if out is None else make_folder(claim(file_path("compare: out", out)))
+    written = _Written(folder, Comparison(
+        (), command or _command(planned, out), versions(), refused,
+        None if out is None else str(out)), len(planned))
+    try:
+        for i, run in (_together(planned, folder, workers, progress)
+                       if min(workers, len(planned)) > 1 else
+                       _one_by_one(planned, folder, progress)):
+            written.add(i, run)
+    except KeyboardInterrupt:
+        written.finish()
+        raise
+    else:
+        return written.finish()
+    finally:
+        if folder is not None:
+            unlock(folder)
+
+
+class PageError(RuntimeError):
+    """The page could not be made; the runs are kept."""
+
+
+@final
+class _Written:
+    """The runs made so far; the page and the table are written again as they come."""
+
+    def __init__(self, folder: Path | None, empty: Comparison, count: int) -> None:
+        self._folder, self._empty, self._count = folder, empty, count
+        self._runs: dict[int, Run] = {}
+        self._next = 0.0
+
+    def add(self, i: int, run: Run) -> None:
+        """Take a run; write the table, and the page of two or more unless it was just written."""
+        self._runs[i] = run
+        if self._folder is None:
+            return
+        write_table(self._folder / TABLE, [_row(one) for one in self._found().runs])
+        if 1 < len(self._runs) < self._count and time.monotonic() >= self._next:
+            begun = time.monotonic()
+            with suppress(Exception):  # `finish` says what is wrong with it
+                self._write(self._folder, self._found())
+            self._next = begun + (time.monotonic() - begun) / _SHARE
+
+    def finish(self) -> Comparison:
+        """Write all that is there and return it; raises PageError."""
+        found = self._found()
+        if self._folder is not None and found.runs:
+            try:
+                self._write(self._folder, found)
+            except Exception as error:  # of the disk, a style of matplotlib, a user's figure
+                raise PageError(f"the page cannot be made: {type(error).__name__}: {error}; the "
+                                f"runs are in {found.folder}") from error
+        return found
+
+    def _found(self) -> Comparison:
+        return dataclasses.replace(self._empty, runs=tuple(
+            self._runs[i] for i in sorted(self._runs)))
+
+    def _write(self, folder: Path, found: Comparison) -> None:
+        from scenarios.results.page import comparison_page
+
+        write_json(folder / "comparison.json", found.as_plain_data())
+        write_text(folder / "index.html", comparison_page(found, self._count))
+
+
+def _row(run: Run) -> tuple[Job, Outcome]:
+    """Return a run as the table has it."""
+    job = _job(run)
+    ticks = run.recording.ticks if run.recording else 0
+    return job, Outcome(job.key, ticks, run.fault, float("nan"), tuple(run.metrics.values()))
+
+
+def _job(run: Run) -> Job:
+    text = run.scenario.to_toml()
+    return Job(key_of(text, run.spec, digest()), text, run.spec, run.scenario.name,
+               plugins=plugins.loaded())
+
+
+def _plan(scenarios: Iterable[str | Scenario],
+          resolvers: Sequence[str] | None) -> tuple[list[Run], tuple[str, ...]]:
+    """Return the planned runs, and why others are not possible."""
+    named = list(scenarios)
+    if resolvers is None and any(one in shipped_groups() for one in named):
+        resolvers = [OWN]
+    loaded = [load(s) if isinstance(s, (str, Path)) else s for s in members(named)]
+    for one in loaded:
+        expect("compare", one, Scenario, "give names, files, or what `load` returns")
+    return side_by_side(loaded, resolvers)
+
+
+def _one_by_one(planned: Sequence[Run], folder: Path | None, progress: Progress | None
+                ) -> Iterator[tuple[int, Run]]:
+    """Make the runs in this process, up to an interrupted one."""
+    for i, run in enumerate(planned):
+        told = partial(progress, f"{run.scenario.name} {run.spec}") if progress else None
+        found, error = recorded(run.scenario, None if folder is None else folder / run.folder, told)
+        made = dataclasses.replace(run, recording=found, error=error)
+        yield i, made
+        if str(made.fault).startswith("interrupted"):
+            return
+
+
+def _together(planned: Sequence[Run], folder: Path | None, workers: int,
+              progress: Progress | None) -> Iterator[tuple[int, Run]]:
+    """Make the runs in processes; then repeat the first ticks of each here, to time them alone."""
+    made, total = dict[int, Run](), len(planned)
+    asked = [(i, _job(run), None if folder is None else folder / run.folder)
+             for i, run in enumerate(planned)]
+    try:
+        for (i, _, _), answer in pool.ended(_recorded, asked, workers, salvage=True):
+            found, error = answer or (None, "the process that made this run died")
+            made[i] = dataclasses.replace(planned[i], recording=found, error=error)
+            yield i, made[i]
+            if progress is not None:
+                progress("compare", len(made), total)
+        for i, run in made.items():
+            yield i, dataclasses.replace(run, timing=_timed(run))
+    except KeyboardInterrupt:
+        for i in range(total):
+            if i not in made:
+                yield i, dataclasses.replace(planned[i], error="interrupted")
+
+
+def _recorded(asked: tuple[int, Job, Path | None]) -> tuple[Recording | None, str | None]:
+    _, job, folder = asked
+    return recorded(job.load(), folder, None)
+
+
+def recorded(scenario: Scenario, folder: Path | None,
+             progress: Callable[[int, int], None] | None) -> tuple[Recording | None, str | None]:
+    """Return the recording of a run, which is saved in `folder`, or why there is none."""
+    try:
+        recording = simulate(scenario, progress=progress)
+    except KeyboardInterrupt:
+        return None, "interrupted"
+    except Exception as error:  # a failure is a result too, and must not affect the other runs
+        if folder is not None:
+            write_text(make_folder(folder) / "scenario.toml", scenario.to_toml())
+        return None, f"{type(error).__name__}: {error}"
+    try:
+        if folder is not None:
+            save(recording, folder)
+    except (OSError, OutputError) as error:
+        return recording, f"not saved: {error}"
+    return recording, None
+
+
+def _timed(run: Run) -> Recording | None:
+    """Return the first ticks of a run, made while no other run is; None if they cannot be."""
+    if run.recording is None or not run.recording.ticks:
+        return None
+    control = run.scenario.control
+    ticks = min(TIMED, run.recording.ticks)
+    with suppress(Exception):  # a scenario that allows no shorter duration keeps its own times
+        return simulate(run.scenario.with_changes({"control.duration": ticks * control.period}))
+    return None
+
+
+def _command(planned: Sequence[Run], out: str | Path | None) -> str:
+    names = dict.fromkeys(run.scenario.name for run in planned)
+    specs = ",".join(dict.fromkeys(run.spec for run in planned))
+    where = ["--out", str(out)] if out is not None else []
+    return shlex.join(["hierarchy", "compare", *names, "--resolvers", specs, *where])

@@ -1,0 +1,107 @@
+"""A comparison as one self-contained HTML page: summary, replay, metrics, figures, commands."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from markupsafe import Markup
+
+from hierarchy.words import in_words
+from scenarios.config.scenario import OWN
+from scenarios.draw.figures import drawing
+from scenarios.draw.figures.drawing import svg
+from scenarios.draw.figures.palette import Look, looks
+from scenarios.draw.figures.picture import picture
+from scenarios.measure.motions import Motion, motions
+from scenarios.measure.verdict import lines, table, verdicts
+from scenarios.results import charts, tables
+from scenarios.results.commands import commands
+from scenarios.results.embedded import replay
+from scenarios.templates import render, resource
+
+if TYPE_CHECKING:
+    from scenarios.measure.comparison import Comparison
+    from scenarios.measure.runs import Run
+
+_STARTS = 16  # starts to sample before a difference is believed
+_REPLAY_BYTES, _REPLAYS_BYTES = 3_000_000, 8_000_000  # of one replay, and of all on a page
+
+
+def comparison_page(comparison: Comparison, planned: int = 0) -> str:
+    """Return the page; it refers to no other files except what is beside it.
+
+    planned : number of runs; while there are fewer, the page says so and loads itself again.
+    """
+    groups = comparison.groups()
+    with drawing.styled(drawing.SCREEN):
+        sections = [_group(comparison, name, runs) for name, runs in groups.items()]
+    ends = {name: lines(verdicts(runs))[0] for name, runs in groups.items()}
+    return str(render("results/page.html", title=f"{', '.join(groups)}: a comparison",
+                      style=resource("results/style.css"), script=resource("results/page.js"),
+                      unfinished=_unfinished(len(comparison.runs), planned),
+                      about_rows=_about_rows(comparison), file="",
+                      contents=ends if len(ends) > 1 else {},
+                      count=in_words(len(groups)).capitalize(),
+                      sampled=comparison.sampled(_STARTS), groups=sections,
+                      refused=comparison.refused, command=comparison.command,
+                      versions=comparison.versions))
+
+
+def _unfinished(made: int, planned: int) -> str:
+    return f"{made} of {planned} runs have ended" if made < planned else ""
+
+
+def _about_rows(comparison: Comparison) -> str:
+    """Return what the numbers of the page are not good for."""
+    timed = max((run.timing.ticks for run in comparison.runs if run.timing), default=0)
+    how = (f"the runs were made side by side, and then the first {timed} ticks of each repeated "
+           "alone to take these times" if timed else "one run after the other in one process")
+    return (f"Not comparable: computing times hold for this machine only ({how}); runs of "
+            "different scenarios; runs that stopped early, which cover less time and are never "
+            "marked as best.")
+
+
+def _group(comparison: Comparison, name: str, runs: Sequence[Run]) -> Markup:
+    """Return the article about the runs of one group."""
+    found, look = motions(runs), looks(run.label for run in runs)
+    judged = verdicts(runs)
+    room = min(_REPLAY_BYTES, _REPLAYS_BYTES // len(comparison.groups()))
+    moved = {"replay": replay(name, found, room),
+             "panels": charts.multiples(name, found, look),
+             "overlays": charts.overlays(name, runs, found, look)} if found else {}
+    return render("results/group.html", name=name, looks=look, verdict=lines(judged),
+                  goals=table(judged),
+                  **_about(name, runs), **_picture(name, found, look),
+                  **{"replay": "", "panels": "", "overlays": "", **moved},
+                  numbers=tables.numbers(runs, look), stack=charts.stack(name, runs, look),
+                  partings=tables.parted(runs), commands=commands(comparison, runs),
+                  settings=tables.settings(runs))
+
+
+def _about(name: str, runs: Sequence[Run]) -> dict[str, Any]:
+    """Return the title, and each scenario's description by name ("" if there is only one)."""
+    asked = {run.scenario.name: run.scenario for run in runs}
+    if len(asked) > 1:
+        by = "each by its own resolver" if name == OWN else f"by {name}"
+        return {"title": f"{in_words(len(asked)).capitalize()} scenarios, resolved {by}",
+                "about": {run.scenario.name: run.title for run in runs}}
+    by = "one resolver" if len(runs) == 1 else f"{in_words(len(runs))} resolvers"
+    return {"title": f"{runs[0].scenario.title or name}: {by}",
+            "about": {"": runs[0].scenario.description}}
+
+
+def _picture(name: str, found: Sequence[Motion], look: Mapping[str, Look]) -> dict[str, Any]:
+    """Return the picture of the paths with its caption; both empty without a path."""
+    moved = {one.label: one.recording for one in found if "ee_position" in one.recording}
+    if not moved:
+        return {"picture": "", "caption": ""}
+    first = next(iter(moved.values()))
+    caption = f"The robot is shown for {next(iter(moved))}."
+    if "desired_position" in first:
+        caption += " Dashed: the desired path."
+    if first.scenario.avoidance is not None:
+        caption += (" Red: obstacles, the distances of the avoidance around them, and control "
+                    "points; the robot is solid at its closest approach to an obstacle.")
+    fig = picture(moved, {label: look[label].colour for label in moved})
+    return {"picture": svg(fig, f"{name}: the paths taken"), "caption": caption}

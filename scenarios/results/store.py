@@ -1,0 +1,173 @@
+"""The table of results: rows of scenario x resolver x sample x metric, as CSV files.
+
+`compare`, `compare --starts` and `sweep` write the same columns. pandas reads them:
+`read_csv("results.csv").pivot_table("value", ["scenario", "resolver", "sample"], "metric")`.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import os
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from hierarchy.errors import HierarchyError
+from scenarios import files
+from scenarios.measure.metrics import Metric
+from scenarios.results.run import Job, Outcome
+
+COLUMNS = ("key", "scenario", "resolver", "sample", "metric", "value", "unit", "label", "group",
+           "better", "note")
+TABLE = "results.csv"
+_SAMPLED, _RUN, _END = "Sampled", "Run", "reached_end"
+_BETTER = {True: "lower", False: "higher", None: ""}
+_LOWER = {word: lower for lower, word in _BETTER.items()}
+
+
+class StoreError(HierarchyError):
+    """A folder that is in use or not a sweep's, or a file that cannot be read."""
+
+
+class FullError(OSError):
+    """A file that cannot be written, such as on a full disk; what was written before is kept."""
+
+
+@dataclass(frozen=True)
+class Store:
+    """The folder of a sweep: `runs/` with the rows of each writer as they come, and the results.
+
+    part : name of this writer's file in `runs/`.
+    """
+
+    folder: Path
+    part: str = "all"
+
+    @property
+    def file(self) -> Path:
+        """The file that this writer appends to."""
+        return self.folder / "runs" / f"{self.part}.csv"
+
+    @contextmanager
+    def opened(self) -> Iterator[None]:
+        """Lock this writer's file for this process; make the folder if it is new.
+
+        Raises
+        ------
+        StoreError : the folder has other content.
+        OutputError : it cannot be made, or another process writes the file.
+        """
+        if self.folder.is_dir() and not (self.folder / "runs").is_dir() and any(
+                self.folder.iterdir()):
+            raise StoreError(f"output folder {self.folder} is not empty and is not a sweep's; "
+                             "choose another, or remove it first")
+        files.make_folder(self.folder / "runs")
+        with files.named(self.folder):
+            files.lock(self.file.resolve())
+        try:
+            yield
+        finally:
+            files.unlock(self.file.resolve())
+
+    def add(self, job: Job, outcome: Outcome) -> None:
+        """Append the rows of a run; raises FullError."""
+        append(self.file, rows(job, outcome))
+
+    def outcomes(self) -> dict[str, Outcome]:
+        """Return all finished runs by key; raises StoreError for a damaged file."""
+        return {key: one for file in sorted((self.folder / "runs").glob("[!.]*.csv"))
+                for key, one in read(file).items()}
+
+
+def rows(job: Job, outcome: Outcome) -> list[tuple[Any, ...]]:
+    """Return the rows of a run; the last one says whether it reached its end, or why not."""
+    head = job.key, job.scenario, job.resolver, job.sample
+    sampled = [(name, value, "", name, _SAMPLED, "", "") for key, one in job.values.items()
+               for name, value in _flat(key, one)]
+    found = [(m.name, m.value, m.unit, m.label, m.group, _BETTER[m.lower_is_better], m.note)
+             for m in outcome.metrics]
+    told = [("ticks", outcome.ticks, "", "Ticks", _RUN, "", ""),
+            ("wall_seconds", outcome.wall_seconds, "s", "Time of the run", _RUN, "", ""),
+            (_END, int(outcome.reason is None), "", "Reached the end", _RUN, "higher",
+             outcome.reason or "")]
+    return [(*head, *row) for row in (*sampled, *found, *told)]
+
+
+def _flat(key: str, value: Any) -> Iterator[tuple[str, Any]]:
+    """Yield a sampled value, each entry of a list by its number."""
+    if isinstance(value, list | tuple):
+        for i, one in enumerate(value):
+            yield from _flat(f"{key}.{i}", one)
+    else:
+        yield key, value
+
+
+def append(file: Path, added: Sequence[Sequence[Any]]) -> None:
+    """Append rows to a file in one piece that is on the disk on return; raises FullError."""
+    text = _as_text(added if file.exists() and file.stat().st_size else [COLUMNS, *added])
+    with writing(file), file.open("a+b") as stream:
+        if stream.tell():
+            stream.seek(-1, os.SEEK_END)
+            if stream.read(1) != b"\n":  # a row was cut off by a full disk or a loss of power
+                text = f"\n{text}"
+        stream.write(text.encode())
+        stream.flush()
+        os.fsync(stream.fileno())
+
+
+def write_table(file: Path, found: Iterable[tuple[Job, Outcome]]) -> None:
+    """Write the rows of runs, whole or not at all; raises FullError."""
+    with writing(file):
+        files.write_text(file, _as_text([COLUMNS, *(row for one in found for row in rows(*one))]))
+
+
+def _as_text(lines: Iterable[Sequence[Any]]) -> str:
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerows(lines)
+    return text.getvalue()
+
+
+def read(file: Path) -> dict[str, Outcome]:
+    """Return the runs of a file by key, without those whose last row is missing.
+
+    Raises StoreError if it cannot be read.
+    """
+    found: dict[str, Outcome] = {}
+    metrics: dict[str, dict[str, Metric]] = {}
+    try:
+        with file.open(encoding="utf-8", newline="") as stream:
+            for row in csv.DictReader(stream):
+                if None not in row.values():
+                    _take(row, metrics.setdefault(row["key"], {}), found)
+    except (OSError, ValueError, KeyError, csv.Error) as error:
+        raise StoreError(f"{file} cannot be read ({error}); remove it to repeat its "
+                         "runs") from error
+    return found
+
+
+def _take(row: dict[str, str], metrics: dict[str, Metric], found: dict[str, Outcome]) -> None:
+    """Add a row to the metrics of its run, which is complete with its last row."""
+    name, group = row["metric"], row["group"]
+    if group == _SAMPLED:
+        return
+    value = float(row["value"]) if row["value"] else None
+    metrics[name] = Metric(name, row["label"], value, row["unit"], _LOWER[row["better"]], group,
+                           row["note"])
+    if name == _END:
+        measured = tuple(one for one in metrics.values() if one.group != _RUN)
+        found[row["key"]] = Outcome(row["key"], int(metrics["ticks"].value or 0),
+                                    row["note"] or None, metrics["wall_seconds"].value or 0.0,
+                                    measured)
+
+
+@contextmanager
+def writing(path: Path) -> Iterator[None]:
+    """Turn an OSError into a FullError that names the file."""
+    try:
+        yield
+    except OSError as error:
+        raise FullError(f"{path} cannot be written: {files.reason(error)}; finished runs are "
+                        "kept") from error

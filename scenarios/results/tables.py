@@ -1,0 +1,137 @@
+"""The tables of the page: numbers with the best marked, events, settings."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from markupsafe import Markup
+
+from scenarios.draw.figures.palette import Look
+from scenarios.measure.partings import BOUND, partings
+from scenarios.measure.runs import table
+from scenarios.results.columns import flags
+from scenarios.templates import render
+
+if TYPE_CHECKING:
+    from scenarios.measure.runs import Row, Run
+
+# The most important metrics; the others are folded away.
+_FIRST = ("position_error_median_settled", "position_error_max_settled", "cone_violation_max",
+          "moved_by_lower_max", "body_distance_min", "body_below_share", "ee_distance_min",
+          "ee_below_share", "contact_ticks", "slip_max", "friction_margin_min",
+          "support_margin_min", "torque_limit_share", "torque_step_max", "joint_limit_excess",
+          "speed_max", "velocity_step_max", "command_step_max", "acceleration_max",
+          "stack_changes", "active_set_changes", "ticks_not_solved", "ticks_brake", "ticks_stop",
+          "ticks_late", "time_resolve_median", "time_resolve_p999", "time_tick_median")
+
+
+class Cell(NamedTuple):
+    """A cell of a table: `kind` is "best", "out" or "", `more` a second line."""
+
+    text: str
+    kind: str = ""
+    note: str = ""
+    more: str = ""
+
+
+Groups = Mapping[str, Sequence[tuple[str, str, Sequence[Cell]]]]  # rows: label, unit, cells
+
+
+def numbers(runs: Sequence[Run], looks: Mapping[str, Look]) -> Markup:
+    """Return the metrics with the best of each row marked; minor ones are folded away."""
+    rows = table(runs, details=False)
+    first, rest = ([row for row in rows if _is_first(row.name) == is_first]
+                   for is_first in (True, False))
+    marked = flags({run.label: run.scenario for run in runs})
+    heads = {run.label: [(kind, text) for kind, text in (
+        ("alert", _stopped(run)), ("quiet", marked[run.label])) if text] for run in runs}
+    return render("results/measured.html", heads=heads, looks=looks, first=_grouped(first, runs),
+                  rest=_grouped(rest, runs), count=len(rest),
+                  said=_marks(runs)) if rows else Markup()
+
+
+def _is_first(name: str) -> bool:
+    return name in _FIRST or (name.startswith("task_") and name.endswith("_rms"))
+
+
+def _marks(runs: Sequence[Run]) -> str:
+    """Return what the marks mean and what to know about the numbers."""
+    from scenarios.measure.runs import flags
+
+    if all(run.fault for run in runs):
+        return "No run was completed, so none is marked as best."
+    detour = any(run.recording and "repulsion_active" in run.recording
+                 and run.recording["repulsion_active"].any() for run in runs)
+    one = len({run.scenario.name for run in runs}) == 1
+    marks = ("The best value of each row is coloured and has a dot; values within 1 % count as "
+             "equal, and rows in which all are equal are unmarked." if one else
+             "The scenarios differ, so none is marked as best.")
+    stopped = (" Runs that stopped early are grey and not compared."
+               if any(run.fault for run in runs) else "")
+    said = "".join(f" {flag}." for flag in flags(runs))
+    return marks + stopped + said + (
+        " The position error includes the detour of the end effector around obstacles on its path."
+        if detour else "")
+
+
+def _grouped(rows: Sequence[Row], runs: Sequence[Run]) -> Groups:
+    """Return rows with their cells, by group."""
+    out = [run.fault is not None for run in runs]
+    groups = dict.fromkeys(row.group for row in rows)
+    return {group: [(row.label, row.unit, _cells(row, out)) for row in rows if row.group == group]
+            for group in groups}
+
+
+def _cells(row: Row, out: Sequence[bool]) -> list[Cell]:
+    return [Cell(cell, "best" if i in row.best else "out" if out[i] else "", note)
+            for i, (cell, note) in enumerate(zip(row.cells, row.notes, strict=True))]
+
+
+def _stopped(run: Run) -> str:
+    if run.fault is None:
+        return ""
+    if run.recording is None or not run.recording.ticks:
+        return "did not start"
+    return f"stopped at {run.recording['t'][-1]:.2f} s"
+
+
+def events(runs: Sequence[Run]) -> list[tuple[str, tuple[str, str, str, str]]]:
+    """Return the problems of every run: by kind, contacts and faults.
+
+    Only the first row of a run has its label.
+    """
+    return [(run.label if i == 0 else "", happened)
+            for run in runs for i, happened in enumerate(_happened(run))]
+
+
+def _happened(run: Run) -> list[tuple[str, str, str, str]]:
+    """Return the problem, the action taken, the number of ticks and the first time."""
+    recording = run.recording
+    found = []
+    if recording is not None:
+        t = recording["t"]
+        found = [(kind.replace("_", " "), action, str(len(ticks)), f"{t[ticks[0]]:.3f} s")
+                 for (kind, action), ticks in recording.troubles().items()]
+        touched = np.flatnonzero(recording.get("contacts", np.empty(0)))
+        if touched.size:
+            found.append(("contact", "–", str(touched.size), f"{t[touched[0]]:.3f} s"))
+    if run.fault:
+        ended = f"{recording['t'][-1]:.3f} s" if recording and recording.ticks else "the start"
+        found.append((f"fault: {run.fault}", "run stopped", "–", ended))
+    return found
+
+
+def parted(runs: Sequence[Run]) -> Markup:
+    """Return where the runs of strict resolvers diverge, and why."""
+    found = [str(one) for one in partings(runs)]
+    return render("results/partings.html", partings=found, bound=BOUND) if found else Markup()
+
+
+def settings(runs: Sequence[Run]) -> Markup:
+    """Return the resolvers' settings and the scenario files as used."""
+    first = {run.scenario.name: run for run in reversed(runs)}
+    rows = [(run, ", ".join(f"{name} = {value!r}" for name, value in run.settings.items())
+             or "none") for run in runs]
+    return render("results/settings.html", rows=rows, scenarios=list(reversed(first.values())))

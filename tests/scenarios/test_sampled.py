@@ -1,0 +1,383 @@
+"""Sampled runs are made once each, whatever is killed on the way, and compared sample by sample."""
+
+import csv
+import json
+import os
+import signal
+import subprocess
+import sys
+from collections import Counter
+from contextlib import suppress
+from dataclasses import replace
+
+import numpy as np
+import psutil
+import pytest
+from deadly import dies_of_one
+
+from hierarchy import HierarchyError
+from scenarios import load, shipped, simulate
+from scenarios.cli.main import run_command
+from scenarios.config.sampling import changed, drawn
+from scenarios.measure import metrics
+from scenarios.measure.statistics import wilson
+from scenarios.results import cluster, pool
+from scenarios.results.columns import Results, verdict
+from scenarios.results.plan import Planned, plan
+from scenarios.results.run import Job, Outcome, outcome
+from scenarios.results.sampled import Workers, compare_starts, sweep
+from scenarios.results.store import FullError, Store, read
+from scenarios.results.sweep_file import load_sweep, shipped_sweeps
+
+BODY = {"name": '"small"', "scenarios": '["ellipse"]', "resolvers": '["tpm", "recursive"]',
+        "duration": "0.02", "samples": "3", "seed": "7"}
+PARAMETERS = """
+start.q = { around = 0.05 }
+avoidance.obstacles.0.centre = { around = [0.01, 0.02, 0.0] }
+"position.stiffness" = { uniform = [30.0, 50.0] }
+position.damping = { normal = [20.0, 1.0] }
+pointing.alpha_d = { choice = [5.0, 15.0] }
+plant.measurement.seed = { integers = [3, 5] }
+"""
+SHORT = {"control.duration": 0.03}
+
+
+def write(folder, parameters=PARAMETERS, **changed):
+    body = "\n".join(f"{key} = {value}" for key, value in (BODY | changed).items())
+    path = folder / "small.toml"
+    path.write_text(f"{body}\n[parameters]\n{parameters}")
+    return path
+
+
+def table(file):
+    """Return value and note of each row of a table by resolver, sample and metric."""
+    with file.open() as stream:
+        return {(row["resolver"], row["sample"], row["metric"]): (row["value"], row["note"])
+                for row in csv.DictReader(stream) if not row["metric"].startswith("time_")
+                and row["metric"] not in ("wall_seconds", "ticks_late")}
+
+
+def made(folder):
+    """Return how often each run stands in the rows that were written as runs ended."""
+    ends = (line.partition(",")[0] for file in (folder / "runs").iterdir()
+            for line in file.read_text().splitlines() if ",reached_end," in line)
+    return Counter(ends)
+
+
+# What is asked
+
+@pytest.mark.parametrize(("parameters", "changed", "says"), [
+    ("", {"sampels": "3"}, "did you mean 'samples'"),
+    ("", {"scenarios": '["elipse"]'}, "did you mean 'ellipse'"),
+    ("", {"scenarios": '["ellipse", "ellipse"]'}, "2 scenarios are named 'ellipse'"),
+    ("", {"resolvers": '["tpm:dampign=0.1"]'}, "dampign"),
+    ("", {"duration": "-1.0"}, "duration: "),
+    ("start.q = { arround = 0.1 }", {}, "parameters.start.q.arround: "),
+    ("start.q = { around = [0.1, 0.2] }", {}, "parameters.start.q: scenario 'ellipse': around"),
+    ("position.gain = { uniform = [2.0, 1.0] }", {}, "parameters.position.gain.uniform: "),
+    ("position.gian = { uniform = [1.0, 2.0] }", {}, "[position] has no key 'gian'"),
+    ("position.damping = { normal = [-9.0, 0.0] }", {}, "sample 0 of scenario 'ellipse'"),
+])
+def test_a_wrong_file_is_refused_before_anything_is_run(parameters, changed, says, tmp_path,
+                                                        capsys):
+    path = write(tmp_path, parameters, **changed)
+    assert run_command(["sweep", str(path), "--out", str(tmp_path / "out")]) == 2
+    assert says in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_unreadable_files_and_unknown_names_are_named(tmp_path):
+    (tmp_path / "bad.toml").write_text("name = ")
+    with pytest.raises(HierarchyError, match=r"bad\.toml"):
+        load_sweep(tmp_path / "bad.toml")
+    with pytest.raises(HierarchyError, match="'ellipse-starts'"):
+        load_sweep("ellipse-start")
+
+
+def test_every_shipped_sweep_can_be_planned():
+    for name in shipped_sweeps():
+        small = load_sweep(name).model_copy(update={"samples": 2})
+        assert len(plan(small).runs) == 2 * len(small.resolvers) * len(small.scenarios)
+
+
+def test_samples_stay_as_they_are_when_others_are_added(tmp_path):
+    def sampled(asked, index):
+        return drawn(load("ellipse"), asked.parameters, asked.seed, index)
+
+    few = load_sweep(write(tmp_path))
+    more = load_sweep(write(tmp_path, PARAMETERS + "pointing.damping = { around = 0.5 }",
+                            samples="9", resolvers='["hcod", "tpm"]'))
+    for index in range(3):
+        assert sampled(few, index).items() <= sampled(more, index).items()
+    assert sampled(few, 0) != sampled(few, 1)
+    assert sampled(few, 0)["start.q"] != sampled(few.model_copy(update={"seed": 8}), 0)["start.q"]
+
+
+def test_samples_are_drawn_from_what_the_file_says(tmp_path):
+    asked, ellipse = load_sweep(write(tmp_path)), load("ellipse")
+    found = [drawn(ellipse, asked.parameters, asked.seed, index) for index in range(400)]
+    q = np.array([one["start.q"] for one in found]) - ellipse.start.q
+    assert np.abs(q).max() <= 0.05
+    assert q.std() == pytest.approx(0.05 / np.sqrt(3.0), rel=0.05)
+    damping = [one["position.damping"] for one in found]
+    assert (np.mean(damping), np.std(damping)) == pytest.approx((20.0, 1.0), abs=0.15)
+    assert {one["pointing.alpha_d"] for one in found} == {5.0, 15.0}
+    assert {one["plant.measurement.seed"] for one in found} == {3, 4, 5}
+
+
+def test_all_resolvers_see_the_same_samples_and_no_run_is_planned_twice(tmp_path):
+    planned = plan(load_sweep(write(tmp_path, resolvers='["tpm", "recursive", "tpm"]')))
+    texts = {}
+    for one in planned.runs:
+        texts.setdefault(one.job.sample, set()).add(one.job.text)
+    assert [len(seen) for seen in texts.values()] == [1, 1, 1]
+    assert len({one.job.key for one in planned.runs}) == len(planned.runs) == 6
+    assert len(plan(load_sweep(write(tmp_path, ""))).runs) == 2  # all samples are the same
+
+
+def test_a_resolver_that_cannot_resolve_a_scenario_is_not_run_on_it(tmp_path):
+    (tmp_path / "mine.toml").write_text('extends = "ellipse"\nname = "mine"\n')
+    planned = plan(load_sweep(write(tmp_path, "", scenarios='["ellipse-hqp", "mine.toml"]')))
+    assert {one.job.scenario for one in planned.runs} == {"mine"}
+    assert len(planned.refused) == 2
+
+
+@pytest.mark.parametrize("name", shipped())
+def test_every_shipped_scenario_says_what_varies(name):
+    scenario = load(name)
+    first, second = (drawn(scenario, scenario.variation, 0, index) for index in range(2))
+    assert first
+    assert first != second
+    assert changed(scenario, first, "test").variation == scenario.variation
+
+
+def test_a_star_stands_for_every_entry_of_a_list():
+    ellipse = load("ellipse")
+    found = drawn(ellipse, ellipse.variation, 0, 0)
+    for i, obstacle in enumerate(ellipse.avoidance.obstacles):
+        assert found[f"avoidance.obstacles.{i}.centre"] == pytest.approx(obstacle.centre, abs=0.005)
+
+
+@pytest.mark.parametrize(("variation", "says"), [
+    ({}, r"'ellipse' has no \[variation\]"),
+    ({"start.p": {"around": 1.0}}, r"variation\.start\.p")])
+def test_a_variation_that_cannot_be_drawn_is_refused(variation, says, tmp_path):
+    with pytest.raises(HierarchyError, match=says):
+        compare_starts([load("ellipse", {**SHORT, "variation": variation})], ["hcod"], 2, 0,
+                       tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+# Runs, wherever they are made
+
+def test_a_run_has_every_metric_of_its_scenario_as_sampled(tmp_path):
+    job = plan(load_sweep(write(tmp_path))).runs[1].job
+    found, expected = outcome(job), metrics.measure(simulate(job.load()))
+    assert (found.key, found.ticks, found.reason) == (job.key, 20, None)
+    assert {m.name: m.value for m in found.metrics if m.group != "Computing"} == {
+        m.name: m.value for m in expected.values() if m.group != "Computing"}
+
+
+@pytest.mark.slow
+def test_a_run_that_breaks_is_a_row_with_its_reason(tmp_path):
+    path = write(tmp_path, "start.q = { choice = [[0.1], [0.1, 0.2]] }", samples="8")
+    done = sweep(path, tmp_path / "out", Workers(1))
+    found = read(tmp_path / "out" / "results.csv").values()
+    assert len(found) == done.failed == 4  # 2 values, 2 resolvers
+    assert all("for 7 joint positions" in one.reason and one.ticks == 0 for one in found)
+
+
+@pytest.mark.slow
+def test_the_rows_are_the_same_in_processes_in_parts_and_on_a_cluster(tmp_path):
+    distributed = pytest.importorskip("distributed", reason="needs the extra sweep")
+    command = ["sweep", str(write(tmp_path)), "--out"]
+    assert run_command([*command, str(tmp_path / "a"), "--workers", "2"]) == 0
+    for part in ("1/2", "2/2"):
+        assert run_command([*command, str(tmp_path / "b"), "--part", part]) == 0
+    assert not (tmp_path / "b" / "results.csv").exists()
+    assert run_command([*command, str(tmp_path / "b"), "--scheduler", "tcp://127.0.0.1:1"]) == 0
+    with distributed.LocalCluster(n_workers=1, threads_per_worker=2, dashboard_address=None) as one:
+        assert run_command([*command, str(tmp_path / "c"), "--scheduler",
+                            one.scheduler_address]) == 0
+    first, second, third = (table(tmp_path / out / "results.csv") for out in "abc")
+    assert first == second == third
+    assert sum(metric == "reached_end" for _, _, metric in first) == 6
+    assert ("tpm", "2", "start.q.6") in first
+
+
+def test_a_part_that_is_not_there_and_a_scheduler_that_does_not_answer_are_named(tmp_path, capsys,
+                                                                               monkeypatch):
+    pytest.importorskip("distributed", reason="needs the extra sweep")
+    monkeypatch.setattr(cluster, "_PATIENCE", 0.5)
+    command = ["sweep", str(write(tmp_path)), "--out", str(tmp_path / "out")]
+    for option in (["--part", "3/2"], ["--part", "3"], ["--scheduler", "tcp://127.0.0.1:1"]):
+        assert run_command([*command, *option]) == 2
+        assert option[1] in capsys.readouterr().err
+
+
+@pytest.mark.slow
+def test_only_the_runs_that_are_not_there_are_made(tmp_path):
+    assert sweep(write(tmp_path), tmp_path / "out").made == 6
+    more = write(tmp_path, samples="4", resolvers='["hcod", "tpm"]')
+    assert sweep(more, tmp_path / "out").made == 5
+    assert set(made(tmp_path / "out").values()) == {1}
+    assert len(read(tmp_path / "out" / "results.csv")) == 8
+
+
+def test_a_run_that_kills_its_process_costs_only_itself():
+    jobs = [Job(str(i), "", "deadly" if i == 2 else "tpm") for i in range(6)]
+    found = {job.key: one for job, one in pool.ended(dies_of_one, jobs, 2)}
+    assert len(found) == 6
+    assert [key for key, one in found.items() if one is None] == ["2"]
+
+
+KILLED_AFTER_THE_FIRST_ROWS = """
+import os, pathlib, signal
+import psutil
+from scenarios.results.store import Store
+
+add = Store.add
+
+def add_and_die(store, job, outcome):
+    add(store, job, outcome)
+    workers = psutil.Process().children(recursive=True)
+    pathlib.Path("workers").write_text(" ".join(str(one.pid) for one in workers))
+    os.kill(os.getpid(), signal.SIGKILL)
+
+Store.add = add_and_die
+from scenarios.cli.main import main
+main()
+"""
+
+
+def alive(pids):
+    """The processes of these numbers that have not ended."""
+    for pid in pids:
+        with suppress(psutil.NoSuchProcess):
+            yield psutil.Process(pid)
+
+
+@pytest.mark.slow
+def test_a_sweep_that_is_killed_goes_on_where_it_stopped(tmp_path):
+    path, out = write(tmp_path, samples="8"), tmp_path / "out"
+    died = subprocess.run([sys.executable, "-c", KILLED_AFTER_THE_FIRST_ROWS, "sweep", str(path),
+                           "--out", str(out), "--workers", "2"], cwd=tmp_path, check=False)
+    assert died.returncode == -signal.SIGKILL
+    workers = (tmp_path / "workers").read_text().split()
+    assert workers
+    assert psutil.wait_procs(alive(map(int, workers)), timeout=60.0)[1] == []
+    before = made(out)
+    assert 0 < len(before) < 16
+    assert sweep(path, out).made == 16 - len(before)
+    assert made(out) == Counter(read(out / "results.csv").keys())
+
+
+# What is kept
+
+def test_rows_that_were_cut_off_are_made_again_and_a_full_disk_is_said(tmp_path, monkeypatch):
+    store, jobs = Store(tmp_path / "out"), [Job(key, "", "tpm") for key in "abc"]
+    speed = metrics.Metric("speed_max", "Joint speed, max", 1.5, "rad/s")
+    with store.opened():
+        for job in jobs[:2]:
+            store.add(job, Outcome(job.key, 20, None, 0.1, (speed,)))
+        whole = store.file.read_bytes()
+        os.truncate(store.file, len(whole) - 20)
+        assert store.outcomes() == {"a": Outcome("a", 20, None, 0.1, (speed,))}
+        store.add(jobs[2], Outcome("c", 20, None, 0.1, (speed,)))
+        store.add(jobs[1], Outcome("b", 0, "broke,\nfor once", 0.1))
+        assert {key: one.reason for key, one in store.outcomes().items()} == {
+            "a": None, "c": None, "b": "broke,\nfor once"}
+
+        def full(_):
+            raise OSError(28, os.strerror(28))
+
+        monkeypatch.setattr(os, "fsync", full)
+        with pytest.raises(FullError, match=r"out/runs/all\.csv cannot be written: No space"):
+            store.add(jobs[0], Outcome("d", 20, None, 0.1))
+
+
+def test_a_folder_in_use_or_of_something_else_is_refused(tmp_path):
+    held = ("import sys, time; from pathlib import Path\n"
+            "from scenarios.results.store import Store\n"
+            "with Store(Path(sys.argv[1])).opened(): print(flush=True); time.sleep(60)")
+    with subprocess.Popen([sys.executable, "-c", held, str(tmp_path / "a")],
+                          stdout=subprocess.PIPE) as process:
+        process.stdout.readline()
+        with pytest.raises(HierarchyError, match=f"process {process.pid} on "), \
+                Store(tmp_path / "a").opened():
+            pass
+        process.kill()
+    with Store(tmp_path / "a").opened():
+        pass
+    (tmp_path / "b").mkdir()
+    (tmp_path / "b" / "thesis.tex").touch()
+    with pytest.raises(HierarchyError, match="not a sweep's"), Store(tmp_path / "b").opened():
+        pass
+
+
+# What it comes to
+
+@pytest.fixture(scope="module")
+def done(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("starts") / "out"
+    found = compare_starts([load("ellipse", SHORT)], ["recursive", "hcod", "augmented"], 7, 3,
+                           folder)
+    return found, json.loads((folder / "results.json").read_text()), folder
+
+
+@pytest.mark.slow
+def test_strict_resolvers_are_the_same_and_none_is_best_among_them(done):
+    found, data, _ = done
+    columns = data["groups"]["ellipse"]["columns"]
+    speed = columns["hcod"]["metrics"]["speed_max"]
+    assert speed["against_first"]["same"] == speed["count"] == 7
+    assert not speed["best"]
+    assert columns["recursive"]["shares"]["Reached the end"]["met"] == 7
+    assert found.found["ellipse"].alike()[0] == ["recursive", "hcod"]
+
+
+@pytest.mark.slow
+def test_the_page_has_its_verdict_and_links_worst_runs_to_files_that_give_the_same(done):
+    found, data, folder = done
+    page = (folder / "index.html").read_text()
+    assert all(line in page for line in data["groups"]["ellipse"]["verdict"])
+    for metric, run in found.found["ellipse"].worst()[:3]:
+        name = next(file for file in (folder / "worst").iterdir()
+                    if run.job.key[:6] in file.name)
+        assert f"worst/{name.name}" in page
+        again = metrics.measure(simulate(load(name)))
+        assert again[metric.name].value == metric.value
+
+
+@pytest.mark.slow
+def test_scenarios_under_their_own_resolvers_are_columns(tmp_path):
+    found = compare_starts([load(name, SHORT) for name in ("ellipse", "ellipse-hqp")], ["own"], 2,
+                           0, tmp_path / "out")
+    (results,) = found.found.values()
+    assert results.labels == ("ellipse", "ellipse-hqp")
+
+
+@pytest.mark.slow
+def test_the_table_of_a_sweep_fits_80_columns(tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv("COLUMNS", "80")
+    monkeypatch.chdir(tmp_path)
+    path = write(tmp_path, resolvers='["tpm", "recursive", "augmented", "hqp:backend=osqp"]')
+    assert run_command(["sweep", path.name]) == 0
+    shown = capsys.readouterr().out.partition("\nReport")[0]
+    assert max(map(len, shown.splitlines())) <= 80
+    assert "…" not in shown
+
+
+def test_what_was_not_met_in_every_run_is_counted_by_column():
+    runs = [Planned("a", label, Job("", "", label, sample=sample))
+            for sample in range(4) for label in ("tpm", "weighted")]
+    excess = np.array([1.0 if run.label == "weighted" and run.job.sample else 0.0 for run in runs])
+    found = Results(tuple(runs), (None,) * 8, {}, {"joint_limit_excess": excess})
+    assert "Kept the joint limits: tpm 4 of 4, weighted 1 of 4" in verdict(found)[0]
+    assert found.share(replace(found.criteria()[-1]), "weighted").met == 1
+
+
+@pytest.mark.parametrize(("met", "of", "low", "high"), [
+    (0, 10, 0.0, 0.2775), (5, 10, 0.2366, 0.7634), (81, 263, 0.2553, 0.3662), (0, 0, 0.0, 1.0)])
+def test_the_interval_of_a_share_is_wilsons(met, of, low, high):
+    assert wilson(met, of) == pytest.approx((low, high), abs=1e-4)
