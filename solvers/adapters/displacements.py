@@ -62,7 +62,7 @@ class Pull(NamedTuple):
 def hierarchy(configuration: object, joints: Names, n: int, period: float,
               limits: Sequence[Limit], constraints: Sequence[Task],
               tasks: Iterable[Task | Sequence[Task]], pull: Pull | None = None,
-              solve: Solve | None = None) -> Hierarchy:
+              *, solve: Solve | None = None) -> Hierarchy:
     """Pack limits, constraints and tasks into levels, without the empty ones.
 
     n unknowns [rad/s or m/s], and a function that returns their names; period [s]. An entry of

@@ -45,7 +45,7 @@ def hierarchy(configuration: Configuration, tasks: Iterable[Task | Sequence[Task
     n = configuration.model.nv
     pull = None if damping is None else Pull(damping, np.zeros(n))
     return displacements.hierarchy(configuration, partial(_joints, configuration.model), n, dt,
-                                   given, list(constraints or ()), tasks, pull, solve)
+                                   given, list(constraints or ()), tasks, pull, solve=solve)
 
 
 def _joints(model: MjModel) -> list[str]:

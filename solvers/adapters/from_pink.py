@@ -153,7 +153,7 @@ def hierarchy(configuration: Configuration,
             pull = _pulled(pull, H, c, dt)
     return displacements.hierarchy(configuration, partial(_joints, configuration.model), n, dt,
                                    [(name, *pair) for name, pair in found if pair is not None],
-                                   list(constraints or ()), tasks, pull, solve)
+                                   list(constraints or ()), tasks, pull, solve=solve)
 
 
 def _joints(model: Any) -> list[str]:
