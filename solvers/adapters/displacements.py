@@ -154,7 +154,8 @@ class _Packed:
         given = [(name, _plain(G), _plain(h)) for name, G, h in limits]
         for name, G, h in given:
             _check_fit(name, G, h, n)
-            row = int(write_limits(G, h, period, lower, upper, self.A, self.lower, self.upper, row))
+            row = int(write_limits(G, h, period, (lower, upper), self.A, self.lower, self.upper,
+                                   row))
             if row == ODD:
                 check_rows(name, G, _filled(len(h), -np.inf), h)
         last = int(write_bounds(lower, upper, self.A, self.lower, self.upper, row))
@@ -220,7 +221,7 @@ def _contradiction(limits: Sequence[Limit], n: int, period: float, i: int,
     for name, G, h in limits:
         lower, upper = _filled(n, -np.inf), _filled(n, np.inf)
         spare = np.empty((len(h), n)), np.empty(len(h)), np.empty(len(h))
-        write_limits(G, h, period, lower, upper, *spare, 0)
+        write_limits(G, h, period, (lower, upper), *spare, 0)
         lows.append((float(lower[i]), name))
         highs.append((float(upper[i]), name))
     (low, demands), (high, allows) = max(lows), min(highs)

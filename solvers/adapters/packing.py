@@ -18,12 +18,13 @@ CONTRADICT = -2  # returned for bounds that no value meets
 
 
 @compiled
-def write_limits(G, h, period, lower, upper, A, low, up, row):
+def write_limits(G, h, period, bounds, A, low, up, row):
     """Write the rows G x <= h / period on several unknowns from `row` on.
 
-    Rows on a single one narrow its bounds lower, upper (n,); rows with infinite h are no limits.
+    Rows on a single one narrow its bounds, two of (n,); rows with infinite h are no limits.
     Returns the row after them, or ODD.
     """
+    lower, upper = bounds
     for i in range(len(h)):
         if np.isnan(h[i]) or h[i] == -np.inf:
             return ODD

@@ -60,8 +60,9 @@ class LivePage:
         self._first_tick()
         self.panel = LivePanel(
             server, self.requests, live.scenario, list(self.specs),
-            self._lately.curves(live.controller), speed, len(self._stage.obstacles),
-            self._stage.floor, key_html(key(live.recorder.facts, live.scenario), self._colour))
+            self._lately.curves(live.controller), speed, obstacles=len(self._stage.obstacles),
+            floor=self._stage.floor,
+            key=key_html(key(live.recorder.facts, live.scenario), self._colour))
         self.draw()
 
     @property

@@ -25,7 +25,7 @@ class LivePanel:
     """
 
     def __init__(self, server: Any, requests: Requests, scenario: Scenario, labels: Sequence[str],
-                 curves: Any, speed: float, obstacles: int, floor: float, key: str = "") -> None:
+                 curves: Any, speed: float, *, obstacles: int, floor: float, key: str = "") -> None:
         gui = server.gui
         with lay_out(server):
             self._plots = Plots(gui, {"run": curves}, {"run": _CURVE}, rolling=True)
