@@ -70,7 +70,8 @@ def test_it_runs_from_outside_the_source_with_core_dependencies_alone(clean, tmp
 
 
 def test_what_needs_an_extra_says_which(clean, tmp_path):
-    for extra, command in {"sim": ["run", "human"], "sweep": ["sweep", "ellipse-starts"]}.items():
+    scheduler = ["sweep", "ellipse-starts", "--scheduler", "tcp://127.0.0.1:9"]
+    for extra, command in {"sim": ["run", "human"], "sweep": scheduler}.items():
         done = subprocess.run([str(clean / "hierarchy"), *command], capture_output=True, text=True,
                               check=False, cwd=tmp_path, env=UNCOMPILED)
         assert done.returncode == 2
