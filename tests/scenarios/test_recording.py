@@ -112,25 +112,6 @@ def test_what_is_written_whole_leaves_nothing_else(tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["run"]
 
 
-def test_a_folder_that_another_process_is_going_to_write_cannot_be_claimed(tmp_path):
-    (tmp_path / f".run.{os.getppid()}.kept").touch()
-    with pytest.raises(OutputError, match=f"written by process {os.getppid()}"):
-        claim(tmp_path / "run")
-
-
-def test_what_killed_processes_left_is_removed_and_nothing_else(tmp_path):
-    ended = subprocess.Popen([sys.executable, "-c", ""])
-    ended.wait()
-    (tmp_path / f".run.{ended.pid}.kept").touch()
-    (tmp_path / f".run.{ended.pid}.abcd").mkdir()
-    (tmp_path / f".run.{ended.pid}.abcd" / "run.npz").touch()
-    (tmp_path / f".other.{ended.pid}.abcd").mkdir()
-    (tmp_path / ".run.toml").touch()
-    claim(tmp_path / "run")
-    left = {path.name for path in tmp_path.iterdir()}
-    assert left == {f".run.{os.getpid()}.kept", f".other.{ended.pid}.abcd", ".run.toml"}
-
-
 def write_to_a_full_disk(folder):
     with whole(folder) as partial:
         (partial / "file").touch()
@@ -167,3 +148,17 @@ def test_a_whole_folder_has_the_usual_permissions(tmp_path):
     with whole(tmp_path / "new") as partial:
         (partial / "file").touch()
     assert (tmp_path / "new").stat().st_mode == (tmp_path / "usual").stat().st_mode
+
+
+def test_a_folder_that_another_process_has_locked_cannot_be_claimed(tmp_path):
+    from scenarios.files import OutputError, claim
+
+    code = ("import sys; from pathlib import Path; from scenarios.files import lock\n"
+            "lock(Path(sys.argv[1])); print(); sys.stdin.read()")
+    with subprocess.Popen([sys.executable, "-c", code, str(tmp_path / "run")],
+                          stdin=subprocess.PIPE, stdout=subprocess.PIPE) as other:
+        other.stdout.readline()
+        with pytest.raises(OutputError, match="run is going to be written by"):
+            claim(tmp_path / "run")
+        other.stdin.close()
+    assert claim(tmp_path / "run") == tmp_path / "run"
