@@ -254,7 +254,7 @@ def _read(task: Task, configuration: object, damped: bool, weighted: bool = True
     J, e = _plain(task.compute_jacobian(configuration)), _plain(task.compute_error(configuration))
     if J.ndim == 1 and e.ndim == 1 and J.size == e.size:
         J = J.reshape(-1, 1)  # as pinocchio returns the Jacobian of a single joint
-    cost = costs(task, len(e)) if weighted else _filled(len(e), 1.0)
+    cost = _costs(task, len(e)) if weighted else _filled(len(e), 1.0)
     gain = float(task.gain)
     return _Read(task, J, e, cost, gain, lm * gain * gain * squared(cost, e) if lm else 0.0)
 
@@ -272,21 +272,21 @@ def _plain(values: Any) -> Array:
     return np.array(values, dtype=np.float64, order="C")
 
 
-def residual(task: Task, configuration: object, weighted: bool = True) -> tuple[Array, Array]:
+def residual(task: Task, configuration: object) -> tuple[Array, Array]:
     """Return W J (k, n) and -W e (k,) of a task, W the diagonal matrix of its costs.
 
-    Rows with zero cost are left out. With `weighted` false, all rows are returned unweighted.
+    Rows with zero cost are left out.
 
     Raises
     ------
     HierarchyError : the task is not of the form J dq = -gain e, or has lm_damping.
     """
-    _, J, e, cost, _, _ = _read(task, configuration, False, weighted)
-    asked = cost != 0.0
-    return cost[asked, None] * J[asked], -cost[asked] * e[asked]
+    one = _read(task, configuration, False)
+    asked = one.cost != 0.0
+    return one.cost[asked, None] * one.J[asked], -one.cost[asked] * one.e[asked]
 
 
-def costs(task: Task, rows: int) -> Array:
+def _costs(task: Task, rows: int) -> Array:
     """Return the cost of each row of a task: (rows,); ones for a task without a cost."""
     given = getattr(task, "cost", None)
     if given is None or type(given) is float:
