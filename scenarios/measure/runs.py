@@ -97,18 +97,24 @@ def table(runs: Sequence[Run], details: bool = True) -> list[Row]:
 
 
 def flags(runs: Sequence[Run]) -> list[str]:
-    """Return the `caveats` about the resolvers of runs."""
-    return caveats({run.label: run.recording.facts.resolver for run in runs if run.recording})
+    """Return the `caveats` about the resolvers of runs, each once, with the columns it is about."""
+    found = caveats({run.label: run.recording.facts.resolver for run in runs if run.recording})
+    columns: dict[str, list[str]] = {}
+    for label, said in found.items():
+        for caveat in said:
+            columns.setdefault(caveat, []).append(label)
+    return [f"{', '.join(labels)}: {caveat}" for caveat, labels in columns.items()]
 
 
-def caveats(resolvers: Mapping[str, ResolverFacts]) -> list[str]:
-    """Return which columns, by label, have no strict priorities, or damp unlike the first."""
-    damped = [one.damped.replace("each pivot", "each level") for one in resolvers.values()]
-    flags = {"not strict at every rank": [
-        label for label, one in resolvers.items() if not one.strict],
-        f"damped differently from {next(iter(resolvers), '')}": [
-        label for label, what in zip(resolvers, damped, strict=True) if what != damped[0]]}
-    return [f"{', '.join(labels)}: {flag}" for flag, labels in flags.items() if labels]
+def caveats(resolvers: Mapping[str, ResolverFacts]) -> dict[str, list[str]]:
+    """Return by column what to know of its resolver before it is called the best."""
+    # Damping by pivot or by level gives the same x while no level loses rank.
+    damped = {label: one.damped.replace("each pivot", "each level")
+              for label, one in resolvers.items()}
+    first = next(iter(resolvers), "")
+    return {label: ["not strict at every rank"] * (not one.strict)
+            + [f"damped differently from {first}"] * (damped[label] != damped[first])
+            for label, one in resolvers.items()}
 
 
 def _row(metric: Metric, found: Sequence[Metric | None], competes: Sequence[bool]) -> Row:

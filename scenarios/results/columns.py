@@ -16,6 +16,7 @@ from hierarchy.words import listed
 from scenarios.config import Scenario
 from scenarios.measure import statistics
 from scenarios.measure.metrics import Metric
+from scenarios.measure.runs import caveats
 from scenarios.measure.statistics import Paired, Spread, paired, wilson
 from scenarios.recording.facts import resolver_facts
 from scenarios.results.plan import Plan, Planned
@@ -24,7 +25,6 @@ from scenarios.results.run import Outcome
 # What is weighed in the verdict.
 _WEIGHED = ("position_error_median_settled", "body_distance_min", "ee_distance_min",
             "cone_violation_max", "speed_max", "acceleration_max")
-_SAME = {"each pivot": "each level"}  # the same x while no level loses rank
 _TOLERANCE = 1e-6  # [rad] beyond a joint limit that still counts as within it
 
 
@@ -210,13 +210,9 @@ def verdict(results: Results) -> list[str]:
 
 
 def flags(runs: Mapping[str, Scenario]) -> dict[str, str]:
-    """Return by column what to know of its resolver before it is called the best."""
+    """Return the `caveats` of each column in one line."""
     facts = {label: resolver_facts(scenario) for label, scenario in runs.items()}
-    damped = {label: _SAME.get(one.damped, one.damped) for label, one in facts.items()}
-    first = next(iter(damped), "")
-    return {label: ", ".join(["not strict at every rank"] * (not one.strict)
-                             + [f"damps otherwise than {first}"] * (damped[label] != damped[first]))
-            for label, one in facts.items()}
+    return {label: ", ".join(said) for label, said in caveats(facts).items()}
 
 
 def valued(metric: Metric, value: float) -> Metric:

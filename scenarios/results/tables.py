@@ -58,8 +58,6 @@ def _is_first(name: str) -> bool:
 
 def _marks(runs: Sequence[Run]) -> str:
     """Return what the marks mean and what to know about the numbers."""
-    from scenarios.measure.runs import flags
-
     if all(run.fault for run in runs):
         return "No run was completed, so none is marked as best."
     detour = any(run.recording and "repulsion_active" in run.recording
@@ -70,8 +68,7 @@ def _marks(runs: Sequence[Run]) -> str:
              "The scenarios differ, so none is marked as best.")
     stopped = (" Runs that stopped early are grey and not compared."
                if any(run.fault for run in runs) else "")
-    said = "".join(f" {flag}." for flag in flags(runs))
-    return marks + stopped + said + (
+    return marks + stopped + (
         " The position error includes the detour of the end effector around obstacles on its path."
         if detour else "")
 
