@@ -5,9 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from hierarchy.errors import HierarchyError
 from hierarchy.notebook import html_table, numbers
-from hierarchy.problem import Array
-from solvers.status import Status
+from hierarchy.problem import Array, Hierarchy
+from solvers.kernels.exact import verify_answer
+from solvers.status import SOLVED, Status
+from solvers.workspace import run
 
 
 class Resolution:
@@ -37,6 +40,25 @@ class Resolution:
     def active(self) -> NDArray[np.int8] | None:
         """State of each row (m,), values of `solvers.status.Row`; None if it is not reported."""
         return None
+
+    def verified(self, h: Hierarchy, rank_tolerance: float = 1e-8) -> bool:
+        """Whether x and the active rows prove each other on the data of h; `th_verify` in C.
+
+        The check of docs/theory/hcod.md, from nothing but h, x and `active`: multipliers and signs
+        of every level. False too for an answer with damping, which is optimal for other data.
+
+        Raises HierarchyError for a hierarchy with a metric or with levels that give, and for a
+        resolver that reports no active rows; `certify(h, x)` judges these.
+        """
+        active = self.active
+        if active is None and (h.lower == h.upper).all():
+            active = np.zeros(h.m, dtype=np.int8)
+        if active is None or not h.plain:
+            why = "no active rows are reported" if h.plain else "h has a metric or levels that give"
+            raise HierarchyError(f"verified: {why}; certify(h, x) judges such an answer")
+        settings = np.array([0.0, 0.0, rank_tolerance])
+        return run(verify_answer, *h.rows, np.concatenate([self.x, h.reference]),
+                   active.astype(float), settings) == SOLVED
 
     def __repr__(self) -> str:
         return (f"{type(self).__name__}({self.status.name}, x={numbers(self.x)}, "

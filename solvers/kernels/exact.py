@@ -21,23 +21,24 @@ from solvers.kernels.damping import (
     open_damped,
 )
 from solvers.kernels.levels import pass_through_levels
+from solvers.kernels.multipliers import write_multipliers
 from solvers.kernels.rows import NO, YES, ZERO, all_equal, finish, length_of
 from solvers.kernels.search import pivot_in_blocks, pivot_one_by_one, save
 from solvers.kernels.space import matrix, vector
 from solvers.kernels.staircase import solve_by_staircase
 from solvers.kernels.tableau import STEPS, carve_tableau, tableau_size
-from solvers.kernels.tolerances import PASS_STEPS, SEARCH_STEPS
+from solvers.kernels.tolerances import MET, PASS_STEPS, SEARCH_STEPS
 from solvers.kernels.verification import neglects, verify
 from solvers.kernels.working_set import (
     COARSE,
     FINISHED,
     FIRST,
-    NEGLECTED,
     SCALE,
     STATE,
     Scaled,
     carve_working_set,
     load,
+    meet,
     rescale,
     restore,
     working_set_size,
@@ -173,20 +174,11 @@ def _keep_staircase(lower, upper, record):
 def solve_exactly(A, lower, upper, sizes, x, record, settings, work):
     """Like `solve_hierarchy`, for any rows without damping."""
     m, n = A.shape
-    multiplier, at = matrix(work, ZERO, sizes.size + 1, m)
-    current, at = matrix(work, at, sizes.size + 1, m)
-    saved, at = vector(work, at, n)
-    own, after = carve_working_set(A, sizes, x, multiplier, work, at)
-    s, own.scalar[SCALE], own.count[COARSE] = own, 1.0, 0
-    code = load(s, lower, upper, sizes, record, settings[RANK_TOLERANCE])
-    if code == UNPROVED:
-        scaled, after = _carve_scaled(work, after, m, n)
-        code = rescale(own, lower, upper, scaled)
-        s, _ = carve_working_set(scaled.A, sizes, x, multiplier, work, at)
-        if code == SOLVED:
-            code = load(s, scaled.lower, scaled.upper, sizes, record, settings[RANK_TOLERANCE])
+    s, code, at = _open(A, lower, upper, sizes, x, record, settings, work)
     if code != SOLVED:
         return finish(x, code)
+    current, at = matrix(work, at, sizes.size + 1, m)
+    saved, at = vector(work, at, n)
     limit, code, steps = np.int64(settings[MOST]), ZERO + UNPROVED, ZERO
     warm, level, s.count[FINISHED] = record[3 * m] + record[3 * m + 1] > 0.0, ZERO - 1, 0
     begin = ZERO
@@ -196,7 +188,7 @@ def solve_exactly(A, lower, upper, sizes, x, record, settings, work):
         code, steps = pivot_in_blocks(s, limit, NO)
     blocks = steps
     if code == UNPROVED and level < 0:
-        t, _ = carve_tableau(s, work, after)
+        t, _ = carve_tableau(s, work, at)
         code, level = pass_through_levels(t, settings[TOLERANCE],
                                           min(limit - steps, PASS_STEPS * (m + n)))
         steps += t.count[STEPS]
@@ -215,7 +207,7 @@ def solve_exactly(A, lower, upper, sizes, x, record, settings, work):
                 ZERO if coarse > begin else level)
             steps += tries
             code = _verified(s, code, YES)
-    if code == SOLVED and s.count[NEGLECTED] > 0 and neglects(s):
+    if code == SOLVED and neglects(s):
         code = ZERO + INACCURATE
     elif code not in (SOLVED, NUMERICAL_FAILURE):
         finished = s.count[FINISHED]
@@ -227,6 +219,49 @@ def solve_exactly(A, lower, upper, sizes, x, record, settings, work):
     if code == ITERATION_LIMIT:
         record[3 * m + 2] = _resume(s, level)
     return code if np.isfinite(length_of(x)) else finish(x, NUMERICAL_FAILURE)
+
+
+@compiled
+def verify_answer(A, lower, upper, sizes, x, record, settings, work):
+    """Whether x and the rows that act in it prove each other: SOLVED, else INACCURATE.
+
+    For any answer without damping, also of another method. x (2 n,): the answer, then the
+    reference. record (m or more,): the state of each row; the multipliers follow from these.
+    """
+    (m, n), proved = A.shape, False
+    if n + exact_size(n, m, sizes.size) > work.size:
+        return ZERO + TOO_SMALL
+    found, at = vector(work, ZERO, n)
+    for c in range(n):
+        found[c] = x[n + c]
+    s, code, _ = _open(A, lower, upper, sizes, found, record, settings, work[at:])
+    for coarse in range(2 if code == SOLVED else 0):
+        if not proved:
+            s.count[COARSE] = coarse
+            restore(s)
+            meet(s, sizes.size)
+            write_multipliers(s, MET)
+            for c in range(n):
+                s.x[c] = x[c]
+            proved = verify(s, YES) and not neglects(s)
+    return ZERO + (SOLVED if proved else INACCURATE if code == SOLVED else code)
+
+
+@inlined
+def _open(A, lower, upper, sizes, x, record, settings, work):
+    """Return a WorkingSet with the data, rescaled if need be; a code; where it ends."""
+    m, n = A.shape
+    multiplier, at = matrix(work, ZERO, sizes.size + 1, m)
+    own, end = carve_working_set(A, sizes, x, multiplier, work, at)
+    s, own.scalar[SCALE], own.count[COARSE] = own, 1.0, 0
+    code = load(s, lower, upper, sizes, record, settings[RANK_TOLERANCE])
+    if code == UNPROVED:
+        scaled, end = _carve_scaled(work, end, m, n)
+        code = rescale(own, lower, upper, scaled)
+        s, _ = carve_working_set(scaled.A, sizes, x, multiplier, work, at)
+        if code == SOLVED:
+            code = load(s, scaled.lower, scaled.upper, sizes, record, settings[RANK_TOLERANCE])
+    return s, code, end
 
 
 @inlined

@@ -47,6 +47,7 @@ from solvers.kernels.working_set import (
     FIRST,
     GRADIENT,
     LOWER,
+    NEGLECTED,
     NOISE,
     NORM,
     PIVOT,
@@ -85,7 +86,7 @@ def verify(s, factored):
 def neglects(s):
     """Whether x violates a row that is ignored because rows of other levels are far larger."""
     missed, reach = False, 1.0 + length_of(s.x)
-    for i in range(s.A.shape[0]):
+    for i in range(s.A.shape[0] if s.count[NEGLECTED] > 0 else 0):
         value = row_times_x(s, i)
         over = max(value - s.number[UPPER, i], s.number[LOWER, i] - value)
         missed = missed or over > BAND * -s.number[NORM, i] * reach > 0.0

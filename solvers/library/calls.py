@@ -74,6 +74,15 @@ class Call(NamedTuple):
 @compiled
 def judged(problem, settings, record, x, work, size):
     """Return SOLVED if a call can be opened, else INVALID or TOO_SMALL with x and record reset."""
+    code = can_open(problem, settings, record, x, work, size)
+    if code != SOLVED:
+        _reset(problem, record, x)
+    return code
+
+
+@compiled
+def can_open(problem, settings, record, x, work, size):
+    """Return SOLVED if a call can be opened, else INVALID or TOO_SMALL."""
     code = judged_problem(problem)
     if code == SOLVED and (record == 0 or x == 0 or work == 0 or not _in_range(settings)):
         code = INVALID
@@ -84,8 +93,6 @@ def judged(problem, settings, record, x, work, size):
             code = TOO_SMALL
         elif state[VALUES] == 0:
             code = INVALID
-    if code != SOLVED:
-        _reset(problem, record, x)
     return ZERO + code
 
 

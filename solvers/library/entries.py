@@ -13,7 +13,7 @@ from hierarchy.jit import compiled, inlined
 from hierarchy.jit.exporting import INTEGER, STATUS, Entry
 from solvers.kernels.bounds import name_saturation, solve_without_bounds
 from solvers.kernels.damped import damped_recursion
-from solvers.kernels.exact import DAMPING, solve_damped, solve_hierarchy
+from solvers.kernels.exact import DAMPING, solve_damped, solve_hierarchy, verify_answer
 from solvers.kernels.recursion import recursion
 from solvers.kernels.rows import ZERO
 from solvers.kernels.sns import sns
@@ -26,6 +26,7 @@ from solvers.library.calls import (
     WARM,
     begin_again,
     begun,
+    can_open,
     closed,
     given,
     judged,
@@ -109,6 +110,26 @@ def violations_at(problem, x, norms):
     if code == SOLVED and not violations(problem, x, norms):
         code = NUMERICAL_FAILURE
     return np.int32(code)
+
+
+def verify_x(problem, settings, record, x, work, size):
+    """Verify like `Resolution.verified`; x and the record are only read."""
+    code = can_open(problem, settings, record, x, work, size)
+    if code != SOLVED:
+        return np.int32(code)
+    call, s = opened(problem, record, x, work, size), given(settings)
+    (m, n), used = call.A.shape, call.state[USED]
+    _write_exact(call.settings, s)
+    both = call.work[:2 * n]
+    for c in range(n):
+        both[c] = call.x[c]
+        both[n + c] = call.reference[c] if call.reference.size > 0 else 0.0
+    states, first = call.work[2 * n:2 * n + m], used - 3 * m - 3
+    for i in range(m):  # without a record of `hcod` or `tpm` no inequality acts
+        known = first == 0 or first == n + call.sizes.size
+        states[i] = call.values[first + i] if known else 0.0
+    return np.int32(verify_answer(call.A, call.lower, call.upper, call.sizes, both, states,
+                                  call.settings, call.work[2 * n + m:]))
 
 
 def size_of_work(n, m, levels):
@@ -200,4 +221,5 @@ RESOLVERS = {
 }
 ALWAYS = {"th_work_size": Entry(size_of_work, 3, INTEGER, -1),
           "th_record_size": Entry(size_of_record, 3, INTEGER, -1),
+          "th_verify": Entry(verify_x, 6, STATUS, NUMERICAL_FAILURE),
           "th_violations": Entry(violations_at, 3, STATUS, NUMERICAL_FAILURE)}

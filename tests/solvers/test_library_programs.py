@@ -50,7 +50,7 @@ def test_it_asks_for_nothing_but_libm_and_owns_no_variable(folder):
     assert {kind for kind, _ in kinds} <= set("UTtr")  # code and constants
     assert {name for kind, name in kinds if kind == "T"} == {
         *(f"th_solve_{name}" for name in c.NAMES), "th_work_size", "th_record_size",
-        "th_violations", "th_version", "th_digest"}
+        "th_verify", "th_violations", "th_version", "th_digest"}
 
 
 def built(out, source, folder, *flags, compiler=COMPILER):

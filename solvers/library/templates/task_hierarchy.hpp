@@ -73,6 +73,12 @@ class Solver {
     const th_problem problem = described();
     return static_cast<th_status>(th_violations(&problem, x_.data(), norms));
   }
+  // Whether x and the rows that act prove each other on the data, see th_verify.
+  bool verified() noexcept {
+    const th_problem problem = described();
+    return th_verify(&problem, &settings_, &record_, x_.data(), work_.data(),
+                     static_cast<std::int64_t>(work_.size())) == TH_SOLVED;
+  }
   // Let the next solve start cold.
   void forget() noexcept { record_.warm = 0; }
 
