@@ -27,8 +27,9 @@ class Factorization:
 
     Swap, reorder and delete work on C (m, r) alone, from the first changed level on, so their cost
     does not depend on n; insert projects its rows on the basis Q (n, r). The next solve does the
-    work, so several edits cost one. It gives the x of `tpm` with the same settings. Costs and the
-    treatment of deleted rows: docs/factorization.md.
+    work, so several edits cost one. It gives the x of `tpm` with the same settings, and leaves
+    nearly parallel rows and rows far lighter than others to it. Costs and the treatment of deleted
+    rows: docs/factorization.md.
 
     levels : A_k (m_k, n) of each level, most important first.
     names : one name per level; None for "level 1", "level 2", ...
@@ -190,11 +191,14 @@ class Factorization:
         HierarchyError : a wrong shape or an entry that is not finite; names level, row and value.
         """
         b, x = self._packed(targets), self._reference(reference)
-        if self.update() is not Status.SOLVED:
-            return Resolution(np.zeros(self._n), self._data.status)
+        status = self.update()
+        if status is Status.NUMERICAL_FAILURE:
+            return Resolution(np.zeros(self._n), status)
         code = self._data.resolve(b, x)
         if code < 0:
             self._refuse(b, x, -code - 1)
+        if status is Status.INACCURATE and self._settings.damping == 0.0:
+            return self._settings.solve(self.hierarchy(b, reference))  # by the exact engine
         return Resolution(x, Status(code))
 
     def hierarchy(self, targets: Targets, reference: ArrayLike | None = None) -> Hierarchy:
@@ -227,7 +231,7 @@ class Factorization:
         self._levels = self._data.append(blocks)
 
     def _units(self) -> Array:
-        if self.update() is not Status.SOLVED:
+        if self.update() is Status.NUMERICAL_FAILURE:
             raise HierarchyError(f"no task priority matrix: {self._data.status}")
         return self._data.units(self._m)
 

@@ -92,12 +92,12 @@ class FactoredRows:
     def refactor(self, levels: Sequence[Held]) -> Status:
         """Add the levels below the kept ones to the staircase."""
         count = len(levels)
-        if self.kept < count or self.status is not Status.SOLVED:
+        if self.kept < count or self.status is Status.NUMERICAL_FAILURE:
             self._list(levels, self.kept)
             self.status = Status(refactor(
                 self._C, self._squares, self._table, self.kept, self._W, self._pivots,
                 self._settings.rank_tolerance, self._work))
-            self.kept = count if self.status is Status.SOLVED else 0
+            self.kept = 0 if self.status is Status.NUMERICAL_FAILURE else count
         elif len(self._table) > count:
             self._table = self._table[:count]
         return self.status

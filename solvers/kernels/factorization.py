@@ -22,11 +22,18 @@ import numpy as np
 
 from hierarchy.jit import compiled, inlined
 from solvers.kernels.block import solve_level
-from solvers.kernels.rows import ZERO, factor_level, finish, reflect, reflect_back
+from solvers.kernels.rows import (
+    ZERO,
+    factor_level,
+    finish,
+    has_outlier,
+    reflect,
+    reflect_back,
+)
 from solvers.kernels.space import Basis, Block, Rows, View, shared
-from solvers.kernels.staircase import subtract
-from solvers.kernels.tolerances import OUTSIDE
-from solvers.status import NUMERICAL_FAILURE, SOLVED
+from solvers.kernels.staircase import is_doubtful, smallest_pivot, subtract
+from solvers.kernels.tolerances import FAR_LIGHTER, OUTSIDE, UNCLEAR_PIVOT
+from solvers.status import INACCURATE, NUMERICAL_FAILURE, SOLVED
 
 PASSES = 4       # most passes; two are enough unless the row is rounding
 EXTRA_ROWS = 4   # of W, in addition to staircase and reflectors
@@ -122,7 +129,8 @@ def _opened(W, pivots, work):
 def refactor(C, squares, table, kept, W, pivots, rank_tolerance, work):
     """Add the levels from `kept` on to the staircase, after the kept ones; return a code.
 
-    Writes ranks into the table, and into pivots (V,) the row of the stack of each row of W.
+    INACCURATE: `solve_by_staircase` would say so without damping. Writes ranks into the
+    table, and into pivots (V,) the row of the stack of each row of W.
     work: see `factorization_work`.
     """
     rows, basis, _, _, _ = _opened(W, pivots, work)
@@ -144,7 +152,23 @@ def refactor(C, squares, table, kept, W, pivots, rank_tolerance, work):
         rank = factor_level(rows, basis, first, last, rank)
         table[level, 2] = rank
         first = last
-    return SOLVED
+    return SOLVED if _is_clear(rows, squares, table, rank_tolerance) else INACCURATE
+
+
+@inlined
+def _is_clear(rows, squares, table, rank_tolerance):
+    """Whether no row of the staircase is nearly parallel to others or far lighter."""
+    first, above, least, clear = ZERO, ZERO, np.inf, True
+    for level in range(table.shape[0]):
+        slot, last, rank = table[level, 0], first + table[level, 1], table[level, 2]
+        for i in range(first, last):
+            rows.zero[i] = rank_tolerance * rank_tolerance * squares[slot + rows.row[i] - first]
+        block = Block(first, last, above, rank)
+        least = smallest_pivot(rows, block, least)
+        clear &= rank - above == last - first or not is_doubtful(rows, block, least, rank_tolerance)
+        first, above = last, rank
+    return (clear and not has_outlier(rows.zero[:first], FAR_LIGHTER * FAR_LIGHTER)
+            and not np.sqrt(least) * rank_tolerance < UNCLEAR_PIVOT)
 
 
 @inlined

@@ -101,8 +101,8 @@ def climb(A, lower, upper, sizes, x, settings, work):
         _ask(rows, lower, first, last)
         rank = factor_level(rows, basis, first, last, rank)
         block = Block(first, last, above, rank)
-        least = _smallest_pivot(rows, block, least)
-        if rank - above < last - first and _is_doubtful(rows, block, settings, least):
+        least = smallest_pivot(rows, block, least)
+        if rank - above < last - first and is_doubtful(rows, block, least, settings.rank_tolerance):
             least = 0.0
         subtract(rows, y, first, last, above)  # p_i - J_i x_{i-1}, in (13)
         solve_level(rows.W, rows.miss, y, block, settings, of_block)
@@ -113,9 +113,9 @@ def climb(A, lower, upper, sizes, x, settings, work):
 
 
 @inlined
-def _is_doubtful(rows, block, settings, least):
+def is_doubtful(rows, block, least, rank_tolerance):
     """Whether rounding in heavy rows of a level hides light ones, or a row is hardly dependent."""
-    thin = min(np.sqrt(least) * settings.rank_tolerance, 1.0)  # the smallest pivot
+    thin = min(np.sqrt(least) * rank_tolerance, 1.0)  # the smallest pivot
     return (has_outlier(rows.zero[block.i0:block.i1], LIGHT_ROW * LIGHT_ROW)
             or is_borderline(rows, block.i0 + block.k1 - block.k0, block.i1, block.k1,
                              UNCLEAR_CUT * thin))
@@ -134,7 +134,7 @@ def is_borderline(rows, begin, end, rank, share):
 
 
 @inlined
-def _smallest_pivot(rows, block, least):
+def smallest_pivot(rows, block, least):
     """Return the least squared pivot, relative to the square at which a row counts as zero."""
     for k in range(block.k0, block.k1):
         i = block.i0 + k - block.k0
