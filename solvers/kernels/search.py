@@ -4,7 +4,8 @@ First, all rows that are wrong change at once (block pivoting), while their numb
 dual active set (Goldfarb, Idnani 1983, here over series in e, see `multipliers.py`): levels join
 one at a time; the most violated row enters; where multipliers would change their sign, they move
 towards those of the new working set until the first is zero, and that row leaves. Each accepted set
-raises a strictly convex dual, so in exact arithmetic none recurs.
+raises a strictly convex dual, so in exact arithmetic none recurs; where one does, rounding or cuts
+decide, and the search ends.
 """
 
 # mypy: disable-error-code="no-untyped-def"
@@ -19,7 +20,15 @@ from hierarchy.jit import compiled, inlined
 from solvers.kernels.multipliers import INWARD, UNDECIDED, write_multipliers
 from solvers.kernels.rows import YES, ZERO, length_of
 from solvers.kernels.space import View
-from solvers.kernels.tolerances import MET, PATIENCE, RELEASED, RESTORED, SHADOW, VIOLATED
+from solvers.kernels.tolerances import (
+    MET,
+    PATIENCE,
+    RECURRENCES,
+    RELEASED,
+    RESTORED,
+    SHADOW,
+    VIOLATED,
+)
 from solvers.kernels.verification import verify
 from solvers.kernels.working_set import (
     BEGIN,
@@ -34,6 +43,8 @@ from solvers.kernels.working_set import (
     NORM,
     SCRATCH,
     SEED,
+    SEEN,
+    SEEN_LAST,
     SIGN,
     SIZE,
     STATE,
@@ -146,11 +157,14 @@ def pivot_one_by_one(s, current, saved, limit, level):
     """
     levels, last, newest, fresh = (
         s.multiplier.shape[0] - 1, _next_level(s, max(level, 0)), ZERO - 1, True)
-    clean, accepted, tries = ZERO, ZERO, ZERO
+    clean, accepted, tries, recurred = ZERO, ZERO, ZERO, ZERO
     for i in range(s.A.shape[0]):
         s.index[ENTERED, i] = 0
     while tries < limit:
         tries += 1
+        recurred = _count_recurrences(s, last, tries, recurred)
+        if recurred > RECURRENCES:
+            break
         found = try_working_set(s, last, newest)
         if not np.isfinite(length_of(s.x)):
             return ZERO + NUMERICAL_FAILURE, tries, last - 1
@@ -167,12 +181,25 @@ def pivot_one_by_one(s, current, saved, limit, level):
             last, newest, fresh = _next_level(s, last), ZERO - 1, True
         elif s.count[DIRTY] == 1 and clean < RESTORED:  # free of what other working sets cut
             restore(s)
-            newest, fresh, clean = ZERO - 1, True, clean + 1
+            newest, fresh, clean, recurred = ZERO - 1, True, clean + 1, ZERO
         else:
             return ZERO + SOLVED, tries, last - 1
     if accepted > 1:  # go on later from the last accepted set; if this step is long, from within
         _copy_states(s, SEED, STATE)
     return ZERO + UNPROVED, tries, last - 1
+
+
+@inlined
+def _count_recurrences(s, last, tries, recurred):
+    """Return how often the working set of the last power of two of tries has come again since."""
+    if tries & (tries - 1) == 0:
+        s.count[SEEN_LAST] = last
+        _copy_states(s, STATE, SEEN)
+        return ZERO
+    same = s.count[SEEN_LAST] == last
+    for i in range(s.A.shape[0] if same else 0):
+        same = same and s.index[STATE, i] == s.index[SEEN, i]
+    return recurred + same
 
 
 @inlined

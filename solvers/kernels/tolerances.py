@@ -52,5 +52,6 @@ PASS_STEPS = 2
 SEARCH_STEPS = 2
 PATIENCE = 2         # block pivots that may not reduce the number of wrong rows
 RELEASED = 3         # times that a row may enter and leave again because nothing holds it
+RECURRENCES = 1      # of a working set in one search: after more it goes in circles
 RESTORED = 3         # times that a final working set is solved anew from uncut rows
 SWEEPS = 40          # of Jacobi rotations, which need 6 to 10

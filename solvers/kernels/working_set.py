@@ -35,15 +35,17 @@ from solvers.status import EQUAL, FREE, NUMERICAL_FAILURE, SOLVED, UNPROVED
 NUMBERS = 16  # one more than these: `levels.py` keeps its own behind REFERENCE
 # Rows of `index`. Per row of A: its unknown (-1 for several entries), the side at which it acts,
 # the change that the search asks for, how often it entered,
-# the side before a search. By place in the list: the row, the sign
+# the side before a search and at its last checkpoint. By place in the list: the row, the sign
 # of its multipliers. The unknown of each column, the column of each unknown. Per level: its first
 # row, its first place in the list, its first column.
-UNIT, STATE, FIRST, CHANGE, ENTERED, SEED, LIST, SIGN, ORDER, PLACE, BEGIN, RANK = range(12)
+(UNIT, STATE, FIRST, CHANGE, ENTERED, SEED, SEEN, LIST, SIGN, ORDER, PLACE, BEGIN,
+ RANK) = range(13)
+INDICES = 13
 # In `count`: columns that are unknowns, the level that sets all of x (-1: none), whether a row was
 # cut since the rows were those of A, whether small coefficients are cut along other rows too, the
 # number of rows that are negligible beside those of other levels alone, the number of levels that
-# the saved x meets.
-PICKED, WHOLE, DIRTY, COARSE, NEGLECTED, FINISHED = range(6)
+# the saved x meets, the number of levels in the search at its last checkpoint.
+PICKED, WHOLE, DIRTY, COARSE, NEGLECTED, FINISHED, SEEN_LAST = range(7)
 # In `scalar`: rank_tolerance, the largest number so far, the smallest pivot of a row over its norm
 # and the next one, the factor by which the data are those of the caller.
 TOLERANCE, SIZE, PIVOT, SECOND, SCALE = range(5)
@@ -82,7 +84,7 @@ class WorkingSet(NamedTuple):
 @inlined
 def working_set_size(n, m, levels):
     """Return the numbers that a WorkingSet needs, without its multipliers."""
-    return (NUMBERS + 12) * max(m, n, levels + 1) + 11 + 3 * m * n + n * n + n
+    return (NUMBERS + INDICES) * max(m, n, levels + 1) + 12 + 3 * m * n + n * n + n
 
 
 @inlined
@@ -91,14 +93,14 @@ def carve_working_set(A, sizes, x, multiplier, work, at):
     m, n = A.shape
     w = max(m, n, sizes.size + 1)
     number, at = matrix(work, at, NUMBERS, w)
-    numbers, at = integers(work, at, 12 * w)
-    count, at = integers(work, at, 6)
+    numbers, at = integers(work, at, INDICES * w)
+    count, at = integers(work, at, 7)
     scalar, at = vector(work, at, 5)
     W, at = matrix(work, at, m, n)
     basis, at = carve_basis(work, at, n, n)
     T, at = matrix(work, at, n, m)
     C, at = matrix(work, at, m, n)
-    index = as_matrix(numbers, 12 if numbers.size > 0 else 0, w)
+    index = as_matrix(numbers, INDICES if numbers.size > 0 else 0, w)
     return WorkingSet(A, x, number, index, count, scalar, multiplier, W, basis, T, C), at
 
 
