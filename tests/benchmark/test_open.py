@@ -158,20 +158,18 @@ def test_a_solver_in_a_library_is_timed_from_python_and_inside(tmp_path, equalit
 @needs_c
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="the C library is made on Linux")
-@pytest.mark.parametrize("resolver", ["hcod", "tpm"])
-def test_our_c_library_answers_behind_the_header_as_python_does(tmp_path, resolver):
+def test_our_c_library_answers_behind_the_header_as_python_does(folder, tmp_path):
     """The worked example of solver.h; tpm refuses inequalities beyond bounds."""
-    library.write(tmp_path / "lib", ("hcod", "tpm"))
-    out = shared(SOLVE / "library.c", tmp_path / "ours.so", f"-DSOLVE=th_solve_{resolver}",
-                 f"-I{tmp_path / 'lib' / 'include'}",
-                 tmp_path / "lib" / "lib" / "libtask_hierarchy.a", "-lm")
     made = collection([simple(side) for side in (1.0, 2.0, 3.0)], sequence=True)
     made.save(tmp_path / "simple.npz")
-    rows = run_entrant(compiled([out], ["ours"])[0], tmp_path / "simple.npz")
-    if resolver == "tpm":
-        assert {row["refused"] for row in rows} == {"not for this solver"}
-        return
-    found = judge(rows, {made.digest: made})
+    rows = {}
+    for resolver in ("hcod", "tpm"):
+        out = shared(SOLVE / "library.c", tmp_path / f"{resolver}.so",
+                     f"-DSOLVE=th_solve_{resolver}", f"-I{folder / 'include'}",
+                     folder / "lib" / "libtask_hierarchy.a", "-lm")
+        rows[resolver] = run_entrant(compiled([out], ["ours"])[0], tmp_path / "simple.npz")
+    assert {row["refused"] for row in rows["tpm"]} == {"not for this solver"}
+    found = judge(rows["hcod"], {made.digest: made})
     assert [row["verdict"] for row in found] == [judging.SOLVED] * 3
     assert [row["warm_right"] for row in found] == [None, True, True]
 
