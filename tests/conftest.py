@@ -56,6 +56,7 @@ def folder(tmp_path_factory):
     import fcntl
 
     from c_library import NAMES
+
     from solvers.library import write
 
     root = tmp_path_factory.getbasetemp()

@@ -27,7 +27,7 @@ from hierarchy import Hierarchy
 from hierarchy.errors import HierarchyError
 from scenarios.cli.main import run_command
 from scenarios.problems.families import FAMILIES
-from solvers import certify, library
+from solvers import certify
 from solvers.problems.files import Collection, Head
 from solvers.proof import prove
 

@@ -257,7 +257,7 @@ def test_quick_lists_the_commands_that_it_does_not_run(tmp_path, monkeypatch, ca
 @pytest.mark.slow
 def test_what_is_measured_in_ticks_is_stored_for_each_start(tmp_path, monkeypatch):
     scenario = tmp_path / "short.toml"
-    scenario.write_text('extends = "ellipse"\nname = "short"\n[control]\nduration = 0.5\n')
+    scenario.write_text('extends = "ellipse"\nname = "short"\n[control]\nduration = 0.1\n')
     common = {"title": "a title", "scenario": str(scenario), "resolver": "tpm", "starts": 2}
     for study in (Study("pairs", pairs={"recursive": ("tpm", "recursive")}, **common),
                   Study("pivots", pivots=("avoidance",), **common)):
