@@ -3,7 +3,7 @@ import pytest
 from scene import BODY, OBSTACLES, ROBOT, TIP, states
 
 from hierarchy import HierarchyError, State
-from hierarchy.avoidance import Measurement, Obstacle, Obstacles, Repulsion, SurveillanceAreas
+from hierarchy.avoidance import Obstacle, Obstacles, Repulsion, SurveillanceAreas
 from hierarchy.avoidance.obstacles import distance_to_obstacle
 from hierarchy.paths import Waypoints
 from scenarios.cell.sensors import ExactDistances
@@ -69,13 +69,6 @@ def test_direction_is_the_gradient_of_distance(shape):
         np.testing.assert_allclose(away, gradient, atol=1e-7)
 
 
-@pytest.mark.parametrize("shape", SHAPES)
-def test_direction_has_a_fallback_at_the_centre(shape):
-    D, away = distance(SHAPES[shape], SHAPES[shape].centre)
-    assert np.isfinite(D)
-    assert np.linalg.norm(away) == pytest.approx(1)
-
-
 def test_moving_obstacles_follow_their_path():
     path = Waypoints((1.0, 2.0), ((0, 0, 0), (1, 0, 0)))
     obstacles = Obstacles([Obstacle("sphere", (9, 9, 9), (0.1,), path=path), SHAPES["box"]])
@@ -136,42 +129,6 @@ def test_the_active_point_is_the_nearest_one_without_the_end_effector():
         assert seen.active == int(np.argmin(seen.distance[:8]))
         assert seen.minimal_distance == seen.distance[:8].min()
         assert seen.end_effector_distance == seen.distance[8]
-
-
-def at_origin_between(*centres, mean_within):
-    """Measure the end effector of an arm whose end is put at the middle of two points."""
-    state = State.at(ROBOT, np.full(7, 0.4))
-    middle = state.position(ROBOT.frame("end_effector"))
-    obstacles = Obstacles([Obstacle("point", tuple(middle + c)) for c in np.array(centres)])
-    return ExactDistances(ROBOT, obstacles, BODY, TIP, mean_within).measure(state)
-
-
-def test_the_mean_of_the_end_effector_has_its_own_distance():
-    """The sum of unit vectors of eq. (25), over what is within eps_ee of it and far of the body."""
-    offsets = np.array([(0.05, 0.02, 0.0), (0.0, -0.09, 0.01), (-0.12, 0.0, 0.05)])
-    for within in (0.06, 0.1, 0.2):
-        seen = at_origin_between(*offsets, mean_within=(0.9, within))
-        near = offsets[np.linalg.norm(offsets, axis=1) < within]
-        mean = -(near / np.linalg.norm(near, axis=1)[:, None]).sum(axis=0)
-        np.testing.assert_allclose(seen.direction[8], mean / np.linalg.norm(mean), atol=1e-12)
-        away = seen.points[3] - (seen.points[8] + offsets)
-        distances = np.linalg.norm(away, axis=1)
-        assert (distances < 0.9).all(), "all count for the body's points"
-        mean = (away / distances[:, None]).sum(axis=0)
-        np.testing.assert_allclose(seen.direction[3], mean / np.linalg.norm(mean), atol=1e-12)
-
-
-def test_mean_direction_falls_back_to_the_nearest_where_the_unit_vectors_cancel():
-    seen = at_origin_between((0.1, 0, 0), (-0.2, 0, 0), mean_within=(1.0, 1.0))
-    np.testing.assert_allclose(seen.direction[8], [-1, 0, 0], atol=1e-12)
-
-
-def test_without_obstacles_nothing_is_near():
-    seen = ExactDistances(ROBOT, Obstacles([]), BODY, TIP).measure(State.at(ROBOT, np.zeros(7)))
-    assert seen.active == -1
-    assert seen.minimal_distance == seen.end_effector_distance == np.inf
-    assert not seen.magnitude.any()
-    assert Measurement(3).minimal_distance == np.inf
 
 
 def test_an_obstacle_at_a_control_point_is_refused_at_the_start():

@@ -5,7 +5,6 @@ from dataclasses import fields, replace
 import numpy as np
 import pinocchio as pin
 import pytest
-from scipy.spatial.transform import Rotation
 from standing import (
     ROBOT,
     WEIGHT,
@@ -13,7 +12,6 @@ from standing import (
     feet,
     moving_state,
     soles_and_palm,
-    standing_stack,
 )
 
 from hierarchy import HierarchyError, Robot, Stack, State
@@ -87,14 +85,6 @@ def test_torques_are_those_of_inverse_dynamics_with_external_forces():
     np.testing.assert_allclose(CONTACTS.torques(state, x), efforts[6:], atol=1e-10)
 
 
-def test_blocks_name_every_unknown_once():
-    x = np.arange(float(CONTACTS.unknowns))
-    assert list(CONTACTS.blocks) == ["accelerations", "left_foot", "left_hand", "right_foot"]
-    np.testing.assert_array_equal(np.concatenate([x[part] for part in CONTACTS.blocks.values()]), x)
-    np.testing.assert_array_equal(CONTACTS.forces(x, "left_hand"), [x[N + 12:N + 15]])
-    np.testing.assert_array_equal(CONTACTS.forces(x).ravel(), x[N:])
-
-
 # Rows of the tasks
 
 
@@ -165,25 +155,6 @@ def test_the_centre_of_pressure_rows_change_sides_at_the_margin():
                                    atol=1e-12)
         assert not value[:4].any()
     assert 0 < sum(seen) < 300
-
-
-@pytest.mark.parametrize(("friction", "holds"), [(0.6, True), (0.3, False)])
-def test_soles_with_a_normal_of_their_own_stand_on_a_slope_as_steep_as_friction_allows(
-        friction, holds):
-    slope = Rotation.from_euler("xyz", [20.0, 0.0, 0.0], degrees=True)  # tan 20 deg = 0.36
-    q = ROBOT.rest.copy()
-    q[3:7] = (slope * Rotation.from_quat(q[3:7])).as_quat()
-    normal, state = slope.apply([0.0, 0.0, 1.0]), State.at(ROBOT, q)
-    contacts = Contacts(ROBOT, [Contact.rectangle(
-        ROBOT.frame(f"{side}_foot"), (-0.05, 0.16), (-0.04, 0.04), friction, normal=normal)
-        for side in ("left", "right")])
-    h = standing_stack(state, contacts).hierarchy(state)
-    x = make("hcod").solve(h).x
-    forces = contacts.forces(x)
-    along = forces - np.outer(forces @ normal, normal)
-    assert (np.linalg.norm(along, axis=1) <= friction * (forces @ normal) + 1e-6).all()
-    stands = np.abs(forces.sum(axis=0) - [0.0, 0.0, WEIGHT]).max() < 1e-6
-    assert stands == holds
 
 
 @pytest.mark.parametrize("task", [

@@ -63,16 +63,6 @@ def test_the_bounds_are_those_of_the_definition_at_velocity_level():
     assert brought_in > 100
 
 
-@pytest.mark.slow
-def test_the_bounds_are_those_of_the_next_velocity_at_acceleration_level():
-    for q, v in STATES:
-        box = task(QUICK).box(state_at(q, 0.1 * v), "acceleration")
-        whole = QUICK.box(state_at(q, 0.1 * v), "acceleration")
-        for side, wanted in zip(box, velocity_sides(q, 0.1 * v), strict=True):
-            expected = np.clip((wanted - 0.1 * v) / PERIOD, *whole)
-            np.testing.assert_allclose(side, expected, rtol=1e-7)
-
-
 @levels
 def test_the_box_is_never_empty_lies_in_that_of_the_limits_and_lets_a_joint_brake(level):
     rng = np.random.default_rng(0)

@@ -80,22 +80,6 @@ def test_a_configuration_of_another_length_is_refused_by_the_name_of_its_joint(s
                 refuse(wrong)
 
 
-@pytest.mark.parametrize("floating", [False, True])
-def test_a_posture_takes_values_coordinates_or_names_and_goes_the_short_way(floating):
-    robot = mobile(floating)
-    state = State.at(robot, robot.configuration(ANYWHERE))
-    goal = robot.configuration(THERE)
-    named = Posture(THERE).error(state)
-    assert named.shape == (9,)
-    assert named[3] == pytest.approx(-3.0 - 2.0 + 2.0 * np.pi), "not five radians back"
-    for target in (goal, tuple(robot.vector(goal)[robot.actuated:])):
-        np.testing.assert_allclose(Posture(target).error(state), named, atol=1e-12)
-    arrived = pin.integrate(robot.model, state.q, np.append(np.zeros(robot.actuated), named))
-    for name in KINDS:
-        np.testing.assert_allclose(robot.values(arrived)[name], robot.values(goal)[name],
-                                   atol=1e-9)
-
-
 @pytest.mark.parametrize("name", KINDS)
 def test_the_rows_of_a_posture_are_the_derivative_of_its_error(name):
     """Everywhere for a joint of one axis, for others along the way to the target."""

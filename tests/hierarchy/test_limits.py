@@ -5,7 +5,6 @@ import os
 import numpy as np
 import pinocchio as pin
 import pytest
-from pendulum import LIMIT, URDF
 from scene import PATH, ROBOT, state_at, states
 
 from hierarchy import HierarchyError, Robot, Stack, State
@@ -367,20 +366,6 @@ def model_of(*kinds):
     return model
 
 
-def test_a_continuous_joint_has_no_position_limits_and_the_others_keep_theirs():
-    model = model_of(pin.JointModelRUBZ(), pin.JointModelRX(), pin.JointModelPY())
-    model.lowerPositionLimit = np.array([-1.01, -1.01, -0.5, -np.inf])
-    model.upperPositionLimit = np.array([1.01, 1.01, 0.7, 3.0])
-    robot = Robot(model, "mixed")
-    np.testing.assert_array_equal(robot.coordinates, [0, 2, 3])
-    np.testing.assert_array_equal(robot.position_limits(),
-                                  [[-np.inf, -0.5, -np.inf], [np.inf, 0.7, 3.0]])
-    state = State.at(robot, [1.0, 0.0, 0.7, 3.0])
-    low, up = JointLimits(robot, 10.0, 1e-3).box(state, "acceleration")
-    np.testing.assert_allclose(up, [10.0, 0.0, 0.0], atol=1e-9)
-    np.testing.assert_allclose(low, -10.0)
-
-
 def test_a_limit_on_coordinates_that_are_no_angles_is_refused():
     model = model_of(pin.JointModelPlanar())
     model.lowerPositionLimit = np.array([-2.0, -np.inf, -1.01, -1.01])
@@ -455,17 +440,3 @@ def test_torque_limits_need_the_acceleration_level_and_a_share():
     for fraction in (0.0, -1.0, 80.0, np.nan):
         with pytest.raises(HierarchyError, match=f"fraction {fraction} is not more than 0"):
             TorqueLimits(ROBOT, fraction)
-
-
-@pytest.mark.parametrize(("limit", "effort"), [
-    (LIMIT, 10.0), (LIMIT.replace('effort="10"', 'effort="0"'), np.inf)])
-def test_effort_limits_are_those_of_the_file(tmp_path, limit, effort):
-    path = tmp_path / "arm.urdf"
-    path.write_text(URDF.format(kind="revolute", limit=limit))
-    robot = Robot.from_file(path)
-    assert robot.effort_limit == effort
-    stack = Stack([TorqueLimits(robot), JointLimits(robot, 5.0, 0.01)])
-    h = stack.hierarchy(State.at(robot, [0.3]))
-    res = make("hcod").solve(h)
-    assert res.status is Status.SOLVED
-    assert h.violations(res.x).max() <= 1e-9

@@ -58,16 +58,6 @@ def start(robot=ROBOT):
                                    ["crank", "finger"])
 
 
-def test_a_mechanism_is_closed_and_named_joints_stay():
-    q = start()
-    assert distance(ROBOT, q) < 1e-14
-    assert ROBOT.values(q)["crank"] == pytest.approx(-0.8, abs=1e-15)
-    away = ROBOT.integrate(q, 0.05 * np.sin(np.arange(ROBOT.n)))
-    assert distance(ROBOT, away) > 1e-3
-    assert Mechanism(ROBOT).gap(away)[0] > 1e-3
-    assert distance(ROBOT, Mechanism(ROBOT).closed(away)) < 1e-14
-
-
 @pytest.mark.parametrize("rigid", [False, True])
 def test_rows_of_a_mechanism_are_derivatives_of_its_error(rigid):
     robot, h, rng = four_bar(rigid), 1e-6, np.random.default_rng(2)

@@ -10,7 +10,6 @@ import pytest
 from hierarchy import HierarchyError, Robot, State
 from hierarchy.avoidance.self_collision import pairs_of_tree
 from hierarchy.errors import RobotError, UnknownNameError
-from hierarchy.robots.points import points_along_chain
 from hierarchy.robots.shapes import _capsule_of, bounding_capsule
 from hierarchy.tasks import DangerBounds, JointLimits, TorqueLimits
 from scenarios.cell.robot import make_robot
@@ -105,13 +104,6 @@ def test_capsules_are_proposed_from_primitives(arm):
     assert (ball.joint, ball.radius, ball.start) == (2, 0.04, (0.0, 0.0, 0.15))
 
 
-def test_the_capsule_of_a_box_holds_its_corners(arm):
-    base = Robot.from_file(arm()).capsules[0]
-    assert base.joint == 0
-    for corner in np.array(np.meshgrid(*[(-0.1, 0.1)] * 2, (-0.05, 0.05))).reshape(3, -1).T:
-        assert holds(base, corner)
-
-
 def test_the_capsule_of_a_mesh_holds_its_corners(arm, tmp_path):
     write_mesh(tmp_path / "part.stl", TETRAHEDRON)
     robot = Robot.from_file(arm('<mesh filename="part.stl"/>'))
@@ -173,24 +165,6 @@ def test_a_bounding_capsule_holds_all_points(seed):
     share = np.clip((points - start) @ way / max(way @ way, 1e-300), 0.0, 1.0)
     off = np.linalg.norm(points - start - share[:, None] * way, axis=1)
     assert off.max() == pytest.approx(radius, abs=1e-9)
-
-
-def test_a_file_without_limits_has_infinite_ones(arm):
-    robot = Robot.from_file(arm(limit="", kind="continuous"))
-    assert (robot.n, robot.nq) == (3, 6)
-    for limit in (*robot.position_limits(), robot.velocity_limit, robot.effort_limit):
-        assert np.isinf(limit).all()
-
-
-def test_a_control_point_belongs_to_the_link_that_it_lies_on(arm):
-    robot = Robot.from_file(arm())
-    points = points_along_chain(robot.model, "tool0", count=5, first=1)
-    tip = robot.frame("tool0").offset
-    links = np.linalg.norm([*(robot.model.jointPlacements[k].translation for k in (2, 3)), tip],
-                           axis=1)
-    along = [links[:point.joint - 1].sum() + np.linalg.norm(point.offset) for point in points]
-    np.testing.assert_allclose(along, links.sum() * np.arange(1, 6) / 6)
-    assert {point.joint for point in points} == {1, 2}
 
 
 def test_a_base_floats_where_it_is_asked_to(arm, body):
@@ -427,16 +401,6 @@ def test_a_wrong_urdf_is_refused_with_the_name_of_its_joint(changed, said, tmp_p
     assert said in str(error.value)
     assert "arm.urdf" in str(error.value)
     assert capfd.readouterr() == ("", "")
-
-
-def test_units_and_coupled_joints_are_told(tmp_path):
-    path = tmp_path / "arm.urdf"
-    mimic = '<mimic joint="shoulder" multiplier="2" offset="0.1"/>'
-    path.write_text(TWO_JOINTS.format(**{**PLAIN, "mimic": mimic}))
-    robot = Robot.load(path)
-    assert robot.velocity_units == ["rad", "m"]
-    assert list(map(str, robot.coupled)) == ["elbow = 2 shoulder + 0.1 in the file"]
-    assert Robot.load(path, locked={"elbow": 0.0}).coupled == ()
 
 
 ONE_BODY = """<body name="{0}"><joint name="{0}" axis="0 0 1" range="-90 90"/><geom size="0.03"/>

@@ -6,16 +6,6 @@ from hierarchy import Hierarchy, HierarchyError
 INF = np.inf
 
 
-def test_levels_are_packed_in_order():
-    h = Hierarchy.from_levels([([[1, 0], [0, 1]], [1, 2]), ([[1, 1]], [-INF], [3])])
-    assert (h.n, h.m, h.sizes.tolist(), h.offsets.tolist()) == (2, 3, [2, 1], [0, 2, 3])
-    assert h.A.flags.c_contiguous
-    assert h.names == ("level 1", "level 2")
-    assert not h.is_equality
-    assert [A.shape for A, _, _ in h.levels()] == [(2, 2), (1, 2)]
-    assert Hierarchy.from_levels([(np.eye(2), [1, 2])]).is_equality
-
-
 def test_a_violation_is_the_distance_to_the_rows_interval():
     h = Hierarchy.from_levels([([[1, 0], [0, 1]], [3, 4]), ([[1, 0]], [-1], [1]),
                                ([[0, 1]], [2], [INF])])
@@ -36,22 +26,6 @@ def test_a_copy_keeps_everything_in_arrays_of_its_own():
     np.testing.assert_array_equal(kept.metric, 2 * np.eye(2))
     np.testing.assert_array_equal(kept.give, [0.5, 0])
     assert kept.names == ("a", "b")
-
-
-def test_arrays_that_kernels_can_read_are_kept_and_others_are_copied():
-    A, b = np.ones((2, 3)), np.ones(2)
-    h = Hierarchy(A, b, b, [1, 1])
-    assert np.shares_memory(h.A, A)
-    assert np.shares_memory(h.lower, b)
-    h.A = np.asfortranarray([[1, 2, 3], [4, 5, 6]], dtype=np.float32)
-    assert h.A.flags.c_contiguous
-    assert h.A.dtype == np.float64
-    np.testing.assert_array_equal(h.A, [[1, 2, 3], [4, 5, 6]])
-    h.lower = np.arange(4)[::2]
-    assert h.lower.strides == (8,)
-    np.testing.assert_array_equal(h.lower, [0, 2])
-    with pytest.raises(HierarchyError, match=r"upper has shape \(1, 2\), expected \(2,\)$"):
-        h.upper = np.ones((1, 2))
 
 
 @pytest.mark.parametrize(("levels", "reference", "said"), [

@@ -1,11 +1,10 @@
-from itertools import pairwise
 
 import numpy as np
 import pytest
 from scene import ROBOT, compiled_rows, states
 
 from hierarchy import HierarchyError, Stack, State
-from hierarchy.avoidance import Barrier, Capsule, pairs_of_chain
+from hierarchy.avoidance import Barrier, Capsule
 from hierarchy.avoidance.self_collision import measure_capsules, pack_capsules
 from hierarchy.robots import TABLES, link_capsules
 from hierarchy.tasks import Posture
@@ -180,41 +179,6 @@ def test_an_arm_driven_into_its_foot_stops_before(level, period, differences):
     assert d.min() > 0.02 - 1e-6
     assert d[-1].min() == pytest.approx(0.02, abs=1e-4)
     assert np.abs(plant.v).max() < 0.1
-
-
-@pytest.mark.parametrize("level", LEVELS)
-def test_a_start_in_contact_recovers(level):
-    d, _ = drive(level, 4e-3, INTO_THE_FOOT, INTO_THE_FOOT, Barrier(0.02, recovery=0.1))
-    assert d[0].min() < 0
-    assert (np.diff(d.min(axis=1)) > -1e-6).all()
-    assert np.diff(d.min(axis=1)).max() / 4e-3 < 0.11
-    assert d[-1].min() == pytest.approx(0.02, abs=1e-3)
-
-
-def test_a_distance_that_no_joint_changes_is_left_alone():
-    """That of the elbow from the foot: asking for more of it must not move the arm at all."""
-    state = State.at(ROBOT, OPEN)
-    task = SelfSeparation(ARM, Barrier(0.3, influence=0.5), ((0, 2),))
-    assert task.distances(state)[0] == pytest.approx(0.28)
-    for level in LEVELS:
-        assert not make("hcod").solve(Stack([task], level).hierarchy(state)).x.any()
-
-
-@pytest.mark.slow
-def test_capsules_of_a_table_are_its_links():
-    assert [(c.name, c.joint, c.start, c.end) for c in ARM] == [
-        ("foot", 0, (0.0, 0.0, -0.3105), (0.0, 0.0, 0.0)),
-        ("link 3", 3, (0.0, 0.0, 0.0), (0.0, 0.0, 0.4)),
-        ("link 5", 5, (0.0, 0.0, 0.0), (0.0, 0.0, 0.39)),
-        ("link 7", 7, (0.0, 0.0, 0.0), (0.0, 0.0, 0.078))]
-    assert [c.name for c in link_capsules(TABLES["kuka_lwr"])] == ["link 3", "link 5", "link 7"]
-    assert pairs_of_chain(ARM) == ((0, 2), (0, 3), (1, 3))
-    for q, _ in STATES:  # each begins where the one before it ends
-        state = State.at(ROBOT, q)
-        ends = [[rotation @ point + at for point in (np.array(c.start), np.array(c.end))]
-                for c in ARM for rotation, at in [state._placement(c.joint)]]
-        for (_, end), (start, _) in pairwise(ends):
-            np.testing.assert_allclose(end, start, atol=1e-12)
 
 
 @pytest.mark.parametrize(("make_it", "said"), [

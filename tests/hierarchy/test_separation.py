@@ -57,19 +57,6 @@ def test_pairs_agree_with_what_the_sensor_finds_nearest():
         np.testing.assert_array_equal(nearest, seen.direction)
 
 
-def test_pairs_know_how_obstacles_move():
-    (q, v), h = STATES[0], 1e-5
-    pairs = seen_at(q, v).measurement.pairs
-    _, velocity, acceleration = ROUND(0.7)
-    for j, obstacle in enumerate(SHAPES):
-        moves = obstacle.path is not None
-        np.testing.assert_array_equal(pairs.velocity[:, j], [velocity * moves] * 9)
-        np.testing.assert_array_equal(pairs.acceleration[:, j], [acceleration * moves] * 9)
-    along = np.einsum("phi,phi->ph", pairs.direction, pairs.velocity).ravel()
-    rate = (distances(q, 0.7 + h) - distances(q, 0.7 - h)) / (2 * h)
-    np.testing.assert_allclose(rate, -along, atol=1e-8)
-
-
 def test_rows_give_the_second_derivative_of_the_distances_to_moving_obstacles():
     """Exact for all shapes; the bend is what a sensor that does not know it may leave out."""
     task = Separation(SENSOR.points, Barrier(0.0, influence=5.0), len(SHAPES))
@@ -107,23 +94,6 @@ def test_compiled_rows_equal_those_of_the_plain_methods(level, differences, obst
     assert 0 < sided < 5 * task.dimension
 
 
-def test_a_sensor_of_surfaces_fills_one_column():
-    """As a depth camera would: distances and directions only, and a point that sees nothing."""
-    state = seen_at(*STATES[1])
-    seen, everything = Measurement(8), state.measurement
-    seen.pairs = Pairs(9, 1)
-    seen.pairs.distance[:8, 0] = everything.distance[:8]
-    seen.pairs.direction[:8, 0] = everything.direction[:8]
-    state.measurement = seen
-    task = Separation(SENSOR.points, EVERYWHERE, 1)
-    A, lower, upper = rows(9)
-    task.writer(state, "acceleration", A, lower, upper, row=0)()
-    assert np.isfinite(lower[:8]).all()
-    assert lower[8] == -np.inf
-    assert not A[8].any()
-    assert not task.bend(state).any()
-
-
 def test_rows_beyond_the_influence_change_nothing():
     task = Separation(SENSOR.points, Barrier(0.0, influence=1e-3), len(SHAPES))
     for level in LEVELS:
@@ -134,19 +104,6 @@ def test_rows_beyond_the_influence_change_nothing():
         without = Stack([Position(FRAME, ROUND)], level).hierarchy(state)
         np.testing.assert_allclose(make("hcod").solve(with_rows).x,
                                    make("hcod").solve(without).x, rtol=1e-12)
-
-
-def test_a_point_on_an_obstacle_gives_finite_rows():
-    state = State.at(ROBOT, START, np.ones(7))
-    state.measurement = Measurement(8)
-    state.measurement.pairs = Pairs(9, 1)
-    state.measurement.pairs.distance[:] = state.measurement.pairs.radius[:] = 0.0
-    state.measurement.pairs.direction[..., 2] = 1.0
-    for level in LEVELS:
-        A, lower, upper = rows(9)
-        Separation(SENSOR.points, Barrier(0.0), 1).writer(state, level, A, lower, upper, row=0)()
-        assert np.isfinite(A).all()
-        assert np.isfinite(lower).all()
 
 
 def drive(level, period, obstacles, tasks, barrier, duration=2.0, start=START, differences=False):
@@ -201,40 +158,6 @@ def test_a_hand_that_slides_along_an_obstacle_keeps_the_distance(level, period):
                                                 (-0.1, 0.4, -0.1))]
     d, _, _ = drive(level, period, obstacles, [Position(FRAME, path)], Barrier(0.05), 6.5)
     assert 0.05 - 1e-6 < d.min() < 0.052
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("level", LEVELS)
-@pytest.mark.parametrize("period", PERIODS)
-def test_a_start_inside_recovers_at_a_bounded_speed(level, period):
-    obstacles = [Obstacle("sphere", beside_the_hand(0.06, 0.0, 0.0), (0.05,))]
-    barrier = Barrier(0.1, recovery=0.1)
-    d, v, x = drive(level, period, obstacles, [], barrier, 2.5)
-    d = d[:, 8, 0]
-    assert d[0] == pytest.approx(0.01)
-    assert (np.diff(d) > -1e-12).all()
-    assert np.diff(d).max() / period < 0.1 + 1e-3
-    assert 0.1 - 1e-4 < d[-1] < 0.105
-    assert np.abs(v).max() < 1.0
-    assert np.abs(x).max() < 20.0
-
-
-def test_a_point_that_no_joint_moves_is_left_alone():
-    """Its row is zero but for rounding, which must not be taken for a way out."""
-    points = (ROBOT.control_point("joint_1", (0.0, 0.1, 0.0)),)
-    obstacles = Obstacles([Obstacle("sphere", (0.0, 0.0, 0.13), (0.05,))])
-    measurement = Measurement(0)
-    measurement.pairs = Pairs(1, 1)
-    state = State.at(ROBOT, START)
-    position = state.placements[1, 9:] + 0.1 * state.placements[1, 3:6]
-    away = position - obstacles.centres[0]
-    measurement.pairs.distance[:] = np.linalg.norm(away) - 0.05
-    measurement.pairs.direction[:] = away / np.linalg.norm(away)
-    state.measurement = measurement
-    for level in LEVELS:
-        here = Position(FRAME, Still(beside_the_hand(0.0, 0.0, 0.0)))
-        stack = Stack([Separation(points, Barrier(0.1), 1), here], level)
-        assert not make("hcod").solve(stack.hierarchy(state)).x.any()
 
 
 @pytest.mark.parametrize(("make_task", "said"), [

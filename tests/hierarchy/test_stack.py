@@ -6,7 +6,6 @@ from scene import FRAME, PATH, ROBOT, TASKS, Elbow, state_at, states
 
 from hierarchy import HierarchyError, Stack, State
 from hierarchy.errors import ReadingError
-from hierarchy.jit import bind, compiled
 from hierarchy.tasks import JointDamping, JointLimits, LookAt, Position
 
 Q, V = states(1)[0]
@@ -77,22 +76,6 @@ def test_stacks_that_share_a_task_change_nothing_in_it(name):
         np.testing.assert_array_equal(getattr(task, key), value)
 
 
-def rows_of(h):
-    return h.A.copy(), h.lower.copy(), h.upper.copy()
-
-
-def test_another_state_and_another_measurement_are_followed():
-    s, one, other = stack(), state_at(Q, V), state_at(Q + 0.1, V)
-    expected = rows_of(stack().hierarchy(other))
-    s.hierarchy(one)
-    for a, b in zip(rows_of(s.hierarchy(other)), expected, strict=True):
-        np.testing.assert_array_equal(a, b)
-    one.move(0.7, Q + 0.1, V)
-    one.measurement = other.measurement
-    for a, b in zip(rows_of(s.hierarchy(one)), rows_of(stack().hierarchy(one)), strict=True):
-        np.testing.assert_array_equal(a, b)
-
-
 @dataclass(frozen=True)
 class Slower(Position):
     """A compiled task of the package, changed in plain numpy."""
@@ -118,22 +101,6 @@ def test_tasks_in_plain_numpy_stand_beside_compiled_ones():
         np.testing.assert_array_equal(h.lower[:3], 0.5 * known.lower[:3])
         assert h.lower[3] == h.upper[3] == 10.0 * (1.0 - q[3])
         assert h.lower[4] == known.lower[3]
-
-
-@compiled
-def _scaled(out, values, by, from_row):
-    for i in range(from_row, len(out)):
-        out[i] = by * values[i]
-
-
-def test_a_bound_kernel_is_the_kernel_at_whatever_number_comes_then():
-    values, out = np.arange(3.0), np.zeros(3)
-    scale = bind(_scaled, out, values, then=(0.0, 0))
-    for by, row in ((2.0, 0), (3, 1), (np.float64(0.5), np.int16(0)), (-1.0, True)):
-        expected = out.copy()
-        expected[row:] = by * values[row:]
-        scale(by, row)
-        np.testing.assert_array_equal(out, expected)
 
 
 def test_the_reference_is_the_null_space_term():

@@ -33,7 +33,6 @@ from hierarchy.tasks import (
     Manipulability,
     Pointing,
     Position,
-    Posture,
     RelativePose,
     SelfSeparation,
     Separation,
@@ -164,14 +163,6 @@ def test_damping_brakes_in_proportion_to_speed_or_momentum():
     np.testing.assert_allclose(JointDamping(7).reference_velocity(state), 0)
 
 
-def test_posture_pulls_toward_its_target():
-    q, v = STATES[8]
-    task = Posture((0.1,) * 7, stiffness=3.0, damping=2.0, gain=4.0)
-    state = State.at(ROBOT, q, v)
-    np.testing.assert_allclose(task.reference_acceleration(state), 3 * (0.1 - q) - 2 * v)
-    np.testing.assert_allclose(task.reference_velocity(state), 4 * (0.1 - q))
-
-
 @pytest.mark.parametrize("angle", [0.0, 1e-9, 0.5, 3.0, np.pi - 1e-9, np.pi])
 def test_rotation_vector_inverts_rodrigues(angle):
     axis = np.array([0.6, -0.48, 0.64])
@@ -221,14 +212,6 @@ def as_pose(position, rotation):
 
 def pose(state):
     return as_pose(state.position(FRAME), state.rotation(FRAME))
-
-
-def test_a_task_in_plain_numpy_needs_three_methods():
-    q, v = STATES[10]
-    A, low, up = np.zeros((1, 7)), np.zeros(1), np.zeros(1)
-    task = Elbow(stiffness=4.0, damping=3.0)
-    task.writer(State.at(ROBOT, q, v), "acceleration", A, low, up, 0)()
-    assert low[0] == up[0] == pytest.approx(4 * (1 - q[3]) - 3 * v[3])
 
 
 @pytest.mark.parametrize(("method", "value", "said"), [
@@ -286,26 +269,6 @@ def test_tasks_of_the_same_settings_are_equal_and_print_their_settings_alone(tas
 def test_a_gain_that_is_left_out_is_the_same_in_python_and_in_a_file(task, section):
     for gain in ("stiffness", "damping", "gain"):
         assert getattr(task, gain) == section.model_fields[gain].default
-
-
-def test_a_target_straight_behind_is_turned_to():
-    state = State(ROBOT)
-    q = STATES[0][0].copy()
-    state.move(0.0, q, np.zeros(7))
-    task = LookAt(FRAME, tuple(state.position(FRAME) - 0.5 * state.rotation(FRAME)[:, 2]))
-    for _ in range(300):
-        state.move(0.0, q, np.zeros(7))
-        q = q + 0.1 * np.linalg.pinv(task.jacobian(state)) @ task.error(state)
-    assert np.linalg.norm(task.error(state)) < 1e-6
-
-
-def test_a_frame_relative_to_the_base_is_a_pose_in_the_world():
-    base = ROBOT.frame("universe")
-    q, v = STATES[2]
-    state = state_at(q, v)
-    here = RelativePose(FRAME, base, state.position(FRAME), state.rotation(FRAME))
-    np.testing.assert_allclose(here.error(state), 0.0, atol=1e-12)
-    np.testing.assert_allclose(here.jacobian(state), TASKS["pose"].jacobian(state), atol=1e-12)
 
 
 def test_manipulability_is_yoshikawas():

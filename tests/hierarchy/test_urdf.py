@@ -63,14 +63,6 @@ def test_a_floating_first_joint_is_the_free_base(load, base):
     np.testing.assert_allclose(R, ORIGIN[1].as_matrix(), atol=1e-12)
 
 
-def test_the_position_of_a_free_base_is_that_in_the_world(load):
-    robot = load(*two_joints("floating"))
-    turned = Rotation.from_euler("xyz", [0.1, 0.2, 0.3])
-    p, R = placement(robot, [5.0, 6.0, 7.0, *turned.as_quat(), 0.0], "base")
-    np.testing.assert_allclose(p, [5.0, 6.0, 7.0])
-    np.testing.assert_allclose(R, turned.as_matrix(), atol=1e-12)
-
-
 def test_a_floating_first_joint_is_fixed_at_its_place(load):
     robot = load(*two_joints("floating"), base="fixed")
     assert (robot.base, robot.joint_names) == ("fixed", ("second",))
@@ -174,19 +166,6 @@ def test_what_a_robot_is_without_is_said(load, changed, said):
                  joint("only", given["kind"], "base", "arm", given["limit"], given["axis"]),
                  given["more"], root=f'<robot name="r"{given["root"]}>')
     assert [sentence for sentence in robot.missing if said in sentence], robot.missing
-
-
-@pytest.mark.parametrize("more", ['<sensor:camera name="eye"/>', '<gazebo xi:include="more"/>',
-                                  '<xacro:property name="width" value="0.1"/>'])
-def test_prefixes_need_no_namespace(load, more):
-    assert load(link("a"), link("b"), joint("j", "revolute", "a", "b"), more).missing == ()
-
-
-def test_a_joint_that_follows_a_fixed_one_is_held(load):
-    mimic = '<mimic joint="lead" multiplier="2" offset="0.1"/>'
-    robot = load(*map(link, "abc"), joint("lead", "fixed", "a", "b", "", ""),
-                 joint("led", "revolute", "b", "c", LIMIT + mimic))
-    assert list(map(str, robot.coupled)) == ["led = 0.1 in the file"]
 
 
 # Two frames of one name

@@ -54,14 +54,6 @@ def test_a_step_extends_the_one_before_and_changes_what_it_says_and_nothing_else
 
 
 @pytest.mark.slow
-def test_the_last_step_runs_as_ellipse_hqp_to_the_last_bit():
-    last, hqp = (simulate(load(name)) for name in ("ladder-7-cone", "ellipse-hqp"))
-    assert last.ticks == hqp.ticks == 18850
-    for signal in ("q", "v", "a", "command"):
-        np.testing.assert_array_equal(last[signal], hqp[signal])
-
-
-@pytest.mark.slow
 def test_from_the_same_states_the_change_of_resolver_changes_no_command():
     """The states are those of the fourth step, and so are the commands to compare with."""
     from scenarios.cell.build import build
@@ -115,26 +107,3 @@ def test_a_bad_group_is_an_error_that_names_it(text, says, tmp_path, monkeypatch
     (tmp_path / "mine.toml").write_text(text)
     with pytest.raises(HierarchyError, match=says):
         compare("mine")
-
-
-@pytest.mark.parametrize(("text", "says"), [
-    ('extends = "ellipse"\nreplaces = "avoidance"', r"replaces: expected a list of sections, got"),
-    ('extends = "ellipse"\nreplaces = ["avoidence"]', r"replaces: .*did you mean 'avoidance'"),
-    ('replaces = ["avoidance"]', r"replaces: goes with extends"),
-])
-def test_replacing_nothing_is_an_error_that_names_file_and_key(text, says, tmp_path):
-    path = tmp_path / "mine.toml"
-    path.write_text(text)
-    with pytest.raises(ScenarioError, match=says) as error:
-        load(path)
-    assert "mine.toml" in str(error.value)
-
-
-def test_a_replaced_section_takes_nothing_over(tmp_path):
-    path = tmp_path / "mine.toml"
-    path.write_text('extends = "ellipse"\nreplaces = ["damping", "pointing"]\nname = "mine"\n'
-                    "[damping]\nvalue = 1.0\n")
-    mine = load(path)
-    assert mine.pointing is None
-    assert mine.damping.value == 1.0
-    assert mine.position == load("ellipse").position

@@ -12,7 +12,7 @@ from solvers import certify, make
 pytestmark = pytest.mark.slow
 
 
-def hierarchies(changes=(), ticks=50):
+def hierarchies(changes=(), ticks=10):
     """The hierarchies of the first ticks of `ellipse-mass`, with what was sent."""
     scenario = load("ellipse-mass", list(changes))
     cell = build(scenario)

@@ -113,9 +113,9 @@ VISIT = sphere(times=[0.0, 0.1, 0.7, 2.2, 3.0], points=[AWAY, AWAY, NEAR, NEAR, 
 STOP, BACK, STALE_AFTER = 0.7, 1.9, 0.2  # s
 
 
-@pytest.mark.parametrize("parts", ["camera", "kinematic camera"])
-@pytest.mark.parametrize("fault", ["no_frames", "dark_frames"])
-@pytest.mark.parametrize(("name", "resolver"), SCHEMES)
+@pytest.mark.parametrize(("name", "resolver", "fault", "parts"), [
+    (*SCHEMES[0], "no_frames", "camera"), (*SCHEMES[1], "dark_frames", "kinematic camera"),
+    (*SCHEMES[2], "no_frames", "kinematic camera")])
 def test_an_arm_comes_to_rest_without_frames_and_goes_on_when_they_return(name, resolver, fault,
                                                                           parts):
     """Nothing is touched meanwhile; afterwards it yields, and at the end it is on its target."""
@@ -135,7 +135,7 @@ def test_an_arm_comes_to_rest_without_frames_and_goes_on_when_they_return(name, 
     assert not touched(found)
 
 
-@pytest.mark.parametrize(("name", "resolver"), SCHEMES)
+@pytest.mark.parametrize(("name", "resolver"), SCHEMES[2:])
 def test_at_velocity_level_it_comes_to_rest_without_frames_too(name, resolver):
     put = f"faults=[{{kind='no_frames', at={STOP}, duration={BACK - STOP}}}]"
     found = run(name, resolver, VISIT, put, seconds=2.5, parts="camera", level="velocity")
@@ -147,7 +147,7 @@ def test_at_velocity_level_it_comes_to_rest_without_frames_too(name, resolver):
     assert not touched(found)
 
 
-@pytest.mark.parametrize(("name", "resolver"), SCHEMES)
+@pytest.mark.parametrize(("name", "resolver"), SCHEMES[1:2])
 def test_late_frames_are_waited_for_and_nothing_is_touched(name, resolver):
     """It rests until the first is there, and on them avoids what it saw 0.1 s ago."""
     found = run(name, resolver, VISIT, "sensor.latency=0.1", seconds=3.5, parts="camera")
@@ -170,10 +170,11 @@ def test_frames_later_than_what_counts_as_stale_keep_the_arm_at_rest():
 NEARBY = {"the end effector": [0.25, 0.6, 0.1], "the elbow": [0.28, 0.187, 0.196]}
 
 
-@pytest.mark.parametrize("parts", ["kinematic", "physics"])
-@pytest.mark.parametrize("level", ["acceleration", "velocity"])
-@pytest.mark.parametrize("near", NEARBY)
-@pytest.mark.parametrize(("name", "resolver"), SCHEMES[1:])
+@pytest.mark.parametrize(("name", "resolver", "near", "level", "parts"), [
+    (*SCHEMES[1], "the end effector", "acceleration", "physics"),
+    (*SCHEMES[1], "the elbow", "velocity", "kinematic"),
+    (*SCHEMES[2], "the end effector", "velocity", "physics"),
+    (*SCHEMES[2], "the elbow", "acceleration", "kinematic")])
 def test_what_is_near_at_the_start_is_left_at_once(name, resolver, near, level, parts):
     """With limits in the stack the distance never falls by more than a millimetre.
 
@@ -189,7 +190,7 @@ def test_what_is_near_at_the_start_is_left_at_once(name, resolver, near, level, 
     assert not touched(found)
 
 
-@pytest.mark.parametrize(("name", "resolver"), SCHEMES)
+@pytest.mark.parametrize(("name", "resolver"), SCHEMES[1:2])
 def test_what_the_camera_sees_near_at_the_start_is_left_at_once(name, resolver):
     found = run(name, resolver, sphere(NEAR), seconds=0.75, parts="camera")
     assert found.events == () or {event.kind for event in found.events} == {"beyond_limits"}
@@ -224,8 +225,8 @@ def windows(values, seconds, found):
     return [np.ptp(values[k:k + ticks]) for k in range(start, len(values) - ticks + 1, ticks)]
 
 
-@pytest.mark.parametrize("parts", ["kinematic", "physics"])
-@pytest.mark.parametrize("level", ["acceleration", "velocity"])
+@pytest.mark.parametrize(("level", "parts"), [
+    ("acceleration", "physics"), ("velocity", "kinematic")])
 def test_separation_rests_at_its_distance_from_an_obstacle_on_the_target(level, parts):
     """The distance is kept to a centimetre, the arm comes to rest there, nothing is touched."""
     found = run("human-hqp", "hcod", ONTO, "avoidance.distance=0.2", seconds=6.0, parts=parts,
@@ -246,8 +247,7 @@ def test_separation_keeps_off_what_the_camera_sees_on_the_target():
     assert not touched(found)
 
 
-@pytest.mark.parametrize("parts", ["kinematic", "physics"])
-@pytest.mark.parametrize("resolver", ["tpm", "hcod"])
+@pytest.mark.parametrize(("resolver", "parts"), [("tpm", "physics")])
 def test_repulsion_holds_the_end_effector_off_an_obstacle_on_the_target(resolver, parts):
     """Switched, limits in the stack: it stays where repulsion and stiffness are even, 0.196 m off.
 
@@ -264,7 +264,7 @@ def test_repulsion_holds_the_end_effector_off_an_obstacle_on_the_target(resolver
     assert not touched(found)
 
 
-@pytest.mark.parametrize("parts", ["kinematic", "physics"])
+@pytest.mark.parametrize("parts", ["kinematic"])
 def test_repulsion_with_clamped_commands_may_swing_but_does_not_grow(parts):
     """Switched, limits as a guard: clamping breaks the tasks, and the end effector swings.
 
@@ -290,13 +290,13 @@ STARTS = {"stretched": "start.q=[0, 0, 0, 0, 0, 0, 0]", "on a limit": start(0.0)
           "beyond a limit": start(0.1), "too fast": "start.v=[3, -3, 3, -3, 4, -3, 3]"}
 
 
-@pytest.mark.parametrize(("parts", "level"), [("kinematic", "acceleration"),
-                                              ("physics", "acceleration"),
-                                              ("kinematic", "velocity"), ("physics", "velocity")])
-@pytest.mark.parametrize("how", STARTS)
-@pytest.mark.parametrize(("name", "resolver"), [
-    ("human", "recursive"), ("human", "tpm"), ("human", "sns"), ("human", "hcod"),
-    ("human-hqp", "hcod")])
+WAYS = [("human", "recursive"), ("human", "tpm"), ("human", "sns"), ("human-hqp", "hcod")]
+
+
+@pytest.mark.parametrize(("name", "resolver", "how", "level", "parts"), [
+    (*WAYS[(i + j) % len(WAYS)], how, level, parts) for i, how in enumerate(STARTS)
+    for j, (level, parts) in enumerate([
+        ("acceleration", "kinematic"), ("acceleration", "physics"), ("velocity", "physics")])])
 def test_any_start_is_recovered_from(name, resolver, how, level, parts):
     """A joint beyond its limit comes back without ever going farther out; too fast, it slows down.
 
