@@ -112,6 +112,20 @@ def test_a_live_run_that_nobody_touches_is_the_run_itself(recording):
         assert (found[name] == recording[name]).all(), name
 
 
+def test_a_live_run_that_starts_again_keeps_its_settings_and_nothing_of_its_motion(recording):
+    live = Live(LIMITED)
+    ticks(live, 10)
+    live.drag(0, (0.0, 0.0, 0.1))
+    live.change({"pointing.alpha_d": 15.0})
+    ticks(live, 50)
+    live.restart()
+    assert (live.t, live.changes, live.over) == (0.0, [], False)
+    assert live.scenario.pointing.alpha_d == 15.0
+    assert not live.obstacles.offset.any()
+    ticks(live, 1)
+    np.testing.assert_array_equal(live.recording()["q"][0], recording["q"][0])
+
+
 def test_the_resolver_is_switched_in_mid_motion_and_back():
     live = Live(load("ellipse", ["control.duration=0.6"]))
     ticks(live, 100)
