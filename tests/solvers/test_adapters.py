@@ -498,33 +498,3 @@ def test_a_problem_needs_a_level_that_is_there_and_what_the_levels_above_reach()
         level_problem(h, 2)
     with pytest.raises(HierarchyError, match="level 2: above must be"):
         level_problem(h, 2, np.full(7, np.nan))
-
-
-def test_rows_of_adapters_carry_the_names_of_joints_and_frames():
-    mink, mujoco = pytest.importorskip("mink"), pytest.importorskip("mujoco")
-    model = mujoco.MjModel.from_xml_string(BEYOND)
-    tip = mink.FrameTask("hand", "site", 1.0, [0.0, 0.5, 0.0])
-    tip.set_target(mink.SE3.from_translation(np.array([0.3, 0.0, 0.3])))
-    rest = mink.PostureTask(model, cost=1.0)
-    rest.set_target(np.zeros(2))
-    h = from_mink.hierarchy(mink.Configuration(model, q=np.array([0.2, -0.1])), [tip, rest], 0.01)
-    assert h.named() == ("s", "e", "hand x", "hand y", "hand z", "hand about y", "s", "e")
-
-
-def test_a_joint_too_far_outside_its_range_for_its_speed_is_named():
-    mink, mujoco = pytest.importorskip("mink"), pytest.importorskip("mujoco")
-    model = mujoco.MjModel.from_xml_string(BEYOND)
-    tip = mink.FrameTask("hand", "site", 1.0, 0.0)
-    tip.set_target(mink.SE3.from_translation(np.array([0.3, 0.0, 0.3])))
-    limits = [mink.ConfigurationLimit(model), mink.VelocityLimit(model, {"s": 5.0, "e": 5.0})]
-    with pytest.raises(HierarchyError, match="limits cannot all hold: joint e must move by"):
-        from_mink.hierarchy(mink.Configuration(model, q=np.array([0.2, 0.25])), [tip], 0.01,
-                            limits)
-    inside = mink.Configuration(model, q=np.array([0.2, 0.04]))
-    x = make("hcod").solve(from_mink.hierarchy(inside, [tip], 0.01, limits)).x
-    assert (np.abs(x) <= 5.0 + 1e-9).all()
-
-
-BEYOND = """<mujoco><worldbody><body name="u"><joint name="s" axis="0 1 0" range="-120 120"/>
-<geom size=".05"/><body name="f" pos="0 0 .3"><joint name="e" axis="0 1 0" range="-140 0"/>
-<geom size=".05"/><site name="hand" pos="0 0 .3"/></body></body></worldbody></mujoco>"""
