@@ -1,7 +1,6 @@
 """Generated problems, every answer certified or proved; problems that once failed."""
 
 import os
-from collections import Counter
 from pathlib import Path
 
 import numpy as np
@@ -104,18 +103,6 @@ def test_an_answer_that_an_oracle_cannot_judge_is_a_failure(monkeypatch):
     monkeypatch.setattr(stress, "certify", raises)
     assert stress.outcome(make("hcod"), problem())[0] == stress.UNJUDGED
     assert stress.UNJUDGED in stress.FAILURES
-
-
-def test_a_status_other_than_solved_is_counted_by_its_name():
-    h = Hierarchy.from_levels([(np.eye(2), np.zeros(2))])
-    assert stress.outcome(Wrong(stress.RAISED), h)[0] == "ITERATION_LIMIT"
-    assert stress.outcome(make("tpm"), h)[0] == stress.CERTIFIED
-
-
-def test_iterations_are_counted_by_row():
-    found = stress.Tally(effort=Counter({10: 998, 50: 1, 700: 1}))
-    assert [*found.iterations_per_row().values()] == [0.1, 0.5, 7.0]
-    assert [*stress.Tally().iterations_per_row().values()] == [0.0, 0.0, 0.0]
 
 
 def test_many_processes_count_like_one_and_report_all_kinds_apart(tmp_path, monkeypatch):

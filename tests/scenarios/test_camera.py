@@ -89,19 +89,6 @@ def test_the_robot_is_seen_where_its_capsules_are():
             assert 0.0 < seen[round(v), round(u)] < depth - 0.9 * capsule.radius + 1e-3
 
 
-def test_a_camera_looks_at_its_target_upright():
-    position, target = np.array([1.0, -2.0, 1.5]), np.array([0.2, 0.1, 0.3])
-    pinhole = Pinhole(position=position, rotation=looking_at(position, target))
-    u, v, depth = pinhole.project(target)
-    assert (u, v) == pytest.approx((319.5, 239.5))
-    assert depth == pytest.approx(np.linalg.norm(target - position))
-    above = pinhole.project(target + np.array([0.0, 0.0, 0.1]))
-    assert above[0] == pytest.approx(319.5)
-    assert above[1] < v
-    down = Pinhole(position=(0, 0, 3), rotation=looking_at((0, 0, 3), (0, 0, 0)))
-    assert down.project((0.0, 0.1, 0.0))[1] < 239.5
-
-
 @pytest.mark.parametrize("depth", [1.0, 3.0])
 def test_noise_has_the_stated_size_and_a_bound(depth):
     errors = DepthErrors(step=0.0, missing=0.0, missing_at_edges=0.0, outliers=0.0)

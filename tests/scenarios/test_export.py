@@ -13,7 +13,6 @@ from scenarios.cli.main import run_command
 from scenarios.export import export, foxglove
 from scenarios.measure.run_folder import save
 from scenarios.recording.recording import Event
-from scenarios.recording.tree import joint_units, tree_of
 from scenarios.scene import scene
 
 CONSTANT = {"joint_lower", "joint_upper", "velocity_limit"}
@@ -30,17 +29,6 @@ def run():
 def test_every_signal_of_the_ticks_is_a_column(run):
     names = {column.name.partition("[")[0] for column in run.columns()}
     assert names == {*run.signals, "stack", "events"} - CONSTANT
-
-
-def test_a_slide_is_measured_in_metres_and_a_wheel_by_cosine_and_sine(tmp_path):
-    (tmp_path / "cart.urdf").write_text("""<robot name="cart"><link name="a"/><link name="b"/>
-      <link name="c"/><joint name="slide" type="prismatic"><parent link="a"/><child link="b"/>
-      <axis xyz="1 0 0"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
-      <joint name="wheel" type="continuous"><parent link="b"/><child link="c"/>
-      <axis xyz="0 0 1"/></joint></robot>""")
-    robot = Robot.from_file(tmp_path / "cart.urdf")
-    assert joint_units(tree_of(robot)) == (("m", "1", "1"), ("m", "rad"))
-    assert robot.velocity_names == ["slide", "wheel"]
 
 
 @pytest.fixture(scope="module")
@@ -139,17 +127,6 @@ def test_the_path_taken_is_whole_when_its_pieces_are_joined(run, every):
         assert after[0] == before[-1]
     joined = [pieces[0][0], *(point for piece in pieces for point in piece[1:])]
     np.testing.assert_array_equal(joined, drawn.traced)
-
-
-def test_what_has_several_indices_is_one_list(run, tmp_path):
-    reader = pytest.importorskip("mcap.reader")
-    offsets = np.arange(6.0 * run.ticks).reshape(run.ticks, 2, 3)
-    dragged = replace(run, signals=run.signals | {"dragged": offsets})
-    export(dragged, tmp_path / "run.mcap")
-    with (tmp_path / "run.mcap").open("rb") as stream:
-        rows = [json.loads(message.data)["dragged"]
-                for _, _, message in reader.make_reader(stream).iter_messages(["/other"])]
-    np.testing.assert_array_equal(np.reshape(rows, offsets.shape), offsets)
 
 
 def test_the_layout_shows_only_what_the_file_has(messages):

@@ -141,13 +141,6 @@ def test_out_of_reach_strict_resolvers_keep_the_feet(reaching, name):
     assert excess.max() < 1e-6
 
 
-def test_out_of_reach_the_resolver_without_priorities_lets_the_feet_slip(reaching):
-    run = reaching["augmented"]
-    slips = [np.linalg.norm(run[f"task_error_{foot}"][:, :3], axis=1).max()
-             for foot in ("left_foot", "right_foot")]
-    assert min(slips) > 0.05
-
-
 def test_the_picture_of_a_robot_that_branches_shows_its_body(standing):
     from matplotlib.collections import PatchCollection
     axes = picture({"tpm": standing}).axes[0]

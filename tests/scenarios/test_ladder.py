@@ -4,12 +4,11 @@ import json
 import tomllib
 from itertools import pairwise
 
-import numpy as np
 import pytest
 
 import scenarios.config.groups as groups_of
 from hierarchy import HierarchyError
-from scenarios import compare, load, simulate
+from scenarios import compare, load
 from scenarios.cli.main import run_command
 from scenarios.config import ScenarioError, members, shipped_groups
 from scenarios.config.reading import LIBRARY
@@ -51,25 +50,6 @@ def test_a_step_extends_the_one_before_and_changes_what_it_says_and_nothing_else
     found = differing(before, name)
     assert found
     assert all(key == STEPS[name] or key.startswith(f"{STEPS[name]}.") for key in found)
-
-
-@pytest.mark.slow
-def test_from_the_same_states_the_change_of_resolver_changes_no_command():
-    """The states are those of the fourth step, and so are the commands to compare with."""
-    from scenarios.cell.build import build
-
-    run = simulate(load("ladder-4-priority", ["control.duration=3.0"]))
-    scenario = load("ladder-5-hcod")
-    cell, resolver = build(scenario), scenario.make_resolver()
-    worst = 0.0
-    for k in range(0, run.ticks, 10):
-        cell.state.move(float(run["t"][k]), run["q"][k], run["v"][k])
-        seen = cell.sensor.measure(cell.state)
-        order = cell.order(seen, float(run["pointing_error"][k])).order
-        assert order == run.order_names[run["order"][k]]
-        x = resolver.solve(cell.stack.hierarchy(cell.state, order)).x
-        worst = max(worst, np.abs(x - run["command"][k]).max())
-    assert worst < 1e-6
 
 
 @pytest.mark.slow

@@ -48,13 +48,6 @@ def test_other_resolvers_find_the_same_command_or_refuse_the_bounds():
         make("sns").solve(h)
 
 
-def test_velocities_have_a_metric_too():
-    changes = ["control.level=velocity", "control.stack=hierarchical"]
-    h, x, _ = next(hierarchies(changes, 1))
-    assert h.metric is not None
-    assert certify(h, x).certified
-
-
 def test_bounds_in_the_inertia_are_for_resolvers_of_any_rows():
     assert load("ellipse-limits").asks == "bounds"
     assert load("ellipse-limits", ["control.metric=mass"]).asks == "inequalities"

@@ -63,11 +63,6 @@ def test_joint_limit_excess_names_the_joint_that_is_furthest_out():
     assert value("joint_limit_excess") == 0.0
 
 
-def test_changes_are_counted_between_ticks():
-    assert value("stack_changes", order=[0, 1, 1, 0, 0]) == 2
-    assert value("active_point_changes", active_control_point=[-1, 6, 6, 7, -1]) == 3
-
-
 @pytest.mark.parametrize(("unit", "shown"), [
     ("m", "12345.679"), ("s", "1.2e+07"), ("deg", "12.346"), ("share", "1234.57"),
     ("rad", "12.346"), ("rad/s", "12.346"), ("rad/s^2", "12.35"), ("rad/s^3", "12"),

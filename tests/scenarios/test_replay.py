@@ -131,21 +131,6 @@ def test_scrubbing_moves_the_cursor_of_every_curve(page):
     assert page.run("player.t") == 1.0
 
 
-def test_the_list_is_the_order_of_the_stack_and_says_what_is_given_up(page, runs):
-    recording = runs["tpm-published"]
-    shown = scene(recording)
-    for f in (0, *(int(np.searchsorted(shown.t, t)) for t in shown.switches[:3])):
-        page.run(f"player.seek({float(shown.t[f])} + 1e-4)")
-        listed = page.run("""[...document.querySelectorAll('.card')[0].querySelectorAll('li')]
-            .filter(li => li.className !== 'absent')
-            .sort((a, b) => +a.querySelector('b').textContent - +b.querySelector('b').textContent)
-            .map(li => [li.dataset.task, li.className])""")
-        assert tuple(task for task, _ in listed) == shown.orders[shown.order[f]]
-        for task, fate in listed:
-            found = shown.levels.fate[f, shown.levels.names.index(task)]
-            assert fate == {2: "free", 3: "met", 4: "missed"}[int(found)]
-
-
 def test_runs_stand_side_by_side_and_can_be_hidden(page):
     page.press("s")
     page.painted()

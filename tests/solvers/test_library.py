@@ -73,28 +73,6 @@ def test_warm_sequences_give_the_same_bits(library, name):
 
 
 @pytest.mark.slow
-def test_violations_are_those_of_python(library):
-    rng = np.random.default_rng(3)
-    for h in hierarchies(25):
-        x = rng.normal(size=h.n)
-        status, norms = library.violations(c.problem_of(h), x, len(h.sizes))
-        assert status == c.SOLVED
-        np.testing.assert_allclose(norms, h.violations(x), rtol=1e-12, atol=1e-12)
-
-
-@pytest.mark.slow
-def test_a_record_goes_on_with_another_kind_of_rows(library):
-    """From inequalities to equalities alone, and back."""
-    rng = np.random.default_rng(5)
-    A, b = rng.normal(size=(6, 7)), rng.normal(size=6)
-    wide = Hierarchy.from_levels([(A[:3], b[:3] - 0.1, b[:3] + 0.1), (A[3:], b[3:])])
-    equal = Hierarchy.from_levels([(A[:3], b[:3]), (A[3:], b[3:])])
-    memory, before = library.memory(wide), None
-    for h in (wide, equal, wide, wide, equal, equal):
-        before = c.check_same(library, ("hcod", {}, {}), h, memory, before).memory
-
-
-@pytest.mark.slow
 def test_the_object_loaded_without_a_linker_gives_the_same_bits(folder):
     library = c.Library.unlinked(folder / "lib" / "libtask_hierarchy.a")
     for h in hierarchies(5):

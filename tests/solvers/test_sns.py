@@ -1,7 +1,6 @@
 """Saturation in the null space: the box is kept, what is scaled is said, priorities hold."""
 
 import os
-from itertools import product
 
 import numpy as np
 import pytest
@@ -128,63 +127,6 @@ def test_the_basic_form_is_the_algorithm_as_printed():
     assert judged > 15 or not JIT
 
 
-# The planar arm of four unit links of the papers, q = (90, -90, 90, -90) degrees, and speeds of at
-# most 2, 1, 4, 4 rad/s.
-ARM = np.array([[-2.0, -1.0, -1.0, 0.0], [2.0, 2.0, 1.0, 1.0]])
-SPEED = np.array([2.0, 1.0, 4.0, 4.0])
-
-
-def best_set(J, b, low, up):
-    """Return the largest scaling over all 3^n sets of joints at bounds, and its least x."""
-    n, best = len(low), (-1.0, None)
-    for choice in product((None, 0, 1), repeat=n):
-        free = np.array([side is None for side in choice])
-        held = np.array([0.0 if side is None else (low, up)[side][j]
-                         for j, side in enumerate(choice)])
-        if np.linalg.matrix_rank(J[:, free]) < len(J):
-            continue
-        a, c = np.zeros(n), held.copy()
-        inverse = np.linalg.pinv(J[:, free])
-        a[free], c[free] = inverse @ b, -inverse @ J @ held
-        s = largest_scaling(a[free], c[free], low[free], up[free])
-        x = s * a + c
-        if s > best[0] + 1e-9 or (s > best[0] - 1e-9 and x @ x < best[1] @ best[1]):
-            best = s, x
-    return best
-
-
-def largest_scaling(a, c, low, up):
-    """Return the largest s of 0 .. 1 with s a + c in the box, or -1, by trying all candidates."""
-    sides = [(side - c)[np.abs(a) > 1e-12] / a[np.abs(a) > 1e-12] for side in (low, up)]
-    candidates = [s for s in np.concatenate([[0.0, 1.0], *sides]) if 0.0 <= s <= 1.0]
-    fits = [s for s in candidates
-            if (s * a + c >= low - 1e-9).all() and (s * a + c <= up + 1e-9).all()]
-    return max(fits, default=-1.0)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("velocity", "scaling", "x"), [
-    ([-4.0, -1.5], 10 / 11, [1.8545454545, -1.0, 0.9272727273, -4.0]),
-    ([-8.0, -3.0], 5 / 11, [1.8545454545, -1.0, 0.9272727273, -4.0]),
-    ([-4.0, 1.5], 1.0, [1.9090909091, -0.7727272727, 0.9545454545, -1.7272727273]),
-    ([-4.0, -1.0], 1.0, [2.0, -1.0, 1.0, -4.0]),
-    ([-2.0, 4.0], 1.0, None),
-    ([3.0, 3.0], None, None),
-])
-@pytest.mark.parametrize("resolver", [BASIC, OPTIMAL], ids=str)
-def test_the_planar_arm_gets_the_best_of_all_sets(resolver, velocity, scaling, x):
-    res = resolver.solve(boxed(-SPEED, SPEED, (ARM, velocity)))
-    best, nearest = best_set(ARM, np.array(velocity), -SPEED, SPEED)
-    assert res.scaling[1] == pytest.approx(best, abs=1e-9)
-    np.testing.assert_allclose(ARM @ res.x, best * np.array(velocity), atol=1e-9)
-    if scaling is not None:
-        assert best == pytest.approx(scaling)
-    if x is not None:
-        np.testing.assert_allclose(res.x, x, atol=1e-9)
-    if resolver is OPTIMAL:
-        np.testing.assert_allclose(res.x, nearest, atol=1e-9)
-
-
 def test_what_saturates_first_is_the_joint_that_leaves_at_the_smallest_scaling():
     """x = s (1, 1, 1) at first: joint 3 leaves at s = 0.4, though joint 1 is as far out."""
     h = boxed([-1, -9, -9], [0.8, 9, 0.4], (np.ones((1, 3)), [3.0]))
@@ -204,24 +146,6 @@ def test_the_optimal_form_ends_nearest_to_the_reference():
         if judge.status is Status.SOLVED:
             distance = np.linalg.norm(judge.x - h.reference)
             assert np.linalg.norm(x - h.reference) <= distance + 1e-8 * (1.0 + distance)
-
-
-@every_form
-def test_scaling_is_the_largest_for_the_joints_that_are_saturated(resolver):
-    """With these joints at their bounds, a larger share would drive another one out."""
-    for seed in range(FEW):
-        r = np.random.default_rng(seed)
-        J, bound = r.normal(size=(3, 7)), r.uniform(0.2, 2.0, 7)
-        b = 3.0 * J @ r.uniform(-1, 1, 7)
-        res = resolver.solve(boxed(-bound, bound, (J, b)))
-        s = res.scaling[1]
-        if not 0.0 < s < 1.0:
-            continue
-        free = np.abs(res.x) < bound - 1e-9
-        assert np.count_nonzero(free) <= 3  # no freedom is left beside the task ...
-        step = np.linalg.pinv(J[:, free]) @ b * 1e-6
-        more = J[:, free] @ step - b * 1e-6
-        assert np.abs(more).max() > 1e-9  # ... and without a joint at its bound it does not get on
 
 
 def test_bounds_may_be_given_in_any_order_sign_and_number():

@@ -10,7 +10,6 @@ from standing import (
     WEIGHT,
     external_forces,
     feet,
-    moving_state,
     standing_stack,
     stepping,
 )
@@ -85,26 +84,6 @@ def test_hcod_is_certified_and_agrees_with_a_cascade_of_programs(shift, faces):
     other = make("hqp", backend="clarabel").solve(h)  # the one that solves all of them
     assert other.status is Status.SOLVED
     assert np.abs(other.x - res.x).max() <= 1e-8 * (1.0 + np.abs(res.x).max())
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_momentum_and_energy_change_as_the_forces_and_torques_of_an_answer_say(seed):
-    """Newton, Euler and the balance of power of a moving robot, none of which is a row."""
-    state, contacts = moving_state(seed), feet()
-    x = make("hcod").solve(standing_stack(state, contacts).hierarchy(state)).x
-    a, f, torques = contacts.accelerations(x), contacts.forces(x), contacts.torques(state, x)
-    A, dA = state.momentum
-    rate = A @ a + dA @ state.v
-    com = CentreOfMass(ROBOT, Still((0.0, 0.0, 0.0))).position(state)
-    places = [place + R @ offset for joint, offset in zip(*contacts.points, strict=True)
-              for R, place in [state._placement(joint)]]
-    np.testing.assert_allclose(rate[:3], f.sum(axis=0) - [0.0, 0.0, WEIGHT], atol=1e-7)
-    np.testing.assert_allclose(rate[3:], np.cross(places - com, f).sum(axis=0), atol=1e-7)
-    M, dM = state.mass_matrix(), state.mass_matrix_derivative()
-    kinetic = state.v @ M @ a + state.v @ dM @ state.v / 2
-    rising = 9.81 * (A @ state.v)[2]  # of the potential energy [W]
-    put_in = torques @ state.v[6:] + (contacts.jacobian(state) @ state.v) @ f.ravel()
-    assert kinetic + rising == pytest.approx(put_in, abs=1e-6)
 
 
 def test_explain_says_what_blocks_a_centre_of_mass_out_of_reach():
