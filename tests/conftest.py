@@ -48,3 +48,32 @@ def no_plugins(monkeypatch):
     _REGISTRY.clear()
     _REGISTRY.update(before)
     plugins._points.cache_clear()
+
+
+@pytest.fixture(scope="session")
+def folder(tmp_path_factory):
+    """The folder of the C library, made once by the first worker that needs it."""
+    import fcntl
+
+    from c_library import NAMES
+
+    from solvers.library import write
+
+    root = tmp_path_factory.getbasetemp()
+    root = root.parent if "PYTEST_XDIST_WORKER" in os.environ else root
+    folder = root / "c-library"
+    with (root / "c-library.lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if not folder.exists():
+            partial = root / "c-library.partial"
+            partial.mkdir(exist_ok=True)
+            write(partial, NAMES, "native")
+            partial.rename(folder)
+    return folder
+
+
+@pytest.fixture(scope="session")
+def library(folder):
+    from c_library import Library
+
+    return Library.of(folder)

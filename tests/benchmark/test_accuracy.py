@@ -1,17 +1,14 @@
 """Accuracy and growth: their arms, their references, who reaches what, their rows."""
 
-from dataclasses import replace
 
 import exact
 import numpy as np
 import oracle
 import pytest
 
-from benchmark import arms, figures
+from benchmark import arms
 from benchmark.solve import accuracy, growth
 from benchmark.solve.ours import Ours
-from hierarchy import Robot, State
-from hierarchy.robots import KUKA_LWR, TABLES
 from scenarios.problems.answers import answer
 from solvers import names
 
@@ -34,20 +31,6 @@ def claims():
     made = [(one.label, Ours(**one.options).resolver) for one in accuracy.entrants()
             if "resolver" in one.options]
     return {label: resolver.accuracy for label, resolver in made if resolver.strict}
-
-
-def test_the_jacobians_are_those_of_pinocchio(monkeypatch):
-    rng = np.random.default_rng(5)
-    some, q = arms.draw(4, rng), rng.uniform(-3.0, 3.0, (4, 6))
-    for i, J in enumerate(some.jacobians(q)):
-        table = replace(KUKA_LWR, name="some", a=tuple(some.a[i]), d=tuple(some.d[i]),
-                        alpha=tuple(np.degrees(some.alpha[i])), range=(180.0,) * 6,
-                        velocity=(1.0,) * 6, mass=(1.0,) * 6, control_points=())
-        monkeypatch.setitem(TABLES, "some", table)
-        state = State.at(Robot.named("some"), q[i])
-        p = state.position(state.robot.frame("end_effector"))
-        linear = state.J[:3] + np.cross(state.J[3:].T, p).T
-        np.testing.assert_allclose(J, np.vstack([linear, state.J[3:]]), atol=1e-12)
 
 
 def test_regular_arms_are_regular_and_near_singular_ones_lack_one_direction():
@@ -108,9 +91,3 @@ def test_the_table_tells_who_is_not_strict(tables):
     assert found["regular", "tpm-published"]["task_3_max"] < 1e-9
     assert found["crowded", "tpm-published"]["task_4_max"] > 0.1
     assert found["crowded", "tpm-published"]["certified"] < 1.0
-
-
-def test_an_exponent_is_the_slope_of_the_upper_half_of_the_sizes():
-    rows = [{"joints": n, "entrant": "some", "median_us": max(100.0, n**2)}
-            for n in (1, 3, 9, 20, 40, 80)]
-    assert figures.exponents(rows, "joints") == {"some": pytest.approx(2.0)}

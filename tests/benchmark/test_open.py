@@ -18,7 +18,7 @@ from benchmark.solve import judge as judging
 from benchmark.solve import open as opened
 from benchmark.solve.entrants import ENTRANTS, chosen, compiled
 from benchmark.solve.interface import read_problems
-from benchmark.solve.judge import cells, judge, judged, profile, summaries, summary
+from benchmark.solve.judge import cells, judge, judged, summaries, summary
 from benchmark.solve.open import asked
 from benchmark.solve.views import lead
 from benchmark.store import Store
@@ -26,8 +26,7 @@ from benchmark.worker import Repeats
 from hierarchy import Hierarchy
 from hierarchy.errors import HierarchyError
 from scenarios.cli.main import run_command
-from scenarios.problems.families import FAMILIES
-from solvers import certify, library
+from solvers import certify
 from solvers.problems.files import Collection, Head
 from solvers.proof import prove
 
@@ -93,24 +92,11 @@ def test_an_end_costs_one_problem_and_too_many_the_rest_of_a_file(
 
 
 @pytest.mark.slow
-def test_what_is_raised_is_told_and_what_is_printed_does_not_mix(equalities):
-    answers = run_entrant(fake("Raising"), equalities)
-    assert [answer["raised"] for answer in answers] == ["ArithmeticError: not today"] * 5
-
-
-@pytest.mark.slow
 def test_an_entrant_that_cannot_start_is_missing_with_the_reason(equalities):
     with pytest.raises(MissingError, match="takes no arguments"):
         run_entrant(fake("LeastSquares", no=1), equalities)
     with pytest.raises(MissingError, match="No such file"):
         run_entrant(replace(fake("LeastSquares"), python="/no/such/python"), equalities)
-
-
-@pytest.mark.slow
-def test_an_entrant_that_starts_warm_is_asked_warm(equalities):
-    answers = run_entrant(fake("Starting"), equalities)
-    assert all(answer["warm_ns"] and answer["warm_solved"] for answer in answers)
-    assert answers[3]["warm_x"] == pytest.approx([3.0, 1.0])
 
 
 CC = next(filter(None, map(shutil.which, ("cc", "gcc", "clang"))), None)
@@ -158,20 +144,18 @@ def test_a_solver_in_a_library_is_timed_from_python_and_inside(tmp_path, equalit
 @needs_c
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="the C library is made on Linux")
-@pytest.mark.parametrize("resolver", ["hcod", "tpm"])
-def test_our_c_library_answers_behind_the_header_as_python_does(tmp_path, resolver):
+def test_our_c_library_answers_behind_the_header_as_python_does(folder, tmp_path):
     """The worked example of solver.h; tpm refuses inequalities beyond bounds."""
-    library.write(tmp_path / "lib", ("hcod", "tpm"))
-    out = shared(SOLVE / "library.c", tmp_path / "ours.so", f"-DSOLVE=th_solve_{resolver}",
-                 f"-I{tmp_path / 'lib' / 'include'}",
-                 tmp_path / "lib" / "lib" / "libtask_hierarchy.a", "-lm")
     made = collection([simple(side) for side in (1.0, 2.0, 3.0)], sequence=True)
     made.save(tmp_path / "simple.npz")
-    rows = run_entrant(compiled([out], ["ours"])[0], tmp_path / "simple.npz")
-    if resolver == "tpm":
-        assert {row["refused"] for row in rows} == {"not for this solver"}
-        return
-    found = judge(rows, {made.digest: made})
+    rows = {}
+    for resolver in ("hcod", "tpm"):
+        out = shared(SOLVE / "library.c", tmp_path / f"{resolver}.so",
+                     f"-DSOLVE=th_solve_{resolver}", f"-I{folder / 'include'}",
+                     folder / "lib" / "libtask_hierarchy.a", "-lm")
+        rows[resolver] = run_entrant(compiled([out], ["ours"])[0], tmp_path / "simple.npz")
+    assert {row["refused"] for row in rows["tpm"]} == {"not for this solver"}
+    found = judge(rows["hcod"], {made.digest: made})
     assert [row["verdict"] for row in found] == [judging.SOLVED] * 3
     assert [row["warm_right"] for row in found] == [None, True, True]
 
@@ -219,37 +203,12 @@ def test_only_x_decides_whether_an_answer_is_right(x, solved, verdict, level):
         assert one["relative"] == pytest.approx(1.0 / (2.0 * (1.0 + np.sqrt(10.0))))
 
 
-def test_the_distance_to_the_reference_counts_as_a_last_level():
-    h = Hierarchy.from_levels([([[1.0, 0.0]], [1.0])], reference=[0.0, 5.0])
-    one = collection([h])
-    near, far = judge([raw([1.0, 5.0], one), raw([1.0, 4.0], one)], {one.digest: one})
-    assert near["verdict"] == judging.SOLVED
-    assert (far["verdict"], far["level"]) == (judging.WRONG, 1)
-
-
-def test_what_moves_a_level_above_is_seen():
-    assert found([3.0, 1.0], without=[3.0, 0.0])["moved"] == 0.0
-    assert found([3.5, 1.0], without=[3.0, 0.0])["moved"] == pytest.approx(0.5 / (1 + 10**0.5))
-
-
 @pytest.mark.parametrize(("more", "verdict"), [
     ({"ended": CRASHED}, judging.CRASHED), ({"ended": HUNG}, judging.HUNG),
     ({"ended": LEFT_OUT}, judging.CRASHED), ({"refused": "no"}, judging.REFUSED),
     ({"raised": "Error"}, judging.RAISED)])
 def test_what_is_not_answered_has_its_own_verdict(more, verdict):
     assert found(None, **more)["verdict"] == verdict
-
-
-def test_a_warm_answer_is_judged_as_well():
-    assert found([3.0, 1.0], warm_x=[3.0, 1.0], warm_solved=True)["warm_right"] is True
-    assert found([3.0, 1.0], warm_x=[3.0, 0.0], warm_solved=True)["warm_right"] is False
-    assert found([3.0, 1.0])["warm_right"] is None
-
-
-def test_a_level_that_is_ill_posed_is_not_judged():
-    one = collection([simple(3.0)])
-    upper = replace(one, answers=(replace(one.answers[0], posed=1),))
-    assert judge([raw([3.0, 7.0], one)], {one.digest: upper})[0]["verdict"] == judging.SOLVED
 
 
 def test_a_problem_without_a_proof_is_judged_by_its_certificate():
@@ -269,16 +228,6 @@ def test_a_summary_counts_and_takes_the_worst_of_what_is_called_solved():
     assert whole["rough"] == pytest.approx(0.75)  # 1.5 where the proved answers move by 2
     assert (whole["median_us"], whole["most_us"]) == (2.0, 3.0)
     assert np.isnan(whole["warm_median_us"])
-
-
-def test_a_profile_counts_only_what_is_solved():
-    one = collection([simple(3.0), simple(1.0)])
-    rows = judge([raw([3.0, 1.0], one), raw([9.0, 1.0], one, 1),
-                  raw([3.0, 1.0], one, entrant="slow", cold_ns=[4000]),
-                  raw([1.0, 1.0], one, 1, entrant="slow", cold_ns=[4000])], {one.digest: one})
-    found = profile(rows, np.array([1.0, 2.0, 10.0]))
-    np.testing.assert_array_equal(found["one"], [0.5, 0.5, 0.5])  # twice as fast, once wrong
-    np.testing.assert_array_equal(found["slow"], [0.5, 1.0, 1.0])
 
 
 def test_the_three_sentences_name_who_solves_most_and_who_is_faster():
@@ -332,21 +281,6 @@ def test_the_command_runs_continues_and_writes_its_page(tmp_path, capsys, monkey
     for text in ("Fresh problems, seed 9", "Moody", "fake 1", "hierarchy"):
         assert text in page
     assert not re.search(r'(src|href)="http', page)
-
-
-@pytest.mark.slow
-def test_what_was_asked_before_an_interruption_is_stored(tmp_path, monkeypatch):
-    def interrupted(process, questions, limit, most):
-        for _, file, _ in questions:
-            if "one_unknown" in file:
-                raise KeyboardInterrupt
-            yield {"ended": CRASHED}
-
-    monkeypatch.setattr(opened.Process, "answers", interrupted)
-    families = [FAMILIES[name] for name in ("integers", "one_unknown")]
-    with pytest.raises(KeyboardInterrupt):
-        opened.run(tmp_path, families, [fake("LeastSquares")], {0: 2}, told=str)
-    assert [row["family"] for row in Store(tmp_path).rows()] == ["integers"] * 2
 
 
 @pytest.mark.slow

@@ -3,12 +3,10 @@
 import csv
 import json
 
-import numpy as np
 import pytest
 
 from benchmark.solve import resolvers
 from benchmark.solve.entrants import HIERARCHICAL, NUMPY
-from benchmark.timing import times_of
 from scenarios.cli.main import run_command
 from scenarios.problems import reference
 from scenarios.problems.reference import family
@@ -21,8 +19,8 @@ EQUALITIES = {NUMPY, "augmented", "recursive", "reverse", "sns", "tpm", "tpm-pub
 
 @pytest.fixture
 def few(monkeypatch):
-    """Only two problems a family, since one cascade takes 40 ms for one of them."""
-    monkeypatch.setattr(resolvers.reference, "family", lambda name: family(name)[:2])
+    """Only one problem a family, since one cascade takes 40 ms for one of them."""
+    monkeypatch.setattr(resolvers.reference, "family", lambda name: family(name)[:1])
 
 
 def test_a_row_for_everybody_and_every_family(few, tmp_path, capsys, monkeypatch):
@@ -52,13 +50,6 @@ def test_a_row_for_everybody_and_every_family(few, tmp_path, capsys, monkeypatch
     assert "…" not in out
 
 
-def test_times_are_given_by_median_and_tail():
-    row = times_of([1000 * i for i in range(1, 102)])
-    assert (row["median_us"], row["p95_us"], row["most_us"]) == (51.0, 96.0, 101.0)
-    assert np.isnan(row["p99.9_us"])  # rare times need a thousand
-    assert times_of([1000] * 1000)["p99.9_us"] == 1.0
-
-
 def test_a_backend_that_is_not_installed_is_named_and_not_skipped_silently(monkeypatch):
     monkeypatch.setattr(resolvers, "installed", lambda name: name != "daqp")
     field, missing = resolvers.field()
@@ -77,12 +68,6 @@ def test_fresh_problems_are_timed_and_reported_apart(few):
     assert all(row["wrong"] == 0 for row in rows if row["entrant"] in ("hcod", "hcod warm"))
     assert [table.title for table in found.sections[1].tables] == ["EQ7, fresh", "INEQ7, fresh"]
     assert "fresh INEQ7" in found.sections[-1].text
-
-
-def test_fresh_problems_are_not_the_stored_ones():
-    stored = [problem.h.upper for problem in family("INEQ7")]
-    assert not any(np.array_equal(one.h.upper, old)
-                   for one in reference.fresh("INEQ7", 10_000_000, 4) for old in stored)
 
 
 @pytest.mark.parametrize(("asked", "says"), [

@@ -1,7 +1,6 @@
 """Generated problems, every answer certified or proved; problems that once failed."""
 
 import os
-from collections import Counter
 from pathlib import Path
 
 import numpy as np
@@ -15,8 +14,8 @@ pytestmark = pytest.mark.slow
 
 REGRESSIONS = sorted((Path(__file__).parents[1] / "data" / "regressions").glob("*.npz"))
 JUDGED = [name for name in ("hcod", "tpm", "recursive") if name in names()]
-COUNT = 200 if os.environ.get("NUMBA_DISABLE_JIT") == "1" else 2_000
-PARTS = 4  # so that cores can share them
+COUNT = 100 if os.environ.get("NUMBA_DISABLE_JIT") == "1" else 400
+PARTS = 2  # so that cores can share them
 FIRST = 10_000_000  # seeds that nothing was tuned on
 
 
@@ -32,13 +31,13 @@ def test_generated_problems_are_solved_and_certified(name, part):
 @pytest.mark.parametrize("kind", problems.KINDS)
 @pytest.mark.parametrize("name", JUDGED[:2])
 def test_structured_problems_end_certified_or_with_a_status(name, kind):
-    assert not stress.tally(name, range(FIRST, FIRST + 100), kind).failing
+    assert not stress.tally(name, range(FIRST, FIRST + 12), kind).failing
 
 
 @pytest.mark.parametrize("name", JUDGED[1:])
 def test_generated_equalities_and_bounds_are_solved_and_certified(name):
-    found = stress.tally(name, range(FIRST, FIRST + COUNT // 8))
-    assert found.counts == {stress.CERTIFIED: COUNT // 8}
+    found = stress.tally(name, range(FIRST, FIRST + COUNT // 4))
+    assert found.counts == {stress.CERTIFIED: COUNT // 4}
 
 
 ONCE_FAILED = [(file, name) for file in REGRESSIONS for name in JUDGED
@@ -106,32 +105,22 @@ def test_an_answer_that_an_oracle_cannot_judge_is_a_failure(monkeypatch):
     assert stress.UNJUDGED in stress.FAILURES
 
 
-def test_a_status_other_than_solved_is_counted_by_its_name():
-    h = Hierarchy.from_levels([(np.eye(2), np.zeros(2))])
-    assert stress.outcome(Wrong(stress.RAISED), h)[0] == "ITERATION_LIMIT"
-    assert stress.outcome(make("tpm"), h)[0] == stress.CERTIFIED
-
-
-def test_iterations_are_counted_by_row():
-    found = stress.Tally(effort=Counter({10: 998, 50: 1, 700: 1}))
-    assert [*found.iterations_per_row().values()] == [0.1, 0.5, 7.0]
-    assert [*stress.Tally().iterations_per_row().values()] == [0.0, 0.0, 0.0]
-
-
 def test_many_processes_count_like_one_and_report_all_kinds_apart(tmp_path, monkeypatch):
     monkeypatch.setattr(stress, "_CHUNK", 3)
-    found = stress.run(5 * len(stress.KINDS), "tpm", processes=2, kind=stress.ALL)
+    monkeypatch.setattr(stress, "KINDS", stress.KINDS[:3])
+    found = stress.run(2 * len(stress.KINDS), "tpm", processes=2, kind=stress.ALL)
     told = stress.report("tpm", found, tmp_path / "none")
-    assert found == {kind: stress.tally("tpm", range(5), kind) for kind in stress.KINDS}
+    assert found == {kind: stress.tally("tpm", range(2), kind) for kind in stress.KINDS}
     assert [row["kind"] for row in told.rows["stress"]] == [*stress.KINDS, stress.ALL]
-    assert told.rows["stress"][-1]["problems"] == 5 * len(stress.KINDS)
+    assert told.rows["stress"][-1]["problems"] == 2 * len(stress.KINDS)
     assert not told.failed
     assert not (tmp_path / "none").exists()
 
 
 def test_failing_problems_are_listed_and_saved(tmp_path, monkeypatch):
     monkeypatch.setattr(stress, "make", lambda name: Wrong(stress.WRONG))
-    found = stress.tally("wrong", range(200))
+    monkeypatch.setattr(stress, "_TRIALS", 3)  # every trial is proved wrong, in 120 digits
+    found = stress.tally("wrong", range(1, 2))
     told = stress.report("wrong", {stress.RECIPE: found}, tmp_path)
     assert told.failed
     assert f"recipe, seed {found.failing[0][0]}, {stress.WRONG}" in told.sections[0].text

@@ -3,10 +3,9 @@ import pytest
 from scene import BODY, OBSTACLES, ROBOT, TIP, states
 
 from hierarchy import HierarchyError, State
-from hierarchy.avoidance import Measurement, Obstacle, Obstacles, Repulsion, SurveillanceAreas
+from hierarchy.avoidance import Obstacle, Obstacles, Repulsion, SurveillanceAreas
 from hierarchy.avoidance.obstacles import distance_to_obstacle
-from hierarchy.errors import UnknownNameError
-from hierarchy.paths import Ellipse, Still, Waypoints
+from hierarchy.paths import Waypoints
 from scenarios.cell.sensors import ExactDistances
 
 TURN = np.array([[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]])
@@ -70,18 +69,6 @@ def test_direction_is_the_gradient_of_distance(shape):
         np.testing.assert_allclose(away, gradient, atol=1e-7)
 
 
-@pytest.mark.parametrize("shape", ["sphere", "capsule", "box"])
-def test_distance_is_negative_inside(shape):
-    assert distance(SHAPES[shape], (0.11, -0.2, 0.3))[0] < 0
-
-
-@pytest.mark.parametrize("shape", SHAPES)
-def test_direction_has_a_fallback_at_the_centre(shape):
-    D, away = distance(SHAPES[shape], SHAPES[shape].centre)
-    assert np.isfinite(D)
-    assert np.linalg.norm(away) == pytest.approx(1)
-
-
 def test_moving_obstacles_follow_their_path():
     path = Waypoints((1.0, 2.0), ((0, 0, 0), (1, 0, 0)))
     obstacles = Obstacles([Obstacle("sphere", (9, 9, 9), (0.1,), path=path), SHAPES["box"]])
@@ -109,12 +96,6 @@ def test_magnitude_reaches_its_maximum_at_contact_and_vanishes_at_the_reach():
     values = [law(D) for D in np.linspace(0, 1, 50)]
     assert (np.diff(values) <= 0).all()
     assert law(1e6) == 0.0
-
-
-def test_magnitude_has_the_shape_of_the_published_code():
-    D = 0.06
-    assert BODY(D) == pytest.approx(0.15 / (1 + np.exp(D * 3 / 0.15 * 2 - 2)))
-    assert TIP(D) == pytest.approx(5 / (1 + np.exp(D * 1.5 / 0.1 * 10 - 10)))
 
 
 @pytest.mark.parametrize("bad", [{"maximum": 0}, {"reach": -1}, {"shape": np.nan},
@@ -150,52 +131,6 @@ def test_the_active_point_is_the_nearest_one_without_the_end_effector():
         assert seen.end_effector_distance == seen.distance[8]
 
 
-def at_origin_between(*centres, mean_within):
-    """Measure the end effector of an arm whose end is put at the middle of two points."""
-    state = State.at(ROBOT, np.full(7, 0.4))
-    middle = state.position(ROBOT.frame("end_effector"))
-    obstacles = Obstacles([Obstacle("point", tuple(middle + c)) for c in np.array(centres)])
-    return ExactDistances(ROBOT, obstacles, BODY, TIP, mean_within).measure(state)
-
-
-def test_mean_direction_is_that_of_all_near_obstacles():
-    seen = at_origin_between((0.1, 0, 0), (0, 0.2, 0), (0, 0, 5.0), mean_within=(1.0, 1.0))
-    np.testing.assert_allclose(seen.direction[8], [-(0.5**0.5), -(0.5**0.5), 0], atol=1e-12)
-
-
-def test_the_mean_of_the_end_effector_has_its_own_distance():
-    """The sum of unit vectors of eq. (25), over what is within eps_ee of it and far of the body."""
-    offsets = np.array([(0.05, 0.02, 0.0), (0.0, -0.09, 0.01), (-0.12, 0.0, 0.05)])
-    for within in (0.06, 0.1, 0.2):
-        seen = at_origin_between(*offsets, mean_within=(0.9, within))
-        near = offsets[np.linalg.norm(offsets, axis=1) < within]
-        mean = -(near / np.linalg.norm(near, axis=1)[:, None]).sum(axis=0)
-        np.testing.assert_allclose(seen.direction[8], mean / np.linalg.norm(mean), atol=1e-12)
-        away = seen.points[3] - (seen.points[8] + offsets)
-        distances = np.linalg.norm(away, axis=1)
-        assert (distances < 0.9).all(), "all count for the body's points"
-        mean = (away / distances[:, None]).sum(axis=0)
-        np.testing.assert_allclose(seen.direction[3], mean / np.linalg.norm(mean), atol=1e-12)
-
-
-def test_beyond_the_distance_of_the_mean_the_direction_is_that_of_the_nearest():
-    seen = at_origin_between((0.1, 0, 0), (0, 0.11, 0), mean_within=(0.9, 0.05))
-    np.testing.assert_allclose(seen.direction[8], [-1, 0, 0], atol=1e-12)
-
-
-def test_mean_direction_falls_back_to_the_nearest_where_the_unit_vectors_cancel():
-    seen = at_origin_between((0.1, 0, 0), (-0.2, 0, 0), mean_within=(1.0, 1.0))
-    np.testing.assert_allclose(seen.direction[8], [-1, 0, 0], atol=1e-12)
-
-
-def test_without_obstacles_nothing_is_near():
-    seen = ExactDistances(ROBOT, Obstacles([]), BODY, TIP).measure(State.at(ROBOT, np.zeros(7)))
-    assert seen.active == -1
-    assert seen.minimal_distance == seen.end_effector_distance == np.inf
-    assert not seen.magnitude.any()
-    assert Measurement(3).minimal_distance == np.inf
-
-
 def test_an_obstacle_at_a_control_point_is_refused_at_the_start():
     state = State.at(ROBOT, np.full(7, 0.4))
     rotation, translation = state._placement(ROBOT.control_points[4].joint)
@@ -204,33 +139,3 @@ def test_an_obstacle_at_a_control_point_is_refused_at_the_start():
                            Obstacle("point", tuple(point), name="obstacle 2")])
     with pytest.raises(HierarchyError, match=r"obstacle 2 .* touches control point 5"):
         ExactDistances(ROBOT, obstacles, BODY, TIP).check_start(state)
-
-
-PATHS = [Still((1, 2, 3)), Ellipse((0, 0.6, 0), (0.2, 0, 0.2), (0, 0.1, 0), 0.7),
-         Waypoints((0.5, 2.0, 2.5), ((0, 0, 0), (1, 2, 3), (1, 0, 0)))]
-
-
-@pytest.mark.parametrize("path", PATHS)
-def test_path_velocity_and_acceleration_are_derivatives(path):
-    h = 1e-5
-    for t in (0.1, 0.9, 1.7, 2.2, 4.0):
-        _, v, a = path(t)
-        np.testing.assert_allclose(v, (path(t + h)[0] - path(t - h)[0]) / (2 * h), atol=1e-8)
-        np.testing.assert_allclose(a, (path(t + h)[1] - path(t - h)[1]) / (2 * h), atol=1e-7)
-
-
-@pytest.mark.parametrize(("make", "said"), [
-    (lambda: Still((1, 2)), "position"),
-    (lambda: Ellipse((0, 0, 0), (np.inf, 0, 0), (0, 0, 0)), "cosine"),
-    (lambda: Ellipse((0, 0, 0), (0, 0, 0), (0, 0, 0), np.nan), "rate"),
-    (lambda: Waypoints((1, 1), ((0, 0, 0), (0, 0, 1))), "times must increase"),
-    (lambda: Waypoints((1,), ()), "1 times for 0 points"),
-])
-def test_bad_paths_are_named(make, said):
-    with pytest.raises(HierarchyError, match=said):
-        make()
-
-
-def test_unknown_shape_is_an_unknown_name():
-    with pytest.raises(UnknownNameError, match="did you mean 'sphere'"):
-        Obstacle("sfere", (0, 0, 0))

@@ -5,7 +5,6 @@ from dataclasses import fields, replace
 import numpy as np
 import pinocchio as pin
 import pytest
-from scipy.spatial.transform import Rotation
 from standing import (
     ROBOT,
     WEIGHT,
@@ -13,16 +12,14 @@ from standing import (
     feet,
     moving_state,
     soles_and_palm,
-    standing_stack,
 )
 
 from hierarchy import HierarchyError, Robot, Stack, State
 from hierarchy.contacts import Contact, Contacts
 from hierarchy.errors import UnknownNameError
 from hierarchy.paths import Still
-from hierarchy.robot import Frame
 from hierarchy.robots.from_table import from_table
-from hierarchy.robots.table import Link, TreeFrame, TreeJoint, TreeTable
+from hierarchy.robots.table import TreeJoint, TreeTable
 from hierarchy.task import Task
 from hierarchy.tasks import (
     BaseDynamics,
@@ -33,8 +30,6 @@ from hierarchy.tasks import (
     Friction,
     LeastForce,
     Momentum,
-    Pose,
-    Position,
     Posture,
     Together,
     TorqueLimits,
@@ -90,37 +85,6 @@ def test_torques_are_those_of_inverse_dynamics_with_external_forces():
     np.testing.assert_allclose(CONTACTS.torques(state, x), efforts[6:], atol=1e-10)
 
 
-def test_blocks_name_every_unknown_once():
-    x = np.arange(float(CONTACTS.unknowns))
-    assert list(CONTACTS.blocks) == ["accelerations", "left_foot", "left_hand", "right_foot"]
-    np.testing.assert_array_equal(np.concatenate([x[part] for part in CONTACTS.blocks.values()]), x)
-    np.testing.assert_array_equal(CONTACTS.forces(x, "left_hand"), [x[N + 12:N + 15]])
-    np.testing.assert_array_equal(CONTACTS.forces(x).ravel(), x[N:])
-
-
-def test_dynamics_of_a_state_follow_it_and_are_those_of_pinocchio():
-    state = State.at(ROBOT, ROBOT.rest)
-    M, h = state.dynamics
-    A, dA = state.momentum
-    other = moving_state(4)
-    state.move(0.0, other.q, other.v)
-    data = ROBOT.model.createData()
-    np.testing.assert_allclose(M, pin.crba(ROBOT.model, data, other.q))
-    np.testing.assert_allclose(h, pin.rnea(ROBOT.model, data, other.q, other.v, np.zeros(N)))
-    np.testing.assert_allclose(state.J, other.J)
-    np.testing.assert_allclose(state.dJ, other.dJ, atol=1e-12)
-    a = random_x(4)[:N]
-    pin.computeCentroidalMomentumTimeVariation(ROBOT.model, data, other.q, other.v, a)
-    np.testing.assert_allclose(A @ other.v, data.hg.vector, atol=1e-11)
-    np.testing.assert_allclose(A @ a + dA @ other.v, data.dhg.vector, atol=1e-10)
-
-
-def test_a_state_without_force_tasks_computes_no_dynamics():
-    state = State.at(ROBOT, ROBOT.rest)
-    Stack([Posture((0.0,) * 30)]).hierarchy(state)
-    assert state._further == ()
-
-
 # Rows of the tasks
 
 
@@ -151,21 +115,6 @@ def test_torque_rows_hold_up_to_both_limits():
                                - state.dynamics.h[6:])
 
 
-def test_torques_may_differ_from_those_sent_before_by_a_step_and_no_more():
-    task, state = TorqueLimits(ROBOT, 0.5, contacts=CONTACTS, step=2.0), moving_state(3)
-    stack = Stack([task], "torque", contacts=CONTACTS)
-    rows = stack.hierarchy(state)                           # nothing was sent before
-    np.testing.assert_allclose(rows.upper - rows.lower, 2.0 * task.limit)
-    sent = np.linspace(-1.0, 1.0, 30) * task.limit          # from one limit to the other
-    state.commanded = sent
-    rows, h = stack.hierarchy(state), state.bias_effort()[6:]
-    np.testing.assert_allclose(rows.lower + h, np.maximum(-task.limit, sent - 2.0), atol=1e-12)
-    np.testing.assert_allclose(rows.upper + h, np.minimum(task.limit, sent + 2.0), atol=1e-12)
-    x = np.linalg.lstsq(rows.A, rows.upper, rcond=None)[0]
-    np.testing.assert_allclose(CONTACTS.torques(state, x), np.minimum(task.limit, sent + 2.0),
-                               atol=1e-9)
-
-
 @pytest.mark.parametrize("faces", [4, 8])
 def test_what_friction_rows_allow_is_in_the_cone_and_their_edges_touch_it(faces):
     contact = CONTACTS["left_hand"]
@@ -184,21 +133,6 @@ def test_what_friction_rows_allow_is_in_the_cone_and_their_edges_touch_it(faces)
         edge *= np.sign(edge @ normal)
         tangential = edge - (edge @ normal) * normal
         assert np.linalg.norm(tangential) == pytest.approx(contact.friction * (edge @ normal))
-
-
-def test_each_friction_row_changes_sides_where_its_face_is_passed():
-    task = Friction(feet(0.5), 4, least=2.0, largest=100.0)
-    assert task.dimension == len(task.row_names) == 8 * 5
-    rows, (lower, upper) = task.forces[:5, :3], task.sides
-    slope = 0.5 * np.cos(np.pi / 4)
-    for share, holds in ((0.99, True), (1.01, False)):
-        for i, (x, y) in enumerate([(1, 0), (0, 1), (-1, 0), (0, -1)]):
-            value = rows @ [x * share * slope * 10.0, y * share * slope * 10.0, 10.0]
-            inside = (value >= lower[:5]) & (value <= upper[:5])
-            assert inside.tolist() == [j != i or holds for j in range(5)]
-    for normal, holds in ((1.99, False), (2.01, True), (99.9, True), (100.1, False)):
-        value = rows @ [0.0, 0.0, normal]
-        assert ((value >= lower[:5]) & (value <= upper[:5])).all() == holds
 
 
 def test_the_centre_of_pressure_rows_change_sides_at_the_margin():
@@ -223,68 +157,6 @@ def test_the_centre_of_pressure_rows_change_sides_at_the_margin():
     assert 0 < sum(seen) < 300
 
 
-def test_points_inside_a_sole_or_on_its_edge_make_no_edges_of_their_own():
-    frame = ROBOT.frame("left_foot")
-    plain = Contact.rectangle(frame, (-0.05, 0.16), (-0.04, 0.04))
-    dotted = Contact(frame, [*plain.points, (0.0, 0.0, 0.0), (0.05, 0.04, 0.0), plain.points[0]])
-    rows, more = (CentreOfPressure(Contacts(ROBOT, [one])).forces for one in (plain, dotted))
-    assert len(rows) == len(more) == 4
-    assert sorted(map(tuple, more[:, :12])) == sorted(map(tuple, rows))
-
-
-@pytest.mark.parametrize("turn", [(90.0, 0.0, 0.0), (0.0, 90.0, 0.0), (180.0, 0.0, 40.0)])
-def test_a_sole_in_another_plane_of_its_frame_has_the_same_rows(turn):
-    """The frame of a foot may lie on its side; `up` says in it which way is up."""
-    foot, rotation = ROBOT.frame("left_foot"), Rotation.from_euler("xyz", turn, degrees=True)
-    turned = Frame(foot.name, foot.joint, foot.offset, foot.rotation @ rotation.as_matrix())
-    up = rotation.inv().apply([0.0, 0.0, 1.0])
-    own = Contact.rectangle(turned, (-0.05, 0.16), (-0.04, 0.04), up=up)
-    places = turned.rotation @ np.transpose(own.points)
-    np.testing.assert_allclose(places[2], 0.0, atol=1e-15)
-    sides = np.linalg.norm(np.diff(own.points, axis=0), axis=1)
-    np.testing.assert_allclose(sides, [0.21, 0.08, 0.21])
-    plain = Contact(foot, places.T)  # the same points, in a frame that is level
-    rows, same = (CentreOfPressure(Contacts(ROBOT, [one])).forces for one in (own, plain))
-    value, other = (np.sort(one @ np.arange(12.0) ** 2) for one in (rows, same))
-    np.testing.assert_allclose(value, other, atol=1e-12)
-
-
-@pytest.mark.parametrize(("friction", "holds"), [(0.6, True), (0.3, False)])
-def test_soles_with_a_normal_of_their_own_stand_on_a_slope_as_steep_as_friction_allows(
-        friction, holds):
-    slope = Rotation.from_euler("xyz", [20.0, 0.0, 0.0], degrees=True)  # tan 20 deg = 0.36
-    q = ROBOT.rest.copy()
-    q[3:7] = (slope * Rotation.from_quat(q[3:7])).as_quat()
-    normal, state = slope.apply([0.0, 0.0, 1.0]), State.at(ROBOT, q)
-    contacts = Contacts(ROBOT, [Contact.rectangle(
-        ROBOT.frame(f"{side}_foot"), (-0.05, 0.16), (-0.04, 0.04), friction, normal=normal)
-        for side in ("left", "right")])
-    h = standing_stack(state, contacts).hierarchy(state)
-    x = make("hcod").solve(h).x
-    forces = contacts.forces(x)
-    along = forces - np.outer(forces @ normal, normal)
-    assert (np.linalg.norm(along, axis=1) <= friction * (forces @ normal) + 1e-6).all()
-    stands = np.abs(forces.sum(axis=0) - [0.0, 0.0, WEIGHT]).max() < 1e-6
-    assert stands == holds
-
-
-def test_a_plain_contact_pushes_up_with_one_point_in_the_middle_of_its_frame():
-    contact = Contact(ROBOT.frame("left_foot"))
-    np.testing.assert_array_equal(contact.axes, np.eye(3))
-    assert np.array_equal(contact.points, [[0.0, 0.0, 0.0]])
-    assert contact.load(0.0) == 1.0
-
-
-@pytest.mark.parametrize("normal", [(0.0, 0.0, 1.0), (-1.0, 0.2, 0.1), (1.0, 0.0, 0.0)])
-def test_the_last_row_of_a_point_is_its_normal_force(normal):
-    contacts = Contacts(ROBOT, [Contact(ROBOT.frame("left_hand"), normal=normal)])
-    np.testing.assert_allclose(Friction(contacts).forces[-1], normal / np.linalg.norm(normal),
-                               atol=1e-15)
-    axes = contacts["left_hand"].axes
-    np.testing.assert_allclose(axes @ axes.T, np.eye(3), atol=1e-15)
-    assert np.linalg.det(axes) > 0.0
-
-
 @pytest.mark.parametrize("task", [
     BaseDynamics(CONTACTS), ContactMotion(CONTACTS), Friction(CONTACTS),
     CentreOfPressure(CONTACTS), ContactForce(CONTACTS, "left_hand", (1.0,)), LeastForce(CONTACTS),
@@ -295,14 +167,6 @@ def test_tasks_of_the_same_settings_are_equal_and_print_their_settings_alone(tas
     assert replace(task, name="another") != task
     for record in (task, CONTACTS, CONTACTS.contacts[0]):
         assert all(field.repr == field.init == field.compare for field in fields(record))
-
-
-def test_faces_alone_say_that_a_contact_pushes():
-    task = Friction(feet(), 4)
-    assert np.isinf(task.sides[0][4::5]).all()
-    for pull in np.random.default_rng(20).normal(size=(100, 3)):
-        pull[2] = -abs(pull[2])
-        assert not (task.forces[:4, :3] @ pull >= 0.0).all()
 
 
 def opening(ramp=0.2):
@@ -341,21 +205,6 @@ def test_an_open_contact_has_no_force_and_is_free_to_move(faces):
         assert not rows.any()
 
 
-def test_an_open_contact_moves_no_base_until_it_is_closed_again():
-    contacts, state = opening(), State.at(ROBOT, ROBOT.rest)
-    right = contacts.blocks[contacts.contacts[1].name]
-    A, lower, upper = np.zeros((6, 60)), np.zeros(6), np.zeros(6)
-    write = BaseDynamics(contacts).writer(state, "torque", A, lower, upper, 0)
-    write()
-    closed = A.copy()
-    assert closed[:, right].any()
-    for t in (0.5, 1.5, 2.5):
-        state.move(t, state.q, state.v)
-        write()
-        assert A[:, right].any() == (t != 1.5)
-    np.testing.assert_array_equal(A, closed)
-
-
 def load_row(contacts, carried=None, **settings):
     """A function of time: the sides of the row that has all the normal force of the right sole."""
     task, state = Friction(contacts, **settings), State.at(ROBOT, ROBOT.rest)
@@ -376,44 +225,6 @@ def test_the_load_of_a_sole_falls_in_its_ramp_from_what_it_carried(largest):
     at = load_row(opening(), 92.0, largest=largest)
     assert [at(t) for t in (0.5, 0.79, 0.9, 0.99, 1.5)] == [
         (-np.inf, pytest.approx(up)) for up in (np.inf, np.inf, 46.0, 4.6, np.inf)]
-
-
-@pytest.mark.parametrize("largest", [100.0, 1e5, np.inf])
-def test_where_that_is_not_known_the_load_ramps_with_the_weight(largest):
-    for carried in (None, np.nan):
-        at = load_row(opening(), carried, largest=largest)
-        assert [at(t)[1] for t in (0.9, 1.5, 2.05, 2.1, 2.21)] == pytest.approx(
-            [0.5 * WEIGHT, np.inf, 0.25 * WEIGHT, 0.5 * WEIGHT, np.inf])
-
-
-def test_a_contact_that_carried_nothing_has_no_force_in_its_ramp():
-    contacts = opening()
-    state = State.at(ROBOT, ROBOT.rest, t=0.9)
-    state.carried = np.array([392.0, 0.0])
-    _, lower, upper = Friction(contacts, largest=50.0).rows(state)
-    state.move(1.5, state.q, state.v)
-    for side, other in zip((lower, upper), Friction(contacts, largest=50.0).rows(state)[1:],
-                           strict=True):
-        np.testing.assert_array_equal(side, other)
-
-
-def test_the_least_force_of_each_point_falls_with_the_ramp():
-    task, state = Friction(opening(), least=2.0, largest=50.0), State.at(ROBOT, ROBOT.rest)
-    state.carried = np.array([300.0, 92.0])
-    for t, load in ((0.0, 1.0), (0.9, 0.5), (2.05, 0.25), (3.0, 1.0)):
-        state.move(t, state.q, state.v)
-        _, lower, upper = task.rows(state)
-        np.testing.assert_allclose(lower[4:40:5], [2.0] * 4 + [2.0 * load] * 4)
-        np.testing.assert_allclose(upper[4:40:5], 50.0)
-
-
-def test_a_point_that_opens_ramps_in_the_row_of_its_normal_force():
-    contacts = Contacts(ROBOT, [Contact(FRAME, open=((1.0, 2.0),), ramp=0.2)])
-    state, task = State.at(ROBOT, ROBOT.rest, t=0.9), Friction(contacts, largest=80.0)
-    assert task.dimension == 5
-    for carried, allowed in ((60.0, 30.0), (600.0, 80.0)):
-        state.carried = np.array([carried])
-        assert task.rows(state)[2][-1] == pytest.approx(allowed)
 
 
 def test_what_a_contact_carries_is_kept_while_it_ramps_and_forgotten_when_it_is_open():
@@ -454,7 +265,6 @@ def test_lifting_a_loaded_foot_changes_torques_alike_whatever_the_largest_force(
     assert np.abs(np.diff(found[0])).max() < 1.01 * WEIGHT / 2 / 100
 
 
-
 @pytest.mark.parametrize("target", [(20.0,), (1.0, 2.0, 3.0), (1.0, 2.0, 3.0, 0.4, 0.5, 0.6)])
 @pytest.mark.parametrize("name", ["left_hand", "right_foot"])
 def test_contact_force_rows_are_the_sum_over_the_points(target, name):
@@ -474,13 +284,6 @@ def test_contact_force_rows_are_the_sum_over_the_points(target, name):
     assert len(task.row_names) == task.dimension
 
 
-def test_least_force_asks_for_zero_of_every_force():
-    A, lower, upper = LeastForce(CONTACTS).rows(moving_state(10))
-    np.testing.assert_array_equal(A, np.eye(CONTACTS.unknowns)[N:])
-    assert not lower.any()
-    assert not upper.any()
-
-
 def test_contact_motion_rows_are_the_accelerations_of_contacts_with_baumgartes_terms():
     state = moving_state(11)
     start = State.at(ROBOT, ROBOT.rest)
@@ -494,17 +297,6 @@ def test_contact_motion_rows_are_the_accelerations_of_contacts_with_baumgartes_t
     np.testing.assert_allclose(lower[6:9], -dJ - 20.0 * J @ state.v + 100.0 * gone, atol=1e-9)
     np.testing.assert_array_equal(lower, upper)
     assert np.abs(task.error(start)).max() < 1e-12
-
-
-def test_contacts_at_rest_move_no_point_of_a_sole():
-    """a from the rows of the frame gives each corner the acceleration of the rows: rigidity."""
-    state = State.at(ROBOT, ROBOT.rest)
-    contacts = feet()
-    task = ContactMotion(contacts)
-    a = np.linalg.pinv(task.jacobian(state)) @ task.reference_acceleration(state)
-    N_c = np.eye(N) - np.linalg.pinv(task.jacobian(state)) @ task.jacobian(state)
-    corners = contacts.jacobian(state) @ (a + N_c @ random_x(12)[:N])
-    np.testing.assert_allclose(corners, 0.0, atol=1e-9)
 
 
 def test_without_anchors_a_contact_is_damped_where_it_is():
@@ -558,26 +350,6 @@ def test_a_momentum_target_is_approached():
 # Stacks at level "torque"
 
 
-def test_tasks_of_the_joints_write_the_first_columns_and_leave_the_forces_alone():
-    state, frame = moving_state(17), ROBOT.frame("right_hand")
-    tasks = [Position(frame, Still((0.1, 0.2, 0.3))), Pose(frame, Still((0, 0, 0)), np.eye(3)),
-             Posture((0.1,) * 30), Momentum()]
-    torque = Stack(tasks, "torque", contacts=CONTACTS).hierarchy(state)
-    plain = Stack(tasks, "acceleration").hierarchy(state)
-    np.testing.assert_array_equal(torque.A[:, :N], plain.A)
-    assert not torque.A[:, N:].any()
-    np.testing.assert_array_equal(torque.lower, plain.lower)
-    np.testing.assert_array_equal(torque.upper, plain.upper)
-
-
-def test_the_reference_of_a_torque_stack_is_that_of_the_joints_and_no_force():
-    state = moving_state(18)
-    posture = Posture((0.1,) * 30)
-    h = Stack([BaseDynamics(CONTACTS)], "torque", posture, CONTACTS).hierarchy(state)
-    np.testing.assert_allclose(h.reference[6:N], posture.reference_acceleration(state))
-    assert not h.reference[N:].any()
-
-
 def test_together_has_the_rows_of_its_tasks_in_order():
     state = moving_state(19)
     tasks = [BaseDynamics(CONTACTS), ContactMotion(CONTACTS), Friction(CONTACTS)]
@@ -592,27 +364,6 @@ def test_together_has_the_rows_of_its_tasks_in_order():
     assert together.jacobian_derivative(state).shape == apart.A.shape
     assert together.row_names[0] == "base dynamics force x"
     assert Together([Posture((0.0,) * 30)]).of_forces is False
-
-
-def test_without_contacts_the_robot_falls():
-    contacts = Contacts(ROBOT)
-    stack = Stack([BaseDynamics(contacts), Posture(tuple(ROBOT.rest[7:]))], "torque",
-                  contacts=contacts)
-    state = State.at(ROBOT, ROBOT.rest)
-    h = stack.hierarchy(state)
-    x = np.linalg.solve(h.A, h.lower)
-    rate = state.momentum.A @ x
-    np.testing.assert_allclose(rate, [0, 0, -WEIGHT, 0, 0, 0], atol=1e-9)
-    np.testing.assert_allclose(contacts.torques(state, x), 0.0, atol=1e-9)
-
-
-def test_a_fixed_base_has_no_base_rows():
-    arm = Robot.named("kuka_lwr")
-    contacts = Contacts(arm, [Contact(arm.frame("end_effector"))])
-    assert BaseDynamics(contacts).dimension == 0
-    h = Stack([BaseDynamics(contacts), TorqueLimits(arm, contacts=contacts)], "torque",
-              contacts=contacts).hierarchy(State.at(arm, np.full(7, 0.3)))
-    assert (h.n, h.m) == (10, 7)
 
 
 # Bad input
@@ -678,32 +429,3 @@ def test_bad_input_is_named(make, said):
     with pytest.raises((HierarchyError, UnknownNameError)) as error:
         make()
     assert said in str(error.value)
-
-
-def test_a_robot_of_one_joint_has_matrices_of_one_column():
-    table = TreeTable("lever", (TreeJoint("one", "", (0.0, 0.0, 0.0), "x", (-90, 90), 1.0, 9.0,
-                                          Link((0.0, 0.4, 0.0), 0.02, 0.5)),),
-                      (TreeFrame("tip", "one", (0.0, 0.4, 0.0)),), "tip")
-    lever = Robot(from_table(table).model, "lever", "tip")
-    state = State.at(lever, [0.2], [0.5])
-    assert [part.shape for part in (state.J, state.dJ, *state.momentum)] == [(6, 1)] * 4
-    contacts = Contacts(lever, [Contact(lever.frame("tip"))])
-    h = Stack([TorqueLimits(lever, contacts=contacts), ContactMotion(contacts)], "torque",
-              contacts=contacts).hierarchy(state)
-    held = [0.0, 0.0, 0.0, 0.5 * 0.5 * 9.81]  # half the weight at the end of a rod
-    assert np.linalg.norm(contacts.torques(State.at(lever, [0.0]), held)) < 1e-9
-    assert h.A.shape == (4, 4)
-
-
-def test_a_torque_beyond_its_limit_comes_back_by_its_step():
-    robot = Robot.named("quadruped")
-    state, contacts = State.at(robot, robot.rest), Contacts(robot)
-    limits = TorqueLimits(robot, 0.5, contacts=contacts, step=1.0)
-    state.commanded = np.linspace(-0.9, 0.9, 12) * robot.effort_limit[6:]
-    sides = np.zeros((12, contacts.unknowns)), np.empty(12), np.empty(12)
-    limits.writer(state, "torque", *sides, 0)()
-    low, up = (side + state.bias_effort()[6:] for side in sides[1:])
-    full, sent = 0.5 * robot.effort_limit[6:], state.commanded
-    np.testing.assert_allclose(low, np.clip(-full, sent - 1.0, sent + 1.0), atol=1e-9)
-    np.testing.assert_allclose(up, np.clip(full, sent - 1.0, sent + 1.0), atol=1e-9)
-    assert (low <= up).all()

@@ -63,16 +63,6 @@ def test_the_bounds_are_those_of_the_definition_at_velocity_level():
     assert brought_in > 100
 
 
-@pytest.mark.slow
-def test_the_bounds_are_those_of_the_next_velocity_at_acceleration_level():
-    for q, v in STATES:
-        box = task(QUICK).box(state_at(q, 0.1 * v), "acceleration")
-        whole = QUICK.box(state_at(q, 0.1 * v), "acceleration")
-        for side, wanted in zip(box, velocity_sides(q, 0.1 * v), strict=True):
-            expected = np.clip((wanted - 0.1 * v) / PERIOD, *whole)
-            np.testing.assert_allclose(side, expected, rtol=1e-7)
-
-
 @levels
 def test_the_box_is_never_empty_lies_in_that_of_the_limits_and_lets_a_joint_brake(level):
     rng = np.random.default_rng(0)
@@ -89,40 +79,6 @@ def test_the_box_is_never_empty_lies_in_that_of_the_limits_and_lets_a_joint_brak
             assert (halt <= up).all()
 
 
-@pytest.mark.slow
-def test_a_joint_that_is_too_fast_brakes_as_hard_as_it_may():
-    braked = 0
-    for q, _ in STATES:
-        _, up = velocity_sides(q, np.zeros(7))
-        for j in np.flatnonzero(up < 0.9 * V):
-            v = 0.5 * (up + V) * np.eye(7)[j]
-            hardest = LIMITS.box(state_at(q, v), "acceleration")[0][j]
-            assert task().box(state_at(q, v), "acceleration")[1][j] == hardest
-            braked += 1
-    assert braked > 20
-
-
-@pytest.mark.slow
-def test_no_command_of_the_box_nears_a_point_faster_than_the_danger_lets_it():
-    rng = np.random.default_rng(1)
-    for q, _ in STATES:
-        state = state_at(q, np.zeros(7))
-        low, up = task(QUICK).box(state, "velocity")
-        distances, toward = state.measurement.distance.copy(), columns(q, np.zeros(7))
-        for D, row in zip(distances, toward, strict=True):
-            most = (1.0 - danger(D)) * np.abs(row) @ V
-            worst = np.where(row > 0.0, low, up)  # the command that nears it fastest
-            for x in (worst, *rng.uniform(low, up, (20, 7))):
-                assert row @ x >= -most - 1e-7
-
-
-@levels
-def test_without_obstacles_the_box_is_that_of_the_limits(level):
-    state = State.at(ROBOT, *STATES[0])
-    ExactDistances(ROBOT, Obstacles([]), BODY, TIP).measure(state)
-    np.testing.assert_array_equal(task().box(state, level), LIMITS.box(state, level))
-
-
 @levels
 def test_the_rows_are_the_identity_with_the_box_as_sides(level):
     for q, v in STATES[:5]:
@@ -136,17 +92,6 @@ def test_the_rows_are_the_identity_with_the_box_as_sides(level):
         assert not task().jacobian_derivative(state).any()
         np.testing.assert_array_equal(task().jacobian(state), np.eye(7))
         np.testing.assert_array_equal(task().error(state), LIMITS.error(state))
-
-
-def test_a_joint_that_only_turns_about_the_point_is_free():
-    q = np.array([0.3, 0.4, 0.0, 0.5, 0.2, 0.1, 0.6])
-    state = State.at(ROBOT, q)
-    axis = ROBOT.control_point("joint_1", (0.0, 0.0, 0.0))
-    sensor = ExactDistances(ROBOT, Obstacles([Obstacle("point", (0.01, 0.01, 0.0))]), BODY, TIP)
-    sensor.measure(state)
-    state.measurement.distance[0] = 0.001
-    bounds = DangerBounds(QUICK, [axis], reach=REACH)
-    np.testing.assert_array_equal(bounds.box(state, "velocity"), QUICK.box(state, "velocity"))
 
 
 @pytest.mark.parametrize(("settings", "said"), [

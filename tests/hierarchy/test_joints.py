@@ -8,7 +8,7 @@ from hierarchy import HierarchyError, Robot, Stack, State
 from hierarchy.errors import RobotError, UnknownNameError
 from hierarchy.paths import Still
 from hierarchy.tasks import JointCoupling, JointLimits, Position, Posture
-from solvers import make, solve_ik
+from solvers import solve_ik
 
 T = 0.01  # [s]
 KINDS = {"drive": pin.JointModelPlanar, "wheel": pin.JointModelRUBZ,
@@ -47,13 +47,6 @@ def test_values_of_joints_are_set_and_read_by_name():
     np.testing.assert_allclose(ROBOT.configuration(ROBOT.vector(q)), q, atol=1e-15)
 
 
-def test_a_joint_takes_its_coordinates_too():
-    q = ROBOT.configuration({"wheel": (0.0, 1.0), "neck": (0.0, 0.0, 1.0, 0.0)})
-    np.testing.assert_allclose(q[4:10], [0, 1, 0, 0, 1, 0])
-    standing = mobile(floating=True).configuration({"root": (1, 2, 3, 0, 1, 0, 0)})
-    np.testing.assert_array_equal(standing[:7], [1, 2, 3, 0, 1, 0, 0])
-
-
 @pytest.mark.parametrize(("values", "said"), [
     ({"neck": (0, 0, 0, 2)}, "joint 'neck': its quaternion (x, y, z, w)"),
     ({"wheel": (1.0, 1.0)}, "joint 'wheel': its (cos, sin) [1.0, 1.0] has length 1.414"),
@@ -87,22 +80,6 @@ def test_a_configuration_of_another_length_is_refused_by_the_name_of_its_joint(s
                 refuse(wrong)
 
 
-@pytest.mark.parametrize("floating", [False, True])
-def test_a_posture_takes_values_coordinates_or_names_and_goes_the_short_way(floating):
-    robot = mobile(floating)
-    state = State.at(robot, robot.configuration(ANYWHERE))
-    goal = robot.configuration(THERE)
-    named = Posture(THERE).error(state)
-    assert named.shape == (9,)
-    assert named[3] == pytest.approx(-3.0 - 2.0 + 2.0 * np.pi), "not five radians back"
-    for target in (goal, tuple(robot.vector(goal)[robot.actuated:])):
-        np.testing.assert_allclose(Posture(target).error(state), named, atol=1e-12)
-    arrived = pin.integrate(robot.model, state.q, np.append(np.zeros(robot.actuated), named))
-    for name in KINDS:
-        np.testing.assert_allclose(robot.values(arrived)[name], robot.values(goal)[name],
-                                   atol=1e-9)
-
-
 @pytest.mark.parametrize("name", KINDS)
 def test_the_rows_of_a_posture_are_the_derivative_of_its_error(name):
     """Everywhere for a joint of one axis, for others along the way to the target."""
@@ -131,20 +108,6 @@ def test_compiled_rows_of_a_posture_are_those_of_its_methods(level, floating):
             3.0 * task.error(state) - 2.0 * v[robot.actuated:])
         np.testing.assert_allclose(h.lower, asked, atol=1e-12)
         np.testing.assert_array_equal(h.lower, h.upper)
-
-
-@pytest.mark.parametrize("level", ["velocity", "acceleration"])
-def test_a_mobile_robot_arrives_at_its_posture(level):
-    stack, state, solver = Stack([Posture(THERE, 100.0, 20.0, 10.0)], level), State(ROBOT), make(
-        "hcod")
-    q, v = ROBOT.configuration(ANYWHERE), np.zeros(9)
-    for _ in range(500):
-        state.move(0.0, q, v)
-        x = solver.solve(stack.hierarchy(state)).x
-        q = ROBOT.integrate(q, x * T if level == "velocity" else v * T + x * T * T / 2)
-        v = v + x * T if level == "acceleration" else v
-    np.testing.assert_allclose(ROBOT.vector(q), ROBOT.vector(ROBOT.configuration(THERE)),
-                               atol=1e-9)
 
 
 def test_a_posture_that_fits_no_form_is_refused():

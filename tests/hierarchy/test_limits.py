@@ -5,7 +5,6 @@ import os
 import numpy as np
 import pinocchio as pin
 import pytest
-from pendulum import LIMIT, URDF
 from scene import PATH, ROBOT, state_at, states
 
 from hierarchy import HierarchyError, Robot, Stack, State
@@ -16,7 +15,7 @@ from hierarchy.tasks import JointLimits, Position, TorqueLimits
 from solvers import Status, make
 
 PLAIN = os.environ.get("NUMBA_DISABLE_JIT") == "1"  # everything some hundred times slower
-JOINTS, TICKS = (40, 60) if PLAIN else (2000, 600)  # 1.2 million steps a test
+JOINTS, TICKS = (40, 60) if PLAIN else (500, 400)
 LEVELS = pytest.mark.parametrize("level", ["velocity", "acceleration"])
 
 # Rounding: of a position relative to 1 + |q|, of a speed and an acceleration relative to the limit.
@@ -160,20 +159,6 @@ def test_no_limit_is_exceeded_whatever_is_chosen(level, seed):
 
 @pytest.mark.slow
 @LEVELS
-def test_every_state_of_such_a_ride_is_viable(level):
-    rng = np.random.default_rng(2)
-    limits, T = random_limits(rng, JOINTS)
-    ride = Ride(*viable_starts(rng, limits, T, level), limits, T, level,
-                adversary(rng, JOINTS, TICKS))
-    for k in range(0, TICKS, TICKS // 6):
-        way = braking_way(ride.v[k], limits[3], T, level)
-        at = ride.q[k] + np.sign(ride.v[k]) * way
-        slack = 1e-11 * (1 + np.abs(ride.q[k]))
-        assert ((at <= limits[1] + slack) & (at >= limits[0] - slack)).all()
-
-
-@pytest.mark.slow
-@LEVELS
 def test_beyond_the_box_a_limit_is_exceeded_or_the_joint_cannot_stop_in_time(level):
     rng = np.random.default_rng(3)
     limits, T = random_limits(rng, JOINTS)
@@ -194,20 +179,6 @@ def test_beyond_the_box_a_limit_is_exceeded_or_the_joint_cannot_stop_in_time(lev
         assert ((rest > upper) | (rest < lower) | (abs(w) > velocity) | (abs(a) > A)).all()
 
 
-def test_between_ticks_the_position_is_within_its_limits_too():
-    """Here the ride's own formula for the turning point is not trusted."""
-    rng = np.random.default_rng(4)
-    limits, T = random_limits(rng, 40)
-    q, v = viable_starts(rng, limits, T, "acceleration")
-    ride = Ride(q, v, limits, T, "acceleration", adversary(rng, 40, 300))
-    q, v = np.vstack([q, ride.q]), np.vstack([v, ride.v])
-    for share in np.linspace(0, 1, 41):
-        t = share * T
-        between = q[:-1] + v[:-1] * t + (v[1:] - v[:-1]) / T * t**2 / 2
-        assert (between <= limits[1] + POSITION * 10).all()
-        assert (between >= limits[0] - POSITION * 10).all()
-
-
 @LEVELS
 @pytest.mark.parametrize("period", [1e-4, 1e-3, 7e-3, 0.05])
 def test_one_who_always_pushes_up_comes_to_rest_on_the_limit_without_bouncing(level, period):
@@ -220,14 +191,6 @@ def test_one_who_always_pushes_up_comes_to_rest_on_the_limit_without_bouncing(le
     assert ride.v.max() == pytest.approx(2.0)
 
 
-@LEVELS
-def test_the_box_of_an_unlimited_joint_is_its_acceleration(level):
-    limits = Limits([-np.inf], [np.inf], [np.inf], [5.0], 0.01)
-    low, up = limits.box(np.array([1e3]), np.array([20.0]), level)
-    expected = [-5.0, 5.0] if level == "acceleration" else [19.95, 20.05]
-    np.testing.assert_allclose([low[0], up[0]], expected)
-
-
 def test_a_joint_that_must_turn_back_within_a_tick_keeps_its_limit():
     """q + v^2 / (2 A) <= U, but too near to be at rest at the end of a tick."""
     rng = np.random.default_rng(5)
@@ -238,28 +201,6 @@ def test_a_joint_that_must_turn_back_within_a_tick_keeps_its_limit():
     v = rng.uniform(0, 1, JOINTS) * np.minimum(3.0, 5 * A * T)
     q = 1.0 - v**2 / (2 * A) - rng.choice([0.0, 1e-6, 1e-4], JOINTS)
     Ride(q, v, limits, T, "acceleration", adversary(rng, JOINTS, TICKS)).keeps(limits)
-
-
-def test_turning_back_stops_short_of_making_the_other_limit_impossible():
-    limits = Limits([-0.05], [0.0], [9.0], [100.0], 0.05)
-    q, v = np.array([-0.01]), np.array([1.0])
-    _, up = limits.box(q, v, "acceleration")
-    w = v + up * 0.05
-    rest = q + (v + w) / 2 * 0.05 - braking_way(w, 100.0, 0.05, "acceleration")
-    assert w < 0.0
-    assert rest == pytest.approx(-0.05)
-
-
-@LEVELS
-def test_the_box_of_the_mirrored_joint_is_the_mirrored_box(level):
-    rng = np.random.default_rng(13)
-    (lower, upper, velocity, acceleration), _ = random_limits(rng, 1000)
-    q, v = rng.normal(0, 2, 1000), rng.normal(0, 0.1, 1000)
-    q[::2] = upper[::2] - 0.02 * np.abs(v[::2])  # where a joint turns back within a tick
-    q = np.where(np.isfinite(q), q, 0.0)
-    box = Limits(lower, upper, velocity, acceleration, 0.05).box(q, v, level)
-    mirrored = Limits(-upper, -lower, velocity, acceleration, 0.05).box(-q, -v, level)
-    np.testing.assert_array_equal(box, [-mirrored[1], -mirrored[0]])
 
 
 # ---- from outside -----------------------------------------------------------------------------
@@ -299,27 +240,12 @@ def test_every_joint_ends_within_its_limits_wherever_it_started(level):
     limits = np.array([lower, upper, 10 ** rng.uniform(-1, 2, JOINTS) * A * T, A])
     q = lower + rng.uniform(-100, 100, JOINTS) * size
     v = rng.normal(0, 1, JOINTS) * 10 ** rng.uniform(-2, 1, JOINTS) * A * T
-    ride = Ride(q, v, limits, T, level, adversary(rng, JOINTS, 4000))
+    ride = Ride(q, v, limits, T, level, adversary(rng, JOINTS, 2500))
     last = np.s_[-1000:]
     slack = POSITION * (1 + np.abs(ride.q[last]))
     assert (ride.q[last] <= upper + slack).all()
     assert (ride.q[last] >= lower - slack).all()
     assert (np.abs(ride.v[last]) <= limits[2] * (1 + SPEED)).all()
-
-
-@LEVELS
-@PERIODS
-def test_a_joint_that_is_too_fast_to_stop_goes_no_farther_than_it_must(level, period):
-    rng = np.random.default_rng(8)
-    limits, T = wide(50, period)
-    v = rng.uniform(0.1, 3.0, 50)
-    q = 1.0 - rng.uniform(-0.5, 0.9, 50) * v**2 / 20  # some outside already
-    ride = Ride(q, v, limits, T, level, rng.random((int(0.4 / period), 50)))
-    unavoidable = q + (v**2 / 20 if level == "acceleration" else braking_way(v, 10.0, T, level))
-    beyond = unavoidable > 1.0
-    assert beyond.any()
-    np.testing.assert_allclose(ride.high[beyond], unavoidable[beyond], rtol=0, atol=1e-12)
-    assert (ride.high[~beyond] <= 1.0 + POSITION).all()
 
 
 @pytest.mark.slow
@@ -344,20 +270,6 @@ def test_a_joint_outside_returns_without_turning_and_in_finite_time(level, perio
         assert (outside[-1] <= POSITION).all()
         assert (ride.speed <= max(velocity, np.sqrt(10 * 1.0) * 1.01)).all() or choice == "random"
         assert (ride.speed <= velocity * (1 + SPEED)).all()
-
-
-@LEVELS
-@PERIODS
-def test_speed_outward_is_braked_by_the_full_acceleration_then_the_joint_returns(level, period):
-    limits, T = wide(3, period, 5.0)
-    q, v = np.array([1.0, 1.2, 1.5]), np.array([0.5, 0.02, 2.0])
-    ride = Ride(q, v, limits, T, level, np.ones((int(3 / period), 3)))
-    np.testing.assert_allclose(ride.high, q + (v**2 / 20 if level == "acceleration" else
-                                               braking_way(v, 10.0, T, level)), atol=1e-12)
-    top = ride.q.argmax(axis=0)
-    for j in range(3):
-        assert (np.diff(ride.q[top[j]:, j]) <= 1e-12).all()
-    assert (ride.q[-1] <= 1.0 + POSITION).all()
 
 
 @LEVELS
@@ -387,23 +299,6 @@ def test_the_clamp_answers_anything_with_a_command_of_the_box(level):
         rest = -v / 2e-3 if level == "acceleration" else np.zeros(200)
         np.testing.assert_array_equal(answer, np.clip(np.where(np.isnan(x), rest, x), low, up))
         assert np.isfinite(answer).all()
-
-
-def test_nothing_but_nan_brings_a_joint_to_rest_within_its_limits():
-    limits = Limits([-1.0], [1.0], [2.0], [8.0], 0.01)
-    q, v = np.zeros(1), np.ones(1)
-    for _ in range(20):
-        a = limits.clamp(q, v, "acceleration", [np.nan])
-        q, v = q + v * 0.01 + a * 0.01**2 / 2, v + a * 0.01
-    assert v == pytest.approx(0.0, abs=1e-15)
-    assert q == pytest.approx(1 / 16, abs=1e-3)
-
-
-@LEVELS
-def test_the_clamp_is_finite_even_where_the_state_is_not(level):
-    limits = Limits([-1.0] * 3, [1.0] * 3, [2.0] * 3, [8.0] * 3, 0.01)
-    q, v = np.array([np.nan, 0.0, np.nan]), np.array([0.0, np.nan, np.nan])
-    assert np.isfinite(limits.clamp(q, v, level, [1.0, np.nan, np.inf])).all()
 
 
 # ---- the tasks --------------------------------------------------------------------------------
@@ -471,20 +366,6 @@ def model_of(*kinds):
     return model
 
 
-def test_a_continuous_joint_has_no_position_limits_and_the_others_keep_theirs():
-    model = model_of(pin.JointModelRUBZ(), pin.JointModelRX(), pin.JointModelPY())
-    model.lowerPositionLimit = np.array([-1.01, -1.01, -0.5, -np.inf])
-    model.upperPositionLimit = np.array([1.01, 1.01, 0.7, 3.0])
-    robot = Robot(model, "mixed")
-    np.testing.assert_array_equal(robot.coordinates, [0, 2, 3])
-    np.testing.assert_array_equal(robot.position_limits(),
-                                  [[-np.inf, -0.5, -np.inf], [np.inf, 0.7, 3.0]])
-    state = State.at(robot, [1.0, 0.0, 0.7, 3.0])
-    low, up = JointLimits(robot, 10.0, 1e-3).box(state, "acceleration")
-    np.testing.assert_allclose(up, [10.0, 0.0, 0.0], atol=1e-9)
-    np.testing.assert_allclose(low, -10.0)
-
-
 def test_a_limit_on_coordinates_that_are_no_angles_is_refused():
     model = model_of(pin.JointModelPlanar())
     model.lowerPositionLimit = np.array([-2.0, -np.inf, -1.01, -1.01])
@@ -507,11 +388,6 @@ def test_settings_that_make_no_sense_are_named(settings, said):
         JointLimits(**({"robot": ROBOT, "acceleration": 10.0, "period": 1e-3} | settings))
     assert said in str(error.value)
     assert "task 'joint limits'" in str(error.value)
-
-
-def test_a_joint_with_a_single_position_is_kept_there():
-    box = Limits([1.0], [1.0], [2.0], [100.0], 0.01).box(np.ones(1), np.zeros(1), "velocity")
-    np.testing.assert_array_equal(box, np.zeros((2, 1)))
 
 
 @pytest.mark.parametrize(("limits", "said"), [
@@ -558,31 +434,9 @@ def test_the_other_methods_of_the_torque_task_say_the_same():
     assert (task.dimension, task.kind) == (7, "inequality")
 
 
-def test_dynamics_leave_the_kinematics_of_a_state_alone():
-    q, v = states(1)[0]
-    state, fresh = state_at(q, v), state_at(q, v)
-    for _ in (state.mass_matrix(), state.bias_effort(), state.mass_matrix_derivative()):
-        for view in ("J", "dJ", "placements"):
-            np.testing.assert_array_equal(getattr(state, view), getattr(fresh, view))
-
-
 def test_torque_limits_need_the_acceleration_level_and_a_share():
     with pytest.raises(HierarchyError, match="'torque limits': torque limits need the acceler"):
         Stack([TorqueLimits(ROBOT)], "velocity").hierarchy(state_at(*states(1)[0]))
     for fraction in (0.0, -1.0, 80.0, np.nan):
         with pytest.raises(HierarchyError, match=f"fraction {fraction} is not more than 0"):
             TorqueLimits(ROBOT, fraction)
-
-
-@pytest.mark.parametrize(("limit", "effort"), [
-    (LIMIT, 10.0), (LIMIT.replace('effort="10"', 'effort="0"'), np.inf)])
-def test_effort_limits_are_those_of_the_file(tmp_path, limit, effort):
-    path = tmp_path / "arm.urdf"
-    path.write_text(URDF.format(kind="revolute", limit=limit))
-    robot = Robot.from_file(path)
-    assert robot.effort_limit == effort
-    stack = Stack([TorqueLimits(robot), JointLimits(robot, 5.0, 0.01)])
-    h = stack.hierarchy(State.at(robot, [0.3]))
-    res = make("hcod").solve(h)
-    assert res.status is Status.SOLVED
-    assert h.violations(res.x).max() <= 1e-9

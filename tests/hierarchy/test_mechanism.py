@@ -58,16 +58,6 @@ def start(robot=ROBOT):
                                    ["crank", "finger"])
 
 
-def test_a_mechanism_is_closed_and_named_joints_stay():
-    q = start()
-    assert distance(ROBOT, q) < 1e-14
-    assert ROBOT.values(q)["crank"] == pytest.approx(-0.8, abs=1e-15)
-    away = ROBOT.integrate(q, 0.05 * np.sin(np.arange(ROBOT.n)))
-    assert distance(ROBOT, away) > 1e-3
-    assert Mechanism(ROBOT).gap(away)[0] > 1e-3
-    assert distance(ROBOT, Mechanism(ROBOT).closed(away)) < 1e-14
-
-
 @pytest.mark.parametrize("rigid", [False, True])
 def test_rows_of_a_mechanism_are_derivatives_of_its_error(rigid):
     robot, h, rng = four_bar(rigid), 1e-6, np.random.default_rng(2)
@@ -88,8 +78,8 @@ def test_rows_of_a_mechanism_are_derivatives_of_its_error(rigid):
         (task.jacobian(at(h * v)) - task.jacobian(at(-h * v))) / (2 * h), atol=1e-8)
 
 
-@pytest.mark.parametrize("resolver", ["hcod", "tpm", "recursive"])
-@pytest.mark.parametrize("level", ["velocity", "acceleration", "torque"])
+@pytest.mark.parametrize(("level", "resolver"), [
+    ("velocity", "hcod"), ("acceleration", "tpm"), ("torque", "recursive")])
 def test_a_four_bar_closes_from_a_millimetre_off_and_goes_to_its_posture(level, resolver):
     """The torque is that of the answer, and the motion is what pinocchio says that it causes."""
     crank = Posture({**ROBOT.values(start()), **GOAL}, 100.0, 20.0, 10.0)
@@ -132,7 +122,7 @@ def planar_bar(rigid, rounding):
 
 
 @pytest.mark.parametrize("rigid", [False, True])
-@pytest.mark.parametrize("rounding", [0.0, 1e-9, 1e-6, 1e-4])
+@pytest.mark.parametrize("rounding", [0.0, 1e-6])
 def test_a_chain_in_a_plane_moves_although_its_file_is_rounded(rigid, rounding):
     """What rounding opens across the plane no motion closes: once the joints were thrown after it.
 
@@ -164,8 +154,7 @@ JOINT = """<link name="{0}"/><joint name="{0}" type="{2}"><parent link="{1}"/><c
 
 
 @pytest.mark.parametrize("kind", ["revolute", "continuous"])
-@pytest.mark.parametrize("resolver", ["hcod", "tpm"])
-def test_a_gripper_with_mimic_joints_stays_one_in_inverse_kinematics(kind, resolver, tmp_path):
+def test_a_gripper_with_mimic_joints_stays_one_in_inverse_kinematics(kind, tmp_path):
     follow = '<mimic joint="driver" multiplier="{}" offset="{}"/>'
     joints = [("driver", "base", ""), ("knuckle", "driver", follow.format(-1, 0)),
               ("left", "base", follow.format(1, 0.1)), ("right", "base", follow.format(-0.5, 0))]
@@ -176,7 +165,7 @@ def test_a_gripper_with_mimic_joints_stays_one_in_inverse_kinematics(kind, resol
     q = Mechanism(robot).closed(robot.rest)
     for _ in range(300):
         step = solve_ik(robot, q, [Posture({"driver": 0.6, "left": -0.5}, gain=5.0)],
-                        resolver=resolver)
+                        resolver="hcod")
         q = robot.integrate(q, 0.01 * step.v)
         found = robot.values(q)
         expected = [-found["driver"], found["driver"] + 0.1, -0.5 * found["driver"]]

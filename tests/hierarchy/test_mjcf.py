@@ -1,7 +1,6 @@
 """Robots of MJCF files are what MuJoCo says they are; MuJoCo itself is asked."""
 
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,7 +9,6 @@ from hierarchy import Robot, State
 from hierarchy.errors import RobotError, UnknownNameError
 from scenarios.cell.robot import start_of
 from scenarios.cli.main import run_command
-from scenarios.config.references import separable_pairs
 from scenarios.config.robot import StartSection
 
 mujoco = pytest.importorskip("mujoco")
@@ -100,14 +98,6 @@ def test_an_attached_model_is_part_of_the_robot(written, tmp_path):
     assert Robot.load(path).joint_names == ("a_joint", "left_hand_joint")
 
 
-def test_the_mjcf_in_the_documents_has_its_three_joints(written):
-    page = Path(__file__).parents[2] / "docs/adapters.md"
-    text = page.read_text().partition("<mujoco>")[2].partition("</mujoco>")[0]
-    robot = Robot.load(written(text))
-    assert robot.joint_names == ("a", "b", "c")
-    assert set(robot.frame_names) == {"universe", *"abc", "body 1", "body 2", "wrist", "tip"}
-
-
 PACKAGES = public_robots.MJCF + public_robots.URDF
 
 
@@ -162,15 +152,6 @@ def test_a_second_body_that_floats_is_refused_by_name(scene, written):
     assert Robot.load(path, base="fixed").base == "fixed"
 
 
-def test_a_free_base_rests_where_the_file_puts_it(written):
-    path = written(world(WALKER))
-    robot = Robot.load(path)
-    np.testing.assert_allclose(robot.rest, [0, 0, 0.5, 0.6, 0, 0, 0.8, 0], atol=1e-12)
-    held = Robot.load(path, base="fixed")
-    tip = [State.at(one, one.rest).position("leg_tip") for one in (robot, held)]
-    np.testing.assert_allclose(*tip, atol=1e-12)
-
-
 def test_a_base_floats_where_it_is_asked_to(written):
     path = written(world(link("a")))
     robot, held = Robot.load(path, base="floating"), Robot.load(path)
@@ -180,14 +161,6 @@ def test_a_base_floats_where_it_is_asked_to(written):
     assert Robot.load(written(world(TABLE)), base="floating").n == 6
     with pytest.raises(RobotError, match="it has no joint that moves"):
         Robot.load(path.with_name("robot.xml"))
-
-
-def test_a_locked_joint_stays_where_it_is_put(written):
-    path = written(world(link("a", 'ref="30"', link("b"))))
-    whole, part = Robot.load(path), Robot.load(path, locked={"a_joint": 0.3})
-    assert part.joint_names == ("b_joint",)
-    np.testing.assert_allclose(State.at(part, [0.2]).position("b_tip"),
-                               State.at(whole, [0.3, 0.2]).position("b_tip"), atol=1e-12)
 
 
 @pytest.mark.parametrize(("joint", "value", "qpos"), [
@@ -353,14 +326,6 @@ def test_keyframes_are_starts(written):
     np.testing.assert_allclose(start_of(held, moved)[0], [0.1])
     with pytest.raises(UnknownNameError, match="unknown keyframe 'hom'"):
         robot.start("hom")
-
-
-def test_pairs_that_the_file_lets_touch_are_not_kept_apart(written):
-    chain = link("a", more=link("b", 'axis="0 0 1"', link("c", more=link("d"))))
-    exclude = '<contact><exclude body1="a" body2="c"/></contact>'
-    free, apart = (Robot.load(written(world(chain, more))) for more in ("", exclude))
-    assert apart.apart == (("a_joint", "c_joint"),)
-    assert set(separable_pairs(free, 0.01)) - set(separable_pairs(apart, 0.01)) == {(0, 2)}
 
 
 def test_check_shows_what_the_file_has_besides_joints(written, capsys):

@@ -10,9 +10,8 @@ import pytest
 from hierarchy import HierarchyError, Robot, State
 from hierarchy.avoidance.self_collision import pairs_of_tree
 from hierarchy.errors import RobotError, UnknownNameError
-from hierarchy.robots.points import points_along_chain
 from hierarchy.robots.shapes import _capsule_of, bounding_capsule
-from hierarchy.tasks import DangerBounds, JointLimits, Posture, TorqueLimits
+from hierarchy.tasks import DangerBounds, JointLimits, TorqueLimits
 from scenarios.cell.robot import make_robot
 from scenarios.cli.main import run_command
 from scenarios.cli.robot_check import look_at, paste
@@ -97,25 +96,12 @@ def test_the_end_effector_proposed_is_the_frame_with_a_tools_name(arm):
     assert Robot.from_file(arm(), "fore").end_effector == "fore"
 
 
-def test_without_a_tools_name_it_is_the_last_frame_that_most_joints_move(arm):
-    path = arm()
-    path.write_text(path.read_text().replace("tool0", "palm").replace("flange", "mounted"))
-    assert Robot.from_file(path).end_effector == "palm", "not the sensor on the base"
-
-
 def test_capsules_are_proposed_from_primitives(arm):
     upper = Robot.from_file(arm()).capsules[1]
     assert (upper.joint, upper.radius) == (1, 0.05)
     np.testing.assert_allclose([upper.start, upper.end], [(0, 0, 0), (0, 0, 0.4)], atol=1e-12)
     ball = Robot.from_file(arm()).capsules[2]
     assert (ball.joint, ball.radius, ball.start) == (2, 0.04, (0.0, 0.0, 0.15))
-
-
-def test_the_capsule_of_a_box_holds_its_corners(arm):
-    base = Robot.from_file(arm()).capsules[0]
-    assert base.joint == 0
-    for corner in np.array(np.meshgrid(*[(-0.1, 0.1)] * 2, (-0.05, 0.05))).reshape(3, -1).T:
-        assert holds(base, corner)
 
 
 def test_the_capsule_of_a_mesh_holds_its_corners(arm, tmp_path):
@@ -162,10 +148,6 @@ def test_an_mjcf_without_the_mesh_of_what_is_only_seen_keeps_its_other_shapes(bo
     assert [capsule.radius for capsule in Robot.from_file(path).capsules][1:] == [0.05]
 
 
-def test_an_mjcf_with_its_mesh_has_a_capsule_for_it(body):
-    assert len(Robot.from_file(body()).capsules) == 3
-
-
 def test_the_capsule_of_a_cone_has_its_axis():
     cone = SimpleNamespace(radius=0.1, halfLength=0.4)
     start, end, radius = _capsule_of(cone, "Cone")
@@ -185,60 +167,6 @@ def test_a_bounding_capsule_holds_all_points(seed):
     assert off.max() == pytest.approx(radius, abs=1e-9)
 
 
-def test_points_all_over_a_capsule_have_that_capsule():
-    """Its caps reach beyond the segment: without them the one found is two radii too long."""
-    along, around = np.meshgrid(np.linspace(-np.pi / 2, np.pi / 2, 201),
-                                np.linspace(0.0, 2 * np.pi, 40, endpoint=False))
-    height = 0.1 * np.sin(along) + 0.25 * np.sign(along)
-    points = np.stack([0.1 * np.cos(along) * np.cos(around), 0.1 * np.cos(along) * np.sin(around),
-                       height], axis=-1).reshape(-1, 3)
-    start, end, radius = bounding_capsule(points)
-    assert radius == pytest.approx(0.1, abs=1e-9)
-    np.testing.assert_allclose(sorted([start[2], end[2]]), [-0.25, 0.25], atol=1e-3)
-
-
-def test_the_capsule_of_a_plate_lies_along_its_length():
-    """Across it the segment is shortest, but the caps hold many times the volume."""
-    corners = np.array(np.meshgrid((-2.0, 2.0), (-1.0, 1.0), (-0.1, 0.1))).reshape(3, -1).T
-    start, end, radius = bounding_capsule(corners)
-    assert radius == pytest.approx(np.hypot(1.0, 0.1))
-    assert abs(end[0] - start[0]) == pytest.approx(4.0)
-
-
-def test_a_start_beyond_the_limits_is_put_midway(arm):
-    np.testing.assert_allclose(Robot.from_file(arm()).rest, [1.25, 1.25, 1.25])
-
-
-def test_a_file_without_limits_has_infinite_ones(arm):
-    robot = Robot.from_file(arm(limit="", kind="continuous"))
-    assert (robot.n, robot.nq) == (3, 6)
-    for limit in (*robot.position_limits(), robot.velocity_limit, robot.effort_limit):
-        assert np.isinf(limit).all()
-
-
-def test_control_points_are_spread_evenly_over_the_chain(arm):
-    robot = Robot.from_file(arm())
-    state, end = State.at(robot, [0.7, 0.9, 0.6]), robot.frame("tool0")
-    places = [state._placement(p.joint)[1] + state._placement(p.joint)[0] @ p.offset
-              for p in robot.control_points]
-    places = np.array([*places, state.position(end)])
-    steps = np.linalg.norm(np.diff(places, axis=0), axis=1)
-    np.testing.assert_allclose(steps, steps[0])
-    assert len(robot.control_points) == 8
-    assert {p.joint for p in robot.control_points} == {3}, "from the third joint on"
-
-
-def test_a_control_point_belongs_to_the_link_that_it_lies_on(arm):
-    robot = Robot.from_file(arm())
-    points = points_along_chain(robot.model, "tool0", count=5, first=1)
-    tip = robot.frame("tool0").offset
-    links = np.linalg.norm([*(robot.model.jointPlacements[k].translation for k in (2, 3)), tip],
-                           axis=1)
-    along = [links[:point.joint - 1].sum() + np.linalg.norm(point.offset) for point in points]
-    np.testing.assert_allclose(along, links.sum() * np.arange(1, 6) / 6)
-    assert {point.joint for point in points} == {1, 2}
-
-
 def test_a_base_floats_where_it_is_asked_to(arm, body):
     assert Robot.from_file(arm()).base == "fixed"
     floating = Robot.from_file(arm(), base="floating")
@@ -247,36 +175,6 @@ def test_a_base_floats_where_it_is_asked_to(arm, body):
     fixed = Robot.from_file(body(), base="fixed")
     assert (fixed.n, fixed.joint_names) == (1, ("hinge",))
     assert fixed.capsules[0].joint == 0
-
-
-def test_a_floating_base_has_no_limits(body):
-    robot = Robot.from_file(body())
-    lower, upper = robot.position_limits()
-    assert np.isinf(lower[:6]).all()
-    assert np.isinf(upper[:6]).all()
-    np.testing.assert_allclose([lower[6], upper[6]], [-1, 1])
-
-
-def test_the_state_of_a_floating_base_has_exact_derivatives(arm):
-    robot, h = Robot.from_file(arm(), base="floating"), 1e-6
-    rng = np.random.default_rng(3)
-    q = robot.integrate(robot.rest, rng.normal(size=robot.n))
-    v, frame = rng.normal(size=robot.n), robot.frame("tool0")
-
-    def position(step):
-        return State.at(robot, robot.integrate(q, step)).position(frame)
-
-    state = State.at(robot, q, v)
-    columns = [(position(h * e) - position(-h * e)) / (2 * h) for e in np.eye(robot.n)]
-    from hierarchy.paths import Still
-    from hierarchy.tasks import Position
-    task = Position(frame, Still((0.0, 0.0, 0.0)))
-    J = task.jacobian(state)
-    np.testing.assert_allclose(J, np.transpose(columns), atol=1e-8)
-    later, before = (State.at(robot, robot.integrate(q, s * h * v), v) for s in (1, -1))
-    np.testing.assert_allclose(
-        task.jacobian_derivative(state),
-        (task.jacobian(later) - task.jacobian(before)) / (2 * h), atol=1e-8)
 
 
 def test_joint_limits_leave_the_base_alone(arm):
@@ -299,15 +197,6 @@ def test_what_cannot_be_said_of_a_floating_base_is_refused(arm):
         TorqueLimits(robot)
     with pytest.raises(HierarchyError, match="floating base"):
         DangerBounds(JointLimits(robot, 5.0, 0.01), robot.control_points)
-
-
-def test_a_posture_is_that_of_the_joints_behind_a_floating_base(arm):
-    robot = Robot.from_file(arm(), base="floating")
-    task, state = Posture((1.0, 1.0, 1.0)), State.at(robot, robot.rest)
-    np.testing.assert_allclose(task.error(state), [-0.25] * 3)
-    np.testing.assert_array_equal(task.jacobian(state), np.eye(9)[6:])
-    with pytest.raises(HierarchyError, match="2 values for 3 joint positions"):
-        Posture((0.0, 0.0)).error(state)
 
 
 def test_a_file_with_the_name_of_a_table_is_not_that_table(arm):
@@ -370,20 +259,6 @@ def test_check_says_what_was_found_and_gives_a_section_that_makes_the_same_robot
         assert one.joint == other.joint
         np.testing.assert_allclose(one.offset, other.offset, atol=1e-4)
     assert [c.joint for c in again.capsules] == [c.joint for c in before.capsules]
-
-
-def test_check_says_which_limits_and_masses_there_are_not(arm, capsys):
-    assert run_command(["check", str(arm(limit="", kind="continuous"))]) == 0
-    said = capsys.readouterr().out
-    assert "missing         position limits of shoulder, elbow, turn" in said
-    assert "effort limits of shoulder" in said
-
-
-def test_check_of_a_robot_as_json(arm, capsys):
-    assert run_command(["check", str(arm()), "--json"]) == 0
-    found = json.loads(capsys.readouterr().out)
-    assert found["base"] == "fixed"
-    assert [joint["name"] for joint in found["joints"]] == ["shoulder", "elbow", "turn"]
 
 
 @pytest.mark.parametrize(("name", "feet"), [
@@ -472,16 +347,6 @@ def test_an_unknown_name_comes_with_the_nearest():
 
 
 @pytest.mark.usefixtures("example_robot_data")
-@pytest.mark.parametrize("resolver", ["recursive", "hcod"])
-def test_strict_resolvers_move_the_panda_alike(resolver):
-    from scenarios import load, simulate
-
-    scenario = load("panda-ellipse", ["control.duration=0.5"])
-    one, other = simulate(scenario), simulate(scenario.with_resolver(resolver))
-    assert abs(one["q"] - other["q"]).max() < 1e-6
-
-
-@pytest.mark.usefixtures("example_robot_data")
 def test_the_panda_follows_its_ellipse_within_its_limits():
     from scenarios import load, simulate
 
@@ -536,16 +401,6 @@ def test_a_wrong_urdf_is_refused_with_the_name_of_its_joint(changed, said, tmp_p
     assert said in str(error.value)
     assert "arm.urdf" in str(error.value)
     assert capfd.readouterr() == ("", "")
-
-
-def test_units_and_coupled_joints_are_told(tmp_path):
-    path = tmp_path / "arm.urdf"
-    mimic = '<mimic joint="shoulder" multiplier="2" offset="0.1"/>'
-    path.write_text(TWO_JOINTS.format(**{**PLAIN, "mimic": mimic}))
-    robot = Robot.load(path)
-    assert robot.velocity_units == ["rad", "m"]
-    assert list(map(str, robot.coupled)) == ["elbow = 2 shoulder + 0.1 in the file"]
-    assert Robot.load(path, locked={"elbow": 0.0}).coupled == ()
 
 
 ONE_BODY = """<body name="{0}"><joint name="{0}" axis="0 0 1" range="-90 90"/><geom size="0.03"/>

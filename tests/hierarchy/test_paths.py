@@ -38,24 +38,6 @@ def test_position_velocity_and_acceleration_do_not_jump(name):
         np.testing.assert_allclose(path(t - 1e-9), path(t + 1e-9), atol=1e-6)
 
 
-def test_a_line_goes_straight_from_rest_to_rest():
-    path = PATHS["line"]
-    np.testing.assert_allclose(path(0.4), [POINTS[0], [0] * 3, [0] * 3], atol=1e-12)
-    np.testing.assert_allclose(path(1.9), [POINTS[1], [0] * 3, [0] * 3], atol=1e-12)
-    aside = np.cross(path(1.0)[0] - POINTS[0], np.subtract(POINTS[1], POINTS[0]))
-    np.testing.assert_allclose(aside, 0.0, atol=1e-12)
-
-
-@pytest.mark.parametrize(("name", "normal"), [("circle", (0.2, -0.4, 1.0)),
-                                              ("circle about x", (1.0, 0.0, 0.0))])
-def test_a_circle_keeps_its_radius_and_its_plane(name, normal):
-    path = PATHS[name]
-    for t in MOMENTS[::20]:
-        out = path(t)[0] - [0.1, 0.2, 0.3]
-        assert np.linalg.norm(out) == pytest.approx(0.2)
-        assert out @ normal == pytest.approx(0.0, abs=1e-12)
-
-
 def test_a_circle_turns_about_its_normal():
     start, later = (circle((0, 0, 0), 1.0)(t)[0] for t in (0.0, 0.1))
     np.testing.assert_allclose(start, [1.0, 0.0, 0.0])

@@ -6,28 +6,11 @@ from pinned import leaves, read, robot_facts
 from hierarchy import HierarchyError, Robot, State
 from hierarchy.errors import RobotError, UnknownNameError
 from hierarchy.robots import TABLES
-from hierarchy.robots.from_table import from_table
-from hierarchy.robots.table import Link, TreeJoint, TreeTable
 
 ROBOT = Robot.named("kuka_lwr")
 
-MJCF = """<mujoco><worldbody><body name="arm"><joint name="hinge" type="hinge" axis="0 1 0"/>
-<geom type="capsule" size="0.05" fromto="0 0 0 0 0 -1"/></body></worldbody></mujoco>"""
-
-
 D = [0, 0, 0.4, 0, 0.39, 0, 0.078]
 ALPHA = np.deg2rad([90, -90, -90, 90, 90, -90, 0])
-
-
-def test_a_link_of_a_table_is_what_is_given_of_it():
-    """Without anything it has no shape and no mass; with a radius alone it is a ball."""
-    bare, ball = (from_table(TreeTable("one joint", (
-        TreeJoint("one", "", (0.0, 0.0, 0.0), "z", (-90, 90), 1.0, 1.0, link),), (), "one"))
-        for link in (Link(), Link(radius=0.1)))
-    assert bare.capsules == ()
-    assert bare.model.inertias[1].mass == 0.0
-    found = [(capsule.start, capsule.end, capsule.radius) for capsule in ball.capsules]
-    assert found == [((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.1)]
 
 
 def from_dh_table(q, joints=7):
@@ -46,35 +29,6 @@ def test_kinematics_equal_the_table_multiplied_out():
         state, T = State.at(ROBOT, q), from_dh_table(q)
         np.testing.assert_allclose(state.position(frame), T[:3, 3], atol=1e-14)
         np.testing.assert_allclose(state.rotation(frame), T[:3, :3], atol=1e-14)
-
-
-def test_the_start_of_the_letter_is_22_mm_off_the_path():
-    q0 = [0.923, -0.854, 0.903, 1.195, 0.971, 1.796, 0.0]
-    p = State.at(ROBOT, q0).position(ROBOT.frame("end_effector"))
-    assert np.linalg.norm(p - [0.2, 0.6, 0.2]) == pytest.approx(0.022, abs=5e-4)
-
-
-def test_control_points_lie_on_the_upper_arm_and_the_forearm():
-    state = State.at(ROBOT, np.linspace(-1, 1, 7))
-    elbow, wrist = from_dh_table(state.q, 3)[:3, 3], from_dh_table(state.q, 5)[:3, 3]
-    for i, point in enumerate(ROBOT.control_points):
-        rotation, translation = state._placement(point.joint)
-        here = translation + rotation @ point.offset
-        end, other, reach = (elbow, np.zeros(3), 0.2) if i < 4 else (wrist, elbow, 0.39)
-        toward = (other - end) / np.linalg.norm(other - end)
-        np.testing.assert_allclose(here, end + toward * (i % 4) / 4 * reach, atol=1e-13)
-
-
-def test_limits_are_those_of_the_arm():
-    np.testing.assert_allclose(np.rad2deg(ROBOT.upper), [170, 120, 170, 120, 170, 120, 170])
-    np.testing.assert_allclose(ROBOT.lower, -ROBOT.upper)
-    assert (ROBOT.velocity_limit > 1.5).all()
-
-
-def test_the_mass_matrix_is_symmetric_and_positive():
-    M = State.at(ROBOT, np.ones(7)).mass_matrix()
-    np.testing.assert_allclose(M, M.T)
-    assert np.linalg.eigvalsh(M).min() > 0
 
 
 def test_a_state_is_moved_without_making_another():
@@ -129,29 +83,6 @@ def pendulum(tmp_path):
     return write
 
 
-def test_a_urdf_file_is_read_with_its_limits_and_frames(pendulum):
-    robot = Robot.from_file(pendulum())
-    assert (robot.n, robot.name, robot.joint_names) == (1, "revolute", ("hinge",))
-    assert (robot.lower[0], robot.upper[0], robot.velocity_limit[0]) == (-1, 2, 3)
-    assert robot.end_effector == "hand"
-    p = State.at(robot, [0.5]).position(robot.frame("hand"))
-    np.testing.assert_allclose(p, [-np.sin(0.5), 0, -np.cos(0.5)])
-
-
-def test_a_continuous_joint_keeps_its_own_coordinates(pendulum):
-    robot = Robot.from_file(pendulum("continuous", ""))
-    assert (robot.n, robot.nq) == (1, 2)
-    q = robot.integrate(np.array([1.0, 0.0]), np.array([0.5]))
-    np.testing.assert_allclose(q, [np.cos(0.5), np.sin(0.5)])
-
-
-def test_an_mjcf_file_is_read(tmp_path):
-    pytest.importorskip("mujoco")
-    path = tmp_path / "arm.xml"
-    path.write_text(MJCF)
-    assert Robot.from_file(path).joint_names == ("hinge",)
-
-
 def test_bad_robot_files_are_named(tmp_path, pendulum):
     (tmp_path / "broken.urdf").write_text("<robot")
     (tmp_path / "arm.stl").write_text("solid")
@@ -161,12 +92,6 @@ def test_bad_robot_files_are_named(tmp_path, pendulum):
             Robot.from_file(tmp_path / path)
     with pytest.raises(HierarchyError, match="unknown frame 'tool'"):
         Robot.from_file(pendulum(), end_effector="tool")
-
-
-def test_a_state_begins_at_rest_at_time_zero():
-    state = State(ROBOT)
-    assert state.t == 0.0
-    assert not state.v.any()
 
 
 @pytest.mark.parametrize("name", TABLES)

@@ -1,15 +1,14 @@
-from itertools import pairwise
 
 import numpy as np
 import pytest
 from scene import ROBOT, compiled_rows, states
 
 from hierarchy import HierarchyError, Stack, State
-from hierarchy.avoidance import Barrier, Capsule, pairs_of_chain
+from hierarchy.avoidance import Barrier, Capsule
 from hierarchy.avoidance.self_collision import measure_capsules, pack_capsules
 from hierarchy.robots import TABLES, link_capsules
 from hierarchy.tasks import Posture
-from hierarchy.tasks.self_separation import SelfSeparation, _write
+from hierarchy.tasks.self_separation import SelfSeparation
 from scenarios.cell.plants import KinematicArm
 from solvers import Status, make
 
@@ -81,16 +80,6 @@ def test_distance_of_segments_is_the_least_there_is():
             np.testing.assert_allclose(seen[0] * seen[1:4], on_a - on_b, atol=1e-9)
 
 
-def test_capsules_overlap_by_a_negative_distance():
-    seen = measured(((0, 0, 0), (1, 0, 0), 0.3), ((0.5, -1, 0.4), (0.5, 1, 0.4), 0.2))
-    np.testing.assert_allclose(seen, [-0.1, 0, 0, -1, 0.5, 0.5])
-
-
-def test_axes_that_cross_have_a_finite_direction():
-    seen = measured(((-1, 0, 0), (1, 0, 0), 0.1), ((0, -1, 0), (0, 1, 0), 0.1))
-    np.testing.assert_allclose(seen, [-0.2, 0, 0, 1, 0.5, 0.5])
-
-
 def test_distances_agree_with_coal_through_pinocchio():
     pytest.importorskip("coal")
     import coal
@@ -117,17 +106,6 @@ def test_distances_agree_with_coal_through_pinocchio():
             apart = ours > 0
             np.testing.assert_allclose(ours[apart], coal_says[apart], atol=2e-6)
             assert (coal_says[~apart] < 2e-6).all(), name
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", TASKS)
-def test_rows_are_the_derivative_of_the_distances(name):
-    task, h = TASKS[name], 1e-6
-    for q, v in STATES:
-        columns = [(task.distances(State.at(ROBOT, q + h * e))
-                    - task.distances(State.at(ROBOT, q - h * e))) / (2 * h) for e in np.eye(7)]
-        np.testing.assert_allclose(task.jacobian(State.at(ROBOT, q, v)), np.transpose(columns),
-                                   atol=1e-7)
 
 
 def test_rows_give_the_second_derivative_with_nearest_points_that_slide():
@@ -168,20 +146,6 @@ def test_compiled_rows_equal_those_of_the_plain_methods(name, level, differences
     assert 0 < sided < 8 * task.dimension
 
 
-def test_parallel_links_give_finite_rows():
-    """Stretched out, then folded by half a turn: the axes of the arm lie on one line."""
-    for elbow in (0.0, np.pi):
-        state = State.at(ROBOT, [0.0, 0.3, 0.0, elbow, 0.0, 0.0, 0.0], np.ones(7))
-        A, lower, upper = np.zeros((3, 7)), np.zeros(3), np.zeros(3)
-        TASKS["arm"].writer(state, "acceleration", A, lower, upper, row=0)()
-        assert np.isfinite(A).all()
-        assert np.isfinite(lower).all()
-
-
-def test_the_kernel_allocates_nothing():
-    assert not getattr(_write, "allocates", False)
-
-
 def drive(level, period, start, goal, barrier, differences=False, duration=2.5):
     """Distances [m] of the arm's pairs on the way to a posture below it, tick after tick."""
     task = SelfSeparation(ARM, barrier)
@@ -215,53 +179,6 @@ def test_an_arm_driven_into_its_foot_stops_before(level, period, differences):
     assert d.min() > 0.02 - 1e-6
     assert d[-1].min() == pytest.approx(0.02, abs=1e-4)
     assert np.abs(plant.v).max() < 0.1
-
-
-@pytest.mark.parametrize("level", LEVELS)
-def test_no_posture_near_that_one_brings_the_arm_into_itself(level):
-    rng = np.random.default_rng(1)
-    for _ in range(15):
-        start = rng.uniform(ROBOT.lower, ROBOT.upper)
-        goal = INTO_THE_FOOT + rng.uniform(-0.1, 0.1, 7)
-        goal[0] = rng.uniform(-2, 2)
-        assert TASKS["arm"].distances(State.at(ROBOT, start)).min() > 0.03
-        d, _ = drive(level, 4e-3, start, tuple(goal), Barrier(0.02))
-        assert d.min() > 0.02 - 1e-5
-
-
-@pytest.mark.parametrize("level", LEVELS)
-def test_a_start_in_contact_recovers(level):
-    d, _ = drive(level, 4e-3, INTO_THE_FOOT, INTO_THE_FOOT, Barrier(0.02, recovery=0.1))
-    assert d[0].min() < 0
-    assert (np.diff(d.min(axis=1)) > -1e-6).all()
-    assert np.diff(d.min(axis=1)).max() / 4e-3 < 0.11
-    assert d[-1].min() == pytest.approx(0.02, abs=1e-3)
-
-
-def test_a_distance_that_no_joint_changes_is_left_alone():
-    """That of the elbow from the foot: asking for more of it must not move the arm at all."""
-    state = State.at(ROBOT, OPEN)
-    task = SelfSeparation(ARM, Barrier(0.3, influence=0.5), ((0, 2),))
-    assert task.distances(state)[0] == pytest.approx(0.28)
-    for level in LEVELS:
-        assert not make("hcod").solve(Stack([task], level).hierarchy(state)).x.any()
-
-
-@pytest.mark.slow
-def test_capsules_of_a_table_are_its_links():
-    assert [(c.name, c.joint, c.start, c.end) for c in ARM] == [
-        ("foot", 0, (0.0, 0.0, -0.3105), (0.0, 0.0, 0.0)),
-        ("link 3", 3, (0.0, 0.0, 0.0), (0.0, 0.0, 0.4)),
-        ("link 5", 5, (0.0, 0.0, 0.0), (0.0, 0.0, 0.39)),
-        ("link 7", 7, (0.0, 0.0, 0.0), (0.0, 0.0, 0.078))]
-    assert [c.name for c in link_capsules(TABLES["kuka_lwr"])] == ["link 3", "link 5", "link 7"]
-    assert pairs_of_chain(ARM) == ((0, 2), (0, 3), (1, 3))
-    for q, _ in STATES:  # each begins where the one before it ends
-        state = State.at(ROBOT, q)
-        ends = [[rotation @ point + at for point in (np.array(c.start), np.array(c.end))]
-                for c in ARM for rotation, at in [state._placement(c.joint)]]
-        for (_, end), (start, _) in pairwise(ends):
-            np.testing.assert_allclose(end, start, atol=1e-12)
 
 
 @pytest.mark.parametrize(("make_it", "said"), [

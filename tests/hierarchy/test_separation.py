@@ -4,10 +4,8 @@ from scene import BODY, FRAME, ROBOT, TIP, compiled_rows, states
 
 from hierarchy import HierarchyError, Stack, State
 from hierarchy.avoidance import Barrier, Measurement, Obstacle, Obstacles, Pairs
-from hierarchy.avoidance.barrier import least_acceleration, least_rate
 from hierarchy.paths import Ellipse, Still
 from hierarchy.tasks import JointDamping, Position, Separation
-from hierarchy.tasks.separation import _write
 from scenarios.cell.plants import KinematicArm
 from scenarios.cell.sensors import ExactDistances
 from solvers import Status, make
@@ -34,7 +32,6 @@ def sensor_of(obstacles):
 
 SENSOR = sensor_of(SHAPES)
 EVERYWHERE = Barrier(0.05, influence=5.0)
-TASK = Separation(SENSOR.points, EVERYWHERE, len(SHAPES))
 
 
 def seen_at(q, v, t=0.7, differences=None):
@@ -58,32 +55,6 @@ def test_pairs_agree_with_what_the_sensor_finds_nearest():
         np.testing.assert_array_equal(seen.pairs.distance.argmin(axis=1), seen.nearest)
         nearest = seen.pairs.direction[np.arange(9), seen.nearest]
         np.testing.assert_array_equal(nearest, seen.direction)
-
-
-def test_pairs_are_measured_only_where_they_are_asked_for():
-    assert ExactDistances(ROBOT, Obstacles(SHAPES), BODY, TIP).measurement.pairs is None
-    assert Measurement(8).pairs is None
-
-
-def test_pairs_know_how_obstacles_move():
-    (q, v), h = STATES[0], 1e-5
-    pairs = seen_at(q, v).measurement.pairs
-    _, velocity, acceleration = ROUND(0.7)
-    for j, obstacle in enumerate(SHAPES):
-        moves = obstacle.path is not None
-        np.testing.assert_array_equal(pairs.velocity[:, j], [velocity * moves] * 9)
-        np.testing.assert_array_equal(pairs.acceleration[:, j], [acceleration * moves] * 9)
-    along = np.einsum("phi,phi->ph", pairs.direction, pairs.velocity).ravel()
-    rate = (distances(q, 0.7 + h) - distances(q, 0.7 - h)) / (2 * h)
-    np.testing.assert_allclose(rate, -along, atol=1e-8)
-
-
-def test_rows_are_the_derivative_of_the_distances():
-    h = 1e-6
-    for q, v in STATES:
-        columns = [(distances(q + h * e, 0.7) - distances(q - h * e, 0.7)) / (2 * h)
-                   for e in np.eye(7)]
-        np.testing.assert_allclose(TASK.jacobian(seen_at(q, v)), np.transpose(columns), atol=1e-8)
 
 
 def test_rows_give_the_second_derivative_of_the_distances_to_moving_obstacles():
@@ -123,35 +94,6 @@ def test_compiled_rows_equal_those_of_the_plain_methods(level, differences, obst
     assert 0 < sided < 5 * task.dimension
 
 
-def test_one_row_a_point_is_that_of_its_nearest_obstacle():
-    nearest = Separation(SENSOR.points, EVERYWHERE)
-    for level in LEVELS:
-        state = seen_at(*STATES[1])
-        every, one = rows(54), rows(9)
-        TASK.writer(state, level, *every, row=0)()
-        nearest.writer(state, level, *one, row=0)()
-        chosen = np.arange(9) * len(SHAPES) + state.measurement.nearest
-        for a, b in zip(every, one, strict=True):
-            np.testing.assert_array_equal(a[chosen], b)
-
-
-def test_a_sensor_of_surfaces_fills_one_column():
-    """As a depth camera would: distances and directions only, and a point that sees nothing."""
-    state = seen_at(*STATES[1])
-    seen, everything = Measurement(8), state.measurement
-    seen.pairs = Pairs(9, 1)
-    seen.pairs.distance[:8, 0] = everything.distance[:8]
-    seen.pairs.direction[:8, 0] = everything.direction[:8]
-    state.measurement = seen
-    task = Separation(SENSOR.points, EVERYWHERE, 1)
-    A, lower, upper = rows(9)
-    task.writer(state, "acceleration", A, lower, upper, row=0)()
-    assert np.isfinite(lower[:8]).all()
-    assert lower[8] == -np.inf
-    assert not A[8].any()
-    assert not task.bend(state).any()
-
-
 def test_rows_beyond_the_influence_change_nothing():
     task = Separation(SENSOR.points, Barrier(0.0, influence=1e-3), len(SHAPES))
     for level in LEVELS:
@@ -162,42 +104,6 @@ def test_rows_beyond_the_influence_change_nothing():
         without = Stack([Position(FRAME, ROUND)], level).hierarchy(state)
         np.testing.assert_allclose(make("hcod").solve(with_rows).x,
                                    make("hcod").solve(without).x, rtol=1e-12)
-
-
-def test_a_side_that_appears_does_not_bind_at_once():
-    barrier = Barrier(0.05, rate=10.0, influence=0.25)
-    h, settings = 0.2, barrier.packed()
-    assert least_rate(h, settings) == -2.0
-    assert least_acceleration(h, -1.0, 0.0, settings) == 0.0, "an approach at 1 m/s goes on"
-    assert least_acceleration(h, -0.5, 0.0, settings) < 0.0
-
-
-def test_what_is_asked_inside_is_bounded_and_continuous():
-    settings = Barrier(0.05, rate=10.0, recovery=0.2, limit=50.0).packed()
-    deep = np.linspace(-10, 1, 20001)
-    asked = np.array([[least_rate(h, settings), least_acceleration(h, 0.0, 0.0, settings)]
-                      for h in deep])
-    assert asked.max(axis=0).tolist() == [0.2, 4.0]
-    assert np.abs(np.diff(asked, axis=0)).max() < 0.1
-    assert least_acceleration(-0.1, -1e6, 0.0, settings) == 50.0
-    assert least_acceleration(-10.0, 0.2, 0.0, settings) == 0.0, "the speed of recovery is kept"
-
-
-def test_a_point_on_an_obstacle_gives_finite_rows():
-    state = State.at(ROBOT, START, np.ones(7))
-    state.measurement = Measurement(8)
-    state.measurement.pairs = Pairs(9, 1)
-    state.measurement.pairs.distance[:] = state.measurement.pairs.radius[:] = 0.0
-    state.measurement.pairs.direction[..., 2] = 1.0
-    for level in LEVELS:
-        A, lower, upper = rows(9)
-        Separation(SENSOR.points, Barrier(0.0), 1).writer(state, level, A, lower, upper, row=0)()
-        assert np.isfinite(A).all()
-        assert np.isfinite(lower).all()
-
-
-def test_the_kernel_allocates_nothing():
-    assert not getattr(_write, "allocates", False)
 
 
 def drive(level, period, obstacles, tasks, barrier, duration=2.0, start=START, differences=False):
@@ -252,59 +158,6 @@ def test_a_hand_that_slides_along_an_obstacle_keeps_the_distance(level, period):
                                                 (-0.1, 0.4, -0.1))]
     d, _, _ = drive(level, period, obstacles, [Position(FRAME, path)], Barrier(0.05), 6.5)
     assert 0.05 - 1e-6 < d.min() < 0.052
-
-
-@pytest.mark.parametrize("level", LEVELS)
-@pytest.mark.parametrize("period", PERIODS)
-def test_an_arm_at_rest_makes_way_for_what_comes(level, period):
-    path = Ellipse(beside_the_hand(0.4, 0.0, 0.0), (0.0, 0.2, 0.1), (-0.4, 0.0, 0.0), rate=1.5)
-    obstacles = [Obstacle("sphere", (0, 0, 0), (0.05,), path=path)]
-    d, v, _ = drive(level, period, obstacles, [], Barrier(0.05), 4.0)
-    assert d.min() >= 0.05 - 0.005 * period, "well under a tick of the obstacle's 0.6 m/s"
-    assert d.min() < 0.06
-    assert 0.1 < np.abs(v).max() < 2.0
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("level", LEVELS)
-@pytest.mark.parametrize("period", PERIODS)
-def test_a_start_inside_recovers_at_a_bounded_speed(level, period):
-    obstacles = [Obstacle("sphere", beside_the_hand(0.06, 0.0, 0.0), (0.05,))]
-    barrier = Barrier(0.1, recovery=0.1)
-    d, v, x = drive(level, period, obstacles, [], barrier, 2.5)
-    d = d[:, 8, 0]
-    assert d[0] == pytest.approx(0.01)
-    assert (np.diff(d) > -1e-12).all()
-    assert np.diff(d).max() / period < 0.1 + 1e-3
-    assert 0.1 - 1e-4 < d[-1] < 0.105
-    assert np.abs(v).max() < 1.0
-    assert np.abs(x).max() < 20.0
-
-
-def test_a_start_inside_an_obstacle_comes_out():
-    obstacles = [Obstacle("box", beside_the_hand(0.0, 0.0, 0.0), (0.05, 0.1, 0.1))]
-    for level in LEVELS:
-        d, _, _ = drive(level, 4e-3, obstacles, [], Barrier(0.02), 3.0)
-        assert d[0, 8, 0] == pytest.approx(-0.05)
-        assert d[-1].min() > 0.02 - 1e-4
-
-
-def test_a_point_that_no_joint_moves_is_left_alone():
-    """Its row is zero but for rounding, which must not be taken for a way out."""
-    points = (ROBOT.control_point("joint_1", (0.0, 0.1, 0.0)),)
-    obstacles = Obstacles([Obstacle("sphere", (0.0, 0.0, 0.13), (0.05,))])
-    measurement = Measurement(0)
-    measurement.pairs = Pairs(1, 1)
-    state = State.at(ROBOT, START)
-    position = state.placements[1, 9:] + 0.1 * state.placements[1, 3:6]
-    away = position - obstacles.centres[0]
-    measurement.pairs.distance[:] = np.linalg.norm(away) - 0.05
-    measurement.pairs.direction[:] = away / np.linalg.norm(away)
-    state.measurement = measurement
-    for level in LEVELS:
-        here = Position(FRAME, Still(beside_the_hand(0.0, 0.0, 0.0)))
-        stack = Stack([Separation(points, Barrier(0.1), 1), here], level)
-        assert not make("hcod").solve(stack.hierarchy(state)).x.any()
 
 
 @pytest.mark.parametrize(("make_task", "said"), [

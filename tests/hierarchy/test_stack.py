@@ -2,11 +2,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from scene import FRAME, PATH, ROBOT, SENSOR, TASKS, Elbow, state_at, states
+from scene import FRAME, PATH, ROBOT, TASKS, Elbow, state_at, states
 
 from hierarchy import HierarchyError, Stack, State
 from hierarchy.errors import ReadingError
-from hierarchy.jit import bind, compiled
 from hierarchy.tasks import JointDamping, JointLimits, LookAt, Position
 
 Q, V = states(1)[0]
@@ -14,10 +13,6 @@ Q, V = states(1)[0]
 
 def stack(level="acceleration", **kwargs):
     return Stack([TASKS["position"], TASKS["pointing"], TASKS["avoidance 3-D"]], level, **kwargs)
-
-
-def test_tasks_come_in_the_order_given():
-    assert stack().names == ("position", "pointing", "avoidance")
 
 
 def test_insert_remove_swap_and_reorder_by_name():
@@ -57,15 +52,6 @@ def test_the_same_order_is_written_into_the_same_buffers():
     assert not np.array_equal(first.A, A)
 
 
-def test_changing_the_stack_changes_the_hierarchy():
-    s, state = stack(), state_at(Q, V)
-    s.hierarchy(state)
-    s.remove("avoidance")
-    assert s.hierarchy(state).names == ("position", "pointing")
-    s.insert(TASKS["avoidance 1-D"], 0)
-    assert s.hierarchy(state).sizes.tolist() == [1, 3, 1]
-
-
 def test_a_task_that_takes_the_place_of_one_removed_is_the_one_that_is_written():
     s, state = Stack([TASKS["position"]]), state_at(Q, V)
     before = s.hierarchy(state).lower.copy()
@@ -88,33 +74,6 @@ def test_stacks_that_share_a_task_change_nothing_in_it(name):
     np.testing.assert_array_equal(rows[0], rows[2])
     for key, value in before.items():
         np.testing.assert_array_equal(getattr(task, key), value)
-
-
-def rows_of(h):
-    return h.A.copy(), h.lower.copy(), h.upper.copy()
-
-
-def test_another_state_and_another_measurement_are_followed():
-    s, one, other = stack(), state_at(Q, V), state_at(Q + 0.1, V)
-    expected = rows_of(stack().hierarchy(other))
-    s.hierarchy(one)
-    for a, b in zip(rows_of(s.hierarchy(other)), expected, strict=True):
-        np.testing.assert_array_equal(a, b)
-    one.move(0.7, Q + 0.1, V)
-    one.measurement = other.measurement
-    for a, b in zip(rows_of(s.hierarchy(one)), rows_of(stack().hierarchy(one)), strict=True):
-        np.testing.assert_array_equal(a, b)
-
-
-def test_what_moves_between_two_calls_is_followed():
-    s, state = stack(reference=JointDamping(7, 5.0)), state_at(Q, V)
-    s.hierarchy(state)
-    state.move(0.9, Q + 0.2, 2 * V)
-    SENSOR.measure(state)
-    state.measurement.active = (state.measurement.active + 1) % 8
-    for a, b in zip(rows_of(s.hierarchy(state)), rows_of(stack().hierarchy(state)), strict=True):
-        np.testing.assert_array_equal(a, b)
-    np.testing.assert_array_equal(s.hierarchy(state).reference, -10 * V)
 
 
 @dataclass(frozen=True)
@@ -142,38 +101,6 @@ def test_tasks_in_plain_numpy_stand_beside_compiled_ones():
         np.testing.assert_array_equal(h.lower[:3], 0.5 * known.lower[:3])
         assert h.lower[3] == h.upper[3] == 10.0 * (1.0 - q[3])
         assert h.lower[4] == known.lower[3]
-
-
-@compiled
-def _scaled(out, values, by, from_row):
-    for i in range(from_row, len(out)):
-        out[i] = by * values[i]
-
-
-def test_a_bound_kernel_is_the_kernel_at_whatever_number_comes_then():
-    values, out = np.arange(3.0), np.zeros(3)
-    scale = bind(_scaled, out, values, then=(0.0, 0))
-    for by, row in ((2.0, 0), (3, 1), (np.float64(0.5), np.int16(0)), (-1.0, True)):
-        expected = out.copy()
-        expected[row:] = by * values[row:]
-        scale(by, row)
-        np.testing.assert_array_equal(out, expected)
-
-
-@compiled
-def _filled(count, by):
-    return np.full(count, by)
-
-
-@compiled
-def _total_of(count, by):
-    return _filled(count, by).sum()
-
-
-def test_a_kernel_counts_references_where_it_or_one_it_calls_makes_an_array():
-    assert _filled.allocates
-    assert _total_of.allocates
-    assert not _scaled.allocates
 
 
 def test_the_reference_is_the_null_space_term():

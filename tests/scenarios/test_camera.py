@@ -75,14 +75,6 @@ def test_every_pixel_has_the_depth_at_which_its_ray_meets_the_shape(name):
         assert seen[i, j] == pytest.approx(traced(SHAPES[name], pinhole, j, i), rel=2e-6), (i, j)
 
 
-def test_the_nearest_shape_is_seen_and_a_wall_behind_all():
-    seen = depths(camera(Obstacle("sphere", (0.0, 0.0, 2.0), (0.2,)),
-                         Obstacle("sphere", (0.0, 0.0, 3.0), (0.6,)), backdrop=4.0))
-    assert seen[30, 40] == pytest.approx(1.8, rel=1e-3)
-    assert seen[30, 40 + 10] == pytest.approx(2.536, abs=1e-3)
-    assert seen[0, 0] == 4.0
-
-
 def test_the_robot_is_seen_where_its_capsules_are():
     position = np.array([0.3, 2.0, 0.5])
     pinhole = Pinhole(position=position, rotation=looking_at(position, (0.0, 0.3, 0.1)))
@@ -95,28 +87,6 @@ def test_the_robot_is_seen_where_its_capsules_are():
             axis = placement[9:] + placement[:9].reshape(3, 3).T @ offset
             u, v, depth = pinhole.project(axis)
             assert 0.0 < seen[round(v), round(u)] < depth - 0.9 * capsule.radius + 1e-3
-
-
-def test_obstacles_are_seen_where_they_are_at_the_time():
-    from hierarchy.paths import Waypoints
-
-    path = Waypoints((0.0, 1.0), ((0.0, 0.0, 2.0), (0.0, 0.0, 3.0)))
-    moving = camera(Obstacle("sphere", (0, 0, 0), (0.5,), path=path), pinhole=Pinhole(3, 3))
-    assert moving.image(0, State.at(ROBOT, np.zeros(7), t=0.0))[0][1, 1] == pytest.approx(1.5)
-    assert moving.image(1, State.at(ROBOT, np.zeros(7), t=1.0))[0][1, 1] == pytest.approx(2.5)
-
-
-def test_a_camera_looks_at_its_target_upright():
-    position, target = np.array([1.0, -2.0, 1.5]), np.array([0.2, 0.1, 0.3])
-    pinhole = Pinhole(position=position, rotation=looking_at(position, target))
-    u, v, depth = pinhole.project(target)
-    assert (u, v) == pytest.approx((319.5, 239.5))
-    assert depth == pytest.approx(np.linalg.norm(target - position))
-    above = pinhole.project(target + np.array([0.0, 0.0, 0.1]))
-    assert above[0] == pytest.approx(319.5)
-    assert above[1] < v
-    down = Pinhole(position=(0, 0, 3), rotation=looking_at((0, 0, 3), (0, 0, 0)))
-    assert down.project((0.0, 0.1, 0.0))[1] < 239.5
 
 
 @pytest.mark.parametrize("depth", [1.0, 3.0])
@@ -139,12 +109,6 @@ def test_rounding_is_to_steps_of_the_depth_or_of_its_inverse(rounding, step):
     assert len(np.unique(seen)) > 3
     assert all(abs(a - z) <= errors.bound(z) + 1e-6
                for a, z in zip(seen[true > 0], true[true > 0], strict=True))
-
-
-@pytest.mark.parametrize(("depth", "share"), [(0.4, 0.0), (0.6, 1.0), (4.9, 1.0), (5.1, 0.0)])
-def test_nothing_is_read_outside_the_range(depth, share):
-    errors = DepthErrors(noise_floor=0.0, noise_growth=0.0, missing=0.0, outliers=0.0)
-    assert (depths(wall(depth, errors=errors)) > 0).mean() == share
 
 
 def test_pixels_are_missing_at_random_and_more_so_at_edges():

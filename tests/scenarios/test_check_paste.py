@@ -104,9 +104,3 @@ def test_joints_that_follow_are_named_and_need_no_task(tmp_path, capsys):
     for name in ("f2", "f3", "f4"):
         assert f"  follows         {name} = 1 f1 in the file (kept by every scenario)" in said
     assert "[[tasks]]" not in said
-
-
-def test_a_limit_that_is_none_is_said_once(tmp_path, capsys):
-    (tmp_path / "free.urdf").write_text(ROBOTS["free.urdf"])
-    assert run_command(["check", str(tmp_path / "free.urdf")]) == 0
-    assert capsys.readouterr().out.count("velocity limits of hip") == 1

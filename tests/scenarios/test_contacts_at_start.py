@@ -6,12 +6,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 from standing import ROBOT, feet
 
-from hierarchy import Robot, State
-from hierarchy.contacts import Contact, Contacts
-from hierarchy.robot import Frame
 from scenarios import load, simulate
 from scenarios.cell.build import build
-from scenarios.cell.plants.physics import PhysicsArm
 from scenarios.cell.plants.torque import TorqueRobot
 from scenarios.config import ScenarioError
 from scenarios.config.kinds.torque import TorqueSection
@@ -131,40 +127,3 @@ def test_a_base_that_tilts_has_fallen():
             break
         plant.act(np.zeros(ROBOT.n - 6))
     assert plant.fault.startswith("the robot has fallen: its base has tilted by 0.5 rad (")
-
-
-def test_an_arm_under_servos_has_stops_too():
-    arm = Robot.named("kuka_lwr")
-    q = np.zeros(7)
-    q[3] = arm.upper[3] + 0.3
-    plant = PhysicsArm(arm, q, np.zeros(7), 0.005, "velocity")
-    assert plant.fault is None  # it starts there
-    plant.q[3] += 0.19
-    assert plant.fault is None
-    plant.q[3] += 0.02
-    assert plant.fault.startswith("joint joint_4 is 0.21 rad beyond its stop")
-    plant.q[:] = 0.0
-    plant.q[1] = arm.lower[1] - 0.25
-    assert "joint joint_2 is 0.25 rad beyond its stop at -" in plant.fault
-
-
-def test_a_sole_in_another_plane_of_its_frame_stands_like_a_level_one():
-    rotation = Rotation.from_euler("xyz", [0.0, 90.0, 30.0], degrees=True)
-
-    def turned(contact):
-        old = contact.frame
-        frame = Frame(old.name, old.joint, old.offset, old.rotation @ rotation.as_matrix())
-        points = rotation.inv().apply(contact.points)
-        return Contact(frame, points, up=rotation.inv().apply([0.0, 0.0, 1.0]))
-
-    state = State.at(ROBOT, ROBOT.rest)
-    found = []
-    for contacts in (feet(), Contacts(ROBOT, [turned(one) for one in feet().contacts])):
-        plant = TorqueRobot(ROBOT, contacts, ROBOT.rest)
-        geom = plant.model.geom("left_foot")
-        np.testing.assert_allclose(plant.data.geom_xpos[geom.id][2],
-                                   plant.model.geom_size[geom.id][2], atol=1e-9)
-        found.append([plant.data.geom_xpos[geom.id],
-                      np.abs(plant.data.geom_xmat[geom.id].reshape(3, 3)[2])])
-    np.testing.assert_allclose(found[0], found[1], atol=1e-9)
-    assert state.position(ROBOT.frame("left_foot"))[2] == pytest.approx(0.0, abs=1e-9)

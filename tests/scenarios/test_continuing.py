@@ -42,12 +42,6 @@ def test_an_obstacle_that_was_shifted_keeps_its_offset_while_it_moves():
         assert obstacles.at(t)[1, 4:7] == pytest.approx(WAY(t)[0] + [0.0, 0.1, 0.0])
 
 
-def test_position_offset_moves_the_target():
-    here, there = (build(load("ellipse", changes)).position.path(0.3)[0]
-                   for changes in ([], ["position.offset=[0.0, 0.1, 0.2]"]))
-    assert there - here == pytest.approx([0.0, 0.1, 0.2])
-
-
 def test_a_change_of_a_scenario_is_validated():
     scenario = load("ellipse")
     assert scenario.with_changes({"pointing.alpha_d": 35.0}).pointing.alpha_d == 35.0

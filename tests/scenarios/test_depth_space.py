@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hierarchy import HierarchyError, Robot, State
-from hierarchy.avoidance import ControlPoint, Obstacle, Obstacles, Repulsion
+from hierarchy.avoidance import ControlPoint, Obstacle, Obstacles
 from hierarchy.robots import TABLES, link_capsules
 from scenarios import load, simulate
 from scenarios.cell.build import build
@@ -25,7 +25,6 @@ from scenarios.measure.judging import depth_view
 ROBOT = Robot.named("kuka_lwr")
 CAPSULES = link_capsules(TABLES["kuka_lwr"], foot=0.31)
 STATE = State.at(ROBOT, [0.9, -0.9, 0.9, 1.2, 1.0, 1.8, 0.0])
-BODY, TIP = Repulsion(3.0, 0.4, 4.0), Repulsion(12.0, 0.4, 6.0)
 FACING = Pinhole(101, 81, 100.0, 100.0)  # at the origin, z forward, its middle in pixel (50, 40)
 SIDE = Pinhole(320, 240, 262.0, 262.0, position=(0.3, 2.2, 0.8),
                rotation=looking_at((0.3, 2.2, 0.8), (0.0, 0.3, 0.1)))
@@ -42,14 +41,6 @@ def seen_in(image, *places, pinhole=FACING, region=0.4, support=1, **settings):
     obstacles = ObstacleImage.empty(pinhole.height, pinhole.width)
     space.find_obstacles(np.asarray(image, np.float32), STATE.placements, obstacles)
     return space.measure(obstacles, STATE.placements)
-
-
-def image_of(pixels, shape=(81, 101)):
-    """An empty image but for pixels {(u, v): depth}."""
-    image = np.zeros(shape, np.float32)
-    for (u, v), depth in pixels.items():
-        image[v, u] = depth
-    return image
 
 
 def one_by_one(image, pinhole, point, region, thin=inf, within=inf):
@@ -94,15 +85,6 @@ def test_distances_and_directions_are_those_of_all_pixels_one_by_one(share, thin
     assert seen_some > 12
 
 
-def test_a_point_at_the_edge_of_the_image_or_near_the_camera_misses_nothing():
-    rng = np.random.default_rng(6)
-    image = rng.uniform(0.2, 2.0, (81, 101)).astype(np.float32)
-    for place in ((0.55, 0.0, 1.0), (-0.8, 0.5, 1.2), (0.0, 0.0, 0.3), (0.1, 0.1, 0.41),
-                  (0.0, 0.0, -0.1), (0.3, -0.6, 0.6), (3.0, 0.0, 1.0), (0.0, 0.0, -1.0)):
-        D, _, _ = one_by_one(image, FACING, np.array(place), 0.4)
-        assert seen_in(image, place).distance[0] == pytest.approx(D, abs=1e-6)
-
-
 def test_a_point_in_the_shadow_of_an_obstacle_touches_it_and_leaves_it_where_it_ends_first():
     image = np.zeros((81, 101))
     image[20:61, 40:91] = 0.7  # its left side is 10 pixels off the point, all others farther
@@ -110,16 +92,6 @@ def test_a_point_in_the_shadow_of_an_obstacle_touches_it_and_leaves_it_where_it_
     assert seen.distance[0] == pytest.approx(0.0, abs=1e-9)
     assert seen.direction[0] @ (-1.0, 0.0, 0.0) > 0.99
     np.testing.assert_array_equal(seen.pairs.direction[0, 0], seen.direction[0])
-
-
-def test_repulsion_is_that_of_the_distance_and_the_active_point_the_nearest_of_the_body():
-    image = image_of({(50, 40): 1.2, (80, 40): 1.0})
-    seen = seen_in(image, (0, 0, 1), (0.2, 0, 1), (0.25, 0, 1), body=BODY, tip=TIP)
-    assert seen.distance == pytest.approx([0.2, 0.1, 0.05])
-    assert seen.magnitude == pytest.approx([BODY(0.2), BODY(0.1), TIP(0.05)])
-    assert seen.active == 1
-    assert seen.minimal_distance == pytest.approx(0.1)
-    assert seen.end_effector_distance == pytest.approx(0.05)
 
 
 def facing_surface(obstacle, place):
@@ -190,44 +162,7 @@ def test_the_arm_does_not_avoid_itself():
         assert np.isinf(space.measure(obstacles, state.placements).distance).all()
 
 
-def test_the_margin_is_what_is_taken_out_around_the_arm():
-    """A ball 8 cm off the arm's surface, to the side: seen with a margin of 5 cm, not of 20."""
-    points = ExactDistances(ROBOT, Obstacles()).measure(STATE).points
-    ball = Obstacle("sphere", tuple(points[2] + [0.0, 0.0, 0.06 + 0.08 + 0.03]), (0.03,))
-    found = {}
-    for margin in (0.05, 0.2):
-        sensor, move = sensor_of(camera_of(ball), inf, margin=margin)
-        found[margin] = sensor.measure(move(0.0, STATE.q)).minimal_distance
-    assert found[0.05] < 0.4
-    assert found[0.2] == inf
-
-
-def test_a_single_outlier_has_no_effect_with_support_and_a_wire_still_has():
-    wall = np.full((81, 101), 3.0)
-    lone, pair, wire, blob = (wall.copy() for _ in range(4))
-    lone[40, 50] = 1.2
-    pair[40, 50:52] = 1.2
-    wire[30:50, 50] = 1.2
-    blob[40:43, 50:53] = 1.2
-    distances = {support: [seen_in(image, (0, 0, 1), support=support).distance[0]
-                           for image in (lone, pair, wire, blob)] for support in (1, 2, 3, 9)}
-    assert distances[1] == pytest.approx([0.2] * 4)
-    assert distances[2] == pytest.approx([inf, 0.2, 0.2, 0.2])
-    assert distances[3] == pytest.approx([inf, inf, 0.2, 0.2])
-    assert distances[9] == pytest.approx([inf, inf, inf, 0.2], rel=1e-2)
-
-
-def test_pixels_that_are_not_numbers_are_no_obstacles():
-    image = np.full((81, 101), np.nan)
-    image[40, 50], image[0, 0], image[1, 1] = 1.2, inf, -1.0
-    seen = seen_in(image, (0, 0, 1))
-    assert seen.distance[0] == pytest.approx(0.2)
-
-
 # The sensor in the loop.
-
-WALL = Obstacle("box", (0.0, -1.0, 0.1), (3.0, 0.02, 3.0))
-
 
 def camera_of(*obstacles, errors=None, capsules=CAPSULES, **settings):
     return DepthCamera(SIDE, Obstacles(obstacles), capsules, errors or DepthErrors.none(),
@@ -265,14 +200,6 @@ def test_a_camera_that_stops_or_is_covered_is_blind_after_its_time_and_sees_agai
     assert len({distance for _, distance in log.values()}) == 1  # the last image is kept
 
 
-def test_images_with_next_to_no_readings_are_none():
-    errors = DepthErrors(missing=0.95, outliers=0.0)
-    sensor, state_at = sensor_of(camera_of(errors=errors))
-    assert sensor.measure(state_at(0.0)).blind
-    sensor, state_at = sensor_of(camera_of(errors=errors), least_readings=0.01)
-    assert not sensor.measure(state_at(0.0)).blind
-
-
 def test_a_clock_that_is_set_back_begins_anew():
     sensor, state_at = sensor_of(camera_of(rate=10.0))
     assert [sensor.measure(state_at(t)).stamp for t in (0.0, 0.5, 0.1)] == [0.0, 0.5, 0.1]
@@ -302,14 +229,6 @@ def test_a_blind_camera_leads_to_the_policy_for_stale_measurements(name, kind):
     assert ticks[0] in (35, 36)  # the last frame was taken in tick 14, at 0.07 s
     assert np.abs(run["v"][79]).max() < 0.5 * np.abs(run["v"][ticks[0]]).max()
     assert {event.action for event in run.events} == {"brake"}
-
-
-@pytest.mark.slow
-def test_a_camera_that_is_late_leaves_the_arm_at_rest_until_it_sees():
-    run = simulate(load("human", [*QUICK, "sensor.latency=0.2", "sensor.stale_after=0.3"]))
-    assert troubles(run) == {"stale": list(range(40))}
-    assert not run["command"][:40].any()
-    assert run["command"][40:].any()
 
 
 def test_the_camera_tells_the_controller_what_exact_distances_would_nearly():
@@ -344,21 +263,6 @@ def written(tmp_path_factory):
     example = Path(__file__).parents[2] / "examples" / "record_frames.py"
     write, folder = run_path(str(example))["write"], tmp_path_factory.mktemp("frames") / "some"
     return write(folder, run, frames=6), run
-
-
-@pytest.mark.slow
-def test_frames_written_are_those_the_camera_took(written):
-    folder, run = written
-    frames = RecordedFrames(folder, ROBOT)
-    camera = build(run.scenario).sensor.source
-    assert len(frames.times) == 6
-    assert frames.pinhole.packed() == pytest.approx(camera.pinhole.packed())
-    for i, t in enumerate(frames.times):
-        k = int(np.argmin(np.abs(run["t"] - t)))
-        state = State.at(ROBOT, run["q"][k], t=t)
-        taken, placements = frames.image(i, state)
-        np.testing.assert_allclose(taken, camera.image(camera.newest(t), state)[0], atol=5.1e-4)
-        np.testing.assert_allclose(placements, state.placements, atol=1e-12)
 
 
 @pytest.mark.slow

@@ -29,17 +29,17 @@ def test_every_requirement_is_looked_at(monkeypatch):
         assert any(one.what == extra and one.part.startswith("extras") for one in doctor.examine())
 
 
-@pytest.mark.parametrize(("broken", "named"), [
-    (lambda: (_ for _ in ()).throw(RuntimeError("no such kernel")), "RuntimeError: no such kernel"),
-    (lambda: ("tpm, recursive to 1e-01", False), "tpm, recursive to 1e-01")])
-def test_what_does_not_work_is_named_and_ends_with_1(broken, named, monkeypatch, capsys):
+def test_what_does_not_work_is_named_and_ends_with_1(monkeypatch, capsys):
+    def broken():
+        raise RuntimeError("no such kernel")
+
     monkeypatch.setattr(doctor, "_resolvers_agree", broken)
     assert run_command(["doctor", "--json"]) == 1
     said = json.loads(capsys.readouterr().out)
     assert said["well"] is False
     bad = [one for one in said["findings"] if one["well"] is False]
     assert [one["what"] for one in bad] == ["resolvers agree"]
-    assert named in bad[0]["found"]
+    assert "RuntimeError: no such kernel" in bad[0]["found"]
 
 
 def test_a_missing_package_says_how_to_get_it(monkeypatch):

@@ -103,15 +103,6 @@ def test_every_fault_under_every_policy(fault, policy, name, limited):
     assert np.abs(run["v"][-1]).max() > 1e-2  # it moves again
 
 
-def test_faults_leave_the_run_before_them_as_it_was():
-    clean = simulate(scenario("ellipse", None))
-    spoilt = simulate(scenario("ellipse", faults(*((put, settings)
-                                                   for put, settings, _, _ in FAULTS.values()))))
-    for signal in ("q", "v", "command", "ee_distance", "minimal_distance"):
-        np.testing.assert_array_equal(spoilt[signal][:AT], clean[signal][:AT])
-    assert clean.events == ()
-
-
 def test_an_answer_under_a_bad_status_may_be_used():
     clean = simulate(scenario("ellipse", None))
     for status in ("iteration_limit", "backend_failure", "inaccurate"):
@@ -120,26 +111,6 @@ def test_an_answer_under_a_bad_status_may_be_used():
         np.testing.assert_array_equal(run["q"], clean["q"])
         assert {(event.kind, event.action) for event in run.events} == {(status, "use")}
         assert len(run.events) == LASTS
-
-
-def test_an_obstacle_stands_where_the_body_was_and_goes_away_again():
-    run = simulate(scenario("ellipse", faults(("obstacle", INSIDE))))
-    far = simulate(scenario("ellipse", None))
-    during = slice(AT, AT + LASTS)
-    assert run["minimal_distance"][AT] == pytest.approx(-0.05, abs=1e-3)
-    assert run["minimal_distance"][during].max() < 0.0
-    assert run["minimal_distance"][AT + LASTS:].min() > 0.1
-    assert far["minimal_distance"][during].min() > 0.1
-
-
-@pytest.mark.slow
-def test_a_hierarchical_stack_survives_its_sensor():
-    fault = faults(("nan_distance", ""))
-    run = simulate(scenario("ellipse-hqp", fault))
-    assert run.fault is None
-    assert {event.kind for event in run.events} == {"not_finite"}
-    run = simulate(scenario("ellipse-hqp", faults(("obstacle", INSIDE))))
-    assert {event.kind for event in run.events} == {"inside"}
 
 
 def test_what_happened_is_saved_counted_and_loaded_again(tmp_path):
@@ -200,5 +171,3 @@ def test_a_fault_of_distances_needs_a_sensor(tmp_path):
                     '[[faults]]\nkind = "nan_distance"\nat = 0.1\nduration = 0.1\n')
     with pytest.raises(HierarchyError, match="'nan_distance' needs"):
         load(path)
-
-

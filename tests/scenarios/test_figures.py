@@ -13,7 +13,7 @@ from scenarios.cli.figures import redraw
 from scenarios.config import load
 from scenarios.config.kinds.frames import ListedPosition
 from scenarios.draw.figures import drawing, letter, palette, panels
-from scenarios.draw.figures.picture import once, picture
+from scenarios.draw.figures.picture import picture
 from scenarios.draw.figures.timeline import timeline
 from scenarios.loop.simulation import simulate
 from scenarios.measure.run_folder import save
@@ -37,13 +37,6 @@ def test_a_thinned_curve_keeps_its_ends_and_every_peak():
     assert len(kept) < 1_000
     assert {0, 12_345, len(y) - 1} <= set(kept.tolist())
     assert (np.diff(kept) > 0).all()
-
-
-def test_a_thinned_curve_keeps_the_gaps_of_what_was_not_there():
-    y = spiky()
-    y[4_000:8_000] = np.nan
-    kept = drawing.envelope(y)
-    assert np.isnan(y[kept[(kept > 4_100) & (kept < 7_900)]]).all()
 
 
 # Linear RGB as it is seen by most, and with each kind of colour blindness.
@@ -89,12 +82,6 @@ def test_the_colours_are_legible_on_light_and_dark(ground):
     assert min(contrast(c, ground) for c in palette.COLOURS.values()) > 2.2
 
 
-def test_a_resolver_has_the_same_colour_in_any_company():
-    for label in ("recursive", "hqp osqp", "tpm-published"):
-        for others in ([], ["hqp proxqp", "something new"], ["tpm", "hqp daqp", "my own"]):
-            assert drawing.colours([*others, label])[label] == palette.colour(label)
-
-
 def test_a_variant_has_the_colour_of_its_resolver_and_a_line_of_its_own():
     looks = palette.looks(["tpm-published", "tpm", "hqp osqp", "hqp daqp", "hqp proxqp"])
     assert list(looks) == ["tpm-published", "tpm", "hqp osqp", "hqp daqp", "hqp proxqp"]
@@ -104,23 +91,10 @@ def test_a_variant_has_the_colour_of_its_resolver_and_a_line_of_its_own():
     assert len(set(looks.values())) == 5
 
 
-def test_no_two_that_stand_side_by_side_look_alike():
-    labels = ["tpm-published", "one", "two", "three", "hqp", "weighted 10", "weighted 20",
-              "weighted 30", "ellipse", "human"]
-    assert len(set(palette.looks(labels).values())) == len(labels)
-
-
 def test_shared_limits_leave_out_the_one_run_that_would_flatten_the_others():
     low, high = drawing.shared_limits([(-1.0, 1.0), (-1.2, 1.1), (-80.0, 90.0)])
     assert -2.0 < low < -1.2
     assert 1.1 < high < 2.0
-
-
-def test_the_picture_is_seen_without_distortion():
-    x, y, z = drawing.project(np.eye(3))
-    for axis in (x, y, z):
-        assert np.linalg.norm(axis) <= 1.0
-    assert drawing.project(np.array([0.0, 0.0, 1.0]))[0] == pytest.approx(0.0)
 
 
 @pytest.mark.slow
@@ -197,13 +171,6 @@ def test_the_letters_pairs_are_made_of_its_runs_in_its_order():
     assert speeds == [2.0, 1.0]  # the velocity level is (a)
 
 
-def test_a_scene_without_obstacles_or_a_path_asked_for_is_still_a_picture():
-    run = recording()
-    for signal in ("desired_position", "minimal_distance", "control_point_distance"):
-        del run.signals[signal]
-    assert picture({"hqp": run}).axes
-
-
 @pytest.mark.slow
 def test_an_inline_svg_follows_the_page_and_brings_no_ids_that_could_clash():
     fig, (ax,) = drawing.figure()
@@ -271,14 +238,6 @@ def test_a_resolver_has_its_colour_in_every_figure(label):
         assert wanted in colours
 
 
-def test_computing_times_stand_at_their_medians_and_slowest_ticks():
-    run = recording(time_tick=[4e-6, 4e-6, 4e-6, 4e-6, 4e-3], time_resolve=np.full(5, 2e-6))
-    (ax,) = computing_time({"tpm": run}, palette.looks(["tpm"])).axes
-    resolve, median, slow = (float(line.get_xdata()[0]) for line in ax.lines)
-    assert (resolve, median) == (pytest.approx(2.0), pytest.approx(4.0))
-    assert slow > 3900.0
-
-
 def test_the_stack_over_time_has_a_band_for_each_place_and_a_row_for_each_event():
     run = dataclasses.replace(recording(orders=("a > b", "b"), order=[0, 0, 1, 1, 0]),
                               fault="stopped", events=(Event(2, "overrun", "use"),))
@@ -286,21 +245,3 @@ def test_the_stack_over_time_has_a_band_for_each_place_and_a_row_for_each_event(
     assert [text.get_text() for text in ax.get_yticklabels()] == ["1", "2", "overrun: use"]
     assert ax.get_title(loc="left") == "Place in the stack, 2 changes"
     assert "fault" in [text.get_text() for text in ax.texts]
-
-
-def test_stacks_beside_each_other_have_the_same_rows_and_time():
-    quiet, short = recording(), dataclasses.replace(
-        recording(t=[0.0, 1.0], orders=("a > b > c",)), events=(Event(1, "stale", "brake"),))
-    axes = [timeline(run, [quiet, short]).axes[0] for run in (quiet, short)]
-    rows = [[text.get_text() for text in ax.get_yticklabels()] for ax in axes]
-    assert rows[0] == rows[1] == ["1", "2", "3", "stale: brake"]
-    assert axes[0].get_xlim() == axes[1].get_xlim() == (0.0, 4.0)
-
-
-def test_the_desired_path_is_drawn_for_one_turn():
-    t = np.linspace(0.0, 6 * np.pi, 601)
-    ellipse = np.stack([0.2 * np.cos(t), 0.1 * np.sin(t), 0.0 * t], axis=1)
-    assert len(once(ellipse)) == pytest.approx(201, abs=1)
-    np.testing.assert_allclose(once(ellipse)[-1], ellipse[0], atol=0.01)
-    for path in (ellipse[:150], np.zeros((50, 3)), ellipse[:1]):
-        assert len(once(path)) == len(path)

@@ -5,7 +5,7 @@ import pytest
 from hand_made import recording
 
 from scenarios import load, simulate
-from scenarios.measure.goals import goals, percent
+from scenarios.measure.goals import goals
 from scenarios.measure.runs import Run
 from scenarios.measure.verdict import lines, table, verdict, verdicts
 
@@ -91,11 +91,6 @@ def test_a_line_says_what_was_asked_how_far_off_and_for_how_long(signals, name, 
     assert str(goal(name, **signals)) == said
 
 
-def test_a_run_of_no_known_number_has_no_goal_of_it():
-    with pytest.raises(StopIteration):
-        goal("body", minimal_distance=np.full(5, np.nan))
-
-
 def run(label, **signals):
     made = recording(**signals)
     return Run(made.scenario, label, label, made)
@@ -113,21 +108,11 @@ def test_the_table_has_a_row_for_each_goal_and_a_cell_for_each_run():
     assert found[0].as_plain_data()["goals"][0]["flag"] == "left"
 
 
-def test_one_run_says_its_end_and_all_kept():
-    end, promises, _ = lines(verdicts([run("a")]))
-    assert (end, promises) == ("Ran the whole 4 s.", "Every promise was kept.")
-
-
 def test_many_that_broke_a_promise_are_named_up_to_three():
     found = [run(label, **joint([0, 0, 0, 0, 2.5])) for label in "abcd"]
     assert lines(verdicts(found))[1].startswith("Broken: joint limits by all, 0.5 rad at worst")
     said = lines(verdicts([*found, run("e")]))[1]
     assert said.startswith("Broken: joint limits by a, b, c and 1 more, 0.5 rad at worst")
-
-
-def test_a_share_is_rounded_to_two_digits_and_never_up_to_the_whole():
-    assert [percent(share) for share in (0.0094, 0.123, 0.994, 0.997, 1.0)] == [
-        "0.94 %", "12 %", "99 %", "100 %", "100 %"]
 
 
 @pytest.mark.parametrize(("name", "asked"), [

@@ -32,6 +32,7 @@ def test_the_server_of_a_page_rejects_them():
     from scenarios.draw.viewer.server import close, open_server
 
     server = open_server(0, "test")
+    assert server.get_host() == "127.0.0.1"
     try:
         found = []
         for host in (None, "rebound.example"):

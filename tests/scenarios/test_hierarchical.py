@@ -36,15 +36,6 @@ def test_every_tick_of_hcod_is_certified():
     assert run["certified"].all()
 
 
-@pytest.mark.slow
-def test_the_joint_that_passes_its_limit_in_the_letters_task_stops_at_it():
-    """Joint 6 of `ellipse` reaches its limit within the first turn."""
-    beyond = simulate(load("ellipse", {"control.duration": 5.0}))
-    inside = simulate(load("ellipse-limits", {"control.duration": 5.0}).with_resolver("hcod"))
-    assert measure(beyond)["joint_limit_excess"].value > 0.1
-    assert measure(inside)["joint_limit_excess"].value == 0.0
-
-
 def test_the_order_is_fixed_and_limits_come_first():
     assert names_of() == ("joint limits", "separation", "position", "pointing")
     assert names_of("limits.torque=0.5") == ("joint limits", "torque limits", "separation",

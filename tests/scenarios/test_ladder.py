@@ -4,12 +4,11 @@ import json
 import tomllib
 from itertools import pairwise
 
-import numpy as np
 import pytest
 
 import scenarios.config.groups as groups_of
 from hierarchy import HierarchyError
-from scenarios import compare, load, simulate
+from scenarios import compare, load
 from scenarios.cli.main import run_command
 from scenarios.config import ScenarioError, members, shipped_groups
 from scenarios.config.reading import LIBRARY
@@ -54,33 +53,6 @@ def test_a_step_extends_the_one_before_and_changes_what_it_says_and_nothing_else
 
 
 @pytest.mark.slow
-def test_the_last_step_runs_as_ellipse_hqp_to_the_last_bit():
-    last, hqp = (simulate(load(name)) for name in ("ladder-7-cone", "ellipse-hqp"))
-    assert last.ticks == hqp.ticks == 18850
-    for signal in ("q", "v", "a", "command"):
-        np.testing.assert_array_equal(last[signal], hqp[signal])
-
-
-@pytest.mark.slow
-def test_from_the_same_states_the_change_of_resolver_changes_no_command():
-    """The states are those of the fourth step, and so are the commands to compare with."""
-    from scenarios.cell.build import build
-
-    run = simulate(load("ladder-4-priority", ["control.duration=3.0"]))
-    scenario = load("ladder-5-hcod")
-    cell, resolver = build(scenario), scenario.make_resolver()
-    worst = 0.0
-    for k in range(0, run.ticks, 10):
-        cell.state.move(float(run["t"][k]), run["q"][k], run["v"][k])
-        seen = cell.sensor.measure(cell.state)
-        order = cell.order(seen, float(run["pointing_error"][k])).order
-        assert order == run.order_names[run["order"][k]]
-        x = resolver.solve(cell.stack.hierarchy(cell.state, order)).x
-        worst = max(worst, np.abs(x - run["command"][k]).max())
-    assert worst < 1e-6
-
-
-@pytest.mark.slow
 def test_compare_runs_a_group_side_by_side_each_scenario_with_its_own_resolver(
         tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
@@ -115,26 +87,3 @@ def test_a_bad_group_is_an_error_that_names_it(text, says, tmp_path, monkeypatch
     (tmp_path / "mine.toml").write_text(text)
     with pytest.raises(HierarchyError, match=says):
         compare("mine")
-
-
-@pytest.mark.parametrize(("text", "says"), [
-    ('extends = "ellipse"\nreplaces = "avoidance"', r"replaces: expected a list of sections, got"),
-    ('extends = "ellipse"\nreplaces = ["avoidence"]', r"replaces: .*did you mean 'avoidance'"),
-    ('replaces = ["avoidance"]', r"replaces: goes with extends"),
-])
-def test_replacing_nothing_is_an_error_that_names_file_and_key(text, says, tmp_path):
-    path = tmp_path / "mine.toml"
-    path.write_text(text)
-    with pytest.raises(ScenarioError, match=says) as error:
-        load(path)
-    assert "mine.toml" in str(error.value)
-
-
-def test_a_replaced_section_takes_nothing_over(tmp_path):
-    path = tmp_path / "mine.toml"
-    path.write_text('extends = "ellipse"\nreplaces = ["damping", "pointing"]\nname = "mine"\n'
-                    "[damping]\nvalue = 1.0\n")
-    mine = load(path)
-    assert mine.pointing is None
-    assert mine.damping.value == 1.0
-    assert mine.position == load("ellipse").position

@@ -39,7 +39,7 @@ def scenario_of(tmp_path, *tasks, **sections):
 
 
 def at_level(level):
-    return {**BASE["control"], "level": level, "period": 0.002, "duration": 3.0}
+    return {**BASE["control"], "level": level, "period": 0.005, "duration": 3.0}
 
 
 @pytest.mark.slow

@@ -1,4 +1,3 @@
-import dataclasses
 from types import SimpleNamespace
 
 import hand_made
@@ -47,13 +46,6 @@ def test_an_error_of_a_listed_task_that_only_rounding_makes_is_none(monkeypatch)
         assert found[f"task_elbow_{key}"].value > 0.0
 
 
-def test_distances_are_the_smallest_and_more_is_better():
-    found = measure(recording(minimal_distance=[1, 0.2, 0.3, 1, 1], ee_distance=[1, 1, 1, 1, 0.1]))
-    assert found["body_distance_min"].value == pytest.approx(0.2)
-    assert found["ee_distance_min"].value == pytest.approx(0.1)
-    assert found["body_distance_min"].lower_is_better is False
-
-
 def test_motion_counts_either_sign_and_the_step_between_neighbouring_ticks():
     v = np.array([[0, 0], [1, 0], [1, -3], [1, -2], [1, -2]], float)
     found = measure(recording(v=v, a=-7.0 * np.eye(5, 2)))
@@ -69,11 +61,6 @@ def test_joint_limit_excess_names_the_joint_that_is_furthest_out():
     assert metric.value == pytest.approx(0.25)
     assert metric.note == "joint 2"
     assert value("joint_limit_excess") == 0.0
-
-
-def test_changes_are_counted_between_ticks():
-    assert value("stack_changes", order=[0, 1, 1, 0, 0]) == 2
-    assert value("active_point_changes", active_control_point=[-1, 6, 6, 7, -1]) == 3
 
 
 @pytest.mark.parametrize(("unit", "shown"), [
@@ -101,10 +88,6 @@ def test_ticks_that_were_not_solved_are_counted():
     other = next(int(status) for status in Status if status != Status.SOLVED)
     solved = int(Status.SOLVED)
     assert value("ticks_not_solved", status=[solved, other, other, solved, solved]) == 2
-
-
-def test_a_tick_is_late_only_when_it_takes_longer_than_the_period():
-    assert value("ticks_late", time_tick=[0.5e-3, 1e-3, 1.1e-3, 2e-3, 3e-3]) == 3
 
 
 def test_a_scenario_without_a_task_has_no_metric_of_it():
@@ -184,13 +167,6 @@ def test_a_commanded_velocity_steps_by_its_change():
 def test_changes_of_the_active_set_are_counted_between_the_ticks_in_which_it_is_known():
     assert value("active_set_changes", active_set=[0, 0, 1, 1, 0]) == 2
     assert value("active_set_changes", active_set=[2, -1, 2, -1, 0]) == 1
-
-
-def test_a_resolver_that_does_not_say_which_rows_act_has_no_changes_of_them():
-    assert "active_set_changes" not in measure(recording())  # there are equalities only
-    unsaid = recording()
-    facts = dataclasses.replace(unsaid.facts, asks="inequalities")
-    assert measure(dataclasses.replace(unsaid, facts=facts))["active_set_changes"].value is None
 
 
 def test_steps_are_measured_and_large_ones_counted_by_tick():

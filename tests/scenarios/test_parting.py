@@ -8,11 +8,9 @@ from hand_made import HandMadeScenario, recording
 
 from scenarios import compare
 from scenarios.config.resolvers import default_resolvers
-from scenarios.measure.comparison import Comparison
 from scenarios.measure.motions import motions
 from scenarios.measure.partings import partings
 from scenarios.measure.runs import Run
-from scenarios.results.page import comparison_page as page
 from solvers.qp import backends
 
 LETTER = "tpm-published"
@@ -28,12 +26,6 @@ def away_from(tick, by=1e-3):
     q = np.zeros((5, 7))
     q[tick:, 2] = by
     return q
-
-
-def test_runs_that_stay_together_are_said_to():
-    (one,) = partings([run_of("recursive"), run_of("hqp", away_from(1, 1e-8))])
-    assert one.tick is None
-    assert str(one) == "hqp keeps within 1.0e-08 rad of recursive to the end"
 
 
 def test_runs_that_are_one_motion_are_as_far_apart_as_the_farthest_of_them():
@@ -72,14 +64,6 @@ def test_a_run_that_is_not_finite_has_parted():
 def test_resolvers_that_are_not_strict_need_not_agree():
     """Neither as the one compared with, nor as the one compared."""
     assert partings([run_of(LETTER), run_of("recursive"), run_of("augmented", away_from(1))]) == []
-
-
-@pytest.mark.slow
-def test_the_page_says_it():
-    runs = (run_of("recursive"), run_of("hqp", away_from(3)))
-    text = page(Comparison(runs, "hierarchy compare", {}))
-    assert "Where strict resolvers diverge" in text
-    assert "parts from recursive" in text
 
 
 @pytest.mark.slow

@@ -68,38 +68,7 @@ def inertia_times(mujoco, plant, vector):
     return product
 
 
-def test_the_inertia_of_the_drives_comes_on_top(mujoco):
-    plain, driven = (arm(mujoco, joints={"armature": a}) for a in (0.0, tuple(np.arange(1.0, 8.0))))
-    for i, e in enumerate(np.eye(7)):
-        np.testing.assert_allclose(
-            inertia_times(mujoco, driven, e) - inertia_times(mujoco, plain, e), (i + 1) * e,
-            rtol=0, atol=1e-12)
-
-
-def test_the_links_are_where_the_robot_has_them(mujoco):
-    plant = arm(mujoco)
-    for q, v in states():
-        plant.data.qpos[:] = q
-        mujoco.mj_forward(plant.model, plant.data)
-        state = State.at(ROBOT, q, v)
-        for name in ROBOT.joint_names:
-            body, joint = plant.data.body(f"body {name}"), ROBOT.joint(name)
-            placed = state.placements[joint]
-            np.testing.assert_allclose(body.xpos, placed[9:], rtol=0, atol=1e-12)
-            np.testing.assert_allclose(body.xmat.reshape(3, 3), placed[:9].reshape(3, 3).T,
-                                       rtol=0, atol=1e-12)
-
-
 # The servos.
-
-
-def test_an_arm_sags_by_the_share_of_gravity_that_is_not_compensated(mujoco):
-    plant = arm(mujoco, servo={"gravity": 0.5}, joints={"friction": 0.0})
-    for _ in range(400):
-        plant.act(STILL)
-    expected = 0.5 * State.at(ROBOT, plant.q).bias_effort() / plant.stiffness
-    np.testing.assert_allclose(START - plant.q, expected, rtol=1e-3, atol=1e-6)
-    assert np.abs(expected).max() > 1e-4
 
 
 def test_a_smooth_motion_is_followed_closely(mujoco):
@@ -138,12 +107,6 @@ def test_the_reference_keeps_the_joint_range(mujoco, level):
     np.testing.assert_array_equal(plant.reference_v, STILL)
 
 
-def test_the_servos_rate_is_a_whole_number_of_steps_a_period(mujoco):
-    assert arm(mujoco, period=0.001).model.opt.timestep == 0.001
-    assert arm(mujoco, period=0.005).model.opt.timestep == 0.001
-    assert arm(mujoco, period=0.0025).model.opt.timestep == pytest.approx(0.0025 / 3)
-
-
 # Contacts.
 
 
@@ -155,33 +118,6 @@ def forearm(q=START):
     """The middle of the forearm, a capsule along the z axis of the frame of joint 5."""
     placed = State.at(ROBOT, q).placements[5]
     return placed[9:] + 0.195 * placed[6:9]
-
-
-@pytest.mark.parametrize("shape", ["sphere", "capsule", "box"])
-def test_an_obstacle_put_into_the_arm_is_touched(mujoco, shape):
-    sizes = {"sphere": (0.05,), "capsule": (0.05, 0.1), "box": (0.05, 0.05, 0.05)}[shape]
-    plant = arm(mujoco, obstacles=[Obstacle(shape, tuple(forearm()), sizes)])
-    plant.act(STILL)
-    assert plant.extra["contacts"] > 0
-    assert plant.extra["contact_depth"] > 0.05
-    assert plant.extra["contact_force"] > 0.0
-
-
-def test_the_depth_of_a_contact_is_how_far_shapes_overlap(mujoco):
-    side = State.at(ROBOT, START).placements[5][0:3]
-    deep = 1e-3  # [m]
-    centre = forearm() + (0.06 + 0.05 - deep) * side  # radii of arm and ball
-    plant = arm(mujoco, obstacles=[sphere_at(centre)])
-    plant.act(STILL)
-    assert plant.extra["contacts"] == 1
-    assert plant.extra["contact_depth"] == pytest.approx(deep, rel=1e-6)
-
-
-def test_the_links_do_not_touch_each_other(mujoco):
-    folded = [0.0, 0.0, 0.0, ROBOT.upper[3], 0.0, ROBOT.upper[5], 0.0]
-    plant = arm(mujoco, folded)
-    plant.act(STILL)
-    assert plant.extra["contacts"] == 0
 
 
 def test_a_moving_obstacle_is_at_each_step_where_its_path_has_it(mujoco):
@@ -254,34 +190,12 @@ def test_a_delay_of_half_a_period_is_refused():
         build(load("ellipse", [*SHORT, "plant.measurement.delay=0.0025"]))
 
 
-def test_positions_come_in_steps():
-    step = 2e-3
-    q, _, true_q, _ = told({"quantisation": step}, 200, command=np.linspace(0.1, 0.7, 7))
-    np.testing.assert_allclose(q / step, np.round(q / step), rtol=0, atol=1e-9)
-    assert np.abs(q - true_q).max() <= step / 2 * (1 + 1e-9)
-    assert np.abs(q - true_q).max() > 0.4 * step
-
-
-def test_a_velocity_is_the_difference_of_the_positions_told():
-    q, v, _, _ = told({"velocity": "differenced", "quantisation": 1e-3}, 50,
-                      command=np.linspace(0.1, 0.7, 7))
-    np.testing.assert_allclose(v[1:], np.diff(q, axis=0) / PERIOD, rtol=0, atol=1e-9)
-
-
 def test_a_filtered_velocity_lags_by_the_time_of_its_filter():
     slope, time = 2.0, 0.02  # [rad/s^2], [s]
     _, v, _, true_v = told({"velocity": "differenced", "filter_time": time}, 200, "acceleration",
                            np.full(7, slope))
     # A difference is the velocity half a period ago.
     np.testing.assert_allclose(true_v[-1] - v[-1], slope * (time + PERIOD / 2), rtol=1e-6)
-
-
-def test_steps_of_a_continuous_joint_are_those_of_its_angle(tmp_path):
-    scenario = load(on_file(tmp_path, "continuous"), ["plant.measurement.quantisation=0.01"])
-    q = simulate(scenario)["q"]
-    steps = np.arctan2(q[:, 1::2], q[:, ::2]) / 0.01
-    np.testing.assert_allclose(steps, np.round(steps), atol=1e-9)
-    assert len(np.unique(np.round(steps))) > 2
 
 
 # Runs.
@@ -301,9 +215,9 @@ def test_the_controller_sees_what_is_measured_and_nothing_else(changes):
         np.testing.assert_array_equal(command, run["command"][k])
 
 
-@pytest.mark.parametrize(("feedback", "period"), [("measured", 0.001), ("commanded", 0.005)])
+@pytest.mark.parametrize(("feedback", "period"), [("commanded", 0.005)])
 def test_the_ellipse_away_from_obstacles_is_tracked(mujoco, period, feedback):
-    changes = ["control.duration=4.0", f"control.period={period}", "limits.acceleration=10.0",
+    changes = ["control.duration=3.0", f"control.period={period}", "limits.acceleration=10.0",
                "control.resolver=tpm", "avoidance.obstacles=[[5.0, 5.0, 5.0]]"]
     exact = simulate(load("ellipse", changes))
     run = simulate(load("ellipse", [*changes, "plant.kind=mujoco", f"plant.feedback={feedback}"]))
@@ -342,15 +256,6 @@ def test_contacts_are_measured_in_a_run(mujoco, tmp_path):
     away = measure(touching([0.0, -2.0, 0.0]))
     assert away["contact_ticks"].value == away["contact_force_max"].value == 0.0
     assert "contact_ticks" not in measure(simulate(load("ellipse", SHORT)))
-
-
-def test_an_obstacle_of_a_fault_is_touched(mujoco):
-    run = simulate(load("ellipse", [
-        *PHYSICS, "faults=[{kind='obstacle', at=0.1, duration=0.1, radius=0.05, "
-                  "place={joint='joint_5', offset=[0.0, 0.0, 0.195]}}]"]))
-    ticks = np.flatnonzero(run["contacts"])
-    assert ticks[0] == 20
-    assert ticks[-1] < 40
 
 
 # Mistakes.

@@ -66,11 +66,6 @@ def test_what_is_sent_and_said(case):
         assert [kind for kind, _ in p.events][:len(troubles)] == troubles
 
 
-def test_an_answer_that_is_not_finite_is_not_even_used():
-    p = policy(inaccurate="use")
-    assert np.isfinite(p.choose(0.0, ["inaccurate"], BAD, V)).all()
-
-
 @pytest.mark.parametrize("period", [0.001, 0.1, 1.0])
 def test_braking_ends_at_rest_and_never_swings_through_it(period):
     p, v = policy(period=period), V.copy()
@@ -88,18 +83,6 @@ def test_a_stop_is_at_rest_after_one_tick_and_says_why_the_run_ends(level):
     np.testing.assert_allclose(x if level == "velocity" else V + x * PERIOD, 0.0, atol=1e-12)
     assert p.stopped
     assert "0.250 s: not_finite" in p.fault
-
-
-def test_within_limits_a_stop_takes_its_time_and_nothing_interrupts_it():
-    p = policy(clamp=bound, stale="stop")
-    v, ticks = V.copy(), 0
-    while not p.stopped:
-        x = p.choose(0.1, ["stale"] if ticks == 0 else [], X, v)
-        assert np.abs(x).max() <= 1.5
-        v, ticks = v + x * PERIOD, ticks + 1
-        assert ticks <= 1000
-    assert ticks == pytest.approx(1.0 / 1.5 / PERIOD, abs=2)
-    np.testing.assert_allclose(v, 0.0, atol=1e-9)
 
 
 @pytest.mark.parametrize(("key", "value"), [

@@ -21,7 +21,3 @@ def test_a_long_one_says_every_ten_seconds_how_far_it_is_and_what_is_left(capsys
     said = told(capsys, (0.0, 0), (6.0, 10), (12.0, 20), (18.0, 30), (24.0, 40), (60.0, 100))
     assert said == ["tpm: 20 of 100 ticks, about 48 s left",
                     "tpm: 40 of 100 ticks, about 36 s left"]
-
-
-def test_nothing_is_promised_before_the_first_step(capsys):
-    assert told(capsys, (0.0, 0), (12.0, 0)) == ["tpm: 0 of 100 ticks"]

@@ -14,7 +14,7 @@ from scenarios.draw.viewer.moment import Watched, of_scene
 from scenarios.loop.controller import Controller
 from scenarios.recording.facts import ContactPoint, facts_of
 from scenarios.scene import scene
-from scenarios.scene.pushes import key, pushes
+from scenarios.scene.pushes import pushes
 
 STANDING, STEP = load("stand-push"), load("step")
 FACTS = facts_of(STANDING, Robot.named("humanoid"))
@@ -70,14 +70,6 @@ def test_an_arrow_goes_to_the_middle_of_a_pushed_body_while_it_is_pushed():
     assert all((barb[1] == shaft[1]).all() and barb[0, 1] < shaft[1, 1] for barb in head)
     assert abs(shaft[1, 1]) < 1e-9
     assert shaft[1, 2] > rest[:, 11].mean()  # in the trunk
-
-
-def test_the_key_names_what_is_drawn_and_nothing_else():
-    assert list(key(FACTS, STANDING)) == ["force", "cone", "support", "centre", "push"]
-    assert list(key(FACTS, STEP)) == ["force", "cone", "support", "centre"]
-    wipe = load("wipe")
-    assert list(key(facts_of(wipe, Robot.named("kuka_lwr")), wipe)) == ["force", "cone", "table"]
-    assert key(replace(FACTS, contacts=()), STANDING) == {}
 
 
 @pytest.fixture(scope="module")

@@ -57,15 +57,6 @@ def test_a_save_that_breaks_leaves_nothing_behind(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_an_earlier_run_is_never_overwritten(tmp_path):
-    save(recording(), tmp_path / "run")
-    before = (tmp_path / "run" / "run.npz").read_bytes()
-    with pytest.raises(OutputError):
-        save(recording(t=[0.0, 1.0]), tmp_path / "run")
-    assert (tmp_path / "run" / "run.npz").read_bytes() == before
-    assert [path.name for path in tmp_path.iterdir()] == ["run"]
-
-
 @pytest.mark.usefixtures("hand_made_scenarios")
 def test_a_folder_that_is_no_run_or_is_damaged_is_named(tmp_path):
     with pytest.raises(HierarchyError, match=r"no run\.npz"):
@@ -100,11 +91,6 @@ def test_an_empty_or_new_folder_can_be_claimed_with_its_parents(tmp_path):
     assert (tmp_path / "a").is_dir()
 
 
-def test_claiming_a_folder_does_not_make_it(tmp_path):
-    claim(tmp_path / "run")
-    assert not (tmp_path / "run").exists()
-
-
 def test_what_is_written_whole_leaves_nothing_else(tmp_path):
     with whole(claim(tmp_path / "run")) as partial:
         (partial / "file").touch()
@@ -122,12 +108,6 @@ def test_a_full_disk_is_named_and_leaves_nothing(tmp_path):
     with pytest.raises(OutputError, match=r"run cannot be written: No space left"):
         write_to_a_full_disk(tmp_path / "run")
     assert list(tmp_path.iterdir()) == []
-
-
-def test_a_folder_in_use_cannot_be_claimed(tmp_path):
-    (tmp_path / "precious.txt").touch()
-    with pytest.raises(OutputError, match="not empty"):
-        claim(tmp_path)
 
 
 def test_a_folder_that_cannot_be_written_cannot_be_claimed(tmp_path):

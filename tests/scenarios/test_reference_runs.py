@@ -5,7 +5,6 @@ import pytest
 
 from benchmark.studies.reference_runs import EVERY, RIGHT, RUNS, differences, reference
 from scenarios.config import load
-from scenarios.loop.controller import Controller
 from scenarios.loop.simulation import simulate
 
 
@@ -37,19 +36,3 @@ def test_exact_derivatives_command_nearly_the_same_from_every_recorded_state(nam
     assert len(found) == len(reference(name)["t"]) - 1
     assert max(found) < 0.1
     assert np.median(found) < 1e-3
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", RIGHT)
-def test_exact_derivatives_leave_the_stack_of_every_recorded_state_as_it_was(name):
-    expected = reference(name)
-    controller = Controller(load(RUNS[name][0]))
-    always = name.startswith("equality")
-    for t, q, v, active, error in zip(
-            *(expected[key] for key in ("t", "q", "v", "active_control_point",
-                                        "pointing_error")), strict=True):
-        controller.command(t, q, v)
-        order = controller.allocation.order
-        seen = controller.cell.sensor.measurement
-        assert (seen.active + 1 if "avoidance" in order else -1) == active
-        assert ("pointing" in order) == (always or error > 0)

@@ -12,8 +12,6 @@ from scenarios.cli.main import run_command
 from scenarios.draw.replay import html
 from scenarios.scene import scene
 
-VOID = {"meta", "input", "br", "link", "img"}
-
 
 @pytest.fixture(scope="module")
 def runs():
@@ -133,31 +131,6 @@ def test_scrubbing_moves_the_cursor_of_every_curve(page):
     assert page.run("player.t") == 1.0
 
 
-def test_keys_step_by_a_frame_and_by_a_second(page):
-    page.run("player.seek(0)")
-    page.press("ArrowRight")
-    assert page.run("player.t") == pytest.approx(1 / 30, abs=2e-3)
-    page.press("End")
-    assert page.run("player.t === player.end")
-    page.press("Home")
-    assert page.run("player.t") == 0.0
-
-
-def test_the_list_is_the_order_of_the_stack_and_says_what_is_given_up(page, runs):
-    recording = runs["tpm-published"]
-    shown = scene(recording)
-    for f in (0, *(int(np.searchsorted(shown.t, t)) for t in shown.switches[:3])):
-        page.run(f"player.seek({float(shown.t[f])} + 1e-4)")
-        listed = page.run("""[...document.querySelectorAll('.card')[0].querySelectorAll('li')]
-            .filter(li => li.className !== 'absent')
-            .sort((a, b) => +a.querySelector('b').textContent - +b.querySelector('b').textContent)
-            .map(li => [li.dataset.task, li.className])""")
-        assert tuple(task for task, _ in listed) == shown.orders[shown.order[f]]
-        for task, fate in listed:
-            found = shown.levels.fate[f, shown.levels.names.index(task)]
-            assert fate == {2: "free", 3: "met", 4: "missed"}[int(found)]
-
-
 def test_runs_stand_side_by_side_and_can_be_hidden(page):
     page.press("s")
     page.painted()
@@ -167,19 +140,6 @@ def test_runs_stand_side_by_side_and_can_be_hidden(page):
     page.painted()
     assert page.run("document.querySelectorAll('.card')[1].hidden")
     assert page.run("document.querySelectorAll('#names span').length") == 1
-
-
-def test_the_arm_is_drawn_again_after_the_graphics_card_was_lost(page):
-    page.run("""new Promise(done => {
-        const space = document.getElementById('space');
-        const lost = player.stage.painter.gl.getExtension('WEBGL_lose_context');
-        space.addEventListener('webglcontextrestored', () => setTimeout(done, 100));
-        const restore = () => setTimeout(() => lost.restoreContext(), 50);
-        space.addEventListener('webglcontextlost', restore, {once: true});
-        lost.loseContext(); })""")
-    page.painted()
-    assert page.run("player.stage.painter.gl.getError()") == 0
-    page.complaints[:] = [said for said in page.complaints if "CONTEXT_LOST" not in said]
 
 
 @pytest.mark.parametrize("width", [360, 800, 1400])
@@ -261,12 +221,3 @@ def test_the_command_takes_several_runs_and_a_name(folder, short, tmp_path):
     file = tmp_path / "new" / "two.html"
     assert run_command(["replay", str(folder), str(other), "--out", str(file)]) == 0
     assert len(data_of(file.read_text(encoding="utf-8"))["runs"]) == 2
-
-
-def test_the_same_run_gives_the_same_file(folder, tmp_path):
-    files = [tmp_path / name for name in ("a.html", "b.html")]
-    for file in files:
-        run_command(["replay", str(folder), "--out", str(file)])
-    assert files[0].read_bytes() == files[1].read_bytes()
-
-

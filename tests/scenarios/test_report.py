@@ -1,5 +1,4 @@
 import dataclasses
-import html
 import itertools
 import re
 import shlex
@@ -12,7 +11,6 @@ from hand_made import HandMadeScenario, recording
 from headless import chromium
 
 from scenarios.config import load
-from scenarios.config.resolvers import default_resolvers
 from scenarios.loop.simulation import simulate
 from scenarios.measure.comparison import Comparison
 from scenarios.measure.motions import motions
@@ -20,7 +18,6 @@ from scenarios.measure.runs import Run, table
 from scenarios.measure.verdict import lines, verdicts
 from scenarios.recording.recording import Event
 from scenarios.results.commands import run_command
-from scenarios.results.embedded import replay
 from scenarios.results.page import comparison_page as page
 
 LETTER = "tpm-published"
@@ -65,11 +62,6 @@ def test_values_within_a_percent_are_equally_good():
     assert row(runs, "Joint acceleration").best == {0, 1}
 
 
-def test_what_rounding_makes_of_nothing_is_nothing():
-    runs = [made(LETTER, a=np.full((5, 7), 1e-17)), made("hqp", a=np.zeros((5, 7)))]
-    assert row(runs, "Joint acceleration, max").best == set()
-
-
 def test_a_run_that_stopped_early_wins_nothing():
     runs = [made(LETTER, fault="diverged at tick 5"), made("hqp", a=np.ones((5, 7))),
             made("recursive", a=np.full((5, 7), 2.0))]
@@ -98,14 +90,6 @@ def test_a_page_is_whole_and_needs_nothing_outside_itself(runs):
     balanced(text)
     assert not re.search(r"""(?:src|href)=["']?(?:https?:)?//""", text)
     assert not re.search(r"<(?:link|img|(?:iframe|script)[^>]* src)\b|@import|url\((?!#)", text)
-
-
-@pytest.mark.slow
-def test_rows_of_a_group_stand_together_where_the_first_run_lacks_some():
-    runs = [made(LETTER, scenario=HandMadeScenario(pointing=None)), made("tpm")]
-    groups = [row.group for row in table(runs)]
-    assert "Beyond the cone, max" in [row.label for row in table(runs)]
-    assert len([group for group, _ in itertools.groupby(groups)]) == len(set(groups))
 
 
 def test_one_resolver_in_several_scenarios_is_one_table_and_nothing_is_best():
@@ -152,14 +136,6 @@ def test_the_page_shows_every_event_in_words_and_in_the_stack_over_time():
     assert ">contact</text>" in drawn[0]
 
 
-@pytest.mark.slow
-def test_the_same_motion_with_other_events_has_a_stack_over_time_of_its_own():
-    runs = [made(LETTER), with_events(made("hqp"), (2, "overrun", "use"))]
-    assert len(motions(runs)) == 1
-    text = page(comparison(*runs))
-    assert len(re.findall(r'aria-label="[^"]*the stack over time"', text)) == 2
-
-
 def test_every_run_has_a_command_that_makes_it_again():
     scenario = load("ellipse", ["control.duration=0.5", "pointing.alpha_d=35",
                                 "faults=[{kind='overrun', at=0.1, duration=0.1, takes=1.0}]"])
@@ -168,16 +144,6 @@ def test_every_run_has_a_command_that_makes_it_again():
     assert command == ["hierarchy", "run", f"runs/a/{run.folder}/scenario.toml"]
     unchanged = Run(load("ellipse").with_resolver("hcod"), "hcod", "hcod")
     assert run_command(unchanged, "runs/a") == "hierarchy run ellipse --resolver hcod"
-
-
-@pytest.mark.slow
-def test_the_page_has_the_commands_to_run_view_replay_and_draw():
-    text = html.unescape(page(dataclasses.replace(comparison(made(LETTER)), folder="runs/my own")))
-    for command in ("hierarchy run 'runs/my own/hand-made/tpm-published/scenario.toml'",
-                    "hierarchy view 'runs/my own/hand-made/tpm-published'",
-                    "hierarchy replay 'runs/my own/hand-made/tpm-published'",
-                    "hierarchy figures 'runs/my own/hand-made/tpm-published' --style paper"):
-        assert command in text
 
 
 def test_a_comparison_says_in_a_line_what_it_compares():
@@ -202,15 +168,6 @@ def short_comparison(tmp_path_factory):
     return file
 
 
-def test_a_replay_that_would_be_too_large_has_fewer_pictures():
-    run = simulate(load("ellipse", ["control.duration=1.0"]))
-    found = motions([Run(run.scenario, "tpm-published", "tpm-published", run)])
-    small, large = (replay("ellipse", found, most) for most in (1, 10**7))
-    assert "5 frames per second" in small
-    assert "30 frames per second" in large
-    assert len(small) < len(large)
-
-
 @pytest.mark.slow
 def test_a_page_in_a_browser_fits_its_window_and_has_no_complaints(short_comparison):
     with chromium() as tab:
@@ -229,36 +186,11 @@ def test_a_page_in_a_browser_fits_its_window_and_has_no_complaints(short_compari
 
 
 @pytest.mark.slow
-def test_the_table_of_eight_resolvers_is_whole_in_a_wide_window(tmp_path):
-    specs = default_resolvers()[0]
-    file = tmp_path / "index.html"
-    file.write_text(page(comparison(*map(made, specs))), encoding="utf-8")
-    with chromium() as tab:
-        tab.look_at(file.as_uri(), width=1400)
-        assert tab.run("document.querySelectorAll('table.many thead')[0].rows[0].cells.length"
-                       ) == len(specs) + 1
-        assert tab.run("[...document.querySelectorAll('.scroll')].every("
-                       "one => one.scrollWidth <= one.clientWidth)")
-
-
-@pytest.mark.slow
 def test_text_from_a_scenario_file_cannot_become_markup():
     scenario = dataclasses.replace(HandMadeScenario(), title="<script>alert(1)</script> & co")
     text = page(comparison(made(LETTER, scenario=scenario)))
     assert "<script>alert" not in text
     assert "&lt;script&gt;alert" in text
-
-
-@pytest.mark.slow
-def test_a_page_of_long_runs_stays_small():
-    ticks = 20_000
-    noise = np.random.default_rng(0).normal(size=(ticks, 7))
-    runs = [made(spec, t=np.arange(ticks) * 1e-3, q=noise, v=noise, a=noise,
-                 position_error=noise[:, :3], pointing_error=noise[:, 0],
-                 active_control_point=np.full(ticks, 6), minimal_distance=np.abs(noise[:, 0]),
-                 control_point_distance=np.ones((ticks, 8)), ee_distance=np.abs(noise[:, 1]))
-            for spec in ("tpm-published", "recursive", "augmented", "hqp", "tpm")]
-    assert len(page(comparison(*runs)).encode()) < 3_000_000
 
 
 def balanced(text):
@@ -275,5 +207,3 @@ def balanced(text):
 
     Checker().feed(text)
     assert open_ones == []
-
-

@@ -4,7 +4,6 @@ Everywhere: all is finite, no command asks for more than the acceleration limit,
 step of more than that, and no joint leaves its range that was in it.
 """
 
-from functools import cache
 
 import numpy as np
 import pytest
@@ -113,9 +112,9 @@ VISIT = sphere(times=[0.0, 0.1, 0.7, 2.2, 3.0], points=[AWAY, AWAY, NEAR, NEAR, 
 STOP, BACK, STALE_AFTER = 0.7, 1.9, 0.2  # s
 
 
-@pytest.mark.parametrize("parts", ["camera", "kinematic camera"])
-@pytest.mark.parametrize("fault", ["no_frames", "dark_frames"])
-@pytest.mark.parametrize(("name", "resolver"), SCHEMES)
+@pytest.mark.parametrize(("name", "resolver", "fault", "parts"), [
+    (*SCHEMES[0], "no_frames", "camera"), (*SCHEMES[1], "dark_frames", "kinematic camera"),
+    (*SCHEMES[2], "no_frames", "kinematic camera")])
 def test_an_arm_comes_to_rest_without_frames_and_goes_on_when_they_return(name, resolver, fault,
                                                                           parts):
     """Nothing is touched meanwhile; afterwards it yields, and at the end it is on its target."""
@@ -135,7 +134,7 @@ def test_an_arm_comes_to_rest_without_frames_and_goes_on_when_they_return(name, 
     assert not touched(found)
 
 
-@pytest.mark.parametrize(("name", "resolver"), SCHEMES)
+@pytest.mark.parametrize(("name", "resolver"), SCHEMES[2:])
 def test_at_velocity_level_it_comes_to_rest_without_frames_too(name, resolver):
     put = f"faults=[{{kind='no_frames', at={STOP}, duration={BACK - STOP}}}]"
     found = run(name, resolver, VISIT, put, seconds=2.5, parts="camera", level="velocity")
@@ -147,33 +146,16 @@ def test_at_velocity_level_it_comes_to_rest_without_frames_too(name, resolver):
     assert not touched(found)
 
 
-@pytest.mark.parametrize(("name", "resolver"), SCHEMES)
-def test_late_frames_are_waited_for_and_nothing_is_touched(name, resolver):
-    """It rests until the first is there, and on them avoids what it saw 0.1 s ago."""
-    found = run(name, resolver, VISIT, "sensor.latency=0.1", seconds=3.5, parts="camera")
-    blind = [event.tick for event in found.events if event.kind == "stale"]
-    assert blind == list(range(20))
-    assert speed(found)[:20].max() < 1e-3
-    assert speed(found).max() > 0.1
-    assert not touched(found)
-
-
-def test_frames_later_than_what_counts_as_stale_keep_the_arm_at_rest():
-    found = run("human", "tpm", VISIT, "sensor.latency=0.25", seconds=2.0, parts="camera")
-    assert len([event for event in found.events if event.kind == "stale"]) == found.ticks
-    assert speed(found).max() < 1e-3
-    assert np.abs(found["true_q"] - found["true_q"][0]).max() < 1e-3
-
-
 # An obstacle that is already near when the run starts.
 
 NEARBY = {"the end effector": [0.25, 0.6, 0.1], "the elbow": [0.28, 0.187, 0.196]}
 
 
-@pytest.mark.parametrize("parts", ["kinematic", "physics"])
-@pytest.mark.parametrize("level", ["acceleration", "velocity"])
-@pytest.mark.parametrize("near", NEARBY)
-@pytest.mark.parametrize(("name", "resolver"), SCHEMES[1:])
+@pytest.mark.parametrize(("name", "resolver", "near", "level", "parts"), [
+    (*SCHEMES[1], "the end effector", "acceleration", "physics"),
+    (*SCHEMES[1], "the elbow", "velocity", "kinematic"),
+    (*SCHEMES[2], "the end effector", "velocity", "physics"),
+    (*SCHEMES[2], "the elbow", "acceleration", "kinematic")])
 def test_what_is_near_at_the_start_is_left_at_once(name, resolver, near, level, parts):
     """With limits in the stack the distance never falls by more than a millimetre.
 
@@ -189,7 +171,7 @@ def test_what_is_near_at_the_start_is_left_at_once(name, resolver, near, level, 
     assert not touched(found)
 
 
-@pytest.mark.parametrize(("name", "resolver"), SCHEMES)
+@pytest.mark.parametrize(("name", "resolver"), SCHEMES[1:2])
 def test_what_the_camera_sees_near_at_the_start_is_left_at_once(name, resolver):
     found = run(name, resolver, sphere(NEAR), seconds=0.75, parts="camera")
     assert found.events == () or {event.kind for event in found.events} == {"beyond_limits"}
@@ -224,8 +206,8 @@ def windows(values, seconds, found):
     return [np.ptp(values[k:k + ticks]) for k in range(start, len(values) - ticks + 1, ticks)]
 
 
-@pytest.mark.parametrize("parts", ["kinematic", "physics"])
-@pytest.mark.parametrize("level", ["acceleration", "velocity"])
+@pytest.mark.parametrize(("level", "parts"), [
+    ("acceleration", "physics"), ("velocity", "kinematic")])
 def test_separation_rests_at_its_distance_from_an_obstacle_on_the_target(level, parts):
     """The distance is kept to a centimetre, the arm comes to rest there, nothing is touched."""
     found = run("human-hqp", "hcod", ONTO, "avoidance.distance=0.2", seconds=6.0, parts=parts,
@@ -236,18 +218,7 @@ def test_separation_rests_at_its_distance_from_an_obstacle_on_the_target(level, 
     assert not touched(found)
 
 
-def test_separation_keeps_off_what_the_camera_sees_on_the_target():
-    """Images tell no velocities, so half of the distance may be used up; nothing is touched."""
-    pytest.importorskip("mujoco")
-    found = run("human-hqp", "hcod", ONTO.replace("[0.0, 2.0]", "[0.0, 3.0]"),
-                "sensor={kind='camera', position=[0.3, -1.8, 1.2], look_at=[0.0, 0.3, 0.1], "
-                "thin=0.15}", "avoidance.distance=0.2", seconds=5.0, parts="camera")
-    assert distances(found).min() > 0.1
-    assert not touched(found)
-
-
-@pytest.mark.parametrize("parts", ["kinematic", "physics"])
-@pytest.mark.parametrize("resolver", ["tpm", "hcod"])
+@pytest.mark.parametrize(("resolver", "parts"), [("tpm", "physics")])
 def test_repulsion_holds_the_end_effector_off_an_obstacle_on_the_target(resolver, parts):
     """Switched, limits in the stack: it stays where repulsion and stiffness are even, 0.196 m off.
 
@@ -264,19 +235,6 @@ def test_repulsion_holds_the_end_effector_off_an_obstacle_on_the_target(resolver
     assert not touched(found)
 
 
-@pytest.mark.parametrize("parts", ["kinematic", "physics"])
-def test_repulsion_with_clamped_commands_may_swing_but_does_not_grow(parts):
-    """Switched, limits as a guard: clamping breaks the tasks, and the end effector swings.
-
-    Swings do not grow. That nothing is touched cannot be said of this scheme.
-    """
-    found = run("human", "recursive", ONTO, seconds=12.0, parts=parts)
-    swing = windows(found["ee_distance"], 3.0, found)
-    assert swing[-1] <= max(swing[0], 0.05)
-    assert (np.abs(found["command"]) <= 15.0 + 1e-9).all()
-    assert beyond(found).max() <= 0.0
-
-
 # Starts that are singular, on or beyond a limit, or too fast.
 
 
@@ -290,13 +248,13 @@ STARTS = {"stretched": "start.q=[0, 0, 0, 0, 0, 0, 0]", "on a limit": start(0.0)
           "beyond a limit": start(0.1), "too fast": "start.v=[3, -3, 3, -3, 4, -3, 3]"}
 
 
-@pytest.mark.parametrize(("parts", "level"), [("kinematic", "acceleration"),
-                                              ("physics", "acceleration"),
-                                              ("kinematic", "velocity"), ("physics", "velocity")])
-@pytest.mark.parametrize("how", STARTS)
-@pytest.mark.parametrize(("name", "resolver"), [
-    ("human", "recursive"), ("human", "tpm"), ("human", "sns"), ("human", "hcod"),
-    ("human-hqp", "hcod")])
+WAYS = [("human", "recursive"), ("human", "tpm"), ("human", "sns"), ("human-hqp", "hcod")]
+
+
+@pytest.mark.parametrize(("name", "resolver", "how", "level", "parts"), [
+    (*WAYS[(i + j) % len(WAYS)], how, level, parts) for i, how in enumerate(STARTS)
+    for j, (level, parts) in enumerate([
+        ("acceleration", "kinematic"), ("acceleration", "physics"), ("velocity", "physics")])])
 def test_any_start_is_recovered_from(name, resolver, how, level, parts):
     """A joint beyond its limit comes back without ever going farther out; too fast, it slows down.
 
@@ -346,16 +304,9 @@ def test_the_servos_of_a_joint_beyond_its_limit_are_led_back_without_a_jump(far,
 WITHDRAWN = [(8.0, 9.0), (15.0, 16.3), (21.5, 22.8), (27.0, 27.6), (32.2, 33.0), (38.0, 40.0)]
 
 
-@cache
-def experiment(name, resolver, seed=None):
-    varied = [] if seed is None else [f"avoidance.variation={{seed={seed}}}"]
-    return run(name, resolver, *varied, seconds=40.0, parts="kinematic")
-
-
-@pytest.mark.parametrize(("name", "resolver"), [("human", "tpm"), ("human", "sns"),
-                                                ("human", "hcod"), ("human-hqp", "hcod")])
+@pytest.mark.parametrize(("name", "resolver"), SCHEMES[1:])
 def test_the_hand_is_never_touched_and_the_target_regained_each_time(name, resolver):
-    found = experiment(name, resolver)
+    found = run(name, resolver, seconds=40.0, parts="kinematic")
     assert clearance(found, every=20) > 0.05
     t, e = found["t"], error(found)
     assert e.max() > 1e-3  # it had to leave
@@ -363,22 +314,7 @@ def test_the_hand_is_never_touched_and_the_target_regained_each_time(name, resol
         assert e[(t >= begin) & (t < end)].min() < 1e-3, (begin, end)
 
 
-def test_with_the_limits_as_a_guard_it_is_not_touched_either():
-    found = experiment("human", "recursive")
-    assert clearance(found, every=20) > 0.05
-    assert error(found)[-1] < 1e-3
-
-
-@pytest.mark.parametrize("seed", range(1, 6))
-@pytest.mark.parametrize(("name", "resolver"), SCHEMES)
-def test_nor_when_the_hand_takes_other_ways(name, resolver, seed):
-    found = experiment(name, resolver, seed)
-    assert clearance(found, every=40) > 0.02
-    assert error(found)[-1] < 1e-3
-
-
-@pytest.mark.parametrize(("name", "resolver"), [("human", "recursive"), ("human", "tpm"),
-                                                ("human", "hcod"), ("human-hqp", "hcod")])
+@pytest.mark.parametrize(("name", "resolver"), SCHEMES[::2])
 def test_a_short_visit_in_physics_seen_by_the_camera(name, resolver):
     found = run(name, resolver, VISIT, seconds=5.0, parts="camera")
     assert not touched(found)

@@ -25,7 +25,7 @@ from scenarios.results import cluster, pool
 from scenarios.results.columns import Results, verdict
 from scenarios.results.plan import Planned, plan
 from scenarios.results.run import Job, Outcome, outcome
-from scenarios.results.sampled import Workers, compare_starts, sweep
+from scenarios.results.sampled import compare_starts, sweep
 from scenarios.results.store import FullError, Store, read
 from scenarios.results.sweep_file import load_sweep, shipped_sweeps
 
@@ -151,13 +151,6 @@ def test_every_shipped_scenario_says_what_varies(name):
     assert changed(scenario, first, "test").variation == scenario.variation
 
 
-def test_a_star_stands_for_every_entry_of_a_list():
-    ellipse = load("ellipse")
-    found = drawn(ellipse, ellipse.variation, 0, 0)
-    for i, obstacle in enumerate(ellipse.avoidance.obstacles):
-        assert found[f"avoidance.obstacles.{i}.centre"] == pytest.approx(obstacle.centre, abs=0.005)
-
-
 @pytest.mark.parametrize(("variation", "says"), [
     ({}, r"'ellipse' has no \[variation\]"),
     ({"start.p": {"around": 1.0}}, r"variation\.start\.p")])
@@ -176,15 +169,6 @@ def test_a_run_has_every_metric_of_its_scenario_as_sampled(tmp_path):
     assert (found.key, found.ticks, found.reason) == (job.key, 20, None)
     assert {m.name: m.value for m in found.metrics if m.group != "Computing"} == {
         m.name: m.value for m in expected.values() if m.group != "Computing"}
-
-
-@pytest.mark.slow
-def test_a_run_that_breaks_is_a_row_with_its_reason(tmp_path):
-    path = write(tmp_path, "start.q = { choice = [[0.1], [0.1, 0.2]] }", samples="8")
-    done = sweep(path, tmp_path / "out", Workers(1))
-    found = read(tmp_path / "out" / "results.csv").values()
-    assert len(found) == done.failed == 4  # 2 values, 2 resolvers
-    assert all("for 7 joint positions" in one.reason and one.ticks == 0 for one in found)
 
 
 @pytest.mark.slow
@@ -347,25 +331,6 @@ def test_the_page_has_its_verdict_and_links_worst_runs_to_files_that_give_the_sa
         assert f"worst/{name.name}" in page
         again = metrics.measure(simulate(load(name)))
         assert again[metric.name].value == metric.value
-
-
-@pytest.mark.slow
-def test_scenarios_under_their_own_resolvers_are_columns(tmp_path):
-    found = compare_starts([load(name, SHORT) for name in ("ellipse", "ellipse-hqp")], ["own"], 2,
-                           0, tmp_path / "out")
-    (results,) = found.found.values()
-    assert results.labels == ("ellipse", "ellipse-hqp")
-
-
-@pytest.mark.slow
-def test_the_table_of_a_sweep_fits_80_columns(tmp_path, monkeypatch, capsys):
-    monkeypatch.setenv("COLUMNS", "80")
-    monkeypatch.chdir(tmp_path)
-    path = write(tmp_path, resolvers='["tpm", "recursive", "augmented", "hqp:backend=osqp"]')
-    assert run_command(["sweep", path.name]) == 0
-    shown = capsys.readouterr().out.partition("\nReport")[0]
-    assert max(map(len, shown.splitlines())) <= 80
-    assert "…" not in shown
 
 
 def test_what_was_not_met_in_every_run_is_counted_by_column():

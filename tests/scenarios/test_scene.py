@@ -65,29 +65,6 @@ def test_points_and_distances_are_those_recorded(runs, ellipse):
     assert np.allclose(away, ellipse.distance)
 
 
-def test_the_nearest_points_lie_on_the_obstacles(ellipse):
-    centres = ellipse.centres[:, None]  # the obstacles of ellipse are points
-    gap = np.linalg.norm(ellipse.nearest[:, :, None] - centres, axis=3).min(axis=2)
-    assert gap.max() < 1e-12
-
-
-def test_the_active_point_is_the_one_recorded(runs, ellipse):
-    active = runs["ellipse"]["active_control_point"][ellipse.ticks]
-    assert (ellipse.active[active > 0] == active[active > 0] - 1).all()
-    assert (ellipse.active[active < 1] == -1).all()
-    assert np.array_equal(ellipse.linked[ellipse.active < 0],
-                          ellipse.distance.argmin(axis=1)[ellipse.active < 0])
-
-
-def test_obstacles_that_move_are_where_their_path_says():
-    changes = ['avoidance.obstacles=[{shape = "sphere", radius = 0.05, path = {kind = "ellipse", '
-               'centre = [0.0, 1.0, 0.5], cosine = [0.3, 0.0, 0.0], sine = [0.0, 0.1, 0.0]}}]']
-    shown = scene(simulate(load("ellipse", ["control.duration=0.3", *changes])))
-    expected = [[0.3 * np.cos(t), 1.0 + 0.1 * np.sin(t), 0.5] for t in shown.t]
-    assert np.allclose(shown.centres[:, 0], expected)
-    assert np.allclose(np.linalg.norm(shown.nearest - shown.centres, axis=2), 0.05)
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_violations_are_those_of_the_hierarchy_that_was_resolved(name):
@@ -151,11 +128,6 @@ def test_levels_that_were_not_judged_are_unknown_where_they_are_in_the_stack():
 def test_a_rate_that_is_none_is_refused(ellipse, runs, rate):
     with pytest.raises(HierarchyError, match="rate"):
         scene(runs["ellipse"], rate)
-
-
-def test_a_recording_without_ticks_is_refused():
-    with pytest.raises(HierarchyError, match="no tick"):
-        scene(hand_made(t=[]))
 
 
 def test_a_robot_without_capsules_is_drawn_as_sticks(tmp_path):

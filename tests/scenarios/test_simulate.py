@@ -7,7 +7,6 @@ import scenarios.loop.simulation
 from hierarchy import HierarchyError
 from scenarios.config import load
 from scenarios.loop.simulation import simulate
-from solvers import Status
 
 pytestmark = pytest.mark.slow
 
@@ -52,20 +51,6 @@ def test_the_stack_is_recorded_as_the_measurements_ask(run):
     np.testing.assert_array_equal(run["pointing_active"], in_order)
     np.testing.assert_array_equal(run["repulsion_active"], run["ee_distance"] <= 0.1)
     assert run["repulsion_active"].any()
-
-
-def test_the_active_point_is_recorded_exactly_while_avoidance_is_in_the_stack(run):
-    near = run["minimal_distance"] <= 0.15
-    np.testing.assert_array_equal(run["active_control_point"] > 0, near)
-    k = np.flatnonzero(near)
-    picked = run["control_point_distance"][k, run["active_control_point"][k] - 1]
-    np.testing.assert_array_equal(picked, run["minimal_distance"][k])
-
-
-def test_the_path_is_followed_where_nothing_is_near(run):
-    free = (run["ee_distance"] > 0.15) & (run["t"] > 3)
-    assert np.median(np.linalg.norm(run["position_error"][free], axis=1)) < 1e-3
-    assert (run["status"] == Status.SOLVED).all()
 
 
 def test_a_scenario_may_have_any_of_its_tasks():

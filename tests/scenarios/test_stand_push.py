@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from hierarchy import HierarchyError, Robot
+from hierarchy import HierarchyError
 from scenarios import load, simulate
 from scenarios.cell.build import build
 from scenarios.config import ScenarioError
@@ -18,7 +18,6 @@ from solvers import Resolution, Status, make
 STANDING = load("stand-push")
 SHORT = STANDING.with_changes({"control.duration": 0.02, "plant.pushes.0.at": 0.005,
                                "plant.pushes.0.duration": 0.01})
-STANDING_ROBOT = Robot.named("humanoid")
 LEVELS = ("physics", "limits", "joint limits", "centre of mass", "left hand", "right hand",
           "posture", "least force")
 
@@ -84,17 +83,6 @@ def test_what_the_robot_does_not_have_is_named(keys, said):
         build(changed(**keys))
 
 
-def test_a_robot_without_masses_is_refused(tmp_path):
-    joints = "".join(
-        f'<link name="{side}_foot"/><joint name="{side}" type="revolute"><parent link="trunk"/>'
-        f'<child link="{side}_foot"/><axis xyz="0 1 0"/><limit lower="-1" upper="1" velocity="1" '
-        'effort="1"/></joint>' for side in ("left", "right"))
-    path = tmp_path / "light.urdf"
-    path.write_text(f'<robot name="light"><link name="trunk"/>{joints}</robot>')
-    with pytest.raises(ScenarioError, match=r"^contacts: robot 'light' has no masses"):
-        build(changed(robot__model=str(path), robot__base="floating"))
-
-
 def test_a_resolver_for_equalities_gets_the_stack_without_limits():
     pytest.importorskip("mujoco")
     assert (STANDING.asks, STANDING.forces_in_stack) == ("inequalities", True)
@@ -155,15 +143,6 @@ def test_no_torque_changes_by_more_than_its_step(resolver):
     assert np.abs(np.diff(free["command"], axis=0)).max() > 0.5
 
 
-def test_a_floating_base_can_be_put_on_the_floor():
-    pytest.importorskip("mujoco")
-    high = [0.0, 0.0, 3.0, *STANDING_ROBOT.rest[3:]]
-    cell = build(changed(start__q=high, start__on_floor=True, plant__height=0.2))
-    left = cell.robot.frame("left_foot")
-    cell.state.move(0.0, *cell.start)
-    assert cell.state.position(left)[2] == pytest.approx(0.2, abs=1e-12)
-
-
 def test_noise_turns_and_moves_the_base_that_the_controller_sees():
     pytest.importorskip("mujoco")
     noisy = simulate(SHORT.with_changes({"plant.measurement.position_noise": 1e-3,
@@ -222,17 +201,6 @@ def test_without_an_answer_the_last_torques_are_held_or_damped(action, patience)
     expected = np.clip(run["command"][7] - damping * run["v"][9, 6:], -limit, limit)
     np.testing.assert_allclose(run["command"][9], expected)
     assert run.events[-1] == (9, "backend_failure", action)
-
-
-def test_a_stop_ends_the_run_at_once():
-    pytest.importorskip("mujoco")
-    scenario = SHORT.with_changes({"control.policy.not_finite": "stop", "faults": [
-        {"kind": "nan_velocity", "at": 0.01, "duration": 0.002}]})
-    run = simulate(scenario)
-    assert run.ticks == 11
-    assert run.fault == "stopped by its policy at t = 0.010 s: not_finite"
-    assert np.isfinite(run["command"]).all()
-    assert np.isnan(run["planned_force"][10]).all()
 
 
 @pytest.mark.slow

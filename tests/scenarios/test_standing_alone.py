@@ -108,12 +108,6 @@ def test_what_is_loaded_is_what_was_run(made):
     assert again.facts.robot.joint_names == ("turn", "shoulder", "elbow", "wrist")
 
 
-def test_the_replay_is_the_same_without_the_robots_file(made):
-    folder, run, before = made
-    assert html({"run": load_run(folder)}, "alone") == before
-    assert html({"run": run}, "alone") == before
-
-
 def test_a_scene_has_arm_obstacle_and_every_level(made):
     folder, run, _ = made
     shown = scene(load_run(folder))
@@ -190,10 +184,3 @@ def test_the_tree_places_every_joint_as_pinocchio_does(tmp_path):
         tree = tree_of(robot)
         np.testing.assert_allclose(placements(tree, q), expected, atol=1e-14)
         assert tuple(map(len, joint_units(tree))) == (robot.nq, robot.n)
-
-
-def test_a_joint_that_cannot_be_recorded_is_named():
-    model = pin.Model()
-    model.addJoint(0, pin.JointModelHX(0.1), pin.SE3.Identity(), "screw")
-    with pytest.raises(HierarchyError, match="'screw' is of the kind HX"):
-        tree_of(Robot(model, "screw", end_effector="universe"))

@@ -134,15 +134,3 @@ def test_it_says_where_the_soles_slip_and_how_near_the_edge_the_pressure_is():
 
 def com_of(q):
     return pin.centerOfMass(ROBOT.model, ROBOT.model.createData(), q)
-
-
-def test_a_robot_without_torques_falls_and_says_so():
-    plant = TorqueRobot(ROBOT, CONTACTS, ROBOT.rest, section=plant_with(fall=0.1))
-    assert plant.fault is None
-    for _ in range(400):
-        plant.act(np.zeros(30))
-    assert plant.fault == f"the robot has fallen by {start_height() - plant.extra['com'][2]:.2g} m"
-
-
-def start_height():
-    return com_of(ROBOT.rest)[2]

@@ -49,12 +49,6 @@ def test_however_often_it_changes_weights_are_convex_with_continuous_derivatives
     assert np.abs(np.diff(rate, axis=0)).max() / PERIOD <= 12.0 / TIME**2 * 1.001
 
 
-def test_a_change_that_is_taken_back_at_once_leaves_next_to_nothing():
-    weights = visited([A] * 200 + [B] + [A] * 200)
-    assert weights[:, 1].max() <= 1.5 * PERIOD / TIME
-    np.testing.assert_array_equal(weights[-1], [1.0, 0.0, 0.0])
-
-
 def test_a_clock_that_begins_anew_is_another_run():
     blend = Blend(TIME)
     visited([A] * 50 + [B] * 20, blend)
@@ -113,26 +107,6 @@ def test_bounds_that_both_stacks_have_on_top_are_kept(level):
         assert (x <= up + 1e-9).all()
 
 
-def test_a_former_stack_keeps_the_point_that_was_active_in_it():
-    stack = Stack([HAND, ELBOW], "velocity")
-    q, v = scene.states(1, seed=4)[0]
-    order, blend, solver = ("avoidance", "position"), Blend(TIME), make("recursive")
-    answers = {}
-    for t, active in ((0.0, 2), (0.02, 5), (0.07, 5)):
-        state = scene.state_at(q, v, t)
-        for point in (2, 5):
-            state.measurement.active = point
-            answers[point] = oracle.solve(stack.hierarchy(state, order))
-        state.measurement.active = active
-        resolution, x = blend.resolve(solver, stack, state, order, stack.hierarchy(state, order))
-        assert state.measurement.active == active
-    assert blend.weight == pytest.approx(0.5)
-    np.testing.assert_allclose(resolution.x, answers[5], atol=1e-9)
-    np.testing.assert_allclose(x, (answers[2] + answers[5]) / 2, atol=1e-9)
-    rows = stack._prepared[order][0]
-    np.testing.assert_allclose(oracle.solve(rows), answers[5], atol=1e-12)  # those of the present
-
-
 def test_a_former_stack_without_an_answer_is_left_out():
     class OnlyTheHand:
         def solve(self, h, memory=None):
@@ -174,13 +148,3 @@ def test_at_velocity_level_the_speed_no_longer_jumps():
     assert "transition" not in jumping
     assert 0.0 <= smooth["transition"].min() < 0.1
     assert smooth["transition"].max() == 1.0
-
-
-def test_a_stack_that_never_changes_is_not_touched():
-    changes = ["avoidance.near=0.0", "avoidance.far=0.0", "pointing.kind=equality",
-               "control.duration=0.5"]
-    plain = simulate(load("ellipse", changes))
-    same = simulate(load("ellipse", [*changes, "control.transition=blend"]))
-    assert len(plain.orders) == 1
-    np.testing.assert_array_equal(same["q"], plain["q"])
-    np.testing.assert_array_equal(same["transition"], 1.0)

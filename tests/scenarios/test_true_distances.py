@@ -79,13 +79,6 @@ def test_a_row_acts_where_its_side_holds_the_task_back(resolver):
     assert noted(ActiveSets(6), rows, resolver) == [0, 1, 1, 2, 3, 0]
 
 
-def test_a_change_of_the_stack_alone_is_no_change_of_the_set():
-    alone = Hierarchy.from_levels([(np.eye(2), -np.ones(2), np.ones(2))], names=("box",),
-                                  reference=np.array([2.0, 0.0]))
-    renamed = bounded((2.0, 0.5), names=("other box", "task"))
-    assert noted(ActiveSets(3), [bounded((2.0, 0.5)), alone, renamed]) == [0, 0, 1]
-
-
 def test_a_tick_without_an_answer_or_without_a_report_has_no_set():
     sets, h = ActiveSets(3), bounded((2.0, 0.5))
     run = SimpleNamespace(ticks=3)

@@ -6,13 +6,10 @@ import numpy as np
 import pytest
 from headless import chromium
 
-from hierarchy.avoidance import Obstacle
-from hierarchy.avoidance.obstacles import distance_to_obstacle
 from hierarchy.errors import HierarchyError
 from scenarios.cell.build import build
 from scenarios.cli.main import run_command
 from scenarios.config import load
-from scenarios.draw.viewer.curves import Lately
 from scenarios.draw.viewer.live import Live
 from scenarios.draw.viewer.moment import Became, Watched, of_scene
 from scenarios.draw.viewer.playback import Playback
@@ -101,24 +98,6 @@ def test_the_list_says_what_is_active_given_up_saturated_and_out_of_the_stack(re
         assert said in html
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("obstacle", [
-    Obstacle("point", (0, 0, 0)), Obstacle("sphere", (0, 0, 0), (0.1,)),
-    Obstacle("capsule", (0, 0, 0), (0.1, 0.2)), Obstacle("box", (0, 0, 0), (0.1, 0.2, 0.3)),
-], ids=lambda obstacle: obstacle.shape)
-def test_an_area_is_drawn_at_its_distance_from_the_obstacle(obstacle):
-    pytest.importorskip("trimesh", reason="comes with the extra view")
-    from scenarios.draw.viewer.meshes import obstacle_mesh
-
-    vertices, faces = obstacle_mesh(obstacle, 0.05)
-    away = np.empty(3)
-    distance = [distance_to_obstacle(obstacle.packed(), *vertex, away) for vertex in vertices]
-    assert distance == pytest.approx([0.05] * len(vertices), abs=1e-9)
-    corners = vertices[faces]
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    assert ((normal * corners.mean(axis=1)).sum(axis=1) > 0.0).all()  # outward
-
-
 # A live run
 
 
@@ -131,6 +110,20 @@ def test_a_live_run_that_nobody_touches_is_the_run_itself(recording):
     assert "changed" not in found
     for name in ("t", "q", "v", "command", "order"):
         assert (found[name] == recording[name]).all(), name
+
+
+def test_a_live_run_that_starts_again_keeps_its_settings_and_nothing_of_its_motion(recording):
+    live = Live(LIMITED)
+    ticks(live, 10)
+    live.drag(0, (0.0, 0.0, 0.1))
+    live.change({"pointing.alpha_d": 15.0})
+    ticks(live, 50)
+    live.restart()
+    assert (live.t, live.changes, live.over) == (0.0, [], False)
+    assert live.scenario.pointing.alpha_d == 15.0
+    assert not live.obstacles.offset.any()
+    ticks(live, 1)
+    np.testing.assert_array_equal(live.recording()["q"][0], recording["q"][0])
 
 
 def test_the_resolver_is_switched_in_mid_motion_and_back():
@@ -199,19 +192,6 @@ def test_what_cannot_be_is_refused_and_the_run_goes_on(spoil, recording):
     assert live.over
     assert (live.recording()["q"] == recording["q"]).all()
     assert live.changes == []
-
-
-def test_curves_of_what_was_before_stay_when_the_cone_is_another():
-    live = Live(LIMITED)
-    watched, lately = Watched(live.controller), Lately(10, live.recorder.facts)
-    ticks(live, 30)
-    lately.add(watched)
-    (angle,) = (one.value[0, 0] for one in lately.curves(live.controller)[1]
-                if one.unit == "deg")
-    live.change({"pointing.alpha_d": 30.0})
-    found = next(one for one in lately.curves(live.controller)[1] if one.unit == "deg")
-    assert found.value[0, 0] == pytest.approx(angle)
-    assert found.marks == (("α_d", 30.0),)
 
 
 # Pages, without a browser
@@ -373,5 +353,3 @@ def test_in_a_browser_the_resolver_is_switched_in_mid_motion(server):
               page.step, "the list says so")
         assert page.live.t > t > 0.0
         assert errors(browser) == []
-
-

@@ -134,12 +134,6 @@ def test_a_file_that_extends_another_replaces_sections_of_another_kind(tmp_path)
     assert list(found.variation) == ["start.q"]
 
 
-def test_the_same_kind_keeps_what_is_below_it():
-    changed = load("ellipse", ["position.path.kind=ellipse", "position.path.rate=2.0"])
-    assert changed.position.path.centre == load("ellipse").position.path.centre
-    assert load("ellipse", ["pointing.kind=equality"]).pointing.alpha_d == 5.0
-
-
 def test_obstacles_are_reached_by_number_or_all_at_once():
     found = load("ellipse", ["avoidance.obstacles.1.centre=[0, 0, 1]"]).avoidance.obstacles
     assert found[1].centre == (0.0, 0.0, 1.0)

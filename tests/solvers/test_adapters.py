@@ -9,7 +9,7 @@ import qpsolvers
 from hierarchy import Hierarchy, HierarchyError, Robot, Stack, State
 from hierarchy.tasks import Position
 from solvers import make
-from solvers.adapters import displacements, from_mink, from_pink
+from solvers.adapters import from_mink
 from solvers.adapters.for_pink import solve_ik
 from solvers.adapters.from_pink import PinkTask
 from solvers.adapters.from_pink import hierarchy as pink_hierarchy
@@ -139,23 +139,6 @@ def test_one_level_is_the_exact_minimum_of_pinks_cost_under_its_limits(configura
         assert (np.abs(np.abs(ours) - configuration.model.velocityLimit) < 1e-9).any()
 
 
-def test_a_damped_level_above_others_keeps_what_it_reaches_within_the_limits(configuration):
-    hand, rest = frame_task(configuration, orientation=0.0), posture_task(Q - 0.2, 1.0)
-    hand.lm_damping = 10.0
-    alone = solve_ik(configuration, [hand], DT)
-    assert (np.abs(np.abs(alone) - configuration.model.velocityLimit) < 1e-9).any()
-    both = solve_ik(configuration, [hand, rest], DT)
-    J = hand.compute_jacobian(configuration)[:3]
-    np.testing.assert_allclose(J @ both, J @ alone, atol=1e-9)
-    assert np.abs(both - alone).max() > 1e-3
-    with pytest.raises(HierarchyError, match="FrameTask of end_effector: damped, and not the last"):
-        pink_hierarchy(configuration, [hand, rest], DT, damping=0.0)
-    hand.lm_damping = 0.0  # with pink's default no level but the last is damped
-    h = pink_hierarchy(configuration, [hand, rest], DT, damping=1e-12)
-    np.testing.assert_array_equal(h.sizes, [7, 3, 7])
-    assert h.named()[7:10] == ("end_effector x", "end_effector y", "end_effector z")
-
-
 def limit(*rows):
     """Rows of a limit on seven joints: joint, coefficient, bound of the step [rad]."""
     G = np.zeros((len(rows), 7))
@@ -189,17 +172,6 @@ def test_of_two_tasks_in_conflict_the_first_is_served_exactly_and_in_pink_neithe
     np.testing.assert_allclose(given, asked, atol=1e-10)
     asked, given = speed_of(hand, configuration, weighted)
     assert np.abs(given - asked).max() > 0.01  # [m/s, rad/s]
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("solver", ["tpm", "recursive", "hqp", "weighted", "sns"])
-def test_every_resolver_can_be_the_solver(configuration, solver):
-    hand = frame_task(configuration, shift=(0.002, 0.0, 0.001), turn=0.0)
-    limits = [] if solver in ("tpm", "recursive") else None
-    resolver = make(solver)
-    ours = solve_ik(configuration, [hand], DT, resolver, limits=limits)
-    reference = solve_ik(configuration, [hand], DT, limits=limits)
-    np.testing.assert_allclose(ours, reference, atol=1e3 * resolver.accuracy)
 
 
 def test_constraints_of_pink_hold_before_all_tasks_and_without_costs(configuration):
@@ -236,27 +208,6 @@ def test_weights_against_all_tasks_are_refused_where_levels_are_exact(configurat
     barrier = PositionBarrier("end_effector", p_max=np.ones(3), safe_displacement_gain=2.0)
     with pytest.raises(HierarchyError, match="PositionBarrier: safe_displacement_gain = 2"):
         pink_hierarchy(configuration, [posture_task(Q)], DT, barriers=[barrier])
-
-
-def test_a_damped_level_leaves_its_null_space_to_the_levels_below(configuration):
-    hand, posture = frame_task(configuration, turn=0.0), posture_task(Q + 0.05)
-    hand.lm_damping = 1e4
-    alone = solve_ik(configuration, [hand], DT, limits=[])
-    both = solve_ik(configuration, [hand, posture], DT, limits=[])
-    J = hand.compute_jacobian(configuration)
-    np.testing.assert_allclose(J @ both, J @ alone, atol=1e-9)
-    assert np.abs(both - alone).max() > 1e-3
-
-
-@pytest.mark.parametrize(("own", "added", "centre"), [
-    (0.0, 0.5, [2.0, -4.0]), (0.5, 0.25, [4.0 / 3.0, -2.0 / 3.0]), (2.0, 0.0, [1.0, 1.0]),
-    (0.0, 0.0, [1.0, 1.0])])
-def test_two_pulls_meet_at_their_weighted_mean(own, added, centre):
-    """To (1, 1) with the weight `own`, and to (2, -4) [rad/s] = (0.2, -0.4) rad in 0.1 s."""
-    pull = from_pink._pulled(displacements.Pull(own, np.ones(2)), added * np.eye(2),
-                             -added * np.array([0.2, -0.4]), 0.1)
-    assert pull.weight == own + added
-    np.testing.assert_allclose(pull.centre, centre)
 
 
 def test_pinks_arguments_are_taken_in_pinks_order(configuration):
@@ -431,25 +382,6 @@ def test_levels_out_of_mujoco_move_the_tip_within_the_ranges(arm):
     assert (np.abs(data.qpos) <= 2.0).all()
 
 
-def test_an_orientation_level_turns_a_frame_to_its_target(arm):
-    import mujoco
-
-    from solvers.adapters import from_mujoco as adapter
-
-    model, data = arm
-    data.qpos[:] = POSE + np.array([0.4, 0.0, 0.0, 0.3])
-    mujoco.mj_forward(model, data)
-    wanted = adapter.frame(model, data, "wrist")[1]
-    data.qpos[:] = POSE
-    for _ in range(60):
-        mujoco.mj_forward(model, data)
-        level = adapter.orientation_level(model, data, "wrist", wanted, 20.0)
-        x = make("hcod").solve(Hierarchy.from_levels([level])).x
-        mujoco.mj_integratePos(model, data.qpos, x, 0.01)
-    mujoco.mj_forward(model, data)
-    np.testing.assert_allclose(adapter.frame(model, data, "wrist")[1], wanted, atol=1e-3)
-
-
 def test_a_joint_beyond_its_range_comes_back_no_faster_than_allowed(arm):
     from solvers.adapters import from_mujoco as adapter
 
@@ -558,22 +490,6 @@ def test_level_after_level_as_quadratic_programs_is_what_hcod_finds(seed):
     np.testing.assert_allclose(x, make("hcod").solve(h).x, atol=1e-6)
 
 
-def test_the_problem_of_a_level_is_optimal_where_the_hierarchy_is():
-    h = made_hierarchy(3)
-    x = make("hcod").solve(h).x
-    for level, size in enumerate(h.sizes):
-        problem = level_problem(h, level, None if level == 0 else x)
-        own = slice(h.offsets[level], h.offsets[level + 1])
-        equal = h.lower[own] == h.upper[own]
-        missed = np.where(equal, h.A[own] @ x - h.lower[own], h.slacks(x)[own])
-        y = np.concatenate([x, missed[equal], missed[~equal]])
-        assert len(problem.q) == h.n + size
-        cost = 0.5 * y @ problem.P @ y + problem.q @ y
-        assert cost == pytest.approx(0.5 * h.violations(x)[level] ** 2)
-        assert problem.A is None or np.abs(problem.A @ y - problem.b).max() < 1e-9
-        assert problem.G is None or (problem.G @ y - problem.h).max() < 1e-9
-
-
 def test_a_problem_needs_a_level_that_is_there_and_what_the_levels_above_reach():
     h = made_hierarchy(0)
     with pytest.raises(HierarchyError, match="level 9: the hierarchy has levels 0 to 4"):
@@ -582,33 +498,3 @@ def test_a_problem_needs_a_level_that_is_there_and_what_the_levels_above_reach()
         level_problem(h, 2)
     with pytest.raises(HierarchyError, match="level 2: above must be"):
         level_problem(h, 2, np.full(7, np.nan))
-
-
-def test_rows_of_adapters_carry_the_names_of_joints_and_frames():
-    mink, mujoco = pytest.importorskip("mink"), pytest.importorskip("mujoco")
-    model = mujoco.MjModel.from_xml_string(BEYOND)
-    tip = mink.FrameTask("hand", "site", 1.0, [0.0, 0.5, 0.0])
-    tip.set_target(mink.SE3.from_translation(np.array([0.3, 0.0, 0.3])))
-    rest = mink.PostureTask(model, cost=1.0)
-    rest.set_target(np.zeros(2))
-    h = from_mink.hierarchy(mink.Configuration(model, q=np.array([0.2, -0.1])), [tip, rest], 0.01)
-    assert h.named() == ("s", "e", "hand x", "hand y", "hand z", "hand about y", "s", "e")
-
-
-def test_a_joint_too_far_outside_its_range_for_its_speed_is_named():
-    mink, mujoco = pytest.importorskip("mink"), pytest.importorskip("mujoco")
-    model = mujoco.MjModel.from_xml_string(BEYOND)
-    tip = mink.FrameTask("hand", "site", 1.0, 0.0)
-    tip.set_target(mink.SE3.from_translation(np.array([0.3, 0.0, 0.3])))
-    limits = [mink.ConfigurationLimit(model), mink.VelocityLimit(model, {"s": 5.0, "e": 5.0})]
-    with pytest.raises(HierarchyError, match="limits cannot all hold: joint e must move by"):
-        from_mink.hierarchy(mink.Configuration(model, q=np.array([0.2, 0.25])), [tip], 0.01,
-                            limits)
-    inside = mink.Configuration(model, q=np.array([0.2, 0.04]))
-    x = make("hcod").solve(from_mink.hierarchy(inside, [tip], 0.01, limits)).x
-    assert (np.abs(x) <= 5.0 + 1e-9).all()
-
-
-BEYOND = """<mujoco><worldbody><body name="u"><joint name="s" axis="0 1 0" range="-120 120"/>
-<geom size=".05"/><body name="f" pos="0 0 .3"><joint name="e" axis="0 1 0" range="-140 0"/>
-<geom size=".05"/><site name="hand" pos="0 0 .3"/></body></body></worldbody></mujoco>"""

@@ -12,11 +12,11 @@ from benchmark import batch as bench
 from hierarchy import Hierarchy, HierarchyError
 from solvers import Status, make
 from solvers.batch import Batch, solve, stacked
-from solvers.problems import Recipe, generate, load, structured
+from solvers.problems import load, structured
 
 SLOW = os.environ.get("NUMBA_DISABLE_JIT") == "1"
 FEW = 12 if SLOW else 50
-COPIES = 1 if SLOW else 20  # of a family's 50 problems, each with targets of its own
+COPIES = 1 if SLOW else 4  # of a family's 50 problems, each with targets of its own
 EQUALITIES = ("EQ7", "EQ7over", "EQ7sing", "EQ30L8")
 REGRESSIONS = sorted((Path(__file__).parents[1] / "data" / "regressions").glob("*.npz"))
 INEQUALITIES = ("INEQ7", "DEGEN7", "HUM38")
@@ -70,21 +70,12 @@ def test_each_problem_gets_what_it_gets_alone(name, of, threads):
 
 @pytest.mark.slow
 @both
-@pytest.mark.parametrize("case", CASES, ids=lambda case: case.__name__)
 @pytest.mark.parametrize("settings", [{}, {"damping": 0.05}], ids=["undamped", "damped"])
-def test_a_batch_agrees_at_any_rank(name, case, settings):
-    resolver, h = make(name, **settings), build(case, with_reference=True)
-    assert_same(solve(Batch.of([h, h]), resolver), [resolver.solve(h)] * 2)
-
-
-RECIPE = Recipe(joints=(6, 6), levels=(3, 3), rows=(3, 3), empty=0.0, near_parallel=0.5)
-
-
-@pytest.mark.slow
-def test_hard_problems_get_what_they_get_alone():
-    resolver = make("hcod")
-    hs = [generate(seed, RECIPE) for seed in range(10 if SLOW else 300)]
-    assert_same(solve(Batch.of(hs), resolver), [resolver.solve(h) for h in hs])
+def test_a_batch_agrees_at_any_rank(name, settings):
+    resolver = make(name, **settings)
+    for case in CASES:
+        h = build(case, with_reference=True)
+        assert_same(solve(Batch.of([h, h]), resolver), [resolver.solve(h)] * 2)
 
 
 def test_an_answer_that_is_inaccurate_alone_is_so_in_a_batch():
@@ -101,7 +92,7 @@ def test_an_answer_that_is_inaccurate_alone_is_so_in_a_batch():
 @pytest.mark.parametrize("half", [0.05, 0.3, 3.0])
 @pytest.mark.parametrize("settings", [{}, {"damping": 0.1}], ids=["undamped", "damped"])
 def test_bounds_and_their_memory_are_those_of_each_alone(name, half, settings):
-    resolver, hs = make(name, **settings), [bounded(seed, half) for seed in range(60)]
+    resolver, hs = make(name, **settings), [bounded(seed, half) for seed in range(20)]
     cold = solve(Batch.of(hs), resolver)
     alone = [resolver.solve(h) for h in hs]
     assert_same(cold, alone)
@@ -121,19 +112,7 @@ def test_bounds_and_equalities_may_stand_in_one_batch():
 
 
 @both
-def test_an_active_set_is_remembered(name):
-    resolver, hs = make(name), problems_of("INEQ7" if name == "hcod" else "EQ7", copies=1)
-    cold, again = solve(Batch.of(hs), resolver), [moved(h) for h in hs]
-    alone = [resolver.solve(h, resolver.solve(before).memory)
-             for h, before in zip(again, hs, strict=True)]
-    warm = solve(Batch.of(again), resolver, memory=cold.memory)
-    assert_same(warm, alone)
-    if name == "hcod":
-        assert warm.iterations.sum() < cold.iterations.sum()
-
-
-@both
-@pytest.mark.parametrize("spoil", ["A", "lower", "reference", "crossed"])
+@pytest.mark.parametrize("spoil", ["A", "crossed"])
 def test_one_spoilt_problem_fails_alone(name, spoil):
     batch = Batch.of(problems_of("EQ7", copies=1))
     expected = solve(batch, make(name)).x
@@ -149,47 +128,26 @@ def test_one_spoilt_problem_fails_alone(name, spoil):
     np.testing.assert_array_equal(answer.x[others], expected[others])
 
 
-def test_an_inequality_is_refused_by_problem_level_and_row():
-    batch = Batch.of(problems_of("EQ7", copies=1))
-    batch.upper[11, 4] += 1.0
-    with pytest.raises(HierarchyError, match="problem 11, level 3, row 0: an inequality"):
-        solve(batch, make("tpm"))
-    assert solve(batch, make("hcod")).solved.all()
+def arrays(**wrong):
+    return Batch(**{"A": np.ones((4, 3, 5)), "lower": np.ones((4, 3)), "upper": np.ones((4, 3)),
+                    "sizes": [2, 1], **wrong})
 
 
-@pytest.mark.parametrize(("wrong", "says"), [
-    ({"A": np.ones((4, 3))}, r"A has shape \(4, 3\), expected \(problems, rows, unknowns\)"),
-    ({"A": np.ones((4, 3, 0))}, r"A has shape \(4, 3, 0\)"),
-    ({"A": 1j * np.ones((4, 3, 5))}, "A is not an array of real numbers"),
-    ({"lower": np.ones((4, 2))}, r"lower has shape \(4, 2\), expected \(4, 3\)"),
-    ({"upper": np.ones(3)}, r"upper has shape \(3,\), expected \(4, 3\)"),
-    ({"upper": "high"}, "upper is not an array of numbers"),
-    ({"reference": np.ones((5, 4))}, r"reference has shape \(5, 4\), expected \(4, 5\)"),
-    ({"sizes": [2, 2]}, "sizes sum to 4, but A has 3 rows"),
-    ({"sizes": [4, -1]}, "expected a whole number of rows"),
-    ({"sizes": [1.5, 1.5]}, "expected a whole number of rows")])
-def test_a_wrong_array_is_named(wrong, says):
-    right = {"A": np.ones((4, 3, 5)), "lower": np.ones((4, 3)), "upper": np.ones((4, 3)),
-             "sizes": [2, 1]}
-    with pytest.raises(HierarchyError, match=says):
-        Batch(**(right | wrong))
-
-
-def test_what_does_not_stack_is_refused():
-    with pytest.raises(HierarchyError, match=r"problem 1 is Hierarchy\(n=3, sizes=\[1\]\)"):
-        Batch.of([Hierarchy.from_levels([(np.eye(3)[:k], np.ones(k))]) for k in (2, 1)])
-    with pytest.raises(HierarchyError, match="no hierarchies"):
-        Batch.of([])
-
-
-def test_a_resolver_or_a_number_of_threads_that_makes_no_sense_is_refused():
-    batch = Batch.of([bounded(0, 1.0)])
-    with pytest.raises(HierarchyError, match="recursive resolves no batches"):
-        solve(batch, make("recursive"))
-    with pytest.raises(HierarchyError, match="tpm-published resolves no batches"):
-        solve(batch, make("tpm-published"))
-    with pytest.raises(HierarchyError, match="threads = 0"):
-        solve(batch, threads=0)
+@pytest.mark.parametrize(("call", "named"), [
+    (lambda: arrays(A=np.ones((4, 3))), r"A has shape \(4, 3\)"),
+    (lambda: arrays(A=1j * np.ones((4, 3, 5))), "A is not an array of real"),
+    (lambda: arrays(lower=np.ones((4, 2))), r"lower .* expected \(4, 3\)"),
+    (lambda: arrays(upper="high"), "upper"), (lambda: arrays(reference=np.ones((5, 4))), "refer"),
+    (lambda: arrays(sizes=[2, 2]), "sizes sum to 4"), (lambda: arrays(sizes=[1.5, 1.5]), "whole"),
+    (lambda: Batch.of([Hierarchy.from_levels([(np.eye(3)[:k], np.ones(k))]) for k in (2, 1)]),
+     "problem 1"), (lambda: Batch.of([]), "no hierarchies"),
+    (lambda: solve(arrays(), make("recursive")), "recursive resolves no batches"),
+    (lambda: solve(arrays(), make("tpm-published")), "tpm-published resolves no batches"),
+    (lambda: solve(arrays(), threads=0), "threads = 0"),
+    (lambda: solve(arrays(upper=2 * np.ones((4, 3))), make("tpm")), "problem 0, level 1, row 0")])
+def test_what_makes_no_batch_is_named(call, named):
+    with pytest.raises(HierarchyError, match=named):
+        call()
 
 
 @both
@@ -214,23 +172,6 @@ def test_a_problem_that_fails_keeps_no_memory_and_the_others_keep_theirs():
     assert warm.memory.any(axis=1).tolist() == [True, False, True]
 
 
-@both
-def test_lists_strides_and_arrays_that_must_not_be_written_are_taken(name):
-    batch = Batch.of(problems_of("EQ7", copies=1))
-    expected = solve(batch, make(name)).x
-    A = np.asfortranarray(batch.A)
-    A.flags.writeable = False
-    given = Batch(A, batch.lower.tolist(), batch.upper[::-1][::-1], batch.sizes.tolist())
-    np.testing.assert_array_equal(solve(given, make(name)).x, expected)
-
-
-def test_work_space_grows_in_every_thread():
-    r = rng(4)
-    hs = [Hierarchy.from_levels([(r.normal(size=(30, 60)), r.normal(size=30))] * 2)
-          for _ in range(9)]
-    assert_same(solve(Batch.of(hs), make("tpm"), threads=3), [make("tpm").solve(h) for h in hs])
-
-
 @pytest.mark.parametrize(("of", "damping"), [("EQ7over", 0.0), ("EQ7sing", 0.0), ("EQ7sing", 0.05)])
 def test_jax_agrees_with_the_kernel(of, damping):
     in_jax = jax_backend()
@@ -238,12 +179,6 @@ def test_jax_agrees_with_the_kernel(of, damping):
     ours, theirs = solve(batch, resolver), in_jax.solve(batch, resolver)
     np.testing.assert_array_equal(ours.status, theirs.status)
     assert_near(theirs.x, ours.x)
-
-
-@pytest.mark.parametrize("case", CASES, ids=lambda case: case.__name__)
-def test_jax_agrees_at_any_rank(case):
-    in_jax, batch = jax_backend(), Batch.of([build(case, with_reference=True)])
-    assert_near(in_jax.solve(batch).x, solve(batch).x)
 
 
 def test_jax_fails_alone_and_refuses_as_the_kernel_does():

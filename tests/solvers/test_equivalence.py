@@ -52,7 +52,7 @@ def test_every_strict_resolver_commands_what_the_staircase_does(resolver, level,
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["ellipse", "ellipse-velocity", "ellipse-35deg-equality"])
+@pytest.mark.parametrize("name", ["ellipse", "ellipse-velocity"])
 def test_hcod_and_recursion_and_the_staircase_are_the_same_run(name):
     """Over all 18,850 ticks, singularities damped alike: (7) equals (5), (12) equals (13)."""
     scenario = load(name)

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
-from rank_cases import CASES, build, random_levels
+from rank_cases import CASES, build
 
 from benchmark.studies import edits
 from hierarchy import HierarchyError
@@ -85,7 +85,7 @@ def orthogonality(factored):
 def test_after_random_edits_the_answers_are_those_of_tpm():
     """The gap between two roundings is far below 1e-12 in nearly all."""
     gaps = []
-    for sequence in range(1500):
+    for sequence in range(250):
         rng = np.random.default_rng(sequence)
         n = int(rng.integers(3, 41))
         levels = [rng.normal(size=(rng.integers(5), n)) for _ in range(rng.integers(6))]
@@ -96,35 +96,8 @@ def test_after_random_edits_the_answers_are_those_of_tpm():
                 gaps.append(agrees(factored, rng))
         gaps.append(agrees(factored, rng))
         assert orthogonality(factored) < 1e-14
-    assert len(gaps) > 6_000
+    assert len(gaps) > 1_000
     assert np.percentile(gaps, 99.9) < 1e-12
-
-
-@pytest.mark.slow
-def test_nothing_drifts_over_thousands_of_edits():
-    rng = np.random.default_rng(0)
-    factored = Factorization([rng.normal(size=(3, 30)) for _ in range(5)])
-    for number in range(3000):
-        edit(factored, rng, number)
-    assert orthogonality(factored) < 1e-14
-    rows = factored.rows
-    error = np.abs(factored.coefficients @ factored.basis.T - rows).max(initial=0.0)
-    assert error < 1e-13 * (1.0 + np.abs(rows).max(initial=0.0))
-    agrees(factored, rng)
-
-
-@every_case
-@pytest.mark.parametrize("damping", [0.0, 0.05])
-def test_every_rank_case_in_every_rotation_is_the_oracle_s(case, damping):
-    h = build(case, True)
-    factored = Factorization.of(h, make("tpm", damping=damping))
-    b = dict(zip(h.names, np.split(h.lower, h.offsets[1:-1]), strict=True)) if h.m else {}
-    for _ in range(max(len(h.sizes), 1)):
-        now = factored.hierarchy(b, h.reference)
-        x = oracle.solve(now, damping=damping)
-        np.testing.assert_allclose(factored.solve(b, h.reference).x, x, rtol=0,
-                                   atol=1e-8 * (1.0 + np.abs(x).max()))
-        factored.reorder([*factored.names[1:], *factored.names[:1]])
 
 
 @every_case
@@ -153,81 +126,6 @@ def test_rank_moves_to_whoever_comes_first():
     assert factored.ranks == (2, 2, 0)
 
 
-def test_swap_insert_delete_and_back_gives_the_first_answer():
-    rng = np.random.default_rng(3)
-    levels = dict(zip("abcd", random_levels(9, (2, 3, 3, 2)), strict=True))
-    factored = Factorization([A for A, _ in levels.values()], names=list(levels))
-    b = {name: b for name, (_, b) in levels.items()}
-    first = factored.solve(b).x
-    factored.swap("a", "d")
-    factored.insert("e", rng.normal(size=(2, 9)), at=1)
-    assert not np.allclose(factored.solve({**b, "e": [1.0, 2.0]}).x, first)
-    factored.delete("e")
-    factored.swap("a", "d")
-    np.testing.assert_allclose(factored.solve(b).x, first, atol=1e-13)
-    assert certify(factored.hierarchy(b), first).certified
-
-
-def test_only_levels_from_the_first_changed_one_on_are_factored_again():
-    """The upper ones keep their staircase to the last bit."""
-    factored = Factorization([A for A, _ in random_levels(12, (2, 2, 2, 2))])
-    factored.update()
-    before = factored._data._W[:4].copy()
-    factored.swap(2, 3)
-    assert factored._data.kept == 2
-    factored.insert("wider", np.random.default_rng(0).normal(size=(3, 12)), at=3)
-    factored.update()
-    assert (factored._data._W[:4, :8] == before[:, :8]).all()
-    agrees(factored, np.random.default_rng(1))
-
-
-def test_the_basis_forgets_what_was_deleted():
-    rng = np.random.default_rng(0)
-    factored = Factorization([rng.normal(size=(3, 50)) for _ in range(10)])
-    for name in factored.names[1:]:
-        factored.delete(name)
-    assert factored.basis.shape == (50, 30)  # nothing of 50 numbers was touched
-    for number in range(200):
-        factored.insert(f"n{number}", rng.normal(size=(2, 50)))
-        assert factored.basis.shape[1] <= 2 * factored.m + 8
-        factored.delete(f"n{number}")
-    agrees(factored, rng)
-
-
-def test_nearly_parallel_rows_are_decided_as_tpm_decides():
-    rng = np.random.default_rng(5)
-    for gap in (1e-3, 1e-5, 1e-7, 1e-9, 1e-10, 1e-11, 1e-13):
-        A = rng.normal(size=(3, 20))
-        near = A[:2] + gap * rng.normal(size=(2, 20))
-        factored = Factorization([A, near, rng.normal(size=(2, 20))])
-        agrees(factored, rng)
-        assert factored.ranks == ((3, 2, 2) if gap > 1e-8 else (3, 0, 2))
-        factored.swap(0, 1)
-        agrees(factored, rng)
-
-
-def test_rows_of_very_different_scale_keep_their_ranks():
-    levels = [(A * scale, b * scale) for (A, b), scale in
-              zip(random_levels(8, (2, 2, 2)), (1e6, 1e-6, 1.0), strict=True)]
-    factored = Factorization([A for A, _ in levels])
-    assert factored.ranks == (2, 2, 2)
-    factored.swap(0, 1)
-    x = factored.solve([levels[1][1], levels[0][1], levels[2][1]]).x
-    for A, b in levels:
-        np.testing.assert_allclose(A @ x, b, rtol=1e-9)
-
-
-def test_there_may_be_many_levels_and_empty_ones():
-    rng = np.random.default_rng(2)
-    factored = Factorization([rng.normal(size=(k % 2, 25)) for k in range(40)])
-    agrees(factored, rng)
-    for k in range(40):
-        factored.insert(f"more {k}", rng.normal(size=(int(k % 3 == 0), 25)), at=30)
-        agrees(factored, rng)
-    factored.reorder(factored.names[::-1])
-    agrees(factored, rng)
-
-
 def test_the_stack_may_be_empty_and_fill_again():
     factored = Factorization([], n=3)
     np.testing.assert_allclose(factored.solve([], [1.0, 2.0, 3.0]).x, [1.0, 2.0, 3.0])
@@ -252,20 +150,6 @@ def test_rows_whose_squares_overflow_are_a_status_until_they_are_deleted():
         factored.F  # noqa: B018
     factored.delete("b")
     assert factored.solve([[1.0]]).status is Status.SOLVED
-
-
-def test_what_is_given_and_what_is_returned_are_copies():
-    A = np.eye(3)[:2].copy()
-    factored = Factorization([A])
-    A[:] = 7.0
-    factored.rows[:] = 7.0
-    factored.basis[:] = 7.0
-    factored.coefficients[:] = 7.0
-    factored.hierarchy([[1.0, 2.0]]).A[:] = 7.0
-    b, q0 = np.array([1.0, 2.0]), np.array([0.0, 0.0, 4.0])
-    np.testing.assert_allclose(factored.solve(b, q0).x, [1.0, 2.0, 4.0])
-    np.testing.assert_allclose(b, [1.0, 2.0])
-    np.testing.assert_allclose(q0, [0.0, 0.0, 4.0])
 
 
 # -- mistakes --------------------------------------------------------------------------------------
@@ -373,7 +257,7 @@ class Edits(RuleBasedStateMachine):
 
 TestEdits = Edits.TestCase
 TestEdits.pytestmark = [pytest.mark.slow]
-TestEdits.settings = hypothesis_settings(max_examples=60, stateful_step_count=25, deadline=None,
+TestEdits.settings = hypothesis_settings(max_examples=30, stateful_step_count=20, deadline=None,
                                          derandomize=True)
 
 
@@ -390,4 +274,3 @@ def test_nearly_parallel_rows_are_left_to_the_exact_engine():
             unclear += res.status is Status.INACCURATE
             factored.reorder(rng.permutation(len(factored.names)).tolist())
     assert unclear > 0
-

@@ -36,16 +36,6 @@ def test_an_answer_found_by_hand():
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", INEQUALITIES)
-def test_every_reference_problem_is_solved_and_certified(name):
-    for h, _, norms in family(name):
-        res = HCOD.solve(h)
-        assert res.status is Status.SOLVED
-        np.testing.assert_allclose(h.violations(res.x), norms, atol=1e-6)
-        assert certify(h, res.x).certified
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", INEQUALITIES)
 def test_the_answer_does_not_depend_on_the_memory(name):
     rng = np.random.default_rng(0)
     for h, _, _ in family(name):
@@ -74,25 +64,12 @@ def test_its_own_memory_needs_one_iteration(name):
         np.testing.assert_allclose(warm.x, cold.x, atol=1e-9 * (1 + np.abs(cold.x).max()))
 
 
-def test_a_memory_of_another_hierarchy_is_left_aside():
-    h = two_joints()
-    other = Hierarchy.from_levels([([[1.0]], [0.0], [1.0])])
-    np.testing.assert_allclose(HCOD.solve(h, HCOD.solve(other).memory).x, [1, 1])
-
-
 @pytest.mark.parametrize("name", ["EQ7", "EQ7over", "EQ7sing", "EQ30L8"])
 @pytest.mark.parametrize("damping", [0.0, 0.5])
 def test_equalities_alone_are_the_staircase_to_the_last_digit(name, damping):
     hcod, tpm = make("hcod", damping=damping), make("tpm", damping=damping)
     for h, _, _ in family(name):
         np.testing.assert_array_equal(hcod.solve(h).x, tpm.solve(h).x)
-
-
-def test_a_memory_of_far_off_sides_gives_one_answer():
-    rng = np.random.default_rng(1)
-    for h, _, _ in family("INEQ7"):
-        memory = HCOD.solve(moved(h, rng, 0.3)).memory
-        np.testing.assert_allclose(HCOD.solve(h, memory).x, HCOD.solve(h).x, atol=1e-9)
 
 
 def test_cold_and_warm_know_the_same_rows_and_multipliers():
@@ -110,7 +87,7 @@ def test_multipliers_balance_the_pull_of_the_level_they_hold_back():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("limit", range(1, 12))
+@pytest.mark.parametrize("limit", [1, 3, 6, 11])
 def test_an_iteration_limit_keeps_the_levels_above_and_says_where_it_was(limit):
     resolver = make("hcod", max_iterations=limit)
     for h, _, norms in list(family("HUM38"))[:10]:
@@ -161,40 +138,34 @@ def test_explain_names_the_rows_that_are_missed_by_most_and_not_those_missed_by_
     assert said.startswith("wish is missed by 1.12, at a and b: held back by limits a at")
 
 
-def test_rows_that_disagree_pull_at_nothing_above_them():
-    h = Hierarchy.from_levels([([[1.0, 0.0]], [0.0]), ([[0.0, 1.0], [0.0, 1.0]], [0.0, 2.0])])
-    assert explain(h, HCOD.solve(h)).splitlines()[1] == (
-        "level 2 is missed by 1.41: its own rows disagree.")
-
-
 def test_explain_needs_to_know_the_active_set():
     h = Hierarchy.from_levels([([[1.0]], [1.0])])
     with pytest.raises(HierarchyError, match="hcod"):
         explain(h, make("tpm").solve(h))
 
 
-def test_rows_without_sides_and_empty_sides_do_nothing():
-    h = Hierarchy.from_levels([([[1.0, 0.0]], [-INF], [INF]), ([[0.0, 0.0]], [-1.0], [1.0]),
-                               ([[1.0, 1.0]], [2.0], [INF])], reference=[0.5, 0.0])
-    res = HCOD.solve(h)
-    np.testing.assert_allclose(res.x, [1.25, 0.75])
-    assert res.active.tolist() == [0, 0, -1]
+# Levels, the reference, and x, found by hand.
+BY_HAND = {
+    "rows without sides": ([([[1.0, 0.0]], [-INF], [INF]), ([[0.0, 0.0]], [-1.0], [1.0]),
+                            ([[1.0, 1.0]], [2.0], [INF])], [0.5, 0.0], [1.25, 0.75]),
+    "a zero row that cannot be met": (
+        [(np.zeros((1, 2)), [1.0], [2.0]), ([[1.0, 1.0]], [4.0])], None, [2.0, 2.0]),
+    "sides that exclude each other": (
+        [([[1.0], [1.0]], [1.0, -INF], [INF, -1.0])], None, [0.0]),
+    "a reference out of reach": ([([[1.0, 0.0]], [-1.0], [1.0])], [5.0, 7.0], [1.0, 7.0]),
+    "every number met is zero": (
+        [([[2.0], [1.0], [1.0]], [0.0, 1.0, -1.0]), ([[1.0]], [-9.0], [9.0])], None, [0.0])}
 
 
-def test_a_zero_row_that_cannot_be_met_disturbs_nobody():
-    h = Hierarchy.from_levels([(np.zeros((1, 2)), [1.0], [2.0]), ([[1.0, 1.0]], [4.0])])
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("case", BY_HAND)
+def test_small_hierarchies_have_the_answer_found_by_hand(case):
+    levels, reference, x = BY_HAND[case]
+    h = Hierarchy.from_levels(levels, reference)
     res = HCOD.solve(h)
     assert res.status is Status.SOLVED
-    np.testing.assert_allclose(res.x, [2, 2])
-    np.testing.assert_allclose(h.violations(res.x), [1, 0], atol=4e-15)
-
-
-def test_inequalities_stay_violated_where_they_must():
-    h = Hierarchy.from_levels([([[1.0], [1.0]], [1.0, -INF], [INF, -1.0])])
-    res = HCOD.solve(h)
-    np.testing.assert_allclose(res.x, [0.0], atol=1e-12)
-    np.testing.assert_allclose(res.multipliers, [-1, 1])
-    assert res.holds_back.tolist() == [0, 0]
+    np.testing.assert_allclose(res.x, x, atol=1e-12)
+    assert certify(h, res.x).certified
 
 
 @pytest.mark.parametrize("scale", [1e-6, 1.0, 1e6])
@@ -203,22 +174,6 @@ def test_the_answer_scales_with_the_data(scale):
         scaled = Hierarchy(h.A, h.lower * scale, h.upper * scale, h.sizes, h.reference, h.names)
         np.testing.assert_allclose(HCOD.solve(scaled).x, x * scale, rtol=1e-7,
                                    atol=1e-8 * scale * np.abs(x).max())
-
-
-def test_a_reference_is_reached_as_far_as_the_rows_allow():
-    h = Hierarchy.from_levels([([[1.0, 0.0]], [-1.0], [1.0])], reference=[5.0, 7.0])
-    res = HCOD.solve(h)
-    np.testing.assert_allclose(res.x, [1, 7])
-    assert res.holds_back.tolist() == [1]
-
-
-@pytest.mark.parametrize("spoil", ["A", "lower", "upper", "reference"])
-def test_bad_numbers_after_construction_are_a_status(spoil):
-    h = two_joints()
-    getattr(h, spoil).flat[0] = np.nan
-    res = HCOD.solve(h)
-    assert res.status is Status.NUMERICAL_FAILURE
-    assert not res.x.any()
 
 
 @pytest.mark.parametrize(("settings", "said"), [
@@ -231,7 +186,7 @@ def test_bad_settings_are_named(settings, said):
         make("hcod", **settings)
 
 
-@pytest.mark.parametrize("seed", range(30))
+@pytest.mark.parametrize("seed", range(5))
 @pytest.mark.parametrize("damping", [0.01, 0.3])
 def test_a_damped_level_inside_bounds_is_a_bounded_least_squares_problem(seed, damping):
     rng = np.random.default_rng(seed)
@@ -246,28 +201,7 @@ def test_a_damped_level_inside_bounds_is_a_bounded_least_squares_problem(seed, d
     np.testing.assert_allclose(res.x, expected, atol=1e-9)
 
 
-def test_damping_and_active_inequalities_always_end():
-    rng = np.random.default_rng(0)
-    for damping in (0.01, 0.1, 0.5):
-        resolver = make("hcod", damping=damping)
-        for _ in range(100):
-            A, b = rng.normal(size=(4, 3, 9)), rng.normal(size=(4, 3))
-            h = Hierarchy.from_levels([(A[0], b[0], b[0] + 1.0), (A[1], b[1]),
-                                       (A[2], b[2], b[2] + 1.0), (A[3], b[3])])
-            res = resolver.solve(h)
-            assert res.status is Status.SOLVED
-            assert h.violations(res.x)[0] < 1e-9
-
-
-@pytest.mark.filterwarnings("error")
-def test_a_level_missed_where_every_number_met_is_zero():
-    h = Hierarchy.from_levels([([[2.0], [1.0], [1.0]], [0.0, 1.0, -1.0]), ([[1.0]], [-9.0], [9.0])])
-    res = make("hcod").solve(h)
-    assert res.status is Status.SOLVED
-    assert certify(h, res.x).certified
-
-
-@pytest.mark.parametrize("seed", range(40))
+@pytest.mark.parametrize("seed", range(8))
 def test_rows_as_small_as_rounding_make_no_answer_large(seed):
     h = structured(seed, ("tiny_rows",))
     res = make("hcod").solve(h)

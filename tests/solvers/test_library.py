@@ -45,15 +45,8 @@ def hierarchies(count, first=0):
 @pytest.mark.slow
 @pytest.mark.parametrize("resolver", RESOLVERS, ids=str)
 def test_c_and_python_give_the_same_bits(library, resolver):
-    answered = [c.check_same(library, resolver, h) for h in hierarchies(60)]
-    assert sum(res is not None for res in answered) > 60
-
-
-@pytest.mark.slow
-def test_c_and_python_give_the_same_bits_on_a_thousand_hierarchies(library):
-    for h in hierarchies(250, first=1_000_000):
-        for name in c.NAMES:
-            c.check_same(library, (name, {}, {}), h)
+    answered = [c.check_same(library, resolver, h) for h in hierarchies(40)]
+    assert sum(res is not None for res in answered) > 40
 
 
 @pytest.mark.slow
@@ -68,7 +61,7 @@ def test_c_and_python_give_the_same_bits_on_the_reference_families(library, name
 @pytest.mark.parametrize("name", ["hcod", "tpm"])
 def test_warm_sequences_give_the_same_bits(library, name):
     warm = 0
-    for seed in range(30):
+    for seed in range(12):
         h = problems.bounded(problems.structured(seed, equalities_only=True), seed)
         starts = h if name == "tpm" or seed % 2 else problems.generate(seed)
         memory, before = library.memory(starts), None
@@ -76,29 +69,7 @@ def test_warm_sequences_give_the_same_bits(library, name):
             warm += before is not None
             res = c.check_same(library, (name, {}, {}), tick, memory, before)
             before = None if res is None else res.memory
-    assert warm > 100
-
-
-@pytest.mark.slow
-def test_violations_are_those_of_python(library):
-    rng = np.random.default_rng(3)
-    for h in hierarchies(25):
-        x = rng.normal(size=h.n)
-        status, norms = library.violations(c.problem_of(h), x, len(h.sizes))
-        assert status == c.SOLVED
-        np.testing.assert_allclose(norms, h.violations(x), rtol=1e-12, atol=1e-12)
-
-
-@pytest.mark.slow
-def test_a_record_goes_on_with_another_kind_of_rows(library):
-    """From inequalities to equalities alone, and back."""
-    rng = np.random.default_rng(5)
-    A, b = rng.normal(size=(6, 7)), rng.normal(size=6)
-    wide = Hierarchy.from_levels([(A[:3], b[:3] - 0.1, b[:3] + 0.1), (A[3:], b[3:])])
-    equal = Hierarchy.from_levels([(A[:3], b[:3]), (A[3:], b[3:])])
-    memory, before = library.memory(wide), None
-    for h in (wide, equal, wide, wide, equal, equal):
-        before = c.check_same(library, ("hcod", {}, {}), h, memory, before).memory
+    assert warm > 40
 
 
 @pytest.mark.slow
@@ -141,13 +112,3 @@ def test_the_commands_of_a_scenario_come_out_of_c_to_the_last_bit(library, name)
     for h in recorded(name, 200):
         memory = memory or library.memory(h)
         before = c.check_same(library, (resolver.name, damped, damped), h, memory, before).memory
-
-
-@pytest.mark.slow
-def test_the_library_for_any_x86_64_agrees_to_rounding(generic):
-    library = c.Library.of(generic)
-    for h in hierarchies(50):
-        status, left = library.solve("hcod", h)
-        x = make("hcod").solve(h).x
-        assert status in (c.SOLVED, c.INACCURATE)
-        assert np.abs(left.answer - x).max() <= 1e-12 * (1.0 + np.abs(x).max())

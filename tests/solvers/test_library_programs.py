@@ -3,6 +3,7 @@
 What needs a compiler is skipped by name where there is none.
 """
 
+import os
 import re
 import shutil
 import subprocess
@@ -21,7 +22,7 @@ from hierarchy.paths import Still
 from hierarchy.tasks import JointLimits, Position
 from scenarios.cli.main import run_command
 from scenarios.problems.reference import family
-from solvers import make
+from solvers import make, problems
 from solvers.library import differs, entries, write
 from solvers.library.archive import archive
 from solvers.library.emission import RESOLVERS
@@ -35,7 +36,6 @@ EXAMPLES, PROGRAM = ROOT / "examples" / "c", ROOT / "tests" / "helpers" / "c_spe
 STRICT = ["-Wall", "-Wextra", "-Werror", "-pedantic", "-O2"]
 COMPILER = next(filter(None, map(shutil.which, ("cc", "gcc", "clang"))), None)
 CXX = next(filter(None, map(shutil.which, ("c++", "g++", "clang++"))), None)
-CROSS, QEMU = shutil.which("aarch64-linux-gnu-gcc"), shutil.which("qemu-aarch64")
 needs_c = pytest.mark.skipif(COMPILER is None, reason="no compiler of C")
 LIBM = {"hypot", "memset", "memcpy"}  # all that the library asks for
 
@@ -100,15 +100,6 @@ def test_recorded_problems_of_a_standing_humanoid_give_the_same_bits_in_c(replay
 
 
 @pytest.mark.slow
-def test_replaying_counts_the_answers_that_differ(replay, tmp_path):
-    ticks = sequence(family("INEQ7")[0].h, 5)
-    record_sequence(tmp_path / "ticks", ticks, [np.zeros(7)] * 5)
-    done = subprocess.run([replay, tmp_path / "ticks"], capture_output=True, text=True, check=False)
-    assert done.returncode == 1
-    assert "0 with the bits of Python" in done.stdout
-
-
-@pytest.mark.slow
 @pytest.mark.skipif(CXX is None, reason="no compiler of C++")
 def test_the_header_of_cxx_compiles_without_exceptions(folder, tmp_path):
     once = built(tmp_path / "once", EXAMPLES / "once.cpp", folder, "-std=c++17",
@@ -166,23 +157,12 @@ def test_cmake_finds_it(folder, tmp_path, linked):
 @needs_c
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "resolver"), [("INEQ7", "hcod"), ("EQ7", "tpm")])
-def test_a_million_solves_allocate_nothing_and_touch_no_new_page(folder, tmp_path, name, resolver):
+def test_many_solves_allocate_nothing_and_touch_no_new_page(folder, tmp_path, name, resolver):
     record_sequence(tmp_path / "ticks", sequence(family(name)[0].h, 100))
     program = built(tmp_path / "study", PROGRAM, folder, "-O2")
     solves, failed, allocated, faults, *_ = map(int, said(
-        program, tmp_path / "ticks", resolver, "1000000").split())
-    assert (solves, failed, allocated, faults) == (1_000_000, 0, 0, 0)
-
-
-@needs_c
-@pytest.mark.slow
-def test_the_program_that_counts_allocations_sees_them(folder, tmp_path):
-    source = tmp_path / "allocating.c"
-    source.write_text(PROGRAM.read_text().replace(
-        "double begin = now();", "double begin = now(); free(malloc(16));"))
-    record_sequence(tmp_path / "ticks", sequence(family("EQ7")[0].h, 2))
-    program = built(tmp_path / "study", source, folder, "-O0")
-    assert int(said(program, tmp_path / "ticks", "hcod", "10").split()[2]) == 10
+        program, tmp_path / "ticks", resolver, "200000").split())
+    assert (solves, failed, allocated, faults) == (200_000, 0, 0, 0)
 
 
 @needs_c
@@ -198,17 +178,6 @@ def test_the_examples_pass_the_address_sanitizer(folder, tmp_path, name, words):
     assert said(program).startswith(words)
 
 
-@needs_c
-@pytest.mark.slow
-@pytest.mark.skipif(shutil.which("valgrind") is None, reason="no valgrind")
-def test_the_examples_pass_valgrind(generic, tmp_path):
-    """With the library for any x86-64, since valgrind knows no AVX-512."""
-    program = built(tmp_path / "loop", EXAMPLES / "loop.c", generic, "-g")
-    done = subprocess.run(["valgrind", "--error-exitcode=9", "--leak-check=full", program],
-                          capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-
-
 @pytest.mark.slow
 def test_code_for_aarch64_is_made_here(tmp_path):
     write(tmp_path, ("recursive",), "aarch64")
@@ -217,17 +186,6 @@ def test_code_for_aarch64_is_made_here(tmp_path):
     assert int.from_bytes(elf[18:20], "little") == 183  # EM_AARCH64
     assert not (tmp_path / "lib" / "libtask_hierarchy.so").exists()
     assert "th_solve_sns" not in (tmp_path / "include" / "task_hierarchy.h").read_text()
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(None in (CROSS, QEMU), reason="no compiler and no emulator for aarch64")
-@pytest.mark.parametrize("name", ["EQ7sing", "EQ30L8", "INEQ7", "HUM38"])
-def test_emulated_code_for_aarch64_agrees_to_rounding(arm, tmp_path, name):
-    problems = [problem.h for problem in family(name)[:20]]
-    record_sequence(tmp_path / "ticks", problems, recorded.answers(problems))
-    program = built(tmp_path / "replay", EXAMPLES / "replay.c", arm, "-O2", "-static",
-                    compiler=CROSS)
-    assert "0 unsolved" in said(QEMU, program, tmp_path / "ticks")
 
 
 @pytest.mark.slow
@@ -256,12 +214,19 @@ def test_check_compares_the_kernels(folder, tmp_path, capsys):
 
 
 @pytest.mark.slow
-def test_the_command_writes_a_library(tmp_path, capsys):
-    out = str(tmp_path / "lib")
-    assert run_command(["library", "--out", out, "--resolvers", "recursive"]) == 0
+def test_the_command_writes_a_library_for_any_x86_64_that_agrees_to_rounding(tmp_path, capsys):
+    out, here = tmp_path / "lib", os.uname().machine == "x86_64"
+    line = ["library", "--out", str(out), "--resolvers", "recursive"]
+    assert run_command([*line, "--target", "x86_64" if here else "native"]) == 0
     assert "libtask_hierarchy.a" in capsys.readouterr().out
-    assert run_command(["library", "--out", out]) == 2
+    assert run_command(line) == 2
     assert "not empty" in capsys.readouterr().err
+    library = c.Library.of(out)
+    for seed in range(30):
+        h = problems.structured(seed, equalities_only=True)
+        x = make("recursive").solve(h).x
+        left = library.solve("recursive", h)[1]
+        assert np.abs(left.answer - x).max() <= 1e-9 * (1.0 + np.abs(x).max())
 
 
 @pytest.mark.parametrize(("options", "words"), [
@@ -274,11 +239,10 @@ def test_a_wrong_name_is_an_error_that_names_it(tmp_path, capsys, options, words
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("target", ["native", "x86_64"])
-def test_kernels_that_are_not_compiled_are_an_error(tmp_path, target, monkeypatch, capsys):
+def test_kernels_that_are_not_compiled_are_an_error(tmp_path, monkeypatch, capsys):
     monkeypatch.setenv("NUMBA_DISABLE_JIT", "1")
     monkeypatch.setattr("numba.config.DISABLE_JIT", 1)  # which is read when a process starts
-    assert run_command(["library", "--target", target, "--out", str(tmp_path / "lib")]) == 2
+    assert run_command(["library", "--out", str(tmp_path / "lib")]) == 2
     said = capsys.readouterr().err
     assert "NUMBA_DISABLE_JIT is set" in said
     assert "Traceback" not in said

@@ -5,7 +5,7 @@ import pytest
 
 from hierarchy import Hierarchy, HierarchyError, Robot, Stack, State
 from hierarchy.paths import Still
-from hierarchy.tasks import JointDamping, Position, TorqueLimits
+from hierarchy.tasks import JointDamping, Position
 from solvers import Status, certify, make, names
 from solvers.batch import Batch
 
@@ -74,17 +74,6 @@ def test_the_metric_mass_gives_the_dynamically_consistent_inverse(resolver):
         expected = inverse @ b + nothing - inverse @ (J @ nothing)
         np.testing.assert_allclose(resolver.solve(h).x, expected, atol=100.0 * resolver.accuracy)
         state.move(0.0, rng.normal(size=7), rng.normal(size=7))
-
-
-def test_null_space_torques_of_the_metric_mass_do_not_move_the_hand():
-    """What the metric is for: a torque M a of the null space has no acceleration at the hand."""
-    robot = Robot.named("kuka_lwr")
-    state = State.at(robot, np.random.default_rng(3).normal(size=7))
-    position = Position(robot.frame("end_effector"), Still([0.1, 0.6, 0.2]))
-    M, J = state.mass_matrix(), position.jacobian(state)
-    a = make("hcod").solve(Stack([position], metric="mass").hierarchy(state)).x
-    force = np.linalg.lstsq(J.T, M @ a, rcond=None)[0]
-    np.testing.assert_allclose(J.T @ force, M @ a, atol=1e-8)  # a force at the hand is enough
 
 
 @pytest.mark.parametrize("resolver", INEQUALITIES, ids=lambda r: r.label)
@@ -161,15 +150,3 @@ def test_a_batch_has_no_metric():
     h = Hierarchy.from_levels([([[1.0, 0.3]], [1.0])], metric=np.eye(2))
     with pytest.raises(HierarchyError, match="problem 0 has a metric"):
         Batch.of([h])
-
-
-def test_a_metric_and_torque_limits_in_one_stack():
-    robot = Robot.named("kuka_lwr")
-    state = State.at(robot, np.full(7, 0.4))
-    stack = Stack([TorqueLimits(robot, 0.2),
-                   Position(robot.frame("end_effector"), Still([0.1, 0.6, 0.2]), 400.0)],
-                  metric="mass")
-    h = stack.hierarchy(state)
-    res = make("hcod").solve(h)
-    assert (res.active[:7] != 0).any(), "a limit acts"
-    assert certify(h, res.x).certified

@@ -63,11 +63,6 @@ def test_a_resolution_is_solved_unless_it_says_otherwise():
     assert "SOLVED" in repr(res)
 
 
-def test_a_form_that_does_not_exist_names_those_that_do():
-    with pytest.raises(HierarchyError, match="form of tpm 'publishd'; did you mean 'published'"):
-        make("tpm", form="publishd")
-
-
 @pytest.mark.parametrize("resolver", ["hcod", "weighted"])
 def test_a_count_is_a_whole_number_that_a_kernel_can_hold(resolver):
     assert make(resolver, max_iterations=1).max_iterations == 1

@@ -1,7 +1,6 @@
 """Priorities as weights: the sum is minimised exactly, and what that does to the priorities."""
 
 import os
-from fractions import Fraction
 
 import numpy as np
 import oracle
@@ -10,15 +9,13 @@ from rank_cases import CASES, build, family, generic, more_rows_than_joints
 
 from hierarchy import Hierarchy, HierarchyError
 from solvers import Status, certify, make, problems
-from solvers.qp.backends import BACKENDS
-from solvers.resolvers.weighted import _acting, lexicographic_weights
-from solvers.workspace import WORKSPACE
+from solvers.resolvers.weighted import lexicographic_weights
 
 EXACT = 1e-9
 every_case = pytest.mark.parametrize("case", CASES, ids=lambda c: c.__name__)
 LIMIT = 0.7
 PLAIN = os.environ.get("NUMBA_DISABLE_JIT") == "1"  # everything some hundred times slower
-HUMANOIDS = 1 if PLAIN else 8
+HUMANOIDS = 1 if PLAIN else 3
 
 
 def within_limits(h, limit=LIMIT):
@@ -28,72 +25,6 @@ def within_limits(h, limit=LIMIT):
 
 def gap(x, expected):
     return np.abs(x - expected).max(initial=0.0) / (1.0 + np.abs(expected).max(initial=0.0))
-
-
-def exactly(h, resolver, x, hard=0):
-    """Return the minimiser of the sum in rational numbers, found from the rows that act at x.
-
-    hard : levels that are constraints. The rows that act are repaired until rational multipliers
-    and violations prove them; None where 30 repairs do not lead there.
-    """
-    ratio, level = Fraction(resolver.ratio), np.repeat(np.arange(len(h.sizes)), h.sizes)
-    w = [ratio ** int(len(h.sizes) - 1 - k) for k in level]
-    A = [[Fraction(a) for a in row] for row in h.A]
-    value, margin = h.A @ x, np.where(level < hard, 1e-7 * (1.0 + np.abs(h.A @ x)), 0.0)
-    acts = np.where(value > h.upper - margin, 1, np.where(value < h.lower + margin, -1, 0))
-    acts[h.lower == h.upper] = 2
-    reference, mu = [Fraction(v) for v in h.reference], Fraction(resolver.regularisation)
-    for _ in range(30):
-        side = [Fraction((h.lower if acts[i] < 0 else h.upper)[i]) if acts[i] else None
-                for i in range(h.m)]
-        held = [i for i in range(h.m) if acts[i] and level[i] < hard]
-        soft = [i for i in range(h.m) if acts[i] and level[i] >= hard]
-        y = _kkt(A, side, w, reference, mu, held, soft)
-        if y is None:
-            return None
-        force = dict(zip(held, y[h.n:], strict=True))
-        new = np.array([_acts(h, i, A[i], y, acts[i], force) for i in range(h.m)], dtype=int)
-        if (new == acts).all():
-            return np.array([float(v) for v in y[:h.n]])
-        acts = new
-    return None
-
-
-def _acts(h, i, a, y, now, force):
-    """What row i does: 2 an equality, +1 or -1 at or beyond a side, 0 nothing."""
-    if now == 2:
-        return 2
-    if i in force:
-        return now if force[i] * int(now) >= 0 else 0
-    at = sum(p * q for p, q in zip(a, y[:h.n], strict=True))
-    above = h.upper[i] < np.inf and at > Fraction(h.upper[i])
-    return 1 if above else -int(h.lower[i] > -np.inf and at < Fraction(h.lower[i]))
-
-
-def _kkt(A, side, w, reference, mu, held, soft):
-    """Solve sum w^2 a (a x - side) + mu^2 (x - reference) + sum of multipliers a = 0, held rows."""
-    n = len(reference)
-    size = n + len(held)
-    M = [[Fraction(0)] * (size + 1) for _ in range(size)]
-    for p in range(n):
-        M[p][p] = mu**2
-        M[p][size] = mu**2 * reference[p] + sum(w[i]**2 * A[i][p] * side[i] for i in soft)
-        for q in range(n):
-            M[p][q] += sum(w[i]**2 * A[i][p] * A[i][q] for i in soft)
-    for j, i in enumerate(held):
-        for p in range(n):
-            M[p][n + j] = M[n + j][p] = A[i][p]
-        M[n + j][size] = side[i]
-    for k in range(size):
-        pivot = max(range(k, size), key=lambda r: abs(M[r][k]))
-        if M[pivot][k] == 0:
-            return None
-        M[k], M[pivot] = M[pivot], M[k]
-        for r in range(size):
-            if r != k and M[r][k]:
-                factor = M[r][k] / M[k][k]
-                M[r] = [a - factor * b for a, b in zip(M[r], M[k], strict=True)]
-    return [M[k][size] / M[k][k] for k in range(size)]
 
 
 def as_two_levels(h, resolver, hard):
@@ -114,31 +45,21 @@ def as_two_levels(h, resolver, hard):
 @pytest.mark.slow
 @every_case
 @pytest.mark.parametrize("ratio", [1.0, 10.0, 1e3])
-def test_equalities_give_the_minimiser_of_the_sum(case, ratio):
-    h, weighted = build(case, True), make("weighted", ratio=ratio, regularisation=1e-2)
-    res = weighted.solve(h)
-    assert res.status is Status.SOLVED
-    assert gap(res.x, exactly(h, weighted, res.x)) < EXACT
-
-
-@pytest.mark.slow
-@every_case
-@pytest.mark.parametrize("ratio", [1.0, 10.0, 1e3])
 def test_within_limits_it_is_the_minimiser_and_shown_to_be(case, ratio):
     h, weighted = within_limits(build(case, True)), make("weighted", ratio=ratio)
     res = weighted.solve(h)
     assert res.status is Status.SOLVED
-    assert gap(res.x, exactly(h, weighted, res.x, hard=1)) < EXACT
+    assert certify(as_two_levels(h, weighted, 1), res.x).optimal
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("ratio", [10.0, 100.0, 1e4, 1e8])
-def test_inequalities_at_all_levels_give_the_minimiser_whatever_the_ratio(ratio):
+@pytest.mark.parametrize("ratio", [10.0, 100.0])
+def test_inequalities_at_all_levels_give_the_minimiser(ratio):
     weighted = make("weighted", ratio=ratio)
     for h, _, _ in list(family("INEQ7"))[:12]:
         res = weighted.solve(h)
         assert res.status is Status.SOLVED
-        assert gap(res.x, exactly(h, weighted, res.x, hard=1)) < EXACT
+        assert certify(as_two_levels(h, weighted, 1), res.x).optimal
 
 
 @pytest.mark.parametrize("ratio", [10.0, 1e3])
@@ -149,31 +70,6 @@ def test_humanoids_are_solved_step_by_step(ratio):
         assert res.status is Status.SOLVED
         assert res.iterations > 5
         assert certify(as_two_levels(h, weighted, 1), res.x).optimal
-
-
-SMALL = problems.Recipe(joints=(1, 12), levels=(1, 5), rows=(0, 8), scales=(0.1, 10.0), spread=3.0)
-
-
-@pytest.mark.slow
-def test_no_answer_to_a_generated_problem_is_called_solved_without_being_right():
-    weighted, solved = make("weighted", ratio=10.0, regularisation=1e-2, hard_levels=0), 0
-    for seed in range(150):
-        h = problems.generate(seed, SMALL)
-        res = weighted.solve(h)
-        assert np.isfinite(res.x).all()
-        if res.status is Status.SOLVED:
-            solved += 1
-            assert certify(as_two_levels(h, weighted, 0), res.x, 1e-7).optimal, seed
-    assert solved >= 145
-
-
-@pytest.mark.parametrize("guesses", [1, 10])
-def test_a_row_whose_multiplier_drowns_in_rounding_is_released_on_trial(guesses):
-    h = problems.generate(33, problems.Recipe(joints=(1, 4), levels=(2, 4), rows=(1, 4),
-                                              scales=(0.1, 10.0), spread=3.0, ties=0.8))
-    weighted = make("weighted", ratio=1e6, guesses=guesses)
-    x = weighted.solve(h).x
-    assert gap(x, exactly(h, weighted, x, hard=1)) < EXACT
 
 
 @pytest.mark.parametrize("seed", [3, 4, 5])
@@ -198,20 +94,6 @@ def test_an_upper_level_is_missed_by_an_amount_that_falls_with_the_square_of_the
     assert abs(slope(ratios, missed[:, 0]) + 4.0) < 0.05  # what it conflicts with is two below
 
 
-def test_so_does_the_distance_to_the_strict_answer():
-    h, ratios = build(more_rows_than_joints, False), np.logspace(1.5, 4, 6)
-    strict = oracle.solve(h)
-    far = [np.linalg.norm(make("weighted", ratio=r).solve(h).x - strict) for r in ratios]
-    assert abs(slope(ratios, far) + 2.0) < 0.05
-
-
-def test_a_level_that_conflicts_with_itself_is_missed_more_by_the_fourth_power():
-    A, b = np.array([[1.0, 0.0], [1.0, 0.0]]), np.array([1.0, -1.0])
-    h, ratios = Hierarchy.from_levels([(A, b), ([[1.0, 0.0]], [3.0])]), np.logspace(1, 2.5, 5)
-    more = [h.violations(make("weighted", ratio=r).solve(h).x)[0] - np.sqrt(2.0) for r in ratios]
-    assert abs(slope(ratios, more) + 4.0) < 0.05
-
-
 @every_case
 def test_with_a_huge_ratio_it_is_the_strict_answer_where_normal_equations_are_destroyed(case):
     """Rows whose dependence is itself a matter of rounding are dependent at any weight."""
@@ -220,43 +102,11 @@ def test_with_a_huge_ratio_it_is_the_strict_answer_where_normal_equations_are_de
     assert gap(weighted.solve(h).x, oracle.solve(h)) < EXACT
 
 
-def test_normal_equations_are_destroyed():
-    h, weighted = build(generic, False), make("weighted", ratio=1e4)
-    w = np.repeat(1e4 ** np.array([2.0, 1.0, 0.0]), h.sizes)
-    M, c = h.A.T * w**2 @ h.A + 1e-12 * np.eye(h.n), h.A.T @ (w**2 * h.lower)
-    assert gap(np.linalg.solve(M, c), oracle.solve(h)) > 1e-2
-    assert gap(weighted.solve(h).x, oracle.solve(h)) < EXACT
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("ratio", [1e4, 1e8])
-def test_with_limits_too_it_comes_to_the_strict_answer(ratio):
-    weighted = make("weighted", ratio=ratio)
-    for name in ("INEQ7", "HUM38"):
-        gaps = [gap(h.violations(weighted.solve(h).x), norms)
-                for h, _, norms in list(family(name))[:HUMANOIDS]]
-        assert max(gaps) < max(1e4 / ratio**2, EXACT)
-
-
-def test_a_ratio_weighs_the_lowest_level_by_one():
-    """Two levels ask one unknown for 0 and 1: the answer is the mean with squared weights."""
-    h = Hierarchy.from_levels([([[1.0]], [0.0]), ([[1.0]], [1.0])])
-    assert make("weighted", ratio=10.0).solve(h).x == pytest.approx([1.0 / 101.0], rel=1e-6)
-
-
 def test_weights_that_overflow_give_a_status_and_a_finite_answer():
     with np.errstate(all="ignore"):  # without compilation numpy warns
         res = make("weighted", ratio=1e200).solve(build(generic, True))
     assert res.status is Status.NUMERICAL_FAILURE
     assert not res.x.any()
-
-
-def test_the_unit_of_a_level_matters_which_it_does_not_to_a_strict_resolver():
-    levels = more_rows_than_joints()
-    scaled = [levels[0], (levels[1][0] * 1e-3, levels[1][1] * 1e-3), levels[2]]
-    h, g = Hierarchy.from_levels(levels), Hierarchy.from_levels(scaled)
-    assert gap(make("tpm").solve(h).x, make("tpm").solve(g).x) < EXACT
-    assert gap(make("weighted").solve(h).x, make("weighted").solve(g).x) > 0.1
 
 
 @pytest.mark.parametrize("tolerance", [1e-1, 1e-3])
@@ -306,18 +156,6 @@ def test_only_levels_of_inequalities_are_constraints_and_as_many_as_asked_for():
     assert violations[2][:2] == pytest.approx([0.0, 0.0], abs=EXACT)
 
 
-def test_a_level_with_one_equality_is_no_constraint():
-    mixed = (np.eye(2), [-1.0, 0.0], [1.0, 0.0])
-    h = Hierarchy.from_levels([mixed, ([[1.0, 1.0]], [9.0])])
-    assert h.violations(make("weighted", ratio=3.0).solve(h).x)[0] > 0.1
-
-
-def test_a_level_without_rows_is_not_counted_as_a_constraint():
-    h = Hierarchy.from_levels([(np.empty((0, 2)), []), (np.eye(2), [-1.0] * 2, [1.0] * 2),
-                               ([[1.0, 1.0]], [9.0])])
-    assert gap(make("weighted", ratio=3.0).solve(h).x, np.ones(2)) < EXACT
-
-
 @pytest.mark.parametrize("backend", ["own", "proxqp"])
 def test_constraints_that_exclude_each_other_give_what_violates_them_least(backend):
     h = Hierarchy.from_levels([([[1.0, 0.0], [1.0, 0.0]], [-np.inf, 1.0], [0.0, np.inf]),
@@ -337,13 +175,6 @@ def test_rows_that_are_nearly_parallel_are_said_to_leave_a_doubt():
         assert make("weighted").solve(nearly(angle)).status is Status.SOLVED
 
 
-def test_an_end_of_the_iterations_keeps_the_constraints():
-    h, _, _ = next(iter(family("HUM38")))
-    res = make("weighted", max_iterations=3).solve(h)
-    assert res.status is Status.ITERATION_LIMIT
-    assert h.violations(res.x)[0] < 1e-8
-
-
 # Settings ----------------------------------------------------------------------------------------
 
 
@@ -357,49 +188,12 @@ def test_the_memory_of_a_tick_before_leaves_one_factorisation_and_the_same_answe
         assert gap(warm.x, cold.x) < EXACT
 
 
-def test_a_memory_of_another_hierarchy_does_no_harm():
-    weighted, (first, second) = make("weighted"), [h for h, _, _ in list(family("INEQ7"))[:2]]
-    memory = weighted.solve(within_limits(build(generic, True))).memory
-    assert gap(weighted.solve(first, memory).x, weighted.solve(first).x) < EXACT
-    other = weighted.solve(second, weighted.solve(first).memory)
-    assert gap(other.x, weighted.solve(second).x) < EXACT
-
-
-@pytest.mark.parametrize("backend", list(BACKENDS))
-def test_backends_find_the_same_answer_or_say_that_they_did_not(backend):
-    own, weighted = make("weighted"), make("weighted", backend=backend, guesses=2)
-    found = [h for h, _, _ in list(family("INEQ7"))[:15]]
-    solved = 0
-    for h in found:
-        res = weighted.solve(h)
-        assert h.violations(res.x)[0] < 1e-6
-        if res.status is Status.SOLVED:
-            solved += 1
-            assert gap(res.x, own.solve(h).x) < EXACT
-    assert solved >= 13
-
-
 def test_a_backend_that_fails_is_named_by_the_status_and_x_keeps_the_constraints(monkeypatch):
     monkeypatch.setattr("qpsolvers.solve_problem", lambda *a, **k: 1 / 0)
     h, _, _ = next(iter(family("HUM38")))
     res = make("weighted", backend="proxqp").solve(h)
     assert res.status is Status.BACKEND_FAILURE
     assert h.violations(res.x)[0] < 1e-8
-
-
-def test_damping_bounds_the_answer_near_a_singularity_and_is_off_above_its_threshold():
-    h = Hierarchy.from_levels([([[1.0, 0.0, 0.0], [1.0, 1e-5, 0.0]], [0.0, 1.0])])
-    assert np.abs(make("weighted").solve(h).x).max() > 1e4
-    assert np.abs(make("weighted", damping=0.05).solve(h).x).max() < 10.0
-    g = build(generic, True)
-    assert gap(make("weighted", damping=0.05, threshold=1e-3).solve(g).x,
-               make("weighted").solve(g).x) < EXACT
-
-
-def test_weights_by_hand_are_those_of_a_ratio():
-    h = build(more_rows_than_joints, True)
-    by_hand = make("weighted", weights=[100.0, 10.0, 1.0])
-    assert gap(by_hand.solve(h).x, make("weighted", ratio=10.0).solve(h).x) < EXACT
 
 
 def test_weights_for_another_number_of_levels_are_refused():
@@ -416,11 +210,6 @@ def test_a_bad_setting_is_named_with_its_value(setting, value):
         make("weighted", **{setting: value})
 
 
-def test_an_unknown_backend_names_the_nearest():
-    with pytest.raises(HierarchyError, match="did you mean 'daqp'"):
-        make("weighted", backend="dapq")
-
-
 def test_labels_say_what_makes_another_method_of_it():
     assert make("weighted").label == "weighted"
     assert make("weighted", ratio=1e3, backend="daqp").label == "weighted 1000 daqp"
@@ -428,22 +217,3 @@ def test_labels_say_what_makes_another_method_of_it():
 
 
 # Work space --------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("name", ["INEQ7", "HUM38"])
-def test_the_work_space_grows_and_what_was_left_in_it_does_not_matter(name, monkeypatch):
-    h, weighted = next(iter(family(name)))[0], make("weighted", guesses=2)
-    before = weighted.solve(h).x
-    monkeypatch.setattr(WORKSPACE, "array", np.empty(1))
-    np.testing.assert_array_equal(weighted.solve(h).x, before)
-    monkeypatch.setattr(WORKSPACE, "array", np.full(50_000, np.nan))
-    np.testing.assert_array_equal(weighted.solve(h).x, before)
-
-
-def test_a_row_acts_within_a_distance_of_x_whatever_its_length():
-    """1e-6 of 1 + |x| = 2 from a side: half as far acts, twice as far does not."""
-    for length in (1e-3, 1e3):
-        A = np.array([[length]])
-        for off, acts in ((1e-6, 1.0), (4e-6, 0.0)):
-            h = Hierarchy.from_levels([(A, [-np.inf], [length * (1.0 + off)])])
-            assert _acting(h, np.array([True]), np.ones(1)) == acts

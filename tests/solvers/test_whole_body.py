@@ -6,13 +6,10 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from standing import (
-    HANDS,
     ROBOT,
     WEIGHT,
     external_forces,
     feet,
-    moving_state,
-    soles_and_palm,
     standing_stack,
     stepping,
 )
@@ -23,12 +20,10 @@ from hierarchy.paths import Ellipse, Still
 from hierarchy.tasks import (
     BaseDynamics,
     CentreOfMass,
-    CentreOfPressure,
     ContactForce,
     ContactMotion,
     Friction,
     LeastForce,
-    Momentum,
     Pose,
     Position,
     Posture,
@@ -91,49 +86,6 @@ def test_hcod_is_certified_and_agrees_with_a_cascade_of_programs(shift, faces):
     assert np.abs(other.x - res.x).max() <= 1e-8 * (1.0 + np.abs(res.x).max())
 
 
-@pytest.mark.parametrize("shift", [(0.0, 0.0, 0.0), (0.0, 0.0, 1.0)])
-def test_hqp_as_it_comes_agrees_where_only_the_forces_give_way(shift):
-    h, res = solved(standing_stack(STANDING, CONTACTS, shift), STANDING)
-    other = make("hqp").solve(h)
-    assert other.status is Status.SOLVED
-    assert np.abs(other.x - res.x).max() <= 1e-8 * (1.0 + np.abs(res.x).max())
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", range(12))
-def test_moving_states_have_answers_that_obey_physics(seed):
-    """Bent joints and speeds of 0.3 rad/s, where most levels below physics cannot be met."""
-    moving = moving_state(seed, spread=0.1)
-    state = State.at(ROBOT, moving.q, 0.3 * moving.v)
-    stack = standing_stack(state, CONTACTS, (0.05, 0.0, 0.0))
-    _, res = solved(stack, state)
-    tau = CONTACTS.torques(state, res.x)
-    a = pin.aba(ROBOT.model, ROBOT.model.createData(), state.q, state.v,
-                np.concatenate([np.zeros(6), tau]),
-                external_forces(state, CONTACTS, CONTACTS.forces(res.x)))
-    np.testing.assert_allclose(a, CONTACTS.accelerations(res.x), atol=1e-6)
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_momentum_and_energy_change_as_the_forces_and_torques_of_an_answer_say(seed):
-    """Newton, Euler and the balance of power of a moving robot, none of which is a row."""
-    state, contacts = moving_state(seed), feet()
-    x = make("hcod").solve(standing_stack(state, contacts).hierarchy(state)).x
-    a, f, torques = contacts.accelerations(x), contacts.forces(x), contacts.torques(state, x)
-    A, dA = state.momentum
-    rate = A @ a + dA @ state.v
-    com = CentreOfMass(ROBOT, Still((0.0, 0.0, 0.0))).position(state)
-    places = [place + R @ offset for joint, offset in zip(*contacts.points, strict=True)
-              for R, place in [state._placement(joint)]]
-    np.testing.assert_allclose(rate[:3], f.sum(axis=0) - [0.0, 0.0, WEIGHT], atol=1e-7)
-    np.testing.assert_allclose(rate[3:], np.cross(places - com, f).sum(axis=0), atol=1e-7)
-    M, dM = state.mass_matrix(), state.mass_matrix_derivative()
-    kinetic = state.v @ M @ a + state.v @ dM @ state.v / 2
-    rising = 9.81 * (A @ state.v)[2]  # of the potential energy [W]
-    put_in = torques @ state.v[6:] + (contacts.jacobian(state) @ state.v) @ f.ravel()
-    assert kinetic + rising == pytest.approx(put_in, abs=1e-6)
-
-
 def test_explain_says_what_blocks_a_centre_of_mass_out_of_reach():
     stack = standing_stack(STANDING, CONTACTS, (0.5, 0.0, 0.0))
     h, res = solved(stack, STANDING)
@@ -154,37 +106,6 @@ def test_torques_that_cannot_hold_the_weight_stay_within_limits_and_the_knees_ar
     said = explain(h, res, rows=stack.row_names()).splitlines()[2]
     assert said.startswith("centre of mass is missed by")
     assert "torque limits left_knee at its" in said
-
-
-def test_a_falling_robot_gets_torques_within_limits_and_hears_what_blocks_what():
-    """It tips over its toes at 1.5 rad/s: no push of the soles brings the centre of mass back."""
-    tipping = np.zeros(ROBOT.n)
-    com = CentreOfMass(ROBOT, Still((0.0, 0.0, 0.0))).position(STANDING)
-    tipping[[0, 4]] = 1.5 * com[2], 1.5  # [m/s], [rad/s]
-    falling = State.at(ROBOT, ROBOT.rest, tipping)
-    stack = standing_stack(falling, CONTACTS)
-    h, res = solved(stack, falling)
-    assert_physical(h, res.x, falling, CONTACTS)
-    said = dict(line.split(" is ", 1) for line in
-                explain(h, res, rows=stack.row_names()).splitlines())
-    assert said["physics"] == said["limits"] == "met."
-    assert said["centre of mass"].startswith("missed by")
-    assert "friction" in said["centre of mass"]
-
-
-def test_a_hand_presses_with_the_force_it_is_given():
-    contacts = soles_and_palm()
-    stack = Stack([
-        Together([BaseDynamics(contacts), ContactMotion(contacts)], "physics"),
-        Together([TorqueLimits(ROBOT, contacts=contacts), Friction(contacts)], "limits"),
-        ContactForce(contacts, "left_hand", (20.0,)),
-        Momentum(), Posture(tuple(ROBOT.rest[7:])), LeastForce(contacts)],
-        "torque", contacts=contacts)
-    h, res = solved(stack, STANDING)
-    normal = np.array(contacts["left_hand"].normal)
-    assert contacts.forces(res.x, "left_hand")[0] @ normal == pytest.approx(
-        20.0 * np.linalg.norm(normal))
-    np.testing.assert_allclose(h.violations(res.x)[:4], 0.0, atol=1e-8)
 
 
 def test_an_arm_presses_on_a_table_while_its_tip_moves_along_it():
@@ -208,21 +129,6 @@ def test_an_arm_presses_on_a_table_while_its_tip_moves_along_it():
     np.testing.assert_allclose(contacts.torques(state, res.x), efforts, atol=1e-9)
 
 
-def test_a_margin_moves_the_centre_of_pressure_away_from_the_edge():
-    """To accelerate forward the robot pushes from its heels, as far back as allowed."""
-    stack = standing_stack(STANDING, CONTACTS, (0.12, 0.0, 0.0))
-    _, free = solved(stack, STANDING)
-    stack.insert(CentreOfPressure(CONTACTS, 0.03), 2)
-    _, held = solved(stack, STANDING)
-
-    def pressure(x):
-        forces = CONTACTS.forces(x, "left_foot")
-        return np.array(CONTACTS["left_foot"].points)[:, 0] @ forces[:, 2] / forces[:, 2].sum()
-
-    assert pressure(free.x) == pytest.approx(-0.05, abs=1e-6)
-    assert pressure(held.x) == pytest.approx(-0.02, abs=1e-6)
-
-
 def test_a_foot_swings_as_a_pose_while_the_other_carries_all():
     """The centre of mass is above the left foot: what a shift of weight leads to."""
     left = feet().contacts[0]
@@ -243,25 +149,6 @@ def test_a_foot_swings_as_a_pose_while_the_other_carries_all():
     np.testing.assert_allclose(lifted, [0.0, 0.0, 40.0 * 0.02, 0.0, 0.0, 0.0], atol=1e-8)
 
 
-def test_hands_above_the_centre_of_mass_are_kept_where_it_has_to_give_way():
-    """Strict order: the level above is as well off as if the level below were not there."""
-    stack = standing_stack(STANDING, CONTACTS, (0.5, 0.0, 0.0))
-    h, res = solved(stack, STANDING)
-    first = h.violations(res.x)
-    for name in (*HANDS, "posture"):
-        stack.remove(name)
-    h, res = solved(stack, STANDING)
-    assert h.violations(res.x)[2] == pytest.approx(first[2], abs=1e-8)
-
-
-def test_a_warm_start_finds_the_same_answer_in_fewer_steps():
-    stack = standing_stack(STANDING, CONTACTS, (0.5, 0.0, 0.0))
-    h, res = solved(stack, STANDING)
-    warm = make("hcod").solve(h, memory=res.memory)
-    np.testing.assert_allclose(warm.x, res.x, atol=1e-9)
-    assert warm.iterations < res.iterations
-
-
 IN_DOUBT = sorted((Path(__file__).parents[1] / "data/regressions/whole-body").glob("*.npz"))
 
 
@@ -275,15 +162,6 @@ def test_a_tick_whose_rows_are_parallel_up_to_the_rank_tolerance_is_settled(path
         assert one.status in settled
         assert certify(h, one.x).certified
         assert h.violations(one.x)[:2].max() < 1e-6, "physics and limits hold, to 1 uN"
-
-
-@pytest.mark.parametrize("path", [p for p in IN_DOUBT if p.stem != "step-7"], ids=lambda p: p.stem)
-def test_a_cascade_agrees_on_the_levels_of_such_a_tick(path):
-    h = problems.load(path)
-    res = make("hqp", backend="clarabel").solve(h)
-    assert res.status is Status.SOLVED
-    np.testing.assert_allclose(h.violations(make("hcod").solve(h).x), h.violations(res.x),
-                               rtol=1e-4, atol=1e-6)
 
 
 @pytest.mark.slow

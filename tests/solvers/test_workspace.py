@@ -9,7 +9,7 @@ from hierarchy import Hierarchy
 from solvers import Status, make
 from solvers.workspace import WORKSPACE
 
-KERNELS = [make("tpm"), make("tpm-published"), make("recursive"), make("augmented"),
+KERNELS = [make("tpm"), make("sns"), make("tpm-published"), make("recursive"), make("augmented"),
            make("hcod"), make("hcod", damping=0.1), make("tpm", damping=0.1),
            make("tpm-published", damping=0.1)]
 
