@@ -281,6 +281,22 @@ def replay(folders: Annotated[list[Path], typer.Argument(
 
 
 @app.command()
+def why(folder: Annotated[Path, typer.Argument(
+            metavar="RUN", help="Run folder of `hierarchy run`.")],
+        tick: Annotated[int | None, typer.Option(
+            "--tick", metavar="N", help="The change into this tick. Default: the three largest.")
+            ] = None,
+        plugin: Plugins = None, as_json: AsJson = False) -> None:
+    """Say why the command of a run jumped: torque, acceleration or speed.
+
+    Bisects between the rows of two ticks.
+    """
+    from scenarios.cli.why import why_command
+
+    return why_command(folder, tick, as_json)
+
+
+@app.command()
 def figures(folders: Annotated[list[Path], typer.Argument(
                 metavar="RUN...", help="Folders of `hierarchy run` or `compare`.")],
             style: Annotated[str, typer.Option(

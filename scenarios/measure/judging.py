@@ -106,7 +106,7 @@ def judge(recording: Recording, cell: Cell) -> None:
     """
     orders, rows = recording.order_names, Rows(recording, cell)
     fates = Fates(recording.task_names, recording.ticks, cell.robot.n)
-    accuracy, commands = recording.facts.resolver.accuracy, _meant(recording)
+    accuracy, commands = recording.facts.resolver.accuracy, rows.meant
     changed = recording.get("changed", np.zeros(recording.ticks, bool))
     for k, index in enumerate(recording["order"].tolist()):
         order = orders[index]
@@ -117,7 +117,7 @@ def judge(recording: Recording, cell: Cell) -> None:
 
 
 class Rows:
-    """Moves a cell through the recorded ticks."""
+    """Moves a cell through the recorded ticks; `meant` (T, n) is what their commands stand for."""
 
     def __init__(self, recording: Recording, cell: Cell) -> None:
         self._cell, level = cell, recording.scenario.control.level
@@ -126,8 +126,9 @@ class Rows:
         self._follows = level != "acceleration"  # whether rows depend on the last command
         self._first = self._v[0] if level == "velocity" else None
         self._carried: list[Array | None] = [None]  # by the contacts before each tick
+        self.meant = _meant(recording)
         if cell.contacts:
-            for t, x in zip(self._t, _meant(recording), strict=True):
+            for t, x in zip(self._t, self.meant, strict=True):
                 last = self._carried[-1]
                 self._carried.append(
                     last if np.isnan(x[0]) else cell.contacts.carried(t, x, last))
