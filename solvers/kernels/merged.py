@@ -4,10 +4,10 @@ Rows of the strict levels stay as they are; all others are multiplied by the wei
 and become one level. Rows that draw x to the reference follow, for the unknowns that no row of that
 level names alone, so that it has full column rank. The exact kernel solves this. A row that has a memory y aims at sides moved by y, and then
 
-    z = a x - y,    y <- clip(clip(z, lower, upper) - z, -cap, cap)                          (a)
+    z = a x - y,    y <- clip(y + step (clip(z, lower, upper) - a x), -cap, cap)             (a)
 
-which for an equality a x = b is y <- clip(y + b - a x): the step of the multiplier in the method of
-multipliers, in units of the row. docs/theory/merged.md has the bounds.
+which for an equality a x = b is y <- clip(y + step (b - a x)): what the method of multipliers does
+to a multiplier, in the unit of the row. docs/theory/merged.md has the bounds.
 """
 
 # mypy: disable-error-code="no-untyped-def"
@@ -35,6 +35,7 @@ class Options(NamedTuple):
     strict: View
     regularisation: View
     weights: View
+    step: View
     caps: View
 
 
@@ -76,7 +77,7 @@ def solve_merged(A, lower, upper, sizes, x, record, settings, work):
     code = _solve(s, rows, min(strict + 1, levels), x, inner, settings[:EXACT], work[at:])
     record[m] = inner[3 * rows] + inner[3 * rows + 1]
     if code not in (NUMERICAL_FAILURE, TOO_SMALL):
-        _carry(A, lower, upper, sizes, x, y, strict, options.caps)
+        _carry(A, lower, upper, sizes, x, y, strict, options)
     return code
 
 
@@ -84,7 +85,7 @@ def solve_merged(A, lower, upper, sizes, x, record, settings, work):
 def _options(settings, levels):
     """Return the Options in an array of settings."""
     rest = settings[EXACT:]
-    return Options(rest[0], rest[1], rest[2:2 + levels], rest[2 + levels:])
+    return Options(rest[0], rest[1], rest[2:2 + levels], rest[2 + levels], rest[3 + levels:])
 
 
 @compiled
@@ -165,12 +166,13 @@ def _solve(s, rows, levels, x, inner, settings, work):
 
 
 @compiled
-def _carry(A, lower, upper, sizes, x, y, strict, caps):
-    """Move the memory of each row by what x misses, (a); that of strict rows is zero."""
+def _carry(A, lower, upper, sizes, x, y, strict, options):
+    """Move the memory of each row, (a); strict rows and the lowest level have none."""
     first = ZERO
     for k in range(sizes.size):
-        cap = caps[k] if k >= strict else 0.0
+        cap = options.caps[k] if strict <= k < sizes.size - 1 else 0.0
         for i in range(first, first + sizes[k]):
-            z = inner_product(A[i], x) - y[i]
-            y[i] = min(max(min(max(z, lower[i]), upper[i]) - z, -cap), cap)
+            value = inner_product(A[i], x)
+            miss = min(max(value - y[i], lower[i]), upper[i]) - value
+            y[i] = min(max(y[i] + options.step * miss, -cap), cap)
         first += sizes[k]

@@ -57,7 +57,9 @@ class Merged(Resolver):
 
     ratio : weight of a level over that of the level below; the lowest level has weight 1.
     scales : by name of a level, the miss [unit of its rows] that counts as 1; 1 where not given.
-    cap : most that a target moves, times the scale of its level; 0 for no memory.
+    cap : most that a target moves, times the scale of its level; 0 for no memory. The lowest level
+        has none.
+    step : share of a miss, at most 1, by which the target moves in the next solve.
     strict_levels : number of levels that stay strict; None for the rule: the first run of levels
         with inequalities, and all levels above it.
     regularisation : weight of |x - reference|, for unknowns that no row of a merged level names
@@ -69,9 +71,10 @@ class Merged(Resolver):
     handles: ClassVar[Handles] = "inequalities"
     damps: ClassVar[str] = "the merged level as a whole"
     damps_with_bounds: ClassVar[str] = damps
-    ratio: float = 3.0
+    ratio: float = 5.0
     scales: Mapping[str, float] | tuple[tuple[str, float], ...] = ()
     cap: float = 1.0
+    step: float = 0.1
     strict_levels: int | None = None
     regularisation: float = 1e-3
     tolerance: float = Hcod.tolerance
@@ -81,6 +84,7 @@ class Merged(Resolver):
         super().__post_init__()
         self._number("ratio", 1.0, 1e6)
         self._number("cap", 0.0, np.inf)
+        self._number("step", 0.0, np.nextafter(1.0, 2.0), open_below=True)
         self._number("regularisation", 0.0, np.inf)
         self._number("tolerance", 0.0, 1e-3, open_below=True)
         self._whole_number("max_iterations", 1)
@@ -113,7 +117,9 @@ class Merged(Resolver):
             self._known[names] = np.array([
                 self.damping, self.threshold, self.rank_tolerance, self.tolerance,
                 self.max_iterations, strict, self.regularisation,
-                *self.ratio ** np.arange(len(names) - 1, -1, -1.0) / scale, *self.cap * scale])
+                *self.ratio ** np.arange(len(names) - 1, -1, -1.0) / scale,
+                self.step,
+                *self.cap * scale])
         return self._known[names]
 
     def solve(self, h: Hierarchy, memory: Array | None = None) -> MergedResolution:
