@@ -65,9 +65,10 @@ class Limits:
     """Limits of n joints that get a command every `period` [s], and the box that they leave.
 
     `lower`, `upper` (n,) [rad or m] and `velocity` (n,) [rad/s or m/s] may be infinite,
-    `acceleration` (n,) [rad/s^2 or m/s^2] may not. The box is finite and never empty; see the
-    module for what it guarantees. Raises HierarchyError, naming joint and value, if an entry is
-    NaN, lower > upper, or a rate or the period is not positive.
+    `acceleration` (n,) [rad/s^2 or m/s^2] may not. A `horizon` [s] of at most a period changes
+    nothing. The box is finite and never empty; see the module for what it guarantees. Raises
+    HierarchyError, naming joint and value, if an entry is NaN, lower > upper, a rate or the period
+    is not positive, or the horizon is negative.
     """
 
     lower: Array
@@ -75,7 +76,8 @@ class Limits:
     velocity: Array
     acceleration: Array
     period: float
-    packed: Array = field(init=False, repr=False, compare=False)  # (4, n), for the kernels
+    horizon: float = 0.0
+    packed: Array = field(init=False, repr=False, compare=False)  # (6, n), for the kernels
 
     def __post_init__(self) -> None:
         try:
@@ -96,7 +98,9 @@ class Limits:
                 "acceleration must be positive and finite", acceleration)
         if not 0.0 < number("limits: period [s]", self.period):
             raise HierarchyError(f"limits: period {self.period} s must be positive and finite")
-        set_frozen(self, packed=np.array(rows))
+        number("limits: horizon [s]", self.horizon, 0.0)
+        times = [np.full(len(lower), time) for time in (self.period, self.horizon)]
+        set_frozen(self, packed=np.array([*rows, *times]))
 
     def box(self, q: Array, v: Array, level: Level) -> tuple[Array, Array]:
         """Return the least and greatest command (n,), (n,) at positions q and velocities v.
@@ -104,7 +108,7 @@ class Limits:
         Both are finite. The command is a velocity or an acceleration, depending on `level`.
         """
         lower, upper = np.empty(len(v)), np.empty(len(v))
-        write_box(q, v, self.packed, self.period, level == "acceleration", lower, upper, 0)
+        write_box(q, v, self.packed, level == "acceleration", lower, upper, 0)
         return lower, upper
 
     def clamp(self, q: Array, v: Array, level: Level, x: ArrayLike) -> Array:
@@ -114,7 +118,7 @@ class Limits:
         becomes the command in the box that comes nearest to a standstill.
         """
         command = np.array(x, dtype=float)
-        clamp_into_box(q, v, self.packed, self.period, level == "acceleration", command)
+        clamp_into_box(q, v, self.packed, level == "acceleration", command)
         return command
 
 
@@ -125,31 +129,43 @@ def _refuse(bad: NDArray[np.bool_], why: str, *values: Array) -> None:
 
 
 @compiled
-def write_box(q, v, limits, T, acceleration, lower, upper, row):
+def write_box(q, v, limits, acceleration, lower, upper, row):
     """Write the box of n joints into lower and upper from `row` on; limits as `Limits.packed`."""
     for i in range(len(v)):
-        lower[row + i], upper[row + i] = box(q[i], v[i], limits[0, i], limits[1, i],
-                                             limits[2, i], limits[3, i], T, acceleration)
+        lower[row + i], upper[row + i] = box(q[i], v[i], limits, i, acceleration)
 
 
 @compiled
-def clamp_into_box(q, v, limits, T, acceleration, x):
+def clamp_into_box(q, v, limits, acceleration, x):
     """Clamp x (n,) in place, see `Limits.clamp`."""
     for i in range(len(v)):
-        lower, upper = box(q[i], v[i], limits[0, i], limits[1, i], limits[2, i], limits[3, i], T,
-                           acceleration)
-        rest = -v[i] / T if acceleration else 0.0
+        lower, upper = box(q[i], v[i], limits, i, acceleration)
+        rest = -v[i] / limits[4, i] if acceleration else 0.0
         x[i] = clipped(rest if np.isnan(x[i]) else x[i], lower, upper)
         if not np.isfinite(x[i]):  # q or v is not finite either
             x[i] = 0.0
 
 
 @inlined
-def box(q, v, L, U, V, A, T, acceleration):
-    """Return the least and the greatest command of one joint."""
+def box(q, v, limits, i, acceleration):
+    """Return the least and the greatest command of joint i, which has q and v."""
+    L, U, V, A, T = limits[0, i], limits[1, i], limits[2, i], limits[3, i], limits[4, i]
+    H = limits[5, i]
+    low, up = widest(q, v, (L, U, V, A, T), acceleration)
+    if not H > T:
+        return low, up
+    least, most = next_velocities(q + v * H if acceleration else q, L, U, V, A, H)     # (c)
+    if acceleration:
+        least, most = (least - v) / H, (most - v) / H
+    return clipped(least, low, up), clipped(most, low, up)
+
+
+@inlined
+def widest(q, v, limits, acceleration):
+    """Return the same without a horizon."""
+    L, U, V, A, T = limits
     r = q + v * T / 2 if acceleration else q                                           # (a)
-    low = clipped(fastest(L - r, A, T), -V, V)                                         # (b)
-    up = clipped(fastest(U - r, A, T), -V, V)
+    low, up = next_velocities(r, L, U, V, A, T)                                        # (b)
     if not acceleration:
         return clipped(low, v - A * T, v + A * T), clipped(up, v - A * T, v + A * T)
     low, up = clipped((low - v) / T, -A, A), clipped((up - v) / T, -A, A)
@@ -159,6 +175,12 @@ def box(q, v, L, U, V, A, T, acceleration):
     if v < 0.0 and r < L:
         return min(up, max(low, v * v / (2 * max(q - L, ROUNDING * (1 + abs(L)))))), up
     return low, up
+
+
+@inlined
+def next_velocities(r, L, U, V, A, T):
+    """Return the least and the greatest velocity of a joint that rests before L and U from r."""
+    return clipped(fastest(L - r, A, T), -V, V), clipped(fastest(U - r, A, T), -V, V)
 
 
 @inlined

@@ -8,9 +8,9 @@ the danger
 which is 1 at contact and near 0 from `reach` on. For each joint with velocity limit V that supports
 the point, one bound is tightened: the next velocity w satisfies w <= V (1 - f) where the joint's
 column of r^T J_c is negative and w >= -V (1 - f) where it is positive; a column of at most `lever`
-[m] tightens neither. The greatest danger of all points counts. At acceleration level w = v + a T; a
-joint beyond such a bound brakes as hard as its limits allow until it is within it. Braking is never
-forbidden.
+[m] tightens neither. The greatest danger of all points counts. At acceleration level w = v + a T,
+with the horizon of the limits in place of T if it is longer; a joint beyond such a bound brakes as
+hard as its limits allow, or gradually within the horizon. Braking is never forbidden.
 
 Once the joints are within these bounds, a point approaches an obstacle at rest at most at (1 - f)
 times the sum of V |r^T J_c| over the joints, which is zero at contact. The task does not push away
@@ -140,7 +140,8 @@ class DangerBounds(Task):
     def _tighten(self, state: State, level: Level, lower: Array, upper: Array,
                  row: int) -> Callable[[], object]:
         parameters = _Parameters(self.joints, self.offsets, self.reach, self.shape, self.lever,
-                                 self.limits.limits.packed[2], self.limits.period,
+                                 self.limits.limits.packed[2],
+                                 max(self.limits.period, self.limits.horizon),
                                  level == "acceleration")
         return bind(_tighten, state.kinematics, parameters, self._seen(state).arrays, lower, upper,
                     row)
@@ -162,7 +163,7 @@ class _Parameters(NamedTuple):
     shape: float
     lever: float
     V: Array  # velocity limits
-    T: float  # period
+    T: float  # period, or horizon
     acceleration: bool
 
 

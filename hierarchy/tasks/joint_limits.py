@@ -29,7 +29,8 @@ class JointLimits(JointRows):
     `robot`, `margin` [rad or m] is kept from each position limit, `acceleration` [rad/s^2 or m/s^2]
     is one number or (n,), `period` [s] is that of the control loop. For what is guaranteed from
     which initial state see `hierarchy.limits`. A continuous joint has no position limits. At
-    velocity level the acceleration is that of the commands: a step from `State.commanded`.
+    velocity level the acceleration is that of the commands: a step from `State.commanded`. With a
+    `horizon` [s] of many periods the sides change slowly, see there.
 
     With `base_speed` or `base_acceleration`, (linear, angular) in [m, rad, s], a floating base has
     rows too, the first six. What is not given is then the speed limit of the robot, or the largest
@@ -46,6 +47,7 @@ class JointLimits(JointRows):
     name: str = "joint limits"
     base_speed: tuple[float, float] | None = None
     base_acceleration: tuple[float, float] | None = None
+    horizon: float = 0.0
     limits: Limits = field(init=False, repr=False, compare=False)
     kind = "inequality"
 
@@ -74,7 +76,7 @@ class JointLimits(JointRows):
         of = slice(self.first, robot.n)
         try:
             limits = Limits(lower[of] + self.margin, upper[of] - self.margin, speed[of], rate[of],
-                            self.period)
+                            self.period, self.horizon)
         except HierarchyError as error:
             raise HierarchyError(f"task {self.name!r}: {error}") from error
         set_frozen(self, limits=limits)
@@ -125,8 +127,8 @@ class JointLimits(JointRows):
 
         def write() -> None:
             write_rows()
-            write_box(self._positions(state), self._rates(state, level), limits, self.period,
-                      acceleration, lower, upper, row)
+            write_box(self._positions(state), self._rates(state, level), limits, acceleration,
+                      lower, upper, row)
 
         return write
 

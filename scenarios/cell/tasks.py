@@ -114,8 +114,12 @@ def _joint_limits(section: LimitsSection, control: ControlSection, robot: Robot)
     speed = section.base_speed
     if speed is None and robot.base == "floating" and control.level != "torque":
         speed = float(robot.velocity_limit[0]), float(robot.velocity_limit[3])
+    horizon = section.horizon
+    if horizon is None:
+        horizon = 0.05 if control.level == "torque" else 0.0
     return JointLimits(robot, section.acceleration, control.period, section.margin,
-                       base_speed=speed, base_acceleration=section.base_acceleration)
+                       base_speed=speed, base_acceleration=section.base_acceleration,
+                       horizon=horizon)
 
 
 def _avoidance(scenario: Scenario,

@@ -230,8 +230,10 @@ class LimitsSection(Section):
     they bound single unknowns: without torque limits and the limits of contact forces.
 
     Position and velocity limits are those of the robot; `acceleration` [rad/s^2] is one value for
-    all joints or one each; `margin` [rad] shrinks the position limits; `torque` is the usable share
-    of the effort limits, None for no torque limit. At level "torque" no torque changes by more than
+    all joints or one each; `margin` [rad] shrinks the position limits; `horizon` [s] is how far
+    ahead they look, so that they act gradually, see hierarchy.limits: by default 0.05 s at level
+    "torque", and one tick elsewhere and if it is shorter than that. `torque` is the usable share of
+    the effort limits, None for no torque limit. At level "torque" no torque changes by more than
     `torque_step` [N m] from one tick to the next. `base_speed` and `base_acceleration`, each
     [linear, angular] in m, rad and s, limit a floating base; by default to 2 m/s and 3 rad/s, and
     the largest `acceleration`; at level "torque", where only forces move it, not at all. With
@@ -242,6 +244,7 @@ class LimitsSection(Section):
     acceleration: Acceleration | tuple[Acceleration, ...]
     place: Literal["stack", "guard", "either", "bounds"] = "stack"
     margin: Annotated[NotNegative, Unit("rad")] = 0.0
+    horizon: Annotated[NotNegative, Unit("s")] | None = None
     danger_reach: Length | None = None
     torque: Annotated[float, Field(strict=True, gt=0.0, le=1.0)] | None = None
     torque_step: Annotated[Positive, Unit("N m")] | None = None

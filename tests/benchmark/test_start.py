@@ -23,7 +23,7 @@ with event.install_recorder("numba:compile") as recorder:
     from hierarchy.limits import write_box
     import numpy as np
     one = np.ones(1)
-    write_box(one, one, np.ones((4, 1)), 0.001, False, one.copy(), one.copy(), 0)
+    write_box(one, one, np.ones((6, 1)), False, one.copy(), one.copy(), 0)
 events = [(at, e.is_start, e.data["dispatcher"].py_func) for at, e in recorder.buffer]
 print(json.dumps([[at, start, f.__module__ + "." + f.__name__] for at, start, f in events]))""")
     costs, kernels = start.first_compilation(tmp_path / "cache")

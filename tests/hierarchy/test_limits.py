@@ -27,17 +27,17 @@ POSITION, SPEED, ACCELERATION = 1e-12, 1e-12, 1e-9
 # ---- a plant that remembers what it has seen --------------------------------------------------
 
 @compiled
-def drive(q, v, limits, periods, acceleration, picks, low, up, seen, log):
+def drive(q, v, limits, acceleration, picks, low, up, seen, log):
     """Move each joint through picks (ticks, joints), 0 for the lower end of its box, 1 the upper.
 
     seen (6, joints): highest and lowest position, also between ticks, greatest speed and
-    acceleration, greatest lower - upper of the box, whether it was finite. log (ticks, 2, joints)
-    keeps q and v after every tick.
+    acceleration, greatest lower - upper of the box, whether it was finite. log (ticks, 4, joints)
+    keeps q and v after every tick, and the sides of the box before it.
     """
     for k in range(len(picks)):
         for j in range(len(q)):
-            T = periods[j]
-            write_box(q[j:j + 1], v[j:j + 1], limits[:, j:j + 1], T, acceleration, low, up, j)
+            T = limits[4, j]
+            write_box(q[j:j + 1], v[j:j + 1], limits[:, j:j + 1], acceleration, low, up, j)
             x = low[j] * (1.0 - picks[k, j]) + up[j] * picks[k, j]
             a = x if acceleration else (x - v[j]) / T
             high, deep = q[j], q[j]
@@ -57,7 +57,7 @@ def drive(q, v, limits, periods, acceleration, picks, low, up, seen, log):
             seen[4, j] = max(seen[4, j], low[j] - up[j])
             if not np.isfinite(low[j]) or not np.isfinite(up[j]):
                 seen[5, j] = 0.0
-            log[k, 0, j], log[k, 1, j] = q[j], v[j]
+            log[k, 0, j], log[k, 1, j], log[k, 2, j], log[k, 3, j] = q[j], v[j], low[j], up[j]
 
 
 def spread(values, *shape):
@@ -68,16 +68,17 @@ def spread(values, *shape):
 class Ride:
     """What happened to joints driven through `picks`."""
 
-    def __init__(self, q, v, limits, period, level, picks):
+    def __init__(self, q, v, limits, period, level, picks, horizon=0.0):
         joints = len(q)
         picks = spread(picks, len(picks), joints)
+        packed = np.vstack([limits, spread(period, joints), spread(horizon, joints)])
         seen = np.full((6, joints), -np.inf)
         seen[1], seen[5] = np.inf, 1.0
-        log = np.empty((len(picks), 2, joints))
-        drive(q.copy(), v.copy(), limits, spread(period, joints),
-              level == "acceleration", picks, np.empty(joints), np.empty(joints), seen, log)
+        log = np.empty((len(picks), 4, joints))
+        drive(q.copy(), v.copy(), packed, level == "acceleration", picks, np.empty(joints),
+              np.empty(joints), seen, log)
         self.high, self.low, self.speed, self.acceleration, empty, finite = seen
-        self.q, self.v = log[:, 0], log[:, 1]
+        self.q, self.v, self.least, self.most = log.transpose(1, 0, 2)
         assert finite.all(), "a box was not finite"
         assert (empty <= 0.0).all(), "a box was empty"
 
@@ -151,11 +152,12 @@ def adversary(rng, joints, ticks):
 @pytest.mark.slow
 @LEVELS
 @pytest.mark.parametrize("seed", [0, 1])
-def test_no_limit_is_exceeded_whatever_is_chosen(level, seed):
+@pytest.mark.parametrize("ticks", [0, 1.5, 50])
+def test_no_limit_is_exceeded_whatever_is_chosen_and_however_far_ahead_it_looks(level, seed, ticks):
     rng = np.random.default_rng(seed)
     limits, period = random_limits(rng, JOINTS)
     q, v = viable_starts(rng, limits, period, level)
-    Ride(q, v, limits, period, level, adversary(rng, JOINTS, TICKS)).keeps(limits)
+    Ride(q, v, limits, period, level, adversary(rng, JOINTS, TICKS), ticks * period).keeps(limits)
 
 
 @pytest.mark.slow
@@ -181,9 +183,7 @@ def test_beyond_the_box_a_limit_is_exceeded_or_the_joint_cannot_stop_in_time(lev
     q, v = viable_starts(rng, limits, T, level)
     for sign in (-1, 1):
         box = np.empty((2, JOINTS))
-        for j in range(JOINTS):
-            write_box(q[j:j + 1], v[j:j + 1], limits[:, j:j + 1], T[j], level == "acceleration",
-                      box[0], box[1], j)
+        write_box(q, v, np.vstack([limits, T, T]), level == "acceleration", box[0], box[1], 0)
         x = box[(sign + 1) // 2]
         more = 1e-4 * A if level == "acceleration" else 1e-4 * A * T
         x = x + sign * more
@@ -260,6 +260,61 @@ def test_the_box_of_the_mirrored_joint_is_the_mirrored_box(level):
     box = Limits(lower, upper, velocity, acceleration, 0.05).box(q, v, level)
     mirrored = Limits(-upper, -lower, velocity, acceleration, 0.05).box(-q, -v, level)
     np.testing.assert_array_equal(box, [-mirrored[1], -mirrored[0]])
+
+
+# ---- with a horizon ------------------------------------------------------------------------------
+
+def calm(rng, ticks):
+    """Joints at rest, with horizons of `ticks` periods; see docs/theory/joint-limits.md."""
+    limits, T = random_limits(rng, JOINTS)
+    H = ticks * T
+    limits[2] = np.minimum(limits[2], limits[3] * (H**2 - T**2 / 4) / (2 * T))
+    q, v = viable_starts(rng, limits, T, "velocity")
+    return limits, T, H, q, 0.0 * v
+
+
+@pytest.mark.slow
+@LEVELS
+@pytest.mark.parametrize("ticks", [2.5, 10, 50])
+def test_from_rest_on_no_side_changes_faster_than_its_constant(level, ticks):
+    rng = np.random.default_rng(0)
+    limits, T, H, q, v = calm(rng, ticks)
+    ride = Ride(q, v, limits, T, level, adversary(rng, JOINTS, TICKS), H)
+    ride.keeps(limits)
+    in_q, in_v = (1 / H**2, 2 / H) if level == "acceleration" else (1 / H, spread(1.0, JOINTS))
+    allowed = (in_q * np.abs(np.diff(ride.q, axis=0)) + in_v * np.abs(np.diff(ride.v, axis=0)))[:-1]
+    rounding = (1e-9 * limits[3] + 1e-15 * (1 + np.abs(ride.q[1:-1])) / T**2) * (
+        1.0 if level == "acceleration" else T)
+    for side in (ride.least, ride.most):  # of box k, from the state after tick k - 1
+        step = np.abs(np.diff(side, axis=0))[1:]
+        assert (step <= allowed + rounding).all()
+
+
+def test_the_side_is_a_critically_damped_approach_where_a_joint_is_slow():
+    rng, H = np.random.default_rng(1), 0.05
+    q, v = rng.uniform(-1.0, 1.0, 2000), rng.uniform(-3.0, 3.0, 2000)
+    one = np.ones(2000)
+    low, up = Limits(-one, one, 4.0 * one, 300.0 * one, 1e-3, H).box(q, v, "acceleration")
+    wide_low, wide_up = Limits(-one, one, 4.0 * one, 300.0 * one, 1e-3).box(q, v, "acceleration")
+    most = np.minimum((4.0 - v) / H, (1.0 - q) / H**2 - 2.0 * v / H)
+    least = np.maximum((-4.0 - v) / H, (-1.0 - q) / H**2 - 2.0 * v / H)
+    most, least = np.maximum(most, (-4.0 - v) / H), np.minimum(least, (4.0 - v) / H)
+    np.testing.assert_allclose(up, np.clip(most, wide_low, wide_up), rtol=0, atol=1e-9)
+    np.testing.assert_allclose(low, np.clip(least, wide_low, wide_up), rtol=0, atol=1e-9)
+
+
+@LEVELS
+def test_a_horizon_of_at_most_a_tick_changes_nothing(level):
+    for q, v in states(5):
+        state = state_at(q, v)
+        box, same = (JointLimits(ROBOT, 10.0, 1e-3, horizon=horizon).box(state, level)
+                     for horizon in (0.0, 1e-3))
+        np.testing.assert_array_equal(box, same)
+
+
+def test_a_horizon_is_not_negative():
+    with pytest.raises(HierarchyError, match=r"limits: horizon \[s\] = -1: expected"):
+        JointLimits(ROBOT, 10.0, 1e-3, horizon=-1.0)
 
 
 # ---- from outside -----------------------------------------------------------------------------
