@@ -2,7 +2,8 @@
 
 Rows of the strict levels stay as they are; all others are multiplied by the weight of their level
 and become one level. Rows that draw x to the reference follow, for the unknowns that no row of that
-level names alone, so that it has full column rank. The exact kernel solves this. A row that has a memory y aims at sides moved by y, and then
+level names alone, so that it has full column rank. The exact kernel solves this. A row with a
+memory y aims at sides moved by y, and then
 
     z = a x - y,    y <- clip(y + step (clip(z, lower, upper) - a x), -cap, cap)             (a)
 
@@ -103,7 +104,7 @@ def strict_levels(lower, upper, sizes, options):
         for i in range(first, last):
             bounded |= lower[i] < upper[i]
         if bounded:
-            strict = k + 1
+            strict = ZERO + k + 1
         elif strict > 0 and sizes[k] > 0:
             break
         first = last
@@ -133,7 +134,7 @@ def _merge(s, A, lower, upper, sizes, strict, options, y):
             for c in range(A.shape[1]):
                 s.A[i, c] = weight * A[i, c]
                 if A[i, c] != 0.0:
-                    last, entries = c, entries + 1
+                    last, entries = ZERO + c, entries + 1
             s.lower[i], s.upper[i] = weight * (lower[i] + moved), weight * (upper[i] + moved)
             if entries == 1 and k >= strict and lower[i] == upper[i]:
                 s.own[last] = 1.0

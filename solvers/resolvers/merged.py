@@ -145,7 +145,7 @@ def _checked(scales: Mapping[str, float] | tuple[tuple[str, float], ...]
              ) -> tuple[tuple[str, float], ...]:
     """Return the scales as pairs, which a record can hold."""
     if not isinstance(scales, (Mapping, tuple)):
-        raise HierarchyError(f"merged: scales = {scales!r}, expected numbers > 0 by name of a level")
+        raise HierarchyError(f"merged: scales = {scales!r}, expected numbers > 0 by a level's name")
     pairs = dict(scales)
     for name, scale in pairs.items():
         number = isinstance(scale, (int, float)) and not isinstance(scale, bool)
