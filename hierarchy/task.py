@@ -55,6 +55,7 @@ class Task(ABC):
     kind: Kind = "equality"
     of_forces: ClassVar[bool] = False  # whether contact forces enter the rows
     straight: bool = False  # whether the Jacobian is the same at every configuration
+    scale: float = 1.0  # a miss that counts as much as 1 m, rad, m/s^2, ... of other tasks
     contacts: Contacts | None  # whose forces these are; only then
     stiffness: float = 0.0
     damping: float = 0.0

@@ -26,6 +26,7 @@ class ForceTask(Task):
     """
 
     of_forces: ClassVar[bool] = True
+    scale = 3.0  # N
     contacts: Contacts
 
     @abstractmethod

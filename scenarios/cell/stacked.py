@@ -16,6 +16,7 @@ from scenarios.cell.order import Order, order_of
 from scenarios.cell.tasks import Tasks
 from scenarios.config import Scenario, ScenarioError
 from solvers import Resolver
+from solvers.resolvers.merged import Merged
 from solvers.resolvers.set_based import SetBased
 from solvers.resolvers.settled import Settled
 from solvers.resolvers.smooth import Activated, Smooth
@@ -49,6 +50,9 @@ def stack_resolver(scenario: Scenario, stack: Stack, activation: Activation | No
     Raises ScenarioError if the stack has activations and the resolver does not take them.
     """
     resolver = scenario.make_resolver()
+    if isinstance(resolver, Merged):
+        scales = {name: stack[name].scale for name in stack.names}
+        resolver = replace(resolver, scales=scales | dict(resolver.scales))
     if scenario.control.stack == "set-based":
         return SetBased(inner=resolver)
     if activation is None:

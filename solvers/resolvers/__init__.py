@@ -3,6 +3,7 @@
 from solvers.resolvers import augmented as augmented
 from solvers.resolvers import hcod as hcod
 from solvers.resolvers import hqp as hqp
+from solvers.resolvers import merged as merged
 from solvers.resolvers import recursive as recursive
 from solvers.resolvers import reverse as reverse
 from solvers.resolvers import set_based as set_based

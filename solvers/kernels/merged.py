@@ -1,0 +1,179 @@
+"""Levels below the strict ones as one weighted level, with targets that move by what was missed.
+
+Rows of the strict levels stay as they are; all others are multiplied by the weight of their level
+and become one level. Rows that draw x to the reference follow, for the unknowns that no row of that
+level names alone, so that it has full column rank. The exact kernel solves this. A row with a
+memory y aims at sides moved by y, and then
+
+    z = a x - y,    y <- clip(y + step (clip(z, lower, upper) - a x), -cap, cap)             (a)
+
+which for an equality a x = b is y <- clip(y + step (b - a x)): what the method of multipliers does
+to a multiplier, in the unit of the row. docs/theory/merged.md has the bounds.
+"""
+
+# mypy: disable-error-code="no-untyped-def"
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from hierarchy.jit import compiled, inlined, inner_product
+from solvers.kernels.exact import DAMPING, solve_damped, solve_hierarchy
+from solvers.kernels.rows import ZERO
+from solvers.kernels.space import View, integers, matrix, vector
+from solvers.status import NUMERICAL_FAILURE, TOO_SMALL
+
+NOTHING = -1     # code: every level is strict
+BY_RULE = -1.0   # of strict levels: see `strict_levels`
+EXACT = 5        # settings of `Hcod` at the start; then those of `Options`
+
+
+class Options(NamedTuple):
+    """The settings of `Merged`: weights and caps (L,), the others numbers."""
+
+    strict: View
+    regularisation: View
+    weights: View
+    step: View
+    caps: View
+
+
+class Merged(NamedTuple):
+    """The rows that are solved: A (m + n, n), of which the first `m` and some more are written.
+
+    own (n,): 1 for an unknown that a row to merge names alone.
+    """
+
+    A: View
+    lower: View
+    upper: View
+    sizes: View
+    own: View
+
+
+@compiled
+def solve_merged(A, lower, upper, sizes, x, record, settings, work):
+    """Solve; x (n,) is the reference on entry and the answer on return, zero on failure.
+
+    record: y (m,), iterations, and the record of the exact kernel, (3 (m + n) + 3,); on entry that
+    of an earlier solve, or zeros. work: any contents. Returns the codes of `solve_hierarchy`, or
+    NOTHING if no level is left to merge.
+    """
+    (m, n), levels = A.shape, sizes.size
+    options = _options(settings, levels)
+    strict = strict_levels(lower, upper, sizes, options)
+    if strict >= levels > 0:
+        return ZERO + NOTHING
+    s, at = _carve(work, m, n, levels)
+    if at > work.size:
+        return ZERO + TOO_SMALL
+    y, inner = record[:m], record[m + 1:]
+    _merge(s, A, lower, upper, sizes, strict, options, y)
+    rows = _draw(s, m, x, options.regularisation)
+    if strict < levels:
+        s.sizes[strict] += rows - m
+    inner = inner[:3 * rows + 3]
+    code = _solve(s, rows, min(strict + 1, levels), x, inner, settings[:EXACT], work[at:])
+    record[m] = inner[3 * rows] + inner[3 * rows + 1]
+    if code not in (NUMERICAL_FAILURE, TOO_SMALL):
+        _carry(A, lower, upper, sizes, x, y, strict, options)
+    return code
+
+
+@inlined
+def _options(settings, levels):
+    """Return the Options in an array of settings."""
+    rest = settings[EXACT:]
+    return Options(rest[0], rest[1], rest[2:2 + levels], rest[2 + levels], rest[3 + levels:])
+
+
+@compiled
+def strict_levels(lower, upper, sizes, options):
+    """Return how many levels stay strict: those that are set, or by the rule of `Merged`.
+
+    The rule: the first run of levels with inequalities and all levels above it; none if no level
+    has inequalities.
+    """
+    if options.strict != BY_RULE:
+        return ZERO + np.int64(options.strict)
+    first, strict = ZERO, ZERO
+    for k in range(sizes.size):
+        last, bounded = first + sizes[k], False
+        for i in range(first, last):
+            bounded |= lower[i] < upper[i]
+        if bounded:
+            strict = ZERO + k + 1
+        elif strict > 0 and sizes[k] > 0:
+            break
+        first = last
+    return strict
+
+
+@inlined
+def _carve(work, m, n, levels):
+    """Return Merged without content, and where it ends in the work space."""
+    A, at = matrix(work, ZERO, m + n, n)
+    lower, at = vector(work, at, m + n)
+    upper, at = vector(work, at, m + n)
+    sizes, at = integers(work, at, levels)
+    own, at = vector(work, at, n)
+    return Merged(A, lower, upper, sizes, own), at
+
+
+@compiled
+def _merge(s, A, lower, upper, sizes, strict, options, y):
+    """Write the rows of all levels, those to merge times their weights and at moved sides."""
+    first = ZERO
+    s.own[:] = 0.0
+    for k in range(sizes.size):
+        weight = options.weights[k] if k >= strict else 1.0
+        for i in range(first, first + sizes[k]):
+            moved, last, entries = y[i] if k >= strict else 0.0, ZERO, ZERO
+            for c in range(A.shape[1]):
+                s.A[i, c] = weight * A[i, c]
+                if A[i, c] != 0.0:
+                    last, entries = ZERO + c, entries + 1
+            s.lower[i], s.upper[i] = weight * (lower[i] + moved), weight * (upper[i] + moved)
+            if entries == 1 and k >= strict and lower[i] == upper[i]:
+                s.own[last] = 1.0
+        s.sizes[k] = sizes[k]
+        if k > strict:
+            s.sizes[strict] += sizes[k]
+        first += sizes[k]
+
+
+@compiled
+def _draw(s, m, x, mu):
+    """Add a row mu (x - reference) for each unknown without one; return the number of all rows."""
+    rows = m
+    for c in range(x.size):
+        if mu > 0.0 and s.own[c] == 0.0:
+            s.A[rows] = 0.0
+            s.A[rows, c] = mu
+            s.lower[rows] = s.upper[rows] = mu * x[c]
+            rows += 1
+    return rows
+
+
+@inlined
+def _solve(s, rows, levels, x, inner, settings, work):
+    """Solve what was written with the exact kernel."""
+    A, lower, upper, sizes = s.A[:rows], s.lower[:rows], s.upper[:rows], s.sizes[:levels]
+    if settings[DAMPING] > 0.0:
+        return solve_damped(A, lower, upper, sizes, x, inner, settings, work)
+    return solve_hierarchy(A, lower, upper, sizes, x, inner, settings, work)
+
+
+@compiled
+def _carry(A, lower, upper, sizes, x, y, strict, options):
+    """Move the memory of each row, (a); strict rows and the lowest level have none."""
+    first = ZERO
+    for k in range(sizes.size):
+        cap = options.caps[k] if strict <= k < sizes.size - 1 else 0.0
+        for i in range(first, first + sizes[k]):
+            value = inner_product(A[i], x)
+            miss = min(max(value - y[i], lower[i]), upper[i]) - value
+            y[i] = min(max(y[i] + options.step * miss, -cap), cap)
+        first += sizes[k]

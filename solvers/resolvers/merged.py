@@ -1,0 +1,154 @@
+"""Strict levels for what must hold, one weighted level with a memory for all that follows."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import ClassVar, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hierarchy.errors import HierarchyError
+from hierarchy.problem import Array, Hierarchy
+from hierarchy.records import set_frozen
+from solvers.kernels.merged import BY_RULE, NOTHING, solve_merged
+from solvers.resolver import Handles, Resolution, Resolver, register
+from solvers.resolvers.hcod import Hcod, warm_record
+from solvers.status import TOO_SMALL, Status
+from solvers.workspace import WORKSPACE, entry
+
+
+@final
+class MergedResolution(Resolution):
+    """A resolution whose memory is y (m,), the iterations, and a working set."""
+
+    __slots__ = ("_m",)
+
+    memory: Array
+
+    def __init__(self, x: Array, status: Status, memory: Array, m: int) -> None:
+        super().__init__(x, status, int(memory[m]), memory)
+        self._m = m
+
+    @property
+    def active(self) -> NDArray[np.int8]:
+        """State of each row: (m,)."""
+        return self.memory[self._m + 1:2 * self._m + 1].astype(np.int8)
+
+    @property
+    def carried(self) -> Array:
+        """By how much the sides of each row move in the next solve: (m,), in its unit."""
+        return self.memory[:self._m].copy()
+
+
+@final
+@register
+@dataclass(frozen=True, kw_only=True)
+class Merged(Resolver):
+    """Strict for limits, weighted below, with a memory that meets upper levels at rest.
+
+    The levels of the tasks become one weighted level below the strict ones, so x moves no faster
+    than the data where the strict optimum jumps. What a task misses moves its target in the next
+    solve, by at most `cap`: where all rests, upper levels are met as under strict priorities.
+    docs/theory/merged.md has the bounds. The memory is a working set and y, for solves in a row
+    on data that change little; without a memory this is a weighted sum.
+
+    ratio : weight of a level over that of the level below; the lowest level has weight 1.
+    scales : by name of a level, the miss [unit of its rows] that counts as 1; 1 where not given.
+    cap : most that a target moves, times the scale of its level; 0 for no memory. The lowest level
+        has none.
+    step : share of a miss, at most 1, by which the target moves in the next solve.
+    strict_levels : number of levels that stay strict; None for the rule: the first run of levels
+        with inequalities, and all levels above it.
+    regularisation : weight of |x - reference|, for unknowns that no row of a merged level names
+        alone, as those of a posture do; 0 for none.
+    tolerance, max_iterations : as in `hcod`, which solves.
+    """
+
+    name: ClassVar[str] = "merged"
+    handles: ClassVar[Handles] = "inequalities"
+    damps: ClassVar[str] = "the merged level as a whole"
+    damps_with_bounds: ClassVar[str] = damps
+    ratio: float = 5.0
+    scales: Mapping[str, float] | tuple[tuple[str, float], ...] = ()
+    cap: float = 1.0
+    step: float = 0.1
+    strict_levels: int | None = None
+    regularisation: float = 1e-3
+    tolerance: float = Hcod.tolerance
+    max_iterations: int = Hcod.max_iterations
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self._number("ratio", 1.0, 1e6)
+        self._number("cap", 0.0, np.inf)
+        self._number("step", 0.0, np.nextafter(1.0, 2.0), open_below=True)
+        self._number("regularisation", 0.0, np.inf)
+        self._number("tolerance", 0.0, 1e-3, open_below=True)
+        self._whole_number("max_iterations", 1)
+        if self.strict_levels is not None:
+            self._whole_number("strict_levels", 0)
+        set_frozen(self, scales=_checked(self.scales))
+
+    @property
+    def strict(self) -> bool:
+        """False: a task can disturb one above it, in motion."""
+        return False
+
+    @property
+    def label(self) -> str:
+        """`merged`, with a ratio and a cap other than the default."""
+        ratio = "" if self.ratio == Merged.ratio else f" {self.ratio:g}"
+        return self.name + ratio + ("" if self.cap == Merged.cap else f" cap {self.cap:g}")
+
+    @cached_property
+    def _known(self) -> dict[tuple[str, ...], Array]:
+        """Cache of `_settings_for`."""
+        return {}
+
+    def _settings_for(self, names: tuple[str, ...]) -> Array:
+        """Return the settings of the kernel for levels of these names."""
+        if names not in self._known:
+            scales = dict(self.scales)
+            scale = np.array([scales.get(name, 1.0) for name in names])
+            strict = BY_RULE if self.strict_levels is None else self.strict_levels
+            self._known[names] = np.array([
+                self.damping, self.threshold, self.rank_tolerance, self.tolerance,
+                self.max_iterations, strict, self.regularisation,
+                *self.ratio ** np.arange(len(names) - 1, -1, -1.0) / scale,
+                self.step,
+                *self.cap * scale])
+        return self._known[names]
+
+    def solve(self, h: Hierarchy, memory: Array | None = None) -> MergedResolution:
+        """Resolve h, continuing an earlier resolution if given.
+
+        Raises HierarchyError if every level is strict, so that none is left to merge.
+        """
+        x, m = h.start(), h.m
+        record = warm_record(memory, 4 * m + 3 * h.n + 4)
+        A, lower, upper, sizes = h.rows
+        solve, settings = entry(solve_merged), self._settings_for(h.names)
+        code = solve(A, lower, upper, sizes, x, record, settings, WORKSPACE.array)
+        while code == TOO_SMALL:
+            WORKSPACE.double()
+            code = solve(A, lower, upper, sizes, x, record, settings, WORKSPACE.array)
+        if code == NOTHING:
+            raise HierarchyError(f"merged: all levels stay strict ({', '.join(h.names)}) and none "
+                                 "is left to merge; set strict_levels, or use hcod")
+        return MergedResolution(x, Status(code), record, m)
+
+
+def _checked(scales: Mapping[str, float] | tuple[tuple[str, float], ...]
+             ) -> tuple[tuple[str, float], ...]:
+    """Return the scales as pairs, which a record can hold."""
+    if not isinstance(scales, (Mapping, tuple)):
+        raise HierarchyError(f"merged: scales = {scales!r}, expected numbers > 0 by a level's name")
+    pairs = dict(scales)
+    for name, scale in pairs.items():
+        number = isinstance(scale, (int, float)) and not isinstance(scale, bool)
+        if not number or not 0.0 < scale < np.inf:
+            raise HierarchyError(f"merged: scales: {name!r} = {scale!r}, expected a number > 0")
+    return tuple((name, float(scale)) for name, scale in pairs.items())

@@ -1,0 +1,137 @@
+"""`merged`: strict limits, one weighted level with a memory: what its documentation promises."""
+
+import numpy as np
+import pytest
+
+from hierarchy import Hierarchy, HierarchyError
+from solvers import Status, make
+
+N, RATIO = 6, 5.0
+
+
+def arm(seed, limit=0.6):
+    """Return physics (E), a box (I), two tasks that conflict and a posture, as arrays."""
+    random = np.random.default_rng(seed)
+    levels = [(random.normal(size=(1, N)), np.zeros(1), np.zeros(1)),
+              (np.eye(N), np.full(N, -limit), np.full(N, limit))]
+    for m in (2, 3):
+        b = random.normal(size=m)
+        levels.append((random.normal(size=(m, N)), b, b))
+    return [*levels, (np.eye(N), np.zeros(N), np.zeros(N))]
+
+
+def with_targets(levels, b):
+    """Return the hierarchy whose tasks, below the first two levels, aim at b (11,)."""
+    parts = np.split(b, [2, 5])
+    return Hierarchy.from_levels([*levels[:2], *((A, part) for (A, _, _), part in zip(
+        levels[2:], parts, strict=True))])
+
+
+def targets(seed, size=1.0):
+    return size * np.random.default_rng(seed).normal(size=11)
+
+
+def weighted_rows(levels):
+    W = np.repeat([RATIO**2, RATIO, 1.0], [2, 3, N])
+    return W, np.vstack([A for A, _, _ in levels[2:]])
+
+
+def solved(resolver, h, memory=None):
+    found = resolver.solve(h, memory)
+    assert found.status is Status.SOLVED
+    return found
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_x_and_torques_move_no_faster_than_the_targets(seed):
+    levels, resolver = arm(seed), make("merged", ratio=RATIO, cap=0.0)
+    W, A = weighted_rows(levels)
+    T = np.random.default_rng(seed + 100).normal(size=(4, N))
+    null = np.linalg.svd(levels[0][0])[2][1:].T
+    gamma = np.linalg.norm(T @ null @ np.linalg.pinv(W[:, None] * A @ null), axis=1)
+    for size in (1e-6, 0.1, 3.0):
+        b = targets(seed)
+        db = targets(seed + 1, size)
+        dx = (solved(resolver, with_targets(levels, b + db)).x
+              - solved(resolver, with_targets(levels, b)).x)
+        moved = np.linalg.norm(W * db)
+        assert np.linalg.norm(W * (A @ dx)) <= moved * (1 + 1e-9) + 1e-9
+        assert (abs(T @ dx) <= gamma * moved * (1 + 1e-9) + 1e-9).all()
+
+
+@pytest.mark.parametrize("ratio", [1.0, 3.0, 30.0])
+def test_a_ratio_costs_the_upper_level_at_most_what_lower_ones_miss_over_its_square(ratio):
+    for seed in range(20):
+        h = with_targets(arm(seed), targets(seed))
+        strict, merged = make("hcod").solve(h).x, solved(make("merged", ratio=ratio, cap=0.0), h).x
+        best, found = h.violations(strict), h.violations(merged)
+        assert (found[:2] < 1e-9).all()
+        below = best[3]**2 / ratio**2 + best[4]**2 / ratio**4
+        assert found[2]**2 - best[2]**2 <= below + 1e-9
+
+
+def test_the_memory_moves_by_at_most_a_step_of_the_miss_and_stays_within_its_cap():
+    levels, resolver = arm(3), make("merged", step=0.5, cap=0.2)
+    memory, before = None, np.zeros(7 + 11)
+    for seed in range(50):
+        h = with_targets(levels, targets(seed))
+        found = solved(resolver, h, memory)
+        miss = h.lower - h.A @ found.x
+        y, memory = found.carried, found.memory
+        assert (abs(y - before)[7:12] <= 0.5 * abs(miss[7:12]) + 1e-12).all()
+        assert (abs(y) <= 0.2).all()
+        assert (y[:7] == 0.0).all(), "what is strict has no memory"
+        assert (y[12:] == 0.0).all(), "nothing stands below the lowest level"
+        before = y
+
+
+def test_at_rest_upper_levels_are_met_as_under_strict_priorities():
+    b = np.concatenate([[0.1, -0.2], [0.3, 0.1, -0.2], np.full(N, 0.3)])
+    h = with_targets(arm(1, limit=5.0), b)
+    strict, resolver = make("hcod").solve(h).x, make("merged")
+    found = solved(resolver, h)
+    assert h.violations(found.x)[2] > 1e-4, "the memory has nothing to do"
+    for _ in range(3000):
+        found = solved(resolver, h, found.memory)
+    np.testing.assert_allclose(found.x, strict, atol=1e-8)
+
+
+def test_two_nearly_equal_edges_do_not_make_x_jump():
+    edge = np.array([[1.0, 0.0, 1.0], [1.0, 0.0, 1.0]])
+    def at(tilt):
+        A = edge + tilt * np.array([[0.0, 1.0, 0.0], [0.0, -1.0, 0.0]])
+        return Hierarchy.from_levels([(np.eye(3), np.zeros(3), np.full(3, 10.0)),
+                                      (A, [5.0, 5.0 + 1e-7]), (np.eye(3), np.zeros(3))])
+    jump = {name: abs(make(name).solve(at(1e-8)).x - make(name).solve(at(-1e-8)).x).max()
+            for name in ("hcod", "merged")}
+    assert jump["hcod"] > 1.0
+    assert jump["merged"] < 1e-6
+
+
+def test_levels_stay_strict_down_to_the_first_run_of_inequalities():
+    h = Hierarchy.from_levels([
+        ([[1.0, 0.0]], [1.0]), ([[1.0, 0.0]], [-5.0], [0.5]), ([[0.0, 1.0]], [-1.0], [1.0]),
+        ([[0.0, 1.0]], [2.0]), ([[0.0, 1.0]], [-9.0], [0.0])])
+    x = solved(make("merged", cap=0.0), h).x
+    np.testing.assert_allclose(x, [1.0, 1.0], atol=1e-6)  # strict 2 and 3; level 4 outweighs 5
+    one = solved(make("merged", cap=0.0, ratio=1.0, strict_levels=0), h).x
+    np.testing.assert_allclose(one, [0.75, 1.0], atol=1e-5)
+
+
+def test_a_stack_of_safety_levels_alone_is_refused():
+    h = Hierarchy.from_levels([([[1.0]], [0.0], [1.0])], names=["limits"])
+    with pytest.raises(HierarchyError, match=r"all levels stay strict \(limits\)"):
+        make("merged").solve(h)
+
+
+@pytest.mark.parametrize(("scales", "said"), [({"hand": 0.0}, "'hand' = 0.0"), (3.0, "scales = 3")])
+def test_scales_are_positive_numbers_by_name(scales, said):
+    with pytest.raises(HierarchyError, match=said):
+        make("merged", scales=scales)
+
+
+def test_scales_divide_the_weight_of_their_level():
+    rows = [([[1.0]], [1.0]), ([[1.0]], [0.0])]
+    h = Hierarchy.from_levels(rows, names=["hand", "posture"])
+    x = solved(make("merged", ratio=2.0, scales={"hand": 2.0}, strict_levels=0, cap=0.0), h).x
+    np.testing.assert_allclose(x, [0.5], atol=1e-5)
