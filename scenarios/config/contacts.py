@@ -14,11 +14,11 @@ from scenarios.config.sections import (
     Point,
     Positive,
     Section,
+    TaskName,
     Time,
     Unit,
     Vector3,
 )
-from scenarios.config.tasks import TaskName
 
 Place = Annotated[Finite, Unit("m")]
 

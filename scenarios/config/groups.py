@@ -11,7 +11,7 @@ from pydantic import Field
 from scenarios.config.errors import ScenarioError
 from scenarios.config.sections import Section
 from scenarios.config.validation import validated
-from scenarios.files import read_toml
+from scenarios.toml_text import read_toml
 
 LIBRARY = Path(__file__).parents[1] / "library" / "groups"
 

@@ -9,7 +9,6 @@ from typing import Annotated, ClassVar, Literal, Self
 import numpy as np
 from pydantic import model_validator
 
-from hierarchy.errors import HierarchyError
 from hierarchy.paths import (
     Blended,
     Ellipse,
@@ -21,7 +20,7 @@ from hierarchy.paths import (
     circle,
     line,
 )
-from scenarios.config.errors import ScenarioError
+from scenarios.config.errors import naming
 from scenarios.config.sections import (
     Angle,
     Count,
@@ -69,10 +68,8 @@ class _AnyPath(Section):
 
     def make(self) -> Path:
         """Return the path; raises ScenarioError where the values are no path."""
-        try:
+        with naming(f"path of kind {getattr(self, 'kind', '')!r}"):
             path, jitter = self._steady(), self.jitter
-        except HierarchyError as error:
-            raise ScenarioError(f"path of kind {getattr(self, 'kind', '')!r}: {error}") from error
         return path if jitter is None else Jittered(path, jitter.amplitude, jitter.rate,
                                                     jitter.seed)
 

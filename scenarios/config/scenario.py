@@ -7,7 +7,7 @@ import tomllib
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import chain
-from typing import TYPE_CHECKING, Annotated, Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import tomli_w
 from pydantic import Field, field_validator, model_validator
@@ -23,7 +23,7 @@ from scenarios.config.distributions import Parameters
 from scenarios.config.faults import FaultSection
 from scenarios.config.plant import KinematicSection, PlantKind
 from scenarios.config.robot import RobotSection, StartSection
-from scenarios.config.sections import Section
+from scenarios.config.sections import Name, Section
 from scenarios.config.sensor import ExactSection, SensorKind
 from scenarios.config.stacks import RIVALS, unfit
 from scenarios.config.tasks import (
@@ -56,7 +56,7 @@ class Scenario(Section):
     file, see hierarchy.plugins.
     """
 
-    name: Annotated[str, Field(max_length=100, pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$")]
+    name: Name
     title: str = ""
     description: str = ""
     plugins: tuple[str, ...] | None = None

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, get_args
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 from pydantic_core import PydanticCustomError, core_schema
 
 from hierarchy import plugins
+from hierarchy.errors import UnknownNameError
 from hierarchy.plugins import Group
+from hierarchy.words import listed
 
 
 @dataclass(frozen=True)
@@ -46,6 +49,24 @@ Force = Annotated[NotNegative, Unit("N")]
 Point = Annotated[Vector3, Unit("m")]
 
 
+def _named(text: str) -> str:
+    if not re.fullmatch(r"[^\W_][\w.-]*", text):
+        raise ValueError("a name has letters, digits, \".\", \"_\" and \"-\", and begins with a "
+                         "letter or a digit")
+    return text
+
+
+def _titled(text: str) -> str:
+    if not re.fullmatch(r"[^\W\d_][\w -]*", text):
+        raise ValueError("a task's name has letters, digits, spaces, \"_\" and \"-\", and begins "
+                         "with a letter")
+    return text
+
+
+Name = Annotated[str, Field(max_length=100), AfterValidator(_named)]
+TaskName = Annotated[str, AfterValidator(_titled)]
+
+
 class Section(BaseModel):
     """A table of a scenario file: unknown keys are rejected, and it is immutable.
 
@@ -66,7 +87,7 @@ class OneOf:
     """
 
     default: str | None = None
-    wants: ClassVar[str] = "expected a kind,"
+    wants: ClassVar[str] = "expected a table with a kind,"
 
     def sections(self, annotation: Any) -> tuple[type[Section], ...]:
         """Return the sections of all kinds."""
@@ -101,9 +122,10 @@ class OneOf:
         kind = self.kind_of(table) if isinstance(table, dict) else table
         found = self.find(source, kind) if isinstance(kind, str) and kind is not table else None
         if found is None:
-            got = "" if kind is None else f"; got {kind!r}"
-            raise PydanticCustomError("kind", f"{self.wants} {{kinds}}{{got}}", {
-                "kinds": ", ".join(map(repr, self.names(source))), "got": got})
+            names = self.names(source)
+            text = str(UnknownNameError("kind", kind, names)) if isinstance(kind, str) else (
+                f"{self.wants} {listed([repr(name) for name in names], 'or')}")
+            raise PydanticCustomError("kind", "{text}", {"text": text})
         return found.model_validate(table)
 
 

@@ -31,6 +31,7 @@ from scenarios.config.sections import (
     Registered,
     Section,
     Stiffness,
+    TaskName,
     Unit,
     Vector3,
 )
@@ -41,7 +42,6 @@ if TYPE_CHECKING:
 
 Acceleration = Annotated[Positive, Unit("rad/s^2")]
 Rows = Literal["equality", "inequality"]
-TaskName = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_ -]*$")]
 
 
 class Made(Section):
