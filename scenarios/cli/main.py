@@ -345,6 +345,17 @@ def check(file: Annotated[str, typer.Argument(help="A scenario or a robot: file 
         scenario_check.say(scenario, found))
 
 
+@app.command("help")
+def help_(context: typer.Context, what: Annotated[str | None, typer.Argument(
+        metavar="KEY", help="A key of a scenario file, such as avoidance.obstacles.path, or a "
+                            "command. Default: all sections and commands.")] = None,
+          plugin: Plugins = None) -> None:
+    """Say what a key of a scenario file means."""
+    from scenarios.cli.help import print_help
+
+    print_help(context, what)
+
+
 @app.command()
 def doctor(as_json: AsJson = False) -> int:
     """Check the installation and run a self-test."""

@@ -33,7 +33,9 @@ Share = Annotated[float, Field(strict=True, ge=0.0, le=1.0)]
 Count = Annotated[int, Field(strict=True, ge=0)]
 Whole = Annotated[int, Field(strict=True)]
 Flag = Annotated[bool, Field(strict=True)]
-JointValue = Finite | tuple[Finite, ...]  # see hierarchy.Robot.configuration
+JointPosition = Annotated[Finite, Unit("rad or m")]
+JointVelocity = Annotated[Finite, Unit("rad/s or m/s")]
+JointValue = JointPosition | tuple[JointPosition, ...]  # see hierarchy.Robot.configuration
 Vector3 = tuple[Finite, Finite, Finite]
 Rows3 = tuple[Vector3, Vector3, Vector3]
 Length = Annotated[Positive, Unit("m")]
